@@ -21,7 +21,7 @@ from omnidyn.findings.fitness import uses
 from omnidyn.findings.limits import check_limits
 from omnidyn.findings.motion import check_motion
 from omnidyn.findings.oddities import check_oddities
-from omnidyn.findings.scale.derivatives import check_derivatives, check_path
+from omnidyn.findings.scale.derivatives import check_derivatives
 from omnidyn.findings.scale.lag import check_lag
 from omnidyn.findings.scale.scale import check_dead_wheels, check_scale
 from omnidyn.findings.scale.turn_rate import check_turn_rate
@@ -40,7 +40,7 @@ __all__ = ["check", "check_blocks", "check_log"]
 
 Family = Callable[[LogUnderCheck], tuple[list[Finding], LogUnderCheck]]
 FAMILIES: tuple[Family, ...] = (
-    check_values, check_limits, check_twist_frame, check_derivatives, check_path, check_turn_rate, check_wiring,
+    check_values, check_limits, check_twist_frame, check_derivatives, check_turn_rate, check_wiring,
     check_dead_wheels, check_slip, check_axes, check_scale, check_lag, check_filters, check_energy, check_motion,
     check_oddities, check_excitation,
 )  # fmt: skip

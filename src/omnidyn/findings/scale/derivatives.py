@@ -6,7 +6,7 @@ column that was read in rad/s cannot be "rad/s read as rpm".
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -33,16 +33,18 @@ from omnidyn.model.frames import unwrapped
 
 LEAST, SURE = 0.03, 6.0  # of the ratio; standard errors
 ALIKE = 0.95  # likeness of window means, from which one channel is taken for a multiple of the other
+HALF = 0.05  # [s] to either side, over which rates are taken
 SAME = 0.03  # ratios that differ by less are one
 SPEED_SIDE, POSITION_SIDE = "speed", "position"
 
 
 class Pair(NamedTuple):
-    """A speed and the rate of its position, shapes (rows, k), means over the same rows.
+    """A speed and the rate of its position, shapes (rows, k), means over the same rows. kind: turn, wheels or path.
 
     of: channel and columns of the speed; on: those of the position. witness: another channel that says the same.
     """
 
+    kind: str
     speed: str
     position: str
     value: FloatArray
@@ -58,25 +60,22 @@ def check_derivatives(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck
     """Findings on positions and their speeds; the work with the wrong one of them put right."""
     if len(work) < MIN_ROWS or not SHORTEST_STEP <= work.step <= LONGEST_STEP:
         return [], work
-    found: list[Finding] = []
-    lines = [(pair, line) for pair in _pairs(work) if (line := _off(work, pair)) is not None]
+    lines = [each for pairs in PAIRS for each in _lines(work, pairs)]
     ratios = np.array([line.value for _, line in lines])
-    if len({pair.of[0] for pair, _ in lines}) > 1 and np.ptp(ratios) < SAME * np.abs(ratios).mean():
+    kinds = {pair.kind for pair, _ in lines}
+    if len(kinds) > 1 and np.ptp(ratios) < SAME * np.abs(ratios).mean():
         return [_of_time(lines[0])], replace(work, t=work.t * ratios.mean(), step=work.step * float(ratios.mean()))
-    for pair, line in _joined(lines):
-        finding, work = _judged(work, pair, line)
-        found.append(finding)
+    found: list[Finding] = []
+    for pairs in PAIRS:
+        for pair, line in _joined(_lines(work, pairs)):
+            finding, work = _judged(work, pair, line)
+            found.append(finding)
     return found, work
 
 
-def check_path(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
-    """The same of x and y against the twist, once both are in one frame."""
-    pair = _path(work) if len(work) >= MIN_ROWS and SHORTEST_STEP <= work.step <= LONGEST_STEP else None
-    line = None if pair is None else _off(work, pair)
-    if pair is None or line is None:
-        return [], work
-    finding, work = _judged(work, pair, line)
-    return [finding], work
+def _lines(work: LogUnderCheck, pairs: Callable[[LogUnderCheck], Iterator[Pair]]) -> list[tuple[Pair, Slope]]:
+    """The pairs that are surely not 1."""
+    return [(pair, line) for pair in pairs(work) if (line := _off(work, pair)) is not None]
 
 
 def _off(work: LogUnderCheck, pair: Pair) -> Slope | None:
@@ -89,8 +88,7 @@ def _off(work: LogUnderCheck, pair: Pair) -> Slope | None:
 
 def _joined(lines: list[tuple[Pair, Slope]]) -> list[tuple[Pair, Slope]]:
     """Wheels that are off by one ratio as one pair."""
-    wheels = [(pair, line) for pair, line in lines if pair.of[0] == "wheel_speed"]
-    ratios = np.array([line.value for _, line in wheels])
+    wheels, ratios = lines, np.array([line.value for _, line in lines])
     if len(wheels) < 2 or np.ptp(ratios) > SAME * np.abs(ratios).mean():
         return lines
     columns = tuple(k for pair, _ in wheels for k in pair.of[1])
@@ -103,7 +101,7 @@ def _joined(lines: list[tuple[Pair, Slope]]) -> list[tuple[Pair, Slope]]:
         witness=None if None in witness else (witness[0][0], np.hstack([each[1] for each in witness])),  # type: ignore[index]
     )  # fmt: skip
     line = Slope(float(ratios.mean()), max(each.error for _, each in wheels), wheels[0][1].windows)
-    return [*((pair, each) for pair, each in lines if pair.of[0] != "wheel_speed"), (joined, line)]
+    return [(joined, line)]
 
 
 def _judged(work: LogUnderCheck, pair: Pair, line: Slope) -> tuple[Finding, LogUnderCheck]:
@@ -187,17 +185,22 @@ def _likeness(y: FloatArray, x: FloatArray, ids, count: int) -> float:
     return float(abs(a @ b) / max(np.sqrt((a @ a) * (b @ b)), 1e-300))
 
 
-def _pairs(work: LogUnderCheck) -> Iterator[Pair]:
-    """Heading and omega, angle and speed of each wheel."""
-    half = max(1, round(0.05 / work.step))
-    pose, twist = work.get("pose"), work.get("twist")
-    speed = work.full("wheel_speed")
+def _turn(work: LogUnderCheck) -> Iterator[Pair]:
+    """heading against omega."""
+    half = max(1, round(HALF / work.step))
+    pose, twist, speed = work.get("pose"), work.get("twist"), work.full("wheel_speed")
+    if pose is None or twist is None or not np.isfinite(pose[:, 2]).any() or not np.isfinite(twist[:, 2]).any():
+        return
     own = None if speed is None else wheels_twist(work, speed, 2 * half + 1)
-    if pose is not None and twist is not None and np.isfinite(pose[:, 2]).any() and np.isfinite(twist[:, 2]).any():
-        rate = central_rate(unwrapped(pose[:, 2]), work.t, half)
-        witness = None if own is None else ("what the wheels say", own[:, 2:])
-        yield Pair("omega", "heading", smooth(twist[:, 2:], 2 * half + 1), rate[:, None], ("twist", (2,)),
-                   ("pose", (2,)), witness, TURN_UNITS, ANGLE_UNITS)  # fmt: skip
+    rate = central_rate(unwrapped(pose[:, 2]), work.t, half)
+    witness = None if own is None else ("what the wheels say", own[:, 2:])
+    yield Pair("turn", "omega", "heading", smooth(twist[:, 2:], 2 * half + 1), rate[:, None], ("twist", (2,)),
+               ("pose", (2,)), witness, TURN_UNITS, ANGLE_UNITS)  # fmt: skip
+
+
+def _wheels(work: LogUnderCheck) -> Iterator[Pair]:
+    """The angle of each wheel against its speed."""
+    half = max(1, round(HALF / work.step))
     angle, speed = work.get("wheel_angle"), work.get("wheel_speed")
     if angle is None or speed is None or angle.shape != speed.shape or "wheel_speed" not in work.log.channels:
         return
@@ -205,18 +208,20 @@ def _pairs(work: LogUnderCheck) -> Iterator[Pair]:
     for k, name in enumerate(components("wheel_speed", speed.shape[1])):
         witness = None if expected is None else (expected[0], smooth(expected[1][:, [k]], 2 * half + 1))
         rate = central_rate(angle[:, k], work.t, half)[:, None]
-        yield Pair(name, name.replace("w", "a"), smooth(speed[:, [k]], 2 * half + 1), rate, ("wheel_speed", (k,)),
-                   ("wheel_angle", (k,)), witness, TURN_UNITS, ANGLE_UNITS)  # fmt: skip
+        yield Pair("wheels", name, name.replace("w", "a"), smooth(speed[:, [k]], 2 * half + 1), rate,
+                   ("wheel_speed", (k,)), ("wheel_angle", (k,)), witness, TURN_UNITS, ANGLE_UNITS)  # fmt: skip
 
 
-def _path(work: LogUnderCheck) -> Pair | None:
+def _path(work: LogUnderCheck) -> Iterator[Pair]:
     """x and y against vx and vy."""
-    pose, twist = work.full("pose"), work.full("twist")
-    if pose is None or twist is None:
-        return None
+    pose, twist, speed = work.full("pose"), work.full("twist"), work.full("wheel_speed")
+    if pose is None or twist is None or len(work) < 3 * MIN_ROWS:
+        return
     body, width = pose_twist(work, pose)
-    speed = work.full("wheel_speed")
     own = None if speed is None else wheels_twist(work, speed, width)
     witness = None if own is None else ("what the wheels say", own[:, :2])
-    return Pair("vx vy", "x y", smooth(twist[:, :2], width), body[:, :2], ("twist", (0, 1)), ("pose", (0, 1)), witness,
-                SPEED_UNITS, LENGTH_UNITS)  # fmt: skip
+    yield Pair("path", "vx vy", "x y", smooth(twist[:, :2], width), body[:, :2], ("twist", (0, 1)), ("pose", (0, 1)),
+               witness, SPEED_UNITS, LENGTH_UNITS)  # fmt: skip
+
+
+PAIRS: tuple[Callable[[LogUnderCheck], Iterator[Pair]], ...] = (_turn, _wheels, _path)

@@ -43,10 +43,8 @@ def check_frame(work: LogUnderCheck, left: float) -> tuple[list[Finding], LogUnd
         return [_unlike(plain)], work.replace(pose=None)
     if not trusted and left < 0.6 * (1.0 - alike**2) + 0.005:
         return [], work
-    if plain > 0.95 * alike and mirror > 0.0:
-        return _small_turn(work)
     if alike < (0.8 if trusted else 0.9) or plain > 0.95 * alike or not (trusted or _turns_say(work, mirror)):
-        return [], work
+        return _marker(work) if mirror > 0.0 else ([], work)
     words = f"turned by {angle:.0f} deg" + (" and mirrored" if mirror < 0.0 else "")
     how = f"take the angle off its heading: `assume` marker={-angle:.0f}deg" if mirror > 0.0 else "mirror it back"
     mended = pose * [1.0, mirror, mirror]
@@ -61,8 +59,8 @@ def check_frame(work: LogUnderCheck, left: float) -> tuple[list[Finding], LogUnd
     )], work.replace(pose=mended)  # fmt: skip
 
 
-def _small_turn(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
-    """A marker that is mounted at an angle too small to show in the likeness."""
+def _marker(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """A marker that is mounted at an angle, by its own error: one too small to show in the likeness, too."""
     speed, pose = work.full("wheel_speed"), work.full("pose")
     assert speed is not None
     assert pose is not None
