@@ -12,6 +12,7 @@ from omnidyn.errors import INTERRUPTS, OmnidynError, Terminated
 Made = TypeVar("Made")
 
 LADDER, DIAGNOSIS, COMPARISON, PAGE = "ladder", "diagnosis", "comparison with the logs", "page"
+JUDGEMENT = "check of the logs by the fitted robot"
 QUICK = "left out by `quick`"
 
 

@@ -126,7 +126,7 @@ def test_guesses_of_a_robot_file_are_no_evidence_against_a_log(log, robot):
     guess = strong.replace(priors={"motor.emf_constant_Vs_rad": Prior(origin="guess")})
     (finding,) = check(log, guess).of("energy")
     assert finding.level == "warn"
-    assert "motor.emf_constant_Vs_rad of the robot file is only guessed" in finding.remedy
+    assert "motor.emf_constant_Vs_rad of the robot file is only guessed" in finding.message
 
 
 def test_an_input_that_outruns_the_rows(log, with_channels):

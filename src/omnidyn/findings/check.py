@@ -18,6 +18,7 @@ from omnidyn.findings.excitation import check_excitation, joined, judge
 from omnidyn.findings.filters import check_filters
 from omnidyn.findings.finding import FATAL, NOTE, Finding, Verdict, in_order, merged
 from omnidyn.findings.fitness import uses
+from omnidyn.findings.guesses import with_guesses
 from omnidyn.findings.limits import check_limits
 from omnidyn.findings.motion import check_motion
 from omnidyn.findings.oddities import check_oddities
@@ -74,8 +75,11 @@ def check_log(log: Log, robot: Robot | None = None) -> Verdict:
         found, work = begin(log, robot)
         found += _no_channel(log) + _other_count(log, robot) + _about_columns(log)
         for family in FAMILIES:
-            more, work = family(work)
-            found += more
+            more, changed = family(work)
+            said = with_guesses(more, robot, found)
+            found += said
+            if not more or any(not each.rests_on for each in said):  # a guess puts nothing right
+                work = changed
         good = uses(log, robot, {each.code for each in found})
     length = float(work.t[-1] - work.t[0]) if len(work) > 1 else 0.0
     return Verdict(

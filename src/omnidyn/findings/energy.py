@@ -9,14 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.findings.finding import FATAL, WARN, Finding
+from omnidyn.findings.finding import FATAL, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, volts
 from omnidyn.findings.signal.robust import white_noise
 from omnidyn.model.keys import EMF
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.motor import back_emf, settled_current, wheel_torque
-from omnidyn.model.robot import GUESS, Robot
+from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed
 
 MARGIN = 0.08  # of the power that turns with the back-EMF: K, R and the gear are not known better
@@ -37,26 +37,14 @@ def check_energy(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     if not bad.any() or bad.mean() < (0.0 if points else LEAST_SHARE):
         return [], work
     excess = _excess(robot, voltage[bad], speed[bad])
-    guessed = [key for key in OF_BACK_EMF if (prior := robot.priors.get(key)) and prior.origin == GUESS]
     return [Finding(
-        "energy", WARN if guessed else FATAL, "",
+        "energy", FATAL, "",
         f"the motors would take up to {worst:.3g} W out of the robot while it does not slow down: the back-EMF is "
         f"{excess:.3g} times the voltage applied",
-        _remedy(guessed), work.lines(bad), int(bad.sum()), {"worst_W": worst, "emf_over_voltage": excess},
-    )], work  # fmt: skip
-
-
-def _remedy(guessed: list[str]) -> str:
-    """A robot file that only guesses its motors is no evidence against the log."""
-    if guessed:
-        return (
-            f"{', '.join(guessed)} of the robot file {'is' if len(guessed) == 1 else 'are'} only guessed: put in what "
-            "is known of the motors, or let omnidyn identify `free` friction `free` motor.torque_constant_Nm_A find it"
-        )
-    return (
         "these rows cannot be of this robot file: check K, gear ratio, wheel and robot radius, and the units of "
-        "voltage and speed"
-    )
+        "voltage and speed", work.lines(bad), int(bad.sum()), {"worst_W": worst, "emf_over_voltage": excess},
+        OF_BACK_EMF,
+    )], work  # fmt: skip
 
 
 def _speed(work: LogUnderCheck) -> FloatArray | None:

@@ -35,7 +35,8 @@ class Finding:
     code: what kind, such as "gap" or "swapped". level: "fatal" (the log cannot be used as it stands), "warn" (it can,
     with care) or "note". where: the components concerned, such as "w1 w2", or "". message: what is the case, in words.
     remedy: what to do. rows: (first line, last line) in the file, the first MAX_SPANS of them. count: of all rows
-    concerned, 0 where the finding is about the log as a whole. numbers: what it was measured from.
+    concerned, 0 where the finding is about the log as a whole. numbers: what it was measured from. rests_on: keys of
+    the robot file whose numbers it takes; of a verdict, those that are only guessed.
     """
 
     code: str
@@ -46,13 +47,14 @@ class Finding:
     rows: tuple[Span, ...] = ()
     count: int = 0
     numbers: Mapping[str, float] = field(default_factory=dict)
+    rests_on: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; a number that is not finite is None."""
         return plain({
             "code": self.code, "level": self.level, "where": self.where, "message": self.message,
             "remedy": self.remedy, "rows": self.rows, "count": self.count,
-            "numbers": {name: float(value) for name, value in self.numbers.items()},
+            "numbers": {name: float(value) for name, value in self.numbers.items()}, "rests_on": self.rests_on,
         })  # fmt: skip
 
 

@@ -103,7 +103,8 @@ def verdict_table(verdicts: Sequence[Verdict]) -> Table:
     if len(shown) > MOST_LOGS:
         shown = sorted(shown, key=lambda each: (-each.counts[FATAL], -each.counts[WARN]))[: MOST_LOGS - 1]
     for each in shown:
-        what = [f"{f.code} {f.where}".rstrip() for f in each.findings if f.level in (FATAL, WARN)]
+        heard = [f for f in each.findings if f.level in (FATAL, WARN) or f.code == "judged_again"]
+        what = [f"{f.code} {f.where}".rstrip() for f in heard]
         words = ", ".join(what[:SHOWN]) + (", ..." if len(what) > SHOWN else "")
         rows.append((each.source, str(each.rows), f"{each.duration:.4g}", f"{each.rate:.4g}", str(each.counts[FATAL]),
                      str(each.counts[WARN]), words or "fit for use"))  # fmt: skip

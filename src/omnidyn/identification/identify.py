@@ -11,17 +11,18 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.attempts import COMPARISON, DIAGNOSIS, LADDER, QUICK, Attempts, Missing, missing_words
+from omnidyn.attempts import COMPARISON, DIAGNOSIS, JUDGEMENT, LADDER, QUICK, Attempts, Missing, missing_words
 from omnidyn.document import Document, Points, apart, sentence
 from omnidyn.errors import INTERRUPTS, InputError, UnsupportedError
 from omnidyn.findings.finding import Verdict
 from omnidyn.findings.fitness import STEADY as STEADY_USE
+from omnidyn.findings.guesses import rest_on_guesses
 from omnidyn.findings.needs import why_no_inputs
 from omnidyn.identification.advice import advice
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.fit_document import fit_document
 from omnidyn.identification.grouping import group_names, held_out
-from omnidyn.identification.log_verdicts import checked, log_verdicts, told_why, unfit, verdict_advice
+from omnidyn.identification.log_verdicts import checked, judged_by_fit, log_verdicts, told_why, unfit, verdict_advice
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import WHOLE, Fit
@@ -312,6 +313,10 @@ def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[L
         for name, fit in answer.estimates.items()
     }
     validations = {name: found for name, found in compared.items() if found is not None}
+    if any(map(rest_on_guesses, verdicts)):
+        first = next(iter(answer.estimates.values())).robot
+        judged = partial(judged_by_fit, verdicts, logs, first, heard.now, heard.tell)
+        verdicts = heard.attempts.make(JUDGEMENT, judged) or verdicts
     words = [*verdict_advice(verdicts), *_not_independent(runs, held)]
     for group, fit in answer.estimates.items():
         next_steps = advice(fit, validations.get(group))

@@ -10,6 +10,7 @@ from typing import Any
 from omnidyn.errors import InputError
 from omnidyn.findings.check import check_log
 from omnidyn.findings.finding import FATAL, Finding, Verdict
+from omnidyn.findings.guesses import judged_again, judged_words, rest_on_guesses
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
 
@@ -30,6 +31,22 @@ def log_verdicts(logs: Sequence[Log], robot: Robot | None, now: Tell, tell: Tell
         found.append(check_log(log, robot))
     for words in verdict_advice(found):
         tell(f"warning: {words}")
+    return tuple(found)
+
+
+def judged_by_fit(
+    verdicts: Sequence[Verdict], logs: Sequence[Log], robot: Robot, now: Tell, tell: Tell
+) -> tuple[Verdict, ...]:
+    """The verdicts with what rested on a guess judged again by the fitted robot; `tell` hears of what went away."""
+    if not any(map(rest_on_guesses, verdicts)):
+        return tuple(verdicts)
+    now("judging by the fitted robot what rested on a guess")
+    found = [
+        judged_again(each, check_log(log, robot)) if rest_on_guesses(each) else each
+        for each, log in zip(verdicts, logs, strict=True)
+    ]
+    for words in judged_words(found):
+        tell(words)
     return tuple(found)
 
 

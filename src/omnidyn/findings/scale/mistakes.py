@@ -8,11 +8,13 @@ import numpy as np
 
 from omnidyn.findings.finding import FATAL, Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
-from omnidyn.findings.signal.reference import BEYOND, beyond_stall, emf, stall_current, volts
+from omnidyn.findings.signal.reference import BEYOND, CIRCUIT, beyond_stall, emf, stall_current, volts
 from omnidyn.findings.signal.robust import slope
 from omnidyn.logs.channels import components
 from omnidyn.units import DEGREE, TURN, known_unit, parse_unit
 
+RESISTANCE = ("motor.resistance_ohm", "motor.voltage_limit_V")
+LIMITS = ("motor.voltage_limit_V", *CIRCUIT[1:])
 UNIT_OFF = 0.12  # how far off its factor a unit mistake may be: the robot file is not exact either
 
 # How many times too large a value is, if it is read in the unit before "read as".
@@ -35,10 +37,10 @@ def unit_of(factor: float, units: dict[str, float]) -> str:
     return name if off[name] < UNIT_OFF else ""
 
 
-def unit_finding(where: str, words: str, factor: float) -> Finding:
+def unit_finding(where: str, words: str, factor: float, rests_on: tuple[str, ...] = ()) -> Finding:
     return Finding(
         "unit", FATAL, where, words, "give the unit of the column (`column` NAME:UNIT) or its side of the gear",
-        (), 0, {"factor": factor},
+        (), 0, {"factor": factor}, rests_on,
     )  # fmt: skip
 
 
@@ -65,7 +67,9 @@ def current_unit(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     if high > BEYOND * stall:
         unit = unit_of(high / (0.3 * stall), {"mA read as A": 1e3}) or "mA read as A" if high < 3e3 * stall else ""
         words = f"currents of {high:.4g} A, where a blocked motor draws {stall:.3g} A" + (f": {unit}?" if unit else "")
-        return [unit_finding(names, words, high / stall)], work.replace(current=current * (1e-3 if unit else np.nan))
+        return [unit_finding(names, words, high / stall, RESISTANCE)], work.replace(
+            current=current * (1e-3 if unit else np.nan)
+        )
     speed = work.full("wheel_speed")
     counter = None if speed is None else emf(work, speed)
     if voltage is None or counter is None or work.log.current_unsigned:
@@ -76,7 +80,7 @@ def current_unit(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     unit = unit_of(1.0 / line.value, CURRENT_UNITS) if np.isfinite(line.error) and line.value > 0.0 else ""
     if unit and line.differs(1.0, 0.5):
         words = f"the currents are {1 / line.value:.3g} times what voltage and speed leave for them: {unit}?"
-        return [unit_finding(names, words, 1.0 / line.value)], work.replace(current=current * line.value)
+        return [unit_finding(names, words, 1.0 / line.value, CIRCUIT)], work.replace(current=current * line.value)
     return [], work
 
 
@@ -100,7 +104,7 @@ def duty_as_voltage(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         words = f"voltages within -1..1 ({high:.3g} at most), while the speeds need {needed:.3g} V: duty read as volts?"
     if not words:
         return [], work
-    return [unit_finding(names, words, high / limit)], work.replace(voltage=None)
+    return [unit_finding(names, words, high / limit, LIMITS)], work.replace(voltage=None)
 
 
 def emf_alone(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -125,5 +129,5 @@ def emf_alone(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     words = f"the wheel speeds imply a back-EMF {excess:.3g} times the voltage applied"
     names = " ".join(components("wheel_speed", work.wheels))
     found = [unit_finding(names, words + (f": {likely}?" if likely else ": the unit of speed or voltage is wrong"),
-                           excess)]  # fmt: skip
+                          excess, CIRCUIT[1:])]  # fmt: skip
     return found, work.replace(wheel_speed=speed * np.nan)

@@ -17,7 +17,16 @@ from omnidyn.findings.scale.mistakes import (
     unit_of,
 )
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
-from omnidyn.findings.signal.reference import Ground, electric_speed, expected_wheel_speed, ground, wheels_twist
+from omnidyn.findings.signal.reference import (
+    CIRCUIT,
+    GEOMETRY,
+    Ground,
+    electric_speed,
+    expected_wheel_speed,
+    ground,
+    keys_behind,
+    wheels_twist,
+)
 from omnidyn.findings.signal.robust import HELD, Slope, quantum, slope, smooth, turned_by
 from omnidyn.logs.channels import components
 from omnidyn.units import TURN
@@ -135,7 +144,7 @@ def _speeds(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         speed = work.channels["wheel_speed"]
         source = "the motion over the floor" if floor is not None else "voltage and current"
         found = [unit_finding(names, f"the wheel speeds are {1 / factor.value:.4g} times what {source} says: {unit}?",
-                               1.0 / factor.value)]  # fmt: skip
+                              1.0 / factor.value, keys_behind(source))]  # fmt: skip
         return found, work.replace(wheel_speed=speed * factor.value)
     return _ratio_findings(work, these, floor, electric, names)
 
@@ -161,7 +170,7 @@ def _against(work: LogUnderCheck, floor: Slope) -> list[Finding]:
         f"{where} goes the other way than the wheels say ({floor.value:.3g} +-{floor.error:.2g} of "
         "it): it has the opposite sign, or all wheels have",
         "set `invert` for that column in the mapping, or turn the wheels' signs", (), 0,
-        {"ratio": floor.value, "error": floor.error},
+        {"ratio": floor.value, "error": floor.error}, GEOMETRY,
     )]  # fmt: skip
 
 
@@ -272,11 +281,11 @@ def _motor_constants(
             "motor_constants", NOTE, names,
             words + ", while the floor agrees with the wheels: K, R or the gear ratio of "
             "the robot file, or the scale of voltage or current, is off",
-            "identify the motor from this log", (), 0, numbers,
+            "identify the motor from this log", (), 0, numbers, CIRCUIT,
         )  # fmt: skip
     return Finding(
         "gear", WARN, names, words + ": the gear ratio, the counts per turn, or K and R of the robot file are off",
-        "check the gear ratio; roll the robot over a measured distance by hand", (), 0, numbers,
+        "check the gear ratio; roll the robot over a measured distance by hand", (), 0, numbers, CIRCUIT,
     )  # fmt: skip
 
 
@@ -295,7 +304,7 @@ def _dead_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             found.append(Finding(
                 "dead", FATAL, name, f"{name} is noise about 0, while {source} says that the wheel turns",
                 "look at its encoder, its cable and its column; leave it out otherwise",
-                work.lines(work.everywhere), len(work), {"slope": a.value, "error": a.error},
+                work.lines(work.everywhere), len(work), {"slope": a.value, "error": a.error}, keys_behind(source),
             ))  # fmt: skip
             work = work.masked("wheel_speed", k, work.everywhere)
     return found, work
@@ -349,7 +358,7 @@ def _single_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             found.append(Finding(
                 "inverted", FATAL, name, f"{name} has the opposite sign of what {source} says, while the other wheels "
                 "agree with it", "put the column right in the mapping (`column`)", (), 0,
-                {"ratio": off, "error": slopes[k].error},
+                {"ratio": off, "error": slopes[k].error}, keys_behind(source),
             ))  # fmt: skip
             continue
         found.append(Finding(

@@ -7,7 +7,7 @@ import numpy as np
 from omnidyn.findings.finding import Finding
 from omnidyn.findings.scale.mistakes import TURN_UNITS, possible, unit_finding, unit_of
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
-from omnidyn.findings.signal.reference import electric_speed, wheels_twist
+from omnidyn.findings.signal.reference import GEOMETRY, electric_speed, wheels_twist
 from omnidyn.findings.signal.robust import slope
 
 NEAR = 0.5  # of the logarithm: what is off by less is in the right unit
@@ -42,4 +42,4 @@ def check_turn_rate(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     words = f"omega is {yaw.value:.4g} times what the wheels say of the turning: {unit}?"
     values = twist.copy()
     values[:, 2] /= yaw.value
-    return [unit_finding("omega", words, yaw.value)], work.replace(twist=values)
+    return [unit_finding("omega", words, yaw.value, GEOMETRY)], work.replace(twist=values)

@@ -11,11 +11,14 @@ from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.robust import central_rate, smooth
 from omnidyn.model.actuation import asked_voltage
 from omnidyn.model.frames import unwrapped, world_to_body
+from omnidyn.model.keys import EMF
 from omnidyn.model.motor import back_emf, no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, twist_from_wheel_speed, wheel_speed
 
 MEASUREMENTS = ("the twist", "the pose", "voltage and current")  # sources that say what a wheel did
+GEOMETRY = ("wheels.azimuth_deg", "wheels.robot_radius_m", "wheels.wheel_radius_m")
+CIRCUIT = ("motor.resistance_ohm", EMF, "motor.gear_ratio")  # what a speed by voltage and current is made of
 BEYOND = 20.0
 POSE_WINDOW = 0.12  # [s] over which a speed is taken from a pose
 POSE_TURN = 0.35  # [rad] that the robot may turn in it: a chord is then 0.5 % shorter than its arc
@@ -98,6 +101,13 @@ def stall_current(robot: Robot) -> float:
 def beyond_stall(robot: Robot, current: FloatArray) -> float:
     """How many times the current of a blocked motor is usually reached; above BEYOND it is no current in amperes."""
     return float(np.nanquantile(np.abs(current), 0.95)) / stall_current(robot)
+
+
+def keys_behind(source: str) -> tuple[str, ...]:
+    """The keys of the robot file that a source takes, by its name: as `expected_wheel_speed` calls it."""
+    if source.endswith("current"):
+        return CIRCUIT
+    return GEOMETRY if source.endswith(("twist", "pose", "floor")) else ()
 
 
 def electric_speed(work: LogUnderCheck) -> FloatArray | None:

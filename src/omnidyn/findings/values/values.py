@@ -8,7 +8,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
 from omnidyn.findings.signal.clocks import at_each_clock
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, SENSORS, LogUnderCheck
-from omnidyn.findings.signal.reference import MEASUREMENTS, expected_wheel_speed
+from omnidyn.findings.signal.reference import GEOMETRY, MEASUREMENTS, expected_wheel_speed, keys_behind
 from omnidyn.findings.signal.robust import HELD, quantum, smooth, turned_by, white_noise
 from omnidyn.findings.values.codes import check_codes
 from omnidyn.findings.values.spikes import check_spikes
@@ -166,6 +166,7 @@ def _constant(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
                     component, f"{component} is {np.nanmax(values):.4g} in every row, while {reason}",
                     "look at its sensor, its cable and its column; leave it out otherwise",
                     work.lines(work.everywhere), len(work), {"value": float(np.nanmax(values))},
+                    _behind(work, channel),
                 ))  # fmt: skip
                 work = work.masked(channel, k, work.everywhere)
     return found, work
@@ -207,6 +208,14 @@ def _should_move(work: LogUnderCheck, channel: str, k: int, all_flat: bool) -> s
         if turning > 0.3 * straight and turned_by(own[:, 2], work.t) > HELD:
             return "the wheels say that the robot turns: the heading was not recorded, or the wheels ran in the air"
     return ""
+
+
+def _behind(work: LogUnderCheck, channel: str) -> tuple[str, ...]:
+    """The keys of the robot file behind a reason of `_should_move`."""
+    if channel in ("wheel_speed", "wheel_angle"):
+        expected = expected_wheel_speed(work, without=channel)
+        return () if expected is None else keys_behind(expected[0])
+    return GEOMETRY if channel in ("twist", "pose") and work.get("wheel_speed") is not None else ()
 
 
 def _wheel_reason(work: LogUnderCheck, channel: str, k: int) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import FATAL, Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
-from omnidyn.findings.signal.reference import ground, pose_twist, wheels_twist
+from omnidyn.findings.signal.reference import GEOMETRY, ground, pose_twist, wheels_twist
 from omnidyn.findings.signal.robust import smooth
 from omnidyn.findings.wiring.frame import commands_agree
 from omnidyn.findings.wiring.orders import BETTER, WINDOWS, Answer, Wiring, choose, code_of, means, rivals_of, wirings
@@ -143,7 +143,7 @@ def axes_finding(work: LogUnderCheck, answer: Answer) -> Finding:
         + (", or else all wheels have the opposite sign" if heading else ""),
         f"set `invert` for {'that column' if len(wrong) == 1 else 'these columns'} in the mapping, or turn the wheels' "
         "signs in the same way", (), 0,
-        {"explained_as_logged": 1.0 - answer.logged, "explained_put_right": 1.0 - answer.left},
+        {"explained_as_logged": 1.0 - answer.logged, "explained_put_right": 1.0 - answer.left}, GEOMETRY,
     )  # fmt: skip
 
 
@@ -209,5 +209,5 @@ def wheels_finding(work: LogUnderCheck, answer: Answer, blamed: str) -> Finding:
         f"leaves {100 * answer.logged:.0f} % of the motion unexplained, put right {100 * answer.left:.1f} %",
         "put the columns right in the mapping (`column`), or the order and signs of the wheels in the robot file",
         (), 0, {"unexplained_as_logged": answer.logged, "unexplained_put_right": answer.left,
-                "as_good": float(answer.others)},
+                "as_good": float(answer.others)}, GEOMETRY,
     )  # fmt: skip

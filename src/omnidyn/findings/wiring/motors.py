@@ -99,7 +99,7 @@ def by_likeness(work: LogUnderCheck, channel: str) -> Answer | None:
     return answer if answer is not None and (answer.logged - answer.left) * n > 1.0 else None
 
 
-def motor_finding(work: LogUnderCheck, channel: str, answer: Answer) -> Finding:
+def motor_finding(work: LogUnderCheck, channel: str, answer: Answer, rests_on: tuple[str, ...] = ()) -> Finding:
     """Fatal: columns of one channel of the motors are exchanged, or have the opposite sign."""
     names = components(channel, work.wheels)
     wrong = answer.best.touched(names)
@@ -110,4 +110,5 @@ def motor_finding(work: LogUnderCheck, channel: str, answer: Answer) -> Finding:
         f"logged it leaves {100 * answer.logged:.0f} % unexplained, put right {100 * answer.left:.1f} %",
         "put the columns right in the mapping (`column`)", (), 0,
         {"unexplained_as_logged": answer.logged, "unexplained_put_right": answer.left, "as_good": float(answer.others)},
+        rests_on,
     )  # fmt: skip

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
+from omnidyn.findings.signal.reference import CIRCUIT
 from omnidyn.findings.wiring.floor import axes_finding, by_floor, mended_axes, wheels_finding
 from omnidyn.findings.wiring.frame import check_frame
 from omnidyn.findings.wiring.motors import by_circuit, by_drive, by_likeness, motor_finding, motor_known
@@ -25,7 +26,7 @@ def check_wiring(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     found: list[Finding] = []
     circuit = by_circuit(work)  # of each motor for itself: it names the column, so it comes first
     if circuit.wrong is not None:
-        found.append(motor_finding(work, *circuit.wrong))
+        found.append(motor_finding(work, *circuit.wrong, CIRCUIT))
         work = _mended(work, (circuit.wrong[0],), circuit.wrong[1].best)
     floor = by_floor(work)
     framed, turned = check_frame(work, floor[1].left if floor is not None else 1.0)
