@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.arguments import check_order
+from omnidyn.findings.averaged import check_averaged
 from omnidyn.findings.energy import check_energy
 from omnidyn.findings.excitation import check_excitation, joined, judge
 from omnidyn.findings.filters import check_filters
@@ -42,7 +43,7 @@ __all__ = ["check", "check_blocks", "check_log"]
 Family = Callable[[LogUnderCheck], tuple[list[Finding], LogUnderCheck]]
 FAMILIES: tuple[Family, ...] = (
     check_values, check_limits, check_twist_frame, check_derivatives, check_turn_rate, check_wiring,
-    check_dead_wheels, check_slip, check_axes, check_scale, check_lag, check_filters, check_energy, check_motion,
+    check_dead_wheels, check_slip, check_axes, check_scale, check_averaged, check_lag, check_filters, check_energy, check_motion,
     check_oddities, check_excitation,
 )  # fmt: skip
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.findings.averaged import late_by
 from omnidyn.findings.finding import NOTE, WARN, Finding
 from omnidyn.findings.signal.clocks import sampled_with
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
@@ -43,6 +44,9 @@ def check_lag(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         rows = line.value
         if abs(rows) < NOTE_FROM or abs(rows) < SURE * line.error:
             continue
+        of_means = late_by(work, pair.late) - late_by(work, pair.against)
+        if of_means and abs(rows - of_means) < 1.0:
+            continue  # named already
         found.append(_finding(own, pair, line))
     return found, work
 

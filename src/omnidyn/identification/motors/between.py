@@ -69,24 +69,32 @@ def _integrals(t: FloatArray, u: FloatArray, pieces: Rows) -> tuple[FloatArray, 
     return one, other
 
 
+def _integrals_at(t: FloatArray, own: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """As `_integrals`, up to each of the times t, of an input with stamps of its own."""
+    new = np.append(True, (values[1:] != values[:-1]) & np.isfinite(values[:-1]))
+    held, _ = _integrals(own, values, ())
+    whole = [(int(a), int(b) - 1) for a, b in stretches(np.isfinite(values[new]))]
+    _, curved = _integrals(own[new], values[new], whole)
+    return np.interp(t, own, held), np.interp(t, own[new], curved)
+
+
 class InputIntegral:
     """The integral of an input over any rows of a piece: of held values where it comes in steps, else of the curve.
 
     Straight lines from row to row would cut the crests of a sine of 20 rows by almost a percent.
     """
 
-    def __init__(self, t: FloatArray, u: FloatArray, pieces: Rows, given: tuple[FloatArray, FloatArray] | None = None):
-        """given: times and values of the input where it has stamps of its own; u is then what held in each row."""
+    def __init__(
+        self, t: FloatArray, u: FloatArray, pieces: Rows, averaged: int = 1,
+        given: tuple[FloatArray, FloatArray] | None = None,
+    ):  # fmt: skip
+        """averaged: of the integrals over the same rows and those up to so many rows before, their mean: what holds of
+        a speed that is a mean over as many rows. NaN where there are not so many rows before.
+        given: times and values of the input where it has stamps of its own; u is then what held in each row.
+        """
         self._u = u
-        if given is None:
-            self._held, self._curved = _integrals(t, u, pieces)
-            return
-        own, values = given
-        new = np.append(True, (values[1:] != values[:-1]) & np.isfinite(values[:-1]))
-        held, _ = _integrals(own, values, ())
-        whole = [(int(a), int(b) - 1) for a, b in stretches(np.isfinite(values[new]))]
-        _, curved = _integrals(own[new], values[new], whole)
-        self._held, self._curved = np.interp(t, own, held), np.interp(t, own[new], curved)
+        found = _integrals(t, u, pieces) if given is None else _integrals_at(t, *given)
+        self._held, self._curved = (_trailing_mean(each, pieces, averaged) for each in found)
 
     def over(self, window: slice) -> float:
         """From the first row of a window to its last, in units of the input times seconds."""
@@ -94,3 +102,14 @@ class InputIntegral:
         in_steps = np.mean(np.diff(own) != 0.0) <= max(STEPWISE, 2.0 / len(own))
         total = self._held if in_steps else self._curved
         return float(total[window.stop - 1] - total[window.start])
+
+
+def _trailing_mean(values: FloatArray, pieces: Rows, rows: int) -> FloatArray:
+    """The mean of each row and the `rows` - 1 before it in its piece; NaN where there are fewer."""
+    if rows == 1:
+        return values
+    mean = np.full(len(values), np.nan)
+    for first, last in pieces:
+        if last - first >= rows - 1:
+            mean[first + rows - 1 : last + 1] = np.convolve(values[first : last + 1], np.ones(rows) / rows, "valid")
+    return mean

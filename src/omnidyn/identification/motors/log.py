@@ -10,8 +10,10 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.clocks import usual_step
+from omnidyn.document import all_of
 from omnidyn.errors import InputError
 from omnidyn.findings.needs import MOTOR_INPUTS, motor_input
+from omnidyn.logs.averaged import rows_of_mean
 from omnidyn.logs.one_clock import on_clock_of
 from omnidyn.logs.plateaus import live_angle
 from omnidyn.logs.segments import segments
@@ -32,6 +34,7 @@ class MotorLog:
 
     put_in: in `unit`, of `kind` (INPUTS). speed [rad/s] and angle [rad], as measured; one of them may be None.
     motion [rad/s]: by the angle where there is one. motion_from: its origin in words. pieces: rows between gaps.
+    averaged: per motor, over how many rows its motion is a mean; 1 where it is none.
     given: the input as it held, at the times of all sensors, where they share no stamps: rows are those of the motion.
     """
 
@@ -43,6 +46,7 @@ class MotorLog:
     motion: FloatArray
     motion_from: str
     pieces: tuple[slice, ...]
+    averaged: tuple[int, ...]
     given: tuple[FloatArray, FloatArray] | None = None
 
     @property
@@ -109,7 +113,19 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
     if motion is None:
         raise InputError("the log has no speed and no angle of the motors", got=", ".join(run.channels),
                          expected="wheel_angle or wheel_speed", where=run.source)  # fmt: skip
-    return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces, given)
+    averaged = [rows_of_mean(column) or 1 if angle is None else 1 for column in motion.T]
+    return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces, tuple(averaged), given)
+
+
+def averaged_words(logs: Sequence[MotorLog], allowed: bool = True) -> list[str]:
+    """Of which motors the speed is a mean over rows, in words. allowed: whether the fit takes that into account."""
+    found: dict[int, list[str]] = {}
+    for motor in range(max((log.motors for log in logs), default=0)):
+        rows = {log.averaged[motor] for log in logs if motor < log.motors} - {1}
+        for each in rows:
+            found.setdefault(each, []).append(str(motor + 1))
+    rest = "the input is averaged alike; breakaway is not seen sharply" if allowed else "the dead band may be too small"
+    return [f"the speed of motor {all_of(names)} is a mean of {rows} rows: {rest}" for rows, names in found.items()]
 
 
 def orientation(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> float:

@@ -21,7 +21,7 @@ from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, na
 from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
 from omnidyn.identification.motors.free_run import fit_rmse
 from omnidyn.identification.motors.line import fit_line
-from omnidyn.identification.motors.log import GROUND, MotorLog, motor_logs, orientation_of
+from omnidyn.identification.motors.log import GROUND, MotorLog, averaged_words, motor_logs, orientation_of
 from omnidyn.identification.motors.rest import turned_under
 from omnidyn.identification.motors.start import STARTS_HEAD, MotorStart, motor_starts
 from omnidyn.identification.motors.static import is_slow, points_of_logs, starts_of_points, windows_of_points
@@ -199,7 +199,7 @@ def _lines(logs: Sequence[MotorLog], asked: Question) -> MotorStudy:
     )  # fmt: skip
     return MotorStudy(
         STEADY_STATE, windows.kind, windows.unit, windows.speed_from, lines, (), windows,
-        motor_starts(logs, windows, motors), _supply(logs), tuple(_of_windows(windows, lines)),
+        motor_starts(logs, windows, motors), _supply(logs), (*averaged_words(logs), *_of_windows(windows, lines)),
     )  # fmt: skip
 
 
@@ -249,7 +249,7 @@ def _free_runs(runs: Sequence[Run], asked: Question, now: Callable[[str], object
     starts = starts_of_points(points_of_logs(logs)) if slow else motor_starts(logs, seen, motors)
     return MotorStudy(
         OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain, starts=starts, supply=_supply(logs),
-        drawn=seen,
+        drawn=seen, log_warnings=tuple(averaged_words(logs, False)),
     )  # fmt: skip
 
 

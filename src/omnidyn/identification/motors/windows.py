@@ -212,6 +212,7 @@ class _Reader:
                 log.t,
                 log.put_in[:, m],
                 rows_with(np.isfinite(log.put_in[:, m]), log.pieces),
+                log.averaged[m],
                 None if log.given is None else (log.given[0], log.given[1][:, m]),
             )
             for m in range(log.motors)
@@ -229,17 +230,35 @@ class _Reader:
                 self.unresolved += 1
                 continue
             put_in = self._put_in[motor].over(window) / span
-            sides = self._sides(window, motor, float(error[motor]), put_in)
+            if not np.isfinite(put_in):
+                continue
+            wide = self._wide(window, motor)
+            sides = self._sides(wide, motor, float(error[motor]), put_in)
             if np.mean(sides == 0.0) > REST_SHARE:
                 self.resting += 1
                 if not sides.any():
                     self.rest[motor] = np.nanmax([self.rest[motor], abs(put_in)])
                 continue
+            sides = self._mean_sides(sides, motor)
             change = (
                 self._speed_at(window, motor, window.stop - 1) - self._speed_at(window, motor, window.start)
             ) / span
             found.append((put_in, mean[motor], error[motor], float(np.mean(sides)), change, motor))
         return found
+
+    def _wide(self, window: slice, motor: int) -> slice:
+        """The window with as many rows on either side as the mean of its sides reaches, where there are so many."""
+        before, piece = self.log.averaged[motor] // 2, self.log.piece(window.start)
+        after = self.log.averaged[motor] - 1 - before
+        return slice(max(piece.start, window.start - before), min(piece.stop, window.stop + after))
+
+    def _mean_sides(self, sides: FloatArray, motor: int) -> FloatArray:
+        """The mean of sgn w over the rows over which the speed is one.
+
+        A mean changes sign about half its rows later than what it is of: its own signs half as far to either side.
+        """
+        rows = min(self.log.averaged[motor], len(sides))
+        return sides if rows == 1 else np.convolve(sides, np.full(rows, 1.0 / rows), mode="valid")
 
     def _sides(self, window: slice, motor: int, error: float, put_in: float) -> FloatArray:
         """Which way the motor turns, row by row: of the speed averaged until its noise no longer turns the sign. Where

@@ -1,0 +1,42 @@
+"""Speeds that are means over a window of rows, as some motor controllers give them: late, and slow to show a change."""
+
+from __future__ import annotations
+
+from omnidyn.document import all_of
+from omnidyn.findings.finding import WARN, Finding
+from omnidyn.findings.signal.log_under_check import LogUnderCheck
+from omnidyn.logs.averaged import rows_of_mean
+from omnidyn.logs.channels import place
+
+SPEEDS = ("wheel_speed", "twist")
+
+
+def check_averaged(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """Findings on such speeds, those over one window together; nothing is masked. The work knows their windows."""
+    alike: dict[tuple[str, int], list[str]] = {}
+    for channel in SPEEDS if work.step > 0.0 else ():
+        if channel not in work.log.channels:  # differences of angles, made here
+            continue
+        for component, values in work.columns(channel):
+            rows = rows_of_mean(values[work.recorded(channel, place(component)[1])])  # type: ignore[index]
+            if rows:
+                alike.setdefault((channel, rows), []).append(component)
+    known = {channel: rows for channel, rows in alike}
+    return [_finding(names, rows, work.step) for (_, rows), names in alike.items()], work.knowing(averaged=known)
+
+
+def late_by(work: LogUnderCheck, channel: str) -> float:
+    """By how many rows a mean makes a channel late; 0 where it is none."""
+    return 0.5 * (work.known.get("averaged", {}).get(channel, 1) - 1)
+
+
+def _finding(names: list[str], rows: int, step: float) -> Finding:
+    ms = rows * step * 1e3
+    return Finding(
+        "averaged", WARN, " ".join(names),
+        f"{all_of(names)} {'is a mean' if len(names) == 1 else 'are means'} over {rows} rows ({ms:.3g} ms): "
+        f"{0.5 * (ms - step * 1e3):.3g} ms late, and a dead band that is fitted to {'it' if len(names) == 1 else 'them'} "
+        "may be too small",
+        "log the speed of a shorter window (a setting of many motor controllers), or the position", (), 0,
+        {"rows": rows, "seconds": rows * step},
+    )  # fmt: skip
