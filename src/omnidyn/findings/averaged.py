@@ -35,8 +35,8 @@ def _finding(names: list[str], rows: int, step: float) -> Finding:
     return Finding(
         "averaged", WARN, " ".join(names),
         f"{all_of(names)} {'is a mean' if len(names) == 1 else 'are means'} over {rows} rows ({ms:.3g} ms): "
-        f"{0.5 * (ms - step * 1e3):.3g} ms late, and a dead band that is fitted to {'it' if len(names) == 1 else 'them'} "
-        "may be too small",
-        "log the speed of a shorter window (a setting of many motor controllers), or the position", (), 0,
+        f"{0.5 * (ms - step * 1e3):.3g} ms late, and slow to show a start",
+        "log the speed of a shorter window (a setting of many motor controllers), or the position; `what` motors of "
+        "identify takes the mean into account, other fits may find too small a dead band", (), 0,
         {"rows": rows, "seconds": rows * step},
     )  # fmt: skip

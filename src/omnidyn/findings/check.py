@@ -43,8 +43,8 @@ __all__ = ["check", "check_blocks", "check_log"]
 Family = Callable[[LogUnderCheck], tuple[list[Finding], LogUnderCheck]]
 FAMILIES: tuple[Family, ...] = (
     check_values, check_limits, check_twist_frame, check_derivatives, check_turn_rate, check_wiring,
-    check_dead_wheels, check_slip, check_axes, check_scale, check_averaged, check_lag, check_filters, check_energy, check_motion,
-    check_oddities, check_excitation,
+    check_dead_wheels, check_slip, check_axes, check_scale, check_averaged, check_lag, check_filters, check_energy,
+    check_motion, check_oddities, check_excitation,
 )  # fmt: skip
 
 # What only a whole log can show: dropped unless every block shows it.

@@ -15,6 +15,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.document import all_of
 from omnidyn.findings.finding import NOTE, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
+from omnidyn.findings.signal.robust import moving as moves
 from omnidyn.model.frames import unwrapped, world_to_body
 from omnidyn.statistics import robust_std
 
@@ -109,7 +110,7 @@ def _off(errors: FloatArray, rate: FloatArray) -> float:
 
     A speed that is made of positions is so in every row; the middle error would be that of rest.
     """
-    good = np.isfinite(errors) & np.isfinite(rate) & (rate != 0.0)
+    good = np.isfinite(errors) & np.isfinite(rate) & moves(rate)
     return float(np.quantile(np.abs(errors[good]), MOST)) if good.sum() >= MIN_ROWS else np.inf
 
 
@@ -155,7 +156,7 @@ def _made(
         return own
 
     over = tuple(rate(rows, 0) for rows in range(1, LONGEST + 1))
-    moving = np.isfinite(over[0]) & (over[0] != 0.0)
+    moving = np.isfinite(over[0]) & moves(over[0])
     if moving.sum() < MIN_ROWS:
         return
     rough = (part[2:-2] * np.diff(place, 4, axis=0)).sum(axis=1)[moving[2:-2] & _together(near, 4)]

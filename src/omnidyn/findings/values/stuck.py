@@ -15,7 +15,7 @@ from omnidyn.findings.finding import WARN, Finding
 from omnidyn.findings.signal.log_under_check import INPUTS, SENSORS, LogUnderCheck
 from omnidyn.findings.signal.predicted_wheel import WheelPredictor
 from omnidyn.findings.signal.reference import MEASUREMENTS, expected_wheel_speed
-from omnidyn.findings.signal.robust import quantum, smooth
+from omnidyn.findings.signal.robust import quantum, rest_level, smooth
 from omnidyn.logs.channels import place
 from omnidyn.statistics import robust_std, stretches
 
@@ -35,10 +35,10 @@ def check_stuck(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     expected = expected_wheel_speed(work, without="wheel_speed")
     for channel in SENSORS:
         # The longest repeat first: a wheel that sticks is no witness against the others.
-        columns = [(*each, _repeats(each[1])) for each in work.sampled_columns(channel)]
-        for component, values, repeats in sorted(columns, key=lambda each: -_longest(each[1], each[2])):
+        columns = [(name, values, _repeats(values), rest_level(values)) for name, values in work.sampled_columns(channel)]
+        for component, values, repeats, rest in sorted(columns, key=lambda each: -_longest(*each[1:])):
             k = place(component)[1]  # type: ignore[index]
-            judge = _Judge(work, values, repeats)
+            judge = _Judge(work, values, repeats, rest)
             judge.steady = _Steady(work, channel, k).during
             if channel == "wheel_speed":
                 judge.predict = partial(predictor.wheel_speed, k)
@@ -67,9 +67,9 @@ def _repeats(values: FloatArray) -> IntArray:
     return stretches(np.diff(values) == 0.0) + np.array([0, 1])
 
 
-def _longest(values: FloatArray, repeats: IntArray) -> int:
-    """Rows in the longest repeat of a value that is not 0."""
-    return int(np.diff(repeats, axis=1)[values[repeats[:, 0]] != 0.0].max(initial=0))
+def _longest(values: FloatArray, repeats: IntArray, rest: float) -> int:
+    """Rows in the longest repeat of a value that is no rest."""
+    return int(np.diff(repeats, axis=1)[np.abs(values[repeats[:, 0]]) > rest].max(initial=0))
 
 
 class _Judge:
@@ -80,11 +80,12 @@ class _Judge:
     steady: Callable[[int, int], bool] | None = None  # whether nothing in the log changes, commands least of all
     measured = False  # expected is what the wheel did; a command it follows later, or, at rest, not at all
 
-    def __init__(self, work: LogUnderCheck, values: FloatArray, repeats: IntArray) -> None:
+    def __init__(self, work: LogUnderCheck, values: FloatArray, repeats: IntArray, rest: float) -> None:
         self.values, self.repeats, self.slow = values, repeats, max(10, round(FOLLOWS / work.step))
+        self.turns = np.abs(values) > rest
         self.lengths = repeats[:, 1] - repeats[:, 0]
         self.long = self.lengths >= LONG
-        self.moving = values[repeats[:, 0]] != 0.0
+        self.moving = self.turns[repeats[:, 0]]
 
     @cached_property
     def predicted(self) -> _Walk | None:
@@ -114,7 +115,7 @@ class _Judge:
     def _unlikely(self, a: int, b: int, chance: float, usual: float) -> bool:
         """Whether so many repeats of a speed are no chance: by other repeats of the log, and by the rows beside."""
         length, n = b - a, len(self.values)
-        if self.values[a] == 0.0:
+        if not self.turns[a]:
             return False
         if self._rough(a, b):
             return n * self._rare ** (length - 1) < IMPOSSIBLE
@@ -129,7 +130,7 @@ class _Judge:
     @cached_property
     def _rare(self) -> float:
         """Chance of a repeat in a channel without steps, from all but its three longest repeats; 1 where not rare."""
-        moving = int((self.values != 0.0).sum())
+        moving = int(self.turns.sum())
         repeats = float(np.sort(self.lengths[self.moving] - 1)[:-3].sum())
         chance = (repeats + 1.0) / (moving + 2.0)
         return chance if chance < 0.02 and not quantum(self.values) else 1.0
@@ -153,7 +154,7 @@ class _Judge:
 
     def _walked(self, a: int, b: int) -> bool:
         """Whether a reference walks away from the value that repeats."""
-        turning, length = self.values[a] != 0.0, b - a
+        turning, length = bool(self.turns[a]), b - a
         asked = length >= (self.slow // 2 if self.measured else self.slow) and (self.measured or turning)
         if self.expected is not None and asked and self.expected.during(a, b):
             return True

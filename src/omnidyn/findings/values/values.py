@@ -9,7 +9,7 @@ from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
 from omnidyn.findings.signal.clocks import at_each_clock
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, SENSORS, LogUnderCheck
 from omnidyn.findings.signal.reference import GEOMETRY, MEASUREMENTS, expected_wheel_speed, keys_behind
-from omnidyn.findings.signal.robust import HELD, quantum, smooth, turned_by, white_noise
+from omnidyn.findings.signal.robust import HELD, moving, quantum, smooth, turned_by, white_noise
 from omnidyn.findings.values.codes import check_codes
 from omnidyn.findings.values.spikes import check_spikes
 from omnidyn.findings.values.stuck import check_stuck
@@ -92,7 +92,7 @@ def _quantised(work: LogUnderCheck) -> list[Finding]:
             k = place(component)[1]  # type: ignore[index]
             own = values[work.recorded(channel, k)]
             step = quantum(own)
-            busy = np.abs(own[np.isfinite(own) & (own != 0.0)])
+            busy = np.abs(own[np.isfinite(own) & moving(own)])
             usual = float(np.median(busy)) if busy.size else 0.0
             if not step or step < 0.02 * usual:
                 continue
@@ -124,7 +124,7 @@ def _reads_zero(
     own = _told(work, source)
     turning = np.abs(smooth(reference, width))
     sure = 5.0 * white_noise(reference[own]) / np.sqrt(max(1.0, width * len(own) / len(work)))
-    slow = (values == 0.0) & (turning > max(0.3 * step, sure)) & (turning < 2.0 * step)
+    slow = ~moving(values) & np.isfinite(values) & (turning > max(0.3 * step, sure)) & (turning < 2.0 * step)
     if slow.mean() < 0.2:
         return []
     return [Finding(
