@@ -19,6 +19,7 @@ UPPER_TAIL = 0.975  # below it lies all but the upper end of a 95 % interval
 HUBER_CLIP = 2.5  # scales of a mean beyond which a number pulls no harder
 MAX_ITERATIONS, SETTLED = 50, 1e-9  # of a Huber mean, in scales
 SOKAL = 5.0  # autocorrelation times to sum over
+RESIDUE = 1e-6  # of the largest: what a filter or rounding leaves of a rest
 SAME = 1e-6  # readings that differ by less than this share of their range are one reading
 MEMORY_SHARE = 4.0  # a block of a bootstrap is so many times the memory of its series
 ENOUGH, LEAST_ROWS = 20_000, 20  # rows looked at for a tick; rows that change, without which there is none
@@ -31,6 +32,12 @@ SAMPLE, DIFFERENCE = 1500, 0.954  # rows for a median; median difference of two 
 
 
 # ---- spread -----------------------------------------------------------------------------------------------
+
+
+def moving(values: FloatArray) -> BoolArray:
+    """Which values are more than a residue: what a filter or rounding leaves of a rest. Shape of `values`."""
+    size = np.abs(values)
+    return size > RESIDUE * np.nanmax(size, initial=0.0)
 
 
 def robust_std(values: FloatArray, centre: FloatArray | float | None = None, axis: int | None = None) -> FloatArray:

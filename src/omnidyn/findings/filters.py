@@ -15,9 +15,8 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.document import all_of
 from omnidyn.findings.finding import NOTE, Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
-from omnidyn.findings.signal.robust import moving as moves
 from omnidyn.model.frames import unwrapped, world_to_body
-from omnidyn.statistics import robust_std
+from omnidyn.statistics import moving, robust_std
 
 ENOUGH = 60_000  # rows that tell a filter
 ALIKE = 0.2  # of the noise of the differences: a speed that comes nearer has that very noise
@@ -110,7 +109,7 @@ def _off(errors: FloatArray, rate: FloatArray) -> float:
 
     A speed that is made of positions is so in every row; the middle error would be that of rest.
     """
-    good = np.isfinite(errors) & np.isfinite(rate) & moves(rate)
+    good = np.isfinite(errors) & np.isfinite(rate) & moving(rate)
     return float(np.quantile(np.abs(errors[good]), MOST)) if good.sum() >= MIN_ROWS else np.inf
 
 
@@ -156,10 +155,10 @@ def _made(
         return own
 
     over = tuple(rate(rows, 0) for rows in range(1, LONGEST + 1))
-    moving = np.isfinite(over[0]) & moves(over[0])
-    if moving.sum() < MIN_ROWS:
+    turns = np.isfinite(over[0]) & moving(over[0])
+    if turns.sum() < MIN_ROWS or np.nanmin(values) == np.nanmax(values):
         return
-    rough = (part[2:-2] * np.diff(place, 4, axis=0)).sum(axis=1)[moving[2:-2] & _together(near, 4)]
+    rough = (part[2:-2] * np.diff(place, 4, axis=0)).sum(axis=1)[turns[2:-2] & _together(near, 4)]
     rough = rough[np.isfinite(rough)]
     noise = float(robust_std(rough, 0.0)) / FOURTH if rough.size >= MIN_ROWS else 0.0
     yield Speed(component, origin, values, over[0], rate(1, 1), over, noise * np.sqrt(2.0) / step)

@@ -13,6 +13,7 @@ from omnidyn.logs.segments import segments
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.run import Run
+from omnidyn.statistics import moving
 
 POSE, TWIST, WHEELS = "measured positions", "integrated body speeds", "integrated wheel speeds"
 
@@ -70,7 +71,7 @@ def driven(twists: Sequence[FloatArray | None]) -> list[tuple[float, float] | No
     found: list[tuple[float, float] | None] = []
     for axis in range(3):
         speeds = np.concatenate([np.zeros(0), *(each[:, axis] for each in twists if each is not None)])
-        speeds = speeds[np.isfinite(speeds) & (speeds != 0.0)]
+        speeds = speeds[np.isfinite(speeds) & moving(speeds)]
         found.append((float(np.quantile(speeds, 0.05)), float(np.quantile(speeds, 0.95))) if speeds.size else None)
     return found
 

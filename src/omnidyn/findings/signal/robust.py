@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.arrays import BoolArray, FloatArray, IntArray
-from omnidyn.statistics import robust_std
+from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.statistics import RESIDUE, robust_std
 
-RESIDUE = 1e-6  # of the largest: what a filter leaves of a rest
 ROUNDING = 1e-9  # of the largest: nothing that was measured
 GYRO_OFFSET = 0.05  # [rad/s]
 HELD = 0.3  # [rad] a heading that should have changed by less may have been held, or be too coarse to show it
@@ -56,12 +55,6 @@ def white_noise(values: FloatArray) -> float:
         return 0.0
     bend = values[2:] - 2.0 * values[1:-1] + values[:-2]
     return float(robust_std(bend, 0.0) / np.sqrt(6.0))
-
-
-def moving(values: FloatArray) -> BoolArray:
-    """Which values are more than a residue: what a filter or rounding leaves of a rest. Shape of `values`."""
-    size = np.abs(values)
-    return size > RESIDUE * np.nanmax(size, initial=0.0)
 
 
 def rest_level(values: FloatArray) -> float:

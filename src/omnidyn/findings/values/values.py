@@ -9,7 +9,7 @@ from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
 from omnidyn.findings.signal.clocks import at_each_clock
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, SENSORS, LogUnderCheck
 from omnidyn.findings.signal.reference import GEOMETRY, MEASUREMENTS, expected_wheel_speed, keys_behind
-from omnidyn.findings.signal.robust import HELD, moving, quantum, smooth, turned_by, white_noise
+from omnidyn.findings.signal.robust import HELD, quantum, smooth, turned_by, white_noise
 from omnidyn.findings.values.codes import check_codes
 from omnidyn.findings.values.spikes import check_spikes
 from omnidyn.findings.values.stuck import check_stuck
@@ -18,6 +18,7 @@ from omnidyn.logs.columns.mapping import SIDED, component_channel
 from omnidyn.logs.log import MAX_MISSING
 from omnidyn.logs.read_log import driven_way
 from omnidyn.model.wheels import twist_from_wheel_speed
+from omnidyn.statistics import moving
 from omnidyn.units import known_unit
 
 SAME = 0.03  # a scale so near 1 is 1, within what noise makes of it

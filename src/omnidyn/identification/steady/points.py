@@ -22,6 +22,7 @@ from omnidyn.model.dynamics import drive_wrench, frame_wrench, settled_currents,
 from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
+from omnidyn.statistics import moving
 
 # An axis slower than this share of the row's fastest is not driven: its speed and force are noise around zero.
 DRIVEN_SHARE = 0.1
@@ -112,9 +113,9 @@ def driven_axes(robot: Robot, twist: FloatArray, wrench: FloatArray) -> BoolArra
     the axes that carry a tenth or more of the largest push (F_x, F_y, T / b).
     """
     arm = float(np.mean(robot.wheels.robot_radius))
-    moving = np.abs(twist) * [1.0, 1.0, arm]
+    rims = np.abs(twist) * [1.0, 1.0, arm]
     pushed = np.abs(wrench) / [1.0, 1.0, arm]
-    size = np.where((twist != 0.0).any(axis=1, keepdims=True), moving, pushed)
+    size = np.where(moving(rims).any(axis=1, keepdims=True), rims, pushed)
     return (size >= DRIVEN_SHARE * size.max(axis=1, keepdims=True)) & (size > 0.0)
 
 
@@ -139,7 +140,7 @@ def _points(
     if not row.size:
         raise InputError("nothing is driven in any row", got="no speed and no force", where=source)
     speeds = None if speed_std is None else _one_each("speed_std", speed_std, 3, "axis")[column]
-    left_out = int(((twist != 0.0) & ~chosen).sum())
+    left_out = int((moving(twist) & ~chosen).sum())
     if left_out and axis is None:
         notes = (*notes, f"{left_out} speeds below {DRIVEN_SHARE:.0%} of the fastest in their row were left out")
     return SteadyTable(
