@@ -34,6 +34,7 @@ from omnidyn.findings.use import joined as joined_uses
 from omnidyn.findings.values.values import check_values
 from omnidyn.findings.wiring.twist_frame import check_twist_frame
 from omnidyn.findings.wiring.wheels import check_wiring
+from omnidyn.logs.columns.guessed import NO_NUMBER
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_run
@@ -47,6 +48,7 @@ FAMILIES: tuple[Family, ...] = (
     check_motion, check_oddities, check_excitation,
 )  # fmt: skip
 
+OTHER_NAME = "give the column another name, or say what it is: `column`"
 # What only a whole log can show: dropped unless every block shows it.
 WHOLE = ("never_moved", "few_rows")
 # What is said of the columns, once for all blocks of a log.
@@ -115,7 +117,8 @@ def _about_columns(log: Log) -> list[Finding]:
     found = []
     for words in columns.doubts:
         message, _, remedy = words.partition("; say ")
-        remedy = f"say {remedy}" if remedy else "give the column another name, or say what it is: `column`"
+        other = "look at what fills in these messages" if NO_NUMBER in words else OTHER_NAME
+        remedy = f"say {remedy}" if remedy else other
         found.append(Finding(DOUBT, NOTE, "", message, remedy, (), 0, {}))
     doubted = " ".join(columns.doubts)
     unused = [name for name in columns.unused if name not in doubted]

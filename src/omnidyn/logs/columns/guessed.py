@@ -13,6 +13,8 @@ from omnidyn.logs.column import Column
 from omnidyn.logs.table.dialect import is_number_or_missing, looks_like_number, to_float
 from omnidyn.model.robot import Robot
 
+NO_NUMBER = "but no message holds a number for it"
+
 
 class Doubt(NamedTuple):
     """A column that was not taken: what it looks like, why not, and the unit that would settle it."""
@@ -41,7 +43,8 @@ class Guess:
         """The doubts about columns of one kind, by letter, reason and the units that would settle them."""
         groups: dict[tuple[str, str, tuple[str, ...]], list[Doubt]] = {}
         for doubt in self.doubts:
-            groups.setdefault((letter_of(doubt.component), doubt.why, doubt.units), []).append(doubt)
+            letter = letter_of(doubt.component) if doubt.why != NO_NUMBER else ""
+            groups.setdefault((letter, doubt.why, doubt.units), []).append(doubt)
         return groups
 
     def doubted(self) -> dict[str, str]:

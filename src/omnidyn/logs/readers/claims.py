@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.logs.columns.guessed import NO_NUMBER
 from omnidyn.logs.readers.recording import Track
 from omnidyn.logs.table.table import Said
 
+NO_HEADING = f"{NO_NUMBER} (a quaternion of zeros?)"
 USUAL_NAMES = ("odom", "cmd_vel", "joint_states", "battery_state", "data", "pose", "tf")
 
 
@@ -35,19 +39,28 @@ def tracks_of(claims: Sequence[Claim], notes: list[str]) -> Iterator[Track]:
     wanted: dict[str, list[Claim]] = {}
     for claim in claims:
         for out in claim.columns:
-            if out.component:
+            if out.component and not np.isnan(out.values).all():
                 wanted.setdefault(out.component, []).append(claim)
     owners = {component: _owner(each) for component, each in wanted.items()}
     _say(wanted, owners, notes)
     for claim in claims:
         says = {
-            out.name: _said(out.component, claim, wanted, owners) for out in claim.columns if out.component is not None
+            out.name: _said(out, out.component, claim, wanted, owners)
+            for out in claim.columns
+            if out.component is not None
         }
         units = {out.name: out.unit for out in claim.columns if out.unit}
         yield Track(claim.topic, claim.stamps, {out.name: out.values for out in claim.columns}, units, says)
 
 
-def _said(component: str, claim: Claim, wanted: dict[str, list[Claim]], owners: dict[str, str | None]) -> Said:
+def _said(
+    out: Out, component: str, claim: Claim, wanted: dict[str, list[Claim]], owners: dict[str, str | None]
+) -> Said:
+    """What a column is; why it is not taken."""
+    if component and component not in wanted:
+        return Said(component, NO_HEADING if component == "heading" else NO_NUMBER)
+    if np.isnan(out.values).all():
+        return Said("")
     owner = owners.get(component)
     if component and owner is None:
         others = ", ".join(sorted(each.topic for each in wanted[component])[:4])

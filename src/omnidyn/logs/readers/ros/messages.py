@@ -184,7 +184,7 @@ class TopicReader:
             if infinite.any():
                 notes.append(f"{out.name}: {int(infinite.sum())} infinite numbers are taken as missing")
                 out = out._replace(values=np.where(infinite, np.nan, out.values))
-            if not np.isnan(out.values).all():
+            if out.component or not np.isnan(out.values).all():
                 found.append(out)
         if self.bad:
             notes.append(
