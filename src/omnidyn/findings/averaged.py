@@ -18,7 +18,9 @@ def check_averaged(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         if channel not in work.log.channels:  # differences of angles, made here
             continue
         for component, values in work.columns(channel):
-            rows = rows_of_mean(values[work.recorded(channel, place(component)[1])])  # type: ignore[index]
+            if work.log.own_clocks:
+                values = values[work.recorded(channel, place(component)[1])]  # type: ignore[index]
+            rows = rows_of_mean(values)
             if rows:
                 alike.setdefault((channel, rows), []).append(component)
     known = {channel: rows for channel, rows in alike}

@@ -114,6 +114,9 @@ def check_axes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     own = None if speed is None or seen is None else wheels_twist(work, speed, seen.width)
     if seen is None or own is None or len(work) < 3 * MIN_ROWS or seen.axes[:2] != [0, 1]:
         return [], work
+    rough = np.nansum(seen.twist[:, :2] * own[:, :2], axis=0) / np.nansum(own[:, :2] ** 2, axis=0)
+    if abs(rough[0] - rough[1]) < 0.5 * APART:
+        return [], work
     ids, count = work.windows()
     lines = [slope(seen.twist[:, k], own[:, k], ids, count) for k in range(2)]
     k = int(np.argmax([abs(line.value - 1.0) for line in lines]))

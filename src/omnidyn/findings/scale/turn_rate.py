@@ -11,7 +11,6 @@ from omnidyn.findings.signal.reference import GEOMETRY, electric_speed, wheels_t
 from omnidyn.findings.signal.robust import slope
 
 NEAR = 0.5  # of the logarithm: what is off by less is in the right unit
-LEAST_TURN = 0.05  # of the motion of the wheels
 
 
 def check_turn_rate(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -23,6 +22,9 @@ def check_turn_rate(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     speed, twist = work.full("wheel_speed"), work.get("twist")
     own = None if speed is None or len(work) < MIN_ROWS else wheels_twist(work, speed)
     if own is None or twist is None or not np.isfinite(twist[:, 2]).any():
+        return [], work
+    sizes = [float(np.sqrt(np.nanmean(values[:, 2] ** 2))) for values in (twist, own)]
+    if not sizes[1] > 0.0 or abs(np.log(max(sizes[0], 1e-300) / sizes[1])) < NEAR:
         return [], work
     ids, count = work.windows()
     yaw = slope(twist[:, 2], own[:, 2], ids, count)
