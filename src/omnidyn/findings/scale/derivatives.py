@@ -60,6 +60,8 @@ def check_derivatives(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck
     """Findings on positions and their speeds; the work with the wrong one of them put right."""
     if len(work) < MIN_ROWS or not SHORTEST_STEP <= work.step <= LONGEST_STEP:
         return [], work
+    if work.get("pose") is None and work.get("wheel_angle") is None:
+        return [], work
     lines = [each for pairs in PAIRS for each in _lines(work, pairs)]
     ratios = np.array([line.value for _, line in lines])
     kinds = {pair.kind for pair, _ in lines}

@@ -35,7 +35,8 @@ def check_stuck(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     expected = expected_wheel_speed(work, without="wheel_speed")
     for channel in SENSORS:
         # The longest repeat first: a wheel that sticks is no witness against the others.
-        columns = [(name, values, _repeats(values), rest_level(values)) for name, values in work.sampled_columns(channel)]
+        sampled = work.sampled_columns(channel)
+        columns = [(name, values, _repeats(values), rest_level(values)) for name, values in sampled]
         for component, values, repeats, rest in sorted(columns, key=lambda each: -_longest(*each[1:])):
             k = place(component)[1]  # type: ignore[index]
             judge = _Judge(work, values, repeats, rest)

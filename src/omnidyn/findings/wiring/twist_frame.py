@@ -34,7 +34,8 @@ class Found(NamedTuple):
 
 def check_twist_frame(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on twist against pose, else on what was commanded against it; the work with them in one frame."""
-    pose, twist, command = work.full("pose"), work.full("twist"), work.full("twist_command")
+    pose = work.full("pose")
+    twist, command = (None, None) if pose is None else (work.full("twist"), work.full("twist_command"))
     if pose is None or len(work) < 3 * MIN_ROWS or work.step <= 0.0:
         return [], work
     if twist is not None:

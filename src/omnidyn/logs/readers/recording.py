@@ -80,7 +80,8 @@ class Recording:
 
         Raises InputError where no topic holds numbers.
         """
-        tracks = [track.in_order() for track in self._without_strays(self._named()) if len(track.stamps) and track.columns]
+        named = self._without_strays(self._named())
+        tracks = [track.in_order() for track in named if len(track.stamps) and track.columns]
         names = (TIME_COLUMN, *(name for track in tracks for name in track.columns))
         if not tracks:
             raise self._nothing()
