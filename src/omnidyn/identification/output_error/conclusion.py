@@ -51,7 +51,7 @@ def conclude(
     moved (3,): which axes did; levels: of breakaway that were asked for; better: name -> (std, interval) that replace
     those of the covariance; exact: the trust were all that was taken as it stands exact, where `known` has more.
 
-    Raises InsufficientDataError where the logs say nothing about any of the robot's numbers.
+    Raises InsufficientDataError where the logs say nothing about any of the robot's numbers, or of two together.
     """
     problem, values = solver.problem, solution.state.point.values.copy()
     blind = tuple(p.name for p, b in zip(problem.parameters, known.blind, strict=True) if b)
@@ -60,7 +60,8 @@ def conclude(
     own = problem.robot_count
     missed = unexplained(solver, solution)
     directions = () if missed else blind_in_words(problem, values, known.ways, moved)
-    if known.open[:own].all():
+    joint = combinations(problem, values, known, moved)
+    if known.open[:own].all() and (missed or not joint):
         _refuse_blind(problem.names[:own], missed, records[0].source, known.unseen[:own], directions)
     as_they_were = [p.value if p.prior is None else p.prior[0] for p in problem.parameters]
     values = np.where(known.unseen, as_they_were, values)
@@ -68,7 +69,7 @@ def conclude(
     for name, (spread, interval) in (better or {}).items():
         std[name], ci95[name] = std[name] if spread is None else spread, interval
     data, names = _data(records), [p.name for p in problem.parameters]
-    own_levels, joint = _levels(problem.robot, levels, ci95), combinations(problem, values, known, moved)
+    own_levels = _levels(problem.robot, levels, ci95)
     endless = [name for name, (_, (_, high)) in own_levels.items() if high == math.inf]
     fitted, correlation = problem.parameters[:own], _correlation(names, known)
     robot = _with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels)

@@ -157,8 +157,10 @@ def _never_moved(found: Motion, source: str) -> InsufficientDataError:
 
 
 def _loop_question(question: Question, found: Motion, records: Sequence[Record], robot: Robot) -> Question:
-    """By default friction of what moved, and the gains. Raises InsufficientDataError where nothing moved."""
-    keys = dict.fromkeys((*loop_keys(robot, found.moved, records[0].source), *guesses(robot, looped=True)))
+    """By default friction of what moved, guesses and gains. Raises InsufficientDataError where nothing moved."""
+    still = np.flatnonzero(~found.moved).tolist()
+    own = [key for key in guesses(robot, looped=True) if Key.parse(key).axis not in still]
+    keys = dict.fromkeys((*loop_keys(robot, found.moved, records[0].source), *own))
     free = tuple(key for key in keys if key not in question.fixed)
     return question if question.free is not None else replace(question, free=free, fixed=())
 

@@ -32,8 +32,9 @@ SLIPS = 1e-6  # [m/s] between the rim of a wheel and the floor under it
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A piece as the fitted robot drives it. t (n,); twist (n, 3), pose (n, 3); voltage (n, W) at the motors from each
-    row on, current (n, W); share (n,): of the run that has gone by; decay (n - 1, 3, 3), gain (n - 1, 3, 3): of a
-    change of the twist, and per force, over a row; rolls (n, W): whether a wheel does, or slips."""
+    row on, current (n, W); share (n,): of the run that has gone by; decay (n - 1, S, S), gain (n - 1, S, 3): of a
+    change of the twist, and per force, over a row; behind a speed loop with an integral S is 6, for the way of the
+    change is what its integral gathers, else 3; rolls (n, W): whether a wheel does, or slips."""
 
     piece: Piece
     robot: Robot
@@ -49,11 +50,11 @@ class Motion:
 
     def twist_by(self, force: FloatArray) -> FloatArray:
         """The change of the twist by forces [N, N, N m] from each row on. Shapes (n, K, 3) -> (n, K, 3)."""
-        out = np.zeros_like(force)
         pushed = np.einsum("nij,nkj->nki", self.gain, force[:-1])
+        out = np.zeros((len(force), *pushed.shape[1:]))
         for k in range(len(self.decay)):
             out[k + 1] = out[k] @ self.decay[k].T + pushed[k]
-        return out
+        return out[..., :N_AXES]
 
     def under(self, voltage: FloatArray, dt: FloatArray, row: int) -> FloatArray:
         """The twist of the fitted robot from a row on, other voltages (m, W) held for dt (m,). Shape (m + 1, 3)."""
@@ -153,8 +154,11 @@ def _answers(
         up, down = acceleration(robot, middle + change, held), acceleration(robot, middle - change, held)
         rate[:, :, axis] = (up - down) / (2.0 * SMALL)
     per_force = np.broadcast_to(np.linalg.inv(mass_matrix(robot)), rate.shape).copy()
-    if robot.drive.kind == SPEED and robot.drive.kp:
-        rate -= np.einsum("aw,wb->ab", *_by_speed(robot, per_wheel(robot.drive.kp, robot.wheels.count)))
+    gathered = np.zeros((N_AXES, N_AXES))
+    if robot.drive.kind == SPEED:
+        kp, ki = (per_wheel(own or 0.0, robot.wheels.count) for own in (robot.drive.kp, robot.drive.ki))
+        rate -= np.einsum("aw,wb->ab", *_by_speed(robot, kp))
+        gathered = np.einsum("aw,wb->ab", *_by_speed(robot, ki))
     if slips.any():  # whose push does not depend on the speed
         each, turns = _by_speed(robot, per_wheel(robot.motor.emf_constant, robot.wheels.count))
         ratio = per_wheel(robot.motor.gear_ratio, robot.wheels.count)
@@ -165,11 +169,26 @@ def _answers(
     h = dt[:, None, None]
     size = np.abs(rate * h).max(axis=(1, 2))
     rate *= np.minimum(1.0, 1.0 / np.maximum(size, 1e-12))[:, None, None]
-    one = np.eye(N_AXES)
+    if gathered.any():
+        rate, per_force, rests = _with_integral(rate, per_force, rests, gathered)
+    one = np.eye(rate.shape[1])
     left = np.linalg.inv(one - 0.5 * h * rate)
     decay = left @ (one + 0.5 * h * rate)
     decay[rests] = 0.0
     return decay, left @ (h * per_force)
+
+
+def _with_integral(
+    rate: FloatArray, per_force: FloatArray, rests: BoolArray, gathered: FloatArray
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """The same with the way p of the change d beside it: d' = rate d - gathered p + f/M, p' = d. At rest both are 0."""
+    n = len(rate)
+    whole = np.zeros((n, 2 * N_AXES, 2 * N_AXES))
+    whole[:, :N_AXES, :N_AXES], whole[:, :N_AXES, N_AXES:] = rate, -gathered
+    whole[:, N_AXES:, :N_AXES] = np.eye(N_AXES)
+    still = np.concatenate([rests, rests], axis=1)
+    whole[still[:, :, None] | still[:, None, :]] = 0.0
+    return whole, np.concatenate([per_force, np.zeros_like(per_force)], axis=1), still
 
 
 def _by_speed(robot: Robot, volts: FloatArray) -> tuple[FloatArray, FloatArray]:

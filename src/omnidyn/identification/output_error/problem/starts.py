@@ -8,7 +8,7 @@ c that no drive seen in motion overcomes is cut: with too much of it the model n
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,21 +45,26 @@ class Windows:
 
 def measured_twist(record: Record, robot: Robot) -> FloatArray | None:
     """The twist of a record, measured or from wheel speeds, wheel angles or pose; None without. Shape (rows, 3)."""
-    names = [name for name, _ in record.columns]
+    return next(measured_twists(record, robot), None)
+
+
+def measured_twists(record: Record, robot: Robot) -> Iterator[FloatArray]:
+    """The twist of a record as each of its channels tells it, a measured one first. Each (rows, 3)."""
+    names, wheels = [name for name, _ in record.columns], robot.wheels
+
+    def place(name: str, count: int) -> range:
+        return range(names.index(name), names.index(name) + count)
+
     if "twist" in names:
-        first = names.index("twist")
-        return _together(record, range(first, first + 3))
+        yield _together(record, place("twist", 3))
     if "wheel_speed" in names:
-        first = names.index("wheel_speed")
-        return twist_from_wheel_speed(robot.wheels, _together(record, range(first, first + robot.wheels.count)))
+        yield twist_from_wheel_speed(wheels, _together(record, place("wheel_speed", wheels.count)))
     if "wheel_angle" in names:
-        first = names.index("wheel_angle")
-        return twist_from_wheel_speed(robot.wheels, _rates(record, range(first, first + robot.wheels.count)))
+        yield twist_from_wheel_speed(wheels, _rates(record, place("wheel_angle", wheels.count)))
     if "position" in names and np.isfinite(heading := record.outputs[:, names.index("heading")]).any():
         first = names.index("position")
         rates = _rates(record, [first, first + 1, names.index("heading")])
-        return np.einsum("kij,kj->ki", world_to_body(heading), rates)
-    return None
+        yield np.einsum("kij,kj->ki", world_to_body(heading), rates)
 
 
 def _together(record: Record, columns: Sequence[int]) -> FloatArray:

@@ -19,11 +19,12 @@ from omnidyn.identification.output_error.problem.nuisances import EARLIEST, LATE
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
-from omnidyn.identification.output_error.problem.starts import measured_twist
+from omnidyn.identification.output_error.problem.starts import measured_twists
 from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
 from omnidyn.identification.question import FREE, REST
 from omnidyn.model.keys import FRICTION, Key, friction_keys, gain_keys
+from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import GIVEN, Robot
 
 FINE = 1e-3  # [m/s] tolerance at the end of a fit; it begins with a step a tick
@@ -81,7 +82,7 @@ def loop_pieces(records: Sequence[Record], robot: Robot, start: str) -> list[Pie
     found = [
         _piece(record, *record.pieces[0])
         for record in records
-        if start == REST or _begins_at_rest(measured_twist(record, robot), *record.pieces[0])
+        if start == REST or _begins_at_rest([*measured_twists(record, robot)], *record.pieces[0])
     ]
     if not found:
         raise InsufficientDataError(
@@ -106,14 +107,19 @@ def left_out(records: Sequence[Record], pieces: Sequence[Piece]) -> list[str]:
     return words
 
 
-def _begins_at_rest(twist: FloatArray | None, first: int, last: int) -> bool:
-    if twist is None:
-        return True
-    known = twist[first : last + 1]
-    known = known[np.isfinite(known).all(axis=1)] if np.isnan(known).any() else known
-    rows = known[:STILL]
-    scatter = np.nanstd(np.diff(known, axis=0), axis=0) / np.sqrt(2.0 * len(rows))
-    return bool((np.abs(np.nanmean(rows, axis=0)) <= CLEAR * scatter).all())
+def _begins_at_rest(twists: Sequence[FloatArray], first: int, last: int) -> bool:
+    """Whether nothing visibly moves at the beginning of a piece, by the channel that was measured most often.
+
+    twists: as each channel tells it, each (rows, 3).
+    """
+    for axis in range(N_AXES):
+        speeds = [own[np.isfinite(own)] for own in (twist[first : last + 1, axis] for twist in twists)]
+        speed = max(speeds, key=len, default=np.zeros(0))
+        still = speed[:STILL]
+        scatter = float(np.std(np.diff(speed))) / np.sqrt(2.0 * len(still)) if len(speed) > 1 else 0.0
+        if len(still) and not abs(float(still.mean())) <= CLEAR * scatter:
+            return False
+    return True
 
 
 def _piece(record: Record, first: int, last: int) -> Piece:

@@ -61,20 +61,20 @@ def refits(
 ) -> dict[str, tuple[Candidate, list[Trial]]]:  # fmt: skip
     """Key -> a candidate with what a fit with it shows. problem, parts: what was fitted, its rows at the best point.
 
-    ranked: by columns near the fit. Nothing of a speed loop, or of wheels that slip, whose fits take as long as all
-    else.
+    ranked: by columns near the fit. Nothing of wheels that slip, whose fits take as long as all else.
     """
-    if engine_kind(solution.solver.engine) == LOOP or problem.robot.wheels.traction_mu is not None:
+    if problem.robot.wheels.traction_mu is not None:
         return {}
     point, begun = solution.state.point, []
+    coarse = LOOP if engine_kind(solution.solver.engine) == LOOP else IMPLICIT
     try:
-        off = _by_coarse_steps(problem, parts, point)
+        off = _by_coarse_steps(problem, parts, point, coarse)
     except OmnidynError:  # a nuisance that the implicit engine does not know
         return {}
     for candidate, remedy in _asked(ranked, candidates):
         for way in switches(remedy, problem.robot, _question(problem), solution):
             try:
-                begun.append(_begun(candidate, way, problem, solution, off).gone_on(STEPS))
+                begun.append(_begun(candidate, way, problem, solution, off, coarse).gone_on(STEPS))
             except OmnidynError:  # no engine simulates it, or nothing is left to be fitted
                 continue
     begun.sort(key=lambda each: each.state.objective)
@@ -101,10 +101,11 @@ def _question(problem: Problem) -> Question:
 
 
 class _Coarse(OfRows):
-    """The implicit engine by a step a row, three times as fast, and what that was off by in the fit before."""
+    """An engine by a step a row, or a tick, three times as fast, and what that was off by in the fit before."""
 
-    def __init__(self, problem: Problem, off: Sequence[FloatArray]):
-        self.problem, self._engine, self._off = problem, make_engine(IMPLICIT, problem, None), off
+    def __init__(self, problem: Problem, kind: str, off: Sequence[FloatArray]):
+        self.problem, self._kind, self._off = problem, kind, off
+        self._engine = make_engine(kind, problem, None)
 
     def residuals(self, point: Point) -> list[Parts]:
         """Residuals and slopes of every piece, see engines/sums.py."""
@@ -113,30 +114,30 @@ class _Coarse(OfRows):
 
     def on(self, problem: Problem) -> _Coarse:
         """The same engine on other pieces, of which nothing is known."""
-        return _Coarse(problem, [np.zeros(1)] * len(problem.pieces))
+        return _Coarse(problem, self._kind, [np.zeros(1)] * len(problem.pieces))
 
 
-def _by_coarse_steps(problem: Problem, parts: Sequence[Parts], point: Point) -> list[FloatArray]:
-    """What a step a row is off by in the rows of a fit. Of each piece (C, rows)."""
+def _by_coarse_steps(problem: Problem, parts: Sequence[Parts], point: Point, kind: str) -> list[FloatArray]:
+    """What a step a row, or a tick, of an engine is off by in the rows of a fit. Of each piece (C, rows)."""
     known = problem.robot_count  # a robot as it stands needs no slopes: what was driven to 0 has none
     bare = replace(problem, robot=problem.robot_at(point.values), parameters=problem.parameters[known:], robot_count=0)
-    coarse = make_engine(IMPLICIT, bare, None).residuals(Point(point.values[known:], point.states))
+    coarse = make_engine(kind, bare, None).residuals(Point(point.values[known:], point.states))
     return [np.nan_to_num(fine[0] - rough[0]) for fine, rough in zip(parts, coarse, strict=True)]
 
 
 def _begun(
-    candidate: Candidate, way: Switch, problem: Problem, solution: Solution, off: Sequence[FloatArray]
+    candidate: Candidate, way: Switch, problem: Problem, solution: Solution, off: Sequence[FloatArray], coarse: str
 ) -> _Refit:  # fmt: skip
-    """Where a fit with a candidate begins. Raises OmnidynError for what cannot be fitted."""
+    """Where a fit with a candidate begins. coarse: the engine of `off`. Raises OmnidynError where none can."""
     records = list({id(piece.record): piece.record for piece in problem.pieces}.values())
     keys = expand_keys(way.question.free or (), way.robot)
-    kind = EXACT if is_exact(way.robot) and stays_exact(way.robot, keys) else IMPLICIT
+    kind = EXACT if coarse != LOOP and is_exact(way.robot) and stays_exact(way.robot, keys) else coarse
     made = make_problem(records, way.robot, replace(way.question, free=keys), kind)
     made = replace(made, pieces=problem.pieces)
     before, values = _values(problem, solution), np.array([p.value for p in made.parameters])
     for k, name in enumerate(made.names[made.robot_count :], made.robot_count):
         values[k] = before.get(name, values[k])  # numbers of the robot stand in it where they were found
-    engine = make_engine(kind, made) if kind == EXACT else _Coarse(made, off)
+    engine = make_engine(kind, made) if kind == EXACT else _Coarse(made, kind, off)
     solver = Solver(made, engine, solution.solver.nu, CLOSE, counted=False)
     begins = [values]
     if made.robot.wheels.traction_mu is not None:  # whose leaps lead the latency of wheels that roll astray
