@@ -9,6 +9,7 @@ import typer
 from omnidyn.cli import log_options
 from omnidyn.cli.init_answers import LEAST_WHEELS, MOST_WHEELS, Answers, complete
 from omnidyn.cli.init_logs import as_seen, from_logs
+from omnidyn.cli.init_sizes import refuse_sizes
 from omnidyn.cli.terminal.numbers import number_words
 from omnidyn.cli.terminal.streams import say, show
 from omnidyn.cli.terminal.telling import tell
@@ -85,7 +86,9 @@ def init(
     found = {
         KEYS[key] for key in ("azimuth", "robot_radius", "wheel_radius") if given[key] is not None and key not in told
     }
+    refuse_sizes(_sizes(given, preset))
     answers = complete({key: value for key, value in given.items() if value is not None}, preset, mecanum)
+    refuse_sizes(_sizes(answers.value, preset))
     robot = _with_motor(as_seen(_robot(name, answers, preset, mecanum, friction), seen, found), given, bool(like))
     _write(robot, path, force, json, like)
 
@@ -138,6 +141,15 @@ def _refuse_numbers(given: dict[str, Any]) -> None:
         raise InputError(
             "no gear has this ratio", got=f"{gear:g}", expected="more than 0, such as 30", where="--gear-ratio"
         )
+
+
+def _sizes(given: dict[str, Any], preset: Robot | None) -> dict[str, Any]:
+    """What is given of lengths, angles and the mass, the rest from the preset."""
+    of_preset = {} if preset is None else {
+        "wheel_radius": preset.wheels.wheel_radius, "robot_radius": preset.wheels.robot_radius,
+        "mass": preset.body.mass,
+    }  # fmt: skip
+    return of_preset | {key: value for key, value in given.items() if value is not None}
 
 
 def _listed(key: str, text: str) -> list[float] | None:
@@ -258,18 +270,10 @@ def _write(robot: Robot, path: str, force: bool, json: bool, like: str) -> None:
     if path != "-":
         told = Document([printable(path)], {"robot": robot.name, "output": path, "guessed": guessed(robot)})
         tell(told, json, provenance([robot_input(like)] if like else []))
-    if robot.wheels.radii.max() > _smallest(robot):
-        say("omnidyn: warning: a wheel is larger than the robot; are both radii in metres?")
     if guessed(robot):
         say(f"omnidyn: guessed: {', '.join(guessed(robot))}")
     if like:
         say(f"omnidyn: what was not given is like {like}; inertia and friction are scaled to the size")
-
-
-def _smallest(robot: Robot) -> float:
-    import numpy as np
-
-    return float(np.min(robot.wheels.robot_radius))
 
 
 def _head(robot: Robot) -> str:

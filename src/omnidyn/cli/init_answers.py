@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from omnidyn.cli.init_sizes import refuse_sizes
 from omnidyn.cli.terminal.numbers import number_words
 from omnidyn.cli.terminal.streams import say
 
@@ -68,7 +69,10 @@ def _ask_for(needed: list[str], answers: Answers, preset: Robot | None) -> None:
             _ask_for_wheels(answers, preset)
             continue
         default = getattr(preset.body if key == "mass" else preset.wheels, key) if preset else DEFAULTS[key]
-        typed = _ask(f"{QUESTIONS[key]} [{number_words(default)}]: ", lambda text, key=key: _checked(key, _one(text)))
+        typed = _ask(
+            f"{QUESTIONS[key]} [{number_words(default)}]: ",
+            lambda text, key=key: _checked(key, _one(text), answers.value),
+        )
         if typed is None:
             answers.accepted.add(key)
             if preset is None:
@@ -88,7 +92,8 @@ def _ask_for_wheels(answers: Answers, preset: Robot | None) -> None:
     taken = preset is not None and preset.wheels.count == count
     default = preset.wheels.azimuth_deg if preset is not None and taken else even_azimuths(count)
     typed = _ask(
-        f"{QUESTIONS['azimuth']} [{number_words(default)}]: ", lambda text: _checked("azimuth", _several(text, count))
+        f"{QUESTIONS['azimuth']} [{number_words(default)}]: ",
+        lambda text: _checked("azimuth", _several(text, count), {}),
     )
     if typed is not None or not taken:
         answers.value["azimuth"] = list(default) if typed is None else typed
@@ -142,12 +147,13 @@ def _count(text: str) -> int:
     return int(text)
 
 
-def _checked(key: str, value: Any) -> Any:
-    """The value, if a robot may have it. Raises InputError."""
+def _checked(key: str, value: Any, known: Mapping[str, Any]) -> Any:
+    """The value, if a robot may have it beside what is known. Raises InputError."""
     from omnidyn.model.first_guess import even_azimuths
     from omnidyn.model.robot import Body
     from omnidyn.model.wheels import Wheels
 
+    refuse_sizes({**known, key: value})
     if key == "mass":
         Body(mass=value, inertia=1.0)
     else:

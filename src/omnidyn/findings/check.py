@@ -132,8 +132,9 @@ def _other_count(log: Log, robot: Robot | None) -> list[Finding]:
     if robot is None or log.wheels is None or log.wheels == robot.wheels.count:
         return []
     return [Finding(
-        "wheel_count", NOTE, "", f"the log has {log.wheels} wheel{'s' * (log.wheels > 1)} or motors, the robot "
-        f"{robot.wheels.count}: what needs the robot was not checked", "give the robot that the log is of", (), 0, {},
+        "wheel_count", NOTE if log.wheels == 1 else FATAL, "", f"the log has {log.wheels} "
+        f"wheel{'s' * (log.wheels > 1)} or motors, the robot {robot.wheels.count}: what needs the robot was not "
+        "checked", "give the robot that the log is of", (), 0, {},
     )]  # fmt: skip
 
 

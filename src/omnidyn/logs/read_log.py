@@ -42,7 +42,7 @@ from omnidyn.logs.table.text_file import Progress
 from omnidyn.logs.together import joined_table
 from omnidyn.model.frames import unwrapped
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import wheel_speed
+from omnidyn.model.wheels import MIN_WHEELS, wheel_speed
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
 
 STILL = 1e-6  # [rad/s] a commanded speed below counts as none
@@ -200,13 +200,7 @@ def log_from_table(
     Raises InputError for text where numbers are needed, and for a robot with another number of wheels.
     """
     notes = [*table.notes, *columns.notes]
-    counts = [found[1] + 1 for key in columns.columns if (found := place(key)) and CHANNELS[found[0]] == WHEEL]
-    wheels = max(counts, default=0)
-    if robot is not None and wheels > robot.wheels.count:
-        raise InputError(
-            "the log has more wheels than the robot", got=f"{wheels} wheels",
-            expected=f"{robot.wheels.count}, as {robot.name} has", where=table.source,
-        )  # fmt: skip
+    wheels = _wheel_count(columns, robot, table.source)
     if robot is not None and wheels > 1:
         wheels = robot.wheels.count
     clock = clock or Clock()
@@ -277,6 +271,29 @@ def _unrolled(
         periods += [] if period is None else [period]
         again += [part.start + row for row in restarts]
     return np.concatenate(parts), list(dict.fromkeys(periods)), again
+
+
+def _wheel_count(columns: ColumnMap, robot: Robot | None, where: str) -> int:
+    """Number of wheels that a log has columns of. Raises InputError where the robot has another number of wheels.
+
+    Columns of wheels 1 to N, three or more, are those of a robot of N wheels; one or two may be motors on a bench, and
+    currents those of some sensors.
+    """
+    found = [(each, key) for key in columns.columns if (each := place(key)) and CHANNELS[each[0]] == WHEEL]
+    count = max((index + 1 for (_, index), _ in found), default=0)
+    if robot is None or not found:
+        return count
+    turning = {index for (channel, index), _ in found if channel != "current"}
+    fewer = MIN_WHEELS <= len(turning) == count < robot.wheels.count
+    if count > robot.wheels.count or fewer:
+        raise InputError(
+            f"the log has {'more' if count > robot.wheels.count else 'fewer'} wheels than the robot",
+            got=f"{count} wheels", expected=f"{robot.wheels.count}, as {robot.name} has", where=where,
+            remedy="name the robot of this log, or make its file with `omnidyn init`; where columns of a wheel were not "
+            f"found, say which they are: `column` {found[-1][1][0]}{robot.wheels.count}=NAME:UNIT" if fewer else
+            "name the robot of this log, or make its file with `omnidyn init`",
+        )  # fmt: skip
+    return count
 
 
 def _bare(unit: str) -> str:

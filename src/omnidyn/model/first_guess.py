@@ -331,7 +331,8 @@ def _shows_in_motion(key: Key) -> bool:
 def reasons(robot: Robot) -> list[tuple[str, str]]:
     """(key, why) of every guess of `first_guess`, in the order of the file."""
     keys = dict.fromkeys(name_of(key) for key, prior in robot.priors.items() if prior.origin == GUESS)
-    return [(key, WHY[key]) for key in keys if key in WHY]
+    why = WHY if GEAR in keys else WHY | {EMF: WHY[GEAR]}  # behind a gear that is known the speed tells the constant
+    return [(key, why[key]) for key in keys if key in why]
 
 
 def _mean(value: PerWheel) -> float:

@@ -91,11 +91,11 @@ def test_what_a_topic_says_of_other_axes_is_left_alone(tmp_path, name):
     assert list(guess_columns(table_of(tmp_path, {"t_s": clock(0.01), name: 0.5})).columns) == ["t"]
 
 
-def test_wheels_named_by_their_place_are_no_log_of_one_motor(tmp_path):
-    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "fl_vel": 1, "fr_vel": 2, "rear_vel": 3}))
+def test_two_wheels_named_by_their_place_are_no_log_of_one_motor(tmp_path):
+    columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "left_vel": 1, "right_vel": 2}))
     assert list(columns.columns) == ["t"]
     assert columns.doubts == (
-        "fl_vel, fr_vel, rear_vel look like w1, but no number says which wheel each is (say `column` w1=fl_vel and so "
+        "left_vel, right_vel look like w1, but no number says which wheel each is (say `column` w1=left_vel and so "
         "on): not taken",
     )
 

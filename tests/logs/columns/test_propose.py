@@ -42,8 +42,18 @@ def test_the_motion_proposes_the_order_and_the_signs(tmp_path, order, signs, bla
     np.testing.assert_allclose(read_log(path, robot, columns=told).wheel_speed, speed, rtol=1e-14)
 
 
+def test_the_motion_agrees_with_places_or_is_asked_about(tmp_path):
+    """left, right, back of an axebot, whose wheels stand at 180, -60 and 60 degrees: wheels 3, 2 and 1."""
+    path, speed = log_of(tmp_path / "a.csv", np.array([2, 1, 0]), np.array([1, 1, 1]))
+    robot = omnidyn.load_robot("axebot")
+    log = load_log(path, robot)
+    np.testing.assert_allclose(log.channels["wheel_speed"], speed, rtol=1e-14)
+    assert not log.columns.doubts
+
+
 def test_without_a_robot_or_a_motion_it_is_asked_as_before(tmp_path):
     path, _ = log_of(tmp_path / "a.csv", np.arange(3), np.ones(3))
+    path.write_text(path.read_text().replace("back_", "other_"))  # places all around would say which wheel each is
     assert any("say `column` w1=left_speed_rad_s and so on" in doubt for doubt in load_log(path).columns.doubts)
     text = path.read_text().splitlines()
     short = [",".join(line.split(",")[:4]) for line in text]

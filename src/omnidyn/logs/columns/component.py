@@ -43,7 +43,7 @@ def exact_component(name: str) -> str | None:
 def component_of(name: str, unit: Unit | None, wheel: int | None) -> str | None:
     """The component that a column is called, as in a run file or in other words.
 
-    wheel: the number of the wheel, from 1, that the number in its name means.
+    wheel: the number of the wheel, from 1, that the number or the place in its name means.
     """
     exact, parts = exact_component(name), read_name(name)
     if exact is not None and wheel is not None and parts.number != wheel:
@@ -60,13 +60,13 @@ def is_other(name: NameParts) -> bool:
 def component_of_parts(name: NameParts, unit: Unit | None, wheel: int | None) -> str | None:
     """The component that the words of a name say, None where they say none or too many."""
     unit = unit or name.unit
-    if is_other(name) and not (name.number is not None and unit):
+    if is_other(name) and not (name.of_one_wheel and unit):
         return None
     if unit is not None and unit.quantity not in _HELD:
         return None
     command = "_cmd" if words.COMMAND in name.roles else ""
     letter = numbered_kind(name, unit)
-    if name.number is not None:
+    if name.of_one_wheel:
         if wheel is None or letter is None or (command and letter in ("i", "a")):
             return None
         return f"{letter}{wheel}{command if letter == 'w' else ''}"
@@ -81,7 +81,7 @@ def numbered_kind(name: NameParts, unit: Unit | None) -> str | None:
 
     A unit outweighs a word of its kin and no word (motor_1_V); volts of an encoder are no voltage of a motor.
     """
-    if name.number is None:
+    if not name.of_one_wheel:
         return None
     unit, roles = unit or name.unit, name.roles
     if unit is not None and unit.quantity not in _HELD:

@@ -27,7 +27,7 @@ from omnidyn.logs.columns.guessed import Doubt, Guess, first_word, floats, is_nu
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
 from omnidyn.logs.columns.names import BRACKETS, NameParts, read_name
 from omnidyn.logs.columns.propose import proposed_wheels
-from omnidyn.logs.columns.wheel_numbers import wheel_numbers
+from omnidyn.logs.columns.wheel_numbers import TOLD_BY_PLACES, wheel_numbers
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
 from omnidyn.units import COUNT, COUNT_RATE, Unit, known_unit, parse_unit
@@ -74,6 +74,7 @@ def guess_columns(
         take_time(table, assumed, found)
     if set(numbers.values()) <= {1} and not any(each.component[1:2].isdigit() for each in table.says.values()):
         _take_bench(table, names, assumed, found)
+    _ask_where_motion_differs(table, numbers, found)
     settle_side(table, robot, found)
     take_sides({name: side for name, (_, side) in told.items() if side}, found)
     found.doubts = [doubt for doubt in found.doubts if doubt.name not in (taken or {})]
@@ -271,6 +272,19 @@ def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], foun
     if any(component[1:2].isdigit() for component in found.columns.keys() - numbered):
         some = "no wheel has" if not numbered else "no wheel but the first has"
         found.notes.append(f"{some} a number: taken as a log of one motor")
+
+
+def _ask_where_motion_differs(table: Table, numbers: Mapping[str, int], found: Guess) -> None:
+    """Take back wheels told by their places, where the motion of the body says that their order is another one."""
+    placed = [name for name in numbers if read_name(name).place is not None]
+    speeds = {key: column.name for key, column in found.columns.items() if re.fullmatch(r"w\d+", key)}
+    mine = [name for name in speeds.values() if name in placed]
+    order = proposed_wheels(table, mine, found) if mine else ""
+    if order and order.replace("=-", "=") != ", ".join(f"{key}={name}" for key, name in sorted(speeds.items())):
+        _forget(placed, found)
+        found.notes = [note for note in found.notes if not note.startswith(TOLD_BY_PLACES)]
+        why = f"but the motion is another one than that of wheels at these places (the motion says `column` {order})"
+        found.doubts += [Doubt(name, "w1", why, ()) for name in placed]
 
 
 def _drop_unspoken(alike: dict[str, list[str]]) -> None:

@@ -7,6 +7,7 @@ import unicodedata
 from functools import lru_cache
 from typing import NamedTuple
 
+from omnidyn.logs.columns.places import place_in
 from omnidyn.logs.table.dialect import MAX_NAME
 from omnidyn.units import Unit, known_unit
 
@@ -57,13 +58,20 @@ _SHORT = ("x", "y", "z", "v", "b", "w", "m", "u", "i")  # single letters that co
 class NameParts(NamedTuple):
     """A name taken apart: roles of its words, the number of the wheel or None, the unit in it or None.
 
-    before: what stands before the number, in small letters, without the unit.
+    before: what stands before the number, in small letters, without the unit; of a name with a place instead of a
+    number, all but the place. place: where its wheel stands [degree], see places.py.
     """
 
     roles: frozenset[str]
     number: int | None
     unit: Unit | None
     before: str = ""
+    place: float | None = None
+
+    @property
+    def of_one_wheel(self) -> bool:
+        """Whether a number or a place says which of several it is."""
+        return self.number is not None or self.place is not None
 
 
 @lru_cache(4096)
@@ -72,6 +80,7 @@ def read_name(name: str) -> NameParts:
     plain = _AGAIN.sub("", _without_accents(name[-MAX_NAME:].strip()))
     plain = re.sub(r"duty[ _-]?cycle", "duty", plain.replace("v_n", "vn"), flags=re.IGNORECASE)
     stem, unit = _without_unit(plain)
+    stem = re.sub(r"(?<![A-Za-z])([FRBL]{2})(?=[A-Z][a-z])", r"\1 ", stem)  # FLPower
     spread = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", stem).lower()
     words = re.findall(r"[^\W\d_]+", spread)
     unit = unit or next((known_unit(part) for word in words for part in _parts(word) if part in _SAYS_ITS_UNIT), None)
@@ -79,7 +88,10 @@ def read_name(name: str) -> NameParts:
     if CHANNEL in roles and all(len(word) == 1 or _roles(word) == [CHANNEL] for word in words):
         roles = {CHANNEL}  # channel A
     number, before = (None, "") if roles <= {CHANNEL} else _number(spread)
-    return NameParts(frozenset(roles), number, unit, before)
+    place, others = place_in(words, _ROLE) if number is None else (None, words)
+    if place is not None:
+        roles, before = {role for word in others for role in _roles(word)}, " ".join(others)
+    return NameParts(frozenset(roles), number, unit, before, place)
 
 
 def _without_accents(name: str) -> str:

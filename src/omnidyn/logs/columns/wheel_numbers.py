@@ -1,19 +1,21 @@
-"""Which wheel the number in a name means: files count from 1 or from 0, each family of names in its own way."""
+"""Which wheel the number in a name means, or its place: files count from 1 or from 0, each family in its own way."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.component import component_of_parts, numbered_kind
 from omnidyn.logs.columns.guessed import Doubt, Guess
 from omnidyn.logs.columns.names import BRACKETS, read_name
+from omnidyn.logs.columns.places import wheels_at
 from omnidyn.logs.table.table import Table
 from omnidyn.model.wheels import MAX_WHEELS
 from omnidyn.units import known_unit
 
+TOLD_BY_PLACES = "wheels are told by their places"
 BOARD = 2  # so many times the motors are the places of a board that measures all currents of a robot
 
 
@@ -36,19 +38,23 @@ class Family(NamedTuple):
 
 
 def wheel_numbers(table: Table, names: Iterable[str], found: Guess) -> dict[str, int]:
-    """Name -> number of the wheel from 1, of the names that have a number; a family that counts from 0 is shifted.
+    """Name -> number of the wheel from 1, of the names with a number or a place; a family from 0 on is shifted.
 
     A family that does not count from 0 itself is shifted with one of its style that does (the current of wheel 0 may
     not be logged), unless it counts farther than wheels that are counted from 0 can: u0 u1 u2 beside w1 w2 w3.
     """
     families: dict[Family, dict[str, int]] = {}
+    placed: dict[Family, dict[str, float]] = {}
     for name in names:
         bare = BRACKETS.fullmatch(name)  # speed1 [pix/s]: what is known without its unit
         parts, unit = read_name(bare[1] if bare else name), known_unit(table.units.get(name, ""))
         letter = numbered_kind(parts, unit)
-        if letter is not None and parts.number is not None and component_of_parts(parts, unit, 1) is not None:
+        if letter is not None and component_of_parts(parts, unit, 1) is not None:
             family = Family(letter, words.COMMAND in parts.roles, parts.before)
-            families.setdefault(family, {})[name] = parts.number
+            if parts.number is not None:
+                families.setdefault(family, {})[name] = parts.number
+            elif parts.place is not None:
+                placed.setdefault(family, {})[name] = parts.place
     _leave_out_boards(families, found)
     ends: dict[tuple[str, bool, str], int] = {}
     for family, mine in families.items():
@@ -63,7 +69,22 @@ def wheel_numbers(table: Table, names: Iterable[str], found: Guess) -> dict[str,
         but = f" ({', '.join(others)} from 1)" if others else ""
         found.notes.append(f"wheels are numbered from 0 in the file: 0 is wheel 1{but}")
     numbers = {name: number + (family in shifted) for family, mine in families.items() for name, number in mine.items()}
-    return {name: number for name, number in numbers.items() if 0 < number <= MAX_WHEELS}
+    kept = {name: number for name, number in numbers.items() if 0 < number <= MAX_WHEELS}
+    counted = {family.letter for family in families}
+    return kept | _by_place({family: mine for family, mine in placed.items() if family.letter not in counted}, found)
+
+
+def _by_place(families: Mapping[Family, Mapping[str, float]], found: Guess) -> dict[str, int]:
+    """Name -> number of the wheel from 1 at the place in it, of families whose places decide."""
+    numbers: dict[str, int] = {}
+    for mine in families.values():
+        wheels = wheels_at(mine.values(), found.robot)
+        numbers |= {name: wheels[place] for name, place in mine.items() if place in wheels}
+    first = {wheel: name for name, wheel in reversed(numbers.items())}
+    if first:
+        order = ", ".join(f"{first[wheel]} is wheel {wheel}" for wheel in sorted(first))
+        found.notes.append(f"{TOLD_BY_PLACES}: {order}")
+    return numbers
 
 
 def _leave_out_boards(families: dict[Family, dict[str, int]], found: Guess) -> None:

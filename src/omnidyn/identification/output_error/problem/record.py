@@ -94,6 +94,12 @@ def record(
     counted: as in outputs.py.
     """
     refuse_slope(robot.floor, "a fit starts from")
+    if run.wheels is not None and run.wheels != robot.wheels.count:
+        raise InputError(
+            "the log has another number of wheels", got=run.wheels,
+            expected=f"{robot.wheels.count}, as {robot.name} has", where=run.source,
+            remedy="give the robot that the log is of",
+        )  # fmt: skip
     set_point = _set_point(run, robot, loop)
     if set_point is not None:
         refuse_slip(robot.wheels, "a fit through a speed loop knows")
@@ -164,11 +170,6 @@ def _refuse_wheels_without_input(run: Run, robot: Robot, finite: BoolArray) -> N
 
 def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[str]]:
     """(voltages, whether the supply is only nominal, notes)."""
-    if run.wheels is not None and run.wheels != robot.wheels.count:
-        raise InputError(
-            "the log has another number of wheels", got=run.wheels,
-            expected=f"{robot.wheels.count}, as {robot.name} has", where=run.source,
-        )  # fmt: skip
     nominal = robot.drive.supply
     voltage = asked_voltage(run.voltage, run.duty, run.supply, nominal)
     if voltage is not None:
