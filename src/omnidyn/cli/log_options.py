@@ -127,20 +127,20 @@ def log_files(arguments: Sequence[str]) -> list[str]:
     Numbers in names count as numbers (exp2 before exp10). Raises InputError for a folder without logs.
     """
     from omnidyn.errors import InputError
-    from omnidyn.logs.readers.folders import METADATA, is_bag_folder, natural
+    from omnidyn.logs.readers.folders import is_log_folder, log_folders, natural
 
     files: list[str] = []
     for argument in arguments:
-        if not os.path.isdir(argument) or is_bag_folder(argument):
+        if not os.path.isdir(argument) or is_log_folder(argument):
             files.append(argument)
             continue
-        bags = [path.parent for path in Path(argument).rglob(METADATA) if is_bag_folder(path.parent)]
+        folders = log_folders(argument)
         found = [
             str(path)
             for path in Path(argument).rglob("*")
-            if path.suffix.lower() in ENDINGS and path.is_file() and path.parent not in bags
+            if path.suffix.lower() in ENDINGS and path.is_file() and not {*path.parents} & {*folders}
         ]
-        found += map(str, bags)
+        found += map(str, folders)
         if not found:
             raise InputError("no log in the folder", expected=f"files that end in {' '.join(ENDINGS)}", where=argument)
         files += sorted(found, key=natural)

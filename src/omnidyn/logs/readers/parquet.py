@@ -19,7 +19,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, MissingExtraError
 from omnidyn.files import growth, open_regular, pieces, too_large
 from omnidyn.logs.readers.parquet_pages import declared_bytes
-from omnidyn.logs.readers.reader import Options, Reader
+from omnidyn.logs.readers.reader import Options
 from omnidyn.logs.table.header import MAX_COLUMNS, check_name, split_units
 from omnidyn.logs.table.rows import INFINITE, Column, column_of, refuse_infinite, skip_note
 from omnidyn.logs.table.table import MAX_CELLS, Table
@@ -78,27 +78,24 @@ def parquet_tables(path: str | os.PathLike, rows: int, options: Options) -> Iter
     pyarrow, parquet = import_pyarrow(source)
     with open_regular(path) as stream:
         size = os.fstat(stream.fileno()).st_size
-        digest = _sha256(stream, size)
-        with _damage(pyarrow, source):
+        digest = sha256_of(stream, size)
+        with damage(pyarrow, source):
             file, columns = _opened(pyarrow, parquet, stream, source)
             pages = declared_bytes(stream)
-        _check_size(file.metadata, pages, len(columns.names), size, options.max_bytes, source)
+        check_size(file.metadata, pages, len(columns.names), size, options.max_bytes, source)
         reader = _Rows(columns, source, options.skip_bad_rows)
 
         def table(values: dict[str, Column], lines: Any, sha256: str = "") -> Table:
             notes = (*reader.notes, *(growth(stream, size) if sha256 else ()))
             return Table(columns.names, values, lines, columns.units, source, sha256, notes, columns.titles)
 
-        for done, batch in _batches(pyarrow, file, max(1, min(rows, MAX_CELLS // len(columns.names))), source):
-            with _damage(pyarrow, source):
+        for done, batch in batches_of(pyarrow, file, max(1, min(rows, MAX_CELLS // len(columns.names))), source):
+            with damage(pyarrow, source):
                 values, lines = reader.read(batch, done)
             if options.progress is not None:
                 options.progress(size * (done + batch.num_rows) // max(1, file.metadata.num_rows), size)
             yield table(values, lines)
         yield table({}, np.zeros(0, dtype=np.int64), digest)
-
-
-PARQUET = Reader("parquet", "Parquet", SUFFIXES, parquet_tables)
 
 
 def _opened(pyarrow: Any, parquet: Any, stream: BinaryIO, source: str) -> tuple[Any, _Columns]:
@@ -113,7 +110,7 @@ def _opened(pyarrow: Any, parquet: Any, stream: BinaryIO, source: str) -> tuple[
     return parquet.ParquetFile(stream, read_dictionary=words, **options), columns
 
 
-def _check_size(metadata: Any, pages: int, columns: int, size: int, max_bytes: int | None, source: str) -> None:
+def check_size(metadata: Any, pages: int, columns: int, size: int, max_bytes: int | None, source: str) -> None:
     """Refuse what would take much more memory than the file, before it is read.
 
     A constant column packs to nothing: so the numbers in memory count as well, and not only what the pages declare.
@@ -131,13 +128,15 @@ def _check_size(metadata: Any, pages: int, columns: int, size: int, max_bytes: i
         raise too_large(source, max_bytes, TOO_LARGE_REMEDY)
 
 
-def _batches(pyarrow: Any, file: Any, rows: int, source: str) -> Iterator[tuple[int, Any]]:
-    """Blocks of the file, and how many rows stand before each."""
+def batches_of(
+    pyarrow: Any, file: Any, rows: int, source: str, columns: list[str] | None = None
+) -> Iterator[tuple[int, Any]]:
+    """Blocks of the file, of all its columns or some, and how many rows stand before each."""
     done = 0
-    with _damage(pyarrow, source):
-        batches = iter(file.iter_batches(batch_size=rows, use_threads=False))
+    with damage(pyarrow, source):
+        batches = iter(file.iter_batches(batch_size=rows, use_threads=False, columns=columns))
     while True:
-        with _damage(pyarrow, source):
+        with damage(pyarrow, source):
             batch = next(batches, None)
         if batch is None:
             return
@@ -146,7 +145,7 @@ def _batches(pyarrow: Any, file: Any, rows: int, source: str) -> Iterator[tuple[
 
 
 @contextlib.contextmanager
-def _damage(pyarrow: Any, source: str) -> Iterator[None]:
+def damage(pyarrow: Any, source: str) -> Iterator[None]:
     """Every way in which pyarrow stumbles over a broken file, as an InputError."""
     try:
         yield
@@ -160,7 +159,7 @@ def _damage(pyarrow: Any, source: str) -> Iterator[None]:
         ) from None
 
 
-def _sha256(stream: BinaryIO, size: int) -> str:
+def sha256_of(stream: BinaryIO, size: int) -> str:
     digest = hashlib.sha256()
     for block in pieces(stream, size):
         digest.update(block)
@@ -274,26 +273,26 @@ class _Rows:
             return column
         if hasattr(array, "dictionary_decode"):
             array = array.dictionary_decode()
-        missing = _missing(array)
+        missing = missing_of(array)
         if kind in (MOMENT, DURATION, DAY):
             return np.where(missing, np.nan, _seconds(array))
         if str(array.type) in ("int64", "uint64") and not _is_exact(_whole(array)).all():
             self.rounded.add(name)
         if kind == TRUTH:
             array = array.cast("int8")
-        return np.where(missing, np.nan, _numbers(array.cast("float64", safe=False)))
+        return np.where(missing, np.nan, numbers_of(array.cast("float64", safe=False)))
 
 
 def _whole(array: Any) -> Any:
     """Whole numbers, 0 where missing."""
-    return np.where(_missing(array), np.array(0, dtype=str(array.type)), _numbers(array))
+    return np.where(missing_of(array), np.array(0, dtype=str(array.type)), numbers_of(array))
 
 
-def _missing(array: Any) -> Any:
-    return _numbers(array.is_null().cast("uint8")) == 1
+def missing_of(array: Any) -> Any:
+    return numbers_of(array.is_null().cast("uint8")) == 1
 
 
-def _numbers(array: Any) -> Any:
+def numbers_of(array: Any) -> Any:
     """Numbers as they lie in memory, any where one is missing. `to_numpy` imports pandas where it is installed."""
     start, stop = array.offset, array.offset + len(array)
     return np.frombuffer(array.buffers()[1], dtype=str(array.type).replace("double", "float64"))[start:stop]

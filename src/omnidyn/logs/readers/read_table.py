@@ -9,9 +9,9 @@ from pathlib import Path
 
 from omnidyn.errors import InputError
 from omnidyn.files import default_max_bytes, format_of
-from omnidyn.logs.readers.folders import files_of, is_bag_folder
+from omnidyn.logs.readers.folders import files_of, is_bag_folder, is_log_folder
+from omnidyn.logs.readers.lerobot import PARQUET
 from omnidyn.logs.readers.matlab.mat import HDF5, MAT
-from omnidyn.logs.readers.parquet import PARQUET
 from omnidyn.logs.readers.reader import Options, Reader, completed
 from omnidyn.logs.readers.ros.bags import MCAP, ROS1, ROS2
 from omnidyn.logs.readers.text import TEXT
@@ -94,7 +94,7 @@ def _tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Ta
             "there are no variables to choose from", got=reader.word, expected="a MATLAB or HDF5 file", where=str(path),
             remedy="leave `variables` out; `column` chooses columns and topics",
         )  # fmt: skip
-    if is_bag_folder(path):
+    if is_log_folder(path):
         suffix = ""
     promised = next((each for each in READERS if suffix.lower() in each.suffixes), TEXT)
     tables = completed(reader.tables(path, rows, options), reader.least)

@@ -1,0 +1,220 @@
+"""Parquet files, plain ones and those of a LeRobotDataset: the speeds of a base out of its action and its state.
+
+A dataset is a folder: meta/info.json names the numbers of each feature, data/chunk-000/file-000.parquet holds them, a
+row per frame. Of LeKiwi and its kin x.vel, y.vel [m/s] and theta.vel [deg/s] are read: of the action as what was asked
+for, of observation.state as what was measured. Each episode is a recording of its own: a gap lies before it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.errors import InputError, shortened
+from omnidyn.files import open_regular, read_text
+from omnidyn.logs.readers.folders import INFO, data_files, is_dataset_folder
+from omnidyn.logs.readers.parquet import (
+    SUFFIXES,
+    batches_of,
+    check_size,
+    damage,
+    import_pyarrow,
+    missing_of,
+    numbers_of,
+    parquet_tables,
+    sha256_of,
+)
+from omnidyn.logs.readers.parquet_pages import declared_bytes
+from omnidyn.logs.readers.reader import Options, Reader
+from omnidyn.logs.table.rows import refuse_infinite
+from omnidyn.logs.table.table import MAX_CELLS, Said, Table
+
+ACTION, STATE = "action", "observation.state"
+STAMP, EPISODE = "timestamp", "episode_index"
+SPEEDS = {"x.vel": ("vx", "m/s"), "y.vel": ("vy", "m/s"), "theta.vel": ("omega", "deg/s")}
+BETWEEN = 10.0  # [s] that a gap between two episodes is given
+MAX_INFO = 4 * 2**20  # bytes of meta/info.json
+ABOVE = 3  # folders between a file and that of its dataset
+
+
+@dataclass
+class _Clock:
+    """Time over episodes, each of which counts its own from 0."""
+
+    episode: float = np.nan
+    first: float = 0.0
+    end: float = 0.0
+    episodes: int = 0
+
+    def times(self, stamps: FloatArray, episodes: FloatArray) -> FloatArray:
+        """Seconds since the first row of all, BETWEEN episodes apart. Shapes (rows,)."""
+        out = np.empty(len(stamps))
+        cuts = np.flatnonzero(np.diff(episodes, prepend=self.episode) != 0.0)
+        for begin, stop in zip([0, *cuts], [*cuts, len(stamps)], strict=True):
+            if stop == begin:
+                continue
+            if episodes[begin] != self.episode:
+                gap = BETWEEN if self.episodes else 0.0
+                self.first = self.end + gap - float(stamps[begin])
+                self.episode, self.episodes = float(episodes[begin]), self.episodes + 1
+            out[begin:stop] = stamps[begin:stop] + self.first
+            self.end = float(out[stop - 1])
+        return out
+
+
+def tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
+    """The tables of a Parquet file or of a dataset; see the contract."""
+    files = data_files(Path(path)) if is_dataset_folder(path) else [Path(path)]
+    lists = _lists(files[0])
+    if not lists & {ACTION, STATE}:
+        yield from parquet_tables(files[0], rows, options)
+        return
+    source, info = str(path), _info(Path(path))
+    if info is None:
+        raise InputError(
+            "the numbers of a LeRobot dataset have their names in meta/info.json", got="no such file beside the data",
+            expected="the folder as it was recorded: meta/info.json and data/chunk-000/file-000.parquet",
+            remedy="give the folder of the dataset, whole", where=source,
+        )  # fmt: skip
+    names = {key: _names_of(info, key) for key in (ACTION, STATE) if key in lists}
+    yield from _dataset_tables(files, names, source, rows, options)
+
+
+def _lists(file: Path) -> set[str]:
+    """The columns of a file that hold lists."""
+    pyarrow, parquet = import_pyarrow(str(file))
+    with open_regular(file) as stream, damage(pyarrow, str(file)):
+        kinds, schema = pyarrow.types, parquet.ParquetFile(stream, pre_buffer=False).schema_arrow
+        return {
+            field.name for field in schema
+            if kinds.is_list(field.type) or kinds.is_large_list(field.type) or kinds.is_fixed_size_list(field.type)
+        }  # fmt: skip
+
+
+def _info(path: Path) -> Mapping[str, Any] | None:
+    """What meta/info.json of the dataset of a file or folder says; None where there is none. Raises InputError."""
+    path = path.resolve()
+    folders = [path] if path.is_dir() else [*path.parents][: ABOVE + 1]
+    file = next((folder / INFO for folder in folders if (folder / INFO).is_file()), None)
+    if file is None:
+        return None
+    try:
+        found = json.loads(read_text(file, MAX_INFO))
+    except (ValueError, RecursionError):
+        found = None
+    if not isinstance(found, dict) or not isinstance(found.get("features"), dict):
+        raise InputError("not the description of a dataset", got=INFO, expected='JSON with "features"', where=str(file))
+    return found
+
+
+def _names_of(info: Mapping[str, Any], feature: str) -> list[str]:
+    """The names of the numbers of a feature: a list, or a list under one key, as older versions write it."""
+    own = info["features"].get(feature)
+    names = own.get("names") if isinstance(own, dict) else None
+    if isinstance(names, dict) and len(names) == 1:
+        (names,) = names.values()
+    return [str(name) for name in names] if isinstance(names, list) else []
+
+
+def _dataset_tables(
+    files: Sequence[Path], names: Mapping[str, list[str]], source: str, rows: int, options: Options
+) -> Iterator[Table]:
+    """The tables of the files of a dataset, one after the other."""
+    found = {
+        f"{feature}.{name}": (feature, own.index(name), component, unit)
+        for feature, own in names.items() for name, (component, unit) in SPEEDS.items() if name in own
+    }  # fmt: skip
+    if not found:
+        every = [name for own in names.values() for name in own]
+        raise InputError(
+            "no speeds of a base in the dataset", got=shortened(", ".join(dict.fromkeys(every)) or "no names", 200),
+            expected=f"{', '.join(SPEEDS)} in {ACTION} or {STATE}", where=source,
+        )  # fmt: skip
+    units = {STAMP: "s"} | {column: unit for column, (*_, unit) in found.items()}
+    says = {STAMP: Said("t")} | {
+        column: Said(component + "_cmd" * (feature == ACTION)) for column, (feature, _, component, _) in found.items()
+    }
+    others = dict.fromkeys(name for own in names.values() for name in own if name not in SPEEDS)
+    clock, done, digests = _Clock(), 0, list[str]()
+
+    def table(columns: Mapping[str, FloatArray], lines: IntArray, sha256: str = "") -> Table:
+        notes = _notes(clock, list(others)) if sha256 else ()
+        return Table(tuple(units), dict(columns), lines, units, source, sha256, notes, {}, says)
+
+    for file in files:
+        for part, digest in _parts(file, list(names), len(units), rows, options):
+            if digest:
+                digests.append(digest)
+                continue
+            columns = {STAMP: clock.times(part[STAMP], part[EPISODE])}
+            for column, (feature, place, _, _) in found.items():
+                columns[column] = _place(part[feature], place, len(names[feature]), str(file), done)
+            lines = np.arange(done + 1, done + 1 + len(columns[STAMP]))
+            refuse_infinite(columns, lines, source)
+            done += len(lines)
+            yield table(columns, lines)
+    whole = digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
+    yield table({}, np.zeros(0, dtype=np.int64), whole)
+
+
+def _notes(clock: _Clock, others: list[str]) -> tuple[str, ...]:
+    many = f"{clock.episodes} episodes are recordings of their own: a gap of {BETWEEN:g} s is put before each"
+    left = f"not speeds of the base, and not read: {shortened(', '.join(others), 200)}"
+    return (*([many] if clock.episodes > 1 else []), *([left] if others else []))
+
+
+def _parts(
+    file: Path, features: list[str], count: int, rows: int, options: Options
+) -> Iterator[tuple[dict[str, FloatArray], str]]:
+    """(column -> numbers, "") of each block of a file; ({}, sha256) at its end. Lists are (rows, numbers)."""
+    source = str(file)
+    pyarrow, parquet = import_pyarrow(source)
+    with open_regular(file) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        digest = sha256_of(stream, size)
+        with damage(pyarrow, source):
+            data = parquet.ParquetFile(stream, pre_buffer=False, page_checksum_verification=True)
+            pages, present = declared_bytes(stream), set(data.schema_arrow.names)
+        lost = [name for name in (STAMP, *features) if name not in present]
+        if lost:
+            raise InputError("a file of a dataset without its columns", got=f"no {', '.join(lost)}", where=source,
+                             expected=", ".join((STAMP, EPISODE, *features)))  # fmt: skip
+        check_size(data.metadata, pages, count, size, options.max_bytes, source)
+        chosen = [name for name in (STAMP, EPISODE, *features) if name in present]
+        for done, batch in batches_of(pyarrow, data, max(1, min(rows, MAX_CELLS // count)), source, chosen):
+            with damage(pyarrow, source):
+                part = {name: _numbers(batch.column(name)) for name in chosen}
+            part.setdefault(EPISODE, np.zeros(batch.num_rows))
+            if options.progress is not None:
+                options.progress(size * (done + batch.num_rows) // max(1, data.metadata.num_rows), size)
+            yield part, ""
+    yield {}, digest
+
+
+def _numbers(array: Any) -> FloatArray:
+    """Numbers, or lists of numbers as they follow on one another, NaN where missing. Shape (rows,) or (numbers,)."""
+    if hasattr(array, "flatten") and "list" in str(array.type):
+        array = array.flatten()
+    missing = missing_of(array)
+    return np.where(missing, np.nan, numbers_of(array.cast("float64", safe=False)))
+
+
+def _place(values: FloatArray, place: int, count: int, source: str, done: int) -> FloatArray:
+    """One of `count` numbers of each row. Raises InputError for rows that hold more or fewer."""
+    if count == 0 or len(values) % count:
+        raise InputError(
+            "rows without all numbers of a feature", got=f"{len(values)} numbers from row {done + 1} on",
+            expected=f"{count} in each row, as meta/info.json names them", where=source,
+        )  # fmt: skip
+    return values.reshape(-1, count)[:, place].copy()
+
+
+PARQUET = Reader("parquet", "Parquet", SUFFIXES, tables)
