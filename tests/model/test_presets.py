@@ -10,7 +10,7 @@ import pytest
 from omnidyn.model.deadzone import axis_patterns, dead_zone_force
 from omnidyn.model.drive import SPEED
 from omnidyn.model.robot_file import PRESETS, load_robot, parse_robot, preset_names, robot_to_toml
-from omnidyn.model.wheels import twist_from_wheel_speed
+from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed
 from omnidyn.simulation.simulate import simulate
 
 DATA = Path(os.environ.get("OMNIDYN_DATA", Path(__file__).resolve().parents[3] / "shared" / "data"))
@@ -26,7 +26,7 @@ def command(robot, share):
 
 
 def test_the_presets():
-    assert preset_names() == ["axebot", "axebot-lab", "four-wheel", "mecanum", "robotino"]
+    assert preset_names() == ["axebot", "axebot-lab", "four-wheel", "lekiwi", "mecanum", "robotino"]
 
 
 @pytest.mark.parametrize("name", preset_names())
@@ -129,3 +129,14 @@ def test_the_comments_of_a_preset_are_for_its_readers():
     for words in ("b4303b4c142a785a2a26468727d7156f8d39a9ec", "Apache-2.0", "gray runs", "IFAC-PapersOnLine"):
         assert words in text
     assert tomllib.loads(text)["schema"] == 1
+
+
+def test_the_lekiwi_s_wheels_turn_as_its_software_has_it():
+    """Rim speeds of left, back, right: cos a vx + sin a vy + b omega, a = 150, -90, 30 degrees; r = 0.05, b = 0.125."""
+    robot, twist = load_robot("lekiwi"), np.array([0.2, -0.1, 0.5])
+    angle = np.radians([150.0, -90.0, 30.0])
+    rims = np.cos(angle) * twist[0] + np.sin(angle) * twist[1] + 0.125 * twist[2]
+    np.testing.assert_allclose(wheel_speed(robot.wheels, twist), rims / 0.05, rtol=1e-12)
+    assert robot.drive.kind == SPEED
+    top = robot.motor.voltage_limit / (robot.motor.emf_constant * robot.motor.gear_ratio)
+    assert 45.0 == pytest.approx(top * 60.0 / (2.0 * np.pi), rel=0.02)  # rpm without load

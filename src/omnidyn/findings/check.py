@@ -31,6 +31,7 @@ from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.slip import check_axes, check_slip
 from omnidyn.findings.time_base import begin, between
 from omnidyn.findings.use import joined as joined_uses
+from omnidyn.findings.values.echo import check_echo
 from omnidyn.findings.values.values import check_values
 from omnidyn.findings.wiring.twist_frame import check_twist_frame
 from omnidyn.findings.wiring.wheels import check_wiring
@@ -43,7 +44,7 @@ __all__ = ["check", "check_blocks", "check_log"]
 
 Family = Callable[[LogUnderCheck], tuple[list[Finding], LogUnderCheck]]
 FAMILIES: tuple[Family, ...] = (
-    check_values, check_limits, check_twist_frame, check_derivatives, check_turn_rate, check_wiring,
+    check_echo, check_values, check_limits, check_twist_frame, check_derivatives, check_turn_rate, check_wiring,
     check_dead_wheels, check_slip, check_axes, check_scale, check_averaged, check_lag, check_filters, check_energy,
     check_motion, check_oddities, check_excitation,
 )  # fmt: skip

@@ -27,10 +27,13 @@ READERS = {
 MAX_BYTES = 8 * 2**20
 
 
-def import_robot(kind: str, path: str | os.PathLike, like: Robot | None = None) -> Robot:
+def import_robot(
+    kind: str, path: str | os.PathLike, like: Robot | None = None, wheel_radius: float | None = None
+) -> Robot:
     """The robot in a file of another tool; origins of what was read are "imported".
 
     like: gives what the file does not say, motors above all; without it that is guessed, and marked as a guess.
+    wheel_radius [m]: of a URDF file whose wheels are meshes.
     Raises InputError for a kind that is not read, and for a file that cannot be used.
     """
     if kind not in READERS:
@@ -40,6 +43,11 @@ def import_robot(kind: str, path: str | os.PathLike, like: Robot | None = None) 
         raise InputError(
             f"{kind} holds a whole robot", got="`like`", expected="nothing to complete", remedy="leave it out"
         )
+    if wheel_radius is not None and kind != "urdf":
+        raise InputError(
+            f"{kind} holds the radius of its wheels", got="`wheel_radius`", expected="urdf", remedy="leave it out"
+        )
     read = getattr(importlib.import_module(reader.module), reader.function)
     text = read_text(path, MAX_BYTES)
-    return read(text, os.fspath(path), like) if reader.completes else read(text, os.fspath(path))
+    more = {} if wheel_radius is None else {"wheel_radius": wheel_radius}
+    return read(text, os.fspath(path), like, **more) if reader.completes else read(text, os.fspath(path))

@@ -37,12 +37,15 @@ class Lump(NamedTuple):
 
 
 class Axle(NamedTuple):
-    """A wheel: its name, centre and axis in the frame of the robot, radius [m], inertia about the axis [kg m^2]."""
+    """A wheel: its name, centre and axis in the frame of the robot, radius [m], inertia about the axis [kg m^2].
+
+    radius: None where the file has none, for a wheel that is a mesh.
+    """
 
     name: str
     centre: FloatArray
     axis: FloatArray
-    radius: float
+    radius: float | None
     inertia: float
 
 
@@ -83,7 +86,7 @@ def _refuse_impossible(lumps: Sequence[Lump], axles: Sequence[Axle]) -> None:
                 expected="0 or more", remedy="correct the signs of its inertial part",
             )  # fmt: skip
     for axle in axles:
-        if not np.all(np.abs([*axle.centre, *axle.axis, axle.radius, axle.inertia]) <= LARGEST):
+        if not np.all(np.abs([*axle.centre, *axle.axis, axle.radius or 0.0, axle.inertia]) <= LARGEST):
             raise InputError("a part beyond all robots", got=axle.name, expected=f"numbers below {LARGEST:g}")
 
 
@@ -127,8 +130,15 @@ def _wheels(axles: Sequence[Axle], centre: FloatArray) -> Wheels:
     if not MIN_WHEELS <= len(axles) <= MAX_WHEELS:
         raise InputError(
             "cannot tell the wheels", got=f"{len(axles)} found: {', '.join(axle.name for axle in axles) or 'none'}",
-            expected=f"{MIN_WHEELS} to {MAX_WHEELS} parts whose name has wheel in it, on joints that turn about a "
-            "horizontal axis", remedy="name them so in the file, or begin with omnidyn init",
+            expected=f"{MIN_WHEELS} to {MAX_WHEELS} parts whose name has wheel or rim in it, on joints that turn "
+            "without end about a horizontal axis", remedy="name them so in the file, or begin with omnidyn init",
+        )  # fmt: skip
+    radii = [axle.radius for axle in axles if axle.radius is not None]
+    if len(radii) < len(axles):
+        raise InputError(
+            "the file holds no radius of these wheels: they are meshes", where="wheels",
+            got=", ".join(axle.name for axle in axles if axle.radius is None)[:LONGEST_NAMES],
+            expected="a cylinder or a sphere, or the radius [m]", remedy="give it, such as `wheel_radius` 0.05",
         )  # fmt: skip
     azimuth, far = [], []
     for axle in axles:
@@ -145,7 +155,7 @@ def _wheels(axles: Sequence[Axle], centre: FloatArray) -> Wheels:
         far.append(math.hypot(away[0], away[1]))
     return Wheels(
         azimuth_deg=tuple(float(f"{each:.12g}") for each in azimuth), robot_radius=_one_or_all(far),
-        wheel_radius=_one_or_all([axle.radius for axle in axles]),
+        wheel_radius=_one_or_all(radii),
         wheel_inertia=_one_or_all([axle.inertia for axle in axles]),
     )  # fmt: skip
 

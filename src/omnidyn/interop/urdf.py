@@ -1,8 +1,9 @@
 """import urdf: masses, inertias and wheels of a URDF file, through the tree of its joints.
 
 A wheel is the child of a joint that turns without end (continuous) about a horizontal axis; where some of these have
-"wheel" in their name, only those. Its radius is that of its cylinder or sphere. Read by the standard library; a file
-that declares entities is refused.
+"wheel" or "rim" in their name, only those, and else those of a round shape. What rolls on a wheel, and casters, are
+none. Its radius is that of its cylinder or sphere; a mesh has none. Read by the standard library; a file that declares
+entities is refused.
 """
 
 from __future__ import annotations
@@ -24,8 +25,13 @@ INERTIA = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0
 LEVEL = 0.02  # of an axis: its rise, below which it is horizontal
 
 
-def robot_of_urdf(text: str, where: str = "robot.urdf", other: Robot | None = None) -> Robot:
-    """The robot of a URDF file; `other` gives what it does not say. Raises InputError for a bad file."""
+def robot_of_urdf(
+    text: str, where: str = "robot.urdf", other: Robot | None = None, wheel_radius: float | None = None
+) -> Robot:
+    """The robot of a URDF file; `other` gives what it does not say. Raises InputError for a bad file.
+
+    wheel_radius [m]: of its wheels, where the file does not hold it: a mesh has no radius.
+    """
     root = parsed(text, where)
     if root.tag != "robot":
         raise InputError("not a URDF file", got=f"<{root.tag}>", expected="<robot>", where=where)
@@ -33,6 +39,8 @@ def robot_of_urdf(text: str, where: str = "robot.urdf", other: Robot | None = No
         lumps, axles = _parts(root)
     except InputError as error:
         raise error.at(where) from None
+    if wheel_radius is not None:
+        axles = [axle._replace(radius=wheel_radius) for axle in axles]
     return robot_of_parts(root.get("name") or "robot", lumps, axles, where, other)
 
 
@@ -63,9 +71,32 @@ def _parts(root: ET.Element) -> tuple[list[Lump], list[Axle]]:
     frames = _frames(links, joints)
     lumps = [lump for name, frame in frames.items() for lump in _lump(links[name], frame)]
     turning = [joint for joint in joints if joint.get("type") == "continuous" and _child(joint) in frames]
-    axles = [(joint, axle) for joint in turning if (axle := _axle(joint, links, frames)) is not None]
-    named = [axle for joint, axle in axles if "wheel" in f"{joint.get('name')} {_child(joint)}".lower()]
-    return lumps, named or [axle for _, axle in axles]
+    found = [(joint, axle) for joint in turning if (axle := _axle(joint, links, frames)) is not None]
+    upon = {_child(joint) for joint, _ in found}
+    axles = [
+        (joint, axle) for joint, axle in found if not _parents(joint, joints) & upon and not _NO_WHEEL(_name(joint))
+    ]
+    named = [axle for joint, axle in axles if _WHEEL(_name(joint))]
+    return lumps, named or [axle for _, axle in axles if axle.radius is not None]
+
+
+_WHEEL, _NO_WHEEL = re.compile("wheel|whl|rim", re.IGNORECASE).search, re.compile("roller|cast[eo]r", re.I).search
+
+
+def _name(joint: ET.Element) -> str:
+    """The names of a joint and of what it turns."""
+    return f"{joint.get('name')} {_child(joint)}"
+
+
+def _parents(joint: ET.Element, joints: list[ET.Element]) -> set[str]:
+    """The links above a joint, up to the root of a tree."""
+    above = {_child(each): parent.get("link", "") for each in joints if (parent := each.find("parent")) is not None}
+    found: set[str] = set()
+    link = above.get(_child(joint))
+    while link is not None and link not in found:
+        found.add(link)
+        link = above.get(link)
+    return found
 
 
 def _child(joint: ET.Element) -> str:
@@ -140,7 +171,7 @@ def _lump(link: ET.Element, frame: Frame) -> Iterator[Lump]:
 
 
 def _axle(joint: ET.Element, links: dict[str, ET.Element], frames: dict[str, Frame]) -> Axle | None:
-    """The wheel on a joint; None where its axis is not horizontal or it has no round shape."""
+    """What turns on a joint, with the radius of its round shape if it has one; None where its axis is not horizontal."""
     name = _child(joint)
     place, turn = frames[name]
     node = joint.find("axis")
@@ -151,7 +182,7 @@ def _axle(joint: ET.Element, links: dict[str, ET.Element], frames: dict[str, Fra
         (float(_numbers(shape, "radius", 1)[0]) for kind in ("cylinder", "sphere") for shape in links[name].iter(kind)),
         None,
     )
-    if radius is None or length == 0.0 or abs(axis[2]) > LEVEL:
+    if length == 0.0 or abs(axis[2]) > LEVEL:
         return None
     lump = next(_lump(links[name], frames[name]), None)
     spins = 0.0 if lump is None else float(axis @ lump.inertia @ axis)

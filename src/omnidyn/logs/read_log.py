@@ -289,9 +289,10 @@ def _wheel_count(columns: ColumnMap, robot: Robot | None, where: str) -> int:
         raise InputError(
             f"the log has {'more' if count > robot.wheels.count else 'fewer'} wheels than the robot",
             got=f"{count} wheels", expected=f"{robot.wheels.count}, as {robot.name} has", where=where,
-            remedy="name the robot of this log, or make its file with `omnidyn init`; where columns of a wheel were not "
-            f"found, say which they are: `column` {found[-1][1][0]}{robot.wheels.count}=NAME:UNIT" if fewer else
-            "name the robot of this log, or make its file with `omnidyn init`",
+            remedy="name the robot of this log, or make its file with `omnidyn init`" + (
+                "; where columns of a wheel were not found, say which they are: `column` "
+                f"{found[-1][1][0]}{robot.wheels.count}=NAME:UNIT"
+            ) * fewer,
         )  # fmt: skip
     return count
 

@@ -15,6 +15,9 @@ def bring(
     like: str = typer.Option(
         "", metavar="ROBOT", help="Take what FILE does not say, such as motors, from this preset or robot file."
     ),
+    wheel_radius: float | None = typer.Option(
+        None, metavar="M", help="Radius of the wheels [m], where they are meshes in a URDF file."
+    ),
     force: bool = typer.Option(False, "--force", help="Replace the file if it exists."),
     json: bool = typer.Option(False, "--json", help="What was read and guessed, for machines."),
 ) -> None:
@@ -22,6 +25,7 @@ def bring(
 
     What was read is marked as imported; what FILE does not say is guessed, with a wide spread, and marked as a guess.
     """
+    from omnidyn.cli.init_sizes import refuse_sizes
     from omnidyn.cli.terminal.session import input_file, provenance, robot_input
     from omnidyn.files import check_output, keep_apart, write_atomic
     from omnidyn.interop.kinds import import_robot
@@ -34,7 +38,8 @@ def bring(
     if out not in ("", "-"):
         keep_apart([out], [file, *([robot_path(like)] if like else [])])
         check_output(out, force)
-    robot = import_robot(kind, file, load_robot(like) if like else None)
+    refuse_sizes({"wheel_radius": wheel_radius})
+    robot = import_robot(kind, file, load_robot(like) if like else None, wheel_radius)
     text = robot_to_toml(robot)
     if out == "-":
         show(text.rstrip("\n"))

@@ -1,0 +1,47 @@
+"""A measurement that is the command of rows before: software that logs what it sent, in the place of a sensor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.findings.finding import FATAL, Finding
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
+from omnidyn.logs.channels import components
+
+PAIRS = (("twist", "twist_command"), ("wheel_speed", "wheel_speed_command"))
+FARTHEST = 3  # rows by which the command may have been written late
+SAME = 2e-6  # of the largest command: a number in single precision, written with its digits
+ALWAYS = 0.99  # share of the rows in which both are the same
+CHANGES = 5  # of the commands: a robot that rests, or that a simulator moves at one speed, says nothing
+
+
+def check_echo(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """Fatal where a channel is no measurement; it is masked."""
+    found: list[Finding] = []
+    for measured, commanded in PAIRS:
+        values, command = work.get(measured), work.get(commanded)
+        if values is None or command is None or len(work) < MIN_ROWS:
+            continue
+        rows = next((k for k in range(FARTHEST + 1) if _is_command(values, command, k)), None)
+        if rows is None:
+            continue
+        before = "the same row" if rows == 0 else "the row before" if rows == 1 else f"{rows} rows before"
+        found.append(Finding(
+            "echo", FATAL, " ".join(components(measured, values.shape[1])),
+            f"{measured.replace('_', ' ')} is the command of {before}, to the last digit: no sensor measured it",
+            "log what the encoders, the gyroscope or a camera measure; of a robot whose software does not, "
+            "leave the column out", work.lines(np.isfinite(values).any(axis=1)), len(work), {"rows": float(rows)},
+        ))  # fmt: skip
+        work = work.replace(**{measured: None})
+    return found, work
+
+
+def _is_command(values: FloatArray, command: FloatArray, rows: int) -> bool:
+    """Whether all of a measurement is the command of so many rows before, and that changes often enough to tell."""
+    later, before = values[rows:], command[: len(command) - rows]
+    known = np.isfinite(later) & np.isfinite(before) & ((later != 0.0) | (before != 0.0))
+    size = np.nanmax(np.abs(command), axis=0, initial=0.0)
+    same = np.abs(later - before) <= SAME * np.maximum(size, 1e-9)
+    changes = [int(np.count_nonzero(np.diff(own[np.isfinite(own)]))) for own in command.T]
+    return sum(changes) >= CHANGES and bool(known.any()) and float(same[known].mean()) >= ALWAYS
