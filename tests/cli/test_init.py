@@ -258,7 +258,10 @@ def test_a_log_that_does_not_tell_of_turning_says_so(call, here):
         (["--wheel-radius", "2.9"], "--wheel-radius: no wheel radius is so large; got 2.9 m", "--wheel-radius 0.029"),
         (["--wheel-radius", "40"], "--wheel-radius: no wheel radius is so large; got 40 m", "--wheel-radius 0.04"),
         (["--wheel-radius", "40,40,34"], "got 40,40,34 m; expected metres", "--wheel-radius 0.04,0.04,0.034"),
-        (["--wheel-radius", "0.4", "--robot-radius", "0.3"], "a wheel is larger than the robot", "--wheel-radius 0.01016"),
+        (
+            ["--wheel-radius", "0.4", "--robot-radius", "0.3"], "a wheel is larger than the robot",
+            "--wheel-radius 0.01016",
+        ),
         (
             ["--wheel-radius", "0.125", "--robot-radius", "0.04"], "a wheel is larger than the robot",
             "--wheel-radius 0.04 --robot-radius 0.125",

@@ -36,7 +36,7 @@ def test_the_robot_of_the_log_or_the_column_that_was_missed_is_the_remedy(call, 
     text = (here / "log.csv").read_text().splitlines()
     more = [f"{line},{'last_one' if k == 0 else 0.01 * k}" for k, line in enumerate(text)]
     (here / "log.csv").write_text("\n".join(more) + "\n")
-    code, _, err = call("check", "log.csv", "--robot", "four-wheel")
+    _, _, err = call("check", "log.csv", "--robot", "four-wheel")
     assert "say which they are: --column w4=NAME:UNIT" in err
     assert call("check", "log.csv", "--robot", "four-wheel", "--column", "w4=last_one:rad/s")[0] == 0
 

@@ -139,4 +139,4 @@ def test_the_lekiwi_s_wheels_turn_as_its_software_has_it():
     np.testing.assert_allclose(wheel_speed(robot.wheels, twist), rims / 0.05, rtol=1e-12)
     assert robot.drive.kind == SPEED
     top = robot.motor.voltage_limit / (robot.motor.emf_constant * robot.motor.gear_ratio)
-    assert 45.0 == pytest.approx(top * 60.0 / (2.0 * np.pi), rel=0.02)  # rpm without load
+    assert top * 60.0 / (2.0 * np.pi) == pytest.approx(45.0, rel=0.02)  # rpm without load

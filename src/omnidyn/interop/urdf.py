@@ -171,7 +171,7 @@ def _lump(link: ET.Element, frame: Frame) -> Iterator[Lump]:
 
 
 def _axle(joint: ET.Element, links: dict[str, ET.Element], frames: dict[str, Frame]) -> Axle | None:
-    """What turns on a joint, with the radius of its round shape if it has one; None where its axis is not horizontal."""
+    """What turns on a joint, with the radius of its round shape, if any; None where its axis is not horizontal."""
     name = _child(joint)
     place, turn = frames[name]
     node = joint.find("axis")
