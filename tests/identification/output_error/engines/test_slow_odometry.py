@@ -7,7 +7,7 @@ import pytest
 from omnidyn import Run, load_robot, read_log
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.identify import identify
-from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.begin import begun
 from omnidyn.identification.output_error.prepare import read_records
 from omnidyn.identification.output_error.problem.motion import motion
 from omnidyn.identification.output_error.solve.loop import loop_pieces
@@ -124,7 +124,7 @@ def test_guesses_of_an_axis_that_rested_are_not_asked_for(driven, robot):
     only_x = Run(run.t, twist_command=still["twist_command"], twist=still["twist"])
     records = read_records([only_x], robot, Question())
     assert motion(records, robot).moved.tolist() == [True, False, False]
-    free = Fit([only_x], robot, Question()).groups[0].question.free
+    free = begun("all", [only_x], robot, Question(), joint=False)[0].question.free
     assert not [key for key in free if key.startswith("friction.direction.yaw")]
 
 
