@@ -17,6 +17,7 @@ from omnidyn.identification.output_error.problem.problem import Parts, Point, Pr
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
 from omnidyn.identification.output_error.trust.breakaway import levels_of
 from omnidyn.identification.structure.binned import binned
+from omnidyn.identification.structure.bounded import bounded
 from omnidyn.identification.structure.linear import Linear, Rows
 from omnidyn.identification.structure.misfit import FALSE, Misfit, chance, memory_beside, misfit, with_cause
 from omnidyn.identification.structure.missing.candidates import Candidate, Trial
@@ -28,14 +29,14 @@ from omnidyn.identification.structure.missing.unoffered import unoffered
 from omnidyn.identification.structure.motion import motions
 from omnidyn.identification.structure.noise_level import noise_levels
 from omnidyn.identification.structure.rests_on import rests_on
-from omnidyn.identification.structure.rounded_inputs import rows_told, with_rounding
+from omnidyn.identification.structure.rounded_inputs import effects, with_rounding
 from omnidyn.identification.structure.shifts import stability
 from omnidyn.identification.structure.tails import as_counted, calmer, wild_samples
 from omnidyn.identification.structure.workbench import Workbench
 from omnidyn.model.known.holding import holding
 
 SURE = 2.0  # degrees of freedom with which the power of the slowest errors is known within its own size
-MOST_ROWS = 30_000  # that are looked at: of many logs some, of each its beginning
+SHOWN = 400  # columns: about what themes and candidates show
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +65,7 @@ def examine(solution: Solution) -> Examined:
     """
     solver, point = solution.solver, solution.state.point
     whole = with_levels(solver.problem, point, levels_of(solution))
-    problem = whole.shortened(rows_told(whole, MOST_ROWS))
+    problem = bounded(whole, SHOWN, effects(whole))
     engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
     parts = engine.residuals(point)
     moved = motions(problem, point)

@@ -21,13 +21,13 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.solver import Normal, RowEngine, Solution
+from omnidyn.identification.structure.bounded import bounded
 from omnidyn.identification.structure.linear import Linear, Rows
 from omnidyn.identification.structure.misfit import memory_of
 from omnidyn.identification.structure.missing.remedies import Blocks
 from omnidyn.model.actuation import DEAD_BAND
 
 SURE = 10.8  # what a likelihood that is sure of a nuisance gains by it: 2 F, by chance once in a thousand logs
-MOST_ROWS = 30_000  # that are looked at
 
 
 def unearned(solution: Solution) -> tuple[str, ...]:
@@ -64,7 +64,7 @@ def _blocks(solution: Solution) -> Blocks:
     """The fit in blocks of white rows."""
     whole = solution.solver.problem
     assert isinstance(whole, Problem)
-    problem = whole.shortened(MOST_ROWS)
+    problem = bounded(whole)
     engine: RowEngine = solution.solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]
     rows = Rows.of(problem, solution.state.point, engine.residuals(solution.state.point))
     slopes = [np.where(solution.held, 0.0, own) for own in rows.slopes]  # what a bound holds, holds in every block

@@ -20,13 +20,14 @@ from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.memory.whitened import known_rows, moving_rows
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
-from omnidyn.identification.structure.random_effects import RandomEffects, scaled
+from omnidyn.identification.structure.random_effects import RandomEffects, drawn_together, scaled
 from omnidyn.identification.structure.rounding import anew, of_rounding
 
 TINY = 1e-300
 SAME = 1e-10  # of the largest eigenvalue of columns of length 1: below it directions are one
 BARE = 0.32  # of a tick: rounding alone has 1/sqrt(12)
 SIMULATED = 0.3  # of what the first order is off by: what a motion that is simulated anew is
+OPEN, FEWEST = 2_000_000, 40  # numbers of a piece that what rounding may be off by is held in; columns, at least
 Shown = Sequence[FloatArray]  # of each piece: (C, rows, K)
 
 
@@ -138,26 +139,63 @@ class Linear:
 
     def white(self, shown: Shown) -> FloatArray:
         """What is shown in the rows, as the fit sees it: (N, K), starts projected out, a row of 0 for each prior."""
-        found = [self._without_start(k, values) for k, values in enumerate(shown)]
-        if self.rounding:
-            found = [own.white(values) for own, values in zip(self.rounding, found, strict=True)]
+        found = [self._white(k, values) for k, values in enumerate(shown)]
         return np.concatenate([*found, np.zeros((len(self.rows.problem.parameters), found[0].shape[1]))])
+
+    def _white(self, k: int, values: FloatArray) -> FloatArray:
+        one = self._without_start(k, values)
+        return self.rounding[k].white(one) if self.rounding else one
+
+    def beside(self, k: int, shown: Sequence[FloatArray]) -> FloatArray:
+        """[e, J, Z] of piece k in white rows, (N, 1 + P + K), Z of several (C, rows, K of its own): each is made white
+        by itself, so that little more than what is returned is held."""
+        every, first = [self.rows.residual[k][:, :, None], self.rows.slopes[k], *shown], 0
+        found = np.empty((self.length(k), sum(each.shape[2] for each in every)))
+        for each in every:
+            found[:, first : (first := first + each.shape[2])] = self._white(k, each)
+        return found
+
+    def length(self, k: int) -> int:
+        """How many white rows a piece has, with those of what is known of its start."""
+        return len(self._starts[k]) if self.rows.own[k].shape[2] else int(self.rows.there[k].sum())
+
+    @property
+    def priors(self) -> FloatArray:
+        """[e, J] (P, 1 + P) of what is known beforehand, a row of 0 of what is not."""
+        parameters = self.rows.problem.parameters
+        found = np.zeros((len(parameters), 1 + len(parameters)))
+        for i, (p, value) in enumerate(zip(parameters, self.rows.point.values, strict=True)):
+            if p.known is not None:
+                mean, std = p.known
+                found[i, 0], found[i, 1 + i] = (mean - p.inner(float(value))) / std, 1.0 / std
+        return found
 
     def _without_start(self, k: int, values: FloatArray) -> FloatArray:
         """Columns of piece k made white, what its start explains projected out."""
-        piece, own, one = self.rows.pieces[k], self.of_piece(k, self.rows.own[k]), self.of_piece(k, values)
-        if not own.shape[1]:
+        one, start = self.of_piece(k, values), self._starts[k]
+        if not self.rows.own[k].shape[2]:
             return one
+        one = np.concatenate([one, np.zeros((len(start) - len(one), one.shape[1]))])
+        one -= start @ (start.T @ one)
+        return one
+
+    @cached_property
+    def _starts(self) -> list[FloatArray]:
+        """Of each piece an orthonormal basis (N, S) of what its start shows in white rows, what is known of it below."""
+        return [self._start(k) for k in range(len(self.rows.pieces))]
+
+    def _start(self, k: int) -> FloatArray:
+        piece, own = self.rows.pieces[k], self.of_piece(k, self.rows.own[k])
+        if not own.shape[1]:
+            return own
         _, known = piece.start_prior(self.rows.point.states[k])
         held = np.sqrt(known[piece.free[: len(known)]])
         extra = np.zeros((len(held), own.shape[1]))
         extra[np.arange(len(held)), np.arange(len(held))] = held
         own = np.vstack([own, extra])
-        one = np.vstack([one, np.zeros((len(held), one.shape[1]))])
         size = np.linalg.norm(own, axis=0)
         left, size_, _ = np.linalg.svd(own[:, size > 0.0] / size[size > 0.0], full_matrices=False)
-        left = left[:, size_ > 1e-9 * size_.max(initial=1e-300)]
-        return one - left @ (left.T @ one)
+        return left[:, size_ > 1e-9 * size_.max(initial=1e-300)]
 
     def with_start(self, k: int, values: FloatArray) -> FloatArray:
         """Columns of piece k made white, its start still in them, what its inputs were rounded by in none."""
@@ -170,8 +208,11 @@ class Linear:
 
     def of_piece(self, k: int, values: FloatArray) -> FloatArray:
         """Columns of piece k made white, its start, and what its inputs were rounded by, still in them."""
-        parts = [self.of_column(k, j, values[j]) for j in range(len(self.rows.column[k]))]
-        return np.concatenate(parts) if parts else np.zeros((0, values.shape[2]))
+        ends = np.cumsum([0, *(int(there.sum()) for there in self.rows.there[k])])
+        found = np.empty((int(ends[-1]), values.shape[2]))
+        for j in range(len(self.rows.column[k])):
+            found[ends[j] : ends[j + 1]] = self.of_column(k, j, values[j])
+        return found
 
     def of_column(self, k: int, j: int, values: FloatArray) -> FloatArray:
         """Values (rows, K) of column j of piece k made white, in the rows that count."""
@@ -204,8 +245,10 @@ class Linear:
         return self.rows.rounding[k] @ self.rounding[k].predicted(self._without_start(k, values))
 
     def open(self, k: int) -> FloatArray:
-        """What that may be off by, (C, rows, M) of variance 1 each."""
-        return self.rows.rounding[k] @ self.rounding[k].open
+        """What that may be off by, (C, rows, M) of variance 1 each; of many, as few as OPEN leaves room for."""
+        shown, root = self.rows.rounding[k], self.rounding[k].open
+        most = max(OPEN // max(shown[:, :, 0].size, 1), FEWEST)
+        return shown @ (root if root.shape[1] <= most else drawn_together(root, most))
 
     def known(self, shown: Shown) -> FloatArray:
         """Degrees of freedom with which the noise along some directions is known, by how well the memory is. (K,).
@@ -244,15 +287,8 @@ class Linear:
 
     def whole(self) -> tuple[FloatArray, FloatArray]:
         """(e (N,), J (N, P)) of the fit itself, its priors as rows."""
-        e = self.white([r[:, :, None] for r in self.rows.residual])[:, 0]
-        j = self.white(self.rows.slopes)
-        count = len(self.rows.problem.parameters)
-        for i, (p, value) in enumerate(zip(self.rows.problem.parameters, self.rows.point.values, strict=True)):
-            if p.known is not None:
-                mean, std = p.known
-                j[len(j) - count + i, i] = 1.0 / std
-                e[len(e) - count + i] = (mean - p.inner(float(value))) / std
-        return e, j
+        every = np.concatenate([*(self.beside(k, []) for k in range(len(self.rows.pieces))), self.priors])
+        return np.ascontiguousarray(every[:, 0]), np.ascontiguousarray(every[:, 1:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,14 +306,15 @@ class Gram:
     @classmethod
     def of(cls, linear: Linear, shown: Shown) -> Gram:
         """Those of a fit and of what is shown beside it."""
-        e, j = linear.whole()
-        every = np.column_stack([e, j, linear.white(shown)])
-        size = np.linalg.norm(every, axis=0)
-        size[0] = 1.0
-        size[size == 0.0] = 1.0
-        every /= size
-        rows = len(e) - j.shape[1] + sum(p.known is not None for p in linear.rows.problem.parameters)
-        return cls(every.T @ every, size, rows, j.shape[1])
+        parameters, rows = linear.rows.problem.parameters, 0
+        products = with_priors(linear, shown[0].shape[2])
+        for k, own in enumerate(shown):
+            every = linear.beside(k, [own])
+            products += every.T @ every
+            rows += len(every)
+        size = lengths(products)
+        rows += sum(p.known is not None for p in parameters)
+        return cls(products / np.outer(size, size), size, rows, len(parameters))
 
     @property
     def fitted(self) -> IntArray:
@@ -304,6 +341,18 @@ class Gram:
         weights[by] = ways
         weights[known] = -solved_by(self.matrix[np.ix_(known, known)], self.matrix[np.ix_(known, by)] @ ways)
         return (ways.T @ rest.matrix[by, 0]) ** 2, (weights / self.size[:, None])[1:]
+
+
+def with_priors(linear: Linear, more: int) -> FloatArray:
+    """Scalar products of [e, J] in the rows of the priors, and 0 of `more` columns. (1 + P + more, 1 + P + more)."""
+    return np.pad(linear.priors.T @ linear.priors, (0, more))
+
+
+def lengths(products: FloatArray) -> FloatArray:
+    """What columns [e, J, Z] with these scalar products (n, n) are divided by, e and those of 0 by 1. (n,)."""
+    size = np.sqrt(np.diag(products))
+    size[0] = 1.0
+    return np.where(size > 0.0, size, 1.0)
 
 
 def solved(columns: FloatArray, right: FloatArray) -> FloatArray:

@@ -113,20 +113,18 @@ def _beside(rows: Rows, shown: Sequence[FloatArray], taken: IntArray, own: IntAr
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """What is left of a fit, and of the columns that may explain it. known: which columns explain already; bare: all
-    columns in the rows as they are, without what the starts of pieces explain."""
+    """What is left of a fit, and of the columns that may explain it. known: which columns explain already; shown: those
+    columns (C, rows, K) of each piece."""
 
     linear: Linear
     gram: Gram
     known: IntArray
-    bare: Sequence[FloatArray]
+    shown: Sequence[FloatArray]
 
     @classmethod
     def of(cls, linear: Linear, shown: Sequence[FloatArray], taken: IntArray) -> _Asked:
         gram = Gram.of(linear, shown)
-        both = [np.concatenate(each, axis=2) for each in zip(linear.rows.slopes, shown, strict=True)]
-        known = np.concatenate([gram.fitted, 1 + gram.count + taken])
-        return cls(linear, gram, known, linear.without_starts(both))
+        return cls(linear, gram, np.concatenate([gram.fitted, 1 + gram.count + taken]), shown)
 
     def score(self, own: IntArray) -> tuple[float, float, int]:
         """(F, p, directions) of what some columns of what is shown explain of what is left.
@@ -141,7 +139,9 @@ class _Asked:
         rest, _ = self.gram.left(self.known)
         rows = max(rest.rows - len(explained), 1)
         noise = max(float(rest.matrix[0, 0]) - float(explained.sum()), 1e-300) / rows
-        ways = [each @ weights for each in self.bare]
+        count, slopes = self.gram.count, self.linear.rows.slopes
+        both = [j @ weights[:count] + z @ weights[count:] for j, z in zip(slopes, self.shown, strict=True)]
+        ways = self.linear.without_starts(both)
         degrees, explained = self.linear.known(ways), explained / self.linear.rounded(ways)
         told = degrees >= TOLD
         if not told.any():

@@ -15,6 +15,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 
+SEED = 20_13
 SURE = 2.0  # standard errors beyond what is seen of a share
 
 
@@ -51,8 +52,22 @@ class RandomEffects:
 
     @property
     def open(self) -> FloatArray:
-        """A root of the covariance of what is predicted. Shape (M, M)."""
-        return self.size[:, None] * self.ways / np.sqrt(1.0 + self.square)
+        """A root of the covariance of what is predicted, symmetric but for `size`: near effects mix only. (M, M)."""
+        return self.size[:, None] * (self.ways / np.sqrt(1.0 + self.square)) @ self.ways.T
+
+
+def drawn_together(root: FloatArray, count: int) -> FloatArray:
+    """Columns (M, count) with about the covariance of the columns (M, K) of a root: each adds up every count-th of them
+    with random signs, so that of effects in a row none stands beside one that is near it. Always the same ones.
+
+    The covariance is right on average over the signs: M. F. Hutchinson, Commun. Stat. Simul. 19, 433 (1990).
+    """
+    signs = np.random.default_rng(SEED).choice([-1.0, 1.0], root.shape[1])
+    found = np.zeros((len(root), count))
+    for first in range(0, root.shape[1], count):
+        own = root[:, first : first + count] * signs[first : first + count]
+        found[:, : own.shape[1]] += own
+    return found
 
 
 def share(seen: float, noise: float, apart: float, error: float) -> float:

@@ -17,12 +17,12 @@ from omnidyn.identification.output_error.problem.falling import falls
 from omnidyn.identification.output_error.problem.parameters import robot_parameter
 from omnidyn.identification.output_error.problem.problem import Point, Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine
+from omnidyn.identification.structure.bounded import bounded
 from omnidyn.identification.structure.linear import Linear, Rows, solved
 from omnidyn.identification.structure.workbench import Workbench, scaled
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
 
 PERCENT = 0.01
-MOST_ROWS = 30_000  # that are looked at: of many logs some, of each its beginning
 TRIED = 0.01  # relative change of a fixed number, either way is alike
 FIXED = (
     "body.mass_kg", "body.inertia_kg_m2", "wheels.wheel_radius_m", "wheels.robot_radius_m", "motor.resistance_ohm",
@@ -103,11 +103,14 @@ def moved_by_the_file(sure: Weighed, held: Mapping[str, float]) -> FloatArray:
     return found
 
 
-def as_weighed(sure: Weighed) -> tuple[Linear, RowEngine, Point]:
-    """(the rows of a fit made white by the memory that it was weighed with, what simulates them, its best point)."""
+def as_weighed(sure: Weighed, beside: int = 1) -> tuple[Linear, RowEngine, Point]:
+    """(the rows of a fit made white by the memory that it was weighed with, what simulates them, its best point).
+
+    beside: columns that are shown in them beside those of the fit.
+    """
     solver, point = sure.plain.solver, sure.plain.state.point
     assert isinstance(solver.problem, Problem)
-    problem, variance = solver.problem.shortened(MOST_ROWS), sure.plain.state.variance
+    problem, variance = bounded(solver.problem, beside), sure.plain.state.variance
     engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
     rows = Rows.of(problem, point, engine.residuals(point))
     memory = [

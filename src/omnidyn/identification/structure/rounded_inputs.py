@@ -28,8 +28,8 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.memory.whitening import Weighed
 from omnidyn.identification.output_error.problem.input_steps import as_logged, input_steps
-from omnidyn.identification.output_error.problem.problem import Piece, Problem
-from omnidyn.identification.structure.linear import Rows, solved
+from omnidyn.identification.output_error.problem.problem import Fitted, Piece, Problem
+from omnidyn.identification.structure.linear import Rows, lengths, solved_by, with_priors
 from omnidyn.identification.structure.lost_rows import losses, shown_by_losses
 from omnidyn.identification.structure.motion import Motion, motions
 from omnidyn.identification.structure.random_effects import share
@@ -39,7 +39,6 @@ from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import per_wheel
 
 HELD = 0.1  # [s]
-MOST, MOST_NUMBERS = 600, 20_000_000  # stretches of a piece, and what they show, that are looked at
 DRAWS = 60  # a variance within a fifth; always the same ones
 SEED = 20_12
 
@@ -47,16 +46,19 @@ SEED = 20_12
 def moved_by_rounding(sure: Weighed) -> FloatArray:
     """What the rounding of its inputs moves the parameters of a fit by, in the numbers that the solver sees: their
     covariance is that times its transpose. Shape (P, DRAWS)."""
-    linear, engine, point = as_weighed(sure)
-    shown = [np.zeros((*own.shape, DRAWS)) for own in linear.rows.residual]
-    random = np.random.default_rng(SEED)
+    linear, engine, point = as_weighed(sure, DRAWS)
+    products, random = with_priors(linear, DRAWS), np.random.default_rng(SEED)
     for problem, own_point, _, places in members_of(engine, linear.rows.problem, point):
         for place, motion in zip(places, motions(problem, own_point), strict=True):
-            shown[place] = _shown(motion, _drawn(motion, random))
-    e, j = linear.whole()
-    z = linear.white(shown)
-    by = solved(j, z)
-    return by * np.sqrt(_share(e - j @ solved(j, e), z - j @ by) / DRAWS)
+            every = linear.beside(place, [_shown(motion, _drawn(motion, random))])
+            products += every.T @ every
+    size = lengths(products)
+    gram = products / np.outer(size, size)
+    j, other = np.arange(1, len(gram) - DRAWS), np.r_[0, len(gram) - DRAWS : len(gram)]
+    by = solved_by(gram[np.ix_(j, j)], gram[np.ix_(j, other)])
+    left = (gram[np.ix_(other, other)] - by.T @ gram[np.ix_(j, other)]) * np.outer(size[other], size[other])
+    rows, every = (_rows(own) for own in (linear.rows.problem, sure.plain.solver.problem))
+    return (by * size[other] / size[j, None])[:, 1:] * np.sqrt(_share(left) / DRAWS * rows / every)
 
 
 def with_rounding(rows: Rows, moved: Sequence[Motion]) -> Rows:
@@ -74,13 +76,9 @@ def with_rounding(rows: Rows, moved: Sequence[Motion]) -> Rows:
     return replace(rows, rounding=shown, losses=[each.shape[2] for each in lost])
 
 
-def rows_told(problem: Problem, most: int) -> int:
-    """`most` rows, or fewer of a problem whose inputs are rounded more often than can be looked at."""
-    every = [(piece, len(_stretches(piece)) + 2 * len(losses(piece))) for piece in problem.pieces]
-    rows = [piece.last + 1 - piece.first for piece, _ in every]
-    numbers = sum(n * many * len(piece.record.columns) for n, (piece, many) in zip(rows, every, strict=True))
-    share = min(MOST / max(1, *(many for _, many in every)), (MOST_NUMBERS / max(numbers, 1)) ** 0.5)
-    return most if share >= 1.0 else min(most, int(share * sum(rows)))
+def effects(problem: Problem) -> list[int]:
+    """How many columns `with_rounding` shows of each piece."""
+    return [len(_stretches(piece)) + 2 * len(losses(piece)) for piece in problem.pieces]
 
 
 def _stretches(piece: Piece) -> list[tuple[int, int, int, float]]:
@@ -129,9 +127,14 @@ def _shown(motion: Motion, volts: FloatArray) -> FloatArray:
     return found
 
 
-def _share(left: FloatArray, z: FloatArray) -> float:
-    """How much of the variance of what may have been rounded off there is."""
-    both = (z.T @ z) ** 2
+def _rows(problem: Fitted) -> int:
+    return sum(piece.last - piece.first + 1 for piece in problem.pieces)
+
+
+def _share(left: FloatArray) -> float:
+    """How much of the variance of what may have been rounded off there is. left: scalar products (1 + DRAWS, 1 + DRAWS)
+    of residuals and draws without what the parameters make of them."""
+    both = left[1:, 1:] ** 2
     apart = float(both.sum() - np.trace(both)) / (DRAWS * (DRAWS - 1))
-    seen, noise = float(np.mean((left @ z) ** 2)), float(np.mean((z**2).sum(axis=0)))
+    seen, noise = float(np.mean(left[0, 1:] ** 2)), float(np.mean(np.diag(left)[1:]))
     return share(seen, noise, apart, float(np.sqrt(2.0 * both.mean())))

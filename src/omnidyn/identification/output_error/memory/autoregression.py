@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -31,6 +32,8 @@ PATIENCE = 15  # orders without a better one, after which none is looked for
 FOLLOWED = 20_000  # rows after which a memory is as good as endless
 MIXED = 2  # order from which on white noise beside errors that remember is asked for
 BLOCK, MORE = 50, 1.5  # rows; standard errors above the power of white noise from which on the same is asked
+MANY = 300_000  # numbers of series, from which it pays to look for columns that say nothing new
+EMPTY = 1e-9  # of the squares of the errors themselves
 ANYWHERE = 1e8  # times the variance of what is new: where errors that add up may begin
 
 
@@ -65,7 +68,7 @@ class AutoRegression:
         """Whether a row says anything of the next one."""
         return bool(self.order) or self.adds_up
 
-    @property
+    @cached_property
     def filter(self) -> tuple[FloatArray, FloatArray]:
         """(phi (p,), covariance of p rows in a row (p, p)) of the errors as they are, for `innovations`."""
         if not self.adds_up:
@@ -176,6 +179,7 @@ def autoregression(
     moves (n,) of each stretch: in which rows the robot does, where errors may remember only while it does.
     Without rows it has order 0 and variance 0.
     """
+    stretches = _without_empty_axes(stretches)
     found, cost = _fitted(stretches, most)
     own = while_moving(stretches, moves) if moves and most is None else None
     if own is not None and own.cost < cost:
@@ -188,6 +192,19 @@ def autoregression(
         return found
     moving = [each[(each != 0.0).any(axis=1)] for each in (np.diff(one, axis=0) for one in stretches)]
     return replace(_fitted(moving, most)[0], adds_up=True)
+
+
+def _without_empty_axes(stretches: Sequence[FloatArray]) -> Sequence[FloatArray]:
+    """Many series (n, K), the columns beyond the first along their principal axes, without axes that hold nothing.
+
+    What is fitted depends on squares and products of rows summed over columns, which no rotation of columns changes.
+    """
+    if sum(each.size for each in stretches) < MANY:
+        return stretches
+    products = np.sum([each.T @ each for each in stretches], axis=0)
+    held, axes = np.linalg.eigh(products[1:, 1:])
+    axes = axes[:, held > EMPTY * products[0, 0]]
+    return [np.column_stack([each[:, 0], each[:, 1:] @ axes]) for each in stretches]
 
 
 def _of_motion(found: Moving, rows: int) -> AutoRegression:

@@ -16,6 +16,7 @@ from omnidyn.identification.output_error.joint import JointEngine
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
+from omnidyn.identification.structure.bounded import bounded
 from omnidyn.identification.structure.linear import Linear, Rows
 from omnidyn.identification.structure.missing.remedies import Blocks
 from omnidyn.identification.structure.tails import as_counted
@@ -25,7 +26,6 @@ Memories = Sequence[AutoRegression] | Mapping[str, Sequence[AutoRegression]]
 FAR = 1.5  # times what a fit to all leaves of a block, from which the error by a fit to all others is simulated
 SHARES = (1.0, 0.5, 0.25, 0.125)  # of a step that are tried
 CLEAR = 1.0  # standard errors of its gain by which a step must pay
-MOST_ROWS = 30_000  # that are looked at: of many logs some, of each its beginning
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +86,7 @@ def _blocks(
     solution: Solution, memory: Sequence[AutoRegression], margins: Sequence[FloatArray], told: Container[int] = ()
 ) -> tuple[Blocks, int]:
     """(blocks of one group, how many rows they have). told: parameters whose priors another group has already."""
-    problem = _from(solution.solver.problem, margins).shortened(MOST_ROWS)
+    problem = bounded(_from(solution.solver.problem, margins))
     point = solution.state.point
     engine: RowEngine = solution.solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]
     shows: Shows = lambda at: as_counted(solution, problem, engine.residuals(at))  # noqa: E731

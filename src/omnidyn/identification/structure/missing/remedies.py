@@ -15,7 +15,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Remedy
-from omnidyn.identification.structure.linear import SAME, Linear, Rows
+from omnidyn.identification.structure.linear import SAME, Linear, Rows, lengths, with_priors
 from omnidyn.identification.structure.missing.candidates import Candidate, Trial
 from omnidyn.model.keys import BODY_AXES, DIRECTION
 
@@ -48,19 +48,22 @@ class Tried:
 class Blocks:
     """Scalar products of [e, J, Z] in blocks of rows. matrix (B, n, n); shows (n,): which columns are not all 0."""
 
-    def __init__(self, linear: Linear, shown: Sequence[FloatArray]):
-        e, j = linear.whole()
-        z = linear.white(shown)
-        every = np.column_stack([e, j, z])
-        self.size = np.linalg.norm(every, axis=0)
-        self.shows = self.size > 0.0
-        self.size[0] = 1.0
-        self.size[self.size == 0.0] = 1.0
-        every = every / self.size
-        self.count, self.rows = j.shape[1], len(e)
-        self.block = self._blocks(linear, len(e))
-        self.matrix = np.array([every[own].T @ every[own] for own in self.block])
-        self.total = every.T @ every  # with what is known beforehand, which is held out of no block
+    def __init__(self, linear: Linear, *shown: Sequence[FloatArray]):
+        number = self._numbers(linear)
+        self.count, self.rows = len(linear.rows.problem.parameters), len(number)
+        self.block = [np.flatnonzero(number == b) for b in range(BLOCKS)]
+        self.total = with_priors(linear, sum(each[0].shape[2] for each in shown))  # which are held out of no block
+        self.matrix, first = np.zeros((BLOCKS, *self.total.shape)), 0
+        for k in range(len(linear.rows.pieces)):
+            every = linear.beside(k, [each[k] for each in shown])
+            block = number[first : (first := first + len(every))]
+            for b in np.unique(block).tolist():
+                own = every[block == b]
+                self.matrix[b] += own.T @ own
+        self.total += self.matrix.sum(axis=0)
+        self.shows, self.size = np.diag(self.total) > 0.0, lengths(self.total)
+        self.matrix /= np.outer(self.size, self.size)
+        self.total /= np.outer(self.size, self.size)
 
     def of(self, matrix: FloatArray, total: FloatArray) -> Blocks:
         """Blocks with other scalar products, of the same rows."""
@@ -68,21 +71,19 @@ class Blocks:
         other.matrix, other.total = matrix, total
         return other
 
-    def _blocks(self, linear: Linear, rows: int) -> list[IntArray]:
-        """Rows by the time at which they stand, in blocks that are whole stretches of time; priors in all of them."""
+    def _numbers(self, linear: Linear) -> IntArray:
+        """The block of each row, by its time: blocks are whole stretches of time. -1 of priors, which are in all."""
         when, pieces = [], linear.rows
         whole = sum(r.shape[1] for r in pieces.residual)
         seen = 0
         for k, there in enumerate(pieces.there):
             parts = [seen + np.flatnonzero(own) for own in there]
-            extra = int((pieces.pieces[k].start_prior(pieces.point.states[k])[1] > 0.0).sum())
             own = np.concatenate(parts) if parts else np.zeros(0, int)
-            when.append(np.concatenate([own, np.full(extra if pieces.own[k].shape[2] else 0, seen)]))
+            when.append(np.concatenate([own, np.full(linear.length(k) - len(own), seen)]))
             seen += there.shape[1]
         at = np.concatenate(when)
         number = np.minimum(at * BLOCKS // max(whole, 1), BLOCKS - 1)
-        number = np.concatenate([number, np.full(rows - len(number), -1)])
-        return [np.flatnonzero(number == b) for b in range(BLOCKS)]
+        return np.concatenate([number, np.full(len(pieces.problem.parameters), -1)])
 
     def fitted(self, matrix: FloatArray, at: IntArray) -> FloatArray:
         """What the columns `at` are fitted by."""
@@ -115,9 +116,8 @@ def remedies(
     flat = [(one, trial) for one, trials in tried for trial in trials]
     if not flat:
         return ()
-    shown = [np.concatenate([trial.shown[k] for _, trial in flat], axis=2) for k in range(len(linear.rows.residual))]
-    blocks = Blocks(linear, [np.concatenate(both, axis=2) for both in zip(shown, found, strict=True)])
-    themes = np.arange(1 + blocks.count + shown[0].shape[2], len(blocks.size))
+    blocks = Blocks(linear, *(trial.shown for _, trial in flat), found)
+    themes = np.arange(len(blocks.size) - found[0].shape[2], len(blocks.size))
     known = np.arange(1, 1 + blocks.count)
     base, first, best = blocks.left(known), 1 + blocks.count, {}
     before = blocks.held_out(known)
