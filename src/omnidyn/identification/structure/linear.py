@@ -181,7 +181,7 @@ class Linear:
 
     @cached_property
     def _starts(self) -> list[FloatArray]:
-        """Of each piece an orthonormal basis (N, S) of what its start shows in white rows, what is known of it below."""
+        """Of each piece an orthonormal basis (N, S) of what its start shows in white rows, its prior below."""
         return [self._start(k) for k in range(len(self.rows.pieces))]
 
     def _start(self, k: int) -> FloatArray:

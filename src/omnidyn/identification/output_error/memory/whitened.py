@@ -6,7 +6,7 @@ errors, and the solver, the priors and the covariance are as they are for white 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +37,12 @@ class OfRows:
         columns, count = self.problem.columns, len(self.problem.parameters)
         return [
             added(piece, columns, parts, weighting, count)
-            for piece, parts in zip(self.problem.pieces, self.residuals(point), strict=True)
+            for piece, parts in zip(self.problem.pieces, self.parts(point), strict=True)
         ]
+
+    def parts(self, point: Point) -> Iterable[Parts]:
+        """The same as `residuals`, one piece after the other."""
+        return self.residuals(point)
 
 
 class WhitenedEngine(OfRows):
@@ -61,10 +65,14 @@ class WhitenedEngine(OfRows):
 
     def residuals(self, point: Point) -> list[Parts]:
         """Filtered residuals and slopes of every piece, see engines/sums.py."""
+        return list(self.parts(point))
+
+    def parts(self, point: Point) -> Iterator[Parts]:
+        """The same as `residuals`, one piece after the other: of sums no more than one is held."""
         pieces, parts = self.problem.pieces, self.engine.residuals(point)
         if self._moves is None:
             self._moves = [moving_rows(piece, own[0]) for piece, own in zip(pieces, parts, strict=True)]
-        return [self._filtered(*each) for each in zip(pieces, parts, self._moves, strict=True)]
+        yield from (self._filtered(*each) for each in zip(pieces, parts, self._moves, strict=True))
 
     def _filtered(self, piece: Piece, parts: Parts, moves: BoolArray) -> Parts:
         residual, slopes, at = parts
