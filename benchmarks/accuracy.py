@@ -14,6 +14,7 @@ from multiprocessing import get_context
 
 import numpy as np
 
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 from omnidyn.simulation.simulate import simulate
 from tests.reference.reference import Physical, reference
@@ -27,7 +28,7 @@ from tests.support.robots import (
     with_breakaway,
 )
 
-STEPS, ROBOTS = 10_000, 50
+STEPS, ROBOTS = 10_000, scaled(50)
 BOUNDS = {"m/s": 1e-13, "rad/s": 1e-12, "heading rad": 1e-12, "position m": 1e-9}
 GROUPS = ("random, steps of 1 ms", "random, steps of 1e-5 to 0.1 s")
 

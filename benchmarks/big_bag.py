@@ -17,9 +17,10 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 
-MEGABYTES = 2000
+MEGABYTES = scaled(2000, 10)
 PICTURE = 50_000
 
 OURS = """

@@ -6,7 +6,6 @@ python -m benchmarks.big_log PATH      read one file in this process, and print 
 from __future__ import annotations
 
 import json
-import os
 import resource
 import subprocess
 import sys
@@ -16,12 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 from omnidyn.logs.readers.read_table import iter_tables
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 
-BYTES = int(float(os.environ.get("OMNIDYN_BIG_LOG_BYTES", "1e9")))
+BYTES = scaled(1_000_000_000, 1_000_000)
 WHEELS = (("u", "V"), ("i", "A"), ("w", "rad_s"))
 COLUMNS = [
     "t_s",

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.check_faults import FAULTS, draw
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine, one_core
 from omnidyn.findings.check import check
 from omnidyn.findings.finding import NOTE
@@ -20,7 +21,7 @@ from omnidyn.report.figures.raw_log import draw_raw_log
 from omnidyn.report.style import BLUE, GREY, VERMILLION, WIDTH, look, new_figure, picture
 from tests.support.random_logs import clean
 
-LOGS, CLEAN = 200, 1000
+LOGS, CLEAN = scaled(200, 2), scaled(1000, 4)
 RECALL, FALSE = 0.95, 0.02  # the goals
 ROWS, COLUMNS, SECONDS = 500_000, 10, 2.0  # and of the speed, CPU seconds
 BINS = 5

@@ -17,7 +17,8 @@ from scipy.linalg import solve_toeplitz
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from benchmarks.identify_log import COUNTING, SHARE, Draws, fit_output_error
+from benchmarks.identify_log import COUNTING, Draws, fit_output_error
+from benchmarks.size import WHOLE, scaled
 from benchmarks.table import Table
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
@@ -25,7 +26,7 @@ from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, truth, voltages, with_friction
 
-LOGS = max(int(500 * SHARE), 10)
+LOGS = scaled(500, 10)
 RATE, SECONDS = 100.0, 30.0
 MEMORIES = (0.5, 0.9, 0.95, 0.98)
 STD = {"twist": NOISE, "wheel_speed": np.full(3, 0.5)}  # [m/s, rad/s]
@@ -112,8 +113,8 @@ def measure_case(
             chosen += fit.covariance == "autoregressive"
         spread = np.sqrt(np.mean(np.array(draws.error) ** 2, axis=0)) / least
         held, std = float(draws.coverage.mean()), float(np.sqrt(np.mean(spread**2)))
-        slack = 0.0 if SHARE >= 1.0 else COUNTING * np.sqrt(0.95 * 0.05 / (2.0 * LOGS))
-        spare = 0.0 if SHARE >= 1.0 else COUNTING / np.sqrt(4.0 * LOGS)
+        slack = 0.0 if WHOLE else COUNTING * np.sqrt(0.95 * 0.05 / (2.0 * LOGS))
+        spare = 0.0 if WHOLE else COUNTING / np.sqrt(4.0 * LOGS)
         asked = goals and kind == "auto"
         table.add(
             f">= {LEAST}, <= {NEAR}" if asked else "",

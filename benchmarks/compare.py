@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.stats import binom
 
+from benchmarks.size import scaled
 from benchmarks.table import Table, Times, machine, one_core
 from omnidyn.comparison.compare import compare
 from omnidyn.comparison.result import Comparison
@@ -16,7 +17,7 @@ from omnidyn.run import Run
 from omnidyn.simulation.programs import prbs
 from omnidyn.simulation.simulate import simulate
 
-LOGS, ROWS, DT = 400, 400, 0.01
+LOGS, MORE, ROWS, DT = scaled(400, 4), scaled(900, 4), 400, 0.01
 SPEED_NOISE, WHEEL_NOISE, POSE_NOISE = np.array([0.01, 0.01, 0.05]), 0.3, np.array([2e-3, 2e-3, 5e-3])
 SPEEDS = ("vx", "vy", "omega", "w1", "w2", "w3")
 LEVEL = 0.05
@@ -103,7 +104,7 @@ def _two(table: Table, true: Robot, logs: list[Run]) -> None:
         goal = ("> 90 %", value > 0.9) if right else ("0", value == 0.0)
         table.add(*goal, model=name, what="first called better", channels="vx vy", **{"rate or value": value})
     pair = coulomb_times(true, 1.0001), coulomb_times(true, 0.9999)
-    more = [noisy_log(true, seed) for seed in range(LOGS, LOGS + 900)]
+    more = [noisy_log(true, seed) for seed in range(LOGS, LOGS + MORE)]
     for words, tried in (
         ("logs", [[log] for log in logs[:200]]),
         ("tens of logs", [more[k : k + 10] for k in range(0, len(more), 10)]),

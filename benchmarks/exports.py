@@ -19,6 +19,7 @@ import numpy as np
 
 import omnidyn
 from benchmarks import exports_read
+from benchmarks.size import scaled
 from benchmarks.table import Table, Times, machine
 from omnidyn.arrays import FloatArray
 from omnidyn.model.deadzone import axis_patterns
@@ -27,7 +28,7 @@ from omnidyn.paper.tables import TABLE_1
 from tests.support.exported import Stepper
 
 DT, HELD, REST = 1e-3, 400, 200
-STEPS = 400_000  # of the loop in C that is timed
+STEPS = scaled(400_000, 4000)  # of the loop in C that is timed
 NEAR = 1e-9
 CREEP = 0.1  # [mm] in a minute
 TURNING = (1.5, 5.5, -2.5)  # [V] settles at another speed with the turning frame than without

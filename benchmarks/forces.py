@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from benchmarks.identify_log import SHARE
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 from benchmarks.wrong_worlds.log import NOISE, SPEEDS, right_case, robot_of, truths, voltages
 from benchmarks.wrong_worlds.remedies import FRICTION
@@ -18,7 +18,7 @@ from benchmarks.wrong_worlds.world import World
 from omnidyn.identification.identify import identify
 from omnidyn.run import Run
 
-LOGS = max(round(40 * SHARE), 2)
+LOGS = scaled(40, 2)
 FIRST_SEED, MEMORY, INNER = 90_000, 0.1, 100  # memory [s]; steps in a row
 SHARES = (0.0, 0.03, 0.1)  # std of the force, over Coulomb friction
 FALSE, HELD = 0.03, 0.9

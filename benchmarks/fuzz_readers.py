@@ -29,6 +29,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 from omnidyn.errors import OmnidynError
 from omnidyn.logs.command_file import read_commands
@@ -39,7 +40,7 @@ from omnidyn.logs.run_file import read_run, run_to_csv, run_to_parquet
 from omnidyn.logs.steady_table import read_steady_table
 from omnidyn.run import CHANNELS, Run
 
-SECONDS = float(os.environ.get("OMNIDYN_FUZZ_SECONDS", "60"))
+SECONDS = float(scaled(60))
 ROOT = Path(__file__).resolve().parents[1]
 SLOW_S, MAX_MB = 2.0, 2048
 START_S = 300.0  # to load the libraries and make the seeds, on a machine that is busy

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks import steady_shapes
+from benchmarks.size import scaled
 from benchmarks.steady_shapes import Floors, Seen, studied
 from benchmarks.table import Table, machine
-from benchmarks.wrong_worlds import SHARE
 from benchmarks.wrong_worlds.log import SPEEDS, Case, logged, right_case, robot_of, truths
 from benchmarks.wrong_worlds.remedies import FRICTION
 from benchmarks.wrong_worlds.worker import Workers
@@ -27,7 +27,7 @@ from omnidyn.identification.whole_logs import fit_output_error, identify_groups
 from omnidyn.model.friction import Friction
 from omnidyn.run import Run
 
-LOGS = max(round(20 * SHARE), 2)
+LOGS = scaled(20, 2)
 FIRST_SEED, SEEDS_EACH = 210_000, 1000
 NAMED, RICHER = 0.9, 0.05
 RATE = 50.0  # [Hz]

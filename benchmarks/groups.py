@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.whole_logs import identify_groups
@@ -16,10 +17,10 @@ from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import coloured, excitation, noisy_draw
 
-PAIRS, SECONDS = 200, 20.0
+PAIRS, SECONDS = scaled(200, 2), 20.0
 COULOMB, VISCOUS, TORQUE = "friction.axes.coulomb[0]", "friction.axes.viscous[1]", "motor.torque_constant_Nm_A"
 ROUGH = {COULOMB: 2.6, VISCOUS: 1.2}  # of the second floor; the preset has 2.2 N and 0.96 N s/m
-RUNS, DRAWS = 10, 200  # a floor, and of them
+RUNS, DRAWS = 10, scaled(200, 20)  # a floor, and of them
 
 
 def measure() -> Table:

@@ -6,7 +6,8 @@ import time
 
 import numpy as np
 
-from benchmarks.identify_log import COUNTING, SHARE, Draws, cramer_rao, fit_output_error
+from benchmarks.identify_log import COUNTING, Draws, cramer_rao, fit_output_error
+from benchmarks.size import WHOLE, scaled
 from benchmarks.table import Table
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
@@ -14,7 +15,7 @@ from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, RATE, excitation, noisy_draw, truth, with_friction
 
-LOGS, IMPAIRED, STARTS, BREAKAWAYS = (max(int(n * SHARE), 10) for n in (10_000, 1000, 1000, 200))
+LOGS, IMPAIRED, STARTS, BREAKAWAYS = (scaled(n, 10) for n in (10_000, 1000, 1000, 200))
 LATE, GAIN, DEAD = 0.013, 0.97, 0.15
 WILD, WILD_SIZE = 0.02, 1.0
 NUISANCES = ("latency", "gain", "dead_band")
@@ -26,7 +27,7 @@ def coverage(table: Table, robot: Robot, clean: Run) -> None:
     draws = Draws(truth(robot))
     for seed in range(LOGS):
         draws.add(fit_output_error(noisy_draw(clean, seed), robot, start="rest"))
-    slack = 0.0 if SHARE >= 1.0 else COUNTING * np.sqrt(0.95 * 0.05 / LOGS)
+    slack = 0.0 if WHOLE else COUNTING * np.sqrt(0.95 * 0.05 / LOGS)
     shared = {"draws": LOGS}
     low, high = draws.coverage.min(), draws.coverage.max()
     met = bool(low >= 0.942 - slack and high <= 0.958 + slack)

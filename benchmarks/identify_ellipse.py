@@ -13,7 +13,8 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.identify_log import COUNTING, SHARE, Draws
+from benchmarks.identify_log import COUNTING, Draws
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.engines.exact import Weighting
@@ -32,7 +33,7 @@ from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, RATE, excitation, noisy_draw
 
-LOGS = max(int(300 * SHARE), 10)
+LOGS = scaled(300, 10)
 LATE, FINE_ROWS = 0.013, 10  # [s]; rows of the truth in a row of the log
 WRONG = 1.5
 KEYS = tuple(f"friction.direction.{name}" for name in ("coulomb[0]", "coulomb[1]", "viscous", "yaw_coulomb",

@@ -6,7 +6,6 @@ The log of EVIDENCE section 4: 60 s at 100 Hz, holds and ramps on the axes in tu
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable
 from functools import partial
@@ -22,7 +21,6 @@ from tests.support.axebot_logs import NOISE, bare
 
 fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a row asks for
 
-SHARE = float(os.environ.get("OMNIDYN_BENCH_SHARE", "1"))
 COUNTING = 3.0  # standard errors of a counted share, granted where fewer than the full number of draws are done
 
 

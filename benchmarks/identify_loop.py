@@ -7,12 +7,12 @@ or too small. The seed of every draw is its number. OMNIDYN_BENCH_SHARE=0.1 does
 
 from __future__ import annotations
 
-import os
 import time
 
 import numpy as np
 
 from benchmarks.identify_log import COUNTING, Draws
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.friction import DirectionFriction, Friction
@@ -23,8 +23,7 @@ from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE
 
-SHARE = float(os.environ.get("OMNIDYN_BENCH_SHARE", "1"))
-LOGS = max(int(100 * SHARE), 5)
+LOGS = scaled(100, 5)
 SECONDS, FINE, LATE = 20.0, 1e-3, 0.012  # [s]
 CURRENT_NOISE = 0.05  # [A]
 

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine
-from benchmarks.wrong_worlds import SHARE
 from benchmarks.wrong_worlds.kinds import CHANGE, KINDS, Kind, by_name
 from benchmarks.wrong_worlds.log import Case, logged, right_case, robot_of, truths
 from benchmarks.wrong_worlds.remedies import FRICTION, SHAPES, refitted
@@ -28,7 +28,7 @@ from omnidyn.identification.identify import identify
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
-LOGS, RIGHT_LOGS = max(round(10 * SHARE), 1), max(round(50 * SHARE), 1)  # of each kind, of each noise
+LOGS, RIGHT_LOGS = scaled(10), scaled(50)  # of each kind, of each noise
 FIRST_SEED, RIGHT_SEED, SEEDS_EACH = 320_000, 370_000, 1000
 RICHER, HELD = 0.05, 0.9
 COLUMNS = ["world", "cause", "logs", "found", "step", "the cause", "held before", "held after", "silent", "s a log"]

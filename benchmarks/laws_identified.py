@@ -12,7 +12,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks.identify_log import COUNTING, SHARE
+from benchmarks.identify_log import COUNTING
+from benchmarks.size import WHOLE, scaled
 from benchmarks.table import Table, machine
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.whole_logs import fit_output_error
@@ -23,7 +24,7 @@ from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from tests.reference import bristles, modes
 
-LOGS = max(int(200 * SHARE), 10)
+LOGS = scaled(200, 10)
 PROGRAMS, ROWS, DT = 5, 240, 0.02
 TRUE = {
     "viscous": 0.94, "coulomb": 2.2, "breakaway": 2.8, "stribeck_speed": 0.05, "stiffness": 2e3, "damping": 80.0,
@@ -136,7 +137,7 @@ def fitted(name: str, seed: int) -> tuple[FloatArray, Sequence[bool]]:
 def _one_law(table: Table, name: str) -> None:
     every = [fitted(name, seed) for seed in range(LOGS)]
     held, errors = np.array([own for _, own in every], bool), np.array([own for own, _ in every])
-    few = 0.0 if SHARE >= 1.0 else COUNTING  # at full size the goals are what they are
+    few = 0.0 if WHOLE else COUNTING  # at full size the goals are what they are
     slack = few * np.sqrt(0.95 * 0.05 / LOGS)
     for k, number in enumerate(LAWS[name].names):
         share, spread = float(held[:, k].mean()), float(np.sqrt((errors[:, k] ** 2).mean()))

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.identify_log import SHARE
 from benchmarks.ladder import Climbed, climbed
 from benchmarks.laws_identified import (
     DT,
@@ -32,6 +31,7 @@ from benchmarks.laws_identified import (
     std_of_fall,
     true_twist,
 )
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 from benchmarks.wrong_worlds.remedies import FALL, FRICTION
 from omnidyn.arrays import FloatArray
@@ -42,7 +42,7 @@ from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from tests.reference import modes
 
-LOGS, WORLDS, RIGHT_LOGS = max(round(20 * SHARE), 2), max(round(10 * SHARE), 2), max(round(100 * SHARE), 5)
+LOGS, WORLDS, RIGHT_LOGS = scaled(20, 2), scaled(10, 2), scaled(100, 5)
 FIRST_SEED = 7000  # of no log of laws_identified
 CLEAR = (5.0, 10.0, 30.0)  # standard errors (of their difference) by which breakaway exceeds Coulomb friction
 HELD, TAKEN, RICHER = 0.9, 0.95, 0.05

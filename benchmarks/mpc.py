@@ -17,6 +17,7 @@ import numpy as np
 import omnidyn
 from benchmarks.mpc_c import c_rows
 from benchmarks.mpc_peers import ipopt_errors, peer_rows
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine, one_core
 from omnidyn.control.araujo import Araujo
 from omnidyn.control.mpc.controller import Mpc
@@ -47,7 +48,7 @@ CONDITIONS = {  # friction of the plant, noise [m/s], push [m/s^2, m/s^2, rad/s^
 IPOPT = {"fast8": 11.21, "fsquare": 7.73, "fspin": 10.84}  # mm over the first 3.2 s, tanh 0.02
 NOISE = np.array([0.2, 0.2, 0.4, 1.0, 1.0, 4.0])
 REPEATS, DT = 3, 0.02
-COLD = 100_000
+COLD = scaled(100_000, 100)
 COLUMNS = ["what", "value", "unit", "more"]
 
 

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from benchmarks.identify_log import SHARE, Draws
+from benchmarks.identify_log import Draws
+from benchmarks.size import WHOLE, scaled
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.kernel.counts import information
@@ -28,10 +29,10 @@ from tests.support.axebot_logs import NOISE, excitation, truth
 from tests.support.rolled_logs import CAPTURE, captured_log, counted_log
 from tests.support.rolled_logs import rolled as independent
 
-TICKED, TILTED, CAPTURED = (max(int(n * SHARE), 10) for n in (300, 200, 200))
+TICKED, TILTED, CAPTURED = (scaled(n, 10) for n in (300, 200, 200))
 COUNTS, JITTERS = (64, 512, 2048), (0.3, 0.0)  # counts a turn; noise before the encoder rounds, in ticks
 SLOPE = np.radians(1.0)
-IMPLICIT, PROGRAMS = max(int(100 * SHARE), 10), 8  # draws of the implicit engine, and the runs that they are of
+IMPLICIT, PROGRAMS = scaled(100, 10), 8  # draws of the implicit engine, and the runs that they are of
 
 
 def measure() -> Table:
@@ -50,7 +51,7 @@ def measure() -> Table:
 
 def _implicit(table: Table, robot: Robot) -> None:
     """Both on a robot as `omnidyn init` makes it, which the implicit engine fits; runs by DOP853, latencies free."""
-    runs = [independent(robot, excitation(20.0, seed=seed), 0.01) for seed in range(max(int(PROGRAMS * SHARE), 1))]
+    runs = [independent(robot, excitation(20.0, seed=seed), 0.01) for seed in range(scaled(PROGRAMS))]
     for what in ("2048 counts a turn", "pose by motion capture"):
         draws = Draws(truth(robot))
         for seed in range(IMPLICIT):
@@ -61,7 +62,7 @@ def _implicit(table: Table, robot: Robot) -> None:
         name = f"turning frame, {what}"
         _cover(table, name, draws, IMPLICIT)
         spread = float(np.sqrt(np.mean(z**2)))
-        table.add("0.9 to 1.1", 0.9 <= spread <= 1.1 if SHARE >= 1.0 else None, what="... rms of all z-scores",
+        table.add("0.9 to 1.1", 0.9 <= spread <= 1.1 if WHOLE else None, what="... rms of all z-scores",
                   draws=IMPLICIT, value=spread)  # fmt: skip
 
 
@@ -111,14 +112,14 @@ def _ticks(table: Table, robot: Robot, counts: int, jitter: float) -> None:
     name = f"{counts} counts a turn, noise {jitter:g} ticks"
     for way in ways:
         least = draws[way].coverage.min()
-        met = bool(least >= 0.92 - (0.0 if SHARE >= 1.0 else 0.2)) if way == "counts" else None
+        met = bool(least >= 0.92 - (0.0 if WHOLE else 0.2)) if way == "counts" else None
         table.add(">= 0.92" if way == "counts" else "", met, what=f"{name}: coverage by {way}, least", draws=TICKED,
                   value=least)  # fmt: skip
     gain = draws["Gauss"].spread / draws["counts"].spread
     table.add(what="... std by Gauss / std by counts, median", draws=TICKED, value=float(np.median(gain)))
     if jitter:
         ratio = draws["counts"].spread / least_std(log, robot, tick, jitter * tick)
-        met = bool(ratio.max() <= 1.1 + (0.0 if SHARE >= 1.0 else 0.5))
+        met = bool(ratio.max() <= 1.1 + (0.0 if WHOLE else 0.5))
         table.add("<= 1.1", met, what="... std / Cramer-Rao, greatest", draws=TICKED, value=ratio.max())
 
 
@@ -156,7 +157,7 @@ def _tilt(table: Table, robot: Robot) -> None:
 
 def _cover(table: Table, what: str, draws: Draws, number: int) -> None:
     least = draws.coverage.min()
-    met = bool(least >= 0.92 - (0.0 if SHARE >= 1.0 else 0.2))
+    met = bool(least >= 0.92 - (0.0 if WHOLE else 0.2))
     table.add(">= 0.92", met, what=f"{what}: coverage, least", draws=number, value=least)
     table.add(what="... bias, greatest", draws=number, value=np.abs(draws.bias).max(), unit="std")
 

@@ -6,13 +6,12 @@ can tell. score: the two commands, against the truth. OMNIDYN_BENCH_SHARE=0.05 d
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 
-LOGS = max(round(20 * float(os.environ.get("OMNIDYN_BENCH_SHARE", "1"))), 1)
+LOGS = scaled(20)
 POOLED, SINGLE, REPORTED = 0.92, 0.75, 0.9
 ALL = 20  # logs for which the goals are meant; of fewer, counting errors are granted
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.ten_robots.world import BOX, Motion, World, currents, drive
 
-ROWS_LONG = 20.0  # [s] of a log
+SECONDS = 20.0  # [s] of a log
 
 
 @dataclass(frozen=True)
@@ -38,14 +38,14 @@ class Case:
     facts: tuple[str, ...] = ()
     rate: float = 50.0  # [Hz] of the log
     words: str = ""
-    names: dict[str, str] = field(default_factory=dict)
+    seconds: float = SECONDS  # of a log
 
 
 def _numbers(values: tuple[float, ...]) -> str:
     return ",".join(f"{value:g}" for value in values) if len(set(values)) > 1 else f"{values[0]:g}"
 
 
-def _init(world: World, *more: str) -> tuple[str, ...]:
+def init_options(world: World, *more: str) -> tuple[str, ...]:
     """What a ruler and a scale tell."""
     where = ("--mecanum",) if world.roller else ("--azimuth", ",".join(f"{a:g}" for a in world.azimuth))
     return (
@@ -112,30 +112,32 @@ def cases() -> tuple[Case, ...]:
     )  # fmt: skip
     loop = ",".join(f"{value:g}" for value in looped.loop)
     return (
-        Case("kiwi", kiwi, Sensors(speeds=0.15), _init(kiwi), words="3 omni; volts; wheel speeds"),
-        Case("arduino", duty, Sensors(counts=1440, gyro=0.02, duty=True), _init(duty), (*_counts(1440), *PWM),
+        Case("kiwi", kiwi, Sensors(speeds=0.15), init_options(kiwi), words="3 omni; volts; wheel speeds"),
+        Case("arduino", duty, Sensors(counts=1440, gyro=0.02, duty=True), init_options(duty), (*_counts(1440), *PWM),
              words="3 omni, rotors 20 %; PWM, counts, gyro"),
-        Case("square", square, Sensors(counts=2048), _init(square), _counts(2048), 100.0,
+        Case("square", square, Sensors(counts=2048), init_options(square), _counts(2048), 100.0,
              "4 omni at 45 deg, rotors 18 %; volts, counts"),
-        Case("studio", captured, Sensors(capture=(0.001, 0.003), duty=True), _init(captured), PWM, 100.0,
+        Case("studio", captured, Sensors(capture=(0.001, 0.003), duty=True), init_options(captured), PWM, 100.0,
              "4 omni at 45 deg; PWM, motion capture"),
-        Case("mecanum", mecanum, Sensors(counts=1024, capture=(0.002, 0.004), duty=True), _init(mecanum),
+        Case("mecanum", mecanum, Sensors(counts=1024, capture=(0.002, 0.004), duty=True), init_options(mecanum),
              (*_counts(1024), *PWM), words="mecanum, rotors 20 %; PWM, counts, motion capture"),
-        Case("currents", current, Sensors(speeds=0.1, amps=0.05), _init(current), (), 100.0,
+        Case("currents", current, Sensors(speeds=0.1, amps=0.05), init_options(current), (), 100.0,
              "mecanum, rotors 20 %; volts, wheel speeds, currents"),
-        Case("six", six, Sensors(speeds=0.08, gyro=0.01), _init(six), words="6 wheels; volts, wheel speeds, gyro"),
-        Case("uneven", uneven, Sensors(speeds=0.12, gyro=0.02), _init(uneven),
+        Case("six", six, Sensors(speeds=0.08, gyro=0.01), init_options(six),
+             words="6 wheels; volts, wheel speeds, gyro"),
+        Case("uneven", uneven, Sensors(speeds=0.12, gyro=0.02), init_options(uneven),
              words="3 omni, unequal radii; volts, wheel speeds, gyro"),
-        Case("firmware", looped, Sensors(speeds=0.1, amps=0.05, loop=True), _init(looped, "--speed-loop", loop), (),
-             100.0 / 3.0, "4 omni behind a loop of 100 Hz, logged at 33 Hz; set speeds, speeds, currents"),
-        Case("paper", box, Sensors(speeds=0.15, gyro=0.02, duty=True), _init(box, "--friction", "axes"),
+        Case("firmware", looped, Sensors(speeds=0.1, amps=0.05, loop=True),
+             init_options(looped, "--speed-loop", loop), (), 100.0 / 3.0,
+             "4 omni behind a loop of 100 Hz, logged at 33 Hz; set speeds, speeds, currents"),
+        Case("paper", box, Sensors(speeds=0.15, gyro=0.02, duty=True), init_options(box, "--friction", "axes"),
              PWM, words="3 omni, the paper's box, rotors 20 %; PWM, wheel speeds, gyro"),
     )  # fmt: skip
 
 
 def commands(case: Case, rng: np.random.Generator) -> np.ndarray:
     """What a person sends: at rest, then directions and turns at levels of their own, some rest between. (rows, n)."""
-    world, rows = case.world, round(ROWS_LONG * case.rate)
+    world, rows = case.world, round(case.seconds * case.rate)
     radii = np.array(world.wheel_radius)
     top = 0.85 * world.voltage_limit / np.max(world.emf)  # [m/s] of a rim
     out = [np.zeros((round(0.5 * case.rate), radii.size))]

@@ -7,13 +7,13 @@ right worlds against the truth. OMNIDYN_BENCH_SHARE=0.04 does that share of the 
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 
 if TYPE_CHECKING:
@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from benchmarks.wrong_worlds.right import Calm
     from benchmarks.wrong_worlds.score import Seen
 
-SHARE = float(os.environ.get("OMNIDYN_BENCH_SHARE", "1"))
-LOGS, TWO, RIGHT_LOGS = (max(round(n * SHARE), 1) for n in (25, 200, 112))  # of each kind, of two, of each noise
+LOGS, TWO, RIGHT_LOGS = (scaled(n) for n in (25, 200, 112))  # of each kind, of two, of each noise
 SILENT, NAMED, CALM, HELD, FALSE, RICHER = 0.02, 0.9, 0.9, 0.9, 0.03, 0.05
 COLUMNS = [
     "world", "cause", "logs", "off", "silent", "found", "visible", "found of visible", "1st or 2nd", "sure", "held",
