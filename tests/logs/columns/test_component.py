@@ -33,6 +33,8 @@ def test_the_volts_of_a_sensor_are_none_of_a_motor(tmp_path, name):
 @pytest.mark.parametrize("name", ["motor_current_sensor_A", "current_sense_A", "adc_current_A"])
 def test_a_current_may_say_its_sensor(tmp_path, name):
     assert taken(guessed(tmp_path, {name: 2.5})) == {"i1": (name, "A")}
+    assert taken(guessed(tmp_path, {"motor_voltage_sense_V": 2.5})) == {"u1": ("motor_voltage_sense_V", "V")}
+    assert taken(guessed(tmp_path, {"sensor_voltage_V": 2.5, "sensor_V": 2.5, "sense_V": 2.0})) == {}
 
 
 def test_volts_of_what_no_word_says_to_be_a_motor_stand_back(tmp_path):
@@ -49,6 +51,18 @@ def test_percent_is_a_duty(tmp_path, name):
     columns = guessed(tmp_path, {name: 50.0, "speed_rad_s": 9.0})
     assert columns.columns["d1"].name == name
     assert columns.columns["d1"].factor == 0.01
+    assert columns.doubts == ()
+
+
+@pytest.mark.parametrize(("name", "component"), [("cmd_pct", "d1"), ("motor_cmd_%", "d1"), ("cmd_V", "u1")])
+def test_what_is_commanded_in_percent_or_volts_drives_the_motor(tmp_path, name, component):
+    assert guessed(tmp_path, {name: 50.0, "speed_rad_s": 9.0}).columns[component].name == name
+
+
+@pytest.mark.parametrize("name", ["humidity_%", "efficiency_pct", "soc_%", "cpu_load_percent"])
+def test_percent_of_what_no_word_says_to_be_a_motor_is_left(tmp_path, name):
+    columns = guessed(tmp_path, {name: 50.0, "speed_rad_s": 9.0})
+    assert list(columns.columns) == ["t", "w1"]
     assert columns.doubts == ()
 
 

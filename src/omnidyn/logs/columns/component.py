@@ -93,7 +93,8 @@ def numbered_kind(name: NameParts, unit: Unit | None) -> str | None:
     by_unit = BY_UNIT.get(unit.quantity) if unit is not None else None
     if by_unit is not None:
         volts = by_unit == "u" and roles == {words.LINEAR}  # V1 [V]
-        no_word = volts or roles & {words.MOTOR, words.WHEEL} or not roles - {words.OTHER, words.CHANNEL}
+        unknown = frozenset() if by_unit == "d" else {words.OTHER}  # humidity_% is no duty
+        no_word = volts or roles & {words.MOTOR, words.WHEEL} or not roles - {words.CHANNEL, words.COMMAND, *unknown}
         kin = _KIN[by_unit] + ("w" if by_unit == "d" and words.COMMAND in roles else "")  # a speed is set in percent
         if (set(said) & set(kin)) if said else no_word:
             letter = by_unit

@@ -38,9 +38,10 @@ _WORDS = {
     LINEAR: "v lin linear",
     ANGULAR: "angular",
     # Words that change nothing: joint_states/wheel_1_joint/velocity is the speed of wheel 1.
-    MEASURED: "meas measured act actual fb feedback ist est filt filtered raw joint joints states field data msg value",
+    MEASURED: """meas measured act actual fb feedback ist est filt filtered raw joint joints states field data msg value
+        sense""",
     # What puts out volts of its own, which are none of a motor.
-    SENSOR: """sensor sensors sense enc encoder resolver ntc ptc pot poti potentiometer hall thermistor thermo adc ain
+    SENSOR: """sensor sensors enc encoder resolver ntc ptc pot poti potentiometer hall thermistor thermo adc ain
         analog photo ldr shunt strain loadcell tacho probe trigger trig sync""",
     # Of an oscilloscope or a recorder: its number is none of a wheel.
     CHANNEL: "ch chan channel kanal canal voie trace",
