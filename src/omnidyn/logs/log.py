@@ -78,8 +78,9 @@ class Log:
         back = np.flatnonzero(np.diff(self.t) < 0.0) + 1
         cuts = back if back.size <= OFTEN_BACK * len(self) else back[:0]
         lines = [each.line for each in self.restarts if each.is_gap]
-        edges = np.unique([0, *cuts, *np.searchsorted(self.lines, lines), len(self)])
-        parts = [self.rows(slice(int(a), int(b))) for a, b in pairwise(edges)]
+        begins = np.searchsorted(self.lines, lines).tolist()
+        edges = sorted({0, *cuts.tolist(), *begins, len(self)})
+        parts = [self.rows(slice(a, b)) for a, b in pairwise(edges)]
         return [replace(part, restarts=()) for part in parts] if len(parts) > 1 else [self]
 
     def to_run(self, *, sort: bool = False) -> Run:

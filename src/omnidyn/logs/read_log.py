@@ -16,17 +16,8 @@ from omnidyn.clocks import is_staggered
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import TIME, components, place
 from omnidyn.logs.clock.clock import Clock
-from omnidyn.logs.clock.counters import unrolled
-from omnidyn.logs.clock.overflow import widened
+from omnidyn.logs.clock.counted_columns import Counters
 from omnidyn.logs.clock.rate import timed
-from omnidyn.logs.clock.restarts import (
-    Counter,
-    beside_restarts,
-    counter_restarts,
-    full_counter,
-    overflow,
-    recordings,
-)
 from omnidyn.logs.clock.stamps import with_joined_stamp
 from omnidyn.logs.column import MOTOR_SIDE, Column
 from omnidyn.logs.columns.frame_of import turn_to_body, with_frames
@@ -206,9 +197,7 @@ def log_from_table(
     clock = clock or Clock()
     known = len(clock.restarts)
     t = clock.times(table, columns.columns[TIME], notes)
-    restarts = clock.restarts[known:]
-    begins = np.flatnonzero(np.isin(table.lines, [each.line for each in restarts])).tolist()
-    counters: list[Counter] = []
+    counters = Counters(table, t, clock.restarts[known:])
     channels: dict[str, FloatArray] = {}
     for key, column in columns.columns.items():
         found = place(key)
@@ -216,15 +205,9 @@ def log_from_table(
             continue
         values = table.numbers(column.name, missing=True, skip=options.skip_bad_rows)
         if found[0] == "wheel_angle":
-            read, where = values, f"{table.source}, column {column.name}"
-            values, periods, again = _unrolled(read, t, begins, column.unit, where)
-            restarts += [
-                full_counter(key, column.name, each, _bare(column.unit), int(table.lines[0])) for each in periods
-            ]
-            counters.append(Counter(key, column.name, read, again))
+            values = counters.angle(key, column, values)
         if found[0] == "wheel_speed":
-            values, jumps, followed = widened(values, t)
-            restarts += [overflow(key, column.name, jumps, followed, int(table.lines[0]))] if jumps else []
+            values = counters.speed(key, column, values)
         values = values * column.factor
         if found[0] in SIDED:
             values = values / _divisor(column, key, robot, found[1], table.source)
@@ -237,13 +220,14 @@ def log_from_table(
     for name in [name for name in channels if CHANNELS[name] == SCALAR]:
         channels[name] = channels[name][:, 0]
     notes += turn_to_body(t, channels, columns, table.source)
-    restarts += counter_restarts(counters, table.lines)
+    restarts = counters.restarts()
     notes += [each.note for each in restarts if each.where != TIME]
     log = Log(
         t, channels, table.lines, columns, table.source, table.sha256, False, tuple(notes), table.own_clocks,
         tuple(restarts),
     )  # fmt: skip
-    log = log.rows(~beside_restarts(t, counters)) if any(each.restarts for each in counters) else log
+    beside = counters.beside_restarts()
+    log = log.rows(~beside) if beside.any() else log
     log = _without_other_topics(log).joined()
     log = replace(log, own_clocks=log.own_clocks or is_staggered(log.t, log.channels.values()))
     return _signed(log, robot) if options.current_unsigned else log
@@ -253,24 +237,6 @@ def _without_other_topics(log: Log) -> Log:
     """The log without the rows of messages of topics that nobody took."""
     empty = log.empty_rows() if log.own_clocks else np.zeros(len(log), dtype=bool)
     return log.rows(~empty) if empty.any() and not empty.all() else log
-
-
-def _unrolled(
-    values: FloatArray, t: FloatArray, begins: Sequence[int], unit: str, where: str
-) -> tuple[FloatArray, list[float], list[int]]:
-    """(angles of a wheel that go on, what they start over after, the first row behind each restart of their counter).
-
-    begins: the first row of each recording but the first. Each goes on from where the one before it ended.
-    """
-    parts, periods, again = [], [], []
-    for part in recordings(len(values), begins):
-        readings, period, restarts = unrolled(values[part], unit, where, t[part])
-        known = [each[np.isfinite(each)] for each in (*parts[-1:], readings)]
-        shift = known[0][-1] - known[1][0] if len(known) == 2 and all(each.size for each in known) else 0.0
-        parts.append(readings + shift)
-        periods += [] if period is None else [period]
-        again += [part.start + row for row in restarts]
-    return np.concatenate(parts), list(dict.fromkeys(periods)), again
 
 
 def _wheel_count(columns: ColumnMap, robot: Robot | None, where: str) -> int:
@@ -295,11 +261,6 @@ def _wheel_count(columns: ColumnMap, robot: Robot | None, where: str) -> int:
             ) * fewer,
         )  # fmt: skip
     return count
-
-
-def _bare(unit: str) -> str:
-    """ticks of ticks/2000."""
-    return unit.partition("/")[0]
 
 
 def _divisor(column: Column, component: str, robot: Robot | None, wheel: int, where: str) -> float:

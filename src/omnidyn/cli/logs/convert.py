@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
 from omnidyn.cli import log_options
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.streams import say
+
+if TYPE_CHECKING:
+    from omnidyn.run import Run
 
 
 def convert(
@@ -47,7 +52,7 @@ def convert(
     if not split:
         check_output(out, force)
     from omnidyn.logs.read_log import load_log
-    from omnidyn.logs.run_file import check_format, write_run
+    from omnidyn.logs.run_file import check_format
     from omnidyn.model.robot_file import load_robot
 
     check_format(out)
@@ -60,17 +65,25 @@ def convert(
         read = load_log(log, load_robot(robot) if robot else None, options)
         maps.show(log, read.columns)
         runs = [part.to_run(sort=sort) for part in (read.recordings() if split else [read])]
-    files = [out] if len(runs) == 1 else numbered(out, len(runs))
-    log_options.keep_inputs([log, *beside], [robot], [map_file], *files, save_map)
-    for path in files:
-        check_output(path, force)
     for warning in dict.fromkeys(words for run in runs for words in run.warnings):
         say(f"omnidyn: warning: {warning}")
-    for path, run in zip(files, runs, strict=True):
-        write_run(run, path, force)
-        say(f"omnidyn: wrote {path}")
+    files = [out] if len(runs) == 1 else numbered(out, len(runs))
+    log_options.keep_inputs([log, *beside], [robot], [map_file], *files, save_map)
+    write_all(runs, files, force)
     if split and len(runs) == 1:
         say("omnidyn: no clock and no counter restarts in this log: it is one recording")
+
+
+def write_all(runs: Sequence[Run], files: Sequence[str], force: bool) -> None:
+    """Write each run to its file; none where one of the files must not be replaced."""
+    from omnidyn.files import check_output
+    from omnidyn.logs.run_file import write_run
+
+    for path in files:
+        check_output(path, force)
+    for run, path in zip(runs, files, strict=True):
+        write_run(run, path, force)
+        say(f"omnidyn: wrote {path}")
 
 
 def numbered(path: str, count: int) -> list[str]:

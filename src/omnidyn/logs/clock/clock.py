@@ -124,7 +124,7 @@ class Clock:
             within = read.min() >= low and read.max() < low + period and (low == 0.0 or period in COUNTERS)
             if within and (over == (steps < 0.0)).all() and LONG * usual < period:
                 notes.append(f"{column.name} starts over after {period:.6g} {column.unit}: it is taken to go on")
-                return period * over
+                return np.where(over, period, 0.0)
         return None
 
     def _begun_again(self, read: FloatArray, lines: IntArray, column: Column, notes: list[str]) -> FloatArray:
