@@ -163,7 +163,7 @@ def identified(model: str, folder: Path) -> dict[str, Any]:
 def errors(model: str, folder: Path) -> dict[str, Any]:
     """The standard errors of a fit alone, by all rows."""
     import omnidyn
-    from omnidyn.identification.structure import bounded
+    from omnidyn.identification.output_error.problem import bounded
 
     bounded.NUMBERS = bounded.ROWS = 10**12
     runs = [omnidyn.read_log(path) for path in sorted(folder.glob("log*.csv"))]

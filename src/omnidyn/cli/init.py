@@ -77,20 +77,22 @@ def init(
     path = _checked_path(name := name.removesuffix(".toml"), out, force)
     log_options.keep_inputs(log, [like], [map_file], "" if path == "-" else path)
     log_options.refuse_missing(log)
-    preset = _preset(like)
-    told = {key for key, value in given.items() if value is not None}
+    preset, told = _preset(like), _said(given)
     how = (map_file, column, assume, (), no_header, False, False, max_bytes, var, rate)
     if not log and any(how):
         raise typer.BadParameter("--map, --column, --assume, --no-header, --rate, --max-bytes and --var are for --log.")
     seen = from_logs(given, log, log_options.log_options(*how), mecanum, bool(like)) if log else None
-    found = {
-        KEYS[key] for key in ("azimuth", "robot_radius", "wheel_radius") if given[key] is not None and key not in told
-    }
+    found = {KEYS[key] for key in KEYS.keys() & (_said(given).keys() - told.keys())}
     refuse_sizes(_sizes(given, preset))
-    answers = complete({key: value for key, value in given.items() if value is not None}, preset, mecanum)
+    answers = complete(_said(given), preset, mecanum)
     refuse_sizes(_sizes(answers.value, preset))
     robot = _with_motor(as_seen(_robot(name, answers, preset, mecanum, friction), seen, found), given, bool(like))
     _write(robot, path, force, json, like)
+
+
+def _said(given: dict[str, Any]) -> dict[str, Any]:
+    """The numbers that are known, by their names here."""
+    return {key: value for key, value in given.items() if value is not None}
 
 
 def _refuse_words(given: dict[str, Any], mecanum: bool, friction: str, like: str, out: str, json: bool) -> None:

@@ -57,8 +57,7 @@ def conclude(
     blind = tuple(p.name for p, b in zip(problem.parameters, known.blind, strict=True) if b)
     ended = tuple(p.name for p in at_the_end(problem, values))
     open_ = tuple(p.name for p, b in zip(problem.parameters, known.open, strict=True) if b or p.name in ended)
-    own = problem.robot_count
-    missed = unexplained(solver, solution)
+    own, missed = problem.robot_count, unexplained(solver, solution)
     directions = () if missed else blind_in_words(problem, values, known.ways, moved)
     joint = combinations(problem, values, known, moved)
     if known.open[:own].all() and (missed or not joint):

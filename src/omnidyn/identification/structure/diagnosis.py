@@ -13,11 +13,11 @@ from omnidyn.compiled.beside import small_matrices
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.prepare import engine_kind
+from omnidyn.identification.output_error.problem.bounded import bounded
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
 from omnidyn.identification.output_error.trust.breakaway import levels_of
 from omnidyn.identification.structure.binned import binned
-from omnidyn.identification.structure.bounded import bounded
 from omnidyn.identification.structure.linear import Linear, Rows
 from omnidyn.identification.structure.misfit import FALSE, Misfit, chance, memory_beside, misfit, with_cause
 from omnidyn.identification.structure.missing.candidates import Candidate, Trial

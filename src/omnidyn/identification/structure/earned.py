@@ -18,10 +18,10 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.identification.output_error.problem.bounded import bounded
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.solver import Normal, RowEngine, Solution
-from omnidyn.identification.structure.bounded import bounded
 from omnidyn.identification.structure.linear import Linear, Rows
 from omnidyn.identification.structure.misfit import memory_of
 from omnidyn.identification.structure.missing.remedies import Blocks

@@ -13,11 +13,11 @@ from omnidyn.identification.output_error.memory.autoregression import AutoRegres
 from omnidyn.identification.output_error.memory.whitening import Weighed
 from omnidyn.identification.output_error.prepare import engine_kind
 from omnidyn.identification.output_error.problem.bending import bending_keys
+from omnidyn.identification.output_error.problem.bounded import bounded
 from omnidyn.identification.output_error.problem.falling import falls
 from omnidyn.identification.output_error.problem.parameters import robot_parameter
 from omnidyn.identification.output_error.problem.problem import Point, Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine
-from omnidyn.identification.structure.bounded import bounded
 from omnidyn.identification.structure.linear import Linear, Rows, solved
 from omnidyn.identification.structure.workbench import Workbench, scaled
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, EMF, TORQUE, WHEELS, Key, expand

@@ -14,9 +14,9 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.joint import JointEngine
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
+from omnidyn.identification.output_error.problem.bounded import bounded
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
-from omnidyn.identification.structure.bounded import bounded
 from omnidyn.identification.structure.linear import Linear, Rows
 from omnidyn.identification.structure.missing.remedies import Blocks
 from omnidyn.identification.structure.tails import as_counted

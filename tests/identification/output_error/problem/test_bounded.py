@@ -6,9 +6,9 @@ import pytest
 from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.memory.autoregression import _without_empty_axes
+from omnidyn.identification.output_error.problem import bounded as module
+from omnidyn.identification.output_error.problem.bounded import ROWS, bounded
 from omnidyn.identification.question import OUTPUT_ERROR, Question
-from omnidyn.identification.structure import bounded as module
-from omnidyn.identification.structure.bounded import ROWS, bounded
 from omnidyn.identification.structure.linear import Gram, Linear, Rows
 from omnidyn.identification.structure.misfit import memory_of
 from omnidyn.identification.structure.random_effects import RandomEffects, drawn_together
