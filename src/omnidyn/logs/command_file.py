@@ -89,9 +89,9 @@ def _read(
             remedy="shorten the file or raise `max_steps`",
             where=table.source,
         )
-    t = table.numbers("t_s")
-    rows = np.stack([table.numbers(name) for name in columns_of(kind, wheels)], axis=1)
-    supply = table.numbers("supply_V") if "supply_V" in table.names else None
+    t = table.measured("t_s")
+    rows = np.stack([table.measured(name) for name in columns_of(kind, wheels)], axis=1)
+    supply = table.measured("supply_V") if "supply_V" in table.names else None
     _check_time(table, t)
     dt, used = _intervals(table, t, duration)
     notes = table.notes

@@ -90,11 +90,11 @@ def read_motor_table(path: str | os.PathLike) -> MotorTable:
                          remedy="name the columns so, or voltage_V, duty_%, speed_rpm", where=table.source)  # fmt: skip
     own = next(name for name in found if name in _INPUTS)
     kind, unit, size = _INPUTS[_UNITS.get(table.units.get(found[own], ""), own) if own == "input" else own]
-    put_in, notes = table.numbers(found[own]) * size, table.notes
+    put_in, notes = table.measured(found[own]) * size, table.notes
     if unit == "%" and size == 100.0 and np.abs(put_in).max(initial=0.0) > 100.0 * MOST_DUTY:
         put_in, notes = put_in / size, (*notes, f"{found[own]} goes beyond 1: it was read as percent")
     fast = next(name for name in found if name in _SPEEDS)
-    speed = table.numbers(found[fast]) * _speed_size(table, found[fast], fast)
+    speed = table.measured(found[fast]) * _speed_size(table, found[fast], fast)
     motor = _motors(table, found[MOTOR]) if MOTOR in found else np.zeros(len(speed), dtype=np.int64)
     _refuse_log(put_in, speed, motor, table.source)
     rows = f"{len(speed)} rows without a time are taken as points at steady speed; of a log, give its `rate`"
@@ -128,7 +128,7 @@ def _speed_size(table: Table, name: str, bare: str) -> float:
 
 def _motors(table: Table, name: str) -> IntArray:
     """Numbers from 0."""
-    numbers = table.numbers(name)
+    numbers = table.measured(name)
     wrong = np.flatnonzero((numbers < 1.0) | (numbers != np.round(numbers)) | (numbers > 1000.0))
     if wrong.size:
         raise table.fault(int(wrong[0]), name, "no number of a motor", float(numbers[wrong[0]]), "1, 2, 3, ...")

@@ -203,7 +203,7 @@ def log_from_table(
         found = place(key)
         if found is None:
             continue
-        values = table.numbers(column.name, missing=True, skip=options.skip_bad_rows)
+        values = table.measured(column.name, missing=True, skip=options.skip_bad_rows)
         if found[0] == "wheel_angle":
             values = counters.angle(key, column, values)
         if found[0] == "wheel_speed":

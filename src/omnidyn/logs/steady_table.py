@@ -148,10 +148,10 @@ def read_steady_table(path: str | os.PathLike) -> SteadyTable:
     _check_units(table, words)
     steady = SteadyTable(
         axis=words,
-        speed=table.numbers("speed"),
-        force=table.numbers("force"),
-        speed_std=table.numbers("speed_std") if "speed_std" in table.names else None,
-        force_std=table.numbers("force_std") if "force_std" in table.names else None,
+        speed=table.measured("speed"),
+        force=table.measured("force"),
+        speed_std=table.measured("speed_std") if "speed_std" in table.names else None,
+        force_std=table.measured("force_std") if "force_std" in table.names else None,
         voltage=_per_wheel(table, "u", "V"),
         current=_per_wheel(table, "i", "A"),
         source=table.source,
@@ -169,7 +169,7 @@ def _numbered(table: Table, letter: str, unit: str) -> list[str]:
 
 def _per_wheel(table: Table, letter: str, unit: str) -> FloatArray | None:
     names = _numbered(table, letter, unit)
-    return np.stack([table.numbers(name, missing=True) for name in names], axis=1) if names else None
+    return np.stack([table.measured(name, missing=True) for name in names], axis=1) if names else None
 
 
 def _alias_notes(words: Sequence[str]) -> list[str]:

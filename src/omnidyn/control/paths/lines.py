@@ -98,5 +98,5 @@ def path_of_file(path: str | os.PathLike) -> Lines:
             "no path in this file", got=", ".join(table.names), expected=", ".join(COLUMNS),
             remedy=f"add {', '.join(missing)}", where=table.source,
         )  # fmt: skip
-    t, *pose = (table.numbers(name) for name in COLUMNS)
+    t, *pose = (table.measured(name) for name in COLUMNS)
     return lines(t, np.column_stack(pose), str(table.source))

@@ -206,6 +206,7 @@ def _lines(logs: Sequence[MotorLog], asked: Question) -> MotorStudy:
 def _of_each(windows: MotorWindows, source: str) -> tuple[list[int], tuple[MotorEstimate, ...]]:
     """(numbers of the motors, a line each, and one of all where there are several)."""
     motors = [int(motor) for motor in np.unique(windows.motor)]
+    lines = tuple(fit_line(windows, motor, source) for motor in (*motors, *([None] if motors[1:] else [])))
     speeds = [windows.of(motor)[1] for motor in motors]
     if all(np.ptp(speed) <= SAME_SPEED * np.abs(speed).max() for speed in speeds):
         raise InsufficientDataError(
@@ -213,7 +214,7 @@ def _of_each(windows: MotorWindows, source: str) -> tuple[list[int], tuple[Motor
             expected="speeds that change", remedy="drive the motors with several inputs, or look at their sensors",
             where=source,
         )  # fmt: skip
-    return motors, tuple(fit_line(windows, motor, source) for motor in (*motors, *([None] if motors[1:] else [])))
+    return motors, lines
 
 
 def _of_points(points: MotorTable, origin: str, words: Sequence[str]) -> MotorStudy:

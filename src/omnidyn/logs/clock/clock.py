@@ -60,7 +60,7 @@ class Clock:
         cells = table.columns[column.name]
         if isinstance(cells, tuple) and (isinstance(self._start, datetime) or is_dates(cells)):
             return self._from_dates(table, column.name, cells, notes)
-        counts = table.numbers(column.name, missing=True, skip=True)
+        counts = table.measured(column.name, missing=True, skip=True)
         if self._steps is None:
             self._steps = are_steps(column.name, counts)
         if self._steps:

@@ -55,5 +55,5 @@ def take_sides(sides: Mapping[str, str], found: Guess) -> None:
 
 def _values(table: Table, columns: list[Column | None]) -> FloatArray:
     return np.column_stack(
-        [table.numbers(c.name, missing=True, skip=True) * c.factor for c in columns if c is not None]
+        [table.measured(c.name, missing=True, skip=True) * c.factor for c in columns if c is not None]
     )

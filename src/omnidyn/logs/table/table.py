@@ -81,10 +81,9 @@ class Table:
     def __len__(self) -> int:
         return len(self.lines)
 
-    def numbers(self, name: str, *, missing: bool = False, skip: bool = False) -> FloatArray:
+    def numbers(self, name: str, *, missing: bool = False) -> FloatArray:
         """A column of numbers, shape (rows,). With `missing`, a blank or nan cell is NaN; else it is refused.
 
-        A number below LEAST in size is 0. skip: whether one beyond LARGEST is NaN; otherwise it is refused.
         Raises InputError with file, line and column at the first cell that cannot be used.
         """
         column = self.columns[name]
@@ -104,10 +103,14 @@ class Table:
                 "a number",
                 f"fill it in, or remove the row ({bad.size} of {len(self)} are missing)",
             )
-        return self._plausible(column, name, missing, skip)
+        return column
 
-    def _plausible(self, column: FloatArray, name: str, missing: bool, skip: bool) -> FloatArray:
-        """The column, its numbers of a size that a sensor may give."""
+    def measured(self, name: str, *, missing: bool = False, skip: bool = False) -> FloatArray:
+        """A column of numbers of a size that a sensor may give: one below LEAST is 0; see `numbers`.
+
+        skip: whether one beyond LARGEST is NaN; otherwise it raises InputError.
+        """
+        column = self.numbers(name, missing=missing)
         size = np.abs(column)
         large, small = (size > LARGEST) & np.isfinite(size), (size < LEAST) & (size > 0.0)
         if large.any() and not skip:
