@@ -103,14 +103,11 @@ def moved_by_the_file(sure: Weighed, held: Mapping[str, float]) -> FloatArray:
     return found
 
 
-def as_weighed(sure: Weighed, beside: int = 1) -> tuple[Linear, RowEngine, Point]:
-    """(the rows of a fit made white by the memory that it was weighed with, what simulates them, its best point).
-
-    beside: columns that are shown in them beside those of the fit.
-    """
+def as_weighed(sure: Weighed) -> tuple[Linear, RowEngine, Point]:
+    """(the rows of a fit made white by the memory that it was weighed with, what simulates them, its best point)."""
     solver, point = sure.plain.solver, sure.plain.state.point
     assert isinstance(solver.problem, Problem)
-    problem, variance = bounded(solver.problem, beside), sure.plain.state.variance
+    problem, variance = bounded(solver.problem, 1), sure.plain.state.variance
     engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
     rows = Rows.of(problem, point, engine.residuals(point))
     memory = [

@@ -45,8 +45,11 @@ SEED = 20_12
 
 def moved_by_rounding(sure: Weighed) -> FloatArray:
     """What the rounding of its inputs moves the parameters of a fit by, in the numbers that the solver sees: their
-    covariance is that times its transpose. Shape (P, DRAWS)."""
-    linear, engine, point = as_weighed(sure, DRAWS)
+    covariance is that times its transpose. Shape (P, DRAWS).
+
+    One piece after the other. Of logs that are longer than what is looked at as much less as there are more rows.
+    """
+    linear, engine, point = as_weighed(sure)
     products, random = with_priors(linear, DRAWS), np.random.default_rng(SEED)
     for problem, own_point, _, places in members_of(engine, linear.rows.problem, point):
         for place, motion in zip(places, motions(problem, own_point), strict=True):

@@ -64,17 +64,22 @@ def test_long_logs_of_few_channels_stay_within_the_rows(solution, monkeypatch):
     assert sum(p.last - p.first + 1 for p in bounded(solution.solver.problem).pieces) <= 1000 < ROWS
 
 
-def test_intervals_of_a_part_of_the_rows_are_those_of_all(case, log, monkeypatch):
-    """What inputs may have been rounded by is looked at in half of the rows, and scaled to all."""
+def test_intervals_beside_a_bounded_diagnosis_are_those_of_all_rows(case, log, monkeypatch):
+    """A bound that leaves a seventh of the rows to the diagnosis; and one that leaves half of them to the intervals,
+    whose part by rounding 60 draws tell within 9 %, others in each."""
     fits = []
-    for numbers in (10**9, 600_000):
+    for numbers, rows in ((10**9, 10**9), (300_000, 10**9), (10**9, 750)):
         monkeypatch.setattr(module, "NUMBERS", numbers)
+        monkeypatch.setattr(module, "ROWS", rows)
         fits.append(fit_output_error(log, robot_of(case.told), free="friction", nuisances=()))
-    every, part = fits
-    assert any("in steps of 0.3 V" in words for words in every.warnings)
+    every, part, half = fits
+    assert any("up to 3.2 times as wide for it" in words for words in every.warnings)
     for name, std in every.std.items():
         assert part.std[name] == pytest.approx(std, rel=0.05)
         assert part.value[name] == every.value[name]
+    ratio = [half.std[name] / std for name, std in every.std.items()]
+    assert np.exp(np.mean(np.log(ratio))) == pytest.approx(1.0, abs=0.2)
+    assert ratio == pytest.approx([1.0] * len(ratio), abs=0.4)
 
 
 def test_sums_over_pieces_are_those_of_all_rows_at_once(solution):
