@@ -6,6 +6,8 @@ import pytest
 from omnidyn.clocks import fastest_step, has_own_clock, is_staggered, samples, time_of_row, usual_step
 from omnidyn.errors import InputError
 from omnidyn.findings.check import check
+from omnidyn.identification.output_error.problem.differences import added_up, differences
+from omnidyn.identification.output_error.solve.loop import _begins_at_rest
 from omnidyn.logs.log import Log
 from omnidyn.logs.run_file import read_run, write_run
 from omnidyn.run import Run
@@ -63,6 +65,38 @@ def test_a_time_is_so_many_rows_of_all_topics():
     assert round(0.4 / time_of_row(t, True)) == 40  # 20 samples of each of two
     assert time_of_row(np.arange(9) * 0.02, False) == pytest.approx(0.02)
     assert time_of_row(np.zeros(1), True) == 0.0
+
+
+def test_a_set_of_speeds_begins_at_rest_whatever_the_rate_of_its_odometry():
+    """A twist in every second or third row, with noise about 0 at the begin, or in motion from the first row on."""
+    rng = np.random.default_rng(5)
+    for every in (1, 2, 3):
+        rest = np.where(np.arange(300)[:, None] % every, NAN, 0.002 * rng.normal(size=(300, 3)))
+        rest[150:] += 0.3
+        assert _begins_at_rest(rest, 0, 299)
+        assert not _begins_at_rest(rest + 0.1, 0, 299)
+
+
+def test_speeds_that_are_counts_are_added_up_at_their_own_clock():
+    """Counts of an encoder over 10 ms, and another sensor 3 ms later: the angles are those of equal stamps."""
+    t = np.arange(2000) * 0.01
+    tick = 2.0 * np.pi / 1000.0
+    turned = np.floor((8.0 * np.sin(0.7 * t) + 3.0 * np.sin(1.9 * t))[:, None] * [1.0, 0.7] / tick)
+    speed = np.diff(turned, axis=0, prepend=turned[:1]) * tick / 0.01
+    equal = Run(t=t, wheel_speed=speed, current=np.ones((2000, 2)))
+    rows = np.sort(np.concatenate([t, t + 0.003]))
+    mine = np.searchsorted(rows, t)
+    wide = [np.full((4000, 2), NAN) for _ in range(2)]
+    wide[0][mine], wide[1][mine + 1] = speed, 1.0
+    apart = Run(t=rows, wheel_speed=wide[0], current=wide[1])
+    found, told = differences([equal]), differences([apart])
+    assert found is not None
+    assert told is not None
+    np.testing.assert_array_equal(told.ticks, found.ticks)
+    angle, lost = added_up(apart, told)
+    np.testing.assert_array_equal(angle[mine], added_up(equal, found)[0])
+    assert np.isnan(angle[mine + 1]).all()
+    assert not lost.any()
 
 
 def run_of(offset):

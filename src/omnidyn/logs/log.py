@@ -196,6 +196,8 @@ class Log:
         those of a clock of its own where its steps say so.
         """
         there = np.isfinite(values)
+        if there.all():
+            return False
         covered = there | np.isfinite(filled(self.t, values))
         blank = 1.0 - there.sum() / max(covered.sum(), 1)
         return 0.0 < blank < 1.0 and (self.own_clocks or blank > ON_CHANGE or has_own_clock(self.t, values))
