@@ -43,9 +43,7 @@ def init(
     rotor_inertia: float | None = typer.Option(
         None, help="Of one motor's rotor, at its shaft [kg m2]: 1 g cm2 is 1e-7. Default: a guess."
     ),
-    log: list[str] = typer.Option(
-        [], "--log", metavar="LOG", help="Logs that show where the wheels stand. Repeatable."
-    ),
+    log: list[str] = typer.Option([], "--log", metavar="LOG", help="Logs that show where wheels stand. Repeatable."),
     mecanum: bool = typer.Option(False, "--mecanum", help="Four mecanum wheels, in an X seen from above."),
     friction: str = typer.Option("", help="Where the guessed friction acts: direction (default) or axes."),
     speed_loop: str = typer.Option(

@@ -213,8 +213,7 @@ def log_from_table(
             values = values / _divisor(column, key, robot, found[1], table.source)
         width = len(components(found[0], wheels))
         channels.setdefault(found[0], np.full((len(table), width), np.nan))[:, found[1]] = values
-    if any(column.side == MOTOR_SIDE for column in columns.columns.values()) and robot is None:
-        notes.append("speeds and angles are those of the motor shaft: no robot is given, so no gear is known")
+    notes += _side_notes(columns, robot)
     if "pose" in channels:
         channels["pose"][:, 2] = unwrapped(channels["pose"][:, 2])
     for name in [name for name in channels if CHANNELS[name] == SCALAR]:
@@ -231,6 +230,13 @@ def log_from_table(
     log = _without_other_topics(log).joined()
     log = replace(log, own_clocks=log.own_clocks or is_staggered(log.t, log.channels.values()))
     return _signed(log, robot) if options.current_unsigned else log
+
+
+def _side_notes(columns: ColumnMap, robot: Robot | None) -> list[str]:
+    """What it means that speeds are those of the motor shaft, where no robot says the gear."""
+    if robot is not None or not any(column.side == MOTOR_SIDE for column in columns.columns.values()):
+        return []
+    return ["speeds and angles are those of the motor shaft: no robot is given, so no gear is known"]
 
 
 def _without_other_topics(log: Log) -> Log:
