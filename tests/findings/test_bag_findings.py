@@ -1,5 +1,9 @@
 """What a bag shows about itself: a gyroscope in deg/s, messages without a number."""
 
+import shutil
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -7,6 +11,7 @@ from omnidyn.findings.check import check
 from omnidyn.logs.read_log import LogOptions, load_log
 from tests.findings.redundant import ROBOT, driven
 from tests.support.bags import BagMaker, write_mcap
+from tests.support.cases import case
 
 
 @pytest.fixture(scope="module")
@@ -59,3 +64,24 @@ def test_messages_without_a_number_are_named(bag):
     assert [finding.message.partition(" look")[0] for finding in doubts] == ["/odom/heading", "/odom/vx, /odom/vy"]
     assert "quaternion of zeros" in doubts[0].message
     assert doubts[0].remedy == "look at what fills in these messages"
+
+
+# Bag of the case -> what is said above a note, with a robot; each has one cause.
+CAUSES = {
+    "ok": [], "stagger": [], "world_twist": [("twist_frame", "vx vy")],
+    "world_twist_nowheels": [("twist_frame", "vx vy")], "zero_quaternion": [], "nan_odom": [], "gyro_deg": [], "rpm": [("unit", "w1 w2 w3")],
+    "left_handed": [("inverted", "vy omega y heading")], "roller_slip": [("axis_ratio", "y")],
+}  # fmt: skip
+
+
+@pytest.mark.long
+def test_each_bag_of_the_cases_has_one_cause(tmp_path):
+    pytest.importorskip("rosbags")
+    for name in ("make.py", "body.py"):
+        shutil.copy(case("logs/staggered_topics") / name, tmp_path)
+    subprocess.run([sys.executable, "make.py"], cwd=tmp_path, check=True)
+    found = {}
+    for name in CAUSES:
+        findings = check(load_log(tmp_path / name, ROBOT), ROBOT).findings
+        found[name] = [(finding.code, finding.where) for finding in findings if finding.level != "note"]
+    assert found == CAUSES

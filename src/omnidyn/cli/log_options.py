@@ -34,7 +34,8 @@ ASSUME = typer.Option(
     [],
     "--assume",
     metavar="NAME=UNIT",
-    help="Unit of a column, or of all u, w, vx, ...: d=%, a=ticks/48@motor. Repeatable.",
+    help="Unit of a column, or of all u, w, vx, ...: d=%, a=ticks/48@motor. Frames: twist=room, marker=9deg. "
+    "Repeatable.",
 )
 LATENCY = typer.Option(
     [], "--latency", metavar="CH=SECONDS", help="How late a channel was recorded. Repeatable.", rich_help_panel=MORE

@@ -56,7 +56,7 @@ def _against_twist(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> 
     if plain.turn.plain > ALIKE and not is_turned(plain.turn):
         return [], work
     tried = [_found(work, pose, twist, (1.0, 1.0, 1.0), True)]
-    tried += [_found(work, pose, twist, (1.0, *signs), False) for signs in product((1.0, -1.0), repeat=2)]
+    tried += [_found(work, pose, twist, (1.0, y, turn), False) for y, turn in product((1.0, -1.0), repeat=2)]
     known = [each for each in tried if each is not None]
     best = min(known, key=lambda each: each.left)
     room = known[0]

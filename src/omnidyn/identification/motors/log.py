@@ -113,7 +113,7 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
     if motion is None:
         raise InputError("the log has no speed and no angle of the motors", got=", ".join(run.channels),
                          expected="wheel_angle or wheel_speed", where=run.source)  # fmt: skip
-    averaged = [rows_of_mean(column) or 1 if angle is None else 1 for column in motion.T]
+    averaged = [rows_of_mean(np.asarray(column)) or 1 if angle is None else 1 for column in motion.T]
     return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces, tuple(averaged), given)
 
 
