@@ -69,7 +69,8 @@ def test_messages_without_a_number_are_named(bag):
 # Bag of the case -> what is said above a note, with a robot; each has one cause.
 CAUSES = {
     "ok": [], "stagger": [], "world_twist": [("twist_frame", "vx vy")],
-    "world_twist_nowheels": [("twist_frame", "vx vy")], "zero_quaternion": [], "nan_odom": [], "gyro_deg": [], "rpm": [("unit", "w1 w2 w3")],
+    "world_twist_nowheels": [("twist_frame", "vx vy")],
+    "zero_quaternion": [], "nan_odom": [], "gyro_deg": [], "rpm": [("unit", "w1 w2 w3")],
     "left_handed": [("inverted", "vy omega y heading")], "roller_slip": [("axis_ratio", "y")],
 }  # fmt: skip
 
