@@ -81,9 +81,7 @@ def init(
         raise typer.BadParameter("--map, --column, --assume, --no-header, --rate, --max-bytes and --var are for --log.")
     seen = from_logs(given, log, log_options.log_options(*how), mecanum, bool(like)) if log else None
     found = {KEYS[key] for key in KEYS.keys() & (_said(given).keys() - told.keys())}
-    refuse_sizes(_sizes(given, preset))
-    answers = complete(_said(given), preset, mecanum)
-    refuse_sizes(_sizes(answers.value, preset))
+    answers = _answers(given, preset, mecanum)
     robot = _with_motor(as_seen(_robot(name, answers, preset, mecanum, friction), seen, found), given, bool(like))
     _write(robot, path, force, json, like)
 
@@ -141,6 +139,14 @@ def _refuse_numbers(given: dict[str, Any]) -> None:
         raise InputError(
             "no gear has this ratio", got=f"{gear:g}", expected="more than 0, such as 30", where="--gear-ratio"
         )
+
+
+def _answers(given: dict[str, Any], preset: Robot | None, mecanum: bool) -> Answers:
+    """All that is needed, with sizes that a robot may have. Raises InputError."""
+    refuse_sizes(_sizes(given, preset))
+    answers = complete({key: value for key, value in given.items() if value is not None}, preset, mecanum)
+    refuse_sizes(_sizes(answers.value, preset))
+    return answers
 
 
 def _sizes(given: dict[str, Any], preset: Robot | None) -> dict[str, Any]:

@@ -67,8 +67,7 @@ def conclude(
     std, ci95 = intervals(problem, values, known)
     for name, (spread, interval) in (better or {}).items():
         std[name], ci95[name] = std[name] if spread is None else spread, interval
-    data, names = _data(records), [p.name for p in problem.parameters]
-    own_levels = _levels(problem.robot, levels, ci95)
+    data, names, own_levels = _data(records), list(problem.names), _levels(problem.robot, levels, ci95)
     endless = [name for name, (_, (_, high)) in own_levels.items() if high == math.inf]
     fitted, correlation = problem.parameters[:own], _correlation(names, known)
     robot = _with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels)

@@ -11,7 +11,6 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -40,34 +39,8 @@ from omnidyn.logs.table.table import MAX_CELLS, Said, Table
 ACTION, STATE = "action", "observation.state"
 STAMP, EPISODE = "timestamp", "episode_index"
 SPEEDS = {"x.vel": ("vx", "m/s"), "y.vel": ("vy", "m/s"), "theta.vel": ("omega", "deg/s")}
-BETWEEN = 10.0  # [s] that a gap between two episodes is given
 MAX_INFO = 4 * 2**20  # bytes of meta/info.json
 ABOVE = 3  # folders between a file and that of its dataset
-
-
-@dataclass
-class _Clock:
-    """Time over episodes, each of which counts its own from 0."""
-
-    episode: float = np.nan
-    first: float = 0.0
-    end: float = 0.0
-    episodes: int = 0
-
-    def times(self, stamps: FloatArray, episodes: FloatArray) -> FloatArray:
-        """Seconds since the first row of all, BETWEEN episodes apart. Shapes (rows,)."""
-        out = np.empty(len(stamps))
-        cuts = np.flatnonzero(np.diff(episodes, prepend=self.episode) != 0.0)
-        for begin, stop in zip([0, *cuts], [*cuts, len(stamps)], strict=True):
-            if stop == begin:
-                continue
-            if episodes[begin] != self.episode:
-                gap = BETWEEN if self.episodes else 0.0
-                self.first = self.end + gap - float(stamps[begin])
-                self.episode, self.episodes = float(episodes[begin]), self.episodes + 1
-            out[begin:stop] = stamps[begin:stop] + self.first
-            self.end = float(out[stop - 1])
-        return out
 
 
 def tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
@@ -143,10 +116,10 @@ def _dataset_tables(
         column: Said(component + "_cmd" * (feature == ACTION)) for column, (feature, _, component, _) in found.items()
     }
     others = dict.fromkeys(name for own in names.values() for name in own if name not in SPEEDS)
-    clock, done, digests = _Clock(), 0, list[str]()
+    episodes, done, digests = set[float](), 0, list[str]()
 
     def table(columns: Mapping[str, FloatArray], lines: IntArray, sha256: str = "") -> Table:
-        notes = _notes(clock, list(others)) if sha256 else ()
+        notes = _notes(len(episodes), list(others)) if sha256 else ()
         return Table(tuple(units), dict(columns), lines, units, source, sha256, notes, {}, says)
 
     for file in files:
@@ -154,7 +127,8 @@ def _dataset_tables(
             if digest:
                 digests.append(digest)
                 continue
-            columns = {STAMP: clock.times(part[STAMP], part[EPISODE])}
+            episodes |= set(part[EPISODE].tolist())
+            columns = {STAMP: part[STAMP]}
             for column, (feature, place, _, _) in found.items():
                 columns[column] = _place(part[feature], place, len(names[feature]), str(file), done)
             lines = np.arange(done + 1, done + 1 + len(columns[STAMP]))
@@ -165,10 +139,10 @@ def _dataset_tables(
     yield table({}, np.zeros(0, dtype=np.int64), whole)
 
 
-def _notes(clock: _Clock, others: list[str]) -> tuple[str, ...]:
-    many = f"{clock.episodes} episodes are recordings of their own: a gap of {BETWEEN:g} s is put before each"
+def _notes(episodes: int, others: list[str]) -> tuple[str, ...]:
+    many = f"{episodes} episodes are recordings of their own, for each begins its clock anew"
     left = f"not speeds of the base, and not read: {shortened(', '.join(others), 200)}"
-    return (*([many] if clock.episodes > 1 else []), *([left] if others else []))
+    return (*([many] if episodes > 1 else []), *([left] if others else []))
 
 
 def _parts(
