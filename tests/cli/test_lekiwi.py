@@ -16,13 +16,6 @@ def test_commands_take_the_folder_and_a_folder_of_datasets(call, here):
     assert read_log(here / "one.csv").twist.shape == (ROWS, 3)
 
 
-def test_episodes_are_written_apart(call, here):
-    write_dataset(here / "set", [lerobot_episode(1), lerobot_episode(2)])
-    assert call("convert", "set", "episode.csv", "--split")[0] == 0
-    for k in (1, 2):
-        assert len(read_log(here / f"episode_{k}.csv")) == ROWS
-
-
 def test_the_command_asks_for_the_radius_and_its_remedy_works(call, here):
     (here / "bot.urdf").write_text(urdf_robot((60, 180, 300)))
     code, _, err = call("import", "urdf", "bot.urdf", "-o", "bot.toml")

@@ -40,7 +40,25 @@ ACTION, STATE = "action", "observation.state"
 STAMP, EPISODE = "timestamp", "episode_index"
 SPEEDS = {"x.vel": ("vx", "m/s"), "y.vel": ("vy", "m/s"), "theta.vel": ("omega", "deg/s")}
 MAX_INFO = 4 * 2**20  # bytes of meta/info.json
+BETWEEN = 10.0  # [s] that a gap between two episodes is given
 ABOVE = 3  # folders between a file and that of its dataset
+
+
+class _Clock:
+    """Time over episodes, each of which counts its own from 0; what comes next lies BETWEEN behind."""
+
+    def __init__(self) -> None:
+        self.shifts: dict[float, float] = {}
+        self.end = -BETWEEN
+
+    def times(self, stamps: FloatArray, episodes: FloatArray) -> FloatArray:
+        """Seconds since the first row of all. Shapes (rows,)."""
+        out = np.empty(len(stamps))
+        for row, (stamp, episode) in enumerate(zip(stamps.tolist(), episodes.tolist(), strict=True)):
+            if episode not in self.shifts:
+                self.shifts[episode] = self.end + BETWEEN - stamp
+            out[row] = self.end = stamp + self.shifts[episode]
+        return out
 
 
 def tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
@@ -116,10 +134,10 @@ def _dataset_tables(
         column: Said(component + "_cmd" * (feature == ACTION)) for column, (feature, _, component, _) in found.items()
     }
     others = dict.fromkeys(name for own in names.values() for name in own if name not in SPEEDS)
-    episodes, done, digests = set[float](), 0, list[str]()
+    clock, done, digests = _Clock(), 0, list[str]()
 
     def table(columns: Mapping[str, FloatArray], lines: IntArray, sha256: str = "") -> Table:
-        notes = _notes(len(episodes), list(others)) if sha256 else ()
+        notes = _notes(len(clock.shifts), list(others)) if sha256 else ()
         return Table(tuple(units), dict(columns), lines, units, source, sha256, notes, {}, says)
 
     for file in files:
@@ -127,8 +145,7 @@ def _dataset_tables(
             if digest:
                 digests.append(digest)
                 continue
-            episodes |= set(part[EPISODE].tolist())
-            columns = {STAMP: part[STAMP]}
+            columns = {STAMP: clock.times(part[STAMP], part[EPISODE])}
             for column, (feature, place, _, _) in found.items():
                 columns[column] = _place(part[feature], place, len(names[feature]), str(file), done)
             lines = np.arange(done + 1, done + 1 + len(columns[STAMP]))
@@ -140,7 +157,7 @@ def _dataset_tables(
 
 
 def _notes(episodes: int, others: list[str]) -> tuple[str, ...]:
-    many = f"{episodes} episodes are recordings of their own, for each begins its clock anew"
+    many = f"{episodes} episodes are recordings of their own: a gap of {BETWEEN:g} s is put before each"
     left = f"not speeds of the base, and not read: {shortened(', '.join(others), 200)}"
     return (*([many] if episodes > 1 else []), *([left] if others else []))
 
