@@ -32,7 +32,7 @@ from omnidyn.simulation.simulate import FARTHEST
 MARCH, PLACE = "omnidyn.simulation.exact.march", "omnidyn.simulation.exact.inductance_position"
 AXES = Array((3,))
 # Of one while loop: pieces of a way, events of an axis. A step of 1 s at 1000 rad/s takes 4000 and 200.
-MOST_TURNS, MOST_TURNS_WITH_INDUCTANCE = 20_000, 1_000
+MOST_TURNS, MOST_TURNS_WITH_INDUCTANCE = 16_000, 1_000
 
 STATUS = """/* What a step returns: that it was made, or why not; then twist and pose are what they were. */
 enum {

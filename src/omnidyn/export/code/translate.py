@@ -49,7 +49,7 @@ class Program:
     """
 
     single: bool = False
-    most_turns: int = 20_000
+    most_turns: int = 16_000
     structs: dict[str, str] = field(default_factory=dict)
     tables: dict[str, str] = field(default_factory=dict)
     functions: dict[tuple[str, str, tuple[Type, ...]], Function] = field(default_factory=dict)
