@@ -51,7 +51,8 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
     drawn = np.full((DRAWS + 1, 3), np.nan)  # the fit itself first
     drawn[0, used] = fit.parameters
     drawn[1:, used] = _bootstrap(design[:, used], put_in, speed_std, fit, block, windows.settled)
-    numbers = dict(zip((SLOPE, BAND, INERTIA), drawn.T, strict=True)) | {LAG: drawn[:, 2] / drawn[:, 0]}
+    with np.errstate(invalid="ignore", divide="ignore"):  # a draw without a slope has no lag
+        numbers = dict(zip((SLOPE, BAND, INERTIA), drawn.T, strict=True)) | {LAG: drawn[:, 2] / drawn[:, 0]}
     residual = put_in - design[:, used] @ fit.parameters
     slope, error = float(fit.parameters[0]), float(np.sqrt(np.mean(residual**2)))
     with np.errstate(invalid="ignore", divide="ignore"):  # of draws that are all alike there is none
