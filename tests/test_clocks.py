@@ -7,7 +7,6 @@ from omnidyn.clocks import fastest_step, has_own_clock, is_staggered, samples, t
 from omnidyn.errors import InputError
 from omnidyn.findings.check import check
 from omnidyn.identification.output_error.problem.differences import added_up, differences
-from omnidyn.identification.output_error.solve.loop import _begins_at_rest
 from omnidyn.logs.log import Log
 from omnidyn.logs.run_file import read_run, write_run
 from omnidyn.run import Run
@@ -65,16 +64,6 @@ def test_a_time_is_so_many_rows_of_all_topics():
     assert round(0.4 / time_of_row(t, True)) == 40  # 20 samples of each of two
     assert time_of_row(np.arange(9) * 0.02, False) == pytest.approx(0.02)
     assert time_of_row(np.zeros(1), True) == 0.0
-
-
-def test_a_set_of_speeds_begins_at_rest_whatever_the_rate_of_its_odometry():
-    """A twist in every second or third row, with noise about 0 at the begin, or in motion from the first row on."""
-    rng = np.random.default_rng(5)
-    for every in (1, 2, 3):
-        rest = np.where(np.arange(300)[:, None] % every, NAN, 0.002 * rng.normal(size=(300, 3)))
-        rest[150:] += 0.3
-        assert _begins_at_rest(rest, 0, 299)
-        assert not _begins_at_rest(rest + 0.1, 0, 299)
 
 
 def test_speeds_that_are_counts_are_added_up_at_their_own_clock():
