@@ -31,7 +31,9 @@ def log(case):
 @pytest.fixture(scope="module")
 def solution(case, log):
     return Fit.of(
-        [log, log.replace(source="again")], robot_of(case.told), Question.for_method(OUTPUT_ERROR, None, {})
+        [log, log.replace(source="again")],
+        robot_of(case.told),
+        Question.for_method(OUTPUT_ERROR, None, {"free": "friction", "nuisances": ()}),
     ).solve()
 
 
