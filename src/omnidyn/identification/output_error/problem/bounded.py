@@ -25,5 +25,5 @@ def bounded(problem: Problem, beside: int = 0, growing: Sequence[int] = ()) -> P
         more += numbers * own
     # even s + more s^2 = NUMBERS for the share s, in the form that no small term spoils
     share = 2.0 * NUMBERS / (even + (even**2 + 4.0 * more * NUMBERS) ** 0.5)
-    share = min(share, EFFECTS / max(1, *growing))
+    share = min(share, EFFECTS / max([1, *growing]))
     return problem.shortened(min(ROWS, int(share * whole)))
