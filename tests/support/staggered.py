@@ -84,7 +84,7 @@ def plant(seconds: float = 40.0, seed: int = 1) -> dict[str, Values]:
     place = np.concatenate([[0.0], np.cumsum(steps[:-1])])
     wheels = twist @ sides.T / RADIUS
     grid = np.arange(count) * STEP
-    line = {"vx": twist[:, 0], "vy": twist[:, 1], "omega": twist[:, 2], "x": place.real, "y": place.imag,
+    line = {"vx": twist[:, 0], "vy": twist[:, 1], "omega": twist[:, 2], "x": np.real(place), "y": np.imag(place),
             "heading": heading}  # fmt: skip
     line |= {f"w{k + 1}": wheels[:, k] for k in range(3)}
     line |= {f"a{k + 1}": np.cumsum(wheels[:, k]) * STEP for k in range(3)}
