@@ -45,7 +45,7 @@ def path_of(run: Run, robot: Robot | None = None) -> Path | None:
     robot: tells body speeds from wheel speeds, where no others were measured. Steps across a gap are not known.
     """
     if run.pose is not None and np.isfinite(run.pose).all(axis=1).sum() > 1:
-        pose = _filled(run.t if run.staggered else np.arange(len(run)), run.pose)
+        pose = _filled(run.t if run.staggered else np.arange(len(run), dtype=float), run.pose)
         body = _turned(np.diff(pose[:, :2], axis=0), -0.5 * (pose[1:, 2] + pose[:-1, 2]))
         return Path(pose[:, :2], _without_gaps(run, body), POSE)
     twist, origin = _twist(run, robot)

@@ -26,12 +26,13 @@ def check_echo(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         rows = next((k for k in range(FARTHEST + 1) if _is_command(values, command, k)), None)
         if rows is None:
             continue
+        measured_rows = np.asarray(np.isfinite(values).any(axis=1))
         before = "the same row" if rows == 0 else "the row before" if rows == 1 else f"{rows} rows before"
         found.append(Finding(
             "echo", FATAL, " ".join(components(measured, values.shape[1])),
             f"{measured.replace('_', ' ')} is the command of {before}, to the last digit: no sensor measured it",
             "log what the encoders, the gyroscope or a camera measure; of a robot whose software does not, "
-            "leave the column out", work.lines(np.isfinite(values).any(axis=1)), len(work), {"rows": float(rows)},
+            "leave the column out", work.lines(measured_rows), len(work), {"rows": float(rows)},
         ))  # fmt: skip
         work = work.replace(**{measured: None})
     return found, work

@@ -153,7 +153,7 @@ def _answers(
         change = SMALL * np.eye(N_AXES)[axis]
         up, down = acceleration(robot, middle + change, held), acceleration(robot, middle - change, held)
         rate[:, :, axis] = (up - down) / (2.0 * SMALL)
-    per_force = np.broadcast_to(np.linalg.inv(mass_matrix(robot)), rate.shape).copy()
+    per_force = np.array(np.broadcast_to(np.linalg.inv(mass_matrix(robot)), rate.shape), dtype=float)
     gathered = np.zeros((N_AXES, N_AXES))
     if robot.drive.kind == SPEED:
         kp, ki = (per_wheel(own or 0.0, robot.wheels.count) for own in (robot.drive.kp, robot.drive.ki))

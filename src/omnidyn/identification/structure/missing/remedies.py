@@ -52,8 +52,10 @@ class Blocks:
         number = self._numbers(linear)
         self.count, self.rows = len(linear.rows.problem.parameters), len(number)
         self.block = [np.flatnonzero(number == b) for b in range(BLOCKS)]
-        self.total = with_priors(linear, sum(each[0].shape[2] for each in shown))  # which are held out of no block
-        self.matrix, first = np.zeros((BLOCKS, *self.total.shape)), 0
+        # Priors are held out of no block.
+        self.total: FloatArray = with_priors(linear, sum(each[0].shape[2] for each in shown))
+        self.matrix: FloatArray = np.zeros((BLOCKS, *self.total.shape))
+        first = 0
         for k in range(len(linear.rows.pieces)):
             every = linear.beside(k, [each[k] for each in shown])
             block = number[first : (first := first + len(every))]
