@@ -12,7 +12,6 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import os
 import resource
 import subprocess
 import sys
@@ -23,10 +22,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 from benchmarks.ten_robots.world import ELLIPSE, World, currents, drive
 
-RATE, SECONDS, LOGS = 200.0, float(os.environ.get("OMNIDYN_BENCH_SECONDS", "40")), 3
+RATE, SECONDS, LOGS = 200.0, float(scaled(40, 6)), 3
 CPU_GOAL_S, MEMORY_GOAL_MB, RATIO_GOAL = 60.0, 1000.0, 0.05
 AZIMUTH, LEVEL, STEP, STILL = (45.0, 135.0, -135.0, -45.0), 6.0, 0.1, 0.15  # [degree], [V], [V], share of the time
 NOISE = {"current": 0.05, "wheel": 0.05, "gyroscope": 0.01, "place": 0.001, "heading": 0.002}
@@ -147,7 +147,7 @@ def identified(model: str, folder: Path) -> dict[str, Any]:
     logs, out = sorted(str(path) for path in folder.glob("log*.csv")), io.StringIO()
     with contextlib.redirect_stdout(out):
         code = main(["identify", *logs, "--robot", str(folder / f"{model}.toml"), "--json"])
-    if code:
+    if not out.getvalue():
         sys.exit(code)
     told = json.loads(out.getvalue())
     remedies = next(_every(told, "remedies"), [])
@@ -157,6 +157,7 @@ def identified(model: str, folder: Path) -> dict[str, Any]:
         "cpu s": round(usage.ru_utime + usage.ru_stime, 1),
         "peak MB": round(usage.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)),
         "found": bool(next(_every(told, "found"), False)), "remedy": first["key"], "same": first["same_as"],
+        "std": {key: own["std"] for key, own in told["parameters"].items()},
     }  # fmt: skip
 
 
