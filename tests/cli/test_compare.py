@@ -119,7 +119,7 @@ def test_a_model_that_follows_nothing_ends_with_4_and_is_shown(call):
         (("run.csv", "--robot", "axebot", "--fail-if", "rm -rf"), 3, "cannot read this threshold"),
         (("none.csv", "--robot", "axebot"), 3, "no such file"),
         (("run.csv", "--robot", "axebott"), 3, "axebott"),
-        (("run.csv", "--robot", "four-wheel"), 3, "run.csv: u4 was not recorded"),
+        (("run.csv", "--robot", "four-wheel"), 3, "fewer wheels than the robot; got 3 wheels; expected 4"),
         (("run.csv", "--robot", "axebot", "--apply", "duty"), 3, "does not hold this input; got duty"),
         (("run.csv", "--robot", "axebot", "--picture", "p.pdf"), 3, "cannot tell the kind of picture"),
         (("run.csv", "--robot", "axebot", "--picture", "no/p.png"), 3, "the folder does not exist"),

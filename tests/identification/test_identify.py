@@ -48,6 +48,7 @@ def test_a_drive_that_the_file_states_stays(duties):
 def test_a_longer_log_is_asked_for_against_noise_only(right):
     fit = SimpleNamespace(
         value={"body.mass_kg": 2.0}, std={"body.mass_kg": 0.6}, at_bound=(), unidentifiable=(),
+        half_width=lambda _: 0.6 * 1.96 / 2.0, is_known=lambda _: True,
         lack_of_fit=SimpleNamespace(found=not right),
     )  # fmt: skip
     (words,) = advice._wide(fit)

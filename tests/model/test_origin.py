@@ -85,7 +85,15 @@ def test_an_origin_that_is_given_counts_whatever_the_words(origin, source):
     assert ("mass" in guessed(robot)) == (origin == "guess")
 
 
+GUESSED_OF = {
+    "robotino": ["inertia", "voltage limit", "kp of the speed loop", "rate", "friction"],
+    "lekiwi": [
+        "mass", "inertia", "voltage limit", "rotor inertia", "kp of the speed loop", "ki of the speed loop", "rate",
+        "friction",
+    ],
+}  # fmt: skip
+
+
 @pytest.mark.parametrize("name", preset_names())
 def test_the_guesses_of_a_preset_are_marked(name):
-    wanted = ["inertia", "voltage limit", "kp of the speed loop", "rate", "friction"] if name == "robotino" else []
-    assert guessed(load_robot(name)) == wanted
+    assert guessed(load_robot(name)) == GUESSED_OF.get(name, [])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from omnidyn.document import all_of
 from omnidyn.findings.finding import WARN, Finding
+from omnidyn.findings.signal.clocks import at_each_clock
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.logs.averaged import rows_of_mean
 from omnidyn.logs.channels import place
@@ -12,24 +13,30 @@ SPEEDS = ("wheel_speed", "twist")
 
 
 def check_averaged(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
-    """Findings on such speeds, those over one window together; nothing is masked. The work knows their windows."""
+    """Findings on such speeds, those over one window together; nothing is masked. The work knows by how much they are
+    late."""
+    if not work.step > 0.0:
+        return [], work
+    found, _ = at_each_clock(work, _at_its_clock)
+    late = {place(each.where.split()[0])[0]: each.numbers["late_s"] for each in found}  # type: ignore[index]
+    return found, work.knowing(late=late)
+
+
+def _at_its_clock(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """The same of the speeds that were sampled in these rows."""
     alike: dict[tuple[str, int], list[str]] = {}
-    for channel in SPEEDS if work.step > 0.0 else ():
+    for channel in SPEEDS:
         if channel not in work.log.channels:  # differences of angles, made here
             continue
-        for component, values in work.columns(channel):
-            if work.log.own_clocks:
-                values = values[work.recorded(channel, place(component)[1])]  # type: ignore[index]
-            rows = rows_of_mean(values)
-            if rows:
+        for component, values in work.sampled_columns(channel):
+            if rows := rows_of_mean(values):
                 alike.setdefault((channel, rows), []).append(component)
-    known = {channel: rows for channel, rows in alike}
-    return [_finding(names, rows, work.step) for (_, rows), names in alike.items()], work.knowing(averaged=known)
+    return [_finding(names, rows, work.step) for (_, rows), names in alike.items()], work
 
 
 def late_by(work: LogUnderCheck, channel: str) -> float:
-    """By how many rows a mean makes a channel late; 0 where it is none."""
-    return 0.5 * (work.known.get("averaged", {}).get(channel, 1) - 1)
+    """By how many rows of the work a mean makes a channel late; 0 where it is none."""
+    return work.known.get("late", {}).get(channel, 0.0) / work.step
 
 
 def _finding(names: list[str], rows: int, step: float) -> Finding:
@@ -40,5 +47,5 @@ def _finding(names: list[str], rows: int, step: float) -> Finding:
         f"{0.5 * (ms - step * 1e3):.3g} ms late, and slow to show a start",
         "log the speed of a shorter window (a setting of many motor controllers), or the position; `what` motors of "
         "identify takes the mean into account, other fits may find too small a dead band", (), 0,
-        {"rows": rows, "seconds": rows * step},
+        {"rows": rows, "seconds": rows * step, "late_s": 0.5 * (rows - 1) * step},
     )  # fmt: skip

@@ -18,7 +18,7 @@ from omnidyn.errors import InputError
 from omnidyn.logs.channels import components, place
 from omnidyn.logs.clock.restarts import Restart
 from omnidyn.logs.columns.mapping import ColumnMap
-from omnidyn.logs.segments import segments
+from omnidyn.logs.segments import filled
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
 
 OFTEN_BACK = 0.005  # of the rows: no recorder writes so many out of order
@@ -275,16 +275,6 @@ def _held(values: FloatArray) -> FloatArray:
     """Each blank takes the last value before it; before the first there is none."""
     last = np.maximum.accumulate(np.where(np.isnan(values), -1, np.arange(len(values))))
     return np.where(last >= 0, values[last], np.nan)
-
-
-def filled(t: FloatArray, values: FloatArray) -> FloatArray:
-    """Each blank between two values on the line between them; outside, and in a gap between values, there is none."""
-    whole, known = values.copy(), np.flatnonzero(np.isfinite(values))
-    for each in segments(t[known]):
-        rows = known[each]
-        if rows.size:
-            whole[rows[0] : rows[-1] + 1] = np.interp(t[rows[0] : rows[-1] + 1], t[rows], values[rows])
-    return whole
 
 
 def _nearest(at: FloatArray, t: FloatArray) -> IntArray:

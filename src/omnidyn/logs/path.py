@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.logs.log import filled
-from omnidyn.logs.segments import segments
+from omnidyn.logs.segments import filled, segments
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.run import Run

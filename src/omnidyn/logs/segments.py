@@ -26,3 +26,13 @@ def segments(t: FloatArray, gap: float = GAP, usual: float | None = None) -> lis
     limit = max(long, 2.0 * float(np.quantile(steps, 0.95)))
     cuts = np.flatnonzero(steps > limit) + 1
     return [slice(int(a), int(b)) for a, b in zip([0, *cuts], [*cuts, len(t)], strict=True)]
+
+
+def filled(t: FloatArray, values: FloatArray) -> FloatArray:
+    """Each blank between two values on the line between them; outside, and in a gap between values, there is none."""
+    whole, known = values.copy(), np.flatnonzero(np.isfinite(values))
+    for each in segments(t[known]):
+        rows = known[each]
+        if rows.size:
+            whole[rows[0] : rows[-1] + 1] = np.interp(t[rows[0] : rows[-1] + 1], t[rows], values[rows])
+    return whole

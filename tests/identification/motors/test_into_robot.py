@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.motors.into_robot import motors_into_robot
 from omnidyn.identification.motors.study import identify_motors
 from omnidyn.model.motor import mass_at_rim
@@ -173,10 +173,8 @@ def test_what_is_not_determined_is_not_written_and_said():
     assert not [key for key in free.value if key.startswith(COULOMB)]
     assert any("no dead band is seen" in words for words in free.words)
     one = log().replace(voltage=np.full((ROWS, 3), 6.0), wheel_speed=np.full((ROWS, 3), 7.0))
-    numbers = motors_into_robot(identify_motors([one]), tied())
-    assert numbers.value == {}
-    assert numbers.robot == tied()
-    assert all("not determined" in words for words in numbers.words)
+    with pytest.raises(InsufficientDataError, match="a line needs several speeds; got 7 rad/s in every window"):
+        identify_motors([one])
 
 
 def test_motors_that_were_not_logged_keep_their_numbers():

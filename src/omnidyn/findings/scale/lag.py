@@ -44,7 +44,7 @@ def check_lag(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         rows = line.value
         if abs(rows) < NOTE_FROM or abs(rows) < SURE * line.error:
             continue
-        of_means = late_by(work, pair.late) - late_by(work, pair.against)
+        of_means = late_by(own, pair.late) - late_by(own, pair.against)
         if of_means and abs(rows - of_means) < 1.0:
             continue  # named already
         found.append(_finding(own, pair, line))

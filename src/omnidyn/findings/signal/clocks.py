@@ -130,6 +130,7 @@ def at_each_clock(
     log, _ = _put(work.merged.log, first, work, after)
     for clock in others:
         here = at_clock(replace(after, merged=work.merged._replace(log=log)), clock)
+        here = here.replace(**{name: None for name in here.channels if name not in after.channels})  # taken out before
         more, judged = family(here)
         log, changed = _put(log, clock, here, judged)
         found, after = found + more, _again(after, log, first, changed)
@@ -141,6 +142,8 @@ def _put(log: Log, clock: Clock, before: LogUnderCheck, after: LogUnderCheck) ->
     channels, changed = dict(log.channels), set()
     for name in clock.components:
         channel, k = place(name)  # type: ignore[misc]
+        if channel not in before.channels or channel not in after.channels:
+            continue
         one, other = (_column(work.channels, channel, k) for work in (before, after))
         if not np.array_equal(one, other, equal_nan=True):
             channels[channel] = channels[channel].copy()

@@ -64,7 +64,7 @@ def unrolled(counts: FloatArray, unit: str, where: str, t: FloatArray | None = N
     Raises InputError where the wheel turns so far between rows that nobody can tell how far it turned.
     """
     t = np.arange(len(counts), dtype=float) if t is None else t
-    rows = np.flatnonzero(np.isfinite(counts) & np.isfinite(t))
+    rows = _without_padding(np.flatnonzero(np.isfinite(counts) & np.isfinite(t)), t)
     rows = rows[np.argsort(t[rows], kind="stable")]
     readings, steps = counts[rows], np.diff(counts[rows])
     tick = 1.0 if "/" in unit else tick_of(np.abs(steps), float(np.ptp(readings)) if rows.size else 0.0)
@@ -82,6 +82,14 @@ def unrolled(counts: FloatArray, unit: str, where: str, t: FloatArray | None = N
     going_on = counts.copy()
     going_on[rows] = readings + np.concatenate([[0.0], np.cumsum(smooth - steps)])
     return Unrolled(going_on, period, tuple(int(row) for row in rows[restarts + 1]))
+
+
+def _without_padding(rows: IntArray, t: FloatArray) -> IntArray:
+    """The rows but for those at the end that repeat one time which is earlier than that of the row before them."""
+    other = np.flatnonzero(t[rows] != t[rows[-1:]])
+    if not other.size or len(rows) - other[-1] < 3 or t[rows[-1]] > t[rows[other[-1]]]:
+        return rows
+    return rows[: other[-1] + 1]
 
 
 def _refuse_fast(steps: FloatArray, period: float | None, where: str) -> None:

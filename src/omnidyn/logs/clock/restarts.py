@@ -62,10 +62,11 @@ def counter_restarts(counters: Sequence[Counter], lines: Sequence[int] | np.ndar
     for row, members in sorted(by_row.items()):
         names = " and ".join(each.column for each in members)
         known = members[0].values[:row]
-        before = known[np.isfinite(known)][-1]
+        known = known[np.isfinite(known)]
+        before = f" from {known[-1]:.10g}" if known.size else ""
         found.append(Restart(
             COUNTER, " ".join(each.component for each in members), int(lines[row]),
-            f"{names} jump{'s' * (len(members) == 1)} farther than a wheel turns, from {before:.10g} to "
+            f"{names} jump{'s' * (len(members) == 1)} farther than a wheel turns,{before} to "
             f"{members[0].values[row]:.10g} in line {lines[row]}",
             "the count goes on behind a gap there, and the rows beside it are left out",
         ))  # fmt: skip

@@ -11,7 +11,7 @@ NONE = np.zeros(4, bool)
 
 
 def edges(*names):
-    record = SimpleNamespace(t=np.arange(30) * 0.01)
+    record = SimpleNamespace(step_of=lambda rows: 0.01)
     parameters = [SimpleNamespace(name=name) for name in names]
     return Edges(SimpleNamespace(parameters=parameters, pieces=[SimpleNamespace(record=record, first=3, last=29)]))  # pyright: ignore[reportArgumentType]
 

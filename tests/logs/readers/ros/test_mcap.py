@@ -89,11 +89,20 @@ def test_joints_are_known_by_name_in_any_order_and_arrays_may_be_empty(tmp_path)
 def test_wheels_whose_names_do_not_count_are_asked_for(tmp_path):
     maker = BagMaker()
     for k in range(5):
-        maker.joints(0.1 * k, ["front_left_wheel", "front_right_wheel", "rear_wheel"], [0, 0, 0], [1.0 * k, 2, 3])
+        maker.joints(0.1 * k, ["red_wheel", "green_wheel", "blue_wheel"], [0, 0, 0], [1.0 * k, 2, 3])
     log = load_log(write_mcap(maker, tmp_path / "a.mcap"))
     assert "wheel_speed" not in log.channels
-    assert any("/joint_states/front_left_wheel/velocity" in words and "which wheel each is" in words
+    assert any("/joint_states/red_wheel/velocity" in words and "which wheel each is" in words
                for words in log.columns.doubts)  # fmt: skip
+
+
+def test_wheels_whose_names_say_where_they_stand_are_numbered_by_place(tmp_path):
+    maker = BagMaker()
+    for k in range(5):
+        maker.joints(0.1 * k, ["front_left_wheel", "front_right_wheel", "rear_wheel"], [0, 0, 0], [1.0 * k, 2, 3])
+    log = load_log(write_mcap(maker, tmp_path / "a.mcap"))
+    assert np.array_equal(log.channels["wheel_speed"], [[1.0 * k, 3, 2] for k in range(5)])
+    assert any("/joint_states/rear_wheel/position is wheel 2" in words for words in log.notes)
 
 
 def test_joints_that_are_no_wheels_do_not_shift_the_wheels(tmp_path):

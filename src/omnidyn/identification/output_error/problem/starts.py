@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,13 +18,15 @@ from omnidyn.arrays import FloatArray
 from omnidyn.clocks import time_of_row, usual_step
 from omnidyn.compiled.kernel import kernel, maker
 from omnidyn.identification.output_error.problem.primitives import Mapping
-from omnidyn.identification.output_error.problem.record import Record
-from omnidyn.logs.log import filled
+from omnidyn.logs.segments import filled
 from omnidyn.model.frames import world_to_body
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.statistics import difference_noise
+
+if TYPE_CHECKING:
+    from omnidyn.identification.output_error.problem.record import Record
 
 WINDOW = 0.15  # [s], and at least so many rows:
 LEAST_ROWS, EDGE = 6, 3  # of a window; averaged at each of its ends
