@@ -59,6 +59,19 @@ def test_a_robot_that_never_moved(robot):
     assert not verdict.of("blocked")
 
 
+def test_a_robot_that_stands_still_is_not_in_motion():
+    """Noise of speeds and pose is no motion, and what is left of the difference of a constant is no step of a sensor."""
+    n, rng = 1000, np.random.default_rng(0)
+    t, lines = np.arange(n) * 0.02, np.arange(n) + 2
+    noise = {"wheel_speed": 0.05 * rng.normal(size=(n, 4)), "pose": 0.001 * rng.normal(size=(n, 3))}
+    verdict = check(Log(t, noise, lines))
+    assert verdict.of("never_moved")
+    assert verdict.excitation["moving"] == 0.0
+    verdict = check(Log(t, {"wheel_angle": np.full((n, 4), 17.0), "pose": np.zeros((n, 3))}, lines))
+    assert verdict.of("never_moved")
+    assert not verdict.of("quantised")
+
+
 def test_a_blocked_robot(log, robot, with_channels):
     names = ("voltage", "wheel_speed", "twist", "current")
     voltage, speed, twist, current = (log.channels[name].copy() for name in names)

@@ -50,7 +50,8 @@ def excitation(work: LogUnderCheck) -> dict[str, float]:
     level = smooth(twist, width) * [1.0, 1.0, length]
     size = np.sqrt(np.nansum(level**2, axis=1))
     top = float(np.quantile(size, 0.95))
-    moving = size > 0.1 * top if top > 0.0 else np.zeros(len(size), dtype=bool)
+    rests = top <= 0.0 or work.known.get("at_rest", False)
+    moving = np.zeros(len(size), dtype=bool) if rests else size > 0.1 * top
     known = {"time_s": float(work.t[-1] - work.t[0]), "moving": float(moving.mean())}
     if not moving.any():
         return known

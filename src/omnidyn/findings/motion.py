@@ -22,14 +22,14 @@ SAFETY = 1.6  # a robot that stands although its voltages are so many times thos
 
 
 def check_motion(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
-    """Findings on motion."""
+    """Findings on motion; that the robot rests throughout is passed on as `known["at_rest"]`."""
     if len(work) < MIN_ROWS or work.step <= 0.0:
         return [], work
     still = _still(work)
     if still is None:
         return [], work
     if still.all():
-        return [_never_moved(work)], work
+        return [_never_moved(work)], work.knowing(at_rest=True)
     return _start_up(work, still) + _blocked(work, still) + _droop(work), work
 
 

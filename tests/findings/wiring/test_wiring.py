@@ -9,6 +9,7 @@ import pytest
 from omnidyn.findings.check import check
 from omnidyn.findings.wiring.orders import Wiring, wirings
 from omnidyn.model.robot_file import load_robot
+from tests.findings.redundant import ROBOT, recorded
 from tests.support.pushed_logs import clean_log
 from tests.support.random_logs import clean
 
@@ -123,3 +124,15 @@ def test_two_wheels_exchanged_or_one_turned_about_in_rpm_are_both_said(seed, ord
     assert grave[code].where == ("w1 w2" if code == "swapped" else "w1")
     assert "whole motor" not in grave[code].message
     assert "rpm read as rad/s" in grave["unit"].message
+
+
+def test_a_gyroscope_beside_a_pose_hides_no_exchanged_wheels():
+    """The pose tells all three axes; a gyroscope alone cannot tell wheels apart that turn the robot alike."""
+    log = recorded(twist=lambda twist: np.column_stack([np.full((len(twist), 2), np.nan), twist[:, 2]]),
+                   twist_command=None)  # fmt: skip
+    verdict = check(log, ROBOT)
+    assert not verdict.fatal
+    assert verdict.excitation["x"] == pytest.approx(0.3, abs=0.1)
+    speed = log.channels["wheel_speed"][:, [2, 1, 0]]
+    (finding,) = check(replace(log, channels={**log.channels, "wheel_speed": speed}), ROBOT).of("swapped")
+    assert finding.where == "w1 w3"

@@ -15,6 +15,8 @@ from tests.logs.columns.test_guess import ROWS, clock, table_of
         ("timestamp_us", 2e4, "us"), ("ros_time", 0.02, "s"), ("uptime", 20.0, "ms"), ("TIME_NOW", 0.02, "s"),
         ("motorTime", 0.02, "s"), ("log time", 0.02, "s"), ("wheel1_t", 0.02, "s"), ("time since start", 0.02, "s"),
         ("Zeit", 0.02, "s"), ("elapsed_time_seconds", 0.02, "s"), ("/log/t_now", 0.02, "s"),
+        ("ms", 20.0, "ms"), ("us", 2e4, "us"), ("s", 0.02, "s"), ("seconds", 0.02, "s"), ("loop_ms", 20.0, "ms"),
+        ("aika_ms", 20.0, "ms"), ("runtime", 0.02, "s"),
     ],
 )  # fmt: skip
 def test_a_time_may_have_words_about_it(tmp_path, name, step, unit):

@@ -41,12 +41,17 @@ class Ground(NamedTuple):
 
 
 def ground(work: LogUnderCheck) -> Ground | None:
-    """The twist as measured, else from the pose, axis by axis; None where neither was recorded."""
+    """The twist as measured, else that of the pose; None where neither was recorded.
+
+    A twist without all axes, of a gyroscope, yields to a pose that was recorded in most rows and tells all of them.
+    """
     twist, pose = work.get("twist"), work.get("pose")
-    if twist is not None:
-        return Ground("twist", twist, 1)
+    seen = Ground("twist", twist, 1) if twist is not None else None
     if pose is None or work.step <= 0.0 or len(work) < 20:
-        return None
+        return seen
+    often = min(len(work.recorded("pose", k)) for k in range(3)) > 0.5 * len(work)
+    if seen is not None and (len(seen.axes) == 3 or not often or not np.isfinite(pose).any(axis=0).all()):
+        return seen
     return Ground("pose", *pose_twist(work, pose))
 
 

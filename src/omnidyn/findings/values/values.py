@@ -21,6 +21,7 @@ from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.statistics import moving
 from omnidyn.units import known_unit
 
+TINY = 1e-9  # a step so small is what rounding leaves of a constant
 SAME = 0.03  # a scale so near 1 is 1, within what noise makes of it
 
 
@@ -95,7 +96,7 @@ def _quantised(work: LogUnderCheck) -> list[Finding]:
             step = quantum(own)
             busy = np.abs(own[np.isfinite(own) & moving(own)])
             usual = float(np.median(busy)) if busy.size else 0.0
-            if not step or step < 0.02 * usual:
+            if not step or step < max(0.02 * usual, TINY):
                 continue
             key = next((known for known in groups if known[0] == channel and abs(known[1] / step - 1.0) < 0.01),
                        (channel, step))  # fmt: skip

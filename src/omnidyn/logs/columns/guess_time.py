@@ -35,7 +35,7 @@ def take_time(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
     candidates = [name for name in candidates if not read_name(name).roles - {words.TIME, words.BODY, words.MEASURED}]
     candidates = candidates or mixed[:1]  # t_now, motor_time_ms
     if not candidates and not wordy:  # in any language: the one column with a unit of time
-        timed = [name for name in table.names if _has_unit(table, name, assumed) and _increases(table.columns[name])]
+        timed = [name for name in table.names if _is_clock(table, name, assumed)]
         candidates = timed if len(timed) == 1 else []
     candidates.sort(key=lambda name: (name != "t_s", table.names.index(name)))
     if dates and not candidates:
@@ -57,7 +57,7 @@ def take_time(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
         return
     name = candidates[0]
     text = assumed.get(name) or assumed.get(TIME) or table.units.get(name, "")
-    unit = known_unit(text) or read_name(name).unit
+    unit = known_unit(text) or _unit(table, name, assumed)
     if unit is None:
         unit = _plausible_time(floats(table.columns[name]), name, text, found)
     if unit is not None and unit.quantity == TIME_UNIT:
@@ -86,9 +86,15 @@ def _take_steps(table: Table, name: str, assumed: Mapping[str, str], found: Gues
         found.doubts.append(Doubt(name, TIME, f"{unit.text} is no unit of time"))
 
 
-def _has_unit(table: Table, name: str, assumed: Mapping[str, str]) -> bool:
-    unit = known_unit(assumed.get(name) or table.units.get(name, ""))
-    return unit is not None and unit.quantity == TIME_UNIT
+def _is_clock(table: Table, name: str, assumed: Mapping[str, str]) -> bool:
+    """Whether a column has a unit of time, increases, and is no span."""
+    unit = _unit(table, name, assumed)
+    return unit is not None and unit.quantity == TIME_UNIT and _increases(table.columns[name]) and not _is_span(name)
+
+
+def _unit(table: Table, name: str, assumed: Mapping[str, str]) -> Unit | None:
+    """The unit assumed, of a row of units, at the end of the name, or the name itself: ms."""
+    return known_unit(assumed.get(name) or table.units.get(name, "")) or read_name(name).unit or known_unit(name)
 
 
 def _increases(values: FloatArray | tuple[str, ...]) -> bool:
