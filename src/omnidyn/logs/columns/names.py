@@ -20,7 +20,8 @@ from omnidyn.units import Unit, known_unit
 )  # fmt: skip
 
 _WORDS = {
-    TIME: "t time stamp timestamp clock zeit uhrzeit millis micros elapsed uptime runtime laufzeit epoch temps tiempo tempo",
+    TIME: """t time stamp timestamp clock zeit uhrzeit laufzeit millis micros elapsed uptime runtime epoch temps tiempo
+        tempo""",
     SUPPLY: "bat batt battery supply vbat vbatt vcc vin vbus bus akku batterie bateria",
     VOLTAGE: "u volt volts voltage voltages ua va spannung tension voltaje",
     CURRENT: "i cur curr current currents amp amps ia strom courant corriente",
