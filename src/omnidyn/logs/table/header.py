@@ -1,7 +1,7 @@
 """What the columns of a text table are called: names, units and titles, wherever a program put them.
 
 The names stand in the first line; or in comments right above the first row; or under a line of titles, when a row of
-units stands among them. Units stand in a row of their own, or in brackets behind a name: `w1 [rad/s]`.
+units stands among them; or under a preamble (see preamble.py). Units stand in a row of their own, or in brackets behind a name: `w1 [rad/s]`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import NamedTuple
 from omnidyn.errors import InputError
 from omnidyn.logs.table import dialect
 from omnidyn.logs.table.dialect import MAX_NAME, SAMPLE_ROWS, SEPARATOR_WORDS, SEPARATORS
+from omnidyn.logs.table.preamble import preamble
 
 MAX_COLUMNS = 1000
 INDEX = "index"  # what a column of row numbers without a name is called
@@ -66,6 +67,11 @@ def find_layout(lines: Sequence[FileLine], source: str, header: bool = True) -> 
     kept = [line for line in lines if line.text.strip() and not dialect.is_comment(line.text)]
     told = _SEPARATOR_LINE.fullmatch(kept[0].text.strip()) if kept else None
     kept = kept[1:] if told else kept
+    above = preamble([line.text for line in kept]) if header else 0
+    if above:
+        layout = find_layout([line for line in lines if line.number >= kept[above].number], source)
+        said = f"line {kept[above].number} gives the names: what stands above it was left out"
+        return replace(layout, notes=(said, *layout.notes))
     if not kept:
         raise InputError(
             "no table in the file", got="only blank lines and comments", expected="a header and rows", where=source
