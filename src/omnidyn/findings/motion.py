@@ -17,6 +17,7 @@ from omnidyn.statistics import stretches
 
 SETTLE, HELD = 0.4, 0.3  # [s]
 DROOP = 0.05
+MOSTLY, SURELY = 0.99, 1.5  # of noise at rest, a row in some thousands is beyond its level, none beyond 1.5 times that
 MOMENT = 0.15  # [s]
 SAFETY = 1.6  # a robot that stands although its voltages are so many times those that move it was held
 
@@ -28,7 +29,7 @@ def check_motion(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     still = _still(work)
     if still is None:
         return [], work
-    if still.all():
+    if still.mean() > MOSTLY and np.all(_still(work, SURELY)):
         return [_never_moved(work)], work.knowing(at_rest=True)
     return _start_up(work, still) + _blocked(work, still) + _droop(work), work
 
@@ -51,8 +52,8 @@ def _start_up(work: LogUnderCheck, still: BoolArray) -> list[Finding]:
     return []
 
 
-def _still(work: LogUnderCheck) -> BoolArray | None:
-    """Rows in which nothing moves beyond noise; None where no motion was recorded."""
+def _still(work: LogUnderCheck, times: float = 1.0) -> BoolArray | None:
+    """Rows in which nothing moves beyond so many times its noise; None where no motion was recorded."""
     speed, seen = work.get("wheel_speed"), ground(work)
     if speed is None and seen is not None and len(seen.axes) == 3:
         speed = seen.twist
@@ -63,7 +64,7 @@ def _still(work: LogUnderCheck) -> BoolArray | None:
     for column in speed.T:
         if np.isfinite(column).any():
             with np.errstate(invalid="ignore"):
-                still &= ~(np.abs(smooth(column, width)) > _rest_level(column, width))
+                still &= ~(np.abs(smooth(column, width)) > times * _rest_level(column, width))
     return still
 
 

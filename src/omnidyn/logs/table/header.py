@@ -1,7 +1,8 @@
 """What the columns of a text table are called: names, units and titles, wherever a program put them.
 
 The names stand in the first line; or in comments right above the first row; or under a line of titles, when a row of
-units stands among them; or under a preamble (see preamble.py). Units stand in a row of their own, or in brackets behind a name: `w1 [rad/s]`.
+units stands among them; or under a preamble (see preamble.py). Units stand in a row of their own, or in brackets behind
+a name: `w1 [rad/s]`.
 """
 
 from __future__ import annotations
