@@ -81,3 +81,12 @@ def test_what_is_lacking_is_said(tmp_path):
         read_log(
             write_dataset(tmp_path / "d", [lerobot_episode()], ["x.vel", "y.vel", "theta.vel", "more"] + ["z"] * 3)
         )
+
+
+@pytest.mark.parametrize("late", [1, 2, 3])
+def test_many_short_episodes_do_not_hide_an_echo(tmp_path, late):
+    """The rows on either side of a gap are not compared: with episodes of 4 s they are 2 % of all."""
+    commands = [lerobot_episode(seed)[0] for seed in range(6)]
+    echoes = [np.concatenate([np.full((late, 3), 0.1), command[:-late]]).astype(np.float32) for command in commands]
+    verdict = check(load_log(write_dataset(tmp_path / "set", list(zip(commands, echoes, strict=True)))))
+    assert [finding.numbers["rows"] for finding in verdict.of("echo")] == [late]

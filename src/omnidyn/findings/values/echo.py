@@ -23,7 +23,7 @@ def check_echo(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         values, command = work.get(measured), work.get(commanded)
         if values is None or command is None or len(work) < MIN_ROWS:
             continue
-        rows = next((k for k in range(FARTHEST + 1) if _is_command(values, command, k)), None)
+        rows = next((k for k in range(FARTHEST + 1) if _is_command(work, values, command, k)), None)
         if rows is None:
             continue
         measured_rows = np.asarray(np.isfinite(values).any(axis=1))
@@ -38,9 +38,14 @@ def check_echo(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     return found, work
 
 
-def _is_command(values: FloatArray, command: FloatArray, rows: int) -> bool:
-    """Whether all of a measurement is the command of so many rows before, and that changes often enough to tell."""
-    later, before = values[rows:], command[: len(command) - rows]
+def _is_command(work: LogUnderCheck, values: FloatArray, command: FloatArray, rows: int) -> bool:
+    """Whether all of a measurement is the command of so many rows before, and that changes often enough to tell.
+
+    Rows on either side of a gap say nothing.
+    """
+    later, before = values[rows:], command[: len(command) - rows].copy()
+    for segment in work.segments[1:]:
+        before[max(0, segment.start - rows) : segment.start] = np.nan
     known = np.isfinite(later) & np.isfinite(before) & ((later != 0.0) | (before != 0.0))
     size = np.nanmax(np.abs(command), axis=0, initial=0.0)
     same = np.abs(later - before) <= SAME * np.maximum(size, 1e-9)
