@@ -32,6 +32,17 @@ def test_speeds_beyond_16_bits_are_put_right(speeds, scale, first):
     np.testing.assert_allclose(right, scale * true, atol=1e-6)
 
 
+@pytest.mark.parametrize("size", [20.0, 100.0, 150.0])
+@pytest.mark.parametrize("first", [0, 400])
+def test_speeds_sent_without_a_sign_get_it_back(speeds, size, first):
+    t, _, true = (each[first:] for each in speeds)
+    true = np.round(true / 150.0 * size)
+    right, jumps, followed = widened(np.mod(true, 2**16), t)
+    assert followed
+    assert jumps > 0
+    np.testing.assert_array_equal(right, true)
+
+
 def test_a_speed_that_changes_too_fast_to_be_followed_is_named(tmp_path, speeds):
     t, volts, true = speeds
     path = write_columns(tmp_path / "log.csv", "t_s,voltage_V,speed_ticks_s", t, volts, wrapped(true))
@@ -55,6 +66,8 @@ def test_full_speeds_that_reverse_are_left_alone():
         right, jumps, _ = widened(raw, t)
         assert (seed, jumps) == (seed, 0)
         assert right is raw
+        raw = np.abs(2.0 * raw)  # a controller that logs sizes
+        assert widened(raw, t)[0] is raw
 
 
 def test_the_case_of_a_hub_motor():

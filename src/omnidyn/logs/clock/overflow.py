@@ -1,4 +1,4 @@
-"""Speeds that leave the 16 bits they were sent in: beyond 32767 they come out as -32768, and so on."""
+"""Speeds that leave the 16 bits they were sent in: beyond 32767 they come out as -32768, or below 0 as 65535."""
 
 from __future__ import annotations
 
@@ -60,7 +60,8 @@ def _range(values: FloatArray) -> float:
     size = BITS_16 * tick
     low, high = float(values.min()), float(values.max())
     signed = low >= -0.5 * size - tick and high <= 0.5 * size
-    return size if signed and high - low > WIDE * size else 0.0
+    unsigned = low >= 0.0 and high < size  # -1 comes out as 65535
+    return size if (signed or unsigned) and high - low > WIDE * size else 0.0
 
 
 def _from_rest(values: FloatArray, size: float) -> FloatArray:

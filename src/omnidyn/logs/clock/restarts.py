@@ -99,7 +99,9 @@ def full_counter(component: str, column: str, period: float, unit: str, line: in
 
 def overflow(component: str, column: str, jumps: int, followed: bool, line: int) -> Restart:
     """What is to be said of a speed that leaves its 16 bits."""
-    words = f"{column} leaves its 16 bits {jumps} time{'s' * (jumps > 1)} (2^15 - 1 is followed by -2^15)"
+    words = (
+        f"{column} leaves its 16 bits {jumps} time{'s' * (jumps > 1)} (2^15 - 1 is followed by -2^15, or 0 by 2^16 - 1)"
+    )
     done = (
         "2^16 was added or taken off there"
         if followed
