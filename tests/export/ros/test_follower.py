@@ -12,7 +12,7 @@ import omnidyn
 from omnidyn.errors import UnsupportedError
 from omnidyn.export.ros.node import ros2_node
 from omnidyn.model.drive import Drive
-from tests.export.ros.test_node import NO_NUMBERS, NO_SUPPLY, ROBOT, Plant, loaded
+from tests.export.ros.test_node import NO_NUMBERS, NO_SUPPLY, NO_TIME, ROBOT, Plant, loaded
 from tests.export.ros.test_node import bus as bus
 from tests.support.exported import STRICT
 
@@ -110,6 +110,19 @@ def test_what_is_no_number_stops_the_motors_and_raises_nothing(tmp_path):
         loop.follow(0.0, [bad, bad])
         assert loop.step(0.0) == [0.0] * 3
         assert loop.status == module.STOPPED
+    loop = module.PathLoop()
+    for now in NO_TIME:
+        for told, asked, stepped in ((now, 0.0, 0.0), (0.0, 0.0, now)):
+            loop.measured(told, [0.0] * 3, [0.0] * 3)
+            loop.command(asked, (0.3, 0.1, -1.0))
+            assert loop.step(stepped) == [0.0] * 3
+            assert loop.status == module.STOPPED
+        loop.command(now, (0.3, 0.1, -1.0))
+        loop.follow(now, [(0.0, 0.0, 0.0, 0.0)])
+        assert np.isfinite(loop.step(0.0)).all()
+    for rows in (None, 1.0, np.array(5.0)):
+        loop.follow(0.0, rows)
+        assert loop.course is None
     for now in (0.0, 1.7e9):  # of a clock that counts from 1970 two rows so near are at one time
         loop = module.PathLoop()
         loop.measured(now, [0.0] * 3, [0.0] * 3)

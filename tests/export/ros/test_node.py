@@ -2,6 +2,7 @@
 
 import importlib.util
 import sys
+from decimal import Decimal
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
@@ -104,7 +105,8 @@ NO_NUMBERS = [
     (np.nan, 0.0, 0.0), (1e308, -1e308, 1e308), (10**400, 0, 0), (None, 0.0, 0.0), ("x", 1.0, 2.0, 3.0), None, 1.0,
     "abc", ([], [], []),
 ]  # fmt: skip
-NO_SUPPLY = [np.nan, np.inf, 0.0, -6.0, 1e-300, None, "6", 10**400]
+NO_SUPPLY = [np.nan, np.inf, 0.0, -6.0, 1e-300, None, "6", b"6", 10**400, [], object()]
+NO_TIME = [np.nan, np.inf, None, "0.01", b"1", [], 10**400, 1j, object()]
 
 
 @pytest.mark.parametrize("supply", NO_SUPPLY, ids=lambda value: str(value)[:9])
@@ -120,7 +122,7 @@ def test_a_supply_that_is_none_stops_the_motors_with_a_status(drive, supply):
     assert loop.status == module.STOPPED
 
 
-@pytest.mark.parametrize("dt", [np.nan, np.inf, 0.0, -0.01, None, "0.01"])
+@pytest.mark.parametrize("dt", [np.nan, np.inf, 0.0, -0.01, None, "0.01", b"1", []])
 def test_a_time_step_that_is_none_stops_the_motors_with_a_status(drive, dt):
     module = drive(ROBOT)
     loop = module.DriveLoop()
@@ -131,6 +133,19 @@ def test_a_time_step_that_is_none_stops_the_motors_with_a_status(drive, dt):
     assert loop.status == module.STOPPED
     assert any(loop.step(0.01))
     assert loop.status == module.OK
+
+
+@pytest.mark.parametrize("now", NO_TIME, ids=lambda value: str(value)[:9])
+def test_a_time_that_is_none_stops_the_motors(drive, now):
+    module = drive(ROBOT)
+    loop = module.DriveLoop()
+    loop.command(now, (0.1, 0.0, 0.0))
+    loop.measured(now, [0.0] * 3)
+    assert loop.step(0.0) == [0.0] * 3
+    loop.command(0.0, (0.1, 0.0, 0.0))
+    assert loop.step(now) == [0.0] * 3
+    assert loop.status == module.STOPPED
+    assert any(loop.step(0.01))
 
 
 @pytest.mark.parametrize("bad", NO_NUMBERS, ids=lambda value: str(value)[:9])
@@ -150,8 +165,9 @@ def test_what_numpy_calls_a_number_is_one(drive):
     module = drive(ROBOT)
     loop = module.DriveLoop()
     loop.command(0.0, np.array([0.3, 0.0, 0.0], np.float32))
-    assert any(loop.step(0.0, supply=np.float32(7.2)))
-    assert loop.status == module.OK
+    for supply in (np.float32(7.2), Decimal("7.2")):
+        assert any(loop.step(0.0, supply=supply))
+        assert loop.status == module.OK
 
 
 def test_duties_stay_in_their_range_and_keep_the_direction(drive):

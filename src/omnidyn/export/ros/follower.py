@@ -67,18 +67,26 @@ AHEAD = ({", ".join(number(each) for each in ahead)})
 # What both loops ask of numbers from outside.
 NUMBERS = '''
 
+def number(value):
+    """The value as a float; not a number where it is none."""
+    try:
+        return math.nan if isinstance(value, (str, bytes)) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+
+
 def numbers(values, count):
     """The values as `count` numbers of a size that robots have; None where they are not."""
     try:
-        found = [math.nan if isinstance(each, str) else float(each) for each in values]
-    except (TypeError, ValueError, OverflowError):
+        found = [number(each) for each in values]
+    except TypeError:
         return None
     return found if len(found) == count and all(abs(each) <= FARTHEST for each in found) else None
 
 
-def is_usable(value, least, most):
-    """Whether a supply or a time step is a number in a range that batteries and clocks have."""
-    return numbers([value], 1) is not None and least <= value <= most
+def is_within(value, limits):
+    """Whether a supply or a time step is in a range that batteries and clocks have."""
+    return limits[0] <= value <= limits[1]
 '''
 
 # How every node ends: its step, its last word, its loop. rclpy imports are at the top of the text before it.
@@ -193,8 +201,11 @@ class PathLoop:
 
     def follow(self, now, rows):
         """Rows (t, x, y, heading), t in seconds from now; no rows, or what is no path, stops the robot."""
-        rows = [numbers(row, 4) for row in rows]
         self.course = None
+        try:
+            now, rows = number(now), [numbers(row, 4) for row in rows]
+        except TypeError:
+            return
         if rows and all(rows) and all(a[0] < b[0] for a, b in zip(rows, rows[1:])):
             near = self.pose[2] if self.pose is not None else 0.0
             first = nearest_turn(rows[0][3], near)
@@ -204,7 +215,7 @@ class PathLoop:
 
     def command(self, now, twist):
         """A twist (vx, vy, omega) of the body; what is no number is no command."""
-        twist = numbers(twist, 3)
+        now, twist = number(now), numbers(twist, 3)
         if twist is None or self.pose is None:
             return
         start = self.pose
@@ -219,7 +230,7 @@ class PathLoop:
         if pose is None or twist is None:
             return
         heading = pose[2] if self.pose is None else nearest_turn(pose[2], self.pose[2])
-        self.pose, self.twist, self.told_at = [pose[0], pose[1], heading], twist, now
+        self.pose, self.twist, self.told_at = [pose[0], pose[1], heading], twist, number(now)
 
     def alive(self, now):
         """Whether there is something to follow, and it is known where the robot is."""
@@ -228,7 +239,8 @@ class PathLoop:
 
     def step(self, now, supply=SUPPLY):
         """Duties of the motors, -1 to 1. All 0 where `status` is below 0: the dead-man stop is STOPPED."""
-        self.status = 0 if is_usable(supply, *SUPPLIES) else BAD_SUPPLY
+        now, supply = number(now), number(supply)
+        self.status = 0 if is_within(supply, SUPPLIES) else BAD_SUPPLY
         if not self.alive(now):
             self.course, self.status = None, STOPPED
         if self.status < 0:

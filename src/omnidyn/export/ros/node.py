@@ -119,14 +119,14 @@ class DriveLoop:
         """A twist (vx, vy, omega); what is no number is no command."""
         twist = numbers(twist, 3)
         if twist is not None:
-            self.goal, self.asked_at = twist, now
+            self.goal, self.asked_at = twist, number(now)
 
     def measured(self, now, speeds):
         """Speeds of all wheels [rad/s], all forward turn the robot counter-clockwise; others are left out."""
         speeds = numbers(speeds, WHEELS)
         if speeds is not None:
             self.twist = [sum(a * b for a, b in zip(row, speeds)) for row in TO_TWIST]
-            self.told_at = now
+            self.told_at = number(now)
 
     def alive(self, now):
         """Whether somebody still asks for something."""
@@ -134,8 +134,9 @@ class DriveLoop:
 
     def step(self, now, dt=1.0 / RATE, supply=SUPPLY):
         """Duties of the motors, -1 to 1. All 0 where `status` is below 0: the dead-man stop is STOPPED."""
-        self.status = OK if is_usable(supply, *SUPPLIES) else BAD_SUPPLY
-        if not is_usable(dt, *STEPS):
+        now, dt, supply = number(now), number(dt), number(supply)
+        self.status = OK if is_within(supply, SUPPLIES) else BAD_SUPPLY
+        if not is_within(dt, STEPS):
             self.status = BAD_TIME
         if not self.alive(now):
             self.status = STOPPED
