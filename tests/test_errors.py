@@ -1,6 +1,9 @@
 """How messages are put together."""
 
-from omnidyn.errors import InputError, shortened
+import pytest
+
+from omnidyn.attempts import Attempts
+from omnidyn.errors import InputError, Terminated, shortened, told_by
 
 
 def test_words_are_not_cut_in_the_middle():
@@ -12,3 +15,26 @@ def test_words_are_not_cut_in_the_middle():
     assert shortened("a" * 100, 20) == "a" * 17 + "..."
     assert shortened("short", 20) == "short"
     assert "'aaa" in str(InputError("no", got=["a" * 200]))
+
+
+@pytest.mark.parametrize("interrupt", [KeyboardInterrupt, Terminated])
+def test_an_interrupt_in_compiled_code_is_one(interrupt):
+    error = SystemError("CPUDispatcher(f) returned a result with an exception set")
+    error.__cause__ = interrupt()
+    assert told_by(error) is error.__cause__
+    attempts = Attempts()
+    assert attempts.make("diagnosis", raises(error)) is None
+    assert attempts.interrupt is error.__cause__
+    assert attempts.make("page", lambda: 1) is None
+    with pytest.raises(interrupt):
+        Attempts(keep=False).make("diagnosis", raises(error))
+    other = SystemError("of another kind")
+    assert told_by(other) is other
+    assert (Attempts().make("page", raises(other)), told_by(ValueError()).__class__) == (None, ValueError)
+
+
+def raises(error):
+    def make():
+        raise error
+
+    return make

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from omnidyn.document import all_of, sentence
-from omnidyn.errors import INTERRUPTS, OmnidynError, Terminated
+from omnidyn.errors import INTERRUPTS, OmnidynError, Terminated, told_by
 
 Made = TypeVar("Made")
 
@@ -42,9 +42,10 @@ class Attempts:
             return self.leave_out(part, self.interrupt)
         try:
             return making()
-        except (*INTERRUPTS, Exception) as error:
+        except (*INTERRUPTS, Exception) as raised:
+            error = told_by(raised)
             if not self.keep and isinstance(error, INTERRUPTS):
-                raise
+                raise error from None
             return self.give_up(part, error)
 
     def give_up(self, part: str, error: BaseException) -> None:

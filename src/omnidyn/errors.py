@@ -77,6 +77,13 @@ class Terminated(BaseException):
 
 INTERRUPTS = (KeyboardInterrupt, Terminated)  # a user or a system that wants the work to end
 
+
+def told_by(error: BaseException) -> BaseException:
+    """The interrupt that arrived in compiled code, which Python then calls a SystemError; else the error itself."""
+    cause = error.__cause__ if isinstance(error, SystemError) else None
+    return cause if isinstance(cause, INTERRUPTS) else error
+
+
 _ACTS = ("Cc", "Cf", "Cs", "Zl", "Zp")  # categories of control, format, surrogate and line separators
 
 

@@ -66,6 +66,32 @@ def test_a_signal_ends_it_without_a_traceback(tmp_path, number, code, words):
     assert ended(process, number) == (code, words)
 
 
+SWALLOWING = """
+import os, sys, time, weakref
+import omnidyn.model.robot_file as module
+def load_robot(*_, **__):
+    class Mark: pass
+    mark = Mark()
+    def gone(_):
+        os.kill(os.getpid(), {number})
+        time.sleep(1.0)
+    kept = weakref.ref(mark, gone)
+    del mark
+    time.sleep(5.0)
+module.load_robot = load_robot
+from omnidyn.cli import main
+sys.exit(main(["deadzone", "axebot"]))
+"""
+
+
+@posix
+@pytest.mark.parametrize("number, code", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_signal_that_python_swallows_ends_it_all_the_same(tmp_path, number, code):
+    command = [sys.executable, "-c", SWALLOWING.format(number=int(number))]
+    found = subprocess.run(command, cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=60)
+    assert (found.returncode, "Traceback" in found.stderr) == (code, False)
+
+
 @posix
 @pytest.mark.parametrize("number, code", [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_while_writing_leaves_nothing_behind(tmp_path, number, code):

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import _thread
 import contextlib
 import errno
 import signal
 import sys
+import threading
 import traceback
+from collections.abc import Iterator
 from types import FrameType
 
 import typer
@@ -14,7 +17,7 @@ import typer
 from omnidyn.cli.terminal import session
 from omnidyn.cli.terminal.flags import of_place
 from omnidyn.cli.terminal.streams import prepare, say, say_trace, silence
-from omnidyn.errors import OmnidynError, Terminated, printable
+from omnidyn.errors import INTERRUPTS, OmnidynError, Terminated, printable, told_by
 
 BUG, USAGE, BAD_INPUT, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143
 
@@ -25,7 +28,7 @@ def run_guarded(arguments: list[str]) -> int:
     debug, arguments = _take_debug(arguments)
     session.begin(arguments)
     try:
-        with _sigterm_unwinds():
+        with _sigterm_unwinds(), _interrupts_come_again():
             code = _run(arguments)
             if sys.stdout is not None:
                 sys.stdout.flush()
@@ -33,7 +36,7 @@ def run_guarded(arguments: list[str]) -> int:
     except BaseException as error:
         if debug and not isinstance(error, SystemExit):
             say_trace(traceback.format_exc())
-        return _code_of(error, debug)
+        return _code_of(told_by(error), debug)
 
 
 def _run(arguments: list[str]) -> int:
@@ -104,6 +107,27 @@ def _is_closed_pipe(error: BaseException) -> bool:
     """typer turns a closed pipe into an exit; what it saw hangs on it."""
     seen = error.__context__ if isinstance(error, SystemExit) else error
     return isinstance(seen, OSError) and seen.errno == errno.EPIPE
+
+
+@contextlib.contextmanager
+def _interrupts_come_again() -> Iterator[None]:
+    """While it holds, an interrupt that Python swallows, as in the callback of a weak reference, comes once more."""
+    before = sys.unraisablehook
+
+    def swallowed(told: sys.UnraisableHookArgs) -> None:
+        if not isinstance(told.exc_value, INTERRUPTS):
+            before(told)
+            return
+        number = signal.SIGTERM if isinstance(told.exc_value, Terminated) else signal.SIGINT
+        again = threading.Timer(0.01, _thread.interrupt_main, (number,))  # not at once: it would be swallowed again
+        again.daemon = True
+        again.start()
+
+    sys.unraisablehook = swallowed
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
 
 
 @contextlib.contextmanager

@@ -13,7 +13,7 @@ import numpy as np
 from omnidyn.arguments import check_order
 from omnidyn.attempts import COMPARISON, DIAGNOSIS, JUDGEMENT, LADDER, QUICK, Attempts, Missing, missing_words
 from omnidyn.document import Document, Points, apart, sentence
-from omnidyn.errors import INTERRUPTS, InputError, UnsupportedError
+from omnidyn.errors import INTERRUPTS, InputError, UnsupportedError, told_by
 from omnidyn.findings.finding import Verdict
 from omnidyn.findings.fitness import STEADY as STEADY_USE
 from omnidyn.findings.guesses import rest_on_guesses
@@ -379,7 +379,8 @@ def _answered(
     fit = Fit.of(runs, robot, asked, groups, progress)
     try:
         return solved(fit, runs, progress, groups, keep), ""
-    except (*INTERRUPTS, Exception) as error:
+    except (*INTERRUPTS, Exception) as raised:
+        error = told_by(raised)
         if plain and (heard.attempts.keep or isinstance(error, Exception)):
             heard.attempts.give_up(LADDER, error)
             return plain[0], ""
