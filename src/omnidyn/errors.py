@@ -80,7 +80,9 @@ INTERRUPTS = (KeyboardInterrupt, Terminated)  # a user or a system that wants th
 
 def told_by(error: BaseException) -> BaseException:
     """The interrupt that arrived in compiled code, which Python then calls a SystemError; else the error itself."""
-    cause = error.__cause__ if isinstance(error, SystemError) else None
+    cause: BaseException | None = error
+    while isinstance(cause, SystemError):  # one for each compiled or C function that it went through
+        cause = cause.__cause__
     return cause if isinstance(cause, INTERRUPTS) else error
 
 
