@@ -18,6 +18,7 @@ from omnidyn.logs.channels import TIME, components, place
 from omnidyn.logs.clock.clock import Clock
 from omnidyn.logs.clock.counted_columns import Counters
 from omnidyn.logs.clock.rate import timed
+from omnidyn.logs.clock.restarts import EPISODE, Restart
 from omnidyn.logs.clock.stamps import with_joined_stamp
 from omnidyn.logs.column import MOTOR_SIDE, Column
 from omnidyn.logs.columns.frame_of import turn_to_body, with_frames
@@ -197,7 +198,8 @@ def log_from_table(
     clock = clock or Clock()
     known = len(clock.restarts)
     t = clock.times(table, columns.columns[TIME], notes)
-    counters = Counters(table, t, clock.restarts[known:])
+    episodes = [Restart(EPISODE, TIME, line, "another recording begins") for line in table.begins]
+    counters = Counters(table, t, [*episodes, *clock.restarts[known:]])
     channels: dict[str, FloatArray] = {}
     for key, column in columns.columns.items():
         found = place(key)

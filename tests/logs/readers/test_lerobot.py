@@ -38,6 +38,8 @@ def test_each_episode_is_a_recording_of_its_own(tmp_path, files):
     np.testing.assert_allclose(np.delete(steps, [ROWS - 1, 2 * ROWS - 1]), 1.0 / 30.0, atol=1e-5)
     assert any("3 episodes are recordings of their own" in note for note in log.notes)
     assert any("not read: arm_shoulder_pan.pos" in note for note in log.notes)
+    assert not check(log).of("gap")
+    assert [len(part) for part in log.recordings()] == [ROWS] * 3
 
 
 @pytest.mark.parametrize("late", [0, 1, 2])

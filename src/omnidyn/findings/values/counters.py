@@ -9,14 +9,14 @@ from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.logs.channels import place
 from omnidyn.logs.clock.counters import unrolled
-from omnidyn.logs.clock.restarts import COUNTER, FULL
+from omnidyn.logs.clock.restarts import COUNTER, EPISODE, FULL
 from omnidyn.logs.log import Log
 
 
 def restarts_of(log: Log) -> list[Finding]:
     """What the reader found to begin again or to start over."""
     found = []
-    for each in log.restarts:
+    for each in (each for each in log.restarts if each.code != EPISODE):  # of these a note of the reader tells
         level = FATAL if not each.mended else NOTE if each.code == FULL else WARN
         rows = ((each.line, each.line),) if each.is_gap else ()
         found.append(Finding(each.code, level, each.where, each.words, each.remedy, rows, len(rows)))

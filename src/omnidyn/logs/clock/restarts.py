@@ -14,12 +14,14 @@ from omnidyn.logs.segments import GAP
 from omnidyn.statistics import median
 
 CLOCK, COUNTER, FULL, OVERFLOW = "clock_restart", "counter_restart", "counter_full", "speed_overflow"
+EPISODE = "episode"
 MARGIN = 1.1  # of the least gap
 
 
 @dataclass(frozen=True)
 class Restart:
-    """code: CLOCK, COUNTER (set to another value), FULL (over after a period) or OVERFLOW (a speed of too few bits).
+    """code: CLOCK, COUNTER (set to another value), FULL (over after a period), OVERFLOW (a speed of too few bits) or
+    EPISODE (the format says that another recording begins).
 
     where: components, or "t". line: the first one behind it. words: what was found. remedy: what was done about it, and
     what can be. mended: whether the log can be used as it now is.
@@ -35,7 +37,7 @@ class Restart:
     @property
     def is_gap(self) -> bool:
         """Whether the log is cut there."""
-        return self.code in (CLOCK, COUNTER)
+        return self.code in (CLOCK, COUNTER, EPISODE)
 
     @property
     def note(self) -> str:

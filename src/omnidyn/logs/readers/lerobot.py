@@ -50,12 +50,15 @@ class _Clock:
     def __init__(self) -> None:
         self.shifts: dict[float, float] = {}
         self.end = -BETWEEN
+        self.begins: list[int] = []
 
     def times(self, stamps: FloatArray, episodes: FloatArray) -> FloatArray:
-        """Seconds since the first row of all. Shapes (rows,)."""
+        """Seconds since the first row of all, shape (rows,). begins: rows of these in which a later episode begins."""
+        self.begins = []
         out = np.empty(len(stamps))
         for row, (stamp, episode) in enumerate(zip(stamps.tolist(), episodes.tolist(), strict=True)):
             if episode not in self.shifts:
+                self.begins += [row] if self.shifts else []
                 self.shifts[episode] = self.end + BETWEEN - stamp
             out[row] = self.end = stamp + self.shifts[episode]
         return out
@@ -138,7 +141,8 @@ def _dataset_tables(
 
     def table(columns: Mapping[str, FloatArray], lines: IntArray, sha256: str = "") -> Table:
         notes = _notes(len(clock.shifts), list(others)) if sha256 else ()
-        return Table(tuple(units), dict(columns), lines, units, source, sha256, notes, {}, says)
+        begins = tuple(int(lines[row]) for row in clock.begins) if columns else ()
+        return Table(tuple(units), dict(columns), lines, units, source, sha256, notes, {}, says, begins=begins)
 
     for file in files:
         for part, digest in _parts(file, list(names), len(units), rows, options):

@@ -44,7 +44,8 @@ class Table:
     units: name -> unit, where a row or the header gave them. titles: name -> long name, where a line gave them.
     source: the path. sha256: of the file's bytes. notes: what the reader had to decide, in words.
     says: name -> what the format says it is; no other column of these is guessed by its name. own_clocks: topics with
-    clocks of their own, a row per stamp: a blank cell is no missing value.
+    clocks of their own, a row per stamp: a blank cell is no missing value. begins: lines of the rows in which another
+    recording of the same file begins.
     """
 
     names: tuple[str, ...]
@@ -57,6 +58,7 @@ class Table:
     titles: Mapping[str, str] = field(default_factory=dict)
     says: Mapping[str, Said] = field(default_factory=dict)
     own_clocks: bool = False
+    begins: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         shown = {name: printable(name) for name in self.names if not name.isprintable()}
@@ -171,7 +173,8 @@ def join(tables: Iterable[Table], max_bytes: int | None = None) -> Table:
     if len(parts) == 1:
         return last
     columns = {name: _joined([part.columns[name] for part in parts]) for name in last.names}
-    return replace(last, columns=columns, lines=np.concatenate([part.lines for part in parts]))
+    lines, begins = np.concatenate([part.lines for part in parts]), chain.from_iterable(part.begins for part in parts)
+    return replace(last, columns=columns, lines=lines, begins=tuple(begins))
 
 
 def _joined(columns: Sequence[Column]) -> Column:
