@@ -1,0 +1,33 @@
+"""Benchmarks at their smallest size, each in a process of its own: each ends, and its table has rows.
+
+Those that take minutes even then (fits of many kinds of log, logs of gigabytes) are left to `dev.py bench`.
+"""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks.__main__ import NAMES
+
+ROOT = Path(__file__).resolve().parents[1]
+QUICK = (
+    "house", "accuracy", "simulate", "inductance", "rest", "compare", "check", "exports", "stagger", "identify_loop",
+    "ten_robots",
+)  # fmt: skip
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", QUICK)
+def test_each_quick_benchmark_runs_at_its_smallest_size(name):
+    assert name in NAMES
+    environment = os.environ | {"OMNIDYN_BENCH_SHARE": "0"}
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks", name, "--json"], cwd=ROOT, env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    (table,) = json.loads(done.stdout)
+    assert table["rows"]
