@@ -41,12 +41,12 @@ READERS = {
 
 @pytest.mark.parametrize("reader", READERS)
 def test_no_reader_of_text_is_slow(reader):
-    """0.5 s of the processor for 200 kB; a quadratic expression takes minutes."""
+    """5 s of the processor for 200 kB, on a machine that does much else; a quadratic expression takes minutes."""
     for piece in PIECES:
         text, begun = piece * (LENGTH // len(piece)) + "!", time.process_time()
         with contextlib.suppress(OmnidynError, ValueError):
             READERS[reader](text)
-        assert time.process_time() - begun < 0.5, piece
+        assert time.process_time() - begun < 5.0, piece
 
 
 def test_a_struct_of_nothing_has_no_billion_elements():
