@@ -1,6 +1,7 @@
 """Names of any length are read in linear time, and cost themselves alone; texts from users make no reader slow."""
 
 import contextlib
+import math
 import struct
 import time
 
@@ -41,12 +42,17 @@ READERS = {
 
 @pytest.mark.parametrize("reader", READERS)
 def test_no_reader_of_text_is_slow(reader):
-    """5 s of the processor for 200 kB, on a machine that does much else; a quadratic expression takes minutes."""
+    """0.5 s of the processor for 200 kB, the best of three where the machine is busy; a quadratic one takes minutes."""
     for piece in PIECES:
-        text, begun = piece * (LENGTH // len(piece)) + "!", time.process_time()
-        with contextlib.suppress(OmnidynError, ValueError):
-            READERS[reader](text)
-        assert time.process_time() - begun < 5.0, piece
+        took = math.inf
+        for last in "abc":  # no answer is remembered
+            text, begun = piece * (LENGTH // len(piece)) + "!" + last, time.process_time()
+            with contextlib.suppress(OmnidynError, ValueError):
+                READERS[reader](text)
+            took = min(took, time.process_time() - begun)
+            if took < 0.5:
+                break
+        assert took < 0.5, piece
 
 
 def test_a_struct_of_nothing_has_no_billion_elements():
