@@ -1,14 +1,17 @@
 """The same answers: 360 commands and calls of the public API, recorded, and compared to the last digit.
 
     python -m benchmarks answers --record before.json
-    python -m benchmarks answers --against before.json     # runs them again; exit code 1 where one differs
+    python -m benchmarks answers --against before.json     # runs them again; exit code 1 where a number differs
+    python -m benchmarks answers --against before.json --words     # shows where only words differ, too
     python -m benchmarks answers --compare before.json after.json
     PYTHONPATH=/other/checkout/src python -m benchmarks answers --record other.json
 
 Only the command line (as `python -m omnidyn`, in this process) and public names of omnidyn are used, so that one and
 the same script runs on any state of the code. Inputs are made here, rounded to 9 digits, so that a last digit of the
 simulation does not pass for a difference of the fit. Real logs come from OMNIDYN_DATA; their cases are skipped without.
-Lines of progress and the path of the folder are left out of what is compared; of pictures only their names count.
+Numbers are told from words: values of calls, of JSON and of files; numbers in text for people are a kind of their own,
+for a sentence may leave one out. Lines of progress and the path of the folder are left out of what is compared; of
+pictures only their names count.
 Which cases there are: answers_cases.py.
 """
 
@@ -30,9 +33,9 @@ import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -219,22 +222,63 @@ def record(pattern: str = "") -> dict[str, Any]:
 # ---- comparison --------------------------------------------------------------------------------------------
 
 
-def differences(old: Any, new: Any, path: str = "") -> Iterator[str]:
-    """Every place where two recordings of a case differ, in words."""
+NUMBERS, SHOWN_NUMBERS, WORDS = "numbers", "numbers shown", "words"  # what differs
+FIGURE = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?", re.IGNORECASE)
+DATA_FILE = r"\.(csv|toml|c|h|hpp|xml|yaml|urdf|java|py)\b"
+TEXT = ("stdout", "stderr", ".html", ".md", "says")  # parts of a path below which text is written for people
+
+
+class Difference(NamedTuple):
+    """One place where two recordings of a case differ. kind: NUMBERS, SHOWN_NUMBERS (in text for people) or WORDS."""
+
+    kind: str
+    words: str
+
+
+def differences(old: Any, new: Any, path: str = "") -> Iterator[Difference]:
+    """Every place where two recordings of a case differ. A number that is only after is none of the old numbers."""
     if isinstance(old, dict) and isinstance(new, dict):
         for key in dict.fromkeys((*old, *new)):
-            if key not in old or key not in new:
-                yield f"{path}/{key}: only {'before' if key in old else 'after'}"
-            else:
+            if key in old and key in new:
                 yield from differences(old[key], new[key], f"{path}/{key}")
+            else:
+                lost = key in old and any(map(_is_number, _leaves(old[key])))
+                yield Difference(
+                    NUMBERS if lost else WORDS, f"{path}/{key}: only {'before' if key in old else 'after'}"
+                )
     elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
         for k, (one, other) in enumerate(zip(old, new, strict=True)):
             yield from differences(one, other, f"{path}[{k}]")
     elif isinstance(old, list) and isinstance(new, list):
+        kind = _kind(old, new, path)
         lines = difflib.ndiff([_shown(each) for each in old], [_shown(each) for each in new])
-        yield from (f"{path}: {line}" for line in lines if line[:1] in "+-")
+        yield from (Difference(kind, f"{path}: {line}") for line in lines if line[:1] in "+-")
     elif old != new or type(old) is not type(new):
-        yield f"{path}: {_shown(old)} -> {_shown(new)}{_relative(old, new)}"
+        yield Difference(_kind(old, new, path), f"{path}: {_shown(old)} -> {_shown(new)}{_relative(old, new)}")
+
+
+def _kind(old: Any, new: Any, path: str) -> str:
+    """What differs between two values that are not alike in form, or two leaves."""
+    before, after = ([leaf for leaf in _leaves(value) if _is_number(leaf)] for value in (old, new))
+    if before and before != (after if len(before) == len([*_leaves(old)]) else after[: len(before)]):
+        return NUMBERS
+    figures = [[figure for leaf in _leaves(value) for figure in FIGURE.findall(str(leaf))] for value in (old, new)]
+    if not figures[0] or figures[0] == figures[1]:
+        return WORDS
+    for_people = any(part in path for part in TEXT) or (" " in str(old) and not re.search(DATA_FILE, path))
+    return SHOWN_NUMBERS if for_people else NUMBERS
+
+
+def _leaves(value: Any) -> Iterator[Any]:
+    if isinstance(value, dict | list):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from _leaves(item)
+    else:
+        yield value
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) or (isinstance(value, str) and FIGURE.fullmatch(value) is not None)
 
 
 def _shown(value: Any) -> str:
@@ -249,24 +293,27 @@ def _relative(old: Any, new: Any) -> str:
         return ""
 
 
-def tell(old: Mapping[str, Any], new: Mapping[str, Any]) -> int:
-    """Print every difference of two recordings; the number of cases that differ."""
+def tell(old: Mapping[str, Any], new: Mapping[str, Any], kinds: Collection[str]) -> int:
+    """Print every difference of two recordings of these kinds; the number of cases whose numbers differ."""
     one, other = old["cases"], new["cases"]
     skipped = [name for name in other if name in one and ("skipped" in one[name] or "skipped" in other[name])]
     ran = [name for name in other if name in one and name not in skipped]
-    count = 0
+    counts = dict.fromkeys((NUMBERS, SHOWN_NUMBERS, WORDS), 0)
     for name in ran:
         found = list(differences(one[name], other[name]))
-        count += bool(found)
-        if found:
-            print(name, *(f"    {words}" for words in found[:SHOWN]), sep="\n")
-        if len(found) > SHOWN:
-            print(f"    ... {len(found)} differences of this case")
+        for kind in {each.kind for each in found}:
+            counts[kind] += 1
+        wanted = [each for each in found if each.kind in kinds]
+        if wanted:
+            print(name, *(f"    {each.kind} {each.words}" for each in wanted[:SHOWN]), sep="\n")
+        if len(wanted) > SHOWN:
+            print(f"    ... {len(wanted)} differences of this case")
     alone = [name for name in (*one, *other) if (name in one) != (name in other)]
     for name in alone:
         print(f"only {'before' if name in one else 'after'}: {name}")
-    print(f"{len(ran)} cases in both, {count} differ; {len(skipped)} skipped, {len(alone)} in one only")
-    return count
+    print(f"{len(ran)} cases in both; {len(skipped)} skipped, {len(alone)} in one only")
+    print("; ".join(f"{kind} differ in {count}" for kind, count in counts.items()))
+    return counts[NUMBERS]
 
 
 def main(arguments: list[str]) -> int:
@@ -276,13 +323,15 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--compare", nargs=2, metavar="FILE", help="compare two recordings")
     parser.add_argument("--only", default="", metavar="REGEX", help="cases whose name matches")
     parser.add_argument("--list", action="store_true", help="the names of all cases")
+    parser.add_argument("--words", action="store_true", help="show differences of words, too")
     asked = parser.parse_args(arguments)
+    kinds = (NUMBERS, SHOWN_NUMBERS, WORDS) if asked.words else (NUMBERS, SHOWN_NUMBERS)
     if asked.list:
         print(*(name for name, _ in cases() if re.search(asked.only, name)), sep="\n")
         return 0
     if asked.compare:
         old, new = (json.loads(Path(name).read_text("utf-8")) for name in asked.compare)
-        return DIFFERS if tell(old, new) else 0
+        return DIFFERS if tell(old, new, kinds) else 0
     if not (asked.record or asked.against):
         parser.error("what to do: --record, --against, --compare or --list")
     os.environ.update(COLUMNS="110", LC_ALL="C.UTF-8", NO_COLOR="1")
@@ -295,4 +344,4 @@ def main(arguments: list[str]) -> int:
         return 0
     if asked.only:
         old["cases"] = {name: case for name, case in old["cases"].items() if re.search(asked.only, name)}
-    return DIFFERS if tell(old, new) else 0
+    return DIFFERS if tell(old, new, kinds) else 0

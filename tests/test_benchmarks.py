@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.__main__ import NAMES
+from benchmarks.answers import differences
 
 ROOT = Path(__file__).resolve().parents[1]
 QUICK = (
@@ -31,3 +32,20 @@ def test_each_quick_benchmark_runs_at_its_smallest_size(name):
     assert done.returncode == 0, done.stderr[-2000:]
     (table,) = json.loads(done.stdout)
     assert table["rows"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "kind"),
+    [
+        ({"x": "1.5"}, {"x": "1.6"}, "numbers"),
+        ({"w": 1}, {}, "numbers"),
+        ([1, 2], [1, 2, 3], "numbers"),
+        ({"files": {"a.toml": ["m = 1.5"]}}, {"files": {"a.toml": ["m = 1.6"]}}, "numbers"),
+        ("known within 22 % only", "known within 23 % only", "numbers shown"),
+        ("it is known", "it is not known", "words"),
+        (["gap"], [{"code": "gap", "rows": 3}], "words"),
+    ],
+)
+def test_a_changed_number_is_told_from_changed_words(old: object, new: object, kind: str) -> None:
+    assert {each.kind for each in differences(old, new)} == {kind}
+    assert not list(differences(old, old))
