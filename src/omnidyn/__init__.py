@@ -113,6 +113,8 @@ _MAKERS = {
     shown.FRAME: ("omnidyn.interop.dataframe", "to_dataframe"),
     shown.DATASET: ("omnidyn.interop.dataset", "to_xarray"),
     shown.RUN: ("omnidyn.interop.runs", "run_of"),
+    shown.SENTENCE: ("omnidyn.telling.codes", "sentence"),
+    shown.REMEDY: ("omnidyn.telling.codes", "remedy"),
 }
 
 

@@ -40,9 +40,9 @@ class Words:
 
 @dataclass(frozen=True)
 class Points:
-    """Sentences, each a point of a list. mark: what stands before each in text, such as "-" or "warning:"."""
+    """Sentences (text or statements), each a point of a list. mark: what stands before each in text, such as "-"."""
 
-    words: Sequence[str]
+    words: Sequence[object]
     mark: str = "-"
     name: str = ""
 
@@ -98,7 +98,7 @@ class Document:
 
     parts: Sequence[Part]
     data: Mapping[str, Any] = field(default_factory=dict)
-    warnings: Sequence[str] = ()
+    warnings: Sequence[object] = ()
     ascii: bool = False
     verdict: str = ""
 

@@ -16,6 +16,7 @@ from omnidyn.clocks import fastest_step, has_own_clock, is_staggered, samples, u
 from omnidyn.document import Document, Points, Table
 from omnidyn.errors import InputError
 from omnidyn.shown import DATASET, FIGURE, FRAME, RUN, Shown, make
+from omnidyn.statement import Statement, statements
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,7 +55,8 @@ class Run(Shown):
     twist and twist_command: (v_x, v_y, omega) in the body frame [m/s, m/s, rad/s]. Shape (samples, 3).
     pose: (x, y, heading) in the world [m, m, rad], heading not wrapped. Shape (samples, 3).
     supply: voltage of the battery [V]. Shape (samples,).
-    source: where it comes from. warnings: what a reader should know, in words.
+    source: where it comes from. warnings: what a reader should know, as statements; text
+    given for one is quoted.
     Sensors with clocks of their own keep their times: t holds the stamps of all, and a channel is NaN where its sensor
     gave nothing. Nothing is interpolated.
     Inputs (voltage, duty, commands) of row k hold over [t_k, t_k+1). All arrays are read-only.
@@ -73,7 +75,7 @@ class Run(Shown):
     pose: FloatArray | None = None
     supply: FloatArray | None = None
     source: str = ""
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Statement, ...] = ()
 
     def __post_init__(self) -> None:
         time = _read_only("t", self.t, None)
@@ -81,6 +83,7 @@ class Run(Shown):
         if bad.size:
             raise InputError("time does not increase", got=f"row {bad[0] + 1}: t = {time[bad[0] + 1]}", where="t")
         object.__setattr__(self, "t", time)
+        object.__setattr__(self, "warnings", statements(self.warnings))
         for name, kind in CHANNELS.items():
             value = getattr(self, name)
             if value is not None:
@@ -137,7 +140,7 @@ class Run(Shown):
         head = f"{self.source or 'a run'}: {len(self.t)} samples, {span:.6g} s{rate}"
         data = {
             "source": self.source, "samples": len(self.t), "duration_s": span, "channels": list(self.channels),
-            "warnings": list(self.warnings),
+            "warnings": [warning.to_dict() for warning in self.warnings],
         }  # fmt: skip
         table = Table(("channel", "", "unit", "least", "mean", "largest", "missing"), rows, "<<<>", name="channels")
         warnings = Points(self.warnings, "warning:", "warnings")

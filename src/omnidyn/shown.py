@@ -2,7 +2,8 @@
 
 Pages, pictures and tables of other tools stand on floors above every result, and nothing imports from above itself. The
 public package stands above them all, and is imported before anything in it: `omnidyn/__init__.py` hands down, once,
-who makes HTML, draws and fills data frames, each a function that imports its part when it is first called.
+who makes HTML and sentences, draws and fills data frames, each a function that imports its part when it is first
+called.
 """
 
 from __future__ import annotations
@@ -14,12 +15,14 @@ if TYPE_CHECKING:
     from omnidyn.document import Document
 
 HTML, FIGURE, FRAME, DATASET, RUN = "html", "figure", "frame", "dataset", "run"
+SENTENCE, REMEDY = "sentence", "remedy"
 
 _MAKERS: dict[str, Callable[..., Any]] = {}
 
 
 def made_by(**makers: Callable[..., Any]) -> None:
-    """Who makes what: html(document), figure(result, **options), frame(result), dataset(run), run(table)."""
+    """Who makes what: html(document), figure(result, **options), frame(result), dataset(run), run(table),
+    sentence(statement), remedy(statement)."""
     _MAKERS.update(makers)
 
 

@@ -270,4 +270,4 @@ def test_nothing_to_replay_is_too_little_data():
 def test_warnings_of_the_simulation_come_along():
     run = noisy(clean_log(AXEBOT, 4), 4)
     found = replay(AXEBOT, run.replace(voltage=2.0 * run.voltage))
-    assert found.warnings[0].startswith("voltage beyond the limit was clipped in")
+    assert str(found.warnings[0]).startswith("voltage above the limit was clipped in")

@@ -46,12 +46,10 @@ def test_clipping_is_reported():
     run = simulate(driven(kind="duty", supply=8.0), duty=[[0.5, 0.0, 0.0], [0.9, 0.0, 0.0], [-1.5, 0.0, 0.0]], dt=0.01)
     np.testing.assert_array_equal(run.voltage[:, 0], [4.0, 6.0, -6.0, -6.0])
     np.testing.assert_array_equal(run.duty[:, 0], [0.5, 0.9, -1.0, -1.0])
-    assert run.warnings == (
-        "duty beyond the limit was clipped in 1 of 3 rows, first in row 2",
-        "voltage beyond the limit was clipped in 2 of 3 rows, first in row 1",
-    )
+    assert [(each.code, each.subject) for each in run.warnings] == [("clipped", "duty"), ("clipped", "voltage")]
+    assert [[*each.numbers.values()] for each in run.warnings] == [[1, 3, 2], [2, 3, 1]]
     run = simulate(driven(), [[7.0, 0.0, 0.0]], 0.01)
-    assert run.warnings == ("voltage beyond the limit was clipped in 1 of 1 rows, first in row 0",)
+    assert [[*each.numbers.values()] for each in run.warnings] == [[1, 1, 0]]
 
 
 @pytest.mark.parametrize("axis, damping, inertia", [(0, 1.5, MASS), (1, 1.5, MASS), (2, 3 * RADIUS**2, INERTIA)])

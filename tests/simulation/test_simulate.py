@@ -70,7 +70,10 @@ def test_voltage_beyond_the_limit_is_clipped_and_said(axebot):
     voltage = np.array([[0.0, 6.0, -6.0], [0.0, 9.0, -9.0], [0.0, 6.5, -6.0], [0.0, 1.0, 0.0]])
     run = simulate(axebot, voltage, 0.1)
     assert run.voltage[:4].tolist() == np.clip(voltage, -6, 6).tolist()
-    assert run.warnings == ("voltage beyond the limit was clipped in 2 of 4 rows, first in row 1",)
+    (warning,) = run.warnings
+    assert (warning.code, warning.subject) == ("clipped", "voltage")
+    assert warning.numbers == {"clipped": 2, "rows": 4, "first": 1}
+    assert str(warning) == "voltage above the limit was clipped in 2 of 4 rows, first in row 1"
     assert run == simulate(axebot, np.clip(voltage, -6, 6), 0.1).replace(warnings=run.warnings)
 
 

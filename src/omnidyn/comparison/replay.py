@@ -302,7 +302,9 @@ def _assembled(run: Run, robot: Robot, pieces: list[slice], parts: list[Run]) ->
 def _from_simulation(parts: list[tuple[Run, str]]) -> list[str]:
     """What the simulations warned of, by piece, and starts that were assumed."""
     many = len(parts) > 1
-    words = [f"piece {k + 1}: {text}" if many else text for k, (part, _) in enumerate(parts) for text in part.warnings]
+    words = [
+        f"piece {k + 1}: {text}" if many else str(text) for k, (part, _) in enumerate(parts) for text in part.warnings
+    ]
     more = [f"and {len(words) - SHOWN} more warnings of the simulation"] if len(words) > SHOWN else []
     assumed = sum(source.startswith("rest") for _, source in parts)
     told = [f"no speed was logged: {assumed} of {len(parts)} pieces start from rest"] if assumed else []

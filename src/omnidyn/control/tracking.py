@@ -128,7 +128,7 @@ class Tracking(Shown):
 
 def _of_run(tracking: Tracking, named: bool) -> list[str]:
     """What the simulation of the robot itself has to say, such as of wheels that slip."""
-    return [f"{tracking.controller}: {words}" if named else words for words in tracking.run.warnings]
+    return [f"{tracking.controller}: {words}" if named else str(words) for words in tracking.run.warnings]
 
 
 def trackings_document(found: Sequence[Tracking], notes: Sequence[str] = ()) -> Document:

@@ -64,7 +64,7 @@ def _of_run(run: Run, made: Any, library: str) -> Any:
     units = {name: unit_of_column(name) for name in columns}
     index = made.Index(columns.pop("t_s"), name="t_s")
     frame = made.DataFrame(columns, index=index)
-    frame.attrs |= {"source": run.source, "warnings": list(run.warnings), "units": units}
+    frame.attrs |= {"source": run.source, "warnings": [*map(str, run.warnings)], "units": units}
     return frame
 
 

@@ -37,4 +37,4 @@ def to_xarray(run: Run) -> Any:
             coordinates[WHEELS] = (WHEELS, np.arange(1, values.shape[1] + 1), {})
         elif kind != SCALAR:
             coordinates[AXES] = (AXES, AXIS_NAMES, {})
-    return xarray.Dataset(variables, coordinates, {"source": run.source, "warnings": list(run.warnings)})
+    return xarray.Dataset(variables, coordinates, {"source": run.source, "warnings": [*map(str, run.warnings)]})

@@ -11,6 +11,7 @@ from omnidyn.errors import InputError
 from omnidyn.interop.dataset import TIME
 from omnidyn.logs.run_file import run_of_columns
 from omnidyn.run import CHANNELS, Run
+from omnidyn.statement import Statement, statements
 
 REMEDY = "write it to CSV and read it with omnidyn.read_log, which knows names and units of other columns"
 
@@ -29,7 +30,7 @@ def run_of(frame: Any) -> Run:
     if "t_s" not in columns and index is not None and index.name == "t_s":
         columns = {"t_s": _numbers("t_s", index), **columns}
     source = attributes.get("source") or f"a {type(frame).__module__.partition('.')[0]} data frame"
-    return run_of_columns(columns, source, _words(attributes.get("warnings")), REMEDY)
+    return run_of_columns(columns, source, _statements(attributes.get("warnings")), REMEDY)
 
 
 def _of_dataset(dataset: Any) -> Run:
@@ -45,12 +46,12 @@ def _of_dataset(dataset: Any) -> Run:
         channels[str(name)] = _numbers(str(name), variable.transpose(TIME, *others))
     return Run(
         t=_numbers(TIME, dataset.coords[TIME]), source=str(dataset.attrs.get("source", "an xarray Dataset")),
-        warnings=_words(dataset.attrs.get("warnings")), **channels,
+        warnings=_statements(dataset.attrs.get("warnings")), **channels,
     )  # fmt: skip
 
 
-def _words(value: Any) -> tuple[str, ...]:
-    return tuple(map(str, value)) if isinstance(value, list | tuple) else ()
+def _statements(value: Any) -> tuple[Statement, ...]:
+    return statements(map(str, value)) if isinstance(value, list | tuple) else ()
 
 
 def _numbers(name: str, values: Any) -> FloatArray:

@@ -20,6 +20,7 @@ from omnidyn.logs.clock.restarts import Restart
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.logs.segments import filled
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
+from omnidyn.statement import statements
 
 OFTEN_BACK = 0.005  # of the rows: no recorder writes so many out of order
 MAX_MISSING = 0.2  # share of rows without a time or without any number
@@ -56,7 +57,12 @@ class Log:
     def of_run(cls, run: Run) -> Log:
         """A Run as a log; lines count its samples from 0."""
         return cls(
-            run.t, run.channels, np.arange(len(run)), source=run.source, notes=run.warnings, own_clocks=run.staggered
+            run.t,
+            run.channels,
+            np.arange(len(run)),
+            source=run.source,
+            notes=(*map(str, run.warnings),),
+            own_clocks=run.staggered,
         )
 
     def __len__(self) -> int:
@@ -107,7 +113,7 @@ class Log:
         log = log._without(repeated, "repeat the time of the row before", warnings, bound=1.0)._moved(warnings)
         channels = {name: log.aligned(name, values, warnings) for name, values in log.channels.items()}
         channels = {name: np.where(log.between(name), np.nan, values) for name, values in channels.items()}
-        return Run(t=log.t, **channels, source=self.source, warnings=tuple(warnings))
+        return Run(t=log.t, **channels, source=self.source, warnings=statements(warnings))
 
     def _moved(self, warnings: list[str]) -> Log:
         """What was recorded late, at the times when it happened: in rows of its own where no row has such a time.

@@ -30,6 +30,7 @@ from omnidyn.logs.table.table import Table
 from omnidyn.logs.writers.mat_run import columns_to_mat
 from omnidyn.logs.writers.mcap_run import import_mcap, run_to_mcap
 from omnidyn.run import CHANNELS, SCALAR, Run, as_run
+from omnidyn.statement import Statement, statements
 from omnidyn.units import DUTY, known_unit, parse_unit
 
 _SUFFIXES = ("rad_s", "m_s", "duty", "rad", "V", "A", "m", "s")  # as channels.si_suffix gives them, long before short
@@ -157,11 +158,11 @@ def read_run(path: str | os.PathLike) -> Run:
         row = int(bad[0]) + 1
         got = f"{time[row]:.17g} after {time[row - 1]:.17g}"
         raise table.fault(row, "t_s", "time does not increase", got, "increasing times")
-    return Run(t=time, **channels, source=str(path), warnings=table.notes)
+    return Run(t=time, **channels, source=str(path), warnings=statements(table.notes))
 
 
 def run_of_columns(
-    columns: Mapping[str, FloatArray], source: str, warnings: tuple[str, ...] = (), remedy: str = ""
+    columns: Mapping[str, FloatArray], source: str, warnings: tuple[Statement, ...] = (), remedy: str = ""
 ) -> Run:
     """The Run of columns in memory that are named as in a run file. Shape (samples,) each, NaN where missing.
 

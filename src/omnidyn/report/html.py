@@ -42,7 +42,7 @@ def content(*parts: Table | Points | Picture) -> str:
     return "".join(
         figure(part) if isinstance(part, Picture)
         else table(part.head, part.rows) if isinstance(part, Table)
-        else bullets(part.words)
+        else bullets([*map(str, part.words)])
         for part in parts
     )  # fmt: skip
 

@@ -15,6 +15,6 @@ def _part(part: str | Words | Points | Table) -> str:
     if isinstance(part, Table):
         return table(part.head, part.rows)
     if isinstance(part, Points):
-        return bullets(part.words)
+        return bullets([*map(str, part.words)])
     words = f"{part.first}{part.text}".strip() if isinstance(part, Words) else part
     return paragraph(words) if words else ""

@@ -13,6 +13,7 @@ from omnidyn.model.actuation import clip_voltage, voltage_of_duty
 from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
+from omnidyn.statement import WARNING, Statement
 
 MIN_DT, MAX_DT = 1e-9, 3600.0
 
@@ -32,7 +33,7 @@ class Commands:
     duty: FloatArray | None = None
     twist: FloatArray | None = None
     supply: FloatArray | None = None
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Statement, ...] = ()
 
 
 def commands(
@@ -151,11 +152,11 @@ def as_floats(name: str, value: ArrayLike | None) -> FloatArray:
         raise InputError("not numbers", got=value, expected="an array of numbers", where=name) from None
 
 
-def _clipped(name: str, wanted: FloatArray, applied: FloatArray) -> tuple[str, ...]:
+def _clipped(name: str, wanted: FloatArray, applied: FloatArray) -> tuple[Statement, ...]:
     rows = np.flatnonzero((wanted != applied).any(axis=1))
     if not rows.size:
         return ()
-    return (f"{name} beyond the limit was clipped in {rows.size} of {len(wanted)} rows, first in row {rows[0]}",)
+    return (Statement("clipped", WARNING, name, {"clipped": rows.size, "rows": len(wanted), "first": int(rows[0])}),)
 
 
 def current_bounds(robot: Robot, given: Commands, rows: int) -> FloatArray:

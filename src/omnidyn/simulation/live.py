@@ -29,6 +29,7 @@ from omnidyn.simulation.slip.march import rolling, run_slipping
 from omnidyn.simulation.slip.plant import slip_plant
 from omnidyn.simulation.speed_loop import Loop, loop_of, no_loop
 from omnidyn.simulation.view import pushing, refuse_push
+from omnidyn.statement import Statement
 
 EDGE = 1e-9  # of a step or a tick: so near, two times are one
 
@@ -69,9 +70,9 @@ class LiveRobot:
         return wheel_speed(self.robot.wheels, self.twist) if self._turning is None else self._turning
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Statement, ...]:
         """What is to be said of the way so far: which wheels slipped or lifted off, as `simulate` says it."""
-        return self._grip.words if self._grip is not None else ()
+        return self._grip.statements if self._grip is not None else ()
 
     def step(self, command: FloatArray) -> None:
         """Hold a command for dt: volts, a duty, or wheel speeds, shape (wheels,), whichever the drive takes."""

@@ -25,11 +25,12 @@ from omnidyn.simulation.commands import Commands, as_floats, commands, current_b
 from omnidyn.simulation.exact.inductance import simulate_exact_inductance
 from omnidyn.simulation.exact.march import simulate_exact, why_not_exact
 from omnidyn.simulation.implicit.march import Outcome, capped, run_implicit
-from omnidyn.simulation.slip.grip import Grip
+from omnidyn.simulation.slip.grip import Grip, not_converged
 from omnidyn.simulation.slip.march import rolling, run_slipping
 from omnidyn.simulation.slip.plant import slip_plant
 from omnidyn.simulation.speed_loop import Loop, loop_of, no_loop
 from omnidyn.simulation.view import PLAIN, View, pushing, refuse_push, seen_at_once, seen_through
+from omnidyn.statement import Statement
 
 TOLERANCE = 1e-6
 # Beyond these a step has no meaning and the implicit engine no end: [m/s, rad/s], [m, rad], [A].
@@ -188,7 +189,7 @@ def _slipping(
         current = settled_current(robot.motor, _with_last(motors - push), turning)
     done = Done(motors, out.twist[keep], out.pose[keep], None, current, asked, turning)
     how = f"engine of wheels that slip, tol {tol:g} m/s" if tol else "engine of wheels that slip, fixed step"
-    return as_run(robot, given, acting, done, how, grip.words, view)
+    return as_run(robot, given, acting, done, how, grip.statements, view)
 
 
 def implicit_run(
@@ -202,7 +203,7 @@ def implicit_run(
     """
     how = f"implicit engine, tol {tol:g} m/s" if tol else "implicit engine, fixed step"
     stopped, rows = capped(outcome), len(outcome.iterations)
-    warnings = (f"the friction solver hit its cap in {stopped} of {rows} rows: look there",) if stopped else ()
+    warnings = (not_converged(stopped, rows),) if stopped else ()
     twists = outcome.state.x / [1.0, 1.0, plant(robot).body.length]
     done = Done(voltage, twists, outcome.pose, outcome, asked=asked)
     return as_run(robot, given, acting or given, done, how, warnings, view)
@@ -225,7 +226,7 @@ class Done(NamedTuple):
 
 
 def as_run(
-    robot: Robot, given: Commands, acting: Commands, done: Done, engine: str, warnings: tuple[str, ...],
+    robot: Robot, given: Commands, acting: Commands, done: Done, engine: str, warnings: tuple[Statement, ...],
     view: View = PLAIN,
 ) -> Run:  # fmt: skip
     """The Run of a simulation: what the instruments of the robot would have recorded, as a view shows it."""

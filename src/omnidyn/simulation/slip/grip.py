@@ -1,4 +1,4 @@
-"""Which wheels lost their grip in a run, and which have none, in words."""
+"""Which wheels lost their grip in a run, and which have none."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import numpy as np
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.slip.loads import wheel_loads
 from omnidyn.simulation.slip.march import SlipOutcome
+from omnidyn.statement import WARNING, Statement
 
 
 class Grip:
@@ -27,16 +28,20 @@ class Grip:
         self._capped += out.capped
 
     @property
-    def words(self) -> tuple[str, ...]:
-        """A sentence each."""
-        shares, rows = 100.0 * self._spun / max(self._states, 1), max(self._rows, 1)
-        spins = [f"wheel {w + 1} in {share:.2g} %" for w, share in enumerate(shares.tolist()) if share > 0.0]
-        words = [f"wheels slip: {', '.join(spins)} of the samples"] if spins else []
-        if self._capped:
-            words.append(f"the friction solver hit its cap in {self._capped} of {rows} rows: look there")
-        words += [
-            f"wheel {w + 1} lifts off in {100.0 * count / rows:.2g} % of the rows: it has no grip then, and that the "
-            "robot tips is not in the model"
+    def statements(self) -> tuple[Statement, ...]:
+        """What is to be said of the wheels, and of the solver."""
+        shares, rows = self._spun / max(self._states, 1), max(self._rows, 1)
+        wheels = np.flatnonzero(shares)
+        slip = Statement("wheels_slip", WARNING, numbers={"wheels": wheels + 1, "shares": shares[wheels]})
+        lifted = [
+            Statement("wheel_lifts", WARNING, numbers={"wheel": w + 1, "share": count / rows})
             for w, count in enumerate(self._lifted.tolist()) if count
         ]  # fmt: skip
-        return (*wheel_loads(self._robot).words, *words)
+        air = [Statement("wheel_in_air", WARNING, numbers={"wheel": w + 1}) for w in wheel_loads(self._robot).lifted]
+        capped = [not_converged(self._capped, rows)] if self._capped else []
+        return (*air, *([slip] if wheels.size else []), *capped, *lifted)
+
+
+def not_converged(stopped: int, rows: int) -> Statement:
+    """That the friction solver hit its cap in some rows of a run."""
+    return Statement("not_converged", WARNING, numbers={"stopped": stopped, "rows": rows})

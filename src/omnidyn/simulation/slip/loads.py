@@ -32,11 +32,6 @@ class WheelLoads:
     newtons: FloatArray
     lifted: tuple[int, ...] = ()
 
-    @property
-    def words(self) -> tuple[str, ...]:
-        """Wheels in the air, each in words."""
-        return tuple(f"wheel {w + 1} carries nothing: it is in the air, and has no grip" for w in self.lifted)
-
 
 def wheel_loads(robot: Robot) -> WheelLoads:
     """The static loads of the wheels of a robot [N].

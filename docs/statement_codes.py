@@ -1,0 +1,36 @@
+"""Fills the tables of docs/statements.md from `omnidyn.telling`: run it after a sentence was added or changed."""
+
+import re
+from pathlib import Path
+
+from omnidyn.telling.codes import ROOMS
+from omnidyn.telling.sentence import Wording
+
+PAGE = Path(__file__).with_name("statements.md")
+
+
+def filled(page: str) -> str:
+    """The page with the table of each room behind its mark."""
+    return re.sub(
+        r"(<!-- codes of (\w+) -->\n).*?(?=\n## |\Z)", lambda mark: mark[1] + table(mark[2]), page, flags=re.DOTALL
+    )
+
+
+def table(room: str) -> str:
+    """The codes of a room: what is said, and what to do."""
+    rows = []
+    for code, sentence in ROOMS[room].items():
+        remedies = [_cell(remedy) for remedy in (sentence.remedy, *sentence.remedies.values()) if remedy]
+        rows.append(f"| `{code}` | {_cell(sentence.text)} | {'; '.join(remedies)} |")
+    return "\n".join(["| code | sentence | remedy |", "| --- | --- | --- |", *rows]) + "\n"
+
+
+def _cell(wording: Wording) -> str:
+    """A template with the names of its numbers; of a function, what its docstring says."""
+    if isinstance(wording, str):
+        return re.sub(r"\{(\w+)[^}]*\}", r"*\1*", wording).replace("|", "\\|")
+    return " ".join((wording.__doc__ or "").split()).rstrip(".").replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(filled(PAGE.read_text("utf-8")), "utf-8")
