@@ -15,12 +15,13 @@ from pathlib import Path
 
 import omnidyn
 from benchmarks.table import Table
-from tests.house.test_import_direction import circles, imports
+from tests.house.test_import_direction import Import, circles, imports
 
 PACKAGE = Path(omnidyn.__file__).parent
 RUN = 6  # lines that count as a block that stands twice
 LONGEST = 8  # of the longest parameter lists
 TOO_MANY = 8  # parameters
+SHORT = 60  # lines
 
 
 def measure(packages: tuple[Path, ...] = (PACKAGE,)) -> Table:
@@ -46,11 +47,20 @@ def figures(package: Path) -> dict[str, str]:
         floors[path.relative_to(package).parts[0].removesuffix(".py")] += len(lines)
     lists = parameters(package)
     twice = blocks(texts)
-    found = circles(imports(package))
+    every = imports(package)
+    found = circles(every)
+    trees = [ast.parse("\n".join(lines)) for lines in texts.values()]
     return {
+        "statements of the syntax tree": f"{sum(map(statement_count, trees))}",
         "files": f"{len(texts)}",
         "lines": f"{sum(len(lines) for lines in texts.values())}",
         "lines of code, no blanks, comments or docstrings": f"{sum(code_lines(path) for path in texts)}",
+        "lines of docstrings": f"{sum(map(docstring_lines, trees))}",
+        "lines of imports": f"{sum(map(import_lines, trees))}",
+        "blank lines": f"{sum(not line.strip() for lines in texts.values() for line in lines)}",
+        f"files of fewer than {SHORT} lines, no __init__": f"{len(short_files(texts))}",
+        "modules imported from exactly one": f"{len(with_one_importer(every))}",
+        "names of classes that stand twice": f"{names_twice(trees)}",
         "folders": f"{len(folders)}",
         "most files in a folder": f"{max(folders.values())}",
         "longest file": f"{max(len(lines) for lines in texts.values())}",
@@ -75,6 +85,45 @@ def code_lines(path: Path) -> int:
             ):
                 kept -= set(range(first.lineno, (first.end_lineno or first.lineno) + 1))
     return len(kept)
+
+
+def statement_count(tree: ast.AST) -> int:
+    """Statements of a file, however they are laid out."""
+    return sum(isinstance(node, ast.stmt) for node in ast.walk(tree))
+
+
+def docstring_lines(tree: ast.AST) -> int:
+    """Lines of the docstrings of a file."""
+    owners = [node for node in ast.walk(tree) if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)]
+    texts = [node.body[0] for node in owners if ast.get_docstring(node, clean=False) is not None]
+    return sum((text.end_lineno or text.lineno) - text.lineno + 1 for text in texts)
+
+
+def import_lines(tree: ast.AST) -> int:
+    """Lines of the imports of a file."""
+    found = [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
+    return sum((node.end_lineno or node.lineno) - node.lineno + 1 for node in found)
+
+
+def short_files(texts: dict[Path, list[str]]) -> list[Path]:
+    """Files of few lines, other than the map of a folder."""
+    return [path for path, lines in texts.items() if len(lines) < SHORT and path.stem != "__init__"]
+
+
+def with_one_importer(every: list[Import]) -> list[str]:
+    """Modules that exactly one other module imports, and no map of a folder."""
+    importers: dict[str, set[str]] = defaultdict(set)
+    for importer, _, imported in every:
+        importers[imported].add(importer)
+    return sorted(name for name, found in importers.items() if len(found) == 1 and not name.endswith("__init__"))
+
+
+def names_twice(trees: list[ast.Module]) -> int:
+    """Names that more than one class has, in different files."""
+    found = Counter(
+        name for tree in trees for name in {node.name for node in tree.body if isinstance(node, ast.ClassDef)}
+    )
+    return sum(count > 1 for count in found.values())
 
 
 def parameters(package: Path) -> list[tuple[int, str]]:
