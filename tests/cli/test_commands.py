@@ -318,8 +318,8 @@ def test_a_robot_that_never_moves_is_said(call, here):
 def test_clipped_voltages_are_a_warning_on_stderr_and_in_the_result(call, here):
     (here / "high.csv").write_text("t_s,u1_V,u2_V,u3_V\n0,0,30,-30\n1,0,0,0\n")
     _, out, err = call("simulate", "axebot", "high.csv", "--json")
-    assert "omnidyn: warning: voltage beyond the limit was clipped" in err
-    assert np.size(strict(out)["warnings"]) == 1
+    assert "omnidyn: warning: voltage above the limit was clipped" in err
+    assert [warning["code"] for warning in strict(out)["warnings"]] == ["clipped"]
 
 
 @pytest.mark.parametrize(

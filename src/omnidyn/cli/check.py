@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from omnidyn.cli import log_options
+from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.streams import painted, say, show, show_json, width
@@ -39,22 +40,13 @@ class Checked:
     log: Log | None = None  # its first block, where that is drawn
 
 
+@reads_logs("sort")
 def check(
     log: list[str] = log_options.LOGS,
     robot: str = typer.Option("", "--robot", metavar="ROBOT", help="The robot of the logs: a preset or a robot file."),
     picture: str = typer.Option("", "--picture", metavar="FILE", help="The raw log with what was found, .png or .svg."),
     full: bool = typer.Option(False, "--full", help="Every finding of every log, however many logs."),
-    map_file: str = log_options.MAP,
-    column: list[str] = log_options.COLUMN,
-    assume: list[str] = log_options.ASSUME,
-    latency: list[str] = log_options.LATENCY,
-    save_map: str = log_options.SAVE_MAP,
-    no_header: bool = log_options.NO_HEADER,
-    rate: float | None = log_options.RATE,
-    skip_bad_rows: bool = log_options.SKIP_BAD_ROWS,
-    max_bytes: int = log_options.MAX_BYTES,
-    var: list[str] = log_options.VARIABLE,
-    current_unsigned: bool = log_options.CURRENT_UNSIGNED,
+    flags: LogFlags = NO_FLAGS,
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
     json: bool = typer.Option(False, "--json", help="The verdicts for machines."),
 ) -> None:
@@ -67,13 +59,10 @@ def check(
     if picture and (len(log) > 1 or os.path.isdir(log[0])):
         raise InputError("a picture shows one log", got=" ".join(log), expected="one file", where="--picture")
     refuse_picture(picture, force)
-    log_options.keep_inputs(log, [robot], [map_file], picture, save_map)
+    log_options.keep_inputs(log, [robot], [flags.map_file], picture, flags.save_map)
     if len(log) == 1:
         log_options.refuse_missing(log)
-    options = log_options.log_options(
-        map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned, max_bytes, var, rate
-    )
-    maps = log_options.Maps(save_map, force)
+    options, maps = flags.options(), flags.maps(force)
     with progress("reading") as now:
         files = log_options.log_files(log)
         loaded = _robot(robot)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from omnidyn.cli import log_options
+from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.telling import end_failed, tell
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 MOST_ROBOTS = 2
 
 
+@reads_logs("current_unsigned")
 def compare(
     log: list[str] = log_options.LOGS,
     robot: list[str] = typer.Option(..., "--robot", metavar="ROBOT", help="A preset or a robot file; at most twice."),
@@ -34,17 +36,7 @@ def compare(
     segments: bool = typer.Option(False, "--segments", help="Show every segment too."),
     apply: str = typer.Option("", help="Input to replay: voltage, duty, wheel_speed_command or twist_command."),
     hold: float = typer.Option(0.2, min=0.0, help="How long a missing input keeps its last value [s]."),
-    map_file: str = log_options.MAP,
-    column: list[str] = log_options.COLUMN,
-    assume: list[str] = log_options.ASSUME,
-    latency: list[str] = log_options.LATENCY,
-    save_map: str = log_options.SAVE_MAP,
-    sort: bool = log_options.SORT,
-    no_header: bool = log_options.NO_HEADER,
-    rate: float | None = log_options.RATE,
-    skip_bad_rows: bool = log_options.SKIP_BAD_ROWS,
-    max_bytes: int = log_options.MAX_BYTES,
-    var: list[str] = log_options.VARIABLE,
+    flags: LogFlags = NO_FLAGS,
     current_unsigned: bool = typer.Option(False, "--current-unsigned", help="Currents are |i|: compare by size."),
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
     json: bool = typer.Option(False, "--json", help="The comparison for machines."),
@@ -58,17 +50,15 @@ def compare(
     if len(robot) > MOST_ROBOTS:
         raise typer.BadParameter(f"--robot may be given once or twice, not {len(robot)} times.")
     refuse_picture(picture, force)
-    log_options.keep_inputs(log, robot, [map_file], picture, save_map)
+    log_options.keep_inputs(log, robot, [flags.map_file], picture, flags.save_map)
     log_options.refuse_missing(log)
     from omnidyn.comparison.threshold import parse_threshold, refuse_exceeded
 
     rules = [parse_threshold(text) for text in fail_if]
-    how = (map_file, column, assume, latency, no_header, skip_bad_rows, False, max_bytes, var, rate)
-    options = log_options.log_options(*how)
-    maps = log_options.Maps(save_map, force)
+    options, maps = flags.options(), flags.maps(force)
     with progress("reading") as now:
         files, robots = log_options.log_files(log), _robots(robot, with_)
-        runs, hashes = _runs(files, robots[0], options, sort, maps, now)
+        runs, hashes = _runs(files, robots[0], options, flags.sort, maps, now)
         channels = _channels(robots, runs, apply, rules, show_channels if picture else "")
         found = _compared(robots, runs, apply, hold, current_unsigned, band, now)
     tell(found.document(segments), json, _record(robot, files, hashes))

@@ -7,7 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+import omnidyn
+from omnidyn.cli.terminal.folder import check_folder, write_folder
 from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say, to_json, width
 from omnidyn.cli.terminal.telling import as_json, tell
 
@@ -34,7 +37,6 @@ def demo(
 
     Prints every claim with its verdict; writes report.html, result.json and the figures.
     """
-    from omnidyn.cli.terminal.folder import check_folder, write_folder
 
     folder = check_folder(out, force)
     with progress("loading") as now:
@@ -48,15 +50,13 @@ def demo(
 
 def _made(now: Any) -> tuple[tuple[Claim, ...], list[Picture], dict[str, Any]]:
     """Claims, pictures and the record of what they were made from."""
-    from omnidyn.cli.terminal.session import provenance, robot_input
-    from omnidyn.model.robot_file import load_robot
     from omnidyn.paper.claims import PRESET, all_claims
     from omnidyn.report.figures.paper_pictures import paper_pictures
 
     now("computing the claims (the first run compiles the simulation)")
     claims = all_claims()
     pictures = []
-    for picture in paper_pictures(load_robot(PRESET)):
+    for picture in paper_pictures(omnidyn.load_robot(PRESET)):
         pictures.append(picture)
         now(f"drawing, {len(pictures)} figures done")
     return claims, pictures, provenance([robot_input(PRESET)])

@@ -12,6 +12,7 @@ from typing import Any
 import typer
 
 from omnidyn.cli import log_options as options
+from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.flags import flags
 from omnidyn.cli.terminal.help import MORE
 from omnidyn.cli.terminal.progress import progress
@@ -43,6 +44,7 @@ def _asks(command: Callable[..., None]) -> Callable[..., None]:
 
 
 @_asks
+@reads_logs()
 def identify(
     logs: list[str] = typer.Argument(
         metavar="LOG...",
@@ -54,18 +56,7 @@ def identify(
     report: str = typer.Option("", metavar="FILE.html", help="A page with pictures, numbers and what they say."),
     force: bool = typer.Option(False, "--force", help="Replace files that exist.", rich_help_panel=MORE),
     json: bool = typer.Option(False, "--json", help="The result for machines."),
-    map_file: str = options.MAP,
-    column: list[str] = options.COLUMN,
-    assume: list[str] = options.ASSUME,
-    latency: list[str] = options.LATENCY,
-    save_map: str = options.SAVE_MAP,
-    sort: bool = options.SORT,
-    no_header: bool = options.NO_HEADER,
-    rate: float | None = options.RATE,
-    skip_bad_rows: bool = options.SKIP_BAD_ROWS,
-    max_bytes: int = options.MAX_BYTES,
-    var: list[str] = options.VARIABLE,
-    current_unsigned: bool = options.CURRENT_UNSIGNED,
+    flags: LogFlags = NO_FLAGS,
     **asked: Any,
 ) -> None:
     """Identify a robot from its logs: friction, and what --free names.
@@ -88,20 +79,17 @@ def identify(
     for path in (out, report):  # before any work
         if path:
             check_output(path, force)
-    options.keep_inputs(logs, [robot], [map_file], out, report, save_map)
+    options.keep_inputs(logs, [robot], [flags.map_file], out, report, flags.save_map)
     options.refuse_missing(logs)
     if question.what != MOTORS and len(logs) == 1 and is_steady_table(logs[0]):
         tell_table(logs[0], robot, question, to)
         return
-    if question.what == MOTORS and len(logs) == 1 and rate is None and is_motor_table(logs[0]):
+    if question.what == MOTORS and len(logs) == 1 and flags.rate is None and is_motor_table(logs[0]):
         from omnidyn.cli.identify_motors import tell_motor_table
 
         tell_motor_table(logs[0], robot, question, to)
         return
-    how = options.log_options(
-        map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned, max_bytes, var, rate
-    )
-    _identify(logs, robot, question, Reading(how, sort, options.Maps(save_map, force)), to)
+    _identify(logs, robot, question, Reading(flags.options(), flags.sort, flags.maps(force)), to)
 
 
 def _question(asked: dict[str, Any]) -> Question:

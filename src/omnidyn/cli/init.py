@@ -6,15 +6,20 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+import omnidyn
 from omnidyn.cli import log_options
 from omnidyn.cli.init_answers import LEAST_WHEELS, MOST_WHEELS, Answers, complete
 from omnidyn.cli.init_logs import as_seen, from_logs
 from omnidyn.cli.init_sizes import refuse_sizes
-from omnidyn.cli.terminal.numbers import number_words
+from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
+from omnidyn.cli.terminal.numbers import number_list, number_words
+from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say, show
 from omnidyn.cli.terminal.telling import tell
 from omnidyn.document import Document
-from omnidyn.errors import printable
+from omnidyn.errors import InputError, printable
+from omnidyn.files import check_output, write_atomic
+from omnidyn.model.presets import preset_names
 
 if TYPE_CHECKING:
     from omnidyn.model.robot import Robot
@@ -28,6 +33,7 @@ KEYS = {
 }  # fmt: skip
 
 
+@reads_logs("latency", "save_map", "sort", "skip_bad_rows", "current_unsigned")
 def init(
     name: str = typer.Argument(metavar="NAME", help="Name of the robot; the file is NAME.toml."),
     wheels: int | None = typer.Option(None, min=LEAST_WHEELS, max=MOST_WHEELS, help="How many; 3 or 4 is usual."),
@@ -49,13 +55,7 @@ def init(
     speed_loop: str = typer.Option(
         "", metavar="[KP,KI,]HZ", help="The firmware holds wheel speeds: V s/rad, V/rad, ticks a second."
     ),
-    map_file: str = log_options.MAP,
-    column: list[str] = log_options.COLUMN,
-    assume: list[str] = log_options.ASSUME,
-    no_header: bool = log_options.NO_HEADER,
-    rate: float | None = log_options.RATE,
-    max_bytes: int = log_options.MAX_BYTES,
-    var: list[str] = log_options.VARIABLE,
+    flags: LogFlags = NO_FLAGS,
     out: str = typer.Option("", "-o", "--out", metavar="OUT", help="File to write instead; - is stdout."),
     force: bool = typer.Option(False, "--force", help="Replace the file if it exists."),
     json: bool = typer.Option(False, "--json", help="What was written and guessed, for machines."),
@@ -73,13 +73,12 @@ def init(
     _refuse_words(given, mecanum, friction, like, out, json)
     _refuse_numbers(given)
     path = _checked_path(name := name.removesuffix(".toml"), out, force)
-    log_options.keep_inputs(log, [like], [map_file], "" if path == "-" else path)
+    log_options.keep_inputs(log, [like], [flags.map_file], "" if path == "-" else path)
     log_options.refuse_missing(log)
     preset, told = _preset(like), _said(given)
-    how = (map_file, column, assume, (), no_header, False, False, max_bytes, var, rate)
-    if not log and any(how):
+    if not log and flags != NO_FLAGS:
         raise typer.BadParameter("--map, --column, --assume, --no-header, --rate, --max-bytes and --var are for --log.")
-    seen = from_logs(given, log, log_options.log_options(*how), mecanum, bool(like)) if log else None
+    seen = from_logs(given, log, flags.options(), mecanum, bool(like)) if log else None
     found = {KEYS[key] for key in KEYS.keys() & (_said(given).keys() - told.keys())}
     answers = _answers(given, preset, mecanum)
     robot = _with_motor(as_seen(_robot(name, answers, preset, mecanum, friction), seen, found), given, bool(like))
@@ -109,7 +108,6 @@ def _refuse_words(given: dict[str, Any], mecanum: bool, friction: str, like: str
 
 def _refuse_numbers(given: dict[str, Any]) -> None:
     """Numbers with which no robot can be guessed, by the names that they have here. Raises InputError."""
-    from omnidyn.errors import InputError
 
     azimuth, limit, loop = given["azimuth"], given["voltage_limit"], given["speed_loop"]
     count = given["wheels"] or (azimuth and len(azimuth))
@@ -159,7 +157,6 @@ def _sizes(given: dict[str, Any], preset: Robot | None) -> dict[str, Any]:
 
 
 def _listed(key: str, text: str) -> list[float] | None:
-    from omnidyn.cli.terminal.numbers import number_list
 
     return number_list(f"--{key.replace('_', '-')}", text) if text else None
 
@@ -172,9 +169,6 @@ def _radii(key: str, text: str) -> float | tuple[float, ...] | None:
 
 def _checked_path(name: str, out: str, force: bool) -> str:
     """The file to write, refused before any question is asked. Raises InputError."""
-    from omnidyn.errors import InputError
-    from omnidyn.files import check_output
-    from omnidyn.model.presets import preset_names
 
     if name in preset_names():
         raise InputError("a preset has this name", got=name, remedy="choose another one, or use --like", where="NAME")
@@ -192,14 +186,12 @@ def _checked_path(name: str, out: str, force: bool) -> str:
 
 
 def _preset(like: str) -> Robot | None:
-    from omnidyn.model.robot_file import load_robot
 
-    return load_robot(like) if like else None
+    return omnidyn.load_robot(like) if like else None
 
 
 def _robot(name: str, answers: Answers, preset: Robot | None, mecanum: bool, friction: str) -> Robot:
     """The robot of these answers. Raises InputError, also where no guess makes sense."""
-    from omnidyn.errors import InputError
     from omnidyn.model.first_guess import DIRECTION, default_prior, first_guess, like
     from omnidyn.model.robot import Body
 
@@ -228,7 +220,6 @@ def _with_motor(robot: Robot, given: dict[str, Any], copied: bool) -> Robot:
 
     Raises InputError for a rotor behind a gear that is only guessed: at the wheel it counts with its square.
     """
-    from omnidyn.errors import InputError
     from omnidyn.model.first_guess import GEAR, with_gear, with_rotor
     from omnidyn.model.robot import GIVEN, GUESS, Prior
 
@@ -263,8 +254,6 @@ def _wheels(value: dict[str, Any], preset: Robot | None, mecanum: bool) -> Wheel
 
 
 def _write(robot: Robot, path: str, force: bool, json: bool, like: str) -> None:
-    from omnidyn.cli.terminal.session import provenance, robot_input
-    from omnidyn.files import write_atomic
     from omnidyn.model.first_guess import guessed
     from omnidyn.model.robot_file import robot_to_toml
 

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from omnidyn.cli.init_sizes import refuse_sizes
-from omnidyn.cli.terminal.numbers import number_words
+from omnidyn.cli.terminal.numbers import number_list, number_words
 from omnidyn.cli.terminal.streams import say
+from omnidyn.errors import InputError
 
 if TYPE_CHECKING:
     from omnidyn.model.robot import Robot
@@ -103,7 +104,6 @@ def _ask_for_wheels(answers: Answers, preset: Robot | None) -> None:
 
 def _ask(question: str, understood: Callable[[str], Any]) -> Any:
     """An answer, asked for on stderr until it can be used; None for Enter."""
-    from omnidyn.errors import InputError
 
     while True:
         with contextlib.suppress(BrokenPipeError):
@@ -125,8 +125,6 @@ def _one(text: str) -> float:
 
 
 def _several(text: str, count: int, expected: str = "") -> list[float]:
-    from omnidyn.cli.terminal.numbers import number_list
-    from omnidyn.errors import InputError
 
     try:
         values = number_list("", text)
@@ -140,7 +138,6 @@ def _several(text: str, count: int, expected: str = "") -> list[float]:
 
 
 def _count(text: str) -> int:
-    from omnidyn.errors import InputError
 
     if text not in map(str, range(LEAST_WHEELS, MOST_WHEELS + 1)):
         raise InputError("cannot use this answer", got=text, expected=f"{LEAST_WHEELS} to {MOST_WHEELS} wheels")

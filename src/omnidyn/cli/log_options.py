@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+import omnidyn
 from omnidyn.cli.terminal.help import MORE
 from omnidyn.cli.terminal.streams import say
+from omnidyn.errors import InputError
+from omnidyn.files import check_output, keep_apart, open_regular
+from omnidyn.logs.readers.folders import files_of, is_log_folder, log_folders, natural
+from omnidyn.model.presets import robot_path
 
 if TYPE_CHECKING:
     from omnidyn.logs.columns.mapping import ColumnMap
@@ -24,88 +32,115 @@ ENDINGS = (
 MAX_FILES = 100_000
 
 LOGS = typer.Argument(metavar="LOG...", help="Logs (CSV, Parquet, bags of ROS, ..), or folders of them.")
-MAP = typer.Option(
-    "", "--map", metavar="FILE", help="Which column is what (TOML), instead of a guess.", rich_help_panel=MORE
-)
-COLUMN = typer.Option(
-    [], "--column", metavar="CH=COL:UNIT", help="One column: u1=motor_1_volts:V, w2=-m2vel:rpm@motor. Repeatable."
-)
-ASSUME = typer.Option(
-    [],
-    "--assume",
-    metavar="NAME=UNIT",
-    help="Unit of a column, or of all u, w, vx, ...: d=%, a=ticks/48@motor. Frames: twist=room, marker=9deg. "
-    "Repeatable.",
-)
-LATENCY = typer.Option(
-    [], "--latency", metavar="CH=SECONDS", help="How late a channel was recorded. Repeatable.", rich_help_panel=MORE
-)
-SAVE_MAP = typer.Option(
-    "", "--save-map", metavar="FILE", help="Write the map that was used (TOML).", rich_help_panel=MORE
-)
-SORT = typer.Option(
-    False, "--sort", help="Sort rows whose time goes back, instead of refusing them.", rich_help_panel=MORE
-)
-NO_HEADER = typer.Option(
-    False, "--no-header", help="The file has no header: columns are c1, c2, ...", rich_help_panel=MORE
-)
-RATE = typer.Option(
-    None, "--rate", metavar="HZ", help="The file has no time: so many rows a second.", rich_help_panel=MORE
-)
-SKIP_BAD_ROWS = typer.Option(
-    False, "--skip-bad-rows", help="Leave out rows that cannot be read, and count them.", rich_help_panel=MORE
-)
-MAX_BYTES = typer.Option(
-    0, "--max-bytes", min=0, metavar="N", help="Most bytes held at once; default: a quarter of the memory.",
-    rich_help_panel=MORE,
-)  # fmt: skip
-VARIABLE = typer.Option(
-    [], "--var", metavar="NAME", help="Read this variable of a MATLAB file alone, with all in it. Repeatable.",
-    rich_help_panel=MORE,
-)  # fmt: skip
-CURRENT_UNSIGNED = typer.Option(
-    False,
-    "--current-unsigned",
-    help="Currents are |i|: they get the sign of the commanded speed.",
-    rich_help_panel=MORE,
-)
 WITH = typer.Option(
     "", "--with", metavar="KIND=NAME,..", help="Vary the robot: payload, floor, tilt, battery by name of its file."
 )
 
 
-def log_options(
-    map_file: str = "",
-    column: Sequence[str] = (),
-    assume: Sequence[str] = (),
-    latency: Sequence[str] = (),
-    no_header: bool = False,
-    skip_bad_rows: bool = False,
-    current_unsigned: bool = False,
-    max_bytes: int = 0,
-    variables: Sequence[str] = (),
-    rate: float | None = None,
-) -> LogOptions:
-    """The options as the readers take them. Raises InputError for what cannot be read."""
-    from omnidyn.logs.columns.mapping import load_map
-    from omnidyn.logs.read_log import LogOptions
+MAX_BYTES = typer.Option(
+    0, min=0, metavar="N", help="Most bytes held at once; default: a quarter of the memory.", rich_help_panel=MORE
+)
 
-    return LogOptions(
-        columns=load_map(map_file) if map_file else None,
-        overrides=tuple(column),
-        assume=dict(_pair("--assume", text, "u=% or w1=rpm") for text in assume),
-        latency={name: _seconds(text) for name, text in (_pair("--latency", each, "w=0.02") for each in latency)},
-        header=not no_header,
-        skip_bad_rows=skip_bad_rows,
-        current_unsigned=current_unsigned,
-        max_bytes=max_bytes or None,
-        variables=tuple(variables),
-        rate=rate,
+
+@dataclass(frozen=True)
+class LogFlags:
+    """How logs are read, as the command line says it: an option for each field."""
+
+    map_file: str = typer.Option(
+        "", "--map", metavar="FILE", help="Which column is what (TOML), instead of a guess.", rich_help_panel=MORE
     )
+    column: Sequence[str] = typer.Option(
+        [], metavar="CH=COL:UNIT", help="One column: u1=motor_1_volts:V, w2=-m2vel:rpm@motor. Repeatable."
+    )
+    assume: Sequence[str] = typer.Option(
+        [], metavar="NAME=UNIT",
+        help="Unit of a column, or of all u, w, vx, ...: d=%, a=ticks/48@motor. Frames: twist=room, marker=9deg. "
+        "Repeatable.",
+    )  # fmt: skip
+    latency: Sequence[str] = typer.Option(
+        [], metavar="CH=SECONDS", help="How late a channel was recorded. Repeatable.", rich_help_panel=MORE
+    )
+    save_map: str = typer.Option("", metavar="FILE", help="Write the map that was used (TOML).", rich_help_panel=MORE)
+    sort: bool = typer.Option(
+        False, "--sort", help="Sort rows whose time goes back, instead of refusing them.", rich_help_panel=MORE
+    )
+    no_header: bool = typer.Option(
+        False, "--no-header", help="The file has no header: columns are c1, c2, ...", rich_help_panel=MORE
+    )
+    rate: float | None = typer.Option(
+        None, metavar="HZ", help="The file has no time: so many rows a second.", rich_help_panel=MORE
+    )
+    skip_bad_rows: bool = typer.Option(
+        False, "--skip-bad-rows", help="Leave out rows that cannot be read, and count them.", rich_help_panel=MORE
+    )
+    max_bytes: int = MAX_BYTES
+    var: Sequence[str] = typer.Option(
+        [], metavar="NAME", help="Read this variable of a MATLAB file alone, with all in it. Repeatable.",
+        rich_help_panel=MORE,
+    )  # fmt: skip
+    current_unsigned: bool = typer.Option(
+        False, "--current-unsigned", help="Currents are |i|: they get the sign of the commanded speed.",
+        rich_help_panel=MORE,
+    )  # fmt: skip
+
+    def options(self) -> LogOptions:
+        """The options as the readers take them. Raises InputError for what cannot be read."""
+        from omnidyn.logs.columns.mapping import load_map
+        from omnidyn.logs.read_log import LogOptions
+
+        latency = (_pair("--latency", text, "w=0.02") for text in self.latency)
+        return LogOptions(
+            columns=load_map(self.map_file) if self.map_file else None,
+            overrides=tuple(self.column),
+            assume=dict(_pair("--assume", text, "u=% or w1=rpm") for text in self.assume),
+            latency={name: _seconds(text) for name, text in latency},
+            header=not self.no_header,
+            skip_bad_rows=self.skip_bad_rows,
+            current_unsigned=self.current_unsigned,
+            max_bytes=self.max_bytes or None,
+            variables=tuple(self.var),
+            rate=self.rate,
+        )
+
+    def maps(self, force: bool) -> Maps:
+        """What shows which columns were taken, and writes it where that was asked for."""
+        return Maps(self.save_map, force)
+
+
+NO_FLAGS = LogFlags("", [], [], [], "", False, False, None, False, 0, [], False)
+_KINDS = {"Sequence[str]": list[str], "str": str, "bool": bool, "int": int, "float | None": float | None}
+
+
+def reads_logs(*without: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """A command with an option for every field of LogFlags but those `without`, in the place of its `flags`."""
+    used = [option for option in fields(LogFlags) if option.name not in without]
+    options = [
+        inspect.Parameter(option.name, inspect.Parameter.KEYWORD_ONLY, default=option.default,
+                          annotation=_KINDS[str(option.type)])
+        for option in used
+    ]  # fmt: skip
+
+    def with_options(command: Callable[..., None]) -> Callable[..., None]:
+        @functools.wraps(command)
+        def run(**given: Any) -> None:
+            flags = replace(NO_FLAGS, **{option.name: given.pop(option.name) for option in used})
+            command(**given, flags=flags)
+
+        own = list(inspect.signature(command).parameters.values())
+        place = [parameter.name for parameter in own].index("flags")
+        named = [
+            parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+            for parameter in own
+            if parameter.kind is not parameter.VAR_KEYWORD
+        ]
+        rest = [parameter for parameter in own if parameter.kind is parameter.VAR_KEYWORD]
+        run.__signature__ = inspect.Signature([*named[:place], *options, *named[place + 1 :], *rest])  # type: ignore[attr-defined]
+        return run
+
+    return with_options
 
 
 def _pair(option: str, text: str, example: str) -> tuple[str, str]:
-    from omnidyn.errors import InputError
 
     name, equals, value = text.rpartition("=")
     if not equals or not name.strip() or not value.strip():
@@ -114,7 +149,6 @@ def _pair(option: str, text: str, example: str) -> tuple[str, str]:
 
 
 def _seconds(text: str) -> float:
-    from omnidyn.errors import InputError
 
     try:
         return float(text)
@@ -127,8 +161,6 @@ def log_files(arguments: Sequence[str]) -> list[str]:
 
     Numbers in names count as numbers (exp2 before exp10). Raises InputError for a folder without logs.
     """
-    from omnidyn.errors import InputError
-    from omnidyn.logs.readers.folders import is_log_folder, log_folders, natural
 
     files: list[str] = []
     for argument in arguments:
@@ -158,8 +190,6 @@ def keep_inputs(logs: Sequence[str], robots: Sequence[str], others: Sequence[str
 
     others: files that are read beside logs and robots. --force or not. Raises InputError.
     """
-    from omnidyn.files import keep_apart, open_regular
-    from omnidyn.model.presets import robot_path
 
     files = [robot_path(robot) for robot in robots if robot]
     for path in (path for path in others if path):
@@ -170,8 +200,6 @@ def keep_inputs(logs: Sequence[str], robots: Sequence[str], others: Sequence[str
 
 def refuse_missing(logs: Sequence[str]) -> None:
     """Logs that are not there, before anything slow is loaded. Raises InputError."""
-    from omnidyn.files import open_regular
-    from omnidyn.logs.readers.folders import files_of
 
     for path in log_files(logs):
         for file in files_of(path):
@@ -183,12 +211,11 @@ def load_logs(
     files: Sequence[str], robot: Robot | None, options: LogOptions, now: Any = None
 ) -> Iterator[tuple[str, Log]]:
     """Each file as a Log, in order. `now` shows progress. Raises InputError at the first that cannot be read."""
-    from omnidyn.logs.read_log import load_log
 
     for k, path in enumerate(files):
         if now is not None and len(files) > 1:
             now(f"reading {k + 1} of {len(files)}")
-        yield path, load_log(path, robot, options)
+        yield path, omnidyn.load_log(path, robot, options)
 
 
 class Maps:
@@ -197,8 +224,6 @@ class Maps:
     def __init__(self, save: str = "", force: bool = False) -> None:
         self.save, self.force, self.said = save, force, set()
         if save:
-            from omnidyn.files import check_output
-
             check_output(save, force)
 
     def show(self, path: str, columns: ColumnMap, doubts: bool = True) -> None:

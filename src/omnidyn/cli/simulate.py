@@ -9,11 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from omnidyn.cli.log_options import WITH
+import omnidyn
+from omnidyn.cli.log_options import WITH, keep_inputs
+from omnidyn.cli.terminal.numbers import three
 from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say, show
 from omnidyn.cli.terminal.telling import tell
 from omnidyn.document import Document
+from omnidyn.files import check_output
 
 if TYPE_CHECKING:
     from omnidyn.logs.command_file import HeldCommands
@@ -48,7 +52,6 @@ def simulate(
     The dead zone included. The run is written as CSV.
     Without -o nothing is written: only the summary is shown.
     """
-    from omnidyn.cli.terminal.numbers import three
 
     start_twist, start_pose = three("--twist", twist), three("--pose", pose)
     if out == "-" and band:
@@ -85,8 +88,6 @@ def _ends_of(out: str) -> list[str]:
 
 def _refuse_early(robot: str, voltages: str, outputs: list[str], force: bool) -> None:
     """Before any work: an input that is not there, a place where the run could not be written in the end."""
-    from omnidyn.cli.log_options import keep_inputs
-    from omnidyn.files import check_output
 
     keep_inputs([], [robot], [voltages], *outputs)
     for path in filter(None, outputs):
@@ -107,13 +108,10 @@ class _Job:
     @classmethod
     def read(cls, robot: str, voltages: str, duration: float | None, max_steps: int, with_: str) -> _Job:
         """From the files that the command names."""
-        from omnidyn.cli.terminal.session import provenance, robot_input
-        from omnidyn.logs.command_file import read_commands
-        from omnidyn.model.robot_file import load_robot
         from omnidyn.model.varied.vary import vary_as
 
-        loaded = vary_as(load_robot(robot), with_)
-        held = read_commands(voltages, loaded.wheels.count, duration, max_steps)
+        loaded = vary_as(omnidyn.load_robot(robot), with_)
+        held = omnidyn.read_commands(voltages, loaded.wheels.count, duration, max_steps)
         record = provenance([robot_input(robot), {"role": "voltages", "name": voltages, "sha256": held.sha256}])
         return cls(loaded, held, record)
 
@@ -130,9 +128,8 @@ class _Job:
 
     def run(self, **options: Any) -> Run:
         """What the robot does."""
-        from omnidyn.simulation.simulate import simulate as simulate_robot
 
-        run = simulate_robot(self.robot, **self._commands, **options)
+        run = omnidyn.simulate(self.robot, **self._commands, **options)
         return run.replace(t=run.t + self.held.t0, warnings=(*self.held.notes, *run.warnings))
 
     def band(self, run: Run, **options: Any) -> Band:
@@ -144,12 +141,12 @@ class _Job:
 
 
 def _write(run: Run, out: str, force: bool) -> None:
-    from omnidyn.logs.run_file import run_to_csv, write_run
+    from omnidyn.logs.run_file import run_to_csv
 
     if out == "-":
         show(run_to_csv(run).rstrip("\n"))
     elif out:
-        write_run(run, out, force)
+        omnidyn.write_run(run, out, force)
 
 
 def _document(run: Run, job: _Job, ends: Band | None, files: list[str]) -> Document:
@@ -165,7 +162,7 @@ def _document(run: Run, job: _Job, ends: Band | None, files: list[str]) -> Docum
         "moved": moved,
         **_last(run),
         "rests_on_guesses": job.guesses,
-        "warnings": run.warnings,
+        "warnings": [warning.to_dict() for warning in run.warnings],
     }
     lines = [
         f"{run.source}: {len(run)} samples, {duration:.6g} s",
@@ -222,8 +219,9 @@ def _verdict(run: Run, moved: bool) -> str:
         return "It never moved: the voltages stay within the dead zone (see: omnidyn deadzone)."
     east, north, turned = (run.pose[-1] - run.pose[0]).tolist()
     rest = "at rest" if not run.twist[-1].any() else "still in motion"
-    heed = f"; {len(run.warnings)} thing{'s' * (len(run.warnings) > 1)} to heed" if run.warnings else ""
+    count = len(run.warnings)
+    warned = f"; {count} warning{'s' * (count > 1)}" if count else ""
     return (
         f"In {run.t[-1] - run.t[0]:.4g} s the robot came {math.hypot(east, north):.3g} m from where it began and "
-        f"turned by {math.degrees(turned):.3g} degrees; it is {rest} at the end{heed}."
+        f"turned by {math.degrees(turned):.3g} degrees; it is {rest} at the end{warned}."
     )

@@ -10,6 +10,7 @@ from typing import Any
 import typer
 
 from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.session import provenance
 from omnidyn.cli.terminal.streams import say, show, show_json
 from omnidyn.compiled.hearing import Compiling, heard
 
@@ -22,7 +23,7 @@ def warm(json: bool = typer.Option(False, "--json", help="For machines.")) -> No
     """
     started = time.monotonic()
     with progress("loading", hint="") as now, heard() as compiling:
-        from omnidyn.compiled.warmed import circumstances, recalled, remember  # not above: `--help` needs no numba
+        from omnidyn.compiled.warmed import circumstances, recalled, remember
 
         made_with = circumstances()
         caches = recalled(made_with)
@@ -59,7 +60,6 @@ def _make(now: Callable[[str], None], compiling: Compiling) -> list[Any]:
 
 
 def _tell(result: dict[str, Any], seconds: float, json: bool) -> None:
-    from omnidyn.cli.terminal.session import provenance
 
     if json:
         show_json({**result, "provenance": provenance([])})

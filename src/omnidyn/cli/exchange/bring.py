@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import typer
 
+import omnidyn
+from omnidyn.cli.init_sizes import refuse_sizes
+from omnidyn.cli.terminal.session import input_file, provenance, robot_input
 from omnidyn.cli.terminal.streams import say, show
 from omnidyn.cli.terminal.telling import tell
+from omnidyn.files import check_output, keep_apart, write_atomic
+from omnidyn.model.presets import robot_path
 
 
 def bring(
@@ -25,13 +30,9 @@ def bring(
 
     What was read is marked as imported; what FILE does not say is guessed, with a wide spread, and marked as a guess.
     """
-    from omnidyn.cli.init_sizes import refuse_sizes
-    from omnidyn.cli.terminal.session import input_file, provenance, robot_input
-    from omnidyn.files import check_output, keep_apart, write_atomic
     from omnidyn.interop.kinds import import_robot
     from omnidyn.model.first_guess import guessed
-    from omnidyn.model.presets import robot_path
-    from omnidyn.model.robot_file import load_robot, robot_to_toml
+    from omnidyn.model.robot_file import robot_to_toml
 
     if out == "-" and json:
         raise typer.BadParameter("-o - and --json both want stdout.")
@@ -39,7 +40,7 @@ def bring(
         keep_apart([out], [file, *([robot_path(like)] if like else [])])
         check_output(out, force)
     refuse_sizes({"wheel_radius": wheel_radius})
-    robot = import_robot(kind, file, load_robot(like) if like else None, wheel_radius)
+    robot = import_robot(kind, file, omnidyn.load_robot(like) if like else None, wheel_radius)
     text = robot_to_toml(robot)
     if out == "-":
         show(text.rstrip("\n"))

@@ -8,9 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from omnidyn.cli import log_options
+import omnidyn
+from omnidyn.cli.log_options import MAX_BYTES
+from omnidyn.cli.terminal.session import input_file, provenance, robot_input
 from omnidyn.cli.terminal.streams import say, show
 from omnidyn.cli.terminal.telling import tell
+from omnidyn.files import keep_apart
+from omnidyn.model.presets import robot_path
 
 if TYPE_CHECKING:
     from omnidyn.export.contract import Export
@@ -32,7 +36,7 @@ def export(
     horizon: float | None = typer.Option(
         None, metavar="S", help="For which the covariance of the pose is given [s] (ros2-control)."
     ),
-    max_bytes: int = log_options.MAX_BYTES,
+    max_bytes: int = MAX_BYTES,
     controller: str = typer.Option(
         "",
         metavar="NAME|FILE",
@@ -49,18 +53,14 @@ def export(
     KIND is json, c-model, c-controller, fmu, wpilib, road-runner, gains, mjcf, urdf, sdf, ros2-control or ros2-node.
     What the format cannot say stands in the file as comments, and is shown.
     """
-    from omnidyn.cli.terminal.session import input_file, provenance, robot_input
     from omnidyn.export.kinds import maker
-    from omnidyn.files import keep_apart
-    from omnidyn.model.presets import robot_path
-    from omnidyn.model.robot_file import load_robot
 
     make = maker(kind)
     if out == "-" and json:
         raise typer.BadParameter("-o - and --json both want stdout.")
     given = {"precision": precision or None, "height": height, "horizon": horizon, "dt": dt}
     options = _options(kind, make, {**given, "controller": controller or None})
-    loaded = load_robot(robot)
+    loaded = omnidyn.load_robot(robot)
     if log:
         options |= _options(kind, make, {"runs": [_run(path, loaded, max_bytes) for path in log]})
     inputs = [robot_path(robot), *log, *([controller] if controller.endswith(".toml") else [])]
@@ -92,9 +92,8 @@ def _options(kind: str, make: Any, given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _run(path: str, robot: Robot, max_bytes: int) -> Run:
-    from omnidyn.logs.read_log import read_log
 
-    return read_log(path, robot=robot, max_bytes=max_bytes or None)
+    return omnidyn.read_log(path, robot=robot, max_bytes=max_bytes or None)
 
 
 def _say_missing(made: Export) -> None:

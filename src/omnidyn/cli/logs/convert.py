@@ -3,38 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
+import omnidyn
 from omnidyn.cli import log_options
+from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.streams import say
+from omnidyn.files import check_output
 
 if TYPE_CHECKING:
     from omnidyn.run import Run
 
 
+@reads_logs()
 def convert(
     log: str = typer.Argument(metavar="IN", help="A log of any kind: a bag of ROS (its folder too), MCAP, CSV, .."),
     out: str = typer.Argument(metavar="OUT", help="What to write: .csv, .parquet, .mcap (for ROS 2) or .mat."),
     robot: str = typer.Option("", "--robot", metavar="ROBOT", help="The robot of the log: a preset or a robot file."),
-    map_file: str = log_options.MAP,
-    column: list[str] = log_options.COLUMN,
-    assume: list[str] = log_options.ASSUME,
-    latency: list[str] = log_options.LATENCY,
-    save_map: str = log_options.SAVE_MAP,
-    sort: bool = log_options.SORT,
-    no_header: bool = log_options.NO_HEADER,
-    rate: float | None = log_options.RATE,
-    skip_bad_rows: bool = log_options.SKIP_BAD_ROWS,
-    current_unsigned: bool = log_options.CURRENT_UNSIGNED,
+    flags: LogFlags = NO_FLAGS,
     beside: list[str] = typer.Option(
         [], "--with", metavar="FILE", help="Another file of the same experiment and clock: joined by time. Repeatable."
     ),
-    max_bytes: int = log_options.MAX_BYTES,
-    var: list[str] = log_options.VARIABLE,
     split: bool = typer.Option(
         False, "--split", help="Where the clock or a counter of IN restarts, another file: OUT_1, OUT_2, .."
     ),
@@ -44,31 +38,22 @@ def convert(
 
     As MCAP it opens in Foxglove and PlotJuggler, a simulated run beside the real one.
     """
-    from dataclasses import replace
 
-    from omnidyn.files import check_output
-
-    log_options.keep_inputs([log, *beside], [robot], [map_file], out, save_map)
+    log_options.keep_inputs([log, *beside], [robot], [flags.map_file], out, flags.save_map)
     if not split:
         check_output(out, force)
-    from omnidyn.logs.read_log import load_log
     from omnidyn.logs.run_file import check_format
-    from omnidyn.model.robot_file import load_robot
 
     check_format(out)
-    options = log_options.log_options(
-        map_file, column, assume, latency, no_header, skip_bad_rows, current_unsigned, max_bytes, var, rate
-    )
-    options = replace(options, beside=tuple(beside))
-    maps = log_options.Maps(save_map, force)
+    options, maps = replace(flags.options(), beside=tuple(beside)), flags.maps(force)
     with progress("reading"):
-        read = load_log(log, load_robot(robot) if robot else None, options)
+        read = omnidyn.load_log(log, omnidyn.load_robot(robot) if robot else None, options)
         maps.show(log, read.columns)
-        runs = [part.to_run(sort=sort) for part in (read.recordings() if split else [read])]
+        runs = [part.to_run(sort=flags.sort) for part in (read.recordings() if split else [read])]
     for warning in dict.fromkeys(words for run in runs for words in run.warnings):
         say(f"omnidyn: warning: {warning}")
     files = [out] if len(runs) == 1 else numbered(out, len(runs))
-    log_options.keep_inputs([log, *beside], [robot], [map_file], *files, save_map)
+    log_options.keep_inputs([log, *beside], [robot], [flags.map_file], *files, flags.save_map)
     write_all(runs, files, force)
     if split and len(runs) == 1:
         say("omnidyn: no clock and no counter restarts in this log: it is one recording")
@@ -76,13 +61,11 @@ def convert(
 
 def write_all(runs: Sequence[Run], files: Sequence[str], force: bool) -> None:
     """Write each run to its file; none where one of the files must not be replaced."""
-    from omnidyn.files import check_output
-    from omnidyn.logs.run_file import write_run
 
     for path in files:
         check_output(path, force)
     for run, path in zip(runs, files, strict=True):
-        write_run(run, path, force)
+        omnidyn.write_run(run, path, force)
         say(f"omnidyn: wrote {path}")
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from omnidyn.cli.terminal.streams import say
+from omnidyn.errors import InputError
+from omnidyn.files import check_output, write_atomic
 
 if TYPE_CHECKING:
     from omnidyn.report.style import Picture
@@ -14,8 +16,6 @@ KINDS = (".png", ".svg")
 
 def refuse_picture(path: str, force: bool) -> None:
     """Before any work: a place where the picture could not be written in the end. Raises InputError."""
-    from omnidyn.errors import InputError
-    from omnidyn.files import check_output
 
     if path and (not path.endswith(KINDS) or "\0" in path):
         raise InputError("cannot tell the kind of picture", got=path, expected="a name that ends in .png or .svg")
@@ -25,7 +25,6 @@ def refuse_picture(path: str, force: bool) -> None:
 
 def write_picture(drawn: Picture, path: str, force: bool, which: str = "") -> None:
     """Write it in the format that its name asks for, and say so. which: what of the data it shows, in words."""
-    from omnidyn.files import write_atomic
 
     write_atomic(path, drawn.svg if path.endswith(".svg") else drawn.png, force)
     say(f"omnidyn: wrote {path}{which}")

@@ -8,6 +8,7 @@ from typing import Any
 
 import omnidyn
 from omnidyn.files import MAX_TEXT_BYTES, read_bytes, sha256
+from omnidyn.model.presets import preset_names, robot_path
 
 _command_line = "omnidyn"
 
@@ -30,6 +31,5 @@ def input_file(role: str, path: str, max_bytes: int = MAX_TEXT_BYTES) -> dict[st
 
 def robot_input(robot: str) -> dict[str, str]:
     """The record of a robot given by the name of a preset or by a path."""
-    from omnidyn.model.presets import preset_names, robot_path
 
     return {**input_file("robot", robot_path(robot)), "name": robot if robot in preset_names() else str(Path(robot))}
