@@ -13,8 +13,8 @@ from omnidyn.comparison.compare import compare
 from omnidyn.comparison.result import Comparison
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
+from omnidyn.paper.experiments import prbs
 from omnidyn.run import Run
-from omnidyn.simulation.programs import prbs
 from omnidyn.simulation.simulate import simulate
 
 LOGS, MORE, ROWS, DT = scaled(400, 4), scaled(900, 4), 400, 0.01

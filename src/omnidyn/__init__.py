@@ -111,7 +111,7 @@ _MAKERS = {
     shown.HTML: ("omnidyn.report.notebook", "document_html"),
     shown.FIGURE: ("omnidyn.report.plots", "plot"),
     shown.FRAME: ("omnidyn.interop.dataframe", "to_dataframe"),
-    shown.DATASET: ("omnidyn.interop.dataset", "to_xarray"),
+    shown.DATASET: ("omnidyn.interop.runs", "to_xarray"),
     shown.RUN: ("omnidyn.interop.runs", "run_of"),
     shown.SENTENCE: ("omnidyn.telling.codes", "sentence"),
     shown.REMEDY: ("omnidyn.telling.codes", "remedy"),

@@ -8,8 +8,8 @@ from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.robot_file import load_robot
+from omnidyn.paper.experiments import prbs
 from omnidyn.simulation.live import LiveRobot
-from omnidyn.simulation.programs import prbs
 from tests.support.friction_shapes import shaped
 
 AXEBOT = load_robot("axebot")

@@ -3,8 +3,8 @@
 import numpy as np
 
 from omnidyn.model.robot import Robot
+from omnidyn.paper.experiments import prbs
 from omnidyn.run import Run
-from omnidyn.simulation.programs import prbs
 from omnidyn.simulation.simulate import simulate
 
 SPEED_NOISE, WHEEL_NOISE, POSE_NOISE = np.array([0.01, 0.01, 0.05]), 0.3, np.array([2e-3, 2e-3, 5e-3])

@@ -16,7 +16,7 @@ _HOME = {
     "nonlinear_system": "omnidyn.interop.systems",
     "run_of": "omnidyn.interop.runs",
     "to_dataframe": "omnidyn.interop.dataframe",
-    "to_xarray": "omnidyn.interop.dataset",
+    "to_xarray": "omnidyn.interop.runs",
 }
 
 __all__ = [*_HOME]  # pyright: ignore[reportUnsupportedDunderAll]

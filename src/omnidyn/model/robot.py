@@ -15,7 +15,6 @@ from omnidyn.model.fitted.correlation import KeyCorrelation
 from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.friction import Friction
 from omnidyn.model.motor import Motor, mass_at_rim
-from omnidyn.model.robot_table import robot_table
 from omnidyn.model.surroundings.floor import Floor
 from omnidyn.model.surroundings.variations import FARTHEST, Variations
 from omnidyn.model.value import Flag, Text, Value, number, place
@@ -24,6 +23,13 @@ from omnidyn.shown import FIGURE, Shown, make
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+from collections.abc import Iterator, Mapping
+from typing import Protocol
+
+from pydantic import BaseModel
+
+from omnidyn.document import Table
+from omnidyn.model.value import keys_of
 
 SCHEMA = 1
 MOST_OFF = 1000.0  # times the radius of gyration: beyond, a push has no turning that digits could tell
@@ -172,3 +178,47 @@ class Robot(Shown, Value):
         force of friction over speed, along x, along y and about yaw.
         """
         return make(FIGURE, self, what=what)
+
+
+# The numbers of a robot as a short table: one row per key of its file, with what is known about each
+
+HEAD = ("key", "value", "std", "origin", "what it is")
+TABLES = ("body", "wheels", "motor", "drive", "friction", "floor")
+
+
+class Known(Protocol):
+    """What is known about a number."""
+
+    @property
+    def std(self) -> float | None: ...
+
+    @property
+    def origin(self) -> str: ...
+
+
+def robot_table(robot: BaseModel, priors: Mapping[str, Known]) -> Table:
+    """Every number that the robot does not leave off; a list takes one row."""
+    rows = [row for table in TABLES for row in _rows(table, getattr(robot, table), priors)]
+    return Table(HEAD, rows, "<<", name="numbers")
+
+
+def _rows(path: str, value: BaseModel, priors: Mapping[str, Known]) -> Iterator[tuple[str, ...]]:
+    for name, attribute in keys_of(type(value), []).items():
+        key, content, field = f"{path}.{name}", getattr(value, attribute), type(value).model_fields[attribute]
+        if content is None or content == field.default:
+            continue
+        if isinstance(content, BaseModel):
+            yield from _rows(key, content, priors)
+        else:
+            count = len(content) if isinstance(content, tuple) else 0
+            known = [priors[each] for each in (key, *(f"{key}[{k}]" for k in range(count))) if each in priors]
+            stds = ", ".join(f"{each.std:.3g}" for each in known if each.std is not None)
+            origins = ", ".join(dict.fromkeys(each.origin for each in known))
+            yield key, _text(content), stds, origins, field.description or ""
+
+
+def _text(content: object) -> str:
+    """A number, a list of them, or a word, as a person reads it."""
+    if isinstance(content, tuple):
+        return ", ".join(map(_text, content))
+    return f"{content:.5g}" if isinstance(content, float) else str(content)
