@@ -1,10 +1,13 @@
-"""A file has at most 400 lines, a function at most 60; and nobody imports what another file keeps to itself."""
+"""A file has at most 300 statements, a function at most 55; and nobody imports what another file keeps to itself.
+
+Statements, not lines: the formatter lays out lines, and an argument list of one line each is no longer file.
+"""
 
 import ast
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[2] / "src" / "omnidyn"
-FILE, FUNCTION = 400, 60
+FILE, FUNCTION = 300, 55  # statements of the syntax tree
 
 # What is longer, and why it stays so. What has become short enough must go from this list.
 KEPT = {
@@ -13,36 +16,41 @@ KEPT = {
 }
 
 
-def trees() -> dict[str, tuple[str, ast.Module]]:
-    """Path inside the package -> (text, tree)."""
-    texts = {path.relative_to(PACKAGE).as_posix(): path.read_text("utf-8") for path in sorted(PACKAGE.rglob("*.py"))}
-    return {name: (text, ast.parse(text)) for name, text in texts.items()}
+def trees() -> dict[str, ast.Module]:
+    """Path inside the package -> tree."""
+    return {
+        path.relative_to(PACKAGE).as_posix(): ast.parse(path.read_text("utf-8"))
+        for path in sorted(PACKAGE.rglob("*.py"))
+    }
+
+
+def statements(tree: ast.AST) -> int:
+    """Statements in a file or a function."""
+    return sum(isinstance(node, ast.stmt) for node in ast.walk(tree)) - isinstance(tree, ast.stmt)
 
 
 def long_ones() -> dict[str, int]:
-    """What is longer than it should be, with its lines."""
+    """What is longer than it should be, with its statements."""
     found = {}
-    for name, (text, tree) in trees().items():
-        if len(text.splitlines()) > FILE:
-            found[name] = len(text.splitlines())
+    for name, tree in trees().items():
+        if statements(tree) > FILE:
+            found[name] = statements(tree)
         for node in ast.walk(tree):
-            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-                lines = (node.end_lineno or node.lineno) - node.lineno + 1
-                if lines > FUNCTION:
-                    found[f"{name}: {node.name}"] = lines
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and statements(node) > FUNCTION:
+                found[f"{name}: {node.name}"] = statements(node)
     return found
 
 
 def test_files_and_functions_are_short():
     found = long_ones()
-    assert not {name: lines for name, lines in found.items() if name not in KEPT}
+    assert not {name: count for name, count in found.items() if name not in KEPT}
     assert not [name for name in KEPT if name not in found], "short by now: take it from the list"
 
 
 def test_private_names_stay_in_their_file():
     found = [
         f"{name}: {alias.name} of {node.module}"
-        for name, (_, tree) in trees().items()
+        for name, tree in trees().items()
         for node in ast.walk(tree)
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("omnidyn")
         for alias in node.names
