@@ -4,7 +4,7 @@ All start from friction twice too large, know the noise and everything else of t
 Two errors of each, in standard errors of the Cramer-Rao bound: on the log without noise against the truth, which is
 what the method itself adds; and on the noisy log against the maximum of the likelihood. That maximum is found without
 anything of ours: motion from event to event in plain Python, and scipy's least_squares. A peer that is not installed is
-skipped by name; docs/identify-figures.md says how to install them.
+skipped by name; docs/tested.md says how to install them.
 """
 
 from __future__ import annotations
