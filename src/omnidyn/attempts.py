@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from omnidyn.document import all_of, sentence
 from omnidyn.errors import INTERRUPTS, OmnidynError, Terminated, told_by
+from omnidyn.statement import WARNING, Statement
 
 Made = TypeVar("Made")
 
@@ -59,11 +59,11 @@ class Attempts:
         self.missing.append(Missing(part, why if isinstance(why, str) else _reason(why)))
 
 
-def missing_words(missing: Sequence[Missing]) -> Iterator[str]:
-    """A sentence for each reason: "Not made: the diagnosis and the page (interrupted)."."""
+def not_made(missing: Sequence[Missing]) -> Iterator[Statement]:
+    """A statement for each reason: "not made: the diagnosis and the page (interrupted)"."""
     for reason in dict.fromkeys(each.reason for each in missing):
-        parts = [f"the {each.part}" for each in missing if each.reason == reason]
-        yield sentence(f"not made: {all_of(parts)} ({reason})")
+        parts = tuple(f"the {each.part}" for each in missing if each.reason == reason)
+        yield Statement("not_made", WARNING, numbers={"parts": parts, "reason": reason})
 
 
 def _reason(error: BaseException) -> str:

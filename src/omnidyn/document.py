@@ -149,6 +149,8 @@ def apart(*blocks: Sequence[Part]) -> list[Part]:
 
 def plain(value: Any) -> Any:
     """A value as JSON can hold it: lists of arrays and tuples, None for a number that is not finite."""
+    if hasattr(value, "to_dict"):  # a statement
+        value = value.to_dict()
     if hasattr(value, "tolist"):  # NumPy, which need not be imported for this
         value = value.tolist()
     if isinstance(value, Mapping):

@@ -138,7 +138,7 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
                 save=lambda fits: to.save({name: fit.robot for name, fit in fits.items()}, record["inputs"]),
             )  # fmt: skip
         if found.interrupted:
-            told(f"interrupted: {found.interrupted}")
+            told("interrupted: the numbers are the best so far, not the best there are")
         tell(found, record, to, now)
     if found.failures:
         end_failed(found.verdict)

@@ -10,7 +10,7 @@ from omnidyn.cli.identify_logs import Loaded
 from omnidyn.cli.identify_show import Out, say_written
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import end_failed, tell
-from omnidyn.document import apart
+from omnidyn.document import apart, sentence
 from omnidyn.identification.question import Question
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def tell_motor_table(table: str, robot: str, question: Question, to: Out) -> Non
 def _tell(
     study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out, now: Callable[[str], object]
 ) -> None:  # fmt: skip
-    from omnidyn.attempts import Attempts, missing_words
+    from omnidyn.attempts import Attempts, not_made
 
     attempts, report, numbers = Attempts(), "", _into_file(study, robot, record, to)
     told = study.document()
@@ -58,7 +58,7 @@ def _tell(
         now("drawing")
         report = to.write_report(attempts, lambda: _page(study, record))
     now("writing")
-    verdict = " ".join([told.verdict, *missing_words(attempts.missing)])
+    verdict = " ".join([told.verdict, *(sentence(str(each)) for each in not_made(attempts.missing))])
     told = replace(told, verdict=verdict, data={**told.data, "verdict": verdict})
     own, missing = numbers.to_dict() if numbers is not None else None, [*map(asdict, attempts.missing)]
     tell(told, to.json, record, robot=own, output=to.files.get(""), report=report or None, missing=missing)

@@ -52,7 +52,7 @@ def json_schema() -> dict[str, Any]:
             "value": {"type": ["number", "array", "string", "boolean"]},
             "std": {"type": "number", "exclusiveMinimum": 0},
             "source": {"type": "string"},
-            "origin": {"enum": ["guess", "given", "datasheet", "measured", "identified", "imported"]},
+            "origin": {"enum": ["guess", "joint", "given", "datasheet", "measured", "identified", "imported"]},
         },
     }  # fmt: skip
     entry = {"anyOf": [{"type": ["number", "string", "boolean"]}, {"$ref": "#/$defs/known"}]}

@@ -5,54 +5,43 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from omnidyn.identification.lack_of_fit import Remedy
+from omnidyn.identification.lack_of_fit import CHANGE, Remedy
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES
-from omnidyn.identification.output_error.trust.cures import MEASURED
-from omnidyn.identification.structure.missing.candidates import CHANGE
 from omnidyn.identification.validation import Validation
 from omnidyn.model.frames import AXES
-from omnidyn.model.keys import BOX, EMF, TORQUE, Key, find_key, unit
-from omnidyn.model.robot import GUESS
+from omnidyn.model.keys import BOX, EMF, TORQUE, Key, find_key
+from omnidyn.model.robot import GUESSES
+from omnidyn.statement import NOTE, Statement
 
 LIMIT = "motor.current_limit_A"
 NEARLY = 0.7  # of what the first remedy explains, from which one behind it is worth a word
 WIDE, GOAL = 0.2, 0.1  # half width of the 95 % interval over the value: worth a word, and what it could be
-LONGEST = 100.0  # times as long as now: nobody records more
-TOGETHER = 0.95  # correlation of two numbers that move together
+CORRELATED = 0.95  # two numbers that move together
 # Guesses worth a fit, where a log has voltages. Of K_t, the EMF constant and the gear only one number shows.
 GOES_WITH_TORQUE = (EMF, "motor.gear_ratio")
 FREEABLE = (TORQUE, "motor.resistance_ohm", "body.inertia_kg_m2")
 
 
-def advice(fit: OutputErrorEstimate, validation: Validation | None) -> list[str]:
+def advice(fit: OutputErrorEstimate, validation: Validation | None) -> list[Statement]:
     """What to measure or to ask for next, gravest first."""
-    words = [*_not_seen(fit), *_missing(fit), *_guesses(fit), *_together(fit), *_wide(fit)]
-    words += _from_validation(validation)
-    return list(dict.fromkeys(words))
+    found = [*_not_seen(fit), *_missing(fit), *_guesses(fit), *_together(fit), *_wide(fit)]
+    if validation is not None and validation.held_out is None:
+        found.append(Statement("hold_out_log", NOTE))
+    return list(dict.fromkeys(found))
 
 
-def _not_seen(fit: OutputErrorEstimate) -> Iterator[str]:
+def _not_seen(fit: OutputErrorEstimate) -> Iterator[Statement]:
     for name, bound in fit.lower_bound.items():
-        axis = _axis(name) or name
-        yield f"drive {axis} harder than {bound:.3g} {unit(name)}: it never moved, so its friction is only bounded"
+        yield Statement("friction_bounded", NOTE, name, {"axis": _axis(name), "bound": bound})
     for name in fit.unidentifiable:
         if math.isinf(fit.std.get(name, 0.0)):
-            yield f"{name} cannot be told from these logs: {_remedy(name)}"
-    known = [name for name in fit.unidentifiable if math.isfinite(fit.std.get(name, math.inf))]
+            yield Statement("number_not_told", NOTE, name, {"axis": _axis(name) if name in BOX else ""})
+    known = tuple(name for name in fit.unidentifiable if math.isfinite(fit.std.get(name, math.inf)))
     if known:
-        yield (
-            f"the logs do not tell {', '.join(known)}: what you measure or read off a label (with its std), or a log "
-            "with currents, says more than a longer log"
-        )
-    for words in fit.blind:
-        yield f"{words}; what is measured goes into the robot file, with its std, or is fixed (`fixed`)"
-
-
-def _remedy(name: str) -> str:
-    if name in BOX:
-        return f"drive {_axis(name)} both ways, at several speeds"
-    return "fix it (`fixed`), or record what depends on it: currents, or another load"
+        yield Statement("known_by_file_only", NOTE, numbers={"keys": known})
+    for direction in fit.blind:
+        yield Statement("measure_or_fix", NOTE, numbers={"direction": direction})
 
 
 def _axis(name: str) -> str:
@@ -61,7 +50,7 @@ def _axis(name: str) -> str:
     return "" if key is None or key.axis is None else AXES[key.axis]
 
 
-def _missing(fit: OutputErrorEstimate) -> Iterator[str]:
+def _missing(fit: OutputErrorEstimate) -> Iterator[Statement]:
     """What would mend a model that leaves something out: the best remedy, and how to ask for it.
 
     One, with those that the logs cannot tell from it: a confident remedy explains most of what is missing, so another
@@ -73,64 +62,54 @@ def _missing(fit: OutputErrorEstimate) -> Iterator[str]:
     near = (each for each in lack.causes if each.confident and each.chi2 >= NEARLY * lack.causes[0].chi2)
     remedy = next(near, None)
     if remedy is not None:
-        alike = f"; these logs cannot tell it from {lack.alike(remedy)}" if remedy.same_as else ""
-        change = f" ({words})" if (words := remedy.would_change()) else ""
-        yield f"{remedy.words} would explain what the model leaves out{change}{alike}: {how_to(remedy)}"
+        numbers = {"cause": remedy.cause, "same_as": remedy.same_as, "alike": lack.alike(remedy), "way": way(remedy)}
+        yield Statement("missing_cause", NOTE, remedy.key, numbers | remedy.largest_changes())
     best = next(iter(lack.causes), None)
     if fit.ladder is None and (best is None or (best.offered and best.key != CHANGE)):
-        yield "let `ladder` fit the logs with each of the best causes, step by step: it keeps what predicts better"
+        yield Statement("try_ladder", NOTE)
 
 
-def how_to(remedy: Remedy) -> str:
-    """What to do about a remedy, in words."""
+def way(remedy: Remedy) -> str:
+    """What to do about a remedy: "distinguish" it from others, "fit" a nuisance, "look", "limit", "measure", "put"."""
     if remedy.same_as:
-        group = {Key.parse(each).name if find_key(each) else each for each in (remedy.key, *remedy.same_as)}
-        ways = [words for key, words in MEASURED.items() if key in group] or ["measure one of them"]
-        return f"{' or '.join(ways)}, or record what tells them apart (currents, another load)"
+        return "distinguish"
     if remedy.key.partition(".")[0] in NUISANCES:
-        return f"fit it (`nuisances` {remedy.key})"
-    if remedy.key == CHANGE:
-        return "look what happened there; fit the parts as logs of their own"
+        return "fit"
+    if remedy.key in (CHANGE, LIMIT):
+        return "look" if remedy.key == CHANGE else "limit"
     key = find_key(remedy.key)
-    if remedy.key == LIMIT:
-        return f"put about that value into the robot file, and let the fit find it (`free` friction {LIMIT})"
-    if key is not None and key.part in ("body", "wheels") and key.field != "rotating_frame":
-        return "measure it and put it into the robot file"
-    return f"put {remedy.key} into the robot file, and fit again"
+    measured = key is not None and key.part in ("body", "wheels") and key.field != "rotating_frame"
+    return "measure" if measured else "put"
 
 
-def _guesses(fit: OutputErrorEstimate) -> Iterator[str]:
+def _guesses(fit: OutputErrorEstimate) -> Iterator[Statement]:
     """What the robot file only guesses, where the model misses something: no friction makes up for a wrong motor."""
     guessed = [
         key for key, prior in fit.robot.priors.items()
-        if prior.origin == GUESS and key not in fit.value and Key.parse(key).part in ("motor", "body")
+        if prior.origin in GUESSES and key not in fit.value and Key.parse(key).part in ("motor", "body")
     ]  # fmt: skip
     if FREEABLE[0] in fit.value:
         guessed = [key for key in guessed if key not in GOES_WITH_TORQUE]
+    freeable = tuple(key for key in FREEABLE if key in guessed)
     if guessed and _misses(fit):
-        free = " ".join(f"`free` {key}" for key in FREEABLE if key in guessed)
-        are = "is a guess" if len(guessed) == 1 else "are guesses"
-        yield (
-            f"{', '.join(guessed)} {are} of the robot file, and the model leaves something out: put in what you can "
-            f"measure{f', or fit what shows in the logs (`free` friction {free})' if free else ''}"
-        )
+        yield Statement("guessed_numbers", NOTE, numbers={"keys": tuple(guessed), "freeable": freeable})
 
 
-def _together(fit: OutputErrorEstimate) -> Iterator[str]:
+def _together(fit: OutputErrorEstimate) -> Iterator[Statement]:
     """Numbers that move together, and are wide for it: where both are known well, it does no harm."""
     names, matrix = fit.correlation.names, fit.correlation.matrix
     pairs = [
-        f"{first} and {names[j]} move together (correlation {matrix[i, j]:+.2f})"
-        for i, first in enumerate(names) for j in range(i + 1, len(names))
-        if abs(matrix[i, j]) > TOGETHER and not {first, names[j]} & set(fit.unidentifiable)
+        (first, names[j], matrix[i, j]) for i, first in enumerate(names) for j in range(i + 1, len(names))
+        if abs(matrix[i, j]) > CORRELATED and not {first, names[j]} & set(fit.unidentifiable)
         and max(fit.half_width(name) if name in fit.value else 0.0 for name in (first, names[j])) > GOAL
     ]  # fmt: skip
     if pairs:
-        one = "one of them" if len(pairs) == 1 else "one of each pair"
-        yield f"{', '.join(pairs)}: measure {one} otherwise, or drive at more different speeds"
+        first, second, between = zip(*pairs, strict=True)
+        numbers = {"first": first, "second": second, "correlation": between}
+        yield Statement("correlated_numbers", NOTE, numbers=numbers)
 
 
-def _wide(fit: OutputErrorEstimate) -> Iterator[str]:
+def _wide(fit: OutputErrorEstimate) -> Iterator[Statement]:
     """What is known too roughly. A longer log helps against noise only: not where the model itself misses something."""
     shares = {
         name: fit.half_width(name) for name in fit.value
@@ -138,27 +117,13 @@ def _wide(fit: OutputErrorEstimate) -> Iterator[str]:
     }  # fmt: skip
     wide = {name: share for name, share in shares.items() if share > WIDE}
     if wide:
-        known = ", ".join(
-            f"{name} is known within {100.0 * share:.0f} % only" if fit.is_known(name) else f"{name} is not known"
-            for name, share in wide.items()
-        )
-        longer = (max(wide.values()) / GOAL) ** 2
-        if _misses(fit):
-            them = "it" if len(wide) == 1 else "them"
-            yield f"{known}: what the model misses widens {them}, and no longer log mends that"
-            return
-        enough = f"a log {longer:.0f} times as long" if longer <= LONGEST else "no log of a usual length"
-        yield (
-            f"{known}: {enough} would bring {'it' if len(wide) == 1 else 'all of them'} to {100.0 * GOAL:.0f} %; more "
-            "motion where it matters would do so sooner"
-        )
+        numbers = {
+            "keys": tuple(wide), "shares": tuple(wide.values()), "known": tuple(fit.is_known(name) for name in wide),
+            "longer": (max(wide.values()) / GOAL) ** 2, "goal": GOAL,
+        }  # fmt: skip
+        yield Statement("wide_by_misfit" if _misses(fit) else "wide_intervals", NOTE, numbers=numbers)
 
 
 def _misses(fit: OutputErrorEstimate) -> bool:
     """Whether the model leaves out more than noise."""
     return fit.lack_of_fit is not None and fit.lack_of_fit.found
-
-
-def _from_validation(validation: Validation | None) -> Iterator[str]:
-    if validation is not None and validation.held_out is None:
-        yield "record one more log, of other drives, and hold it out (`hold_out`): only that shows what it is worth"

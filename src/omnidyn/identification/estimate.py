@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Document, Part, Points, Table, all_of, interval_cell, plain, sentence, short
+from omnidyn.document import Document, Part, Points, Table, interval_cell, plain, sentence
 from omnidyn.errors import shortened
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.model.first_guess import rests_on as guesses_under
@@ -18,13 +18,13 @@ from omnidyn.model.keys import in_words, unit
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
 from omnidyn.shown import FIGURE, FRAME, Shown, make
+from omnidyn.statement import NOTE, SEVERITIES, Statement, statements
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NOT_DETERMINED = "not determined"  # in the place of an interval: the data do not give one
 UNKNOWN = {"std": None, "ci95": [None, None]}  # the same for machines
-NAMED = 4  # numbers that a sentence names
 WORTH = 0.1  # by which an interval must be wider for that to be worth a table
 SOURCE_LENGTH = 300  # a robot file takes 400 characters
 
@@ -51,7 +51,7 @@ class Estimate(Shown):
     at_bound: names of what a bound holds (a friction that came out negative). std is then that of the free fit.
     unidentifiable: names of what the data do not determine. lower_bound: name -> what the number is at least, where the
     data say no more (breakaway from rows at rest).
-    warnings: what a reader must know, in words. method, data: how it was made, and from what (name, SHA-256).
+    warnings: what a reader must know; text is quoted. method, data: how it was made, and from what (name, SHA-256).
     scale: what all forces scale with, in words: numbers that were taken as they stand.
     log_alone: name -> 95 % interval from the log alone, were what the robot file knows with a std exact; empty where it
     knows nothing so.
@@ -67,12 +67,15 @@ class Estimate(Shown):
     at_bound: tuple[str, ...] = ()
     unidentifiable: tuple[str, ...] = ()
     lower_bound: Mapping[str, float] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Statement, ...] = ()
     method: str = ""
     data: str = ""
     scale: str = ""
     log_alone: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     study: Callable[[], Diagnosis] | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "warnings", statements(self.warnings))
 
     @cached_property
     def diagnosis(self) -> Diagnosis | None:
@@ -107,24 +110,16 @@ class Estimate(Shown):
     @property
     def verdict(self) -> str:
         """How well its numbers are known, in a sentence."""
-        return sentence(self.numbers_known())
+        return sentence(str(self.numbers_known()))
 
-    def numbers_known(self) -> str:
-        """ "all 6 numbers are known, the widest (viscous friction forward) within 9 %"; what is not known is named."""
+    def numbers_known(self) -> Statement:
+        """How many numbers are known, the widest of them, and what is not known."""
         share = {name: self.half_width(name) for name in self.value}
         known = {name: each for name, each in share.items() if self.is_known(name)}
-        missing = [in_words(name) for name in share if name not in known]
-        named = all_of([*missing[:NAMED], *([f"{len(missing) - NAMED} more"] if len(missing) > NAMED else [])])
-        if len(missing) == len(share):
-            return f"no number is known{f': not {named}' if named else ''}"
-        one = f"{in_words(next(iter(share)))} is known" if len(share) == 1 else ""
-        count = f"{len(share) - len(missing)} of" if missing else "all"
-        words = one or f"{count} {len(share)} numbers are known"
-        if known:
-            widest = max(known, key=lambda name: known[name])
-            which = "" if one else f", the widest ({in_words(widest)})"
-            words += f"{which} within {short(max(0.1, 100.0 * known[widest]))} %"
-        return f"{words}; not {named}" if missing else words
+        widest = max(known, key=lambda name: known[name], default="")
+        missing = tuple(name for name in share if name not in known)
+        numbers = {"count": len(share), "missing": missing, "widest": widest, "share": known.get(widest)}
+        return Statement("numbers_known", NOTE, numbers=numbers)
 
     def half_width(self, name: str) -> float:
         """Half the width of the 95 % interval of a number over its size; infinite for one that is not determined."""
@@ -152,7 +147,7 @@ class Estimate(Shown):
         scale = [self.scale] if self.scale else []
         held = [words] if (words := rests_on_guesses(self.robot)) else []
         alone = [table] if (table := self.alone_table()) else []
-        return [*head, self._table(), *alone, *bounds, *scale, *held, Points(self.warnings, "warning:")]
+        return [*head, self._table(), *alone, *bounds, *scale, *held, *by_severity(self.warnings)]
 
     def _table(self) -> Table:
         rows = []
@@ -204,6 +199,11 @@ class Estimate(Shown):
             "scale": self.scale,
             "robot": robot_to_toml(self.robot),
         })  # fmt: skip
+
+
+def by_severity(found: Sequence[Statement]) -> list[Points]:
+    """Statements as points, the gravest first, each behind its severity."""
+    return [Points([one for one in found if one.severity == severity], f"{severity}:") for severity in SEVERITIES]
 
 
 def identified(std: float | None, source: str) -> Prior:

@@ -15,6 +15,7 @@ from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.validation import Validation
 from omnidyn.model.actuation import DEAD_BAND
 from omnidyn.model.keys import in_words, unit
+from omnidyn.statement import Statement
 
 SHOWN = 6  # findings of a log that are named
 MOST_LOGS = 20  # that are shown, one by one
@@ -22,7 +23,7 @@ MOST_LOGS = 20  # that are shown, one by one
 
 def fit_document(
     fits: Mapping[str, OutputErrorEstimate], validations: Mapping[str, Validation], differences: Sequence[Difference],
-    verdicts: Sequence[Verdict], advice: Sequence[str],
+    verdicts: Sequence[Verdict], advice: Sequence[Statement],
 ) -> Document:  # fmt: skip
     """The fit of each group beside its logs, the differences between groups, and what to do next."""
     blocks: list[Sequence[Part]] = []
@@ -74,7 +75,15 @@ def number_table(fit: OutputErrorEstimate) -> Table:
                 ("", name, f"{own.value:.4g}", f"{own.std:.2g}", interval_cell(own.ci95), own.unit, _whose(name))
             )
     rows += [
-        (one.words, one.name, f"{one.value:.5g}", f"{one.std:.2g}", interval_cell(one.ci95), one.unit, "together")
+        (
+            str(one.statement()),
+            one.name,
+            f"{one.value:.5g}",
+            f"{one.std:.2g}",
+            interval_cell(one.ci95),
+            one.unit,
+            "together",
+        )
         for one in fit.combinations
     ]
     return Table(("number", "key", "value", "std error", "95 % interval", "unit", ""), rows, "<<>>><<")

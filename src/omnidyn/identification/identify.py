@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.attempts import COMPARISON, DIAGNOSIS, JUDGEMENT, LADDER, QUICK, Attempts, Missing, missing_words
+from omnidyn.attempts import COMPARISON, DIAGNOSIS, JUDGEMENT, LADDER, QUICK, Attempts, Missing, not_made
 from omnidyn.document import Document, Points, apart, sentence
 from omnidyn.errors import INTERRUPTS, InputError, UnsupportedError, told_by
 from omnidyn.findings.finding import Verdict
@@ -36,13 +36,21 @@ from omnidyn.identification.steady.study import diagnosed, fit_steady, identify_
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.identification.validation import Validation, validate
-from omnidyn.identification.verdict import fit_failure, fits_verdict, lines_verdict, steady_failure, steady_verdict
+from omnidyn.identification.verdict import (
+    fit_failure,
+    fits_verdict,
+    lines_verdict,
+    of_group,
+    steady_failure,
+    steady_verdict,
+)
 from omnidyn.identification.whole_logs import fit_output_error, solved
 from omnidyn.logs.log import Log
 from omnidyn.model.drive import DUTY, SPEED, VOLTAGE
 from omnidyn.model.robot import MEASURED, Prior, Robot
 from omnidyn.run import Run, as_list
 from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.statement import ERROR, NOTE, SEVERITIES, WARNING, Statement, statements
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +59,6 @@ Tell = Callable[[str], object]
 Save = Callable[[Mapping[str, Estimate]], object]
 
 LINE = "line"  # a shape: the paper's line on each axis
-CUT_SHORT = "the numbers are the best so far, not the best there are"
 
 
 @shows_options(FIT, STEADY)
@@ -77,7 +84,8 @@ def identify(
     if method == OUTPUT_ERROR:
         return fit_output_error(every, robot, question=asked)
     estimate = identify_steady(every, robot, question=asked).estimate
-    return replace(estimate, warnings=(why, *estimate.warnings)) if why else estimate
+    chosen = Statement("method_chosen", NOTE, numbers={"method": method, "why": why})
+    return replace(estimate, warnings=(chosen, *estimate.warnings)) if why else estimate
 
 
 def as_driven(robot: Robot, runs: Sequence[Run]) -> Robot:
@@ -103,7 +111,7 @@ def choose_method(runs: Sequence[Run], robot: Robot, options: Sequence[str] = ()
     if method != AUTO:
         return method, ""
     why = why_not_output_error(runs, robot)
-    return (STEADY_STATE, f"steady-state, not output error: {why}") if why else (OUTPUT_ERROR, "")
+    return (STEADY_STATE if why else OUTPUT_ERROR), why
 
 
 def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
@@ -131,8 +139,8 @@ class Identification(Shown):
 
     method: that was taken. estimates: group -> Estimate; one, "all", where there are no groups. validations: group ->
     Validation, by output error. study: by steady state, but for the shape "line". verdicts: of `check` on each log.
-    advice: what to mend, to measure or to ask for next, gravest first. interrupted: what an interrupt cut off, in
-    words; "" without one. missing: parts that were not made, and why. interrupt: the interrupt that ended it.
+    advice: what to mend, to measure or to ask for next, gravest first. interrupted: whether an interrupt cut
+    the fit off. missing: parts that were not made, and why. interrupt: the interrupt that ended it.
     """
 
     question: Question
@@ -142,8 +150,8 @@ class Identification(Shown):
     validations: Mapping[str, Validation] | None = None
     study: SteadyStudy | None = None
     verdicts: tuple[Verdict, ...] = ()
-    advice: tuple[str, ...] = ()
-    interrupted: str = ""
+    advice: tuple[Statement, ...] = ()
+    interrupted: bool = False
     missing: tuple[Missing, ...] = ()
     interrupt: BaseException | None = None
 
@@ -186,15 +194,14 @@ class Identification(Shown):
         return make(FIGURE, self)
 
     @property
-    def failures(self) -> tuple[str, ...]:
-        """Why the numbers mean nothing, in words: what of a log is not followed, forces that no shape explains, and
+    def failures(self) -> tuple[Statement, ...]:
+        """Why the numbers mean nothing: what of a log is not followed, forces that no shape explains, and
         fatal findings of `check`; empty for a fit that stands."""
-        words = [steady_failure(self.study)] if self.study is not None else []
+        found = [steady_failure(self.study)] if self.study is not None else []
         for group, fit in self.fits.items():
-            if missed := fit_failure(fit, (self.validations or {}).get(group)):
-                where = f"{group}: " if len(self.estimates) > 1 else ""
-                words.append(f"{where}{missed}")
-        return tuple(each for each in (*words, *unfit(self.verdicts)) if each)
+            missed = fit_failure(fit, (self.validations or {}).get(group))
+            found.append(of_group(group, missed) if missed and len(self.estimates) > 1 else missed)
+        return (*filter(None, found), *unfit(self.verdicts))
 
     @property
     def estimate(self) -> Estimate:
@@ -205,11 +212,19 @@ class Identification(Shown):
     def verdict(self) -> str:
         """What it came to, failures first: whether the model follows, how well its numbers are known, and which parts
         of the result were not made."""
-        return " ".join([self._outcome(), *missing_words(self.missing)])
+        return _sentences([*self.outcome(), *not_made(self.missing)])
 
-    def _outcome(self) -> str:
+    @property
+    def headline(self) -> str:
+        """The verdict in at most two sentences: the gravest statement, and how well the numbers are known."""
+        found = self.outcome()
+        gravest = min(found, key=lambda each: SEVERITIES.index(each.severity))
+        return _sentences(list(dict.fromkeys([gravest, found[-1]])))
+
+    def outcome(self) -> list[Statement]:
+        """What it came to, as statements."""
         if self.failures and not self.interrupted:
-            return sentence(f"failed: {'; '.join(self.failures)}: the numbers mean nothing until that is mended")
+            return [Statement("failed", ERROR, numbers={"failures": self.failures})]
         if self.study is not None:
             return steady_verdict(self.study)
         if self.method == OUTPUT_ERROR:
@@ -252,6 +267,11 @@ class _Heard:
     attempts: Attempts
 
 
+def _sentences(found: Sequence[Statement]) -> str:
+    """Statements as sentences."""
+    return " ".join(sentence(str(each)) for each in found)
+
+
 def _discard(told: object) -> None:
     """Discards what is told."""
 
@@ -277,9 +297,10 @@ def _steady(
         heard.attempts.leave_out(DIAGNOSIS, QUICK)
     found = None if asked.quick else heard.attempts.make(DIAGNOSIS, partial(diagnosed, fit))
     study = found or undiagnosed(fit)
-    study = replace(study, advice=(*mend, *study.advice))
+    study = replace(study, advice=(*map(str, mend), *study.advice))
     return Identification(
-        asked, STEADY_STATE, study.estimates, study.differences, study=study, verdicts=verdicts, advice=study.advice,
+        asked, STEADY_STATE, study.estimates, study.differences, study=study, verdicts=verdicts,
+        advice=statements(study.advice),
         missing=tuple(heard.attempts.missing), interrupt=heard.attempts.interrupt,
     )  # fmt: skip
 
@@ -317,12 +338,12 @@ def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[L
         first = next(iter(answer.estimates.values())).robot
         judged = partial(judged_by_fit, verdicts, logs, first, heard.now, heard.tell)
         verdicts = heard.attempts.make(JUDGEMENT, judged) or verdicts
-    words = [*verdict_advice(verdicts), *_not_independent(runs, held)]
+    steps = [*verdict_advice(verdicts), *_not_independent(runs, held)]
     for group, fit in answer.estimates.items():
-        next_steps = advice(fit, validations.get(group))
-        words += next_steps if len(answer.estimates) == 1 else [f"{group}: {each}" for each in next_steps]
+        own = advice(fit, validations.get(group))
+        steps += own if len(answer.estimates) == 1 else [of_group(group, each) for each in own]
     return Identification(
-        asked, OUTPUT_ERROR, answer.estimates, answer.differences, validations, None, verdicts, tuple(words), cut,
+        asked, OUTPUT_ERROR, answer.estimates, answer.differences, validations, None, verdicts, tuple(steps), cut,
         tuple(heard.attempts.missing), heard.attempts.interrupt,
     )  # fmt: skip
 
@@ -348,20 +369,20 @@ def _of_group(name: str, groups: Collection[str]) -> str:
     return f" of {name}" if len(groups) > 1 else ""
 
 
-def _not_independent(runs: Sequence[Run], held: Sequence[bool]) -> list[str]:
+def _not_independent(runs: Sequence[Run], held: Sequence[bool]) -> list[Statement]:
     """Held-out logs that are fitted too, under another name: they prove nothing."""
     marks = [fingerprint(run) for run in runs] if any(held) else []
     fitted = {mark: run.source for mark, run, out in zip(marks, runs, held, strict=False) if not out}
     return [
-        f"{run.source} is held out, and the same recording as {fitted[mark]}, which is fitted: hold out another"
+        Statement("held_out_is_fitted", WARNING, run.source, {"fitted": fitted[mark]})
         for mark, run, out in zip(marks, runs, held, strict=False) if out and mark in fitted
     ]  # fmt: skip
 
 
 def _answered(
     runs: Sequence[Run], robot: Robot, asked: Question, groups: Sequence[str] | None, heard: _Heard
-) -> tuple[Answer, str]:
-    """(answer, what an interrupt cut off)."""
+) -> tuple[Answer, bool]:
+    """(answer, whether an interrupt cut the fit off)."""
     steps = 0
 
     def better(state: State) -> None:
@@ -378,15 +399,15 @@ def _answered(
     progress = Progress(better, lambda words: heard.now(f"fitting: {words}"))
     fit = Fit.of(runs, robot, asked, groups, progress)
     try:
-        return solved(fit, runs, progress, groups, keep), ""
+        return solved(fit, runs, progress, groups, keep), False
     except (*INTERRUPTS, Exception) as raised:
         error = told_by(raised)
         if plain and (heard.attempts.keep or isinstance(error, Exception)):
             heard.attempts.give_up(LADDER, error)
-            return plain[0], ""
+            return plain[0], False
         if isinstance(error, Exception) or not heard.attempts.keep or progress.best is None:
             raise
         heard.attempts.interrupt = error
         heard.now("finishing with the best so far")
         heard.tell("interrupted: finishing with the best so far (again: give up)")
-        return fit.answer(progress.best), CUT_SHORT
+        return fit.answer(progress.best), True

@@ -8,36 +8,20 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Part, Table, all_of, plain, short
+from omnidyn.document import Part, Points, Table, all_of, plain, short
 from omnidyn.identification.stability import Stability
-from omnidyn.model.keys import find_key, in_words, unit
+from omnidyn.model.keys import in_words
+from omnidyn.statement import NOTE, WARNING, Statement, statements
 
 LOSS = "loss"  # the key of a remedy for wild samples, which is no cause of a misfit
 MOST = 0.7  # of all that residuals hold beside noise, that a remedy must explain to be the one
-# What robots do that no law holds yet: key -> words.
-UNOFFERED = {
-    "friction one way": "friction that is another one backward than forward",
-    "drag": "drag that grows with the square of the speed",
-    "turns of the wheels": "something that comes back with the turns of the wheels",
-    "sag": "a supply that sags under load",
-    "heat": "motors that weaken as they warm up",
-    "filter": "speeds that went through a filter",
-}
+CHANGE = "change"  # the key of friction that is another one from some time of the log on
+# What robots do that no law holds yet: keys.
+UNOFFERED = ("friction one way", "drag", "turns of the wheels", "sag", "heat", "filter")
 REPEATS, HOLDS, NEIGHBOURS, REST, ROUNDING = "repeats", "holds", "neighbours", "rest", "rounding"  # sources of a level
-WHERE = {  # how a log shows its noise, and what is said of more than that
-    REPEATS: ("repeats within", "no noise"), HOLDS: ("scatters, while commands are held, by", "no noise"),
-    NEIGHBOURS: ("scatters from row to row by", "misfit, or noise that is slower"),
-    ROUNDING: ("is rounded within", "misfit, or noise beside what the encoder rounds"),
-    REST: ("scatters at rest by", "misfit, or noise that comes of motion"),
-}  # fmt: skip
-NOTHING = "hold nothing but noise"
-DRIFTS = "the errors last so long that no test in these logs tells them from what the model leaves out; log for longer"
-UNTOLD = "this log cannot tell its noise from misfit: repeat a command, or let the robot rest for a second"
 FAR = 0.001, 0.1  # chance, and share, from which on it is said that a robot in motion leaves more than one at rest
 WORTH = 0.01  # share of the variance of a residual that is worth a line
 CHANGED, SEEN = 2, 0.02  # numbers that a remedy would change that are named; relative change that is worth it
-LARGE = 100.0  # chi2 of which nobody needs decimals
-NONE = 1e-3  # of what a number was, below which nothing is left of it
 MOVES, MOST_NAMED = 0.001, 5  # relative change by a percent of what a number rests on; so many are named
 
 
@@ -91,28 +75,23 @@ class Noise:
         """Whether all noise shows in it: at rest that of motion may be missing, neighbours do not see what is slow."""
         return self.source in (REPEATS, HOLDS)
 
-    def words(self, output: str) -> str:
-        """ "the residual of twist[0] is 0.31 m/s where the log repeats within 0.12 m/s (3 % of what moves): ..."."""
-        where, more = WHERE[self.source]
-        new = f", {100.0 * self.new:.0f} % of what is new from row to row," if self.new > self.share else ""
-        return (
-            f"the residual of {output} is {self.residual:.2g} {self.unit} where the log {where} {self.level:.2g} "
-            f"{self.unit} ({short(100.0 * self.of_moves)} % of what moves): {100.0 * self.share:.0f} % of its "
-            f"variance{new} is {more}"
-        )
+    def beyond(self, output: str) -> Statement:
+        """By how much the residual of an output is larger than this noise."""
+        names = ("source", "residual", "level", "unit", "of_moves", "share", "new")
+        return Statement("beyond_noise", WARNING, output, {name: getattr(self, name) for name in names})
 
 
 @dataclass(frozen=True)
 class Remedy:
-    """key: of the robot file, a nuisance or "change". words: what it is, with its value. gain: share of the squared
-    held-out error that it takes away, with its standard error. same_as: keys that the log cannot tell from it.
-    share: of all that residuals hold beside noise, that it explains. offered: whether a robot file or a fit holds such.
-    chi2: by how much it lowers the sum of squares, in those of the noise; numbers: how many it fits. size, at: its
-    fitted change and where it was tried, both of a first step. changes: number -> (what it is, what it would be with
-    it, to first order)."""
+    """key: of the robot file, a nuisance or "change". cause: what it is, with its value; text is quoted.
+    gain: share of the squared held-out error that it takes away, with its standard error. same_as: keys that the
+    log cannot tell from it. share: of all that residuals hold beside noise, that it explains. offered: whether a
+    robot file or a fit holds such. chi2: by how much it lowers the sum of squares, in those of the noise; numbers:
+    how many it fits. size, at: its fitted change and where it was tried, both of a first step. changes: number ->
+    (what it is, what it would be with it, to first order)."""
 
     key: str
-    words: str
+    cause: Statement
     gain: float
     gain_std: float
     same_as: tuple[str, ...] = ()
@@ -124,24 +103,29 @@ class Remedy:
     at: float = 0.0
     changes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "cause", *statements([self.cause]))
+
     @property
     def confident(self) -> bool:
         """Whether it explains most of what is to be explained, and nothing that nobody offers explains the same."""
         return self.offered and self.share >= MOST and not self.rivals
 
-    def would_change(self, most: int = CHANGED) -> str:
-        """The numbers that it would change most, in words; "" where it changes none that anybody would see."""
+    def largest_changes(self, most: int = CHANGED) -> dict[str, tuple[Any, ...]]:
+        """The numbers that it would change most: changed, before, after; empty where none would be seen to change."""
         shares = {name: abs(after - now) / abs(now) if now else math.inf for name, (now, after) in self.changes.items()}
         worst = sorted((name for name in shares if shares[name] >= SEEN), key=lambda name: -shares[name])[:most]
-        return all_of([
-            f"{in_words(name)} {now:.3g} -> {after if abs(after) > NONE * abs(now) else 0.0:.3g} {unit(name)}".rstrip()
-            for name in worst for now, after in [self.changes[name]]
-        ])  # fmt: skip
+        before, after = (tuple(self.changes[name][k] for name in worst) for k in (0, 1))
+        return {"changed": tuple(worst), "before": before, "after": after}
 
     @property
     def rivals(self) -> tuple[str, ...]:
         """Those of `same_as` that no robot file holds."""
         return tuple(key for key in self.same_as if key in UNOFFERED)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return {**asdict(self), "words": str(self.cause), "cause": self.cause}
 
 
 @dataclass(frozen=True, eq=False)
@@ -195,123 +179,111 @@ class LackOfFit:
         """The remedies of a misfit."""
         return tuple(each for each in self.remedies if each.key != LOSS)
 
-    def words(self) -> str:
-        """In a sentence, "" for a model that fits."""
+    def statement(self) -> Statement | None:
+        """What the model leaves out, and its likely cause; None for a model that fits."""
         if not self.found:
-            return DRIFTS if self.drifts else ""
+            return Statement("slow_errors", WARNING) if self.drifts else None
         worst = max(self.channels, key=lambda name: self.channels[name], default="")
-        share = f" ({100.0 * self.channels[worst]:.0f} % of the residual of {worst} is no noise)" if worst else ""
-        what = all_of([each.theme for each in self.follows[:2]])
-        beyond = "" if what or self.causes else self._beyond_noise()
-        words = "the model leaves something out" + (f": what it misses follows {what}{share}" if what else beyond)
+        follows = tuple(each.theme for each in self.follows[:2])
+        beyond = None if follows or self.causes else self._beyond_noise()
+        numbers = {"share": self.channels.get(worst), "follows": follows, "beyond": beyond}
         if not self.causes:
-            return f"{words}; no cause that is known here explains it"
-        if not self.causes[0].confident:
-            near = self.causes[0]
-            if not near.offered:
-                return f"{words}; it looks like {near.words}, which no law that is known here holds"
-            if near.rivals:
-                return f"{words}; it may be {near.words}, or {' or '.join(UNOFFERED[key] for key in near.rivals)}"
-            return (
-                f"{words}; no cause that is known here explains it: the nearest, {near.words}, explains "
-                f"{100.0 * near.share:.0f} % of it"
-            )
+            return Statement("misfit_unexplained", WARNING, worst, numbers)
         best = self.causes[0]
-        same = f", or what this log cannot tell from it ({self.alike(best)})" if best.same_as else ""
-        return f"{words}; most likely {best.words}{same}"
+        code = (
+            "misfit_likely_cause" if best.confident else "misfit_without_law" if not best.offered
+            else "misfit_with_rivals" if best.rivals else "misfit_nearest_cause"
+        )  # fmt: skip
+        numbers |= {"cause": best.cause, "explains": best.share, "rivals": best.rivals, "alike": self.alike(best)}
+        return Statement(code, WARNING, worst, numbers)
 
-    def _beyond_noise(self) -> str:
-        """The output whose residual is most surely beyond its noise, in words; "" where none is."""
+    def _beyond_noise(self) -> Statement | None:
+        """The output whose residual is most surely beyond its noise; None where none is."""
         noise = {name: (self.noise or {})[name] for name in self.beyond}
         worst = min(noise, key=lambda name: noise[name].p, default="")
-        return f": {noise[worst].words(worst)}" if worst else ""
+        return noise[worst].beyond(worst) if worst else None
 
-    def alike(self, remedy: Remedy) -> str:
-        """What the log cannot tell from a remedy, with their values: "gain 0.94, torque constant -6 %"."""
-        words = {each.key: each.words for each in self.remedies}
-        keys = sorted(remedy.same_as, key=lambda key: key not in words)
-        more = [f"{len(keys) - MOST_NAMED} more"] if len(keys) > MOST_NAMED else []
-        return ", ".join([*(words.get(key, named(key)) for key in keys[:MOST_NAMED]), *more])
+    def alike(self, remedy: Remedy) -> tuple[Statement, ...]:
+        """What the log cannot tell from a remedy, those with values first: gain 0.94, torque constant -6 %."""
+        causes = {each.key: each.cause for each in self.remedies}
+        keys = sorted(remedy.same_as, key=lambda key: key not in causes)
+        more = [Statement("more", NOTE, numbers={"count": len(keys) - MOST_NAMED})] if len(keys) > MOST_NAMED else []
+        return (*(causes.get(key, Statement("cause", NOTE, key)) for key in keys[:MOST_NAMED]), *more)
 
     def table(self) -> Table:
         """The remedies, a row each."""
         rows = [
-            (r.words, r.key, f"{short(100.0 * r.gain)} +- {short(100.0 * r.gain_std)} %", r.would_change(1),
-             all_of([*map(named, r.same_as)]))
+            (str(r.cause), r.key, f"{short(100.0 * r.gain)} +- {short(100.0 * r.gain_std)} %",
+             str(Statement("changes", NOTE, numbers=r.largest_changes(1))),
+             all_of([str(Statement("cause", NOTE, key)) for key in r.same_as]))
             for r in self.remedies
         ]  # fmt: skip
         head = ("what may be missing", "key", "held-out error less by", "would change", "the same to this log")
         return Table(head, rows, "<<><<")
 
-    def statements(self) -> list[str]:
-        """What was found, a sentence each."""
+    def statements(self) -> list[Statement]:
+        """What was found, the gravest first."""
+        whole = self.statement()
         if not self.found:
-            calm = "follow nothing that a model should know" if self._beyond_rest() else NOTHING
-            return [self.words() or f"the residuals {calm}, as far as these logs tell", *self._levels(), *self._tails()]
+            calm = Statement("follows_nothing" if self._beyond_rest() else "only_noise", NOTE)
+            return [whole or calm, *self._levels(), *self._tails()]
         shares = [
-            f"{name}: {self.sizes[name]:.2g} of its residual is no noise, {100.0 * share:.0f} % of the variance"
+            Statement("misfit_of_output", WARNING, name, {"size": self.sizes[name], "percent": 100.0 * share})
             for name, share in self.channels.items() if share >= WORTH
         ]  # fmt: skip
-        return [self.words(), *shares, *self._levels(), *self._tails()]
+        return [*([whole] if whole else []), *shares, *self._levels(), *self._tails()]
 
-    def _levels(self) -> list[str]:
+    def _levels(self) -> list[Statement]:
         """What rounded inputs explain, the noise by each source, and where the robot in motion leaves more than at
         rest."""
         if self.noise is None:
             return self._rounded()
-        told = [] if self.noise else [UNTOLD]
-        for source, (where, _) in WHERE.items():
+        levels = [] if self.noise else [Statement("noise_unknown", NOTE)]
+        for source in (REPEATS, HOLDS, NEIGHBOURS, ROUNDING, REST):
             own = {name: each for name, each in self.noise.items() if each.source == source}
             if own:
-                levels = ", ".join(f"{name} {each.level:.2g} {each.unit}" for name, each in own.items())
-                moves = max(each.of_moves for each in own.values())
-                far = [pick(each.chi2 for each in own.values()) for pick in (min, max)]
-                chi2 = " to ".join(dict.fromkeys(f"{x:.2f}" if x < LARGE else short(x, ".3g") for x in far))
-                told.append(
-                    f"noise: the log {where} {levels}, at most {short(100.0 * moves)} % of what moves; chi2 of the "
-                    f"residuals by that: {chi2}"
-                )
-        return [*self._rounded(), *told, *self._beyond_rest()]
+                noises = [*own.values()]
+                numbers = {
+                    "outputs": tuple(own), "levels": tuple(each.level for each in noises),
+                    "units": tuple(each.unit for each in noises), "of_moves": max(each.of_moves for each in noises),
+                    "chi2": tuple(pick(each.chi2 for each in noises) for pick in (min, max)),
+                }  # fmt: skip
+                levels.append(Statement("noise_level", NOTE, source, numbers))
+        return [*self._rounded(), *levels, *self._beyond_rest()]
 
-    def _rounded(self) -> list[str]:
-        """Of the output that shows most of what the log does not tell of its inputs, in words; none where none does."""
+    def _rounded(self) -> list[Statement]:
+        """Of the output that shows most of what the log does not tell of its inputs; none where none does."""
         worst = max(self.rounded, key=lambda name: self.rounded[name], default="")
         share = self.rounded.get(worst, 0.0)
-        said = "rounding of the inputs, or rows that are missing where they change, may explain"
-        much = f"{100.0 * share:.0f} % of the variance of the residual of {worst}, and hide a misfit"
-        return [f"{said} {much}: log every row, with more digits"] if share >= WORTH else []
+        return [Statement("rounding_may_hide", NOTE, worst, {"percent": 100.0 * share})] if share >= WORTH else []
 
-    def _beyond_rest(self) -> list[str]:
-        """Of the output that most surely leaves more in motion than at rest, in words; nothing where none does."""
+    def _beyond_rest(self) -> list[Statement]:
+        """Of the output that most surely leaves more in motion than at rest; nothing where none does."""
         beyond = {
             name: each for name, each in self.at_rest.items()
             if each.p * len(self.at_rest) < FAR[0] and each.share > FAR[1]
         }  # fmt: skip
         worst = min(beyond, key=lambda name: beyond[name].p, default="")
-        return [beyond[worst].words(worst)] if worst else []
+        return [beyond[worst].beyond(worst)] if worst else []
 
-    def _tails(self) -> list[str]:
-        """What is to be said of wild samples: nothing, or a sentence."""
+    def _tails(self) -> list[Statement]:
+        """What is to be said of outliers: nothing, or one statement."""
         if not self.wild:
             return []
         worst = max(self.wild, key=lambda name: self.wild[name].held)
-        one, others = self.wild[worst], len(self.wild) - 1
-        more = f", and of {others} more" if others else ""
-        return [
-            f"heavy tails: {100.0 * one.share:.2g} % of the samples of {worst}{more} are wild, far beyond its noise, "
-            f"and hold {100.0 * one.held:.0f} % of its squared error; `loss` student-t counts them little"
-        ]
+        numbers = {"share": self.wild[worst].share, "held": self.wild[worst].held, "others": len(self.wild) - 1}
+        return [Statement("heavy_tails", NOTE, worst, numbers)]
 
     def parts(self) -> list[Part]:
-        """As lines and a table."""
-        return [*self.statements(), *([self.table()] if self.remedies else [])]
+        """As points and a table."""
+        return [Points(self.statements()), *([self.table()] if self.remedies else [])]
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
         return plain({
             "found": self.found, "channels": self.channels, "sizes": self.sizes,
             "follows": [asdict(each) for each in self.follows],
-            "remedies": [asdict(each) for each in self.remedies], "tested": self.tested,
+            "remedies": self.remedies, "statements": self.statements(), "tested": self.tested,
             "wild": {name: asdict(each) for name, each in self.wild.items()},
             "noise": {name: asdict(each) for name, each in (self.noise or {}).items()},
             "beyond_noise": self.beyond,
@@ -332,14 +304,9 @@ class Diagnosis:
         """What each number rests on, a row each; None where nothing moves any."""
         rows = []
         for name, by in self.rests_on.items():
-            told = [
-                f"{named(key)} {short(100.0 * share, '+.2g')} %" for key, share in by.items() if abs(share) >= MOVES
+            moves = [
+                f"{in_words(key)} {short(100.0 * share, '+.2g')} %" for key, share in by.items() if abs(share) >= MOVES
             ]
-            if told:
-                rows.append((named(name), name, ", ".join(told[:MOST_NAMED])))
+            if moves:
+                rows.append((in_words(name), name, ", ".join(moves[:MOST_NAMED])))
         return Table(("number", "key", "moves, for +1 % of"), rows, "<<<") if rows else None
-
-
-def named(key: str) -> str:
-    """A remedy's key as people call it."""
-    return in_words(key) if find_key(key) else UNOFFERED.get(key, key)

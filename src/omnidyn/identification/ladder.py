@@ -7,40 +7,49 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from omnidyn.document import Part, Table, all_of, plain, short
-from omnidyn.identification.lack_of_fit import named
-from omnidyn.model.keys import FRICTION, in_words, unit
+from omnidyn.document import Part, Points, Table, plain, short
+from omnidyn.model.keys import FRICTION
+from omnidyn.statement import NOTE, WARNING, Statement
 
-STANDS = "as it is"  # the key of a model into which nothing was put
+STANDS = Statement("as_given", NOTE)  # the cause of a model into which nothing was put
 
 
 @dataclass(frozen=True)
 class Rung:
     """A model that was fitted to all of the logs, on the way up.
 
-    step: of the ladder, 0 for the robot as it was given. key: what was switched on, "" for nothing; words: the same,
+    step: of the ladder, 0 for the robot as it was given. key: what was switched on, "" for nothing; cause: the same,
     with its fitted value. numbers: how many are fitted. held_out: root mean square of what it leaves of blocks that it
     was not fitted to, in those of the noise; gain: share of the squared one of the step before that it takes away, with
     its standard error. bic: less that of the step before, for the number of causes that were tried. taken: whether
-    the ladder went on from here; why: or why not, in words. same_as: keys that as good a model has in its place.
+    the ladder went on from here; why: or why not. same_as: keys that as good a model has in its place.
     instead: whether it is without what the step before had switched on. value: number of the robot, or of the log ->
     fitted. groups: in which it was switched on, where there are several and not in all.
     """
 
     step: int
     key: str
-    words: str
+    cause: Statement
     numbers: int
     held_out: float
     gain: float = 0.0
     gain_std: float = 0.0
     bic: float = 0.0
     taken: bool = False
-    why: str = ""
+    why: Statement | None = None
     same_as: tuple[str, ...] = ()
     instead: bool = False
     value: Mapping[str, float] = field(default_factory=dict)
     groups: tuple[str, ...] = ()
+
+    def step_taken(self) -> Statement:
+        """What was switched on, and what the logs cannot tell from it."""
+        numbers = {"cause": self.cause, "same_as": self.same_as}
+        return Statement("step_with_others", NOTE, self.key, numbers) if self.same_as else self.cause
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return {**asdict(self), "words": str(self.cause), "cause": self.cause, "why": self.why}
 
 
 @dataclass(frozen=True)
@@ -48,7 +57,7 @@ class Ladder:
     """rungs: every model that was fitted, step by step, what was taken first. end: why it went no further."""
 
     rungs: tuple[Rung, ...]
-    end: str
+    end: Statement
 
     @property
     def taken(self) -> tuple[Rung, ...]:
@@ -57,44 +66,39 @@ class Ladder:
         gone = {rung.step - 1 for rung in steps if rung.instead}
         return tuple(rung for rung in steps if rung.step not in gone)
 
-    def words(self) -> str:
-        """What it came to, in a sentence without a full stop."""
-        if not self.taken:
-            return f"the ladder took no step: {self.end}"
-        return f"the ladder took {all_of([_with_others(rung) for rung in self.taken])}; then {self.end}"
+    def statement(self) -> Statement:
+        """What it came to."""
+        steps = tuple(rung.step_taken() for rung in self.taken)
+        return Statement("ladder_steps" if steps else "ladder_no_step", NOTE, numbers={"steps": steps, "end": self.end})
 
-    def warnings(self) -> list[str]:
+    def warnings(self) -> list[Statement]:
         """What a reader of the numbers must know: other robots that these logs do not tell from the one taken."""
         found = []
         for rung in self.taken:
             others = [r for r in self.rungs if r.step == rung.step and not r.taken and r.key in rung.same_as]
-            if not rung.same_as:
-                continue
-            by = _spread([rung, *others])
-            found.append(
-                f"the ladder took {rung.words}; to these logs {all_of([*map(named, rung.same_as)])} would be the same"
-                + (f", with {by}" if by else "") + ": measure one of them, and put it into the robot file"
-            )  # fmt: skip
+            if rung.same_as:
+                numbers = {"cause": rung.cause, "same_as": rung.same_as} | _spread([rung, *others])
+                found.append(Statement("ladder_alternatives", WARNING, rung.key, numbers))
         return found
 
     def table(self) -> Table:
         """Every model that was fitted, a row each."""
         rows = [
-            (str(r.step), r.words, r.key, str(r.numbers or ""), _cell(r.held_out, ".4g"),
+            (str(r.step), str(r.cause), r.key, str(r.numbers or ""), _cell(r.held_out, ".4g"),
              f"{short(100.0 * r.gain)} +- {short(100.0 * r.gain_std)} %" if r.step and math.isfinite(r.gain) else "",
-             _cell(r.bic, "+.3g") if r.step else "", "taken" if r.taken else r.why)
+             _cell(r.bic, "+.3g") if r.step else "", "taken" if r.taken else str(r.why or ""))
             for r in self.rungs
         ]  # fmt: skip
         head = ("step", "with", "key", "numbers", "held-out error", "less by", "BIC", "")
         return Table(head, rows, "<<<>>>><")
 
     def parts(self) -> list[Part]:
-        """As a line and a table."""
-        return [self.words(), *([self.table()] if self.rungs else [])]
+        """As a point and a table."""
+        return [Points([self.statement()]), *([self.table()] if self.rungs else [])]
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
-        return plain({"rungs": [asdict(rung) for rung in self.rungs], "end": self.end})
+        return plain({"rungs": self.rungs, "end": self.end})
 
 
 def _cell(value: float, form: str) -> str:
@@ -102,18 +106,11 @@ def _cell(value: float, form: str) -> str:
     return short(value, form) if math.isfinite(value) else ""
 
 
-def _with_others(rung: Rung) -> str:
-    same = all_of([*map(named, rung.same_as)])
-    return f"{rung.words} (or, the same to these logs, {same})" if same else rung.words
-
-
-def _spread(rungs: Sequence[Rung]) -> str:
-    """The friction that differs most between models, in words; "" where none is in all of them."""
+def _spread(rungs: Sequence[Rung]) -> dict[str, Any]:
+    """The friction that differs most between models, and from where to where; "" where none is in all of them."""
     kept = [name for name in rungs[0].value if name.startswith(FRICTION) and all(name in r.value for r in rungs)]
     if len(rungs) < 2 or not kept:
-        return ""
+        return {"number": ""}
     values = {name: [rung.value[name] for rung in rungs] for name in kept}
     name = max(kept, key=lambda each: (max(values[each]) - min(values[each])) / (abs(values[each][0]) or 1.0))
-    key, _, group = name.partition("@")  # of one group, where it is its own
-    where = f" in {group}" if group else ""
-    return f"{in_words(key)}{where} from {min(values[name]):.3g} to {max(values[name]):.3g} {unit(key)}"
+    return {"number": name, "between": (min(values[name]), max(values[name]))}

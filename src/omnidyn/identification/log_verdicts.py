@@ -13,6 +13,7 @@ from omnidyn.findings.finding import FATAL, Finding, Verdict
 from omnidyn.findings.guesses import judged_again, judged_words, rest_on_guesses
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
+from omnidyn.statement import ERROR, Statement
 
 Tell = Callable[[str], object]
 
@@ -29,8 +30,8 @@ def log_verdicts(logs: Sequence[Log], robot: Robot | None, now: Tell, tell: Tell
     for k, log in enumerate(logs):
         now(f"checking {k + 1} of {len(logs)}")
         found.append(check_log(log, robot))
-    for words in verdict_advice(found):
-        tell(f"warning: {words}")
+    for mend in verdict_advice(found):
+        tell(f"{mend.severity}: {mend}")
     return tuple(found)
 
 
@@ -73,29 +74,34 @@ def of_motors(log: Log, *more: str) -> Log:
     return replace(log, channels=kept)
 
 
-def verdict_advice(verdicts: Sequence[Verdict]) -> list[str]:
+def verdict_advice(verdicts: Sequence[Verdict]) -> list[Statement]:
     """What to mend in logs of which `check` says that they give wrong results as they stand."""
     alike: dict[tuple[str, str], list[tuple[str, Finding]]] = {}
     for each in verdicts:
         for finding in _fatal(each):
             alike.setdefault((finding.code, finding.remedy), []).append((each.source, finding))
     return [
-        f"{_first(source for source, _ in found)}: {found[0][1].message}: {remedy or 'see omnidyn check'}"
+        Statement(
+            "mend_log", ERROR, _first(source for source, _ in found),
+            {"finding": found[0][1].message, "what": remedy or "see omnidyn check"},
+        )
         for (_, remedy), found in alike.items()
-    ]
+    ]  # fmt: skip
 
 
-def unfit(verdicts: Sequence[Verdict]) -> list[str]:
-    """Which logs are not fit for use as they stand, and why, in words: those with the same faults together."""
+def unfit(verdicts: Sequence[Verdict]) -> list[Statement]:
+    """Which logs are not usable as they stand, and why: those with the same faults together."""
     alike: dict[tuple[str, ...], list[Verdict]] = {}
     for each in verdicts:
         if each.fatal:
             alike.setdefault(tuple(finding.code for finding in _fatal(each)), []).append(each)
     return [
-        f"{_first(each.source for each in found)} {'is' if len(found) == 1 else 'are'} not fit for use as "
-        f"{'it stands' if len(found) == 1 else 'they stand'}: {'; '.join(each.message for each in _fatal(found[0]))}"
+        Statement(
+            "log_not_usable", ERROR, _first(each.source for each in found),
+            {"logs": len(found), "findings": tuple(each.message for each in _fatal(found[0]))},
+        )
         for found in alike.values()
-    ]
+    ]  # fmt: skip
 
 
 def checked(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:

@@ -8,11 +8,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from omnidyn.run import Run
+from omnidyn.statement import NOTE, WARNING, Statement
 
 SAME_TIME = 9  # decimals of a second to which times since the first row are compared
 
 
-def count_once(runs: Sequence[Run], groups: Sequence[str]) -> tuple[list[int], tuple[str, ...]]:
+def count_once(runs: Sequence[Run], groups: Sequence[str]) -> tuple[list[int], tuple[Statement, ...]]:
     """(places of the runs to use, what is to be said of the others). groups: of each run.
 
     Runs are the same where all their channels are, and their times since the first row, whatever they are called. The
@@ -21,20 +22,19 @@ def count_once(runs: Sequence[Run], groups: Sequence[str]) -> tuple[list[int], t
     if len(runs) == 1:
         return [0], ()
     seen: dict[str, int] = {}
-    kept, words = [], []
+    kept, repeated = [], list[Statement]()
     for place, run in enumerate(runs):
         first = seen.setdefault(fingerprint(run), place)
         if first == place:
             kept.append(place)
         elif groups[first] == groups[place]:
-            words.append(f"{_name(run, place)} is the same recording as {_name(runs[first], first)}: it counts once")
+            first_name = {"first": _name(runs[first], first)}
+            repeated.append(Statement("counted_once", NOTE, _name(run, place), first_name))
         else:
             kept.append(place)
-            words.append(
-                f"{_name(run, place)} in group {groups[place]} is the same recording as {_name(runs[first], first)} "
-                f"in group {groups[first]}: the groups are not independent"
-            )
-    return kept, tuple(words)
+            names = {"group": groups[place], "first": _name(runs[first], first), "other": groups[first]}
+            repeated.append(Statement("in_two_groups", WARNING, _name(run, place), names))
+    return kept, tuple(repeated)
 
 
 def fingerprint(run: Run) -> str:

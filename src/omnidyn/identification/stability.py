@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from omnidyn.document import Part, Points, Table, all_of, chance_cell, interval_cell, plain
+from omnidyn.document import Part, Points, Table, chance_cell, interval_cell, plain
 from omnidyn.model.keys import in_words, unit
+from omnidyn.statement import WARNING, Statement
 
 TIME, LOGS = "time", "logs"  # parts before and after a moment; parts that are logs
-NAMED = 4  # numbers that a sentence names
 
 
 @dataclass(frozen=True)
@@ -50,20 +50,13 @@ class Split:
     p: float
     shifts: tuple[Shift, ...]
 
-    def words(self) -> str:
-        """What differs, in a sentence."""
-        names = [in_words(each.key) for each in self.shifts]
-        more = [f"{len(names) - NAMED} more"] if len(names) > NAMED else []
-        what = all_of([*names[:NAMED], *more]) or "no number by itself, but what they do together"
-        differs = "differs" if len(names) <= 1 else "differ"
+    def statement(self) -> Statement:
+        """What differs."""
+        keys: dict[str, Any] = {"keys": tuple(each.key for each in self.shifts)}
         if self.by == LOGS:
-            return f"{what} {differs} from log to log by more than their errors allow"
-        of = f" of {self.where}" if self.where else ""
-        if self.at == self.at:
-            when = f"at {self.at:.4g} s{of} (between {self.between[0]:.4g} and {self.between[1]:.4g} s)"
-        else:
-            when = f"{100.0 * self.share:.0f} % into the logs"
-        return f"{what} {differs} before and after a moment, most likely {when}, by more than their errors allow"
+            return Statement("differ_between_logs", WARNING, numbers=keys)
+        when = {"at": self.at if self.at == self.at else None, "between": self.between, "share": self.share}
+        return Statement("differ_in_time", WARNING, self.where, keys | when)
 
 
 @dataclass(frozen=True)
@@ -81,9 +74,9 @@ class Stability:
         """Whether any number differs."""
         return bool(self.splits)
 
-    def statements(self) -> list[str]:
-        """What differs, a sentence each; none for a fit that is stable."""
-        return [split.words() for split in self.splits]
+    def statements(self) -> list[Statement]:
+        """What differs; nothing for a fit that is stable."""
+        return [split.statement() for split in self.splits]
 
     def table(self) -> Table:
         """What each number that differs is in each part."""
@@ -106,4 +99,5 @@ class Stability:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
-        return plain({"found": self.found, "tested": self.tested, "splits": [asdict(each) for each in self.splits]})
+        return plain({"found": self.found, "tested": self.tested, "splits": [asdict(each) for each in self.splits],
+                      "statements": self.statements()})  # fmt: skip

@@ -6,7 +6,7 @@ held-out logs where there are any. Headings and positions count on the logs they
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -19,17 +19,16 @@ from omnidyn.comparison.compare import compare
 from omnidyn.comparison.result import Comparison
 from omnidyn.comparison.traces import counts_from_start, unit
 from omnidyn.comparison.verdict import is_missed
-from omnidyn.document import Document, Table, cell, chance_cell
+from omnidyn.document import Document, Points, Table, cell, chance_cell
 from omnidyn.identification.lack_of_fit import LackOfFit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.logs.channels import place
 from omnidyn.run import Run, as_list
+from omnidyn.statement import NOTE, WARNING, Statement
 from omnidyn.statistics import difference_noise, find_tick, robust_std
 
-STUDENT_WORDS = "Student's t"  # how a fit by that loss calls itself
 FITTED, HELD_OUT = "fitted", "held out"
 POSE = {"x": "position[0]", "y": "position[1]", "heading": "heading[0]"}
-MOSTLY, WORTH = 0.5, 0.01  # share of the variance of errors that is no noise, from which on most is, or any
 FAR = 1.5  # chi2 of held-out logs beyond which the model misses something there
 NOT_WHITE = 0.01
 
@@ -82,39 +81,23 @@ class Validation:
         head = ("logs", "component", "unit", "samples", "rmse", "fit %", "chi2", "white p", "lag s")
         return Table(head, rows, "<<<>")
 
-    def statements(self) -> Iterator[str]:
-        """What they say, in words."""
+    def statement(self) -> Statement:
+        """What they say of logs held out."""
         found = self.scores.get(HELD_OUT)
         if found is None:
-            yield "nothing was held out: how well the model predicts logs that it never saw is not known (`hold_out`)"
-            return
+            return Statement("nothing_held_out", NOTE)
         far = [name for name, s in found.items() if s.chi2 is not None and s.chi2 > FAR]
         if far:
             worst, fitted = max(found[name].chi2 or 0.0 for name in far), self.scores[FITTED]
             too = all(name in fitted and (fitted[name].chi2 or 0.0) > FAR for name in far)
-            yield (
-                f"on held-out logs the errors of {', '.join(far)} are larger than noise (chi2 up to {worst:.3g}): the "
-                f"model misses something{', on the fitted logs too' if too else ' that differs between the logs'}"
-            )
-        elif names := coloured(found):
-            no_larger = f"the errors of {', '.join(names)} are no larger than on the fitted ones"
-            yield f"on held-out logs {no_larger}{self._colour(names)}"
-        else:
-            yield "held-out logs are predicted as well as the noise allows"
-
-    def _colour(self, names: Sequence[str]) -> str:
-        """What errors that are not white hold, by what was found of the fitted ones: colour alone is no misfit."""
-        if self.misfit is None:
-            return ", but not white: noise that remembers, or something that the model misses"
-        share = max((self.misfit.get(name, 0.0) for name in names), default=0.0)
-        if share < WORTH:
-            follow = "follow nothing that the model should know" if not self.misfit else "are not what the model misses"
-            return f"; they are not white, but {follow}: noise that remembers"
-        most, much = (
-            "most of them" if share > MOSTLY else "some of them",
-            f"up to {100.0 * share:.0f} % of their variance",
-        )
-        return f", but {most} is no noise ({much}): the model misses that much"
+            numbers = {"components": tuple(far), "chi2": worst, "fitted_too": too}
+            return Statement("held_out_misfit", WARNING, numbers=numbers)
+        names = coloured(found)
+        if not names:
+            return Statement("held_out_noise", NOTE)
+        share = None if self.misfit is None else max((self.misfit.get(name, 0.0) for name in names), default=0.0)
+        numbers = {"components": tuple(names), "share": share, "misfit": bool(self.misfit)}
+        return Statement("held_out_colour", NOTE, numbers=numbers)
 
     def not_followed(self, fitted: Collection[str]) -> dict[str, float]:
         """Component -> fit [%] of what the model does not follow, by the rule above. fitted: names of outputs."""
@@ -135,7 +118,7 @@ class Validation:
 
     def document(self) -> Document:
         """The scores, and what they say."""
-        return Document([self.table(), *(f"- {words}" for words in self.statements())], self.to_dict())
+        return Document([self.table(), Points([self.statement()])], self.to_dict())
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -233,7 +216,7 @@ def _chi2(
     noise = fit.noise.get(output)
     if not noise:
         return None
-    by_students_t = STUDENT_WORDS in fit.method
+    by_students_t = fit.robust
     if lack is not None and lack.noise and output in lack.beyond and not (tick or by_students_t):
         noise /= max(lack.noise[output].chi2, 1.0) ** 0.5
     errors = np.concatenate(_errors(found, name))

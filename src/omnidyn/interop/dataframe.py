@@ -82,7 +82,7 @@ def _of_estimate(estimate: Estimate) -> tuple[Mapping[str, list[Any]], dict[str,
     }
     attributes = {
         "robot": estimate.robot.name, "method": estimate.method, "data": estimate.data,
-        "warnings": list(estimate.warnings), "units": dict(zip(names, columns["unit"], strict=True)),
+        "warnings": [*map(str, estimate.warnings)], "units": dict(zip(names, columns["unit"], strict=True)),
     }  # fmt: skip
     return columns, attributes
 

@@ -23,7 +23,7 @@ from omnidyn.model.drive import SPEED, Drive
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import EMF, FRICTION, GAINS, ROTOR, TORQUE, VISCOUS, Key, all_keys, find_key, name_of
 from omnidyn.model.motor import Motor
-from omnidyn.model.robot import GIVEN, GUESS, IMPORTED, MEASURED, Body, Origin, Prior, Robot
+from omnidyn.model.robot import GIVEN, GUESS, GUESSES, IMPORTED, MEASURED, Body, Origin, Prior, Robot
 from omnidyn.model.surroundings.floor import GRAVITY as GRAVITY
 from omnidyn.model.wheels import PerWheel, Wheels
 
@@ -147,7 +147,7 @@ def with_gear(robot: Robot, gear_ratio: float, source: str, origin: Origin = MEA
         emf_constant=_times(robot.motor.emf_constant, share),
     )
     shares = {TORQUE: share, EMF: share}
-    if ROTOR in robot.priors and robot.priors[ROTOR].origin == GUESS:
+    if ROTOR in robot.priors and robot.priors[ROTOR].origin in GUESSES:
         motor, shares = motor.replace(rotor_inertia=_times(motor.rotor_inertia, share**2)), shares | {ROTOR: share**2}
     spreads = {
         key: prior.replace(std=_round(prior.std * shares[name_of(key)]))
@@ -296,7 +296,7 @@ def _times(value: Any, factor: float | tuple[float, ...]) -> Any:
 
 def guessed(robot: Robot) -> list[str]:
     """What of a robot is a guess, as short names: ["inertia", "resistance", ...]; all friction is one word."""
-    keys = [place for key, prior in robot.priors.items() if prior.origin == GUESS and (place := find_key(key))]
+    keys = [place for key, prior in robot.priors.items() if prior.origin in GUESSES and (place := find_key(key))]
     return list(dict.fromkeys(FRICTION if key.level else Key(key.name).words for key in keys))
 
 
@@ -306,7 +306,7 @@ def rests_on(robot: Robot, at_rest: bool = False) -> list[str]:
     Numbers that only show together, and were fitted together, are right as the sum or product that any answer takes
     from them: they are not named. at_rest: of what a robot at rest does, which no mass, speed or back-EMF changes.
     """
-    kept = {key: prior for key, prior in robot.priors.items() if prior.guessed or prior.origin != GUESS}
+    kept = {key: prior for key, prior in robot.priors.items() if prior.guessed}
     if at_rest:
         kept = {key: prior for key, prior in kept.items() if (place := find_key(key)) and not _shows_in_motion(place)}
     return guessed(robot.model_copy(update={"priors": kept}))
@@ -330,7 +330,7 @@ def _shows_in_motion(key: Key) -> bool:
 
 def reasons(robot: Robot) -> list[tuple[str, str]]:
     """(key, why) of every guess of `first_guess`, in the order of the file."""
-    keys = dict.fromkeys(name_of(key) for key, prior in robot.priors.items() if prior.origin == GUESS)
+    keys = dict.fromkeys(name_of(key) for key, prior in robot.priors.items() if prior.origin in GUESSES)
     why = WHY if GEAR in keys else WHY | {EMF: WHY[GEAR]}  # behind a gear that is known the speed tells the constant
     return [(key, why[key]) for key in keys if key in why]
 

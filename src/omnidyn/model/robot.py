@@ -61,17 +61,20 @@ class Body(Value):
     ] = 0.0
 
 
-Origin = Literal["guess", "given", "datasheet", "measured", "identified", "imported"]
-"""Where a number comes from. given: by whoever wrote the file; imported: from another robot or another file."""
+Origin = Literal["guess", "joint", "given", "datasheet", "measured", "identified", "imported"]
+"""Where a number comes from. given: by whoever wrote the file; imported: from another robot or another file; joint: a
+guess that a fit has changed together with others, right as the sum or product that answers take."""
 
 GUESS: Origin = "guess"
+JOINT: Origin = "joint"
+GUESSES = (GUESS, JOINT)
 GIVEN: Origin = "given"
 MEASURED: Origin = "measured"
 IDENTIFIED: Origin = "identified"
 IMPORTED: Origin = "imported"
 
 
-WITH_THE_FIT = "goes with a fit"  # source of a guess that a fit has changed together with others
+WITH_THE_FIT = "goes with a fit"  # how the source of a joint number begins
 
 
 class Prior(Value):
@@ -85,11 +88,8 @@ class Prior(Value):
 
     @property
     def guessed(self) -> bool:
-        """Whether an answer that takes this number rests on a guess.
-
-        Numbers that only show together, and were fitted together, are right as the sum or product that answers take.
-        """
-        return self.origin == GUESS and not self.source.startswith(WITH_THE_FIT)
+        """Whether an answer that takes this number rests on a guess."""
+        return self.origin == GUESS
 
 
 class Robot(Shown, Value):

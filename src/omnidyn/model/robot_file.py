@@ -17,7 +17,7 @@ from omnidyn.model.known.told import correlation_of, refuse_strange_keys
 from omnidyn.model.presets import PRESETS as PRESETS
 from omnidyn.model.presets import preset_names as preset_names
 from omnidyn.model.presets import robot_path
-from omnidyn.model.robot import GIVEN, GUESS, IDENTIFIED, SCHEMA, Origin, Prior, Robot
+from omnidyn.model.robot import GIVEN, GUESS, IDENTIFIED, JOINT, SCHEMA, WITH_THE_FIT, Origin, Prior, Robot
 from omnidyn.model.value import from_validation, key_path, keys_of, table_at
 
 TOGETHER = "correlation"
@@ -75,9 +75,11 @@ def _without_priors(node: Any, path: tuple[str | int, ...], priors: dict[str, Pr
     if known_of and path[0] != TOGETHER:  # nothing is known of a correlation
         known = {key: value for key, value in node.items() if key != "value"}
         try:
-            priors[_dotted(path)] = Prior(**{"origin": _origin_in(known.get("source")), **known})
+            prior = Prior(**{"origin": _origin_in(known.get("source")), **known})
         except InputError as error:
             raise error.at(key_path(path)) from None
+        joint = prior.guessed and prior.source.startswith(WITH_THE_FIT)  # as files say it from before "joint"
+        priors[_dotted(path)] = prior.replace(origin=JOINT) if joint else prior
         return node["value"]
     if isinstance(node, dict):
         return {key: _without_priors(value, (*path, key), priors) for key, value in node.items()}

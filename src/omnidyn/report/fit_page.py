@@ -85,12 +85,12 @@ def _page(
     return page(f"{robot}: identified from whole logs", introduction, sections, provenance, verdict=found.verdict)
 
 
-def _named(group: str, words: str, fits: Mapping[str, Any]) -> str:
-    return words if len(fits) == 1 else f"{group}: {words}"
+def _named(group: str, words: object, fits: Mapping[str, Any]) -> str:
+    return f"{words}" if len(fits) == 1 else f"{group}: {words}"
 
 
 def _findings(fits: Fits, validations: Mapping[str, Validation]) -> list[str]:
-    found = [_named(group, words, fits) for group, each in validations.items() for words in each.statements()]
+    found = [_named(group, each.statement(), fits) for group, each in validations.items()]
     for group, fit in fits.items():
         for words, name, value, _, interval, unit, mark in number_table(fit).rows:
             if name in fit.nuisances:
@@ -135,7 +135,7 @@ def _ladder(fit: OutputErrorEstimate) -> str:
     """Every model that the ladder fitted, and what it came to."""
     if fit.ladder is None:
         return ""
-    return paragraph(sentence(fit.ladder.words())) + (content(fit.ladder.table()) if fit.ladder.rungs else "")
+    return paragraph(sentence(str(fit.ladder.statement()))) + (content(fit.ladder.table()) if fit.ladder.rungs else "")
 
 
 def _rests(_group: str, fit: OutputErrorEstimate) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from omnidyn.document import sentence
 from omnidyn.findings.finding import Verdict
 from omnidyn.identification.fit_document import verdict_table
 from omnidyn.identification.steady.operating_points import SPEEDS
@@ -42,4 +43,10 @@ def render_study(
     ]
     sections += [section("logs", "What check says of the logs", verdict_table(verdicts))] if verdicts else []
     title = f"{study.robot.name}: friction from logs"
-    return page(title, introduction, sections, provenance, verdict=verdict or steady_verdict(study))
+    return page(
+        title,
+        introduction,
+        sections,
+        provenance,
+        verdict=verdict or " ".join(sentence(str(each)) for each in steady_verdict(study)),
+    )

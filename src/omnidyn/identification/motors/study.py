@@ -92,7 +92,7 @@ class MotorStudy(Shown):
     def verdict(self) -> str:
         """Which motors answer to their input, and at which input they start, in a sentence; failures first."""
         if faults := unfit(self.verdicts):
-            return sentence(f"failed: {'; '.join(faults)}: the numbers mean nothing until that is mended")
+            return sentence(f"failed: {'; '.join(map(str, faults))}: the numbers mean nothing until that is mended")
         return motors_verdict(self.motors, self.starts)
 
     @property
@@ -103,7 +103,7 @@ class MotorStudy(Shown):
     @property
     def advice(self) -> tuple[str, ...]:
         """What to mend in the logs."""
-        return tuple(verdict_advice(self.verdicts))
+        return tuple(map(str, verdict_advice(self.verdicts)))
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from omnidyn.document import Part, Points, all_of, interval_cell, plain
+from omnidyn.document import Part, Points, interval_cell, plain, sentence
 from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate
 from omnidyn.identification.ladder import Ladder
 from omnidyn.identification.output_error.solve.solver import Solution
@@ -15,6 +15,7 @@ from omnidyn.identification.stability import Stability
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.model.fitted.log_effects import log_mark
 from omnidyn.run import Run
+from omnidyn.statement import ERROR, NOTE, Statement
 
 
 @dataclass(frozen=True)
@@ -29,14 +30,27 @@ class Nuisance:
 
 @dataclass(frozen=True)
 class Combination:
-    """A number that the logs determine where they do not determine those behind it: name, value, std, 95 % interval."""
+    """A number that the logs determine where they do not determine those behind it: name, value, std, 95 % interval.
+
+    axis: along which it acts. correlation: of those behind it, where the sum is known because they trade; else None.
+    """
 
     name: str
     value: float
     std: float
     ci95: tuple[float, float]
     unit: str
-    words: str
+    axis: str
+    correlation: float | None = None
+
+    def statement(self) -> Statement:
+        """What it is."""
+        kind = self.name.partition(".")[0]
+        return Statement(f"combined_{kind}", NOTE, self.axis, {"correlation": self.correlation})
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON has it."""
+        return {**asdict(self), "words": str(self.statement())}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,10 +62,10 @@ class OutputErrorEstimate(Estimate):
     unidentifiable: names of what the data do not determine. Where the std of the robot file is a prior, the value is
     the one that goes best with all others, std and interval are those of the posterior, hardly more than what the file
     said; elsewhere both are infinite. Neither is ever shown. combinations: what the data determine of these numbers
-    together. directions: of these numbers, that the data do not show, with what would. covariance: "white",
-    "autoregressive" or "sandwich". unused: what the logs hold and the fit does not use, and why, in words. iterations,
-    converged: of the minimisation. not_followed: outputs that the model does not
-    follow. ladder: what was switched on step by step, where that was asked for.
+    together. directions: of these numbers, that the data do not show, with what would show them. covariance: "white",
+    "autoregressive" or "sandwich". unused: what the logs hold and the fit does not use, and why. iterations,
+    converged: of the minimisation. not_followed: outputs that the model does not follow. robust: whether the loss is
+    Student's t. ladder: what was switched on step by step, where that was asked for.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
@@ -59,16 +73,17 @@ class OutputErrorEstimate(Estimate):
     combinations: tuple[Combination, ...] = ()
     directions: tuple[Blind, ...] = ()
     covariance: str = ""
-    unused: tuple[str, ...] = ()
+    unused: tuple[Statement, ...] = ()
     iterations: int = 0
     converged: bool = True
     not_followed: tuple[str, ...] = ()
+    robust: bool = False
     ladder: Ladder | None = None
 
     @property
-    def blind(self) -> tuple[str, ...]:
-        """What the data do not show, and what would, a sentence each."""
-        return tuple(map(str, self.directions))
+    def blind(self) -> tuple[Statement, ...]:
+        """What the data do not show, and what would."""
+        return tuple(direction.statement() for direction in self.directions)
 
     def beside(self, runs: Sequence[Run]) -> OutputErrorEstimate:
         """The same, where these logs are of the same series as those that were fitted, such as those held out: the file
@@ -88,12 +103,12 @@ class OutputErrorEstimate(Estimate):
     def verdict(self) -> str:
         """How well its numbers are known, in a sentence; they mean nothing where the model does not follow."""
         if self.not_followed:
-            return f"The model does not follow {all_of(self.not_followed)}: its numbers mean nothing until it does."
+            return sentence(str(Statement("not_followed_at_all", ERROR, numbers={"outputs": self.not_followed})))
         return super().verdict
 
     def _parts(self) -> list[Part]:
         """The numbers of the log, the noise and what the data do not show, after the rest."""
-        sums = [f"{one.words}: {one.value:.4g} {interval_cell(one.ci95)} {one.unit}" for one in self.combinations]
+        sums = [f"{one.statement()}: {one.value:.4g} {interval_cell(one.ci95)} {one.unit}" for one in self.combinations]
         logs = [
             f"{name}: {NOT_DETERMINED if name in self.unidentifiable else self._of_log(own)}"
             for name, own in self.nuisances.items()
@@ -117,7 +132,7 @@ class OutputErrorEstimate(Estimate):
         }
         return super().to_dict() | plain({
             "nuisances": nuisances, "noise": self.noise, "unidentifiable": self.unidentifiable,
-            "combinations": [asdict(one) for one in self.combinations], "blind": self.blind,
+            "combinations": self.combinations, "blind": self.blind,
             "covariance": self.covariance, "unused": self.unused,
             "converged": self.converged, **({"ladder": self.ladder.to_dict()} if self.ladder else {}),
             "directions": [asdict(one) for one in self.directions],

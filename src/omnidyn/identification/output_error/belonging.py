@@ -20,7 +20,7 @@ from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN
 from omnidyn.model.fitted.log_effects import Lateness, LogEffects, log_mark
 from omnidyn.model.frames import AXES
 from omnidyn.model.keys import find_key, with_priors
-from omnidyn.model.robot import GUESS, WITH_THE_FIT, Prior, Robot
+from omnidyn.model.robot import JOINT, WITH_THE_FIT, Prior, Robot
 from omnidyn.run import Run
 
 
@@ -65,7 +65,7 @@ def key_of(name: str, robot: Robot) -> str:
 
 def _known(name: str, std: Mapping[str, float], open_: Sequence[str], data: str) -> Prior:
     if name not in std or name in open_:
-        return Prior(source=printable(f"{WITH_THE_FIT}, {data}"), origin=GUESS)
+        return Prior(source=printable(f"{WITH_THE_FIT}, {data}"), origin=JOINT)
     return identified(std[name], f"output error, {data}")
 
 

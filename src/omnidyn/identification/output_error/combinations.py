@@ -19,7 +19,6 @@ from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.trust.uncertainty import BLIND, Trust
 from omnidyn.model.frames import AXES
 from omnidyn.model.keys import VISCOUS, Key
-from omnidyn.model.layout import YAW
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import damping, push_per_volt
 
@@ -30,17 +29,16 @@ VAGUE = 0.5  # of its value: a std beyond it determines no combination either
 
 @dataclass(frozen=True)
 class _Kind:
-    """A function of the robot along each axis (3,), its units and what it is."""
+    """A function of the robot along each axis (3,), and its units."""
 
     name: str
     of: Callable[[Robot], FloatArray]
     units: tuple[str, str, str]
-    words: str
 
 
 KINDS = (
-    _Kind("damping", damping, ("N s/m", "N s/m", "N m s"), "viscous friction and braking by back-EMF, together"),
-    _Kind("push", push_per_volt, ("N/V", "N/V", "N m/V"), "of the motors per volt at rest"),
+    _Kind("damping", damping, ("N s/m", "N s/m", "N m s")),
+    _Kind("push", push_per_volt, ("N/V", "N/V", "N m/V")),
 )
 
 
@@ -59,7 +57,7 @@ def combinations(problem: Problem, values: FloatArray, known: Trust, moved: Bool
                 found.append(
                     Combination(
                         f"{kind.name}.{AXES[axis]}", value, std, (value - half, value + half), kind.units[axis],
-                        f"{kind.name} {'about yaw' if axis == YAW else f'along {AXES[axis]}'}: {kind.words}",
+                        AXES[axis],
                     )
                 )  # fmt: skip
     return tuple(found)

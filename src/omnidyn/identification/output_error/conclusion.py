@@ -1,4 +1,4 @@
-"""From the minimum to the answer: values, intervals, and what a reader must know, in words."""
+"""From the minimum to the answer: values, intervals, and what a reader must know."""
 
 from __future__ import annotations
 
@@ -27,14 +27,15 @@ from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trades import trades
 from omnidyn.identification.output_error.trust.alone import from_the_log_alone, given
 from omnidyn.identification.output_error.trust.breakaway import Breakaway
-from omnidyn.identification.output_error.trust.cures import Blind, blind_in_words
-from omnidyn.identification.output_error.trust.ends import at_the_end, end_words
+from omnidyn.identification.output_error.trust.cures import Blind, blind_directions
+from omnidyn.identification.output_error.trust.ends import at_the_end
 from omnidyn.identification.output_error.trust.support import too_early
-from omnidyn.identification.output_error.trust.uncertainty import Trust, widened
+from omnidyn.identification.output_error.trust.uncertainty import Trust
 from omnidyn.model.keys import ROTOR, VISCOUS, WHEEL, Key, unit, with_priors
 from omnidyn.model.known.holding import holding
 from omnidyn.model.known.told import with_correlation
-from omnidyn.model.robot import WITH_THE_FIT, Prior, Robot
+from omnidyn.model.robot import JOINT, WITH_THE_FIT, Prior, Robot
+from omnidyn.statement import ERROR, NOTE, WARNING, Statement
 from omnidyn.statistics import difference_noise
 
 IN_METRES = (("twist", 0), ("twist", 1), ("position", 0), ("position", 1))  # outputs that know of no wheel radius
@@ -43,7 +44,7 @@ SCALE_OF_T = 0.8310  # scale of Student's t with four degrees of freedom, fitted
 
 
 def conclude(
-    solver: Solver, solution: Solution, known: Trust, records: Sequence[Record], loss: str, more: Sequence[str],
+    solver: Solver, solution: Solution, known: Trust, records: Sequence[Record], loss: str, more: Sequence[Statement],
     lower_bound: Mapping[str, float], moved: BoolArray, levels: Sequence[Breakaway] = (),
     better: Mapping[str, tuple[float | None, tuple[float, float]]] | None = None, exact: Trust | None = None,
 ) -> OutputErrorEstimate:  # fmt: skip
@@ -58,7 +59,7 @@ def conclude(
     ended = tuple(p.name for p in at_the_end(problem, values))
     open_ = tuple(p.name for p, b in zip(problem.parameters, known.open, strict=True) if b or p.name in ended)
     own, missed = problem.robot_count, unexplained(solver, solution)
-    directions = () if missed else blind_in_words(problem, values, known.ways, moved)
+    directions = () if missed else blind_directions(problem, values, known.ways, moved)
     joint = combinations(problem, values, known, moved)
     if known.open[:own].all() and (missed or not joint):
         _refuse_blind(problem.names[:own], missed, records[0].source, known.unseen[:own], directions)
@@ -100,6 +101,7 @@ def conclude(
         iterations=solution.iterations,
         converged=solution.converged,
         not_followed=tuple(missed),
+        robust=bool(solver.nu),
     )
 
 
@@ -158,18 +160,11 @@ def _measured(problem: Fitted, column: Column) -> list[FloatArray]:
     return [part - part.mean() if column[0] in TRAVELS else part for part in parts if part.size]
 
 
-def _not_followed(missed: Mapping[str, float]) -> list[str]:
+def _not_followed(missed: Mapping[str, float]) -> list[Statement]:
     if not missed:
         return []
-    still = "it never changes, and the model moves it: a sensor that is dead"
-    names = ", ".join(
-        f"{name} ({f'errors {100.0 * share:.0f} % of its spread' if math.isfinite(share) else still})"
-        for name, share in missed.items()
-    )
-    return [
-        f"the model does not follow {names}: a sign, a unit, the order of the wheels or the robot file is wrong; the "
-        "numbers and intervals of this fit mean nothing until it does"
-    ]
+    shares = tuple(share if math.isfinite(share) else None for share in missed.values())
+    return [Statement("not_followed", ERROR, numbers={"outputs": tuple(missed), "shares": shares})]
 
 
 def _refuse_blind(
@@ -187,12 +182,10 @@ def _refuse_blind(
             remedy="check signs, units and the order of the wheels, and the voltages (omnidyn check)",
         )  # fmt: skip
     if not unseen.all():
-        ways = "; ".join(" or ".join(each.cures) for each in directions if each.cures)
         raise InsufficientDataError(
             "; ".join(["of what is free each number can be made up for by others, so that none can be told",
-                       *(each.words for each in directions)]), got=", ".join(free), expected="fewer numbers",
-            remedy=": ".join(["leave out one that is known", *([ways] if ways else [])]),
-            where=where,
+                       *(str(direction.statement()) for direction in directions)]),
+            got=", ".join(free), expected="fewer numbers", remedy="leave out one that is known", where=where,
         )  # fmt: skip
     raise InsufficientDataError(
         "the logs say nothing about what is free", got=", ".join(free), expected="motion",
@@ -263,7 +256,8 @@ def _robot(
                 share = value / float(Key.parse(p.name).get(problem.robot)) if p.log else 1.0
                 joint = together and (p.part == "motor" or Key.parse(key).level == VISCOUS)
                 source = printable(f"{WITH_THE_FIT}, {data}") if joint else before.source
-                found[key] = before.replace(std=float(before.std * share), source=source)
+                origin = JOINT if joint and before.guessed else before.origin
+                found[key] = before.replace(std=float(before.std * share), source=source, origin=origin)
     return with_priors(holding(robot), found)
 
 
@@ -326,43 +320,44 @@ def _together(
 
 def _warnings(
     solver: Solver, solution: Solution, known: Trust, records: Sequence[Record], blind: Sequence[str]
-) -> list[str]:
-    words = list(dict.fromkeys(f"{r.source or 'log'}: {note}" for r in records for note in r.notes))
+) -> list[Statement]:
+    found = list(dict.fromkeys(note for record in records for note in record.notes))
     if not solution.converged:
-        words.append(f"the fit was cut short after {solution.iterations} iterations: the numbers are of its last step")
-    words += [f"{name} is not identifiable from these logs" for name in blind]
-    words += [implausible(name, value) for name, value in too_early(solver, solution).items()]
+        found.append(Statement("iteration_limit", WARNING, numbers={"iterations": solution.iterations}))
+    found += [Statement("not_identifiable", WARNING, name) for name in blind]
+    found += [implausible(name, value) for name, value in too_early(solver, solution).items()]
     values = solution.state.point.values
     ended = {p.name: p for p in at_the_end(solver.problem, values)}
     at = {name: float(values[solver.problem.where(name)]) for name in ended}
-    words += [end_words(p, at[name], _unit(name) or unit(name)) for name, p in ended.items()]
+    found += [
+        Statement("search_end", WARNING, name, {"value": value, "unit": _unit(name) or unit(name)})
+        for name, value in at.items()
+    ]
     for j, p in enumerate(solver.problem.parameters[: solver.problem.robot_count]):
         if known.held[j] and p.name not in ended:
-            bound = f"{p.name} is at its bound {solution.state.point.values[j]:.4g}"
-            still = Key.parse(p.name.partition("@")[0]).name in (ROTOR, WHEEL)
-            why = "nothing is seen to spin beside the body" if still else "the best fit lies beyond it"
-            if falls(p.name.partition("@")[0], solver.problem.robot):
-                why = "the log shows no fall from it to Coulomb friction"
-            words.append(f"{bound}: {why}")
+            key = p.name.partition("@")[0]
+            code = "bound_of_inertia" if Key.parse(key).name in (ROTOR, WHEEL) else "bound"
+            code = "bound_of_breakaway" if falls(key, solver.problem.robot) else code
+            found.append(Statement(code, NOTE, p.name, {"value": values[j]}))
     if known.kind == "sandwich":
-        by = f" by the scatter from run to run ({known.runs} runs)" if known.runs else ""
-        words.append(
-            f"the residuals are not white (correlation of neighbours up to {np.abs(known.neighbours).max():.2f}): the "
-            f"intervals allow for it{by}; {widened(known)}"
-        )
-    return words
+        numbers = {"neighbours": np.abs(known.neighbours).max(), "runs": known.runs, "widening": known.widening}
+        found.append(Statement("not_white", NOTE, numbers=numbers))
+    return found
 
 
-def _unused(records: Sequence[Record]) -> tuple[str, ...]:
+def _unused(records: Sequence[Record]) -> tuple[Statement, ...]:
     """What the logs hold and the fit does not use: each reason once, with the logs it is true of where not of all."""
-    where: dict[str, list[str]] = {}
+    where: dict[Statement, list[str]] = {}
     for record in records:
-        for words in record.unused:
-            where.setdefault(words, []).append(record.source or "a log")
+        for unused in record.unused:
+            where.setdefault(unused, []).append(record.source or "a log")
     return tuple(
-        words if len(own) == len(records) else f"{words} ({len(own)} of {len(records)} logs, such as {own[0]})"
-        for words, own in where.items()
-    )
+        unused if len(logs) == len(records) else Statement(
+            "unused_in_some_logs", NOTE, unused.subject,
+            {"unused": unused, "logs": len(logs), "of": len(records), "first": logs[0]},
+        )
+        for unused, logs in where.items()
+    )  # fmt: skip
 
 
 def _column(column: tuple[str, int]) -> str:

@@ -29,7 +29,7 @@ from omnidyn.identification.output_error.prepare import (
     guesses,
     make_engine,
 )
-from omnidyn.identification.output_error.problem.band import band_words, with_band
+from omnidyn.identification.output_error.problem.band import band_note, with_band
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, automatic, implausible
 from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated
 from omnidyn.identification.output_error.problem.problem import Problem
@@ -49,17 +49,13 @@ from omnidyn.identification.recordings import count_once
 from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
+from omnidyn.statement import WARNING, Statement
 
 Unearned = Callable[[Solution], Sequence[str]]
 
 NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
 HALFWAY = 3e-4  # [m/s] tolerance of the implicit engine on the way there
 CLOSE = 1e-4  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
-HARMS = (
-    "soaks up what the model misses in a part of the log: the likelihood is sure of it, and blocks of the log that are "
-    "left out of the fit are predicted better without"
-)
-INTERRUPTED = "the fit was interrupted: the numbers are the best so far, their intervals are those of that point"
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,14 +63,13 @@ class Fit:
     """A fit of whole logs, ready to be solved.
 
     `solve` finds the best point, `answer` says what it means. After an interrupt, `answer` takes the `best` of the
-    Progress that `solve` was given. began: the robot as it was given. twice: which runs were given twice and count
-    once, in words.
+    Progress that `solve` was given. began: the robot as it was given. twice: which runs were given twice.
     """
 
     question: Question
     groups: tuple[Group, ...]
     began: Robot
-    twice: tuple[str, ...] = ()
+    twice: tuple[Statement, ...] = ()
 
     @classmethod
     def of(
@@ -136,11 +131,11 @@ class Fit:
         any of the robot's numbers.
         """
         answer = self._answer(found, progress or Progress(), moved_by)
-        words, estimates = band_words(self.began), answer.estimates
+        note, estimates = band_note(self.began), answer.estimates
         return replace(
             answer,
             estimates={
-                name: replace(one, robot=with_band(one.robot, self.began), warnings=(*one.warnings, *words))
+                name: replace(one, robot=with_band(one.robot, self.began), warnings=(*one.warnings, *note))
                 for name, one in estimates.items()
             },
         )
@@ -243,8 +238,8 @@ class Fit:
         lost = [name for name in _nuisances(found.solver.problem) if name not in kept]
         if not lost:
             return found
-        notes = tuple(f"{implausible(name, value)}: it is not fitted" for name, value in early.items())
-        notes += tuple(f"{name} {HARMS}: it is not fitted" for name in harmful if name not in early)
+        notes = tuple(implausible(name, value, fitted=False) for name, value in early.items())
+        notes += tuple(Statement("harmful_nuisance", WARNING, name) for name in harmful if name not in early)
         if group.engine == LOOP:  # from its start on: until it is done, the fit with all of them is the best so far
             progress = progress.aside(f"once more without {', '.join(lost)}")
         return replace(self._solve(group, group.problem(kept), progress), notes=notes)
@@ -260,7 +255,7 @@ class Fit:
             return None
         group = self.groups[0]
         plainer = self._solve(group, group.problem([name for name in names if name not in lost]), progress)
-        note = f"beside {' and '.join(lost)} these logs do not settle the numbers of the robot: not fitted"
+        note = Statement("unsettled_nuisances", WARNING, numbers={"nuisances": tuple(lost)})
         return replace(plainer, notes=(*found.notes, note))
 
     def _solve(self, group: Group, problem: Problem, progress: Progress) -> Solution:
@@ -324,9 +319,9 @@ class Fit:
         engine = join(self.groups, problems, own_names(self.question.per_free, problems), tol)
         return Solver(engine.problem, engine, self.nu)
 
-    def _so_far(self, best: Best) -> tuple[Solution, list[str]]:
+    def _so_far(self, best: Best) -> tuple[Solution, list[Statement]]:
         """The best so far as if it were the best, and what is to be said of it."""
-        warnings, state = [INTERRUPTED], best.state
+        warnings, state = [Statement("interrupted")], best.state
         if state is not None:  # it may be of a part of the logs, or of longer steps
             assert isinstance(state.problem, Problem)
             solver = self._solver(_nuisances(state.problem) if self._settles else None)
@@ -336,10 +331,10 @@ class Fit:
             assert isinstance(solver.engine, JointEngine)
             state = solver.minimise(joint_start(solver.engine, self.nu, Progress(), best.alone), limit=0).state
             late = [group.name for group in self.groups if group.name not in best.alone]
-            warnings += [f"{name} was not fitted yet: its own numbers are where its fit begins" for name in late]
+            warnings += [Statement("group_not_fitted", WARNING, name) for name in late]
         return Solution(state, Normal(solver, state).held, 0, True, solver), warnings
 
-    def _hints(self, solution: Solution) -> list[str]:
+    def _hints(self, solution: Solution) -> list[Statement]:
         """Which logs of a speed loop are not used."""
         group = self.groups[0]
         alone = len(self.groups) == 1 and group.engine == LOOP

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.document import short
 from omnidyn.identification.output_error.memory.whitening import Weighed
 from omnidyn.identification.output_error.problem.input_steps import input_steps
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.trust.uncertainty import Trust
+from omnidyn.statement import WARNING, Statement
 
 WIDER = 1.1  # times an interval, from which on what widens it is said
 
@@ -27,7 +27,7 @@ class MovedBy(NamedTuple):
 
 def beside_rounding(
     sure: Weighed, records: Sequence[Record], moved_by: MovedBy | None
-) -> tuple[Trust, list[str]]:  # fmt: skip
+) -> tuple[Trust, list[Statement]]:  # fmt: skip
     """(the trust in a fit, with what inputs in steps may have been rounded by; what is to be said of that)."""
     steps = max(float(input_steps(record).max()) for record in records)
     if not steps or moved_by is None:
@@ -35,5 +35,5 @@ def beside_rounding(
     known = sure.known.beside(moved_by.rounding(sure))
     with np.errstate(divide="ignore", invalid="ignore"):
         wider = float(np.nanmax(known.std / sure.known.std, initial=1.0))
-    words = f"inputs are logged in steps of {steps:.2g} V: what they may have been rounded by is in the intervals"
-    return known, [f"{words}, which are up to {short(wider)} times as wide for it"] if wider > WIDER else []
+    rounded = Statement("rounded_inputs", WARNING, numbers={"step": steps, "wider": wider})
+    return known, [rounded] if wider > WIDER else []

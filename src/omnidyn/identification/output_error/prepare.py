@@ -17,7 +17,7 @@ from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
 from omnidyn.identification.output_error.problem.band import BANDS
 from omnidyn.identification.output_error.problem.differences import differences
 from omnidyn.identification.output_error.problem.falling import falls, kept_in_order
-from omnidyn.identification.output_error.problem.motion import Motion, motion
+from omnidyn.identification.output_error.problem.motion import NOTHING, Motion, motion
 from omnidyn.identification.output_error.problem.nuisances import (
     LATENCY,
     TRAVELS,
@@ -49,16 +49,14 @@ from omnidyn.model.keys import (
     Key,
     expand,
     friction_keys,
-    unit,
 )
 from omnidyn.model.keys import LATENCY as DRIVE_LATENCY
 from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
+from omnidyn.statement import Statement
 
 EXACT, IMPLICIT, LOOP = "exact", "implicit", "loop"  # the engines
-NOTHING = 1e-9  # [N, N m] a drive that is only rounding
-DEAD = ", or its sensor is dead: not one row differs from another, so that no bound is told"
 FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
 FINER = 1e-6  # the same where a path is fitted: what a speed is off by adds up, to a tick of an encoder in 10 s
 ASIDE = 0.01  # by how much numbers are moved apart to see which engine knows the robots that they may make
@@ -95,7 +93,7 @@ class Group:
     usual: tuple[str, ...]
     moved: BoolArray
     bounds: dict[str, float]
-    warnings: tuple[str, ...]
+    warnings: tuple[Statement, ...]
 
     def tells(self, name: str) -> bool:
         """Whether these logs may tell of a level, by its key: of an axis that never moved they do not."""
@@ -129,12 +127,9 @@ def make_group(
         if not own or (alone and not exact and not own & set(asked)):
             continue  # friction along the direction of travel: no axis has its own
         held, key = float(found.held[axis]), f"friction.axes.breakaway[{axis}]"
+        warnings.append(found.unfitted(axis, None if alone else name))
         if not alone:
-            warnings.append(f"{found.words(axis, name)} there")
             continue
-        what = f"; it held {held:.4g} {unit(key)}" if held > NOTHING else "; nothing drove it"
-        what = f"{what}{DEAD}" if held > NOTHING and found.dead[axis] else what
-        warnings.append(found.words(axis) + (what if found.seen[axis] else ""))
         bounds |= {key: held} if held > NOTHING and not found.dead[axis] else {}
         if exact and robot.friction.axes.levels[2][axis] < held:
             robot = Key.parse(f"friction.axes.coulomb[{axis}]").set(robot, held)

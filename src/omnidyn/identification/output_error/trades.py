@@ -25,7 +25,6 @@ from omnidyn.identification.output_error.trust.uncertainty import Trust
 from omnidyn.model.actuation import DEAD_BAND
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage
 from omnidyn.model.frames import AXES
-from omnidyn.model.layout import YAW
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import damping, push_per_volt, taken
@@ -35,17 +34,13 @@ TRADE = 0.9  # correlation beyond which the sum of two numbers is known 2.3 to 4
 
 @dataclass(frozen=True)
 class _Trade:
-    """What a nuisance trades with. of: that (3,) of a robot, in the unit of the nuisance; the sum, in words."""
+    """A sum that a nuisance is known in, and its unit."""
 
     name: str
-    of: str
     unit: str
-    words: str
-    both: str
 
 
-OFF = _Trade("sets_off", "friction", "V", "voltage at which it sets off", "dead band and Coulomb friction")
-LATE_BY = _Trade("follows", "lag", "s", "by how much it follows late", "latency and lag")
+OFF, LATE_BY = _Trade("sets_off", "V"), _Trade("follows", "s")
 
 
 def trades(problem: Problem, values: FloatArray, known: Trust, moved: BoolArray) -> tuple[Combination, ...]:
@@ -82,10 +77,8 @@ def _sums(
         if np.isfinite(alone) and np.isfinite(single):
             between = float((both**2 - alone**2 - single**2) / max(2.0 * alone * single, 1e-300))
         if between < -TRADE:
-            way = "about yaw" if axis == YAW else f"along {AXES[axis]}"
-            words = f"{trade.words} {way}: {trade.both}, which trade with each other (correlation {between:.2f})"
-            low = max(value - half, 0.0)
-            yield Combination(f"{trade.name}.{AXES[axis]}", value, both, (low, value + half), trade.unit, words)
+            ends = max(value - half, 0.0), value + half
+            yield Combination(f"{trade.name}.{AXES[axis]}", value, both, ends, trade.unit, AXES[axis], between)
 
 
 def _friction(robot: Robot) -> FloatArray:

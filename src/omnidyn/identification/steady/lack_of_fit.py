@@ -32,6 +32,7 @@ from omnidyn.identification.steady.shape_fit import (
 from omnidyn.identification.steady.shapes import element_speeds, on_rollers
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import sin_cos_deg
+from omnidyn.statement import quoted
 from omnidyn.statistics import huber_weight
 
 FALSE_ALARM = 0.002  # of all tests of a group together, by Student's t: few directions have longer tails
@@ -66,7 +67,7 @@ class Remedy:
         """See `LackOfFit.as_of_whole_logs`."""
         before, after = self.error_before**2, self.error**2
         std = 2.0 * self.error * self.gain_std / before
-        return common.Remedy(self.key, self.words, 1.0 - after / before, std, self.same_as, offered=False)
+        return common.Remedy(self.key, quoted(self.words), 1.0 - after / before, std, self.same_as, offered=False)
 
     def fits(self, force: float) -> bool:
         """Whether it is no chance, tells more of what was left out, and is as large as matters. force [N]: rms."""

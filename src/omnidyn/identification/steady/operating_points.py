@@ -166,7 +166,7 @@ def steady_windows(
     lacking = f"{len(empty)} of {len(runs)} runs have no steady window, such as {empty[0] or 'run 0'}" if empty else ""
     if origin == CURRENT:
         _refuse_unsigned(runs, [each for *_, each in found])
-    return SteadyWindows(tuple(found), names, speed, origin, (*twice, *([lacking] if lacking else [])))
+    return SteadyWindows(tuple(found), names, speed, origin, (*map(str, twice), *([lacking] if lacking else [])))
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,6 +27,7 @@ from omnidyn.model.friction import AxesFriction
 from omnidyn.model.keys import unit, with_priors
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import Robot
+from omnidyn.statement import statements
 
 REST = ("bound", "line", "ignore")
 MAX_FRICTION = 1e6  # what a robot file takes
@@ -232,7 +233,7 @@ def _estimate(robot: Robot, friction: AxesFriction, found: _Findings, method: st
         degrees_of_freedom=degrees,
         at_bound=tuple(at_bound),
         lower_bound={_breakaway(axis): bound for axis, bound in found.bounds.items()},
-        warnings=tuple(found.warnings),
+        warnings=statements(found.warnings),
         method=method,
         data=data,
     )

@@ -41,8 +41,9 @@ from omnidyn.model.keys import BODY_AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, f
 from omnidyn.model.keys import VISCOUS as VISCOUS_LEVEL
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.layout import YAW
-from omnidyn.model.robot import GUESS, Prior, Robot
+from omnidyn.model.robot import GUESSES, Prior, Robot
 from omnidyn.run import Run, as_list
+from omnidyn.statement import statements
 from omnidyn.statistics import t_quantile
 
 LASTING = Stability({}, ())  # whether levels last, `moments` says
@@ -262,7 +263,7 @@ def _back_emf(robot: Robot, points: ForcePoints) -> _BackEmf:
     brake = -drive_wrench(linear_part(robot), np.eye(3), np.zeros(robot.wheels.count))
     matrix = robot.wheels.wrench_matrix
     guesses = [key for key, prior in robot.priors.items()
-               if prior.origin == GUESS and Key.parse(key).name in (TORQUE, EMF)]  # fmt: skip
+               if prior.origin in GUESSES and Key.parse(key).name in (TORQUE, EMF)]  # fmt: skip
     return _BackEmf(brake, float(np.trace(brake) / np.sum(matrix**2)), tuple(guesses))
 
 
@@ -288,7 +289,7 @@ def _estimate(
         correlation=together,
         degrees_of_freedom=dict.fromkeys(fit.keys, fit.degrees_of_freedom),
         at_bound=tuple(key for key, free in zip(fit.keys, fit.free, strict=True) if free < 0.0),
-        warnings=(*words.about_fit(fit, robust, kept), *words.about_back_emf(fit.keys, emf.guesses)),
+        warnings=statements([*words.about_fit(fit, robust, kept), *words.about_back_emf(fit.keys, emf.guesses)]),
         method=words.method(points, fit, robust),
         data=data,
         scale=scale_of_traction(robot, points.force_from == CURRENT),

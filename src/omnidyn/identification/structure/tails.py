@@ -27,6 +27,7 @@ from omnidyn.identification.structure.misfit import Misfit
 from omnidyn.identification.structure.missing.remedies import Blocks
 from omnidyn.identification.structure.motion import Motion
 from omnidyn.model.mass import mass_matrix
+from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import HUBER_CLIP, huber_loss, robust_std
 
 BEYOND = 5.0  # robust standard deviations: of normal noise one sample in two million is so far out
@@ -107,9 +108,9 @@ def calmer(seen: Misfit, wild: Mapping[str, Wild]) -> tuple[Remedy, ...]:
         plain.append(one)
         robust.append(other)
     change = (np.array(plain) - robust) / max(sum(plain), 1e-300)
-    share = 100.0 * max(each.share for each in wild.values())
-    words = f"noise with wild samples, {share:.2g} % of them, that count little (`loss` student-t)"
-    return (Remedy(LOSS, words, float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change))), share=0.0),)
+    percent = 100.0 * max(each.share for each in wild.values())
+    cause = Statement("outliers", NOTE, numbers={"percent": percent})
+    return (Remedy(LOSS, cause, float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change))), share=0.0),)
 
 
 def _students(columns: FloatArray, e: FloatArray, begin: FloatArray, scale: float) -> FloatArray:

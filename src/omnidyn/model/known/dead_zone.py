@@ -18,7 +18,7 @@ from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_m
 from omnidyn.model.frames import AXES
 from omnidyn.model.known.told import numbers_told, told
 from omnidyn.model.known.uncertainty import DRAWS, Interval, effects, interval_of
-from omnidyn.model.robot import GUESS, Robot
+from omnidyn.model.robot import GUESSES, Robot
 
 WAYS = {"x": "forward", "y": "sideways", "yaw": "turning"}
 AROUND = np.radians(np.arange(0.0, 360.0, 5.0))  # directions of travel that are answered for
@@ -237,7 +237,7 @@ def _row(
 
 def _rests_on(robot: Robot, patterns: FloatArray) -> tuple[RestsOn, ...]:
     """The numbers with a std, and the guesses, that the volts of the patterns change with."""
-    own = {key: p for key, p in numbers_told(robot).items() if p.std is not None or p.origin == GUESS}
+    own = {key: p for key, p in numbers_told(robot).items() if p.std is not None or p.origin in GUESSES}
     moving = patterns[np.isfinite(breakaway_voltage(robot, patterns, HALVINGS))]
     if not own or not len(moving):
         return ()

@@ -32,7 +32,6 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.beside import side_by_side
-from omnidyn.document import short
 from omnidyn.identification.output_error.memory.across import widening
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
 from omnidyn.identification.output_error.memory.innovations import without_gaps
@@ -46,7 +45,8 @@ from omnidyn.identification.output_error.memory.whitened import (
 )
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Normal, RowEngine, Solution, Solver, of_states
-from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, WHITE, Trust, trust, widened
+from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, WHITE, Trust, trust
+from omnidyn.statement import NOTE, WARNING, Statement
 from omnidyn.statistics import t_quantile
 
 ROUNDS, TURNS = 6, 20  # of simulations; of memory and numbers in turn between them
@@ -67,13 +67,13 @@ FEW = 10.0  # memories in a log, below which the memory itself is hardly known
 class Weighed:
     """A point and how far it can be trusted. solution: by filtered rows where errors remember, its solver has a
     WhitenedEngine then. plain: the same point with residuals as they are. known: the trust in `solution`. models: the
-    memory of each column, none where rows are not filtered. warnings: in words."""
+    memory of each column, none where rows are not filtered. warnings: what a reader must know of that."""
 
     solution: Solution
     plain: Solution
     known: Trust
     models: Mapping[Column, AutoRegression] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Statement, ...] = ()
 
 
 def why_not(solution: Solution) -> str:
@@ -125,7 +125,7 @@ def whitened(solution: Solution, before: Trust, doing: Callable[[str], object] =
     # all that came before, would have intervals many times too narrow.
     known = left if left.kind == SANDWICH else _trusted(found, before, models)
     plain = replace(found, state=solver.state(found.state.point), solver=solver)
-    return Weighed(found, plain, known, models, tuple(_words(found, models, known)))
+    return Weighed(found, plain, known, models, tuple(_statements(found, models, known)))
 
 
 def _straight(
@@ -309,31 +309,22 @@ def _degrees(found: Solution, known: Trust, models: Mapping[Column, AutoRegressi
     return float(np.clip(degrees.min(), 3.0, max(known.degrees, 3)))
 
 
-def _words(found: Solution, models: Mapping[Column, AutoRegression], known: Trust) -> Iterator[str]:
+def _statements(found: Solution, models: Mapping[Column, AutoRegression], known: Trust) -> Iterator[Statement]:
     """What a reader should know of the memory: what it is, logs too short for it, stamps that are not even."""
     pieces = found.solver.problem.pieces
     orders = sorted({model.order for model in models.values() if model.slopes is None})
-    order = " to ".join(str(each) for each in dict.fromkeys((*orders[:1], *orders[-1:])))
-    ways = [f"an autoregression of order {order}"] if orders else []
     beside = {model.moving is not None for model in models.values() if model.slopes is not None}
-    if beside:
-        ways.append("white noise beside errors that remember" + " while the robot moves" * (beside == {True}))
     longest = max(models, key=lambda column: models[column].memory)
     model, lasts = models[longest], models[longest].memory * spacing(pieces, longest)[0]
-    yield (
-        f"the residuals are not white (correlation of neighbours up to {np.abs(known.neighbours).max():.2f}): the "
-        f"errors of each output are fitted as {' or '.join(ways)}, with a memory of up to "
-        f"{short(lasts)} s; {widened(known)}"
-    )
+    numbers = {
+        "neighbours": np.abs(known.neighbours).max(), "orders": (orders[0], orders[-1]) if orders else None,
+        "beside_white": ("moving" if beside == {True} else "all") if beside else "", "memory": lasts,
+        "widening": known.widening,
+    }  # fmt: skip
+    yield Statement("autocorrelated_noise", NOTE, numbers=numbers)
     if model.rows < FEW * model.memory:
-        yield (
-            f"the errors of {longest[0]}[{longest[1]}] remember {short(lasts)} s, and the logs last "
-            f"{model.rows / model.memory:.1f} times that: how long they remember is hardly known, nor how sure the "
-            f"numbers are; logs of {short(FEW * lasts)} s or longer tell"
-        )
+        numbers = {"memory": lasts, "times": model.rows / model.memory, "enough": FEW * lasts}
+        yield Statement("short_for_memory", WARNING, f"{longest[0]}[{longest[1]}]", numbers)
     uneven = max(spacing(pieces, column)[2] for column in models)
     if uneven > UNEVEN:
-        yield (
-            f"{100.0 * uneven:.0f} % of the rows do not come at even times: the errors are taken to forget as much "
-            "from each row to the next"
-        )
+        yield Statement("uneven_rows", NOTE, numbers={"share": uneven})

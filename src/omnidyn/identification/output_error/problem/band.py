@@ -13,6 +13,7 @@ from omnidyn.model.friction import Friction
 from omnidyn.model.friction.kinds import COULOMB, KARNOPP
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
+from omnidyn.statement import NOTE, Statement
 
 SPEEDS = ("karnopp_speed", "yaw_karnopp_speed")
 BANDS = tuple(
@@ -47,14 +48,9 @@ def with_band(robot: Robot, of: Robot) -> Robot:
     return _changed(robot, speeds, KARNOPP)
 
 
-def band_words(of: Robot) -> tuple[str, ...]:
+def band_note(of: Robot) -> tuple[Statement, ...]:
     """What is to be said of it."""
-    if not tables_with_band(of):
-        return ()
-    return (
-        f'law = "{KARNOPP}" is fitted as Coulomb friction with breakaway, which its band stands in for: to a log the '
-        "two are the same, but for a band as wide as the log resolves; karnopp_speed is numerical and stays as it is",
-    )
+    return (Statement("karnopp_as_coulomb", NOTE),) if tables_with_band(of) else ()
 
 
 def tables_with_band(robot: Robot) -> list[str]:

@@ -22,6 +22,7 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.clocks import sampled
 from omnidyn.run import Run
+from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import MAD_TO_STD, TEXT, find_tick, stretches
 
 ORDER = 5  # of the differences: an acceleration that dies away within ten rows is gone from them
@@ -40,12 +41,12 @@ WANDER = 0.618034  # a share that no small number of rows brings back to where i
 class Differences:
     """ticks (W,) of the wheels [rad]. stamped: whether each speed is over the time between its own stamps.
 
-    why: what keeps differences from being added up, in words; "" for nothing.
+    why: what keeps differences from being added up; None for nothing.
     """
 
     ticks: FloatArray
     stamped: bool
-    why: str = ""
+    why: Statement | None = None
 
 
 def differences(runs: Sequence[Run]) -> Differences | None:
@@ -194,14 +195,14 @@ def _level(high: FloatArray) -> float:
     return float((MAD_TO_STD * np.median(spread)) ** 2 / (comb(2 * ORDER, ORDER) / 12.0))
 
 
-def _hindrance(logs: Sequence[Run], found: Differences) -> str:
-    """Why such differences cannot be added up, in words; "" where they can."""
+def _hindrance(logs: Sequence[Run], found: Differences) -> Statement | None:
+    """Why such differences cannot be added up; None where they can."""
     steps = [np.diff(run.t) / _row(run) for run in logs if len(run) > 1]
     whole = np.concatenate([each[each < LOST] for each in steps])
     if not found.stamped and np.mean(np.abs(whole - 1.0) <= UNEVEN) < NEARLY:
-        return "the stamps of the rows are uneven"
+        return Statement("uneven_stamps", NOTE)
     rows, missing = sum(map(len, logs)), [_turned(run, found)[1][1:] for run in logs]
     if sum(len(stretches(lost)) for lost in missing) * SHORT > rows:
         lost = sum(int(each.sum()) for each in missing)
-        return f"{lost} of {rows} rows are missing, and what was turned there with them"
-    return ""
+        return Statement("counts_missing", NOTE, numbers={"lost": lost, "rows": rows})
+    return None

@@ -21,9 +21,10 @@ from omnidyn.model.mass import mass_matrix
 from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.simulation.slip.plant import grips
+from omnidyn.statement import WARNING, Statement
 from omnidyn.statistics import difference_noise
 
-DRIVE = ("drive it forward and back", "drive it sideways", "turn it")
+NOTHING = 1e-9  # [N, N m] a drive that is only rounding
 CLEAR = 6.0  # standard errors of a short mean that noise does not reach in any log
 
 
@@ -41,12 +42,14 @@ class Motion:
     seen: BoolArray
     dead: BoolArray
 
-    def words(self, axis: int, where: str = "") -> str:
-        """Why the friction of an axis that did not move is not fitted."""
-        place = f" in {where}" if where else ""
+    def unfitted(self, axis: int, group: str | None = None) -> Statement:
+        """Why the friction of an axis that did not move is not fitted. group: that of several; None: the only one."""
         if not self.seen[axis]:
-            return f"axis {AXES[axis]} was not measured{place}: its friction is not fitted"
-        return f"axis {AXES[axis]} never visibly moved{place}: its friction is not fitted ({DRIVE[axis]})"
+            return Statement("axis_not_measured", WARNING, AXES[axis], {} if group is None else {"group": group})
+        if group is not None:
+            return Statement("axis_not_moved", WARNING, AXES[axis], {"group": group})
+        held = float(self.held[axis]) if self.held[axis] > NOTHING else 0.0
+        return Statement("axis_not_moved", WARNING, AXES[axis], {"held": held, "dead": bool(self.dead[axis])})
 
 
 def motion(records: Sequence[Record], robot: Robot) -> Motion:

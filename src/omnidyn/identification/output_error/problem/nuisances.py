@@ -31,6 +31,7 @@ from omnidyn.model.keys import DEAD_BAND as KEY_DEAD
 from omnidyn.model.keys import LATENCY as KEY_LATE
 from omnidyn.model.layout import YAW
 from omnidyn.model.robot import IDENTIFIED, Robot
+from omnidyn.statement import WARNING, Statement
 
 LATENCY, TILT, PUSH = "latency", "tilt", "push"
 NUISANCES = (LATENCY, GAIN, DEAD_BAND, FADE, TILT, PUSH)
@@ -52,12 +53,9 @@ def earliest(records: Sequence[Record]) -> float:
     return -(max(rows, default=0.0) + FILTER)
 
 
-def implausible(name: str, latency: float) -> str:
-    """What to say of a latency before `earliest`."""
-    return (
-        f"{name} of {1e3 * latency:.0f} ms is implausible: the channel would show what the voltage does only so much "
-        "later. The clocks differ, a filter looks ahead (centred speeds), or it stands in for another fault"
-    )
+def implausible(name: str, latency: float, fitted: bool = True) -> Statement:
+    """What to say of a latency before `earliest` [s]. fitted: whether it is fitted all the same."""
+    return Statement("implausible_latency", WARNING, name, {"latency": latency, "fitted": fitted})
 
 
 def nuisance_parameters(

@@ -13,27 +13,31 @@ from omnidyn.identification.output_error.problem.differences import Differences,
 from omnidyn.identification.output_error.problem.redundant import redundant
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
+from omnidyn.statement import NOTE, WARNING, Statement
 from omnidyn.statistics import find_tick
 
 OUTPUTS = ("twist", "wheel_speed", "current", "heading", "position", "wheel_angle")
 POSE, PARTS = "pose", ("heading", "position")
 SPEEDS = ("twist", "wheel_speed")
+LOG = "log"  # what a log without a name is called
 TRAVEL = ("heading", "position", "wheel_angle")
 
 
 @dataclass(frozen=True, eq=False)
 class Outputs:
-    """columns: (channel, index) each; values (rows, C); ticks (C,): of counts [rad], 0 for others; notes in words.
+    """columns: (channel, index) each; values (rows, C); ticks (C,): of counts [rad], 0 for others.
 
-    unused: what was measured and is not fitted, and why, in words. lost (rows,): rows before which a wheel may have
+    notes: what was decided on the way.
+
+    unused: what was measured and is not fitted, and why. lost (rows,): rows before which a wheel may have
     turned by any angle, None where nothing was added up.
     """
 
     columns: tuple[tuple[str, int], ...]
     values: FloatArray
     ticks: tuple[float, ...]
-    notes: tuple[str, ...]
-    unused: tuple[str, ...]
+    notes: tuple[Statement, ...]
+    unused: tuple[Statement, ...]
     lost: BoolArray | None = None
 
 
@@ -51,7 +55,7 @@ def outputs_of(
     if unknown:
         raise InputError("no such output", got=unknown[0], expected=", ".join((*OUTPUTS, POSE)), where="outputs")
     found = {name: value for name in OUTPUTS if (value := _measured(run, name)) is not None}
-    unused = [f"{name}: not among the outputs asked for" for name in found if wanted is not None and name not in wanted]
+    unused = [Statement("output_not_asked", NOTE, name) for name in found if wanted is not None and name not in wanted]
     if wanted is not None:
         found = {name: value for name, value in found.items() if name in wanted}
     if not found:
@@ -84,7 +88,7 @@ def _measured(run: Run, name: str) -> FloatArray | None:
 
 def _without_doubles(
     run: Run, robot: Robot, found: dict[str, FloatArray], asked: bool
-) -> tuple[dict[str, FloatArray], list[str]]:
+) -> tuple[dict[str, FloatArray], list[Statement]]:
     """Without outputs that are computed from another one; where they were asked for, with a warning instead."""
     if not found.keys() & set(TRAVEL) and not set(SPEEDS) <= found.keys():
         return found, []
@@ -92,31 +96,27 @@ def _without_doubles(
     for name, source in redundant(run, robot).items():
         if name not in found or source not in found:
             continue
-        same = (
-            "its wheel speeds are differences of its wheel angles" if name == "wheel_speed"
-            else "its twist is computed from its wheels" if name == "twist"
-            else f"its {name} is the integral of its own {source.replace('_', ' ')}"
-        )  # fmt: skip
+        both = {"output": name, "computed_from": source}
         if asked:
-            notes.append(f"{same}: the same data count twice, and the intervals are too narrow")
+            notes.append(Statement("same_data_twice", WARNING, run.source or LOG, both))
         else:
             found = {key: value for key, value in found.items() if key != name}
-            notes.append(f"{same}: the {name.replace('_', ' ')} says nothing new and is not fitted")
+            notes.append(Statement("nothing_new", NOTE, run.source or LOG, both))
     return found, notes
 
 
 def _counted(
-    run: Run, found: dict[str, FloatArray], counted: Differences | None, notes: list[str]
+    run: Run, found: dict[str, FloatArray], counted: Differences | None, notes: list[Statement]
 ) -> tuple[dict[str, FloatArray], FloatArray | None, BoolArray | None]:
     """(the outputs, speeds that are differences of counts as angles; ticks of these, rows before which one is lost)."""
     if counted is None or "wheel_speed" not in found or "wheel_angle" in found:
         return found, None, None
-    tick = f"tick {float(np.median(counted.ticks)):.3g} rad"
-    if counted.why:
-        notes.append(f"wheel speeds are differences of encoder counts ({tick}), fitted as they are: {counted.why}")
+    tick = {"tick": float(np.median(counted.ticks))}
+    if counted.why is not None:
+        notes.append(Statement("counts_as_readings", NOTE, run.source or LOG, tick | {"why": counted.why}))
         return found, None, None
     angle, lost = added_up(run, counted)
-    notes.append(f"wheel speeds are differences of encoder counts ({tick}): fitted as the angles that they add up to")
+    notes.append(Statement("counts_added_up", NOTE, run.source or LOG, tick))
     return (
         {name: value for name, value in found.items() if name != "wheel_speed"} | {"wheel_angle": angle},
         counted.ticks,

@@ -10,11 +10,10 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.clocks import usual_step
-from omnidyn.document import short
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.findings.needs import LOOP_REMEDY, has_set_speeds
 from omnidyn.identification.output_error.problem.differences import Differences
-from omnidyn.identification.output_error.problem.outputs import outputs_of
+from omnidyn.identification.output_error.problem.outputs import LOG, outputs_of
 from omnidyn.logs.segments import segments
 from omnidyn.model.actuation import asked_voltage, clip_voltage
 from omnidyn.model.drive import SPEED
@@ -22,6 +21,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings.floor import refuse_slope
 from omnidyn.model.wheels import refuse_slip, wheel_speed
 from omnidyn.run import Run
+from omnidyn.statement import NOTE, WARNING, Statement
 from omnidyn.statistics import stretches
 
 SHORTEST = 3  # rows of a piece that is used
@@ -33,7 +33,7 @@ class Record:
 
     ticks (C,): of columns that are counts [rad], 0 for the others. pieces: (first, last) rows of what has no gap.
     supplied: whether the voltage is a duty times a supply that was not logged. notes: what was decided on the way.
-    unused: what the log holds and a fit does not use, and why, in words.
+    unused: what the log holds and a fit does not use, and why.
     set_point (rows, W): set speeds of the wheels [rad/s] where the loop in the firmware makes the voltage, which is 0
     here then; else None. run: what it was read from.
 
@@ -48,9 +48,9 @@ class Record:
     pieces: tuple[tuple[int, int], ...]
     source: str
     supplied: bool
-    notes: tuple[str, ...]
+    notes: tuple[Statement, ...]
     set_point: FloatArray | None = None
-    unused: tuple[str, ...] = ()
+    unused: tuple[Statement, ...] = ()
     run: Run | None = None
 
     def __post_init__(self) -> None:
@@ -93,6 +93,7 @@ def record(
     loop: take the set speeds even where a voltage was logged, for its gains are asked for. outputs, tick_rad,
     counted: as in outputs.py.
     """
+    source = run.source or LOG
     refuse_slope(robot.floor, "a fit starts from")
     if run.wheels is not None and run.wheels != robot.wheels.count:
         raise InputError(
@@ -107,9 +108,8 @@ def record(
     clipped = clip_voltage(robot.motor, voltage)
     beyond = np.abs(clipped) < np.abs(voltage)
     if beyond.any():
-        notes.append(
-            f"{int(beyond.any(axis=1).sum())} rows ask for more than the voltage limit: they are clipped to it"
-        )
+        rows = {"rows": int(beyond.any(axis=1).sum())}
+        notes.append(Statement("input_beyond_limit", WARNING, source, rows))
         voltage = clipped
     found = outputs_of(run, robot, outputs, tick_rad, counted)
     inputs = voltage if set_point is None else set_point
@@ -120,8 +120,7 @@ def record(
     pieces = [piece for s in _cut(parts, found.lost) for piece in _whole(known, s.start, s.stop)]
     if len(parts) > 1:
         lost = [float(run.t[b.start] - run.t[a.stop - 1]) for a, b in pairwise(parts)]
-        many = "a gap" if len(lost) == 1 else f"{len(lost)} gaps, the longest"
-        notes.append(f"{many} of {short(max(lost), '.3g')} s: what lies between gaps is fitted from a start of its own")
+        notes.append(Statement("split_at_gaps", NOTE, source, {"gaps": len(lost), "longest": max(lost)}))
     if not pieces:
         raise InsufficientDataError(
             "no stretch of the log has inputs throughout", got=f"{int(known.sum())} rows of {len(run)} with all inputs",
@@ -129,30 +128,31 @@ def record(
             remedy="log the voltage or the duty of every wheel in every row",
         )  # fmt: skip
     if not known.all():
-        notes.append(f"{int((~known).sum())} rows lack an input: the log is split there")
+        notes.append(Statement("split_at_missing_inputs", NOTE, source, {"rows": int((~known).sum())}))
     if found.lost is not None and (many := int(found.lost[1:].sum())):
-        notes.append(f"{many} rows lack counts of an encoder, or follow on missing rows: the log is split there")
+        notes.append(Statement("split_at_missing_counts", NOTE, source, {"rows": many}))
     return Record(
         run.t, voltage, found.values, found.columns, found.ticks, tuple(pieces), run.source,
         supplied, (*notes, *found.notes), set_point, (*_unused_inputs(run, set_point is not None), *found.unused), run,
     )  # fmt: skip
 
 
-def _unused_inputs(run: Run, looped: bool) -> list[str]:
-    """Inputs that drive nothing, and why, in words. looped: the speed loop of the robot file makes the voltage."""
-    made = "the speed loop of the robot file makes the voltage from the set speeds"
-    volts, speeds = "the logged voltage drives the model", "the voltage that reached the motors drives the model"
-    given = run.voltage is not None
+def _unused_inputs(run: Run, looped: bool) -> list[Statement]:
+    """Inputs that drive nothing, and what does. looped: the speed loop of the robot file makes the voltage."""
+    volts = "speed_loop" if looped else "voltage" if run.voltage is not None else ""
     why = {
-        "voltage": made if looped else "",
-        "duty": made if looped else volts if given else "",
-        "supply": made if looped else volts if given else "",
-        "wheel_speed_command": "" if looped else speeds,
-        "twist_command": speeds if not looped else "the set speeds of the wheels drive the model",
+        "voltage": "speed_loop" if looped else "",
+        "duty": volts,
+        "supply": volts,
+        "wheel_speed_command": "" if looped else "motor_voltage",
+        "twist_command": "wheel_speed_command" if looped else "motor_voltage",
     }
     if looped and run.wheel_speed_command is None:
         why["twist_command"] = ""
-    return [f"{name}: {words}" for name, words in why.items() if words and getattr(run, name) is not None]
+    return [
+        Statement("input_not_used", NOTE, name, {"driver": driver})
+        for name, driver in why.items() if driver and getattr(run, name) is not None
+    ]  # fmt: skip
 
 
 def _refuse_wheels_without_input(run: Run, robot: Robot, finite: BoolArray) -> None:
@@ -168,14 +168,14 @@ def _refuse_wheels_without_input(run: Run, robot: Robot, finite: BoolArray) -> N
         )  # fmt: skip
 
 
-def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[str]]:
+def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[Statement]]:
     """(voltages, whether the supply is only nominal, notes)."""
     nominal = robot.drive.supply
     voltage = asked_voltage(run.voltage, run.duty, run.supply, nominal)
     if voltage is not None:
         supplied = run.voltage is None and run.supply is None
-        told = [f"the supply is not logged: its nominal {nominal:g} V is taken"] if supplied else []
-        return voltage, supplied, told
+        taken = Statement("supply_nominal", WARNING, run.source or LOG, {"supply": nominal})
+        return voltage, supplied, [taken] if supplied else []
     if run.duty is not None:
         raise InputError(
             "a duty needs a supply", got="neither a supply column nor [drive] supply_V", where=run.source,

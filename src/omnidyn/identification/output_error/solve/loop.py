@@ -26,6 +26,7 @@ from omnidyn.identification.question import FREE, REST
 from omnidyn.model.keys import FRICTION, Key, friction_keys, gain_keys
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import GIVEN, Robot
+from omnidyn.statement import WARNING, Statement
 
 FINE = 1e-3  # [m/s] tolerance at the end of a fit; it begins with a step a tick
 SETTING_OFF = 60  # rows of each log on which starts are tried
@@ -93,18 +94,16 @@ def loop_pieces(records: Sequence[Record], robot: Robot, start: str) -> list[Pie
     return found
 
 
-def left_out(records: Sequence[Record], pieces: Sequence[Piece]) -> list[str]:
-    """Which logs and pieces are not used, in words."""
-    used, words = {id(piece.record) for piece in pieces}, []
+def left_out(records: Sequence[Record], pieces: Sequence[Piece]) -> list[Statement]:
+    """Which logs and pieces are not used."""
+    used, unused = {id(piece.record) for piece in pieces}, []
     moving = sum(id(record) not in used for record in records)
     later = sum(len(record.pieces) > 1 for record in records if id(record) in used)
     if moving:
-        words.append(
-            f"{moving} of {len(records)} logs begin in motion: they are not used, their loop is not known there"
-        )
+        unused.append(Statement("begins_in_motion", WARNING, numbers={"logs": moving, "of": len(records)}))
     if later:
-        words.append(f"{later} logs have gaps: only what stands before the first one is used")
-    return words
+        unused.append(Statement("used_to_first_gap", WARNING, numbers={"logs": later}))
+    return unused
 
 
 def _begins_at_rest(twists: Sequence[FloatArray], first: int, last: int) -> bool:

@@ -21,6 +21,7 @@ from omnidyn.identification.output_error.problem.problem import Fitted, Parts, P
 from omnidyn.identification.output_error.solve.bend import Bend
 from omnidyn.identification.output_error.solve.edges import Edges
 from omnidyn.identification.output_error.solve.ordered import Order
+from omnidyn.statement import Statement
 
 MAX_ITERATIONS = 60
 CLOSE = 1e-5  # squared distance to the best point, in standard errors, at which it ends
@@ -86,7 +87,7 @@ class Solution:
     converged: bool
     solver: Solver[Any]
     blocked: BoolArray | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[Statement, ...] = ()
 
 
 class Solver(Generic[P]):

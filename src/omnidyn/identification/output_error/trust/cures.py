@@ -1,4 +1,4 @@
-"""Blind: a direction that the logs do not show, in words, and what would show it, found by experiments with the model.
+"""Blind: a direction that the logs do not show, and what would show it, found by experiments with the model.
 
 The robot is moved a little along the direction and driven again: by the voltages of the log, to see which channels that
 were not logged would show it, and by voltages along all axes, to see whether another drive would.
@@ -13,72 +13,65 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.compiled.beside import side_by_side
-from omnidyn.document import all_of, short
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.output_error.engines.actuation import driver_of
-from omnidyn.identification.output_error.problem.motion import DRIVE
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.trust.blind import Way
 from omnidyn.model.actuation import at_motors
 from omnidyn.model.dynamics import settled_currents
-from omnidyn.model.keys import CENTRE, EMF, ROTOR, TORQUE, WHEEL, Key, find_key, in_words
+from omnidyn.model.frames import AXES
+from omnidyn.model.keys import CENTRE, EMF, ROTOR, TORQUE, WHEEL, Key, find_key
 from omnidyn.model.layout import YAW
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.simulate import simulate
+from omnidyn.statement import NOTE, Statement
 
 EXACT = 30.0  # times its numbers that a direction may go: the same to the log, and not only nearly
-TOLD = 0.1  # the change of the largest number that the words name
 TRIED, SEEN = 1e-3, 0.01  # size of the change that is tried; share of it in a channel from which that shows it
 ROWS, STEP, HOLD = 1000, 0.01, 50  # of an experiment: rows, their length [s], rows of one level
 MOST = 5  # cures that are named
-MEASURED = {
-    "body.mass_kg": "weigh the robot", "wheels.wheel_radius_m": "measure the wheel radius",
-    "wheels.robot_radius_m": "measure the robot radius", "motor.gear_ratio": "read the gear ratio off its data sheet",
-    "motor.resistance_ohm": "measure the resistance of a motor", TORQUE: "take the torque constant from the data sheet",
-    EMF: "take the emf constant from the data sheet (in SI it is the torque constant)",
-    ROTOR: "take the rotor inertia from the data sheet", WHEEL: "weigh a wheel",
-    CENTRE: "balance the robot on an edge",
-    "body.inertia_kg_m2": "measure the inertia (swing the robot)", "gain": "measure the voltage at the motors",
-}  # fmt: skip
-CHANNELS = {
-    "current": ("log currents", ("current",)), "wheel_speed": ("log wheel speeds", ("wheel_speed", "wheel_angle")),
-    "twist": ("log the speed over the ground, or where the robot is", ("twist", "position")),
+MEASURABLE = (
+    "body.mass_kg", "wheels.wheel_radius_m", "wheels.robot_radius_m", "motor.gear_ratio", "motor.resistance_ohm",
+    TORQUE, EMF, ROTOR, WHEEL, CENTRE, "body.inertia_kg_m2", "gain",
+)  # fmt: skip
+CHANNELS = {  # that would show it -> outputs that show the same
+    "current": ("current",), "wheel_speed": ("wheel_speed", "wheel_angle"), "twist": ("twist", "position"),
 }  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Blind:
     """A direction that the logs do not show. changes: number -> relative change, the largest 1 % of itself or of what
-    it counts as. exact: whether the outputs stay the same, or nearly. cures: what would show it, easiest first."""
+    it counts as. exact: whether the outputs stay the same, or nearly. cures: what would show it, easiest first: the key
+    of a number to be measured, a channel to be logged, an axis along which to drive, or "drive"."""
 
     changes: Mapping[str, float]
     exact: bool
-    words: str
     cures: tuple[str, ...]
 
-    def __str__(self) -> str:
-        what = "them apart" if len(self.changes) > 1 else "it"
-        return f"{self.words}; to tell {what}: {' or '.join(self.cures)}" if self.cures else self.words
+    def statement(self) -> Statement:
+        """What the logs do not show, and what would."""
+        numbers = {"keys": tuple(self.changes), "changes": tuple(self.changes.values())}
+        return Statement("not_shown", NOTE, numbers=numbers | {"exact": self.exact, "cures": self.cures})
 
 
-def blind_in_words(
+def blind_directions(
     problem: Problem, values: FloatArray, ways: Sequence[Way], moved: BoolArray
 ) -> tuple[Blind, ...]:  # fmt: skip
-    """Each direction in words, with what would show it. values (P,); moved (3,): which axes did."""
+    """Each direction with what would show it. values (P,); moved (3,): which axes did."""
     drives = _drives(problem, values) if ways else ()
-    return tuple(side_by_side(lambda way: _in_words(problem, values, way, moved, drives), ways))
+    return tuple(side_by_side(lambda way: _direction(problem, values, way, moved, drives), ways))
 
 
-def _in_words(
+def _direction(
     problem: Problem, values: FloatArray, way: Way, moved: BoolArray, drives: Sequence[_Drive]
 ) -> Blind:  # fmt: skip
     at = np.flatnonzero(way.step)
     names = [problem.names[j].partition("@")[0] for j in at]
-    changes = {name: _relative(problem, values, way, int(j)) for name, j in zip(names, at, strict=True)}
-    exact = way.reach > EXACT
+    changes = {name: 0.01 * _relative(problem, values, way, int(j)) for name, j in zip(names, at, strict=True)}
     cures = tuple(dict.fromkeys(_cures(problem, values, way, names, moved, drives)))[:MOST]
-    return Blind({name: 0.01 * change for name, change in changes.items()}, exact, _words(changes, exact), cures)
+    return Blind(changes, way.reach > EXACT, cures)
 
 
 def _relative(problem: Problem, values: FloatArray, way: Way, j: int) -> float:
@@ -87,37 +80,10 @@ def _relative(problem: Problem, values: FloatArray, way: Way, j: int) -> float:
     return float(way.step[j]) if p.log else float(way.step[j]) / max(abs(value), 0.1 * float(way.size[j]))
 
 
-def _words(changes: Mapping[str, float], exact: bool) -> str:
-    """ "mass +10 % and resistance -10 %: the same to this log"; entries of a list that change alike are one."""
-    if len(changes) == 1:
-        return f"{in_words(next(iter(changes)))}: this log {'does not show' if exact else 'hardly shows'} it"
-    largest = max(map(abs, changes.values()))
-    sign = np.sign(next(iter(changes.values())))
-    percent = {name: 100.0 * TOLD * sign * change / largest for name, change in changes.items()}
-    parts = all_of([f"{name} {short(share, '+.2g')} %" for name, share in _alike(percent)])
-    return f"{parts}: {'the same to this log' if exact else 'this log hardly tells them apart'}"
-
-
-def _alike(percent: Mapping[str, float]) -> Iterator[tuple[str, float]]:
-    left = dict(percent)
-    while left:
-        name, share = next(iter(left.items()))
-        key = find_key(name)
-        alike = [
-            each for each, other in left.items()
-            if key is not None and (own := find_key(each)) is not None and own.name == key.name
-            and abs(other - share) < 0.02 * abs(share)
-        ]  # fmt: skip
-        several = key is not None and len(alike) > 1
-        yield (in_words(key.name) if key is not None and several else in_words(name)), share
-        for each in alike if several else [name]:
-            del left[each]
-
-
 def _cures(
     problem: Problem, values: FloatArray, way: Way, names: list[str], moved: BoolArray, drives: Sequence[_Drive]
 ) -> Iterator[str]:
-    yield from (MEASURED[one] for one in MEASURED if any(_is(name, one) for name in names))
+    yield from (one for one in MEASURABLE if any(_is(name, one) for name in names))
     if not drives:
         return
     of_the_log, of_all_axes = drives
@@ -126,8 +92,7 @@ def _cures(
         seen = of_all_axes.differs(problem, values, way)
         if any(seen[name] for name in dict.fromkeys(name for name, _ in problem.columns) if name in seen):
             axes = {key.axis for name in names if (key := find_key(name)) is not None and key.axis is not None}
-            still = sorted(axis for axis in axes if not moved[axis])
-            yield all_of([DRIVE[axis] for axis in still]) or "drive at several speeds, both ways, with starts and stops"
+            yield from [AXES[axis] for axis in sorted(axes) if not moved[axis]] or ["drive"]
     except OmnidynError:
         return
 
@@ -140,9 +105,9 @@ def _is(name: str, one: str) -> bool:
 def _by_channels(problem: Problem, seen: Mapping[str, bool]) -> Iterator[str]:
     """Channels that were not logged, and would show it under the same voltages."""
     logged = {name for name, _ in problem.columns}
-    for channel, (words, instead) in CHANNELS.items():
+    for channel, instead in CHANNELS.items():
         if not logged & set(instead) and seen[channel]:
-            yield words
+            yield channel
 
 
 @dataclass(frozen=True, eq=False)

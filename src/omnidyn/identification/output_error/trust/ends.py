@@ -22,8 +22,3 @@ def at_the_end(problem: Fitted, values: FloatArray) -> Iterator[Parameter]:
         lossless = p.name.startswith(EFFICIENCY)
         if (share >= 1.0 - NEAR and not lossless) or (share <= NEAR and (p.log or p.low < 0.0)):
             yield p
-
-
-def end_words(p: Parameter, value: float, unit: str) -> str:
-    """What to say of such a number."""
-    return f"{p.name} is at the end of its search range, {f'{value:.4g} {unit}'.rstrip()}: that is no estimate"

@@ -20,6 +20,7 @@ from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, LIMIT
 from omnidyn.identification.output_error.trust.ends import at_the_end
 from omnidyn.identification.output_error.trust.uncertainty import RISE, Trust
+from omnidyn.statement import WARNING, Statement
 
 AT_ONCE = 0.3  # of the least speed that is looked for: a fall that hardly shows
 STEP, HALVINGS = (
@@ -31,24 +32,22 @@ REFIT, NEAR, TOL = 3, 0.1, 1e-3  # iterations at each level; squared standard er
 Intervals = dict[str, tuple[float | None, tuple[float, float]]]
 
 
-def without_a_fall(solution: Solution, known: Trust) -> tuple[Trust, Intervals, list[str]]:
-    """(the trust without Stribeck speeds of falls that are not seen; breakaway there -> (std, 95 % interval); words).
+def without_a_fall(solution: Solution, known: Trust) -> tuple[Trust, Intervals, list[Statement]]:
+    """(the trust without Stribeck speeds of falls that are not seen; breakaway there -> (std, 95 % interval); notes).
 
     Costs a fit by the implicit engine where there is such a number, else nothing.
     """
-    problem, values, found, words = solution.solver.problem, solution.state.point.values, Intervals(), []
+    problem, values, found = solution.solver.problem, solution.state.point.values, Intervals()
+    warnings = list[Statement]()
     for s, c, v in _not_seen(solution, known):
         known = _without(known, v)
         steep = 1.0 if known.blind[c] else known.rise(np.eye(len(known.std))[c]) / RISE
         low, high = _likely(solution, s, v, float(values[c]), LIMIT * steep)
         low = max(min(low, float(values[c] - known.quantile * known.std[c])), 0.0)
-        told = f"it lies between that and {high:.3g}, at which the robot would have been held"
         found[problem.names[s]] = None if high == np.inf else (high - low) / (2.0 * known.quantile), (low, high)
-        words.append(
-            f"{problem.names[s]}: the log shows no fall from it to Coulomb friction, so {problem.names[v]} is no "
-            f"estimate; {told if high < np.inf else 'how far it lies above that is not told'}"
-        )
-    return known, found, words
+        numbers = {"speed": problem.names[v], "high": high if high < np.inf else None}
+        warnings.append(Statement("no_fall", WARNING, problem.names[s], numbers))
+    return known, found, warnings
 
 
 def _not_seen(solution: Solution, known: Trust) -> list[tuple[int, int, int]]:

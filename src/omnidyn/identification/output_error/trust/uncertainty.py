@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.document import short
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.kernel.march import FINAL
 from omnidyn.identification.output_error.problem.problem import PieceSums, per_column
@@ -315,10 +314,3 @@ def _at_least(wide: FloatArray, least: FloatArray, beyond: float) -> FloatArray:
 def _free_step(plain: FloatArray, normal: Normal) -> FloatArray:
     """From where a bound holds a parameter to where the fit would be without the bound, to first order."""
     return np.where(normal.held, plain @ normal.gradient, 0.0)
-
-
-def widened(known: Trust) -> str:
-    """How much wider the intervals are than for white noise, in words."""
-    if known.widening < WIDER:
-        return "the intervals are no wider for it"
-    return f"the intervals are up to {short(known.widening)} times as wide as for white noise"

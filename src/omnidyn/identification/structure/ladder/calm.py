@@ -14,6 +14,7 @@ from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.structure.diagnosis import Examined
 from omnidyn.identification.structure.ladder.models import Model, Move, tried
 from omnidyn.run import Run
+from omnidyn.statement import NOTE, Statement
 
 
 def calmed(
@@ -32,15 +33,15 @@ def calmed(
     best = max(own.values(), key=lambda remedy: remedy.gain - remedy.gain_std)
     made = tried(Move(dict.fromkeys(stands.begins, best)), stands, runs, names, progress)[0]
     count, nothing = len(stands.value), np.nan
-    rung = Rung(step, LOSS, best.words, count, nothing, best.gain, best.gain_std, nothing)
+    rung = Rung(step, LOSS, best.cause, count, nothing, best.gain, best.gain_std, nothing)
     first = [Rung(0, "", STANDS, count, nothing, taken=True, value=stands.value)] if step == 1 else []
     if isinstance(made, Model) and unexplained(made.solution.solver, made.solution):
         return stands, []
     if not isinstance(made, Model):
         return stands, [*first, replace(rung, why=made.why)]
     if not best.gain > best.gain_std:
-        return stands, [*first, replace(rung, why="predicts what it was not fitted to no better", value=made.value)]
-    taken = replace(rung, why="pays", value=made.value, taken=True)
+        return stands, [*first, replace(rung, why=Statement("predicts_no_better", NOTE), value=made.value)]
+    taken = replace(rung, why=Statement("pays", NOTE), value=made.value, taken=True)
     return replace(made, before=None), [*first, taken]
 
 

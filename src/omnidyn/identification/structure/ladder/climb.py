@@ -14,11 +14,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from omnidyn.document import all_of
-from omnidyn.identification.lack_of_fit import DRIFTS, LOSS, NOTHING, UNOFFERED, LackOfFit, Remedy
+from omnidyn.identification.lack_of_fit import CHANGE, LOSS, LackOfFit, Remedy
 from omnidyn.identification.ladder import STANDS, Ladder, Rung
 from omnidyn.identification.output_error.begin import WHOLE
 from omnidyn.identification.output_error.conclusion import unexplained
@@ -30,23 +30,25 @@ from omnidyn.identification.structure.ladder.calm import calmed
 from omnidyn.identification.structure.ladder.held_out import CLEAR, Errors, errors, margins_of
 from omnidyn.identification.structure.ladder.models import Model, Move, Untried, can, moves, moves_apart, tried
 from omnidyn.identification.structure.ladder.slow import Purse, quick_first
-from omnidyn.identification.structure.missing.candidates import CHANGE
-from omnidyn.identification.structure.missing.laws import FALL_WORDS, USUAL_FALL, USUAL_SPEED, other_laws
+from omnidyn.identification.structure.missing.candidates import cause, sized
+from omnidyn.identification.structure.missing.laws import USUAL_FALL, USUAL_SPEED, other_laws
 from omnidyn.identification.structure.missing.odometry import hidden_by
-from omnidyn.identification.structure.missing.switches import EACH_WHEEL, FALLS, LIMIT, simpler_first, told
+from omnidyn.identification.structure.missing.switches import EACH_WHEEL, FALLS, LIMIT, as_fitted, simpler_first
 from omnidyn.identification.structure.motion import motions
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 from omnidyn.model.layout import N_AXES
 from omnidyn.run import Run
+from omnidyn.statement import NOTE, Statement
 
 STEPS = 4  # at most
 TRIED = 3  # remedies that are fitted in a step
 TOLD_APART = 10.0  # of BIC, from which one of two models is the better one: very strong (Kass & Raftery, 1995)
 ROUGHLY = 0.05  # of a first step's chi squared, which is that rough
-MEND = "the model does not follow the logs: first mend signs, units, the order of wheels, dead sensors"
 LIMITS = (0.5, 0.9)  # quantiles of the largest current, from which a limit is looked for
 BY_FAR = 50.0  # of BIC, from which a richer model is the better one though a few blocks scatter more than it gains
-Fits = Callable[[Move, Model, str], list[Model | Untried]]  # of a move from a model, and in the place of which step
+Fits = Callable[
+    [Move, Model, Statement | None], list[Model | Untried]
+]  # of a move from a model, and in the place of which step
 
 
 def climb(
@@ -57,7 +59,7 @@ def climb(
     stands, rungs, calm = Model.first(fit, solution), list[Rung](), False
     seen: dict[str, Examined] | None = None
 
-    def fits(move: Move, before: Model, instead: str) -> list[Model | Untried]:
+    def fits(move: Move, before: Model, instead: Statement | None) -> list[Model | Untried]:
         return tried(move, before, runs, names, progress, instead)
 
     purse, step, most = Purse(), 0, STEPS
@@ -71,11 +73,11 @@ def climb(
                 stands, seen, most = made, None, most + 1
                 continue
         if unexplained(stands.solution.solver, stands.solution):
-            return _ended(stands, rungs, MEND)
+            return _ended(stands, rungs, "mend_first")
         lacks = _lacks(seen)
         if not lacks:
             drifts = any(each.diagnosis.lack_of_fit.drifts for each in seen.values())
-            return _ended(stands, rungs, DRIFTS if drifts else f"the residuals {NOTHING}")
+            return _ended(stands, rungs, "slow_errors" if drifts else "only_noise")
         found, best, after = _climbed(step, stands, seen, lacks, fits, purse)
         rungs += [rung for rung in found if rung.step or not rungs]
         rungs += [_untried(step, each) for each in purse.told()]
@@ -83,10 +85,10 @@ def climb(
             made, found = (stands, []) if calm else calmed(step, stands, seen, runs, names, progress, gave_up=True)
             rungs, calm = [*rungs, *(rung for rung in found if rung.step)], True
             if made is stands:
-                return _ended(stands, rungs, f"nothing that was tried pays{_said(lacks)}")
+                return _ended(stands, rungs, "nothing_pays", **_untaken(lacks))
             best, after, most = made, None, most + 1
         stands, seen = best, after
-    return _ended(stands, rungs, f"{STEPS} steps are the most that it takes")
+    return _ended(stands, rungs, "step_limit", steps=STEPS)
 
 
 def _climbed(
@@ -100,7 +102,7 @@ def _climbed(
     for asked in (quick, slow, moves_apart(first, stands), moves(far, stands)):
         if best is not None and after is not None and not _lacks(after):  # what rivals it, and no more
             asked = purse.rivals(asked, best) if asked is slow else []
-        more = [each for move in purse.pays(asked, stands) for each in fits(move, stands, "")]
+        more = [each for move in purse.pays(asked, stands) for each in fits(move, stands, None)]
         if not more:
             continue
         every += more
@@ -108,7 +110,7 @@ def _climbed(
         after = _examined(best) if best is not None else None
     if best is not None and best.move is not None and stands.before is not None:  # may the step before go?
         again = purse.pays([best.move], stands.before)
-        every += [each for move in again for each in fits(move, stands.before, stands.words)]
+        every += [each for move in again for each in fits(move, stands.before, stands.cause)]
         found, best = judged(step, stands, every, seen)
         after = _examined(best) if best is not None and best.instead else after
     return found, best, after
@@ -141,16 +143,19 @@ def unseen(lack: LackOfFit, stands: Model, group: str) -> list[Remedy]:
     problem, point = stands.alone[group].solver.problem, stands.alone[group].state.point
     robot = stands.robot(group)
     boxed, limit = any(robot.friction.axes.coulomb), robot.motor.current_limit
-    shape = (DIRECTION, "an ellipse") if boxed else (BODY_AXES, "a box")
-    found = [Remedy(shape[0], f"Coulomb friction of another shape, {shape[1]}", 0.0, 0.0)]
-    found.append(Remedy(WHEELS, "friction at the wheels", 0.0, 0.0))
-    found.append(Remedy(EACH_WHEEL, "Coulomb friction of its own at each wheel", 0.0, 0.0))
-    usual = Remedy("", FALL_WORDS, 0.0, 0.0, size=(USUAL_FALL - 1.0,) * N_AXES, at=USUAL_SPEED)
+    shape = DIRECTION if boxed else BODY_AXES
+    found = [Remedy(shape, cause("other_shape", shape), 0.0, 0.0)]
+    found.append(Remedy(WHEELS, cause("friction_at_wheels"), 0.0, 0.0))
+    found.append(Remedy(EACH_WHEEL, cause("friction_at_each_wheel"), 0.0, 0.0))
+    usual = Remedy("", cause("stribeck"), 0.0, 0.0, size=(USUAL_FALL - 1.0,) * N_AXES, at=USUAL_SPEED)
     found += [replace(usual, key=key) for key in other_laws(robot.friction) if key in FALLS]
     if limit is None:
         most = np.concatenate([np.abs(motion.current).max(axis=1) for motion in motions(problem, point)])
         levels = np.quantile(most[most > 0.0], LIMITS).tolist() if most.any() else []
-        found += [Remedy(LIMIT, f"a current limit, from {at:.2g} A", 0.0, 0.0, at=at) for at in levels]
+        found += [
+            Remedy(LIMIT, sized("current_limit_from", "", limit=lambda _, at: at)(0.0, at), 0.0, 0.0, at=at)
+            for at in levels
+        ]
     return [remedy for remedy in found if remedy.key not in first and can(remedy.key, robot)]
 
 
@@ -168,7 +173,7 @@ def judged(
     before = errors(stands.solution, memory, margins, stands.numbers)
     by = [errors(each.solution, memory, margins, each.numbers) for each in models]
     why = [_why_not(each, own, before, count, _beyond(each, seen)) for each, own in zip(models, by, strict=True)]
-    paying = [k for k, words in enumerate(why) if not words]
+    paying = [k for k, reason in enumerate(why) if reason is None]
     best = max(paying, key=lambda k: by[k].gain(before)[0], default=None)
     alike = [
         k for k in paying
@@ -180,44 +185,60 @@ def judged(
     rungs = []
     for k, (each, own) in enumerate(zip(models, by, strict=True)):
         same = [o for o in paying if taken in (k, o) and o != k and k in paying and _is_same(by[k], by[o])]
-        words = why[k] or _why_other(k, taken, alike, same)
+        reason = why[k] or Statement(_why_other(k, taken, alike, same), NOTE)
         others = [models[o].key for o in same] + _not_fitted(models, each, own, before, seen)
         others += hidden_by(each.key, each.solution.solver.problem.columns)
-        rungs.append(_rung(step, each, own, before, count, k == taken, words, others, stands))
+        rungs.append(_rung(step, each, own, before, count, k == taken, reason, others, stands))
     rungs.sort(key=lambda rung: (not rung.taken, -rung.gain))
-    rungs = [*{(rung.key, rung.words): rung for rung in reversed(rungs)}.values()][::-1]  # a limit found twice is one
+    rungs = [*{_mark(rung): rung for rung in reversed(rungs)}.values()][::-1]  # a limit found twice is one
     rungs += [_untried(step, each) for each in every if isinstance(each, Untried)]
     first = [Rung(0, "", STANDS, before.numbers, before.size, taken=True, value=stands.value)] if step == 1 else []
     return [*first, *rungs], None if taken is None else models[taken]
 
 
+def _mark(rung: Rung) -> tuple[Any, ...]:
+    """What two rungs have in common that found the same: their key and cause, its numbers to three digits."""
+
+    def rounded(value: Any) -> Any:
+        if isinstance(value, Statement):
+            return value.code, value.subject, *map(rounded, value.numbers.values())
+        return tuple(map(rounded, value)) if isinstance(value, tuple) else (
+            f"{value:.3g}" if isinstance(value, float) else value
+        )  # fmt: skip
+
+    return rung.key, rounded(rung.cause)
+
+
 def _untried(step: int, each: Untried) -> Rung:
     nothing, move = np.nan, each.move
-    return Rung(step, move.key, each.words, 0, nothing, nothing, nothing, nothing, why=each.why, groups=move.groups)
+    return Rung(step, move.key, each.cause, 0, nothing, nothing, nothing, nothing, why=each.why, groups=move.groups)
 
 
-def _why_not(model: Model, own: Errors, before: Errors, count: int, beyond: tuple[float, str]) -> str:
-    """Why a model is no step up, "" where it is one."""
+def _why_not(
+    model: Model, own: Errors, before: Errors, count: int, beyond: tuple[float, Statement | None]
+) -> Statement | None:
+    """Why a model is no step up, None where it is one."""
     gain, std = own.gain(before)
     if not gain > CLEAR * std:
-        return "predicts what it was not fitted to no better"
+        return Statement("predicts_no_better", NOTE)
     if own.bic(count) >= before.bic():
-        return "explains less than its numbers cost"
-    at_least, words = beyond
+        return Statement("costs_more_than_it_explains", NOTE)
+    at_least, other = beyond
     noise = own.left / max(own.rows, 1)
     if (before.left - own.left) / noise - np.log(max(own.rows, 2)) * (own.numbers - before.numbers) < at_least:
-        return f"{words} would explain more"
+        return Statement("other_explains_more", NOTE, numbers={"cause": other})
     if unexplained(model.solution.solver, model.solution):
-        return "does not follow the logs"
-    return ""
+        return Statement("does_not_follow", NOTE)
+    return None
 
 
 def _why_other(k: int, taken: int | None, alike: Sequence[int], same: Sequence[int]) -> str:
+    """The code of why a model that pays is taken or not."""
     if k == taken:
         return "pays"
     if same:
-        return "the same to these logs"
-    return "as good within a standard error, not simpler" if k in alike else "pays less"
+        return "not_distinguishable"
+    return "as_good_not_simpler" if k in alike else "pays_less"
 
 
 def _is_alike(best: Errors, other: Errors) -> bool:
@@ -245,55 +266,59 @@ def _not_fitted(
 
 
 def _rung(
-    step: int, model: Model, own: Errors, before: Errors, count: int, taken: bool, why: str, same: Sequence[str],
+    step: int, model: Model, own: Errors, before: Errors, count: int, taken: bool, why: Statement, same: Sequence[str],
     stands: Model,
 ) -> Rung:  # fmt: skip
     gain, std = own.gain(before)
     others = dict.fromkeys(key for key in same if taken and key != model.key)
-    words = told(model.words, stands.value, model.value)
-    words += f" in the place of {model.instead}" if model.instead else ""
+    found = as_fitted(model.cause, stands.value, model.value)
+    if model.instead is not None:
+        found = Statement("instead_of", NOTE, numbers={"cause": found, "step": model.instead})
     return Rung(
-        step, model.key, words, own.numbers, own.size, gain, std,
-        own.bic(count) - before.bic(), taken, why, tuple(others), bool(model.instead),
+        step, model.key, found, own.numbers, own.size, gain, std,
+        own.bic(count) - before.bic(), taken, why, tuple(others), model.instead is not None,
         model.value, model.move.groups if model.move else (),
     )  # fmt: skip
 
 
-def _beyond(model: Model, seen: Mapping[str, Examined]) -> tuple[float, str]:
-    """(what the best cause explains that is never taken, less what its numbers cost, in chi squared; its words): of all
-    groups in which something was switched on."""
+def _beyond(model: Model, seen: Mapping[str, Examined]) -> tuple[float, Statement | None]:
+    """(what the best cause explains that is never taken, less what its numbers cost, in chi squared; that cause): of
+    all groups in which something was switched on."""
     assert model.move is not None
     found = [_beyond_one(seen[group]) for group in model.move.remedies]
     worth = [value for value, _ in found if value > 0.0]
-    most, words = max(found)
-    return (sum(worth), words) if worth else (most, words)
+    most, best = max(found, key=lambda one: one[0])
+    return (sum(worth), best) if worth else (most, best)
 
 
-def _beyond_one(seen: Examined) -> tuple[float, str]:
+def _beyond_one(seen: Examined) -> tuple[float, Statement | None]:
     lack = seen.diagnosis.lack_of_fit
     others = [r for r in lack.remedies if not r.offered or r.key == CHANGE]
-    worth = [(r.chi2 - np.log(max(seen.rows, 2)) * r.numbers, r.words) for r in others]
-    return max(worth, default=(-np.inf, ""))
+    worth = [(r.chi2 - np.log(max(seen.rows, 2)) * r.numbers, r.cause) for r in others]
+    return max(worth, key=lambda one: one[0], default=(-np.inf, None))
 
 
-def _said(lacks: Mapping[str, LackOfFit]) -> str:
-    """What was not taken because no robot file holds it."""
-    told = {group: words for group, lack in lacks.items() if (words := _looks_like(lack))}
-    return "".join(f"; {words}" if group == WHOLE else f"; {group}: {words}" for group, words in told.items())
+def _untaken(lacks: Mapping[str, LackOfFit]) -> dict[str, Any]:
+    """What was not taken because no robot file holds it, of each group."""
+    found = {group: looks for group, lack in lacks.items() if (looks := _looks_like(lack)) is not None}
+    groups = ("" if group == WHOLE else group for group in found)
+    return {"groups": tuple(groups), "causes": tuple(found.values())}
 
 
-def _looks_like(lack: LackOfFit) -> str:
+def _looks_like(lack: LackOfFit) -> Statement | None:
     first = next(iter(lack.causes), None)
     if first is None:
-        return ""
+        return None
     if first.key == CHANGE:
-        return f"it looks like {first.words}: fit the parts as logs of their own"
+        return Statement("looks_like_change", NOTE, numbers={"cause": first.cause})
     if not first.offered:
-        return f"it looks like {first.words}, which no law that is known here holds"
+        return Statement("looks_like", NOTE, numbers={"causes": (first.cause,)})
     if first.rivals:
-        return f"it may be {all_of([UNOFFERED[key] for key in first.rivals])}, which no law that is known here holds"
-    return ""
+        return Statement("looks_like", NOTE, numbers={"causes": tuple(cause("cause", key) for key in first.rivals)})
+    return None
 
 
-def _ended(stands: Model, rungs: Sequence[Rung], why: str) -> tuple[Fit, Solution, Ladder]:
-    return stands.fit, stands.solution, Ladder(tuple(rungs), why)
+def _ended(
+    stands: Model, rungs: Sequence[Rung], why: str, **numbers: Any
+) -> tuple[Fit, Solution, Ladder]:  # fmt: skip
+    return stands.fit, stands.solution, Ladder(tuple(rungs), Statement(why, NOTE, numbers=numbers))

@@ -13,7 +13,6 @@ from itertools import zip_longest
 
 import numpy as np
 
-from omnidyn.document import all_of
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.ladder import STANDS
@@ -38,6 +37,7 @@ from omnidyn.model.friction import WheelFriction
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, DIRECTION, FRICTION, WHEELS, find_key
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
+from omnidyn.statement import NOTE, Statement
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ class Move:
         return next(iter(self.remedies.values())).key
 
     @property
-    def words(self) -> str:
+    def cause(self) -> Statement:
         """What is switched on, and where."""
-        return f"{next(iter(self.remedies.values())).words}{self.where}"
+        return self.at(next(iter(self.remedies.values())).cause)
 
     @property
     def promise(self) -> float:
@@ -67,25 +67,25 @@ class Move:
         """In which groups it is switched on, where not in all."""
         return () if self.all else tuple(self.remedies)
 
-    @property
-    def where(self) -> str:
-        """The same in words, with a blank before them."""
-        return f" in {all_of(self.groups)}" if self.groups else ""
+    def at(self, cause: Statement) -> Statement:
+        """A cause with the groups in which it is switched on, where not in all."""
+        numbers = {"cause": cause, "groups": self.groups}
+        return Statement("in_groups", NOTE, numbers=numbers) if self.groups else cause
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
     """A fit, and what it came to. begins: group -> the robot and the question it began from. numbers: see `Switch`.
-    before: what stood when it was tried; instead: of which step it is in the place, in words."""
+    before: what stood when it was tried; instead: of which step it is in the place."""
 
     fit: Fit
     solution: Solution
     begins: Mapping[str, tuple[Robot, Question]]
     move: Move | None = None
-    words: str = STANDS
+    cause: Statement = STANDS
     numbers: int = 0
     before: Model | None = None
-    instead: str = ""
+    instead: Statement | None = None
 
     @classmethod
     def first(cls, fit: Fit, solution: Solution) -> Model:
@@ -135,8 +135,8 @@ class Untried:
     """A move that was not fitted, and why."""
 
     move: Move
-    words: str
-    why: str
+    cause: Statement
+    why: Statement
 
 
 def moves(worth: Mapping[str, Sequence[Remedy]], stands: Model) -> list[Move]:
@@ -201,7 +201,12 @@ def can(key: str, robot: Robot) -> bool:
 
 
 def tried(
-    move: Move, stands: Model, runs: Sequence[Run], names: Sequence[str] | None, progress: Progress, instead: str = ""
+    move: Move,
+    stands: Model,
+    runs: Sequence[Run],
+    names: Sequence[str] | None,
+    progress: Progress,
+    instead: Statement | None = None,
 ) -> list[Model | Untried]:
     """A move, fitted in every way in which it can be switched on. names: of the group of each run."""
     every = {
@@ -209,16 +214,17 @@ def tried(
     }
     found: list[Model | Untried] = []
     for ways in zip(*every.values(), strict=False):
-        words, aside = f"{ways[0].words}{move.where}", progress.aside(f"the ladder tries {ways[0].words}{move.where}")
+        cause = move.at(ways[0].cause)
+        aside = progress.aside(f"the ladder tries {cause}")
         begins = _begins(stands, dict(zip(every, ways, strict=True)))
         try:
             fit = _fit(stands, begins, runs, names, aside)
             solution, _ = fit.with_levels(fit.solve(aside), aside)
         except OmnidynError as error:
-            found.append(Untried(move, words, f"cannot be fitted: {error}"))
+            found.append(Untried(move, cause, Statement("not_fittable", NOTE, numbers={"error": str(error)})))
             continue
         numbers = stands.numbers + sum(way.numbers for way in ways)
-        found.append(Model(fit, solution, begins, move, words, numbers, stands, instead))
+        found.append(Model(fit, solution, begins, move, cause, numbers, stands, instead))
     return found
 
 

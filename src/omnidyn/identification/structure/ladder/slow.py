@@ -11,11 +11,12 @@ from collections.abc import Sequence
 
 from omnidyn.identification.structure.ladder.models import Model, Move, Untried
 from omnidyn.identification.structure.missing.laws import TRACTION
+from omnidyn.statement import NOTE, Statement
 
 FITS = 4  # of wheels that slip, in all steps together
 CLEARLY = 6.0  # of chi squared, by which one remedy explains more than another
-NOT_NEEDED = "not tried: it explains less than what leaves nothing but noise without it, and its fit takes long"
-BEYOND = f"not tried: of fits with wheels that slip, which take long, the ladder makes {FITS} at most"
+NOT_NEEDED = Statement("slow_and_not_needed", NOTE)
+BEYOND = Statement("slow_fits_spent", NOTE, numbers={"fits": FITS})
 
 
 class Purse:
@@ -51,8 +52,8 @@ class Purse:
         found, self._untried = self._untried, []
         return found
 
-    def _leave(self, move: Move, why: str) -> None:
-        self._untried.append(Untried(move, move.words, why))
+    def _leave(self, move: Move, why: Statement) -> None:
+        self._untried.append(Untried(move, move.cause, why))
 
 
 def is_slow(move: Move, stands: Model) -> bool:

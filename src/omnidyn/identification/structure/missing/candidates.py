@@ -8,33 +8,35 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.document import short
 from omnidyn.errors import OmnidynError
+from omnidyn.identification.lack_of_fit import CHANGE
 from omnidyn.identification.output_error.prepare import LOOP
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT
 from omnidyn.identification.structure.motion import Motion, in_the_room
 from omnidyn.identification.structure.workbench import Workbench, scaled
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN, Driver
 from omnidyn.model.dynamics import drive_wrench
-from omnidyn.model.keys import EMF, TORQUE, in_words
+from omnidyn.model.keys import EMF, TORQUE
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
+from omnidyn.statement import NOTE, Statement
 
 LEAST = -0.9  # relative change of a number that is above 0: what goes further is no explanation
 STEP = 0.02  # relative change that a smooth number is tried with
-CHANGE = "change"  # friction that is another one from some time of the log on
 WHEN = np.linspace(0.1, 0.9, 9)  # shares of the run at which it may change
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A candidate that was fitted: in words, how many numbers it took, number -> (before, with it)."""
+    """A candidate that was fitted: what it is, how many numbers it took, number -> (before, with it)."""
 
-    words: str
+    cause: Statement
     numbers: int
     changes: Mapping[str, tuple[float, float]]
 
@@ -51,13 +53,13 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """key: of the robot file, a nuisance, or CHANGE. trials: one or more. told: its fitted change and where it was
-    tried, in words. least: a change below it makes no sense. offered: whether a robot file or a fit can hold it. late:
-    whether it has an engine of its own, and is asked only where something is left out."""
+    """key: of the robot file, a nuisance, or CHANGE. trials: one or more. cause: what it is, of its fitted change and
+    where it was tried. least: a change below it makes no sense. offered: whether a robot file or a fit can hold it.
+    late: whether it has an engine of its own, and is asked only where something is left out."""
 
     key: str
     trials: Callable[[Workbench], list[Trial]]
-    told: Callable[[float, float], str]
+    cause: Callable[[float, float], Statement]
     least: float = -np.inf
     offered: bool = True
     late: bool = False
@@ -70,9 +72,19 @@ class Candidate:
             return []
 
 
-def as_it_is(words: str) -> Callable[[float, float], str]:
-    """Words that no value belongs to."""
-    return lambda _change, _at: words
+def cause(code: str, subject: str = "") -> Statement:
+    """What may be missing from a model."""
+    return Statement(code, NOTE, subject)
+
+
+def as_it_is(code: str, subject: str = "") -> Callable[[float, float], Statement]:
+    """A cause that no value belongs to."""
+    return lambda _change, _at: cause(code, subject)
+
+
+def sized(code: str, subject: str, **numbers: Callable[[float, float], Any]) -> Callable[[float, float], Statement]:
+    """A cause with numbers, each of the fitted change and where it was tried."""
+    return lambda change, at: Statement(code, NOTE, subject, {name: of(change, at) for name, of in numbers.items()})
 
 
 def numbers(bench: Workbench) -> Iterator[Candidate]:
@@ -97,31 +109,30 @@ def _number(robot: Robot, key: str, beside: str = "") -> Iterator[Candidate]:
     def trials(bench: Workbench) -> list[Trial]:
         return [Trial([own / STEP for own in bench.change(changed)])]
 
-    yield Candidate(key, trials, lambda change, _: f"{in_words(key)} {short(100.0 * change, '+.2g')} %", LEAST)
+    yield Candidate(key, trials, sized("number_off", key, change=lambda change, _: change), LEAST)
 
 
 def of_the_log(bench: Workbench) -> Iterator[Candidate]:
     """What a log does to a right model: nuisances that are not fitted, and a change on the way."""
     if bench.kind != LOOP:
-        yield Candidate(GAIN, _driver(GAIN, Driver(gain=1.0 + STEP), STEP), lambda by, _: f"gain {1.0 + by:.3g}")
+        gain, fade, band = Driver(gain=1.0 + STEP), Driver(fade=STEP), Driver(dead_band=0.1)
+        yield Candidate(GAIN, _driver(GAIN, gain, STEP), sized("gain", "", gain=lambda by, _: 1.0 + by))
+        yield Candidate(FADE, _driver(FADE, fade, STEP), sized("fading_voltage", "", percent=lambda by, _: 100.0 * by))
         yield Candidate(
-            FADE, _driver(FADE, Driver(fade=STEP), STEP), lambda by, _: f"a voltage that fades by {100.0 * by:.2g} %"
-        )
-        yield Candidate(
-            DEAD_BAND, _driver(DEAD_BAND, Driver(dead_band=0.1), 0.1), lambda by, _: f"dead band {by:.2g} V", 0.0
-        )
-    yield Candidate(TILT, _by(in_the_room), as_it_is("a force that stays in the room, as of a floor that is not level"))
-    yield Candidate(PUSH, _by(_on_the_body), as_it_is("a constant push in the body, as of a brush that drags"))
-    for channel in dict.fromkeys(name for name, _ in bench.problem.columns):
-        words = channel.replace("_", " ")
-        yield Candidate(
-            f"{LATENCY}.{channel}", _late(channel), lambda by, _, words=words: f"{words} late by {1e3 * by:.3g} ms"
-        )
-    for words, force in (("friction", _friction), ("mass", _inertia), ("supply", _drive)):
-        yield Candidate(
-            CHANGE, _later(force),
-            lambda by, at, words=words: f"{_about(bench.robot, words, by)} {_when(bench, at)}",
+            DEAD_BAND, _driver(DEAD_BAND, band, 0.1), sized("dead_band", "", value=lambda by, _: by), 0.0
         )  # fmt: skip
+    yield Candidate(TILT, _by(in_the_room), as_it_is("force_in_the_room"))
+    yield Candidate(PUSH, _by(_on_the_body), as_it_is("push_on_the_body"))
+    for channel in dict.fromkeys(name for name, _ in bench.problem.columns):
+        late = sized("late_channel", channel, late=lambda by, _: by)
+        yield Candidate(f"{LATENCY}.{channel}", _late(channel), late)
+    mass, at = float(bench.robot.body.mass), partial(_seconds, bench)
+    for what, force in (("friction", _friction), ("mass", _inertia), ("supply", _drive)):
+        changed = sized(
+            "change_on_the_way", what, by=lambda by, _: by, before=lambda *_: mass,
+            after=lambda by, _: max(mass + by, 0.0), share=lambda _, share: share, at=lambda _, share: at(share),
+        )  # fmt: skip
+        yield Candidate(CHANGE, _later(force), changed)
 
 
 def _driver(name: str, driver: Driver, size: float) -> Callable[[Workbench], list[Trial]]:
@@ -163,20 +174,10 @@ def _later(force: Callable[[Motion], FloatArray]) -> Callable[[Workbench], list[
     return trials
 
 
-def _when(bench: Workbench, share: float) -> str:
-    """A moment of the logs, in seconds where all of them are as long."""
+def _seconds(bench: Workbench, share: float) -> float | None:
+    """A moment of the logs [s]; None where they are not as long as each other."""
     spans = [piece.record.span for piece in bench.problem.pieces]
-    seconds = f", at {short(share * max(spans), '.3g')} s" if max(spans) < 1.02 * min(spans) else ""
-    return f"{100.0 * share:.0f} % into the log{seconds}"
-
-
-def _about(robot: Robot, words: str, change: float) -> str:
-    """The levels of a mass or a supply: rough, for to first order a large change is not what it is."""
-    first = float(robot.body.mass)
-    if words == "mass":
-        return f"{words} that changes from {first:.3g} to about {max(first + change, 0.0):.2g} kg"
-    by = f" by about {short(100.0 * change, '+.2g')} %" if words == "supply" else ""
-    return f"{words} that changes{by}"
+    return share * max(spans) if max(spans) < 1.02 * min(spans) else None
 
 
 def _friction(motion: Motion) -> FloatArray:

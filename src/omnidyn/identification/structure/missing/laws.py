@@ -18,6 +18,7 @@ from omnidyn.identification.structure.missing.candidates import (
     as_it_is,
     numbers,
     of_the_log,
+    sized,
 )
 from omnidyn.identification.structure.motion import Motion
 from omnidyn.identification.structure.workbench import Workbench
@@ -26,7 +27,7 @@ from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, Wh
 from omnidyn.model.friction.kinds import COULOMB, LUGRE
 from omnidyn.model.friction.stribeck import USUAL as EXPONENT
 from omnidyn.model.friction.stribeck import fallen
-from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, WHEELS, find_key, in_words, unit
+from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, WHEELS, find_key
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.motor import mass_at_rim, per_wheel, settled_current, traction
@@ -40,7 +41,6 @@ ABOVE = (0.1, 0.25, 0.5, 1.0)  # shares by which breakaway may exceed Coulomb fr
 SPEEDS = (0.01, 0.03, 0.1, 0.3)  # of the fastest speed, over which the level may fall
 BENDS = (2e-4, 1e-3, 5e-3)  # [m] by which bristles may bend before they slip
 USUAL_FALL, USUAL_SPEED = 1.3, 0.05  # breakaway over Coulomb friction, and [m/s] over which it falls to it
-FALL_WORDS = "friction that falls with the speed from breakaway, above Coulomb friction (Stribeck)"
 LIGHT, AMPLE = 0.02, 1e6  # wheels, as a share of the robot's mass at their rims; a grip that no motor overcomes
 TRACTION = "wheels.traction_mu"
 FALL, BEND, DAMPING = "stribeck_speed", "stiffness", "damping"  # numbers by which laws are named: Stribeck, Dahl, LuGre
@@ -61,10 +61,10 @@ def candidates(bench: Workbench) -> Iterator[Candidate]:
 def _of_the_body(bench: Workbench) -> Iterator[Candidate]:
     body = bench.robot.body
     other = bench.robot.model_copy(update={"body": body.model_copy(update={"rotating_frame": not body.rotating_frame})})
-    words = "no forces of a turning frame" if body.rotating_frame else "the forces of a turning frame"
-    yield Candidate("body.rotating_frame", lambda b: [Trial(b.change(other))], as_it_is(words))
-    words = "another centre of mass" if any(body.centre) else "a centre of mass off the middle of the wheels"
-    yield Candidate(CENTRE, lambda b: [Trial(b.by_force(_off_centre))], as_it_is(words))
+    frame = as_it_is("no_turning_frame" if body.rotating_frame else "turning_frame")
+    yield Candidate("body.rotating_frame", lambda b: [Trial(b.change(other))], frame)
+    centre = as_it_is("other_centre" if any(body.centre) else "centre_off_the_middle")
+    yield Candidate(CENTRE, lambda b: [Trial(b.by_force(_off_centre))], centre)
 
 
 def _off_centre(motion: Motion) -> FloatArray:
@@ -87,7 +87,7 @@ def _off_centre(motion: Motion) -> FloatArray:
 def _of_motors(bench: Workbench) -> Iterator[Candidate]:
     motor, n = bench.robot.motor, bench.robot.wheels.count
     if motor.current_limit is None and any(np.any(m.current) for m in bench.motions):
-        yield Candidate("motor.current_limit_A", _limits, lambda _, at: f"a current limit of about {at:.2g} A")
+        yield Candidate("motor.current_limit_A", _limits, sized("current_limit", "", limit=lambda _, at: at))
     peak = float(max(np.abs(m.voltage).max() for m in bench.motions))
     at_rim = per_wheel(motor.gear_ratio, n) ** 2 / bench.robot.wheels.radii**2
     spins = float(SHARE * bench.robot.body.mass / at_rim.sum())
@@ -99,7 +99,7 @@ def _of_motors(bench: Workbench) -> Iterator[Candidate]:
         lossy = _with(bench.robot, gear_efficiency=1.0 - LOSS)
         yield Candidate(
             "motor.gear_efficiency", lambda b: [Trial([own / LOSS for own in b.change(lossy)])],
-            lambda by, _: f"gear efficiency {1.0 - by:.2g}", 0.0,
+            sized("gear_efficiency", "", efficiency=lambda by, _: 1.0 - by), 0.0,
         )  # fmt: skip
 
 
@@ -108,7 +108,7 @@ def _switched_on(robot: Robot, key: str, field: str, size: float) -> Candidate:
     on = _with(robot, **{field: size})
     return Candidate(
         key, lambda b: [Trial([own / size for own in b.change(on)])],
-        lambda by, _: f"{in_words(key)} {by:.2g} {unit(key)}", 0.0,
+        sized("switched_on", key, value=lambda by, _: by), 0.0,
     )  # fmt: skip
 
 
@@ -124,8 +124,7 @@ def _limits(bench: Workbench) -> list[Trial]:
 
 def _of_the_floor(bench: Workbench) -> Iterator[Candidate]:
     if bench.robot.wheels.traction_mu is None and bench.kind != LOOP:
-        words: Callable[[float, float], str] = lambda _, at: f"wheels that slip, at about {at:.2g} of what they carry"  # noqa: E731
-        yield Candidate(TRACTION, _grips, words, late=True)
+        yield Candidate(TRACTION, _grips, sized("slipping_wheels", "", share=lambda _, at: at), late=True)
 
 
 def _grips(bench: Workbench) -> list[Trial]:
@@ -158,23 +157,20 @@ def _of_friction(bench: Workbench) -> Iterator[Candidate]:
     axes, direction = friction.axes, friction.direction
     boxed, round_ = any(axes.coulomb), any(direction.coulomb)
     for table in may_break_away(friction):
-        yield Candidate(f"{table}.{BREAKAWAY}", _breaking(table), as_it_is("breakaway above Coulomb friction"))
+        yield Candidate(f"{table}.{BREAKAWAY}", _breaking(table), as_it_is("breakaway"))
     if boxed and not round_:
-        yield Candidate(
-            DIRECTION, _in_place(along_travel),
-            as_it_is("Coulomb friction along the direction of travel, an ellipse"),
-        )  # fmt: skip
+        yield Candidate(DIRECTION, _in_place(along_travel), as_it_is("friction_of_travel"))
     if round_ and not boxed:
-        yield Candidate(BODY_AXES, _in_place(along_axes), as_it_is("Coulomb friction on each axis by itself, a box"))
+        yield Candidate(BODY_AXES, _in_place(along_axes), as_it_is("friction_of_axes"))
     if friction.wheels == WheelFriction():
-        yield Candidate(WHEELS, _at_wheels, as_it_is("friction at the wheels"))
+        yield Candidate(WHEELS, _at_wheels, as_it_is("friction_at_wheels"))
     for key in other_laws(friction):
         table, _, name = key.rpartition(".")
         if name == FALL:
-            yield Candidate(key, _falling(FORCES[table]), as_it_is(FALL_WORDS), 0.0)
+            yield Candidate(key, _falling(FORCES[table]), as_it_is("stribeck"), 0.0)
         else:
-            law, words = BRISTLES[name]
-            yield Candidate(key, _bending(law, table), as_it_is(words))
+            law, code = BRISTLES[name]
+            yield Candidate(key, _bending(law, table), as_it_is(code))
 
 
 def other_laws(friction: Friction) -> list[str]:
@@ -334,8 +330,8 @@ def bristled(robot: Robot, table: str, bend: float) -> Friction:
 
 
 BRISTLES = {
-    BEND: (bent, "friction that bends before it slips (Dahl)"),
-    DAMPING: (bristled, "friction that bends before it slips, falls and is damped (LuGre)"),
+    BEND: (bent, "dahl"),
+    DAMPING: (bristled, "lugre"),
 }
 
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.model.actuation import GAIN
+from omnidyn.statement import NOTE, Statement
 
 HIDDEN = {
     "motor.resistance_ohm": "wheels.wheel_radius_m", GAIN: "wheels.wheel_radius_m",
@@ -30,7 +31,7 @@ def with_odometry(remedies: Sequence[Remedy], columns: Sequence[tuple[str, int]]
     found = []
     for each in remedies:
         looks = [key for key, radii in behind.items() if each.key in radii]
-        words = f"{each.words} (of another size if the twist is odometry)" if looks else each.words
+        cause = Statement("if_odometry", NOTE, numbers={"cause": each.cause}) if looks else each.cause
         same = tuple(dict.fromkeys((*each.same_as, *behind[each.key], *looks)))
-        found.append(replace(each, same_as=same, words=words))
+        found.append(replace(each, same_as=same, cause=cause))
     return tuple(found)

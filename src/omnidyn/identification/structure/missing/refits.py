@@ -31,7 +31,7 @@ from omnidyn.identification.output_error.problem.problem import Parts, Point, Pr
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.missing.candidates import CHANGE, Candidate, Fitted, Trial
-from omnidyn.identification.structure.missing.switches import Switch, simpler_first, switches, told
+from omnidyn.identification.structure.missing.switches import Switch, as_fitted, simpler_first, switches
 from omnidyn.identification.structure.workbench import on_time
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 
@@ -92,7 +92,7 @@ def _asked(ranked: Sequence[Remedy], candidates: Sequence[Candidate]) -> Iterato
     yield from ((known[each.key], each) for each in best)
     for key in SHAPES:
         if key in known and key not in {each.key for each in best}:
-            yield known[key], Remedy(key, known[key].told(0.0, 0.0), 0.0, 0.0)
+            yield known[key], Remedy(key, known[key].cause(0.0, 0.0), 0.0, 0.0)
 
 
 def _question(problem: Problem) -> Question:
@@ -154,7 +154,7 @@ def _trial(refit: _Refit, problem: Problem, parts: Sequence[Parts], solution: So
     before, value = _values(problem, solution), dict(zip(made.names, point.values.tolist(), strict=True))
     changes = {name: (before[name], value[name]) for name in problem.names[: problem.robot_count] if name in value}
     numbers = max(len(made.parameters) - len(problem.parameters) + refit.way.numbers, 1)
-    return Trial(shown, fitted=Fitted(told(refit.way.words, before, value), numbers, changes))
+    return Trial(shown, fitted=Fitted(as_fitted(refit.way.cause, before, value), numbers, changes))
 
 
 def _values(problem: Problem, solution: Solution) -> dict[str, float]:

@@ -147,12 +147,12 @@ def remedies(
         gain, std = float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change)))
         same = tuple(o.candidate.key for o in worth if o is not t and _same(blocks, known, base, noise, t, o))
         fitted = t.trial.fitted
-        words = fitted.words if fitted else t.candidate.told(float(t.size[0]), t.trial.at)
+        cause = fitted.cause if fitted else t.candidate.cause(float(t.size[0]), t.trial.at)
         every = (base - blocks.left(np.concatenate([known, t.at, themes]))) / noise
         share = (t.chi2 - t.numbers) / max(every - t.numbers - len(themes), t.chi2 - t.numbers, 1e-300)
         ranking.append(
             Remedy(
-                t.candidate.key, words, gain, std, same, share, t.candidate.offered, t.chi2, t.numbers,
+                t.candidate.key, cause, gain, std, same, share, t.candidate.offered, t.chi2, t.numbers,
                 tuple(t.size.tolist()), t.trial.at, fitted.changes if fitted else _changes(linear.rows, t),
             )
         )  # fmt: skip

@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.document import all_of
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import LOSS, Remedy
+from omnidyn.identification.ladder import STANDS
 from omnidyn.identification.output_error.prepare import LOOP, engine_kind, expand_keys, guesses
 from omnidyn.identification.output_error.problem.bending import with_damping
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
-from omnidyn.identification.output_error.problem.parameters import AT, EFFICIENCY, WITHIN
+from omnidyn.identification.output_error.problem.parameters import EFFICIENCY, WITHIN
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, is_profiled, levels_of
 from omnidyn.identification.question import STUDENT, Question
@@ -38,11 +38,12 @@ from omnidyn.identification.structure.missing.laws import (
     table_of,
 )
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
-from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, FRICTION, WHEELS, Key, find_key, in_words, unit
+from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, FRICTION, WHEELS, Key, find_key
 from omnidyn.model.known.holding import holding
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import per_wheel
 from omnidyn.model.robot import Prior, Robot
+from omnidyn.statement import NOTE, Statement
 
 LIMIT, FRAME = "motor.current_limit_A", "body.rotating_frame"
 EACH_WHEEL = f"{WHEELS}.coulomb"  # a level of each wheel, in the place of one of all
@@ -64,11 +65,11 @@ OFF = {"motor.voltage_drop_V": "voltage_drop", "motor.rotor_inertia_kg_m2": "rot
 
 @dataclass(frozen=True, eq=False)
 class Switch:
-    """What to fit. words: what is different. numbers: that the logs decide on beside the parameters of the fit."""
+    """What to fit. cause: what is different. numbers: that the logs decide on beside the parameters of the fit."""
 
     robot: Robot
     question: Question
-    words: str
+    cause: Statement
     numbers: int = 0
 
 
@@ -86,7 +87,7 @@ def switches(remedy: Remedy, robot: Robot, question: Question, found: Solution) 
 
 def as_it_ended(robot: Robot, question: Question, found: Solution) -> Switch:
     """A fit as it ended, nothing switched on."""
-    way = Switch(_where_it_ended(robot, found), _as_it_settled(robot, question, found), "")
+    way = Switch(_where_it_ended(robot, found), _as_it_settled(robot, question, found), STANDS)
     return _as_far_as_profiled(way, found)
 
 
@@ -98,36 +99,32 @@ def simpler_first(remedies: Sequence[Remedy]) -> list[Remedy]:
     return [r for k, r in enumerate(remedies) if not any(key in found[:k] for key in first.get(r.key, ()))]
 
 
-def told(words: str, before: Mapping[str, float], after: Mapping[str, float]) -> str:
+def as_fitted(cause: Statement, before: Mapping[str, float], after: Mapping[str, float]) -> Statement:
     """What was switched on, with its values where they are numbers of their own: before, after: what was fitted."""
     new = [name for name in after if name not in before and not name.startswith(FRICTION)]
     if not new or len(new) > N_AXES or any(name.partition(".")[0] in (TILT, PUSH) for name in new):
-        return words
-    keys = {name: name.partition(AT) for name in new}  # of one group, where it is its own
-    return all_of([
-        f"{in_words(key)} {after[name]:.3g} {unit(key)}".rstrip() + (f" in {group}" if group else "")
-        for name, (key, _, group) in keys.items()
-    ])  # fmt: skip
+        return cause
+    return Statement("fitted_numbers", NOTE, numbers={"keys": tuple(new), "values": tuple(after[key] for key in new)})
 
 
 def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
-    key, words = remedy.key, remedy.words
+    key, cause = remedy.key, remedy.cause
     friction = robot.friction
     if key.partition(".")[0] in NUISANCES:
-        yield Switch(robot, replace(asked, nuisances=(*(asked.nuisances or ()), key)), words)
+        yield Switch(robot, replace(asked, nuisances=(*(asked.nuisances or ()), key)), cause)
     elif key == LOSS:
-        yield Switch(robot, replace(asked, loss=STUDENT), words)
+        yield Switch(robot, replace(asked, loss=STUDENT), cause)
     elif key == FRAME:
         body = robot.body.replace(rotating_frame=not robot.body.rotating_frame)
-        yield Switch(robot.replace(body=body), asked, words)
+        yield Switch(robot.replace(body=body), asked, cause)
     elif key == CENTRE:
-        yield Switch(_balanced(robot, remedy.size), _free(asked, key), words)
+        yield Switch(_balanced(robot, remedy.size), _free(asked, key), cause)
     elif key in BREAKS:
         yield _breaking_away(remedy, robot, asked)
     elif key == DIRECTION:
-        yield Switch(robot.replace(friction=along_travel(friction)), _of_another_shape(asked), words)
+        yield Switch(robot.replace(friction=along_travel(friction)), _of_another_shape(asked), cause)
     elif key == BODY_AXES:
-        yield Switch(robot.replace(friction=along_axes(friction)), _of_another_shape(asked), words)
+        yield Switch(robot.replace(friction=along_axes(friction)), _of_another_shape(asked), cause)
     elif key == WHEELS:
         yield from _at_wheels(robot, asked)
     elif key == EACH_WHEEL:
@@ -136,19 +133,19 @@ def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
         yield _of_another_law(remedy, robot, asked)
     elif key == LIMIT:
         limited = robot.replace(motor=robot.motor.replace(current_limit=remedy.at))
-        yield Switch(limited, _free(asked, key), words)
+        yield Switch(limited, _free(asked, key), cause)
     elif key == TRACTION:
         slips, spins = slippery(robot, remedy.at), "wheels.inertia_kg_m2"
         guessed = [spins] if slips.wheels.wheel_inertia != robot.wheels.wheel_inertia else []
-        yield _rough(slips, _free(asked, key), guessed, words)
+        yield _rough(slips, _free(asked, key), guessed, cause)
     elif key in OFF:
         on = robot.replace(motor=robot.motor.replace(**{OFF[key]: remedy.size[0]}))
-        yield Switch(on, _free(asked, key), words)
+        yield Switch(on, _free(asked, key), cause)
     elif key == EFFICIENCY:
         lossy = robot.replace(motor=robot.motor.replace(gear_efficiency=1.0 - max(remedy.size[0], OF_GEAR)))
-        yield Switch(lossy, _free(asked, key), words)
+        yield Switch(lossy, _free(asked, key), cause)
     elif find_key(key):
-        yield Switch(_as_one(robot, key), _free(asked, key), words)
+        yield Switch(_as_one(robot, key), _free(asked, key), cause)
 
 
 def _where_it_ended(robot: Robot, found: Solution) -> Robot:
@@ -206,7 +203,7 @@ def _breaking_away(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
     changed = robot.replace(friction=breaking(robot, table, above))
     held = [f"{table}.{field}" for field in held_above(robot, table, above)]
     keys = [key for name in held for key in expand_keys(name, changed)]
-    return Switch(changed, _free(asked, *keys), remedy.words, len(keys))
+    return Switch(changed, _free(asked, *keys), remedy.cause, len(keys))
 
 
 def _of_another_law(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
@@ -221,10 +218,10 @@ def _of_another_law(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
     # A damping is asked for where there are bristles: the critical one stands in no file.
     names = [name for name in every if getattr(own, name.replace(DAMPING, BEND), None) is not None]
     keys = [f"{table}.{name}" for name in names]
-    return _rough(with_damping(robot.replace(friction=friction), keys), asked, keys, remedy.words)
+    return _rough(with_damping(robot.replace(friction=friction), keys), asked, keys, remedy.cause)
 
 
-def _rough(robot: Robot, asked: Question, names: Sequence[str], words: str) -> Switch:
+def _rough(robot: Robot, asked: Question, names: Sequence[str], cause: Statement) -> Switch:
     """What a law begins with, free; what of it must be positive stays where it begins if a log says nothing of it."""
     own = {Key.parse(key).axis for key in asked.free or ()}  # of an axis that never moved nothing is asked
     keys = [key for name in names for key in expand_keys(name, robot) if Key.parse(key).axis in own | {None}]
@@ -232,7 +229,7 @@ def _rough(robot: Robot, asked: Question, names: Sequence[str], words: str) -> S
         key: Prior(std=UNSURE * float(Key.parse(key).get(robot)), source="where the search began", origin="guess")
         for key in keys if not Key.parse(key).level
     }  # fmt: skip
-    return Switch(robot.replace(priors={**robot.priors, **rough}), _free(asked, *keys), words)
+    return Switch(robot.replace(priors={**robot.priors, **rough}), _free(asked, *keys), cause)
 
 
 def _at_wheels(robot: Robot, asked: Question) -> Iterator[Switch]:
@@ -243,38 +240,43 @@ def _at_wheels(robot: Robot, asked: Question) -> Iterator[Switch]:
     rim = float(np.mean(viscous / (g**2).sum(axis=1)))
     yield Switch(
         robot.replace(friction=Friction(wheels=WheelFriction(coulomb=level, viscous=rim))), _of_another_shape(asked),
-        "friction at the wheels in the place of the other",
+        Statement("friction_at_wheels_instead", NOTE),
     )  # fmt: skip
     if coulomb.any():
-        yield _beside(robot, asked, "Coulomb friction at the wheels", 0.5 * level)
+        yield _beside(robot, asked, False, 0.5 * level)
 
 
 def _at_each_wheel(robot: Robot, asked: Question) -> Switch:
     """A level of each wheel: of the friction that is there already, else beside that on the body."""
-    wheels, count, words = robot.friction.wheels, robot.wheels.count, "Coulomb friction of its own at each wheel"
+    wheels, count = robot.friction.wheels, robot.wheels.count
     if not np.any(wheels.coulomb):
-        return _beside(robot, asked, words, (0.5 * _at_rims(robot),) * count)
+        return _beside(robot, asked, True, (0.5 * _at_rims(robot),) * count)
     wheels = wheels.replace(coulomb=tuple(per_wheel(wheels.coulomb, count).tolist()))
-    return Switch(robot.replace(friction=robot.friction.replace(wheels=wheels)), _of_another_shape(asked), words)
+    return Switch(
+        robot.replace(friction=robot.friction.replace(wheels=wheels)),
+        _of_another_shape(asked),
+        Statement("friction_at_each_wheel", NOTE),
+    )
 
 
-def _beside(robot: Robot, asked: Question, words: str, level: float | tuple[float, ...]) -> Switch:
+def _beside(robot: Robot, asked: Question, each: bool, level: float | tuple[float, ...]) -> Switch:
     """Coulomb friction at the wheels beside that on the body, of which half is left."""
     direction = robot.friction.direction
     viscous, coulomb = _on_axes(robot.friction)
     if any(robot.friction.axes.coulomb):
         body, where = (
             Friction(axes=AxesFriction(viscous=_levels(viscous), coulomb=_levels(0.5 * coulomb))),
-            "on the axes",
+            BODY_AXES,
         )
     else:
         half = DirectionFriction(
             coulomb=(0.5 * float(coulomb[0]), 0.5 * float(coulomb[1])), yaw_coulomb=0.5 * direction.yaw_coulomb,
             viscous=direction.viscous, yaw_viscous=direction.yaw_viscous,
         )  # fmt: skip
-        body, where = Friction(direction=half), "along the direction of travel"
+        body, where = Friction(direction=half), DIRECTION
+    cause = Statement("friction_beside", NOTE, where, {"each": each})
     both = body.replace(wheels=WheelFriction(coulomb=level))
-    return Switch(robot.replace(friction=both), _of_another_shape(asked), f"{words} beside that {where}")
+    return Switch(robot.replace(friction=both), _of_another_shape(asked), cause)
 
 
 def _at_rims(robot: Robot) -> float:

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.identification.lack_of_fit import UNOFFERED
 from omnidyn.identification.structure.missing.candidates import Candidate, Trial, as_it_is
 from omnidyn.identification.structure.motion import Motion
 from omnidyn.identification.structure.workbench import Workbench
@@ -29,8 +28,8 @@ def unoffered(bench: Workbench) -> Iterator[Candidate]:
         ("sag", _sag, (0.0,)),
         ("heat", _heat, (0.0,)),
     ):
-        yield Candidate(key, _tried(force, sizes), as_it_is(UNOFFERED[key]), offered=False)
-    yield Candidate("filter", _filtered, as_it_is(UNOFFERED["filter"]), offered=False)
+        yield Candidate(key, _tried(force, sizes), as_it_is("cause", key), offered=False)
+    yield Candidate("filter", _filtered, as_it_is("cause", "filter"), offered=False)
 
 
 def _tried(force: Force, sizes: tuple[float, ...]) -> Callable[[Workbench], list[Trial]]:

@@ -1,0 +1,128 @@
+"""What to measure, to mend or to ask for next, after a fit to whole logs."""
+
+from __future__ import annotations
+
+from omnidyn.document import short
+from omnidyn.model.keys import find_key, unit
+from omnidyn.statement import Statement
+from omnidyn.telling.causes import changes
+from omnidyn.telling.fit import MEASURED
+from omnidyn.telling.sentence import Sentence
+
+LONGEST = 100.0  # times as long as now: nobody records more
+WAYS = {  # what to do about a cause
+    "fit": "fit it (`nuisances` {key})",
+    "look": "look what happened there; fit the parts as logs of their own",
+    "limit": "put about that value into the robot file, and let the fit find it (`free` friction {key})",
+    "measure": "measure it and put it into the robot file",
+    "put": "put {key} into the robot file, and fit again",
+}
+
+
+def _bounded(statement: Statement) -> str:
+    """The friction of an axis that never moved is only bounded."""
+    name, axis = statement.subject, statement.numbers["axis"]
+    level = f"{statement.numbers['bound']:.3g} {unit(name)}"
+    return f"drive {axis or name} harder than {level}: it never moved, so its friction is only bounded"
+
+
+def _not_told(statement: Statement) -> str:
+    """A number is not identifiable, and the robot file knows nothing of it."""
+    axis = statement.numbers["axis"]
+    how = (
+        f"drive {axis} both ways, at several speeds" if axis
+        else "fix it (`fixed`), or record what depends on it: currents, or another load"
+    )  # fmt: skip
+    return f"{statement.subject} is not identifiable from these logs: {how}"
+
+
+def _cause(statement: Statement) -> str:
+    """The best cause of a misfit: what it would change, what the logs cannot distinguish from it, what to do."""
+    numbers = statement.numbers
+    alike = f"; these logs cannot tell it from {', '.join(map(str, numbers['alike']))}" if numbers["alike"] else ""
+    change = f" ({words})" if (words := changes(statement)) else ""
+    return f"{numbers['cause']} would explain what the model leaves out{change}{alike}: {_how_to(statement)}"
+
+
+def _how_to(statement: Statement) -> str:
+    """What to do about a cause."""
+    key, way = statement.subject, statement.numbers["way"]
+    if way == "distinguish":
+        group = {place.name if (place := find_key(name)) else name for name in (key, *statement.numbers["same_as"])}
+        ways = [words for name, words in MEASURED.items() if name in group] or ["measure one of them"]
+        return f"{' or '.join(ways)}, or record what tells them apart (currents, another load)"
+    return WAYS[way].format(key=key)
+
+
+def _guesses(statement: Statement) -> str:
+    """Numbers of the robot file are guesses, and the model leaves something out."""
+    keys = statement.numbers["keys"]
+    free = " ".join(f"`free` {key}" for key in statement.numbers["freeable"])
+    are = "is a guess" if len(keys) == 1 else "are guesses"
+    fit = f", or fit what shows in the logs (`free` friction {free})" if free else ""
+    return f"{', '.join(keys)} {are} of the robot file, and the model leaves something out: measure it{fit}"
+
+
+def _together(statement: Statement) -> str:
+    """Pairs of numbers are strongly correlated, and wide for it."""
+    numbers = statement.numbers
+    pairs = [
+        f"{first} and {second} (correlation {value:+.2f})"
+        for first, second, value in zip(numbers["first"], numbers["second"], numbers["correlation"], strict=True)
+    ]
+    one = "one of them" if len(pairs) == 1 else "one of each pair"
+    return f"{', '.join(pairs)} move together: measure {one} otherwise, or drive at more different speeds"
+
+
+def _wide(statement: Statement) -> str:
+    """Intervals are wide; how much longer a log would have to be."""
+    longer, goal = statement.numbers["longer"], 100.0 * statement.numbers["goal"]
+    enough = f"a log {longer:.0f} times as long" if longer <= LONGEST else "no log of a usual length"
+    them = "it" if len(statement.numbers["keys"]) == 1 else "all of them"
+    return (
+        f"{_known_roughly(statement)}: {enough} would bring {them} to {goal:.0f} %; more motion where it matters would "
+        "do so sooner"
+    )
+
+
+def _wide_by_misfit(statement: Statement) -> str:
+    """Intervals are wide because the model misses something."""
+    them = "it" if len(statement.numbers["keys"]) == 1 else "them"
+    return f"{_known_roughly(statement)}: what the model misses widens {them}, and no longer log mends that"
+
+
+def _known_roughly(statement: Statement) -> str:
+    numbers = statement.numbers
+    return ", ".join(
+        f"{name} is known within {short(100.0 * share, '.0f')} % only" if known else f"{name} is not known"
+        for name, share, known in zip(numbers["keys"], numbers["shares"], numbers["known"], strict=True)
+    )
+
+
+SENTENCES = {
+    "friction_bounded": Sentence(_bounded),
+    "number_not_told": Sentence(_not_told),
+    "known_by_file_only": Sentence(
+        "the logs do not tell {keys}: a measurement or a data sheet (with its std), or a log with currents, says more "
+        "than a longer log"
+    ),
+    "measure_or_fix": Sentence(
+        "{direction}; what is measured goes into the robot file, with its std, or is fixed (`fixed`)"
+    ),
+    "missing_cause": Sentence(_cause),
+    "try_ladder": Sentence(
+        "let `ladder` fit the logs with each of the best causes, step by step: it keeps what predicts better"
+    ),
+    "guessed_numbers": Sentence(_guesses),
+    "correlated_numbers": Sentence(_together),
+    "wide_intervals": Sentence(_wide),
+    "wide_by_misfit": Sentence(_wide_by_misfit),
+    "hold_out_log": Sentence(
+        "record one more log, of other drives, and hold it out (`hold_out`): only that shows what it is worth"
+    ),
+    "held_out_is_fitted": Sentence(
+        "{subject} is held out, and the same recording as {fitted}, which is fitted: hold out another"
+    ),
+    "mend_log": Sentence("{subject}: {finding}: {what}"),
+    "of_group": Sentence("{subject}: {statement}"),
+}

@@ -1,0 +1,126 @@
+"""Causes of a misfit, as diagnosis and ladder name them: a number that is off, a missing law, a fault of the log."""
+
+from __future__ import annotations
+
+from omnidyn.document import all_of, short
+from omnidyn.model.keys import BODY_AXES, DIRECTION, find_key, in_words, unit
+from omnidyn.statement import Statement
+from omnidyn.telling.sentence import Sentence
+
+UNOFFERED = {
+    "friction one way": "friction that differs between forward and backward motion",
+    "drag": "drag that grows with the square of the speed",
+    "turns of the wheels": "a force that repeats with the turns of the wheels",
+    "sag": "a supply that sags under load",
+    "heat": "motors that weaken as they warm up",
+    "filter": "speeds that went through a filter",
+}
+NONE = 1e-3  # of what a number was, below which nothing is left of it
+SHAPES = {DIRECTION: "an ellipse", BODY_AXES: "a box"}
+
+
+def named(key: str) -> str:
+    """The key of a cause as people call it."""
+    return in_words(key) if find_key(key) else UNOFFERED.get(key, key)
+
+
+def changes(statement: Statement) -> str:
+    """ "viscous friction forward 0.5 -> 0.3 N s/m": the numbers that a cause would change, as many as are given."""
+    names, before, after = (statement.numbers[name] for name in ("changed", "before", "after"))
+    return all_of([
+        f"{in_words(name)} {now:.3g} -> {then if abs(then) > NONE * abs(now) else 0.0:.3g} {unit(name)}".rstrip()
+        for name, now, then in zip(names, before, after, strict=True)
+    ])  # fmt: skip
+
+
+def _named(statement: Statement) -> str:
+    """A cause of which only the key is known."""
+    return named(statement.subject)
+
+
+def _number_off(statement: Statement) -> str:
+    """A number of the robot file is off."""
+    return f"{in_words(statement.subject)} {short(100.0 * statement.numbers['change'], '+.2g')} %"
+
+
+def _switched_on(statement: Statement) -> str:
+    """A number of the motors is not 0."""
+    return f"{in_words(statement.subject)} {statement.numbers['value']:.2g} {unit(statement.subject)}"
+
+
+def _fitted(statement: Statement) -> str:
+    """Numbers that a fit has found, each with the group that has it for itself."""
+    found = []
+    for name, value in zip(statement.numbers["keys"], statement.numbers["values"], strict=True):
+        key, _, group = name.partition("@")
+        found.append(f"{in_words(key)} {value:.3g} {unit(key)}".rstrip() + (f" in {group}" if group else ""))
+    return all_of(found)
+
+
+def _late(statement: Statement) -> str:
+    """A channel is late."""
+    return f"{statement.subject.replace('_', ' ')} late by {1e3 * statement.numbers['late']:.3g} ms"
+
+
+def _changes(statement: Statement) -> str:
+    """Friction, mass or supply changes at some time of the log."""
+    numbers = statement.numbers
+    at = "" if numbers["at"] is None else f", at {short(numbers['at'], '.3g')} s"
+    when = f"{100.0 * numbers['share']:.0f} % into the log{at}"
+    if statement.subject == "mass":
+        about = f" from {numbers['before']:.3g} to about {numbers['after']:.2g} kg"
+    else:
+        about = f" by about {short(100.0 * numbers['by'], '+.2g')} %" if statement.subject == "supply" else ""
+    return f"{statement.subject} that changes{about} {when}"
+
+
+def _other_shape(statement: Statement) -> str:
+    """Coulomb friction is of another shape."""
+    return f"Coulomb friction of another shape, {SHAPES[statement.subject]}"
+
+
+def _beside(statement: Statement) -> str:
+    """Coulomb friction at the wheels beside that on the body."""
+    each = " of its own at each wheel" if statement.numbers["each"] else " at the wheels"
+    where = "on the axes" if statement.subject == BODY_AXES else "along the direction of travel"
+    return f"Coulomb friction{each} beside that {where}"
+
+
+SENTENCES = {
+    "cause": Sentence(_named),
+    "number_off": Sentence(_number_off),
+    "gain": Sentence("gain {gain:.3g}"),
+    "fading_voltage": Sentence("a voltage that fades by {percent:.2g} %"),
+    "dead_band": Sentence("dead band {value:.2g} V"),
+    "force_in_the_room": Sentence("a force that stays in the room, as of a floor that is not level"),
+    "push_on_the_body": Sentence("a constant push in the body, as of a brush that drags"),
+    "late_channel": Sentence(_late),
+    "change_on_the_way": Sentence(_changes),
+    "turning_frame": Sentence("the forces of a turning frame"),
+    "no_turning_frame": Sentence("no forces of a turning frame"),
+    "centre_off_the_middle": Sentence("a centre of mass off the middle of the wheels"),
+    "other_centre": Sentence("another centre of mass"),
+    "current_limit": Sentence("a current limit of about {limit:.2g} A"),
+    "current_limit_from": Sentence("a current limit, from {limit:.2g} A"),
+    "switched_on": Sentence(_switched_on),
+    "gear_efficiency": Sentence("gear efficiency {efficiency:.2g}"),
+    "slipping_wheels": Sentence("wheels that slip, at about {share:.2g} of what they carry"),
+    "breakaway": Sentence("breakaway above Coulomb friction"),
+    "friction_of_travel": Sentence("Coulomb friction along the direction of travel, an ellipse"),
+    "friction_of_axes": Sentence("Coulomb friction on each axis by itself, a box"),
+    "friction_at_wheels": Sentence("friction at the wheels"),
+    "friction_at_wheels_instead": Sentence("friction at the wheels in the place of the other"),
+    "friction_beside": Sentence(_beside),
+    "friction_at_each_wheel": Sentence("Coulomb friction of its own at each wheel"),
+    "other_shape": Sentence(_other_shape),
+    "stribeck": Sentence("friction that falls with the speed from breakaway, above Coulomb friction (Stribeck)"),
+    "dahl": Sentence("friction that bends before it slips (Dahl)"),
+    "lugre": Sentence("friction that bends before it slips, falls and is damped (LuGre)"),
+    "outliers": Sentence("noise with outliers, {percent:.2g} % of the samples, that count little (`loss` student-t)"),
+    "fitted_numbers": Sentence(_fitted),
+    "if_odometry": Sentence("{cause} (of another size if the twist is odometry)"),
+    "in_groups": Sentence("{cause} in {groups}"),
+    "changes": Sentence(changes),
+    "more": Sentence("{count} more"),
+    "instead_of": Sentence("{cause} in the place of {step}"),
+}

@@ -1,0 +1,299 @@
+"""What a fit to whole logs says of its logs, its way and its numbers: `warnings`, `unused`, `blind` of an Estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+from omnidyn.document import all_of, short
+from omnidyn.model.keys import CENTRE, EMF, ROTOR, TORQUE, WHEEL, find_key, in_words
+from omnidyn.statement import Statement
+from omnidyn.telling.sentence import Sentence
+
+WIDER = 1.1  # times the interval for white noise, from which on the factor is named
+SAME = {
+    "wheel_speed": "its wheel speeds are differences of its wheel angles",
+    "twist": "its twist is computed from its wheels",
+}
+DRIVERS = {
+    "speed_loop": "the speed loop of the robot file makes the voltage from the set speeds",
+    "voltage": "the logged voltage drives the model",
+    "motor_voltage": "the voltage that reached the motors drives the model",
+    "wheel_speed_command": "the set speeds of the wheels drive the model",
+}
+MOVE = {"x": "drive it forward and back", "y": "drive it sideways", "yaw": "turn it"}
+MEASURED = {
+    "body.mass_kg": "weigh the robot", "wheels.wheel_radius_m": "measure the wheel radius",
+    "wheels.robot_radius_m": "measure the robot radius", "motor.gear_ratio": "read the gear ratio off its data sheet",
+    "motor.resistance_ohm": "measure the resistance of a motor", TORQUE: "take the torque constant from the data sheet",
+    EMF: "take the emf constant from the data sheet (in SI it is the torque constant)",
+    ROTOR: "take the rotor inertia from the data sheet", WHEEL: "weigh a wheel",
+    CENTRE: "balance the robot on an edge",
+    "body.inertia_kg_m2": "measure the inertia (swing the robot)", "gain": "measure the voltage at the motors",
+}  # fmt: skip
+CURES = MEASURED | MOVE | {
+    "current": "log currents", "wheel_speed": "log wheel speeds",
+    "twist": "log the speed over the ground, or where the robot is",
+    "drive": "drive at several speeds, both ways, with starts and stops",
+}  # fmt: skip
+
+
+def _gaps(statement: Statement) -> str:
+    """A log has gaps; each part between them is fitted from a start of its own."""
+    count, longest = statement.numbers["gaps"], short(statement.numbers["longest"], ".3g")
+    gaps = f"a gap of {longest} s" if count == 1 else f"{count} gaps, the longest of {longest} s"
+    return f"{statement.subject}: {gaps}: what lies between gaps is fitted from a start of its own"
+
+
+def _same_data(statement: Statement) -> str:
+    """An output that was asked for is computed from another one: the same data count twice."""
+    return f"{_computed(statement)}: the same data count twice, and the intervals are too narrow"
+
+
+def _nothing_new(statement: Statement) -> str:
+    """An output is computed from another one, and is not fitted."""
+    name = statement.numbers["output"].replace("_", " ")
+    return f"{_computed(statement)}: the {name} says nothing new and is not fitted"
+
+
+def _computed(statement: Statement) -> str:
+    name, source = statement.numbers["output"], statement.numbers["computed_from"].replace("_", " ")
+    return f"{statement.subject}: {SAME.get(name, f'its {name} is the integral of its own {source}')}"
+
+
+def _input_not_used(statement: Statement) -> str:
+    """An input of the log drives nothing."""
+    return f"{statement.subject}: {DRIVERS[statement.numbers['driver']]}"
+
+
+def _not_moved(statement: Statement) -> str:
+    """An axis never visibly moved: its friction is not fitted. With what it held, where that is known."""
+    axis, numbers = statement.subject, statement.numbers
+    group, held = numbers.get("group"), numbers.get("held")
+    words = (
+        f"axis {axis} never visibly moved{f' in {group}' if group else ''}: its friction is not fitted ({MOVE[axis]})"
+    )
+    if held is None:
+        return words
+    if not held:
+        return f"{words}; nothing drove it"
+    dead = ", or its sensor is dead: not one row differs from another, so that no bound is known"
+    return f"{words}; it held {held:.4g} {'N m' if axis == 'yaw' else 'N'}{dead if numbers['dead'] else ''}"
+
+
+def _not_measured(statement: Statement) -> str:
+    """An axis was not measured: its friction is not fitted."""
+    group = statement.numbers.get("group")
+    return f"axis {statement.subject} was not measured{f' in {group}' if group else ''}: its friction is not fitted"
+
+
+def _implausible(statement: Statement) -> str:
+    """A channel shows what the voltage does only later; whether it is fitted all the same."""
+    words = (
+        f"{statement.subject} of {1e3 * statement.numbers['latency']:.0f} ms is implausible: the channel would show "
+        "what the voltage does only later. The clocks differ, a filter looks ahead (centred speeds), or it stands in "
+        "for another fault"
+    )
+    return words if statement.numbers["fitted"] else f"{words}: it is not fitted"
+
+
+def _search_end(statement: Statement) -> str:
+    """A number ended where its search ends: it is no estimate."""
+    where = f"{statement.numbers['value']:.4g} {statement.numbers['unit']}".rstrip()
+    return f"{statement.subject} is at the end of its search range, {where}: that is no estimate"
+
+
+def _not_white(statement: Statement) -> str:
+    """The residuals are not white, and the intervals allow for it by the sandwich covariance."""
+    runs = statement.numbers["runs"]
+    by = f" by the scatter from run to run ({runs} runs)" if runs else ""
+    return f"{_neighbours(statement)}: the intervals allow for it{by}; {_widened(statement)}"
+
+
+def _memory(statement: Statement) -> str:
+    """The residuals are not white; the errors are fitted as a process that remembers."""
+    numbers = statement.numbers
+    least, most = numbers["orders"] or (None, None)
+    order = f"{least}" if least == most else f"{least} to {most}"
+    ways = [] if least is None else [f"an autoregression of order {order}"]
+    if beside := numbers["beside_white"]:
+        ways.append(f"white noise beside errors that remember{' while the robot moves' if beside == 'moving' else ''}")
+    return (
+        f"{_neighbours(statement)}: the errors of each output are fitted as {' or '.join(ways)}, with a memory of up "
+        f"to {short(numbers['memory'])} s; {_widened(statement)}"
+    )
+
+
+def _neighbours(statement: Statement) -> str:
+    return f"the residuals are not white (correlation of neighbours up to {statement.numbers['neighbours']:.2f})"
+
+
+def _widened(statement: Statement) -> str:
+    factor = statement.numbers["widening"]
+    if factor < WIDER:
+        return "the intervals are no wider for it"
+    return f"the intervals are up to {short(factor)} times as wide as for white noise"
+
+
+def _short_logs(statement: Statement) -> str:
+    """The logs last only a few times as long as their errors remember."""
+    memory, times = statement.numbers["memory"], statement.numbers["times"]
+    return (
+        f"the errors of {statement.subject} remember {short(memory)} s, and the logs last {times:.1f} times that: the "
+        f"memory is hardly known, nor are the intervals; record {short(statement.numbers['enough'])} s or more"
+    )
+
+
+def _rounded_inputs(statement: Statement) -> str:
+    """Inputs are logged in coarse steps, and the intervals are wider for it."""
+    step, wider = statement.numbers["step"], short(statement.numbers["wider"])
+    return (
+        f"inputs are logged in steps of {step:.2g} V: the intervals hold what rounding may have changed, and are up to "
+        f"{wider} times as wide for it"
+    )
+
+
+def _no_fall(statement: Statement) -> str:
+    """The log shows no fall from breakaway to Coulomb friction."""
+    high = statement.numbers["high"]
+    how_far = (
+        "how far it lies above that is not known" if high is None
+        else f"it lies between that and {high:.3g}, at which the robot would have been held"
+    )  # fmt: skip
+    return (
+        f"{statement.subject}: the log shows no fall from it to Coulomb friction, so {statement.numbers['speed']} is "
+        f"no estimate; {how_far}"
+    )
+
+
+def _not_followed(statement: Statement) -> str:
+    """The model does not follow outputs: by how much it misses each."""
+    still = "it never changes, and the model moves it: a dead sensor"
+    parts = [
+        f"{name} ({still if share is None else f'errors {100.0 * share:.0f} % of its spread'})"
+        for name, share in zip(statement.numbers["outputs"], statement.numbers["shares"], strict=True)
+    ]
+    return (
+        f"the model does not follow {', '.join(parts)}: a sign, a unit, the order of the wheels or the robot file is "
+        "wrong; the numbers and intervals of this fit mean nothing until it does"
+    )
+
+
+def _not_shown(statement: Statement) -> str:
+    """A direction in the numbers that the logs do not show, and what would show it."""
+    cures = [CURES[cure] for cure in statement.numbers["cures"]]
+    what = "them apart" if len(statement.numbers["keys"]) > 1 else "it"
+    return f"{direction(statement)}; to tell {what}: {' or '.join(cures)}" if cures else direction(statement)
+
+
+def direction(statement: Statement) -> str:
+    """ "mass +10 % and resistance -10 %: not distinguishable with this log"; entries that change alike are one."""
+    keys, shares, exact = (statement.numbers[name] for name in ("keys", "changes", "exact"))
+    if len(keys) == 1:
+        return f"{in_words(keys[0])}: this log {'does not show' if exact else 'hardly shows'} it"
+    parts = all_of([f"{name} {short(share, '+.2g')} %" for name, share in _alike(keys, shares)])
+    return f"{parts}: {'not' if exact else 'hardly'} distinguishable with this log"
+
+
+def _alike(keys: Sequence[str], shares: Sequence[float]) -> Iterator[tuple[str, float]]:
+    """(words, change [%], the largest is 10 %, the first is positive); entries of a list that change alike are one."""
+    scale = 10.0 / max(map(abs, shares)) * (1.0 if shares[0] >= 0.0 else -1.0)
+    left = {key: scale * share for key, share in zip(keys, shares, strict=True)}
+    while left:
+        name, share = next(iter(left.items()))
+        key = find_key(name)
+        alike = [
+            other for other, percent in left.items()
+            if key is not None and (place := find_key(other)) is not None and place.name == key.name
+            and abs(percent - share) < 0.02 * abs(share)
+        ]  # fmt: skip
+        several = key is not None and len(alike) > 1
+        yield (in_words(key.name) if key is not None and several else in_words(name)), share
+        for other in alike if several else [name]:
+            del left[other]
+
+
+def _combined(name: str, parts: str) -> Callable[[Statement], str]:
+    """How a number is named that the logs determine where they do not determine those behind it."""
+
+    def words(statement: Statement) -> str:
+        """A number that the logs determine where they do not determine those behind it."""
+        between = statement.numbers["correlation"]
+        trade = "" if between is None else f", which trade with each other (correlation {between:.2f})"
+        way = "about yaw" if statement.subject == "yaw" else f"along {statement.subject}"
+        return f"{name} {way}: {parts}{trade}"
+
+    return words
+
+
+SENTENCES = {
+    "method_chosen": Sentence("{method}, not output error: {why}"),
+    "supply_nominal": Sentence("{subject}: the supply is not logged: its nominal {supply:g} V is taken"),
+    "input_beyond_limit": Sentence("{subject}: {rows} rows ask for more than the voltage limit: clipped to it"),
+    "split_at_gaps": Sentence(_gaps),
+    "split_at_missing_inputs": Sentence("{subject}: {rows} rows lack an input: the log is split there"),
+    "split_at_missing_counts": Sentence(
+        "{subject}: {rows} rows lack counts of an encoder, or follow on missing rows: the log is split there"
+    ),
+    "same_data_twice": Sentence(_same_data),
+    "nothing_new": Sentence(_nothing_new),
+    "counts_as_readings": Sentence(
+        "{subject}: wheel speeds are differences of encoder counts (tick {tick:.3g} rad), fitted as they are: {why}"
+    ),
+    "counts_added_up": Sentence(
+        "{subject}: wheel speeds are differences of encoder counts (tick {tick:.3g} rad): fitted as the angles that "
+        "they add up to"
+    ),
+    "uneven_stamps": Sentence("the stamps of the rows are uneven"),
+    "counts_missing": Sentence("{lost} of {rows} rows are missing, and what was turned there with them"),
+    "output_not_asked": Sentence("{subject}: not among the outputs asked for"),
+    "input_not_used": Sentence(_input_not_used),
+    "unused_in_some_logs": Sentence("{unused} ({logs} of {of} logs, such as {first})"),
+    "counted_once": Sentence("{subject} is the same recording as {first}: it counts once"),
+    "in_two_groups": Sentence(
+        "{subject} in group {group} is the same recording as {first} in group {other}: the groups are not independent"
+    ),
+    "begins_in_motion": Sentence(
+        "{logs} of {of} logs begin in motion: they are not used, the state of their speed loop is not known there"
+    ),
+    "used_to_first_gap": Sentence("{logs} logs have gaps: only what stands before the first gap is used"),
+    "axis_not_moved": Sentence(_not_moved),
+    "axis_not_measured": Sentence(_not_measured),
+    "implausible_latency": Sentence(_implausible),
+    "harmful_nuisance": Sentence(
+        "{subject} improves the likelihood but worsens the prediction of held-out blocks of the log: it is not fitted"
+    ),
+    "unsettled_nuisances": Sentence(
+        "beside {nuisances} these logs do not settle the numbers of the robot: they are not fitted"
+    ),
+    "interrupted": Sentence(
+        "the fit was interrupted: the numbers are the best so far, their intervals are those of that point"
+    ),
+    "group_not_fitted": Sentence("{subject} was not fitted yet: its own numbers are where its fit begins"),
+    "iteration_limit": Sentence("the fit stopped after {iterations} iterations: the numbers are of its last step"),
+    "not_identifiable": Sentence("{subject} is not identifiable from these logs"),
+    "search_end": Sentence(_search_end),
+    "bound_of_inertia": Sentence("{subject} is at its bound {value:.4g}: nothing is seen to spin beside the body"),
+    "bound_of_breakaway": Sentence(
+        "{subject} is at its bound {value:.4g}: the log shows no fall from it to Coulomb friction"
+    ),
+    "bound": Sentence("{subject} is at its bound {value:.4g}: the best fit lies beyond it"),
+    "not_white": Sentence(_not_white),
+    "autocorrelated_noise": Sentence(_memory),
+    "short_for_memory": Sentence(_short_logs),
+    "uneven_rows": Sentence(
+        "{share:.0%} of the rows do not come at even times: the errors are taken to forget as much from each row to "
+        "the next"
+    ),
+    "rounded_inputs": Sentence(_rounded_inputs),
+    "no_fall": Sentence(_no_fall),
+    "karnopp_as_coulomb": Sentence(
+        'law = "karnopp" is fitted as Coulomb friction with breakaway: logs do not distinguish the two; karnopp_speed '
+        "is numerical and stays as it is"
+    ),
+    "combined_damping": Sentence(_combined("damping", "viscous friction and braking by back-EMF, together")),
+    "combined_push": Sentence(_combined("push", "of the motors per volt at rest")),
+    "combined_sets_off": Sentence(_combined("voltage at which it sets off", "dead band and Coulomb friction")),
+    "combined_follows": Sentence(_combined("by how much it follows late", "latency and lag")),
+    "not_followed": Sentence(_not_followed),
+    "not_shown": Sentence(_not_shown),
+}  # fmt: skip

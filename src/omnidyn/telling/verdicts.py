@@ -1,0 +1,119 @@
+"""What an identification came to: whether the model follows, how well its numbers are known, what makes it fail."""
+
+from __future__ import annotations
+
+from omnidyn.document import all_of, short
+from omnidyn.model.keys import in_words
+from omnidyn.statement import Statement
+from omnidyn.telling.lack_of_fit import names_of
+from omnidyn.telling.sentence import Sentence
+
+WHERE = {"fitted": "on the fitted logs", "held out": "on logs held out"}
+NAMED = 4  # shapes that a sentence names
+
+
+def _numbers_known(statement: Statement) -> str:
+    """ "all 6 numbers are known, the widest (viscous friction forward) within 9 %"; what is not known is named."""
+    numbers = statement.numbers
+    count, missing, widest = numbers["count"], numbers["missing"], numbers["widest"]
+    if len(missing) == count:
+        return f"no number is known{f': not {names_of(missing)}' if missing else ''}"
+    known = f"{count - len(missing)} of" if missing else "all"
+    within = f"within {short(max(0.1, 100.0 * numbers['share']))} %"
+    if count == 1:
+        return f"{in_words(widest)} is known {within}"
+    words = f"{known} {count} numbers are known, the widest ({in_words(widest)}) {within}"
+    return f"{words}; not {names_of(missing)}" if missing else words
+
+
+def _outcome(statement: Statement) -> str:
+    """How well the model follows the logs, and how well its numbers are known."""
+    numbers = statement.numbers
+    words = f"{WHERE[numbers['logs']]} {numbers['follows']}"
+    return f"{words}; {numbers['known']}" if numbers["known"] else f"{words}: its numbers mean nothing until it does"
+
+
+def _outputs_missed(statement: Statement) -> str:
+    """Outputs that the model does not follow."""
+    parts = [
+        name if percent is None else f"{name} (fit {percent:.0f} %)"
+        for name, percent in zip(statement.numbers["names"], statement.numbers["percents"], strict=True)
+    ]
+    return f"the model does not follow {', '.join(parts)}"
+
+
+def _failed(statement: Statement) -> str:
+    """Why the numbers mean nothing."""
+    failures = "; ".join(map(str, statement.numbers["failures"]))
+    return f"failed: {failures}: the numbers mean nothing until that is mended"
+
+
+def _not_usable(statement: Statement) -> str:
+    """Logs with the same errors, by `check`."""
+    one = statement.numbers["logs"] == 1
+    faults = "; ".join(map(str, statement.numbers["findings"]))
+    are, they = ("is", "it stands") if one else ("are", "they stand")
+    return f"{statement.subject} {are} not usable as {they}: {faults}"
+
+
+def _logs_with_errors(statement: Statement) -> str:
+    """How many logs have an error, by `check`, and the first one."""
+    logs, of = statement.numbers["logs"], statement.numbers["of"]
+    have = "the log has" if of == 1 else f"{logs} of {of} logs have"
+    return f"{have} an error, to be mended first: {statement.numbers['first']}"
+
+
+def _steady(statement: Statement) -> str:
+    """Friction from steady stretches: its level, its shape, and what other shape is as good, or what none explains."""
+    numbers = statement.numbers
+    levels, groups = numbers["levels"], numbers["groups"]
+    names = [f" ({name})" if len(groups) > 1 else "" for name in groups]
+    level = all_of([f"{value:.3g} N{name}" for value, name in zip(levels, names, strict=True)])
+    if numbers["misfit"]:
+        cause = f"it takes {numbers['cause']} beside it" if numbers["cause"] else "the errors repeat"
+        alike = f"; but no offered shape fits: {cause}"
+    else:
+        ties = all_of([*numbers["ties"][:NAMED]])
+        alike = f"; as good, as far as these data tell: {ties}" if ties else ""
+    error = max(1.0, round(100.0 * numbers["share"]))
+    return (
+        f"friction along travel is {level}; its shape, {numbers['shapes']}, predicts the force in a direction that was "
+        f"left out within {error:.0f} %{alike}; {_of_groups(statement)}"
+    )
+
+
+def _shapes(statement: Statement) -> str:
+    """Shapes of friction, each with its group."""
+    pairs = zip(statement.numbers["names"], statement.numbers["groups"], strict=True)
+    return all_of([f"{name} ({group})" if group else name for name, group in pairs])
+
+
+def _of_groups(statement: Statement) -> str:
+    """How well the numbers of each group are known."""
+    groups, known = statement.numbers["groups"], statement.numbers["known"]
+    return "; ".join(f"{g}: {k}" if len(known) > 1 else str(k) for g, k in zip(groups, known, strict=True))
+
+
+SENTENCES = {
+    "numbers_known": Sentence(_numbers_known),
+    "model_outcome": Sentence(_outcome),
+    "not_compared": Sentence("{known}; no log was compared with the model"),
+    "not_followed_at_all": Sentence("the model does not follow {outputs}: its numbers mean nothing until it does"),
+    "outputs_missed": Sentence(_outputs_missed),
+    "nothing_followed": Sentence("{follows}"),
+    "failed": Sentence(_failed),
+    "cut_short": Sentence("cut short: the numbers are the best so far, not the best there are"),
+    "log_not_usable": Sentence(_not_usable),
+    "logs_with_errors": Sentence(_logs_with_errors),
+    "not_made": Sentence("not made: {parts} ({reason})"),
+    "force_changes_in_run": Sentence(
+        "the force of friction changes within a run ({changes}): the levels lie between both"
+    ),
+    "forces_unexplained": Sentence(
+        "no shape of friction explains the forces: the best, {subject}, misses {error:.2g} N of {size:.2g} N in a "
+        "direction that was left out"
+    ),
+    "steady_friction": Sentence(_steady),
+    "shapes": Sentence(_shapes),
+    "numbers_of_groups": Sentence(_of_groups),
+}
