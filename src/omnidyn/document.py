@@ -92,15 +92,15 @@ class Document:
     """What a result says: its parts in the order in which text tells them, and its values as JSON can hold them.
 
     warnings: what a reader of `data` alone must be told too. ascii: text has an escape for every other character.
-    verdict: the result in a sentence; it stands first, and under "verdict" for machines. Words of the trade are
-    explained at the end of the text, those that occur.
+    verdict: the result in a sentence (text or a statement); it stands first, and under "verdict" for machines. Words of
+    the trade are explained at the end of the text, those that occur.
     """
 
     parts: Sequence[Part]
     data: Mapping[str, Any] = field(default_factory=dict)
     warnings: Sequence[object] = ()
     ascii: bool = False
-    verdict: str = ""
+    verdict: object = ""
 
     def __getitem__(self, name: str) -> Points | Table:
         """The points or the table of this name. Raises KeyError."""
@@ -114,6 +114,11 @@ class Document:
         several = [part for part in map(self.__getitem__, names) if isinstance(part, Points)]
         return Points([words for part in several for words in part.words])
 
+    @property
+    def verdict_text(self) -> str:
+        """The verdict with a capital and a full stop; text stays as it is."""
+        return self.verdict if isinstance(self.verdict, str) else sentence(str(self.verdict))
+
     def legend(self) -> list[str]:
         """A line for each word of the trade that occurs in the parts."""
         told = (part if isinstance(part, str) else "\n".join(part.lines(WIDTH, _bare)) for part in self.parts)
@@ -121,7 +126,7 @@ class Document:
 
     def to_text(self, width: int = WIDTH, paint: Paint = _bare) -> str:
         """The document for people, without a line break at its end. paint: how signs get their colours."""
-        lines: list[str] = [*Words(self.verdict).lines(width, paint), ""] if self.verdict else []
+        lines: list[str] = [*Words(self.verdict_text).lines(width, paint), ""] if self.verdict else []
         for part in self.parts:
             lines += [part] if isinstance(part, str) else part.lines(width, paint)
         if legend := self.legend():

@@ -5,16 +5,17 @@ A statement is made where its numbers are known. No code reads its sentence back
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from omnidyn.document import plain
+from omnidyn.document import Points, plain, sentence
 from omnidyn.shown import REMEDY, SENTENCE, make
 
 ERROR, WARNING, NOTE = "error", "warning", "note"
 SEVERITIES = (ERROR, WARNING, NOTE)  # gravest first
 
+PLACES = "places"  # key of `numbers`: which of several logs, groups or motors a statement is about
 QUOTED = "quoted"  # a sentence that was made elsewhere: by a user, another tool, an older file
 
 
@@ -51,6 +52,11 @@ class Statement:
         """What to do about it; "" where there is nothing to do."""
         return make(REMEDY, self)
 
+    def of(self, *places: str) -> Statement:
+        """The statement about some of several logs, groups or motors; its sentence begins with their names."""
+        before = self.numbers.get(PLACES, ())
+        return replace(self, numbers={**self.numbers, PLACES: (places, *before)})
+
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; a number that is not finite is None."""
         return {
@@ -68,6 +74,17 @@ def quoted(text: str, severity: str = WARNING) -> Statement:
 def statements(values: Iterable[Statement | str]) -> tuple[Statement, ...]:
     """Statements as they are, text of a user or another tool as quoted."""
     return tuple(value if isinstance(value, Statement) else quoted(value) for value in values)
+
+
+def as_verdict(verdict: Statement) -> dict[str, str]:
+    """The verdict of a result in its JSON: the sentence, with a capital and a full stop, and its code."""
+    return {"verdict": sentence(str(verdict)), "verdict_code": verdict.code}
+
+
+def by_severity(found: Sequence[Statement], name: str = "") -> list[Points]:
+    """Statements as points of a document, the gravest first, each behind its severity."""
+    of = {severity: [one for one in found if one.severity == severity] for severity in SEVERITIES}
+    return [Points(some, f"{severity}:", name and f"{name}: {severity}") for severity, some in of.items() if some]
 
 
 def _bare(value: Any) -> Any:

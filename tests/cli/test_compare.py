@@ -75,7 +75,7 @@ def test_for_machines(call):
         ("robot", "axebot"), ("robot", "wrong.toml"), ("log", "run.csv"), ("log", "gap.csv")
     ]  # fmt: skip
     assert all(len(each["sha256"]) == 64 for each in inputs)
-    assert any("1 gap in time" in words for words in result["warnings"])
+    assert "restarts_at_gaps" in [warning["code"] for warning in result["warnings"]]
 
 
 def test_a_folder_is_its_logs_and_segments_can_be_shown(call):

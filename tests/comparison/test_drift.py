@@ -16,6 +16,7 @@ from omnidyn.model.keys import Key
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
+from tests.support.codes import codes
 
 KEYS = tuple(f"friction.axes.{name}[{k}]" for name in ("viscous", "coulomb") for k in range(3))
 AXEBOT = load_robot("axebot")
@@ -54,7 +55,7 @@ def test_two_fits_are_told_apart_as_their_difference_over_its_error():
     chi2, degrees, p = found.together
     assert (chi2, degrees) == (pytest.approx(off @ np.linalg.solve(both, off)), 6)
     assert p == pytest.approx(chi_squared.sf(chi2, 6))
-    assert found.verdict.startswith("1 of 6 numbers changed by more than errors allow: Coulomb friction forward")
+    assert str(found.verdict).startswith("1 of 6 numbers changed by more than errors allow: Coulomb friction forward")
 
 
 def test_numbers_that_trade_can_change_together_where_none_does_alone():
@@ -62,7 +63,7 @@ def test_numbers_that_trade_can_change_together_where_none_does_alone():
     found = drift([fitted(TRUTH, "a", "one"), fitted(moved, "b", "two")])
     assert not found.changed
     assert found.together[2] < LEVEL
-    assert "no number by itself" in found.verdict
+    assert found.verdict.code == "fits_differ_together"
 
 
 def test_right_fits_change_as_rarely_as_said():
@@ -107,8 +108,8 @@ def test_what_is_taken_as_it_stands_and_one_log_twice_are_warned_of():
     heavy = fitted(TRUTH, "b", "log")
     heavy = heavy.replace(body=heavy.body.replace(mass=3.0))
     warnings = drift([fitted(TRUTH, "a", "log"), heavy]).warnings
-    assert any("not independent" in words for words in warnings)
-    assert any("1.5 in a, 3 in b" in words for words in warnings)
+    assert codes(warnings) == ["fits_of_one_log", "taken_differently"]
+    assert warnings[1].numbers == {"values": ((1.5,), (3.0,)), "fits": ("a", "b")}
 
 
 def test_a_number_that_only_one_fit_has_is_left_out():

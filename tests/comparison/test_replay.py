@@ -13,6 +13,7 @@ from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support.codes import codes
 from tests.support.compared_logs import clean_log, coulomb_times, noisy
 
 AXEBOT = load_robot("axebot")
@@ -31,7 +32,7 @@ def test_the_true_robot_repeats_its_run():
     run = clean_log(AXEBOT, 1)
     found = replay(AXEBOT, run)
     assert found.pieces == (slice(0, len(run)),)
-    assert (found.applied, found.words, found.warnings) == ("voltage", "the logged voltage", ())
+    assert (found.applied, str(found.driver), found.warnings) == ("voltage", "the logged voltage", ())
     for name in SIMULATED:
         np.testing.assert_allclose(getattr(found.run, name), getattr(run, name), rtol=0.0, atol=1e-9)
 
@@ -69,10 +70,10 @@ def test_duty_times_the_logged_supply_else_the_nominal_one():
     duty, sag = np.tile([0.0, 0.6, -0.6], (200, 1)), np.linspace(5.5, 4.0, 200)
     run = simulate(SAGGING, duty=duty, dt=0.01, supply=sag)
     found = replay(SAGGING, only(run, "duty", "supply", "twist"))
-    assert found.words == "the logged duty times the logged supply"
+    assert str(found.driver) == "the logged duty times the logged supply"
     np.testing.assert_allclose(found.run.twist, run.twist, atol=1e-12)
     nominal = replay(SAGGING, only(run, "duty", "twist"))
-    assert nominal.words == "the logged duty times the supply of the robot file, 6 V"
+    assert nominal.driver.numbers["supply"] == 6.0
     np.testing.assert_allclose(nominal.run.twist, simulate(SAGGING, duty=duty, dt=0.01).twist, atol=1e-12)
     assert nominal.run.twist[-1, 0] > found.run.twist[-1, 0]
     with pytest.raises(InputError, match="a duty needs a supply"):
@@ -99,7 +100,8 @@ def test_nothing_is_integrated_across_a_gap():
     cut = Run(t=run.t[kept], **{name: getattr(run, name)[kept] for name in SIMULATED})
     found = replay(AXEBOT, cut)
     assert found.pieces == (slice(0, 150), slice(150, 361))
-    assert found.warnings == ("1 gap in time: each piece starts anew from the measured state",)
+    assert codes(found.warnings) == ["restarts_at_gaps"]
+    assert found.warnings[0].numbers == {"gaps": 1}
     np.testing.assert_allclose(found.run.twist[:150], run.twist[:150], atol=1e-9)
     assert np.abs(found.run.twist[150:160] - run.twist[190:200]).max() < 0.15
     np.testing.assert_allclose(found.run.twist[250:], run.twist[290:], atol=2e-4)
@@ -118,7 +120,8 @@ def test_an_input_that_is_missing_holds_and_then_ends_the_piece():
     np.testing.assert_allclose(found.run.twist[:171], run.twist[:171], atol=1e-12)
     assert np.isnan(found.run.twist[171:200]).all()
     assert np.isfinite(found.run.twist[200:]).all()
-    assert "29 of 301 rows are not replayed: inputs missing for more than 0.2 s" in found.warnings[0]
+    assert codes(found.warnings)[0] == "rows_not_replayed"
+    assert found.warnings[0].numbers == {"left": 29, "rows": 301, "hold": 0.2}
     assert replay(AXEBOT, run.replace(voltage=volts), hold=1.0).pieces == (slice(0, 301),)
     assert replay(AXEBOT, run.replace(voltage=volts), hold=0.0).pieces == (
         slice(0, 51),
@@ -202,7 +205,7 @@ def test_set_speeds_go_through_the_loop_of_the_robot_file(kp, ki, rate):
     assert (np.abs(volts) == LIMIT).any() == (kp >= 0.25)
     found = replay(robot, Run(t=t, wheel_speed_command=commands, twist=twists), tol=1e-9)
     assert found.applied == "wheel_speed_command"
-    assert "through the speed loop of the robot file" in found.words
+    assert {"kp", "ki", "rate"} <= found.driver.numbers.keys()
     np.testing.assert_allclose(found.run.twist, twists, rtol=0.0, atol=3e-7)
     np.testing.assert_allclose(found.run.voltage[:-1], volts, rtol=0.0, atol=1e-5)
     body = Run(t=t, twist_command=np.linalg.solve(PUSH.T / RIM, commands.T).T, twist=twists)
@@ -216,10 +219,12 @@ def test_what_a_log_does_not_tell_about_the_loop_is_said():
     run = simulate(robot, wheel_speed_command=random_steps(3, 200, 50), dt=0.01)
     kept = np.r_[0:80, 120:201]
     cut = Run(t=run.t[kept], wheel_speed_command=run.wheel_speed_command[kept], wheel_speed=run.wheel_speed[kept])
-    assert "integral of the speed loop was not logged: it starts at 0 in 1 pieces" in replay(robot, cut).warnings[-1]
+    integral = replay(robot, cut).warnings[-1]
+    assert (integral.code, integral.numbers) == ("integral_not_logged", {"pieces": 1})
     by_voltage = replay(robot, run)
     assert by_voltage.applied == "voltage"
-    assert "the speed loop sets the voltage every 1 ms, the log has one every 10 ms" in by_voltage.warnings[-1]
+    assert by_voltage.warnings[-1].code == "loop_faster_than_log"
+    assert by_voltage.warnings[-1].numbers == pytest.approx({"loop_period": 1e-3, "log_period": 0.01})
     assert replay(robot, run, apply="wheel_speed_command").applied == "wheel_speed_command"
 
 
@@ -270,4 +275,4 @@ def test_nothing_to_replay_is_too_little_data():
 def test_warnings_of_the_simulation_come_along():
     run = noisy(clean_log(AXEBOT, 4), 4)
     found = replay(AXEBOT, run.replace(voltage=2.0 * run.voltage))
-    assert str(found.warnings[0]).startswith("voltage above the limit was clipped in")
+    assert found.warnings[0].code == "clipped"

@@ -111,13 +111,13 @@ def test_the_ground_comes_before_the_wheels_before_the_pose_before_rest():
     np.testing.assert_allclose(start.pose, [1.0, 2.0, 0.4], rtol=1e-9)
     start = start_of(moving(wheel_speed=wheels), ROBOT, ALL)
     np.testing.assert_allclose(start.twist, 0.5 * TWIST, rtol=1e-12)
-    assert start.source == "the wheel speeds"
+    assert start.source == "wheel_speed"
     np.testing.assert_array_equal(start.pose, np.zeros(3))
     start = start_of(moving(pose=pose, wheel_speed=np.full((200, 3), np.nan)), ROBOT, ALL)
     np.testing.assert_allclose(start.twist, TWIST, rtol=1e-9)
-    assert start.source == "the slope of the pose"
+    assert start.source == "pose"
     start = start_of(moving(voltage=wheels), ROBOT, ALL)
-    assert start.source == "rest, as no speed was logged"
+    assert start.source == "rest"
     assert not start.twist.any()
 
 
@@ -150,4 +150,4 @@ def test_wheel_angles_tell_where_a_run_starts():
     found = start_of(Run(t=T, wheel_angle=angle), ROBOT, ALL)
     np.testing.assert_allclose(found.twist, twist, atol=1e-9)
     np.testing.assert_allclose(found.angle, [1.0, -2.0, 3.0], atol=1e-9)
-    assert found.source == "the slope of the wheel angles"
+    assert found.source == "wheel_angle"

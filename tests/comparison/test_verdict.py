@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from omnidyn.comparison.compare import compare
-from omnidyn.comparison.verdict import NOISE, WELL, compared_words, followed, follows, is_missed, nothing_followed
+from omnidyn.comparison.verdict import NOISE, WELL, compared, followed, follows, is_missed, nothing_followed
+from omnidyn.document import sentence
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
+from tests.support.codes import codes
 
 
 class Score(NamedTuple):
@@ -17,56 +19,58 @@ class Score(NamedTuple):
     whiteness: float | None = 0.0
 
 
+def levels(verdict):
+    """How each kind of measurement is followed."""
+    return {signal.subject: signal.numbers["level"] for signal in verdict.numbers["signals"]}
+
+
 def test_a_good_model():
     """Errors of 1 and 3 % of the spread of two wheels, 5 % of the turn rate: fit 99, 97 and 95 %."""
     scores = {"w1": Score(0.1, 99.0), "w2": Score(0.3, 97.0), "omega": Score(0.2, 95.0)}
-    words = compared_words(["axebot"], [scores], {})
-    assert words == "The model follows wheel speeds within 3 % and turn rate within 5 %."
+    verdict = compared(["axebot"], [scores], {})
+    assert str(verdict) == "the model follows wheel speeds within 3 % and turn rate within 5 %"
+    assert (verdict.code, levels(verdict)) == ("follows", {"wheel speeds": "well", "turn rate": "well"})
 
 
 def test_a_half_good_model():
     scores = {"w1": Score(0.3, 97.0), "x": Score(0.2, 70.0), "y": Score(0.2, 65.0), "heading": Score(1.2, -40.0)}
-    assert compared_words(["axebot"], [scores], {}) == (
-        "The model follows wheel speeds within 3 % and position roughly (35 %), but heading not at all (rms error 1.2 "
-        "rad)."
-    )
+    verdict = compared(["axebot"], [scores], {})
+    assert levels(verdict) == {"wheel speeds": "well", "position": "roughly", "heading": "not"}
+    assert str(verdict).endswith("position roughly (35 %), but heading not at all (rms error 1.2 rad)")
 
 
 def test_a_bad_model():
     scores = {"w1": Score(12.0, -60.0), "vx": Score(0.4, 30.0)}
-    assert compared_words(["axebot"], [scores], {}) == (
-        "The model does not follow: speed over the ground hardly (70 %), wheel speeds not at all (rms error 12 rad/s)."
-    )
+    verdict = compared(["axebot"], [scores], {})
+    assert (verdict.code, verdict.severity) == ("follows_nothing", "error")
+    assert levels(verdict) == {"speed over the ground": "hardly", "wheel speeds": "not"}
 
 
 def test_components_of_one_kind_apart_where_they_differ():
-    words = follows("the model", followed({"vx": Score(0.01, 98.0), "vy": Score(0.3, -10.0)}))
-    assert words == (
-        "the model follows vx (speed over the ground) within 2 %, but vy (speed over the ground) not at all (rms error "
-        "0.3 m/s)"
-    )
+    verdict = follows("the model", followed({"vx": Score(0.01, 98.0), "vy": Score(0.3, -10.0)}))
+    assert levels(verdict) == {"vx (speed over the ground)": "well", "vy (speed over the ground)": "not"}
 
 
 def test_white_errors_are_noise_whatever_their_share():
     (each,) = followed({"i1": Score(0.2, 40.0, 0.3)})
     assert each.level == NOISE
-    assert each.words() == "currents as far as noise lets it (60 %)"
+    assert str(each.statement()) == "currents as far as noise lets it (60 %)"
     assert followed({"i1": Score(0.2, 90.0, 0.3)})[0].level == WELL
 
 
 def test_what_never_changes_cannot_be_followed():
-    assert compared_words(["axebot"], [{"w1": Score(0.0, None)}], {}) == (
-        "Nothing that was measured changes: how well the model follows cannot be told."
-    )
+    assert compared(["axebot"], [{"w1": Score(0.0, None)}], {}).code == "nothing_changes"
 
 
 def test_two_models():
     scores = [{"vx": Score(0.01, 98.0)}, {"vx": Score(0.2, 60.0)}]
-    assert compared_words(["a", "b"], scores, {"vx": "a"}) == (
+    assert str(compared(["a", "b"], scores, {"vx": "a"})) == (
         "a is surely nearer in vx; a follows speed over the ground within 2 %; b follows speed over the ground roughly "
-        "(40 %)."
+        "(40 %)"
     )
-    assert compared_words(["a", "b"], scores, {"vx": None}).startswith("neither is surely nearer; a follows")
+    neither = compared(["a", "b"], scores, {"vx": None})
+    assert neither.numbers["nearer"] == ()
+    assert codes(neither.numbers["models"]) == ["follows", "follows"]
 
 
 @pytest.fixture(scope="module")
@@ -81,8 +85,9 @@ def run():
 def test_the_sentence_stands_first_and_in_json(run):
     found = compare(load_robot("axebot"), run)
     assert found.summary().splitlines()[0].startswith("The model follows ")
-    assert "wheel speeds within 1 %" in found.verdict
-    assert found.to_dict()["verdict"] == found.verdict
+    assert levels(found.verdict)["wheel speeds"] == "well"
+    data = found.to_dict()
+    assert (data["verdict"], data["verdict_code"]) == (sentence(str(found.verdict)), "follows")
     text = found.summary()
     assert text.count("white p:") == 1
     assert "VAF %: variance accounted for" in text
@@ -93,7 +98,8 @@ def test_wheels_that_turn_the_other_way_are_not_followed(run):
     found = compare(
         load_robot("axebot"), run.replace(wheel_speed=-run.wheel_speed, twist=None, pose=None, current=None)
     )
-    assert found.verdict.startswith("The model does not follow: wheel speeds not at all (rms error ")
+    assert found.verdict.code == "follows_nothing"
+    assert levels(found.verdict) == {"wheel speeds": "not"}
     assert found.failed
     assert found.to_dict()["ok"] is False
     assert not compare(load_robot("axebot"), run).failed

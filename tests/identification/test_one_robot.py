@@ -49,8 +49,8 @@ def test_the_written_robot_meets_its_log_as_the_fit_did(fit, log, tmp_path):
         each.rmse == pytest.approx(fit.noise[f"wheel_speed[{k}]"], rel=0.02) for k, each in enumerate(score.values())
     )
     assert all(each.samples == len(log) for each in score.values())  # a latency drops no row
-    assert "behind a dead band of 0.801 V, 0.0231 s later" in found.applied[read.name]
-    assert f"gain {log_gain(fit):.3g}" in found.applied[read.name]
+    assert "behind a dead band of 0.801 V, 0.0231 s later" in found.applied_text(read.name)
+    assert f"gain {log_gain(fit):.3g}" in found.applied_text(read.name)
 
 
 def log_gain(fit):
@@ -62,7 +62,7 @@ def test_another_log_gets_none_of_it(fit):
     other = logged(CASE, 902)
     found = omnidyn.compare(fit.robot, other)
     assert any("this is another log, and gets none of it" in words for words in found.warnings)
-    assert "gain" not in found.applied[fit.robot.name]
+    assert "gain" not in found.applied_text(fit.robot.name)
     bare = omnidyn.compare(fit.robot.replace(log=None), other)
     assert found.rmse == bare.rmse
     given = omnidyn.compare(fit.robot, other, log=fit.robot.log)

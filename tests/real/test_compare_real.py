@@ -49,7 +49,7 @@ def rmse(found, floor):
 
 def test_the_speed_loop_of_the_preset_is_applied_and_said(found):
     for each in found.values():
-        assert "set wheel speeds, through the speed loop of the robot file" in each.applied["robotino"]
+        assert "set wheel speeds, through the speed loop of the robot file" in each.applied_text("robotino")
         assert {*WHEELS, "i1", "i2", "i3"} <= set(each.channels)
 
 

@@ -12,6 +12,7 @@ from omnidyn.model.known.told import told
 from omnidyn.model.known.uncertainty import DRAWS, plausible
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.band import Band, band_of, first_order_band
+from omnidyn.statement import Statement
 
 COARSE = 1e-4  # [m/s] of the implicit engine: a band is a hundred times as wide, or of no interest
 
@@ -27,11 +28,11 @@ def with_bands(
     """
     which = range(len(found.measured)) if logs is None else logs
     bands: dict[str, Mapping[int, Band]] = {}
-    words, guessed = [], {}
+    warnings, guessed = [], {}
     for name, robot in zip(found.robots, robots, strict=True):
         known = told(robot)
         if not known.keys:
-            words.append(f"{name} has no band: no number of its file has a std")
+            warnings.append(Statement("no_band", subject=name))
             continue
         drawn = plausible(robot, draws, seed)
         bands[name] = {
@@ -42,8 +43,8 @@ def with_bands(
         }  # fmt: skip
         guessed[name] = known.guessed
         if known.guessed:
-            words.append(f"the band of {name} rests on guesses: {', '.join(known.guessed)}")
-    return replace(found, bands=bands, guesses=guessed, warnings=(*found.warnings, *words))
+            warnings.append(Statement("band_rests_on_guesses", subject=name, numbers={"guesses": known.guessed}))
+    return replace(found, bands=bands, guesses=guessed, warnings=(*found.warnings, *warnings))
 
 
 def with_fitted_band(found: Comparison, robot: Robot, log: int = 0) -> Comparison:

@@ -21,6 +21,7 @@ from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
 from omnidyn.simulation.simulate import TOLERANCE
+from omnidyn.statement import Statement
 
 ABSENT = Trace(np.zeros(0), np.zeros(0), np.zeros(0))
 
@@ -176,14 +177,14 @@ def _differences(
     return {key: each for key, each in found if each is not None}
 
 
-def _applied(replays: Sequence[Replay]) -> str:
-    """What drove a robot; several ways are all named."""
-    return "; or ".join(dict.fromkeys(each.words for each in replays))
+def _applied(replays: Sequence[Replay]) -> tuple[Statement, ...]:
+    """What drove a robot, each way once."""
+    return tuple(dict.fromkeys(each.driver for each in replays))
 
 
 def _sign_warnings(
     runs: Sequence[Run], traces: Mapping[str, Mapping[str, list[Trace]]], current_unsigned: bool
-) -> Iterator[str]:
+) -> Iterator[Statement]:
     """Currents that are never negative where a model has them both ways: the sensor may have no sign."""
     logged = [run.current for run in runs if run.current is not None]
     if current_unsigned or not logged or min(np.nanmin(each, initial=np.inf) for each in logged) < 0.0:
@@ -191,19 +192,15 @@ def _sign_warnings(
     names = components("current", logged[0].shape[1])
     models = [trace.model for by in traces.values() for name in names for trace in by.get(name, [])]
     if any((each < 0.0).any() for each in models):
-        yield "no measured current is negative: has the sensor no sign? then say current_unsigned (`current_unsigned`)"
+        yield Statement("currents_never_negative")
 
 
-def _warnings(runs: Sequence[Run], replays: Mapping[str, Sequence[Replay]]) -> Iterator[str]:
-    """What readers of the logs and the replays warned of, once each, with the log where there are several."""
-    words: dict[str, list[str]] = {}
+def _warnings(runs: Sequence[Run], replays: Mapping[str, Sequence[Replay]]) -> Iterator[Statement]:
+    """What readers of the logs and the replays warned of, once each, with the logs where there are several."""
+    logs: dict[Statement, list[str]] = {}
     for k, run in enumerate(runs):
-        told = [*run.warnings, *(text for parts in replays.values() for text in parts[k].warnings)]
-        for text in dict.fromkeys(told):
-            words.setdefault(text, []).append(run.source or f"log {k + 1}")
-    for text, where in words.items():
-        if len(runs) == 1:
-            yield text
-        else:
-            more = f" and {len(where) - 1} more logs" if len(where) > 1 else ""
-            yield f"{where[0]}{more}: {text}"
+        warnings = [*run.warnings, *(warning for parts in replays.values() for warning in parts[k].warnings)]
+        for warning in dict.fromkeys(warnings):
+            logs.setdefault(warning, []).append(run.source or f"log {k + 1}")
+    for warning, names in logs.items():
+        yield warning if len(runs) == 1 else warning.of(*names)

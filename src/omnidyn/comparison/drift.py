@@ -18,20 +18,20 @@ import numpy as np
 from scipy.special import chdtrc, ndtri
 
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Document, Part, Points, Table, all_of, chance_cell, interval_cell, plain, sentence
+from omnidyn.document import Document, Part, Table, chance_cell, interval_cell, plain
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.model.keys import CENTRE, Key, expand, in_words, unit
 from omnidyn.model.known.told import Told, told
 from omnidyn.model.robot import IDENTIFIED, Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.statement import NOTE, WARNING, Statement, as_verdict, by_severity
 from omnidyn.statistics import homogeneity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEVEL = 0.05  # chance of any change in fits of one and the same robot
-NAMED = 4  # numbers that a sentence names
 UPPER = float(ndtri(0.975))
 SAME = 1e-9  # of the largest eigenvalue of a matrix whose diagonal is 1: below it two numbers are one
 TAKEN = ("body.mass_kg", "body.inertia_kg_m2", CENTRE, "wheels.wheel_radius_m", "wheels.robot_radius_m",
@@ -67,20 +67,26 @@ class Drifting:
         first, last = float(self.value[0]), float(self.value[-1])
         return (last - first) / abs(first) if first else float("inf")
 
+    def statement(self) -> Statement:
+        """Between which two values it changed, in the order of the fits."""
+        first, last = sorted((int(np.argmin(self.value)), int(np.argmax(self.value))))
+        numbers = {"values": self.value[[first, last]], "fits": [self.fits[first], self.fits[last]]}
+        return Statement("number_changed", WARNING, self.key, numbers)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Drift(Shown):
     """Fits beside each other. fits: their names, in the order given; numbers: each that two or more tell.
 
     together: (chi squared, degrees of freedom, chance) of all numbers that all fits tell. warnings: what makes the
-    comparison doubtful, in words.
+    comparison doubtful.
     """
 
     robot: str
     fits: tuple[str, ...]
     numbers: tuple[Drifting, ...]
     together: tuple[float, int, float]
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Statement, ...] = ()
 
     def __repr__(self) -> str:
         return f"<Drift of {self.robot}: {', '.join(self.fits)}; changed: {', '.join(self.changed) or 'nothing'}>"
@@ -95,19 +101,15 @@ class Drift(Shown):
         return tuple(each.key for each in self.numbers if each.changed)
 
     @property
-    def verdict(self) -> str:
-        """What changed, in a sentence."""
-        moved = sorted((each for each in self.numbers if each.changed), key=lambda each: each.p)
-        count = len(self.numbers)
-        if not moved and self.together[2] <= LEVEL:
-            return sentence(
-                f"the {len(self.fits)} fits differ, though no number by itself by more than its errors allow"
-            )
-        if not moved:
-            return sentence(f"no number of {count} changed by more than its errors allow")
-        names = [f"{in_words(each.key)} ({_way(each)})" for each in moved[:NAMED]]
-        more = [f"{len(moved) - NAMED} more"] if len(moved) > NAMED else []
-        return sentence(f"{len(moved)} of {count} numbers changed by more than errors allow: {all_of([*names, *more])}")
+    def verdict(self) -> Statement:
+        """What changed, the surest first."""
+        changed = sorted((each for each in self.numbers if each.changed), key=lambda each: each.p)
+        if not changed and self.together[2] <= LEVEL:
+            return Statement("fits_differ_together", WARNING, numbers={"fits": len(self.fits)})
+        if not changed:
+            return Statement("no_number_changed", NOTE, numbers={"count": len(self.numbers)})
+        numbers = {"count": len(self.numbers), "changed": [each.statement() for each in changed]}
+        return Statement("numbers_changed", WARNING, numbers=numbers)
 
     def document(self) -> Document:
         """All of it, as text, page and machines have it."""
@@ -115,7 +117,7 @@ class Drift(Shown):
         whole = (
             f"all numbers together: chi squared {chi2:.3g} with {degrees} degrees of freedom, chance {chance_cell(p)}"
         )
-        parts: list[Part] = [self.table(), "", whole, Points(self.warnings, "warning:")]
+        parts: list[Part] = [self.table(), "", whole, *by_severity(self.warnings)]
         return Document(parts, self.to_dict(), self.warnings, ascii=True, verdict=self.verdict)
 
     def table(self) -> Table:
@@ -147,7 +149,7 @@ class Drift(Shown):
             for each in self.numbers
         }  # fmt: skip
         return plain({
-            "fits": self.fits, "changed": self.changed, "numbers": numbers,
+            **as_verdict(self.verdict), "fits": self.fits, "changed": self.changed, "numbers": numbers,
             "together": {"chi2": chi2, "degrees": degrees, "p": p}, "warnings": self.warnings,
         })  # fmt: skip
 
@@ -260,34 +262,25 @@ def _inverse(matrix: FloatArray) -> tuple[FloatArray, int]:
     return root @ root.T, int(kept.sum())
 
 
-def _doubts(robots: Sequence[Robot], called: Sequence[str], compared: set[str]) -> list[str]:
+def _doubts(robots: Sequence[Robot], called: Sequence[str], compared: set[str]) -> list[Statement]:
     """What makes the comparison doubtful: one log behind two fits, and numbers that were taken as they stand."""
-    words = []
+    doubts = []
     seen: dict[str, str] = {}
     for robot, name in zip(robots, called, strict=True):
         sources = {p.source for k, p in robot.priors.items() if p.origin == IDENTIFIED and p.source and k in compared}
         for source in sorted(sources):
             if (other := seen.setdefault(source, name)) != name:
-                words.append(f"{other} and {name} were fitted to the same ({source}): they are not independent")
+                doubts.append(Statement("fits_of_one_log", subject=source, numbers={"fits": [other, name]}))
     for name in TAKEN:
         if any(Key.parse(each).name == name for each in compared):
             continue
         values = [_taken(robot, name) for robot in robots]
         if len(set(values)) > 1:
-            own = ", ".join(f"{value} in {fit}" for value, fit in zip(values, called, strict=True))
-            words.append(f"{in_words(name)} was taken as {own}: fitted numbers that rest on it differ for that too")
-    return words
+            doubts.append(Statement("taken_differently", subject=name, numbers={"values": values, "fits": called}))
+    return doubts
 
 
-def _taken(robot: Robot, name: str) -> str:
-    """A number as it stands in the file; of a list, all of them where they differ."""
-    values = (f"{Key.parse(key).get(robot):.4g}" for key in expand(name, robot))
-    return ", ".join(dict.fromkeys(values))
-
-
-def _way(each: Drifting) -> str:
-    low, high = int(np.argmin(each.value)), int(np.argmax(each.value))
-    first, last = sorted((low, high))
-    change = (each.value[last] - each.value[first]) / abs(each.value[first]) if each.value[first] else float("inf")
-    values = f"{each.value[first]:.3g} in {each.fits[first]}, {each.value[last]:.3g} in {each.fits[last]}"
-    return f"{values}: {100.0 * change:+.0f} %" if np.isfinite(change) else values
+def _taken(robot: Robot, name: str) -> tuple[float, ...]:
+    """A number as it stands in the file, to four digits; of a list, all that differ."""
+    values = (float(f"{Key.parse(key).get(robot):.4g}") for key in expand(name, robot))
+    return tuple(dict.fromkeys(values))

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.comparison.start import start_of
+from omnidyn.comparison.start import REST, start_of
 from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.logs.channels import components
 from omnidyn.logs.segments import segments
@@ -28,6 +28,7 @@ from omnidyn.run import CHANNELS, WHEEL, Run
 from omnidyn.simulation.commands import Commands, commands
 from omnidyn.simulation.simulate import TOLERANCE, simulate_seen
 from omnidyn.simulation.view import LATE, View, seen_at_once, seen_through
+from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import stretches
 
 INPUTS = ("voltage", "duty", "wheel_speed_command", "twist_command")
@@ -45,14 +46,14 @@ class Replay:
     """A model under the inputs of a log.
 
     run: what it does, at the times of the log; NaN in the rows that no piece covers. pieces: the rows of each free run.
-    applied: which channel drove it. words: the same for people. warnings: what a reader should know.
+    applied: which channel drove it. driver: the same with its numbers. warnings: what a reader should know.
     """
 
     run: Run
     pieces: tuple[slice, ...]
     applied: str
-    words: str
-    warnings: tuple[str, ...] = ()
+    driver: Statement
+    warnings: tuple[Statement, ...] = ()
 
 
 def replay(
@@ -77,22 +78,18 @@ def replay(
         raise error.at(run.source) if run.source else error from None
     warnings += [*_from_simulation(parts), *_loop_warnings(robot, run, applied, parts)]
     whole = _assembled(run, robot, pieces, [part for part, _ in parts])
-    words = _words(robot, applied, supply) + _driver_words(robot)
-    words += f", and what the fit found of this log: {log.words}" if log is not None and log.words else ""
-    return Replay(whole, tuple(pieces), applied, words, tuple([*warnings, *told]))
+    driver = _driver(robot, applied, supply is not None, log.words if log is not None else "")
+    return Replay(whole, tuple(pieces), applied, driver, tuple([*warnings, *told]))
 
 
-def effects_of(robot: Robot, run: Run) -> tuple[LogEffects | None, list[str]]:
+def effects_of(robot: Robot, run: Run) -> tuple[LogEffects | None, list[Statement]]:
     """(what the file of the robot says of this log, None where it is another one; what is to be said of that)."""
     log = robot.log
     if log is None or log.is_of(run):
         return log, []
     if not log.words:
         return None, []
-    return None, [
-        f"{robot.name} was fitted with what its own logs did beside the robot ({log.words}); this is another log, and "
-        "gets none of it"
-    ]
+    return None, [Statement("effects_of_other_log", subject=robot.name, numbers={"effects": log.words})]
 
 
 def refuse_other_robot(robot: Robot, run: Run) -> None:
@@ -159,7 +156,9 @@ def _blank_components(run: Run, channel: str) -> list[str]:
     return [name for name, column in zip(names, values.T, strict=True) if not np.isfinite(column).any()]
 
 
-def _prepared(run: Run, applied: str, hold: float) -> tuple[list[slice], FloatArray, FloatArray | None, list[str]]:
+def _prepared(
+    run: Run, applied: str, hold: float
+) -> tuple[list[slice], FloatArray, FloatArray | None, list[Statement]]:
     """The pieces to run, the inputs and the supply with what is missing held, and what had to be left out."""
     inputs, alone = np.asarray(getattr(run, applied)), applied != DUTY or run.supply is None
     supply = None if alone or not np.isfinite(run.supply).any() else run.supply  # type: ignore[arg-type]
@@ -178,12 +177,9 @@ def _prepared(run: Run, applied: str, hold: float) -> tuple[list[slice], FloatAr
     left = len(run) - sum(piece.stop - piece.start for piece in kept)
     warnings = []
     if len(stretches) > 1:
-        gaps = "1 gap" if len(stretches) == 2 else f"{len(stretches) - 1} gaps"
-        warnings.append(f"{gaps} in time: each piece starts anew from the measured state")
+        warnings.append(Statement("restarts_at_gaps", numbers={"gaps": len(stretches) - 1}))
     if left:
-        warnings.append(
-            f"{left} of {len(run)} rows are not replayed: inputs missing for more than {hold:g} s, or alone"
-        )
+        warnings.append(Statement("rows_not_replayed", numbers={"left": left, "rows": len(run), "hold": hold}))
     width = inputs.shape[1]
     return kept, held[:, :width], held[:, width] if supply is not None else None, warnings
 
@@ -299,57 +295,39 @@ def _assembled(run: Run, robot: Robot, pieces: list[slice], parts: list[Run]) ->
     return Run(t=run.t, **channels, source=f"replay of {run.source or 'a run'}: {parts[0].source}")
 
 
-def _from_simulation(parts: list[tuple[Run, str]]) -> list[str]:
+def _from_simulation(parts: list[tuple[Run, str]]) -> list[Statement]:
     """What the simulations warned of, by piece, and starts that were assumed."""
-    many = len(parts) > 1
-    words = [
-        f"piece {k + 1}: {text}" if many else str(text) for k, (part, _) in enumerate(parts) for text in part.warnings
-    ]
-    more = [f"and {len(words) - SHOWN} more warnings of the simulation"] if len(words) > SHOWN else []
-    assumed = sum(source.startswith("rest") for _, source in parts)
-    told = [f"no speed was logged: {assumed} of {len(parts)} pieces start from rest"] if assumed else []
-    return [*words[:SHOWN], *more, *told]
+    warnings = [
+        warning.of(f"piece {k + 1}") if len(parts) > 1 else warning
+        for k, (part, _) in enumerate(parts) for warning in part.warnings
+    ]  # fmt: skip
+    more = len(warnings) - SHOWN
+    cut = [Statement("more_warnings", numbers={"more": more})] if more > 0 else []
+    assumed = sum(source == REST for _, source in parts)
+    starts = [Statement("start_assumed", numbers={"assumed": assumed, "pieces": len(parts)})] if assumed else []
+    return [*warnings[:SHOWN], *cut, *starts]
 
 
-def _loop_warnings(robot: Robot, run: Run, applied: str, parts: list[tuple[Run, str]]) -> list[str]:
+def _loop_warnings(robot: Robot, run: Run, applied: str, parts: list[tuple[Run, str]]) -> list[Statement]:
     """What a log does not tell about the speed loop in the firmware."""
     warnings, drive = [], robot.drive
     if drive.kind != SPEED:
         return warnings
     moving = sum(bool(np.any(part.twist[0])) for part, _ in parts if part.twist is not None)
     if applied in SET_SPEEDS and moving and np.any(np.asarray(drive.ki) > 0.0):
-        warnings.append(
-            f"the integral of the speed loop was not logged: it starts at 0 in {moving} pieces that start moving"
-        )
-    usual = run.step
-    if applied == "voltage" and usual * (drive.rate or 0.0) > 1.5:
-        warnings.append(
-            f"the speed loop sets the voltage every {1e3 / (drive.rate or 1.0):.3g} ms, the log has one every "
-            f"{1e3 * usual:.3g} ms: between its rows the voltage is taken as held"
-        )
+        warnings.append(Statement("integral_not_logged", numbers={"pieces": moving}))
+    if applied == "voltage" and run.step * (drive.rate or 0.0) > 1.5:
+        periods = {"loop_period": 1.0 / (drive.rate or 1.0), "log_period": run.step}
+        warnings.append(Statement("loop_faster_than_log", numbers=periods))
     return warnings
 
 
-def _words(robot: Robot, applied: str, supply: FloatArray | None) -> str:
-    """What was applied, for people."""
-    if applied == "voltage":
-        return "the logged voltage"
-    if applied == DUTY:
-        battery = f"the supply of the robot file, {robot.drive.supply:g} V" if supply is None else "the logged supply"
-        return f"the logged duty times {battery}"
-    speeds = "wheel speeds" if applied == "wheel_speed_command" else "body speeds"
-    return (
-        f"the logged set {speeds}, through the speed loop of the robot file (kp {_listed(robot.drive.kp)} V s/rad, "
-        f"ki {_listed(robot.drive.ki)} V/rad, {robot.drive.rate:g} Hz): no voltage was applied as logged"
-    )
-
-
-def _driver_words(robot: Robot) -> str:
-    """What the driver of the robot file does to it, for people."""
+def _driver(robot: Robot, applied: str, supply_logged: bool, effects: str) -> Statement:
+    """What was applied, and what the driver of the robot file does to it. effects: of the log, in words of the fit."""
     drive = robot.drive
-    words = f", behind a dead band of {drive.dead_band:.3g} V" if drive.dead_band else ""
-    return f"{words}, {drive.latency:.3g} s later" if drive.latency else words
-
-
-def _listed(value: float | tuple[float, ...]) -> str:
-    return "/".join(f"{each:g}" for each in np.atleast_1d(value))
+    numbers: dict[str, Any] = {"dead_band": drive.dead_band, "latency": drive.latency, "effects": effects}
+    if applied == DUTY:
+        numbers |= {"supply": None if supply_logged else drive.supply}
+    if applied in SET_SPEEDS:
+        numbers |= {"kp": np.atleast_1d(drive.kp), "ki": np.atleast_1d(drive.ki), "rate": drive.rate}
+    return Statement("applied", NOTE, applied, numbers)

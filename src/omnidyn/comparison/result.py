@@ -13,13 +13,14 @@ from omnidyn.comparison import text
 from omnidyn.comparison.difference import ModelDifference
 from omnidyn.comparison.metrics import Metrics
 from omnidyn.comparison.traces import Trace, trace_of, unit
-from omnidyn.comparison.verdict import compared_words, followed, nothing_followed
-from omnidyn.document import Document, Part, Points, Words
+from omnidyn.comparison.verdict import compared, followed, nothing_followed
+from omnidyn.document import Document, Part, Words, plain
 from omnidyn.logs.channels import place
 from omnidyn.model.first_guess import guess_line
 from omnidyn.run import Run
 from omnidyn.shown import FIGURE, FRAME, Shown, make
 from omnidyn.simulation.band import Band
+from omnidyn.statement import Statement, as_verdict, by_severity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,19 +47,19 @@ class Comparison(Shown):
     """How near one or two models come to the logs of a robot.
 
     robots: their names, the first one being what `rmse`, `fit_percent` and `vaf` are about. measured: the logs.
-    simulated: robot -> what it does under the same inputs, one Run per log. applied: robot -> what drove it, in words.
+    simulated: robot -> what it does under the same inputs, one Run per log. applied: robot -> what drove it.
     channels: the components compared ("vx", "w1", "heading", ...). segments: the free runs.
     overall: robot -> component -> Metrics over all samples. by_segment: robot -> component -> Metrics of each segment,
     None where it has no sample. difference: component -> which of two robots is better; empty for one robot.
     current_unsigned: whether currents were compared by size. rests_on: robot -> what of it is a guess.
-    warnings: what a reader must know, in words. bands: robot -> log -> Band of its run, where that was asked for and
+    warnings: what a reader must know. bands: robot -> log -> Band of its run, where that was asked for and
     its file has a std.
     """
 
     robots: tuple[str, ...]
     measured: tuple[Run, ...]
     simulated: Mapping[str, tuple[Run, ...]]
-    applied: Mapping[str, str]
+    applied: Mapping[str, tuple[Statement, ...]]
     channels: tuple[str, ...]
     segments: tuple[Segment, ...]
     overall: Mapping[str, Mapping[str, Metrics]]
@@ -66,7 +67,7 @@ class Comparison(Shown):
     difference: Mapping[str, ModelDifference] = field(default_factory=dict)
     current_unsigned: bool = False
     rests_on: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Statement, ...] = ()
     bands: Mapping[str, Mapping[int, Band]] = field(default_factory=dict)
     guesses: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
@@ -110,10 +111,10 @@ class Comparison(Shown):
         return None if found is None else self.robots[found]
 
     @property
-    def verdict(self) -> str:
-        """How well the model follows the logs, in a sentence; of two models also which is nearer."""
+    def verdict(self) -> Statement:
+        """How well the model follows the logs; of two models also which is nearer."""
         better = {name: self.better(name) for name in self.difference}
-        return compared_words(self.robots, [self.overall[robot] for robot in self.robots], better)
+        return compared(self.robots, [self.overall[robot] for robot in self.robots], better)
 
     @property
     def failed(self) -> bool:
@@ -170,7 +171,7 @@ class Comparison(Shown):
             ]  # fmt: skip
         parts += text.legend([each for found in self.overall.values() for each in found.values()])
         parts += ["currents are compared by size, without sign."] if self.current_unsigned else []
-        parts.append(Points(self.warnings, "warning:"))
+        parts += by_severity(self.warnings)
         return Document(parts, self.to_dict(), self.warnings, ascii=True, verdict=self.verdict)
 
     def _title(self, robot: str) -> tuple[Words, ...]:
@@ -181,7 +182,11 @@ class Comparison(Shown):
         where = where if logs == 1 else f"{logs} logs, first {where}"
         title = f"{robot} against {where}: {count} free run{'s' * (count > 1)}, {seconds:.4g} s"
         held = [Words(line)] if (line := guess_line(self.rests_on.get(robot, ()))) else []
-        return Words(title), Words(f"applied: {self.applied[robot]}"), *held
+        return Words(title), Words(f"applied: {self.applied_text(robot)}"), *held
+
+    def applied_text(self, robot: str) -> str:
+        """What drove a robot, in words."""
+        return "; or ".join(map(str, self.applied[robot]))
 
     def _name(self, k: int) -> str:
         at = self.segments[k]
@@ -192,7 +197,7 @@ class Comparison(Shown):
         """The comparison as JSON can hold it, without the runs."""
         robots = {
             name: {
-                "applied": self.applied[name],
+                "applied": plain(self.applied[name]),
                 "rests_on_guesses": list(self.rests_on.get(name, ())),
                 "overall": {key: asdict(each) for key, each in self.overall[name].items()},
                 "by_segment": {
@@ -203,7 +208,7 @@ class Comparison(Shown):
             for name in self.robots
         }
         return {
-            "verdict": self.verdict,
+            **as_verdict(self.verdict),
             "ok": not self.failed,
             "logs": [run.source for run in self.measured],
             "segments": [asdict(segment) for segment in self.segments],
@@ -215,5 +220,5 @@ class Comparison(Shown):
                 for name in self.bands
             },
             "current_unsigned": self.current_unsigned,
-            "warnings": list(self.warnings),
+            "warnings": plain(self.warnings),
         }

@@ -19,11 +19,12 @@ LONGEST = 0.25  # [s] FEWEST samples that take longer are no neighbours: only th
 SURE = 2.0  # standard errors beyond which a difference is believed
 END_OF_LINE = 2.2  # standard error of a Theil-Sen line at its end, times sqrt(n) over the noise
 FIT, FLAT = 4.0, 0.1  # noises, and shares of its bend, that the samples of a parabola may be away from it
+REST = "rest"  # where no speed was logged
 FAR = 3.0  # a first sample so many ranges of the next ones away from them is a spike
 
 
 class Start(NamedTuple):
-    """twist [m/s, m/s, rad/s] and pose [m, m, rad], shapes (3,); where the twist comes from, in words.
+    """twist [m/s, m/s, rad/s] and pose [m, m, rad], shapes (3,); source: the channel that tells the twist, or REST.
 
     angle: of the wheels [rad], shape (n,); 0 where they were not logged.
     """
@@ -44,16 +45,16 @@ def start_of(run: Run, robot: Robot, rows: slice) -> Start:
     angle = np.zeros(robot.wheels.count) if run.wheel_angle is None else _levels(t, run.wheel_angle[rows])
     pose = np.zeros(3) if run.pose is None else _levels(t, _continuous(run.pose[rows]))
     if run.twist is not None and _seen(run.twist[rows]):
-        return Start(_levels(t, run.twist[rows], at_rest=True), pose, "the measured twist", angle)
+        return Start(_levels(t, run.twist[rows], at_rest=True), pose, "twist", angle)
     if run.wheel_speed is not None and _seen(run.wheel_speed[rows]):
         speeds = _levels(t, run.wheel_speed[rows], at_rest=True)
-        return Start(twist_from_wheel_speed(robot.wheels, speeds), pose, "the wheel speeds", angle)
+        return Start(twist_from_wheel_speed(robot.wheels, speeds), pose, "wheel_speed", angle)
     if run.wheel_angle is not None and _seen(run.wheel_angle[rows]):
         speeds = _slopes(t, run.wheel_angle[rows])
-        return Start(twist_from_wheel_speed(robot.wheels, speeds), pose, "the slope of the wheel angles", angle)
+        return Start(twist_from_wheel_speed(robot.wheels, speeds), pose, "wheel_angle", angle)
     if run.pose is not None and _seen(run.pose[rows]):
-        return Start(_twist_from_pose(t, _continuous(run.pose[rows])), pose, "the slope of the pose", angle)
-    return Start(np.zeros(3), pose, "rest, as no speed was logged", angle)
+        return Start(_twist_from_pose(t, _continuous(run.pose[rows])), pose, "pose", angle)
+    return Start(np.zeros(3), pose, REST, angle)
 
 
 def first_level(t: FloatArray, values: FloatArray, at_rest: bool = False) -> float:

@@ -1,4 +1,4 @@
-"""How well a model follows what was measured, in a sentence: the same words for `compare` and for `identify`.
+"""How well a model follows what was measured: one judgement for `compare` and for `identify`.
 
 The error of a component as a share of its spread is 1 - fit / 100 (metrics.py). Up to FOLLOWS of it the model follows,
 up to HALF roughly; errors that are white are the noise of the sensor, whatever their share.
@@ -14,13 +14,16 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from omnidyn.comparison.traces import unit
-from omnidyn.document import all_of, sentence
+from omnidyn.document import all_of
 from omnidyn.logs.channels import place
+from omnidyn.statement import ERROR, NOTE, WARNING, Statement
 
 FOLLOWS, HALF, NOTHING = 0.2, 0.5, 1.0  # error over spread
 ROUGH = 3.0  # times what a signal scatters by from row to row: errors beyond are no noise
 WHITE = 0.05  # p-value from which errors are noise
 WELL, NOISE, ROUGHLY, HARDLY, NOT = range(5)  # how a component is followed, best first
+LEVELS = ("well", "noise", "roughly", "hardly", "not")  # the same for machines
+THE_MODEL = "the model"
 PLAIN = {
     ("twist", 0): "speed over the ground", ("twist", 1): "speed over the ground", ("twist", 2): "turn rate",
     ("pose", 0): "position", ("pose", 1): "position", ("pose", 2): "heading",
@@ -53,16 +56,10 @@ class Followed:
     error: float
     unit: str
 
-    def words(self) -> str:
-        """ "wheel speeds within 3 %", "heading not at all (rms error 1.2 rad)"."""
-        percent = max(1.0, round(100.0 * self.share))
-        if self.level == NOT:
-            return f"{self.name} not at all (rms error {self.error:.2g} {self.unit})"
-        how = {
-            WELL: f"within {percent:.0f} %", NOISE: f"as far as noise lets it ({percent:.0f} %)",
-            ROUGHLY: f"roughly ({percent:.0f} %)", HARDLY: f"hardly ({percent:.0f} %)",
-        }  # fmt: skip
-        return f"{self.name} {how[self.level]}"
+    def statement(self) -> Statement:
+        """The same as a statement."""
+        numbers = {"level": LEVELS[self.level], "share": self.share, "error": self.error, "unit": self.unit}
+        return Statement("signal_followed", NOTE if self.level <= ROUGHLY else WARNING, self.name, numbers)
 
 
 def followed(scores: Mapping[str, Scored]) -> list[Followed]:
@@ -123,26 +120,25 @@ def _level(score: Scored) -> int:
     return ROUGHLY if share <= HALF else HARDLY if share < NOTHING else NOT
 
 
-def follows(who: str, found: Sequence[Followed]) -> str:
-    """ "the model follows wheel speeds within 3 % and turn rate within 5 %, heading not at all (..)", no full stop."""
+def follows(model: str, found: Sequence[Followed]) -> Statement:
+    """How well a model follows each kind of measurement. model: its name."""
+    signals = {"signals": [each.statement() for each in found]}
     if not found:
-        return f"nothing that was measured changes: how well {who} follows cannot be told"
+        return Statement("nothing_changes", WARNING, model)
     if nothing_followed(found):
-        return f"{who} does not follow: {', '.join(each.words() for each in found)}"
-    good = [each.words() for each in found if each.level <= ROUGHLY]
-    bad = [each.words() for each in found if each.level >= HARDLY]
-    return f"{who} follows {all_of(good)}{f', but {all_of(bad)}' if bad else ''}"
+        return Statement("follows_nothing", ERROR, model, signals)
+    return Statement("follows", NOTE, model, signals)
 
 
-def compared_words(
+def compared(
     robots: Sequence[str], scores: Sequence[Mapping[str, Scored]], better: Mapping[str, str | None]
-) -> str:
-    """A comparison in a sentence. better: component -> the robot that is surely nearer, None where none is."""
+) -> Statement:
+    """The verdict of a comparison. better: component -> the robot that is surely nearer, None where none is."""
     if len(robots) == 1:
-        return sentence(follows("the model", followed(scores[0])))
-    each = [follows(robot, followed(own)) for robot, own in zip(robots, scores, strict=True)]
+        return follows(THE_MODEL, followed(scores[0]))
+    models = [follows(robot, followed(own)) for robot, own in zip(robots, scores, strict=True)]
     nearer = [
-        f"{robot} is surely nearer in {all_of(own)}" for robot in robots
-        if (own := [name for name, best in better.items() if best == robot])
+        Statement("nearer", NOTE, robot, {"components": components}) for robot in robots
+        if (components := [name for name, best in better.items() if best == robot])
     ]  # fmt: skip
-    return f"{'; '.join([*(nearer or ['neither is surely nearer']), *each])}."
+    return Statement("models_compared", NOTE, numbers={"nearer": nearer, "models": models})

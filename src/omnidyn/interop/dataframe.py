@@ -105,4 +105,4 @@ def _of_comparison(found: Comparison) -> tuple[Mapping[str, list[Any]], dict[str
         "max": "unit",
         "bias": "unit",
     }
-    return columns, {"warnings": list(found.warnings), "units": units}
+    return columns, {"warnings": [*map(str, found.warnings)], "units": units}

@@ -7,20 +7,20 @@ from typing import Any, NoReturn
 import typer
 
 from omnidyn.cli.terminal.streams import painted, say, show, show_json
-from omnidyn.document import WIDTH, Document
+from omnidyn.document import WIDTH, Document, sentence
 
 FAILED = 4  # the result is written, and it means nothing
 
 
-def end_failed(verdict: str) -> NoReturn:
+def end_failed(verdict: object) -> NoReturn:
     """End with exit code 4 a command whose result, written and shown, means nothing; `verdict` says why."""
-    say(f"omnidyn: {verdict}")
+    say(f"omnidyn: {verdict if isinstance(verdict, str) else sentence(str(verdict))}")
     raise typer.Exit(FAILED)
 
 
 def as_json(document: Document, record: dict[str, Any], **written: Any) -> dict[str, Any]:
     """The result for machines. record: its provenance; written: which files hold what."""
-    verdict = {"verdict": document.verdict} if document.verdict else {}
+    verdict = {"verdict": document.verdict_text} if document.verdict else {}
     return {**verdict, **document.data, **written, "provenance": record}
 
 

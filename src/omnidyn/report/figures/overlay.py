@@ -147,6 +147,7 @@ def _caption(comparison: Comparison, log: int, count: int) -> str:
     if any(each.draws == 0 for own in comparison.bands.values() for each in own.values()):
         band += " They are to first order: where a model rests they have no width."
     return (
-        f"{source}: measured, and what each model does under {comparison.applied[comparison.robots[0]]}, as a free run "
-        f"that never sees the measurement. Below each: model minus measured.{gaps}{band} Over all logs, {errors}."
+        f"{source}: measured, and what each model does under {comparison.applied_text(comparison.robots[0])}, as a "
+        f"free run that never sees the measurement. Below each: model minus measured.{gaps}{band} Over all logs, "
+        f"{errors}."
     )
