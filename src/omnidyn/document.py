@@ -40,7 +40,10 @@ class Words:
 
 @dataclass(frozen=True)
 class Points:
-    """Sentences (text or statements), each a point of a list. mark: what stands before each in text, such as "-"."""
+    """Sentences (text or statements), each a point of a list.
+
+    mark: what stands before each in text, such as "-"; "" for the severity of each statement.
+    """
 
     words: Sequence[object]
     mark: str = "-"
@@ -49,7 +52,8 @@ class Points:
     def lines(self, width: int, paint: Paint) -> Iterator[str]:
         """The points, each wrapped."""
         for words in self.words:
-            yield from Words(f"{self.mark} {words}", rest="  ").lines(width, paint)
+            mark = self.mark or f"{getattr(words, 'severity', '-')}:"
+            yield from Words(f"{mark} {words}", rest="  ").lines(width, paint)
 
 
 @dataclass(frozen=True)

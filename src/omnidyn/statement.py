@@ -5,7 +5,7 @@ A statement is made where its numbers are known. No code reads its sentence back
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -81,10 +81,10 @@ def as_verdict(verdict: Statement) -> dict[str, str]:
     return {"verdict": sentence(str(verdict)), "verdict_code": verdict.code}
 
 
-def by_severity(found: Sequence[Statement], name: str = "") -> list[Points]:
+def by_severity(found: Iterable[Statement], name: str = "") -> Points:
     """Statements as points of a document, the gravest first, each behind its severity."""
-    of = {severity: [one for one in found if one.severity == severity] for severity in SEVERITIES}
-    return [Points(some, f"{severity}:", name and f"{name}: {severity}") for severity, some in of.items() if some]
+    ordered = sorted(found, key=lambda one: SEVERITIES.index(one.severity))
+    return Points(ordered, "", name)
 
 
 def _bare(value: Any) -> Any:

@@ -92,7 +92,7 @@ def test_names_of_groups_are_text(page):
 def test_the_numbers_of_the_study_are_on_it(study, page):
     text = Reader(page).text
     for words in (*study.statements, *study.warnings, *study.advice):
-        assert words in text
+        assert str(words) in text
     for group, travel in study.travel.items():
         assert f"{travel.mean:.2f}" in text, group
     assert f"{study.choice.score.loo:.2f}" in text

@@ -117,7 +117,7 @@ class Drift(Shown):
         whole = (
             f"all numbers together: chi squared {chi2:.3g} with {degrees} degrees of freedom, chance {chance_cell(p)}"
         )
-        parts: list[Part] = [self.table(), "", whole, *by_severity(self.warnings)]
+        parts: list[Part] = [self.table(), "", whole, by_severity(self.warnings)]
         return Document(parts, self.to_dict(), self.warnings, ascii=True, verdict=self.verdict)
 
     def table(self) -> Table:

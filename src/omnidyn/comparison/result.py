@@ -171,7 +171,7 @@ class Comparison(Shown):
             ]  # fmt: skip
         parts += text.legend([each for found in self.overall.values() for each in found.values()])
         parts += ["currents are compared by size, without sign."] if self.current_unsigned else []
-        parts += by_severity(self.warnings)
+        parts.append(by_severity(self.warnings))
         return Document(parts, self.to_dict(), self.warnings, ascii=True, verdict=self.verdict)
 
     def _title(self, robot: str) -> tuple[Words, ...]:

@@ -19,6 +19,7 @@ from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.table.table import Table
 from omnidyn.model.frames import AXES
+from omnidyn.statement import Statement
 
 ALIASES = {"v": "x", "v_n": "y", "vn": "y", "w": "yaw", "omega": "yaw"}  # the paper's letters
 FORCE_SOURCES = ("table", "current", "voltage")
@@ -59,7 +60,7 @@ class SteadyTable:
     force_from: str = "table"
     source: str = ""
     sha256: str = ""
-    notes: tuple[str, ...] = ()
+    notes: tuple[Statement | str, ...] = ()
     lines: IntArray | None = None
 
     def __post_init__(self) -> None:

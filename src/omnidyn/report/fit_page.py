@@ -220,8 +220,8 @@ def _correlations(fits: Fits) -> list[str]:
 
 
 def _warnings(fits: Fits, validations: Mapping[str, Validation]) -> list[str]:
-    words = [_named(group, each, fits) for group, fit in fits.items() for each in fit.warnings]
+    words = [_named(group, each, fits) for group, fit in fits.items() for each in map(str, fit.warnings)]
     for each in validations.values():
         for comparison in (each.fitted, each.held_out):
-            words += comparison.warnings if comparison is not None else ()
+            words += map(str, comparison.warnings) if comparison is not None else ()
     return words

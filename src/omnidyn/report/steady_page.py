@@ -8,9 +8,8 @@ from typing import Any
 from omnidyn.document import sentence
 from omnidyn.findings.finding import Verdict
 from omnidyn.identification.fit_document import verdict_table
-from omnidyn.identification.steady.operating_points import SPEEDS
+from omnidyn.identification.steady.operating_points import FORCES, SPEEDS
 from omnidyn.identification.steady.study_table import SteadyStudy
-from omnidyn.identification.steady.study_words import FORCES
 from omnidyn.identification.verdict import steady_verdict
 from omnidyn.logs.path import driven
 from omnidyn.report.dead_zone_section import dead_zone_section

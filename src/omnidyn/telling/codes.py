@@ -9,8 +9,10 @@ from omnidyn.telling.comparison import SENTENCES as COMPARISON
 from omnidyn.telling.fit import SENTENCES as FIT
 from omnidyn.telling.lack_of_fit import SENTENCES as LACK_OF_FIT
 from omnidyn.telling.ladder import SENTENCES as LADDER
+from omnidyn.telling.lines import SENTENCES as LINES
 from omnidyn.telling.sentence import Sentence
 from omnidyn.telling.simulation import SENTENCES as SIMULATION
+from omnidyn.telling.steady import SENTENCES as STEADY
 from omnidyn.telling.verdicts import SENTENCES as VERDICTS
 
 ROOMS = {
@@ -22,6 +24,21 @@ ROOMS = {
     "advice": ADVICE,
     "verdicts": VERDICTS,
     "comparison": COMPARISON,
+    "steady": STEADY,
+    "lines": LINES,
+}
+
+ROOMS = {
+    "simulation": SIMULATION,
+    "fit": FIT,
+    "lack_of_fit": LACK_OF_FIT,
+    "causes": CAUSES,
+    "ladder": LADDER,
+    "advice": ADVICE,
+    "verdicts": VERDICTS,
+    "comparison": COMPARISON,
+    "steady": STEADY,
+    "lines": LINES,
 }
 CODES: dict[str, Sentence] = {code: sentence for room in ROOMS.values() for code, sentence in room.items()}
 

@@ -10,6 +10,7 @@ from benchmarks.wrong_worlds.world import ELLIPSE
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.question import STEADY_STATE
 from omnidyn.identification.steady.study import identify_steady
+from tests.support.codes import codes
 
 FLOORS = ("gray", "green")
 MIXED, EACH, _, SAME = KINDS
@@ -42,7 +43,7 @@ def test_the_answer_says_so(mixed):
     study, _ = mixed
     data = study.document().data
     assert [data["groups"][floor]["shape"] for floor in FLOORS] == ["box", "ellipse"]
-    assert sum("has a shape of its own" in words for words in study.statements) == len(study.choice.own) >= 1
+    assert codes(study.statements).count("group_shape") == len(study.choice.own) >= 1
     text = study.document().to_text()
     assert all(f"chosen in {floor}" in text for floor in study.choice.own)
     found = Identification(question=None, method=STEADY_STATE, estimates=study.estimates, study=study)  # type: ignore[arg-type]

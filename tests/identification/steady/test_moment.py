@@ -14,6 +14,7 @@ from omnidyn.identification.steady.moment import levelled
 from omnidyn.identification.steady.operating_points import steady_windows
 from omnidyn.identification.steady.study import identify_steady
 from omnidyn.run import Run
+from tests.support.codes import codes
 
 RATE, HOLD = 100.0, 1.6  # [Hz], [s] of a command
 LEVEL = 3.9  # [N]
@@ -56,7 +57,7 @@ def test_a_change_is_found_with_its_time_and_both_levels(factor):
     assert moment.before == pytest.approx(LEVEL, rel=0.01)
     assert moment.after == pytest.approx(factor * LEVEL, rel=0.01)
     assert moment.ci95[0] <= factor - 1.0 <= moment.ci95[1]
-    assert any("changes within the run, most likely at" in words for words in study.warnings)
+    assert "changes_within_run" in codes(study.warnings)
 
 
 @pytest.mark.parametrize("late", [True, False])
@@ -67,7 +68,7 @@ def test_currents_that_are_gone_on_one_side_are_not_scaled(late):
     study = identify_steady([whole.replace(current=gone)], robot_of(WORLD))
     (moment,) = study.moments
     side = "after" if late else "before"
-    assert any(f"no force is seen {side} it: a sensor or a motor that does not work there" in w for w in study.warnings)
+    assert side in [w.numbers["vanished"] for w in study.warnings if w.code == "changes_within_run"]
     points = steady_windows([whole], robot_of(WORLD)).points(robot_of(WORLD))
     left = levelled(points, [moment], {int(points.run[0]): moment.source})
     known = points.span[:, 1] <= moment.at if late else points.span[:, 0] >= moment.at
@@ -113,8 +114,8 @@ def test_a_change_is_found_by_the_shape_where_no_command_comes_again(shape, coun
     assert moment.after / moment.before == pytest.approx(factor, abs=0.015)
     assert moment.before_ci95[0] < moment.before < moment.before_ci95[1]
     assert moment.shape == study.choice.chosen
-    (words,) = (words for words in study.warnings if "changes within the run" in words)
-    assert "it is one only if that shape is right" in words
+    (change,) = (warning for warning in study.warnings if warning.code == "changes_within_run")
+    assert change.numbers["shape"]
 
 
 @pytest.mark.parametrize("shape", [BOX, ELLIPSE, WHEELS])
@@ -142,7 +143,7 @@ def test_a_change_is_told_first_and_the_shape_fits_on_both_sides_of_it(shape):
     assert [moment.shape for moment in study.moments] == [study.choice.chosen]
     assert not study.lack_of_fit["all"].found
     assert study.lack_of_fit["all"].tested
-    assert any("no lack of fit is seen on both sides of the change" in words for words in study.statements)
+    assert any(one.numbers["changes"] for one in study.statements if one.code == "no_lack_of_fit")
     assert found.verdict.startswith("The force of friction changes within a run (+2")
     assert "no offered shape fits" not in found.verdict
 
@@ -160,9 +161,9 @@ def test_a_shape_that_fits_on_neither_side_of_a_change_is_said_behind_it(factor)
     study = identify_steady([run], robot_of(told))
     assert len(study.moments) == (factor != 1.0)
     assert study.lack_of_fit["all"].found
-    heads = [words.partition(":")[0] for words in study.warnings if "no offered shape" in words or "changes" in words]
-    beside = "no offered shape fits on both sides of the change within the run"
-    assert heads == (["no offered shape fits"] if factor == 1.0 else ["round", beside])
+    found = [one for one in study.warnings if one.code in ("changes_within_run", "no_shape_fits")]
+    assert codes(found) == ["changes_within_run"] * (factor != 1.0) + ["no_shape_fits"]
+    assert found[-1].numbers["changes"] == (factor != 1.0)
 
 
 @pytest.mark.long

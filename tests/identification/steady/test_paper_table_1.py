@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from omnidyn.document import plain
 from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.logs.steady_table import SteadyTable, read_steady_table
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
+from tests.support.codes import codes
 
 SPEED = {"x": [0, 0.37, 0.74, 1.08], "y": [0, 0.42, 0.75, 1.08], "yaw": [0, 5.84, 8.04, 10.02]}
 FORCE = {"x": [2.25, 2.48, 2.79, 3.28], "y": [1.47, 1.97, 2.33, 2.49], "yaw": [0.10, 0.14, 0.18, 0.21]}
@@ -108,7 +110,7 @@ def test_rest_bounds_breakaway_and_raises_it_only_above_coulomb(robot):
     }
     friction = fit.robot.friction.axes
     assert friction.breakaway == (2.25, friction.coulomb[1], 0.10)
-    assert sum("is a lower bound, not an estimate" in words for words in fit.warnings) == 2
+    assert codes(fit.warnings).count("breakaway_from_rest") == 2
     for rest in ("line", "ignore"):
         other = fit_steady_state(robot, table_1(), rest=rest)
         assert other.robot.friction.axes.breakaway is None
@@ -139,16 +141,16 @@ def test_the_robot_carries_the_numbers_their_errors_and_their_origin(robot, tmp_
 def test_the_rows_of_w_are_faster_than_the_motor_can_turn(robot):
     """EVIDENCE: the three w rows turn 25-29 % faster than the no-load speed; v and v_n do not."""
     fit = fit_steady_state(robot, table_1(with_voltage=True), rest="line")
-    (words,) = [words for words in fit.warnings if "no-load" in words]
-    assert "axis yaw: 3 of 3 moving rows are faster than the no-load speed (25 to 29 % faster)" in words
+    (warning,) = [warning for warning in fit.warnings if warning.code == "beyond_no_load"]
+    assert str(warning).startswith("axis yaw: 3 of 3 moving rows are faster than the no-load speed (25 to 29 % faster)")
 
 
 def test_force_from_voltage_disagrees_with_the_table(robot):
     fit = fit_steady_state(robot, table_1(with_voltage=True), rest="line")
-    found = [words for words in fit.warnings if "is 1.22 times the force from the table" in words]
+    found = [one for one in fit.warnings if one.code == "forces_disagree" and f"{one.numbers['ratio']:.3g}" == "1.22"]
     assert len(found) == 1
-    assert "axis x" in found[0]
-    assert "(4 rows, rms difference 0.931 N)" in found[0]
+    assert found[0].subject == "x"
+    assert "(4 rows, rms difference 0.931 N)" in str(found[0])
 
 
 def test_summary_and_dict(robot):
@@ -177,5 +179,5 @@ def test_summary_and_dict(robot):
     document = json.loads(json.dumps(fit.to_dict(), allow_nan=False))
     assert document["parameters"]["friction.axes.coulomb[1]"]["value"] == fit.value["friction.axes.coulomb[1]"]
     assert document["parameters"]["friction.axes.coulomb[1]"]["unit"] == "N"
-    assert document["warnings"] == list(fit.warnings)
+    assert document["warnings"] == plain(fit.warnings)
     assert parse_robot(document["robot"]) == fit.robot

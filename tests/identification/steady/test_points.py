@@ -10,6 +10,7 @@ from omnidyn.identification.steady.points import points_from_currents, points_fr
 from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.model.dynamics import drive_wrench, frame_wrench, settled_currents
 from omnidyn.model.robot_file import load_robot
+from tests.support.codes import codes
 
 ROBOT = load_robot("axebot")
 TURNING = ROBOT.replace(body=ROBOT.body.replace(rotating_frame=True))
@@ -38,7 +39,7 @@ def test_voltages_of_the_model_give_back_its_friction():
     fit = fit_steady_state(ROBOT, points)
     check(fit)
     assert "eq (11)" in fit.method
-    assert any("as right as the R, K_t and K_v of the robot file" in words for words in fit.warnings)
+    assert "forces_from_voltage" in codes(fit.warnings)
 
 
 def test_currents_of_the_model_give_back_its_friction():
@@ -46,7 +47,7 @@ def test_currents_of_the_model_give_back_its_friction():
     fit = fit_steady_state(ROBOT, points_from_currents(ROBOT, TWIST, current))
     check(fit)
     assert "motor currents, eqs (7)-(10)" in fit.method
-    assert not any("eq (11)" in words for words in fit.warnings)
+    assert "forces_from_voltage" not in codes(fit.warnings)
 
 
 def test_four_wheels_do_as_well():
@@ -70,7 +71,7 @@ def test_an_axis_that_is_not_driven_gives_no_point():
     assert points.axis == ("x", "x")
     assert points.speed.tolist() == [0.5, 0.0]
     assert points.twist.tolist() == twist
-    assert points.notes == ("2 speeds below 10% of the fastest in their row were left out",)
+    assert [*map(str, points.notes)] == ["2 speeds below 10% of the fastest in their row were left out"]
     named = points_from_currents(ROBOT, twist, [[0.0, 0.5, -0.5], [0.01, 0.4, -0.39]], axis=["y", "w"])
     assert named.axis == ("y", "yaw")
 
@@ -106,30 +107,30 @@ def test_current_against_voltage_in_numbers():
     voltage = steady_voltage(ROBOT, TWIST)
     current = settled_currents(ROBOT, TWIST, voltage)
     agree = fit_steady_state(ROBOT, points_from_currents(ROBOT, TWIST, current, voltage=voltage))
-    assert not [words for words in agree.warnings if "times the force" in words]
+    assert "forces_disagree" not in codes(agree.warnings)
     fit = fit_steady_state(ROBOT, points_from_currents(ROBOT, TWIST, 0.8 * current, voltage=voltage))
-    found = [words for words in fit.warnings if "times the force from motor currents" in words]
+    found = [one for one in fit.warnings if one.code == "forces_disagree" and one.numbers["origins"][0] == "current"]
     assert len(found) == 3
-    assert "axis x: the force from voltage and speed, eq (11) is 1.25 times the force from motor currents" in found[0]
-    assert "(3 rows, rms difference 0.58 N)" in found[0]
+    assert "axis x: the force from voltage and speed, eq (11) is 1.25 times the force from motor currents" in str(
+        found[0]
+    )
+    assert "(3 rows, rms difference 0.58 N)" in str(found[0])
 
 
 def test_faster_than_the_voltage_allows():
     voltage = steady_voltage(ROBOT, TWIST)
     fit = fit_steady_state(ROBOT, points_from_voltage(ROBOT, TWIST, voltage))
-    assert not [words for words in fit.warnings if "no-load" in words]
+    assert "beyond_no_load" not in codes(fit.warnings)
     points = points_from_currents(ROBOT, 2.0 * TWIST, settled_currents(ROBOT, TWIST, voltage), voltage=voltage)
-    words = [words for words in fit_steady_state(ROBOT, points).warnings if "no-load" in words]
+    beyond = [one for one in fit_steady_state(ROBOT, points).warnings if one.code == "beyond_no_load"]
     # By hand for 0.4 m/s: 2.576 N and 9.105 N s/m of back-EMF ask for the voltage of 0.683 m/s without load.
-    assert words[0].startswith("axis x: 3 of 3 moving rows are faster than the no-load speed (17 to 49 % faster)")
+    assert str(beyond[0]).startswith("axis x: 3 of 3 moving rows are faster than the no-load speed (17 to 49 % faster)")
 
 
 def test_a_current_limit_is_told():
     limited = ROBOT.replace(motor=ROBOT.motor.replace(current_limit=0.5))
     points = points_from_voltage(limited, TWIST, steady_voltage(ROBOT, TWIST))
-    assert points.notes == (
-        "in 2 rows a motor is at its current limit: the force there is that of the limit, not of eq (11)",
-    )
+    assert [(note.code, note.numbers) for note in points.notes] == [("at_current_limit", {"rows": 2})]
 
 
 def test_a_voltage_drop_is_taken_off_before_eq_11():

@@ -10,6 +10,8 @@ from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.friction import AxesFriction, WheelFriction
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
+from omnidyn.statement import quoted
+from tests.support.codes import codes
 
 ROBOT = load_robot("axebot")
 SPEED = np.array([0.2, 0.5, 0.8, 1.1, -0.3, -0.9])
@@ -27,9 +29,9 @@ def both(one, other):
     )
 
 
-def said(fit, words):
-    """The one warning with these words."""
-    (found,) = [each for each in fit.warnings if words in each]
+def warned(fit, code, subject="x"):
+    """The one warning of this code."""
+    (found,) = [warning for warning in fit.warnings if (warning.code, warning.subject) == (code, subject)]
     return found
 
 
@@ -46,28 +48,24 @@ def test_axes_without_data_keep_their_friction_and_say_so():
     assert fit.robot.friction.axes.viscous[::2] == ROBOT.friction.axes.viscous[::2]
     assert fit.robot.friction.axes.coulomb[::2] == ROBOT.friction.axes.coulomb[::2]
     assert set(fit.value) == {"friction.axes.viscous[1]", "friction.axes.coulomb[1]"}
-    assert "axis x: no data, B and C stay as they were" in fit.warnings
-    assert "axis yaw: no data, B and C stay as they were" in fit.warnings
+    assert [warning.subject for warning in fit.warnings if warning.code == "axis_without_data"] == ["x", "yaw"]
 
 
-# ---- warnings, each in words ----------------------------------------------------------------------------
+# ---- warnings ----------------------------------------------------------------------------
 
 
 def test_two_degrees_of_freedom_or_fewer_are_told_with_the_t_factor():
-    assert "1 degree of freedom (3 rows, 2 parameters): the 95 % interval reaches 12.7 standard" in said(
-        fit_steady_state(ROBOT, line(speed=SPEED[:3])), "of freedom"
-    )
-    assert "2 degrees of freedom (4 rows, 2 parameters): the 95 % interval reaches 4.3 standard" in said(
-        fit_steady_state(ROBOT, line(speed=SPEED[:4])), "of freedom"
-    )
-    assert not [words for words in fit_steady_state(ROBOT, line(speed=SPEED[:5])).warnings if "of freedom" in words]
+    one, two = (warned(fit_steady_state(ROBOT, line(speed=SPEED[:rows])), "few_degrees") for rows in (3, 4))
+    assert "1 degree of freedom (3 rows, 2 parameters): the 95 % interval reaches 12.7 standard" in str(one)
+    assert (two.numbers["degrees"], two.numbers["quantile"]) == (2, pytest.approx(4.30, abs=0.01))
+    assert "few_degrees" not in codes(fit_steady_state(ROBOT, line(speed=SPEED[:5])).warnings)
 
 
 def test_an_interval_that_contains_zero():
     fit = fit_steady_state(ROBOT, line(b=0.001))
     low, high = fit.ci95["friction.axes.viscous[0]"]
     assert low < 0.0 < high
-    assert "N s/m contains zero: the data do not show it" in said(fit, "friction.axes.viscous[0]")
+    assert warned(fit, "interval_contains_zero", "friction.axes.viscous[0]").numbers == {"ci95": (low, high)}
 
 
 def test_a_negative_estimate_is_at_bound_not_silently_clamped():  # BAD_INPUTS 30
@@ -76,10 +74,10 @@ def test_a_negative_estimate_is_at_bound_not_silently_clamped():  # BAD_INPUTS 3
     assert fit.robot.friction.axes.viscous[0] == 0.0
     low, high = fit.ci95["friction.axes.viscous[0]"]
     assert low == 0.0 < high
-    words = said(fit, "friction.axes.viscous[0] is at bound")
+    bound = warned(fit, "coefficient_at_bound", "friction.axes.viscous[0]")
     side = np.sign(SPEED)
     slope = stats.linregress(np.abs(SPEED), side * line(b=-0.5).force).slope
-    assert f"the best line has {slope:.4g} N s/m, friction cannot be negative, 0 is taken; it may be up to" in words
+    assert bound.numbers == {"free": pytest.approx(slope), "high": high}
     assert "at bound" in fit.summary()
     assert fit.to_dict()["parameters"]["friction.axes.viscous[0]"]["at_bound"] is True
     assert parse_robot(robot_to_toml(fit.robot)) == fit.robot
@@ -87,49 +85,41 @@ def test_a_negative_estimate_is_at_bound_not_silently_clamped():  # BAD_INPUTS 3
 
 def test_a_row_at_rest_used_as_a_sliding_point():
     points = both(line(speed=SPEED[:4]), SteadyTable("x", [0.0], [2.3]))
-    assert "axis x: 1 row at rest used as a sliding point" in said(
-        fit_steady_state(ROBOT, points, rest="line"), "at rest"
-    )
-    assert "axis x: 1 row at rest not used" in fit_steady_state(ROBOT, points, rest="ignore").warnings
+    assert warned(fit_steady_state(ROBOT, points, rest="line"), "rest_as_sliding").numbers == {"rows": 1}
+    assert warned(fit_steady_state(ROBOT, points, rest="ignore"), "rest_not_used").numbers == {"rows": 1}
 
 
 def test_one_speed_only_is_no_line():
     fit = fit_steady_state(ROBOT, both(line("y"), line("x", speed=[0.5, 0.5, -0.5, 0.5], noise=np.zeros(4))))
-    assert "all rows have the same speed, 0.5: B and C cannot be told apart" in said(fit, "axis x: all rows")
-    assert "B speed + C = 2.67" in said(fit, "axis x: all rows")
+    assert warned(fit, "axis_at_one_speed").numbers == {"speed": 0.5, "sum": pytest.approx(2.67, abs=0.01)}
     assert fit.robot.friction.axes.viscous[0] == ROBOT.friction.axes.viscous[0]
 
 
 def test_force_against_the_motion():  # BAD_INPUTS 23
     points = line()
     unsigned = points.replace(force=np.abs(points.force))
-    words = said(fit_steady_state(ROBOT, unsigned), "against the motion")
-    assert words.startswith("axis x: in 2 rows of 6 the force points against the motion")
-    assert "unsigned current sensor" in words
+    assert warned(fit_steady_state(ROBOT, unsigned), "axis_against_motion").numbers == {"wrong": 2, "rows": 6}
 
 
 def test_scatter_that_contradicts_the_std_given():
     small = line(force_std=np.full(6, 0.001))
-    assert "scatter 15 times as much as their std says; the intervals follow the scatter itself" in said(
-        fit_steady_state(ROBOT, small), "scatter"
-    )
-    assert "the intervals follow the std given" in said(fit_steady_state(ROBOT, small, absolute_std=True), "scatter")
-    assert not [
-        each for each in fit_steady_state(ROBOT, line(force_std=np.full(6, 0.015))).warnings if "scatter" in each
-    ]
+    words = str(warned(fit_steady_state(ROBOT, small), "scatter_contradicts_std"))
+    assert "scatter 15 times as much as their std says; the intervals follow the scatter itself" in words
+    absolute = warned(fit_steady_state(ROBOT, small, absolute_std=True), "scatter_contradicts_std")
+    assert absolute.numbers["absolute_std"]
+    right = fit_steady_state(ROBOT, line(force_std=np.full(6, 0.015)))
+    assert "scatter_contradicts_std" not in codes(right.warnings)
 
 
 def test_an_iteration_that_does_not_settle_is_told(monkeypatch):
     monkeypatch.setattr("omnidyn.identification.steady.line.MAX_ITERATIONS", 2)
     points = line(force_std=np.full(6, 0.015), speed_std=np.full(6, 0.2))
-    assert "axis x: the iteration for speed_std did not settle" in said(fit_steady_state(ROBOT, points), "settle")
+    assert warned(fit_steady_state(ROBOT, points), "speed_std_not_settled")
 
 
 def test_notes_of_the_points_become_warnings():
-    assert (
-        "numbers have a decimal comma"
-        in fit_steady_state(ROBOT, line(notes=("numbers have a decimal comma",))).warnings
-    )
+    note = "numbers have a decimal comma"
+    assert quoted(note) in fit_steady_state(ROBOT, line(notes=(note,))).warnings
 
 
 # ---- breakaway ------------------------------------------------------------------------------------------
@@ -141,17 +131,17 @@ def with_breakaway(*levels):
     return ROBOT.replace(friction=ROBOT.friction.replace(axes=friction))
 
 
-def test_a_breakaway_below_the_new_coulomb_friction_is_raised_in_words():
+def test_a_breakaway_below_the_new_coulomb_friction_is_raised():
     fit = fit_steady_state(with_breakaway(2.3, 1.8, 0.1), line(c=2.6))
     new = fit.robot.friction.axes
     assert new.breakaway == (new.coulomb[0], 1.8, 0.1)
-    assert "friction.axes.breakaway[0] raised from 2.3 to the new coulomb friction" in fit.warnings
+    assert warned(fit, "breakaway_raised", "friction.axes.breakaway[0]").numbers == {"before": 2.3}
 
 
-def test_a_breakaway_above_it_stays_in_words():
+def test_a_breakaway_above_it_stays():
     fit = fit_steady_state(with_breakaway(3.0, 1.8, 0.1), line())
     assert fit.robot.friction.axes.breakaway == (3.0, 1.8, 0.1)
-    assert "friction.axes.breakaway[0] stays at 3: rows in motion do not show it" in fit.warnings
+    assert warned(fit, "breakaway_kept", "friction.axes.breakaway[0]").numbers == {"level": 3.0}
 
 
 def test_slow_rows_count_as_rest_below_rest_speed():
@@ -218,7 +208,7 @@ def test_friction_elsewhere_would_count_twice():
 def test_friction_beyond_any_robot_is_not_put_into_one():
     points = both(line("y"), SteadyTable("x", [1e-9, 2e-9, 3e-9], [1.0, 2.0, 3.0]))
     fit = fit_steady_state(ROBOT, points)
-    assert "axis x: the fit gives 1e+09, beyond any robot; B and C stay" in fit.warnings
+    assert warned(fit, "axis_beyond_any_robot").numbers == {"level": pytest.approx(1e9)}
 
 
 # ---- coverage through the whole function ----------------------------------------------------------------

@@ -12,6 +12,7 @@ from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.run import Run
+from tests.support.codes import codes
 from tests.support.steady_logs import FRICTIONS, TRUTH, clean_runs, robot_with, spoiled, steady_voltage
 
 AXEBOT = load_robot("axebot")
@@ -71,8 +72,8 @@ def test_a_disc_is_told_from_a_box_in_words():
     study = identify_steady(noisy("disc"), AXEBOT)
     box = next(score for score in study.choice.scores if score.name == "box")
     assert box.told_apart
-    assert "friction has the shape disc" in study.statements[0]
-    assert any("cannot tell apart" in words and "ellipse" in words for words in study.statements)
+    assert (study.statements[0].code, study.statements[0].subject) == ("shape_chosen", "disc")
+    assert any("ellipse" in one.numbers["shapes"] for one in study.statements if one.code == "shapes_tied")
 
 
 def test_the_robot_that_comes_back_has_the_friction_with_its_std_and_survives_its_file():
@@ -89,7 +90,7 @@ def test_the_robot_that_comes_back_has_the_friction_with_its_std_and_survives_it
 def test_yaw_friction_that_was_not_measured_stays_and_is_named():
     estimate = identify_steady(noisy("disc"), AXEBOT).estimate
     assert estimate.robot.friction.direction.yaw_coulomb == AXEBOT.friction.axes.coulomb[2]
-    assert any("yaw_coulomb stays at 0.099" in words for words in estimate.warnings)
+    assert any(one.numbers == {"level": pytest.approx(0.099)} for one in estimate.warnings if one.code == "level_kept")
 
 
 def test_turning_robots_give_yaw_friction():
@@ -116,7 +117,7 @@ def test_viscous_friction_is_found_where_there_is_some():
     assert study.choice.chosen == "disc+viscous"
     low, high = study.estimate.ci95["friction.direction.viscous"]
     assert low <= 1.5 <= high
-    assert any("viscous friction is seen" in words for words in study.statements)
+    assert "viscous_seen" in codes(study.statements)
 
 
 def test_viscous_friction_that_the_data_do_not_show_is_bounded_in_words_and_left_at_0():
@@ -126,7 +127,7 @@ def test_viscous_friction_that_the_data_do_not_show_is_bounded_in_words_and_left
     assert study.estimate.robot.friction.direction.viscous == 0.0
     (level,) = study.viscous["all"]
     assert level.low <= 0.0 <= level.high
-    (words,) = [words for words in study.statements if "not identifiable" in words]
+    (words,) = [str(one) for one in study.statements if one.code == "viscous_not_identifiable"]
     assert "it is left at 0, B may be up to" in words
 
 
@@ -144,7 +145,7 @@ def test_groups_that_differ_and_groups_that_do_not():
     assert found["slick", "rough"].differs
     assert found["slick", "rough"].low <= 0.6 <= found["slick", "rough"].high
     assert not found["slick", "again"].differs
-    assert any("slick 2.0" in words and "no difference seen" in words for words in study.statements)
+    assert any(not one.numbers["differs"] for one in study.statements if one.code == "group_difference")
     assert [*study.estimates] == ["slick", "rough", "again"]
 
 
@@ -171,7 +172,7 @@ def test_internal_forces_of_four_wheels_are_told():
     per_ampere = 19.0 * 0.0059 / 0.035
     study = identify_steady(fighting, robot, shape="box", force_from="current")
     assert study.internal["all"] == pytest.approx(0.2 * per_ampere * 2.0, rel=0.01)
-    assert any("work against each other" in words for words in study.statements)
+    assert "internal_force" in codes(study.statements)
     assert study.estimate.value["friction.axes.coulomb[0]"] == pytest.approx(
         identify_steady(runs, robot, shape="box").estimate.value["friction.axes.coulomb[0]"], rel=1e-9
     )
@@ -217,7 +218,7 @@ def test_the_summary_and_the_dictionary_hold_all_of_it():
     assert record["shape"] == "disc"
     assert {score["name"] for score in record["shapes"]} >= {"box", "disc", "ellipse", "wheel", "wheels"}
     for words in study.advice:
-        assert words.split()[0] in text
+        assert str(words).split()[0] in text
 
 
 # ---- what cannot be answered ----------------------------------------------------------------------------

@@ -10,6 +10,7 @@ from omnidyn.model.robot import GUESS, Prior
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.statistics import t_quantile
+from tests.support.codes import codes
 from tests.support.plain_world import World, fan, steady_logs
 
 AXEBOT, MECANUM = load_robot("axebot"), load_robot("mecanum")
@@ -60,7 +61,7 @@ def test_turns_on_the_spot_have_no_share_in_the_friction_along_travel():
 def test_four_turns_are_enough_for_the_friction_about_yaw():
     found = identify_steady(mecanum_runs(SPOTS), MECANUM)
     assert found.estimate.value["friction.direction.yaw_coulomb"] == pytest.approx(1.5, rel=0.02)
-    assert not any("turn on the spot" in words for words in found.advice)
+    assert "turn_on_the_spot" not in codes(found.advice)
 
 
 def test_a_spot_has_no_direction_and_a_straight_drive_no_turn():
@@ -78,7 +79,7 @@ def test_logs_without_currents_are_not_said_to_have_lost_the_sign_of_these():
     world = mecanum(cone=(3.0, 3.0), elements=[YAW])
     runs = [as_run(log, world.voltage(twist), random) for twist, log in steady_logs(world, fan((0.1, 0.1, 0.5), 20))]
     found = identify_steady(runs, wrong, shape="disc")
-    (words,) = [words for words in found.warnings if "against the motion" in words]
+    (words,) = [str(one) for one in found.warnings if one.code == "against_motion"]
     assert "current" not in words
     assert "K_v" in words
 
@@ -104,7 +105,7 @@ def test_mass_times_acceleration_is_taken_off_the_force():
     assert found.estimate.value["friction.direction.coulomb"] == pytest.approx(6.0, rel=0.002)
     (level,) = found.viscous["all"]
     assert level.low <= 0.0 <= level.high  # and no viscous friction where there is none
-    assert any("mass times that, was taken off" in words for words in found.warnings)
+    assert "windows_accelerate" in codes(found.warnings)
     light = identify_steady(runs, robot.replace(body=robot.body.replace(mass=0.01)), shape="disc")
     assert light.estimate.value["friction.direction.coulomb"] > 6.03  # what was said without
 
@@ -169,7 +170,7 @@ def test_currents_or_a_known_constant_separate_it(force_from, guessed):
     (level,) = found.viscous["all"]
     assert level.guesses == ()
     assert level.low <= 3.0 <= level.high
-    assert any("viscous friction is seen" in words for words in found.statements)
+    assert "viscous_seen" in codes(found.statements)
 
 
 def test_what_the_file_knows_only_so_far_is_in_the_intervals():

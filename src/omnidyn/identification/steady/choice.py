@@ -37,6 +37,10 @@ from omnidyn.statistics import huber_loss
 
 AUTO = "auto"
 APART = 2.0  # standard errors from which two shapes are told apart
+NOT_COMPARED = {
+    "one_speed": "the points of a group have nearly one speed",
+    "not_determined": "the directions do not determine all of its levels",
+}  # why a shape was not compared
 SPEED_RATIO = 1.25  # speeds that differ by less do not show a viscous friction
 
 
@@ -70,8 +74,8 @@ class ShapeScore:
 class ShapeChoice:
     """The scores, best first by what decides, of all groups together; the name of the shape that they share.
 
-    fits: shape -> group -> fit; missing: shape -> why not. own: group -> the shape that it has for itself, where its
-    points tell that from the shared one; scored: group -> the scores in these.
+    fits: shape -> group -> fit; missing: shape -> why not (NOT_COMPARED). own: group -> the shape that it has for
+    itself, where its points tell that from the shared one; scored: group -> the scores in these.
     """
 
     scores: tuple[ShapeScore, ...]
@@ -116,7 +120,7 @@ def choose_shape(robot: Robot, points: ForcePoints, *, shape: str = AUTO, robust
     missing: dict[str, str] = {}
     for name, candidate in SHAPES.items():
         if candidate.viscous and not all(map(speeds_differ, parts.values())):
-            missing[name] = "the points of a group have nearly one speed"
+            missing[name] = "one_speed"
             continue
         fitted = {
             group: fit_shape(candidate, robot, own, turning=is_turning(robot, own), robust=robust)
@@ -125,11 +129,11 @@ def choose_shape(robot: Robot, points: ForcePoints, *, shape: str = AUTO, robust
         if all(fit is not None for fit in fitted.values()):
             fits[name] = {group: fit for group, fit in fitted.items() if fit is not None}
         else:
-            missing[name] = "the directions do not determine all of its levels"
+            missing[name] = "not_determined"
     if not fits or (shape != AUTO and shape not in fits):
         raise InsufficientDataError(
             f"the shape {shape} cannot be fitted" if shape != AUTO else "no shape can be fitted",
-            got=f"{len(points)} points: {missing.get(shape, 'too few')}",
+            got=f"{len(points)} points: {NOT_COMPARED.get(missing.get(shape, ''), 'too few')}",
             expected="steady runs in six directions or more", remedy="drive in more directions, each at a held speed",
         )  # fmt: skip
     judge = _Judge(fits, robust)

@@ -43,6 +43,7 @@ SPARE = 6  # folds beyond the levels that a test needs
 ROUNDS = 10  # of robust weights
 TURNED_DEG = (15.0, 30.0, 45.0, 60.0, 75.0)
 REPEATS = "repeats"
+ROOM = {"forward and backward", "left and right", "pull"}  # keys of remedies that a tilted floor looks like
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ explains most; Student's t of d counts all cuts of all runs (C. E. Bonferroni, 1
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from scipy.special import stdtr
@@ -18,13 +18,13 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.steady.operating_points import ForcePoints, HeldForces, held_forces
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
+from omnidyn.statement import Statement
 from omnidyn.statistics import t_quantile
 
 FALSE = 0.01  # of right logs for which a change is told
 SPARE = 4  # windows beyond the commands that a test needs
 AS_GOOD = 6.0  # of t squared, by which a cut must be worse than the best to be ruled out
 MATTERS = 0.02  # of the force: a smaller change does not matter
-GONE = "a sensor or a motor that does not work there, or wheels off the floor"
 
 
 @dataclass(frozen=True)
@@ -51,26 +51,16 @@ class Moment:
         """Whether no force is left that is told from none, before and after: then nothing scales with it."""
         return self.before_ci95[0] <= 0.0, self.after_ci95[0] <= 0.0
 
-    def words(self) -> str:
-        """In a sentence."""
-        low, high = (100.0 * end for end in self.ci95)
-        what, rests = "at the same command", ""
-        if self.shape:
-            what = f"over that of the fitted shape ({self.shape})"
-            rests = "; no command tells it by itself, so it is one only if that shape is right"
-        if any(self.vanished):
-            rests += f"; no force is seen {'before' if self.vanished[0] else 'after'} it: {GONE}"
-        return (
-            f"{self.source or 'the run'}: the force {what} changes within the run, most likely at "
-            f"{self.at:.4g} s (between {self.between[0]:.4g} and {self.between[1]:.4g} s): from {self.before:.3g} N "
-            f"[{self.before_ci95[0]:.3g}, {self.before_ci95[1]:.3g}] to {self.after:.3g} N "
-            f"[{self.after_ci95[0]:.3g}, {self.after_ci95[1]:.3g}], {100.0 * self.change:+.3g} % "
-            f"[{low:.3g}, {high:.3g}]; the levels of the fit lie between both{rests}"
-        )
+    def statement(self) -> Statement:
+        """The change, with its numbers."""
+        numbers = {name: value for name, value in asdict(self).items() if name != "source"}
+        before, after = self.vanished
+        gone = {"vanished": "before" if before else "after" if after else ""}
+        return Statement("changes_within_run", subject=self.source, numbers=numbers | gone)
 
-    def short(self) -> str:
-        """In a few words."""
-        return f"{100.0 * self.change:+.3g} % in {self.source or 'the run'} at {self.at:.4g} s"
+    def short(self) -> Statement:
+        """When and by how much."""
+        return Statement("change_in_run", subject=self.source, numbers={"change": self.change, "at": self.at})
 
 
 def levelled(points: ForcePoints, found: Sequence[Moment], sources: Mapping[int, str]) -> ForcePoints:

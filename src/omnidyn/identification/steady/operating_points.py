@@ -27,6 +27,7 @@ from omnidyn.model.motor import settled_current, traction
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import rim_speed, twist_from_wheel_speed, wrench_from_traction
 from omnidyn.run import Run
+from omnidyn.statement import NOTE, Statement, statements
 
 WHEEL, SET, GROUND = "wheel", "set", "ground"
 SPEEDS = {
@@ -34,6 +35,7 @@ SPEEDS = {
     SET: "set speed",
     GROUND: "speed over the ground",
 }
+FORCES = {CURRENT: "motor currents, eqs (7)-(10)", VOLTAGE: "voltage and speed, eq (11)"}
 STILL_SHARE = 1e-6  # of the fastest rim: slower is not moving, whatever the speed is
 STILL_ERRORS = 2.0  # standard errors: a measured speed below is not known to move
 AT_REST = 1e-3  # [m/s] at the rim
@@ -52,7 +54,7 @@ class ForcePoints:
     whether it turns, (points,); a turn on the spot has no direction of travel. direction: of the commanded motion
     [degree], or of the twist where no command was logged. group: name of each point's group. run: number of its run.
     rows: rows of the log behind it. span: start and end of its window [s], shape (points, 2).
-    speed_from: "wheel", "set" or "ground". force_from: "current" or "voltage". notes: in words.
+    speed_from: "wheel", "set" or "ground". force_from: "current" or "voltage". notes: how they were made.
     """
 
     twist: FloatArray
@@ -69,7 +71,7 @@ class ForcePoints:
     span: FloatArray
     speed_from: str
     force_from: str
-    notes: tuple[str, ...] = ()
+    notes: tuple[Statement, ...] = ()
 
     def __len__(self) -> int:
         return len(self.twist)
@@ -105,14 +107,14 @@ class ForcePoints:
 class SteadyWindows:
     """The steady windows of runs, whatever the numbers of the robot are: (number of the run, run, window) of each.
 
-    names: group of each run. speed, origin: of the points that are made of them. notes: in words.
+    names: group of each run. speed, origin: of the points that are made of them. notes: how they were found.
     """
 
     found: tuple[tuple[int, Run, Plateau], ...]
     names: tuple[str, ...]
     speed: str
     origin: str
-    notes: tuple[str, ...]
+    notes: tuple[Statement, ...]
 
     def points(self, robot: Robot) -> ForcePoints:
         """What the forces of a robot's motors are there. Errors: as of `force_points`."""
@@ -163,10 +165,11 @@ def steady_windows(
         windows = pool(find_plateaus(run, start=window[0], end=window[1]) if window else find_plateaus(run))
         empty += [] if windows else [run.source]
         found += [(number, run, each) for each in windows]
-    lacking = f"{len(empty)} of {len(runs)} runs have no steady window, such as {empty[0] or 'run 0'}" if empty else ""
+    lacking = [Statement("no_steady_window", subject=empty[0] or "run 0",
+                         numbers={"empty": len(empty), "runs": len(runs)})] if empty else []  # fmt: skip
     if origin == CURRENT:
         _refuse_unsigned(runs, [each for *_, each in found])
-    return SteadyWindows(tuple(found), names, speed, origin, (*map(str, twice), *([lacking] if lacking else [])))
+    return SteadyWindows(tuple(found), names, speed, origin, (*statements(twice), *lacking))
 
 
 @dataclass(frozen=True, eq=False)
@@ -346,17 +349,17 @@ def _refuse_unsigned(runs: Sequence[Run], windows: Sequence[Plateau]) -> None:
 
 def _stacked(
     found: list[tuple[int, dict[str, FloatArray], Plateau]], robot: Robot, names: tuple[str, ...], speed: str,
-    origin: str, notes: list[str],
+    origin: str, notes: list[Statement],
 ) -> ForcePoints:  # fmt: skip
     if not found:
         raise InsufficientDataError(
-            "no steady window was found", got="; ".join(notes) or "no rows",
+            "no steady window was found", got="; ".join(map(str, notes)) or "no rows",
             expected="stretches of constant speed, half a second or longer", remedy="hold each command longer",
         )  # fmt: skip
     arrays = {name: np.array([point[name] for _, point, _ in found]) for name in found[0][1]}
     notes = [*notes, *_about_acceleration(arrays.pop("inertial"), arrays["wrench"], robot)]
     if any(each.speed_from == ANGLE for *_, each in found) and speed == WHEEL:
-        notes = [*notes, f"speeds of the wheels are from {ANGLE}, finer than a quantised speed"]
+        notes = [*notes, Statement("speeds_from_angles", NOTE)]
     travels, turns = arrays.pop("travels") > 0.0, arrays.pop("turns") > 0.0
     return ForcePoints(
         **arrays,
@@ -372,13 +375,13 @@ def _stacked(
     )
 
 
-def _about_acceleration(inertial: FloatArray, wrench: FloatArray, robot: Robot) -> list[str]:
+def _about_acceleration(inertial: FloatArray, wrench: FloatArray, robot: Robot) -> list[Statement]:
     """What accelerations took of the forces, where it is worth a word."""
     scale = [1.0, 1.0, float(np.mean(robot.wheels.robot_radius))]
     most = float(np.linalg.norm(inertial / scale, axis=1).max())
     if most <= ACCELERATES * float(np.median(np.linalg.norm(wrench / scale, axis=1))):
         return []
-    return [f"some windows still accelerate: up to {most:.2g} N, mass times that, was taken off their forces"]
+    return [Statement("windows_accelerate", numbers={"force": most})]
 
 
 def _moving(points: ForcePoints, robot: Robot) -> ForcePoints:
@@ -393,4 +396,5 @@ def _moving(points: ForcePoints, robot: Robot) -> ForcePoints:
         )  # fmt: skip
     resting = int((~moves).sum())
     kept = points.chosen(moves)
-    return replace(kept, notes=(*kept.notes, f"{resting} windows at rest were left out")) if resting else kept
+    left_out = Statement("windows_at_rest", NOTE, numbers={"windows": resting})
+    return replace(kept, notes=(*kept.notes, left_out)) if resting else kept

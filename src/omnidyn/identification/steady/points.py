@@ -22,6 +22,7 @@ from omnidyn.model.dynamics import drive_wrench, frame_wrench, settled_currents,
 from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
+from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import moving
 
 # An axis slower than this share of the row's fastest is not driven: its speed and force are noise around zero.
@@ -131,7 +132,7 @@ def _points(
     current: FloatArray | None = None,
     force_from: str,
     source: str,
-    notes: tuple[str, ...] = (),
+    notes: tuple[Statement, ...] = (),
 ) -> SteadyTable:
     """One point per row and axis. In a turning frame the friction also balances M omega v."""
     balanced = wrench + frame_wrench(robot, twist)
@@ -142,7 +143,8 @@ def _points(
     speeds = None if speed_std is None else _one_each("speed_std", speed_std, 3, "axis")[column]
     left_out = int((moving(twist) & ~chosen).sum())
     if left_out and axis is None:
-        notes = (*notes, f"{left_out} speeds below {DRIVEN_SHARE:.0%} of the fastest in their row were left out")
+        numbers = {"count": left_out, "share": DRIVEN_SHARE}
+        notes = (*notes, Statement("slow_speeds_left_out", NOTE, numbers=numbers))
     return SteadyTable(
         axis=[AXES[k] for k in column],
         speed=twist[row, column],
@@ -169,14 +171,13 @@ def _wrench_std(robot: Robot, current_std: FloatArray) -> FloatArray:
     return np.sqrt(current_std**2 @ per_ampere**2)
 
 
-def _at_limit(robot: Robot, twist: FloatArray, voltage: FloatArray) -> tuple[str, ...]:
+def _at_limit(robot: Robot, twist: FloatArray, voltage: FloatArray) -> tuple[Statement, ...]:
     """Eq (12): there the current is the limit itself, as far as that is known, and says nothing of R."""
     if robot.motor.current_limit is None:
         return ()
     limit = per_wheel(robot.motor.current_limit, robot.wheels.count)
     rows = int((np.abs(settled_currents(robot, twist, voltage)) >= limit).any(axis=1).sum())
-    words = f"in {rows} rows a motor is at its current limit: the force there is that of the limit, not of eq (11)"
-    return (words,) if rows else ()
+    return (Statement("at_current_limit", numbers={"rows": rows}),) if rows else ()
 
 
 def refuse_losses(robot: Robot) -> None:

@@ -20,14 +20,14 @@ from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.estimate import Correlation, Estimate, identified
 from omnidyn.identification.force_scale import scale_of_traction
 from omnidyn.identification.steady.line import PARAMETERS, Line, fit_line
-from omnidyn.identification.steady.steady_state_words import ORIGIN, about_line, about_points
+from omnidyn.identification.steady.line_statements import line_statements, point_statements, rest_statements
 from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.frames import AXES
 from omnidyn.model.friction import AxesFriction
-from omnidyn.model.keys import unit, with_priors
+from omnidyn.model.keys import with_priors
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import Robot
-from omnidyn.statement import statements
+from omnidyn.statement import NOTE, Statement
 
 REST = ("bound", "line", "ignore")
 MAX_FRICTION = 1e6  # what a robot file takes
@@ -36,12 +36,12 @@ ONE_SPEED = 1e-4  # speeds that differ by less than this share are one speed
 
 @dataclass
 class _Findings:
-    """What the axes gave so far: lines and bounds by axis, and warnings in words."""
+    """What the axes gave so far: lines and bounds by axis, and warnings."""
 
     lines: dict[int, Line] = field(default_factory=dict)
     bounds: dict[int, float] = field(default_factory=dict)
-    warnings: list[str] = field(default_factory=list)
-    unfitted: list[str] = field(default_factory=list)
+    warnings: list[Statement] = field(default_factory=list)
+    unfitted: list[Statement] = field(default_factory=list)
 
 
 def fit_steady_state(
@@ -71,18 +71,18 @@ def fit_steady_state(
     check_order("fit_steady_state(robot, data)", (robot, Robot), (data, SteadyTable))
     limits = _options(rest, rest_speed, absolute_std, data)
     _refuse_other_friction(robot)
-    found = _Findings(warnings=about_points(robot, data))
+    found = _Findings(warnings=point_statements(robot, data))
     for axis in range(len(AXES)):
         _study(axis, data, rest, limits[axis], absolute_std, found)
     if not found.lines:
         raise InsufficientDataError(
-            "; ".join(["no axis can be fitted", *found.unfitted, *_bound_words(found.bounds)]),
+            "; ".join(map(str, ["no axis can be fitted", *found.unfitted, *_held(found.bounds)])),
             expected="three rows in motion or more, at two speeds or more, per axis",
             where=data.source,
         )
     found.warnings += found.unfitted
     if data.force_from == "voltage":
-        found.warnings.append(f"forces are from {ORIGIN['voltage']}: as right as the R, K_t and K_v of the robot file")
+        found.warnings.append(Statement("forces_from_voltage", NOTE))
     friction = _friction(robot.friction.axes, found)
     estimate = _estimate(robot, friction, found, _method(data, rest, absolute_std), _data(data))
     if data.force_from == "table":
@@ -121,9 +121,9 @@ def _study(axis: int, data: SteadyTable, rest: str, limit: float, absolute_std: 
     moving = mine & (np.abs(data.speed) > limit)
     resting = mine & ~moving
     if not mine.any():
-        found.unfitted.append(f"axis {AXES[axis]}: no data, B and C stay as they were")
+        found.unfitted.append(Statement("axis_without_data", NOTE, AXES[axis]))
         return
-    _say_rest(axis, int(resting.sum()), rest, found.warnings)
+    found.warnings += rest_statements(axis, int(resting.sum()), rest)
     if rest == "bound" and resting.any():
         found.bounds[axis] = float(np.abs(data.force[resting]).max())
     used = moving | (resting & (data.force != 0.0)) if rest == "line" else moving
@@ -133,40 +133,28 @@ def _study(axis: int, data: SteadyTable, rest: str, limit: float, absolute_std: 
     spreads = [None if std is None else std[used] for std in (data.speed_std, data.force_std)]
     line = fit_line(speed, data.force[used], *spreads, absolute_std=absolute_std)
     if (line.estimate > MAX_FRICTION).any():
-        size = f"{line.estimate.max():.3g}"
-        found.unfitted.append(f"axis {AXES[axis]}: the fit gives {size}, beyond any robot; B and C stay")
+        beyond = {"level": line.estimate.max()}
+        found.unfitted.append(Statement("axis_beyond_any_robot", subject=AXES[axis], numbers=beyond))
         return
     found.lines[axis] = line
-    found.warnings += about_line(axis, line, _names(axis), data.force_std is not None, absolute_std)
-
-
-def _say_rest(axis: int, resting: int, rest: str, warnings: list[str]) -> None:
-    rows = f"{resting} row" + ("" if resting == 1 else "s")
-    if resting and rest == "line":
-        warnings.append(
-            f"axis {AXES[axis]}: {rows} at rest used as a sliding point: there friction only balances the drive, "
-            f"anywhere up to breakaway, so B and C may be wrong by more than the intervals say"
-        )
-    if resting and rest == "ignore":
-        warnings.append(f"axis {AXES[axis]}: {rows} at rest not used")
+    found.warnings += line_statements(axis, line, _names(axis), data.force_std is not None, absolute_std)
 
 
 def _identifiable(
     axis: int, speed: FloatArray, force: FloatArray, absolute_std: bool, found: _Findings, source: str
 ) -> bool:
-    """Whether the rows determine a line; what is known instead goes to the words.
+    """Whether the rows determine a line; what is known instead goes to `found`.
 
     Raises InsufficientDataError for too few rows: to leave such an axis out would hide the user's own points.
     """
     size = np.abs(speed)
-    name = f"axis {AXES[axis]}"
     if not size.any():
-        found.unfitted.append(f"{name}: the robot never moved, B and C stay as they were")
+        found.unfitted.append(Statement("axis_never_moved", subject=AXES[axis]))
         return False
     needed = PARAMETERS if absolute_std else PARAMETERS + 1
     if len(speed) < needed:
         raise InsufficientDataError(
-            f"{name}: too few rows for a line with intervals",
+            f"axis {AXES[axis]}: too few rows for a line with intervals",
             got=f"{len(speed)} usable rows",
             expected=f"{needed} or more at two speeds or more",
             where=source,
@@ -175,10 +163,8 @@ def _identifiable(
     if np.ptp(size) > ONE_SPEED * size.max():
         return True
     total = float(np.mean(force * np.sign(speed)))
-    found.unfitted.append(
-        f"{name}: all rows have the same speed, {size.max():.4g}: B and C cannot be told apart and stay as they "
-        f"were; only their sum is known there, B speed + C = {total:.4g}"
-    )
+    numbers = {"speed": size.max(), "sum": total}
+    found.unfitted.append(Statement("axis_at_one_speed", subject=AXES[axis], numbers=numbers))
     return False
 
 
@@ -191,23 +177,22 @@ def _breakaway(axis: int) -> str:
 
 
 def _friction(before: AxesFriction, found: _Findings) -> AxesFriction:
-    """The friction with the fitted B and C; breakaway raised only as far as C or a row at rest demands, in words."""
+    """The friction with the fitted B and C; breakaway raised only as far as C or a row at rest demands."""
     viscous, coulomb, breakaway = (level.copy() for level in before.levels)
     for axis, line in found.lines.items():
         viscous[axis], coulomb[axis] = line.estimate
         if before.breakaway is None:
             breakaway[axis] = coulomb[axis]
         elif breakaway[axis] < coulomb[axis]:
-            found.warnings.append(f"{_breakaway(axis)} raised from {breakaway[axis]:.4g} to the new coulomb friction")
+            raised = {"before": breakaway[axis]}
+            found.warnings.append(Statement("breakaway_raised", subject=_breakaway(axis), numbers=raised))
             breakaway[axis] = coulomb[axis]
         else:
-            found.warnings.append(f"{_breakaway(axis)} stays at {breakaway[axis]:.4g}: rows in motion do not show it")
+            found.warnings.append(Statement("breakaway_kept", NOTE, _breakaway(axis), {"level": breakaway[axis]}))
     for axis, bound in found.bounds.items():
         if bound > breakaway[axis]:
-            found.warnings.append(
-                f"{_breakaway(axis)} set to {bound:.4g} {unit(_breakaway(axis))}: the robot stayed at rest under that "
-                f"force, more than the coulomb friction {coulomb[axis]:.4g}; it is a lower bound, not an estimate"
-            )
+            numbers = {"bound": bound, "coulomb": coulomb[axis]}
+            found.warnings.append(Statement("breakaway_from_rest", subject=_breakaway(axis), numbers=numbers))
             breakaway[axis] = bound
     raised = before.breakaway is not None or bool((breakaway > coulomb).any())
     return before.replace(
@@ -233,7 +218,7 @@ def _estimate(robot: Robot, friction: AxesFriction, found: _Findings, method: st
         degrees_of_freedom=degrees,
         at_bound=tuple(at_bound),
         lower_bound={_breakaway(axis): bound for axis, bound in found.bounds.items()},
-        warnings=statements(found.warnings),
+        warnings=tuple(found.warnings),
         method=method,
         data=data,
     )
@@ -260,10 +245,9 @@ def _correlation(lines: dict[int, Line]) -> Correlation:
 
 
 def _method(data: SteadyTable, rest: str, absolute_std: bool) -> str:
-    weights = "weighted least squares" if data.force_std is not None else "least squares"
-    weights += ", std taken as exact" if absolute_std else ""
-    use = {"bound": "bound breakaway", "line": "count as sliding", "ignore": "are not used"}[rest]
-    return f"steady state, eqs (15)-(17), {weights}; forces from {ORIGIN[data.force_from]}; rows at rest {use}"
+    numbers = {"weighted": data.force_std is not None, "absolute_std": absolute_std, "force_from": data.force_from,
+               "rest": rest}  # fmt: skip
+    return str(Statement("line_method", NOTE, numbers=numbers))
 
 
 def _data(data: SteadyTable) -> str:
@@ -272,5 +256,9 @@ def _data(data: SteadyTable) -> str:
     return f"{words}, sha256 {data.sha256}" if data.sha256 else words
 
 
-def _bound_words(bounds: dict[int, float]) -> list[str]:
-    return [f"axis {AXES[axis]} holds at least {bound:.4g} {unit(_breakaway(axis))}" for axis, bound in bounds.items()]
+def _held(bounds: dict[int, float]) -> list[Statement]:
+    """What axes held at rest."""
+    return [
+        Statement("holds_at_least", NOTE, AXES[axis], {"bound": bound, "key": _breakaway(axis)})
+        for axis, bound in bounds.items()
+    ]

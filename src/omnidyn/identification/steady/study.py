@@ -7,7 +7,7 @@ levels   of each group, with 95 % intervals; what differs between groups, and wh
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -24,7 +24,6 @@ from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.question import STEADY, STEADY_STATE, Question
 from omnidyn.identification.stability import Stability
-from omnidyn.identification.steady import study_words as words
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
 from omnidyn.identification.steady.lack_of_fit import LackOfFit, lack_of_fit
 from omnidyn.identification.steady.moment import Moment, levelled, moments
@@ -34,6 +33,13 @@ from omnidyn.identification.steady.rests_on import moved_by_the_file, rests_on
 from omnidyn.identification.steady.shape_fit import ShapeFit, fit_shape, is_turning
 from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, friction_of
 from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
+from omnidyn.identification.steady.study_statements import (
+    advice,
+    fit_statements,
+    lack_statements,
+    point_statements,
+    result_statements,
+)
 from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.friction import Friction
@@ -43,11 +49,10 @@ from omnidyn.model.known.told import with_correlation
 from omnidyn.model.layout import YAW
 from omnidyn.model.robot import GUESSES, Prior, Robot
 from omnidyn.run import Run, as_list
-from omnidyn.statement import statements
+from omnidyn.statement import NOTE, Statement, statements
 from omnidyn.statistics import t_quantile
 
 LASTING = Stability({}, ())  # whether levels last, `moments` says
-MATTERS = 0.02  # of the force: a viscous part below this does not matter in the speeds driven
 
 
 @shows_options(STEADY)
@@ -130,7 +135,7 @@ def diagnosed(fit: SteadyFit) -> SteadyStudy:
 
 
 def _study(
-    fit: SteadyFit, changed: Sequence[Moment], lack: Mapping[str, LackOfFit], within: Container[str]
+    fit: SteadyFit, changed: Sequence[Moment], lack: Mapping[str, LackOfFit], within: Collection[str]
 ) -> SteadyStudy:  # fmt: skip
     """The study. changed: inside a run; lack: group -> what its shape leaves out; within: groups with such a change."""
     robot, points, choice, robust = fit.robot, fit.points, fit.choice, fit.asked.robust
@@ -146,16 +151,16 @@ def _study(
         robot=robot, points=points, choice=choice, estimates=fit.estimates, travel=travel, viscous=viscous,
         differences=differences, internal=internal,
         lack_of_fit=lack,
-        statements=(
-            *words.statements(choice, viscous, differences, internal, lack, within, MATTERS),
+        statements=statements((
+            *result_statements(choice, viscous, differences, internal, lack, within),
             scale_of_traction(robot, points.force_from == CURRENT),
-        ),
+        )),
         warnings=(
-            *points.notes, *words.about_points(points, choice, turning), *(each.words() for each in changed),
-            *words.about_lack_of_fit(lack, choice, within),
+            *points.notes, *point_statements(points, choice, turning), *(each.statement() for each in changed),
+            *lack_statements(lack, choice, within),
         ),
         moments=tuple(changed),
-        advice=words.lack_advice(lack) + words.advice(choice, viscous, turning, points.force_from),
+        advice=tuple(advice(choice, viscous, lack, turning, points.force_from)),
     )  # fmt: skip
 
 
@@ -277,7 +282,7 @@ def _estimate(
     value = dict(zip(fit.keys, fit.level.tolist(), strict=True))
     std = dict(zip(fit.keys, fit.std.tolist(), strict=True))
     turning = is_turning(robot, points)
-    data = words.data(points, group)
+    data = _data(points, group)
     friction, kept = _friction(robot, fit, value, turning)
     together = Correlation(fit.keys, _correlation(fit.covariance))
     fitted = robot.replace(friction=friction, priors=_priors(robot, std, kept, data))
@@ -289,12 +294,27 @@ def _estimate(
         correlation=together,
         degrees_of_freedom=dict.fromkeys(fit.keys, fit.degrees_of_freedom),
         at_bound=tuple(key for key, free in zip(fit.keys, fit.free, strict=True) if free < 0.0),
-        warnings=statements([*words.about_fit(fit, robust, kept), *words.about_back_emf(fit.keys, emf.guesses)]),
-        method=words.method(points, fit, robust),
+        warnings=tuple(fit_statements(fit, robust, kept, emf.guesses)),
+        method=_method(points, fit, robust),
         data=data,
         scale=scale_of_traction(robot, points.force_from == CURRENT),
         log_alone=_intervals(alone) if moved.size else {},
     )
+
+
+def _method(points: ForcePoints, fit: ShapeFit, robust: bool) -> str:
+    """How the numbers were made."""
+    numbers = {
+        "shape": fit.shape.name, "robust": robust, "force_from": points.force_from, "speed_from": points.speed_from,
+        "folds": int(fit.fold.max()) + 1,
+    }  # fmt: skip
+    return str(Statement("steady_method", NOTE, numbers=numbers))
+
+
+def _data(points: ForcePoints, group: str) -> str:
+    """What the numbers were made from: the source of the numbers in a robot file."""
+    name = "" if group == "all" else f"{group}: "
+    return f"{name}{len(set(points.run.tolist()))} runs, {len(points)} steady points, {int(points.rows.sum())} rows"
 
 
 def _intervals(fit: ShapeFit) -> dict[str, tuple[float, float]]:

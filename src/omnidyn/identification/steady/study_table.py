@@ -6,17 +6,17 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from omnidyn.document import Document, Points, Table, all_of, interval_cell
+from omnidyn.document import Document, Points, Table, all_of, interval_cell, plain
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.steady.choice import ShapeChoice
 from omnidyn.identification.steady.lack_of_fit import LackOfFit
 from omnidyn.identification.steady.moment import Moment
-from omnidyn.identification.steady.operating_points import SPEEDS, ForcePoints
+from omnidyn.identification.steady.operating_points import FORCES, SPEEDS, ForcePoints
 from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
-from omnidyn.identification.steady.study_words import FORCES
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.statement import Statement, by_severity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -30,7 +30,7 @@ class SteadyStudy(Shown):
     friction. travel: group -> force along travel. viscous: group -> what is known of the viscous levels. differences
     between groups. internal: group -> rms of the forces with which the wheels work against each other [N], where there
     are more than three. lack_of_fit: group -> whether any offered shape fits, and what would. moments: changes
-    inside a run. statements, warnings, advice: in words.
+    inside a run. statements: what the data say; warnings: what is weak; advice: what to measure next.
     """
 
     robot: Robot
@@ -42,9 +42,9 @@ class SteadyStudy(Shown):
     differences: tuple[Difference, ...]
     internal: Mapping[str, float]
     lack_of_fit: Mapping[str, LackOfFit]
-    statements: tuple[str, ...]
-    warnings: tuple[str, ...]
-    advice: tuple[str, ...]
+    statements: tuple[Statement, ...]
+    warnings: tuple[Statement, ...]
+    advice: tuple[Statement, ...]
     moments: tuple[Moment, ...] = ()
 
     @property
@@ -81,17 +81,17 @@ def _document(study: SteadyStudy) -> Document:
     """The study: what was used, the shapes, the levels, what it says and what it warns of."""
     points = study.points
     of_fits = [
-        words if group == "all" else f"{group}: {words}"
-        for group, estimate in study.estimates.items() for words in estimate.warnings
+        warning if group == "all" else warning.of(group)
+        for group, estimate in study.estimates.items() for warning in estimate.warnings
     ]  # fmt: skip
     parts = [
         f"{study.robot.name}: steady state from logs; forces from {FORCES[points.force_from]}; friction over the "
         f"{SPEEDS[points.speed_from]}",
         "", _travel_table(study), "", _shape_table(study), "", _level_table(study), *_alone_tables(study), "",
         Points(study.statements, name="statements"),
-        Points(study.warnings, "warning:", "warnings"),
+        by_severity(study.warnings, "warnings"),
         Points(study.advice, "next:", "next"),
-        Points(of_fits, "warning:", "warnings of fits"),
+        by_severity(of_fits, "warnings of fits"),
     ]  # fmt: skip
     return Document(parts, _data(study), study.warnings)
 
@@ -170,7 +170,7 @@ def _data(study: SteadyStudy) -> dict[str, Any]:
         "lack_of_fit": _lack(next(iter(study.lack_of_fit.values()), None)),
         "moments": [asdict(each) for each in study.moments],
         "differences": [{**asdict(each), "differs": each.differs} for each in study.differences],
-        "statements": list(study.statements),
-        "warnings": list(study.warnings),
-        "advice": list(study.advice),
+        "statements": plain(study.statements),
+        "warnings": plain(study.warnings),
+        "advice": plain(study.advice),
     }

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.projections.polar import PolarAxes
 
 from omnidyn.arrays import FloatArray
+from omnidyn.document import sentence
 from omnidyn.identification.steady.operating_points import SPEEDS, ForcePoints
 from omnidyn.identification.steady.shapes import SHAPES
 from omnidyn.identification.steady.study_table import SteadyStudy
@@ -75,7 +76,7 @@ def _scores_words(study: SteadyStudy) -> str:
     return (
         "Each shape of friction is fitted to all other directions and asked for the force vector in the one left out: "
         "root mean square over all points. Diamonds are shapes that a robot file cannot hold, drawn to compare. "
-        f"{study.statements[0][0].upper()}{study.statements[0][1:]}."
+        f"{sentence(str(study.statements[0]))}"
     )
 
 

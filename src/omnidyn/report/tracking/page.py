@@ -34,7 +34,7 @@ def render_tracking(
         "A simulated robot, driven step by step. Errors are distances from where the path is at that time. Position "
         "and heading: root mean square; effort: that of a voltage; change: of a voltage from step to step."
     )
-    return page(title, introduction, sections, provenance, verdict=told.verdict)
+    return page(title, introduction, sections, provenance, verdict=told.verdict_text)
 
 
 def _moving(found: Sequence[Tracking], robot: Robot) -> str:
