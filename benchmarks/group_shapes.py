@@ -108,7 +108,7 @@ def climbed(kind: Kind, seed: int) -> Seen:
     pairs = list(zip(found.values(), worlds, strict=True))
     out.named = all(shape_of(each.robot.friction) == true_shape(world) for each, world in pairs)
     ladder = next(iter(found.values())).ladder
-    out.words = ladder.words()
+    out.words = str(ladder.statement())
     out.other = any(rung.key not in _steps(kind) for rung in ladder.taken)
     for each, world in pairs:
         for name, value in true_levels(world).items():

@@ -111,7 +111,7 @@ def on(case: Case, run: Run, key: str) -> Climbed:
         out.words = str(error)
         return out
     steps = best.ladder.taken
-    out.steps, out.words = len(steps), best.ladder.words()
+    out.steps, out.words = len(steps), str(best.ladder.statement())
     out.before, out.after = _held(case, [plain]), _held(case, [best])
     if steps:
         group = (steps[0].key, *steps[0].same_as)

@@ -123,7 +123,11 @@ def _on(twist: FloatArray, noise: float, seed: int, law: Sequence[str]) -> tuple
     plain: Any = identify([log], robot, free=FRICTION)
     began = time.process_time()
     best: Any = identify([log], robot, free=FRICTION, ladder=True)
-    out.seconds, out.found, out.words = time.process_time() - began, plain.lack_of_fit.found, best.ladder.words()
+    out.seconds, out.found, out.words = (
+        time.process_time() - began,
+        plain.lack_of_fit.found,
+        str(best.ladder.statement()),
+    )
     steps = best.ladder.taken
     out.steps = len(steps)
     out.cause = any(key in (step.key, *step.same_as) for step in steps for key in law)

@@ -131,4 +131,4 @@ def grouped(case: Alike, seed: int) -> tuple[bool, str]:
         return False, "nothing found"
     first = lack.remedies[0]
     group = {first.key, *first.same_as}
-    return set(case.same) <= group, f"{lack.words()}"
+    return set(case.same) <= group, str(lack.statement())

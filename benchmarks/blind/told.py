@@ -19,8 +19,8 @@ def said(setup: Setup, seed: int) -> list[str]:
         fit = fit_output_error(run, robot, free=setup.free, nuisances=setup.nuisances)
     except InsufficientDataError as error:
         return [f"{words}; to tell: {error.remedy}" for words in error.what.split("; ")[1:]]
-    still = [words for words in fit.warnings if STILL in words and _free_there(setup, robot, words)]
-    return [*fit.blind, *still]
+    still = [words for words in map(str, fit.warnings) if STILL in words and _free_there(setup, robot, words)]
+    return [*map(str, fit.blind), *still]
 
 
 def _free_there(setup: Setup, robot: Robot, words: str) -> bool:

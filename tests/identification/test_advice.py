@@ -8,12 +8,13 @@ from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.stability import Stability
 from omnidyn.model.robot_file import load_robot
+from omnidyn.statement import quoted
 
-DISC = Remedy("friction.direction", "friction along the direction of travel", 0.5, 0.1, share=0.95, chi2=1000.0)
-WHEELS = Remedy("friction.wheels", "friction at each wheel", 0.4, 0.1, share=0.9, chi2=900.0)
-MASS = Remedy("body.mass_kg", "another mass, 2.1 kg", 0.5, 0.1, ("gain",), share=0.95, chi2=1000.0)
-GAIN = Remedy("gain", "voltages 0.8 times those logged", 0.5, 0.1, ("body.mass_kg",), share=0.95, chi2=999.0)
-SAG = Remedy("sag", "a supply that sags under load", 0.6, 0.1, share=0.99, offered=False, chi2=1200.0)
+DISC = Remedy("friction.direction", quoted("friction along the direction of travel"), 0.5, 0.1, share=0.95, chi2=1000.0)
+WHEELS = Remedy("friction.wheels", quoted("friction at each wheel"), 0.4, 0.1, share=0.9, chi2=900.0)
+MASS = Remedy("body.mass_kg", quoted("another mass, 2.1 kg"), 0.5, 0.1, ("gain",), share=0.95, chi2=1000.0)
+GAIN = Remedy("gain", quoted("voltages 0.8 times those logged"), 0.5, 0.1, ("body.mass_kg",), share=0.95, chi2=999.0)
+SAG = Remedy("sag", quoted("a supply that sags under load"), 0.6, 0.1, share=0.99, offered=False, chi2=1200.0)
 
 
 def missing(*remedies):
@@ -23,25 +24,25 @@ def missing(*remedies):
         robot=load_robot("axebot"), value={}, std={}, ci95={}, correlation=Correlation((), np.eye(0)),
         degrees_of_freedom={}, study=lambda: Diagnosis(lack, {}, Stability({}, ())),
     )  # fmt: skip
-    return [words for words in advice(fit, None) if "would explain" in words]
+    return [each for each in advice(fit, None) if each.code == "missing_cause"]
 
 
 def test_of_remedies_that_explain_the_same_only_the_first_is_advised():
     """Two shapes of friction, each of which explains what is missing: both together would be one too many."""
-    assert missing(DISC, WHEELS) == [
+    assert [*map(str, missing(DISC, WHEELS))] == [
         "friction along the direction of travel would explain what the model leaves out: put friction.direction into "
         "the robot file, and fit again"
     ]
 
 
 def test_what_the_logs_cannot_tell_apart_is_one_advice():
-    (words,) = missing(MASS, GAIN, DISC)
+    words = str(*missing(MASS, GAIN, DISC))
     assert "cannot tell it from voltages 0.8 times those logged" in words
     assert "weigh the robot" in words
 
 
 def test_what_explains_much_less_than_the_first_is_not_advised():
-    weak = Remedy("friction.wheels", "friction at each wheel", 0.4, 0.1, share=0.75, chi2=600.0)
+    weak = Remedy("friction.wheels", quoted("friction at each wheel"), 0.4, 0.1, share=0.75, chi2=600.0)
     assert missing(SAG, weak) == []
     assert len(missing(SAG, DISC)) == 1
 
@@ -54,7 +55,7 @@ def together(std):
         ci95=dict.fromkeys(names, (2.0 - 2.0 * std, 2.0 + 2.0 * std)),
         correlation=Correlation(names, np.array([[1.0, 0.97], [0.97, 1.0]])), degrees_of_freedom={},
     )  # fmt: skip
-    return [words for words in advice(fit, None) if "move together" in words]
+    return [each for each in advice(fit, None) if each.code == "correlated_numbers"]
 
 
 def test_numbers_that_move_together_are_named_where_that_widens_them():

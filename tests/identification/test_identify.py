@@ -7,7 +7,8 @@ import pytest
 
 from omnidyn import Run, identify, load_robot, simulate
 from omnidyn.identification import advice
-from omnidyn.identification.identify import Identification, as_driven
+from omnidyn.identification.identify import Identification
+from omnidyn.identification.methods import as_driven
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
 
 

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 import omnidyn
 from omnidyn.errors import InputError
-from omnidyn.identification.identify import choose_method
+from omnidyn.identification.methods import choose_method
 from omnidyn.identification.output_error.conclusion import SCALE_OF_T
 from omnidyn.identification.output_error.fit import NU
 from omnidyn.identification.question import Question
@@ -58,10 +58,9 @@ def test_what_lasts_is_not_called_small(fit):
     weak = Key.parse("motor.resistance_ohm").set(AXEBOT, 2.0 * AXEBOT.motor.resistance)
     log = noisy_draw(simulate(weak, excitation(20.0), 0.01), 1)
     wrong = fit_output_error(log, AXEBOT, nuisances=())
-    (words,) = validate(wrong, [log], [log]).statements()
-    assert "no larger than on the fitted ones" in words
-    assert "most of them is no noise" in words
-    assert "small" not in words
+    found = validate(wrong, [log], [log]).statement()
+    assert found.code == "held_out_colour"
+    assert found.numbers["share"] > 0.5
 
 
 def test_noise_that_remembers_is_not_taken_for_a_fault():
@@ -74,9 +73,9 @@ def test_noise_that_remembers_is_not_taken_for_a_fault():
         return Run(t=clean.t, voltage=clean.voltage, twist=clean.twist + noise, source=f"log {seed}")
 
     fit = fit_output_error(remembered(1), AXEBOT, nuisances=())
-    (words,) = validate(fit, [remembered(1)], [remembered(2)]).statements()
-    assert "noise that remembers" in words
-    assert "misses" not in words
+    found = validate(fit, [remembered(1)], [remembered(2)]).statement()
+    assert found.code == "held_out_colour"
+    assert found.numbers["share"] < 0.01
 
 
 def test_another_floor_is_seen(fit):
@@ -86,7 +85,7 @@ def test_another_floor_is_seen(fit):
     found = validate(plain, [other], [other])
     assert found.scores["held out"]["vx"].chi2 > 1.5
     assert found.scores["held out"]["vy"].chi2 < 1.2
-    assert any("the errors of vx are larger than noise" in words for words in found.statements())
+    assert "vx" in found.statement().numbers["components"]
 
 
 def test_a_fit_by_students_t_has_a_chi2_of_one_too():

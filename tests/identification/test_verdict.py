@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from omnidyn.document import sentence
 from omnidyn.findings.finding import FATAL, Finding, Verdict
 from omnidyn.identification.estimate import Correlation, Estimate
 from omnidyn.identification.identify import Identification
@@ -46,9 +47,14 @@ GOOD = {"w1": Score(0.1, 97.0), "w2": Score(0.1, 99.0)}
 BAD = {"w1": Score(9.0, -50.0)}
 
 
+def said(*statements):
+    """Statements as sentences."""
+    return " ".join(sentence(str(each)) for each in statements)
+
+
 def test_a_good_fit():
     fit = estimate([0.02, 0.18, 0.02, 0.02, 0.02, 0.02])
-    assert fit_verdict(fit, beside(GOOD, "held out")) == (
+    assert said(fit_verdict(fit, beside(GOOD, "held out"))) == (
         "On logs held out the model follows wheel speeds within 3 %; all 6 numbers are known, the widest (viscous "
         "friction sideways) within 18 %."
     )
@@ -58,7 +64,7 @@ def test_a_good_fit():
 def test_a_half_good_fit():
     fit = estimate([0.02, 1.8, np.inf, 0.02, 0.02, 0.02], unidentifiable=(BOX[2],))
     scores = GOOD | {"heading": Score(1.2, -20.0)}
-    assert fit_verdict(fit, beside(scores)) == (
+    assert said(fit_verdict(fit, beside(scores))) == (
         "On the fitted logs the model follows wheel speeds within 3 %, but heading not at all (rms error 1.2 rad); "
         "4 of 6 numbers are known, the widest (viscous friction forward) within 2 %; not "
         "viscous friction sideways and viscous friction turning."
@@ -66,13 +72,13 @@ def test_a_half_good_fit():
 
 
 def test_a_bad_fit():
-    assert fit_verdict(estimate([0.02] * 6), beside(BAD)) == (
+    assert said(fit_verdict(estimate([0.02] * 6), beside(BAD))) == (
         "On the fitted logs the model does not follow: wheel speeds not at all (rms error 9 rad/s): "
         "its numbers mean nothing until it does."
     )
     lost = estimate([0.02] * 6, not_followed=("wheel_speed[0]",))
     assert lost.verdict == "The model does not follow wheel_speed[0]: its numbers mean nothing until it does."
-    assert fit_verdict(lost, beside(GOOD)).endswith("its numbers mean nothing until it does.")
+    assert fit_verdict(lost, beside(GOOD)).numbers["known"] is None
 
 
 def test_no_number_is_known():
@@ -102,14 +108,15 @@ def test_a_number_whose_interval_holds_0_is_not_known():
 def test_groups_faults_and_interrupts_are_said():
     verdicts = [Verdict((Finding("swapped", FATAL, "w1 w2", "two wheels are swapped"),))]
     fits = {"all": estimate([0.02] * 6)}
-    assert fits_verdict(fits, {}, verdicts).startswith(
-        "The log has a fatal fault, to be mended first: two wheels are swapped. All 6 numbers are known"
+    assert said(*fits_verdict(fits, {}, verdicts)).startswith(
+        "The log has an error, to be mended first: two wheels are swapped. All 6 numbers are known"
     )
-    both = fits_verdict({"oak": fits["all"], "felt": fits["all"]}, {"oak": beside(GOOD)}, cut="the best so far")
+    both = said(*fits_verdict({"oak": fits["all"], "felt": fits["all"]}, {"oak": beside(GOOD)}, cut=True))
     assert both.startswith(
-        "Cut short: the best so far. oak: On the fitted logs the model follows wheel speeds within 3 %"
+        "Cut short: the numbers are the best so far, not the best there are. Oak: on the fitted logs the model follows "
+        "wheel speeds within 3 %"
     )
-    assert "felt: All 6 numbers are known" in both
+    assert "Felt: all 6 numbers are known" in both
 
 
 def test_the_sentence_stands_first():
@@ -140,19 +147,19 @@ def study(loo, ties=(), std=0.02) -> Any:
 
 
 def test_a_good_shape():
-    assert steady_verdict(study(0.5)) == (
-        "Friction along travel is 10 N; its shape, disc (equal in all directions), predicts the force in a direction "
+    assert said(*steady_verdict(study(0.5))) == (
+        "Friction along travel is 10 N; its shape, disc, predicts the force in a direction "
         "that was left out within 5 %; all 6 numbers are known, the widest (viscous friction forward) within 2 %."
     )
 
 
 def test_a_shape_that_others_equal():
-    words = steady_verdict(study(2.0, ["ellipse", "box"]))
+    words = said(*steady_verdict(study(2.0, ["ellipse", "box"])))
     assert "within 20 %; as good, as far as these data tell: ellipse and box; " in words
 
 
 def test_no_shape_fits():
-    assert steady_verdict(study(7.0)) == (
+    assert said(*steady_verdict(study(7.0))) == (
         "No shape of friction explains the forces: the best, disc, misses 7 N of 10 N in a direction that was left out."
     )
     found = Identification(Question(), "steady-state", {"all": estimate([0.02] * 6, Estimate)}, study=study(7.0))
@@ -165,10 +172,10 @@ def test_what_the_verdict_calls_meaningless_is_a_failure():
     """The sentence said that the numbers mean nothing, and `failures` was empty: exit 0."""
     lost = estimate([0.02] * 6, not_followed=("wheel_speed[0]",))
     found = Identification(Question(), "output-error", {"all": lost})
-    assert found.failures == ("the model does not follow wheel_speed[0]",)
+    assert [*map(str, found.failures)] == ["the model does not follow wheel_speed[0]"]
     scores = SimpleNamespace(scores={"fitted": BAD}, not_followed=lambda noise: {})
     hardly = replace(found, estimates={"all": estimate([0.02] * 6)}, validations={"all": scores})
-    assert hardly.failures == ("the model does not follow: wheel speeds not at all (rms error 9 rad/s)",)
+    assert [*map(str, hardly.failures)] == ["the model does not follow: wheel speeds not at all (rms error 9 rad/s)"]
 
 
 # ---- motors -----------------------------------------------------------------------------------------------

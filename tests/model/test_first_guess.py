@@ -23,7 +23,7 @@ from omnidyn.model.first_guess import (
 )
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import Key, all_keys
-from omnidyn.model.robot import GUESS, WITH_THE_FIT, Prior
+from omnidyn.model.robot import GUESS, JOINT, Prior
 from omnidyn.model.robot_file import load_robot, parse_robot, preset_names, robot_to_toml
 from omnidyn.model.wheels import Wheels
 from omnidyn.simulation.simulate import simulate
@@ -226,6 +226,6 @@ def test_what_an_answer_rests_on_is_named_once(axebot):
     assert rests_on_guesses(robot) == f"rests on guesses of the robot file: {every}"
     still = "resistance, torque constant, gear ratio, voltage limit, friction"
     assert rests_on_guesses(robot, at_rest=True) == f"rests on guesses of the robot file: {still}"
-    fitted = {key: prior.replace(source=f"{WITH_THE_FIT}, yard.csv") for key, prior in robot.priors.items()}
+    fitted = {key: prior.replace(origin=JOINT) for key, prior in robot.priors.items()}
     assert rests_on(robot.replace(priors=fitted)) == []
     assert rests_on_guesses(axebot) == ""

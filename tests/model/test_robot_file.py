@@ -169,7 +169,7 @@ BAD = {
     "unknown origin": (
         MASS,
         'mass_kg = { value = 1.5, origin = "guessed" }',
-        r"\[body\] mass_kg: origin: .*got guessed; expected 'guess', 'given', 'datasheet', 'measured'",
+        r"\[body\] mass_kg: origin: .*got guessed; expected 'guess', 'joint', 'given', 'datasheet'",
     ),
     "deviation without value": (MASS, "mass_kg = { std = 1.0 }", "mass_kg: cannot use this value"),
     "priors": ("schema = 1", "schema = 1\npriors = {}", "unknown key; got priors"),

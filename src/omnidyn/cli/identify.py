@@ -56,6 +56,7 @@ def identify(
     report: str = typer.Option("", metavar="FILE.html", help="A page with pictures, numbers and what they say."),
     force: bool = typer.Option(False, "--force", help="Replace files that exist.", rich_help_panel=MORE),
     json: bool = typer.Option(False, "--json", help="The result for machines."),
+    full: bool = typer.Option(False, "--full", help="All that the result says, not only the first screen."),
     flags: LogFlags = NO_FLAGS,
     **asked: Any,
 ) -> None:
@@ -70,7 +71,7 @@ def identify(
     from omnidyn.cli.identify_show import Out, tell_table
     from omnidyn.files import check_output
 
-    question, to = _question(asked), Out(report, out, force, json)
+    question, to = _question(asked), Out(report, out, force, json, full)
     question = replace(question, method=question.method_asked())
     if not robot and question.what != MOTORS:
         of_motors = len(logs) == 1 and os.path.isfile(logs[0]) and is_motor_table(logs[0])
@@ -108,7 +109,8 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
     from omnidyn.cli.identify_show import load_meanwhile, outputs, tell
     from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.identification.first_runs import shared_out
-    from omnidyn.identification.identify import Identification, settle_method
+    from omnidyn.identification.identify import Identification
+    from omnidyn.identification.methods import settle_method
     from omnidyn.model.robot_file import load_robot
 
     def told(words: str) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from omnidyn.cli.identify_brief import brief
 from omnidyn.cli.terminal.flags import with_flags
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.streams import say
@@ -34,6 +35,7 @@ class Out:
     out: str
     force: bool
     json: bool
+    full: bool = False
     files: dict[str, str] = field(default_factory=dict)
     refused: list[Exception] = field(default_factory=list)
 
@@ -93,8 +95,10 @@ def tell(found: Identification, record: dict[str, Any], to: Out, now: Callable[[
         report = to.write_report(attempts, lambda: _page(found, record))
     now("writing")
     found = replace(found, missing=tuple(attempts.missing), interrupt=attempts.interrupt)
-    tell_document(found.document(), to.json, record, output=to.files or None, report=report or None)
-    say_written([*to.files.values(), report])
+    written = [*to.files.values(), *([report] if report else [])]
+    told = found.document() if to.json or to.full else brief(found, len(written))
+    tell_document(told, to.json, record, output=to.files or None, report=report or None)
+    say_written(written)
     to.finish(attempts)
 
 

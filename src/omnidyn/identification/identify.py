@@ -8,8 +8,6 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Unpack
 
-import numpy as np
-
 from omnidyn.arguments import check_order
 from omnidyn.attempts import COMPARISON, DIAGNOSIS, JUDGEMENT, LADDER, QUICK, Attempts, Missing, not_made
 from omnidyn.document import Document, Points, apart, sentence
@@ -17,12 +15,12 @@ from omnidyn.errors import INTERRUPTS, InputError, UnsupportedError, told_by
 from omnidyn.findings.finding import Verdict
 from omnidyn.findings.fitness import STEADY as STEADY_USE
 from omnidyn.findings.guesses import rest_on_guesses
-from omnidyn.findings.needs import why_no_inputs
 from omnidyn.identification.advice import advice
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.fit_document import fit_document
 from omnidyn.identification.grouping import group_names, held_out
 from omnidyn.identification.log_verdicts import checked, judged_by_fit, log_verdicts, told_why, unfit, verdict_advice
+from omnidyn.identification.methods import as_driven, choose_method, settle_method, why_not_output_error
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import WHOLE, Fit
@@ -31,7 +29,6 @@ from omnidyn.identification.output_error.solve.solver import State
 from omnidyn.identification.question import AUTO, FIT, MOTORS, OUTPUT_ERROR, STEADY, STEADY_STATE, Question
 from omnidyn.identification.recordings import fingerprint
 from omnidyn.identification.steady.axis_lines import identify_lines
-from omnidyn.identification.steady.settling import why_no_transient
 from omnidyn.identification.steady.study import diagnosed, fit_steady, identify_steady, undiagnosed
 from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.steady.study_table import SteadyStudy
@@ -46,8 +43,8 @@ from omnidyn.identification.verdict import (
 )
 from omnidyn.identification.whole_logs import fit_output_error, solved
 from omnidyn.logs.log import Log
-from omnidyn.model.drive import DUTY, SPEED, VOLTAGE
-from omnidyn.model.robot import MEASURED, Prior, Robot
+from omnidyn.model.drive import SPEED
+from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
 from omnidyn.shown import FIGURE, Shown, make
 from omnidyn.statement import ERROR, NOTE, SEVERITIES, WARNING, Statement, statements
@@ -86,51 +83,6 @@ def identify(
     estimate = identify_steady(every, robot, question=asked).estimate
     chosen = Statement("method_chosen", NOTE, numbers={"method": method, "why": why})
     return replace(estimate, warnings=(chosen, *estimate.warnings)) if why else estimate
-
-
-def as_driven(robot: Robot, runs: Sequence[Run]) -> Robot:
-    """The robot with the drive that its logs show: one of duties where they hold duties and no voltage.
-
-    A file without it would take the next set of duties for volts. The supply is the median of the logged one, where
-    the file has none.
-    """
-    if robot.drive.kind != VOLTAGE or not runs or any(run.duty is None or run.voltage is not None for run in runs):
-        return robot
-    drive, priors = robot.drive.replace(kind=DUTY), robot.priors
-    supplies = [run.supply[np.isfinite(run.supply)] for run in runs if run.supply is not None]
-    logged = np.concatenate(supplies) if supplies else np.zeros(0)
-    if drive.supply is None and logged.size and float(np.median(logged)) > 0.0:
-        drive = drive.replace(supply=round(float(np.median(logged)), 3))
-        priors = {**priors, "drive.supply_V": Prior(source="median of the logs", origin=MEASURED)}
-    return robot.replace(drive=drive, priors=priors)
-
-
-def choose_method(runs: Sequence[Run], robot: Robot, options: Sequence[str] = ()) -> tuple[str, str]:
-    """(method, why it is not output error; "" where it is, or where an option decides). options: names of those."""
-    method = Question().method_asked(options)
-    if method != AUTO:
-        return method, ""
-    why = why_not_output_error(runs, robot)
-    return (STEADY_STATE if why else OUTPUT_ERROR), why
-
-
-def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
-    """Why whole logs are not fitted by output error unless it is asked for, in words; "" where they are."""
-    why = why_no_inputs(runs, robot)
-    if why or robot.drive.kind != SPEED or any(run.voltage is not None or run.duty is not None for run in runs):
-        return why
-    return why_no_transient(runs, robot)
-
-
-def settle_method(runs: Sequence[Run], robot: Robot, question: Question, tell: Tell) -> Question:
-    """The question with its method, by name, by options, or by what robot and logs support; `tell` hears why."""
-    method = question.method_asked()
-    if method == AUTO:
-        why = why_not_output_error(runs, robot)
-        method = STEADY_STATE if why else OUTPUT_ERROR
-        if why:
-            tell(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {why}")
-    return replace(question, method=method)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

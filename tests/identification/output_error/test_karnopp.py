@@ -12,6 +12,7 @@ from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from tests.reference.modes import reference
+from tests.support.codes import codes
 
 AXEBOT = load_robot("axebot")
 BAND = "friction.axes.karnopp_speed"
@@ -44,7 +45,7 @@ def test_its_levels_are_found_and_the_answer_keeps_the_law():
     assert low <= 2.8 <= high
     axes = fit.robot.friction.axes
     assert (axes.law, axes.karnopp_speed) == ("karnopp", guess.friction.axes.karnopp_speed)
-    assert any("karnopp_speed is numerical" in words for words in fit.warnings)
+    assert "karnopp_as_coulomb" in codes(fit.warnings)
 
 
 @pytest.mark.parametrize("place", ["direction", "wheels"])
@@ -74,7 +75,7 @@ def test_so_it_is_elsewhere(place):
         assert abs(fit.value[key] - Key.parse(key).get(robot)) <= 3.0 * fit.std[key]
     found = getattr(fit.robot.friction, place)
     assert (found.law, found.karnopp_speed) == ("karnopp", 1e-3)
-    assert any("to a log the two are the same" in words for words in fit.warnings)
+    assert "karnopp_as_coulomb" in codes(fit.warnings)
     assert not fit.lack_of_fit.found
     with pytest.raises(InputError, match="cannot be free"):
         omnidyn.identify([seen], robot, free=(*keys, f"{table}.karnopp_speed"))

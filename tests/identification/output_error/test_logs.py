@@ -48,7 +48,7 @@ def test_rows_without_input_split_the_log_too(axebot, clean):
     voltage[1000:1040] = np.nan
     fit = fit_output_error(log.replace(voltage=voltage), axebot)
     assert holds(fit)
-    assert any("40 rows lack an input: the log is split there" in words for words in fit.warnings)
+    assert [each.numbers["rows"] for each in fit.warnings if each.code == "split_at_missing_inputs"] == [40]
 
 
 def test_two_runs_are_worth_two(axebot, clean):
@@ -110,7 +110,7 @@ def test_a_nominal_supply_is_uncertain(axebot, clean):
     fit = fit_output_error(run, robot, nuisances=["gain"])
     assert fit.nuisances["gain"].value == pytest.approx(11.0 / 12.0, rel=0.02)
     assert holds(fit)
-    assert any("its nominal 12 V is taken" in words for words in fit.warnings)
+    assert [each.numbers["supply"] for each in fit.warnings if each.code == "supply_nominal"] == [12.0]
 
 
 def test_latency_gain_dead_band_and_outliers_at_once(axebot):
@@ -164,16 +164,15 @@ def test_an_axis_that_never_moved_is_bounded_from_below(axebot, clean):
     bound = fit.lower_bound["friction.axes.breakaway[2]"]
     assert 0.0 < bound < 0.099
     assert "friction.axes.coulomb[2]" not in fit.value
-    assert any("axis yaw never visibly moved" in words for words in fit.warnings)
+    assert ("axis_not_moved", "yaw") in {(each.code, each.subject) for each in fit.warnings}
 
 
 def test_a_dead_sensor_bounds_nothing(axebot, clean):
     log = noisy(clean, 17)
     fit = fit_output_error(log.replace(twist=log.twist * [1.0, 1.0, 0.0]), axebot, start="rest")
     assert not fit.lower_bound
-    assert any(
-        "axis yaw never visibly moved" in w and "its sensor is dead: not one row differs" in w for w in fit.warnings
-    )
+    (still,) = [each for each in fit.warnings if each.code == "axis_not_moved"]
+    assert (still.subject, still.numbers["dead"]) == ("yaw", True)
 
 
 def test_what_has_a_std_is_free_with_it_as_a_prior_but_never_one_of_an_earlier_fit(axebot, clean):
@@ -263,7 +262,7 @@ def test_nuisances_by_default_are_those_that_a_log_supports(axebot, clean):
     remedies = wrong.lack_of_fit.remedies
     assert "gain" in {remedies[0].key, *remedies[0].same_as}
     (gain,) = [remedy for remedy in remedies if remedy.key == "gain"]
-    assert float(gain.words.split("gain ")[1]) == pytest.approx(0.96, abs=0.02)
+    assert gain.cause.numbers["gain"] == pytest.approx(0.96, abs=0.02)
     again = whole.fit_output_error(log.replace(voltage=log.voltage / 0.96), axebot, nuisances=["latency", "gain"])
     assert holds(again)
 

@@ -40,14 +40,14 @@ def test_a_dead_band_and_coulomb_friction_that_trade_are_told_together():
     for seed in range(960, 966):
         fit = fit_output_error(turning(seed), robot_of(World()), nuisances=("dead_band",))
         one = sums(fit)["sets_off.yaw"]
-        assert "dead band and Coulomb friction, which trade with each other" in one.words
+        assert one.correlation < -0.9
         assert one.std < 0.3 * fit.nuisances["dead_band"].std
         off.append((one.value - truth) / one.std)
         beside = fit.robot.correlation.of(("drive.dead_band_V", "friction.axes.coulomb[2]"))
         assert beside[0, 1] == pytest.approx(fit.correlation.between("dead_band", "friction.axes.coulomb[2]"))
         assert beside[0, 1] < -0.95
     assert np.sqrt(np.mean(np.square(off))) < 2.0
-    assert one.words in fit.summary()
+    assert str(one.statement()) in fit.summary()
 
 
 def test_numbers_that_the_log_tells_apart_have_no_sum():
@@ -59,7 +59,7 @@ def test_a_latency_beyond_the_search_is_no_estimate():
     fit = fit_output_error(turning(968, World(), 0.36), robot_of(World()), nuisances=("latency",))
     assert "latency.wheel_speed" in fit.unidentifiable
     assert "latency.wheel_speed: not determined" in fit.summary()
-    assert any("latency.wheel_speed is at the end of its search range, 0.29" in words for words in fit.warnings)
+    assert [each.subject for each in fit.warnings if each.code == "search_end"] == ["latency.wheel_speed"]
 
 
 @pytest.mark.parametrize(

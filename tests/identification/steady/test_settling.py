@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.identify import choose_method
+from omnidyn.identification.methods import choose_method
 from omnidyn.identification.steady.settling import settling_time
 from omnidyn.model.friction import Friction
 from omnidyn.model.robot_file import load_robot

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.output_error.fit import HARMS, Fit
+from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.question import OUTPUT_ERROR, Question
 from omnidyn.identification.structure import earned
 from omnidyn.identification.structure.earned import _harm, _without, unearned
@@ -12,6 +12,7 @@ from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation, noisy_draw
+from tests.support.codes import codes
 
 VOLTS = excitation(60.0, 100.0)
 PART = slice(1500, 1900)
@@ -42,7 +43,7 @@ def test_what_soaks_up_a_part_of_the_log_is_not_fitted(robot):
     assert set(unearned(found)) == {"latency.twist", "dead_band"} == set(found.solver.problem.names[6:])
     fit = fit_output_error(log, robot)
     assert not fit.nuisances
-    assert sum(HARMS in words for words in fit.warnings) == 2
+    assert codes(fit.warnings).count("harmful_nuisance") == 2
 
 
 @pytest.mark.parametrize("late", [1, 3])

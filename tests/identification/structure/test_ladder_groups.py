@@ -10,12 +10,13 @@ from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of, tr
 from benchmarks.wrong_worlds.world import BOX, ELLIPSE
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.lack_of_fit import Remedy
+from omnidyn.identification.ladder import STANDS
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.ladder.held_out import errors, margins_of
 from omnidyn.identification.structure.ladder.models import Model, can, is_own, moves, moves_apart
-from omnidyn.identification.structure.missing.switches import told
+from omnidyn.identification.structure.missing.switches import as_fitted
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.report.fit_page import render_fit
@@ -54,7 +55,7 @@ def test_each_group_gets_the_shape_of_its_own(mixed):
     found, worlds = mixed
     (step,) = ladder(found).taken
     assert (step.key, step.groups) == ("friction.direction", ("green",))
-    assert step.words.endswith("an ellipse in green")
+    assert str(step.cause).endswith("an ellipse in green")
     for (_, estimate), world in zip(found.estimates.items(), worlds, strict=True):
         true = truths(world, world.shape)
         assert set(true) == set(estimate.value)
@@ -90,7 +91,7 @@ def test_the_answer_has_the_ladder_once(mixed):
 
 def test_a_number_of_one_group_is_told_with_its_group():
     assert (
-        told("w", {}, {"body.mass_kg@gray": 2.0, "body.mass_kg@green": 3.0})
+        as_fitted(STANDS, {}, {"body.mass_kg@gray": 2.0, "body.mass_kg@green": 3.0})
         == "mass 2 kg in gray and mass 3 kg in green"
     )
 

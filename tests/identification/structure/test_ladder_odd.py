@@ -45,7 +45,7 @@ def test_an_encoder_that_is_dead_is_named_and_nothing_is_tried(level, monkeypatc
     assert fits <= 2  # as it is, and by Student's t
     assert f"wheel_speed[{DEAD}]" in estimate.not_followed
     told = f"wheel_speed[{DEAD}] (it never changes, and the model moves it: a sensor that is dead)"
-    assert any(told in words for words in estimate.warnings)
+    assert any(told in str(each) for each in estimate.warnings)
 
 
 def test_a_wheel_that_stands_still_as_the_model_has_it_is_no_dead_one():

@@ -55,7 +55,7 @@ def test_a_right_model_leaves_nothing(right):
     assert not lack.found
     assert lack.remedies == ()
     assert set(lack.channels.values()) == {0.0}
-    assert "nothing but noise" in " ".join(lack.statements())
+    assert "nothing but noise" in " ".join(map(str, lack.statements()))
 
 
 def test_a_gain_goes_with_what_scales_all_forces():

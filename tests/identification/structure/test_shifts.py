@@ -52,7 +52,7 @@ def test_a_change_of_floor_is_found_with_its_time_and_both_levels(seed):
     assert first.value == pytest.approx(case.world.coulomb[0], abs=4.0 * first.std)
     assert then.value == pytest.approx(1.15 * case.world.coulomb[0], abs=4.0 * then.std)
     assert first.ci95[1] < then.ci95[0]
-    assert "Coulomb friction forward" in found.statements()[0]
+    assert "Coulomb friction forward" in str(found.statements()[0])
 
 
 def test_the_levels_are_those_of_fits_of_the_parts():

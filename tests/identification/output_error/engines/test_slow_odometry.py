@@ -146,4 +146,4 @@ def test_friction_at_the_wheels_is_named_behind_a_loop(robot):
     assert lack.found
     assert lack.remedies[0].key == "friction.wheels"
     assert lack.remedies[0].share > 0.7
-    assert "friction at the wheels" in lack.words()
+    assert "friction at the wheels" in str(lack.statement())

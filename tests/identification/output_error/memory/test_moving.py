@@ -150,7 +150,7 @@ def test_a_fit_of_a_pushed_robot_knows_when_its_errors_remember():
         fit = Fit.of([Run(t, voltage=volts, twist=twist + noise)], robot_of(case.told), Question(free=FRICTION))
         found = whitened(solution := fit.solve(), trust(solution.solver, solution, WHITE))
         assert found is not None
-        words += "while the robot moves" in " ".join(found.warnings)
+        words += "moving" in [each.numbers.get("beside_white") for each in found.warnings]
         solver = found.solution.solver
         (piece,), (plain,) = solver.problem.pieces, below(solver).residuals(found.solution.state.point)
         (new,) = solver.engine.residuals(found.solution.state.point)

@@ -17,6 +17,7 @@ from omnidyn.model.keys import BOX
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, TRUTH, noisy, voltages, with_friction
+from tests.support.codes import codes
 
 fit_output_error = partial(whole.fit_output_error, nuisances=(), start="rest")
 KNOWN = np.array(list(TRUTH.values()))
@@ -62,7 +63,7 @@ def test_slow_errors_cost_what_they_must(axebot, clean):
         np.testing.assert_allclose([fit.std[key] for key in BOX] / least, 1.0, atol=0.45)
     assert np.sqrt(np.mean((np.array(errors) / least) ** 2)) < 1.35
     assert held >= 0.85 * 72
-    assert all("autoregression of order" in fit.warnings[0] for fit in [fit])
+    assert fit.warnings[0].code == "autocorrelated_noise"
 
 
 def test_white_logs_stay_as_they_are(axebot, clean):
@@ -125,7 +126,7 @@ def test_the_engine_filters_residuals_and_slopes_alike(axebot, clean):
 def test_a_log_that_is_too_short_is_said(axebot, clean):
     short = Run(t=clean.t[:1500], voltage=clean.voltage[:1500], twist=clean.twist[:1500])
     fit = fit_output_error(remembering(short, 0.998, 1), axebot)
-    assert any("how long they remember is hardly known" in words for words in fit.warnings)
+    assert "short_for_memory" in codes(fit.warnings)
 
 
 def test_groups_share_a_memory(axebot, clean):

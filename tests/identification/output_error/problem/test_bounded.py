@@ -75,7 +75,7 @@ def test_intervals_beside_a_bounded_diagnosis_are_those_of_all_rows(case, log, m
         monkeypatch.setattr(module, "ROWS", rows)
         fits.append(fit_output_error(log, robot_of(case.told), free="friction", nuisances=()))
     every, part, half = fits
-    assert any("up to 3.2 times as wide for it" in words for words in every.warnings)
+    assert [f"{each.numbers['wider']:.2g}" for each in every.warnings if each.code == "rounded_inputs"] == ["3.2"]
     for name, std in every.std.items():
         assert part.std[name] == pytest.approx(std, rel=0.05)
         assert part.value[name] == every.value[name]

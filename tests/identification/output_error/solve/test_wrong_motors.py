@@ -64,9 +64,8 @@ def test_a_speed_long_before_its_voltage_is_no_automatic_latency(true, run):
     log = run.replace(twist=noisy(early, 0.005), current=None, wheel_speed=None, pose=None)
     fit = fit_output_error(log, true, start="rest")
     assert "latency.twist" not in fit.nuisances
-    (words,) = [words for words in fit.warnings if "is implausible" in words]
-    assert "latency.twist" in words
-    assert "it is not fitted" in words
+    (early,) = [each for each in fit.warnings if each.code == "implausible_latency"]
+    assert (early.subject, early.numbers["fitted"]) == ("latency.twist", False)
     asked = fit_output_error(log, true, start="rest", nuisances="latency")
     assert asked.nuisances["latency.twist"].value < -0.08
-    assert any("latency.twist of -1" in words and "is implausible" in words for words in asked.warnings)
+    assert ("implausible_latency", "latency.twist") in {(each.code, each.subject) for each in asked.warnings}

@@ -1,0 +1,79 @@
+"""The result of `omnidyn identify` on one screen: verdict, numbers, the gravest warnings, the next step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from omnidyn.document import WIDTH, Document, Points, Table, Words, interval_cell
+
+if TYPE_CHECKING:
+    from omnidyn.identification.estimate import Estimate
+    from omnidyn.identification.identify import Identification
+
+LINES = 25  # of all, the names of the files that were written among them
+ROWS, WARNINGS, STEPS = 12, 3, 2  # numbers, warnings and next steps that are shown, where there is room
+SPARE = 3  # lines for empty lines and what is left out
+Row = tuple[str, ...]
+
+
+class Brief(Document):
+    """A document without explanations of its terms: `--full` has them."""
+
+    def legend(self) -> list[str]:
+        """No lines."""
+        return []
+
+
+def brief(found: Identification, files: int) -> Document:
+    """What the result says in at most LINES lines. files: how many were written, a line each on stderr."""
+    from omnidyn.statement import ERROR, WARNING
+
+    rows = [row for group, estimate in found.estimates.items() for row in _rows(group, estimate, len(found.estimates))]
+    every = dict.fromkeys(one for estimate in found.estimates.values() for one in estimate.warnings)
+    grave = [one for severity in (ERROR, WARNING) for one in every if one.severity == severity]
+    table = Table(("number", "value", "95 % interval", "unit", "key"), rows[:ROWS], "<>><<")
+    room = LINES - files - SPARE - len([*Words(found.headline).lines(WIDTH, _bare)]) - 1 - len(table.rows)
+    warnings = _that_fit([f"{one.severity}: {one}" for one in grave[:WARNINGS]], room - 2)
+    steps = _that_fit([f"next: {one}" for one in found.advice[:STEPS]], room - _height(warnings))
+    left = {"numbers": len(rows) - len(table.rows), "warnings": len(grave) - len(warnings),
+            "notes": len(every) - len(grave), "next steps": len(found.advice) - len(steps)}  # fmt: skip
+    more = ", ".join(f"{count} more {what}" for what, count in left.items() if count > 0)
+    last = f"--full shows all{f': {more}' if more else ''}."
+    return Brief(
+        [table, "", *(Points([text], "") for text in (*warnings, *steps)), last], ascii=True, verdict=found.headline
+    )
+
+
+def _rows(group: str, estimate: Estimate, groups: int) -> Iterator[Row]:
+    """The numbers of a group, those of the log after those of the robot."""
+    from omnidyn.identification.estimate import NOT_DETERMINED
+    from omnidyn.identification.output_error.answer import OutputErrorEstimate
+    from omnidyn.model.keys import in_words, unit
+
+    of = f" in {group}" if groups > 1 else ""
+    for name, value in estimate.value.items():
+        known = NOT_DETERMINED if name in estimate.unidentifiable else interval_cell(estimate.ci95[name])
+        yield f"{in_words(name)}{of}", f"{value:.4g}", known, unit(name), name
+    if isinstance(estimate, OutputErrorEstimate):
+        for name, own in estimate.nuisances.items():
+            known = NOT_DETERMINED if name in estimate.unidentifiable else interval_cell(own.ci95)
+            yield f"{name} of the log{of}", f"{own.value:.4g}", known, own.unit, ""
+
+
+def _that_fit(texts: Sequence[str], room: int) -> list[str]:
+    """The first of some texts that take no more than so many lines."""
+    kept = list[str]()
+    for text in texts:
+        if _height([*kept, text]) > room:
+            break
+        kept.append(text)
+    return kept
+
+
+def _height(texts: Sequence[str]) -> int:
+    return sum(len([*Points([text], "").lines(WIDTH, _bare)]) for text in texts)
+
+
+def _bare(word: str, tone: str) -> str:
+    return word

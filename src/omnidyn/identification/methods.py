@@ -1,0 +1,62 @@
+"""Which method a robot and its logs allow: output error, or where they do not allow that, steady state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from omnidyn.findings.needs import why_no_inputs
+from omnidyn.identification.question import AUTO, OUTPUT_ERROR, STEADY_STATE, Question
+from omnidyn.identification.steady.settling import why_no_transient
+from omnidyn.model.drive import DUTY, SPEED, VOLTAGE
+from omnidyn.model.robot import MEASURED, Prior, Robot
+from omnidyn.run import Run
+
+Tell = Callable[[str], object]
+
+
+def as_driven(robot: Robot, runs: Sequence[Run]) -> Robot:
+    """The robot with the drive that its logs show: one of duties where they hold duties and no voltage.
+
+    A file without it would take the next set of duties for volts. The supply is the median of the logged one, where
+    the file has none.
+    """
+    if robot.drive.kind != VOLTAGE or not runs or any(run.duty is None or run.voltage is not None for run in runs):
+        return robot
+    drive, priors = robot.drive.replace(kind=DUTY), robot.priors
+    supplies = [run.supply[np.isfinite(run.supply)] for run in runs if run.supply is not None]
+    logged = np.concatenate(supplies) if supplies else np.zeros(0)
+    if drive.supply is None and logged.size and float(np.median(logged)) > 0.0:
+        drive = drive.replace(supply=round(float(np.median(logged)), 3))
+        priors = {**priors, "drive.supply_V": Prior(source="median of the logs", origin=MEASURED)}
+    return robot.replace(drive=drive, priors=priors)
+
+
+def choose_method(runs: Sequence[Run], robot: Robot, options: Sequence[str] = ()) -> tuple[str, str]:
+    """(method, why it is not output error; "" where it is, or where an option decides). options: names of those."""
+    method = Question().method_asked(options)
+    if method != AUTO:
+        return method, ""
+    why = why_not_output_error(runs, robot)
+    return (STEADY_STATE if why else OUTPUT_ERROR), why
+
+
+def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
+    """Why whole logs are not fitted by output error unless it is asked for, in words; "" where they are."""
+    why = why_no_inputs(runs, robot)
+    if why or robot.drive.kind != SPEED or any(run.voltage is not None or run.duty is not None for run in runs):
+        return why
+    return why_no_transient(runs, robot)
+
+
+def settle_method(runs: Sequence[Run], robot: Robot, question: Question, tell: Tell) -> Question:
+    """The question with its method, by name, by options, or by what robot and logs support; `tell` hears why."""
+    method = question.method_asked()
+    if method == AUTO:
+        why = why_not_output_error(runs, robot)
+        method = STEADY_STATE if why else OUTPUT_ERROR
+        if why:
+            tell(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {why}")
+    return replace(question, method=method)
