@@ -178,11 +178,15 @@ def _not_followed(statement: Statement) -> str:
     )
 
 
+def _cures(statement: Statement) -> str:
+    """What would show a direction that the logs do not show."""
+    return " or ".join(CURES[cure] for cure in statement.numbers["cures"])
+
+
 def _not_shown(statement: Statement) -> str:
     """A direction in the numbers that the logs do not show, and what would show it."""
-    cures = [CURES[cure] for cure in statement.numbers["cures"]]
     what = "them apart" if len(statement.numbers["keys"]) > 1 else "it"
-    return f"{direction(statement)}; to tell {what}: {' or '.join(cures)}" if cures else direction(statement)
+    return f"{direction(statement)}; to tell {what}: {cures}" if (cures := _cures(statement)) else direction(statement)
 
 
 def direction(statement: Statement) -> str:
@@ -296,4 +300,5 @@ SENTENCES = {
     "combined_follows": Sentence(_combined("by how much it follows late", "latency and lag")),
     "not_followed": Sentence(_not_followed),
     "not_shown": Sentence(_not_shown),
+    "cures": Sentence(_cures),
 }  # fmt: skip

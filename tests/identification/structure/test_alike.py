@@ -3,6 +3,7 @@
 import pytest
 
 from benchmarks.blind.alike import ALIKE, grouped
+from omnidyn.identification.advice import way
 from omnidyn.identification.lack_of_fit import LackOfFit, Remedy
 from omnidyn.statement import quoted
 

@@ -108,7 +108,7 @@ def test_right_floors_take_no_step():
     runs, robot, _ = floors(BOX, BOX)
     found = Identification.of(runs, robot, free=FREE, ladder=True, per=PER)
     assert ladder(found).taken == ()
-    assert ladder(found).end == "the residuals hold nothing but noise"
+    assert ladder(found).end.code == "only_noise"
 
 
 def test_what_is_shared_is_switched_on_in_all():

@@ -32,7 +32,7 @@ def test_a_law_that_the_file_lacks_is_named_and_taken(name, seed):
     assert early
     assert log.cause
     assert log.after == [True, True]
-    assert log.words.endswith("the residuals hold nothing but noise")
+    assert "the residuals hold nothing but noise" in log.words
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,7 @@ def test_a_law_of_five_standard_errors_is_taken(seed):
     assert log.found
     assert early
     assert log.cause
-    assert log.words.endswith("the residuals hold nothing but noise")
+    assert "the residuals hold nothing but noise" in log.words
 
 
 def test_a_law_is_taken_where_a_linear_step_of_one_block_leads_far_astray():
@@ -57,7 +57,7 @@ def test_a_law_is_taken_where_a_linear_step_of_one_block_leads_far_astray():
     log, _ = of_law("Stribeck", 5.0, 17)
     assert log.found
     assert log.cause
-    assert log.words.endswith("the residuals hold nothing but noise")
+    assert "the residuals hold nothing but noise" in log.words
 
 
 BOX = AxesFriction(viscous=(0.94, 0.96, 0.01), coulomb=(2.2, 1.5, 0.099))

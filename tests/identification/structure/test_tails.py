@@ -84,7 +84,7 @@ def test_the_loss_is_tried_where_the_cause_that_gains_more_does_not_pay():
     rungs = [rung for rung in best.ladder.rungs if rung.step == 1]
     assert any(rung.key == "fade" and rung.gain > rung.gain_std and not rung.taken for rung in rungs)
     assert [rung.key for rung in best.ladder.taken] == ["loss"]
-    assert "friction that changes" in best.ladder.end
+    assert "friction that changes" in str(best.ladder.end)
     assert best.lack_of_fit.found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NoReturn
 
 import numpy as np
@@ -182,10 +183,12 @@ def _refuse_blind(
             remedy="check signs, units and the order of the wheels, and the voltages (omnidyn check)",
         )  # fmt: skip
     if not unseen.all():
+        what = [str(replace(direction, cures=()).statement()) for direction in directions]
+        ways = "; ".join(str(direction.how_to_show()) for direction in directions if direction.cures)
         raise InsufficientDataError(
-            "; ".join(["of what is free each number can be made up for by others, so that none can be told",
-                       *(str(direction.statement()) for direction in directions)]),
-            got=", ".join(free), expected="fewer numbers", remedy="leave out one that is known", where=where,
+            "; ".join(["of what is free each number can be made up for by others, so that none can be told", *what]),
+            got=", ".join(free), expected="fewer numbers", where=where,
+            remedy=": ".join(["leave out one that is known", *([ways] if ways else [])]),
         )  # fmt: skip
     raise InsufficientDataError(
         "the logs say nothing about what is free", got=", ".join(free), expected="motion",

@@ -55,6 +55,10 @@ class Blind:
         numbers = {"keys": tuple(self.changes), "changes": tuple(self.changes.values())}
         return Statement("not_shown", NOTE, numbers=numbers | {"exact": self.exact, "cures": self.cures})
 
+    def how_to_show(self) -> Statement:
+        """What would show it."""
+        return Statement("cures", NOTE, numbers={"cures": self.cures})
+
 
 def blind_directions(
     problem: Problem, values: FloatArray, ways: Sequence[Way], moved: BoolArray
