@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from omnidyn.document import WIDTH, Document, Points, Table, Words, interval_cell
+from omnidyn.document import WIDTH, Document, Table, Words, interval_cell
 
 if TYPE_CHECKING:
     from omnidyn.identification.estimate import Estimate
     from omnidyn.identification.identify import Identification
 
-LINES = 25  # of all, the names of the files that were written among them
+LINES = 20  # on stdout; the columns of a log and the files written are a few more on stderr
 ROWS, WARNINGS, STEPS = 12, 3, 2  # numbers, warnings and next steps that are shown, where there is room
-SPARE = 3  # lines for empty lines and what is left out
+SPARE = 4  # lines: two empty ones, the head of the table, what is left out
 Row = tuple[str, ...]
 
 
@@ -25,23 +25,25 @@ class Brief(Document):
         return []
 
 
-def brief(found: Identification, files: int) -> Document:
-    """What the result says in at most LINES lines. files: how many were written, a line each on stderr."""
+def brief(found: Identification) -> Document:
+    """What the result says in at most LINES lines."""
     from omnidyn.statement import ERROR, WARNING
 
     rows = [row for group, estimate in found.estimates.items() for row in _rows(group, estimate, len(found.estimates))]
     every = dict.fromkeys(one for estimate in found.estimates.values() for one in estimate.warnings)
     grave = [one for severity in (ERROR, WARNING) for one in every if one.severity == severity]
     table = Table(("number", "value", "95 % interval", "unit", "key"), rows[:ROWS], "<>><<")
-    room = LINES - files - SPARE - len([*Words(found.headline).lines(WIDTH, _bare)]) - 1 - len(table.rows)
-    warnings = _that_fit([f"{one.severity}: {one}" for one in grave[:WARNINGS]], room - 2)
+    room = LINES - SPARE - len([*Words(found.headline).lines(WIDTH, _bare)]) - len(table.rows)
+    warnings = _that_fit([f"{one.severity}: {one}" for one in grave[:WARNINGS]], room - 2 * bool(found.advice))
     steps = _that_fit([f"next: {one}" for one in found.advice[:STEPS]], room - _height(warnings))
-    left = {"numbers": len(rows) - len(table.rows), "warnings": len(grave) - len(warnings),
-            "notes": len(every) - len(grave), "next steps": len(found.advice) - len(steps)}  # fmt: skip
-    more = ", ".join(f"{count} more {what}" for what, count in left.items() if count > 0)
+    left = {
+        "number": len(rows) - len(table.rows), "warning": len(grave) - len(warnings), "note": len(every) - len(grave),
+        "next step": len(found.advice) - len(steps),
+    }  # fmt: skip
+    more = ", ".join(f"{count} more {what}{'s' * (count > 1)}" for what, count in left.items() if count > 0)
     last = f"--full shows all{f': {more}' if more else ''}."
     return Brief(
-        [table, "", *(Points([text], "") for text in (*warnings, *steps)), last], ascii=True, verdict=found.headline
+        [table, "", *(Words(text, rest="  ") for text in (*warnings, *steps)), last], ascii=True, verdict=found.headline
     )
 
 
@@ -62,7 +64,7 @@ def _rows(group: str, estimate: Estimate, groups: int) -> Iterator[Row]:
 
 
 def _that_fit(texts: Sequence[str], room: int) -> list[str]:
-    """The first of some texts that take no more than so many lines."""
+    """The first of some texts, as many as take no more than so many lines."""
     kept = list[str]()
     for text in texts:
         if _height([*kept, text]) > room:
@@ -72,7 +74,7 @@ def _that_fit(texts: Sequence[str], room: int) -> list[str]:
 
 
 def _height(texts: Sequence[str]) -> int:
-    return sum(len([*Points([text], "").lines(WIDTH, _bare)]) for text in texts)
+    return sum(len([*Words(text, rest="  ").lines(WIDTH, _bare)]) for text in texts)
 
 
 def _bare(word: str, tone: str) -> str:

@@ -96,7 +96,7 @@ def tell(found: Identification, record: dict[str, Any], to: Out, now: Callable[[
     now("writing")
     found = replace(found, missing=tuple(attempts.missing), interrupt=attempts.interrupt)
     written = [*to.files.values(), *([report] if report else [])]
-    told = found.document() if to.json or to.full else brief(found, len(written))
+    told = found.document() if to.json or to.full else brief(found)
     tell_document(told, to.json, record, output=to.files or None, report=report or None)
     say_written(written)
     to.finish(attempts)

@@ -89,6 +89,15 @@ def number_table(fit: OutputErrorEstimate) -> Table:
     return Table(("number", "key", "value", "std error", "95 % interval", "unit", ""), rows, "<<>>><<")
 
 
+def short_table(fit: OutputErrorEstimate) -> Table:
+    """Every fitted number with its 95 % interval, by its plain name."""
+    rows = [
+        (words or name, value, mark if mark == NOT_DETERMINED else interval, unit)
+        for words, name, value, _, interval, unit, mark in number_table(fit).rows[: len(fit.value) + len(fit.nuisances)]
+    ]
+    return Table(("number", "value", "95 % interval", "unit"), rows, "<>>")
+
+
 def _whose(name: str) -> str:
     """What a number belongs to that was fitted beside those of the file: a dead band is of the driver."""
     return "of the driver" if name == DEAD_BAND else "of the log"

@@ -13,7 +13,7 @@ import numpy as np
 from omnidyn.comparison.bands import with_fitted_band
 from omnidyn.comparison.result import Comparison
 from omnidyn.document import Points, sentence
-from omnidyn.identification.fit_document import difference_table, number_table, verdict_table
+from omnidyn.identification.fit_document import difference_table, number_table, short_table, verdict_table
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.validation import FITTED, HELD_OUT, Score, Validation, output_name
@@ -26,7 +26,7 @@ from omnidyn.report.figures.misfit import draw_misfit
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.path import draw_path
 from omnidyn.report.figures.residuals import draw_residuals, residuals_of
-from omnidyn.report.html import Section, bullets, content, figure, page, paragraph, section
+from omnidyn.report.html import Section, beside, bullets, content, figure, page, paragraph, section
 from omnidyn.report.style import Picture
 from omnidyn.run import Run
 
@@ -49,7 +49,7 @@ def _page(
     """All of it. banded: group -> its comparisons with the band of the model, which are on their way."""
     first = found.estimate
     robot = first.robot.name
-    introduction = (
+    made = (
         f"Numbers of {robot} for which the model, run freely under the logged inputs, comes nearest to all that was "
         f"measured: {first.method}. Data: {'; '.join(f.data for f in fits.values())}."
     )
@@ -75,14 +75,27 @@ def _page(
         Section("stability", "Whether the numbers are the same throughout the logs", _each(fits, _stability)),
         Section("residuals", "Residuals", residuals),
         Section("correlation", "What cannot be told apart", "".join(_correlations(fits))),
-        Section("numbers", "Numbers, with 95 % intervals", numbers),
+        Section("numbers", "All numbers, with standard errors", paragraph(made) + numbers),
         *(between if found.differences else []),
         Section("scores", "How near the model comes", _each(validations, lambda group, each: content(each.table()))),
         Section("data", "The logs, and what check says of them", checked),
     ]
     runs = Section("runs", "Measured and model", _each(banded, _runs))  # the last to be drawn: bands take longest
     sections.insert(2, runs)
-    return page(f"{robot}: identified from whole logs", introduction, sections, provenance, verdict=found.verdict)
+    group, fit = next(iter(fits.items()))
+    screen = beside(content(short_table(fit)), _first_overlay(group, banded))
+    more = f"Verdict in full: {found.verdict}" if found.verdict != found.headline else ""
+    return page(
+        f"{robot}: identified from whole logs", more, sections, provenance, verdict=found.headline, screen=screen
+    )
+
+
+def _first_overlay(group: str, banded: Mapping[str, Future[Bands]]) -> str:
+    """Model and measurement of the first log held out, or fitted where none was; nothing where none was compared."""
+    if group not in banded:
+        return ""
+    fitted, held_out = banded[group].result()
+    return figure(_renamed(draw_overlay(held_out or fitted), "overlay-first", "held out" if held_out else "fitted"))
 
 
 def _named(group: str, words: object, fits: Mapping[str, Any]) -> str:

@@ -49,16 +49,18 @@ def content(*parts: Table | Points | Picture) -> str:
 
 def page(
     title: str, introduction: str, sections: Sequence[Section], provenance: Mapping[str, Any], *, lead: str = "",
-    verdict: str = "",
+    verdict: str = "", screen: str = "",
 ) -> str:  # fmt: skip
     """The page as HTML. verdict: the result in a sentence, before all else. lead: HTML between introduction and links.
+    screen: HTML right behind the verdict, for the first screen.
 
     provenance: version ("omnidyn"), "command" and "inputs" (role, name, sha256); it is the last section.
     """
     every = [*sections, Section("made", "How this was made", provenance_table(provenance))]
     links = "".join(f'<a href="#{escaped(each.key)}">{escaped(each.title)}</a>' for each in every)
     first = f"<p><strong>{escaped(verdict)}</strong></p>" if verdict else ""
-    head = f"<header><h1>{escaped(title)}</h1>{first}<p>{escaped(introduction)}</p>{lead}<nav>{links}</nav></header>"
+    words = f"<p>{escaped(introduction)}</p>" if introduction else ""
+    head = f"<header><h1>{escaped(title)}</h1>{first}{screen}{words}{lead}<nav>{links}</nav></header>"
     parts = (
         f'<section id="{escaped(each.key)}"><h2>{escaped(each.title)}</h2>{each.content}</section>' for each in every
     )
@@ -75,6 +77,11 @@ def _document(title: str, body: str) -> str:
         '<meta name="color-scheme" content="light dark"><link rel="icon" href="data:,">'
         f"<title>{escaped(title)}</title><style>{STYLE}</style></head>\n<body><main>{body}</main></body></html>\n"
     )
+
+
+def beside(left: str, right: str) -> str:
+    """Two parts side by side, where the screen is wide enough."""
+    return f'<div class="beside"><div>{left}</div><div>{right}</div></div>'
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], name: str = "plain") -> str:
