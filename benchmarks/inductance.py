@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.table import Table, Times, machine, one_core
 from omnidyn.simulation.exact.inductance import simulate_exact_inductance
-from omnidyn.simulation.exact.march import simulate_exact
+from omnidyn.simulation.exact.march import ExactMarch
 from tests.support.robots import TABLE_3, robot_of, table_3_voltages, with_breakaway
 
 DT, ROUNDS, REPEATS = 1e-3, 10, 5
@@ -21,7 +21,7 @@ def calls(ratio: float) -> dict[str, partial]:
     """The same inputs for each engine: Table 3's robot with breakaway = ratio * coulomb, from rest."""
     robot, voltage, zero = robot_of(with_breakaway(TABLE_3, ratio)), table_3_voltages(), np.zeros(3)
     dt = np.full(len(voltage), DT)
-    named = {NO_INDUCTANCE: partial(simulate_exact, robot, voltage, dt, zero, zero)}
+    named = {NO_INDUCTANCE: partial(ExactMarch(robot).run, voltage, dt, zero, zero)}
     for inductance in INDUCTANCES:
         motor = robot.motor.model_copy(update={"inductance": inductance})
         with_windings = robot.model_copy(update={"motor": motor})

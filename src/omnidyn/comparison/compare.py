@@ -20,7 +20,7 @@ from omnidyn.model.first_guess import rests_on
 from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
-from omnidyn.simulation.simulate import TOLERANCE
+from omnidyn.simulation.engine import TOLERANCE
 from omnidyn.statement import Statement
 
 ABSENT = Trace(np.zeros(0), np.zeros(0), np.zeros(0))

@@ -26,7 +26,8 @@ from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.robot import Robot
 from omnidyn.run import CHANNELS, WHEEL, Run
 from omnidyn.simulation.commands import Commands, commands
-from omnidyn.simulation.simulate import TOLERANCE, simulate_seen
+from omnidyn.simulation.engine import TOLERANCE
+from omnidyn.simulation.simulate import simulate_seen
 from omnidyn.simulation.view import LATE, View, seen_at_once, seen_through
 from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import stretches

@@ -9,14 +9,12 @@ tilt: a force that stays in the room.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.errors import UnsupportedError
 from omnidyn.model.actuation import Driver, at_motors
-from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.clocks import Clock, clock
@@ -53,11 +51,11 @@ class View:
             share = np.zeros(len(given.dt)) if self.share is None else self.share
             voltage = at_motors(np.ascontiguousarray(voltage), np.ascontiguousarray(share), self.driver)[0]
         if self.clock is not None:
-            given = replace(
-                given, dt=self.clock.dt, set_point=self._stepped(given.set_point), open_circuit=self._open(given)
+            given = given._replace(
+                dt=self.clock.dt, set_point=self._stepped(given.set_point), open_circuit=self._open(given)
             )
             voltage = self._stepped(voltage)
-        return given if voltage is given.voltage else replace(given, voltage=voltage)
+        return given if voltage is given.voltage else given._replace(voltage=voltage)
 
     def of(self, channel: str, samples: FloatArray) -> FloatArray:
         """What a channel shows at the rows, of all samples of the simulation. Shape (rows + 1, columns)."""
@@ -108,19 +106,3 @@ def seen_through(
     at = {"voltage": apart.index(0.0)} | {name: apart.index(each) for name, each in late.items()}
     driver, room = Driver(log.gain, robot.drive.dead_band, log.fade), log.tilt if any(log.tilt) else None
     return View(time, at, driver, share, log.push if any(log.push) else None, start is not None, room)
-
-
-def pushing(robot: Robot, push: tuple[float, float, float]) -> FloatArray:
-    """The least volts that push the body at rest as hard as a wrench (3,) [N, N, N m]. Shape (wheels,)."""
-    per_volt = drive_wrench(linear_part(robot), np.zeros(3), np.eye(robot.wheels.count)).T
-    return np.asarray(np.linalg.lstsq(per_volt, np.array(push), rcond=None)[0], dtype=float)
-
-
-def refuse_push(robot: Robot, looped: bool) -> None:
-    """Raises UnsupportedError for a push on wheels that may slip behind a speed loop: volts cannot stand for it."""
-    if looped:
-        raise UnsupportedError(
-            "a push on a robot whose wheels may slip is simulated as volts, and a speed loop makes its own",
-            got=f'drive = "{robot.drive.kind}"', expected="voltages or duties", where=robot.name,
-            remedy="leave the push out, or [wheels] traction_mu",
-        )  # fmt: skip

@@ -15,7 +15,7 @@ from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.exact.inductance import axis_laws, current_gain, simulate_exact_inductance
 from omnidyn.simulation.exact.inductance_step import AxisLaw, response
-from omnidyn.simulation.exact.march import simulate_exact
+from omnidyn.simulation.exact.march import ExactMarch
 from tests.support.robots import TABLE_3, random_program, random_robot, robot_of, with_breakaway
 
 INDUCTANCES = (1.1e-4, 2e-3, 2e-2)
@@ -329,7 +329,7 @@ def test_held_below_breakaway_it_rests_exactly(inductance, share):
 
 def test_inductance_to_zero_meets_the_quasi_static_engine():
     voltage, dt = random_program(3, 2000, 3), np.full(2000, 1e-3)
-    twists, poses = simulate_exact(robot_of(with_breakaway(TABLE_3, 1.0)), voltage, dt, ZERO, ZERO)
+    twists, poses = ExactMarch(robot_of(with_breakaway(TABLE_3, 1.0))).run(voltage, dt, ZERO, ZERO)
     errors = []
     for inductance in (1e-6, 1e-7, 1e-8, 1e-12):
         got = simulate_exact_inductance(table_3(inductance, 1.0), voltage, dt, ZERO, ZERO, ZERO)

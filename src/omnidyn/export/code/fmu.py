@@ -23,7 +23,7 @@ from omnidyn.export.features import left_out, refuse
 from omnidyn.export.spelling import attribute, c_number, filled, identifier
 from omnidyn.files import sha256
 from omnidyn.model.robot import Robot
-from omnidyn.simulation.simulate import FARTHEST
+from omnidyn.simulation.engine import FARTHEST
 
 OUTPUTS = ("vx_m_s", "vy_m_s", "omega_rad_s", "x_m", "y_m", "heading_rad")
 _OUTPUT_UNITS = ("m/s", "m/s", "rad/s", "m", "m", "rad")

@@ -22,12 +22,12 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.statespace import state_space
 from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.commands import MAX_DT
+from omnidyn.simulation.engine import FARTHEST
 from omnidyn.simulation.exact import inductance_position, march
 from omnidyn.simulation.exact.inductance import axis_laws, current_gain
 from omnidyn.simulation.exact.inductance_position import COUNT, GAUSS, Axes, Nodes
 from omnidyn.simulation.exact.inductance_step import AxisLaw
 from omnidyn.simulation.exact.march import NODES, WEIGHTS, axis_levels
-from omnidyn.simulation.simulate import FARTHEST
 
 MARCH, PLACE = "omnidyn.simulation.exact.march", "omnidyn.simulation.exact.inductance_position"
 AXES = Array((3,))

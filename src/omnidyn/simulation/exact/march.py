@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel, maker, part
@@ -64,27 +65,8 @@ def why_not_exact(robot: Robot) -> list[str]:
     return reasons
 
 
-def simulate_exact(
-    robot: Robot, voltage: FloatArray, dt: FloatArray, twist: FloatArray, pose: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Twist and pose after each of n steps, the start in row 0. Shapes (n + 1, 3) each.
-
-    `voltage` [V] is within limits, shape (n, wheels); `dt` [s], shape (n,); `twist` and `pose` the start, shape (3,).
-    Raises InputError when one step turns the robot further than MAX_TURN_PER_STEP.
-    """
-    system = state_space(robot)
-    rate, coulomb, breakaway = axis_levels(robot, system)
-    drive = drive_acceleration(system, voltage)
-    steps, which = np.unique(dt, return_inverse=True)
-    phi = discretise(system, steps)
-    twists = _twists(drive, phi, which, rate, coulomb, breakaway, twist)
-    refuse_spin(np.abs(twists[:-1, 2]) * dt)
-    poses = _poses(twists, drive, phi, which, steps, rate, coulomb, breakaway, pose, NODES, WEIGHTS)
-    return twists, poses
-
-
 class ExactMarch:
-    """`simulate_exact`, a row at a time: what does not change between rows is made once."""
+    """Runs of one robot; what does not change between them is made once."""
 
     def __init__(self, robot: Robot) -> None:
         self._system = state_space(robot)
@@ -92,20 +74,31 @@ class ExactMarch:
         self._phi: dict[float, FloatArray] = {}
         self._first = np.zeros(1, np.intp)
 
-    def step(
-        self, voltage: FloatArray, dt: float, twist: FloatArray, pose: FloatArray
+    def run(
+        self, voltage: FloatArray, dt: FloatArray, twist: FloatArray, pose: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Twist and pose after `voltage` [V], shape (wheels,), was held for dt [s]. Shape (3,) each."""
-        phi = self._phi.get(dt)
-        if phi is None:
-            phi = self._phi[dt] = discretise(self._system, np.array([dt]))
+        """Twist and pose after each of n steps, the start in row 0. Shapes (n + 1, 3) each.
+
+        `voltage` [V] is within limits, shape (n, wheels); `dt` [s], shape (n,); `twist` and `pose` the start, shape
+        (3,). Raises InputError when one step turns the robot further than MAX_TURN_PER_STEP.
+        """
         rate, coulomb, breakaway = self._levels
-        drive = drive_acceleration(self._system, voltage[None])
-        twists = _twists(drive, phi, self._first, rate, coulomb, breakaway, twist)
-        steps = np.array([dt])
+        drive = drive_acceleration(self._system, voltage)
+        steps, which, phi = self._steps(dt)
+        twists = _twists(drive, phi, which, rate, coulomb, breakaway, twist)
         refuse_spin(np.abs(twists[:-1, 2]) * dt)
-        poses = _poses(twists, drive, phi, self._first, steps, rate, coulomb, breakaway, pose, NODES, WEIGHTS)
-        return twists[1], poses[1]
+        poses = _poses(twists, drive, phi, which, steps, rate, coulomb, breakaway, pose, NODES, WEIGHTS)
+        return twists, poses
+
+    def _steps(self, dt: FloatArray) -> tuple[FloatArray, NDArray[np.intp], FloatArray]:
+        """(the lengths that occur, which of them each row has, their phi); of one row kept for the next call."""
+        if len(dt) > 1:
+            steps, which = np.unique(dt, return_inverse=True)
+            return steps, which, discretise(self._system, steps)
+        phi = self._phi.get(dt[0])
+        if phi is None:
+            phi = self._phi[dt[0]] = discretise(self._system, dt)
+        return dt, self._first, phi
 
 
 def axis_levels(robot: Robot, system: StateSpace) -> tuple[FloatArray, FloatArray, FloatArray]:

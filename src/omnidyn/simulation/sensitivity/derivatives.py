@@ -21,7 +21,16 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.release import start_state
 from omnidyn.run import Run
 from omnidyn.simulation.commands import Commands, commands, current_bounds
-from omnidyn.simulation.implicit.march import Outcome, begun, room
+from omnidyn.simulation.engine import (
+    TOLERANCE,
+    Implicit,
+    as_start,
+    as_tolerance,
+    cap_warnings,
+    implicit_motion,
+    named,
+)
+from omnidyn.simulation.implicit.march import Outcome, begun, capped, room
 from omnidyn.simulation.sensitivity.directions import (
     Directions,
     Prepared,
@@ -34,7 +43,7 @@ from omnidyn.simulation.sensitivity.directions import (
 from omnidyn.simulation.sensitivity.loop import run_loop_with_derivatives
 from omnidyn.simulation.sensitivity.march import march_with_derivatives
 from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, Samples
-from omnidyn.simulation.simulate import TOLERANCE, as_start, as_tolerance, implicit_run
+from omnidyn.simulation.simulate import as_run
 from omnidyn.simulation.view import seen_at_once
 
 RATE = "drive.rate_Hz"
@@ -129,7 +138,9 @@ def differentiate(
         outcome, ds, dposes, rows = found.outcome, found.dstate, found.dpose, found.keep[:-1]
         voltage, dvolts = found.voltage[rows], found.dvoltage[:, rows]
     assert voltage is not None
-    run = implicit_run(robot, given, voltage, outcome, tol)
+    motion = implicit_motion(robot, np.array([1.0, 1.0, length]), outcome, voltage)
+    warnings = cap_warnings(capped(outcome), len(given.dt))
+    run = as_run(robot, given, given, motion, named(Implicit.kind, tol), warnings)
     assert run.twist is not None
     dtwist = ds[..., :N_AXES].copy()
     dtwist[..., 2] = (dtwist[..., 2] - run.twist[:, 2, None] * stretch) / length

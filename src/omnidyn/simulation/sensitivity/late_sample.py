@@ -22,6 +22,7 @@ from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.step_bound import MONOTONE
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.commands import Commands, current_bounds
+from omnidyn.simulation.engine import as_tolerance
 from omnidyn.simulation.implicit.march import capped
 from omnidyn.simulation.sensitivity.derivatives import refuse_rate, run_with_derivatives
 from omnidyn.simulation.sensitivity.directions import (
@@ -35,7 +36,6 @@ from omnidyn.simulation.sensitivity.directions import (
 )
 from omnidyn.simulation.sensitivity.loop import LoopRun, run_loop_with_derivatives
 from omnidyn.simulation.sensitivity.sample import MEET, PATH, TURN, Samples, empty_samples
-from omnidyn.simulation.simulate import as_tolerance
 
 PIECES, ROUGH = 16, 1e-3  # steps in a row, at most; [m/s] the tolerance where they were more
 PATH_AND_TURN = [1, 2, 0]  # of the way, in the order of a twist
