@@ -23,10 +23,10 @@ from benchmarks.check_faults import FAULTS, draw
 from benchmarks.size import scaled
 from benchmarks.table import Table, machine, one_core
 from omnidyn.findings.check import check
-from omnidyn.findings.finding import NOTE
 from omnidyn.logs.log import Log
 from omnidyn.report.figures.raw_log import draw_raw_log
 from omnidyn.report.style import BLUE, GREY, VERMILLION, WIDTH, look, new_figure, picture
+from omnidyn.statement import NOTE
 from tests.support.random_logs import clean
 
 LOGS, CLEAN = scaled(200, 2), scaled(1000, 4)
@@ -51,7 +51,7 @@ def run_fault(name: str, logs: int = LOGS) -> Outcome:
         verdict = check(log, robot)
         sizes.append(size)
         found.append(fault.found(verdict, broken))
-        untrue += any(f.level != NOTE and f.code not in (*CODES[name], *fault.also) for f in verdict.findings)
+        untrue += any(f.severity != NOTE and f.code not in (*CODES[name], *fault.also) for f in verdict.findings)
     return Outcome(np.array(sizes), np.array(found), untrue)
 
 
@@ -69,9 +69,9 @@ def run_clean(logs: int = CLEAN) -> tuple[int, list[str]]:
     wrong, words = 0, []
     for seed in range(logs):
         log, robot, scene = clean(seed)
-        said = [f for f in check(log, robot).findings if f.level != NOTE]
+        said = [f for f in check(log, robot).findings if f.severity != NOTE]
         wrong += bool(said)
-        words += [f"clean log {seed} ({robot.name}, {scene.floor}): {f.code} {f.where}" for f in said]
+        words += [f"clean log {seed} ({robot.name}, {scene.floor}): {f.code} {f.subject}" for f in said]
     return wrong, words
 
 

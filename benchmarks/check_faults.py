@@ -33,7 +33,7 @@ class Fault(NamedTuple):
 
 
 def _named(verdict: Verdict, codes: tuple[str, ...], where: str) -> bool:
-    return any(f.code in codes and set(f.where.split()) == set(where.split()) for f in verdict.findings)
+    return any(f.code in codes and set(f.subject.split()) == set(where.split()) for f in verdict.findings)
 
 
 def _full_floor(scene: Scene) -> bool:
@@ -111,7 +111,7 @@ def put_lag(rng: Rng, scene: Scene, size: float):
 
 def found_lag(verdict: Verdict, broken: dict) -> bool:
     names = {"wheel_speed": ("wheel_speed", "current"), "twist": ("twist",), "current": ("current",)}[broken["name"]]
-    return any(f.code == "lag" and any(name in f.where for name in names) for f in verdict.findings)
+    return any(f.code == "lag" and any(name in f.subject for name in names) for f in verdict.findings)
 
 
 def put_gap(rng: Rng, scene: Scene, size: float):
@@ -250,7 +250,7 @@ FAULTS: dict[str, Fault] = {
     "inverted sign": Fault(1, 1, "one column", _any_check, put_inverted,
                            lambda v, b: _named(v, ("inverted",), b["where"])),
     "rpm as rad/s": Fault(1, 1, "9.55 times", lambda s: s.has_speed, put_rpm,
-                          lambda v, b: any(f.code == "unit" and "rpm" in f.message for f in v.findings)),
+                          lambda v, b: any(f.code == "unit" and "rpm" in str(f) for f in v.findings)),
     "one-sample lag": Fault(1, 1, "row", _any_check, put_lag, found_lag),
     "gap": Fault(3, 200, "rows", lambda s: True, put_gap, found_gap),
     "repeated stamps": Fault(1, 20, "rows", lambda s: True, put_repeats, found_repeats),

@@ -27,9 +27,8 @@ def table(room: str) -> str:
 
 def _cell(wording: Wording) -> str:
     """A template with the names of its numbers; of a function, what its docstring says."""
-    if isinstance(wording, str):
-        return re.sub(r"\{(\w+)[^}]*\}", r"*\1*", wording).replace("|", "\\|")
-    return " ".join((wording.__doc__ or "").split()).rstrip(".").replace("|", "\\|")
+    text = wording if isinstance(wording, str) else " ".join((wording.__doc__ or "").split()).rstrip(".")
+    return re.sub(r"\{(\w+)[^}]*\}", r"*\1*", text).replace("|", "\\|")
 
 
 if __name__ == "__main__":

@@ -115,6 +115,7 @@ _MAKERS = {
     shown.RUN: ("omnidyn.interop.runs", "run_of"),
     shown.SENTENCE: ("omnidyn.telling.codes", "sentence"),
     shown.REMEDY: ("omnidyn.telling.codes", "remedy"),
+    shown.DOCUMENT: ("omnidyn.telling.log_verdict", "document"),
 }
 
 

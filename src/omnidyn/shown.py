@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from omnidyn.document import Document
 
 HTML, FIGURE, FRAME, DATASET, RUN = "html", "figure", "frame", "dataset", "run"
-SENTENCE, REMEDY = "sentence", "remedy"
+SENTENCE, REMEDY, DOCUMENT = "sentence", "remedy", "document"
 
 _MAKERS: dict[str, Callable[..., Any]] = {}
 
 
 def made_by(**makers: Callable[..., Any]) -> None:
     """Who makes what: html(document), figure(result, **options), frame(result), dataset(run), run(table),
-    sentence(statement), remedy(statement)."""
+    sentence(statement), remedy(statement), document(verdict)."""
     _MAKERS.update(makers)
 
 

@@ -57,6 +57,11 @@ class Statement:
         before = self.numbers.get(PLACES, ())
         return replace(self, numbers={**self.numbers, PLACES: (places, *before)})
 
+    @property
+    def with_remedy(self) -> str:
+        """The sentence and the remedy in one line."""
+        return "; ".join(filter(None, (str(self), self.remedy_text)))
+
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; a number that is not finite is None."""
         return {

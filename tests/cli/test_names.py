@@ -58,8 +58,8 @@ def test_names_of_columns_and_files_say_nothing_of_their_own(call, here, more):
     assert code in (0, 4)
     assert quiet(out)
     assert quiet(err)
-    told = json.loads(out)["logs"][0]["findings"] if more else [{"message": " ".join(out.split())}]
-    assert any(r"ex\u001b[31mtra\u202e, ex\u202dtra" in each["message"] for each in told)
+    told = json.loads(out)["logs"][0]["findings"] if more else [{"text": " ".join(out.split())}]
+    assert any(r"ex\u001b[31mtra\u202e, ex\u202dtra" in each["text"] for each in told)
 
 
 def test_a_column_is_found_by_the_name_that_is_shown(call, here):
@@ -91,8 +91,8 @@ def test_our_own_colours_stay(capsys, monkeypatch):
     monkeypatch.setattr(streams.sys.stdout, "isatty", lambda: True, raising=False)
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.setenv("TERM", "xterm")
-    red = streams.painted("FATAL", "fatal")
-    assert red == "\x1b[31mFATAL\x1b[0m"
+    red = streams.painted("ERROR", "error")
+    assert red == "\x1b[31mERROR\x1b[0m"
     streams.show(f"{red}  \x1b[32mforged\x1b[0m\n")
     assert capsys.readouterr().out == f"{red}  \\u001b[32mforged\\u001b[0m\n\n"
 

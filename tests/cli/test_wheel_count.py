@@ -51,7 +51,7 @@ def test_a_run_in_memory_is_told_too():
     run = Run(np.arange(9) * 0.1, wheel_speed=np.ones((9, 3)), wheel_speed_command=np.ones((9, 3)))
     robot = load_robot("four-wheel")
     (finding,) = check(run, robot).of("wheel_count")
-    assert finding.level == "fatal"
+    assert finding.severity == "error"
     looped = robot.replace(drive=robot.drive.replace(kind="speed", kp=1.0, rate=100.0))
     with pytest.raises(InputError, match=r"another number of wheels; got 3; expected 4, as four-wheel has; give the"):
         record(run, looped)

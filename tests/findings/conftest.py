@@ -34,6 +34,6 @@ def grave():
     """The kinds of findings above a note."""
 
     def kinds(verdict):
-        return {finding.code for finding in verdict.findings if finding.level != "note"}
+        return {finding.code for finding in verdict.findings if finding.severity != "note"}
 
     return kinds

@@ -61,7 +61,7 @@ def test_what_is_no_mean_is_not_called_one(motor):
 
 def test_check_says_it_once():
     log = recorded(wheel_speed=lambda speed: np.column_stack([mean(each, 12) for each in speed.T]))
-    above = [(finding.code, finding.where) for finding in check(log, ROBOT).findings if finding.level != "note"]
+    above = [(finding.code, finding.subject) for finding in check(log, ROBOT).findings if finding.severity != "note"]
     assert above == [("averaged", "w1 w2 w3")]  # that it is late, too, is a consequence
     (finding,) = check(log, ROBOT).of("averaged")
     assert finding.numbers["seconds"] == pytest.approx(0.24)

@@ -46,24 +46,25 @@ def bag(tmp_path_factory):
 
 def test_a_gyroscope_in_degrees_is_asked_about_and_the_remedy_works(bag):
     verdict = check(load_log(bag, ROBOT), ROBOT)
-    assert [finding.code for finding in verdict.findings if finding.level != "note"] == []
-    doubts = [finding.message for finding in verdict.of("not_taken")]
+    assert [finding.code for finding in verdict.findings if finding.severity != "note"] == []
+    doubts = [str(finding) for finding in verdict.of("not_taken")]
     (gyroscope,) = [words for words in doubts if "/imu/data/omega" in words]
     assert "no turn rate of a robot in rad/s" in gyroscope
     for options in (LogOptions(assume={"omega": "deg/s"}), LogOptions(overrides=("omega=/imu/data/omega:deg/s",))):
         log = load_log(bag, ROBOT, options)
         assert np.nanmax(np.abs(log.channels["twist"][:, 2])) < 1.0
-        assert [finding.code for finding in check(log, ROBOT).findings if finding.level != "note"] == []
+        assert [finding.code for finding in check(log, ROBOT).findings if finding.severity != "note"] == []
     # Who insists on rad/s is told by the wheels.
     (finding,) = check(load_log(bag, ROBOT, LogOptions(assume={"omega": "rad/s"})), ROBOT).of("unit")
-    assert finding.where == "omega"
+    assert finding.subject == "omega"
 
 
 def test_messages_without_a_number_are_named(bag):
-    doubts = [finding for finding in check(load_log(bag)).of("not_taken") if "/odom" in finding.message]
-    assert [finding.message.partition(" look")[0] for finding in doubts] == ["/odom/heading", "/odom/vx, /odom/vy"]
-    assert "quaternion of zeros" in doubts[0].message
-    assert doubts[0].remedy == "look at what fills in these messages"
+    doubts = [finding for finding in check(load_log(bag)).of("not_taken") if "/odom" in str(finding)]
+    assert [finding.numbers["doubt"].columns for finding in doubts] == [("/odom/heading",), ("/odom/vx", "/odom/vy")]
+    assert "quaternion of zeros" in str(doubts[0])
+    assert [finding.numbers["doubt"].code for finding in doubts] == ["no_heading_number", "no_number"]
+    assert doubts[1].remedy_text == "look at what fills in these messages"
 
 
 # Bag of the case -> what is said above a note, with a robot; each has one cause.
@@ -84,5 +85,5 @@ def test_each_bag_of_the_cases_has_one_cause(tmp_path):
     found = {}
     for name in CAUSES:
         findings = check(load_log(tmp_path / name, ROBOT), ROBOT).findings
-        found[name] = [(finding.code, finding.where) for finding in findings if finding.level != "note"]
+        found[name] = [(finding.code, finding.subject) for finding in findings if finding.severity != "note"]
     assert found == CAUSES

@@ -19,8 +19,8 @@ def test_a_run_and_its_log_have_the_same_verdict():
 
 def test_two_wheels_swapped_are_found_in_memory_too():
     swapped = RUN.replace(wheel_speed=RUN.wheel_speed[:, [1, 0, 2]])
-    assert omnidyn.check(swapped, ROBOT).fatal
-    assert not omnidyn.check(RUN, ROBOT).fatal
+    assert omnidyn.check(swapped, ROBOT).has_errors
+    assert not omnidyn.check(RUN, ROBOT).has_errors
 
 
 def test_the_verdict_that_the_command_keeps_holds_no_log():

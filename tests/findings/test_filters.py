@@ -61,10 +61,10 @@ MADE = {
 def test_speeds_of_wheels_made_of_counts(log, robot, with_channels, made, words, rows):
     angle = counted(log)
     (found,) = check(with_channels(wheel_angle=angle, wheel_speed=MADE[made](angle)), robot).of("filtered")
-    assert found.message == words
-    assert found.level == "note"
+    assert str(found) == words
+    assert found.severity == "note"
     assert found.numbers["rows_late"] == pytest.approx(rows, abs=0.05)
-    assert found.remedy
+    assert found.remedy_text
 
 
 def test_speeds_over_the_floor_made_of_a_pose(log, robot, with_channels):
@@ -73,8 +73,8 @@ def test_speeds_over_the_floor_made_of_a_pose(log, robot, with_channels):
     rate = np.gradient(pose, STEP, axis=0)
     twist = np.einsum("kij,kj->ki", world_to_body(pose[:, 2]), rate)
     (made,) = check(with_channels(twist=twist), robot).of("filtered")
-    assert made.message.startswith("vx, vy and omega are centred differences")
-    assert made.message.endswith("of x and y and heading")
+    assert str(made).startswith("vx, vy and omega are centred differences")
+    assert str(made).endswith("of x, y and heading")
 
 
 def test_a_log_with_gaps_in_time_shows_it_too(log, robot, with_channels):
@@ -85,7 +85,7 @@ def test_a_log_with_gaps_in_time_shows_it_too(log, robot, with_channels):
     (found,) = check(replace(broken, t=broken.t[kept], lines=broken.lines[kept], channels=channels), robot).of(
         "filtered"
     )
-    assert "differences to the row before" in found.message
+    assert "differences to the row before" in str(found)
 
 
 @pytest.mark.parametrize("seed", range(4))

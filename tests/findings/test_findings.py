@@ -17,7 +17,7 @@ from omnidyn.run import CHANNELS, SCALAR, WHEEL
 
 
 def test_json_holds_no_nan():
-    finding = Finding("gap", "warn", "t", "a gap", "mend it", ((3, 4),), 1, {"size": float("nan")})
+    finding = Finding("padding", "warning", "t", {"size": float("nan")}, rows=((3, 4),), count=1)
     verdict = Verdict((finding,), {"x": float("inf")}, 10, float("nan"), 0.0, ("twist",), "a.csv")
     document = json.loads(json.dumps(verdict.to_dict(), allow_nan=False))
     assert document["findings"][0]["numbers"] == {"size": None}
@@ -41,12 +41,13 @@ def test_spans_are_lines_and_bounded():
 
 
 def test_merging_joins_what_touches_and_counts_all():
-    one = Finding("stuck", "warn", "w1", "first", "", ((2, 9),), 8)
-    two = Finding("stuck", "fatal", "w1", "second", "", ((10, 12), (40, 41)), 5)
+    one = Finding("placeholder", "warning", "w1", {"cell": 1.0, "times": 9.0}, rows=((2, 9),), count=8)
+    two = Finding("placeholder", "error", "w1", {"cell": 2.0, "times": 4.0}, rows=((10, 12), (40, 41)), count=5)
     both = merged([one, two], 7)
     assert both.rows == ((2, 12), (40, 41))
-    assert (both.count, both.level) == (13, "fatal")
-    assert both.message == "second (so in 2 of 7 blocks of the log)"
+    assert (both.count, both.severity) == (13, "error")
+    assert both.numbers == {"cell": 2.0, "times": 4.0, "blocks": 7, "in_blocks": 2}
+    assert str(both).endswith(" (so in 2 of 7 blocks of the log)")
 
 
 def mutilated(log, rng):
@@ -107,5 +108,5 @@ def test_no_log_makes_it_raise(log, robot):
 
 def test_what_a_log_shows_is_said_in_words(log, robot):
     text = " ".join(check(log, robot).as_text(200).split())
-    assert re.search(r"shows in motion for \d+ % of 20 s; x [\d.]+ m/s rms, up to [\d.]+; y ", text)
+    assert re.search(r"motion in motion for \d+ % of 20 s; x [\d.]+ m/s rms, up to [\d.]+; y ", text)
     assert re.search(r"yaw [\d.]+ rad/s rms, up to [\d.]+; turning in \d+ % of the motion; directions \d+ of 12;", text)

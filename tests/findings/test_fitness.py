@@ -1,4 +1,4 @@
-"""What a log is good for: each use yes, or no and why; and the verdict in a sentence."""
+"""What a log can be used for: each use yes, or no and why; and the verdict in a sentence."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def good(verdict):
 
 
 def words(verdict, name):
-    return next(use.words for use in verdict.uses if use.name == name)
+    return next(str(use.reason) for use in verdict.uses if use.name == name)
 
 
 @pytest.fixture
@@ -51,15 +51,18 @@ def run():
     return held(load_robot("axebot"))
 
 
-def test_a_full_log_is_good_for_all(run, robot):
+def test_a_full_log_is_usable_for_all(run, robot):
     verdict = check(run, robot)
     assert good(verdict) == GOOD
-    assert verdict.verdict == "Good for whole logs, steady state, motors and geometry; nothing to heed."
+    assert verdict.verdict == "Usable for whole logs, steady state, motors and geometry; no warning."
     assert str(verdict).splitlines()[0] == verdict.verdict
     assert words(verdict, "whole logs") == "voltage in, twist, wheel_speed, current and pose out"
     assert "stretches of constant speed, the force from current" in words(verdict, "steady state")
     assert "omni wheels at 180, 300 and 60 degrees" in words(verdict, "geometry")
-    assert verdict.to_dict()["uses"][0] == {"name": "whole logs", "good": True, "words": words(verdict, "whole logs")}
+    use = verdict.to_dict()["uses"][0]
+    assert (use["name"], use["good"], use["code"], use["text"]) == (
+        "whole logs", True, "serves_whole", words(verdict, "whole logs"),
+    )  # fmt: skip
 
 
 def test_a_run_is_checked_without_a_robot_too(run):
@@ -67,23 +70,23 @@ def test_a_run_is_checked_without_a_robot_too(run):
     assert good(verdict) == GOOD
     assert words(verdict, "whole logs").endswith("; with a robot file")
     assert words(verdict, "steady state").endswith("; with a robot file")
-    assert omnidyn.check(run.replace(warnings=("the clock was sorted",))).of("reading")[0].level == "note"
+    assert omnidyn.check(run.replace(warnings=("the clock was sorted",))).of("reading")[0].severity == "note"
 
 
 def test_pwm_without_a_unit_names_what_would_settle_it(pwm):
     verdict = check(load_log(pwm))
     assert verdict.useless
-    assert verdict.verdict == (
-        "Nothing can be done with this log: it holds no voltage and no duty: PWM1 .. PWM3, no unit is given (say "
-        "`assume` d=duty/255); enc1 .. enc3, counts per turn are not known (say `assume` "
-        "a=ticks/COUNTS_PER_TURN)."
-    )
-    assert words(verdict, "motors") == ("no motor input: PWM1 .. PWM3, no unit is given (say `assume` d=duty/255)")
+    assert verdict.conclusion.numbers["reason"].code == "no_input"
+    for settled in ("PWM1 .. PWM3, no unit is given", "(say `assume` d=duty/255)", "a=ticks/COUNTS_PER_TURN)"):
+        assert settled in verdict.verdict
+    assert words(verdict, "motors").startswith("no motor input: PWM1 .. PWM3, no unit is given")
     doubts = verdict.of("not_taken")
-    assert [each.message.partition(" look")[0] for each in doubts] == ["PWM1, PWM2, PWM3", "enc1, enc2, enc3"]
-    assert doubts[1].remedy == "say `assume` a=ticks/COUNTS_PER_TURN"
-    assert verdict.of("not_used")[0].message == "columns that nobody took: note"
-    assert "good for nothing" in verdict.headline()
+    columns = [finding.numbers["doubt"].columns for finding in doubts]
+    assert columns == [("PWM1", "PWM2", "PWM3"), ("enc1", "enc2", "enc3")]
+    assert doubts[1].numbers["doubt"].declarations == (("assume", "a=ticks/COUNTS_PER_TURN"),)
+    assert doubts[1].remedy_text == "say `assume` a=ticks/COUNTS_PER_TURN"
+    assert verdict.of("not_used")[0].numbers == {"columns": ("note",)}
+    assert verdict.conclusion.code == "not_usable"
 
 
 def test_the_units_it_names_settle_it(pwm):
@@ -91,7 +94,7 @@ def test_the_units_it_names_settle_it(pwm):
     assert good(verdict) == GOOD | {"geometry": False}
     assert words(verdict, "whole logs").endswith("with a robot file that has supply_V")
     assert words(verdict, "steady state").endswith("the force from duty; with a robot file that has supply_V")
-    assert verdict.verdict.startswith("Good for whole logs, steady state and motors, not for geometry")
+    assert verdict.verdict.startswith("Usable for whole logs, steady state and motors, not for geometry")
     assert not verdict.of("not_taken")
 
 
@@ -109,17 +112,17 @@ def test_a_duty_needs_its_battery(run, robot):
 def test_no_input(run, robot):
     verdict = check(run.replace(voltage=None, current=None), robot)
     assert good(verdict) == {"whole logs": False, "steady state": False, "motors": False, "geometry": True}
-    assert words(verdict, "whole logs") == "it holds no voltage and no duty"
+    assert words(verdict, "whole logs") == "holds no voltage and no duty"
     assert words(verdict, "steady state") == "no current and no motor input"
-    assert verdict.verdict == "Good for geometry, not for whole logs, steady state and motors; nothing to heed."
+    assert verdict.verdict == "Usable for geometry, not for whole logs, steady state and motors; no warning."
 
 
 def test_encoders_only(run, robot):
     turned = np.cumsum(run.wheel_speed, axis=0) * 0.01
     verdict = check(Run(t=run.t, wheel_angle=turned, source="counts.csv"), robot)
     assert verdict.useless
-    assert not verdict.fatal
-    assert verdict.verdict == "Nothing can be done with this log: it holds no voltage and no duty."
+    assert not verdict.has_errors
+    assert verdict.verdict == "Not usable: holds no voltage and no duty."
     with_volts = check(Run(t=run.t, wheel_angle=turned, voltage=run.voltage), robot)
     assert good(with_volts) == GOOD | {"geometry": False}
 
@@ -136,7 +139,7 @@ def test_too_short(run, robot):
     short = Run(t=run.t[:20], **{name: values[:20] for name, values in run.channels.items()})
     verdict = check(short, robot)
     assert verdict.useless
-    assert verdict.verdict.startswith("Nothing can be done with this log: 20 rows, too few to tell motion from noise")
+    assert verdict.verdict.startswith("Not usable: 20 rows, too few to tell motion from noise")
 
 
 def test_at_rest_all_the_time(run, robot):
@@ -147,7 +150,7 @@ def test_at_rest_all_the_time(run, robot):
     )  # fmt: skip
     verdict = check(still, robot)
     assert verdict.useless
-    assert verdict.verdict.startswith("Nothing can be done with this log: the robot never moves")
+    assert verdict.verdict.startswith("Not usable: the robot never moves")
 
 
 def test_commands_that_never_hold_have_no_steady_state(robot):
@@ -164,11 +167,11 @@ def test_another_robot(run):
     assert good(verdict)["motors"]
 
 
-def test_a_fatal_log_says_what_it_is_good_for_once_mended(run, robot):
+def test_a_faulty_log_says_what_it_can_be_used_for_once_corrected(run, robot):
     verdict = check(run.replace(wheel_speed=run.wheel_speed[:, [1, 0, 2]]), robot)
-    assert verdict.fatal
-    assert verdict.verdict.startswith("Not to be used as it stands: ")
-    assert "once that is mended, good for whole logs" in verdict.verdict
+    assert verdict.has_errors
+    assert verdict.verdict.startswith("Not usable as it stands: ")
+    assert "once corrected, usable for whole logs" in verdict.verdict
 
 
 def test_blocks_have_one_answer(run, robot):
@@ -182,4 +185,4 @@ def test_doubts_are_told_once_for_all_blocks(pwm):
     log = load_log(pwm)
     verdict = check_blocks([log.rows(slice(0, 200)), log.rows(slice(200, 400))])
     assert len(verdict.of("not_taken")) == 2
-    assert "blocks" not in verdict.of("not_taken")[0].message
+    assert "blocks" not in verdict.of("not_taken")[0].numbers

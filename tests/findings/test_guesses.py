@@ -27,21 +27,21 @@ def test_a_guessed_motor_is_no_reason_against_a_wheel():
     columns = load_map(case("logs/guessed_motor/map.toml"))
     log = load_log(case("logs/guessed_motor/ssl_tiny.csv"), robot, LogOptions(columns))
     verdict = check(log, robot)
-    assert not verdict.fatal
+    assert not verdict.has_errors
     (finding,) = verdict.of("dead")
-    assert (finding.level, finding.where) == ("warn", "w4")
-    assert "motor.resistance_ohm" in finding.message
+    assert (finding.severity, finding.subject) == ("warning", "w4")
+    assert "motor.resistance_ohm" in str(finding)
     assert [each.code for each in verdict.findings if each.rests_on] == ["dead"]  # its consequences are not told
 
 
 def test_a_guess_makes_no_finding_fatal(log, robot, with_channels, grave):
     """Currents of mA, by R: fatal for a data sheet, a doubt for a guess."""
     broken = with_channels(current=1e3 * log.channels["current"])
-    assert check(broken, robot).fatal
+    assert check(broken, robot).has_errors
     verdict = check(broken, guessed(robot))
-    assert not verdict.fatal
+    assert not verdict.has_errors
     assert grave(verdict) == {"unit"}
-    assert "let omnidyn identify fit" in verdict.of("unit")[0].remedy
+    assert "let omnidyn identify fit" in verdict.of("unit")[0].remedy_text
 
 
 def test_it_stays_or_goes_away_with_the_fitted_robot(log, robot):
@@ -49,10 +49,10 @@ def test_it_stays_or_goes_away_with_the_fitted_robot(log, robot):
     # Columns that are exchanged stay wrong whatever the motor is.
     swapped = replace(log, channels={**log.channels, "current": log.channels["current"][:, [1, 0, 2]]})
     before = check(swapped, guessed(robot))
-    assert before.of("swapped")[0].level == "warn"
+    assert before.of("swapped")[0].severity == "warning"
     (after,) = judged_by_fit([before], [swapped], robot, told.append, told.append)
-    assert after.of("swapped")[0].level == "fatal"
-    assert "so it is with the fitted robot" in after.of("swapped")[0].message
+    assert after.of("swapped")[0].severity == "error"
+    assert "so it is with the fitted robot" in str(after.of("swapped")[0])
     # A motor that was guessed wrong explains all of it, and the finding goes away.
     wrong = guessed(robot.replace(motor=robot.motor.replace(emf_constant=2.0 * robot.motor.emf_constant)))
     before = check(log, wrong)
@@ -60,7 +60,7 @@ def test_it_stays_or_goes_away_with_the_fitted_robot(log, robot):
     (after,) = judged_by_fit([before], [log], robot, told.append, told.append)
     assert not rest_on_guesses(after)
     assert not after.of("energy")
-    assert "with the fitted robot this is gone" in after.of("judged_again")[0].message
+    assert "with the fitted robot this is gone" in str(after.of("judged_again")[0])
     assert any("this is gone" in words for words in told)
 
 
@@ -73,4 +73,4 @@ def test_nothing_is_checked_twice_where_nothing_was_guessed(log, robot):
 def test_a_guess_of_one_wheel_counts(log, robot):
     motor = robot.motor.replace(resistance=1e-3 * np.ones(3) * robot.motor.resistance)
     one = robot.replace(motor=motor, priors={"motor.resistance_ohm[1]": Prior(origin="guess")})
-    assert not check(log, one).fatal
+    assert not check(log, one).has_errors

@@ -12,7 +12,7 @@ def test_saturation_and_its_share(log, robot, with_channels):
     voltage = log.channels["voltage"].copy()
     voltage[500:540, 1] = 6.0  # the limit of the AxeBot
     (finding,) = check(with_channels(voltage=voltage, current=None), robot).of("saturation")
-    assert finding.where == "u2"
+    assert finding.subject == "u2"
     assert finding.rows == ((502, 541),)
     assert finding.numbers["share"] == pytest.approx(40 / len(log))
 
@@ -21,7 +21,7 @@ def test_full_duty_needs_no_robot(log, with_channels):
     duty = log.channels["voltage"] / 6.0
     duty[100:150, 0] = -1.0
     (finding,) = check(with_channels(voltage=None, duty=duty)).of("saturation")
-    assert finding.where == "d1"
+    assert finding.subject == "d1"
 
 
 def test_a_battery_that_sags(log, robot, with_channels):
@@ -42,7 +42,7 @@ def test_a_duty_without_a_supply_is_noted(log, with_channels):
 
 def test_currents_without_a_sign(log, robot, with_channels, grave):
     verdict = check(with_channels(current=np.abs(log.channels["current"])), robot)
-    assert verdict.of("unsigned")[0].level == "fatal"
+    assert verdict.of("unsigned")[0].severity == "error"
     assert "inverted" not in grave(verdict)
 
 
@@ -55,7 +55,7 @@ def test_a_robot_that_never_moved(robot):
         "current": voltage / 1.69 + 0.01 * rng.normal(size=(n, 3)),
     }
     verdict = check(Log(np.arange(n) * 0.01, channels, np.arange(n) + 2), robot)
-    assert verdict.of("never_moved")[0].level == "fatal"
+    assert verdict.of("never_moved")[0].severity == "error"
     assert not verdict.of("blocked")
 
 
@@ -110,8 +110,8 @@ def test_what_a_straight_run_cannot_tell(robot):
     n, rng = 1500, np.random.default_rng(0)
     twist = np.column_stack([np.full(n, 0.5), np.zeros(n), np.zeros(n)]) + 0.005 * rng.normal(size=(n, 3))
     verdict = check(Log(np.arange(n) * 0.01, {"twist": twist}, np.arange(n) + 2), robot)
-    assert {finding.where for finding in verdict.of("not_excited")} == {"y", "yaw"}
-    assert [finding.where for finding in verdict.of("one_way")] == ["x"]
+    assert {finding.subject for finding in verdict.of("not_excited")} == {"y", "yaw"}
+    assert [finding.subject for finding in verdict.of("one_way")] == ["x"]
     assert verdict.of("one_speed")
     assert verdict.excitation["x"] == pytest.approx(0.5, rel=0.01)
     assert verdict.excitation["directions"] == 1
@@ -122,7 +122,7 @@ def test_excitation_of_blocks_is_that_of_the_whole(log, robot):
     parts = check_blocks((log.rows(slice(k, k + 500)) for k in range(0, len(log), 500)), robot)
     assert parts.excitation["x"] == pytest.approx(whole.excitation["x"], rel=0.15)
     assert parts.excitation["time_s"] == pytest.approx(whole.excitation["time_s"], rel=0.01)
-    assert not [finding for finding in parts.findings if finding.level != "note"]
+    assert not [finding for finding in parts.findings if finding.severity != "note"]
 
 
 def test_a_fault_in_one_block_is_found_with_its_lines(log, robot, with_channels):
@@ -130,19 +130,19 @@ def test_a_fault_in_one_block_is_found_with_its_lines(log, robot, with_channels)
     speed[:, [0, 1]] = speed[:, [1, 0]]
     broken = with_channels(wheel_speed=speed)
     (finding,) = check_blocks((broken.rows(slice(k, k + 500)) for k in range(0, len(log), 500)), robot).of("swapped")
-    assert finding.where == "w1 w2"
-    assert "blocks of the log" in finding.message
+    assert finding.subject == "w1 w2"
+    assert "blocks of the log" in str(finding)
 
 
 def test_guesses_of_a_robot_file_are_no_evidence_against_a_log(log, robot):
     """The back-EMF of a made-up motor is above the voltage: fatal for a data sheet, a hint for a guess."""
     strong = robot.replace(motor=robot.motor.replace(emf_constant=2.0 * robot.motor.emf_constant))
     (finding,) = check(log, strong).of("energy")
-    assert finding.level == "fatal"
+    assert finding.severity == "error"
     guess = strong.replace(priors={"motor.emf_constant_Vs_rad": Prior(origin="guess")})
     (finding,) = check(log, guess).of("energy")
-    assert finding.level == "warn"
-    assert "motor.emf_constant_Vs_rad of the robot file is only guessed" in finding.message
+    assert finding.severity == "warning"
+    assert "motor.emf_constant_Vs_rad of the robot file is only guessed" in str(finding)
 
 
 def test_an_input_that_outruns_the_rows(log, with_channels):
@@ -150,6 +150,6 @@ def test_an_input_that_outruns_the_rows(log, with_channels):
     half = len(log) // 2
     voltage[half:, 0] = 3.0 * (-1.0) ** np.arange(len(log) - half)
     (finding,) = check(with_channels(voltage=voltage)).of("too_fast")
-    assert finding.where == "u1"
+    assert finding.subject == "u1"
     assert finding.numbers["share"] == pytest.approx(0.5, abs=0.05)
     assert not check(log).of("too_fast")

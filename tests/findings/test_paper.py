@@ -27,14 +27,14 @@ def test_the_w_rows_of_table_1_are_impossible(table_1):
     emf = TABLE_3[EMF] * TABLE_3["motor.gear_ratio"] / TABLE_3["wheels.wheel_radius_m"]
     above = [row.speed * TABLE_3["wheels.robot_radius_m"] * emf > row.voltage[0] for row in TABLE_1["yaw"]]
     assert above == [False, True, True, True]
-    assert energy.level == "fatal"
+    assert energy.severity == "error"
     assert energy.rows == ((11, 13),)  # the last three of twelve rows, the first of them in line 2
     assert energy.count == 3
 
 
 def test_nothing_else_of_table_1_is_called_wrong(table_1):
     verdict = check(table_1, load_robot("axebot"))
-    assert {finding.code for finding in verdict.findings if finding.level != "note"} == {"energy"}
+    assert {finding.code for finding in verdict.findings if finding.severity != "note"} == {"energy"}
 
 
 def test_a_robot_radius_that_fits_makes_the_rows_possible(table_1):

@@ -64,7 +64,7 @@ def test_a_spike_is_found_among_the_samples_of_its_own_channel(tmp_path):
         values["vx"][400] += 3.0
 
     verdict = check(load_log(with_fault(spike).csv(tmp_path / "log.csv")), robot_of(tmp_path))
-    assert [(found.code, found.where, found.count) for found in verdict.findings] == [("spike", "vx", 1)]
+    assert [(found.code, found.subject, found.count) for found in verdict.findings] == [("spike", "vx", 1)]
     assert verdict.excitation["x_max"] < 0.5
 
 
@@ -73,7 +73,7 @@ def test_a_sensor_that_sticks_is_found_at_its_own_clock(tmp_path):
         values["omega"][300:420] = values["omega"][300]
 
     verdict = check(load_log(with_fault(stick).csv(tmp_path / "log.csv")), robot_of(tmp_path))
-    assert [(found.code, found.where, found.count) for found in verdict.findings] == [("stuck", "omega", 120)]
+    assert [(found.code, found.subject, found.count) for found in verdict.findings] == [("stuck", "omega", 120)]
     assert verdict.findings[0].numbers["longest_s"] == pytest.approx(119 * 0.02)
 
 
@@ -83,7 +83,7 @@ def test_a_topic_that_is_late_is_found_to_the_millisecond(tmp_path):
     parts[2] = parts[2].late(0.03)
     verdict = check(load_log(Logged.of(parts, SECONDS).csv(tmp_path / "log.csv")), robot_of(tmp_path))
     late = [found for found in verdict.findings if found.code == "lag"]
-    assert [found.where for found in late] == ["wheel_speed twist"]
+    assert [found.subject for found in late] == ["wheel_speed twist"]
     assert late[0].numbers["seconds"] == pytest.approx(-0.03, abs=1e-3)
 
 

@@ -25,7 +25,7 @@ def test_time_that_goes_back_is_fatal_with_its_lines():
     t = np.arange(200) * 0.01
     t[120:] -= 0.5
     (finding,) = check(ticking(t)).of("time_back")
-    assert finding.level == "fatal"
+    assert finding.severity == "error"
     assert finding.rows == ((122, 122),)
     assert finding.numbers["farthest_s"] == pytest.approx(0.49)
 
@@ -47,13 +47,13 @@ def test_repeated_stamps_are_counted():
     t = np.arange(300) * 0.01
     t[[50, 51, 200]] = t[[49, 49, 199]]
     (finding,) = check(ticking(t)).of("time_repeats")
-    assert (finding.level, finding.count) == ("warn", 3)
+    assert (finding.severity, finding.count) == ("warning", 3)
     assert finding.rows == ((52, 53), (202, 202))
 
 
 def test_a_clock_too_coarse_is_fatal():
     (finding,) = check(ticking(np.floor(np.arange(300) / 4) * 0.01)).of("time_repeats")
-    assert finding.level == "fatal"
+    assert finding.severity == "error"
 
 
 def test_padding_at_the_end_is_told_from_time_going_back():
@@ -68,14 +68,14 @@ def test_jitter_is_a_note_with_its_size():
     rng = np.random.default_rng(1)
     steps = 0.01 * (1.0 + 0.15 * rng.normal(size=2000).clip(-3, 3))
     (finding,) = check(ticking(np.cumsum(steps))).of("jitter")
-    assert finding.level == "note"
+    assert finding.severity == "note"
     assert finding.numbers["relative"] == pytest.approx(0.15, rel=0.1)
 
 
 @pytest.mark.parametrize("step", [10.0, 1e-5])
 def test_milliseconds_read_as_seconds_and_back(step):
     (finding,) = check(ticking(np.arange(300) * step)).of("time_unit")
-    assert finding.level == "fatal"
+    assert finding.severity == "error"
     assert finding.numbers["step_s"] == pytest.approx(step)
 
 
@@ -94,16 +94,16 @@ def test_rows_without_numbers_and_few_rows():
     values[[10, 11]] = np.nan
     assert check(ticking(t, supply=values)).of("empty_rows")[0].rows == ((12, 13),)
     values[:50] = np.nan
-    assert check(ticking(t, supply=values)).of("empty_rows")[0].level == "fatal"
+    assert check(ticking(t, supply=values)).of("empty_rows")[0].severity == "error"
     assert check(ticking(t[:5])).of("few_rows")
-    assert check(ticking([])).of("few_rows")[0].level == "fatal"
+    assert check(ticking([])).of("few_rows")[0].severity == "error"
 
 
 def test_a_run_refuses_what_is_called_fatal():
     t = np.arange(200) * 0.01
     t[120:] -= 0.5
     log = ticking(t)
-    assert check(log).fatal
+    assert check(log).has_errors
     with pytest.raises(InputError, match="time goes back"):
         log.to_run()
 
@@ -134,10 +134,10 @@ def test_angles_without_speeds_are_checked_as_speeds():
     channels = {name: values for name, values in log.channels.items() if name != "wheel_speed"}
     good = replace(log, channels={**channels, "wheel_angle": angle})
     assert check(good, robot).of("speed_from_angle")
-    assert not [finding for finding in check(good, robot).findings if finding.level != "note"]
+    assert not [finding for finding in check(good, robot).findings if finding.severity != "note"]
     swapped = replace(log, channels={**channels, "wheel_angle": angle[:, [1, 0, *range(2, angle.shape[1])]]})
     (finding,) = check(swapped, robot).of("swapped")
-    assert set(finding.where.split()) == {"w1", "w2"}
+    assert set(finding.subject.split()) == {"w1", "w2"}
 
 
 def test_a_few_rows_at_rest_are_no_impossible_energy():

@@ -11,6 +11,7 @@ from omnidyn.errors import InputError
 from omnidyn.logs.motor_table import read_motor_table
 from omnidyn.logs.read_log import load_log
 from tests.support.cases import case
+from tests.support.codes import said
 
 
 def made(name, folder):
@@ -43,7 +44,7 @@ def test_the_drive_is_what_the_name_says_and_no_sensor():
     log = load_log(case("logs/sensor_volts/one_way.csv"))
     assert log.columns.columns["d1"].name == "duty_pct"
     assert "u1" not in log.columns.columns
-    assert any("encoder_V looks like a1, but V is no unit of an angle" in doubt for doubt in log.columns.doubts)
+    assert any("encoder_V looks like a1, but V is no unit of an angle" in doubt for doubt in said(log.columns.doubts))
 
 
 @pytest.mark.long
@@ -59,7 +60,7 @@ def test_an_angle_that_jumps_by_360_is_asked_about(tmp_path, file, component):
     path = made("degrees_wrap", tmp_path) / file
     log = load_log(path)
     assert component not in log.columns.columns
-    assert "it jumps by 360 as degrees do" in log.columns.doubts[0]
+    assert "it jumps by 360 as degrees do" in said(log.columns.doubts)[0]
     assert ptp(read_log(path, columns={component: f"{path.stem}:deg"}), component) > 2.0 * np.pi
 
 

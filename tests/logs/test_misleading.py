@@ -8,6 +8,7 @@ from omnidyn.findings.check import check
 from omnidyn.logs.read_log import LogOptions, iter_logs, load_log, read_log
 from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.model.robot_file import load_robot
+from tests.support.codes import said
 
 VOLTS = "u1_V,u2_V,u3_V"
 
@@ -30,7 +31,7 @@ def test_milliseconds_without_leading_zeros_are_understood(write):
     path = write(text("time", map(bare, seconds)))
     run = read_log(path)
     np.testing.assert_allclose(run.t, seconds - seconds[0], atol=1e-3)
-    assert any("milliseconds without leading zeros" in words for words in run.warnings)
+    assert any("milliseconds without leading zeros" in words for words in said(run.warnings))
     pieces = list(iter_logs(path, rows=100))
     np.testing.assert_allclose(np.concatenate([piece.t for piece in pieces]), run.t, atol=1e-9)
 
@@ -46,7 +47,7 @@ def test_a_clock_that_goes_back_over_and_over_is_not_to_be_sorted(write):
         read_log(path)
     assert "`sort`" not in str(error.value)
     (finding,) = check(load_log(path)).of("time_back")
-    assert "do not sort the rows" in finding.remedy
+    assert "do not sort the rows" in finding.remedy_text
 
 
 # ---- a column of steps ----------------------------------------------------------------------------------
@@ -62,7 +63,7 @@ def test_a_column_of_step_times_is_summed_up(write, name, step):
     run = read_log(path)
     size = 0.02 / step
     np.testing.assert_allclose(run.t, size * (np.cumsum(steps) - steps[0]), atol=1e-6)
-    assert any("it is summed up" in words for words in run.warnings)
+    assert any("it is summed up" in words for words in said(run.warnings))
     pieces = list(iter_logs(path, rows=64))
     np.testing.assert_allclose(np.concatenate([piece.t for piece in pieces]), run.t, atol=1e-9)
 
@@ -87,7 +88,7 @@ def test_a_last_row_cut_in_mid_write_is_left_out(write, rest, rows):
     path = write(whole + rest)
     pieces = list(iter_tables(path, rows))
     assert sum(map(len, pieces)) == 250
-    assert "line 252, the last one, ends in the middle of a row: it was left out" in read_table(path).notes
+    assert "line 252, the last one, ends in the middle of a row: it was left out" in said(read_table(path).notes)
     with pytest.raises(InputError, match=":252: "):
         read_table(write(whole + rest + "\n"))
 
@@ -143,18 +144,18 @@ def three(names, rows=60):
 
 def test_a_column_that_is_mapped_is_no_longer_called_not_taken(write):
     path = write(three("speed_m1 [m/s],speed_m2 [m/s],speed_m3 [m/s]"))
-    plain = load_log(path).columns.doubts
+    plain = said(load_log(path).columns.doubts)
     assert any("speed_m1, speed_m2, speed_m3" in words for words in plain)
-    one = load_log(path, options=LogOptions(overrides=("w1=speed_m1:rad/s",))).columns.doubts
+    one = said(load_log(path, options=LogOptions(overrides=("w1=speed_m1:rad/s",))).columns.doubts)
     assert any("speed_m2, speed_m3" in words for words in one)
     assert not any("speed_m1" in words for words in one)
 
 
 def test_the_speed_of_a_rim_is_called_that(write):
-    (words,) = load_log(write(three("speed_m1 [m/s],speed_m2 [m/s],speed_m3 [m/s]"))).columns.doubts
+    (words,) = said(load_log(write(three("speed_m1 [m/s],speed_m2 [m/s],speed_m3 [m/s]"))).columns.doubts)
     assert "m/s is the speed of its rim: name the robot, whose radius of the wheels makes rad/s of it" in words
     assert "`assume`" not in words
-    (words,) = load_log(write(three("v1_m_s,v2_m_s,v3_m_s"))).columns.doubts
+    (words,) = said(load_log(write(three("v1_m_s,v2_m_s,v3_m_s"))).columns.doubts)
     assert words.startswith("v1_m_s, v2_m_s, v3_m_s look like w1, w2, w3, but m/s is the speed of its rim")
 
 
@@ -165,8 +166,8 @@ def test_the_speed_of_a_rim_is_that_of_the_wheel_times_its_radius(write, names):
     log = load_log(write(three(",".join(names.format(k) for k in (1, 2, 3)))), robot)
     size = 1e-3 if "mm" in names else 1.0
     assert log.channels["wheel_speed"] == pytest.approx(size * np.outer(np.arange(60), [13, 17, 7]) / 0.035)
-    assert not log.columns.doubts
-    assert sum("divided by the radius of the wheels" in note for note in log.notes) == 1
+    assert not said(log.columns.doubts)
+    assert sum("divided by the radius of the wheels" in note for note in said(log.notes)) == 1
 
 
 def test_a_rim_may_be_given_by_hand(write):
@@ -184,10 +185,10 @@ def test_a_rim_may_be_given_by_hand(write):
 
 def test_an_assumed_unit_of_nothing_is_said(write):
     path = write(three("w1,w2,w3"))
-    doubts = load_log(path, options=LogOptions(assume={"z": "rpm", "w": "rpm"})).columns.doubts
+    doubts = said(load_log(path, options=LogOptions(assume={"z": "rpm", "w": "rpm"})).columns.doubts)
     assert doubts == ("`assume` z=rpm is used for no column: there is none of this name or kind",)
     for fine in ({"w": "rpm"}, {"w2": "rpm"}):
-        assert load_log(path, options=LogOptions(assume=fine)).columns.doubts == ()
+        assert said(load_log(path, options=LogOptions(assume=fine)).columns.doubts) == ()
 
 
 def test_counts_called_a1_are_taken_where_their_unit_is_said(write):
@@ -215,4 +216,4 @@ def test_a_unit_may_be_said_of_all_columns_of_one_name(tmp_path):
     by_letter = load_log(path, options=LogOptions(assume={"a": "ticks/1440", "d": "duty/255"}))
     for name in ("wheel_angle", "duty"):
         assert np.array_equal(by_name.channels[name], by_letter.channels[name])
-    assert "assume" not in " ".join(by_name.columns.doubts)
+    assert "assume" not in " ".join(said(by_name.columns.doubts))

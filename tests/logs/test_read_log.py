@@ -10,6 +10,7 @@ from omnidyn.logs.log import component
 from omnidyn.logs.read_log import LogOptions, iter_logs, load_log, read_log
 from omnidyn.logs.run_file import write_run
 from omnidyn.run import Run
+from tests.support.codes import codes, said
 
 
 def write(tmp_path, text, name="log.csv"):
@@ -32,7 +33,7 @@ def test_speeds_of_the_motor_shaft_are_divided_by_the_gear(tmp_path):
     path = write(tmp_path, "t_s,motor1_rpm,motor2_rpm,motor3_rpm\n0,600,0,-600\n0.1,600,0,-600\n")
     run = read_log(path, load_robot("axebot"))
     np.testing.assert_allclose(run.wheel_speed[0], np.array([600, 0, -600]) * 2 * np.pi / 60 / 19)
-    assert any("no robot is given" in words for words in read_log(path).warnings)
+    assert any("no robot is given" in words for words in said(read_log(path).warnings))
 
 
 def test_a_run_file_is_a_log(tmp_path):
@@ -44,7 +45,7 @@ def test_a_run_file_is_a_log(tmp_path):
     assert (read.t == run.t).all()
     assert (read.voltage == run.voltage).all()
     assert (read.twist == run.twist).all()
-    assert read.warnings == ()
+    assert said(read.warnings) == ()
 
 
 def test_heading_is_unwrapped(tmp_path):
@@ -56,7 +57,7 @@ def test_epoch_time_keeps_its_digits(tmp_path):
     path = write(tmp_path, "t_ns,w1_rad_s\n1700000000000000000,1\n1700000000010000000,2\n1700000000020000000,3\n")
     run = read_log(path)
     np.testing.assert_allclose(run.t, [0.0, 0.01, 0.02], atol=1e-6)
-    assert any("counted from an epoch" in words for words in run.warnings)
+    assert any("counted from an epoch" in words for words in said(run.warnings))
 
 
 @pytest.mark.parametrize("form", ["2026-11-20T10:00:{}", "2026-11-20 10:00:{}+02:00", "2026-11-20T10:00:{}Z"])
@@ -64,7 +65,7 @@ def test_dates_are_a_clock(tmp_path, form):
     rows = "".join(f"{form.format(s)},{k}\n" for k, s in enumerate(("00.500", "00.750", "01.000")))
     run = read_log(write(tmp_path, "timestamp,w1_rad_s\n" + rows))
     np.testing.assert_allclose(run.t, [0.0, 0.25, 0.5], atol=1e-9)
-    assert any("timestamp holds dates" in words for words in run.warnings)
+    assert any("timestamp holds dates" in words for words in said(run.warnings))
     with pytest.raises(InputError, match=r"log.csv:5, column timestamp: not a date; got noon"):
         read_log(write(tmp_path, "timestamp,w1_rad_s\n" + rows + "noon,4\n"))
 
@@ -75,7 +76,7 @@ def test_time_that_goes_back_is_refused_or_sorted(tmp_path):
         read_log(path)
     run = read_log(path, sort=True)
     np.testing.assert_array_equal(run.wheel_speed[:, 0], [1, 2, 3, 4])
-    assert any("rows were sorted" in words for words in run.warnings)
+    assert any("rows were sorted" in words for words in said(run.warnings))
 
 
 def test_time_that_stands_still_is_refused(tmp_path):
@@ -88,8 +89,8 @@ def test_repeated_stamps_and_padding_are_left_out_in_words(tmp_path):
     path = write(tmp_path, "t_s,w1_rad_s\n0,1\n0.1,2\n0.1,9\n0.2,3\n0.3,4\n0,0\n0,0\n0,0\n")
     run = read_log(path)
     np.testing.assert_array_equal(run.wheel_speed[:, 0], [1, 2, 3, 4])
-    assert any("3 of 8 rows at the end repeat one row" in words for words in run.warnings)
-    assert any("1 of 5 rows repeat the time of the row before" in words for words in run.warnings)
+    assert any("3 of 8 rows at the end repeat one row" in words for words in said(run.warnings))
+    assert any("1 of 5 rows repeat the time of the row before" in words for words in said(run.warnings))
 
 
 def test_rows_without_numbers_are_left_out_up_to_a_fifth(tmp_path):
@@ -107,7 +108,8 @@ def test_a_log_on_change_holds_commands_and_makes_nothing_up(tmp_path):
     run = read_log(write(tmp_path, text))
     np.testing.assert_array_equal(run.voltage[:, 0], [1, 1, 1, 2, 2, 2])
     np.testing.assert_array_equal(run.wheel_speed[:, 0], [np.nan, 10, np.nan, np.nan, 40, np.nan])
-    assert any("u1 is recorded on change (67% of its cells are blank): held" in words for words in run.warnings)
+    (note,) = [warning for warning in run.warnings if warning.code == "on_change"]
+    assert (note.subject, note.numbers["held"], round(100 * note.numbers["blank"])) == ("u1", True, 67)
     late = read_log(write(tmp_path, text), latency={"w": 0.1})
     np.testing.assert_allclose(late.wheel_speed[:, 0], [10, np.nan, np.nan, 40, np.nan, np.nan])
 
@@ -116,7 +118,7 @@ def test_a_sensor_that_is_out_for_long_is_no_log_on_change(tmp_path):
     rows = [f"{0.1 * k:.1f},{k % 5},{'' if 40 <= k < 80 else k}" for k in range(100)]
     path = write(tmp_path, "t_s,u1_V,w1_rad_s\n" + "\n".join(rows))
     run, log = read_log(path), load_log(path)
-    assert not any("recorded on change" in words for words in run.warnings)
+    assert "on_change" not in codes(run.warnings)
     filled = log.aligned("wheel_speed", log.channels["wheel_speed"], [])
     np.testing.assert_array_equal(np.isnan(filled[:, 0]), (np.arange(100) >= 40) & (np.arange(100) < 80))
 
@@ -124,14 +126,15 @@ def test_a_sensor_that_is_out_for_long_is_no_log_on_change(tmp_path):
 def test_a_command_that_is_out_for_long_is_not_held(tmp_path):
     rows = [f"{0.1 * k:.1f},{'' if 40 <= k < 80 else k % 5},{k}" for k in range(100)]
     run = read_log(write(tmp_path, "t_s,u1_V,w1_rad_s\n" + "\n".join(rows)))
-    assert not any("recorded on change" in words for words in run.warnings)
+    assert "on_change" not in codes(run.warnings)
     np.testing.assert_array_equal(np.isnan(run.voltage[:, 0]), (np.arange(100) >= 40) & (np.arange(100) < 80))
 
 
 def test_a_command_on_change_is_held_however_long(tmp_path):
     rows = [f"{0.1 * k:.1f},{k / 10 if k % 3 == 0 and not 40 <= k < 80 else ''},{k}" for k in range(121)]
     run = read_log(write(tmp_path, "t_s,u1_V,w1_rad_s\n" + "\n".join(rows)))
-    assert any("u1 is recorded on change (77% of its cells are blank): held" in words for words in run.warnings)
+    (note,) = [warning for warning in run.warnings if warning.code == "on_change"]
+    assert (note.subject, note.numbers["held"], round(100 * note.numbers["blank"])) == ("u1", True, 77)
     np.testing.assert_array_equal(run.voltage[39:82, 0], [3.9] * 42 + [8.1])
 
 
@@ -144,7 +147,8 @@ def test_a_log_on_change_has_gaps_too(tmp_path):
     known = (np.arange(121) <= 39) | (np.arange(121) >= 81)
     np.testing.assert_array_equal(np.isfinite(filled), known)
     np.testing.assert_allclose(filled[known], np.arange(121)[known])
-    assert words == ["w1 is recorded on change (77% of its cells are blank): nothing is made up between"]
+    (note,) = words
+    assert (note.code, note.subject, note.numbers["held"]) == ("on_change", "w1", False)
 
 
 def test_rows_of_one_time_that_fill_each_other_s_blanks_are_one_row(tmp_path):
@@ -154,14 +158,14 @@ def test_rows_of_one_time_that_fill_each_other_s_blanks_are_one_row(tmp_path):
     np.testing.assert_allclose(run.t, 0.1 * np.arange(6))
     np.testing.assert_array_equal(run.voltage[:, 0], np.arange(6))
     np.testing.assert_array_equal(run.wheel_speed[:, 0], 10 * np.arange(6))
-    assert any("6 of 12 rows fill the blanks of a row of the same time: joined to it" in w for w in run.warnings)
+    assert any("6 of 12 rows fill the blanks of a row of the same time: joined to it" in w for w in said(run.warnings))
 
 
 def test_rows_of_one_time_that_contradict_each_other_are_not_joined(tmp_path):
     text = "t_s,u1_V,w1_rad_s\n0,1,10\n0,2,\n0.1,1,10\n0.1,1,10\n0.2,1,10\n"
     run = read_log(write(tmp_path, text))
     np.testing.assert_array_equal(run.voltage[:, 0], [1, 1, 1])
-    assert any("2 of 5 rows repeat the time of the row before" in words for words in run.warnings)
+    assert any("2 of 5 rows repeat the time of the row before" in words for words in said(run.warnings))
 
 
 @pytest.mark.parametrize(
@@ -174,7 +178,7 @@ def test_seconds_and_the_rest_of_a_second_are_one_time(tmp_path, names, size):
     cells = [f"{int(t)},{round((t - int(t)) * size)},{k}" for k, t in enumerate(times)]
     run = read_log(write(tmp_path, "\n".join([f"{names[0]},{names[1]},w1_rad_s", *cells])))
     np.testing.assert_array_equal(run.t, times - times[0])
-    assert any(f"t is {names[0]} + {1 / size:g} {names[1]}" in words for words in run.warnings)
+    assert any(f"t is {names[0]} + {1 / size:g} {names[1]}" in words for words in said(run.warnings))
     one = read_log(tmp_path / "log.csv", columns={"t": f"{names[0]}:s"})
     np.testing.assert_array_equal(one.t, [0.0, 1.0])  # one count a second, where the map says so
 
@@ -202,7 +206,7 @@ def test_a_latency_between_rows_makes_rows_of_its_own_and_changes_no_number(tmp_
     np.testing.assert_array_equal(run.wheel_speed[known, 0], 10 * np.arange(1, 6))
     np.testing.assert_allclose(run.t[~known], 0.1 * np.arange(6))
     np.testing.assert_array_equal(run.voltage[:, 0], [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5])
-    assert any("w1 was moved back by its latency of 0.03 s" in words for words in run.warnings)
+    assert any("w1 was moved back by its latency of 0.03 s" in words for words in said(run.warnings))
 
 
 def test_a_battery_holds_what_was_measured(tmp_path):
@@ -309,7 +313,7 @@ def test_a_clock_whose_counter_is_full_goes_on(tmp_path, unit, period, step):
     run = read_log(path)
     size = {"s": 1.0, "ms": 1e-3, "us": 1e-6}[unit]
     np.testing.assert_allclose(np.diff(run.t), step * size, rtol=1e-4)
-    assert any(f"starts over after {period:.6g} {unit}" in words for words in run.warnings)
+    assert any(f"starts over after {period:.6g} {unit}" in words for words in said(run.warnings))
     pieces = list(iter_logs(path, rows=150))
     np.testing.assert_allclose(np.concatenate([piece.t for piece in pieces]), run.t, rtol=1e-12)
 
@@ -324,4 +328,4 @@ def test_two_logs_in_one_file_are_no_full_counter_but_lie_apart(tmp_path):
     t = [*np.arange(0, 500, 10), *np.arange(0, 500, 10)]
     run = read_log(write(tmp_path, "t_ms,w1_rad_s\n" + "".join(f"{each},1\n" for each in t)))
     np.testing.assert_allclose(run.t[[49, 50, 99]], [0.49, 1.49, 1.98])
-    assert any("the time begins again in line 52, at 0 s after 0.49 s" in words for words in run.warnings)
+    assert any("the time begins again in line 52, at 0 s after 0.49 s" in words for words in said(run.warnings))

@@ -6,6 +6,7 @@ import pytest
 from omnidyn import read_log
 from omnidyn.cli import main
 from omnidyn.errors import InputError
+from tests.support.codes import said
 
 START = 1_700_000_000.0
 
@@ -25,7 +26,7 @@ def test_two_tables_of_one_clock_are_one_log(tmp_path):
     np.testing.assert_array_equal(speed[np.isfinite(speed)], np.arange(50.0))
     np.testing.assert_allclose(run.t[np.isfinite(heading)], late, atol=1e-6)
     np.testing.assert_array_equal(heading[np.isfinite(heading)], late / 2)
-    assert any("2 files are one experiment" in words for words in run.warnings)
+    assert any("2 files are one experiment" in words for words in said(run.warnings))
 
 
 def test_a_bag_and_a_table_are_one_log(tmp_path):

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from omnidyn.findings.check import check
-from omnidyn.findings.finding import FATAL
 from omnidyn.logs.read_log import LogOptions, load_log
 from omnidyn.model.robot_file import load_robot, robot_from_dict
+from omnidyn.statement import ERROR
 
 ROBOTINO = load_robot("robotino")
 POSE = ("x=xpos:1.84 mm", "y=ypos:1.84 mm")
@@ -37,7 +37,7 @@ def some(folder, first, last, step):
 
 
 def grave(verdict):
-    return {finding.code for finding in verdict.findings if finding.level != "note"}
+    return {finding.code for finding in verdict.findings if finding.severity != "note"}
 
 
 # ---- Robotino ----
@@ -46,18 +46,18 @@ def grave(verdict):
 def test_the_current_is_unsigned_with_its_step(gray):
     verdict = robotino(gray / "exp35.csv", unsigned=False, pose=False)
     (unsigned,) = verdict.of("unsigned")
-    assert unsigned.level == "fatal"
-    steps = [finding.numbers["step"] for finding in verdict.of("quantised") if finding.where.startswith("i")]
+    assert unsigned.severity == "error"
+    steps = [finding.numbers["step"] for finding in verdict.of("quantised") if finding.subject.startswith("i")]
     assert steps == [pytest.approx(0.0256, abs=1e-4)]
 
 
 def test_the_speed_counts_in_steps_and_the_slow_wheel_reads_0(gray):
     verdict = robotino(gray / "exp35.csv")
-    (steps,) = [finding for finding in verdict.of("quantised") if finding.where.startswith("w")]
+    (steps,) = [finding for finding in verdict.of("quantised") if finding.subject.startswith("w")]
     assert steps.numbers["step"] * 16 == pytest.approx(2.827, abs=1e-3)
-    assert "2.827 rad/s" in steps.message  # as it stands in the file, at the motor
+    assert "2.827 rad/s" in str(steps)  # as it stands in the file, at the motor
     (slow,) = verdict.of("reads_zero")
-    assert slow.where == "w2"
+    assert slow.subject == "w2"
 
 
 @pytest.mark.parametrize("first, droop", [(0, 0.72), (72, 0.86), (144, 0.90)])
@@ -107,7 +107,7 @@ def test_nothing_else_is_said_of_the_robotino(gray, green):
     allowed = {"droop", "path_ratio", "pose_frame", "reads_zero", "slip", "gap", "spike"}
     for path in [*some(gray, 0, 216, 1), *some(green, 0, 71, 2)]:
         verdict = robotino(path)
-        assert not verdict.fatal, path
+        assert not verdict.has_errors, path
         assert grave(verdict) <= allowed, path
 
 
@@ -124,7 +124,7 @@ def test_motors_off_the_ground_are_no_stuck_encoders(data):
     path = data / "robotino" / "dc_motor_model_identification" / "validation_data.csv"
     verdict = robotino(path, pose=False)
     assert grave(verdict) <= {"droop"}
-    assert not verdict.fatal
+    assert not verdict.has_errors
 
 
 def test_a_recording_that_is_given_twice(data, gray, capsys):
@@ -157,15 +157,15 @@ def udea(path):
 def test_positive_pwm_turns_the_heading_negative(data):
     verdict = udea(data / "udea_three_omni" / "rotation_tests" / "stage2_1.txt")
     (finding,) = verdict.of("inverted")
-    assert finding.where == "heading"
-    assert "all wheels have the opposite sign" in finding.message
+    assert finding.subject == "heading"
+    assert "all wheels have the opposite sign" in str(finding)
     assert grave(verdict) == {"inverted"}
 
 
 @pytest.mark.parametrize("number", [1, 2, 3, 4])
 def test_the_same_in_the_drives_through_all_their_noise(data, number):
     verdict = udea(data / "udea_three_omni" / "sensor_data" / f"exp{number}.txt")
-    assert [finding.where for finding in verdict.of("inverted")] == ["heading"]
+    assert [finding.subject for finding in verdict.of("inverted")] == ["heading"]
     assert grave(verdict) <= {"inverted", "spike"}
 
 
@@ -174,7 +174,7 @@ def test_noise_steps_and_spikes_of_the_wheel_speed(data):
     (steps,) = verdict.of("quantised")
     assert steps.numbers["step"] == pytest.approx(2.38, abs=0.01)
     assert 8.0 < steps.numbers["noise"] < 70.0
-    assert "hidden in a noise" in steps.message
+    assert "hidden in a noise" in str(steps)
     (spike,) = verdict.of("spike")
     assert abs(spike.numbers["farthest"]) == pytest.approx(381.0, abs=1.0)
     assert verdict.of("no_supply")
@@ -189,20 +189,20 @@ def test_the_last_row_has_no_duty(data):
 def test_the_camera_shoots_up_to_17_rad_per_s(data, number):
     path = data / "udea_three_omni" / "video_trajectories" / f"traj_vid_{number}.csv"
     verdict = check(load_log(path), UDEA)
-    (burst,) = [finding for finding in verdict.of("burst") if finding.where == "omega"]
+    (burst,) = [finding for finding in verdict.of("burst") if finding.subject == "omega"]
     assert 16.0 < abs(burst.numbers["farthest"]) < 19.0
     # Nothing else but that vx and vy are the rates of x and y, whatever the heading is.
     (frame,) = verdict.of("twist_frame")
     assert frame.numbers["likeness"] > 0.99
     assert abs(frame.numbers["likeness_as_logged"]) < 0.6
-    assert {finding.code for finding in verdict.findings if finding.level == FATAL} == {"twist_frame"}
+    assert {finding.code for finding in verdict.findings if finding.severity == ERROR} == {"twist_frame"}
 
 
 def test_a_heading_that_was_not_recorded(data):
     # In stage 1 the wheels turn at up to 45 % while alpha stays within 0.02 rad; in exp5 it is 0 from t = 10.2 s on.
     for path in ("motor_tests/stage1_1.txt", "motor_tests/stage1_2.txt", "sensor_data/exp5.txt"):
         (finding,) = udea(data / "udea_three_omni" / path).of("dead")
-        assert finding.where == "heading"
+        assert finding.subject == "heading"
 
 
 def test_the_drop_out_of_exp5(data):
@@ -232,4 +232,4 @@ def test_rows_of_nan_and_padding_and_nothing_else(data, name):
 def test_the_clock_of_the_header_is_wrong(data):
     # "8Hz" as stated: a row every 5 s.
     (finding,) = odrive(data, "step2", "0.125 s").of("time_unit")
-    assert finding.level == FATAL
+    assert finding.severity == ERROR

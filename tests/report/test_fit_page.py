@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.findings.finding import FATAL, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.identification.fit_document import number_table, verdict_table
 from omnidyn.logs.log import Log
 from omnidyn.report.figures.correlation import draw_correlation
 from omnidyn.report.figures.residuals import draw_residuals
 from omnidyn.report.fit_page import _noise, render_fit
+from omnidyn.statement import ERROR
 from tests.support.axebot_logs import excitation
 from tests.support.compared_logs import clean_log, noisy
 from tests.support.figures import shown_texts
@@ -116,11 +117,11 @@ def test_numbers_have_their_plain_names_beside_their_keys(found):
 
 def test_of_many_logs_the_table_shows_the_gravest(found):
     """250 logs were 250 rows."""
-    first, fatal = found.verdicts[0], Finding("dead", FATAL, "w1", "w1 is 0 in every row")
+    first, fatal = found.verdicts[0], Finding("dead", ERROR, "w1")
     many = [replace(first, source=f"{k}.csv", findings=(fatal,) if k == 40 else ()) for k in range(50)]
     table = verdict_table(many)
     assert len(table.rows) == 20
     assert table.rows[0][0] == "40.csv"
     assert table.rows[-1][0] == "and 31 more"
-    assert table.rows[-1][-1].endswith("of all 50 logs, 49 have nothing to heed")
+    assert table.rows[-1][-1].endswith("of all 50 logs, 49 have no error or warning")
     assert len(verdict_table(many[:20]).rows) == 20

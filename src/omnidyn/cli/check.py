@@ -14,16 +14,16 @@ from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.progress import progress
 from omnidyn.cli.terminal.streams import painted, say, show, show_json, width
-from omnidyn.errors import InputError, OmnidynError, printable
+from omnidyn.errors import InputError, OmnidynError
 
 if TYPE_CHECKING:
-    from omnidyn.findings.finding import Finding, Verdict
+    from omnidyn.findings.finding import Verdict
     from omnidyn.logs.log import Log
     from omnidyn.logs.read_log import LogOptions
     from omnidyn.model.robot import Robot
+    from omnidyn.statement import Statement
 
 BLOCK = 500_000  # rows that are held at once
-WHOLE = 3  # logs that are shown one by one in full
 BAD_INPUT, INSUFFICIENT = 3, 4
 
 
@@ -36,7 +36,7 @@ class Checked:
     error: OmnidynError | None = None
     digest: str = ""
     sha256: str = ""
-    notes: tuple[str, ...] = ()
+    notes: tuple[Statement, ...] = ()
     log: Log | None = None  # its first block, where that is drawn
 
 
@@ -45,16 +45,17 @@ def check(
     log: list[str] = log_options.LOGS,
     robot: str = typer.Option("", "--robot", metavar="ROBOT", help="The robot of the logs: a preset or a robot file."),
     picture: str = typer.Option("", "--picture", metavar="FILE", help="The raw log with what was found, .png or .svg."),
-    full: bool = typer.Option(False, "--full", help="Every finding of every log, however many logs."),
+    full: bool = typer.Option(False, "--full", help="Every finding of every log, notes too."),
     flags: LogFlags = NO_FLAGS,
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
     json: bool = typer.Option(False, "--json", help="The verdicts for machines."),
 ) -> None:
-    """Say what logs are good for and what is wrong with them: which rows, why, and what to do.
+    """Say what logs can be used for and what is wrong with them: which rows, why, and what to do.
 
-    First what a log is good for: whole logs, steady state, motors, geometry. Then time base, sensors, units, wiring,
-    scales, slip, lag, limits, energy, and what the log excites. Without a robot what needs none is checked. Exit code 4
-    when a finding is fatal or nothing can be done with a log, 3 when one could not be read; the rest is still shown.
+    First what a log can be used for: whole logs, steady state, motors, geometry. Then time base, sensors, units,
+    wiring, scales, slip, lag, limits, energy, and what the log excites. Without a robot, what needs none is checked.
+    Exit code 4 when a log has errors or cannot be used for anything, 3 when one could not be read; the rest is still
+    shown.
     """
     if picture and (len(log) > 1 or os.path.isdir(log[0])):
         raise InputError("a picture shows one log", got=" ".join(log), expected="one file", where="--picture")
@@ -71,9 +72,9 @@ def check(
     _tell(done, json, full, robot)
     if picture:
         _draw(done[0], picture, force)
-    if any(each.error is not None for each in done):
+    if any(log.error is not None for log in done):
         raise typer.Exit(BAD_INPUT)
-    if any(each.verdict is not None and (each.verdict.fatal or each.verdict.useless) for each in done):
+    if any(log.verdict is not None and (log.verdict.has_errors or log.verdict.useless) for log in done):
         raise typer.Exit(INSUFFICIENT)
 
 
@@ -155,106 +156,54 @@ def _compare_data(done: list[Checked]) -> None:
     """Logs that hold the same numbers under two names: evidence that counts once."""
     from dataclasses import replace
 
-    from omnidyn.findings.finding import WARN, Finding, in_order
+    from omnidyn.findings.finding import Finding, in_order
+    from omnidyn.statement import WARNING
 
     first: dict[str, Checked] = {}
-    for each in done:
-        if each.verdict is None:
+    for log in done:
+        if log.verdict is None:
             continue
-        other = first.setdefault(each.digest, each)
-        if other is not each:
-            finding = Finding(
-                "same_data", WARN, "", f"it holds the same numbers as {other.path}",
-                "leave one of them out: they are one recording, not two", (), 0, {},
-            )  # fmt: skip
-            each.verdict = replace(each.verdict, findings=in_order([*each.verdict.findings, finding]))
+        other = first.setdefault(log.digest, log)
+        if other is not log:
+            finding = Finding("same_data", WARNING, "", {"other": other.path})
+            log.verdict = replace(log.verdict, findings=in_order([*log.verdict.findings, finding]))
 
 
 def _tell(done: list[Checked], json: bool, full: bool, robot: str) -> None:
-    for each in done:
-        if each.error is not None:
-            say(f"omnidyn: error: {each.error}")
+    for log in done:
+        if log.error is not None:
+            say(f"omnidyn: error: {log.error}")
+        for note in log.notes if full or len(done) == 1 else ():
+            say(f"omnidyn: {log.path}: {note}")
     if json:
         show_json(_document(done, robot))
         return
-    read = [each for each in done if each.verdict is not None]
+    from omnidyn.telling import log_verdict
+
+    read = [log.verdict for log in done if log.verdict is not None]
+    documents = []
     if len(done) > 1:
-        show(_overall(done) + "\n")
-    for each in read:
-        assert each.verdict is not None
-        for note in each.notes if full or len(read) <= WHOLE else ():
-            say(f"omnidyn: {each.path}: {note}")
-        show(each.verdict.as_text(width()) if full or len(read) <= WHOLE else _brief(each.verdict))
-    if len(done) > 1:
-        show(_summary(done, read))
+        documents.append(log_verdict.of_several({log.path: log.verdict for log in done}, width(), full))
+    if full:
+        documents += [verdict.document() for verdict in read]
+    elif len(done) == 1:
+        documents += [log_verdict.in_brief(verdict, width()) for verdict in read]
+    for document in documents:
+        show(document.to_text(width(), painted))
 
 
 def _document(done: list[Checked], robot: str) -> dict[str, Any]:
     from omnidyn.cli.terminal.session import provenance, robot_input
+    from omnidyn.telling.log_verdict import overall
 
     logs = [
-        each.verdict.to_dict() | {"source": each.path, "notes": list(each.notes)}
-        for each in done
-        if each.verdict is not None
+        log.verdict.to_dict() | {"source": log.path, "notes": [note.to_dict() for note in log.notes]}
+        for log in done
+        if log.verdict is not None
     ]
-    errors = [{"source": each.path, "error": str(each.error)} for each in done if each.error is not None]
-    inputs = [{"role": "log", "name": each.path, "sha256": each.sha256} for each in done if each.verdict is not None]
+    errors = [{"source": log.path, "error": str(log.error)} for log in done if log.error is not None]
+    inputs = [{"role": "log", "name": log.path, "sha256": log.sha256} for log in done if log.verdict is not None]
     record = provenance([*([robot_input(robot)] if robot else []), *inputs])
-    fatal = any(log["fatal"] for log in logs)
-    verdict = logs[0]["verdict"] if len(done) == 1 and logs else _overall(done)
-    return {"verdict": verdict, "logs": logs, "unread": errors, "fatal": fatal, "provenance": record}
-
-
-def _overall(done: list[Checked]) -> str:
-    """All logs in a sentence: how many are good for what, and how many cannot be used as they stand."""
-    from omnidyn.document import all_of
-
-    read = [each.verdict for each in done if each.verdict is not None]
-    alike: dict[int, list[str]] = {}
-    for use in read[0].uses if read else ():
-        count = sum(each.good for verdict in read for each in verdict.uses if each.name == use.name)
-        alike.setdefault(count, []).append(use.name)
-    words = [f"{_are(count)} good for {all_of(names)}" for count, names in sorted(alike.items(), reverse=True) if count]
-    bad = {
-        "fatally wrong": sum(verdict.fatal and not verdict.useless for verdict in read),
-        "good for nothing": sum(verdict.useless for verdict in read),
-        "unreadable": len(done) - len(read),
-    }
-    words += [f"{_are(count)} {what}" for what, count in bad.items() if count]
-    return f"Of {len(done)} logs {'; '.join(words)}."
-
-
-def _are(count: int) -> str:
-    return f"{count} {'is' if count == 1 else 'are'}"
-
-
-def _brief(verdict: Verdict) -> str:
-    """One log in a line: its findings by name."""
-    from omnidyn.findings.finding import FATAL, LABELS, WARN
-    from omnidyn.findings.use import good_for
-
-    parts = []
-    for level in (FATAL, WARN):
-        codes = [f"{each.code} {each.where}".rstrip() for each in verdict.findings if each.level == level]
-        if codes:
-            parts.append(f"{painted(LABELS[level], level)} {', '.join(codes)}")
-    return f"{verdict.source}: {'; '.join(parts) or 'nothing to heed'}; {good_for(verdict.uses)}"
-
-
-def _summary(done: list[Checked], read: list[Checked]) -> str:
-    """What was found over all logs: each kind once, in how many logs, with one example."""
-    from omnidyn.findings.finding import LABELS, LEVELS
-
-    groups: dict[tuple[str, str], list[tuple[str, Finding]]] = {}
-    for each in read:
-        for finding in each.verdict.findings if each.verdict is not None else ():
-            groups.setdefault((finding.level, finding.code), []).append((each.path, finding))
-    lines = [f"{len(done)} logs, {len(read)} read:"]
-    for (level, code), members in sorted(groups.items(), key=lambda kind: (LEVELS.index(kind[0][0]), -len(kind[1]))):
-        logs = len({path for path, _ in members})
-        path, example = members[0]
-        word = painted(f"{LABELS[level]:5s}", level)
-        lines.append(f"  {word}  {code}: in {logs} log{'s' * (logs > 1)}, such as {printable(path)}: {example.message}")
-        if example.remedy:
-            lines.append(f"         -> {example.remedy}")
-    return "\n".join(lines)
+    verdict = logs[0]["verdict"] if len(done) == 1 and logs else overall({log.path: log.verdict for log in done})
+    has_errors = any(log["has_errors"] for log in logs)
+    return {"verdict": verdict, "logs": logs, "unread": errors, "has_errors": has_errors, "provenance": record}

@@ -233,7 +233,7 @@ class Maps:
         """
         from omnidyn.logs.columns.mapping import save_map
 
-        taken, told = tuple(columns.lines()), tuple(f"doubt: {words}" for words in columns.doubts)
+        taken, told = tuple(columns.lines()), tuple(f"doubt: {doubt.with_remedy}" for doubt in columns.doubts)
         if (taken, told) in self.said:
             return
         if self.save and not self.said:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from omnidyn.document import all_of
-from omnidyn.findings.finding import WARN, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.clocks import at_each_clock
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.logs.averaged import rows_of_mean
 from omnidyn.logs.channels import place
+from omnidyn.statement import WARNING
 
 SPEEDS = ("wheel_speed", "twist")
 
@@ -18,7 +18,7 @@ def check_averaged(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     if not work.step > 0.0:
         return [], work
     found, _ = at_each_clock(work, _at_its_clock)
-    late = {place(each.where.split()[0])[0]: each.numbers["late_s"] for each in found}  # type: ignore[index]
+    late = {place(each.subject.split()[0])[0]: each.numbers["late_s"] for each in found}  # type: ignore[index]
     return found, work.knowing(late=late)
 
 
@@ -40,12 +40,7 @@ def late_by(work: LogUnderCheck, channel: str) -> float:
 
 
 def _finding(names: list[str], rows: int, step: float) -> Finding:
-    ms = rows * step * 1e3
     return Finding(
-        "averaged", WARN, " ".join(names),
-        f"{all_of(names)} {'is a mean' if len(names) == 1 else 'are means'} over {rows} rows ({ms:.3g} ms): "
-        f"{0.5 * (ms - step * 1e3):.3g} ms late, and slow to show a start",
-        "log the speed of a shorter window (a setting of many motor controllers), or the position; `what` motors of "
-        "identify takes the mean into account, other fits may find too small a dead band", (), 0,
+        "averaged", WARNING, " ".join(names),
         {"rows": rows, "seconds": rows * step, "late_s": 0.5 * (rows - 1) * step},
     )  # fmt: skip

@@ -17,7 +17,7 @@ from omnidyn.findings.averaged import check_averaged
 from omnidyn.findings.energy import check_energy
 from omnidyn.findings.excitation import check_excitation, joined, judge
 from omnidyn.findings.filters import check_filters
-from omnidyn.findings.finding import FATAL, NOTE, Finding, Verdict, in_order, merged
+from omnidyn.findings.finding import Finding, Verdict, in_order, merged
 from omnidyn.findings.fitness import uses
 from omnidyn.findings.guesses import with_guesses
 from omnidyn.findings.limits import check_limits
@@ -35,10 +35,10 @@ from omnidyn.findings.values.echo import check_echo
 from omnidyn.findings.values.values import check_values
 from omnidyn.findings.wiring.twist_frame import check_twist_frame
 from omnidyn.findings.wiring.wheels import check_wiring
-from omnidyn.logs.columns.guessed import NO_NUMBER
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_run
+from omnidyn.statement import ERROR, NOTE
 
 __all__ = ["check", "check_blocks", "check_log"]
 
@@ -49,7 +49,6 @@ FAMILIES: tuple[Family, ...] = (
     check_motion, check_oddities, check_excitation,
 )  # fmt: skip
 
-OTHER_NAME = "give the column another name, or say what it is: `column`"
 # What only a whole log can show: dropped unless every block shows it.
 WHOLE = ("never_moved", "few_rows")
 # What is said of the columns, once for all blocks of a log.
@@ -62,8 +61,8 @@ def check(log: Log | Run, robot: Robot | None = None) -> Verdict:
     """Everything that a log shows about itself, and, with a robot, about how the two fit together.
 
     log: as `load_log` reads it, or a Run in memory: then rows are its samples, counted from 0, and faults of its time
-    base are gone, for a Run has none. The verdict is fatal where the log gives wrong results as it stands; it says
-    what the log is good for, and keeps it, to be drawn by its `plot()`.
+    base are gone, for a Run has none. The verdict has errors where the log gives wrong results as it stands; it says
+    what the log can be used for, and keeps it, to be drawn by its `plot()`.
     Never raises for what the log holds; InputError for what is neither, or where log and robot are swapped.
     """
     check_order("check(log) or check(log, robot)", (log, (Log, Run)), (robot, (Robot, type(None))))
@@ -101,12 +100,7 @@ def work_has(log: Log, channel: str) -> bool:
 def _no_channel(log: Log) -> list[Finding]:
     if any(work_has(log, name) for name in log.channels) or not len(log):
         return []
-    unused = log.columns.unused
-    names = f" of {', '.join(unused[:6])}{', ...' * (len(unused) > 6)}" if unused else ""
-    return [Finding(
-        "no_channel", FATAL, "", f"no column but the time is known: nothing was checked{names}",
-        "say which column is what: `column` w1=NAME:rad/s, or `map` FILE", (), 0, {},
-    )]  # fmt: skip
+    return [Finding("no_channel", ERROR, "", {"unused": log.columns.unused})]
 
 
 def _about_columns(log: Log) -> list[Finding]:
@@ -115,28 +109,18 @@ def _about_columns(log: Log) -> list[Finding]:
     Of a Run, what its reader said.
     """
     columns = log.columns
-    found = []
-    for words in columns.doubts:
-        message, _, remedy = words.partition("; say ")
-        other = "look at what fills in these messages" if NO_NUMBER in words else OTHER_NAME
-        remedy = f"say {remedy}" if remedy else other
-        found.append(Finding(DOUBT, NOTE, "", message, remedy, (), 0, {}))
-    doubted = " ".join(columns.doubts)
-    unused = [name for name in columns.unused if name not in doubted]
-    if unused:
-        found.append(Finding(UNUSED, NOTE, "", f"columns that nobody took: {', '.join(unused)}", "", (), 0, {}))
+    found = [Finding(DOUBT, NOTE, "", {"doubt": doubt}) for doubt in columns.doubts]
+    if columns.passed_over:
+        found.append(Finding(UNUSED, NOTE, "", {"columns": columns.passed_over}))
     notes = () if columns.columns else log.notes
-    return found + [Finding(READING, NOTE, "", words, "", (), 0, {}) for words in notes]
+    return found + [Finding(READING, NOTE, "", {"note": note}) for note in notes]
 
 
 def _other_count(log: Log, robot: Robot | None) -> list[Finding]:
     if robot is None or log.wheels is None or log.wheels == robot.wheels.count:
         return []
-    return [Finding(
-        "wheel_count", NOTE if log.wheels == 1 else FATAL, "", f"the log has {log.wheels} "
-        f"wheel{'s' * (log.wheels > 1)} or motors, the robot {robot.wheels.count}: what needs the robot was not "
-        "checked", "give the robot that the log is of", (), 0, {},
-    )]  # fmt: skip
+    numbers = {"wheels": log.wheels, "of_robot": robot.wheels.count}
+    return [Finding("wheel_count", NOTE if log.wheels == 1 else ERROR, "", numbers)]
 
 
 def check_blocks(blocks: Iterable[Log], robot: Robot | None = None) -> Verdict:
@@ -145,6 +129,7 @@ def check_blocks(blocks: Iterable[Log], robot: Robot | None = None) -> Verdict:
     Findings of one kind and place are joined; what only a whole log can show has to hold in every block.
     """
     found: dict[tuple[str, str], list[Finding]] = {}
+    once: list[Finding] = []
     parts, good, rows, duration, rates, channels, source = [], [], 0, 0.0, [], (), ""
     last: tuple[float, int] | None = None
     count = 0
@@ -154,10 +139,10 @@ def check_blocks(blocks: Iterable[Log], robot: Robot | None = None) -> Verdict:
         good.append(verdict.uses)
         more, last = between(last, block, verdict.rate)
         for finding in (*more, *verdict.findings):
-            of_columns = finding.code in OF_COLUMNS
-            if finding.code not in OF_EXCITATION and not (of_columns and count > 1):
-                place = finding.message if of_columns else finding.where
-                found.setdefault((finding.code, place), []).append(finding)
+            if finding.code in OF_COLUMNS:
+                once += [finding] if count == 1 else []
+            elif finding.code not in OF_EXCITATION:
+                found.setdefault((finding.code, finding.subject), []).append(finding)
         parts.append(verdict.excitation)
         rows, duration = rows + verdict.rows, duration + verdict.duration
         rates.append(verdict.rate)
@@ -166,5 +151,5 @@ def check_blocks(blocks: Iterable[Log], robot: Robot | None = None) -> Verdict:
     known = joined(parts)
     length = float(np.mean(robot.wheels.robot_radius)) if robot is not None else 0.15
     rate = float(np.median(rates)) if rates else 0.0
-    findings = in_order([*together, *judge(known, length)])
+    findings = in_order([*once, *together, *judge(known, length)])
     return Verdict(findings, known, rows, duration, rate, channels, source, joined_uses(good))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.findings.finding import FATAL, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, volts
 from omnidyn.findings.signal.robust import white_noise
@@ -18,6 +18,7 @@ from omnidyn.model.mass import mass_matrix
 from omnidyn.model.motor import back_emf, settled_current, wheel_torque
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed
+from omnidyn.statement import ERROR
 
 MARGIN = 0.08  # of the power that turns with the back-EMF: K, R and the gear are not known better
 WINDOW = 0.4  # [s]
@@ -38,12 +39,8 @@ def check_energy(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         return [], work
     excess = _excess(robot, voltage[bad], speed[bad])
     return [Finding(
-        "energy", FATAL, "",
-        f"the motors would take up to {worst:.3g} W out of the robot while it does not slow down: the back-EMF is "
-        f"{excess:.3g} times the voltage applied",
-        "these rows cannot be of this robot file: check K, gear ratio, wheel and robot radius, and the units of "
-        "voltage and speed", work.lines(bad), int(bad.sum()), {"worst_W": worst, "emf_over_voltage": excess},
-        OF_BACK_EMF,
+        "energy", ERROR, "", {"worst_W": worst, "emf_over_voltage": excess}, rows=work.lines(bad), count=int(bad.sum()),
+        rests_on=OF_BACK_EMF,
     )], work  # fmt: skip
 
 

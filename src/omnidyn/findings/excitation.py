@@ -7,13 +7,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.findings.finding import NOTE, SECTORS, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, wheels_twist
 from omnidyn.findings.signal.robust import smooth
 from omnidyn.model.frames import AXES
 from omnidyn.model.wheels import twist_from_wheel_speed
+from omnidyn.statement import NOTE
 
+SECTORS = 12  # of directions of travel
 HARDLY = 0.1  # of the motion along the axis that moves most
 SPEEDS = 2.0  # fastest over slowest motion, below which viscous and dry friction look alike
 
@@ -89,25 +91,13 @@ def judge(known: Mapping[str, float], length: float = 0.15) -> list[Finding]:
         return found
     for axis, size in sizes.items():
         if size < HARDLY * max(sizes.values()):
-            found.append(Finding(
-                "not_excited", NOTE, axis, f"the robot hardly moves {'about' if axis == 'yaw' else 'along'} {axis} "
-                f"({known[axis]:.3g} {'rad/s' if axis == 'yaw' else 'm/s'} rms)",
-                f"friction and inertia of {axis} cannot be told from this log; add a run that "
-                + ("turns" if axis == "yaw" else f"drives along {axis}"), (), 0, {"rms": known[axis]},
-            ))  # fmt: skip
+            found.append(Finding("not_excited", NOTE, axis, {"rms": known[axis]}))
         elif known[f"forward_{axis}"] > 0.05 > 20.0 * known[f"backward_{axis}"] or (
             known[f"backward_{axis}"] > 0.05 > 20.0 * known[f"forward_{axis}"]
         ):
-            found.append(Finding(
-                "one_way", NOTE, axis, f"{axis} moves one way only", "friction that differs forward and backward, and "
-                "an offset of a sensor, cannot be told from this log; drive both ways", (), 0, {},
-            ))  # fmt: skip
+            found.append(Finding("one_way", NOTE, axis))
     if known.get("speeds", SPEEDS) < SPEEDS:
-        found.append(Finding(
-            "one_speed", NOTE, "", f"while it moves, the speed varies by a factor of {known['speeds']:.2g} only",
-            "viscous and Coulomb friction cannot be told apart from this log alone; drive at several speeds", (), 0,
-            {"speeds": known["speeds"]},
-        ))  # fmt: skip
+        found.append(Finding("one_speed", NOTE, "", {"speeds": known["speeds"]}))
     return found
 
 

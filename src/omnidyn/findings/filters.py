@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.document import all_of
-from omnidyn.findings.finding import NOTE, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.model.frames import unwrapped, world_to_body
+from omnidyn.statement import NOTE
 from omnidyn.statistics import moving, robust_std
 
 ENOUGH = 60_000  # rows that tell a filter
@@ -42,12 +42,13 @@ class Speed(NamedTuple):
 
 
 class Filter(NamedTuple):
-    """What a speed is of its positions: how it was made, by how much it is late [rows], and what to do about it."""
+    """How a speed was made of its positions: "centred", "backward" or "low_pass" differences; by how much it is late
+    [rows]; time constant of the low-pass [s], to two digits.
+    """
 
     kind: str
-    words: str
     late: float
-    remedy: str
+    constant: float = 0.0
 
 
 def check_filters(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -62,13 +63,12 @@ def check_filters(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     return [_finding(each, speeds, work.step) for each, speeds in alike.items()], work
 
 
-def _finding(each: Filter, speeds: list[Speed], step: float) -> Finding:
-    names = all_of([speed.component for speed in speeds])
-    of = all_of(list(dict.fromkeys(speed.origin for speed in speeds)))
-    are = "is" if len(speeds) == 1 else "are"
+def _finding(filtered: Filter, speeds: list[Speed], step: float) -> Finding:
     return Finding(
-        "filtered", NOTE, " ".join(speed.component for speed in speeds), f"{names} {are} {each.words} of {of}",
-        each.remedy, (), 0, {"rows_late": each.late, "seconds_late": each.late * step},
+        "filtered", NOTE, " ".join(speed.component for speed in speeds),
+        {"rows_late": filtered.late, "seconds_late": filtered.late * step, "filter": filtered.kind,
+         "positions": list(dict.fromkeys(speed.origin for speed in speeds)), "time_constant_s": filtered.constant},
+        filtered.kind,
     )  # fmt: skip
 
 
@@ -77,15 +77,10 @@ def _filter_of(speed: Speed, step: float) -> Filter | None:
     if not speed.noise > 0.0:
         return None
     if _off(speed.values - speed.centred, speed.back) < ALIKE * 0.5 * speed.noise:
-        return Filter(
-            "centred", "centred differences, from the row before to the row after,", 0.0,
-            "they show a motion a row before it begins: where that matters, fit to the positions, without the speeds",
-        )  # fmt: skip
+        return Filter("centred", 0.0)  # fmt: skip
     for rows, rate in enumerate(speed.over, 1):
         if _off(speed.values - rate, speed.back) < ALIKE * speed.noise / rows:
-            ms = 0.5 * rows * step * 1e3
-            how = "differences to the row before" if rows == 1 else f"differences over {rows} rows back"
-            return Filter("backward", how, 0.5 * rows, f"they are {ms:.3g} ms late: latency in the mapping")
+            return Filter("backward", 0.5 * rows)
     return _low_pass(speed, step)
 
 
@@ -98,10 +93,7 @@ def _low_pass(speed: Speed, step: float) -> Filter | None:
     if not STRONGEST < share < PLAIN or not _off(change - share * ahead, ahead) < ALIKE * share * speed.noise:
         return None
     constant = (1.0 - share) / share
-    return Filter(
-        "low-pass", f"low-passed differences (time constant {constant * step * 1e3:.2g} ms)", 0.5 + round(constant, 1),
-        "they lag and hide what is fast: log the speed without the filter, or fit to the positions, without the speeds",
-    )  # fmt: skip
+    return Filter("low_pass", 0.5 + round(constant, 1), float(f"{constant * step * 1e3:.2g}") * 1e-3)  # fmt: skip
 
 
 def _off(errors: FloatArray, rate: FloatArray) -> float:
@@ -130,7 +122,7 @@ def _speeds(work: LogUnderCheck) -> Iterator[Speed]:
             yield from _made(component, "heading", own, heading[:, None], t, work.step, None)
         else:
             row = world_to_body(heading)[:, ["vx", "vy"].index(component), :2]
-            yield from _made(component, "x and y", own, place, t, work.step, row)
+            yield from _made(component, "x y", own, place, t, work.step, row)
 
 
 def _names(values: FloatArray, letter: str) -> list[str]:

@@ -1,61 +1,46 @@
-"""What `check` says about a log: findings, each with its rows and a remedy, and the verdict they add up to."""
+"""What `check` says about a log: findings, each with its rows, and the verdict they add up to."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from omnidyn.arrays import BoolArray, IntArray
-from omnidyn.document import Document, Words, plain, sentence, short
-from omnidyn.findings.use import Use, good_for
+from omnidyn.document import Document, plain, sentence
+from omnidyn.findings.use import Use
 from omnidyn.logs.log import Log
-from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.shown import DOCUMENT, FIGURE, Shown, make
+from omnidyn.statement import ERROR, NOTE, SEVERITIES, WARNING, Statement
 from omnidyn.statistics import stretches
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FATAL, WARN, NOTE = "fatal", "warn", "note"
-LEVELS = (FATAL, WARN, NOTE)
-LABELS = {FATAL: "FATAL", WARN: "warn", NOTE: "note"}
 MAX_SPANS = 20  # spans of rows that a finding keeps; it counts all
-SHOWN_SPANS = 4
-LEAST_WIDTH, INDENT = 40, " " * 9  # of text
-SECTORS = 12  # of directions of travel
+LEAST_WIDTH = 40  # of text
 
 Span = tuple[int, int]
 
 
 @dataclass(frozen=True)
-class Finding:
+class Finding(Statement):
     """One thing that a log shows.
 
-    code: what kind, such as "gap" or "swapped". level: "fatal" (the log cannot be used as it stands), "warn" (it can,
-    with care) or "note". where: the components concerned, such as "w1 w2", or "". message: what is the case, in words.
-    remedy: what to do. rows: (first line, last line) in the file, the first MAX_SPANS of them. count: of all rows
-    concerned, 0 where the finding is about the log as a whole. numbers: what it was measured from. rests_on: keys of
-    the robot file whose numbers it takes; of a verdict, those that are only guessed.
+    rows: (first line, last line) in the file, the first MAX_SPANS of them. count: of all rows concerned, 0 where the
+    finding is about the log as a whole. rests_on: keys of the robot file whose numbers it takes; of a verdict, those
+    that are only guessed.
     """
 
-    code: str
-    level: str
-    where: str
-    message: str
-    remedy: str = ""
     rows: tuple[Span, ...] = ()
     count: int = 0
-    numbers: Mapping[str, float] = field(default_factory=dict)
     rests_on: tuple[str, ...] = ()
+
+    __hash__ = Statement.__hash__
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; a number that is not finite is None."""
-        return plain({
-            "code": self.code, "level": self.level, "where": self.where, "message": self.message,
-            "remedy": self.remedy, "rows": self.rows, "count": self.count,
-            "numbers": {name: float(value) for name, value in self.numbers.items()}, "rests_on": self.rests_on,
-        })  # fmt: skip
+        return super().to_dict() | plain({"rows": self.rows, "count": self.count, "rests_on": self.rests_on})
 
 
 @dataclass(frozen=True, repr=False)
@@ -63,8 +48,8 @@ class Verdict(Shown):
     """All findings of one log, gravest first, and what the log excites.
 
     excitation: name of a measure -> value (see excitation.py). rows: of the log. duration [s]. rate [Hz].
-    channels: that were recorded. source: the path. uses: what the log is good for, and why not for the rest. log: what
-    was checked; None where it came in blocks, and was not kept.
+    channels: that were recorded. source: the path. uses: what the log can be used for, and why not for the rest. log:
+    what was checked; None where it came in blocks, and was not kept.
     """
 
     findings: tuple[Finding, ...]
@@ -88,9 +73,9 @@ class Verdict(Shown):
         return make(FIGURE, self)
 
     @property
-    def fatal(self) -> bool:
-        """Whether any finding is fatal."""
-        return any(finding.level == FATAL for finding in self.findings)
+    def has_errors(self) -> bool:
+        """Whether any finding is an error."""
+        return bool(self.counts[ERROR])
 
     @property
     def useless(self) -> bool:
@@ -98,19 +83,23 @@ class Verdict(Shown):
         return bool(self.uses) and not any(use.good for use in self.uses)
 
     @property
-    def verdict(self) -> str:
-        """What the log is good for, in a sentence."""
+    def conclusion(self) -> Statement:
+        """What the log can be used for: the code `not_usable`, `faulty` or `usable`."""
+        uses = {
+            "uses": [use.name for use in self.uses if use.good],
+            "not": [use.name for use in self.uses if not use.good],
+        }
         if self.useless:
-            return f"Nothing can be done with this log: {self.uses[0].words.rstrip('.')}."
-        fatal = [each for each in self.findings if each.level == FATAL]
-        if fatal:
-            more = f" (and {len(fatal) - 1} more)" if fatal[1:] else ""
-            rest = f"; once that is mended, {good_for(self.uses)}" if self.uses else ""
-            return f"Not to be used as it stands: {fatal[0].message.rstrip('.')}{more}{rest}."
-        heed = self.counts[WARN]
-        words = good_for(self.uses) if self.uses else "no row to judge by"
-        told = f"; {heed} thing{'s' * (heed > 1)} to heed" if heed else "; nothing to heed"
-        return sentence(f"{words}{told}")
+            return Statement("not_usable", ERROR, "", {"reason": self.uses[0].reason})
+        if self.has_errors:
+            return Statement("faulty", ERROR, "", {**uses, "errors": self.counts[ERROR], "first": self.findings[0]})
+        warnings = self.counts[WARNING]
+        return Statement("usable", WARNING if warnings else NOTE, "", {**uses, "warnings": warnings})
+
+    @property
+    def verdict(self) -> str:
+        """What the log can be used for, in a sentence."""
+        return sentence(str(self.conclusion))
 
     def of(self, code: str) -> tuple[Finding, ...]:
         """The findings of one kind."""
@@ -118,42 +107,36 @@ class Verdict(Shown):
 
     @property
     def counts(self) -> dict[str, int]:
-        """Level -> number of findings."""
-        return {level: sum(finding.level == level for finding in self.findings) for level in LEVELS}
+        """Severity -> number of findings."""
+        return {severity: sum(finding.severity == severity for finding in self.findings) for severity in SEVERITIES}
 
     def headline(self) -> str:
-        """One line: what the log is, and how many findings of each level it has."""
-        counts = self.counts
-        parts = [f"{counts[FATAL]} fatal", f"{counts[WARN]} to heed", f"{counts[NOTE]} to know"]
-        size = f"{self.rows} rows, {self.duration:.4g} s"
-        rate = f" at {self.rate:.4g} Hz" if self.rate > 0.0 else ""
-        parts += ["good for nothing"] if self.useless else []
-        return f"{self.source or 'log'}: {size}{rate}: {', '.join(parts)}"
+        """One line: what the log is, and how many findings of each severity it has."""
+        size = {"rows": self.rows, "duration_s": self.duration, "rate_Hz": self.rate}
+        return str(Statement("log_summary", NOTE, self.source, {**size, **self.counts}))
 
     def as_text(self, width: int = 110) -> str:
         """The verdict for people: a sentence, a headline, the uses, then a paragraph per finding. ASCII only."""
         return self.document().to_text(max(LEAST_WIDTH, width))
 
     def document(self) -> Document:
-        """The verdict: what the log is good for, then what is the case and what to do about it, gravest first."""
-        paragraphs = [words for finding in self.findings for words in _paragraphs(finding)]
-        parts = [Words(self.headline()), *(use.told() for use in self.uses), *paragraphs, _excited(self.excitation)]
-        return Document(parts, self.to_dict(), ascii=True, verdict=self.verdict)
+        """The verdict: what the log can be used for, then what is the case and what to do about it, gravest first."""
+        return make(DOCUMENT, self)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, without NaN."""
         return plain({
             "source": self.source, "rows": self.rows, "duration_s": float(self.duration), "rate_Hz": float(self.rate),
-            "channels": self.channels, "verdict": self.verdict, "fatal": self.fatal, "useless": self.useless,
-            "counts": self.counts, "uses": [use.to_dict() for use in self.uses],
-            "findings": [finding.to_dict() for finding in self.findings],
+            "channels": self.channels, "verdict": self.verdict, "code": self.conclusion.code,
+            "has_errors": self.has_errors, "useless": self.useless, "counts": self.counts,
+            "uses": [use.to_dict() for use in self.uses], "findings": [finding.to_dict() for finding in self.findings],
             "excitation": {name: float(value) for name, value in self.excitation.items()},
         })  # fmt: skip
 
 
 def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Gravest first; otherwise as they were found."""
-    return tuple(sorted(findings, key=lambda finding: LEVELS.index(finding.level)))
+    return tuple(sorted(findings, key=lambda finding: SEVERITIES.index(finding.severity)))
 
 
 def spans_of(bad: BoolArray, lines: IntArray) -> tuple[Span, ...]:
@@ -164,52 +147,17 @@ def spans_of(bad: BoolArray, lines: IntArray) -> tuple[Span, ...]:
 def merged(findings: Sequence[Finding], blocks: int) -> Finding:
     """Findings of one kind and place from several blocks of a log as one: rows joined, counts added.
 
-    The words and numbers are those of the block where it weighs most: the gravest, then the one with most rows.
+    The numbers are those of the block where it weighs most: the gravest, then the one with most rows.
     """
     if len(findings) == 1:
         return findings[0]
-    heaviest = max(findings, key=lambda finding: (-LEVELS.index(finding.level), finding.count))
+    heaviest = max(findings, key=lambda finding: (-SEVERITIES.index(finding.severity), finding.count))
     rows: list[Span] = []
     for span in sorted(span for finding in findings for span in finding.rows):
         if rows and span[0] <= rows[-1][1] + 1:
             rows[-1] = (rows[-1][0], max(rows[-1][1], span[1]))
         else:
             rows.append(span)
-    words = f"{heaviest.message} (so in {len(findings)} of {blocks} blocks of the log)"
+    numbers = {**heaviest.numbers, "blocks": blocks, "in_blocks": len(findings)}
     total = sum(finding.count for finding in findings)
-    return replace(heaviest, message=words, rows=tuple(rows[:MAX_SPANS]), count=total)
-
-
-def _paragraphs(finding: Finding) -> Iterator[Words]:
-    """What is the case, and what to do."""
-    head = f"  {LABELS[finding.level]:5s}  {finding.code}{' ' + finding.where if finding.where else ''}: "
-    yield Words(head + finding.message + (f" [{_lines(finding)}]" if finding.rows else ""), rest=INDENT)
-    if finding.remedy:
-        yield Words("-> " + finding.remedy, INDENT, INDENT + "   ")
-
-
-def _lines(finding: Finding) -> str:
-    shown = [f"{a}-{b}" if b > a else f"{a}" for a, b in finding.rows[:SHOWN_SPANS]]
-    more = ", ..." if len(finding.rows) > SHOWN_SPANS else ""
-    count = f"; {finding.count} rows" if finding.count else ""
-    return f"line {', '.join(shown)}{more}{count}"
-
-
-def _excited(excitation: Mapping[str, float]) -> Words:
-    """What the log excites; no words where nothing was measured."""
-    known = {name: value for name, value in excitation.items() if math.isfinite(value)}
-    parts = []
-    if "moving" in known:
-        parts.append(
-            f"in motion for {100.0 * known['moving']:.0f} % of {short(known.get('time_s', math.nan), '.3g')} s"
-        )
-    for axis, unit in (("x", "m/s"), ("y", "m/s"), ("yaw", "rad/s")):
-        if axis in known:
-            parts.append(f"{axis} {known[axis]:.3g} {unit} rms, up to {known.get(f'{axis}_max', math.nan):.3g}")
-    if "turning" in known:
-        parts.append(f"turning in {100.0 * known['turning']:.0f} % of the motion")
-    if "directions" in known:
-        parts.append(f"directions {known['directions']:.0f} of {SECTORS}")
-    if "speeds" in known:
-        parts.append(f"speeds a factor of {known['speeds']:.2g} apart")
-    return Words("shows  " + "; ".join(parts) if excitation else "", "  ", INDENT)
+    return replace(heaviest, numbers=numbers, rows=tuple(rows[:MAX_SPANS]), count=total)

@@ -1,4 +1,4 @@
-"""What a log is good for: a fit of whole logs, steady state, motors, geometry; each yes, or no and why.
+"""What a log can be used for: a fit of whole logs, steady state, motors, geometry; each yes, or no and why.
 
 The rules are those by which `identify` itself decides and refuses (needs.py), and what reads a log for it: steady
 windows (logs/plateaus.py) and where the wheels stand (logs/geometry.py).
@@ -7,11 +7,9 @@ windows (logs/plateaus.py) and where the wheels stand (logs/geometry.py).
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 
 import numpy as np
 
-from omnidyn.document import all_of
 from omnidyn.errors import OmnidynError
 from omnidyn.findings import needs
 from omnidyn.findings.signal.log_under_check import MIN_ROWS
@@ -24,6 +22,7 @@ from omnidyn.logs.plateaus import MIN_DURATION, Plateau, first_plateaus
 from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
+from omnidyn.statement import ERROR, NOTE, WARNING, Statement
 
 WHOLE, STEADY, MOTORS, GEOMETRY = "whole logs", "steady state", "motors", "geometry"
 USES = (WHOLE, STEADY, MOTORS, GEOMETRY)
@@ -36,110 +35,114 @@ WHEELS = ("wheel_speed", "wheel_angle")
 
 
 def uses(log: Log, robot: Robot | None = None, codes: Collection[str] = ()) -> tuple[Use, ...]:
-    """What a log is good for as it stands. codes: of the findings on it. Never raises for what the log holds."""
-    why = _why_nothing(log, codes)
-    run = None
+    """What a log can be used for as it stands. codes: of the findings on it. Never raises for what the log holds."""
+    why, run = _why_nothing(log, codes), None
     try:
         run = None if why else log.to_run()
     except OmnidynError as error:
-        why = error.what if not error.remedy else f"{error.what}; {error.remedy}"
-    if run is None:
+        why = _refused(error)
+    if run is None or why is not None:
+        assert why is not None
         return tuple(Use(name, False, why) for name in USES)
-    lacks = _Lacks(log.columns)
-    return (_whole(run, robot, lacks), _steady(run, robot, lacks), _motors(run, robot, lacks), _geometry(run))
+    columns = log.columns
+    return (_whole(run, robot, columns), _steady(run, robot, columns), _motors(run, columns), _geometry(run))
 
 
-def _why_nothing(log: Log, codes: Collection[str]) -> str:
+def _why_nothing(log: Log, codes: Collection[str]) -> Statement | None:
     if len(log) < 2:
-        return "it holds no two rows"
+        return Statement("no_two_rows", ERROR)
     if FEW in codes:
-        return f"{len(log)} rows, too few to tell motion from noise: {MIN_ROWS} or more are needed, 10 s are better"
-    return "the robot never moves: drive it beyond its dead zone" if NEVER in codes else ""
+        return Statement("too_few_rows", ERROR, "", {"rows": len(log), "least": MIN_ROWS})
+    return Statement("robot_rests", ERROR) if NEVER in codes else None
 
 
-@dataclass(frozen=True)
-class _Lacks:
-    """What the columns say of channels that are not there."""
-
-    columns: ColumnMap
-
-    def words(self, what: str, *channels: str) -> str:
-        """What is lacking, and which columns look like it but were not taken."""
-        doubted = self.columns.doubted.items()
-        found = dict.fromkeys(words for name, words in doubted if component_channel(name) in channels)
-        return f"{what}: {'; '.join(found)}" if found else what
+def _refused(error: OmnidynError) -> Statement:
+    """What the message of an error says, with its remedy."""
+    return Statement("refused", ERROR, "", {"what": error.what, "remedy": error.remedy})
 
 
-def _whole(run: Run, robot: Robot | None, lacks: _Lacks) -> Use:
+def _not(use: str, code: str, columns: ColumnMap, *channels: str, **numbers: object) -> Use:
+    """A use that a log does not serve, with the doubts about columns that look like the channels that are missing."""
+    doubts = [
+        doubt for doubt in columns.doubts if any(component_channel(name) in channels for name in doubt.components)
+    ]
+    return Use(use, False, Statement(code, WARNING, "", {**numbers, "doubts": doubts}))
+
+
+def _yes(use: str, code: str, **numbers: object) -> Use:
+    return Use(use, True, Statement(code, NOTE, "", numbers))
+
+
+def _whole(run: Run, robot: Robot | None, columns: ColumnMap) -> Use:
     """A fit of the whole log by output error."""
     why = needs.why_not_whole(run, robot)
-    if why:
+    if why is not None:
         no_output = not any(getattr(run, name) is not None for name in needs.OUTPUTS)
         no_input = run.voltage is None and run.duty is None
         channels = (*(INPUTS if no_input else ()), *(needs.OUTPUTS if no_output else ()))
-        return Use(WHOLE, False, lacks.words(f"it {why}", *channels))
-    if why := _why_not_robot(run, robot) or _why_no_battery(run, robot, lacks):
-        return Use(WHOLE, False, why)
-    if why := _why_no_stretch(run, robot):
-        return Use(WHOLE, False, why)
+        return _not(WHOLE, why.code, columns, *channels)
+    if use := _not_robot(WHOLE, run, robot, columns) or _no_battery(WHOLE, run, robot, columns):
+        return use
+    if use := _no_stretch(run, robot, columns):
+        return use
     drives = next(name for name in (*INPUTS, *SET_SPEEDS) if getattr(run, name) is not None)
     outputs = [name for name in needs.OUTPUTS if getattr(run, name) is not None]
-    return Use(WHOLE, True, f"{drives} in, {all_of(outputs)} out{_if_robot(run, robot, drives)}")
+    return _yes(WHOLE, "serves_whole", input=drives, outputs=outputs, needs=_needs_of_robot(run, robot, drives))
 
 
-def _if_robot(run: Run, robot: Robot | None, drives: str) -> str:
-    """What a robot file must have, where none was given."""
+def _needs_of_robot(run: Run, robot: Robot | None, drives: str) -> str:
+    """What a robot file must have, where none was given: "speed_loop", "supply" or "robot"; "" where one was."""
     if robot is not None:
         return ""
     if drives in SET_SPEEDS:
-        return '; with a robot file that has the speed loop of the firmware, [drive] kind = "speed"'
-    return f"; with a robot file{' that has supply_V' if drives == 'duty' and needs.needs_supply(run, None) else ''}"
+        return "speed_loop"
+    return "supply" if drives == "duty" and needs.needs_supply(run, None) else "robot"
 
 
-def _why_not_robot(run: Run, robot: Robot | None) -> str:
+def _not_robot(use: str, run: Run, robot: Robot | None, columns: ColumnMap) -> Use | None:
     if robot is None or run.wheels is None or run.wheels == robot.wheels.count:
-        return ""
-    return f"the log is of {run.wheels} wheels, {robot.name} has {robot.wheels.count}"
+        return None
+    return _not(use, "other_robot", columns, wheels=run.wheels, of_robot=robot.wheels.count, robot=robot.name)
 
 
-def _why_no_battery(run: Run, robot: Robot | None, lacks: _Lacks) -> str:
+def _no_battery(use: str, run: Run, robot: Robot | None, columns: ColumnMap) -> Use | None:
     if robot is None or robot.drive.kind == SPEED or not needs.needs_supply(run, robot):
-        return ""
-    return lacks.words("a duty needs its battery: a column supply, or [drive] supply_V in the robot file", "supply")
+        return None
+    return _not(use, "no_battery", columns, "supply")
 
 
-def _why_no_stretch(run: Run, robot: Robot | None) -> str:
-    """An input of all wheels at once, in more rows than one."""
+def _no_stretch(run: Run, robot: Robot | None, columns: ColumnMap) -> Use | None:
+    """Where no rows have an input of all wheels at once."""
     name = next((name for name in INPUTS if getattr(run, name) is not None), "")
     if not name or (robot is not None and robot.drive.kind == SPEED):
-        return ""
+        return None
     known = np.isfinite(getattr(run, name))
-    lacking = [f"{k + 1}" for k in np.flatnonzero(~known.any(axis=0))]
-    if lacking:
-        return f"no {name} of wheel {all_of(lacking)}"
-    return "" if known.all(axis=1).sum() >= MIN_ROWS else f"hardly a row has the {name} of all wheels"
+    missing = [int(k) + 1 for k in np.flatnonzero(~known.any(axis=0))]
+    if missing or known.all(axis=1).sum() < MIN_ROWS:
+        return _not(WHOLE, "input_incomplete", columns, channel=name, missing=missing)
+    return None
 
 
-def _steady(run: Run, robot: Robot | None, lacks: _Lacks) -> Use:
+def _steady(run: Run, robot: Robot | None, columns: ColumnMap) -> Use:
     """Friction from stretches of constant speed."""
     origin = needs.force_origin([run])
     if not origin:
-        return Use(STEADY, False, lacks.words("no current and no motor input", *INPUTS, "current"))
+        return _not(STEADY, "no_force", columns, *INPUTS, "current")
     if not needs.turns_known(run):
-        return Use(STEADY, False, lacks.words("no speed or angle of the wheels", *WHEELS))
-    battery = _why_no_battery(run, robot, lacks) if origin == needs.VOLTAGE else ""
-    if why := _why_not_robot(run, robot) or battery:
-        return Use(STEADY, False, why)
+        return _not(STEADY, "no_wheel_motion", columns, *WHEELS)
+    battery = _no_battery(STEADY, run, robot, columns) if origin == needs.VOLTAGE else None
+    if use := _not_robot(STEADY, run, robot, columns) or battery:
+        return use
     if robot is not None and needs.loses_in_gear(robot):
-        return Use(STEADY, False, "the robot file has a lossy gear, which a steady state does not know")
+        return _not(STEADY, "lossy_gear", columns)
     windows = first_plateaus(on_clock_of_wheels(run), ENOUGH)
     count = sum(map(_moves, windows))
     if not count:
-        rest = ", only at rest" if windows else ""
-        return Use(STEADY, False, f"no stretch of constant speed{rest}: hold commands for {MIN_DURATION:g} s or more")
-    many = f"{count} or more stretches" if len(windows) == ENOUGH else f"{count} stretch{'es' * (count > 1)}"
+        return _not(STEADY, "no_steady_stretch", columns, hold_s=MIN_DURATION, at_rest=len(windows))
     drives = "duty" if origin == needs.VOLTAGE and run.voltage is None else origin
-    return Use(STEADY, True, f"{many} of constant speed, the force from {drives}{_if_robot(run, robot, drives)}")
+    more = len(windows) == ENOUGH
+    return _yes(STEADY, "serves_steady", stretches=count, more=more, force_from=drives,
+                needs=_needs_of_robot(run, robot, drives))  # fmt: skip
 
 
 def _moves(window: Plateau) -> bool:
@@ -150,26 +153,24 @@ def _moves(window: Plateau) -> bool:
     return bool((np.abs(speed) > np.maximum(AT_REST, SURE * np.nan_to_num(std))).any())
 
 
-def _motors(run: Run, robot: Robot | None, lacks: _Lacks) -> Use:
+def _motors(run: Run, columns: ColumnMap) -> Use:
     """The line of each motor."""
     kind = needs.motor_input([run])
     if not kind:
-        return Use(MOTORS, False, lacks.words("no motor input", *needs.MOTOR_INPUTS))
+        return _not(MOTORS, "no_motor_input", columns, *needs.MOTOR_INPUTS)
     if not needs.turns_known(run):
-        return Use(MOTORS, False, lacks.words("no speed or angle of the motors", *WHEELS))
-    speed = all_of([name for name in WHEELS if getattr(run, name) is not None])
-    return Use(MOTORS, True, f"{kind} against {speed}, if the wheels were off the ground")
+        return _not(MOTORS, "no_motor_motion", columns, *WHEELS)
+    return _yes(MOTORS, "serves_motors", input=kind, speeds=[name for name in WHEELS if getattr(run, name) is not None])
 
 
 def _geometry(run: Run) -> Use:
     """Where the wheels stand."""
     if not shows_both(run):
-        return Use(GEOMETRY, False, "no motion of both the body and the wheels")
+        return Use(GEOMETRY, False, Statement("no_two_motions"))
     try:
         seen = wheel_geometry([run])
     except OmnidynError as error:
-        return Use(GEOMETRY, False, error.what)
+        return Use(GEOMETRY, False, _refused(error))
     except np.linalg.LinAlgError:
-        return Use(GEOMETRY, False, "the speeds are beyond all numbers of a robot")
-    angles = all_of([f"{angle:.0f}" for angle in seen.azimuth_deg])
-    return Use(GEOMETRY, True, f"the wheels push as omni wheels at {angles} degrees do ({seen.source})")
+        return Use(GEOMETRY, False, Statement("speeds_beyond_robots"))
+    return _yes(GEOMETRY, "serves_geometry", azimuth_deg=seen.azimuth_deg, source=seen.source)

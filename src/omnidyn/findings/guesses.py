@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from omnidyn.document import all_of
-from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding, Verdict, in_order
+from omnidyn.findings.finding import Finding, Verdict, in_order
 from omnidyn.model.robot import Robot
+from omnidyn.statement import ERROR, NOTE, WARNING
 
 
 def with_guesses(findings: Iterable[Finding], robot: Robot | None, before: Iterable[Finding] = ()) -> list[Finding]:
@@ -15,27 +15,19 @@ def with_guesses(findings: Iterable[Finding], robot: Robot | None, before: Itera
 
     One that rests on guesses of a finding `before` is left out: one wrong guess explains both.
     """
-    found, doubted = [], {key for finding in before if finding.level != NOTE for key in finding.rests_on}
+    found, doubted = [], {key for finding in before if finding.severity != NOTE for key in finding.rests_on}
     for finding in findings:
         each = _with_guess(finding, robot)
         if not each.rests_on or not doubted.issuperset(each.rests_on):
             found.append(each)
-            doubted.update(each.rests_on if each.level != NOTE else ())
+            doubted.update(each.rests_on if each.severity != NOTE else ())
     return found
 
 
 def _with_guess(finding: Finding, robot: Robot | None) -> Finding:
     guessed = tuple(key for key in finding.rests_on if robot is not None and is_guessed(robot, key))
-    if not guessed:
-        return replace(finding, rests_on=())
-    are = "is" if len(guessed) == 1 else "are"
-    message = f"{finding.message}; but {all_of(guessed)} of the robot file {are} only guessed"
-    remedy = (
-        f"let omnidyn identify fit {'it' if len(guessed) == 1 else 'them'}, and judge this again, or put in what is "
-        f"known; if it stays, {finding.remedy}"
-    )
-    return replace(finding, level=WARN if finding.level == FATAL else finding.level, message=message, remedy=remedy,
-                   rests_on=guessed)  # fmt: skip
+    severity = WARNING if guessed and finding.severity == ERROR else finding.severity
+    return replace(finding, severity=severity, rests_on=guessed)
 
 
 def is_guessed(robot: Robot, key: str) -> bool:
@@ -54,26 +46,21 @@ def judged_again(verdict: Verdict, fitted: Verdict) -> Verdict:
     fitted: what check says of the same log and the fitted robot.
     """
     kept = [finding for finding in verdict.findings if not finding.rests_on]
-    known = {(finding.code, finding.where) for finding in kept}
-    doubted = {(finding.code, finding.where): finding for finding in verdict.findings if finding.rests_on}
+    known = {(finding.code, finding.subject) for finding in kept}
+    doubted = {(finding.code, finding.subject): finding for finding in verdict.findings if finding.rests_on}
     for finding in fitted.findings:
-        place = finding.code, finding.where
-        if place in doubted or (finding.level == FATAL and place not in known):
-            kept.append(replace(finding, message=f"{finding.message}; so it is with the fitted robot"))
+        place = finding.code, finding.subject
+        if place in doubted or (finding.severity == ERROR and place not in known):
+            kept.append(replace(finding, numbers={**finding.numbers, "by_fit": True}))
             doubted.pop(place, None)
     return replace(verdict, findings=in_order([*kept, *map(_gone, doubted.values())]))
 
 
 def _gone(finding: Finding) -> Finding:
-    guesses = all_of(finding.rests_on)
-    return Finding(
-        "judged_again", NOTE, finding.where,
-        f"with the fitted robot this is gone ({finding.code}): it rested on the guess of {guesses}", "", (), 0,
-        dict(finding.numbers),
-    )  # fmt: skip
+    numbers = {**finding.numbers, "finding": finding.code, "guesses": finding.rests_on}
+    return Finding("judged_again", NOTE, finding.subject, numbers)
 
 
-def judged_words(verdicts: Sequence[Verdict]) -> list[str]:
-    """What was judged again and went away, in words."""
-    return [f"{each.source or 'the log'}: {finding.where}: {finding.message}" for each in verdicts
-            for finding in each.of("judged_again")]  # fmt: skip
+def gone_by_fit(verdicts: Sequence[Verdict]) -> list[tuple[str, Finding]]:
+    """(source, finding) of what was judged again and went away."""
+    return [(verdict.source, finding) for verdict in verdicts for finding in verdict.of("judged_again")]

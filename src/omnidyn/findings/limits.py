@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.clocks import at_each_clock
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.robust import quantum, smooth, white_noise
 from omnidyn.logs.channels import components
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.model.wheels import per_wheel
+from omnidyn.statement import ERROR, NOTE, WARNING
 
 AT_LIMIT = 0.003  # of the limit
 LEAST_SHARE = 0.005  # of the rows
@@ -32,7 +33,7 @@ def check_limits(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         more = _one_way_drive(work, channel)
         work, found = work.replace(**{channel: None}) if more else work, found + more
     more = _unsigned(work)
-    return found + more, work.replace(current=None) if any(each.level == FATAL for each in more) else work
+    return found + more, work.replace(current=None) if any(each.severity == ERROR for each in more) else work
 
 
 def _one_way_drive(work: LogUnderCheck, channel: str) -> list[Finding]:
@@ -54,28 +55,22 @@ def _one_way_drive(work: LogUnderCheck, channel: str) -> list[Finding]:
     if not names:
         return []
     share = float(back.mean())
-    return [Finding(
-        "unsigned", FATAL, " ".join(names),
-        f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} never negative, though the wheels turn backward "
-        f"under it in {100 * share:.0f} % of the values: a size without its direction, or counted from an offset",
-        f"log the signed {channel}: times the bit of direction, or less the value of standstill", (), 0,
-        {"share": share},
-    )]  # fmt: skip
+    return [Finding("unsigned", ERROR, " ".join(names), {"share": share, "channel": channel})]
 
 
 def _limit(work: LogUnderCheck, channel: str) -> tuple[FloatArray | float | None, str]:
-    """What a channel cannot exceed, and whose limit that is."""
+    """What a channel cannot exceed, and what limits it: "duty", "supply" or a key of the robot file."""
     robot, supply = work.geometry, work.get("supply")
     if channel == "duty":
-        return 1.0, "full duty"
+        return 1.0, "duty"
     if robot is None:
         if channel == "voltage" and supply is not None:
-            return 0.985 * smooth(supply, 9)[:, None], "the supply"
+            return 0.985 * smooth(supply, 9)[:, None], "supply"
         return None, ""
     if channel == "current":
         limit = robot.motor.current_limit
-        return (None, "") if limit is None else (per_wheel(limit, work.wheels), "current_limit_A of the robot file")
-    return per_wheel(robot.motor.voltage_limit, work.wheels), "voltage_limit_V of the robot file"
+        return (None, "") if limit is None else (per_wheel(limit, work.wheels), "motor.current_limit_A")
+    return per_wheel(robot.motor.voltage_limit, work.wheels), "motor.voltage_limit_V"
 
 
 def _saturated(work: LogUnderCheck, channel: str) -> list[Finding]:
@@ -96,11 +91,8 @@ def _saturated(work: LogUnderCheck, channel: str) -> list[Finding]:
              if column.mean() > 0.2 * LEAST_SHARE]  # fmt: skip
     level = float(np.mean(limit))
     return [Finding(
-        "saturation", WARN, " ".join(names),
-        f"{' and '.join(names)} {'is' if len(names) == 1 else 'are'} at the limit ({level:.4g}, {whose}) in "
-        f"{100 * share:.2g} % of the rows",
-        "what was asked for beyond it was not applied: fit from what was applied, or drive with less",
-        work.lines(bad), int(bad.sum()), {"share": share, "limit": level},
+        "saturation", WARNING, " ".join(names), {"share": share, "limit": level, "limited_by": whose},
+        rows=work.lines(bad), count=int(bad.sum()),
     )]  # fmt: skip
 
 
@@ -116,11 +108,7 @@ def _too_fast(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         return [], work
     names = [each for (each, _), column in zip(columns, fast.T, strict=True) if column.any()]
     return [Finding(
-        "too_fast", NOTE, " ".join(names),
-        f"{' and '.join(names)} {'changes' if len(names) == 1 else 'change'} so much from row to row in "
-        f"{100 * float(bad.mean()):.2g} % of the rows that what the motors got between them is not in the log",
-        "log faster, or drive more slowly; a fit of the motors leaves these rows out", work.lines(bad),
-        int(bad.sum()), {"share": float(bad.mean())},
+        "too_fast", NOTE, " ".join(names), {"share": float(bad.mean())}, rows=work.lines(bad), count=int(bad.sum())
     )], work  # fmt: skip
 
 
@@ -139,13 +127,10 @@ def _sag(work: LogUnderCheck) -> list[Finding]:
     if drop < SAG or high - low < 4.0 * noise:
         return []
     bad = level < high - 0.5 * (high - low)
-    used = "voltage = duty x supply" if work.get("duty") is not None else "the voltage applied"
     return [Finding(
-        "sag", WARN, "supply",
-        f"the supply drops by {100 * drop:.3g} %, from {high:.4g} to {low:.4g} V, at its lowest at "
-        f"t = {work.t[int(np.nanargmin(level))]:.5g} s",
-        f"use the supply row by row ({used}), never one number for it", work.lines(bad), int(bad.sum()),
-        {"drop": drop, "high_V": high, "low_V": low},
+        "sag", WARNING, "supply",
+        {"drop": drop, "high_V": high, "low_V": low, "lowest_at_s": float(work.t[int(np.nanargmin(level))])},
+        "of_duty" if work.get("duty") is not None else "", rows=work.lines(bad), count=int(bad.sum()),
     )]  # fmt: skip
 
 
@@ -153,11 +138,7 @@ def _no_supply(work: LogUnderCheck) -> list[Finding]:
     if work.get("duty") is None or work.get("supply") is not None or work.get("voltage") is not None:
         return []
     nominal = work.geometry.drive.supply if work.geometry is not None else None
-    rest = f"the {nominal:g} V of the robot file are taken" if nominal else "no voltage can be made of it"
-    return [Finding(
-        "no_supply", NOTE, "supply", f"duty was logged, the supply was not: {rest}, and a sag cannot be seen",
-        "log the battery voltage; give its nominal value as [drive] supply_V", (), 0, {},
-    )]  # fmt: skip
+    return [Finding("no_supply", NOTE, "supply", {"nominal_V": nominal} if nominal else {})]
 
 
 def _unsigned(work: LogUnderCheck) -> list[Finding]:
@@ -167,11 +148,7 @@ def _unsigned(work: LogUnderCheck) -> list[Finding]:
         return []
     names = " ".join(components("current", current.shape[1]))
     if work.log.current_unsigned:
-        return [Finding(
-            "unsigned", NOTE, names,
-            "the sensor gives the size of the current only; its sign was taken from the commanded speed",
-            "a mean of it has a floor where the current changes sign within its ripple", (), 0, {},
-        )]  # fmt: skip
+        return [Finding("unsigned", NOTE, names)]
     turning = next((values for name in ("wheel_speed", "wheel_speed_command", "voltage", "duty")
                     if (values := work.get(name)) is not None and values.shape == current.shape), None)  # fmt: skip
     noise = np.array([max(white_noise(column), quantum(column)) for column in current.T])
@@ -183,9 +160,4 @@ def _unsigned(work: LogUnderCheck) -> list[Finding]:
     share = float(backward.mean())
     if usual <= 0.0 or share < 0.05:
         return []
-    return [Finding(
-        "unsigned", FATAL, names,
-        f"the currents are never negative, though the motors are driven backward in {100 * share:.0f} % of the values: "
-        "the sensor gives their size only",
-        "say so: `current_unsigned` takes the sign from the commanded speed", (), 0, {"share": share},
-    )]  # fmt: skip
+    return [Finding("unsigned", ERROR, names, {"share": share, "channel": "current"})]

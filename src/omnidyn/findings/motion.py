@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.document import short
-from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, volts
 from omnidyn.findings.signal.robust import quantum, slope, smooth, white_noise
 from omnidyn.logs.channels import components
 from omnidyn.model.dynamics import acceleration
 from omnidyn.model.wheels import wheel_speed
+from omnidyn.statement import ERROR, NOTE, WARNING
 from omnidyn.statistics import stretches
 
 SETTLE, HELD = 0.4, 0.3  # [s]
@@ -44,10 +44,8 @@ def _start_up(work: LogUnderCheck, still: BoolArray) -> list[Finding]:
         if command is not None and np.nanmax(np.abs(command[0])) > 0.0 and not np.diff(command[:rows], axis=0).any():
             first = np.arange(len(work)) < rows
             return [Finding(
-                "start_up", NOTE, channel, f"the command is set from the first row, the wheels rest for {rows} rows "
-                f"({work.t[rows] - work.t[0]:.2g} s) and then speed up",
-                "leave the first half second out of steady values", work.lines(first), rows,
-                {"seconds": float(work.t[rows] - work.t[0])},
+                "start_up", NOTE, channel, {"rows": rows, "seconds": float(work.t[rows] - work.t[0])},
+                rows=work.lines(first), count=rows,
             )]  # fmt: skip
     return []
 
@@ -86,12 +84,7 @@ def _level(work: LogUnderCheck) -> float:
 def _never_moved(work: LogUnderCheck) -> Finding:
     driven = any(work.get(name) is not None and np.nanmax(np.abs(work.channels[name])) > 0.0
                  for name in ("voltage", "duty", "wheel_speed_command", "twist_command"))  # fmt: skip
-    why = "it was driven, but never beyond its dead zone, or it was blocked" if driven else "and nothing drove it"
-    return Finding(
-        "never_moved", FATAL, "", f"the robot never moves beyond the noise of its sensors: {why}",
-        "drive with more; such a log bounds friction from below and says nothing else",
-        work.lines(work.everywhere), len(work), {},
-    )  # fmt: skip
+    return Finding("never_moved", ERROR, "", {"driven": driven}, rows=work.lines(work.everywhere), count=len(work))
 
 
 def _blocked(work: LogUnderCheck, still: BoolArray) -> list[Finding]:
@@ -119,10 +112,7 @@ def _blocked(work: LogUnderCheck, still: BoolArray) -> list[Finding]:
     if not bad.any():
         return []
     return [Finding(
-        "blocked", WARN, "",
-        f"for {short(bad.sum() * work.step, '.3g')} s the robot stands although it is driven hard enough to move: it "
-        "was held, stood against something, or its friction is far above that of the robot file",
-        "leave those rows out", work.lines(bad), int(bad.sum()), {"seconds": float(bad.sum() * work.step)},
+        "blocked", WARNING, "", {"seconds": float(bad.sum() * work.step)}, rows=work.lines(bad), count=int(bad.sum())
     )]  # fmt: skip
 
 
@@ -158,10 +148,7 @@ def _droop(work: LogUnderCheck) -> list[Finding]:
     line = slope(w, command, ids, count)
     if not line.differs(1.0, DROOP, 5.0) or line.windows < 4 or line.value <= 0.0:
         return []
-    words = "is not reached" if line.value < 1.0 else "is exceeded"
     return [Finding(
-        "droop", WARN, " ".join(components("wheel_speed", speed.shape[1])),
-        f"the commanded speed ({name}) {words}: settled wheels turn {line.value:.3g} (+-{line.error:.2g}) of it",
-        "fit friction against measured speed, not against the commanded one", work.lines(settled), int(settled.sum()),
-        {"ratio": line.value, "error": line.error},
+        "droop", WARNING, " ".join(components("wheel_speed", speed.shape[1])),
+        {"ratio": line.value, "error": line.error, "command": name}, rows=work.lines(settled), count=int(settled.sum()),
     )]  # fmt: skip

@@ -1,6 +1,6 @@
 """What each use of a log needs of it. `identify` chooses its method by these rules, and `check` says what they say.
 
-A rule answers with the reason why not, in words, "" where nothing is lacking; it never raises.
+A rule answers with the reason why not, and none where nothing is missing; it never raises.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.exact.march import why_not_exact
+from omnidyn.statement import Statement
 
 OUTPUTS = ("twist", "wheel_speed", "wheel_angle", "current", "pose")  # what a model predicts
 CURRENT, VOLTAGE = "current", "voltage"  # where the force of the motors is from
@@ -34,22 +35,22 @@ def why_no_inputs(runs: Sequence[Run], robot: Robot) -> str:
     """Which log has no input that the robot follows, or no output, in words; "" where all have both."""
     for run in runs:
         why = why_not_whole(run, robot)
-        if why:
+        if why is not None:
             return f"{run.source or 'a log'} {why}"
     return ""
 
 
-def why_not_whole(run: Run, robot: Robot | None) -> str:
-    """Why a log cannot be fitted whole: it "holds no voltage and no duty". Without a robot: for none that there is."""
+def why_not_whole(run: Run, robot: Robot | None) -> Statement | None:
+    """Why a log cannot be fitted whole; None where it can be. Without a robot: by no robot that there is."""
     none = run.voltage is None and run.duty is None
     if none and has_set_speeds(run):
         if robot is not None and robot.drive.kind != SPEED:
-            return f"holds set speeds only; to fit it whole, {LOOP_REMEDY}"
+            return Statement("set_speeds_only")
     elif none:
-        return "holds no voltage and no duty"
+        return Statement("no_input")
     if not any(getattr(run, name) is not None for name in OUTPUTS):
-        return "holds no speed, angle, current or pose"
-    return ""
+        return Statement("no_output")
+    return None
 
 
 def has_set_speeds(run: Run) -> bool:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from omnidyn.findings.finding import NOTE, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import INPUTS, MIN_ROWS, LogUnderCheck
+from omnidyn.statement import NOTE
 from omnidyn.statistics import stretches
 
 BURST, SHORT = 10.0, 0.25  # times what 90 % of the rows stay below; [s]
@@ -34,10 +35,8 @@ def _bursts(work: LogUnderCheck) -> list[Finding]:
         top = int(np.flatnonzero(bad)[np.argmax(size[bad])])
         found.append(Finding(
             "burst", NOTE, component,
-            f"{component} shoots up to {values[top]:.3g} at t = {work.t[top]:.5g} s for less than {SHORT:g} s, "
-            f"{size[top] / usual:.0f} times what it stays below in 90 % of the rows",
-            "a tracker that slips does so; leave those rows out if the robot cannot turn or drive like that",
-            work.lines(bad), int(bad.sum()), {"farthest": float(values[top]), "usual": usual},
+            {"farthest": float(values[top]), "usual": usual, "at_s": float(work.t[top]), "longest_s": SHORT},
+            rows=work.lines(bad), count=int(bad.sum()),
         ))  # fmt: skip
     return found
 
@@ -48,8 +47,5 @@ def _last_row(work: LogUnderCheck) -> list[Finding]:
         values = work.get(channel)
         if values is not None and not values[-1].any() and values[-2].any() and np.isfinite(values[-2:]).all():
             bad = np.arange(len(work)) == len(work) - 1
-            return [Finding(
-                "last_row", NOTE, channel, f"{channel} is 0 in the last row, and not before: the end of the recording",
-                "leave the last row out", work.lines(bad), 1, {},
-            )]  # fmt: skip
+            return [Finding("last_row", NOTE, channel, rows=work.lines(bad), count=1)]
     return []

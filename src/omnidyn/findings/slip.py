@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
-from omnidyn.findings.finding import WARN, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, wheels_twist
 from omnidyn.findings.signal.robust import products, slope, smooth
 from omnidyn.logs.channels import components
 from omnidyn.model.motor import settled_current, traction
 from omnidyn.simulation.slip.plant import grips
+from omnidyn.statement import WARNING
 from omnidyn.statistics import robust_std
 
 WINDOW, SHORTEST = 0.15, 0.4  # [s]
@@ -39,13 +40,10 @@ def check_slip(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         names = " ".join(components("wheel_speed", work.wheels))
         rows = np.flatnonzero(bad)
         found.append(Finding(
-            "slip", WARN, names,
-            f"from t = {work.t[rows[0]]:.5g} to {work.t[rows[-1]]:.5g} s the robot covers {inside / outside:.3g} "
-            f"(+-{error:.2g}) of the path its wheels roll, measured by the rest of the log ({inside:.3g} there, "
-            f"{outside:.3g} elsewhere): it slips, or was pushed{_against_the_limit(work, bad)}",
-            "leave those rows out of fits of wheel speed against ground speed", work.lines(bad), int(bad.sum()),
+            "slip", WARNING, names,
             {"ratio": inside / outside, "error": error, "from_s": float(work.t[rows[0]]),
-             "to_s": float(work.t[rows[-1]])},
+             "to_s": float(work.t[rows[-1]]), "inside": inside, "outside": outside, **_against_the_limit(work, bad)},
+            rows=work.lines(bad), count=int(bad.sum()),
         ))  # fmt: skip
         values = work.channels[seen.name].copy()
         values[bad] = np.nan
@@ -53,22 +51,20 @@ def check_slip(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     return found, work
 
 
-def _against_the_limit(work: LogUnderCheck, bad: BoolArray) -> str:
-    """What the motors push with in those rows, beside what the floor of the robot file takes, in words."""
+def _against_the_limit(work: LogUnderCheck, bad: BoolArray) -> dict[str, object]:
+    """What the motors push with in those rows, and what the floor of the robot file takes of a wheel [N]."""
     robot = work.robot
     if robot is None or robot.wheels.traction_mu is None:
-        return ""
+        return {}
     current, voltage, speed = (work.full(name) for name in ("current", "voltage", "wheel_speed"))
     if current is None and voltage is not None and speed is not None:
         current = settled_current(robot.motor, voltage, speed)
     limit = grips(robot)
-    said = ", ".join(f"{each:.3g}" for each in sorted(set(np.round(limit, 6).tolist())))
-    floor = f"the floor of the robot file takes {said} N of a wheel (traction_mu)"
+    floor = {"grips_N": sorted(set(np.round(limit, 6).tolist()))}
     if current is None or not np.isfinite(pushes := np.abs(traction(robot.motor, robot.wheels, current[bad]))).any():
-        return f"; {floor}"
-    beyond = pushes > limit
-    return f"; the motors push with up to {np.nanmax(pushes):.3g} N a wheel there, beyond the limit in " \
-           f"{100.0 * beyond.any(axis=1).mean():.2g} % of the rows: {floor}"  # fmt: skip
+        return floor
+    beyond = float((pushes > limit).any(axis=1).mean())
+    return floor | {"push_N": float(np.nanmax(pushes)), "beyond": beyond}
 
 
 def _worst(work: LogUnderCheck) -> tuple[BoolArray, float, float, float] | None:
@@ -126,14 +122,8 @@ def check_axes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         return [], work
     if not (min(off.value, other.value) > 0.1 and abs(other.value - 1.0) < 0.5 * apart):
         return [], work
-    axis, straight = ("x", "y")[k], ("x", "y")[1 - k]
-    found = Finding(
-        "axis_ratio", WARN, axis,
-        f"along {axis} the robot covers {off.value:.3g} (+-{off.error:.2g}) of the path that its wheels roll, along "
-        f"{straight} {other.value:.3g}: its rollers slip, or its wheels do not stand as the robot file says",
-        "check azimuth_deg; else take the motion over the floor for friction along this axis", (), 0,
-        {"ratio": off.value, "error": off.error, "other": other.value},
-    )  # fmt: skip
+    axis = ("x", "y")[k]
+    found = Finding("axis_ratio", WARNING, axis, {"ratio": off.value, "error": off.error, "other": other.value})
     values = work.channels[seen.name].copy()
     values[:, k] = values[:, k] / off.value if seen.name == "twist" else np.nan
     return [found], work.replace(**{seen.name: values})

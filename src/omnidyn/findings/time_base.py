@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import BoolArray, IntArray
-from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding, spans_of
+from omnidyn.findings.finding import Finding, spans_of
 from omnidyn.findings.signal.clocks import at_each_clock, leading, with_speed
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.values.counters import check_counters, restarts_of
-from omnidyn.logs.log import MAX_MISSING, Log, back_remedy
+from omnidyn.logs.log import MAX_MISSING, Log, goes_back_often
 from omnidyn.logs.segments import GAP
 from omnidyn.model.robot import Robot
+from omnidyn.statement import ERROR, NOTE, WARNING
 from omnidyn.statistics import robust_std
 
 JITTER_WARN, JITTER_NOTE = 0.5, 0.1  # spread of the steps, of the usual step
@@ -36,10 +37,7 @@ def begin(log: Log, robot: Robot | None) -> tuple[list[Finding], LogUnderCheck]:
     more, work = at_each_clock(leading(log, robot, rows), check_counters)
     found, work = found + more, with_speed(work)
     if work.get("wheel_speed") is not None and work.derived_speed:
-        found.append(Finding(
-            "speed_from_angle", NOTE, "", "no speed of wheels was logged: w1, .. are differences of the angles a1, ..",
-            "", (), 0, {},
-        ))  # fmt: skip
+        found.append(Finding("speed_from_angle", NOTE))
     return found + _gaps(work) + _jitter(work) + _unit(work) + _few(work), work
 
 
@@ -50,10 +48,9 @@ def _empty_rows(log: Log, empty: BoolArray) -> list[Finding]:
     share = count / len(log)
     return [
         Finding(
-            "empty_rows", FATAL if share > MAX_MISSING else WARN, "",
-            f"{count} of {len(log)} rows hold no time or no number", "they are left out; mend the recording",
-            spans_of(empty, log.lines), count, {"share": share},
-        )
+        "empty_rows", ERROR if share > MAX_MISSING else WARNING, "", {"share": share, "of_rows": len(log)},
+        rows=spans_of(empty, log.lines), count=count,
+    )
     ]  # fmt: skip
 
 
@@ -63,11 +60,7 @@ def _padded(log: Log, rows: IntArray) -> list[Finding]:
     bad = np.zeros(len(log), dtype=bool)
     bad[rows] = True
     return [
-        Finding(
-            "padding", WARN, "t",
-            f"{rows.size} rows at the end all repeat one row, at an earlier time: the recorder filled its buffer up",
-            "they are left out; cut them off", spans_of(bad, log.lines), int(rows.size),
-        )
+        Finding("padding", WARNING, "t", rows=spans_of(bad, log.lines), count=int(rows.size))
     ]  # fmt: skip
 
 
@@ -80,10 +73,9 @@ def _backward(log: Log, rows: IntArray) -> list[Finding]:
     farthest = float(-np.diff(log.t[rows]).min())
     return [
         Finding(
-            "time_back", FATAL, "t", f"time goes back {count} times, by up to {farthest:.4g} s",
-            back_remedy(count, len(rows), "sort them, or give identify and compare `sort`"),
-            spans_of(bad, log.lines[rows]), count, {"farthest_s": farthest},
-        )
+        "time_back", ERROR, "t", {"farthest_s": farthest}, "often" if goes_back_often(count, len(rows)) else "",
+        rows=spans_of(bad, log.lines[rows]), count=count,
+    )
     ]  # fmt: skip
 
 
@@ -92,18 +84,14 @@ def _repeated(log: Log, rows: IntArray, again: BoolArray) -> list[Finding]:
     if not count:
         return []
     share = count / len(rows)
-    words = f"{count} rows have the same time as the row before"
-    if share > MAX_MISSING:
-        words += ": the clock is too coarse for this rate, or the time stands still"
     where = np.argsort(rows[again], kind="stable")
     bad = np.zeros(len(log), dtype=bool)
     bad[rows[again][where]] = True
     return [
         Finding(
-            "time_repeats", FATAL if share > MAX_MISSING else WARN, "t", words,
-            "only the first of them is used; log a finer clock" if share > 0.01 else "only the first of them is used",
-            spans_of(bad, log.lines), count, {"share": share},
-        )
+        "time_repeats", ERROR if share > MAX_MISSING else WARNING, "t", {"share": share},
+        "often" if share > 0.01 else "", rows=spans_of(bad, log.lines), count=count,
+    )
     ]  # fmt: skip
 
 
@@ -118,13 +106,11 @@ def _gaps(work: LogUnderCheck) -> list[Finding]:
     lost = int(min(np.round(lengths / work.step - 1.0).sum(), 1e15))
     return [
         Finding(
-            "gap", WARN, "t",
-            f"{len(cuts)} gap{'s' if len(cuts) > 1 else ''}, about {lost} rows lost; the longest lasts "
-            f"{lengths.max():.4g} s, at t = {work.t[cuts[int(lengths.argmax())] - 1]:.6g} s",
-            "nothing is integrated across a gap: the pieces count as separate runs",
-            tuple((int(lines[k - 1]), int(lines[k])) for k in cuts[:20]), len(cuts),
-            {"longest_s": float(lengths.max()), "lost_rows": float(lost)},
-        )
+        "gap", WARNING, "t",
+        {"longest_s": float(lengths.max()), "lost_rows": float(lost),
+         "at_s": float(work.t[cuts[int(lengths.argmax())] - 1])},
+        rows=tuple((int(lines[k - 1]), int(lines[k])) for k in cuts[:20]), count=len(cuts),
+    )
     ]  # fmt: skip
 
 
@@ -136,28 +122,19 @@ def _jitter(work: LogUnderCheck) -> list[Finding]:
     low, high = np.quantile(steps, [0.05, 0.95])
     if relative < JITTER_NOTE and (high - low) < 4.0 * JITTER_NOTE * work.step:
         return []
-    irregular = relative > JITTER_WARN
     return [
         Finding(
-            "jitter", WARN if irregular else NOTE, "t",
-            f"the steps of time vary: usually {work.step * 1e3:.4g} ms, 90 % between {low * 1e3:.4g} and "
-            f"{high * 1e3:.4g} ms",
-            "the times as logged are used, not a fixed rate", (), 0,
-            {"relative": relative, "step_s": work.step, "low_s": float(low), "high_s": float(high)},
-        )
+        "jitter", WARNING if relative > JITTER_WARN else NOTE, "t",
+        {"relative": relative, "step_s": work.step, "low_s": float(low), "high_s": float(high)},
+    )
     ]  # fmt: skip
 
 
 def _unit(work: LogUnderCheck) -> list[Finding]:
     if len(work) < MIN_ROWS or SHORTEST_STEP <= work.step <= LONGEST_STEP:
         return []
-    likely = "ms, us or ticks read as seconds" if work.step > LONGEST_STEP else "seconds read as ms or us"
     return [
-        Finding(
-            "time_unit", FATAL, "t",
-            f"one row every {work.step:.4g} s: the time is hardly in the unit given ({likely})",
-            "give the unit of the time column, such as `column` t=NAME:ms", (), 0, {"step_s": work.step},
-        )
+        Finding("time_unit", ERROR, "t", {"step_s": work.step})
     ]  # fmt: skip
 
 
@@ -165,11 +142,7 @@ def _few(work: LogUnderCheck) -> list[Finding]:
     if len(work) >= MIN_ROWS:
         return []
     return [
-        Finding(
-            "few_rows", FATAL if len(work) < 2 else NOTE, "",
-            f"{len(work)} rows with a time: too few to judge noise, wiring or scale from",
-            "log longer, 10 s or more", (), 0, {"rows": float(len(work))},
-        )
+        Finding("few_rows", ERROR if len(work) < 2 else NOTE, "", {"rows": float(len(work))})
     ]  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from omnidyn.document import Document, Part, Points, Table, apart, interval_cell
-from omnidyn.findings.finding import FATAL, WARN, Verdict
+from omnidyn.findings.finding import Verdict
 from omnidyn.identification.estimate import NOT_DETERMINED
 from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.log_verdicts import checked
@@ -15,7 +15,7 @@ from omnidyn.identification.steady.study_parts import Difference
 from omnidyn.identification.validation import Validation
 from omnidyn.model.actuation import DEAD_BAND
 from omnidyn.model.keys import in_words, unit
-from omnidyn.statement import Statement
+from omnidyn.statement import ERROR, WARNING, Statement
 
 SHOWN = 6  # findings of a log that are named
 MOST_LOGS = 20  # that are shown, one by one
@@ -119,16 +119,16 @@ def verdict_table(verdicts: Sequence[Verdict]) -> Table:
     """What `check` says of each log; of many logs the gravest, then a line for the rest."""
     rows, shown = [], list(verdicts)
     if len(shown) > MOST_LOGS:
-        shown = sorted(shown, key=lambda each: (-each.counts[FATAL], -each.counts[WARN]))[: MOST_LOGS - 1]
+        shown = sorted(shown, key=lambda each: (-each.counts[ERROR], -each.counts[WARNING]))[: MOST_LOGS - 1]
     for each in shown:
-        heard = [f for f in each.findings if f.level in (FATAL, WARN) or f.code == "judged_again"]
-        what = [f"{f.code} {f.where}".rstrip() for f in heard]
+        heard = [f for f in each.findings if f.severity in (ERROR, WARNING) or f.code == "judged_again"]
+        what = [f"{f.code} {f.subject}".rstrip() for f in heard]
         words = ", ".join(what[:SHOWN]) + (", ..." if len(what) > SHOWN else "")
-        rows.append((each.source, str(each.rows), f"{each.duration:.4g}", f"{each.rate:.4g}", str(each.counts[FATAL]),
-                     str(each.counts[WARN]), words or "fit for use"))  # fmt: skip
+        rows.append((each.source, str(each.rows), f"{each.duration:.4g}", f"{each.rate:.4g}", str(each.counts[ERROR]),
+                     str(each.counts[WARNING]), words or "fit for use"))  # fmt: skip
     rest = len(verdicts) - len(shown)
     if rest:
-        fit = len(verdicts) - sum(each.counts[FATAL] + each.counts[WARN] > 0 for each in verdicts)
-        told = f"no worse than these; of all {len(verdicts)} logs, {fit} have nothing to heed"
+        fit = len(verdicts) - sum(each.counts[ERROR] + each.counts[WARNING] > 0 for each in verdicts)
+        told = f"no worse than these; of all {len(verdicts)} logs, {fit} have no error or warning"
         rows.append((f"and {rest} more", "", "", "", "", "", told))
-    return Table(("log", "rows", "length s", "rate Hz", "fatal", "to heed", "what"), rows)
+    return Table(("log", "rows", "length s", "rate Hz", "errors", "warnings", "what"), rows)

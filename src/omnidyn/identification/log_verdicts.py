@@ -9,8 +9,8 @@ from typing import Any
 
 from omnidyn.errors import InputError
 from omnidyn.findings.check import check_log
-from omnidyn.findings.finding import FATAL, Finding, Verdict
-from omnidyn.findings.guesses import judged_again, judged_words, rest_on_guesses
+from omnidyn.findings.finding import Finding, Verdict
+from omnidyn.findings.guesses import gone_by_fit, judged_again, rest_on_guesses
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
 from omnidyn.statement import ERROR, Statement
@@ -46,8 +46,8 @@ def judged_by_fit(
         judged_again(each, check_log(log, robot)) if rest_on_guesses(each) else each
         for each, log in zip(verdicts, logs, strict=True)
     ]
-    for words in judged_words(found):
-        tell(words)
+    for source, finding in gone_by_fit(found):
+        tell(f"{source or 'the log'}: {finding.subject}: {finding}")
     return tuple(found)
 
 
@@ -60,7 +60,7 @@ def told_why(verdicts: Sequence[Verdict], use: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        why = next((own.words for each in verdicts for own in each.uses if own.name == use and not own.good), "")
+        why = next((str(own.reason) for each in verdicts for own in each.uses if own.name == use and not own.good), "")
         if error.remedy or not why:
             raise
         raise InputError(
@@ -79,11 +79,11 @@ def verdict_advice(verdicts: Sequence[Verdict]) -> list[Statement]:
     alike: dict[tuple[str, str], list[tuple[str, Finding]]] = {}
     for each in verdicts:
         for finding in _fatal(each):
-            alike.setdefault((finding.code, finding.remedy), []).append((each.source, finding))
+            alike.setdefault((finding.code, finding.remedy_text), []).append((each.source, finding))
     return [
         Statement(
             "mend_log", ERROR, _first(source for source, _ in found),
-            {"finding": found[0][1].message, "what": remedy or "see omnidyn check"},
+            {"finding": found[0][1], "what": remedy or "see omnidyn check"},
         )
         for (_, remedy), found in alike.items()
     ]  # fmt: skip
@@ -93,12 +93,12 @@ def unfit(verdicts: Sequence[Verdict]) -> list[Statement]:
     """Which logs are not usable as they stand, and why: those with the same faults together."""
     alike: dict[tuple[str, ...], list[Verdict]] = {}
     for each in verdicts:
-        if each.fatal:
+        if each.has_errors:
             alike.setdefault(tuple(finding.code for finding in _fatal(each)), []).append(each)
     return [
         Statement(
             "log_not_usable", ERROR, _first(each.source for each in found),
-            {"logs": len(found), "findings": tuple(each.message for each in _fatal(found[0]))},
+            {"logs": len(found), "findings": tuple(_fatal(found[0]))},
         )
         for found in alike.values()
     ]  # fmt: skip
@@ -106,11 +106,11 @@ def unfit(verdicts: Sequence[Verdict]) -> list[Statement]:
 
 def checked(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
     """The verdicts as JSON has them beside a fit."""
-    return [{"source": each.source, "fatal": each.fatal, "counts": each.counts} for each in verdicts]
+    return [{"source": each.source, "has_errors": each.has_errors, "counts": each.counts} for each in verdicts]
 
 
 def _fatal(verdict: Verdict) -> list[Finding]:
-    return [finding for finding in verdict.findings if finding.level == FATAL]
+    return [finding for finding in verdict.findings if finding.severity == ERROR]
 
 
 def _first(sources: Iterator[str]) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from omnidyn.comparison.verdict import followed, follows, nothing_followed
-from omnidyn.findings.finding import FATAL, Verdict
+from omnidyn.findings.finding import Verdict
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.steady.choice import ShapeScore
@@ -37,9 +37,9 @@ def fits_verdict(
 ) -> list[Statement]:  # fmt: skip
     """Fits of all groups. verdicts: of `check` on the logs. cut: whether an interrupt cut the fit off."""
     found = [Statement("cut_short", WARNING)] if cut else []
-    faults = [finding for each in verdicts for finding in each.findings if finding.level == FATAL]
+    faults = [finding for each in verdicts for finding in each.findings if finding.severity == ERROR]
     if faults:
-        logs = {"logs": sum(each.fatal for each in verdicts), "of": len(verdicts), "first": faults[0].message}
+        logs = {"logs": sum(each.has_errors for each in verdicts), "of": len(verdicts), "first": faults[0]}
         found.append(Statement("logs_with_errors", ERROR, numbers=logs))
     found += [fit.ladder.statement() for fit in [*fits.values()][:1] if fit.ladder]  # all have the same
     for group, fit in fits.items():

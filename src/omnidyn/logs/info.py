@@ -26,6 +26,7 @@ from omnidyn.logs.readers.recording import Topic
 from omnidyn.logs.table.table import Table
 from omnidyn.logs.table.text_file import Progress
 from omnidyn.model.robot import Robot
+from omnidyn.statement import Statement, statements
 
 NAMES = {"": "text", "sqlite": "db3"}  # of formats, where the name of the reader is another
 PIECE = 200_000  # rows looked at together
@@ -43,7 +44,7 @@ class Info:
     mapping: ColumnMap | None
     span: float = 0.0
     salvaged: int | None = None
-    notes: tuple[str, ...] = ()
+    notes: tuple[Statement, ...] = ()
     why: str = ""
     sha256: str = ""
 
@@ -61,8 +62,10 @@ class Info:
         lines = self.mapping.lines() if self.mapping is not None else [f"nothing: {self.why}"]
         doubts = self.mapping.doubts if self.mapping is not None else ()
         taken = Points(lines, "taken:", "mapping")
+        open_questions = [doubt.with_remedy for doubt in doubts]
         return Document(
-            [head, "", table, "", taken, Points(doubts, "doubt:", "doubts"), Points(self.notes, "note:", "notes")],
+            [head, "", table, "", taken, Points(open_questions, "doubt:", "doubts"),
+             Points(self.notes, "note:", "notes")],
             self.to_dict(), doubts, ascii=True,
         )  # fmt: skip
 
@@ -77,7 +80,8 @@ class Info:
                 for each in self.topics
             ],
             "mapping": {key: {"column": column.name, "unit": column.unit} for key, column in columns.items()},
-            "doubts": list(self.mapping.doubts) if self.mapping is not None else [self.why], "notes": list(self.notes),
+            "doubts": [doubt.to_dict() for doubt in self.mapping.doubts] if self.mapping is not None else [self.why],
+            "notes": [note.to_dict() for note in self.notes],
         }  # fmt: skip
 
 
@@ -107,7 +111,7 @@ def read_info(
         first = min(int(track.stamps.min()) for track in recording.tracks if len(track.stamps))
         last = max(int(track.stamps.max()) for track in recording.tracks if len(track.stamps))
         span = (last - first) / 1e9
-    notes = (*recording.notes, *(mapping.notes if mapping is not None else ()))
+    notes = statements((*recording.notes, *(mapping.notes if mapping is not None else ())))
     return Info(printable(str(path)), kind, topics, mapping, span, recording.salvaged, notes, why, recording.sha256)
 
 
@@ -159,7 +163,7 @@ def _of_columns(
     assert table is not None
     taken = {column.name for column in mapping.columns.values()} if mapping is not None else set()
     topics = tuple(_topic(name, each, table, name in taken) for name, each in seen.items())
-    notes = (*table.notes, *(mapping.notes if mapping is not None else ()))
+    notes = statements((*table.notes, *(mapping.notes if mapping is not None else ())))
     return Info(printable(str(path)), kind, topics, mapping, max(0.0, last - first), None, notes, why, table.sha256)
 
 

@@ -20,8 +20,13 @@ from omnidyn.logs.clock.restarts import Restart
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.logs.segments import filled
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
-from omnidyn.statement import statements
+from omnidyn.statement import NOTE, WARNING, Statement, statements
 
+REFUSED = {
+    "rows_empty": "hold no time or no number",
+    "rows_of_padding": "at the end repeat one row with an earlier time (padding)",
+    "rows_repeated": "repeat the time of the row before",
+}  # fmt: skip
 OFTEN_BACK = 0.005  # of the rows: no recorder writes so many out of order
 MAX_MISSING = 0.2  # share of rows without a time or without any number
 ON_CHANGE = 0.2  # a component with more blank cells than this share, gaps left out, is recorded on change
@@ -38,7 +43,7 @@ class Log:
     as in Run; NaN where missing, and all NaN for a component that was not recorded. lines: line of each row in the
     file, shape (rows,). columns: which column each component came from, and how. source, sha256: of the file.
     current_unsigned: the sensor gives |i|; the sign in `channels` is that of the commanded speed.
-    notes: what the readers had to decide, in words. own_clocks: topics with clocks of their own; a blank is no missing
+    notes: what the readers had to decide. own_clocks: topics with clocks of their own; a blank is no missing
     value. restarts: where its clock or a counter begins again, which the times and angles here no longer show.
     """
 
@@ -49,7 +54,7 @@ class Log:
     source: str = ""
     sha256: str = ""
     current_unsigned: bool = False
-    notes: tuple[str, ...] = ()
+    notes: tuple[Statement, ...] = ()
     own_clocks: bool = False
     restarts: tuple[Restart, ...] = ()
 
@@ -61,7 +66,7 @@ class Log:
             run.channels,
             np.arange(len(run)),
             source=run.source,
-            notes=(*map(str, run.warnings),),
+            notes=run.warnings,
             own_clocks=run.staggered,
         )
 
@@ -95,13 +100,11 @@ class Log:
         Raises InputError when time goes back (unless `sort`), when more than 20 % of the rows cannot be used, or when
         no two times differ.
         """
-        warnings = list(self.notes)
-        log = self._without(self.empty_rows(), "hold no time or no number", warnings)
-        log = log._without(
-            log.padding_rows(), "at the end repeat one row with an earlier time (padding)", warnings, bound=1.0
-        )
+        warnings: list[Statement | str] = list(self.notes)
+        log = self._without(self.empty_rows(), "rows_empty", warnings)
+        log = log._without(log.padding_rows(), "rows_of_padding", warnings, bound=1.0)
         if sort and (np.diff(log.t) < 0.0).any():
-            warnings.append(f"time goes back {int((np.diff(log.t) < 0.0).sum())} times: rows were sorted")
+            warnings.append(Statement("rows_sorted", WARNING, "t", {"times": int((np.diff(log.t) < 0.0).sum())}))
             log = log.rows(np.argsort(log.t, kind="stable"))
         log._refuse_backward()
         repeated = np.concatenate([[False], np.diff(log.t) == 0.0])
@@ -110,12 +113,12 @@ class Log:
                 "time stands still", got=f"t = {log.t[0]:.9g} s in all {len(log)} rows", expected="times that increase",
                 where=self.source,
             )  # fmt: skip
-        log = log._without(repeated, "repeat the time of the row before", warnings, bound=1.0)._moved(warnings)
+        log = log._without(repeated, "rows_repeated", warnings, bound=1.0)._moved(warnings)
         channels = {name: log.aligned(name, values, warnings) for name, values in log.channels.items()}
         channels = {name: np.where(log.between(name), np.nan, values) for name, values in channels.items()}
         return Run(t=log.t, **channels, source=self.source, warnings=statements(warnings))
 
-    def _moved(self, warnings: list[str]) -> Log:
+    def _moved(self, warnings: list[Statement | str]) -> Log:
         """What was recorded late, at the times when it happened: in rows of its own where no row has such a time.
 
         No number is changed, and none stands between two rows. Times increase. What happened before the first row goes.
@@ -138,7 +141,7 @@ class Log:
                 there = np.abs(t[rows] - at[key]) <= near if key in late else np.ones(len(own), dtype=bool)
                 table[rows[there], k] = columns[there, k]
             channels[name] = table[:, 0] if CHANNELS[name] == SCALAR else table
-        warnings += [f"{key} was moved back by its latency of {seconds:g} s" for key, seconds in late.items()]
+        warnings += [Statement("latency_taken_out", NOTE, key, {"seconds": seconds}) for key, seconds in late.items()]
         settled = {key: replace(each, latency=0.0) for key, each in self.columns.columns.items()}
         lines = self.lines[np.searchsorted(self.t, t, side="right") - 1]
         log = replace(
@@ -169,10 +172,10 @@ class Log:
         for name, values in self.channels.items():
             whole = np.fmax.reduceat(values, first)[group]
             channels[name] = np.where(joins if values.ndim == 1 else joins[:, None], whole, values)[keep]
-        note = f"{int((~keep).sum())} of {len(self)} rows fill the blanks of a row of the same time: joined to it"
+        note = Statement("rows_joined", NOTE, "t", {"joined": int((~keep).sum()), "rows": len(self)})
         return replace(self, t=self.t[keep], channels=channels, lines=self.lines[keep], notes=(*self.notes, note))
 
-    def aligned(self, channel: str, values: FloatArray, warnings: list[str]) -> FloatArray:
+    def aligned(self, channel: str, values: FloatArray, warnings: list[Statement | str]) -> FloatArray:
         """A channel in every row of the log, once its times can be trusted; what was done goes to `warnings`.
 
         What was recorded on change, or by a topic with a clock of its own: commands held, measurements on the line
@@ -185,14 +188,13 @@ class Log:
             if self.now_and_then(columns[:, k]):
                 hold = channel in NEVER_MADE_UP
                 changed[:, k] = _held(columns[:, k]) if hold else filled(self.t, columns[:, k])
-                how = "held" if hold else "nothing is made up between"
                 if not self.own_clocks:
                     share = float(np.isnan(columns[:, k]).mean())
-                    warnings.append(f"{component} is recorded on change ({share:.0%} of its cells are blank): {how}")
+                    warnings.append(Statement("on_change", NOTE, component, {"blank": share, "held": hold}))
             late = self.columns.columns[component].latency if component in self.columns.columns else 0.0
             if late:
                 changed[:, k] = np.interp(self.t + late, self.t, changed[:, k], right=np.nan)
-                warnings.append(f"{component} was moved back by its latency of {late:g} s")
+                warnings.append(Statement("latency_taken_out", NOTE, component, {"seconds": late}))
         return changed[:, 0] if CHANNELS[channel] == SCALAR else changed
 
     def now_and_then(self, values: FloatArray) -> bool:
@@ -241,18 +243,20 @@ class Log:
             padding[first:] = True
         return padding
 
-    def _without(self, bad: BoolArray, words: str, warnings: list[str], bound: float = MAX_MISSING) -> Log:
+    def _without(self, bad: BoolArray, code: str, warnings: list[Statement | str], bound: float = MAX_MISSING) -> Log:
         """The other rows, with a warning; refused where more than a share of `bound` would go."""
         count = int(bad.sum())
         if not count:
             return self
         first = int(self.lines[np.flatnonzero(bad)[0]])
+        said = Statement(code, WARNING, "", {"left_out": count, "rows": len(self), "first": first})
         if count > bound * len(self) or count == len(self):
             raise InputError(
-                f"{count} of {len(self)} rows {words}", got=f"first in line {first}", expected=f"at most {bound:.0%}",
+                f"{count} of {len(self)} rows {REFUSED[code]}", got=f"first in line {first}",
+                expected=f"at most {bound:.0%}",
                 remedy="mend the recording, or map another column to t", where=self.source,
             )  # fmt: skip
-        warnings.append(f"{count} of {len(self)} rows {words} and were left out, first in line {first}")
+        warnings.append(said)
         return self.rows(~bad)
 
     def _refuse_backward(self) -> None:
@@ -266,9 +270,14 @@ class Log:
             )  # fmt: skip
 
 
+def goes_back_often(times: int, rows: int) -> bool:
+    """Whether time goes back so often that the clock is wrong, not the order of the rows."""
+    return times > OFTEN_BACK * rows
+
+
 def back_remedy(times: int, rows: int, sort: str) -> str:
     """What to do about a time that goes back; sort: how to sort. Over and over, the clock is wrong: never sort."""
-    if times > OFTEN_BACK * rows:
+    if goes_back_often(times, rows):
         return (
             "do not sort the rows: look at how the time is written (milliseconds without leading zeros?), and whether "
             "another column is the clock (`column` t=NAME:UNIT)"

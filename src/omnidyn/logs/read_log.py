@@ -36,6 +36,7 @@ from omnidyn.model.frames import unwrapped
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import MIN_WHEELS, wheel_speed
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
+from omnidyn.statement import NOTE, Statement, statements
 
 STILL = 1e-6  # [rad/s] a commanded speed below counts as none
 
@@ -191,14 +192,14 @@ def log_from_table(
 
     Raises InputError for text where numbers are needed, and for a robot with another number of wheels.
     """
-    notes = [*table.notes, *columns.notes]
+    notes: list[Statement | str] = [*table.notes, *columns.notes]
     wheels = _wheel_count(columns, robot, table.source)
     if robot is not None and wheels > 1:
         wheels = robot.wheels.count
     clock = clock or Clock()
     known = len(clock.restarts)
     t = clock.times(table, columns.columns[TIME], notes)
-    episodes = [Restart(EPISODE, TIME, line, "another recording begins") for line in table.begins]
+    episodes = [Restart(EPISODE, TIME, line) for line in table.begins]
     counters = Counters(table, t, [*episodes, *clock.restarts[known:]])
     channels: dict[str, FloatArray] = {}
     for key, column in columns.columns.items():
@@ -222,9 +223,9 @@ def log_from_table(
         channels[name] = channels[name][:, 0]
     notes += turn_to_body(t, channels, columns, table.source)
     restarts = counters.restarts()
-    notes += [each.note for each in restarts if each.where != TIME]
+    notes += [each.statement for each in restarts if each.where != TIME]
     log = Log(
-        t, channels, table.lines, columns, table.source, table.sha256, False, tuple(notes), table.own_clocks,
+        t, channels, table.lines, columns, table.source, table.sha256, False, statements(notes), table.own_clocks,
         tuple(restarts),
     )  # fmt: skip
     beside = counters.beside_restarts()
@@ -234,11 +235,11 @@ def log_from_table(
     return _signed(log, robot) if options.current_unsigned else log
 
 
-def _side_notes(columns: ColumnMap, robot: Robot | None) -> list[str]:
+def _side_notes(columns: ColumnMap, robot: Robot | None) -> list[Statement]:
     """What it means that speeds are those of the motor shaft, where no robot says the gear."""
     if robot is not None or not any(column.side == MOTOR_SIDE for column in columns.columns.values()):
         return []
-    return ["speeds and angles are those of the motor shaft: no robot is given, so no gear is known"]
+    return [Statement("motor_side_without_robot", NOTE)]
 
 
 def _without_other_topics(log: Log) -> Log:
@@ -294,7 +295,7 @@ def _signed(log: Log, robot: Robot | None) -> Log:
             expected="a commanded speed of the wheels or of the body, a voltage or a duty", where=log.source,
         )  # fmt: skip
     current = np.abs(log.channels["current"]) * sign
-    note = f"currents are taken as unsigned: they get the sign of the {origin}, and 0 where that is 0"
+    note = Statement("current_sign_taken", NOTE, "current", {"origin": origin})
     channels = {**log.channels, "current": current}
     return replace(log, channels=channels, current_unsigned=True, notes=(*log.notes, note))
 

@@ -2,58 +2,66 @@
 
 from __future__ import annotations
 
+from omnidyn.document import all_of
+from omnidyn.findings.finding import Finding
 from omnidyn.statement import PLACES, Statement
-from omnidyn.telling.advice import SENTENCES as ADVICE
-from omnidyn.telling.causes import SENTENCES as CAUSES
-from omnidyn.telling.comparison import SENTENCES as COMPARISON
-from omnidyn.telling.fit import SENTENCES as FIT
-from omnidyn.telling.lack_of_fit import SENTENCES as LACK_OF_FIT
-from omnidyn.telling.ladder import SENTENCES as LADDER
-from omnidyn.telling.lines import SENTENCES as LINES
+from omnidyn.telling import (
+    advice,
+    causes,
+    comparison,
+    findings_rows,
+    findings_scale,
+    findings_signal,
+    findings_uses,
+    findings_wiring,
+    fit,
+    lack_of_fit,
+    ladder,
+    lines,
+    logs,
+    simulation,
+    steady,
+    verdicts,
+)
 from omnidyn.telling.sentence import Sentence
-from omnidyn.telling.simulation import SENTENCES as SIMULATION
-from omnidyn.telling.steady import SENTENCES as STEADY
-from omnidyn.telling.verdicts import SENTENCES as VERDICTS
+from omnidyn.telling.words import by_number
 
 ROOMS = {
-    "simulation": SIMULATION,
-    "fit": FIT,
-    "lack_of_fit": LACK_OF_FIT,
-    "causes": CAUSES,
-    "ladder": LADDER,
-    "advice": ADVICE,
-    "verdicts": VERDICTS,
-    "comparison": COMPARISON,
-    "steady": STEADY,
-    "lines": LINES,
-}
-
-ROOMS = {
-    "simulation": SIMULATION,
-    "fit": FIT,
-    "lack_of_fit": LACK_OF_FIT,
-    "causes": CAUSES,
-    "ladder": LADDER,
-    "advice": ADVICE,
-    "verdicts": VERDICTS,
-    "comparison": COMPARISON,
-    "steady": STEADY,
-    "lines": LINES,
-}
+    room.__name__.rpartition(".")[2]: room.SENTENCES
+    for room in (
+        simulation, fit, lack_of_fit, causes, ladder, advice, verdicts, comparison, steady, lines, logs,
+        findings_rows, findings_signal, findings_wiring, findings_scale, findings_uses,
+    )
+}  # fmt: skip
 CODES: dict[str, Sentence] = {code: sentence for room in ROOMS.values() for code, sentence in room.items()}
 
 
 def sentence(statement: Statement) -> str:
     """The statement in words, behind the logs, groups or motors that it is about."""
     places = statement.numbers.get(PLACES, ())
-    return ": ".join([*map(_named, places), CODES[statement.code].of(statement)])
+    words = CODES[statement.code].of(statement) + (_support(statement) if isinstance(statement, Finding) else "")
+    return ": ".join([*map(_named, places), words])
 
 
 def remedy(statement: Statement) -> str:
     """What to do about it, in words."""
-    return CODES[statement.code].remedy_of(statement)
+    words = CODES[statement.code].remedy_of(statement)
+    if not isinstance(statement, Finding) or not statement.rests_on:
+        return words
+    them = by_number(statement.rests_on, "it", "them")
+    return f"let omnidyn identify fit {them}, and judge this again, or put in what is known; if it stays, {words}"
 
 
 def _named(places: tuple[str, ...]) -> str:
     """ "exp00.csv", "exp00.csv and 215 more" """
     return places[0] if len(places) == 1 else f"{places[0]} and {len(places) - 1} more"
+
+
+def _support(finding: Finding) -> str:
+    """What a finding stands on: guesses of the robot file, some blocks of a long log, a fitted robot."""
+    guesses, numbers = finding.rests_on, finding.numbers
+    words = (
+        f"; but {all_of(guesses)} of the robot file {by_number(guesses, 'is', 'are')} only guessed" if guesses else ""
+    )
+    words += f" (so in {numbers['in_blocks']} of {numbers['blocks']} blocks of the log)" if "blocks" in numbers else ""
+    return words + ("; so it is with the fitted robot" if "by_fit" in numbers else "")

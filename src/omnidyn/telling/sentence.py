@@ -15,9 +15,9 @@ Wording = str | Callable[[Statement], str]
 class Sentence:
     """How a statement of one code is said.
 
-    text: a format string over `subject` and the statement's numbers ("{rows:.0f} rows were cut"), or a function of the
-    statement where words depend on numbers; its docstring says when the statement is made. remedy: the same for what
-    to do. remedies: those that a statement names in its `remedy`. Names in a tuple are joined: "a, b and c".
+    text: a format string over the fields and numbers of the statement ("{rows:.0f} rows were cut"), or a function of
+    the statement where words depend on numbers; its docstring says when the statement is made. remedy: the same for
+    what to do. remedies: those that a statement names in its `remedy`. Names in a tuple are joined: "a, b and c".
     """
 
     text: Wording
@@ -37,5 +37,5 @@ def _filled(wording: Wording, statement: Statement) -> str:
     if callable(wording):
         return wording(statement)
     values = {name: all_of([*map(str, value)]) if isinstance(value, tuple) else value
-              for name, value in statement.numbers.items()}  # fmt: skip
-    return wording.format(subject=statement.subject, **values)
+              for name, value in (vars(statement) | dict(statement.numbers)).items()}  # fmt: skip
+    return wording.format(**values)

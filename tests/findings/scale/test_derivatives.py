@@ -14,7 +14,7 @@ DEGREES = 180.0 / np.pi
 
 
 def above_notes(verdict):
-    return [(finding.code, finding.where) for finding in verdict.findings if finding.level != "note"]
+    return [(finding.code, finding.subject) for finding in verdict.findings if finding.severity != "note"]
 
 
 def in_degrees(twist):
@@ -29,7 +29,7 @@ def alone(twist):
 def test_a_gyroscope_in_degrees_is_blamed_and_nothing_else(without):
     verdict = check(recorded(twist=in_degrees, **dict.fromkeys(without)), ROBOT)
     assert above_notes(verdict) == [("unit", "omega")]
-    assert "deg/s read as rad/s" in verdict.of("unit")[0].message
+    assert "deg/s read as rad/s" in str(verdict.of("unit")[0])
 
 
 def test_a_gyroscope_in_degrees_beside_wheels_alone():

@@ -17,7 +17,7 @@ def test_a_number_that_stands_for_no_value(log, robot, with_channels, grave, cha
     values[7::37, 1] = code
     verdict = check(with_channels(**{channel: values}), robot)
     (finding,) = verdict.of("placeholder")
-    assert (finding.level, finding.where) == ("fatal", f"{letter}2" if letter else "y")
+    assert (finding.severity, finding.subject) == ("error", f"{letter}2" if letter else "y")
     assert finding.numbers["cell"] == code
     assert finding.rows[0] == (9, 9)
     assert grave(verdict) == {"placeholder"}
@@ -34,8 +34,8 @@ def test_negative_numbers_of_16_bits_read_as_unsigned(log, robot, with_channels,
     columns = ColumnMap({f"i{k}": Column(f"m{k}", "mA") for k in (1, 2, 3)})
     changed = with_channels(current=wrong)
     verdict = check(Log(changed.t, changed.channels, changed.lines, columns), robot)
-    assert [finding.where for finding in verdict.of("wrapped")] == ["i1", "i2", "i3"]
-    assert "negative numbers of 16 bits, read as unsigned" in verdict.of("wrapped")[0].message
+    assert [finding.subject for finding in verdict.of("wrapped")] == ["i1", "i2", "i3"]
+    assert "negative numbers of 16 bits, read as unsigned" in str(verdict.of("wrapped")[0])
     assert grave(verdict) == {"wrapped"}
 
 
@@ -56,9 +56,9 @@ def test_a_drive_that_is_never_negative_while_the_wheels_turn_back(log, robot, w
     signed = log.channels["voltage"] / (1.0 if drive == "voltage" else 6.0)
     values = np.abs(signed) if how == "size" else signed / 2.0 + np.abs(signed).max() / 2.0
     verdict = check(with_channels(**{"voltage": None, drive: values}), robot)
-    (finding,) = [each for each in verdict.of("unsigned") if each.where[0] == drive[0].replace("v", "u")]
-    assert finding.level == "fatal"
-    assert "a size without its direction, or counted from an offset" in finding.message
+    (finding,) = [each for each in verdict.of("unsigned") if each.subject[0] == drive[0].replace("v", "u")]
+    assert finding.severity == "error"
+    assert "a size without its direction, or counted from an offset" in str(finding)
     assert grave(verdict) <= {"unsigned", "saturation"}
 
 
@@ -89,7 +89,8 @@ def test_a_long_steady_spin_in_coarse_steps_is_not_stuck(robot, grave, rate):
     broken = {**channels, "wheel_speed": channels["wheel_speed"].copy()}
     broken["wheel_speed"][5 * rate :, 1] = broken["wheel_speed"][rate // 2 + 4, 1]
     again = check(Log(run.t, broken, np.arange(len(run)) + 2), robot)
-    assert "w2" in {finding.where for finding in again.findings if finding.level != "note"} or again.of("wheel_scale")
+    grave = {finding.subject for finding in again.findings if finding.severity != "note"}
+    assert "w2" in grave or again.of("wheel_scale")
 
 
 @pytest.mark.parametrize("fault", ["rpm", "inverted", "swapped", "gear"])
@@ -105,10 +106,10 @@ def test_a_dead_encoder_hides_no_second_fault(log, robot, with_channels, grave, 
         speed *= 1.2
     speed[:, 0] = 0.0
     verdict = check(with_channels(wheel_speed=speed), robot)
-    assert [finding.where for finding in verdict.of("dead")] == ["w1"]
+    assert [finding.subject for finding in verdict.of("dead")] == ["w1"]
     assert grave(verdict) == {"dead", {"rpm": "unit"}.get(fault, fault)}
     if fault == "inverted":
-        assert [finding.where for finding in verdict.of("inverted")] == ["w3"]
+        assert [finding.subject for finding in verdict.of("inverted")] == ["w3"]
 
 
 def test_what_was_exchanged_with_the_dead_encoder_starts_no_tale(log, robot, with_channels, grave):

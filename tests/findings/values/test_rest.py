@@ -43,7 +43,7 @@ def test_a_robot_that_is_said_to_drive_on_is():
 def test_the_residue_of_a_filter_is_not_stuck():
     verdict = check(load_log(case("logs/still_called_stuck/rest.csv")))
     assert not verdict.of("stuck")
-    assert not [finding for finding in verdict.findings if finding.level != "note"]
+    assert not [finding for finding in verdict.findings if finding.severity != "note"]
 
 
 def test_an_encoder_that_reads_a_residue_reads_zero(log, robot, with_channels):

@@ -22,7 +22,7 @@ def test_a_flat_line_is_dead(log, robot, with_channels, grave, channel, letter):
     values = log.channels[channel].copy()
     values[:, 1] = 0.0
     verdict = check(with_channels(**{channel: values}), robot)
-    assert [finding.where for finding in verdict.of("dead")] == [f"{letter}2"]
+    assert [finding.subject for finding in verdict.of("dead")] == [f"{letter}2"]
     assert grave(verdict) == {"dead"}
 
 
@@ -38,14 +38,14 @@ def test_a_current_that_was_given_no_sign_is_not_dead(log, robot, with_channels,
         with_channels(wheel_speed_command=log.channels["wheel_speed"], current=current * np.sign(command)),
         current_unsigned=True,
     )
-    assert [finding.where for finding in check(dead, robot).of("dead")] == ["i2"]
+    assert [finding.subject for finding in check(dead, robot).of("dead")] == ["i2"]
 
 
 def test_a_sensor_that_is_noise_only_is_dead(log, robot, with_channels, grave):
     values = log.channels["wheel_speed"].copy()
     values[:, 2] = 0.3 * np.random.default_rng(0).normal(size=len(values))
     verdict = check(with_channels(wheel_speed=values), robot)
-    assert [finding.where for finding in verdict.of("dead")] == ["w3"]
+    assert [finding.subject for finding in verdict.of("dead")] == ["w3"]
     assert grave(verdict) == {"dead"}
 
 
@@ -73,7 +73,7 @@ def test_a_stuck_encoder_is_found_with_its_rows(log, robot, with_channels, grave
     values[start : start + 90, 0] = values[start, 0]
     verdict = check(with_channels(wheel_speed=values), robot)
     (finding,) = verdict.of("stuck")
-    assert finding.where == "w1"
+    assert finding.subject == "w1"
     assert finding.rows == ((start + 2, start + 91),)
     assert grave(verdict) == {"stuck"}
     assert check(with_channels(wheel_speed=values)).of("stuck")  # chance alone, without a robot
@@ -108,7 +108,7 @@ def test_single_wild_values_are_spikes(log, robot, with_channels, grave):
     values = log.channels["wheel_speed"].copy()
     values[[333, 1444], 1] = 400.0, -381.0
     (finding,) = check(with_channels(wheel_speed=values), robot).of("spike")
-    assert (finding.where, finding.count) == ("w2", 2)
+    assert (finding.subject, finding.count) == ("w2", 2)
     assert finding.rows == ((335, 335), (1446, 1446))
     assert finding.numbers["farthest"] == 400.0
     assert grave(check(with_channels(wheel_speed=values), robot)) == {"spike"}
@@ -118,7 +118,7 @@ def test_missing_values_are_counted(log, robot, with_channels):
     values = log.channels["current"].copy()
     values[100:150, 0] = np.nan
     (finding,) = check(with_channels(current=values), robot).of("missing")
-    assert (finding.level, finding.where, finding.count) == ("note", "i1", 50)
+    assert (finding.severity, finding.subject, finding.count) == ("note", "i1", 50)
 
 
 def test_a_sensor_that_is_out_for_long_is_missing_and_no_other_fault(log, robot, with_channels, grave):
@@ -128,7 +128,7 @@ def test_a_sensor_that_is_out_for_long_is_missing_and_no_other_fault(log, robot,
     values[out, 1] = np.nan
     broken = with_channels(wheel_speed=values)
     (finding,) = check(broken, robot).of("missing")
-    assert (finding.where, finding.count) == ("w2", out.stop - out.start)
+    assert (finding.subject, finding.count) == ("w2", out.stop - out.start)
     assert grave(check(broken, robot)) == {"missing"}
 
 
@@ -143,7 +143,7 @@ def test_a_slow_wheel_that_reads_zero(robot, log, with_channels, missing):
     others = dict.fromkeys(("voltage", "current", "twist", "pose"))
     broken = with_channels(wheel_speed_command=command, wheel_speed=speed, **others)
     (finding,) = check(broken).of("reads_zero")
-    assert finding.where == "w3"
+    assert finding.subject == "w3"
     assert finding.numbers["step"] == pytest.approx(0.5)
 
 
@@ -158,7 +158,7 @@ def test_kicks_of_a_current_recorded_now_and_then_are_no_spikes():
     assert not check(log, robot).of("spike")
     current[250, 1] += 40.0 * np.nanstd(current[:, 1])
     (finding,) = check(log, robot).of("spike")
-    assert (finding.where, finding.rows) == ("i2", ((252, 252),))
+    assert (finding.subject, finding.rows) == ("i2", ((252, 252),))
 
 
 def _wheels(rng, seconds):
@@ -188,7 +188,7 @@ def test_a_wheel_that_its_voltage_leaves_is_stuck_and_its_neighbours_are_not():
         broken = coarse.copy()
         broken[a : a + 25, 1] = broken[a, 1]  # half a second
         (finding,) = check(_recorded(t, drive, broken)).of("stuck")
-        assert finding.where == "w2"
+        assert finding.subject == "w2"
         assert finding.rows[0][0] <= a + 2 + 1 < a + 25 <= finding.rows[-1][1]
 
 
@@ -211,7 +211,7 @@ def test_a_channel_that_never_repeats_is_stuck_after_a_few_rows():
     noisy = speed + 0.02 * rng.normal(size=speed.shape)
     noisy[700:708, 0] = noisy[700, 0]
     (finding,) = check(_recorded(t, drive, noisy)).of("stuck")
-    assert (finding.where, finding.rows) == ("w1", ((702, 709),))
+    assert (finding.subject, finding.rows) == ("w1", ((702, 709),))
 
 
 def test_a_simulated_speed_that_settles_is_not_stuck():
@@ -255,7 +255,7 @@ def test_a_heading_that_was_not_recorded_is_dead_still(robot, with_channels):
     pose[:, 2] = 0.25
     for twist in (turning.channels["twist"], None):
         (finding,) = check(with_channels(turning, pose=pose, twist=twist), robot).of("dead")
-        assert finding.where == "heading"
+        assert finding.subject == "heading"
 
 
 def exact_turn(robot):

@@ -10,7 +10,7 @@ WHEELS, NO_WHEELS = {}, {"wheel_speed": None}
 
 
 def above_notes(verdict):
-    return [(finding.code, finding.where) for finding in verdict.findings if finding.level != "note"]
+    return [(finding.code, finding.subject) for finding in verdict.findings if finding.severity != "note"]
 
 
 def turn(values, degrees):
@@ -34,8 +34,8 @@ def test_a_twist_in_the_frame_of_the_room(robot, others):
     verdict = check(recorded(twist=in_room, **others), robot)
     assert above_notes(verdict) == [("twist_frame", "vx vy")]
     (finding,) = verdict.of("twist_frame")
-    assert finding.level == "fatal"
-    assert "twist=room" in finding.remedy
+    assert finding.severity == "error"
+    assert "twist=room" in finding.remedy_text
     assert finding.numbers["likeness"] > 0.98
 
 
@@ -48,15 +48,15 @@ def test_a_marker_that_is_mounted_at_an_angle(degrees, others):
         assert above_notes(verdict) == [("marker_angle", "heading")]
         (finding,) = verdict.of("marker_angle")
         assert finding.numbers["angle_deg"] == pytest.approx(degrees, abs=1.5)
-        assert "assume` marker=" in finding.remedy
+        assert "assume` marker=" in finding.remedy_text
 
 
 @pytest.mark.parametrize("degrees", [8.0, -30.0])
 def test_a_marker_at_an_angle_against_the_wheels_alone(degrees):
     log = recorded(pose=lambda pose: pose + np.array([0.0, 0.0, np.radians(degrees)]), twist=None, twist_command=None)
-    (finding,) = [each for each in check(log, ROBOT).findings if each.level != "note"]
+    (finding,) = [each for each in check(log, ROBOT).findings if each.severity != "note"]
     assert finding.numbers["angle_deg"] == pytest.approx(degrees, abs=1.5)
-    assert f"marker={finding.numbers['angle_deg']:.1f}deg" in finding.remedy
+    assert f"marker={finding.numbers['angle_deg']:.1f}deg" in finding.remedy_text
 
 
 @pytest.mark.parametrize("degrees", [10.0, -60.0])
@@ -86,7 +86,7 @@ def test_a_mirrored_pose_beside_a_right_twist(signs, where, others):
 def test_an_inverted_gyroscope_is_no_time_in_another_unit(others):
     verdict = check(recorded(twist=lambda twist: twist * [1, 1, -1], **others), ROBOT)
     assert [code for code, _ in above_notes(verdict)] == ["inverted"]
-    assert "omega" in verdict.of("inverted")[0].where
+    assert "omega" in verdict.of("inverted")[0].subject
 
 
 def test_wheels_that_slip_sideways_are_one_cause():

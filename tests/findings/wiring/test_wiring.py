@@ -41,8 +41,8 @@ def test_columns_in_the_wrong_place_are_named(log, robot, with_channels, grave, 
     verdict = check(broken, robot)
     found = [finding for finding in verdict.findings if finding.code in ("swapped", "inverted")]
     assert len(found) == 1
-    assert set(found[0].where.split()) == names_of(order, sign, letter)
-    assert found[0].level == "fatal"
+    assert set(found[0].subject.split()) == names_of(order, sign, letter)
+    assert found[0].severity == "error"
     assert grave(verdict) == {found[0].code}  # nothing that follows from it
 
 
@@ -50,8 +50,8 @@ def test_a_whole_motor_in_the_wrong_place_is_told_from_its_encoder(log, robot, w
     order = [1, 0, 2]
     broken = with_channels(**{name: log.channels[name][:, order] for name in ("voltage", "current", "wheel_speed")})
     (finding,) = check(broken, robot).of("swapped")
-    assert "the whole motor" in finding.message
-    assert "w1 and w2 are exchanged" in finding.message
+    assert "the whole motor" in str(finding)
+    assert "w1 and w2 are exchanged" in str(finding)
     assert grave(check(broken, robot)) == {"swapped"}
 
 
@@ -60,29 +60,29 @@ def test_wheels_of_four_against_each_other_without_any_floor(four_wheel, with_ch
     speed = base.channels["wheel_speed"] * [1.0, -1.0, 1.0, 1.0]
     alone = with_channels(base, wheel_speed=speed, voltage=None, current=None, twist=None, pose=None)
     (finding,) = check(alone, four_wheel).of("inverted")
-    assert finding.where == "w2"  # the other explanation turns the three others about
-    assert "what the wheels must agree on" in finding.message
+    assert finding.subject == "w2"  # the other explanation turns the three others about
+    assert "what the wheels must agree on" in str(finding)
 
 
 def test_an_axis_with_the_opposite_sign(log, robot, with_channels, grave):
     verdict = check(with_channels(twist=log.channels["twist"] * [1.0, 1.0, -1.0], pose=None), robot)
-    assert [finding.where for finding in verdict.of("inverted")] == ["omega"]
+    assert [finding.subject for finding in verdict.of("inverted")] == ["omega"]
     assert grave(verdict) == {"inverted"}
 
 
 def test_an_axis_that_looks_like_two_exchanged_wheels(log, robot, with_channels):
     # Wheels 2 and 3 of the AxeBot mirror each other: exchanging them is turning vx about.
     (finding,) = check(with_channels(twist=log.channels["twist"] * [-1.0, 1.0, 1.0], pose=None), robot).of("swapped")
-    assert "w2 and w3 are exchanged" in finding.message
-    assert "vx has the opposite sign" in finding.message
+    assert "w2 and w3 are exchanged" in str(finding)
+    assert "vx has the opposite sign" in str(finding)
 
 
 def test_a_heading_alone_that_runs_the_other_way(log, robot, with_channels):
     pose = np.full_like(log.channels["pose"], np.nan)
     pose[:, 2] = -log.channels["pose"][:, 2]
     (finding,) = check(with_channels(pose=pose, twist=None), robot).of("inverted")
-    assert finding.where == "heading"
-    assert "counter-clockwise" in finding.message
+    assert finding.subject == "heading"
+    assert "counter-clockwise" in str(finding)
 
 
 def test_a_pose_in_a_frame_of_its_own(log, robot, with_channels, grave):
@@ -103,12 +103,12 @@ def test_what_the_log_cannot_tell_apart_is_said(robot, with_channels):
     speed = np.outer(omega, np.full(3, 0.1 / 0.035)) + 0.02 * rng.normal(size=(n, 3))
     twist = np.column_stack([np.zeros(n), np.zeros(n), omega]) + 0.01 * rng.normal(size=(n, 3))
     turning = with_channels(base, wheel_speed=speed[:, [1, 0, 2]], twist=twist, voltage=None, current=None, pose=None)
-    assert not check(turning, robot).fatal
+    assert not check(turning, robot).has_errors
 
 
 def test_a_robot_with_another_number_of_wheels_is_said(log):
     (finding,) = check(log, load_robot("four-wheel")).of("wheel_count")
-    assert "3 wheels" in finding.message
+    assert "3 wheels" in str(finding)
 
 
 @pytest.mark.parametrize("seed", [1, 4, 7])
@@ -119,11 +119,11 @@ def test_two_wheels_exchanged_or_one_turned_about_in_rpm_are_both_said(seed, ord
     speed = log.channels["wheel_speed"][:, [*order, *range(2, robot.wheels.count)]] * 60.0 / (2.0 * np.pi)
     speed[:, 0] *= sign
     verdict = check(replace(log, channels={**log.channels, "wheel_speed": speed}), robot)
-    grave = {finding.code: finding for finding in verdict.findings if finding.level != "note"}
+    grave = {finding.code: finding for finding in verdict.findings if finding.severity != "note"}
     assert set(grave) == {code, "unit"}
-    assert grave[code].where == ("w1 w2" if code == "swapped" else "w1")
-    assert "whole motor" not in grave[code].message
-    assert "rpm read as rad/s" in grave["unit"].message
+    assert grave[code].subject == ("w1 w2" if code == "swapped" else "w1")
+    assert "whole motor" not in str(grave[code])
+    assert "rpm read as rad/s" in str(grave["unit"])
 
 
 def test_a_gyroscope_beside_a_pose_hides_no_exchanged_wheels():
@@ -131,8 +131,8 @@ def test_a_gyroscope_beside_a_pose_hides_no_exchanged_wheels():
     log = recorded(twist=lambda twist: np.column_stack([np.full((len(twist), 2), np.nan), twist[:, 2]]),
                    twist_command=None)  # fmt: skip
     verdict = check(log, ROBOT)
-    assert not verdict.fatal
+    assert not verdict.has_errors
     assert verdict.excitation["x"] == pytest.approx(0.3, abs=0.1)
     speed = log.channels["wheel_speed"][:, [2, 1, 0]]
     (finding,) = check(replace(log, channels={**log.channels, "wheel_speed": speed}), ROBOT).of("swapped")
-    assert finding.where == "w1 w3"
+    assert finding.subject == "w1 w3"

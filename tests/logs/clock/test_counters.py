@@ -6,6 +6,7 @@ import pytest
 from omnidyn import read_log
 from omnidyn.errors import InputError
 from omnidyn.logs.clock.counters import unrolled
+from tests.support.codes import said
 from tests.support.counted import bench, counts_of, wandering
 
 TURNS = np.cumsum(np.concatenate([np.linspace(0.0, 0.04, 600), np.linspace(0.04, -0.06, 1200)]))
@@ -64,7 +65,9 @@ def test_a_log_says_that_its_counter_starts_over(tmp_path):
     path.write_text("t_s,enc1_ticks\n" + "\n".join(rows))
     run = read_log(path, assume={"a": "ticks/32768"})
     np.testing.assert_allclose(np.ptp(run.wheel_angle), np.ptp(TURNS) * 2.0 * np.pi, rtol=1e-3)
-    assert any("enc1_ticks starts over after 65536 ticks: it is taken to go on" in words for words in run.warnings)
+    assert any(
+        "enc1_ticks starts over after 65536 ticks: it is taken to go on" in words for words in said(run.warnings)
+    )
 
 
 @pytest.mark.parametrize(("bits", "kind"), [(16, float), (16, np.float32), (32, float)])

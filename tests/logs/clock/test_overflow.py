@@ -48,14 +48,14 @@ def test_a_speed_that_changes_too_fast_to_be_followed_is_named(tmp_path, speeds)
     path = write_columns(tmp_path / "log.csv", "t_s,voltage_V,speed_ticks_s", t, volts, wrapped(true))
     column = ("w1=speed_ticks_s:0.0066666667 rad/s",)
     (finding,) = check(load_log(path, options=LogOptions(overrides=column))).of("speed_overflow")
-    assert finding.level == "warn"
-    assert "leaves its 16 bits" in finding.message
+    assert finding.severity == "warning"
+    assert "leaves its 16 bits" in str(finding)
     true = true.copy()
     true[3000:3100:2] -= 40_000  # kicks of which nobody can tell whether they go over the end
     path = write_columns(tmp_path / "fast.csv", "t_s,voltage_V,speed_ticks_s", t, volts, wrapped(true))
     log = load_log(path, options=LogOptions(overrides=column))
     found = check(log).of("speed_overflow")
-    assert not found or found[0].level == "fatal"
+    assert not found or found[0].severity == "error"
 
 
 def test_full_speeds_that_reverse_are_left_alone():
@@ -74,4 +74,4 @@ def test_the_case_of_a_hub_motor():
     path = case("logs/speed_overflow/wrap16.csv")
     log = load_log(path, options=LogOptions(overrides=("w1=velocity_ticks_s:0.0066666667 rad/s",)))
     assert float(np.nanmax(log.channels["wheel_speed"])) == pytest.approx((6.0 - 0.35) / 0.02, rel=0.02)
-    assert check(log).of("speed_overflow")[0].level == "warn"
+    assert check(log).of("speed_overflow")[0].severity == "warning"

@@ -6,6 +6,7 @@ import pytest
 from omnidyn import read_log
 from omnidyn.errors import InputError
 from omnidyn.logs.read_log import LogOptions, iter_logs, load_log
+from tests.support.codes import said
 
 
 def written(tmp_path, header="duty_%,speed_rad_s", rows=40, odd=None):
@@ -19,7 +20,7 @@ def test_row_k_is_at_k_over_the_rate(tmp_path):
     run = read_log(written(tmp_path), rate=500.0)
     assert np.array_equal(run.t, np.arange(40) / 500.0)
     assert np.array_equal(run.wheel_speed[:, 0], 0.5 * np.arange(40))
-    assert "time was made of the rate: 500 rows a second" in run.warnings
+    assert "time was made of the rate: 500 rows a second" in said(run.warnings)
 
 
 def test_in_pieces_it_goes_on(tmp_path):

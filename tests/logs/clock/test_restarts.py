@@ -9,6 +9,7 @@ from omnidyn.logs.read_log import LogOptions, load_log
 from omnidyn.logs.segments import segments
 from omnidyn.run import Run
 from tests.support.cases import case
+from tests.support.codes import said
 from tests.support.counted import ROW, bench, counts_of, write_columns
 
 TICKS = {"a": "ticks/2048"}
@@ -38,9 +39,9 @@ def test_counters_that_begin_again_are_a_gap_with_and_without_a_robot(tmp_path, 
     log = load_log(path, model, LogOptions(assume=TICKS))
     verdict = check(log, model)
     (finding,) = verdict.of("counter_restart")
-    assert finding.level == "warn"
+    assert finding.severity == "warning"
     assert finding.rows == ((1502, 1502),)
-    assert finding.where == " ".join(f"a{k + 1}" for k in wheels)
+    assert finding.subject == " ".join(f"a{k + 1}" for k in wheels)
     assert not verdict.of("gap")  # one cause
     run = log.to_run()
     assert len(segments(run.t)) == 2
@@ -64,7 +65,7 @@ def test_a_run_made_in_memory_is_judged_too(motor):
     angle = counts * 2.0 * np.pi / 2048
     angle[2700:] -= angle[2700]
     (finding,) = check(Run(t=t, voltage=volts[:, None], wheel_angle=angle[:, None])).of("counter_restart")
-    assert finding.level == "fatal"
+    assert finding.severity == "error"
     assert finding.rows == ((2700, 2700),)
 
 
@@ -90,8 +91,8 @@ def test_a_board_that_restarts_makes_two_recordings(tmp_path, text, again):
     log = load_log(path, options=LogOptions(assume=TICKS, skip_bad_rows=True))
     verdict = check(log)
     (finding,) = verdict.of("clock_restart")
-    assert "at 0.6 s after 8.78 s" in finding.message
-    assert not verdict.fatal
+    assert "at 0.6 s after 8.78 s" in str(finding)
+    assert not verdict.has_errors
     assert not verdict.of("gap")
     assert not verdict.of("counter_restart")
     run = log.to_run()
@@ -117,7 +118,9 @@ def test_a_single_time_far_from_all_others_costs_its_row(tmp_path):
     run = read_log(write_columns(tmp_path / "log.csv", "t_s,w1_rad_s", t, np.arange(200.0)))
     assert len(run) == 199
     assert float(run.t[-1]) == pytest.approx(1.99)
-    assert any("1 row has a time far from all others (first: -428000 s in line 122)" in words for words in run.warnings)
+    assert any(
+        "1 row has a time far from all others (first: -428000 s in line 122)" in words for words in said(run.warnings)
+    )
 
 
 def test_the_cases_of_counters_and_boards():
@@ -127,11 +130,11 @@ def test_the_cases_of_counters_and_boards():
     for model in (None, robot):
         log = load_log(case("logs/counter_reset/kiwi2_reset.csv"), model, LogOptions(assume=ROBOT_ASSUME))
         verdict = check(log, model)
-        assert verdict.of("counter_restart")[0].where == "a1 a2 a3"
+        assert verdict.of("counter_restart")[0].subject == "a1 a2 a3"
         assert not verdict.of("slip")
     options = LogOptions(assume=ROBOT_ASSUME, skip_bad_rows=True)
     log = load_log(case("logs/serial_restart/kiwi2_glitch.csv"), robot, options)
-    assert not check(log, robot).fatal
+    assert not check(log, robot).has_errors
     assert [len(part) for part in log.recordings()] == [1245, 1249]
 
 

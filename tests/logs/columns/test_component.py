@@ -6,6 +6,7 @@ import pytest
 from omnidyn.logs.columns.guess import guess_columns
 from omnidyn.units import parse_unit
 from tests.logs.columns.test_guess import ROWS, clock, table_of
+from tests.support.codes import said
 
 
 def guessed(tmp_path, more, **options):
@@ -41,7 +42,7 @@ def test_volts_of_what_no_word_says_to_be_a_motor_stand_back(tmp_path):
     columns = guessed(tmp_path, {"logic_V": 5.0, "duty_%": 40.0, "speed_rad_s": 9.0})
     assert taken(columns) == {"d1": ("duty_%", "%"), "w1": ("speed_rad_s", "rad/s")}
     assert columns.unused == ("logic_V",)
-    assert columns.doubts == ()
+    assert said(columns.doubts) == ()
 
 
 @pytest.mark.parametrize(
@@ -51,7 +52,7 @@ def test_percent_is_a_duty(tmp_path, name):
     columns = guessed(tmp_path, {name: 50.0, "speed_rad_s": 9.0})
     assert columns.columns["d1"].name == name
     assert columns.columns["d1"].factor == 0.01
-    assert columns.doubts == ()
+    assert said(columns.doubts) == ()
 
 
 @pytest.mark.parametrize(("name", "component"), [("cmd_pct", "d1"), ("motor_cmd_%", "d1"), ("cmd_V", "u1")])
@@ -63,20 +64,20 @@ def test_what_is_commanded_in_percent_or_volts_drives_the_motor(tmp_path, name, 
 def test_percent_of_what_no_word_says_to_be_a_motor_is_left(tmp_path, name):
     columns = guessed(tmp_path, {name: 50.0, "speed_rad_s": 9.0})
     assert list(columns.columns) == ["t", "w1"]
-    assert columns.doubts == ()
+    assert said(columns.doubts) == ()
 
 
 def test_a_charge_in_percent_is_no_supply(tmp_path):
     columns = guessed(tmp_path, {"battery_pct": 80.0, "w1_rad_s": 1.0})
     assert list(columns.columns) == ["t", "w1"]
-    assert columns.doubts == ()
+    assert said(columns.doubts) == ()
 
 
 def test_a_speed_in_percent_is_asked_about_and_its_command_is_a_duty(tmp_path):
     assert taken(guessed(tmp_path, {"speed_cmd_1_pct": 50.0})) == {"d1": ("speed_cmd_1_pct", "pct")}
     columns = guessed(tmp_path, {"speed_1_pct": 50.0})
     assert taken(columns) == {}
-    assert "pct is no unit of a turn rate" in columns.doubts[0]
+    assert "pct is no unit of a turn rate" in said(columns.doubts)[0]
 
 
 def test_the_power_of_a_motor_is_a_duty_and_that_in_watts_is_not(tmp_path):
@@ -85,9 +86,9 @@ def test_the_power_of_a_motor_is_a_duty_and_that_in_watts_is_not(tmp_path):
     assert taken(guessed(tmp_path, {"motor_1_power_W": 0.5, "power [W]": 0.5})) == {}
     beside = guessed(tmp_path, {"u1_V": 5.0, "power1": 0.5, "battery_power": 0.3})
     assert taken(beside) == {"u1": ("u1_V", "V")}
-    assert beside.doubts == ()
+    assert said(beside.doubts) == ()
     sides = guessed(tmp_path, {"Power_left": -0.5, "Power_right": 0.7})
-    assert sides.doubts == (
+    assert said(sides.doubts) == (
         "Power_left, Power_right look like d1, but no number says which wheel each is (say `column` d1=Power_left and "
         "so on): not taken",
     )
@@ -96,7 +97,7 @@ def test_the_power_of_a_motor_is_a_duty_and_that_in_watts_is_not(tmp_path):
 @pytest.mark.parametrize("name", ["enc1_ticks_per_s", "speed1_ticks_s", "velocity1TicksPerSecond", "w1 [counts/s]"])
 def test_counts_per_second_ask_for_the_counts_per_turn(tmp_path, name):
     columns = guessed(tmp_path, {name: 300.0})
-    assert "counts per turn are not known: not taken; say `assume` w=ticks/COUNTS_PER_TURN/s" in columns.doubts[0]
+    assert "counts per turn are not known: not taken; say `assume` w=ticks/COUNTS_PER_TURN/s" in said(columns.doubts)[0]
     column = guessed(tmp_path, {name: 300.0}, assume={"w": "ticks/150/s"}).columns["w1"]
     assert 300.0 * column.factor == pytest.approx(4.0 * np.pi)
 
@@ -116,7 +117,7 @@ def test_numbers_that_cannot_be_what_they_are_called_are_asked_about(tmp_path, n
     values = np.round(np.linspace(-230.0, 230.0, ROWS))
     columns = guessed(tmp_path, {name: values})
     assert taken(columns) == {}
-    assert columns.doubts[0].endswith(f"not taken; say {units}")
+    assert said(columns.doubts)[0].endswith(f"not taken; say {units}")
     letter, unit = units.removeprefix("`assume` ").split("=")
     column = guessed(tmp_path, {name: values}, assume={letter: unit}).columns["d1"]  # the remedy works
     assert column.factor == pytest.approx(1.0 / 255.0)
@@ -125,9 +126,9 @@ def test_numbers_that_cannot_be_what_they_are_called_are_asked_about(tmp_path, n
 @pytest.mark.parametrize(("unit", "asked"), [("V", True), ("duty", True), ("%", True), ("duty/255", False)])
 def test_a_unit_that_is_assumed_is_held_against_the_numbers(tmp_path, unit, asked):
     columns = guessed(tmp_path, {"pwm1": np.round(np.linspace(-230.0, 230.0, ROWS))}, assume={"d": unit})
-    assert bool(columns.doubts) is asked
+    assert bool(said(columns.doubts)) is asked
     if asked:
-        assert columns.doubts[0].endswith("say `assume` d=duty/255")
+        assert said(columns.doubts)[0].endswith("say `assume` d=duty/255")
 
 
 @pytest.mark.parametrize(
@@ -135,12 +136,12 @@ def test_a_unit_that_is_assumed_is_held_against_the_numbers(tmp_path, unit, aske
 )
 def test_the_scale_of_a_pwm_is_the_next_one(tmp_path, largest, scale):
     columns = guessed(tmp_path, {"pwm1": np.linspace(-largest, largest, ROWS)})
-    assert columns.doubts[0].endswith(f"not taken; say `assume` d={scale}")
+    assert said(columns.doubts)[0].endswith(f"not taken; say `assume` d={scale}")
 
 
 def test_widths_of_servo_pulses_are_no_pwm(tmp_path):
     columns = guessed(tmp_path, {"pwm1": np.linspace(1100.0, 1900.0, ROWS)})
-    assert "1100 to 1900 look like widths of servo pulses: log (width - 1500) / 500, a duty" in columns.doubts[0]
+    assert "1100 to 1900 look like widths of servo pulses: log (width - 1500) / 500, a duty" in said(columns.doubts)[0]
 
 
 def test_what_may_be_asked_of_a_driver_is_believed(tmp_path):
@@ -156,8 +157,8 @@ STEPS = np.arange(ROWS) * 130.0
 def test_an_angle_that_jumps_by_360_is_asked_about_whatever_its_name(tmp_path, name, values):
     columns = guessed(tmp_path, {"voltage_V": 3.0, name: values})
     assert not {"a1", "heading"} & columns.columns.keys()
-    assert "it jumps by 360 as degrees do" in columns.doubts[0]
-    assert "deg" in columns.doubts[0].rpartition("say ")[2]
+    assert "it jumps by 360 as degrees do" in said(columns.doubts)[0]
+    assert "deg" in said(columns.doubts)[0].rpartition("say ")[2]
     assert guessed(tmp_path, {name: values}, assume={"a": "deg"}).columns["a1"].unit == "deg"
 
 
@@ -165,7 +166,7 @@ def test_an_angle_that_jumps_by_360_is_asked_about_whatever_its_name(tmp_path, n
 def test_an_angle_that_does_not_is_not_asked_about(tmp_path, values):
     columns = guessed(tmp_path, {"voltage_V": 3.0, "angle_rad": values})
     assert columns.columns["a1"].unit == "rad"
-    assert columns.doubts == ()
+    assert said(columns.doubts) == ()
 
 
 @pytest.mark.parametrize(
@@ -185,5 +186,5 @@ def test_tables_of_other_languages_with_decimal_commas(tmp_path, header, want):
     path.write_text("\n".join([header, *rows]), "utf-8")
     columns = guess_columns(read_table(path))
     assert {key: column.unit for key, column in columns.columns.items() if key != "t"} == want
-    assert columns.doubts == ()
+    assert said(columns.doubts) == ()
     assert parse_unit(columns.columns["t"].unit).size == 1.0

@@ -11,6 +11,7 @@ from omnidyn.logs.columns.mapping import ColumnMap, load_map, map_to_toml, parse
 from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.units import parse_unit
+from tests.support.codes import said
 
 ROWS = 20
 
@@ -94,7 +95,7 @@ def test_what_a_topic_says_of_other_axes_is_left_alone(tmp_path, name):
 def test_two_wheels_named_by_their_place_are_no_log_of_one_motor(tmp_path):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "left_vel": 1, "right_vel": 2}))
     assert list(columns.columns) == ["t"]
-    assert columns.doubts == (
+    assert said(columns.doubts) == (
         "left_vel, right_vel look like w1, but no number says which wheel each is (say `column` w1=left_vel and so "
         "on): not taken",
     )
@@ -144,7 +145,7 @@ def test_the_columns_of_the_robotino(tmp_path):
         "w1": "m1vel", "w1_cmd": "m1setvel",
     }  # fmt: skip
     assert columns.columns["w1"].side == columns.columns["w1_cmd"].side == "motor"
-    doubts = " ".join(columns.doubts)
+    doubts = " ".join(said(columns.doubts))
     assert "m1pos looks like a1, but counts per turn are not known" in doubts
     assert 'the unit pix is unknown: not taken; say `column` "x=xpos:UNIT"' in doubts
 
@@ -171,7 +172,7 @@ def test_the_clocks_of_a_microcontroller_say_their_unit(tmp_path, name, step, un
 def test_whole_numbers_of_an_encoder_are_counts_and_no_radians(tmp_path):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "enc1": clock(7.0), "enc2": clock(-7.0)}))
     assert list(columns.columns) == ["t"]
-    assert columns.doubts == (
+    assert said(columns.doubts) == (
         "enc1, enc2 look like a1, a2, but counts per turn are not known: not taken; say `assume` "
         "a=ticks/COUNTS_PER_TURN",
     )
@@ -181,14 +182,14 @@ def test_whole_numbers_of_an_encoder_are_counts_and_no_radians(tmp_path):
 def test_a_turn_rate_beyond_any_robot_is_not_taken_as_rad_s(tmp_path):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "gyro_z": clock(20.0)}))
     assert "omega" not in columns.columns
-    assert 'say `column` "omega=gyro_z:deg/s"' in columns.doubts[0]
+    assert 'say `column` "omega=gyro_z:deg/s"' in said(columns.doubts)[0]
     assert "omega" in guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "gyro_z": clock(0.2)})).columns
 
 
 def test_an_unknown_unit_in_brackets_is_a_doubt(tmp_path):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "omega [pix/s]": 1.0, "speed1 (pix/s)": 2.0}))
     assert list(columns.columns) == ["t"]
-    assert all("the unit pix/s is unknown: not taken" in doubt for doubt in columns.doubts)
+    assert all("the unit pix/s is unknown: not taken" in doubt for doubt in said(columns.doubts))
     assert len(columns.doubts) == 2
 
 
@@ -199,7 +200,7 @@ def test_german_degrees_are_degrees(tmp_path):
 
 def test_v_with_a_number_may_be_volts_or_a_speed(tmp_path):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "V_1": 1, "V_2": 2, "omega_1": 3}))
-    assert columns.doubts == (
+    assert said(columns.doubts) == (
         "V_1, V_2 look like u1, u2, which may be voltages or speeds (say `column` u1=V_1:V and so on): not taken",
     )
 
@@ -211,7 +212,7 @@ def test_a_name_that_spells_voltage_is_in_volts(tmp_path):
 
 
 def test_volts_or_percent_is_asked_once_for_all_wheels(tmp_path):
-    doubts = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "pwm1": 45.0, "pwm2": 47.0})).doubts
+    doubts = said(guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "pwm1": 45.0, "pwm2": 47.0})).doubts)
     assert len(doubts) == 1
     assert "pwm1, pwm2 look like d1, d2, but no unit is given, and up to 47 may be volts or percent" in doubts[0]
 
@@ -229,28 +230,28 @@ def test_counts_are_an_angle_once_their_counts_per_turn_are_said(tmp_path):
 def test_time_without_a_unit_is_taken_where_it_is_unmistakable(tmp_path, step, unit):
     columns = guess_columns(table_of(tmp_path, {"t": clock(step), "w1": 1.0}))
     assert columns.columns["t"].unit == unit
-    assert any("taken as " + unit in note for note in columns.notes)
+    assert any("taken as " + unit in note for note in said(columns.notes))
 
 
 @pytest.mark.parametrize(("step", "units"), [(0.5, ("s", "ms")), (500.0, ("ms", "us")), (5e5, ("us", "ns"))])
 def test_time_that_may_be_two_units_is_not_taken(tmp_path, step, units):
     columns = guess_columns(table_of(tmp_path, {"t": clock(step), "w1": 1.0}))
     assert "t" not in columns.columns
-    assert all(f'`column` "t=t:{unit}"' in columns.doubts[0] for unit in units)
+    assert all(f'`column` "t=t:{unit}"' in said(columns.doubts)[0] for unit in units)
 
 
 def test_a_counter_is_no_clock(tmp_path):
     table = table_of(tmp_path, {"timestep (8Hz)": clock(45.0), "voltage": 1.0}, ["#", "V"])
     columns = guess_columns(table)
     assert "t" not in columns.columns
-    assert "timestep" in " ".join(columns.doubts)
+    assert "timestep" in " ".join(said(columns.doubts))
 
 
 def test_volts_or_duty_is_not_guessed(tmp_path):
     table = table_of(tmp_path, {"t_s": clock(0.01), "u1": 45.0})
     columns = guess_columns(table)
     assert "u1" not in columns.columns
-    assert "`assume` u=V" in columns.doubts[0]
+    assert "`assume` u=V" in said(columns.doubts)[0]
     assert guess_columns(table, assume={"u": "%"}).columns["d1"] == Column("u1", "%")
     assert guess_columns(table, assume={"u1": "V"}).columns["u1"] == Column("u1", "V")
 
@@ -294,7 +295,7 @@ def test_an_assumed_unit_may_say_the_side_of_the_gear(tmp_path):
 def test_wheels_may_be_counted_from_zero(tmp_path):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "w0_rpm": 1, "w1_rpm": 2, "w2_rpm": 3}))
     assert [columns.columns[f"w{k}"].name for k in (1, 2, 3)] == ["w0_rpm", "w1_rpm", "w2_rpm"]
-    assert any("numbered from 0" in note for note in columns.notes)
+    assert any("numbered from 0" in note for note in said(columns.notes))
 
 
 def test_names_of_a_run_file_may_be_counted_from_zero_too(tmp_path):
@@ -304,7 +305,7 @@ def test_names_of_a_run_file_may_be_counted_from_zero_too(tmp_path):
         "u1": "u0_V", "u2": "u1_V", "u3": "u2_V", "i2": "i1_A", "i3": "i2_A",
         "w1_cmd": "w0_cmd_rad_s", "w2_cmd": "w1_cmd_rad_s", "w3_cmd": "w2_cmd_rad_s",
     }  # fmt: skip
-    assert columns.doubts == ()
+    assert said(columns.doubts) == ()
 
 
 @pytest.mark.parametrize(("speed", "more"), [("w{}_rad_s", ()), ("wheel{}_rpm", ()), ("w{}_rad_s", ("enc0_deg",))])
@@ -313,13 +314,13 @@ def test_what_counts_farther_than_wheels_from_zero_counts_from_one(tmp_path, spe
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), **dict.fromkeys(names, 1)}))
     assert [columns.columns[f"u{k}"].name for k in (1, 2, 3)] == ["u0_V", "u1_V", "u2_V"]
     assert [columns.columns[f"w{k}"].name for k in (1, 2, 3)] == [speed.format(k) for k in (1, 2, 3)]
-    assert "wheels are numbered from 0 in the file: 0 is wheel 1 (w from 1)" in columns.notes
+    assert "wheels are numbered from 0 in the file: 0 is wheel 1 (w from 1)" in said(columns.notes)
 
 
 def test_a_units_row_that_contradicts_a_name_is_still_refused(tmp_path):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "w1_rad_s": 1}, ["s", "rad"]))
     assert list(columns.columns) == ["t"]
-    assert columns.doubts == (
+    assert said(columns.doubts) == (
         "w1_rad_s looks like w1, but rad is no unit of a turn rate: not taken; say `assume` w=UNIT",
     )
 
@@ -340,7 +341,7 @@ def test_a_heading_that_jumps_by_360_is_not_taken_as_radians(tmp_path, yaw, take
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "x_m": 1, "yaw": yaw}))
     assert (columns.columns["heading"].unit if "heading" in columns.columns else "") == taken
     if not taken:
-        assert columns.doubts == (
+        assert said(columns.doubts) == (
             "yaw looks like heading, but no unit is given, and it jumps by 360 as degrees do: not taken; say `column` "
             '"heading=yaw:deg"',
         )
@@ -359,7 +360,7 @@ def test_a_log_of_one_motor_needs_no_numbers(tmp_path):
 def test_two_columns_for_one_component_take_the_first_and_say_so(tmp_path):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "w1_rad_s": 1, "wheel_speed_1_rpm": 2}))
     assert columns.columns["w1"].name == "w1_rad_s"
-    assert "wheel_speed_1_rpm looks like w1, which is w1_rad_s already: not taken" in columns.doubts
+    assert "wheel_speed_1_rpm looks like w1, which is w1_rad_s already: not taken" in said(columns.doubts)
 
 
 @pytest.mark.parametrize(
@@ -462,7 +463,7 @@ def test_cells_with_their_unit_are_doubted_in_words(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("t_s,u1,w1_rad_s,mode1\n" + "".join(f"{0.01 * k:.2f},{k}.5V,{k},fast\n" for k in range(ROWS)))
     columns = guess_columns(read_table(path))
-    assert columns.doubts == ("u1 looks like u1, but cells such as 0.5V are no numbers: not taken",)
+    assert said(columns.doubts) == ("u1 looks like u1, but cells such as 0.5V are no numbers: not taken",)
     assert columns.unused == ("u1", "mode1")
 
 
@@ -471,7 +472,7 @@ def test_they_are_doubted_too_where_no_other_column_has_a_number(tmp_path, cell)
     path = tmp_path / "log.csv"
     path.write_text("t_s,w1_rad_s,w2_rad_s\n" + "".join(f"{0.01 * k:.2f},{cell},{cell}\n" for k in range(ROWS)))
     words = cell.strip('"')
-    assert guess_columns(read_table(path)).doubts == (
+    assert said(guess_columns(read_table(path)).doubts) == (
         f"w1_rad_s, w2_rad_s look like w1, w2, but cells such as {words} are no numbers: not taken",
     )
 

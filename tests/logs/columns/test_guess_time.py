@@ -6,6 +6,7 @@ import pytest
 from omnidyn.logs.columns.guess import guess_columns
 from omnidyn.logs.read_log import load_log
 from tests.logs.columns.test_guess import ROWS, clock, table_of
+from tests.support.codes import said
 
 
 @pytest.mark.parametrize(
@@ -22,7 +23,7 @@ from tests.logs.columns.test_guess import ROWS, clock, table_of
 def test_a_time_may_have_words_about_it(tmp_path, name, step, unit):
     columns = guess_columns(table_of(tmp_path, {name: clock(step), "w1_rad_s": 1.0}))
     assert (columns.columns["t"].name, columns.columns["t"].unit) == (name, unit)
-    assert columns.doubts == ()
+    assert said(columns.doubts) == ()
 
 
 @pytest.mark.parametrize("name", ["time_left", "on_time", "temp_t", "time_diff", "motor_t"])
@@ -64,6 +65,6 @@ def test_the_channels_of_an_oscilloscope_are_no_numbers_of_wheels(tmp_path, head
 def test_two_channels_of_one_kind_are_asked_about(tmp_path):
     path = tmp_path / "scope.csv"
     path.write_text("x-axis,1,2\ns,V,V\n" + "\n".join(f"{0.01 * k:.2f},{k},{k}" for k in range(60)))
-    assert load_log(path).columns.doubts == (
+    assert said(load_log(path).columns.doubts) == (
         "1, 2 look like u1, but no number says which wheel each is (say `column` u1=1 and so on): not taken",
     )

@@ -9,6 +9,7 @@ from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.table.table import Table
 from omnidyn.model.first_guess import first_guess
 from omnidyn.model.wheels import Wheels
+from tests.support.codes import said
 
 FL, FR, RL, RR = 45.0, -45.0, 135.0, -135.0
 
@@ -86,7 +87,7 @@ def test_places_that_no_wheel_stands_at_are_asked_about():
     wheels = Wheels(azimuth_deg=(0.0, 90.0, 180.0, 270.0), robot_radius=0.1, wheel_radius=0.03)
     found = guess_columns(table("fl_rad_s", "left_rad_s", "rl_rad_s", "right_rad_s"), first_guess("plus", wheels, 3.0))
     assert list(found.columns) == ["t"]
-    assert "no number says which wheel each is" in found.doubts[0]
+    assert "no number says which wheel each is" in said(found.doubts)[0]
 
 
 def test_commands_currents_and_voltages_of_places_go_with_their_speeds():

@@ -7,6 +7,7 @@ import omnidyn
 from omnidyn.logs.read_log import load_log, read_log
 from omnidyn.model.wheels import wheel_speed
 from tests.support.axebot_logs import voltages
+from tests.support.codes import said
 
 NAMES = ("left_speed_rad_s", "right_speed_rad_s", "back_speed_rad_s")
 
@@ -38,7 +39,7 @@ def test_the_motion_proposes_the_order_and_the_signs(tmp_path, order, signs, bla
     assert "wheel_speed" not in log.channels
     told = {f"w{wheel + 1}": f"{'-' * (signs[k] < 0)}{NAMES[k]}" for k, wheel in enumerate(order)}
     words = ", ".join(f"{name}={told[name]}" for name in sorted(told))
-    assert any(f"the motion says `column` {words})" in doubt for doubt in log.columns.doubts)
+    assert any(f"the motion says `column` {words})" in doubt for doubt in said(log.columns.doubts))
     np.testing.assert_allclose(read_log(path, robot, columns=told).wheel_speed, speed, rtol=1e-14)
 
 
@@ -48,15 +49,15 @@ def test_the_motion_agrees_with_places_or_is_asked_about(tmp_path):
     robot = omnidyn.load_robot("axebot")
     log = load_log(path, robot)
     np.testing.assert_allclose(log.channels["wheel_speed"], speed, rtol=1e-14)
-    assert not log.columns.doubts
+    assert not said(log.columns.doubts)
 
 
 def test_without_a_robot_or_a_motion_it_is_asked_as_before(tmp_path):
     path, _ = log_of(tmp_path / "a.csv", np.arange(3), np.ones(3))
     path.write_text(path.read_text().replace("back_", "other_"))  # places all around would say which wheel each is
-    assert any("say `column` w1=left_speed_rad_s and so on" in doubt for doubt in load_log(path).columns.doubts)
+    assert any("say `column` w1=left_speed_rad_s and so on" in doubt for doubt in said(load_log(path).columns.doubts))
     text = path.read_text().splitlines()
     short = [",".join(line.split(",")[:4]) for line in text]
     path.write_text("\n".join(short) + "\n")
     log = load_log(path, omnidyn.load_robot("axebot"))
-    assert any("say `column` w1=left_speed_rad_s and so on" in doubt for doubt in log.columns.doubts)
+    assert any("say `column` w1=left_speed_rad_s and so on" in doubt for doubt in said(log.columns.doubts))

@@ -4,6 +4,7 @@ import pytest
 
 from omnidyn.logs.columns.guess import guess_columns
 from tests.logs.columns.test_guess import clock, table_of
+from tests.support.codes import said
 
 DRIVE = [f"/drive/motor{k}/{what}" for k in (1, 2, 3, 4) for what in ("voltage_V", "velocity_rad_s")]
 NAMED = {f"u{k}": f"/drive/motor{k}/voltage_V" for k in (1, 2, 3, 4)} | {
@@ -21,15 +22,15 @@ def taken(tmp_path, names):
 def test_the_currents_of_a_board_shift_no_wheel(tmp_path, board, places):
     found, columns = taken(tmp_path, [*DRIVE, *(board.format(k) for k in range(places))])
     assert found == NAMED
-    assert not any("numbered from 0" in note for note in columns.notes)
-    (doubt,) = columns.doubts
+    assert not any("numbered from 0" in note for note in said(columns.notes))
+    (doubt,) = said(columns.doubts)
     assert f"there are {places} beside 4 motors (say `column` i1={board.format(0)} and so on): not taken" in doubt
 
 
 def test_an_array_of_as_many_places_as_motors_counts_from_0_alone(tmp_path):
     found, columns = taken(tmp_path, [*DRIVE, *(f"/driver/currents_A[{k}]" for k in range(4))])
     assert found == NAMED | {f"i{k + 1}": f"/driver/currents_A[{k}]" for k in range(4)}
-    assert "wheels are numbered from 0 in the file: 0 is wheel 1 (u, w from 1)" in columns.notes
+    assert "wheels are numbered from 0 in the file: 0 is wheel 1 (u, w from 1)" in said(columns.notes)
 
 
 def test_a_sensor_that_is_missing_does_not_move_the_others_of_its_style(tmp_path):

@@ -6,6 +6,7 @@ import pytest
 from omnidyn import check, load_log, load_robot, read_log
 from omnidyn.errors import InputError
 from omnidyn.logs.segments import segments
+from tests.support.codes import said
 from tests.support.lerobot_set import NAMES, ROWS, lerobot_episode, pa, write_dataset
 
 
@@ -36,8 +37,8 @@ def test_each_episode_is_a_recording_of_its_own(tmp_path, files):
     steps = np.diff(log.t)
     assert [part.start for part in segments(log.t)] == [0, ROWS, 2 * ROWS]
     np.testing.assert_allclose(np.delete(steps, [ROWS - 1, 2 * ROWS - 1]), 1.0 / 30.0, atol=1e-5)
-    assert any("3 episodes are recordings of their own" in note for note in log.notes)
-    assert any("not read: arm_shoulder_pan.pos" in note for note in log.notes)
+    assert any("3 episodes are recordings of their own" in note for note in said(log.notes))
+    assert any("not read: arm_shoulder_pan.pos" in note for note in said(log.notes))
     assert not check(log).of("gap")
     assert [len(part) for part in log.recordings()] == [ROWS] * 3
 
@@ -53,9 +54,9 @@ def test_a_state_that_is_the_action_of_a_row_before_is_no_measurement(tmp_path, 
         load_log(write_dataset(tmp_path / "set", [(command, echo)]), load_robot("lekiwi")), load_robot("lekiwi")
     )
     (finding,) = verdict.of("echo")
-    assert finding.level == "fatal"
+    assert finding.severity == "error"
     assert finding.numbers["rows"] == late
-    assert "is the command of" in finding.message
+    assert "is the command of" in str(finding)
 
 
 @pytest.mark.parametrize("seed", range(3))

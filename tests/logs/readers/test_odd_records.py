@@ -12,6 +12,7 @@ from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.readers.reader import Options
 from omnidyn.logs.readers.wpilib.wpilog import read_wpilog
 from tests.support.cases import case
+from tests.support.codes import said
 from tests.support.data_logs import data_log, record, start
 
 ROWS = 400
@@ -51,15 +52,15 @@ def test_an_odd_record_of_a_data_log_costs_itself(tmp_path, odd, words):
     assert len(run) == ROWS
     np.testing.assert_allclose(run.t, 1.0 + 0.02 * np.arange(ROWS))
     np.testing.assert_array_equal(run.voltage[:, 0], np.arange(ROWS) % 9)
-    assert not words or any(words in note for note in run.warnings)
-    assert not any("damaged" in note for note in run.warnings)
+    assert not words or any(words in note for note in said(run.warnings))
+    assert not any("damaged" in note for note in said(run.warnings))
 
 
 def test_many_strays_in_a_row_are_damage(tmp_path):
     path = motor_log(tmp_path / "bad.wpilog", record(9, 1_500_000, b"1") * 50)
     recording = read_wpilog(path, Options())
     assert recording.salvaged == 100
-    assert any("the file is damaged: a value of entry 9" in note for note in recording.notes)
+    assert any("the file is damaged: a value of entry 9" in note for note in said(recording.notes))
 
 
 @pytest.mark.parametrize(("kind", "pack"), [("int64", "<q"), ("int", "<q")])
@@ -78,7 +79,9 @@ def test_the_old_name_of_arrays_is_read(tmp_path):
 def test_the_cases_of_data_logs():
     run = read_log(case("logs/wpilog_negative_stamp/negative.wpilog"))
     assert int(np.isfinite(run.wheel_speed).sum()) == 3000
-    assert any("1 record was left out: a value of NT:/SmartDashboard/Auto/selected" in note for note in run.warnings)
+    assert any(
+        "1 record was left out: a value of NT:/SmartDashboard/Auto/selected" in note for note in said(run.warnings)
+    )
     table = read_table(case("logs/wpilog_int/int.wpilog"))
     assert int(np.isfinite(table.numbers("NT:/motor1/position_ticks", missing=True)).sum()) == 3000
 
@@ -101,7 +104,7 @@ def test_an_odd_message_of_a_db3_costs_itself(tmp_path):
         db.execute("insert into messages (topic_id, timestamp, data) values (1, 'noon', x'00')")
     table = read_table(path)
     assert len(table) == rows
-    assert any("2 records were left out, the first: a message of topic 99" in note for note in table.notes)
+    assert any("2 records were left out, the first: a message of topic 99" in note for note in said(table.notes))
 
 
 @pytest.mark.parametrize("where", ["receive", "channel"])
@@ -116,7 +119,7 @@ def test_an_odd_message_of_an_mcap_costs_itself(tmp_path, where):
     path.write_bytes(content[:at] + odd + content[at:])
     table = read_table(path)
     assert len(table) == rows
-    assert any("1 record was left out: a message of" in note for note in table.notes)
+    assert any("1 record was left out: a message of" in note for note in said(table.notes))
 
 
 def test_a_single_row_of_a_parquet_far_from_all_others_is_left_out(tmp_path):
@@ -127,7 +130,7 @@ def test_a_single_row_of_a_parquet_far_from_all_others_is_left_out(tmp_path):
     pq.write_table(pa.table({"t_s": t, "w1_rad_s": np.arange(200.0)}), tmp_path / "log.parquet")
     run = read_log(tmp_path / "log.parquet")
     assert len(run) == 199
-    assert any("1 row has a time far from all others" in note for note in run.warnings)
+    assert any("1 row has a time far from all others" in note for note in said(run.warnings))
 
 
 def test_a_file_of_odd_records_alone_is_refused(tmp_path):

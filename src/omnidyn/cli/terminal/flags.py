@@ -8,7 +8,7 @@ from functools import cache
 # Options beside those of a Question, and those whose flag is not their name.
 OTHERS = (
     "assume", "azimuth", "column", "controller", "current_unsigned", "delay", "draws", "dt", "duration", "evaluations",
-    "fail_if", "force", "horizon", "map", "max_bytes", "max_steps", "no_header", "no_observer", "noise", "path",
+    "fail_if", "force", "full", "horizon", "map", "max_bytes", "max_steps", "no_header", "no_observer", "noise", "path",
     "plant", "pose", "rate", "skip", "skip_bad_rows", "sort", "split", "tol", "twist", "wheel_radius", "with",
 )  # fmt: skip
 _NAMED = re.compile(r"`([a-z_]+)`")

@@ -19,7 +19,7 @@ from omnidyn.errors import printable
 
 MIN_WIDTH, WIDTH_WITHOUT_TERMINAL = 20, 110
 COLOURS = {
-    "fatal": "red", "warn": "yellow", "note": "white", "yes": "green", "mended": "yellow", "no": "red",
+    "error": "red", "warning": "yellow", "note": "white", "yes": "green", "mended": "yellow", "no": "red",
 }  # fmt: skip
 
 # What a terminal that knows ASCII only gets to see.

@@ -6,20 +6,21 @@ column that was read in rad/s cannot be "rad/s read as rpm".
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.findings.finding import FATAL, WARN, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.scale.mistakes import (
     ANGLE_UNITS,
     LENGTH_UNITS,
     SPEED_UNITS,
     TIME_UNITS,
     TURN_UNITS,
+    Mistakes,
     possible,
     unit_finding,
     unit_of,
@@ -30,6 +31,7 @@ from omnidyn.findings.signal.robust import Slope, central_rate, slope, smooth, w
 from omnidyn.findings.time_base import LONGEST_STEP, SHORTEST_STEP
 from omnidyn.logs.channels import components
 from omnidyn.model.frames import unwrapped
+from omnidyn.statement import ERROR, WARNING
 
 LEAST, SURE = 0.03, 6.0  # of the ratio; standard errors
 ALIKE = 0.95  # likeness of window means, from which one channel is taken for a multiple of the other
@@ -52,8 +54,8 @@ class Pair(NamedTuple):
     of: tuple[str, tuple[int, ...]]
     on: tuple[str, tuple[int, ...]]
     witness: tuple[str, FloatArray] | None
-    speed_units: Mapping[str, float]
-    position_units: Mapping[str, float]
+    speed_units: Mistakes
+    position_units: Mistakes
 
 
 def check_derivatives(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -113,31 +115,24 @@ def _judged(work: LogUnderCheck, pair: Pair, line: Slope) -> tuple[Finding, LogU
     units = {SPEED_SIDE: unit_of(1.0 / ratio, possible(pair.speed_units, work, _component(pair.of))),
              POSITION_SIDE: unit_of(ratio, possible(pair.position_units, work, _component(pair.on)))}  # fmt: skip
     if not side:
-        side = POSITION_SIDE if units[POSITION_SIDE] and not units[SPEED_SIDE] else SPEED_SIDE
+        side = POSITION_SIDE if any(units[POSITION_SIDE]) and not any(units[SPEED_SIDE]) else SPEED_SIDE
     name, other = (pair.speed, pair.position) if side == SPEED_SIDE else (pair.position, pair.speed)
-    change = "change" if " " in pair.position else "changes"
-    words = (
-        f"{pair.position} {change} {ratio:.4g} times as fast as {pair.speed} {'say' if ' ' in pair.speed else 'says'}"
-    )
-    words += f", and {by} agrees with {other}" if by else ""
+    compared = {"position": pair.position, "speed": pair.speed, "source": by, "agrees_with": other if by else ""}
     clock = unit_of(1.0 / ratio, TIME_UNITS)
-    if units[side]:
-        finding = unit_finding(name, f"{words}: {units[side]}?", 1.0 / ratio if side == SPEED_SIDE else ratio)
-    elif clock:
+    if any(units[side]):
+        factor = 1.0 / ratio if side == SPEED_SIDE else ratio
+        finding = unit_finding(name, factor, units[side], shown_by="derivative", ratio=ratio, **compared)
+    elif any(clock):
         finding = _of_time((pair, line))
     elif ratio < 0.0:
-        both = name if by else f"{pair.speed} {pair.position}"
-        which = f"{name} has the opposite sign" if by else "one of the two has the opposite sign"
         finding = Finding(
-            "inverted", FATAL, both, f"{words}: {which}", "set `invert` for that column in the mapping", (), 0,
-            {"ratio": ratio, "error": line.error},
+            "inverted", ERROR, name if by else f"{pair.speed} {pair.position}",
+            {"ratio": ratio, "error": line.error, **compared, "blamed": name if by else ""},
         )  # fmt: skip
     else:
-        which = f"{name} has a wrong scale" if by else "one of the two has a wrong scale, or the rows are too far apart"
         finding = Finding(
-            "scale", WARN, name, f"{words} (+-{line.error:.2g})",
-            f"{which}{'' if by else ' to see how it moves'}", (), 0, {"ratio": ratio, "error": line.error},
-        )  # fmt: skip
+            "scale", WARNING, name, {"ratio": ratio, "error": line.error, **compared, "blamed": name if by else ""}
+        )
     return finding, _scaled(
         work, *(pair.of if side == SPEED_SIDE else pair.on), ratio if side == SPEED_SIDE else 1 / ratio
     )
@@ -162,11 +157,8 @@ def _of_time(which: tuple[Pair, Slope]) -> Finding:
     pair, line = which
     clock = unit_of(1.0 / line.value, TIME_UNITS)
     return Finding(
-        "time_unit", FATAL, "t",
-        f"{pair.position} {'change' if ' ' in pair.position else 'changes'} {line.value:.4g} times as fast as "
-        f"{pair.speed} {'say' if ' ' in pair.speed else 'says'}: the time is not in the unit given"
-        + (f" ({clock}?)" if clock else ""),
-        "give the unit of the time column, such as `column` t=NAME:ms", (), 0, {"ratio": line.value},
+        "time_unit", ERROR, "t", {"ratio": line.value, "position": pair.position, "speed": pair.speed,
+         "mistake": clock if any(clock) else ()},
     )  # fmt: skip
 
 
@@ -195,7 +187,7 @@ def _turn(work: LogUnderCheck) -> Iterator[Pair]:
         return
     own = None if speed is None else wheels_twist(work, speed, 2 * half + 1)
     rate = central_rate(unwrapped(pose[:, 2]), work.t, half)
-    witness = None if own is None else ("what the wheels say", own[:, 2:])
+    witness = None if own is None else ("wheels", own[:, 2:])
     yield Pair("turn", "omega", "heading", smooth(twist[:, 2:], 2 * half + 1), rate[:, None], ("twist", (2,)),
                ("pose", (2,)), witness, TURN_UNITS, ANGLE_UNITS)  # fmt: skip
 
@@ -221,7 +213,7 @@ def _path(work: LogUnderCheck) -> Iterator[Pair]:
         return
     body, width = pose_twist(work, pose)
     own = None if speed is None else wheels_twist(work, speed, width)
-    witness = None if own is None else ("what the wheels say", own[:, :2])
+    witness = None if own is None else ("wheels", own[:, :2])
     yield Pair("path", "vx vy", "x y", smooth(twist[:, :2], width), body[:, :2], ("twist", (0, 1)), ("pose", (0, 1)),
                witness, SPEED_UNITS, LENGTH_UNITS)  # fmt: skip
 

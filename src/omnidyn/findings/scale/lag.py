@@ -9,12 +9,13 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.findings.averaged import late_by
-from omnidyn.findings.finding import NOTE, WARN, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.clocks import sampled_with
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import electric_speed, emf, ground, ohmic, volts, wheels_twist
 from omnidyn.findings.signal.robust import Slope, central_rate, clusters, ratio, smooth, windowed
 from omnidyn.model.frames import unwrapped
+from omnidyn.statement import NOTE, WARNING
 
 FARTHEST = 8  # rows that are searched to either side
 WARN_FROM, NOTE_FROM = 0.75, 0.35  # rows
@@ -29,7 +30,7 @@ class Pair(NamedTuple):
     against: str
     y: FloatArray
     x: FloatArray
-    where: str
+    subject: str
 
 
 def check_lag(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -53,14 +54,9 @@ def check_lag(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
 
 def _finding(work: LogUnderCheck, pair: Pair, line: Slope) -> Finding:
     late, early = (pair.late, pair.against) if line.value > 0.0 else (pair.against, pair.late)
-    rows, ms = abs(line.value), abs(line.value) * work.step * 1e3
-    half = rows < WARN_FROM
-    why = ": half a row is what a speed from differences of counts is late by" if half else ""
     return Finding(
-        "lag", NOTE if half else WARN, pair.where,
-        f"{late} is {ms:.3g} ms ({rows:.2f} rows, +-{line.error:.2f}) later than {early}{why}",
-        f"move its times back by {ms:.3g} ms: latency in the mapping", (), 0,
-        {"rows": line.value, "error": line.error, "seconds": line.value * work.step},
+        "lag", NOTE if abs(line.value) < WARN_FROM else WARNING, pair.subject,
+        {"rows": line.value, "error": line.error, "seconds": line.value * work.step, "late": late, "early": early},
     )  # fmt: skip
 
 
@@ -96,7 +92,7 @@ def _of_motors(work: LogUnderCheck, speed: FloatArray) -> Iterator[Pair]:
     if counter is None or lost is None or voltage.shape != lost.shape:
         return
     names = "voltage" if work.get("voltage") is not None else "duty"
-    yield Pair("current", f"{names} and wheel_speed", lost, voltage - counter, "current")
+    yield Pair("current", f"{names} wheel_speed", lost, voltage - counter, "current")
 
 
 def lag(work: LogUnderCheck, y: FloatArray, x: FloatArray) -> Slope | None:

@@ -6,53 +6,70 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from omnidyn.findings.finding import FATAL, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.reference import BEYOND, CIRCUIT, beyond_stall, emf, stall_current, volts
 from omnidyn.findings.signal.robust import slope
 from omnidyn.logs.channels import components
+from omnidyn.statement import ERROR
 from omnidyn.units import DEGREE, TURN, known_unit, parse_unit
 
 RESISTANCE = ("motor.resistance_ohm", "motor.voltage_limit_V")
 LIMITS = ("motor.voltage_limit_V", *CIRCUIT[1:])
 UNIT_OFF = 0.12  # how far off its factor a unit mistake may be: the robot file is not exact either
 
-# How many times too large a value is, if it is read in the unit before "read as".
-TURN_UNITS = {"rpm read as rad/s": 60.0 / TURN, "deg/s read as rad/s": 1.0 / DEGREE,
-              "turns/s read as rad/s": 1.0 / TURN, "rad/s read as rpm": TURN / 60.0,
-              "rad/s read as deg/s": DEGREE}  # fmt: skip
-ANGLE_UNITS = {"deg read as rad": 1.0 / DEGREE, "turns read as rad": 1.0 / TURN, "rad read as deg": DEGREE}
-LENGTH_UNITS = {"mm read as m": 1e3, "cm read as m": 1e2, "m read as mm": 1e-3, "m read as cm": 1e-2}
-SPEED_UNITS = {"mm/s read as m/s": 1e3, "cm/s read as m/s": 1e2, "m/s read as mm/s": 1e-3, "m/s read as cm/s": 1e-2}
-CURRENT_UNITS = {"mA read as A": 1e3, "A read as mA": 1e-3}
-TIME_UNITS = {"ms read as s": 1e3, "us read as s": 1e6, "ns read as s": 1e9, "s read as ms": 1e-3}
+Mistake = tuple[str, str]  # (unit it is in, unit it was read in)
+Mistakes = Mapping[Mistake, float]
+NONE: Mistake = ("", "")
+
+# How many times too large a value is, if it is read in the second unit.
+TURN_UNITS: Mistakes = {
+    ("rpm", "rad/s"): 60.0 / TURN, ("deg/s", "rad/s"): 1.0 / DEGREE, ("turns/s", "rad/s"): 1.0 / TURN,
+    ("rad/s", "rpm"): TURN / 60.0, ("rad/s", "deg/s"): DEGREE,
+}  # fmt: skip
+ANGLE_UNITS: Mistakes = {("deg", "rad"): 1.0 / DEGREE, ("turns", "rad"): 1.0 / TURN, ("rad", "deg"): DEGREE}
+LENGTH_UNITS: Mistakes = {("mm", "m"): 1e3, ("cm", "m"): 1e2, ("m", "mm"): 1e-3, ("m", "cm"): 1e-2}
+SPEED_UNITS: Mistakes = {("mm/s", "m/s"): 1e3, ("cm/s", "m/s"): 1e2, ("m/s", "mm/s"): 1e-3, ("m/s", "cm/s"): 1e-2}
+CURRENT_UNITS: Mistakes = {("mA", "A"): 1e3, ("A", "mA"): 1e-3}
+TIME_UNITS: Mistakes = {("ms", "s"): 1e3, ("us", "s"): 1e6, ("ns", "s"): 1e9, ("s", "ms"): 1e-3}
+MOTOR_SPEED: Mistake = ("rad/s@motor", "rad/s@wheel")
+MOTOR_RPM: Mistake = ("rpm@motor", "rad/s@wheel")
 
 
-def unit_of(factor: float, units: dict[str, float]) -> str:
-    """The unit mistake that makes values so many times too large; empty where none does."""
+def unit_of(factor: float, units: Mistakes) -> Mistake:
+    """The unit mistake that makes values so many times too large; NONE where none does."""
     if not np.isfinite(factor) or factor <= 0.0:
-        return ""
-    off = {name: abs(np.log(factor / size)) for name, size in units.items()}
-    name = min(off, key=lambda each: off[each])
-    return name if off[name] < UNIT_OFF else ""
+        return NONE
+    off = {mistake: abs(np.log(factor / size)) for mistake, size in units.items()}
+    mistake = min(off, key=lambda key: off[key])
+    return mistake if off[mistake] < UNIT_OFF else NONE
 
 
-def unit_finding(where: str, words: str, factor: float, rests_on: tuple[str, ...] = ()) -> Finding:
+def unit_finding(
+    subject: str, factor: float, mistake: Mistake, rests_on: tuple[str, ...] = (), **numbers: object
+) -> Finding:
+    """Error: values in another unit than they were read in.
+
+    Args:
+        subject: components.
+        factor: how many times too large they are.
+        mistake: the likely unit mistake; NONE where none is likely.
+        rests_on: keys of the robot file behind it.
+        numbers: what shows it: `shown_by` and what was measured.
+    """
     return Finding(
-        "unit", FATAL, where, words, "give the unit of the column (`column` NAME:UNIT) or its side of the gear",
-        (), 0, {"factor": factor}, rests_on,
+        "unit", ERROR, subject, {"factor": factor, **numbers, "mistake": mistake if any(mistake) else ()},
+        rests_on=rests_on,
     )  # fmt: skip
 
 
-def possible(units: Mapping[str, float], work: LogUnderCheck, component: str) -> dict[str, float]:
+def possible(units: Mistakes, work: LogUnderCheck, component: str) -> Mistakes:
     """Those of the unit mistakes that the unit allows in which a component was read; SI where nobody knows it."""
     column = work.log.columns.columns.get(component)
     unit = known_unit(column.unit) if column is not None else None
     size = 1.0 if unit is None else unit.size
     return {
-        name: factor
-        for name, factor in units.items()
-        if abs(parse_unit(name.rpartition(" ")[2]).size / size - 1.0) < 1e-6
+        mistake: factor for mistake, factor in units.items() if abs(parse_unit(mistake[1]).size / size - 1.0) < 1e-6
     }
 
 
@@ -65,11 +82,10 @@ def current_unit(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     stall = stall_current(robot)
     high = beyond_stall(robot, current) * stall
     if high > BEYOND * stall:
-        unit = unit_of(high / (0.3 * stall), {"mA read as A": 1e3}) or "mA read as A" if high < 3e3 * stall else ""
-        words = f"currents of {high:.4g} A, where a blocked motor draws {stall:.3g} A" + (f": {unit}?" if unit else "")
-        return [unit_finding(names, words, high / stall, RESISTANCE)], work.replace(
-            current=current * (1e-3 if unit else np.nan)
-        )
+        milli = high < 3e3 * stall
+        mistake = ("mA", "A") if milli else NONE
+        found = unit_finding(names, high / stall, mistake, RESISTANCE, shown_by="stall", high_A=high, stall_A=stall)
+        return [found], work.replace(current=current * (1e-3 if milli else np.nan))
     speed = work.full("wheel_speed")
     counter = None if speed is None else emf(work, speed)
     if voltage is None or counter is None or work.log.current_unsigned:
@@ -77,10 +93,10 @@ def current_unit(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     ids, count = work.windows()
     ohm = current * np.mean(robot.motor.resistance)
     line = slope(voltage - counter, ohm, ids, count)
-    unit = unit_of(1.0 / line.value, CURRENT_UNITS) if np.isfinite(line.error) and line.value > 0.0 else ""
-    if unit and line.differs(1.0, 0.5):
-        words = f"the currents are {1 / line.value:.3g} times what voltage and speed leave for them: {unit}?"
-        return [unit_finding(names, words, 1.0 / line.value, CIRCUIT)], work.replace(current=current * line.value)
+    mistake = unit_of(1.0 / line.value, CURRENT_UNITS) if np.isfinite(line.error) and line.value > 0.0 else NONE
+    if any(mistake) and line.differs(1.0, 0.5):
+        found = unit_finding(names, 1.0 / line.value, mistake, CIRCUIT, shown_by="circuit")
+        return [found], work.replace(current=current * line.value)
     return [], work
 
 
@@ -93,18 +109,15 @@ def duty_as_voltage(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     names, speed = " ".join(components("voltage", work.wheels)), work.get("wheel_speed")
     counter = None if speed is None else emf(work, speed)
     needed = 0.0 if counter is None else float(np.nanquantile(np.abs(counter), 0.95))
-    words = ""
     if high > 1.5 * limit:
-        words = f"voltages up to {high:.4g} V, where the driver of the robot file gives {limit:.4g} V"
-        if 2.0 * limit < high <= 256.0 and limit < 100.0:
-            words += ": pwm 0..255 read as volts?"
-        elif high > 100.0 * limit:
-            words += ": mV read as V?"
+        pwm = 2.0 * limit < high <= 256.0 and limit < 100.0
+        mistake = ("duty/255", "V") if pwm else ("mV", "V") if high > 100.0 * limit else NONE
+        measured = {"shown_by": "driver", "high_V": high, "limit_V": limit}
     elif high <= 1.0 < 0.5 * limit and needed > 1.5 * high:
-        words = f"voltages within -1..1 ({high:.3g} at most), while the speeds need {needed:.3g} V: duty read as volts?"
-    if not words:
+        mistake, measured = ("duty", "V"), {"shown_by": "speed", "high_V": high, "needed_V": needed}
+    else:
         return [], work
-    return [unit_finding(names, words, high / limit, LIMITS)], work.replace(voltage=None)
+    return [unit_finding(names, high / limit, mistake, LIMITS, **measured)], work.replace(voltage=None)
 
 
 def emf_alone(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -123,11 +136,8 @@ def emf_alone(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     assert robot is not None
     gear = float(np.mean(robot.motor.gear_ratio))
     # At the voltages given a motor turns at most 1, usually 0.5 to 1 times as fast as without load.
-    fits = {name: factor for name, factor in {**TURN_UNITS, "the motor's speed read as the wheel's": gear}.items()
+    fits = {mistake: factor for mistake, factor in {**TURN_UNITS, MOTOR_SPEED: gear}.items()
             if 0.2 < excess / factor < 1.15}  # fmt: skip
-    likely = max(fits, key=lambda name: -abs(np.log(excess / fits[name] / 0.7))) if fits else ""
-    words = f"the wheel speeds imply a back-EMF {excess:.3g} times the voltage applied"
+    likely = max(fits, key=lambda mistake: -abs(np.log(excess / fits[mistake] / 0.7))) if fits else NONE
     names = " ".join(components("wheel_speed", work.wheels))
-    found = [unit_finding(names, words + (f": {likely}?" if likely else ": the unit of speed or voltage is wrong"),
-                          excess, CIRCUIT[1:])]  # fmt: skip
-    return found, work.replace(wheel_speed=speed * np.nan)
+    return [unit_finding(names, excess, likely, CIRCUIT[1:], shown_by="emf")], work.replace(wheel_speed=speed * np.nan)

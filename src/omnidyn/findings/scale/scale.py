@@ -7,8 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.scale.mistakes import (
+    MOTOR_RPM,
+    MOTOR_SPEED,
+    NONE,
     TURN_UNITS,
     current_unit,
     duty_as_voltage,
@@ -19,6 +22,8 @@ from omnidyn.findings.scale.mistakes import (
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import (
     CIRCUIT,
+    CURRENT_AND_VOLTAGE,
+    FLOOR,
     GEOMETRY,
     Ground,
     electric_speed,
@@ -29,6 +34,7 @@ from omnidyn.findings.signal.reference import (
 )
 from omnidyn.findings.signal.robust import HELD, Slope, quantum, slope, smooth, turned_by
 from omnidyn.logs.channels import components
+from omnidyn.statement import ERROR, NOTE, WARNING
 from omnidyn.units import TURN
 
 LEAST = 0.02  # a scale that is off by less is not worth a word
@@ -134,18 +140,18 @@ def _speeds(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         return _against(work, floor), work
     work = work.knowing(floor_ratio=floor, electric_ratio=electric)
     gear = float(np.mean(robot.motor.gear_ratio))
-    units = {**TURN_UNITS, "the motor's speed read as the wheel's": gear,
-             "the motor's rpm read as the wheel's rad/s": gear * 60.0 / TURN}  # fmt: skip
+    units = {**TURN_UNITS, MOTOR_SPEED: gear, MOTOR_RPM: gear * 60.0 / TURN}
     if not factor.value > 0.0:
         return [], work  # a current that says the motors run backward: its wiring or sign was named before
-    unit = unit_of(1.0 / factor.value, units) if abs(np.log(factor.value)) > 0.5 else ""
+    mistake = unit_of(1.0 / factor.value, units) if abs(np.log(factor.value)) > 0.5 else NONE
     names = " ".join(components("wheel_speed", work.wheels))
-    if unit and (electric is None or floor is None or abs(np.log(max(electric.value, 1e-9) / factor.value)) < 0.5):
+    if any(mistake) and (
+        electric is None or floor is None or abs(np.log(max(electric.value, 1e-9) / factor.value)) < 0.5
+    ):
         speed = work.channels["wheel_speed"]
-        source = "the motion over the floor" if floor is not None else "voltage and current"
-        found = [unit_finding(names, f"the wheel speeds are {1 / factor.value:.4g} times what {source} says: {unit}?",
-                              1.0 / factor.value, keys_behind(source))]  # fmt: skip
-        return found, work.replace(wheel_speed=speed * factor.value)
+        source = FLOOR if floor is not None else CURRENT_AND_VOLTAGE
+        found = unit_finding(names, 1.0 / factor.value, mistake, keys_behind(source), shown_by="ratio", source=source)
+        return [found], work.replace(wheel_speed=speed * factor.value)
     return _ratio_findings(work, these, floor, electric, names)
 
 
@@ -155,23 +161,12 @@ def _against(work: LogUnderCheck, floor: Slope) -> list[Finding]:
     if seen is None:
         return []
     names = {"twist": ("vx", "vy", "omega"), "pose": ("x", "y", "heading")}[seen.name]
-    where = " ".join(names[k] for k in seen.axes)
+    subject = " ".join(names[k] for k in seen.axes)
     if floor.value > -4.0 * floor.error:
         if abs(floor.value) > 0.1 or floor.error > 0.03 or _held(work, seen):
             return []
-        return [Finding(
-            "dead", WARN, where,
-            f"{where} stays as it is while the wheels say that the robot moves: it was not recorded, "
-            "or the wheels ran in the air", "leave it out of the mapping", (), 0,
-            {"ratio": floor.value, "error": floor.error},
-        )]  # fmt: skip
-    return [Finding(
-        "inverted", FATAL, where,
-        f"{where} goes the other way than the wheels say ({floor.value:.3g} +-{floor.error:.2g} of "
-        "it): it has the opposite sign, or all wheels have",
-        "set `invert` for that column in the mapping, or turn the wheels' signs", (), 0,
-        {"ratio": floor.value, "error": floor.error}, GEOMETRY,
-    )]  # fmt: skip
+        return [Finding("dead", WARNING, subject, {"ratio": floor.value, "error": floor.error})]
+    return [Finding("inverted", ERROR, subject, {"ratio": floor.value, "error": floor.error}, rests_on=GEOMETRY)]
 
 
 def _held(work: LogUnderCheck, seen: Ground) -> bool:
@@ -207,19 +202,14 @@ def _ratio_findings(
             return [_yaw_only(these.yaw)], work
     if off_floor and floor is not None and off_motor and electric is not None and _same(floor, electric):
         both = _joined([floor, electric]) or floor
-        return [Finding(
-            "gear", WARN, names,
-            f"floor and motors agree that the wheels turn {both.value:.4g} times (+-{both.error:.2g}) what "
-            "wheel_speed says: "
-            "a wrong gear ratio or a wrong number of counts per turn in the log",
-            "divide by the right gear ratio, or give the right counts per turn", (), 0,
-            {**numbers, "ratio": both.value},
-        )], work.replace(wheel_speed=speed * both.value).knowing(floor_ratio=None)  # fmt: skip
+        return [Finding("gear", WARNING, names, {**numbers, "ratio": both.value, "error": both.error})], work.replace(
+            wheel_speed=speed * both.value
+        ).knowing(floor_ratio=None)
     found = []
     if off_floor and floor is not None:
         found.append(_path_ratio(floor, electric, off_motor, names, numbers))
     if off_motor and electric is not None:
-        found.append(_motor_constants(electric, floor, off_floor, names, numbers))
+        found.append(_motor_constants(floor, off_floor, names, numbers))
     return found, work
 
 
@@ -234,59 +224,24 @@ def _apart(a: Slope, b: Slope) -> float | None:
 
 
 def _yaw_only(yaw: Slope) -> Finding:
-    return Finding(
-        "robot_radius", WARN, "omega",
-        f"the robot turns {yaw.value:.4g} times (+-{yaw.error:.2g}) as fast as its wheels say, while it drives "
-        "as far as "
-        "they say: the robot radius of the file is not that of the robot, or the gyro has a wrong scale",
-        f"try a robot radius {1.0 / max(yaw.value, 1e-9):.4g} times as large", (), 0,
-        {"ratio": yaw.value, "error": yaw.error},
-    )  # fmt: skip
+    return Finding("robot_radius", WARNING, "omega", {"ratio": yaw.value, "error": yaw.error})
 
 
 def _path_ratio(
     floor: Slope, electric: Slope | None, off_motor: bool, names: str, numbers: dict[str, float]
 ) -> Finding:
     """Floor and wheels disagree everywhere alike."""
-    words = f"the robot covers {floor.value:.4g} (+-{floor.error:.2g}) of the path that its wheels roll"
     if electric is not None and not off_motor and floor.value < 1.0:
-        return Finding(
-            "slip", WARN, names, words + ", the whole log through, while voltage and current agree with the wheels: it "
-            "slips, or the wheel radius of the file is too large",
-            "take the motion over the floor for friction; measure the wheel radius by rolling slowly", (), 0, numbers,
-        )  # fmt: skip
+        return Finding("slip", WARNING, names, numbers)
     if electric is not None and not off_motor:
-        return Finding(
-            "wheel_radius", WARN, names,
-            words + ", while voltage and current agree with the wheels: the wheel radius of "
-            "the file is too small, or the ground speed has a wrong scale",
-            f"try a wheel radius {floor.value:.4g} times as large", (), 0, numbers,
-        )  # fmt: skip
-    slips = " it slips, or" if floor.value < 1.0 else ""
-    return Finding(
-        "path_ratio", WARN, names,
-        words + f", the whole log through:{slips} the gear ratio (counts per turn) of the log "
-        "or the wheel radius of the file is wrong",
-        "roll the robot over a measured distance by hand: that tells slip from a wrong radius or gear", (), 0, numbers,
-    )  # fmt: skip
+        return Finding("wheel_radius", WARNING, names, numbers)
+    return Finding("path_ratio", WARNING, names, numbers)
 
 
-def _motor_constants(
-    electric: Slope, floor: Slope | None, off_floor: bool, names: str, numbers: dict[str, float]
-) -> Finding:
-    size = f"{electric.value:.4g} times (+-{electric.error:.2g})"
-    words = f"by voltage and current the wheels turn {size} what wheel_speed says"
+def _motor_constants(floor: Slope | None, off_floor: bool, names: str, numbers: dict[str, float]) -> Finding:
     if floor is not None and not off_floor:
-        return Finding(
-            "motor_constants", NOTE, names,
-            words + ", while the floor agrees with the wheels: K, R or the gear ratio of "
-            "the robot file, or the scale of voltage or current, is off",
-            "identify the motor from this log", (), 0, numbers, CIRCUIT,
-        )  # fmt: skip
-    return Finding(
-        "gear", WARN, names, words + ": the gear ratio, the counts per turn, or K and R of the robot file are off",
-        "check the gear ratio; roll the robot over a measured distance by hand", (), 0, numbers, CIRCUIT,
-    )  # fmt: skip
+        return Finding("motor_constants", NOTE, names, numbers, rests_on=CIRCUIT)
+    return Finding("gear", WARNING, names, numbers, rests_on=CIRCUIT)
 
 
 def _dead_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -302,9 +257,8 @@ def _dead_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         sure = np.isfinite(a.error) and a.windows >= 4 and abs(a.value) < 0.1 and a.error < 0.05
         if sure and size > max(0.2 * max(sizes), coarse) and not _told_to_rest(work, k):
             found.append(Finding(
-                "dead", FATAL, name, f"{name} is noise about 0, while {source} says that the wheel turns",
-                "look at its encoder, its cable and its column; leave it out otherwise",
-                work.lines(work.everywhere), len(work), {"slope": a.value, "error": a.error}, keys_behind(source),
+                "dead", ERROR, name, {"slope": a.value, "error": a.error, "source": source},
+                rows=work.lines(work.everywhere), count=len(work), rests_on=keys_behind(source),
             ))  # fmt: skip
             work = work.masked("wheel_speed", k, work.everywhere)
     return found, work
@@ -325,7 +279,7 @@ def _wheel_lines(work: LogUnderCheck) -> tuple[str, list[Slope], list[float]] | 
     if speed is None or expected is None or expected[1].shape != speed.shape or work.geometry is None:
         return None
     seen = ground(work)
-    width = seen.width if seen is not None and expected[0].endswith(seen.name) else 1
+    width = seen.width if seen is not None and expected[0] == seen.name else 1
     w = smooth(speed, width)
     ids, count = work.windows()
     slopes = [slope(w[:, k], expected[1][:, k], ids, count) for k in range(speed.shape[1])]
@@ -336,7 +290,7 @@ def _wheel_lines(work: LogUnderCheck) -> tuple[str, list[Slope], list[float]] | 
 def _single_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """One wheel that differs from the others: its own radius, gear or counter."""
     line = _wheel_lines(work) if work.known.get("dead_wheel") is None else None
-    if line is None or (work.known.get("floor_ratio") is None and not line[0].startswith("voltage")):
+    if line is None or (work.known.get("floor_ratio") is None and line[0] != CURRENT_AND_VOLTAGE):
         return [], work
     source, slopes, sizes = line
     ratio = work.known.get("floor_ratio")
@@ -356,14 +310,9 @@ def _single_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         name = components("wheel_speed", work.wheels)[k]
         if off < 0.0:
             found.append(Finding(
-                "inverted", FATAL, name, f"{name} has the opposite sign of what {source} says, while the other wheels "
-                "agree with it", "put the column right in the mapping (`column`)", (), 0,
-                {"ratio": off, "error": slopes[k].error}, keys_behind(source),
+                "inverted", ERROR, name, {"ratio": off, "error": slopes[k].error, "source": source},
+                rests_on=keys_behind(source),
             ))  # fmt: skip
             continue
-        found.append(Finding(
-            "wheel_scale", WARN, name, f"{name} reads {off:.4g} times what {source} says, measured by the other wheels",
-            "that wheel has another radius, gear or counter; give it its own in the mapping or the robot file", (), 0,
-            {"ratio": off, "error": slopes[k].error},
-        ))  # fmt: skip
+        found.append(Finding("wheel_scale", WARNING, name, {"ratio": off, "error": slopes[k].error, "source": source}))
     return (found, work) if len(found) == 1 else ([], work)

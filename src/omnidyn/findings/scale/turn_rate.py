@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.findings.finding import Finding
-from omnidyn.findings.scale.mistakes import TURN_UNITS, possible, unit_finding, unit_of
+from omnidyn.findings.scale.mistakes import NONE, TURN_UNITS, possible, unit_finding, unit_of
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import GEOMETRY, electric_speed, wheels_twist
 from omnidyn.findings.signal.robust import slope
@@ -28,8 +28,8 @@ def check_turn_rate(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         return [], work
     ids, count = work.windows()
     yaw = slope(twist[:, 2], own[:, 2], ids, count)
-    unit = unit_of(yaw.value, possible(TURN_UNITS, work, "omega")) if yaw.windows >= 4 else ""
-    if not unit or not yaw.differs(1.0, NEAR):
+    mistake = unit_of(yaw.value, possible(TURN_UNITS, work, "omega")) if yaw.windows >= 4 else NONE
+    if not any(mistake) or not yaw.differs(1.0, NEAR):
         return [], work
     for axes in ([0], [1]):
         if np.isfinite(twist[:, axes]).any():
@@ -41,7 +41,8 @@ def check_turn_rate(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         turned = slope(implied, speed, ids, count)  # type: ignore[arg-type]
         if turned.windows >= 4 and turned.value > 0.0 and abs(np.log(turned.value)) > NEAR:
             return [], work
-    words = f"omega is {yaw.value:.4g} times what the wheels say of the turning: {unit}?"
     values = twist.copy()
     values[:, 2] /= yaw.value
-    return [unit_finding("omega", words, yaw.value, GEOMETRY)], work.replace(twist=values)
+    return [unit_finding("omega", yaw.value, mistake, GEOMETRY, shown_by="ratio", source="wheels")], work.replace(
+        twist=values
+    )

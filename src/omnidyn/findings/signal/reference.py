@@ -16,7 +16,9 @@ from omnidyn.model.motor import back_emf, no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, twist_from_wheel_speed, wheel_speed
 
-MEASUREMENTS = ("the twist", "the pose", "voltage and current")  # sources that say what a wheel did
+# Sources that say how fast a wheel turns; the others are channels.
+CURRENT_AND_VOLTAGE, DRIVE, FLOOR, WHEELS = "circuit", "drive", "floor", "wheels"
+MEASUREMENTS = ("twist", "pose", CURRENT_AND_VOLTAGE)  # those that say what it did
 GEOMETRY = ("wheels.azimuth_deg", "wheels.robot_radius_m", "wheels.wheel_radius_m")
 CIRCUIT = ("motor.resistance_ohm", EMF, "motor.gear_ratio")  # what a speed by voltage and current is made of
 BEYOND = 20.0
@@ -109,10 +111,10 @@ def beyond_stall(robot: Robot, current: FloatArray) -> float:
 
 
 def keys_behind(source: str) -> tuple[str, ...]:
-    """The keys of the robot file that a source takes, by its name: as `expected_wheel_speed` calls it."""
-    if source.endswith("current"):
+    """The keys of the robot file that a source of `expected_wheel_speed` takes."""
+    if source == CURRENT_AND_VOLTAGE:
         return CIRCUIT
-    return GEOMETRY if source.endswith(("twist", "pose", "floor")) else ()
+    return GEOMETRY if source in ("twist", "pose", "twist_command", FLOOR) else ()
 
 
 def electric_speed(work: LogUnderCheck) -> FloatArray | None:
@@ -132,23 +134,23 @@ def emf(work: LogUnderCheck, speed: FloatArray) -> FloatArray | None:
 
 
 def expected_wheel_speed(work: LogUnderCheck, without: str = "") -> tuple[str, FloatArray] | None:
-    """(what says so, wheel speed by it, shape (rows, wheels)), from the most exact source there is."""
+    """(source, wheel speed by it, shape (rows, wheels)), from the most exact source there is."""
     robot, seen = work.geometry, ground(work)
     if robot is not None and seen is not None and len(seen.axes) == 3:
-        return f"the {seen.name}", wheel_speed(robot.wheels, seen.twist)
+        return seen.name, wheel_speed(robot.wheels, seen.twist)
     electric = electric_speed(work)
     if electric is not None:
-        return "voltage and current", electric
+        return CURRENT_AND_VOLTAGE, electric
     command = work.get("wheel_speed_command")
     if command is not None:
-        return "the commanded speed", command
+        return "wheel_speed_command", command
     orders = work.full("twist_command")
     if robot is not None and orders is not None:
-        return "the commanded twist", wheel_speed(robot.wheels, orders)
+        return "twist_command", wheel_speed(robot.wheels, orders)
     driven, speed = work.get("voltage"), work.get("wheel_speed")
     if driven is None:
         driven = work.get("duty")
     if driven is None or speed is None or without != "wheel_speed" or driven.shape != speed.shape:
         return None
     top, below = np.nansum(np.abs(speed)), np.nansum(np.abs(driven))
-    return ("its voltage", driven * (top / below)) if below > 0.0 else None
+    return (DRIVE, driven * (top / below)) if below > 0.0 else None

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.findings.finding import FATAL, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.logs.channels import place
 from omnidyn.logs.columns.mapping import SIDED, component_channel
 from omnidyn.logs.log import MAX_MISSING
+from omnidyn.statement import ERROR
 
 CODES = frozenset((999, 9999, 99999, 999999, 32767, 32768, 65535, 2147483647, 2147483648, 4294967295))
 FAR = 3.0  # times all other values: what stands for no value lies so far out
@@ -46,10 +47,8 @@ def _wrapped(work: LogUnderCheck, channel: str, component: str, values: FloatArr
         return [], work, values
     bits = round(np.log2(wrap))
     finding = Finding(
-        "wrapped", FATAL, component,
-        f"{component} is near 0 or near 2^{bits} in the units of the file, and never between: negative numbers of "
-        f"{bits} bits, read as unsigned", f"take 2^{bits} off those cells", work.lines(high), int(high.sum()),
-        {"share": float(high.mean())},
+        "wrapped", ERROR, component, {"share": float(high.mean()), "bits": bits}, rows=work.lines(high),
+        count=int(high.sum()),
     )  # fmt: skip
     right = np.where(high, values - wrap * size, values)
     return [finding], _changed(work, channel, component, right), right
@@ -67,10 +66,8 @@ def _placeholder(work: LogUnderCheck, channel: str, component: str, values: Floa
         return [], work, values
     cell = float(cells[np.flatnonzero(bad)[0]])
     finding = Finding(
-        "placeholder", FATAL, component,
-        f"{component} is {cell:.10g} in {int(bad.sum())} rows, {top / others:.3g} times what it is otherwise: it "
-        "stands for no value", "leave those cells blank", work.lines(bad), int(bad.sum()),
-        {"cell": cell, "share": float(bad.mean())},
+        "placeholder", ERROR, component, {"cell": cell, "share": float(bad.mean()), "times": top / others},
+        rows=work.lines(bad), count=int(bad.sum()),
     )  # fmt: skip
     kept = np.where(bad, np.nan, values)
     return [finding], _changed(work, channel, component, kept), kept

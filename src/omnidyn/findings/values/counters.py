@@ -5,22 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.errors import InputError
-from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.logs.channels import place
 from omnidyn.logs.clock.counters import unrolled
 from omnidyn.logs.clock.restarts import COUNTER, EPISODE, FULL
 from omnidyn.logs.log import Log
+from omnidyn.statement import ERROR
 
 
 def restarts_of(log: Log) -> list[Finding]:
     """What the reader found to begin again or to start over."""
-    found = []
-    for each in (each for each in log.restarts if each.code != EPISODE):  # of these a note of the reader tells
-        level = FATAL if not each.mended else NOTE if each.code == FULL else WARN
-        rows = ((each.line, each.line),) if each.is_gap else ()
-        found.append(Finding(each.code, level, each.where, each.words, each.remedy, rows, len(rows)))
-    return found
+    restarts = [restart for restart in log.restarts if restart.code != EPISODE]  # of these a note of the reader tells
+    return [
+        Finding(**vars(restart.statement), rows=((restart.line, restart.line),) * restart.is_gap, count=+restart.is_gap)
+        for restart in restarts
+    ]
 
 
 def check_counters(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -37,11 +37,9 @@ def check_counters(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             continue
         bad = np.zeros(len(work), dtype=bool)
         bad[list(rows)] = True
-        over = "" if period is None else f"{component} starts over after {period:.6g} rad"
-        jumps = f"{component} jumps farther than a wheel turns" if rows else ""
         found.append(Finding(
-            COUNTER if rows else FULL, FATAL, component, " and ".join(filter(None, (jumps, over))),
-            "split the run there" if rows else "unwrap the angle", work.lines(bad), len(rows), {},
+            COUNTER if rows else FULL, ERROR, component, {} if period is None else {"period_rad": period},
+            "of_run", rows=work.lines(bad), count=len(rows),
         ))  # fmt: skip
         angle = work.channels["wheel_angle"].copy()
         angle[:, place(component)[1]] = going_on  # type: ignore[index]

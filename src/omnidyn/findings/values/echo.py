@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.findings.finding import FATAL, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.logs.channels import components
+from omnidyn.statement import ERROR
 
 PAIRS = (("twist", "twist_command"), ("wheel_speed", "wheel_speed_command"))
 FARTHEST = 3  # rows by which the command may have been written late
@@ -27,12 +28,9 @@ def check_echo(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         if rows is None:
             continue
         measured_rows = np.asarray(np.isfinite(values).any(axis=1))
-        before = "the same row" if rows == 0 else "the row before" if rows == 1 else f"{rows} rows before"
         found.append(Finding(
-            "echo", FATAL, " ".join(components(measured, values.shape[1])),
-            f"{measured.replace('_', ' ')} is the command of {before}, to the last digit: no sensor measured it",
-            "log what the encoders, the gyroscope or a camera measure; of a robot whose software does not, "
-            "leave the column out", work.lines(measured_rows), len(work), {"rows": float(rows)},
+            "echo", ERROR, " ".join(components(measured, values.shape[1])),
+            {"rows": float(rows), "channel": measured}, rows=work.lines(measured_rows), count=len(work),
         ))  # fmt: skip
         work = work.replace(**{measured: None})
     return found, work

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
-from omnidyn.findings.finding import WARN, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import INPUTS, MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.robust import quantum, sample, spread
 from omnidyn.logs.channels import place
+from omnidyn.statement import WARNING
 from omnidyn.statistics import robust_std
 
 MEASURED = ("current", "wheel_speed", "wheel_angle", "twist", "pose", "supply")
@@ -29,12 +30,9 @@ def check_spikes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
                 continue
             worst = int(np.flatnonzero(bad)[np.argmax(np.abs(values[bad] - np.nanmedian(values)))])
             found.append(Finding(
-                "spike", WARN, component,
-                f"{int(bad.sum())} value{'s' * (int(bad.sum()) > 1)} of {component} alone, far from the rows "
-                "before and "
-                f"after, the farthest {values[worst]:.4g} at t = {work.t[worst]:.6g} s",
-                "they are left out where a mean is taken", work.lines(bad), int(bad.sum()),
-                {"farthest": float(values[worst]), "share": float(bad.mean())},
+                "spike", WARNING, component,
+                {"farthest": float(values[worst]), "share": float(bad.mean()), "at_s": float(work.t[worst])},
+                rows=work.lines(bad), count=int(bad.sum()),
             ))  # fmt: skip
             work = work.masked(channel, k, bad)
     return found, work

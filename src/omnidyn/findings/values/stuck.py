@@ -10,13 +10,13 @@ import numpy as np
 from scipy.special import ndtr
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
-from omnidyn.document import short
-from omnidyn.findings.finding import WARN, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import INPUTS, SENSORS, LogUnderCheck
 from omnidyn.findings.signal.predicted_wheel import WheelPredictor
 from omnidyn.findings.signal.reference import MEASUREMENTS, expected_wheel_speed
 from omnidyn.findings.signal.robust import quantum, rest_level, smooth
 from omnidyn.logs.channels import place
+from omnidyn.statement import WARNING
 from omnidyn.statistics import robust_std, stretches
 
 LONG = 5  # rows
@@ -52,11 +52,9 @@ def check_stuck(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             each = stretches(bad)
             longest = max(work.t[b - 1] - work.t[a] for a, b in each)
             found.append(Finding(
-                "stuck", WARN, component,
-                f"{component} repeats one value to the last digit {len(each)} time{'s' * (len(each) > 1)}, "
-                f"for up to {short(float(longest), '.3g')} s, while the robot moves",
-                "those rows of it are not used; look at the encoder and its cable", work.lines(bad), int(bad.sum()),
-                {"longest_s": float(longest), "share": float(bad.mean())},
+                "stuck", WARNING, component,
+                {"longest_s": float(longest), "share": float(bad.mean()), "times": len(each)},
+                rows=work.lines(bad), count=int(bad.sum()),
             ))  # fmt: skip
             work = work.masked(channel, k, bad)
             predictor = WheelPredictor(work)

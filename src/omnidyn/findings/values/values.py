@@ -5,10 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.clocks import at_each_clock
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, SENSORS, LogUnderCheck
-from omnidyn.findings.signal.reference import GEOMETRY, MEASUREMENTS, expected_wheel_speed, keys_behind
+from omnidyn.findings.signal.reference import (
+    CURRENT_AND_VOLTAGE,
+    GEOMETRY,
+    MEASUREMENTS,
+    WHEELS,
+    expected_wheel_speed,
+    keys_behind,
+)
 from omnidyn.findings.signal.robust import HELD, quantum, smooth, turned_by, white_noise
 from omnidyn.findings.values.codes import check_codes
 from omnidyn.findings.values.spikes import check_spikes
@@ -18,6 +25,7 @@ from omnidyn.logs.columns.mapping import SIDED, component_channel
 from omnidyn.logs.log import MAX_MISSING
 from omnidyn.logs.read_log import driven_way
 from omnidyn.model.wheels import twist_from_wheel_speed
+from omnidyn.statement import ERROR, NOTE, WARNING
 from omnidyn.statistics import moving
 from omnidyn.units import known_unit
 
@@ -49,7 +57,7 @@ def _with_dead_wheel(work: LogUnderCheck, found: list[Finding]) -> LogUnderCheck
 
     Else it hides what is wrong with them: neither floor nor circuit can be held against a robot with a wheel missing.
     """
-    dead = [at[1] for each in found if each.code == "dead" and (at := place(each.where)) and at[0] == "wheel_speed"]
+    dead = [at[1] for each in found if each.code == "dead" and (at := place(each.subject)) and at[0] == "wheel_speed"]
     expected = expected_wheel_speed(work, without="wheel_speed")
     if len(dead) != 1 or expected is None or expected[0] not in MEASUREMENTS or expected[1].shape[1] != work.wheels:
         return work
@@ -76,9 +84,8 @@ def _missing(work: LogUnderCheck) -> list[Finding]:
             if share > 0.0:
                 grave = share > MAX_MISSING and channel not in ("pose", "twist", "supply")
                 found.append(Finding(
-                    "missing", WARN if grave else NOTE, component, f"{100 * share:.3g} % of {component} is missing",
-                    "rows without it are not used where it is needed", work.lines(bad), int(bad.sum()),
-                    {"share": share},
+                    "missing", WARNING if grave else NOTE, component, {"share": share}, rows=work.lines(bad),
+                    count=int(bad.sum()),
                 ))  # fmt: skip
     return found
 
@@ -87,7 +94,7 @@ def _quantised(work: LogUnderCheck) -> list[Finding]:
     """Steps of a sensor that matter: 2 % of what it usually reads, or more; sensors of one step in one finding."""
     found: list[Finding] = []
     command = work.get("wheel_speed_command")
-    expected = ("the commanded speed", command) if command is not None else expected_wheel_speed(work)
+    expected = ("wheel_speed_command", command) if command is not None else expected_wheel_speed(work)
     groups: dict[tuple[str, float], list[tuple[str, float, float]]] = {}
     for channel in SENSORS:
         for component, values in work.sampled_columns(channel):
@@ -106,13 +113,9 @@ def _quantised(work: LogUnderCheck) -> list[Finding]:
     for (_, step), members in groups.items():
         names = [name for name, _, _ in members]
         share, noise = max(each for _, each, _ in members), max(each for _, _, each in members)
-        hidden = f", hidden in a noise of {noise:.3g}" if noise > step else ""
         found.append(Finding(
             "quantised", NOTE, " ".join(names),
-            f"{' and '.join(names)} {'counts' if len(names) == 1 else 'count'} in steps of {step:.4g} "
-            f"{_unit_words(work, names[0], step)}, up to {100 * share:.0f} % of the usual value{hidden}",
-            "average over longer windows; a sample alone says little", (), 0,
-            {"step": step, "share": share, "noise": noise},
+            {"step": step, "share": share, "noise": noise, **_in_column(work, names[0], step)},
         ))  # fmt: skip
     return found
 
@@ -130,25 +133,22 @@ def _reads_zero(
     if slow.mean() < 0.2:
         return []
     return [Finding(
-        "reads_zero", WARN, component,
-        f"{component} reads 0 in {100 * slow.mean():.0f} % of the rows while {source} says it turns, slower than two "
-        f"steps of its encoder ({step:.4g} rad/s)",
-        "take its speed from counts over a longer time, or from the other wheels", work.lines(slow), int(slow.sum()),
-        {"step": step, "share": float(slow.mean())},
+        "reads_zero", WARNING, component, {"step": step, "share": float(slow.mean()), "source": source},
+        rows=work.lines(slow), count=int(slow.sum()),
     )]  # fmt: skip
 
 
-def _unit_words(work: LogUnderCheck, component: str, step: float) -> str:
+def _in_column(work: LogUnderCheck, component: str, step: float) -> dict[str, object]:
     """The step as it stands in the file, where its unit is another."""
     column = work.log.columns.columns.get(component)
-    si = {"c": "A", "w": "rad/s", "t": "in SI"}[place(component)[0][0]]  # type: ignore[index]
     unit = known_unit(column.unit) if column is not None else None
     if column is None or unit is None:
-        return si
+        return {}
     size = unit.size
     if work.robot is not None and component_channel(component) in SIDED:
         size /= column.divisor(work.robot, place(component)[1])  # type: ignore[index]
-    return si if abs(size - 1.0) < 1e-9 else f"{si} ({step / size:.4g} {unit.text} in column {column.name})"
+    known = {"step_in_column": step / size, "unit": unit.text, "column": column.name}
+    return {} if abs(size - 1.0) < 1e-9 else known
 
 
 def _constant(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -164,31 +164,29 @@ def _constant(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             reason = _should_move(work, channel, k, all(flat.values()))
             if reason:
                 found.append(Finding(
-                    "dead", FATAL if channel not in ("pose", "twist_command", "wheel_speed_command") else WARN,
-                    component, f"{component} is {np.nanmax(values):.4g} in every row, while {reason}",
-                    "look at its sensor, its cable and its column; leave it out otherwise",
-                    work.lines(work.everywhere), len(work), {"value": float(np.nanmax(values))},
-                    _behind(work, channel),
+                    "dead", ERROR if channel not in ("pose", "twist_command", "wheel_speed_command") else WARNING,
+                    component, {"value": float(np.nanmax(values)), "reason": reason},
+                    rows=work.lines(work.everywhere), count=len(work), rests_on=_behind(work, channel),
                 ))  # fmt: skip
                 work = work.masked(channel, k, work.everywhere)
     return found, work
 
 
 def _should_move(work: LogUnderCheck, channel: str, k: int, all_flat: bool) -> str:
-    """Why a constant component should change: what else moves. Empty where nothing says so."""
+    """Why a constant component should change, by what else moves: a reason of `telling`; "" where nothing says so."""
     if channel in ("voltage", "duty"):
         current, speed = work.get("current"), work.get("wheel_speed")
         driven = current is not None and k < current.shape[1] and _moves(current[:, k])
         turned = speed is not None and k < speed.shape[1] and _moves(speed[:, k])
-        return f"current and speed of motor {k + 1} change" if driven and turned and not all_flat else ""
+        return "motor" if driven and turned and not all_flat else ""
     if channel == "current":
         if work.log.current_unsigned and not _driven(work, k):
             return ""  # 0 is what it was given for a sign
         for other in ("voltage", "duty"):
             values = work.get(other)
             if values is not None and k < values.shape[1] and _moves(values[:, k]):
-                return f"its motor gets a changing {other}"
-        return "the other motors draw current" if not all_flat and _wheel_moves(work, k) else ""
+                return other
+        return "other_motors" if not all_flat and _wheel_moves(work, k) else ""
     if channel in ("wheel_speed", "wheel_angle"):
         return _wheel_reason(work, channel, k)
     if channel == "twist" and not all_flat:
@@ -197,18 +195,18 @@ def _should_move(work: LogUnderCheck, channel: str, k: int, all_flat: bool) -> s
             return ""
         own = twist_from_wheel_speed(robot.wheels, speed)[:, k]
         scale = float(np.nanstd(twist_from_wheel_speed(robot.wheels, speed), axis=0).max())
-        return "the wheels say it changes" if float(np.nanstd(own)) > 0.1 * scale and _moves(own) else ""
+        return WHEELS if float(np.nanstd(own)) > 0.1 * scale and _moves(own) else ""
     if channel == "pose" and k == 2:
         twist, speed, robot = work.get("twist"), work.full("wheel_speed"), work.geometry
         if twist is not None and _moves(twist[:, 2]):
-            return "omega says it turns" if turned_by(twist[:, 2], work.t) > HELD else ""
+            return "omega" if turned_by(twist[:, 2], work.t) > HELD else ""
         if speed is None or robot is None:
             return ""
         own = smooth(twist_from_wheel_speed(robot.wheels, speed), work.width(0.3))
         turning = spread_of_motion(own[:, 2]) * float(np.mean(robot.wheels.robot_radius))
         straight = max(spread_of_motion(own[:, 0]), spread_of_motion(own[:, 1]))
         if turning > 0.3 * straight and turned_by(own[:, 2], work.t) > HELD:
-            return "the wheels say that the robot turns: the heading was not recorded, or the wheels ran in the air"
+            return "turning_wheels"
     return ""
 
 
@@ -228,7 +226,7 @@ def _wheel_reason(work: LogUnderCheck, channel: str, k: int) -> str:
     others = np.delete(expected[1], k, axis=1)
     sizes = [spread_of_motion(column) for column in others.T]
     usual = max(sizes) if sizes else 0.0
-    return f"{expected[0]} says that the wheel turns" if spread_of_motion(own) > 0.1 * usual and _moves(own) else ""
+    return expected[0] if spread_of_motion(own) > 0.1 * usual and _moves(own) else ""
 
 
 def spread_of_motion(values: FloatArray) -> float:
@@ -258,4 +256,4 @@ def _told(work: LogUnderCheck, source: str) -> IntArray:
     """Rows in which what tells the speed of a wheel was recorded."""
     if source not in MEASUREMENTS:
         return np.arange(len(work))
-    return work.recorded("current" if source == "voltage and current" else source.removeprefix("the "), 0)
+    return work.recorded("current" if source == CURRENT_AND_VOLTAGE else source, 0)

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.findings.finding import FATAL, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.reference import GEOMETRY, ground, pose_twist, wheels_twist
 from omnidyn.findings.signal.robust import smooth
@@ -16,6 +16,7 @@ from omnidyn.findings.wiring.orders import BETTER, WINDOWS, Answer, Wiring, choo
 from omnidyn.logs.channels import components
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
+from omnidyn.statement import ERROR
 
 Moments = tuple[FloatArray, FloatArray, FloatArray]  # sums of v v', v w', w w'
 
@@ -75,7 +76,7 @@ def _simpler(work: LogUnderCheck, answer: Answer | None, turned: Answer | None) 
     if answer is None or turned.best.changes + 1 < answer.best.changes or turned.left < BETTER * answer.left:
         return "axes", turned
     if turned.left < 2.0 * answer.left + 0.02:
-        answer = answer._replace(rival=turned.best.words(_axes_names(work)[1]))
+        answer = answer._replace(rival=turned.best.statement(_axes_names(work)[1]))
     return "wheels", answer
 
 
@@ -131,28 +132,14 @@ def _axes_names(work: LogUnderCheck) -> tuple[str, tuple[str, ...]]:
 def axes_finding(work: LogUnderCheck, answer: Answer) -> Finding:
     """Fatal: axes of what was measured over the floor are exchanged, or have the opposite sign."""
     channel, names = _axes_names(work)
-    wrong = answer.best.touched(names)
-    if (turn := _turn_of_pose(work, answer.best)) is not None:
-        channel, wrong = "twist and pose", wrong + turned_names(turn)
-    heading = wrong == ["heading"] or wrong == ["omega"]
-    also = " (a positive speed of all wheels must turn the robot counter-clockwise)" if heading else ""
+    turn = _turn_of_pose(work, answer.best)
+    also = [] if turn is None else turned_names(turn)
+    wrong = answer.best.touched(names) + also
     return Finding(
-        code_of(answer.best), FATAL, " ".join(wrong),
-        f"{channel} against the wheels: {_axes_words(answer.best, names, turn)}{also}; as logged they share "
-        f"{100 * (1 - answer.logged):.0f} % of their motion, put right {100 * (1 - answer.left):.0f} %"
-        + (", or else all wheels have the opposite sign" if heading else ""),
-        f"set `invert` for {'that column' if len(wrong) == 1 else 'these columns'} in the mapping, or turn the wheels' "
-        "signs in the same way", (), 0,
-        {"explained_as_logged": 1.0 - answer.logged, "explained_put_right": 1.0 - answer.left}, GEOMETRY,
+        code_of(answer.best), ERROR, " ".join(wrong),
+        {"explained_as_logged": 1.0 - answer.logged, "explained_put_right": 1.0 - answer.left,
+         "channel": channel, "wiring": answer.best.statement(names), "of_pose": also}, "axes", rests_on=GEOMETRY,
     )  # fmt: skip
-
-
-def _axes_words(wiring: Wiring, names: tuple[str, ...], turn: FloatArray | None) -> str:
-    """What is wrong with the axes of the twist, and of the pose where it goes with them."""
-    words = wiring.words(names)
-    if turn is None or not (also := turned_names(turn)):
-        return words
-    return f"{words}, and so {'has' if len(also) == 1 else 'have'} {' and '.join(also)} of the pose"
 
 
 def turned_names(turn: FloatArray) -> list[str]:
@@ -200,14 +187,9 @@ def wheels_finding(work: LogUnderCheck, answer: Answer, blamed: str) -> Finding:
     seen = ground(work)
     against = seen.name if seen is not None else ("twist_command" if work.get("twist_command") is not None else "")
     names = components("wheel_speed", work.wheels)
-    wrong = answer.best.touched(names)
-    what = f"the {against} of the robot" if against else "what the wheels must agree on"
-    also = "; its voltage, current and speed agree, so the whole motor is meant" if blamed == "motors" else ""
     return Finding(
-        code_of(answer.best), FATAL, " ".join(wrong),
-        f"wheel_speed against {what}: {answer.best.words(names)}{also}{rivals_of(answer, names)}; as logged it "
-        f"leaves {100 * answer.logged:.0f} % of the motion unexplained, put right {100 * answer.left:.1f} %",
-        "put the columns right in the mapping (`column`), or the order and signs of the wheels in the robot file",
-        (), 0, {"unexplained_as_logged": answer.logged, "unexplained_put_right": answer.left,
-                "as_good": float(answer.others)}, GEOMETRY,
+        code_of(answer.best), ERROR, " ".join(answer.best.touched(names)),
+        {"unexplained_as_logged": answer.logged, "unexplained_put_right": answer.left,
+         "as_good": float(answer.others), "channel": "wheel_speed", "against": against, "blamed": blamed,
+         "wiring": answer.best.statement(names), **rivals_of(answer, names)}, "wheels", rests_on=GEOMETRY,
     )  # fmt: skip

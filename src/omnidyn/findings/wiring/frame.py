@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from omnidyn.findings.finding import WARN, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
-from omnidyn.findings.signal.reference import pose_twist, wheels_twist
+from omnidyn.findings.signal.reference import WHEELS, pose_twist, wheels_twist
 from omnidyn.findings.wiring.orders import means
 from omnidyn.findings.wiring.turned import is_turned, marker_finding, turned, with_marker
 from omnidyn.model.wheels import wheel_speed
+from omnidyn.statement import WARNING
 
 
 def check_frame(work: LogUnderCheck, left: float) -> tuple[list[Finding], LogUnderCheck]:
@@ -45,17 +46,14 @@ def check_frame(work: LogUnderCheck, left: float) -> tuple[list[Finding], LogUnd
         return [], work
     if alike < (0.8 if trusted else 0.9) or plain > 0.95 * alike or not (trusted or _turns_say(work, mirror)):
         return _marker(work) if mirror > 0.0 else ([], work)
-    words = f"turned by {angle:.0f} deg" + (" and mirrored" if mirror < 0.0 else "")
-    how = f"take the angle off its heading: `assume` marker={-angle:.0f}deg" if mirror > 0.0 else "mirror it back"
     mended = pose * [1.0, mirror, mirror]
     unit = np.exp(-1.0j * np.radians(angle))
     place = (mended[:, 0] + 1.0j * mended[:, 1]) * unit
     mended = np.column_stack([place.real, place.imag, mended[:, 2]])
     return [Finding(
-        "pose_frame", WARN, "x y", f"x and y of the pose are {words} against its heading and the wheels (likeness "
-        f"{plain:.2f} as logged, {alike:.2f} put right)",
-        f"turn the frame of the pose, or {how}", (), 0,
+        "pose_frame", WARNING, "x y",
         {"angle_deg": angle, "mirrored": float(mirror < 0.0), "likeness": alike, "likeness_as_logged": plain},
+        "mirrored" if mirror < 0.0 else "turned",
     )], work.replace(pose=mended)  # fmt: skip
 
 
@@ -70,16 +68,11 @@ def _marker(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     turn = turned(work, body[:, :2], own[:, :2], body[:, 2])
     if turn is None or not is_turned(turn):
         return [], work
-    return [marker_finding(turn, "the motion of the wheels")], with_marker(work, pose, turn.angle)
+    return [marker_finding(turn, WHEELS)], with_marker(work, pose, turn.angle)
 
 
 def _unlike(plain: float) -> Finding:
-    return Finding(
-        "pose_unlike", WARN, "x y heading",
-        f"the pose does not follow the wheels (likeness {plain:.2f}), which turn as "
-        "they are told; no turned or mirrored frame explains it",
-        "look at the tracking of the pose; it was not used", (), 0, {"likeness_as_logged": plain},
-    )  # fmt: skip
+    return Finding("pose_unlike", WARNING, "x y heading", {"likeness_as_logged": plain})
 
 
 def commands_agree(work: LogUnderCheck) -> bool:

@@ -7,11 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.findings.finding import FATAL, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
-from omnidyn.findings.signal.reference import emf, ohmic, volts
+from omnidyn.findings.signal.reference import CURRENT_AND_VOLTAGE, emf, ohmic, volts
 from omnidyn.findings.wiring.orders import Answer, Wiring, choose, code_of, means, rivals_of, wirings
 from omnidyn.logs.channels import components
+from omnidyn.statement import ERROR
 
 HOLDS = 0.25  # of the voltage: where more is left of it under every wiring, a scale is wrong, and no wiring is told
 EXACT = 0.004  # of the voltage: what less is left of it is the noise of an exact relation
@@ -102,13 +103,10 @@ def by_likeness(work: LogUnderCheck, channel: str) -> Answer | None:
 def motor_finding(work: LogUnderCheck, channel: str, answer: Answer, rests_on: tuple[str, ...] = ()) -> Finding:
     """Fatal: columns of one channel of the motors are exchanged, or have the opposite sign."""
     names = components(channel, work.wheels)
-    wrong = answer.best.touched(names)
-    against = "wheel_speed" if channel != "wheel_speed" else "voltage and current"
+    against = "wheel_speed" if channel != "wheel_speed" else CURRENT_AND_VOLTAGE
     return Finding(
-        code_of(answer.best), FATAL, " ".join(wrong),
-        f"{channel} against {against} of the same motor: {answer.best.words(names)}{rivals_of(answer, names)}; as "
-        f"logged it leaves {100 * answer.logged:.0f} % unexplained, put right {100 * answer.left:.1f} %",
-        "put the columns right in the mapping (`column`)", (), 0,
-        {"unexplained_as_logged": answer.logged, "unexplained_put_right": answer.left, "as_good": float(answer.others)},
-        rests_on,
+        code_of(answer.best), ERROR, " ".join(answer.best.touched(names)),
+        {"unexplained_as_logged": answer.logged, "unexplained_put_right": answer.left,
+         "as_good": float(answer.others), "channel": channel, "against": against,
+         "wiring": answer.best.statement(names), **rivals_of(answer, names)}, "motors", rests_on=rests_on,
     )  # fmt: skip

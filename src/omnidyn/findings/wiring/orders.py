@@ -11,6 +11,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.robust import windowed
+from omnidyn.statement import NOTE, Statement
 
 BETTER = 0.35  # the right wiring leaves at most so much of what the logged one leaves
 POOR = 0.02  # a wiring that leaves less than this share of the motion unexplained is not doubted
@@ -42,18 +43,10 @@ class Wiring(NamedTuple):
         """The columns put right. Shape (rows, n)."""
         return values[:, self.order] * np.array(self.sign)
 
-    def words(self, names: tuple[str, ...]) -> str:
+    def statement(self, names: tuple[str, ...]) -> Statement:
         """What is wrong, by the names of the columns."""
-        parts = []
-        moved = [k for k, j in enumerate(self.order) if k != j]
-        if len(moved) == 2:
-            parts.append(f"{names[moved[0]]} and {names[moved[1]]} are exchanged")
-        elif moved:
-            parts.append("; ".join(f"{names[self.order[k]]} is in truth {names[k]}" for k in moved))
-        turned = [names[j] for j, s in zip(self.order, self.sign, strict=True) if s < 0.0]
-        if turned:
-            parts.append(f"{' and '.join(turned)} {'has' if len(turned) == 1 else 'have'} the opposite sign")
-        return ", and ".join(parts)
+        signs, columns = self.sign, [names[j] for j in self.order]
+        return Statement("wiring", NOTE, "", {"slots": names, "columns": columns, "signs": signs})
 
     def touched(self, names: tuple[str, ...]) -> list[str]:
         """The columns that are wrong."""
@@ -69,7 +62,7 @@ class Answer(NamedTuple):
     second: Wiring | None
     left: float
     logged: float
-    rival: str = ""  # the same seen from the floor
+    rival: Statement | None = None  # the same seen from the floor
 
 
 def wirings(n: int) -> Iterator[Wiring]:
@@ -118,8 +111,7 @@ def code_of(wiring: Wiring) -> str:
     return "swapped" if any(k != j for k, j in enumerate(wiring.order)) else "inverted"
 
 
-def rivals_of(answer: Answer, names: tuple[str, ...]) -> str:
-    if answer.second is None:
-        return f" (or, which this log cannot tell apart, {answer.rival})" if answer.rival else ""
-    more = f", or {answer.others - 1} more" if answer.others > 1 else ""
-    return f" (or, which this log cannot tell apart, {answer.second.words(names)}{more})"
+def rivals_of(answer: Answer, names: tuple[str, ...]) -> dict[str, Statement]:
+    """Another wiring that the log cannot tell from the best one."""
+    rival = answer.rival if answer.second is None else answer.second.statement(names)
+    return {} if rival is None else {"rival": rival}

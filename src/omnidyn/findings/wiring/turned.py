@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.findings.finding import WARN, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.wiring.orders import means
+from omnidyn.statement import WARNING
 
 MOVING = 0.2  # of what 90 % of the windows stay below
 FEWEST = 12  # windows
@@ -59,16 +60,16 @@ def is_turned(turn: Turned) -> bool:
     return far or (turn.alike > ALIKE and abs(turn.angle) > LEAST and abs(turn.angle) > SURE * turn.error)
 
 
-def marker_finding(turn: Turned, source: str) -> Finding:
-    """The heading of a marker that is mounted at an angle. turn: of what `source` says, against the pose."""
+def marker_finding(turn: Turned, source: str, agrees: str = "") -> Finding:
+    """The heading of a marker that is mounted at an angle.
+
+    turn: of what `source` says, and `agrees` too, against the pose.
+    """
     degrees = float(np.degrees(turn.angle))
     return Finding(
-        "marker_angle", WARN, "heading",
-        f"the heading is {degrees:.1f} deg (+-{np.degrees(turn.error):.1g}) ahead of what {source} and the path say: "
-        "the marker is mounted at that angle",
-        f"take the angle off: `assume` marker={degrees:.1f}deg", (), 0,
+        "marker_angle", WARNING, "heading",
         {"angle_deg": degrees, "error_deg": float(np.degrees(turn.error)), "likeness": turn.alike,
-         "likeness_as_logged": turn.plain},
+         "likeness_as_logged": turn.plain, "source": source, "agrees": agrees},
     )  # fmt: skip
 
 

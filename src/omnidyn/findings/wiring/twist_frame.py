@@ -8,12 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.findings.finding import FATAL, WARN, Finding
+from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
-from omnidyn.findings.signal.reference import pose_twist, wheels_twist
+from omnidyn.findings.signal.reference import WHEELS, pose_twist, wheels_twist
 from omnidyn.findings.signal.robust import smooth
 from omnidyn.findings.wiring.turned import ALIKE, Turned, is_turned, marker_finding, turned, with_marker
 from omnidyn.model.frames import unwrapped
+from omnidyn.statement import ERROR, WARNING
 
 BETTER = 0.35  # the right frame leaves at most so much of what the one as logged leaves
 NAMES = ("x", "y", "heading")
@@ -46,7 +47,7 @@ def check_twist_frame(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck
     turn = turned(work, body[:, :2], smooth(command[:, :2], width), body[:, 2])
     if turn is None or not is_turned(turn):
         return [], work
-    return [marker_finding(turn, "the commanded twist")], with_marker(work, pose, turn.angle)
+    return [marker_finding(turn, "twist_command")], with_marker(work, pose, turn.angle)
 
 
 def _against_twist(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> tuple[list[Finding], LogUnderCheck]:
@@ -85,23 +86,13 @@ def _as_in_body(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> Flo
 
 
 def _room_finding(plain: Found, room: Found) -> Finding:
-    return Finding(
-        "twist_frame", FATAL, "vx vy",
-        f"vx and vy are in the frame of the room, not of the robot: they are the rates of x and y (likeness "
-        f"{room.turn.plain:.2f}; {plain.turn.plain:.2f} as logged)",
-        "turn them by the heading: `assume` twist=room", (), 0,
-        {"likeness": room.turn.plain, "likeness_as_logged": plain.turn.plain},
-    )  # fmt: skip
+    return Finding("twist_frame", ERROR, "vx vy", {"likeness": room.turn.plain, "likeness_as_logged": plain.turn.plain})
 
 
 def _mirror_finding(plain: Found, best: Found) -> Finding:
     wrong = [name for name, sign in zip(NAMES, best.signs, strict=True) if sign < 0.0]
-    have = "has" if len(wrong) == 1 else "have"
     return Finding(
-        "pose_frame", FATAL, " ".join(wrong),
-        f"{' and '.join(wrong)} of the pose {have} the opposite sign of what vx, vy and omega say (likeness "
-        f"{plain.turn.plain:.2f} as logged, {best.turn.alike:.2f} put right)",
-        "set `invert` for those columns in the mapping", (), 0,
+        "pose_frame", ERROR, " ".join(wrong),
         {"likeness": best.turn.alike, "likeness_as_logged": plain.turn.plain, "mirrored": 1.0},
     )  # fmt: skip
 
@@ -117,27 +108,24 @@ def _turned(
             continue
         if abs(against.angle - turn.angle) < abs(against.angle):  # the other agrees with the pose
             return [_sensor_finding(against, name)], work.replace(twist=_turned_back(twist, against.angle))
-        return [marker_finding(turn, f"the twist ({name} agrees)")], with_marker(work, pose, turn.angle)
-    return [marker_finding(turn, "the twist")], with_marker(work, pose, turn.angle)
+        return [marker_finding(turn, "twist", name)], with_marker(work, pose, turn.angle)
+    return [marker_finding(turn, "twist")], with_marker(work, pose, turn.angle)
 
 
 def _others(work: LogUnderCheck, width: int) -> list[tuple[str, FloatArray]]:
     """What else says how the robot moves in the plane: (name, velocity, shape (rows, 2))."""
     speed, command = work.full("wheel_speed"), work.full("twist_command")
     own = None if speed is None else wheels_twist(work, speed, width)
-    found = [] if own is None else [("the motion of the wheels", own[:, :2])]
-    return found + ([] if command is None else [("the commanded twist", smooth(command[:, :2], width))])
+    found = [] if own is None else [(WHEELS, own[:, :2])]
+    return found + ([] if command is None else [("twist_command", smooth(command[:, :2], width))])
 
 
 def _sensor_finding(turn: Turned, name: str) -> Finding:
     degrees = float(np.degrees(turn.angle))
     return Finding(
-        "twist_frame", WARN, "vx vy",
-        f"vx and vy are turned by {degrees:.1f} deg (+-{np.degrees(turn.error):.1g}) against the pose, and {name} "
-        "agrees with the pose: their sensor is mounted at an angle",
-        f"turn them back: `assume` twist={degrees:.1f}deg", (), 0,
+        "twist_frame", WARNING, "vx vy",
         {"angle_deg": degrees, "error_deg": float(np.degrees(turn.error)), "likeness": turn.alike,
-         "likeness_as_logged": turn.plain},
+         "likeness_as_logged": turn.plain, "agrees": name}, "turned",
     )  # fmt: skip
 
 

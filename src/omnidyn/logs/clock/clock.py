@@ -141,12 +141,9 @@ class Clock:
         lost[cuts] = seam - steps[cuts]
         for cut in cuts.tolist():
             line = int(lines[cut + 1])
-            before, behind = (f"{count * column.factor:.6g} s" for count in read[cut : cut + 2])
-            self.restarts.append(Restart(
-                CLOCK, "t", line, f"the time begins again in line {line}, at {behind} after {before}",
-                "a recording of its own behind a gap; `convert` with `split` writes them apart",
-            ))  # fmt: skip
-            notes.append(self.restarts[-1].note)
+            before, behind = (float(count * column.factor) for count in read[cut : cut + 2])
+            self.restarts.append(Restart(CLOCK, "t", line, {"before_s": before, "behind_s": behind}))
+            notes.append(self.restarts[-1].statement)
         self._begin = float(begins[-1])  # type: ignore[arg-type]
         return lost
 

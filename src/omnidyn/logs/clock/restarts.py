@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.logs.segments import GAP
+from omnidyn.statement import ERROR, NOTE, WARNING, Statement
 from omnidyn.statistics import median
 
 CLOCK, COUNTER, FULL, OVERFLOW = "clock_restart", "counter_restart", "counter_full", "speed_overflow"
@@ -23,15 +24,14 @@ class Restart:
     """code: CLOCK, COUNTER (set to another value), FULL (over after a period), OVERFLOW (a speed of too few bits) or
     EPISODE (the format says that another recording begins).
 
-    where: components, or "t". line: the first one behind it. words: what was found. remedy: what was done about it, and
-    what can be. mended: whether the log can be used as it now is.
+    where: components, or "t". line: the first one behind it. numbers: what was found. mended: whether the log can be
+    used as it now is.
     """
 
     code: str
     where: str
     line: int
-    words: str
-    remedy: str = ""
+    numbers: Mapping[str, Any] = field(default_factory=dict)
     mended: bool = True
 
     @property
@@ -40,9 +40,10 @@ class Restart:
         return self.code in (CLOCK, COUNTER, EPISODE)
 
     @property
-    def note(self) -> str:
-        """Both in one line."""
-        return f"{self.words}: {self.remedy}"
+    def statement(self) -> Statement:
+        """What is the case: an error where the log cannot be used so, a note where nothing is lost."""
+        severity = ERROR if not self.mended else NOTE if self.code == FULL else WARNING
+        return Statement(self.code, severity, self.where, {"line": self.line, **self.numbers})
 
 
 class Counter(NamedTuple):
@@ -62,16 +63,11 @@ def counter_restarts(counters: Sequence[Counter], lines: Sequence[int] | np.ndar
             by_row.setdefault(row, []).append(counter)
     found = []
     for row, members in sorted(by_row.items()):
-        names = " and ".join(each.column for each in members)
         known = members[0].values[:row]
         known = known[np.isfinite(known)]
-        before = f" from {known[-1]:.10g}" if known.size else ""
-        found.append(Restart(
-            COUNTER, " ".join(each.component for each in members), int(lines[row]),
-            f"{names} jump{'s' * (len(members) == 1)} farther than a wheel turns,{before} to "
-            f"{members[0].values[row]:.10g} in line {lines[row]}",
-            "the count goes on behind a gap there, and the rows beside it are left out",
-        ))  # fmt: skip
+        numbers = {"columns": [counter.column for counter in members], "after": members[0].values[row]}
+        numbers |= {"before": known[-1]} if known.size else {}
+        found.append(Restart(COUNTER, " ".join(each.component for each in members), int(lines[row]), numbers))
     return found
 
 
@@ -96,17 +92,9 @@ def recordings(rows: int, begins: Sequence[int]) -> list[slice]:
 
 def full_counter(component: str, column: str, period: float, unit: str, line: int) -> Restart:
     """What is to be said of a counter that starts over after a period."""
-    return Restart(FULL, component, line, f"{column} starts over after {period:.6g} {unit}", "it is taken to go on")
+    return Restart(FULL, component, line, {"column": column, "period": period, "unit": unit})
 
 
 def overflow(component: str, column: str, jumps: int, followed: bool, line: int) -> Restart:
     """What is to be said of a speed that leaves its 16 bits."""
-    words = (
-        f"{column} leaves its 16 bits {jumps} time{'s' * (jumps > 1)} (2^15 - 1 is followed by -2^15, or 0 by 2^16 - 1)"
-    )
-    done = (
-        "2^16 was added or taken off there"
-        if followed
-        else "it changes too fast to be followed: log 32 bits, or faster"
-    )
-    return Restart(OVERFLOW, component, line, words, done, followed)
+    return Restart(OVERFLOW, component, line, {"column": column, "jumps": jumps}, followed)

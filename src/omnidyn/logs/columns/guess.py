@@ -19,22 +19,27 @@ from omnidyn.logs.columns.component import (
     component_of_parts,
     numbered_kind,
 )  # fmt: skip
+from omnidyn.logs.columns.doubt import Doubt, doubt, joined_doubts, letter_of
 from omnidyn.logs.columns.frame_of import FRAMES
 from omnidyn.logs.columns.guess_side import settle_side, take_sides
 from omnidyn.logs.columns.guess_time import take_time
 from omnidyn.logs.columns.guess_unit import doubt_of_rate, implausible, unit_of
-from omnidyn.logs.columns.guessed import Doubt, Guess, first_word, floats, is_numeric, letter_of
+from omnidyn.logs.columns.guessed import Guess, first_word, floats, is_numeric
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
 from omnidyn.logs.columns.names import BRACKETS, NameParts, read_name
 from omnidyn.logs.columns.propose import proposed_wheels
-from omnidyn.logs.columns.wheel_numbers import TOLD_BY_PLACES, wheel_numbers
+from omnidyn.logs.columns.wheel_numbers import BY_PLACES, wheel_numbers
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
+from omnidyn.statement import ERROR, WARNING, Statement
 from omnidyn.units import COUNT, COUNT_RATE, Unit, known_unit, parse_unit
 from omnidyn.units import DUTY as DUTY_UNIT
 from omnidyn.units import SPEED as SPEED_UNIT
 from omnidyn.units import TIME as TIME_UNIT
 from omnidyn.units import VOLTAGE as VOLTAGE_UNIT
+
+TIME_REMEDY = "say which column it is (`column` t=COLUMN:s), or how many rows a second: `rate` HZ"
+SECONDS_OR_DATES = "write seconds, or dates such as 2026-11-20T10:00:00.125"
 
 _LETTER = re.compile(r"([a-z])\d{1,3}")
 
@@ -77,18 +82,18 @@ def guess_columns(
     _ask_where_motion_differs(table, numbers, found)
     settle_side(table, robot, found)
     take_sides({name: side for name, (_, side) in told.items() if side}, found)
-    found.doubts = [doubt for doubt in found.doubts if doubt.name not in (taken or {})]
+    found.doubts = [each for each in found.doubts if each.columns[0] not in (taken or {})]
     used = {column.name for column in found.columns.values()}
     unused = tuple(name for name in table.names if name not in used)
     ordered = dict(sorted(found.columns.items(), key=lambda item: _order(item[0])))
     idle = tuple(
-        f"`assume` {name}={unit} is used for no column: there is none of this name or kind"
+        Doubt("assumption_unused", WARNING, "", {"assumption": f"{name}={unit}"}, units=())
         for name, unit in assumed.items()
         if not _is_used(
-            name, table, (*found.columns, *(each.component for each in found.doubts), *(taken or {}).values())
+            name, table, (*found.columns, *(each.components[0] for each in found.doubts), *(taken or {}).values())
         )
     )
-    return ColumnMap(ordered, unused, (*found.doubt_words(), *idle), found.note_words(), found.doubted())
+    return ColumnMap(ordered, unused, (*joined_doubts(found.doubts), *idle), found.all_notes())
 
 
 def _without_measured_power(names: list[str]) -> list[str]:
@@ -104,13 +109,13 @@ def _take_said(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
     for name, said in table.says.items():
         given = assumed.get(name) or assumed.get(said.component) or assumed.get(letter_of(said.component))
         unit = given or table.units.get(name) or si_suffix(said.component or TIME).replace("_", "/")
-        if said.why:
-            found.doubts.append(Doubt(name, said.component, said.why, ()))
+        if said.why is not None:
+            found.doubts.append(doubt(name, said.component, said.why.code, (), **said.why.numbers))
         elif said.component and said.component not in found.columns:
-            if given or not (doubt := doubt_of_rate(table, name, said.component, unit)):
+            if given or not (fast := doubt_of_rate(table, name, said.component, unit)):
                 found.columns[said.component] = Column(name, unit)
             else:
-                found.doubts.append(doubt)
+                found.doubts.append(fast)
 
 
 def _meant(name: str, names: Iterable[str]) -> list[str]:
@@ -156,14 +161,14 @@ def _take(
         _doubt_brackets(name, numbers, found)
         return
     if component in found.columns:
-        found.doubts.append(Doubt(name, component, f"which is {found.columns[component].name} already", ()))
+        found.doubts.append(doubt(name, component, "component_taken", (), by=found.columns[component].name))
         return
     assumption = assumed.get(component) or assumed.get(component.rstrip("0123456789"))
     if assumption is not None:
         unit = parse_unit(assumption)
     unit = unit or parts.unit
     if unit is None and given and given not in ("-", "SI"):
-        found.doubts.append(Doubt(name, component, f"the unit {given} is unknown"))
+        found.doubts.append(doubt(name, component, "unit_unknown", unit=given))
         return
     if unit is None:
         unit = unit_of(table, name, component, robot, found)
@@ -177,7 +182,7 @@ def _doubt_words(table: Table, numbers: Mapping[str, int], found: Guess) -> None
         cells = table.columns[name]
         component = None if is_numeric(cells) else component_of(name, None, numbers.get(name))
         if component is not None and (cell := first_word(cells)).lstrip("+-.")[:1].isdigit():
-            found.doubts.append(Doubt(name, component, f"but cells such as {cell} are no numbers", ()))
+            found.doubts.append(doubt(name, component, "cells_not_numbers", (), cell=cell))
 
 
 def _doubt_brackets(name: str, numbers: Mapping[str, int], found: Guess) -> None:
@@ -185,7 +190,7 @@ def _doubt_brackets(name: str, numbers: Mapping[str, int], found: Guess) -> None
     match = BRACKETS.fullmatch(name)
     component = component_of_parts(read_name(match[1]), None, numbers.get(name)) if match else None
     if match and component is not None:
-        found.doubts.append(Doubt(name, component, f"the unit {match[2]} is unknown"))
+        found.doubts.append(doubt(name, component, "unit_unknown", unit=match[2]))
 
 
 def _doubt_letters(names: list[str], found: Guess) -> None:
@@ -193,8 +198,7 @@ def _doubt_letters(names: list[str], found: Guess) -> None:
     parts = {name: read_name(name) for name in names}
     mine = [name for name in names if _is_letter_v(parts[name])]
     if mine and "u1" not in found.columns:
-        why = f"which may be voltages or speeds (say `column` u1={mine[0]}:V and so on)"
-        found.doubts += [Doubt(name, f"u{parts[name].number}", why, ()) for name in mine]
+        found.doubts += [doubt(name, f"u{parts[name].number}", "volts_or_speeds", (), first=mine[0]) for name in mine]
 
 
 def _is_letter_v(name: NameParts) -> bool:
@@ -213,19 +217,18 @@ def _enter(table: Table, name: str, component: str, unit: Unit, said: bool, foun
         component = "u" + component[1:]
     elif unit.quantity in (COUNT, COUNT_RATE):
         divided = "ticks/COUNTS_PER_TURN" + ("/s" if unit.quantity == COUNT_RATE else "")
-        found.doubts.append(Doubt(name, component, "counts per turn are not known", (divided,)))
+        found.doubts.append(doubt(name, component, "counts_per_turn_unknown", (divided,)))
         return
     elif unit.quantity == SPEED_UNIT and is_of_rim(component, unit):
         _enter_rim(name, component, unit, found)
         return
     elif unit.quantity != wanted:
         if unit.quantity != TIME_UNIT or component not in ("x", "y", "heading"):  # x [s] is the axis of a picture
-            article = "an" if wanted[0] in "aeiou" else "a"
-            found.doubts.append(Doubt(name, component, f"{unit.text} is no unit of {article} {wanted}"))
+            found.doubts.append(doubt(name, component, "unit_of_other", unit=unit.text, quantity=wanted))
         return
-    doubt = implausible(component, unit, floats(table.columns[name]), said, found.robot)
-    if doubt is not None:
-        found.doubts.append(Doubt(name, called, *doubt))
+    unlikely = implausible(component, unit, floats(table.columns[name]), said, found.robot)
+    if unlikely is not None:
+        found.doubts.append(replace(unlikely, columns=(name,), components=(called,)))
         return
     roles = read_name(name).roles
     side = MOTOR_SIDE if component_channel(component) in SIDED and words.MOTOR in roles else WHEEL_SIDE
@@ -235,13 +238,10 @@ def _enter(table: Table, name: str, component: str, unit: Unit, said: bool, foun
 def _enter_rim(name: str, component: str, unit: Unit, found: Guess) -> None:
     """Take a speed of a rim, where the radius is known that makes it one of the wheel."""
     if found.robot is None:
-        why = f"but {unit.text} is the speed of its rim: name the robot, whose radius of the wheels makes rad/s of it"
-        found.doubts.append(Doubt(name, component, why, ()))
+        found.doubts.append(doubt(name, component, "rim_without_robot", (), unit=unit.text))
         return
     found.columns[component] = Column(name, unit.text)
-    words = f"speeds of wheels in {unit.text} are those of their rims: divided by the radius of the wheels"
-    if words not in found.notes:
-        found.notes.append(words)
+    found.note("speeds_of_rims", unit=unit.text)
 
 
 def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], found: Guess) -> None:
@@ -251,7 +251,7 @@ def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], foun
     """
     alike: dict[str, list[str]] = {}
     numbered = {component for component in found.columns if component[1:2].isdigit()}
-    settled = numbered | {doubt.component for doubt in found.doubts if read_name(doubt.name).number is not None}
+    settled = numbered | {each.components[0] for each in found.doubts if read_name(each.columns[0]).number is not None}
     body = found.columns.keys() - numbered - {TIME, "supply", "omega", "heading"}
     turning = {column.name for key, column in found.columns.items() if body and key in ("omega", "heading")}
     for name in names:
@@ -263,15 +263,13 @@ def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], foun
         if len(mine) > 1:
             _forget(mine, found)
             order = proposed_wheels(table, mine, found) if component == "w1" else ""
-            say = f"the motion says `column` {order}" if order else f"say `column` {component}={mine[0]} and so on"
-            why = f"but no number says which wheel each is ({say})"
-            found.doubts += [Doubt(name, component, why, ()) for name in mine]
+            first = "" if order else f"{component}={mine[0]}"
+            found.doubts += [doubt(name, component, "wheel_unknown", (), order=order, first=first) for name in mine]
         elif mine and not body:
             _forget(mine, found)
             _take_single(table, mine[0], component, assumed, found)
     if any(component[1:2].isdigit() for component in found.columns.keys() - numbered):
-        some = "no wheel has" if not numbered else "no wheel but the first has"
-        found.notes.append(f"{some} a number: taken as a log of one motor")
+        found.note("one_motor", numbered=len(numbered))
 
 
 def _ask_where_motion_differs(table: Table, numbers: Mapping[str, int], found: Guess) -> None:
@@ -282,9 +280,8 @@ def _ask_where_motion_differs(table: Table, numbers: Mapping[str, int], found: G
     order = proposed_wheels(table, mine, found) if mine else ""
     if order and order.replace("=-", "=") != ", ".join(f"{key}={name}" for key, name in sorted(speeds.items())):
         _forget(placed, found)
-        found.notes = [note for note in found.notes if not note.startswith(TOLD_BY_PLACES)]
-        why = f"but the motion is another one than that of wheels at these places (the motion says `column` {order})"
-        found.doubts += [Doubt(name, "w1", why, ()) for name in placed]
+        found.notes = [note for note in found.notes if note.code != BY_PLACES]
+        found.doubts += [doubt(name, "w1", "places_against_motion", (), order=order) for name in placed]
 
 
 def _drop_unspoken(alike: dict[str, list[str]]) -> None:
@@ -309,7 +306,7 @@ def _forget(names: list[str], found: Guess) -> None:
     """Take back what was said about some columns."""
     for component in [key for key, column in found.columns.items() if column.name in names]:
         del found.columns[component]
-    found.doubts = [doubt for doubt in found.doubts if doubt.name not in names]
+    found.doubts = [each for each in found.doubts if each.columns[0] not in names]
     for name in names:
         found.si.pop(name, None)
 
@@ -320,7 +317,7 @@ def _take_single(table: Table, name: str, component: str, assumed: Mapping[str, 
     unit = known_unit(text) or parts.unit
     unknown = text if text not in ("", "-", "SI") else (match[2] if (match := BRACKETS.fullmatch(name)) else "")
     if unit is None and unknown:
-        found.doubts.append(Doubt(name, component, f"the unit {unknown} is unknown"))
+        found.doubts.append(doubt(name, component, "unit_unknown", unit=unknown))
         return
     unit = unit or unit_of(table, name, component, None, found)
     if unit is not None:
@@ -331,10 +328,9 @@ def _take_single(table: Table, name: str, component: str, assumed: Mapping[str, 
 def refuse_doubtful(columns: ColumnMap, where: str) -> None:
     """Raises InputError where nothing tells the time: without it there is no log."""
     if TIME not in columns.columns:
-        doubt = next((doubt for doubt in columns.doubts if f" {TIME}, " in doubt), "")
-        settled = doubt.rpartition("; ")[2] if "; " in doubt else ""
-        written = "write seconds, or dates such as 2026-11-20T10:00:00.125" if doubt else ""
-        either = "say which column it is (`column` t=COLUMN:s), or how many rows a second: `rate` HZ"
-        remedy = settled or written or either
-        why = shortened(doubt.partition(": not taken")[0] or "no column looks like a time", 300)
+        unclear = next((doubt for doubt in columns.doubts if TIME in doubt.components), None)
+        why, remedy = "no column looks like a time", TIME_REMEDY
+        if unclear is not None:
+            why = shortened(str(Statement("time_unclear", ERROR, TIME, {"doubt": unclear})), 300)
+            remedy = unclear.remedy_text if unclear.units else SECONDS_OR_DATES
         raise InputError(f"cannot tell the time of the rows: {why}", remedy=remedy, where=where)

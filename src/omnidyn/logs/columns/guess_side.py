@@ -40,9 +40,7 @@ def settle_side(table: Table, robot: Robot | None, found: Guess) -> None:
             for component, column in found.columns.items():
                 if component_channel(component) in SIDED and not column.of_rim:
                     found.columns[component] = Column(column.name, column.unit, side)
-            found.notes.append(
-                f"speeds of wheels are on the {side} side: the commands are {ratio:.4g} times those of the body"
-            )
+            found.note("side_of_gear", side=side, ratio=ratio)
 
 
 def take_sides(sides: Mapping[str, str], found: Guess) -> None:

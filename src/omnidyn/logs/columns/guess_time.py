@@ -14,7 +14,8 @@ from omnidyn.logs.channels import TIME
 from omnidyn.logs.clock.clock import are_steps, is_dates
 from omnidyn.logs.column import Column
 from omnidyn.logs.columns import names as words
-from omnidyn.logs.columns.guessed import Doubt, Guess, first_word, floats, is_numeric
+from omnidyn.logs.columns.doubt import UNIT, doubt
+from omnidyn.logs.columns.guessed import Guess, first_word, floats, is_numeric
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.table.table import Table
@@ -40,11 +41,11 @@ def take_time(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
     candidates.sort(key=lambda name: (name != "t_s", table.names.index(name)))
     if dates and not candidates:
         found.columns[TIME] = Column(dates[0], "s")
-        found.notes.append(f"{dates[0]} holds dates: time begins at 0 with the first")
+        found.note("dates", column=dates[0])
         return
     if not candidates and wordy:
         cell = first_word(table.columns[wordy[0]])
-        found.doubts.append(Doubt(wordy[0], TIME, f"but cells such as {cell} are no numbers and no known dates", ()))
+        found.doubts.append(doubt(wordy[0], TIME, "cells_not_dates", (), cell=cell))
         return
     steps = [name for name in table.names if is_numeric(table.columns[name]) and _are_steps(table, name)]
     if steps and (not candidates or candidates == steps):
@@ -53,7 +54,7 @@ def take_time(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
     if not candidates:
         increasing = [name for name in table.names if _increases(table.columns[name])]
         if increasing:
-            found.doubts.append(Doubt(increasing[0], TIME, "its name and unit do not say how long one count is"))
+            found.doubts.append(doubt(increasing[0], TIME, "clock_unit_unknown"))
         return
     name = candidates[0]
     text = assumed.get(name) or assumed.get(TIME) or table.units.get(name, "")
@@ -63,7 +64,7 @@ def take_time(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
     if unit is not None and unit.quantity == TIME_UNIT:
         found.columns[TIME] = Column(name, unit.text)
     elif unit is not None:
-        found.doubts.append(Doubt(name, TIME, f"{unit.text} is no unit of time"))
+        found.doubts.append(doubt(name, TIME, "unit_of_other", unit=unit.text, quantity="time"))
 
 
 def _is_span(name: str) -> bool:
@@ -83,7 +84,7 @@ def _take_steps(table: Table, name: str, assumed: Mapping[str, str], found: Gues
     if unit is not None and unit.quantity == TIME_UNIT:
         found.columns[TIME] = Column(name, unit.text)
     elif unit is not None:
-        found.doubts.append(Doubt(name, TIME, f"{unit.text} is no unit of time"))
+        found.doubts.append(doubt(name, TIME, "unit_of_other", unit=unit.text, quantity="time"))
 
 
 def _is_clock(table: Table, name: str, assumed: Mapping[str, str]) -> bool:
@@ -113,15 +114,13 @@ def _plausible_time(values: FloatArray, name: str, given: str, found: Guess) -> 
     units = [parse_unit(text) for text in TIME_NAMES]
     possible = [unit for unit in units if SHORTEST_STEP <= step * unit.size <= LONGEST_STEP]
     if given and given not in ("-", "SI"):
-        found.doubts.append(Doubt(name, TIME, f"the unit {given} is unknown"))
+        found.doubts.append(doubt(name, TIME, "unit_unknown", unit=given))
         return None
     if len(possible) != 1:
         texts = tuple(unit.text for unit in possible)
-        found.doubts.append(Doubt(name, TIME, f"no unit is given and rows are {step:.4g} apart", texts or ("UNIT",)))
+        found.doubts.append(doubt(name, TIME, "time_without_unit", texts or UNIT, step=step))
         return None
-    found.notes.append(
-        f"{name} has no unit: taken as {possible[0].text}, rows are {step * possible[0].size:.4g} s apart"
-    )
+    found.note("time_unit_taken", column=name, unit=possible[0].text, step_s=step * possible[0].size)
     return possible[0]
 
 

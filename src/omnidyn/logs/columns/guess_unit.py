@@ -8,7 +8,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.logs.channels import si_suffix
-from omnidyn.logs.columns.guessed import Doubt, Guess, floats
+from omnidyn.logs.columns.doubt import Doubt, doubt
+from omnidyn.logs.columns.guessed import Guess, floats
 from omnidyn.logs.columns.mapping import quantity_of
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
@@ -31,39 +32,37 @@ def unit_of(table: Table, name: str, component: str, robot: Robot | None, found:
     """The unit where the file gives none: SI, said in words; volts only where they cannot be a duty."""
     suffix = si_suffix(component)
     if suffix == "rad" and _turns_in_degrees(floats(table.columns[name])):
-        found.doubts.append(Doubt(name, component, "no unit is given, and it jumps by 360 as degrees do", ("deg",)))
+        found.doubts.append(doubt(name, component, "turns_in_degrees", ("deg",)))
         return None
     if suffix in ("V", "duty") and component != "supply":
         return _command_unit(table, name, component, robot, found)
     if suffix == "rad" and component != "heading" and _are_counts(floats(table.columns[name])):
-        found.doubts.append(Doubt(name, component, "counts per turn are not known", ("ticks/COUNTS_PER_TURN",)))
+        found.doubts.append(doubt(name, component, "counts_per_turn_unknown", ("ticks/COUNTS_PER_TURN",)))
         return None
-    if doubt := doubt_of_rate(table, name, component):
-        found.doubts.append(doubt)
+    if fast := doubt_of_rate(table, name, component):
+        found.doubts.append(fast)
         return None
     found.si[name] = SI.get(suffix, suffix)
     return parse_unit(found.si[name])
 
 
-def implausible(
-    component: str, unit: Unit, values: FloatArray, said: bool, robot: Robot | None
-) -> tuple[str, tuple[str, ...]] | None:
-    """Why values cannot be in their unit, and the units in which they can; None where they can.
+def implausible(component: str, unit: Unit, values: FloatArray, said: bool, robot: Robot | None) -> Doubt | None:
+    """The doubt, of no column yet, about values that cannot be in their unit; None where they can.
 
     said: whether the user said the unit: what is only unlikely is then believed.
     """
     if quantity_of(component) == ANGLE and unit == parse_unit("rad") and not said and _turns_in_degrees(values):
-        return "it jumps by 360 as degrees do, not radians", ("deg",)
+        return doubt("", component, "turns_in_degrees", ("deg",), unit="rad")
     if component[0] not in "ud" or not component[1:].isdigit():
         return None
     largest = _largest(values)
     if component[0] == "u":
         most = _most_volts(robot)
-        why = f"up to {largest:.3g} {unit.text} cannot be: a motor gets {most:.3g} V at the most"
+        code, numbers = "too_many_volts", {"largest": largest, "unit": unit.text, "most_V": most}
     else:
         most = 1.0 if unit.text in PERCENT and largest > MOST_PERCENT and _are_whole(values) else MOST_DUTY
-        why = f"up to {largest:.3g} {unit.text if unit.text in PERCENT else 'as a duty'} cannot be: a full duty is 1"
-    return (why, _scales(largest)) if largest * unit.size > most else None
+        code, numbers = "too_much_duty", {"largest": largest, "unit": unit.text if unit.text in PERCENT else ""}
+    return doubt("", component, code, _scales(largest), **numbers) if largest * unit.size > most else None
 
 
 def _most_volts(robot: Robot | None) -> float:
@@ -88,9 +87,7 @@ def doubt_of_rate(table: Table, name: str, component: str, unit: str = "") -> Do
     largest = _usual_size(floats(table.columns[name]))
     if largest <= FASTEST_TURN:
         return None
-    given = "its format means rad/s" if unit else "no unit is given"
-    return Doubt(name, component, f"{given}, and up to {largest:.3g} is no turn rate of a robot in rad/s",
-                 ("deg/s", "rad/s"))  # fmt: skip
+    return doubt(name, component, "turn_rate_too_large", ("deg/s", "rad/s"), largest=largest, unit=unit)
 
 
 def _turns_in_degrees(values: FloatArray) -> bool:
@@ -127,27 +124,24 @@ def _command_unit(table: Table, name: str, component: str, robot: Robot | None, 
     """Volts or duty? Volts where a name spells them, or the largest lies between 1 and the robot's limit."""
     largest = _largest(floats(table.columns[name]))
     if component.startswith("d") and largest <= 1.0:
-        found.notes.append(f"{name} has no unit: taken as duty, -1..1")
+        found.note("taken_as_duty", column=name)
         return parse_unit("duty")
     spoken = any(word in name.lower() for word in ("volt", "spannung"))
     if component.startswith("u") and 1.0 < largest <= MOST_VOLTS and spoken:
-        found.notes.append(f"{name} has no unit: taken as V, as its name says")
+        found.note("taken_as_volts", column=name)
         return parse_unit("V")
     if component.startswith("u") and robot is not None and 1.0 < largest <= 1.05 * _limit(robot):
-        found.notes.append(f"{name} has no unit: taken as V (at most {largest:.3g})")
+        found.note("taken_as_volts", column=name, largest=largest)
         return parse_unit("V")
     alike = [other for other in table.names if re.sub(r"\d+", "", other) == re.sub(r"\d+", "", name)]
     largest = max(_largest(floats(table.columns[other])) for other in alike)  # of all wheels: one sentence for all
     least = min(float(np.nanmin(floats(table.columns[other]), initial=np.inf)) for other in alike)
     if SERVO[0] <= least and largest <= SERVO[1]:
-        why = f"{least:.4g} to {largest:.4g} look like widths of servo pulses: log (width - 1500) / 500, a duty"
-        found.doubts.append(Doubt(name, component, f"but {why}", ()))
+        found.doubts.append(doubt(name, component, "servo_pulses", (), least=least, largest=largest))
         return None
     scales = _scales(largest)
-    looks = "a duty" if largest <= 1.0 else "percent" if largest <= 100.0 else "a PWM value, of 0.." + scales[-1][5:]
     volts = ("V",) * (largest <= _most_volts(robot))
-    why = f"no unit is given, and up to {largest:.3g} may be {'volts or ' * bool(volts)}{looks}"
-    found.doubts.append(Doubt(name, component, why, (*volts, *scales)))
+    found.doubts.append(doubt(name, component, "command_without_unit", (*volts, *scales), largest=largest))
     return None
 
 

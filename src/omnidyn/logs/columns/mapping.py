@@ -13,7 +13,9 @@ from omnidyn.errors import InputError
 from omnidyn.files import MAX_TOML_BYTES, parse_toml, read_text, write_atomic
 from omnidyn.logs.channels import TIME, place, si_suffix
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
+from omnidyn.logs.columns.doubt import Doubt
 from omnidyn.model.robot_file import toml_literal
+from omnidyn.statement import Statement
 from omnidyn.units import ANGLE, CURRENT, DUTY, LENGTH, SPEED, TURN_RATE, VOLTAGE, Unit, parse_unit
 from omnidyn.units import TIME as TIME_QUANTITY
 
@@ -33,17 +35,15 @@ _SPEC = re.compile(r"(?P<invert>-)?(?P<name>.+?)(?::(?P<unit>[^:@]*))?(?:@(?P<si
 class ColumnMap:
     """Component ("t", "u1", "vx_cmd", ...) -> Column.
 
-    unused: columns that nobody took. doubts: columns that were not taken because something was not sure, and what to
-    say about them. notes: what was decided, in words. doubted: component -> the doubt about what looks like it, in
-    brief.
+    unused: columns that nobody took. doubts: columns that were not taken because something was not sure, and what
+    settles it. notes: what was decided.
     Raises InputError for a name that is no component, or a unit of another quantity.
     """
 
     columns: Mapping[str, Column] = field(default_factory=dict)
     unused: tuple[str, ...] = ()
-    doubts: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-    doubted: Mapping[str, str] = field(default_factory=dict)
+    doubts: tuple[Doubt, ...] = ()
+    notes: tuple[Statement, ...] = ()
 
     def __post_init__(self) -> None:
         for component, column in self.columns.items():
@@ -65,14 +65,13 @@ class ColumnMap:
         taken = {column.name for column in more.values()}
         kept = {name: column for name, column in self.columns.items() if column.name not in taken}
         unused = tuple(name for name in self.unused if name not in taken)
-        doubts = tuple(words for words in self.doubts if not any(words.startswith(f"{name} ") for name in taken))
-        doubted = {name: words for name, words in self.doubted.items() if name not in more}
-        return replace(self, columns={**kept, **more}, unused=unused, doubts=doubts, doubted=doubted)
+        doubts = tuple(doubt for doubt in self.doubts if not doubt.columns or not taken.issuperset(doubt.columns))
+        return replace(self, columns={**kept, **more}, unused=unused, doubts=doubts)
 
     @property
     def passed_over(self) -> tuple[str, ...]:
         """Columns that nobody took and no doubt names."""
-        doubted = {name for words in self.doubts for name in words.partition(" look")[0].split(", ")}
+        doubted = {name for doubt in self.doubts for name in doubt.columns}
         return tuple(name for name in self.unused if name not in doubted)
 
     def lines(self) -> list[str]:

@@ -8,14 +8,15 @@ from typing import NamedTuple
 
 from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.component import component_of_parts, numbered_kind
-from omnidyn.logs.columns.guessed import Doubt, Guess
+from omnidyn.logs.columns.doubt import doubt
+from omnidyn.logs.columns.guessed import Guess
 from omnidyn.logs.columns.names import BRACKETS, read_name
 from omnidyn.logs.columns.places import wheels_at
 from omnidyn.logs.table.table import Table
 from omnidyn.model.wheels import MAX_WHEELS
 from omnidyn.units import known_unit
 
-TOLD_BY_PLACES = "wheels are told by their places"
+BY_PLACES = "wheels_by_places"
 BOARD = 2  # so many times the motors are the places of a board that measures all currents of a robot
 
 
@@ -66,8 +67,7 @@ def wheel_numbers(table: Table, names: Iterable[str], found: Guess) -> dict[str,
     ]  # fmt: skip
     if shifted:
         others = sorted({family.letter for family in families if family not in shifted})
-        but = f" ({', '.join(others)} from 1)" if others else ""
-        found.notes.append(f"wheels are numbered from 0 in the file: 0 is wheel 1{but}")
+        found.note("wheels_from_zero", from_one=others)
     numbers = {name: number + (family in shifted) for family, mine in families.items() for name, number in mine.items()}
     kept = {name: number for name, number in numbers.items() if 0 < number <= MAX_WHEELS}
     counted = {family.letter for family in families}
@@ -82,8 +82,7 @@ def _by_place(families: Mapping[Family, Mapping[str, float]], found: Guess) -> d
         numbers |= {name: wheels[place] for name, place in mine.items() if place in wheels}
     first = {wheel: name for name, wheel in reversed(numbers.items())}
     if first:
-        order = ", ".join(f"{first[wheel]} is wheel {wheel}" for wheel in sorted(first))
-        found.notes.append(f"{TOLD_BY_PLACES}: {order}")
+        found.note(BY_PLACES, columns=[first[wheel] for wheel in sorted(first)], wheels=sorted(first))
     return numbers
 
 
@@ -93,5 +92,5 @@ def _leave_out_boards(families: dict[Family, dict[str, int]], found: Guess) -> N
     boards = [family for family, mine in families.items() if family.letter == "i" and len(mine) >= BOARD * motors > 0]
     for family in boards:
         mine = list(families.pop(family))
-        why = f"but there are {len(mine)} beside {motors} motors (say `column` i1={mine[0]} and so on)"
-        found.doubts += [Doubt(name, "i1", why, ()) for name in mine]
+        numbers = {"currents": len(mine), "motors": motors, "first": mine[0]}
+        found.doubts += [doubt(name, "i1", "more_currents", (), **numbers) for name in mine]

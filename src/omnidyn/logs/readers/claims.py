@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.logs.columns.guessed import NO_NUMBER
+from omnidyn.logs.columns.doubt import NO_NUMBER
 from omnidyn.logs.readers.recording import Track
 from omnidyn.logs.table.table import Said
+from omnidyn.statement import Statement
 
-NO_HEADING = f"{NO_NUMBER} (a quaternion of zeros?)"
 USUAL_NAMES = ("odom", "cmd_vel", "joint_states", "battery_state", "data", "pose", "tf")
 
 
@@ -58,13 +58,13 @@ def _said(
 ) -> Said:
     """What a column is; why it is not taken."""
     if component and component not in wanted:
-        return Said(component, NO_HEADING if component == "heading" else NO_NUMBER)
+        return Said(component, Statement("no_heading_number" if component == "heading" else NO_NUMBER))
     if np.isnan(out.values).all():
         return Said("")
     owner = owners.get(component)
     if component and owner is None:
-        others = ", ".join(sorted(each.topic for each in wanted[component])[:4])
-        return Said(component, f"and so do those of others ({others})")
+        others = sorted(each.topic for each in wanted[component])[:4]
+        return Said(component, Statement("several_topics", numbers={"topics": others}))
     return Said(component if owner == claim.topic else "")
 
 

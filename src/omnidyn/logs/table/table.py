@@ -16,6 +16,7 @@ from omnidyn.files import too_large
 from omnidyn.logs.table import dialect
 from omnidyn.logs.table.rows import Column
 from omnidyn.logs.table.text_file import TOO_LARGE_REMEDY
+from omnidyn.statement import Statement
 
 ROWS = 500_000
 MAX_CELLS = 2**24  # in one block: 128 MiB of floats
@@ -27,11 +28,11 @@ class Said(NamedTuple):
     """What a format itself says of a column: a message of ROS names what its fields are.
 
     component: such as "vx", "t"; "" for a column that is nothing by itself and is taken only by `column`.
-    why: why it is not taken though it looks like the component; "" where it is taken.
+    why: why it is not taken though it looks like the component; None where it is taken.
     """
 
     component: str = ""
-    why: str = ""
+    why: Statement | None = None
 
 
 @dataclass(frozen=True, eq=False)

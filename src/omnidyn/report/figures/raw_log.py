@@ -7,13 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from omnidyn.findings.finding import FATAL, NOTE, WARN, Finding, Verdict
+from omnidyn.findings.finding import Finding, Verdict
 from omnidyn.logs.log import Log
 from omnidyn.report.figures.channels import draw_channel, hatch_gaps
 from omnidyn.report.style import GREY, ORANGE, VERMILLION, WIDTH, Picture, look, new_figure, picture
 from omnidyn.run import CHANNELS
+from omnidyn.statement import ERROR, NOTE, WARNING
 
-LEVELS = {FATAL: VERMILLION, WARN: ORANGE, NOTE: GREY}
+COLOURS = {ERROR: VERMILLION, WARNING: ORANGE, NOTE: GREY}
 MAX_LANES = 9
 LANE, PANEL, EDGES = 0.26, 1.25, 1.05  # [inch] high
 LABEL = 22  # characters that the margin holds
@@ -22,7 +23,7 @@ LABEL = 22  # characters that the margin holds
 def draw_raw_log(log: Log, verdict: Verdict) -> Picture:
     """The channels of a log as recorded, with the findings that have rows as bars above them."""
     channels = [name for name in CHANNELS if name in log.channels and np.isfinite(log.channels[name]).any()]
-    lanes = [finding for finding in verdict.findings if finding.rows or finding.level != NOTE][:MAX_LANES]
+    lanes = [finding for finding in verdict.findings if finding.rows or finding.severity != NOTE][:MAX_LANES]
     heights = ([LANE * len(lanes) + 0.1] if lanes else []) + [PANEL] * max(1, len(channels))
     total = sum(heights) + 0.32 * len(heights) + EDGES
     with look():
@@ -58,7 +59,7 @@ def _lanes(axes: Axes, log: Log, findings: Sequence[Finding]) -> None:
             if times.size:
                 length = max(float(times.max() - times.min()), shortest)
                 bars.append((float(times.min()), length))
-        colour = LEVELS[finding.level]
+        colour = COLOURS[finding.severity]
         if finding.rows:
             axes.broken_barh(bars, (lane - 0.36, 0.72), facecolors=colour, edgecolors=colour)
         elif len(log):  # of the log as a whole
@@ -67,18 +68,18 @@ def _lanes(axes: Axes, log: Log, findings: Sequence[Finding]) -> None:
     axes.set_yticks(range(len(findings)), [_label(finding) for finding in findings], fontsize=9.0)
     axes.set_ylim(len(findings) - 0.4, -0.6)
     axes.grid(visible=False)
-    axes.set_title("found: red fatal, orange to heed, grey to know; dotted: the log as a whole")
+    axes.set_title("findings: red errors, orange warnings, grey notes; dotted: the log as a whole")
 
 
 def _label(finding: Finding) -> str:
     """What was found and where, whole: places that are too many for the margin are counted."""
-    words = f"{finding.code} {finding.where}".rstrip().replace("_", " ")
-    places = len(finding.where.split())
+    words = f"{finding.code} {finding.subject}".rstrip().replace("_", " ")
+    places = len(finding.subject.split())
     return words if len(words) <= LABEL or places < 2 else f"{finding.code} ({places})".replace("_", " ")
 
 
 def _caption(verdict: Verdict) -> str:
     words = "; ".join(
-        f"{each.level}: {each.code} {each.where}".rstrip() for each in verdict.findings if each.level != NOTE
+        f"{each.severity}: {each.code} {each.subject}".rstrip() for each in verdict.findings if each.severity != NOTE
     )
-    return f"{verdict.headline()}. {words or 'nothing to heed'}. Hatched: gaps."
+    return f"{verdict.headline()}. {words or 'no error, no warning'}. Hatched: gaps."

@@ -9,6 +9,7 @@ from omnidyn.logs.readers.ros.usual import heading_of, wheel_numbers
 pytest.importorskip("rosbags")
 pytest.importorskip("mcap")
 from tests.support.bags import BagMaker, write_mcap
+from tests.support.codes import said
 
 
 class Maker(BagMaker):
@@ -57,7 +58,7 @@ def test_a_gyroscope_gives_the_turn_rate_where_no_odometry_does(tmp_path):
         maker.odometry(0.01 * k, (0, 0, 0), (1.0, 0.0, 7.0))
     log = load_log(write_mcap(maker, tmp_path / "b.mcap"))
     assert (log.channels["twist"][:, 2] == 7.0).all()
-    assert any("omega of /imu/data are not taken: /odom gives them" in note for note in log.notes)
+    assert any("omega of /imu/data are not taken: /odom gives them" in note for note in said(log.notes))
 
 
 def test_a_transform_gives_the_pose_where_nothing_else_does(tmp_path):

@@ -1,0 +1,143 @@
+"""What a log can be used for, and why not."""
+
+from __future__ import annotations
+
+from omnidyn.document import all_of, short
+from omnidyn.findings.needs import LOOP_REMEDY
+from omnidyn.statement import ERROR, NOTE, WARNING, Statement
+from omnidyn.telling.logs import in_brief
+from omnidyn.telling.sentence import Sentence
+from omnidyn.telling.words import by_number, counted
+
+OF_ROBOT = {
+    "": "", "robot": "; with a robot file", "supply": "; with a robot file that has supply_V",
+    "speed_loop": '; with a robot file that has the speed loop of the firmware, [drive] kind = "speed"',
+}  # fmt: skip
+
+
+def usable_for(uses: tuple[str, ...], others: tuple[str, ...] = ()) -> str:
+    """ "usable for whole logs and motors, not for steady state and geometry"; "not usable"."""
+    if not uses:
+        return "not usable"
+    return f"usable for {all_of(uses)}{f', not for {all_of(others)}' if others else ''}"
+
+
+def _usable(statement: Statement) -> str:
+    """A log without errors."""
+    n = statement.numbers
+    warnings = counted(n["warnings"], "warning") if n["warnings"] else "no warning"
+    return f"{usable_for(n['uses'], n['not']) if n['uses'] or n['not'] else 'no row to judge by'}; {warnings}"
+
+
+def _faulty(statement: Statement) -> str:
+    """A log with errors."""
+    n = statement.numbers
+    more = f" (and {counted(n['errors'] - 1, 'other error')})" if n["errors"] > 1 else ""
+    rest = f"; once corrected, {usable_for(n['uses'], n['not'])}" if n["uses"] or n["not"] else ""
+    return f"not usable as it stands: {n['first']}{more}{rest}"
+
+
+def _summary(statement: Statement) -> str:
+    """One line about a log."""
+    n = statement.numbers
+    rate = f" at {n['rate_Hz']:.4g} Hz" if n["rate_Hz"] > 0.0 else ""
+    return f"{statement.subject or 'log'}: {n['rows']} rows, {short(n['duration_s'], '.4g')} s{rate}: {severities(n)}"
+
+
+def severities(counts: object) -> str:
+    """ "1 error, 3 warnings, 2 notes": those that there are; "no findings"."""
+    known = dict(counts)  # type: ignore[call-overload]
+    return ", ".join(counted(known[each], each) for each in (ERROR, WARNING, NOTE) if known[each]) or "no findings"
+
+
+def _lacking(text: str):
+    """A sentence with the columns that look like what is missing behind it."""
+
+    def sentence(statement: Statement) -> str:
+        doubts = [in_brief(doubt) for doubt in statement.numbers.get("doubts", ())]
+        return f"{text.format(**statement.numbers)}{': ' if doubts else ''}{'; '.join(doubts)}"
+
+    sentence.__doc__ = text
+    return sentence
+
+
+def _refused(statement: Statement) -> str:
+    """The log cannot be made a run."""
+    n = statement.numbers
+    return f"{n['what']}; {n['remedy']}" if n["remedy"] else n["what"]
+
+
+def _incomplete(statement: Statement) -> str:
+    """No row has the input of all wheels."""
+    n = statement.numbers
+    if n["missing"]:
+        return f"no {n['channel']} of wheel {all_of([*map(str, n['missing'])])}"
+    return f"hardly a row has the {n['channel']} of all wheels"
+
+
+def _no_steady(statement: Statement) -> str:
+    """No stretch of constant speed."""
+    n = statement.numbers
+    return (
+        f"no stretch of constant speed{', only at rest' if n['at_rest'] else ''}: hold commands for {n['hold_s']:g} s \
+or more"
+    )
+
+
+def _whole(statement: Statement) -> str:
+    """A fit of whole logs is possible."""
+    n = statement.numbers
+    return f"{n['input']} in, {all_of(n['outputs'])} out{OF_ROBOT[n['needs']]}"
+
+
+def _steady(statement: Statement) -> str:
+    """Friction from steady states is possible."""
+    n = statement.numbers
+    many = (
+        f"{n['stretches']} or more stretches"
+        if n["more"]
+        else f"{n['stretches']} \
+{by_number(n['stretches'], 'stretch', 'stretches')}"
+    )
+    return f"{many} of constant speed, the force from {n['force_from']}{OF_ROBOT[n['needs']]}"
+
+
+def _geometry(statement: Statement) -> str:
+    """The wheels' places can be identified."""
+    n = statement.numbers
+    angles = all_of([f"{angle:.0f}" for angle in n["azimuth_deg"]])
+    return f"the wheels push as omni wheels at {angles} degrees do ({n['source']})"
+
+
+SENTENCES = {
+    "usable": Sentence(_usable),
+    "faulty": Sentence(_faulty),
+    "not_usable": Sentence("not usable: {reason}"),
+    "log_summary": Sentence(_summary),
+    "no_two_rows": Sentence("it holds no two rows"),
+    "too_few_rows": Sentence(
+        "{rows} rows, too few to tell motion from noise: {least} or more are needed, 10 s are better"
+    ),
+    "robot_rests": Sentence("the robot never moves: drive it beyond its dead zone"),
+    "refused": Sentence(_refused),
+    "set_speeds_only": Sentence(f"holds set speeds only; to fit it whole, {LOOP_REMEDY}"),
+    "no_input": Sentence(_lacking("holds no voltage and no duty")),
+    "no_output": Sentence(_lacking("holds no speed, angle, current or pose")),
+    "other_robot": Sentence("the log is of {wheels} wheels, {robot} has {of_robot}"),
+    "no_battery": Sentence(
+        _lacking("a duty needs its battery: a column supply, or [drive] supply_V in the robot file")
+    ),
+    "input_incomplete": Sentence(_incomplete),
+    "no_force": Sentence(_lacking("no current and no motor input")),
+    "no_wheel_motion": Sentence(_lacking("no speed or angle of the wheels")),
+    "lossy_gear": Sentence("the robot file has a lossy gear, which a steady state does not know"),
+    "no_steady_stretch": Sentence(_no_steady),
+    "no_motor_input": Sentence(_lacking("no motor input")),
+    "no_motor_motion": Sentence(_lacking("no speed or angle of the motors")),
+    "no_two_motions": Sentence("no motion of both the body and the wheels"),
+    "speeds_beyond_robots": Sentence("the speeds are beyond all numbers of a robot"),
+    "serves_whole": Sentence(_whole),
+    "serves_steady": Sentence(_steady),
+    "serves_motors": Sentence("{input} against {speeds}, if the wheels were off the ground"),
+    "serves_geometry": Sentence(_geometry),
+}  # fmt: skip
