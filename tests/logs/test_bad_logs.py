@@ -55,7 +55,7 @@ def test_13_blank_cells_are_aligned_and_counted(run, tmp_path):
             lines[k] = ",".join(cells)
     (tmp_path / "sparse.csv").write_text("\n".join(lines))
     read = read_log(tmp_path / "sparse.csv")
-    assert [warning.subject for warning in read.warnings if warning.code == "on_change"][0] == "u1"
+    assert next(warning for warning in read.warnings if warning.code == "on_change").subject == "u1"
 
 
 def test_14_too_many_missing_rows_are_refused(run, tmp_path):

@@ -108,7 +108,7 @@ def test_a_log_on_change_holds_commands_and_makes_nothing_up(tmp_path):
     run = read_log(write(tmp_path, text))
     np.testing.assert_array_equal(run.voltage[:, 0], [1, 1, 1, 2, 2, 2])
     np.testing.assert_array_equal(run.wheel_speed[:, 0], [np.nan, 10, np.nan, np.nan, 40, np.nan])
-    (note,) = [warning for warning in run.warnings if warning.code == "on_change"]
+    note = next(warning for warning in run.warnings if warning.code == "on_change")
     assert (note.subject, note.numbers["held"], round(100 * note.numbers["blank"])) == ("u1", True, 67)
     late = read_log(write(tmp_path, text), latency={"w": 0.1})
     np.testing.assert_allclose(late.wheel_speed[:, 0], [10, np.nan, np.nan, 40, np.nan, np.nan])
