@@ -94,7 +94,7 @@ def test_a_folder_is_a_table_of_its_logs_and_what_is_wrong(call, run):
     write_run(run, "again.csv")
     code, out, _ = call(".", "--robot", "axebot")
     assert code == 4
-    assert re.search(r"again.csv +1201 +12 s +- +1 +", out)  # the same data as another
+    assert re.search(r"clean.csv +1201 +12 s +- +1 +", out)  # the same data as again.csv
     assert "error    swapped w1 w2 (swapped.csv): " in out
     assert len(out.splitlines()) <= 25
 

@@ -9,11 +9,6 @@ from omnidyn.telling import (
     advice,
     causes,
     comparison,
-    findings_rows,
-    findings_scale,
-    findings_signal,
-    findings_uses,
-    findings_wiring,
     fit,
     lack_of_fit,
     ladder,
@@ -23,14 +18,15 @@ from omnidyn.telling import (
     steady,
     verdicts,
 )
+from omnidyn.telling.findings import rows, scale, signal, uses, wiring
 from omnidyn.telling.sentence import Sentence
 from omnidyn.telling.words import by_number
 
 ROOMS = {
-    room.__name__.rpartition(".")[2]: room.SENTENCES
+    room.__name__.removeprefix("omnidyn.telling.").replace(".", "_"): room.SENTENCES
     for room in (
         simulation, fit, lack_of_fit, causes, ladder, advice, verdicts, comparison, steady, lines, logs,
-        findings_rows, findings_signal, findings_wiring, findings_scale, findings_uses,
+        rows, signal, wiring, scale, uses,
     )
 }  # fmt: skip
 CODES: dict[str, Sentence] = {code: sentence for room in ROOMS.values() for code, sentence in room.items()}

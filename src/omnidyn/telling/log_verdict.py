@@ -11,7 +11,7 @@ from omnidyn.findings.excitation import SECTORS
 from omnidyn.findings.finding import Finding, Verdict
 from omnidyn.findings.use import Use
 from omnidyn.statement import SEVERITIES
-from omnidyn.telling.findings_uses import severities, usable_for
+from omnidyn.telling.findings.uses import severities, usable_for
 from omnidyn.telling.words import by_number, counted
 
 INDENT = " " * 11  # of text

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from omnidyn.statement import NOTE, Statement
-from omnidyn.telling.findings_wiring import compared
+from omnidyn.telling.findings.wiring import compared
 from omnidyn.telling.sentence import Sentence
 from omnidyn.telling.words import SOURCES, by_number, names, read_as
 
