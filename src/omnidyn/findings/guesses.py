@@ -1,4 +1,4 @@
-"""Findings that rest on numbers of the robot file which are only guessed: they are doubts, never fatal."""
+"""Findings that rest on numbers of the robot file which are only guessed: they are doubts, never errors."""
 
 from __future__ import annotations
 

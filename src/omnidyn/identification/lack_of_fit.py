@@ -225,7 +225,7 @@ class LackOfFit:
         """What was found, the gravest first."""
         whole = self.statement()
         if not self.found:
-            calm = Statement("follows_nothing" if self._beyond_rest() else "only_noise", NOTE)
+            calm = Statement("unrelated_residuals" if self._beyond_rest() else "only_noise", NOTE)
             return [whole or calm, *self._levels(), *self._tails()]
         shares = [
             Statement("misfit_of_output", WARNING, name, {"size": self.sizes[name], "percent": 100.0 * share})

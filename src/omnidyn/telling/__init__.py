@@ -1,5 +1,6 @@
 """What results say, in words: the only room where a number becomes a sentence.
 
 sentence: a Statement in words, and its remedy. `codes` lists all statements: one file per room below, each a table
-`SENTENCES` of code -> Sentence. Read sentence.py first, then the file of the room.
+`SENTENCES` of code -> Sentence. Read sentence.py first, then the file of the room. log_verdict lays out what
+`check` prints.
 """

@@ -158,7 +158,7 @@ SENTENCES = {
         "logs"
     ),
     "only_noise": Sentence("the residuals hold nothing but noise, as far as these logs tell"),
-    "follows_nothing": Sentence("the residuals follow nothing that a model should know, as far as these logs tell"),
+    "unrelated_residuals": Sentence("the residuals follow nothing that a model should know, as far as these logs tell"),
     "misfit_unexplained": Sentence(_unexplained),
     "misfit_without_law": Sentence(_unoffered),
     "misfit_with_rivals": Sentence(_rivals),
