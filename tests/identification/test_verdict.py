@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from omnidyn.document import sentence
-from omnidyn.findings.finding import FATAL, Finding, Verdict
+from omnidyn.findings.finding import Finding, Verdict
 from omnidyn.identification.estimate import Correlation, Estimate
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.motors.verdict import motors_verdict
@@ -18,6 +18,7 @@ from omnidyn.identification.verdict import fit_verdict, fits_verdict, steady_ver
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
+from omnidyn.statement import ERROR
 from tests.support.axebot_logs import excitation, noisy_draw
 
 AXEBOT = load_robot("axebot")
@@ -106,10 +107,10 @@ def test_a_number_whose_interval_holds_0_is_not_known():
 
 
 def test_groups_faults_and_interrupts_are_said():
-    verdicts = [Verdict((Finding("swapped", FATAL, "w1 w2", "two wheels are swapped"),))]
+    verdicts = [Verdict((Finding("wrapped", ERROR, "i1", {"bits": 16}),))]
     fits = {"all": estimate([0.02] * 6)}
     assert said(*fits_verdict(fits, {}, verdicts)).startswith(
-        "The log has an error, to be mended first: two wheels are swapped. All 6 numbers are known"
+        "The log has an error, to be mended first: i1 is near 0 or near 2^16"
     )
     both = said(*fits_verdict({"oak": fits["all"], "felt": fits["all"]}, {"oak": beside(GOOD)}, cut=True))
     assert both.startswith(

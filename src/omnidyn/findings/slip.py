@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
@@ -51,7 +53,7 @@ def check_slip(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     return found, work
 
 
-def _against_the_limit(work: LogUnderCheck, bad: BoolArray) -> dict[str, object]:
+def _against_the_limit(work: LogUnderCheck, bad: BoolArray) -> dict[str, Any]:
     """What the motors push with in those rows, and what the floor of the robot file takes of a wheel [N]."""
     robot = work.robot
     if robot is None or robot.wheels.traction_mu is None:
@@ -60,7 +62,7 @@ def _against_the_limit(work: LogUnderCheck, bad: BoolArray) -> dict[str, object]
     if current is None and voltage is not None and speed is not None:
         current = settled_current(robot.motor, voltage, speed)
     limit = grips(robot)
-    floor = {"grips_N": sorted(set(np.round(limit, 6).tolist()))}
+    floor: dict[str, Any] = {"grips_N": sorted(set(np.round(limit, 6).tolist()))}
     if current is None or not np.isfinite(pushes := np.abs(traction(robot.motor, robot.wheels, current[bad]))).any():
         return floor
     beyond = float((pushes > limit).any(axis=1).mean())

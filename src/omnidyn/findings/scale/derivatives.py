@@ -121,7 +121,7 @@ def _judged(work: LogUnderCheck, pair: Pair, line: Slope) -> tuple[Finding, LogU
     clock = unit_of(1.0 / ratio, TIME_UNITS)
     if any(units[side]):
         factor = 1.0 / ratio if side == SPEED_SIDE else ratio
-        finding = unit_finding(name, factor, units[side], shown_by="derivative", ratio=ratio, **compared)
+        finding = unit_finding(name, factor, units[side], (), shown_by="derivative", ratio=ratio, **compared)
     elif any(clock):
         finding = _of_time((pair, line))
     elif ratio < 0.0:

@@ -13,6 +13,9 @@ from omnidyn.logs.clock.stamps import astray
 from omnidyn.logs.column import Column
 from omnidyn.logs.segments import GAP
 from omnidyn.logs.table.table import Table
+from omnidyn.statement import Statement
+
+Notes = list[Statement | str]
 
 EPOCH = 1e8  # [s]; a later time counts from 1970: the start of the log is taken off, so that no digits are lost
 DAY = 86_400.0  # [s]
@@ -52,7 +55,7 @@ class Clock:
         self._bare = False  # whether milliseconds stand without leading zeros
         self._days = 0  # midnights passed since the first time of day
 
-    def times(self, table: Table, column: Column, notes: list[str]) -> FloatArray:
+    def times(self, table: Table, column: Column, notes: Notes) -> FloatArray:
         """Times of the rows [s], shape (rows,), NaN where missing. What was decided goes to `notes`.
 
         Raises InputError at the first cell that is neither a number nor a date.
@@ -82,7 +85,7 @@ class Clock:
             return self._start.timestamp()
         return (self._start or 0.0) * column.factor
 
-    def _summed(self, steps: FloatArray, column: Column, notes: list[str]) -> FloatArray:
+    def _summed(self, steps: FloatArray, column: Column, notes: Notes) -> FloatArray:
         """Times from steps of time: the first row is at 0, each further one its step later than the row before."""
         notes.append(f"{column.name} holds the time since the row before: it is summed up")
         steps = np.nan_to_num(steps)
@@ -92,7 +95,7 @@ class Clock:
         self._passed = float(sums[-1]) if sums.size else self._passed
         return sums * column.factor
 
-    def _going_on(self, counts: FloatArray, lines: IntArray, column: Column, notes: list[str]) -> FloatArray:
+    def _going_on(self, counts: FloatArray, lines: IntArray, column: Column, notes: Notes) -> FloatArray:
         """The counts of a clock that starts over when its counter is full, at midnight, or with its board: going on."""
         rows = np.flatnonzero(np.isfinite(counts))
         before = [] if self._count is None else [self._count]
@@ -114,7 +117,7 @@ class Clock:
         return counts
 
     @staticmethod
-    def _over(read: FloatArray, column: Column, notes: list[str]) -> FloatArray | None:
+    def _over(read: FloatArray, column: Column, notes: Notes) -> FloatArray | None:
         """What each step lacks, where every one that goes back is by the period of a counter or a day; else None."""
         steps = np.diff(read)
         usual = float(np.median(steps[steps > 0.0]))
@@ -127,7 +130,7 @@ class Clock:
                 return np.where(over, period, 0.0)
         return None
 
-    def _begun_again(self, read: FloatArray, lines: IntArray, column: Column, notes: list[str]) -> FloatArray:
+    def _begun_again(self, read: FloatArray, lines: IntArray, column: Column, notes: Notes) -> FloatArray:
         """What each step lacks: where the board was started again, the way to a seam behind what stood before."""
         steps = np.diff(read)
         lost, cuts = np.zeros(len(steps)), np.flatnonzero(steps < 0.0)
@@ -147,7 +150,7 @@ class Clock:
         self._begin = float(begins[-1])  # type: ignore[arg-type]
         return lost
 
-    def _from_dates(self, table: Table, name: str, cells: tuple[str, ...], notes: list[str]) -> FloatArray:
+    def _from_dates(self, table: Table, name: str, cells: tuple[str, ...], notes: Notes) -> FloatArray:
         self._bare = self._bare or _are_bare(cells)
         if self._bare:
             notes.append(f"{name} has milliseconds without leading zeros: .5 is 5 ms")
@@ -173,7 +176,7 @@ class Clock:
         return (date - self._start).total_seconds()
 
 
-def _without_strays(counts: FloatArray, lines: IntArray, column: Column, notes: list[str]) -> FloatArray:
+def _without_strays(counts: FloatArray, lines: IntArray, column: Column, notes: Notes) -> FloatArray:
     """The counts, NaN where a single one lies far from all others."""
     known = np.flatnonzero(np.isfinite(counts))
     bad = known[astray(counts[known], DAY / abs(column.factor))]

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from typing import Any
+
 from omnidyn.document import all_of, short
 from omnidyn.findings.needs import LOOP_REMEDY
-from omnidyn.statement import ERROR, NOTE, WARNING, Statement
+from omnidyn.statement import SEVERITIES, Statement
 from omnidyn.telling.logs import in_brief
 from omnidyn.telling.sentence import Sentence
 from omnidyn.telling.words import by_number, counted
@@ -44,13 +47,13 @@ def _summary(statement: Statement) -> str:
     return f"{statement.subject or 'log'}: {n['rows']} rows, {short(n['duration_s'], '.4g')} s{rate}: {severities(n)}"
 
 
-def severities(counts: object) -> str:
+def severities(counts: Mapping[str, Any]) -> str:
     """ "1 error, 3 warnings, 2 notes": those that there are; "no findings"."""
-    known = dict(counts)  # type: ignore[call-overload]
-    return ", ".join(counted(known[each], each) for each in (ERROR, WARNING, NOTE) if known[each]) or "no findings"
+    known = [counted(counts[severity], severity) for severity in SEVERITIES if counts[severity]]
+    return ", ".join(known) or "no findings"
 
 
-def _lacking(text: str):
+def _lacking(text: str) -> Callable[[Statement], str]:
     """A sentence with the columns that look like what is missing behind it."""
 
     def sentence(statement: Statement) -> str:
