@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Document, Part, Points, Table, interval_cell, plain, sentence
+from omnidyn.document import Document, Part, Table, interval_cell, plain, sentence
 from omnidyn.errors import shortened
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.model.first_guess import rests_on as guesses_under
@@ -18,7 +18,7 @@ from omnidyn.model.keys import in_words, unit
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
 from omnidyn.shown import FIGURE, FRAME, Shown, make
-from omnidyn.statement import NOTE, SEVERITIES, Statement, statements
+from omnidyn.statement import NOTE, Statement, by_severity, statements
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -147,7 +147,7 @@ class Estimate(Shown):
         scale = [self.scale] if self.scale else []
         held = [words] if (words := rests_on_guesses(self.robot)) else []
         alone = [table] if (table := self.alone_table()) else []
-        return [*head, self._table(), *alone, *bounds, *scale, *held, *by_severity(self.warnings)]
+        return [*head, self._table(), *alone, *bounds, *scale, *held, by_severity(self.warnings)]
 
     def _table(self) -> Table:
         rows = []
@@ -199,11 +199,6 @@ class Estimate(Shown):
             "scale": self.scale,
             "robot": robot_to_toml(self.robot),
         })  # fmt: skip
-
-
-def by_severity(found: Sequence[Statement]) -> list[Points]:
-    """Statements as points, the gravest first, each behind its severity."""
-    return [Points([one for one in found if one.severity == severity], f"{severity}:") for severity in SEVERITIES]
 
 
 def identified(std: float | None, source: str) -> Prior:
