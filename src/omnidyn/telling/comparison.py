@@ -72,7 +72,7 @@ def _follows(statement: Statement) -> str:
     return f"{statement.subject} follows {all_of(good)}{f', but {all_of(bad)}' if bad else ''}"
 
 
-def _follows_nothing(statement: Statement) -> str:
+def _does_not_follow(statement: Statement) -> str:
     """Measured signals change, and the model follows none of them even roughly."""
     return f"{statement.subject} does not follow: {', '.join(map(str, statement.numbers['signals']))}"
 
@@ -130,7 +130,7 @@ SENTENCES = {
     "band_rests_on_guesses": Sentence("the band of {subject} rests on guesses: {guesses}"),
     "signal_followed": Sentence(_signal_followed),
     "follows": Sentence(_follows),
-    "follows_nothing": Sentence(_follows_nothing),
+    "does_not_follow": Sentence(_does_not_follow),
     "nothing_changes": Sentence("nothing that was measured changes: how well {subject} follows is not identifiable"),
     "nearer": Sentence("{subject} is surely nearer in {components}"),
     "models_compared": Sentence(_models_compared),

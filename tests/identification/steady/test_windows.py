@@ -152,9 +152,9 @@ def test_viscous_friction_beside_a_guessed_motor_constant_is_the_sum_that_it_is(
     assert level.back_emf == pytest.approx(brake)
     assert level.value + level.back_emf == pytest.approx(3.0 + brake, rel=0.02)
     assert level.std == pytest.approx(0.2 * (brake - 3.0), rel=0.02)
-    text = " ".join(found.document().to_text().split())
-    assert "viscous friction cannot be told from back-EMF, for motor.torque_constant_Nm_A is a guess" in text
-    assert "friction.direction.viscous: right together with the back-EMF of this file only" in text
+    (both,) = [one for one in found.statements if one.code == "viscous_with_back_emf"]
+    assert both.numbers["guesses"] == ("motor.torque_constant_Nm_A",)
+    assert "rests_on_back_emf" in codes(found.estimate.warnings)
     low, high = found.estimate.ci95["friction.direction.viscous"]
     alone = found.estimate.log_alone["friction.direction.viscous"]
     # u l K/(R r) of the sum grows as K does, the brake as its square: dB = (B + brake) dK/K - 2 brake dK/K
