@@ -42,7 +42,7 @@ def test_a_half_good_model():
 def test_a_bad_model():
     scores = {"w1": Score(12.0, -60.0), "vx": Score(0.4, 30.0)}
     verdict = compared(["axebot"], [scores], {})
-    assert (verdict.code, verdict.severity) == ("does_not_follow", "error")
+    assert (verdict.code, verdict.severity) == ("model_does_not_follow", "error")
     assert levels(verdict) == {"speed over the ground": "hardly", "wheel speeds": "not"}
 
 
@@ -98,7 +98,7 @@ def test_wheels_that_turn_the_other_way_are_not_followed(run):
     found = compare(
         load_robot("axebot"), run.replace(wheel_speed=-run.wheel_speed, twist=None, pose=None, current=None)
     )
-    assert found.verdict.code == "does_not_follow"
+    assert found.verdict.code == "model_does_not_follow"
     assert levels(found.verdict) == {"wheel speeds": "not"}
     assert found.failed
     assert found.to_dict()["ok"] is False

@@ -100,7 +100,7 @@ def test_any_drive_is_driven(drive):
 def test_it_says_what_it_found():
     found = omnidyn.track(AXEBOT, "goal:travel_s=1,hold_s=1", "pid")
     words = str(found)
-    assert words.startswith("pid keeps axebot within ")
+    assert words.startswith("Pid keeps axebot within ")
     assert "of the path goal:travel_s=1,hold_s=1" in words
     assert found.statuses == {"path ended: holding its last pose": 49}
     assert "warning" not in words
@@ -120,13 +120,13 @@ def test_a_demand_by_hand():
     corners = omnidyn.demand(AXEBOT, "square:speed_m_s=0.5,rounds=1")
     assert corners.corners == 3
     assert corners.jump == pytest.approx(0.5 * np.sqrt(2.0))
-    assert "between its corners" in corners.verdict
+    assert "between its corners" in str(corners.verdict)
     fast = omnidyn.demand(AXEBOT, "eight:period_s=2")
     assert not fast.follows
-    assert "cannot follow" in fast.verdict
+    assert "cannot follow" in str(fast.verdict)
     warm = omnidyn.demand(shaped("disc", current_limit=0.5), "eight:period_s=4")
     assert not warm.follows
-    assert "A of 0.5 A" in warm.verdict
+    assert "A of 0.5 A" in str(warm.verdict)
 
 
 @pytest.mark.parametrize(

@@ -75,7 +75,7 @@ def test_a_path_asks_no_more_than_the_floor_takes():
     assert found.current_limit == pytest.approx(amperes, rel=1e-9)
     assert found.grip
     assert found.follows == (found.current <= amperes)
-    assert "at which a wheel slips" in found.verdict
+    assert "at which a wheel slips" in str(found.verdict)
 
 
 def test_a_slope_is_still_refused():

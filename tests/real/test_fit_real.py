@@ -117,4 +117,4 @@ def test_one_step_of_the_bench_tells_no_dead_band(data):
     assert json.loads(json.dumps(fit.to_dict(), allow_nan=False))["parameters"]["slope"]["std"] is None
     assert not fit.dead_band_seen
     assert fit.ci95["dead_band"][0] == 0.0
-    assert "not identifiable" in fit.statement()
+    assert "not identifiable" in str(fit.statement())

@@ -155,7 +155,7 @@ def test_the_dead_zone_of_the_stairs_is_not_identifiable(data):
     low, high = np.quantile(line.draws["dead_band"], [0.05, 0.95])
     assert low < -1.75 < high
     assert not any(each.dead_band_seen for each in study.motors)
-    assert all("dead band not identifiable here" in words for words in study.statements)
+    assert all("dead band not identifiable here" in str(one) for one in study.statements)
 
 
 def test_the_motors_of_a_robot_that_turns_on_the_spot(data):

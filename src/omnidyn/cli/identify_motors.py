@@ -58,7 +58,7 @@ def _tell(
         now("drawing")
         report = to.write_report(attempts, lambda: _page(study, record))
     now("writing")
-    verdict = " ".join([str(told.verdict), *(sentence(str(each)) for each in not_made(attempts.missing))])
+    verdict = " ".join([told.verdict_text, *(sentence(str(each)) for each in not_made(attempts.missing))])
     told = replace(told, verdict=verdict, data={**told.data, "verdict": verdict})
     own, missing = numbers.to_dict() if numbers is not None else None, [*map(asdict, attempts.missing)]
     tell(told, to.json, record, robot=own, output=to.files.get(""), report=report or None, missing=missing)

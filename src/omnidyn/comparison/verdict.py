@@ -126,7 +126,7 @@ def follows(model: str, found: Sequence[Followed]) -> Statement:
     if not found:
         return Statement("nothing_changes", WARNING, model)
     if nothing_followed(found):
-        return Statement("does_not_follow", ERROR, model, signals)
+        return Statement("model_does_not_follow", ERROR, model, signals)
     return Statement("follows", NOTE, model, signals)
 
 

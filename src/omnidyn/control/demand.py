@@ -20,6 +20,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 from omnidyn.run import Run
 from omnidyn.shown import Shown
+from omnidyn.statement import NOTE, WARNING, Statement, as_verdict
 
 SAMPLES = 4001  # times at which a path is asked
 JUMP = 1e-6  # [m/s, rad/s] less is rounding
@@ -59,36 +60,27 @@ class Demand(Shown):
         return self.share_beyond == 0.0
 
     @property
-    def verdict(self) -> str:
-        """Whether it can, in a sentence."""
-        volts = f"up to {self.voltage:.3g} V of {self.voltage_limit:.3g} V"
-        if self.current_limit is not None:
-            slips = " at which a wheel slips" if self.grip else ""
-            volts += f" and {self.current:.3g} A of {self.current_limit:.3g} A{slips}"
+    def verdict(self) -> Statement:
+        """Whether it can."""
+        names = ("path", "voltage", "voltage_limit", "current", "current_limit", "grip", "corners")
+        numbers = {name: getattr(self, name) for name in names}
         if not self.follows:
-            return (
-                f"{self.robot} cannot follow {self.path} in {100.0 * self.share_beyond:.2g} % of its time: that takes "
-                f"{volts}."
-            )
-        corners = f"; at its {self.corners} corners no robot can" if self.corners else ""
-        return f"{self.robot} can follow {self.path}{' between its corners' if self.corners else ''}: {volts}{corners}."
+            return Statement("cannot_follow", WARNING, self.robot, numbers | {"share": self.share_beyond})
+        return Statement("can_follow", NOTE, self.robot, numbers)
 
-    def words(self) -> list[str]:
-        """What it asks for, in sentences."""
-        told = [
-            f"{self.path} asks for up to {self.speed:.3g} m/s and {self.acceleration:.3g} m/s2, "
-            f"{self.turn:.3g} rad/s and {self.turn_acceleration:.3g} rad/s2"
-        ]
+    def statements(self) -> list[Statement]:
+        """What it asks for."""
+        names = ("speed", "acceleration", "turn", "turn_acceleration")
+        found = [Statement("path_asks_for", NOTE, self.path, {name: getattr(self, name) for name in names})]
         if self.corners:
-            told.append(
-                f"its speed jumps at {self.corners} corners, by up to {self.jump:.3g} m/s and "
-                f"{self.turn_jump:.3g} rad/s"
-            )
-        return told
+            jumps = {name: getattr(self, name) for name in ("corners", "jump", "turn_jump")}
+            found.append(Statement("speed_jumps", NOTE, numbers=jumps))
+        return found
 
     def document(self) -> Document:
         """What it says."""
-        return Document([Points(self.words())], plain(vars(self) | {"follows": self.follows}), verdict=self.verdict)
+        data = plain(vars(self) | {"follows": self.follows})
+        return Document([Points(self.statements())], as_verdict(self.verdict) | data, verdict=self.verdict)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""

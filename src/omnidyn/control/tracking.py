@@ -1,4 +1,4 @@
-"""Tracking: how near a controller brought a robot to a path, at what expense, in numbers and in words."""
+"""Tracking: how near a controller brought a robot to a path, and at what expense."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Document, Part, Points, Table
+from omnidyn.control.controller import ENDED
+from omnidyn.document import Document, Part, Points, Table, plain
 from omnidyn.run import Run
 from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.statement import NOTE, WARNING, Statement, as_verdict, by_severity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -91,21 +93,17 @@ class Tracking(Shown):
         return {"median": MICRO * float(median), "p99": MICRO * float(high)}
 
     @property
-    def verdict(self) -> str:
-        """How near it came, in a sentence."""
+    def verdict(self) -> Statement:
+        """How near it came."""
         assert self.run.pose is not None
-        size = float(np.hypot(*np.ptp(self.wanted[:, :2], axis=0)))
-        share = f", {100.0 * self.rmse_position / size:.2g} % of its size" if size > 0.0 else ""
-        limit = ""
-        if self.saturated_share > 0.0:
-            limit = f"; its motors are at their limit in {100.0 * self.saturated_share:.2g} % of the steps"
-        return (
-            f"{self.controller} keeps {self.plant} within {_length(self.worst_position)} of the path {self.path}, "
-            f"{_length(self.rmse_position)} in the mean{share}{limit}."
-        )
+        numbers = {
+            "plant": self.plant, "path": self.path, "worst": self.worst_position, "rmse": self.rmse_position,
+            "size": np.hypot(*np.ptp(self.wanted[:, :2], axis=0)), "saturated": self.saturated_share,
+        }  # fmt: skip
+        return Statement("tracked", NOTE, self.controller, numbers)
 
     def summary(self) -> str:
-        """The result in words, for reading."""
+        """The result as text."""
         return self.document().to_text()
 
     def document(self) -> Document:
@@ -126,12 +124,12 @@ class Tracking(Shown):
         return make(FIGURE, self)
 
 
-def _of_run(tracking: Tracking, named: bool) -> list[str]:
+def _of_run(tracking: Tracking, named: bool) -> list[Statement]:
     """What the simulation of the robot itself has to say, such as of wheels that slip."""
-    return [f"{tracking.controller}: {words}" if named else str(words) for words in tracking.run.warnings]
+    return [warning.of(tracking.controller) if named else warning for warning in tracking.run.warnings]
 
 
-def trackings_document(found: Sequence[Tracking], notes: Sequence[str] = ()) -> Document:
+def trackings_document(found: Sequence[Tracking], notes: Sequence[Statement] = ()) -> Document:
     """What controllers on one path did, side by side. notes: what is said beside, such as what the path asks for."""
     first = found[0]
     span = float(first.run.t[-1])
@@ -149,42 +147,37 @@ def trackings_document(found: Sequence[Tracking], notes: Sequence[str] = ()) -> 
         "controller", "position mm", "heading mrad", "worst mm", "at limit %", "effort V", "change V", "step us",
         "p99 us",
     )  # fmt: skip
-    told = [words for each in found for words in (*_odd(each), *_of_run(each, len(found) > 1))]
+    warnings = [warning for each in found for warning in (*_odd(each), *_of_run(each, len(found) > 1))]
+    verdict = _verdict(found)
     parts: list[Part] = [
         head, "", Table(columns, rows, "<>", name="controllers"), "",
         "position, heading: rmse; effort: rms of a voltage; change: its mean change from step to step.",
     ]  # fmt: skip
     parts += [Points(notes, "-", "path")] if notes else []
-    parts.append(Points(told, "warning:", "warnings"))
+    parts.append(by_severity(warnings, "warnings"))
     data = {
-        "robot": first.plant, "path": first.path, "dt_s": first.dt, "duration_s": span, "skip_s": first.skip,
-        "controllers": [each.to_dict() for each in found], "notes": list(notes), "warnings": told,
+        **as_verdict(verdict), "robot": first.plant, "path": first.path, "dt_s": first.dt, "duration_s": span,
+        "skip_s": first.skip, "controllers": [each.to_dict() for each in found], "notes": plain(list(notes)),
+        "warnings": plain(warnings),
     }  # fmt: skip
-    return Document(parts, data, told, verdict=_verdict(found))
+    return Document(parts, data, warnings, verdict=verdict)
 
 
-def _verdict(found: Sequence[Tracking]) -> str:
+def _verdict(found: Sequence[Tracking]) -> Statement:
     """The best of several first."""
     best = min(found, key=lambda each: each.rmse_position)
     if len(found) == 1:
         return best.verdict
     others = [each for each in found if each is not best]
-    times = ", ".join(
-        f"{each.controller} {float(f'{each.rmse_position / max(best.rmse_position, 1e-12):.2g}'):g} times as far off"
-        for each in others
-    )
-    return f"{best.verdict[:-1]}; {times}."
+    times = [each.rmse_position / max(best.rmse_position, 1e-12) for each in others]
+    numbers = {"best": best.verdict, "others": [each.controller for each in others], "times": times}
+    return Statement("best_tracked", NOTE, best.controller, numbers)
 
 
-def _odd(each: Tracking) -> list[str]:
-    """Steps that did not go as they should, in words."""
-    ended = "path ended"
+def _odd(tracking: Tracking) -> list[Statement]:
+    """Steps that did not go as they should."""
+    steps = len(tracking.step_times)
     return [
-        f"{each.controller}: {count} of {len(each.step_times)} steps: {word}"
-        for word, count in each.statuses.items() if not word.startswith(ended)
+        Statement("steps_with_status", WARNING, status, {"count": count, "steps": steps}).of(tracking.controller)
+        for status, count in tracking.statuses.items() if status != ENDED
     ]  # fmt: skip
-
-
-def _length(value: float) -> str:
-    """A length as one says it."""
-    return f"{1e3 * value:.3g} mm" if value < 1.0 else f"{value:.3g} m"

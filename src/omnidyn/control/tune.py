@@ -31,6 +31,7 @@ from omnidyn.model.known.told import told
 from omnidyn.model.known.uncertainty import plausible
 from omnidyn.model.robot import Robot
 from omnidyn.shown import Shown
+from omnidyn.statement import NOTE, Statement, as_verdict
 
 DRAWS, EVALUATIONS, NOISE = 8, 30, 0.005
 MOST_DRAWS, MOST_EVALUATIONS = 1000, 10_000
@@ -115,47 +116,29 @@ class Tuned(Shown):
         return self.after.cost < self.before.cost
 
     @property
-    def verdict(self) -> str:
-        """What tuning brought, in a sentence."""
-        gains = all_of([f"{name} {value:g}" for name, value in self.gains.items()])
-        before, after = 1e3 * self.before.mean, 1e3 * self.after.mean
+    def verdict(self) -> Statement:
+        """What tuning brought."""
+        errors = {"before": self.before.mean, "after": self.after.mean}
         if not self.better:
-            return f"The gains it began with are as good as any that were tried: {after:.3g} mm."
-        return f"With {gains}, {self.controller.controller} is {after:.3g} mm off in the mean, {before:.3g} mm before."
+            return Statement("gains_kept", NOTE, self.controller.controller, errors)
+        gains = {"names": [*self.gains], "gains": [*self.gains.values()]}
+        return Statement("gains_tuned", NOTE, self.controller.controller, errors | gains)
 
-    def words(self) -> list[str]:
+    def statements(self) -> list[Statement]:
         """What was optimised, and what that gave up."""
-        robots = (
-            f"{self.draws} robots drawn from the std and correlations of the file" if self.draws
-            else "the robot of the file alone: no number of it has a std, so nothing says how far it may be off"
-        )  # fmt: skip
-        lines = [
-            f"optimised: rms distance from the path and rim error of the heading along {all_of(self.paths)}, over "
-            f"{robots}; noise {self.noise:g} m/s, delay {self.delay} steps, {self.dt:g} s a step; {self.evaluations} "
-            "settings tried",
-        ]
-        if self.draws:
-            lines.append(
-                "the numbers are those of as many other draws and of other noise, which the search has not seen"
-            )
-        lines += self._given_up()
-        return lines
-
-    def _given_up(self) -> list[str]:
-        """What got worse."""
-        lost = []
-        if self.after.restless > 1.02 * self.before.restless:
-            lost.append(
-                f"rest: a voltage changes by {self.after.restless:.3g} V a step, {self.before.restless:.3g} V before"
-            )
-        if self.own_after.mean > 1.02 * self.own_before.mean:
-            lost.append(
-                f"the robot as the file says it: {1e3 * self.own_after.mean:.3g} mm, "
-                f"{1e3 * self.own_before.mean:.3g} mm before: the price of being right for the others"
-            )
-        if self.after.worst > 1.02 * self.before.worst:
-            lost.append(f"the worst robot: {1e3 * self.after.worst:.3g} mm, {1e3 * self.before.worst:.3g} mm before")
-        return [f"given up: {words}" for words in lost] or ["given up: nothing that was measured"]
+        names = ("paths", "draws", "noise", "delay", "dt", "evaluations")
+        found = [Statement("optimised", NOTE, numbers={name: getattr(self, name) for name in names})]
+        found += [Statement("judged_on_other_draws", NOTE)] if self.draws else []
+        errors = {
+            "given_up_rest": (self.before.restless, self.after.restless),
+            "given_up_on_file": (self.own_before.mean, self.own_after.mean),
+            "given_up_on_worst": (self.before.worst, self.after.worst),
+        }
+        lost = [
+            Statement(code, NOTE, numbers={"before": before, "after": after})
+            for code, (before, after) in errors.items() if after > 1.02 * before
+        ]  # fmt: skip
+        return [*found, *(lost or [Statement("given_up_nothing", NOTE)])]
 
     def document(self) -> Document:
         """What it says."""
@@ -164,7 +147,7 @@ class Tuned(Shown):
             for name, own, each in (("before", self.own_before, self.before), ("tuned", self.own_after, self.after))
         ]  # fmt: skip
         head = ("", "this robot mm", "robots mm", "worst mm", "change V")
-        scores, words = Table(head, rows, "<>", name="scores"), Points(self.words(), "-", "words")
+        scores, words = Table(head, rows, "<>", name="scores"), Points(self.statements(), "-", "statements")
         parts: list[Part] = [scores, "", words, "", self.controller.to_toml()]
         return Document(parts, self.to_dict(), verdict=self.verdict)
 
@@ -174,7 +157,8 @@ class Tuned(Shown):
         return plain({
             "robot": self.robot, "paths": self.paths, "controller": self.controller.controller,
             "options": dict(self.controller.options), "start": dict(self.start), **scores, "draws": self.draws,
-            "evaluations": self.evaluations, "better": self.better, "words": self.words(),
+            "evaluations": self.evaluations, "better": self.better, "statements": self.statements(),
+            **as_verdict(self.verdict),
         })  # fmt: skip
 
 

@@ -37,4 +37,4 @@ def render_motors(study: MotorStudy, provenance: Mapping[str, Any]) -> str:
     if study.verdicts:
         sections += [section("logs", "What check says of the logs", verdict_table(study.verdicts))]
     how = WINDOWS if study.windows is not None else FREE_RUNS
-    return page("Motors from logs", how, sections, provenance, verdict=study.verdict)
+    return page("Motors from logs", how, sections, provenance, verdict=told.verdict_text)

@@ -9,7 +9,7 @@ import numpy as np
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Document, Points, Table
+from omnidyn.document import Document, Points, Table, plain
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage
 from omnidyn.model.dynamics import drive_wrench, frame_wrench
 from omnidyn.model.frames import AXES
@@ -21,6 +21,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import sliding_wrench, top_speeds
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.simulation.simulate import simulate
+from omnidyn.statement import NOTE, Statement
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -62,13 +63,13 @@ class FrictionStudy:
 
     robot: Robot
     axes: tuple[AxisFriction, ...]
-    notes: tuple[str, ...]
+    notes: tuple[Statement, ...]
 
     def document(self) -> Document:
         """What it says: a table, and words."""
         head = ("axis", "law", "holds", "slides slowly", "at top speed", "bends", "breakaway, slow to fast ramp")
         table = Table(head, [_row(each) for each in self.axes], "<<", name="axes")
-        data = {"robot": self.robot.name, "axes": [_told(each) for each in self.axes], "notes": list(self.notes)}
+        data = {"robot": self.robot.name, "axes": [_told(each) for each in self.axes], "notes": plain(self.notes)}
         return Document([f"friction of {self.robot.name}", "", table, "", Points(self.notes)], data)
 
 
@@ -216,22 +217,15 @@ def _law(robot: Robot, k: int) -> str:
     return " + ".join(named) or "viscous only"
 
 
-def _notes(robot: Robot, axes: Sequence[AxisFriction]) -> list[str]:
-    notes = ["a law that does not bend holds exactly; its breakaway is the same at every rate"]
+def _notes(robot: Robot, axes: Sequence[AxisFriction]) -> list[Statement]:
+    codes = ["holds_exactly"]
     kinds = [KINDS[getattr(robot.friction, name).law] for name in type(robot.friction).model_fields]
-    if any(each.bends and each.drifts for each in kinds):
-        notes.append(
-            "a bristle never holds exactly: under a force that swings below breakaway the robot creeps on, which is "
-            "what the law says"
-        )
-    if any(each.bends for each in kinds):
-        notes.append("in a fast ramp the damping of bristles resists too")
-    if robot.wheels.traction_mu is not None:
-        notes.append("the wheels roll here: what the floor takes before they slip (traction_mu) is not looked at")
+    codes += ["creeps"] if any(each.bends and each.drifts for each in kinds) else []
+    codes += ["bristles_damp"] if any(each.bends for each in kinds) else []
+    codes += ["wheels_roll"] if robot.wheels.traction_mu is not None else []
     weak = [each.axis for each in axes if np.isnan(each.rate).any()]
-    if weak:
-        notes.append(f"the motors cannot break it loose far enough along {', '.join(weak)}: no ramp is shown there")
-    return notes
+    too_weak = [Statement("motors_too_weak", NOTE, numbers={"axes": weak})] if weak else []
+    return [*(Statement(code, NOTE) for code in codes), *too_weak]
 
 
 def _row(each: AxisFriction) -> tuple[str, ...]:

@@ -9,11 +9,14 @@ from omnidyn.telling import (
     advice,
     causes,
     comparison,
+    control,
     fit,
     lack_of_fit,
     ladder,
     lines,
     logs,
+    model,
+    motors,
     simulation,
     steady,
     verdicts,
@@ -26,7 +29,7 @@ ROOMS = {
     room.__name__.removeprefix("omnidyn.telling.").replace(".", "_"): room.SENTENCES
     for room in (
         simulation, fit, lack_of_fit, causes, ladder, advice, verdicts, comparison, steady, lines, logs,
-        rows, signal, wiring, scale, uses,
+        rows, signal, wiring, scale, uses, motors, model, control,
     )
 }  # fmt: skip
 CODES: dict[str, Sentence] = {code: sentence for room in ROOMS.values() for code, sentence in room.items()}

@@ -130,7 +130,7 @@ SENTENCES = {
     "band_rests_on_guesses": Sentence("the band of {subject} rests on guesses: {guesses}"),
     "signal_followed": Sentence(_signal_followed),
     "follows": Sentence(_follows),
-    "does_not_follow": Sentence(_does_not_follow),
+    "model_does_not_follow": Sentence(_does_not_follow),
     "nothing_changes": Sentence("nothing that was measured changes: how well {subject} follows is not identifiable"),
     "nearer": Sentence("{subject} is surely nearer in {components}"),
     "models_compared": Sentence(_models_compared),

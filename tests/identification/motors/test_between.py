@@ -8,6 +8,7 @@ from omnidyn.identification.motors.fit import fit_motor
 from omnidyn.identification.motors.free_run import fit_rmse, run_motor
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run
+from tests.support.codes import codes
 
 SLOPE, LAG, FINE = 0.5, 0.02, 50  # V s/rad, s, steps of Euler's method in a row
 ROWS, DT = 800, 0.01
@@ -65,7 +66,7 @@ def test_a_bend_of_the_line_is_no_dead_band():
     fit = fit_motor(log(3, drag=lambda w: 0.15 * w * np.exp(-((w / 1.5) ** 2))))
     assert fit.value["dead_band"] > 0.01
     assert not fit.dead_band_seen
-    assert any("bends" in words for words in fit.warnings)
+    assert "line_bends" in codes(fit.warnings)
     low, high = fit.ci95["slope"]  # known only together with the dead band
     assert low <= SLOPE <= high
 

@@ -9,6 +9,7 @@ from omnidyn.identification.motors.study import identify_motors
 from omnidyn.model.motor import mass_at_rim
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.run import Run
+from tests.support.codes import codes
 
 EMF, TORQUE, COULOMB = "motor.emf_constant_Vs_rad", "motor.torque_constant_Nm_A", "friction.wheels.coulomb"
 VISCOUS, ROTOR = "friction.wheels.viscous", "motor.rotor_inertia_kg_m2"
@@ -70,7 +71,7 @@ def test_the_numbers_come_back(method):
         assert len(numbers.value) == 12
     else:  # 3.7 ms, with rows every 10 ms
         assert len(numbers.value) == 9
-        assert any("is too short for windows" in words for words in numbers.words)
+        assert "lag_too_short" in codes(numbers.remarks)
 
 
 HEAVY = 4e-3  # at the wheel [kg m^2]: a lag of 37 ms
@@ -85,7 +86,7 @@ def test_a_rotor_comes_back(method):
         rotor, true = f"{ROTOR}[{m}]", HEAVY / GEAR**2
         assert abs(numbers.value[rotor] - true) < 4.0 * numbers.std[rotor] + 0.02 * true
         assert numbers.std[rotor] < 0.1 * true
-    assert any("holds the wheel too" in words for words in numbers.words)
+    assert "rotor_holds_wheel" in codes(numbers.remarks)
 
 
 def test_the_rotor_is_what_the_wheel_leaves():
@@ -99,16 +100,16 @@ def test_the_rotor_is_what_the_wheel_leaves():
         assert mass_at_rim(heavy.robot.motor, heavy.robot.wheels)[m] == pytest.approx(
             mass_at_rim(bare.robot.motor, bare.robot.wheels)[m]
         )
-    assert not any("holds the wheel too" in words for words in heavy.words)
+    assert "rotor_holds_wheel" not in codes(heavy.remarks)
     all_wheel = motors_into_robot(study, robot.replace(wheels=robot.wheels.replace(wheel_inertia=1e-1)))
     assert not [key for key in all_wheel.value if key.startswith(ROTOR)]
-    assert any("the wheel of the file explains all" in words for words in all_wheel.words)
+    assert "wheel_explains_inertia" in codes(all_wheel.remarks)
 
 
 def test_steady_windows_give_no_inertia_and_say_so():
     numbers = motors_into_robot(identify_motors([log(hold=100)], window=(0.5, 1.0)), tied())
     assert not [key for key in numbers.value if key.startswith(ROTOR)]
-    assert any(f"{ROTOR} is not written" in words for words in numbers.words)
+    assert ROTOR in [remark.subject for remark in numbers.remarks]
 
 
 def test_they_stand_in_the_file_with_std_and_source():
@@ -171,7 +172,7 @@ def test_a_current_gives_friction_alone():
 def test_what_is_not_determined_is_not_written_and_said():
     free = motors_into_robot(identify_motors([log(motors=((0.05, 0.0),) * 3)]), tied())
     assert not [key for key in free.value if key.startswith(COULOMB)]
-    assert any("no dead band is seen" in words for words in free.words)
+    assert "no_dead_band" in [remark.numbers.get("why") for remark in free.remarks]
     one = log().replace(voltage=np.full((ROWS, 3), 6.0), wheel_speed=np.full((ROWS, 3), 7.0))
     with pytest.raises(InsufficientDataError, match="a line needs several speeds; got 7 rad/s in every window"):
         identify_motors([one])

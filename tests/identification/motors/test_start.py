@@ -6,6 +6,7 @@ import pytest
 from omnidyn.identification.motors.study import identify_motors
 from omnidyn.run import Run
 from tests.support.bench_motor import BenchMotor, encoder, ramps
+from tests.support.codes import codes
 
 DT = 0.01
 PEAKS = (3.0, -3.0, 3.0, -3.0)
@@ -57,11 +58,11 @@ def test_each_direction_has_its_own_start_stop_line_and_lag():
         assert each.value["stop"] < each.value["offset"] + 0.02 < each.value["start"]
         assert each.value["slope"] == pytest.approx(STICKY.slope, rel=0.02)
         assert each.value["lag"] == pytest.approx(STICKY.inertia / STICKY.slope, abs=DT)
-    assert study.verdict == "Motor 1 starts at 0.603 V (+) and 0.898 V (-)."
+    assert str(study.verdict) == "motor 1 starts at 0.603 V (+) and 0.898 V (-)"
     told = study.to_dict()["starts"]
     assert told[0]["parameters"]["start"]["ci95"][0] <= 0.6 <= told[0]["parameters"]["start"]["ci95"][1]
     assert len(study.document()["starts"].rows) == 2
-    assert any("which is no start" in words for words in study.statements)
+    assert any(one.numbers.get("line_elsewhere") for one in study.statements)
 
 
 def test_a_bend_of_the_line_moves_no_start():
@@ -120,7 +121,7 @@ def test_a_direction_in_which_it_never_sets_off_has_a_bound():
     low, high = back.ci95["start"]
     assert 0.5 < low <= 0.9
     assert np.isinf(high)
-    assert "and never sets off" in back.statement()
+    assert back.statement().code == "never_sets_off"
 
 
 def test_steps_alone_give_bounds():
@@ -132,7 +133,7 @@ def test_steps_alone_give_bounds():
     for each in both_ways(identify_motors([Run(t=t, voltage=put_in[:, None], wheel_speed=noisy[:, None])])):
         assert each.ci95["start"] == (0.0, 2.0)
         assert np.isnan(each.value["start"])
-        assert "or below; a slow ramp from rest tells more" in each.statement()
+        assert each.statement().code == "sets_off_below"
 
 
 def test_passing_zero_is_no_rest():
@@ -143,7 +144,7 @@ def test_passing_zero_is_no_rest():
     noisy = speed + 0.05 * np.random.default_rng(0).standard_normal(len(t))
     study = identify_motors([Run(t=t, voltage=put_in[:, None], wheel_speed=noisy[:, None])])
     assert not any(each.sharp for each in study.starts)
-    assert study.verdict == "Motor 1 answers, and shows no dead band."
+    assert codes(study.verdict.numbers["parts"]) == ["motors_without_dead_band"]
 
 
 def test_reversals_through_a_dead_band_count():
@@ -165,4 +166,4 @@ def test_starts_that_differ_from_time_to_time_are_spanned():
     for each in both_ways(identify_motors(runs)):
         low, high = each.ci95["start"]
         assert low <= 0.6 < 0.8 <= high
-        assert any("starts scatter" in words for words in each.warnings)
+        assert "starts_scatter" in codes(each.warnings)

@@ -8,6 +8,7 @@ from omnidyn.identification.motors.static import line_of_speed
 from omnidyn.identification.motors.study import identify_motors
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.run import Run
+from tests.support.codes import codes
 
 SLOPE, NOISE = 1.5, 0.1
 HOLD, SLIDE = (20.0, 26.0), (14.0, 17.0)  # [%] forward and backward
@@ -55,8 +56,8 @@ def test_a_sweep_of_a_row_a_second_tells_all(how):
         assert each.value["slope"] == pytest.approx(SLOPE, rel=0.01)
         assert each.value["offset"] == pytest.approx(slide, abs=0.3)
         assert np.isnan(each.value["lag"])
-    assert study.verdict == "Motor 1 starts at 21 % (+) and 27 % (-)."
-    assert any("each is a point of steady speed" in words for words in study.warnings)
+    assert str(study.verdict) == "motor 1 starts at 21 % (+) and 27 % (-)"
+    assert "rows_as_points" in codes(study.warnings)
 
 
 def test_whole_logs_of_a_row_a_second_have_the_same_starts():
@@ -81,7 +82,7 @@ def test_rows_of_a_table_have_no_order():
     order = np.random.default_rng(1).permutation(len(put_in))
     one, other = (identify_motors(table(put_in[rows], speed[rows])).starts for rows in (slice(None), order))
     assert [each.ci95["start"] for each in one] == [each.ci95["start"] for each in other]
-    assert any("starts scatter" in words for each in one for words in each.warnings)  # up and down are in one table
+    assert any("starts_scatter" in codes(each.warnings) for each in one)  # up and down are in one table
 
 
 def test_motors_of_a_table_are_told_apart():

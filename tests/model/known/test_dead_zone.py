@@ -70,7 +70,7 @@ def test_a_supply_counts_in_the_duty_alone():
     assert found.rows[0].duty == pytest.approx(CLOSED[0] / 12.0)
     assert np.log(high / low) == pytest.approx(2 * Z * 0.05, rel=0.05)
     assert found.rows[0].scale_interval == pytest.approx((CLOSED[0], CLOSED[0]), rel=1e-9)
-    assert found.full_words == "the supply"
+    assert found.full_of == "supply"
     words = found.summary()
     assert "the duty rests on guesses: drive.supply_V (4.9 %" in " ".join(words.split())
     assert "it rests on guesses" not in words
@@ -88,7 +88,7 @@ def test_what_it_rests_on_is_named_and_what_it_does_not_is_not():
     assert found.guesses == (R, K_T)
     words = " ".join(found.summary().split())
     assert f"it rests on guesses: {R} (19 % by its std), {K_T} (no std: in no interval)" in words
-    assert any(R in each for each in found.document().warnings)
+    assert any(R in warning.numbers["keys"] for warning in found.document().warnings)
     assert json.loads(json.dumps(found.to_dict(), allow_nan=False))["rests_on"][0]["key"] == R
 
 

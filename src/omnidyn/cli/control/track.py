@@ -73,7 +73,7 @@ def track(
         for each in several(controller, believed, no_friction, no_observer, **options):
             now(f"tracking with {each.name}, {len(found) + 1} of {len(controller)}")
             found.append(tracked(driven, follow, each, around))
-    document = trackings_document(found, notes := [asked.verdict, *asked.words()])
+    document = trackings_document(found, notes := [asked.verdict, *asked.statements()])
     record = _record(robot, plant, files)
     _write(found, out, force)
     _draw(found, driven, notes, record, report, gif, force)

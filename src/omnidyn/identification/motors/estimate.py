@@ -12,6 +12,7 @@ from typing import Any
 
 from omnidyn.arrays import FloatArray
 from omnidyn.document import plain
+from omnidyn.statement import NOTE, WARNING, Statement
 
 SLOPE, BAND, LAG, INERTIA, LATENCY = "slope", "dead_band", "lag", "inertia", "latency"
 WINDOWS, FREE_RUN = "windows", "free run"
@@ -29,7 +30,7 @@ class MotorEstimate:
     run" of whole logs. correlation: of slope and dead band. rmse [rad/s]: of the speed; of windows, of their mean
     speed. count: windows, or rows. at_bound, unidentifiable: names. left_out: rows that do not count, because the log
     does not resolve the input there. one_way: it turned one way only, so a dead band and an offset of the input are
-    one. held_out [rad/s]: error of free runs on logs that were not fitted. warnings: in words. source: the logs.
+    one. held_out [rad/s]: error of free runs on logs that were not fitted. source: the logs.
     Of windows: rest, the largest input under which the motor stayed at rest, NaN where it never rested; draws: of the
     bootstrap, by name. Of a free run: between, noise by channel, kind of the covariance, whether the fit converged.
     """
@@ -50,7 +51,7 @@ class MotorEstimate:
     left_out: int = 0
     one_way: bool = False
     held_out: float = math.nan
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Statement, ...] = ()
     rest: float = math.nan
     draws: Mapping[str, FloatArray] = field(default_factory=dict)
     between: str = ""
@@ -89,53 +90,34 @@ class MotorEstimate:
         """The latencies that were fitted [s]."""
         return {name: value for name, value in self.value.items() if name.startswith(LATENCY)}
 
-    def statement(self, *, started: bool = False) -> str:
-        """The estimate in a sentence. started: its starts from rest were seen, so that they are its dead band, and not
-        where the line meets speed 0.
+    def statement(self, *, started: bool = False) -> Statement:
+        """The line of the motor. started: its starts from rest were seen, so that they are its dead band, and not where
+        the line meets speed 0.
         """
-        spread = f" +- {self.std[SLOPE]:.2g}" if math.isfinite(self.std[SLOPE]) else ""
-        words = f"{self.name}: slope {self.value[SLOPE]:.5g}{spread} {self.unit} s/rad"
-        if LAG in self.unidentifiable:
-            words += ", lag not determined"
-        elif self.ci95[LAG][0] > 0.0:
-            words += f", lag {1e3 * self.value[LAG]:.3g} ms"
-        for name, value in self.late.items():
-            sure = f"+- {1e3 * self.std[name]:.2g} ms"
-            known = sure if name not in self.unidentifiable else "ms (the end of what was searched: not determined)"
-            words += f", {name.partition('.')[2]} late by {1e3 * value:.3g} {known}"
-        if self.left_out:
-            words += f" ({self.left_out} rows left out: their input changes too much from row to row)"
-        if started and self.dead_band_seen:
-            low, high = self.ci95[BAND]
-            band = f"{self.value[BAND]:.3g} +- {self.std[BAND]:.2g} {self.unit}, 95 % [{low:.3g}, {high:.3g}]"
-            line = "its line" if self.one_way else "its line, both ways together,"
-            return f"{words}; {line} meets speed 0 at {band}"
-        return f"{words}; {self._of_dead_band()}"
+        late = [
+            (name.partition(".")[2], value, None if name in self.unidentifiable else self.std[name])
+            for name, value in self.late.items()
+        ]
+        numbers = {
+            "slope": self.value[SLOPE], "slope_std": self.std[SLOPE], "unit": self.unit, "lag": self.value[LAG],
+            "lag_known": LAG not in self.unidentifiable, "lag_seen": self.ci95[LAG][0] > 0.0, "late": late,
+            "left_out": self.left_out, "dead_band": self._of_dead_band(started),
+        }  # fmt: skip
+        return Statement("motor_line", NOTE, self.name, numbers)
 
-    def _of_dead_band(self) -> str:
+    def _of_dead_band(self, started: bool) -> Statement:
         if BAND not in self.value:
-            return "no dead band asked for"
-        blind = "dead band not identifiable here"
-        if BAND in self.unidentifiable:
-            low, high = self.ci95[BAND]
-            between = f"between {low:.3g} and {high:.3g}" if low > 0.0 else f"at most {high:.3g}"
-            known = f"; it is {between} {self.unit}, for it turned steadily under that" if high < math.inf else ""
-            if math.isfinite(self.value[BAND]):
-                return f"{blind}: {self.value[BAND]:.3g} {self.unit} is no estimate{known}"
-            told = "with one speed or one input only they cannot be told apart"
-            return f"{blind}, and any is in the slope: {told}{known}"
+            return Statement("dead_band_not_asked", NOTE)
         low, high = self.ci95[BAND]
-        band = f"{self.value[BAND]:.3g} +- {self.std[BAND]:.2g} {self.unit}, 95 % [{low:.3g}, {high:.3g}]"
+        numbers = {"value": self.value[BAND], "std": self.std[BAND], "unit": self.unit, "ci95": (low, high)}
+        one_way = {"one_way": self.one_way}
         if self.dead_band_seen:
-            return f"dead band{' or offset (it turned one way only)' if self.one_way else ''} {band}"
+            return Statement("line_meets_zero" if started else "dead_band_seen", NOTE, numbers=numbers | one_way)
+        if BAND in self.unidentifiable:
+            return Statement("dead_band_bounded", NOTE, numbers=numbers)
         if high < 0.0:
-            return (
-                f"{blind}: the line meets speed 0 at {band}, below 0, and no friction does that; the input has an "
-                "offset, or the speeds are wrong"
-            )
-        if low > 0.0:
-            return f"{blind}: the slope may as well be 0 ({band})"
-        return f"{blind}: {band} contains 0; it is at most {max(high, 0.0):.3g} {self.unit}, and none is needed"
+            return Statement("dead_band_negative", WARNING, numbers=numbers)
+        return Statement("slope_may_be_zero" if low > 0.0 else "dead_band_not_needed", NOTE, numbers=numbers)
 
     def row(self) -> tuple[str, ...]:
         """Cells under HEAD."""

@@ -39,6 +39,7 @@ from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH
 from omnidyn.identification.question import AUTO, GAUSS, STUDENT
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run, as_list
+from omnidyn.statement import Statement
 
 LAGS = (0.005, 0.05, 0.5)  # [s] the search begins at each, and the best end counts
 EDGE = 0.99  # of an input under which the motor rested
@@ -120,12 +121,9 @@ def _with_bend(fit: MotorEstimate, bent: Bend | None) -> MotorEstimate:
     along = fit.correlation * fit.std[SLOPE] / fit.std[BAND]
     slope = float(np.hypot(fit.std[SLOPE], along * np.sqrt(std**2 - fit.std[BAND] ** 2)))
     ends = sorted(fit.value[SLOPE] + along * (end - fit.value[BAND]) for end in bent.ci95)
-    words = (
-        f"the line of speed over input bends: with a smooth bend fitted too (error {bent.left:.3g} of that without), "
-        f"the dead band is {bent.value:.3g} +- {bent.std:.2g} {fit.unit}: the interval spans both, and the "
-        "slope goes with it"
-    )
-    return _widened(fit, {BAND: std, SLOPE: slope}, {BAND: bent.ci95, SLOPE: (ends[0], ends[1])}, words)
+    bends = {"left": bent.left, "value": bent.value, "std": bent.std, "unit": fit.unit}
+    warning = Statement("line_bends", numbers=bends)
+    return _widened(fit, {BAND: std, SLOPE: slope}, {BAND: bent.ci95, SLOPE: (ends[0], ends[1])}, warning)
 
 
 def _with_rival(fit: MotorEstimate, rival: MotorEstimate) -> MotorEstimate:
@@ -137,20 +135,19 @@ def _with_rival(fit: MotorEstimate, rival: MotorEstimate) -> MotorEstimate:
     """
     own = [name for name in (SLOPE, BAND, LAG, INERTIA) if name in fit.value]
     std = {name: float(np.hypot(fit.std[name], fit.value[name] - rival.value[name])) for name in own}
-    verb = "better" if rival.rmse < 0.99 * fit.rmse else "as well"
-    words = (
-        f"the logs are met {verb} where the input is {WORDS[rival.between]} (error {rival.rmse:.3g} rad/s, "
-        f"{fit.rmse:.3g} where it is {WORDS[fit.between]}): the intervals span both"
-    )
-    return _widened(fit, std, {name: rival.ci95[name] for name in std}, words)
+    warning = Statement("other_reading", numbers={
+        "better": rival.rmse < 0.99 * fit.rmse, "other": rival.between, "other_error": rival.rmse, "error": fit.rmse,
+        "between": fit.between,
+    })  # fmt: skip
+    return _widened(fit, std, {name: rival.ci95[name] for name in std}, warning)
 
 
 def _widened(
-    fit: MotorEstimate, std: dict[str, float], ci95: dict[str, tuple[float, float]], words: str
+    fit: MotorEstimate, std: dict[str, float], ci95: dict[str, tuple[float, float]], warning: Statement
 ) -> MotorEstimate:
     """The fit with other standard errors, intervals that hold these too, and a warning more."""
     both = {name: (min(fit.ci95[name][0], low), max(fit.ci95[name][1], high)) for name, (low, high) in ci95.items()}
-    return replace(fit, std={**fit.std, **std}, ci95={**fit.ci95, **both}, warnings=(*fit.warnings, words))
+    return replace(fit, std={**fit.std, **std}, ci95={**fit.ci95, **both}, warnings=(*fit.warnings, warning))
 
 
 def _answer(

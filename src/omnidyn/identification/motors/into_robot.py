@@ -38,6 +38,7 @@ from omnidyn.model.keys import EMF, TORQUE, Key, unit, with_priors
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import Prior, Robot
 from omnidyn.model.wheels import per_wheel
+from omnidyn.statement import NOTE, Statement
 
 COULOMB, VISCOUS = "friction.wheels.coulomb", "friction.wheels.viscous"
 ROTOR = "motor.rotor_inertia_kg_m2"
@@ -48,23 +49,23 @@ STEP = 1e-6  # of a standard error: the differences by which errors propagate
 class MotorNumbers:
     """robot: with the numbers that the motors determine, their std and source. value, std: by key.
 
-    words: what was not written, and why; what a reader must know of what was.
+    remarks: what was not written, and why; what a reader must know of what was.
     """
 
     robot: Robot
     value: dict[str, float]
     std: dict[str, float]
-    words: tuple[str, ...]
+    remarks: tuple[Statement, ...]
 
     def parts(self) -> list[Part]:
-        """A table of the numbers, and the words."""
+        """A table of the numbers, and the remarks."""
         rows = [(key, f"{value:.5g}", f"{self.std[key]:.2g}", unit(key)) for key, value in self.value.items()]
-        return apart([Table(("number", "value", "+-", "unit"), rows)] if rows else [], [Points(self.words)])
+        return apart([Table(("number", "value", "+-", "unit"), rows)] if rows else [], [Points(self.remarks)])
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
         numbers = {key: {"value": v, "std": self.std[key], "unit": unit(key)} for key, v in self.value.items()}
-        return plain({"numbers": numbers, "words": self.words})
+        return plain({"numbers": numbers, "remarks": self.remarks})
 
 
 def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
@@ -78,42 +79,35 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
         raise InputError("the logs have more motors than the robot has wheels", got=most,
                          expected=f"{robot.wheels.count} or fewer, as {robot.name} has")  # fmt: skip
     if study.speed_from == HEADING:
-        words = "slope and dead band are those of motors and floor together: of the motors alone nothing is determined"
-        return MotorNumbers(robot, {}, {}, (words,))
-    supply, words = _supply(study, robot)
+        return MotorNumbers(robot, {}, {}, (Statement("motors_and_floor"),))
+    supply, remarks = _supply(study, robot)
     value: dict[str, float] = {}
     std: dict[str, float] = {}
     priors: dict[str, Prior] = {}
     for each in motors if supply else ():
         wheel = _Wheel(robot, each.motor or 0, study.kind)
         found, own = wheel.numbers(each, supply, 0.0 if study.windows is None else study.windows.smear)
-        words += [f"{each.name}: {text}" for text in own]
+        remarks += [remark.of(each.name) for remark in own]
         for key, (number, spread) in found.items():
             robot = wheel.put(robot, key, number)
             value[key], std[key] = number, spread
             priors[key] = identified(spread, f"motors by {each.way}, {each.source}")
     if any(key.startswith(COULOMB) for key in value) and not _only_wheels(robot):
-        words.append(
-            "the friction of the floor is as it was: if it was fitted with that of the wheels in it, fit it anew"
-        )
+        remarks.append(Statement("floor_friction_kept", NOTE))
     # Motors that were measured anew, each by itself, are no longer off together with what an earlier fit found.
     told = with_correlation(with_priors(robot, priors), [*priors], np.eye(len(priors)))
-    return MotorNumbers(told, value, std, tuple(words))
+    return MotorNumbers(told, value, std, tuple(remarks))
 
 
-def _supply(study: MotorStudy, robot: Robot) -> tuple[float, list[str]]:
-    """(volts, or ampere, in one unit of the input, words); 0 where that is not known."""
+def _supply(study: MotorStudy, robot: Robot) -> tuple[float, list[Statement]]:
+    """(volts, or ampere, in one unit of the input, remarks); 0 where that is not known."""
     if study.kind != "duty":
         return 1.0, []
     if math.isfinite(study.supply):
-        return study.supply / 100.0, [f"the supply is the mean of the logs, {study.supply:.4g} V"]
+        return study.supply / 100.0, [Statement("supply_of_logs", NOTE, numbers={"supply": study.supply})]
     if robot.drive.supply is not None:
-        return robot.drive.supply / 100.0, [
-            f"the supply is not logged: that of the file is taken, {robot.drive.supply:g} V"
-        ]
-    return 0.0, [
-        "a duty needs a supply to become volts: log it, or give drive.supply_V; nothing of the motors is written"
-    ]
+        return robot.drive.supply / 100.0, [Statement("supply_of_file", NOTE, numbers={"supply": robot.drive.supply})]
+    return 0.0, [Statement("no_supply")]
 
 
 def _only_wheels(robot: Robot) -> bool:
@@ -123,7 +117,7 @@ def _only_wheels(robot: Robot) -> bool:
 
 
 class _Wheel:
-    """The numbers of the file at one wheel, and what a line says beside them."""
+    """The numbers of the file at one wheel, and what is to be said of them."""
 
     def __init__(self, robot: Robot, wheel: int, kind: str):
         motor, count = robot.motor, robot.wheels.count
@@ -144,17 +138,17 @@ class _Wheel:
 
     def numbers(
         self, line: MotorEstimate, scale: float, smear: float
-    ) -> tuple[dict[str, tuple[float, float]], list[str]]:
-        """(key -> (value, std), words). scale: volts or ampere in one unit of the line. smear [s]: that of
+    ) -> tuple[dict[str, tuple[float, float]], list[Statement]]:
+        """(key -> (value, std), remarks). scale: volts or ampere in one unit of the line. smear [s]: that of
         `MotorWindows`, 0 of free runs.
         """
         if BAND in line.unidentifiable or SLOPE in line.unidentifiable or not line.ci95[SLOPE][0] > 0.0:
-            return {}, ["slope and dead band are not determined: nothing is written"]
+            return {}, [Statement("line_not_determined")]
         at = np.array([line.value[SLOPE], line.value[BAND]]) * scale
         spread = np.array([line.std[SLOPE], line.std[BAND]]) * scale
         covariance = np.outer(spread, spread) * np.array([[1.0, line.correlation], [line.correlation, 1.0]])
         found: dict[str, tuple[float, float]] = {}
-        words: list[str] = []
+        remarks: list[Statement] = []
         for name, of, why in self._laws(line.dead_band_seen):
             if name == COULOMB and not found:  # how hard a volt pushes is not known either
                 continue
@@ -166,23 +160,23 @@ class _Wheel:
                 ])  # fmt: skip
                 found[self.key(name)] = number, float(np.sqrt(slopes @ covariance @ slopes))
             else:
-                words.append(f"{name} is not written: {why}")
+                remarks.append(Statement("not_written", subject=name, numbers={"why": why}))
         if not line.dead_band_seen:
-            words.append(f"{COULOMB} is not written: no dead band is seen")
+            remarks.append(Statement("not_written", NOTE, COULOMB, {"why": "no_dead_band"}))
         inertia, more = self._of_inertia(line, at[0], scale, smear) if found else ({}, [])
-        return found | inertia, words + more
+        return found | inertia, remarks + more
 
     def _laws(self, with_band: bool) -> Iterator[tuple[str, Callable[[float, float], float], str]]:
-        """(key, its number of slope and dead band, why there is none where that is not above 0)."""
+        """(key, its number of slope and dead band, code of why there is none where that is not above 0)."""
         if self.kind == "current":
-            yield VISCOUS, lambda slope, _: self._push(self.torque) * slope / self.radius, ""
+            yield VISCOUS, lambda slope, _: self._push(self.torque) * slope / self.radius, "negative"
         else:
-            why = f"{VISCOUS} of the file explains all of the slope"
+            why = "viscous_explains_slope"
             for name in (EMF, TORQUE) if self.tied else (EMF,):
                 yield name, lambda slope, _: self._emf(slope), why
         if with_band:
             drop = 0.0 if self.kind == "current" else self.drop
-            why = "motor.voltage_drop_V of the file explains all of the dead band"
+            why = "drop_explains_dead_band"
             yield COULOMB, lambda slope, band: self._push(self._torque(slope)) * (band - drop), why
 
     def _emf(self, slope: float) -> float:
@@ -203,23 +197,22 @@ class _Wheel:
 
     def _of_inertia(
         self, line: MotorEstimate, slope: float, scale: float, smear: float
-    ) -> tuple[dict[str, tuple[float, float]], list[str]]:
-        """Of the rotor: (key -> (value, std), words)."""
+    ) -> tuple[dict[str, tuple[float, float]], list[Statement]]:
+        """Of the rotor: (key -> (value, std), remarks)."""
         if not line.ci95[INERTIA][0] > 0.0:
-            return {}, [f"{ROTOR} is not written: the logs do not determine an inertia"]
+            return {}, [Statement("not_written", NOTE, ROTOR, {"why": "no_inertia"})]
         if line.value[LAG] < smear:
-            lag = f"a lag of {1e3 * line.value[LAG]:.2g} ms is too short for windows, which blur {1e3 * smear:.2g} ms"
-            return {}, [f"{ROTOR} is not written: {lag}; `method` output-error fits it"]
+            return {}, [Statement("lag_too_short", NOTE, ROTOR, {"lag": line.value[LAG], "smear": smear})]
         of_volt = self._push(self._torque(slope)) * self.radius * scale  # N m at the wheel by one unit of the input
         total = float(line.value[INERTIA] * of_volt)
         inertia = (total - self.wheel_inertia) / self.gear**2
         if not inertia > 0.0:
-            return {}, [f"{ROTOR} is not written: the wheel of the file explains all of {total:.3g} kg m^2 there"]
+            return {}, [Statement("wheel_explains_inertia", subject=ROTOR, numbers={"inertia": total})]
         # K_t goes with the slope where it is the same number as K_v: both are off, as if independent
         share = line.std[SLOPE] / line.value[SLOPE] if self.tied and self.kind != "current" else 0.0
         spread = total * math.hypot(line.std[INERTIA] / line.value[INERTIA], share) / self.gear**2
-        words = [] if self.wheel_inertia else [f"{ROTOR} holds the wheel too, which the file gives no inertia"]
-        return {self.key(ROTOR): (inertia, spread)}, words
+        remarks = [] if self.wheel_inertia else [Statement("rotor_holds_wheel", NOTE, ROTOR)]
+        return {self.key(ROTOR): (inertia, spread)}, remarks
 
     def put(self, robot: Robot, key: str, number: float) -> Robot:
         """The robot with a number; other levels of Coulomb friction at the wheel go along where they have to."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.clocks import usual_step
-from omnidyn.document import all_of
 from omnidyn.errors import InputError
 from omnidyn.findings.needs import MOTOR_INPUTS, motor_input
 from omnidyn.logs.averaged import rows_of_mean
@@ -20,6 +19,7 @@ from omnidyn.logs.segments import segments
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import SENSORS, Run
+from omnidyn.statement import Statement
 from omnidyn.statistics import stretches
 
 # Unit of each input, and how many of it in one SI unit.
@@ -117,15 +117,17 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
     return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces, tuple(averaged), given)
 
 
-def averaged_words(logs: Sequence[MotorLog], allowed: bool = True) -> list[str]:
-    """Of which motors the speed is a mean over rows, in words. allowed: whether the fit takes that into account."""
+def averaged_statements(logs: Sequence[MotorLog], allowed: bool = True) -> list[Statement]:
+    """Of which motors the speed is a mean over rows. allowed: whether the fit takes that into account."""
     found: dict[int, list[str]] = {}
     for motor in range(max((log.motors for log in logs), default=0)):
         rows = {log.averaged[motor] for log in logs if motor < log.motors} - {1}
         for each in rows:
             found.setdefault(each, []).append(str(motor + 1))
-    rest = "the input is averaged alike; breakaway is not seen sharply" if allowed else "the dead band may be too small"
-    return [f"the speed of motor {all_of(names)} is a mean of {rows} rows: {rest}" for rows, names in found.items()]
+    return [
+        Statement("speed_is_mean", numbers={"motors": names, "rows": rows, "allowed": allowed})
+        for rows, names in found.items()
+    ]
 
 
 def orientation(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> float:

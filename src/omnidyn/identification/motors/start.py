@@ -27,6 +27,7 @@ from omnidyn.identification.motors.line import fit_line
 from omnidyn.identification.motors.log import MotorLog, orientation_of
 from omnidyn.identification.motors.rest import LEAST_REST, Span, noise_of_rows, starts_and_stops, turned_under
 from omnidyn.identification.motors.windows import EDGE_SHARE, LENGTHS, MotorWindows, motor_windows
+from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import sensor_step
 
 START, STOP, OFFSET = "start", "stop", "offset"
@@ -53,7 +54,7 @@ class MotorStart:
     ci95: Mapping[str, tuple[float, float]]
     starts: int = 0
     stops: int = 0
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Statement, ...] = ()
 
     @property
     def name(self) -> str:
@@ -69,33 +70,23 @@ class MotorStart:
         low, high = self.ci95[START]
         return low > 0.0 and high - low <= SHARP * high < math.inf
 
-    def statement(self) -> str:
-        """The start, which is the dead band of this direction, in a sentence."""
+    def statement(self) -> Statement:
+        """The start, which is the dead band of this direction."""
         low, high = self.ci95[START]
-        if math.isnan(low) or (low <= 0.0 and not math.isfinite(high)):
-            return f"{self.name}: no start from rest was seen; {self._of_line()}"
-        if not math.isfinite(high):
-            return f"{self.name}: it rests up to {low:.3g} {self.unit}, and never sets off"
-        if low <= 0.0:
-            return f"{self.name}: it sets off at {high:.3g} {self.unit} or below; a slow ramp from rest tells more"
-        words = f"{self.name}: the dead band is {self.value[START]:.3g} {self.unit}, 95 % [{low:.3g}, {high:.3g}]"
-        words = words if self.sharp else f"{self.name}: it sets off between {low:.3g} and {high:.3g} {self.unit}"
-        down = self.ci95[STOP]
-        if math.isfinite(self.value[STOP]):
-            words += f"; on the way down it comes to rest at {self.value[STOP]:.3g} [{down[0]:.3g}, {down[1]:.3g}]"
         left, right = self.ci95[OFFSET]
-        if self.sharp and (left > high or right < low):
-            words += (
-                f"; the line of its whole range meets speed 0 at {self.value[OFFSET]:.3g} instead, which is no start: "
-                "the line bends, or rest holds the motor harder than motion"
-            )
-        return words
-
-    def _of_line(self) -> str:
-        low, high = self.ci95[OFFSET]
-        if low > 0.0 and math.isfinite(high):
-            return f"its line meets speed 0 at {self.value[OFFSET]:.3g} {self.unit}, 95 % [{low:.3g}, {high:.3g}]"
-        return "dead band not identifiable here"
+        numbers: dict[str, Any] = {"unit": self.unit, "offset": self.value[OFFSET], "offset_ci95": (left, right)}
+        if math.isnan(low) or (low <= 0.0 and not math.isfinite(high)):
+            numbers |= {"offset_known": left > 0.0 and math.isfinite(right)}
+            return Statement("start_not_seen", NOTE, self.name, numbers)
+        if not math.isfinite(high):
+            return Statement("never_sets_off", NOTE, self.name, {"low": low, "unit": self.unit})
+        if low <= 0.0:
+            return Statement("sets_off_below", NOTE, self.name, {"high": high, "unit": self.unit})
+        numbers |= {
+            "start": self.value[START], "ci95": (low, high), "sharp": self.sharp, "stop": self.value[STOP],
+            "stop_ci95": self.ci95[STOP], "line_elsewhere": self.sharp and (left > high or right < low),
+        }  # fmt: skip
+        return Statement("start_seen", NOTE, self.name, numbers)
 
     def row(self) -> tuple[str, ...]:
         """Cells under STARTS_HEAD."""
@@ -149,7 +140,7 @@ def direction_of(
         known[START] = rest._replace(high=turned), True
     for name, (_, agree) in known.items():
         if not agree:
-            warnings.append(f"its {name}s scatter by more than their intervals: the interval spans them")
+            warnings.append(Statement("starts_scatter", subject=name))
     every = {name: (_middle(span), (span.low, span.high)) for name, (span, _) in known.items()} | dict(numbers)
     return MotorStart(
         motor, side, unit, {name: each[0] for name, each in every.items()},

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.document import Document, Points, Table, sentence
+from omnidyn.document import Document, Points, Table
+from omnidyn.document import plain as plain_values
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.findings.finding import Verdict
 from omnidyn.findings.fitness import MOTORS as MOTORS_USE
@@ -21,7 +22,7 @@ from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, na
 from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
 from omnidyn.identification.motors.free_run import fit_rmse
 from omnidyn.identification.motors.line import fit_line
-from omnidyn.identification.motors.log import GROUND, MotorLog, averaged_words, motor_logs, orientation_of
+from omnidyn.identification.motors.log import GROUND, MotorLog, averaged_statements, motor_logs, orientation_of
 from omnidyn.identification.motors.rest import turned_under
 from omnidyn.identification.motors.start import STARTS_HEAD, MotorStart, motor_starts
 from omnidyn.identification.motors.static import is_slow, points_of_logs, starts_of_points, windows_of_points
@@ -34,6 +35,7 @@ from omnidyn.logs.motor_table import MotorTable
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run, as_list
 from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.statement import ERROR, NOTE, WARNING, Statement, as_verdict, by_severity, statements
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,7 +50,7 @@ class MotorStudy(Shown):
     plain: the same motors without a dead band, from free runs only. method, kind, unit, speed_from: how they were
     found. windows: that the lines go through, None of free runs; drawn: those of a picture of free runs. starts: each
     direction of each motor by itself, with the input at which it sets off. supply [V]: of a duty, the mean of the logs;
-    NaN where it is not logged. log_warnings: of the logs, in words; `warnings` has those of each motor too. verdicts:
+    NaN where it is not logged. log_warnings: of the logs; `warnings` has those of each motor too. verdicts:
     of `check` on each log.
     """
 
@@ -61,7 +63,7 @@ class MotorStudy(Shown):
     windows: MotorWindows | None = None
     starts: tuple[MotorStart, ...] = ()
     supply: float = math.nan
-    log_warnings: tuple[str, ...] = ()
+    log_warnings: tuple[Statement, ...] = ()
     verdicts: tuple[Verdict, ...] = ()
     drawn: MotorWindows | None = None
 
@@ -76,23 +78,21 @@ class MotorStudy(Shown):
         return make(FIGURE, self)
 
     @property
-    def statements(self) -> tuple[str, ...]:
+    def statements(self) -> tuple[Statement, ...]:
         """What the logs say of each motor, and whether its dead band is any use on held-out logs."""
         known = {each.motor for each in self.starts if each.sharp}
-        words = [each.statement(started=each.motor in known) for each in self.motors]
+        found = [each.statement(started=each.motor in known) for each in self.motors]
         for band, plain in zip(self.motors, self.plain, strict=False):
             if band.dead_band_seen and band.held_out > (1.0 - PAYS) * plain.held_out:
-                words.append(
-                    f"{band.name}: held-out logs are met no better with the dead band (error {band.held_out:.4g} "
-                    f"rad/s, {plain.held_out:.4g} without): it may stand for something else"
-                )
-        return (*words, *(each.statement() for each in self.starts))
+                errors = {"with_band": band.held_out, "without": plain.held_out}
+                found.append(Statement("held_out_no_better", WARNING, band.name, errors))
+        return (*found, *(each.statement() for each in self.starts))
 
     @property
-    def verdict(self) -> str:
-        """Which motors answer to their input, and at which input they start, in a sentence; failures first."""
+    def verdict(self) -> Statement:
+        """Which motors answer to their input, and at which input they start; failures first."""
         if faults := unfit(self.verdicts):
-            return sentence(f"failed: {'; '.join(map(str, faults))}: the numbers mean nothing until that is mended")
+            return Statement("failed", ERROR, numbers={"failures": faults})
         return motors_verdict(self.motors, self.starts)
 
     @property
@@ -101,20 +101,20 @@ class MotorStudy(Shown):
         return bool(unfit(self.verdicts)) or none_answers(self.motors, self.starts)
 
     @property
-    def advice(self) -> tuple[str, ...]:
+    def advice(self) -> tuple[Statement, ...]:
         """What to mend in the logs."""
-        return tuple(map(str, verdict_advice(self.verdicts)))
+        return tuple(verdict_advice(self.verdicts))
 
     @property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Statement, ...]:
         """Of the logs, then of each motor."""
-        words = list(self.log_warnings)
-        for each in self.motors:
-            own = [*each.warnings, *(f"{name} is at its bound" for name in each.at_bound)]
-            own += ["the intervals allow for errors that have a memory"] if each.covariance == "sandwich" else []
-            own += [] if each.converged else ["the fit was cut short: the numbers are of its last step"]
-            words += [f"{each.name}: {text}" for text in own]
-        return (*words, *(f"{each.name}: {text}" for each in self.starts for text in each.warnings))
+        found = list(self.log_warnings)
+        for motor in self.motors:
+            warnings = [*motor.warnings, *(Statement("at_its_bound", subject=name) for name in motor.at_bound)]
+            warnings += [Statement("errors_with_memory", NOTE)] if motor.covariance == "sandwich" else []
+            warnings += [] if motor.converged else [Statement("motor_fit_cut_short")]
+            found += [warning.of(motor.name) for warning in warnings]
+        return (*found, *(warning.of(start.name) for start in self.starts for warning in start.warnings))
 
     def document(self) -> Document:
         """What the study says: a row per motor, with a dead band and without, then words."""
@@ -128,7 +128,7 @@ class MotorStudy(Shown):
             f"motors: {self.kind} [{self.unit}] against speed from {self.speed_from}, {how}", "",
             Table(HEAD, [each.row() for several in pairs for each in several], name="motors"), "",
             *([Table(STARTS_HEAD, [each.row() for each in self.starts], name="starts"), ""] if self.starts else []),
-            Points(self.statements, name="statements"), Points(self.warnings, "warning:", "warnings"),
+            Points(self.statements, name="statements"), by_severity(self.warnings, "warnings"),
             Points(self.advice, "next:", "next"),
         ]  # fmt: skip
         return Document(parts, self.to_dict(), self.warnings, verdict=self.verdict)
@@ -139,11 +139,11 @@ class MotorStudy(Shown):
         for own, plain in zip(motors, self.plain, strict=False):
             own["without_dead_band"] = plain.to_dict()
         return {
-            "verdict": self.verdict, "ok": not self.failed, "method": self.method, "input": self.kind,
+            **as_verdict(self.verdict), "ok": not self.failed, "method": self.method, "input": self.kind,
             "unit": self.unit, "speed_from": self.speed_from,
             "window_s": self.windows.length if self.windows is not None else None, "motors": motors,
-            "starts": [each.to_dict() for each in self.starts], "statements": list(self.statements),
-            "warnings": list(self.warnings), "next": list(self.advice), "check": checked(self.verdicts),
+            "starts": [each.to_dict() for each in self.starts], "statements": plain_values(self.statements),
+            "warnings": plain_values(self.warnings), "next": plain_values(self.advice), "check": checked(self.verdicts),
         }  # fmt: skip
 
 
@@ -172,7 +172,7 @@ def identify_motors(
         if asked.method_asked() == OUTPUT_ERROR:
             raise InputError("a table of steady speeds has no time in it", got="a table input,speed",
                              expected="logs, or `method` steady-state", where="method")  # fmt: skip
-        return _of_points(runs, "a table", ())
+        return _of_points(runs, "a table")
     every = as_list(runs)
     more = ["pose"] if asked.speed == GROUND else []
     verdicts = log_verdicts([of_motors(log, *more) for log in logs], robot, now, tell)
@@ -187,8 +187,7 @@ def identify_motors(
 def _lines(logs: Sequence[MotorLog], asked: Question) -> MotorStudy:
     if is_slow(logs):
         points = points_of_logs(logs)
-        words = "the rows are more than 0.1 s apart: each is a point of steady speed, and nothing is known of a lag"
-        study = _of_points(points, logs[0].motion_from, (words,))
+        study = _of_points(points, logs[0].motion_from, [Statement("rows_as_points")])
         return replace(study, supply=_supply(logs))
     windows = motor_windows(logs, steady=asked.steady, share=asked.window)
     source = named([log.run.source for log in logs])
@@ -199,7 +198,7 @@ def _lines(logs: Sequence[MotorLog], asked: Question) -> MotorStudy:
     )  # fmt: skip
     return MotorStudy(
         STEADY_STATE, windows.kind, windows.unit, windows.speed_from, lines, (), windows,
-        motor_starts(logs, windows, motors), _supply(logs), (*averaged_words(logs), *_of_windows(windows, lines)),
+        motor_starts(logs, windows, motors), _supply(logs), (*averaged_statements(logs), *_of_windows(windows, lines)),
     )  # fmt: skip
 
 
@@ -217,7 +216,7 @@ def _of_each(windows: MotorWindows, source: str) -> tuple[list[int], tuple[Motor
     return motors, lines
 
 
-def _of_points(points: MotorTable, origin: str, words: Sequence[str]) -> MotorStudy:
+def _of_points(points: MotorTable, origin: str, remarks: Sequence[Statement] = ()) -> MotorStudy:
     """The study of points of steady speed."""
     windows = windows_of_points(points, origin)
     _, lines = _of_each(windows, points.source)
@@ -226,7 +225,7 @@ def _of_points(points: MotorTable, origin: str, words: Sequence[str]) -> MotorSt
     )
     return MotorStudy(
         STEADY_STATE, points.kind, points.unit, origin, lines, (), windows, starts_of_points(points),
-        log_warnings=(*points.notes, *words, *_of_windows(windows, lines)),
+        log_warnings=(*statements(points.notes), *remarks, *_of_windows(windows, lines)),
     )  # fmt: skip
 
 
@@ -250,7 +249,7 @@ def _free_runs(runs: Sequence[Run], asked: Question, now: Callable[[str], object
     starts = starts_of_points(points_of_logs(logs)) if slow else motor_starts(logs, seen, motors)
     return MotorStudy(
         OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain, starts=starts, supply=_supply(logs),
-        drawn=seen, log_warnings=tuple(averaged_words(logs, False)),
+        drawn=seen, log_warnings=tuple(averaged_statements(logs, False)),
     )  # fmt: skip
 
 
@@ -281,16 +280,13 @@ def _driven(log: MotorLog, motor: int) -> bool:
     return bool(np.isfinite(log.put_in[:, motor]).any())
 
 
-def _of_windows(windows: MotorWindows, lines: Sequence[MotorEstimate]) -> Iterator[str]:
-    """Warnings: what was left out, and what cannot be told apart."""
+def _of_windows(windows: MotorWindows, lines: Sequence[MotorEstimate]) -> Iterator[Statement]:
+    """What was left out, and what cannot be told apart."""
     if windows.unresolved:
-        yield (
-            f"{windows.unresolved} windows were left out: their input changes so much from row to row that what the "
-            "motor got is not in the log"
-        )
+        yield Statement("windows_unresolved", numbers={"windows": windows.unresolved})
     if windows.resting:
-        yield f"{windows.resting} windows at rest, wholly or in part, were left out"
+        yield Statement("motor_windows_at_rest", NOTE, numbers={"windows": windows.resting})
     if windows.every > 1:
-        yield f"the logs are long: one window in {windows.every} was used"
+        yield Statement("windows_thinned", NOTE, numbers={"every": windows.every})
     if any(line.one_way for line in lines):
-        yield "a motor turned one way only: a dead band and an offset of the input cannot be told apart"
+        yield Statement("turned_one_way")

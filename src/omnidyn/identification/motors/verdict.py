@@ -1,37 +1,32 @@
-"""What a study of motors came to, in a sentence."""
+"""What a study of motors came to."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-from omnidyn.document import all_of, sentence
 from omnidyn.identification.motors.estimate import BAND, SLOPE, MotorEstimate
 from omnidyn.identification.motors.start import START, MotorStart
+from omnidyn.statement import ERROR, NOTE, WARNING, Statement
 
 
-def motors_verdict(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart] = ()) -> str:
+def motors_verdict(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart] = ()) -> Statement:
     """Which motors answer to their input, and at which input they start: from rest where that was seen, else by the
     dead band of the line.
     """
-    each = _own(motors)
-    levels, blind = {one.name: _levels(one, starts) for one in each}, unanswering(motors, starts)
-    if len(blind) == len(each):
-        return f"No motor is seen to answer to its input: the slope of {all_of(blind)} may as well be 0."
-    seen = [one for one in each if levels[one.name]]
-    both = [way for way in starts if way.sharp]
-    if len(each) == 1 and len(both) == 2 and both[0].motor == each[0].motor:
-        parts = [f"{each[0].name} starts at {' and '.join(_one_way(way) for way in both)}"]
-    else:
-        parts = [_starts(seen, len(each), levels)] if seen else []
-    without = [one.name for one in each if not levels[one.name] and one.name not in blind]
+    lines, blind = _own(motors), unanswering(motors, starts)
+    if len(blind) == len(lines):
+        return Statement("no_motor_answers", ERROR, numbers={"motors": blind})
+    levels = {line.name: _levels(line, starts) for line in lines}
+    seen = [line for line in lines if levels[line.name]]
+    without = [line.name for line in lines if not levels[line.name] and line.name not in blind]
+    total = {"total": len(lines)}
+    parts = [_starts(seen, levels, starts, len(lines))] if seen else []
     if without:
-        who = f"all {len(each)} motors" if len(without) == len(each) > 1 else all_of(without)
-        one = len(without) == 1
-        too = " too" if seen else ""
-        parts.append(f"{who} answer{'s' * one}{too}, and show{'s' * one} no dead band")
+        numbers = {"motors": without, "too": bool(seen), **total}
+        parts.append(Statement("motors_without_dead_band", NOTE, numbers=numbers))
     if blind:
-        parts.append(f"{all_of(blind)} {'is' if len(blind) == 1 else 'are'} not seen to answer to the input")
-    return sentence("; ".join(parts))
+        parts.append(Statement("motors_not_answering", WARNING, numbers={"motors": blind}))
+    return Statement("motors_answer", WARNING if blind else NOTE, numbers={"parts": parts})
 
 
 def unanswering(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart] = ()) -> list[str]:
@@ -49,22 +44,21 @@ def _own(motors: Sequence[MotorEstimate]) -> list[MotorEstimate]:
     return [one for one in motors if one.motor is not None] or list(motors)
 
 
-def _one_way(start: MotorStart) -> str:
-    return f"{start.value[START]:.3g} {start.unit} ({start.direction})"
-
-
 def _levels(motor: MotorEstimate, starts: Sequence[MotorStart]) -> list[float]:
     """The inputs at which a motor starts; none where that is not known."""
     sharp = [each.value[START] for each in starts if each.motor == motor.motor and each.sharp]
     return sharp or ([motor.value[BAND]] if motor.dead_band_seen else [])
 
 
-def _starts(seen: Sequence[MotorEstimate], total: int, of: Mapping[str, Sequence[float]]) -> str:
-    """ "all 3 motors start at 0.52 to 0.61 V" """
-    levels = sorted({f"{level:.3g}": level for one in seen for level in of[one.name]}.values())
-    span = f"{levels[0]:.3g}" if len(levels) == 1 else f"{levels[0]:.3g} to {levels[-1]:.3g}"
-    if total == 1:
-        return f"{seen[0].name} starts at {span} {seen[0].unit}"
-    if len(seen) == total:
-        return f"all {total} motors start at {span} {seen[0].unit}"
-    return f"{all_of([one.name for one in seen])} start{'s' * (len(seen) == 1)} at {span} {seen[0].unit}"
+def _starts(
+    seen: Sequence[MotorEstimate], levels: dict[str, list[float]], starts: Sequence[MotorStart], total: int
+) -> Statement:  # fmt: skip
+    """At which inputs motors start; of a motor alone, in each direction."""
+    both = [start for start in starts if start.sharp]
+    unit = {"unit": seen[0].unit}
+    if total == 1 and len(both) == 2 and both[0].motor == seen[0].motor:
+        ways = {"levels": [start.value[START] for start in both], "directions": [start.direction for start in both]}
+        return Statement("starts_both_ways", NOTE, seen[0].name, ways | unit)
+    numbers = {"motors": [line.name for line in seen], "total": total,
+               "levels": [level for line in seen for level in levels[line.name]]}  # fmt: skip
+    return Statement("motors_start", NOTE, numbers=numbers | unit)

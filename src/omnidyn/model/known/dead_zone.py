@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
-from omnidyn.document import Document, Part, Table, Words, all_of, plain, short
+from omnidyn.document import Document, Part, Table, Words, all_of, plain
 from omnidyn.model.actuation import clip_voltage
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
 from omnidyn.model.frames import AXES
 from omnidyn.model.known.told import numbers_told, told
 from omnidyn.model.known.uncertainty import DRAWS, Interval, effects, interval_of
 from omnidyn.model.robot import GUESSES, Robot
+from omnidyn.statement import ERROR, NOTE, WARNING, Statement, as_verdict
 
 WAYS = {"x": "forward", "y": "sideways", "yaw": "turning"}
 AROUND = np.radians(np.arange(0.0, 360.0, 5.0))  # directions of travel that are answered for
@@ -71,8 +72,8 @@ class DeadZone:
 
     directions: of travel [rad], shape (k,). voltage: of the most loaded motor at which it starts to move that way [V],
     shape (k,). band: its 95 % interval; None where the file has no std. full: the volts that a duty of 1 is.
-    full_words: what these are. rests_on: numbers with a std, and guesses, that the rows change with; the strongest
-    first. draws: robots behind the intervals.
+    full_of: "supply" or "voltage_limit". rests_on: numbers with a std, and guesses, that the rows change with; the
+    strongest first. draws: robots behind the intervals.
     """
 
     robot: Robot
@@ -81,7 +82,7 @@ class DeadZone:
     voltage: FloatArray
     band: Interval | None
     full: float
-    full_words: str
+    full_of: str
     rests_on: tuple[RestsOn, ...]
     draws: int
 
@@ -91,30 +92,30 @@ class DeadZone:
         return tuple(each.key for each in self.rests_on if each.guessed)
 
     def summary(self) -> str:
-        """The dead zone in words, for reading."""
+        """The dead zone as text."""
         return self.document().to_text()
 
     def document(self) -> Document:
         """What it says."""
         warnings = self._warnings()
         head = f"{self.robot.name} at rest: it starts to move when the voltages of the wheels exceed"
-        parts: list[Part] = [head, "", *map(_line, self.rows), "", *map(Words, [*self._around(), *warnings])]
+        parts: list[Part] = [head, "", *map(_line, self.rows), "", *map(Words, map(str, [*self._around(), *warnings]))]
         intervals = self.table() if self.band is not None else None
         if intervals is not None:
             parts += ["", "95 % intervals, from the std and the correlations of the file", "", intervals]
-        told = [words for words in warnings if self.guesses or self.band is None]
-        return Document(parts, self.to_dict(), told, verdict=self.verdict)
+        return Document(
+            parts, self.to_dict(), warnings if self.guesses or self.band is None else (), verdict=self.verdict
+        )
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Statement:
         """From which voltage of the most loaded motor it moves, and which way; and what its motors never reach."""
         starts = {_way(row): float(np.abs(row.voltage).max()) for row in self.rows if row.reachable and row.axis}
         stuck = [_way(row) for row in self.rows if not (row.reachable and row.axis)]
         if not starts:
-            return f"{self.robot.name} does not move {all_of(stuck)}, whatever voltage its motors can have."
-        words = all_of([f"{way} from {volts:.2f} V" for way, volts in starts.items()])
-        never = f"; {all_of(stuck)} its motors cannot move it" if stuck else ""
-        return f"{self.robot.name} starts to move {words}{never}."
+            return Statement("does_not_move", ERROR, self.robot.name, {"ways": stuck})
+        numbers = {"ways": [*starts], "volts": [*starts.values()], "stuck": stuck}
+        return Statement("starts_to_move", WARNING if stuck else NOTE, self.robot.name, numbers)
 
     def table(self) -> Table:
         """A row per pattern: volts and duty with their intervals."""
@@ -125,39 +126,37 @@ class DeadZone:
         ]  # fmt: skip
         return Table(("axis", "voltage V", "95 %", "duty", "95 %", ""), rows, "<>>>><")
 
-    def statements(self) -> list[str]:
-        """What must be said beside the numbers, in words."""
+    def statements(self) -> list[Statement]:
+        """What must be said beside the numbers."""
         return [*self._around(), *self._warnings()]
 
-    def _around(self) -> list[str]:
+    def _around(self) -> list[Statement]:
         """The easiest and the hardest direction of travel, and what a duty is of."""
-        words = [f"duty: of {self.full_words}, {self.full:g} V"]
+        duty = Statement("duty_of", NOTE, self.full_of, {"volts": self.full})
         if not np.isfinite(self.voltage).any():
-            return words
+            return [duty]
         least, most = (1.0 + FELT) * self.voltage.min(), (1.0 - FELT) * self.voltage.max()  # the first of equals
         ends = [int(np.argmax(self.voltage <= least)), int(np.argmax(self.voltage >= most))]
-        told_ = [f"{self.voltage[k]:.3f} V{self._band_at(k)} at {np.degrees(self.directions[k]):.0f} deg" for k in ends]
-        return [f"over all directions of travel, without turning: from {told_[0]} to {told_[1]}", *words]
+        band = self.band
+        numbers = {
+            "volts": self.voltage[ends], "degrees": np.degrees(self.directions[ends]),
+            "ci95": [None if band is None else (band.low[k], band.high[k]) for k in ends],
+        }  # fmt: skip
+        return [Statement("travel_range", NOTE, numbers=numbers), duty]
 
-    def _band_at(self, k: int) -> str:
-        return "" if self.band is None else f" [{self.band.low[k]:.3f}, {self.band.high[k]:.3f}]"
-
-    def _warnings(self) -> list[str]:
+    def _warnings(self) -> list[Statement]:
         """Guesses that it rests on, by name, and where there is no interval."""
-        words = []
-        for what, duty in (("it rests", False), ("the duty rests", True)):
+        found = []
+        for duty in (False, True):
             named = [each for each in self.rests_on if each.guessed and each.duty == duty]
-            known = [
-                f"{each.key} ({short(100.0 * each.effect)} % by its std)" for each in named if each.std is not None
-            ]
-            bare = [f"{each.key} (no std: in no interval)" for each in named if each.std is None]
-            if named:
-                words.append(f"{what} on guesses: {', '.join([*known, *bare])}")
+            effects = [None if each.std is None else each.effect for each in named]
+            numbers = {"duty": duty, "keys": [each.key for each in named], "effects": effects}
+            found += [Statement("dead_zone_rests_on_guesses", WARNING, numbers=numbers)] if named else []
         if self.band is None:
-            words.append("no interval: no number of the robot file has a std; identify writes them")
+            found.append(Statement("no_interval", WARNING))
         elif not any(each.std is not None and not each.duty for each in self.rests_on):
-            words.append("the intervals are empty: no number that the dead zone follows from has a std in the file")
-        return words
+            found.append(Statement("empty_intervals", WARNING))
+        return found
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -174,8 +173,8 @@ class DeadZone:
             "high_V": None if self.band is None else self.band.high,
         }  # fmt: skip
         return plain({
-            "robot": self.robot.name, "dead_zone": rows, "directions": around,
-            "duty_of": {"volts": self.full, "words": self.full_words},
+            **as_verdict(self.verdict), "robot": self.robot.name, "dead_zone": rows, "directions": around,
+            "duty_of": {"volts": self.full, "of": self.full_of}, "warnings": self._warnings(),
             "rests_on": [vars(each) for each in self.rests_on], "guesses": self.guesses,
             "draws": self.draws if self.band is not None else 0,
         })  # fmt: skip
@@ -197,10 +196,10 @@ def dead_zone(robot: Robot, patterns: ArrayLike | None = None, *, draws: int = D
     found = None
     if told(robot).keys:
         found = interval_of(robot, partial(_volts_and_duty, patterns=every), draws, seed)
-    count, full, words = len(own), *_full(robot)
+    count, full, full_of = len(own), *_full(robot)
     rows = [_row(robot, own[k], float(scale[k]), full, found, k, len(every)) for k in range(count)]
     band = None if found is None else Interval(*(end[count : len(every)] for end in found))
-    return DeadZone(robot, tuple(rows), AROUND, voltage, band, full, words, _rests_on(robot, own), draws)
+    return DeadZone(robot, tuple(rows), AROUND, voltage, band, full, full_of, _rests_on(robot, own), draws)
 
 
 def _volts_and_duty(robot: Robot, patterns: FloatArray) -> FloatArray:
@@ -217,8 +216,8 @@ def _duty(scale: FloatArray, patterns: FloatArray, full: float) -> FloatArray:
 def _full(robot: Robot) -> tuple[float, str]:
     """The volts that a duty of 1 is, and what they are."""
     if robot.drive.supply is not None:
-        return robot.drive.supply, "the supply"
-    return float(np.min(robot.motor.voltage_limit)), "the voltage limit (the file has no supply)"
+        return robot.drive.supply, "supply"
+    return float(np.min(robot.motor.voltage_limit)), "voltage_limit"
 
 
 def _row(

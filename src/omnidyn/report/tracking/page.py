@@ -12,12 +12,13 @@ from omnidyn.model.wheels import per_wheel
 from omnidyn.report.html import Section, escaped, page, section
 from omnidyn.report.tracking.animation import animation
 from omnidyn.report.tracking.pictures import draw_tracking, draw_voltages
+from omnidyn.statement import Statement
 
 
 def render_tracking(
-    found: Sequence[Tracking], robot: Robot, provenance: Mapping[str, Any], *, notes: Sequence[str] = ()
+    found: Sequence[Tracking], robot: Robot, provenance: Mapping[str, Any], *, notes: Sequence[Statement] = ()
 ) -> str:
-    """The page as HTML: it needs no other file. robot: that was driven. notes: what the path asks for, in words."""
+    """The page as HTML: it needs no other file. robot: that was driven. notes: what the path asks for."""
     told = trackings_document(found, notes)
     limit = per_wheel(robot.motor.voltage_limit, robot.wheels.count)
     sections = [

@@ -1,0 +1,119 @@
+"""What tracking, tuning and the demand of a path say."""
+
+from __future__ import annotations
+
+from omnidyn.document import all_of
+from omnidyn.statement import Statement
+from omnidyn.telling.sentence import Sentence
+
+
+def _tracked(statement: Statement) -> str:
+    """How near a controller keeps a robot to a path, and how often its motors are at their limit."""
+    numbers = statement.numbers
+    share = f", {100.0 * numbers['rmse'] / numbers['size']:.2g} % of its size" if numbers["size"] > 0.0 else ""
+    limit = ""
+    if numbers["saturated"] > 0.0:
+        limit = f"; its motors are at their limit in {100.0 * numbers['saturated']:.2g} % of the steps"
+    return (
+        f"{statement.subject} keeps {numbers['plant']} within {_length(numbers['worst'])} of the path "
+        f"{numbers['path']}, {_length(numbers['rmse'])} in the mean{share}{limit}"
+    )
+
+
+def _best_tracked(statement: Statement) -> str:
+    """The best of several controllers, and how many times as far off the others are."""
+    names, times = statement.numbers["others"], statement.numbers["times"]
+    pairs = zip(names, times, strict=True)
+    others = ", ".join(f"{name} {float(f'{ratio:.2g}'):g} times as far off" for name, ratio in pairs)
+    return f"{statement.numbers['best']}; {others}"
+
+
+def _length(value: float) -> str:
+    return f"{1e3 * value:.3g} mm" if value < 1.0 else f"{value:.3g} m"
+
+
+def _can_follow(statement: Statement) -> str:
+    """A robot can follow a path, between its corners, and what that takes."""
+    corners = statement.numbers["corners"]
+    between, jumps = (" between its corners", f"; at its {corners} corners no robot can") if corners else ("", "")
+    return f"{statement.subject} can follow {statement.numbers['path']}{between}: {_volts(statement)}{jumps}"
+
+
+def _cannot_follow(statement: Statement) -> str:
+    """A robot cannot follow a path in some of its time, and what that would take."""
+    path, share = statement.numbers["path"], 100.0 * statement.numbers["share"]
+    return f"{statement.subject} cannot follow {path} in {share:.2g} % of its time: that takes {_volts(statement)}"
+
+
+def _volts(statement: Statement) -> str:
+    numbers = statement.numbers
+    words = f"up to {numbers['voltage']:.3g} V of {numbers['voltage_limit']:.3g} V"
+    if numbers["current_limit"] is None:
+        return words
+    slips = " at which a wheel slips" if numbers["grip"] else ""
+    return f"{words} and {numbers['current']:.3g} A of {numbers['current_limit']:.3g} A{slips}"
+
+
+def _gains_tuned(statement: Statement) -> str:
+    """Tuned gains, and the error with them and before."""
+    numbers = statement.numbers
+    gains = all_of([f"{name} {value:g}" for name, value in zip(numbers["names"], numbers["gains"], strict=True)])
+    after, before = 1e3 * numbers["after"], 1e3 * numbers["before"]
+    return f"with {gains}, {statement.subject} is {after:.3g} mm off in the mean, {before:.3g} mm before"
+
+
+def _gains_kept(statement: Statement) -> str:
+    """Tuning found nothing better."""
+    return f"the gains it began with are as good as any that were tried: {1e3 * statement.numbers['after']:.3g} mm"
+
+
+def _optimised(statement: Statement) -> str:
+    """What was optimised, over which robots."""
+    numbers = statement.numbers
+    robots = "the robot of the file alone: no number of it has a std, so nothing says how far it may be off"
+    if draws := numbers["draws"]:
+        robots = f"{draws} robots drawn from the std and correlations of the file"
+    return (
+        f"optimised: rms distance from the path and rim error of the heading along {all_of(numbers['paths'])}, over "
+        f"{robots}; noise {numbers['noise']:g} m/s, delay {numbers['delay']} steps, {numbers['dt']:g} s a step; "
+        f"{numbers['evaluations']} settings tried"
+    )
+
+
+def _given_up_on_file(statement: Statement) -> str:
+    """The robot of the file got worse: the price of being right for the others."""
+    after, before = (1e3 * statement.numbers[name] for name in ("after", "before"))
+    return (
+        f"given up: the robot as the file says it: {after:.3g} mm, {before:.3g} mm before: the price of being right "
+        "for the others"
+    )
+
+
+def _given_up_on_worst(statement: Statement) -> str:
+    """The worst robot got worse."""
+    after, before = (1e3 * statement.numbers[name] for name in ("after", "before"))
+    return f"given up: the worst robot: {after:.3g} mm, {before:.3g} mm before"
+
+
+SENTENCES = {
+    "tracked": Sentence(_tracked),
+    "best_tracked": Sentence(_best_tracked),
+    "steps_with_status": Sentence("{count} of {steps} steps: {subject}"),
+    "can_follow": Sentence(_can_follow),
+    "cannot_follow": Sentence(_cannot_follow),
+    "path_asks_for": Sentence(
+        "{subject} asks for up to {speed:.3g} m/s and {acceleration:.3g} m/s2, {turn:.3g} rad/s and "
+        "{turn_acceleration:.3g} rad/s2"
+    ),
+    "speed_jumps": Sentence("its speed jumps at {corners} corners, by up to {jump:.3g} m/s and {turn_jump:.3g} rad/s"),
+    "gains_tuned": Sentence(_gains_tuned),
+    "gains_kept": Sentence(_gains_kept),
+    "optimised": Sentence(_optimised),
+    "judged_on_other_draws": Sentence(
+        "the numbers are those of as many other draws and of other noise, which the search has not seen"
+    ),
+    "given_up_rest": Sentence("given up: rest: a voltage changes by {after:.3g} V a step, {before:.3g} V before"),
+    "given_up_on_file": Sentence(_given_up_on_file),
+    "given_up_on_worst": Sentence(_given_up_on_worst),
+    "given_up_nothing": Sentence("given up: nothing that was measured"),
+}

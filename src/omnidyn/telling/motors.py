@@ -1,0 +1,261 @@
+"""What a study of motors says: lines, dead bands, starts, and what becomes of them in a robot file."""
+
+from __future__ import annotations
+
+import math
+
+from omnidyn.document import all_of
+from omnidyn.identification.motors.between import WORDS
+from omnidyn.statement import Statement
+from omnidyn.telling.sentence import Sentence
+
+NOT_IDENTIFIABLE = "dead band not identifiable here"
+NOT_WRITTEN = {
+    "viscous_explains_slope": "friction.wheels.viscous of the file explains all of the slope",
+    "drop_explains_dead_band": "motor.voltage_drop_V of the file explains all of the dead band",
+    "negative": "", "no_dead_band": "no dead band is seen",
+    "no_inertia": "the logs do not determine an inertia",
+}  # fmt: skip
+
+
+def _motor_line(statement: Statement) -> str:
+    """Slope, lag, latencies and dead band of the line of a motor."""
+    numbers = statement.numbers
+    spread = f" +- {numbers['slope_std']:.2g}" if math.isfinite(numbers["slope_std"]) else ""
+    words = f"{statement.subject}: slope {numbers['slope']:.5g}{spread} {numbers['unit']} s/rad"
+    if not numbers["lag_known"]:
+        words += ", lag not determined"
+    elif numbers["lag_seen"]:
+        words += f", lag {1e3 * numbers['lag']:.3g} ms"
+    for channel, late, std in numbers["late"]:
+        known = "ms (the end of what was searched: not determined)" if std is None else f"+- {1e3 * std:.2g} ms"
+        words += f", {channel} late by {1e3 * late:.3g} {known}"
+    if rows := numbers["left_out"]:
+        words += f" ({rows} rows left out: their input changes too much from row to row)"
+    return f"{words}; {numbers['dead_band']}"
+
+
+def _band(statement: Statement) -> str:
+    """ "0.6 +- 0.1 V, 95 % [0.4, 0.8]" """
+    numbers = statement.numbers
+    return "{:.3g} +- {:.2g} {}, 95 % [{:.3g}, {:.3g}]".format(
+        numbers["value"], numbers["std"], numbers["unit"], *numbers["ci95"]
+    )
+
+
+def _line_meets_zero(statement: Statement) -> str:
+    """Where the line of a motor meets speed 0, whose starts from rest were seen."""
+    line = "its line" if statement.numbers["one_way"] else "its line, both ways together,"
+    return f"{line} meets speed 0 at {_band(statement)}"
+
+
+def _dead_band_bounded(statement: Statement) -> str:
+    """The line tells no dead band; what is known of it by an input under which the motor turned steadily."""
+    numbers = statement.numbers
+    (low, high), unit, value = numbers["ci95"], numbers["unit"], numbers["value"]
+    between = f"between {low:.3g} and {high:.3g}" if low > 0.0 else f"at most {high:.3g}"
+    known = f"; it is {between} {unit}, for it turned steadily under that" if math.isfinite(high) else ""
+    if math.isfinite(value):
+        return f"{NOT_IDENTIFIABLE}: {value:.3g} {unit} is no estimate{known}"
+    told = "with one speed or one input only they are not distinguishable"
+    return f"{NOT_IDENTIFIABLE}, and any is in the slope: {told}{known}"
+
+
+def _dead_band_seen(statement: Statement) -> str:
+    """The dead band of a motor."""
+    offset = " or offset (it turned one way only)" if statement.numbers["one_way"] else ""
+    return f"dead band{offset} {_band(statement)}"
+
+
+def _dead_band_negative(statement: Statement) -> str:
+    """The line of a motor meets speed 0 below 0."""
+    return (
+        f"{NOT_IDENTIFIABLE}: the line meets speed 0 at {_band(statement)}, below 0, and no friction does that; the "
+        "input has an offset, or the speeds are wrong"
+    )
+
+
+def _slope_may_be_zero(statement: Statement) -> str:
+    """The slope of a motor may be 0."""
+    return f"{NOT_IDENTIFIABLE}: the slope may as well be 0 ({_band(statement)})"
+
+
+def _dead_band_not_needed(statement: Statement) -> str:
+    """The interval of a dead band contains 0."""
+    high, unit = max(statement.numbers["ci95"][1], 0.0), statement.numbers["unit"]
+    return f"{NOT_IDENTIFIABLE}: {_band(statement)} contains 0; it is at most {high:.3g} {unit}, and none is needed"
+
+
+def _start_not_seen(statement: Statement) -> str:
+    """No start from rest was seen; where the line meets speed 0, if that is known."""
+    numbers = statement.numbers
+    line = NOT_IDENTIFIABLE
+    if numbers["offset_known"]:
+        ends = "[{:.3g}, {:.3g}]".format(*numbers["offset_ci95"])
+        line = f"its line meets speed 0 at {numbers['offset']:.3g} {numbers['unit']}, 95 % {ends}"
+    return f"{statement.subject}: no start from rest was seen; {line}"
+
+
+def _start_seen(statement: Statement) -> str:
+    """Where a motor sets off, where it comes to rest, and whether its line says something else."""
+    numbers = statement.numbers
+    (low, high), unit = numbers["ci95"], numbers["unit"]
+    words = f"{statement.subject}: it sets off between {low:.3g} and {high:.3g} {unit}"
+    if numbers["sharp"]:
+        words = f"{statement.subject}: the dead band is {numbers['start']:.3g} {unit}, 95 % [{low:.3g}, {high:.3g}]"
+    if math.isfinite(numbers["stop"]):
+        words += "; on the way down it comes to rest at {:.3g} [{:.3g}, {:.3g}]".format(
+            numbers["stop"], *numbers["stop_ci95"]
+        )
+    if numbers["line_elsewhere"]:
+        words += (
+            f"; the line of its whole range meets speed 0 at {numbers['offset']:.3g} instead, which is no start: the "
+            "line bends, or rest holds the motor harder than motion"
+        )
+    return words
+
+
+def _no_motor_answers(statement: Statement) -> str:
+    """No motor is seen to answer to its input."""
+    motors = all_of(statement.numbers["motors"])
+    return f"no motor is seen to answer to its input: the slope of {motors} may as well be 0"
+
+
+def _motors_answer(statement: Statement) -> str:
+    """Which motors start at which input, which show no dead band, and which do not answer."""
+    return "; ".join(map(str, statement.numbers["parts"]))
+
+
+def _starts_both_ways(statement: Statement) -> str:
+    """A motor whose starts were seen in both directions."""
+    numbers = statement.numbers
+    unit, ways = numbers["unit"], zip(numbers["levels"], numbers["directions"], strict=True)
+    return f"{statement.subject} starts at {all_of([f'{level:.3g} {unit} ({way})' for level, way in ways])}"
+
+
+def _motors_start(statement: Statement) -> str:
+    """At which inputs motors start."""
+    numbers, (names, total) = statement.numbers, _counted(statement)
+    levels = list(dict.fromkeys(f"{level:.3g}" for level in sorted(numbers["levels"])))
+    span = levels[0] if len(levels) == 1 else f"{levels[0]} to {levels[-1]}"
+    who = f"all {total} motors" if len(names) == total > 1 else all_of(names)
+    return f"{who} start{'s' * (len(names) == 1)} at {span} {numbers['unit']}"
+
+
+def _motors_without_dead_band(statement: Statement) -> str:
+    """Motors that answer and show no dead band."""
+    names, total = _counted(statement)
+    one = len(names) == 1
+    who = f"all {total} motors" if len(names) == total > 1 else all_of(names)
+    too = " too" if statement.numbers["too"] else ""
+    return f"{who} answer{'s' * one}{too}, and show{'s' * one} no dead band"
+
+
+def _motors_not_answering(statement: Statement) -> str:
+    """Motors that are not seen to answer."""
+    names = statement.numbers["motors"]
+    return f"{all_of(names)} {'is' if len(names) == 1 else 'are'} not seen to answer to the input"
+
+
+def _counted(statement: Statement) -> tuple[tuple[str, ...], int]:
+    return statement.numbers["motors"], statement.numbers["total"]
+
+
+def _other_reading(statement: Statement) -> str:
+    """The logs are met as well, or better, with another reading of the input between its rows."""
+    numbers = statement.numbers
+    verb = "better" if numbers["better"] else "as well"
+    return (
+        f"the logs are met {verb} where the input is {WORDS[numbers['other']]} (error {numbers['other_error']:.3g} "
+        f"rad/s, {numbers['error']:.3g} where it is {WORDS[numbers['between']]}): the intervals span both"
+    )
+
+
+def _speed_is_mean(statement: Statement) -> str:
+    """The speed of motors is a mean over rows, and what that does to the fit."""
+    names, rows = statement.numbers["motors"], statement.numbers["rows"]
+    allowed = "the input is averaged alike; breakaway is not seen sharply"
+    rest = allowed if statement.numbers["allowed"] else "the dead band may be too small"
+    return f"the speed of motor {all_of(names)} is a mean of {rows} rows: {rest}"
+
+
+def _not_written(statement: Statement) -> str:
+    """A number of the robot file that the motors do not determine, and why."""
+    return f"{statement.subject} is not written: {NOT_WRITTEN[statement.numbers['why']]}"
+
+
+def _lag_too_short(statement: Statement) -> str:
+    """The lag of a motor is shorter than what windows blur."""
+    lag, smear = (1e3 * statement.numbers[name] for name in ("lag", "smear"))
+    return (
+        f"{statement.subject} is not written: a lag of {lag:.2g} ms is too short for windows, which blur {smear:.2g} "
+        "ms; `method` output-error fits it"
+    )
+
+
+SENTENCES = {
+    "motor_line": Sentence(_motor_line),
+    "dead_band_not_asked": Sentence("no dead band asked for"),
+    "line_meets_zero": Sentence(_line_meets_zero),
+    "dead_band_bounded": Sentence(_dead_band_bounded),
+    "dead_band_seen": Sentence(_dead_band_seen),
+    "dead_band_negative": Sentence(_dead_band_negative),
+    "slope_may_be_zero": Sentence(_slope_may_be_zero),
+    "dead_band_not_needed": Sentence(_dead_band_not_needed),
+    "held_out_no_better": Sentence(
+        "{subject}: held-out logs are met no better with the dead band (error {with_band:.4g} rad/s, {without:.4g} "
+        "without): it may stand for something else"
+    ),
+    "start_not_seen": Sentence(_start_not_seen),
+    "never_sets_off": Sentence("{subject}: it rests up to {low:.3g} {unit}, and never sets off"),
+    "sets_off_below": Sentence(
+        "{subject}: it sets off at {high:.3g} {unit} or below; a slow ramp from rest tells more"
+    ),
+    "start_seen": Sentence(_start_seen),
+    "starts_scatter": Sentence("its {subject}s scatter by more than their intervals: the interval spans them"),
+    "no_motor_answers": Sentence(_no_motor_answers),
+    "motors_answer": Sentence(_motors_answer),
+    "starts_both_ways": Sentence(_starts_both_ways),
+    "motors_start": Sentence(_motors_start),
+    "motors_without_dead_band": Sentence(_motors_without_dead_band),
+    "motors_not_answering": Sentence(_motors_not_answering),
+    "at_its_bound": Sentence("{subject} is at its bound"),
+    "errors_with_memory": Sentence("the intervals allow for autocorrelated errors"),
+    "motor_fit_cut_short": Sentence("the fit was cut short: the numbers are of its last step"),
+    "line_bends": Sentence(
+        "the line of speed over input bends: with a smooth bend fitted too (error {left:.3g} of that without), the "
+        "dead band is {value:.3g} +- {std:.2g} {unit}: the interval spans both, and the slope goes with it"
+    ),
+    "other_reading": Sentence(_other_reading),
+    "speed_is_mean": Sentence(_speed_is_mean),
+    "rows_as_points": Sentence(
+        "the rows are more than 0.1 s apart: each is a point of steady speed, and nothing is known of a lag"
+    ),
+    "windows_unresolved": Sentence(
+        "{windows} windows were left out: their input changes so much from row to row that what the motor got is not "
+        "in the log"
+    ),
+    "motor_windows_at_rest": Sentence("{windows} windows at rest, wholly or in part, were left out"),
+    "windows_thinned": Sentence("the logs are long: one window in {every} was used"),
+    "turned_one_way": Sentence(
+        "a motor turned one way only: a dead band and an offset of the input are not distinguishable"
+    ),
+    "motors_and_floor": Sentence(
+        "slope and dead band are those of motors and floor together: of the motors alone nothing is determined"
+    ),
+    "supply_of_logs": Sentence("the supply is the mean of the logs, {supply:.4g} V"),
+    "supply_of_file": Sentence("the supply is not logged: that of the file is taken, {supply:g} V"),
+    "no_supply": Sentence(
+        "a duty needs a supply to become volts: log it, or give drive.supply_V; nothing of the motors is written"
+    ),
+    "floor_friction_kept": Sentence(
+        "the friction of the floor is as it was: if it was fitted with that of the wheels in it, fit it anew"
+    ),
+    "line_not_determined": Sentence("slope and dead band are not determined: nothing is written"),
+    "not_written": Sentence(_not_written),
+    "lag_too_short": Sentence(_lag_too_short),
+    "wheel_explains_inertia": Sentence(
+        "{subject} is not written: the wheel of the file explains all of {inertia:.3g} kg m^2 there"
+    ),
+    "rotor_holds_wheel": Sentence("{subject} holds the wheel too, which the file gives no inertia"),
+}
