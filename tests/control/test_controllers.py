@@ -18,7 +18,7 @@ from omnidyn.control.controllers import (
 from omnidyn.control.feedforward import Feedforward
 from omnidyn.control.pid import Pid
 from omnidyn.control.speed_loop import SpeedLoop
-from omnidyn.errors import InputError
+from omnidyn.errors import InputError, Terminated
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.live import LiveRobot
 from tests.support.friction_shapes import shaped
@@ -98,6 +98,23 @@ def test_a_path_that_fails_is_told(name):
     control = controller_named(name, AXEBOT)
     assert not control.step(0.0, REST, REST, Broken()).any()
     assert control.info.status.startswith("no output found")
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, Terminated])
+def test_an_interrupt_in_compiled_code_ends_the_loop(name, error):
+    """Python calls it a SystemError there, with the interrupt as its cause."""
+    control = controller_named(name, AXEBOT)
+
+    class Stopped:
+        end = 5.0
+
+        def at(self, t):
+            raise SystemError("a kernel returned a result with an exception set") from error()
+
+        twist_at = at
+
+    with pytest.raises(error):
+        control.step(0.0, REST, REST, Stopped())
 
 
 def test_a_path_that_is_nothing_once_is_forgotten(name):

@@ -6,8 +6,8 @@ A controller must:
    frame, shapes (3,), and a Path (path.py); return what to send to the drive until the next step, shape (wheels,);
 2. say by `output` what that is: "voltage" [V], "duty" [1], or "wheel_speed" [rad/s] for a drive with a speed loop;
 3. keep |output| <= `limit`, shape (wheels,), in every step;
-4. never raise in `step`: what is missing, NaN, of a wrong shape or earlier than the step before gives zeros, and a
-   word in `info.status`. A time that stands still repeats the last output;
+4. never raise in `step` but an interrupt: what is missing, NaN, of a wrong shape or earlier than the step before gives
+   zeros, and a word in `info.status`. A time that stands still repeats the last output;
 5. go on where a path has ended: it holds the last pose of the path, and says so in `info.status`;
 6. tell by `info` what the last step did: status, iterations, time, predicted path, limits met;
 7. forget by `reset()` all it remembers of steps before;
@@ -31,6 +31,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.control.without_slip import without_slip
+from omnidyn.errors import INTERRUPTS, told_by
 from omnidyn.model.drive import DUTY, SPEED
 from omnidyn.model.motor import no_load_speed
 from omnidyn.model.robot import Robot
@@ -184,8 +185,11 @@ class Safe:
             wanted, limits = output(dt)
             sent = np.clip(wanted, -self.limit, self.limit)
             fine = sent.shape == self.limit.shape and bool(np.isfinite(sent).all())
-        except Exception as error:  # the loop of a robot must not end here
-            return self._safe(f"{FAILED}: {type(error).__name__}", begun)
+        except Exception as raised:  # the loop of a robot must not end here, but where a user ends it
+            error = told_by(raised)
+            if isinstance(error, INTERRUPTS):
+                raise error from raised
+            return self._safe(f"{FAILED}: {type(raised).__name__}", begun)
         if not fine:
             return self._safe(FAILED, begun)
         self._last = sent

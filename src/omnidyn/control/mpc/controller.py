@@ -43,7 +43,7 @@ from omnidyn.control.mpc.preview import Preview
 from omnidyn.control.mpc.settings import Settings
 from omnidyn.control.mpc.tables import Memory, Room
 from omnidyn.control.without_slip import without_slip
-from omnidyn.errors import InputError
+from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings.floor import refuse_slope
 from omnidyn.model.wheels import wheel_speed
@@ -165,8 +165,11 @@ class Mpc:
                 twist = vector(twist)
             state[:3], state[3:] = pose, twist
             return self._solved(t, since, path, begun)
-        except Exception as error:  # the loop of a robot must not end here
-            return self._refused(t, pose, twist, path, error, begun)
+        except Exception as raised:  # the loop of a robot must not end here, but where a user ends it
+            error = told_by(raised)
+            if isinstance(error, INTERRUPTS):
+                raise error from raised
+            return self._refused(t, pose, twist, path, raised, begun)
 
     def _solved(self, t: float, since: float, path: Any, begun: float) -> FloatArray:
         """The output of a step whose arguments look well."""
