@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omnidyn.cli import main
-from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.logs.run_file import write_run
 from omnidyn.model.keys import Key
@@ -18,7 +18,7 @@ from tests.support.outputs import strict
 
 ROUGH = 2.6  # N along x; the preset has 2.2
 COULOMB = "friction.axes.coulomb[0]"
-TOLD = Progress.__call__
+TOLD = FitProgress.__call__
 
 
 @pytest.fixture(scope="session")
@@ -190,17 +190,18 @@ def cut_at_the_second_state():
     """What follows a fit, and interrupts it at the second better state."""
     count = []
 
-    def interrupted(self, state):
-        TOLD(self, state)
-        count.append(state)
-        if len(count) == 2:
-            raise KeyboardInterrupt
+    def interrupted(self, report):
+        TOLD(self, report)
+        if report.state is not None:
+            count.append(report.state)
+            if len(count) == 2:
+                raise KeyboardInterrupt
 
     return interrupted
 
 
 def test_an_interrupt_leaves_the_best_so_far(call, tmp_path, monkeypatch):
-    monkeypatch.setattr(Progress, "__call__", cut_at_the_second_state())
+    monkeypatch.setattr(FitProgress, "__call__", cut_at_the_second_state())
     code, out, err = call("smooth0.csv", "--robot", "axebot", "-o", str(tmp_path / "fit.toml"))
     assert code == 130
     assert "the fit was interrupted: the numbers are the best so far" in out.replace("\n  ", " ")
@@ -209,7 +210,7 @@ def test_an_interrupt_leaves_the_best_so_far(call, tmp_path, monkeypatch):
 
 
 def test_an_interrupt_while_groups_are_fitted_alone_leaves_the_best_so_far(call, tmp_path, monkeypatch):
-    told, heard = Progress.doing, []
+    told, heard = FitProgress.enter, []
 
     def listening(self, words):
         told(self, words)
@@ -218,7 +219,7 @@ def test_an_interrupt_while_groups_are_fitted_alone_leaves_the_best_so_far(call,
             if len(heard) == 2:
                 raise KeyboardInterrupt
 
-    monkeypatch.setattr(Progress, "doing", listening)
+    monkeypatch.setattr(FitProgress, "enter", listening)
     code, out, err = call(".", "--robot", "axebot", "--per", "smooth=smooth*", "--per", "rough=rough*", "--json",
                           "-o", str(tmp_path / "{group}.toml"))  # fmt: skip
     assert code == 130
@@ -233,7 +234,7 @@ def test_an_interrupt_of_groups_leaves_the_best_so_far_and_the_same_again(call, 
                  "--free", "motor.torque_constant_Nm_A", "--json")  # fmt: skip
     found = []
     for name in ("a.toml", "b.toml"):
-        monkeypatch.setattr(Progress, "__call__", cut_at_the_second_state())
+        monkeypatch.setattr(FitProgress, "__call__", cut_at_the_second_state())
         code, out, err = call(*arguments, "-o", str(tmp_path / name))
         assert code == 130
         assert "interrupted" in err

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from omnidyn.progress import Report
+
 SOURCES = Path(__file__).resolve().parents[2] / "src"
 DROPPED = ("PYTHONUNBUFFERED", "LC_", "LANG", "NO_COLOR", "COLUMNS")
 CLEAN = {name: value for name, value in os.environ.items() if not name.startswith(DROPPED)}
@@ -209,11 +211,11 @@ def test_work_past_two_seconds_shows_progress(capsys, monkeypatch):
     monkeypatch.setattr("omnidyn.cli.terminal.progress.SILENT_S", 0.05)
     monkeypatch.setattr("omnidyn.cli.terminal.progress.NEW_S", 0.05)
     monkeypatch.setattr("omnidyn.cli.terminal.progress.BEAT_S", 0.05)
-    from omnidyn.cli.terminal.progress import progress
+    from omnidyn.cli.terminal.progress import shown_progress
 
-    with progress("walking") as now:
+    with shown_progress("walking") as progress:
         time.sleep(0.2)
-        now("running")
+        progress(Report("running"))
         time.sleep(0.2)
     out, err = capsys.readouterr()
     assert out == ""
@@ -224,29 +226,29 @@ def test_work_past_two_seconds_shows_progress(capsys, monkeypatch):
 def test_a_new_step_is_told_sooner_than_one_that_lasts(capsys, monkeypatch):
     for name, seconds in (("SILENT_S", 0.02), ("NEW_S", 0.1), ("BEAT_S", 60.0)):
         monkeypatch.setattr(f"omnidyn.cli.terminal.progress.{name}", seconds)
-    from omnidyn.cli.terminal.progress import progress
+    from omnidyn.cli.terminal.progress import shown_progress
 
-    with progress("walking") as now:
+    with shown_progress("walking") as progress:
         time.sleep(0.05)
-        now("running")
+        progress(Report("running"))
         time.sleep(0.5)
     err = capsys.readouterr().err
     assert (err.count("walking"), err.count("running")) == (1, 1)
 
 
 def test_progress_says_where_a_kernel_is_compiled(capsys, monkeypatch):
-    from omnidyn.cli.terminal.progress import progress
+    from omnidyn.cli.terminal.progress import shown_progress
     from omnidyn.compiled.hearing import told
 
     monkeypatch.setattr("omnidyn.cli.terminal.progress.SILENT_S", 0.05)
-    with progress("walking"), told("a kernel"):
+    with shown_progress("walking"), told("a kernel"):
         time.sleep(0.2)
     assert "omnidyn: walking (a kernel is being compiled: once, the first time) ... 0 s" in capsys.readouterr().err
 
 
 def test_quick_work_is_silent(capsys):
-    from omnidyn.cli.terminal.progress import progress
+    from omnidyn.cli.terminal.progress import shown_progress
 
-    with progress("walking"):
+    with shown_progress("walking"):
         pass
     assert capsys.readouterr() == ("", "")

@@ -172,7 +172,8 @@ def test_the_phases_have_their_names(folder):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(diagnosis, "diagnose", diagnosing)
         Identification.of(
-            [read_log(folder / "log0.csv")], robot, Question(free=("friction",), nuisances=()), progress=said.append,
+            [read_log(folder / "log0.csv")], robot, Question(free=("friction",), nuisances=()),
+            progress=lambda report: said.append(str(report)),
             save=lambda fits: said.append(f"saved {', '.join(fits)}"),
         )  # fmt: skip
     phases = [words.partition(":")[0].partition(",")[0].partition(" /")[0] for words in said]

@@ -15,6 +15,7 @@ from omnidyn.cli import main
 from omnidyn.compiled.hearing import told
 from omnidyn.compiled.kernel import kept, kernel
 from omnidyn.identification.first_runs import first_runs
+from omnidyn.progress import Report
 
 SOURCE = str(Path(omnidyn.__file__).resolve().parents[1])
 
@@ -85,18 +86,18 @@ def test_without_a_writable_folder_it_says_so(few, capsys, monkeypatch):
 
 
 def test_who_waits_for_the_compiler_is_told_of_it_once(capsys, monkeypatch):
-    from omnidyn.cli.terminal.progress import progress
+    from omnidyn.cli.terminal.progress import shown_progress
 
     for name in ("SILENT_S", "NEW_S", "BEAT_S"):
         monkeypatch.setattr(f"omnidyn.cli.terminal.progress.{name}", 0.03)
-    with progress("walking") as now, told("a kernel"):
+    with shown_progress("walking") as progress, told("a kernel"):
         time.sleep(0.15)
-        now("running")
+        progress(Report("running"))
         time.sleep(0.15)
     err = capsys.readouterr().err
     assert err.count("`omnidyn warm` compiles for all commands, once") == 1
     assert err.index("omnidyn warm") < err.index("walking") < err.index("running")
-    with progress("walking"):
+    with shown_progress("walking"):
         time.sleep(0.15)
     assert "warm" not in capsys.readouterr().err
 

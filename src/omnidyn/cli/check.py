@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,9 +12,10 @@ import typer
 from omnidyn.cli import log_options
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
-from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.streams import painted, say, show, show_json, width
 from omnidyn.errors import InputError, OmnidynError
+from omnidyn.progress import Progress, Report
 
 if TYPE_CHECKING:
     from omnidyn.findings.finding import Verdict
@@ -64,10 +65,10 @@ def check(
     if len(log) == 1:
         log_options.refuse_missing(log)
     options, maps = flags.options(), flags.maps(force)
-    with progress("reading") as now:
+    with shown_progress("reading") as progress:
         files = log_options.log_files(log)
         loaded = _robot(robot)
-        done = [_checked(path, loaded, options, maps, now, bool(picture)) for path in files]
+        done = [_checked(path, loaded, options, maps, progress, bool(picture)) for path in files]
     _compare_data(done)
     _tell(done, json, full, robot)
     if picture:
@@ -85,22 +86,22 @@ def _robot(robot: str) -> Robot | None:
 
 
 def _checked(
-    path: str, robot: Robot | None, options: LogOptions, maps: log_options.Maps, now: Callable[[str], None],
+    path: str, robot: Robot | None, options: LogOptions, maps: log_options.Maps, progress: Progress,
     picture: bool,
 ) -> Checked:  # fmt: skip
     """One log, block by block; an error in reading it does not stop the others."""
     done, digest = Checked(path), _Digest()
-    now(f"reading {path}")
+    progress(Report(f"reading {path}"))
 
-    def said(count: int, total: int) -> None:
-        now(f"reading {path}, {100 * count // max(total, 1)} %")
+    def listen(report: Report) -> None:
+        progress(report._replace(phase=f"reading {path}"))
 
     try:
         log_options.refuse_missing([path])
         from omnidyn.findings.check import check_blocks, check_log
         from omnidyn.logs.read_log import iter_logs
 
-        log, only, blocks = _first(digest.through(iter_logs(path, robot, options, rows=BLOCK, progress=said)))
+        log, only, blocks = _first(digest.through(iter_logs(path, robot, options, rows=BLOCK, progress=listen)))
         if log is not None:
             maps.show(path, log.columns, doubts=False)
             done.notes = log.notes
@@ -116,7 +117,7 @@ def _draw(done: Checked, picture: str, force: bool) -> None:
     """The picture of a log that could be read."""
     if done.log is None or done.verdict is None:
         return
-    with progress("drawing"):
+    with shown_progress("drawing"):
         from omnidyn.report.figures.raw_log import draw_raw_log
 
         write_picture(draw_raw_log(done.log, done.verdict), picture, force)

@@ -10,8 +10,9 @@ import typer
 from omnidyn.cli import log_options
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
-from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.telling import end_failed, tell
+from omnidyn.progress import Progress
 
 if TYPE_CHECKING:
     from omnidyn.comparison.result import Comparison
@@ -56,14 +57,14 @@ def compare(
 
     rules = [parse_threshold(text) for text in fail_if]
     options, maps = flags.options(), flags.maps(force)
-    with progress("reading") as now:
+    with shown_progress("reading") as progress:
         files, robots = log_options.log_files(log), _robots(robot, with_)
-        runs, hashes = _runs(files, robots[0], options, flags.sort, maps, now)
+        runs, hashes = _runs(files, robots[0], options, flags.sort, maps, progress)
         channels = _channels(robots, runs, apply, rules, show_channels if picture else "")
-        found = _compared(robots, runs, apply, hold, current_unsigned, band, now)
+        found = _compared(robots, runs, apply, hold, current_unsigned, band, progress)
     tell(found.document(segments), json, _record(robot, files, hashes))
     if picture:
-        with progress("drawing"):
+        with shown_progress("drawing"):
             _draw(found, picture, channels, force)
     refuse_exceeded(found, rules)
     if found.failed:
@@ -78,11 +79,11 @@ def _robots(names: Sequence[str], with_: str) -> list[Robot]:
 
 
 def _runs(
-    files: Sequence[str], robot: Robot, options: Any, sort: bool, maps: log_options.Maps, now: Any
+    files: Sequence[str], robot: Robot, options: Any, sort: bool, maps: log_options.Maps, progress: Progress
 ) -> tuple[list[Run], list[str]]:
     """The logs as Runs, and the hashes of their files. Currents stay as recorded: they may be compared by size."""
     runs, hashes = [], []
-    for path, each in log_options.load_logs(files, robot, options, now):
+    for path, each in log_options.load_logs(files, robot, options, progress):
         maps.show(path, each.columns)
         run = each.to_run(sort=sort)
         runs.append(run.replace(warnings=(*run.warnings, *each.columns.doubts)))
@@ -105,7 +106,13 @@ def _channels(
 
 
 def _compared(
-    robots: Sequence[Robot], runs: Sequence[Run], apply: str, hold: float, current_unsigned: bool, band: bool, now: Any
+    robots: Sequence[Robot],
+    runs: Sequence[Run],
+    apply: str,
+    hold: float,
+    current_unsigned: bool,
+    band: bool,
+    progress: Progress,
 ) -> Comparison:
     from omnidyn.comparison.compare import compare as compare_robots
 
@@ -116,7 +123,7 @@ def _compared(
         apply=apply or None,
         hold=hold,
         current_unsigned=current_unsigned,
-        progress=now,
+        progress=progress,
         band=band,
     )
 

@@ -9,10 +9,11 @@ import typer
 
 import omnidyn
 from omnidyn.cli.terminal.folder import check_folder, write_folder
-from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say, to_json, width
 from omnidyn.cli.terminal.telling import as_json, tell
+from omnidyn.progress import Progress, Report
 
 if TYPE_CHECKING:
     from omnidyn.document import Document
@@ -39,26 +40,26 @@ def demo(
     """
 
     folder = check_folder(out, force)
-    with progress("loading") as now:
-        claims, pictures, record = _made(now)
+    with shown_progress("loading") as progress:
+        claims, pictures, record = _made(progress)
         document = _document(claims, pictures)
-        now("writing the report")
+        progress(Report("writing the report"))
         write_folder(folder, _files(claims, pictures, document, record))
     tell(document, json, record, width=width())
     say(f"omnidyn: open {folder / 'report.html'}")
 
 
-def _made(now: Any) -> tuple[tuple[Claim, ...], list[Picture], dict[str, Any]]:
+def _made(progress: Progress) -> tuple[tuple[Claim, ...], list[Picture], dict[str, Any]]:
     """Claims, pictures and the record of what they were made from."""
     from omnidyn.paper.claims import PRESET, all_claims
     from omnidyn.report.figures.paper_pictures import paper_pictures
 
-    now("computing the claims (the first run compiles the simulation)")
+    progress(Report("computing the claims (the first run compiles the simulation)"))
     claims = all_claims()
     pictures = []
     for picture in paper_pictures(omnidyn.load_robot(PRESET)):
         pictures.append(picture)
-        now(f"drawing, {len(pictures)} figures done")
+        progress(Report(f"drawing, {len(pictures)} figures done"))
     return claims, pictures, provenance([robot_input(PRESET)])
 
 

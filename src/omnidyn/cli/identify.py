@@ -15,11 +15,11 @@ from omnidyn.cli import log_options as options
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.flags import flags
 from omnidyn.cli.terminal.help import MORE
-from omnidyn.cli.terminal.progress import progress
-from omnidyn.cli.terminal.streams import say
+from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.telling import end_failed
 from omnidyn.identification.question import MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
 from omnidyn.identification.question import options as fields_of_question
+from omnidyn.progress import Report
 
 
 def _asks(command: Callable[..., None]) -> Callable[..., None]:
@@ -113,34 +113,31 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
     from omnidyn.identification.methods import settle_method
     from omnidyn.model.robot_file import load_robot
 
-    def told(words: str) -> None:
-        say(f"omnidyn: {words}")
-
-    with progress("reading") as now:
+    with shown_progress("reading") as progress:
         start = load_robot(robot) if robot else None
-        loaded = load_runs(arguments, question, start, reading, now)
+        loaded = load_runs(arguments, question, start, reading, progress)
         record = provenance([*([robot_input(robot)] if robot else []), *loaded.inputs])
         if question.what == MOTORS:
             from omnidyn.cli.identify_motors import run_motors
 
-            run_motors(question, loaded, start, record, to, now)
+            run_motors(question, loaded, start, record, to, progress)
             return
         assert start is not None
-        question, logs = settle_method(loaded.runs, start, question, told), loaded.logs
+        question, logs = settle_method(loaded.runs, start, question, progress), loaded.logs
         if loaded.folders and question.method == STEADY_STATE:
             question = replace(question, group=loaded.folders)
         elif loaded.folders:
-            told("all folders are fitted together; `per` NAME=GLOB makes groups of them")
+            progress(Report("all folders are fitted together; `per` NAME=GLOB makes groups of them", urgent=True))
         if groups := [each.partition("=")[0] for each in question.per or question.group]:
             outputs(to, list(dict.fromkeys(groups)), record["inputs"])  # refused before any work
         load_meanwhile(to, question.quick)
         with shared_out(start) if question.method == OUTPUT_ERROR else nullcontext():
             found = Identification.of(
-                loaded.runs, start, question, logs=logs, progress=now, tell=told, keep_best=True,
+                loaded.runs, start, question, logs=logs, progress=progress, keep_best=True,
                 save=lambda fits: to.save({name: fit.robot for name, fit in fits.items()}, record["inputs"]),
             )  # fmt: skip
         if found.interrupted:
-            told("interrupted: the numbers are the best so far, not the best there are")
-        tell(found, record, to, now)
+            progress(Report("interrupted: the numbers are the best so far, not the best there are", urgent=True))
+        tell(found, record, to, progress)
     if found.failures:
         end_failed(found.verdict)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from omnidyn.cli.log_options import Maps, load_logs, log_files
 from omnidyn.cli.terminal.streams import say
 from omnidyn.identification.question import Question
+from omnidyn.progress import Progress
 
 if TYPE_CHECKING:
     from omnidyn.logs.log import Log
@@ -69,13 +70,15 @@ def _first_names(path: str) -> set[str]:
     return {cell.strip().strip('"').lower() for cell in cells}
 
 
-def load_runs(arguments: Sequence[str], question: Question, robot: Robot | None, reading: Reading, now: Any) -> Loaded:
+def load_runs(
+    arguments: Sequence[str], question: Question, robot: Robot | None, reading: Reading, progress: Progress
+) -> Loaded:
     """The runs of LOG... that belong to a group, where there are any; what the readers had to decide is said once."""
     files = log_files(arguments)
     folders = () if question.per or question.group else _folders(arguments)
     used = _of_groups(files, question.per or question.group or folders, "per" if question.per else "group")
     found, said = Loaded([], [], [], folders), {}
-    for path, log in load_logs(used, robot, reading.options, now):
+    for path, log in load_logs(used, robot, reading.options, progress):
         reading.maps.show(path, log.columns)
         run = log.to_run(sort=reading.sort)
         for words in run.warnings:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +11,7 @@ from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import end_failed, tell
 from omnidyn.document import apart, sentence
 from omnidyn.identification.question import Question
+from omnidyn.progress import Progress, Report
 
 if TYPE_CHECKING:
     from omnidyn.identification.motors.into_robot import MotorNumbers
@@ -20,16 +20,13 @@ if TYPE_CHECKING:
 
 
 def run_motors(
-    question: Question, loaded: Loaded, robot: Robot | None, record: dict[str, Any], to: Out, now: Any
+    question: Question, loaded: Loaded, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress
 ) -> None:
     """Fit; write robot file and report; show the result."""
     from omnidyn.identification.motors.study import identify_motors
 
-    def told(words: str) -> None:
-        say(f"omnidyn: {words}")
-
-    study = identify_motors(loaded.runs, robot, question=question, logs=loaded.logs, now=now, tell=told)
-    _tell(study, robot, record, to, now)
+    study = identify_motors(loaded.runs, robot, question=question, logs=loaded.logs, progress=progress)
+    _tell(study, robot, record, to, progress)
 
 
 def tell_motor_table(table: str, robot: str, question: Question, to: Out) -> None:
@@ -46,7 +43,7 @@ def tell_motor_table(table: str, robot: str, question: Question, to: Out) -> Non
 
 
 def _tell(
-    study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out, now: Callable[[str], object]
+    study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress
 ) -> None:  # fmt: skip
     from omnidyn.attempts import Attempts, not_made
 
@@ -55,9 +52,9 @@ def _tell(
     if numbers is not None:
         told = replace(told, parts=apart(told.parts, numbers.parts()))
     if to.report:
-        now("drawing")
+        progress(Report("drawing"))
         report = to.write_report(attempts, lambda: _page(study, record))
-    now("writing")
+    progress(Report("writing"))
     verdict = " ".join([told.verdict_text, *(sentence(str(each)) for each in not_made(attempts.missing))])
     told = replace(told, verdict=verdict, data={**told.data, "verdict": verdict})
     own, missing = numbers.to_dict() if numbers is not None else None, [*map(asdict, attempts.missing)]

@@ -13,10 +13,11 @@ import typer
 
 from omnidyn.cli.identify_brief import brief
 from omnidyn.cli.terminal.flags import with_flags
-from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import tell as tell_document
 from omnidyn.identification.question import OUTPUT_ERROR, Question
+from omnidyn.progress import Progress, Report
 
 PAGE = "page"
 
@@ -85,15 +86,15 @@ def load_meanwhile(to: Out, quick: bool) -> None:
     threading.Thread(target=load).start()
 
 
-def tell(found: Identification, record: dict[str, Any], to: Out, now: Callable[[str], object]) -> None:
+def tell(found: Identification, record: dict[str, Any], to: Out, progress: Progress) -> None:
     """Draw the page of an identification, and show the result."""
     from omnidyn.attempts import Attempts
 
     attempts, report = Attempts([*found.missing], found.interrupt), ""
     if to.report and _has_page(found):
-        now("drawing")
+        progress(Report("drawing"))
         report = to.write_report(attempts, lambda: _page(found, record))
-    now("writing")
+    progress(Report("writing"))
     found = replace(found, missing=tuple(attempts.missing), interrupt=attempts.interrupt)
     written = [*to.files.values(), *([report] if report else [])]
     told = found.document() if to.json or to.full else brief(found)
@@ -134,7 +135,7 @@ def tell_table(table: str, robot: str, question: Question, to: Out) -> None:
                          expected="logs, or `method` steady-state", where="method")  # fmt: skip
     if to.report:
         raise typer.BadParameter("--report needs logs; a table of points has none.")
-    with progress("identifying"):
+    with shown_progress("identifying"):
         start, data = load_robot(robot), read_steady_table(table)
         estimate = fit_steady_state(start, data, rest=question.rest)
         estimate = replace(estimate, warnings=(*data.notes, *estimate.warnings))

@@ -19,6 +19,7 @@ from omnidyn.errors import InputError
 from omnidyn.files import check_output, keep_apart, open_regular
 from omnidyn.logs.readers.folders import files_of, is_log_folder, log_folders, natural
 from omnidyn.model.presets import robot_path
+from omnidyn.progress import Progress, Report, silent
 
 if TYPE_CHECKING:
     from omnidyn.logs.columns.mapping import ColumnMap
@@ -208,13 +209,13 @@ def refuse_missing(logs: Sequence[str]) -> None:
 
 
 def load_logs(
-    files: Sequence[str], robot: Robot | None, options: LogOptions, now: Any = None
+    files: Sequence[str], robot: Robot | None, options: LogOptions, progress: Progress = silent
 ) -> Iterator[tuple[str, Log]]:
-    """Each file as a Log, in order. `now` shows progress. Raises InputError at the first that cannot be read."""
+    """Each file as a Log, in order. Raises InputError at the first that cannot be read."""
 
     for k, path in enumerate(files):
-        if now is not None and len(files) > 1:
-            now(f"reading {k + 1} of {len(files)}")
+        if len(files) > 1:
+            progress(Report(f"reading {k + 1} of {len(files)}"))
         yield path, omnidyn.load_log(path, robot, options)
 
 

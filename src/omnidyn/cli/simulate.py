@@ -12,12 +12,13 @@ import typer
 import omnidyn
 from omnidyn.cli.log_options import WITH, keep_inputs
 from omnidyn.cli.terminal.numbers import three
-from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say, show
 from omnidyn.cli.terminal.telling import tell
 from omnidyn.document import Document
 from omnidyn.files import check_output
+from omnidyn.progress import Report
 
 if TYPE_CHECKING:
     from omnidyn.logs.command_file import HeldCommands
@@ -61,14 +62,14 @@ def simulate(
         raise typer.BadParameter("-o - and --json both want stdout.")
     files = _ends_of(out) if band and out else []
     _refuse_early(robot, voltages, ["" if path == "-" else path for path in (out, *files)], force)
-    with progress("simulating (the first run of an engine compiles it)") as now:
+    with shown_progress("simulating (the first run of an engine compiles it)") as progress:
         job = _Job.read(robot, voltages, duration, max_steps, with_)
         run = job.run(twist=start_twist, pose=start_pose, tol=tol or None)
         ends = None
         if band:
-            now("simulating plausible robots")
+            progress(Report("simulating plausible robots"))
             ends = job.band(run, twist=start_twist, pose=start_pose, tol=tol or None)
-        now("writing the run")
+        progress(Report("writing the run"))
         _write(run, out, force)
         for end, path in zip((ends.low, ends.high) if ends else (), files, strict=False):
             _write(end, path, force)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
 from typing import Any
 
 import typer
 
-from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance
 from omnidyn.cli.terminal.streams import say, show, show_json
 from omnidyn.compiled.hearing import Compiling, heard
+from omnidyn.progress import Progress, Report
 
 
 def warm(json: bool = typer.Option(False, "--json", help="For machines.")) -> None:
@@ -22,13 +22,13 @@ def warm(json: bool = typer.Option(False, "--json", help="For machines.")) -> No
     minute, and a second where all is there. After an update only what has changed is compiled.
     """
     started = time.monotonic()
-    with progress("loading", hint="") as now, heard() as compiling:
+    with shown_progress("loading", hint="") as progress, heard() as compiling:
         from omnidyn.compiled.warmed import circumstances, recalled, remember
 
         made_with = circumstances()
         caches = recalled(made_with)
         if not caches:
-            caches = _make(now, compiling)
+            caches = _make(progress, compiling)
             remember(caches, made_with)
     seconds = time.monotonic() - started
     if not caches:
@@ -42,7 +42,7 @@ def warm(json: bool = typer.Option(False, "--json", help="For machines.")) -> No
     _tell({"compiled": [{"kernel": name, "seconds": s} for name, s in compiling.done], **result}, seconds, json)
 
 
-def _make(now: Callable[[str], None], compiling: Compiling) -> list[Any]:
+def _make(progress: Progress, compiling: Compiling) -> list[Any]:
     """Every run and fit, in turn; says which of them had to wait, for what and how long. Returns their kernels."""
     from omnidyn.compiled.kernel import kept
     from omnidyn.control import first_runs as of_control
@@ -51,7 +51,7 @@ def _make(now: Callable[[str], None], compiling: Compiling) -> list[Any]:
     every = [*of_identification.first_runs(), *of_control.first_runs()]
     for k, (what, make) in enumerate(every):
         done, step = len(compiling.done), f"{k + 1} of {len(every)}, {what}"
-        now(step)
+        progress(Report(step))
         make()
         new = compiling.done[done:]
         if new:

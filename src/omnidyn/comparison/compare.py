@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from omnidyn.logs.channels import components
 from omnidyn.model.first_guess import rests_on
 from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.robot import Robot
+from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list
 from omnidyn.simulation.engine import TOLERANCE
 from omnidyn.statement import Statement
@@ -29,7 +30,7 @@ ABSENT = Trace(np.zeros(0), np.zeros(0), np.zeros(0))
 def compare(
     robot: Robot, run: Run | Sequence[Run], other: Robot | None = None, *, apply: str | None = None,
     hold: float = HOLD, current_unsigned: bool = False, tol: float | None = TOLERANCE, seed: int = 0,
-    progress: Callable[[str], object] | None = None, band: bool = False, log: LogEffects | None = None,
+    progress: Progress = silent, band: bool = False, log: LogEffects | None = None,
 ) -> Comparison:  # fmt: skip
     """Replay logs against one robot, or two, and measure how near each comes.
 
@@ -37,7 +38,7 @@ def compare(
     segment between gaps is a free run from the measured start; the model never sees what was measured after it.
     run: one Run or several. other: a second robot under the same inputs. apply: another input than the first that was
     logged. hold: how long a missing input keeps its value [s]. current_unsigned: compare currents by size, for a
-    sensor without sign. tol: as in `simulate`. seed: of the bootstrap. progress: is told what is being replayed.
+    sensor without sign. tol: as in `simulate`. seed: of the bootstrap. progress: hears what is being replayed.
     band: how far each model may be off by the std of its robot file, from a hundred plausible robots (`with_bands`).
     log: what the logs do beside the robot, such as `robot.log` of a fit; None: what the file of a robot says of its own
     logs, which are known by what they hold; others get none of it.
@@ -50,8 +51,7 @@ def compare(
     channels = what_is_compared([*robots.values()], runs, apply)
     replays: dict[str, list[Replay]] = {name: [] for name in robots}
     for k, each in enumerate(runs):
-        if progress is not None:
-            progress(f"replaying {each.source or 'a run'}, {k + 1} of {len(runs)}")
+        progress(Report(f"replaying {each.source or 'a run'}, {k + 1} of {len(runs)}"))
         for name, model in robots.items():
             replays[name].append(replay(model, each, apply=apply, hold=hold, tol=tol, log=log))
     segments = _segments(runs, next(iter(replays.values())))
@@ -76,8 +76,7 @@ def compare(
     )
     if not band:
         return found
-    if progress is not None:
-        progress("replaying plausible robots for the band")
+    progress(Report("replaying plausible robots for the band"))
     return with_bands(found, [*robots.values()], apply=apply, hold=hold, seed=seed, log=log)
 
 

@@ -10,7 +10,7 @@ its own. A search by Nelder and Mead (1965) finds the least J; what it says of t
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -30,6 +30,7 @@ from omnidyn.errors import InputError
 from omnidyn.model.known.told import told
 from omnidyn.model.known.uncertainty import plausible
 from omnidyn.model.robot import Robot
+from omnidyn.progress import Progress, Report, silent
 from omnidyn.shown import Shown
 from omnidyn.statement import NOTE, Statement, as_verdict
 
@@ -165,7 +166,7 @@ class Tuned(Shown):
 def tune(
     robot: Robot, path: Path | str | Sequence[Path | str], controller: str = "pid", *, draws: int = DRAWS,
     evaluations: int = EVALUATIONS, noise: float = NOISE, delay: int = 0, dt: float = DT, duration: float | None = None,
-    seed: int = 0, progress: Callable[[str], None] | None = None,
+    seed: int = 0, progress: Progress = silent,
 ) -> Tuned:  # fmt: skip
     """Find the gains of a controller by simulation, over the robots that the file says may be meant.
 
@@ -190,8 +191,7 @@ def tune(
     def cost(places: FloatArray) -> float:
         gains = {name: each.at(float(place)) for (name, each), place in zip(ranges.items(), places, strict=True)}
         outside = float(np.sum(np.maximum(np.abs(places - 0.5) - 0.5, 0.0)))
-        if progress is not None:
-            progress(f"trying {', '.join(f'{name} {value:g}' for name, value in gains.items())}")
+        progress(Report(f"trying {', '.join(f'{name} {value:g}' for name, value in gains.items())}"))
         found = _score(robot, seen, follow, _with(spec, gains), around).cost
         tried.append((found, gains))
         return math.log(found) + outside

@@ -24,8 +24,7 @@ from omnidyn.identification.methods import as_driven, choose_method, settle_meth
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import WHOLE, Fit
-from omnidyn.identification.output_error.solve.progress import Progress
-from omnidyn.identification.output_error.solve.solver import State
+from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.question import AUTO, FIT, MOTORS, OUTPUT_ERROR, STEADY, STEADY_STATE, Question
 from omnidyn.identification.recordings import fingerprint
 from omnidyn.identification.steady.axis_lines import identify_lines
@@ -45,6 +44,7 @@ from omnidyn.identification.whole_logs import fit_output_error, solved
 from omnidyn.logs.log import Log
 from omnidyn.model.drive import SPEED
 from omnidyn.model.robot import Robot
+from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list
 from omnidyn.shown import FIGURE, Shown, make
 from omnidyn.statement import ERROR, NOTE, SEVERITIES, WARNING, Statement, statements
@@ -52,7 +52,6 @@ from omnidyn.statement import ERROR, NOTE, SEVERITIES, WARNING, Statement, state
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Tell = Callable[[str], object]
 Save = Callable[[Mapping[str, Estimate]], object]
 
 LINE = "line"  # a shape: the paper's line on each axis
@@ -111,14 +110,14 @@ class Identification(Shown):
     @shows_options(FIT, STEADY)
     def of(
         cls, runs: Run | Sequence[Run], robot: Robot, question: Question | None = None, *, logs: Sequence[Log] = (),
-        progress: Tell | None = None, tell: Tell | None = None, keep_best: bool = False, save: Save | None = None,
+        progress: Progress = silent, keep_best: bool = False, save: Save | None = None,
         **options: Unpack[Options],
     ) -> Identification:  # fmt: skip
         """Choose the method; check, fit, validate and advise.
 
         question, options: see `Question`; the sources of the runs tell their groups, and which are held out. logs:
-        where the runs come from, to be checked as well. progress: is called with what is being done. tell: with what a
-        user must know at once. keep_best: an interrupt leaves the best so far, instead of being raised. save: is called
+        where the runs come from, to be checked as well. progress: hears what is done.
+        keep_best: an interrupt leaves the best so far, instead of being raised. save: is called
         with the estimates of all groups as soon as they are there, and again where a later step changes them.
         What follows the fit may fail: `missing` names it then, with the reason.
         Errors: as `identify` raises.
@@ -127,15 +126,16 @@ class Identification(Shown):
         every = as_list(runs)
         robot = as_driven(robot, every)
         asked = (question or Question()).but(options)
-        heard = _Heard(progress or _discard, tell or _discard, save or _discard, Attempts(keep=keep_best))
+        heard = _Heard(progress, save or _discard, Attempts(keep=keep_best))
         if asked.what == MOTORS:
             raise UnsupportedError("motors have functions of their own", got=MOTORS, where="what")
-        asked = settle_method(every, robot, asked, heard.tell)
+        asked = settle_method(every, robot, asked, progress)
         if asked.method == STEADY_STATE:
-            return _steady(every, robot, asked, log_verdicts(logs, robot, heard.now, heard.tell), heard)
+            return _steady(every, robot, asked, log_verdicts(logs, robot, heard.progress), heard)
         why = why_not_output_error(every, robot) if robot.drive.kind == SPEED else ""
         if why:
-            heard.tell(f"{why}; `method` {STEADY_STATE} (`group` instead of `per`) answers in seconds")
+            words = f"{why}; `method` {STEADY_STATE} (`group` instead of `per`) answers in seconds"
+            progress(Report(words, urgent=True))
         return _fitted(every, robot, asked, logs, heard)
 
     def __repr__(self) -> str:
@@ -213,8 +213,7 @@ class Identification(Shown):
 class _Heard:
     """Who hears what is done, what must be known at once, and estimates that are done; what was not made."""
 
-    now: Tell
-    tell: Tell
+    progress: Progress
     save: Save
     attempts: Attempts
 
@@ -236,7 +235,7 @@ def _steady(
     groups = None if names is None else [name for name in names if name]
     plain = replace(asked, group=())
     mend = tuple(verdict_advice(verdicts))
-    heard.now("fitting")
+    heard.progress(Report("fitting"))
     if asked.shape == LINE:
         lines = identify_lines(used, robot, groups=groups, question=plain)
         heard.save(lines)
@@ -244,7 +243,7 @@ def _steady(
     with told_why(verdicts, STEADY_USE):
         fit = fit_steady(used, robot, groups=groups, question=plain)
     heard.save(fit.estimates)
-    heard.now("diagnosing")
+    heard.progress(Report("diagnosing"))
     if asked.quick:
         heard.attempts.leave_out(DIAGNOSIS, QUICK)
     found = None if asked.quick else heard.attempts.make(DIAGNOSIS, partial(diagnosed, fit))
@@ -265,8 +264,8 @@ def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[L
     names = list(dict.fromkeys(group for _, group in chosen))
     if asked.per and len(names) == 1:
         raise InputError("the logs have only one group", got=names[0], expected="two or more", where="per")
-    verdicts = log_verdicts(logs, robot, heard.now, heard.tell)
-    heard.now("fitting: loading")
+    verdicts = log_verdicts(logs, robot, heard.progress)
+    heard.progress(Report("fitting: loading"))
     plain = replace(asked, per=(), hold_out=())
     answer, cut = _answered(
         [run for run, _ in chosen], robot, plain, [g for _, g in chosen] if asked.per else None, heard
@@ -281,14 +280,14 @@ def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[L
     own = {name: [run for run, group in chosen if group == name] for name in answer.estimates}
     compared = {
         name: heard.attempts.make(
-            f"{COMPARISON}{_of_group(name, own)}", partial(validate, fit, own[name], aside[name], heard.now)
+            f"{COMPARISON}{_of_group(name, own)}", partial(validate, fit, own[name], aside[name], heard.progress)
         )
         for name, fit in answer.estimates.items()
     }
     validations = {name: found for name, found in compared.items() if found is not None}
     if any(map(rest_on_guesses, verdicts)):
         first = next(iter(answer.estimates.values())).robot
-        judged = partial(judged_by_fit, verdicts, logs, first, heard.now, heard.tell)
+        judged = partial(judged_by_fit, verdicts, logs, first, heard.progress)
         verdicts = heard.attempts.make(JUDGEMENT, judged) or verdicts
     steps = [*verdict_advice(verdicts), *_not_independent(runs, held)]
     for group, fit in answer.estimates.items():
@@ -310,7 +309,7 @@ def _diagnosed(
     found = {}
     for name, fit in fits.items():
         of = _of_group(name, fits)
-        heard.now(f"diagnosing{of}")
+        heard.progress(Report(f"diagnosing{of}"))
         made = heard.attempts.make(f"{DIAGNOSIS}{of}", lambda fit=fit: fit.diagnosis)
         found[name] = fit if made is not None else replace(fit, study=None)
     return found
@@ -337,10 +336,11 @@ def _answered(
     """(answer, whether an interrupt cut the fit off)."""
     steps = 0
 
-    def better(state: State) -> None:
+    def listen(report: Report) -> None:
         nonlocal steps
-        steps += 1
-        heard.now(f"fitting, step {steps}, -log likelihood {state.objective:.6g}")
+        steps += report.state is not None
+        words = f", step {steps}, -log likelihood {report.state.objective:.6g}" if report.state else f": {report.phase}"
+        heard.progress(Report(f"fitting{words}"))
 
     plain: list[Answer] = []
 
@@ -348,7 +348,7 @@ def _answered(
         plain.append(answer)
         heard.save(answer.estimates)
 
-    progress = Progress(better, lambda words: heard.now(f"fitting: {words}"))
+    progress = FitProgress(listen)
     fit = Fit.of(runs, robot, asked, groups, progress)
     try:
         return solved(fit, runs, progress, groups, keep), False
@@ -360,6 +360,6 @@ def _answered(
         if isinstance(error, Exception) or not heard.attempts.keep or progress.best is None:
             raise
         heard.attempts.interrupt = error
-        heard.now("finishing with the best so far")
-        heard.tell("interrupted: finishing with the best so far (again: give up)")
+        heard.progress(Report("finishing with the best so far"))
+        heard.progress(Report("interrupted: finishing with the best so far (again: give up)", urgent=True))
         return fit.answer(progress.best), True

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -13,41 +13,40 @@ from omnidyn.findings.finding import Finding, Verdict
 from omnidyn.findings.guesses import gone_by_fit, judged_again, rest_on_guesses
 from omnidyn.logs.log import Log
 from omnidyn.model.robot import Robot
+from omnidyn.progress import Progress, Report
 from omnidyn.statement import ERROR, Statement
-
-Tell = Callable[[str], object]
 
 CHECKED = 1_000_000  # rows that are checked on the way
 OF_MOTORS = ("voltage", "duty", "current", "supply", "wheel_speed", "wheel_angle")
 
 
-def log_verdicts(logs: Sequence[Log], robot: Robot | None, now: Tell, tell: Tell) -> tuple[Verdict, ...]:
-    """What check says of each log, where they are not too long; `tell` hears of fatal findings at once."""
+def log_verdicts(logs: Sequence[Log], robot: Robot | None, progress: Progress) -> tuple[Verdict, ...]:
+    """What check says of each log, where they are not too long; `progress` hears of fatal findings at once."""
     if sum(len(log) for log in logs) > CHECKED:
-        tell("the logs are long: not checked on the way (omnidyn check does)")
+        progress(Report("the logs are long: not checked on the way (omnidyn check does)", urgent=True))
         return ()
     found = []
     for k, log in enumerate(logs):
-        now(f"checking {k + 1} of {len(logs)}")
+        progress(Report(f"checking {k + 1} of {len(logs)}"))
         found.append(check_log(log, robot))
     for mend in verdict_advice(found):
-        tell(f"{mend.severity}: {mend}")
+        progress(Report(f"{mend.severity}: {mend}", urgent=True))
     return tuple(found)
 
 
 def judged_by_fit(
-    verdicts: Sequence[Verdict], logs: Sequence[Log], robot: Robot, now: Tell, tell: Tell
+    verdicts: Sequence[Verdict], logs: Sequence[Log], robot: Robot, progress: Progress
 ) -> tuple[Verdict, ...]:
-    """The verdicts with what rested on a guess judged again by the fitted robot; `tell` hears of what went away."""
+    """The verdicts with what rested on a guess judged again by the fitted robot; `progress` hears of what went away."""
     if not any(map(rest_on_guesses, verdicts)):
         return tuple(verdicts)
-    now("judging by the fitted robot what rested on a guess")
+    progress(Report("judging by the fitted robot what rested on a guess"))
     found = [
         judged_again(each, check_log(log, robot)) if rest_on_guesses(each) else each
         for each, log in zip(verdicts, logs, strict=True)
     ]
     for source, finding in gone_by_fit(found):
-        tell(f"{source or 'the log'}: {finding.subject}: {finding}")
+        progress(Report(f"{source or 'the log'}: {finding.subject}: {finding}", urgent=True))
     return tuple(found)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,9 +12,8 @@ from omnidyn.identification.question import AUTO, OUTPUT_ERROR, STEADY_STATE, Qu
 from omnidyn.identification.steady.settling import why_no_transient
 from omnidyn.model.drive import DUTY, SPEED, VOLTAGE
 from omnidyn.model.robot import MEASURED, Prior, Robot
+from omnidyn.progress import Progress, Report
 from omnidyn.run import Run
-
-Tell = Callable[[str], object]
 
 
 def as_driven(robot: Robot, runs: Sequence[Run]) -> Robot:
@@ -51,12 +50,12 @@ def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
     return why_no_transient(runs, robot)
 
 
-def settle_method(runs: Sequence[Run], robot: Robot, question: Question, tell: Tell) -> Question:
-    """The question with its method, by name, by options, or by what robot and logs support; `tell` hears why."""
+def settle_method(runs: Sequence[Run], robot: Robot, question: Question, progress: Progress) -> Question:
+    """The question with its method, by name, by options, or by what robot and logs support; `progress` hears why."""
     method = question.method_asked()
     if method == AUTO:
         why = why_not_output_error(runs, robot)
         method = STEADY_STATE if why else OUTPUT_ERROR
         if why:
-            tell(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {why}")
+            progress(Report(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {why}", urgent=True))
     return replace(question, method=method)

@@ -6,7 +6,7 @@ held-out logs where there are any. Headings and positions count on the logs they
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -23,6 +23,7 @@ from omnidyn.document import Document, Points, Table, cell, chance_cell
 from omnidyn.identification.lack_of_fit import LackOfFit
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.logs.channels import place
+from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list
 from omnidyn.statement import NOTE, WARNING, Statement
 from omnidyn.statistics import difference_noise, find_tick, robust_std
@@ -138,7 +139,7 @@ def _scatter(found: Comparison, name: str) -> float:
 
 def validate(
     fit: OutputErrorEstimate, runs: Sequence[Run], held_out: Sequence[Run] = (),
-    progress: Callable[[str], object] | None = None,
+    progress: Progress = silent,
 ) -> Validation:  # fmt: skip
     """Run the fitted robot freely beside the logs it was fitted to and beside those held out, nuisances included.
 
@@ -148,8 +149,8 @@ def validate(
     """
     runs, held_out = as_list(runs), as_list(held_out)
     check_order("validate(fit, runs)", (fit, OutputErrorEstimate), (runs, Run), (held_out, Run))
-    if progress is not None and fit.study is not None:
-        progress("diagnosing")
+    if fit.study is not None:
+        progress(Report("diagnosing"))
     lack = fit.lack_of_fit
     fitted = _compared(fit, runs, progress)
     other = _compared(fit, held_out, progress) if held_out else None
@@ -166,7 +167,7 @@ def _misfit(lack: LackOfFit | None, components: Collection[str]) -> dict[str, fl
     return {name: lack.channels.get(output_name(name), 0.0) for name in components} if lack.found else {}
 
 
-def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Callable[[str], object] | None) -> Comparison:
+def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Progress) -> Comparison:
     return compare(fit.robot, list(runs), progress=progress, log=fit.robot.log)
 
 

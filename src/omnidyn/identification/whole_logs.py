@@ -16,53 +16,54 @@ from omnidyn.identification.output_error.answer import Answer, OutputErrorEstima
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.memory.whitening import Weighed
 from omnidyn.identification.output_error.moved_by import MovedBy
-from omnidyn.identification.output_error.solve.progress import Progress
-from omnidyn.identification.output_error.solve.solver import Solution, State
+from omnidyn.identification.output_error.solve.progress import FitProgress
+from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.question import FIT, OUTPUT_ERROR, Question
 from omnidyn.model.robot import Robot
+from omnidyn.progress import Progress
 from omnidyn.run import Run, as_list
 
 
 @shows_options(FIT)
 def fit_output_error(
     runs: Run | Sequence[Run], robot: Robot, *, question: Question | None = None,
-    watch: Callable[[State], object] | None = None, **options: Unpack[Options],
+    progress: Progress | None = None, **options: Unpack[Options],
 ) -> OutputErrorEstimate:  # fmt: skip
     """Fit numbers of a robot to whole logs by maximum likelihood of the model's free run.
 
     runs: one or many, of any length and rate; they are split at gaps. Inputs: voltage, or duty times the supply.
     question, options: those of `Question` that belong to output error, such as free=, nuisances=, loss=.
-    watch: is called with every better state on the way; a Progress is told in words what is done, too.
+    progress: hears what is done, and of every better state on the way.
 
     Returns an Estimate with nuisances, noise and what is not identifiable. Errors: see `Fit.of` and `Fit.answer`.
     """
     check_order("fit_output_error(runs, robot)", (runs, Run), (robot, Robot))
-    progress = Progress.of(watch)
-    fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), progress=progress)
-    return solved(fit, as_list(runs), progress).estimate
+    listener = FitProgress.of(progress)
+    fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), progress=listener)
+    return solved(fit, as_list(runs), listener).estimate
 
 
 @shows_options(FIT)
 def identify_groups(
     runs: Sequence[Run], robot: Robot, groups: Sequence[str], *, question: Question | None = None,
-    watch: Callable[[State], object] | None = None, **options: Unpack[Options],
+    progress: Progress | None = None, **options: Unpack[Options],
 ) -> Answer:  # fmt: skip
     """Fit logs of several groups at once by output error.
 
-    groups: name of each run's group. question, options, watch: as in `fit_output_error`; per_free= names the numbers
+    groups: name of each run's group. question, options, progress: as in `fit_output_error`; per_free= names the numbers
     that each group has for itself.
     Raises InputError for what cannot be used, InsufficientDataError where a group says nothing about its numbers, or
     has too few runs for a bootstrap, UnsupportedError for robots and logs that output error does not take.
     """
     check_order("identify_groups(runs, robot, groups)", (runs, Run), (robot, Robot))
     runs = as_list(runs)
-    progress = Progress.of(watch)
-    fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), groups, progress)
-    return solved(fit, runs, progress, groups)
+    listener = FitProgress.of(progress)
+    fit = Fit.of(runs, robot, Question.for_method(OUTPUT_ERROR, question, options), groups, listener)
+    return solved(fit, runs, listener, groups)
 
 
 def solved(
-    fit: Fit, runs: Sequence[Run], progress: Progress, groups: Sequence[str] | None = None,
+    fit: Fit, runs: Sequence[Run], progress: FitProgress, groups: Sequence[str] | None = None,
     without_ladder: Callable[[Answer], object] | None = None,
 ) -> Answer:  # fmt: skip
     """The answer of a fit of some runs, with the ladder where that is asked for. groups: name of each run's group.
@@ -85,7 +86,7 @@ def solved(
     return replace(answer, estimates=estimates)
 
 
-def answered(fit: Fit, solution: Solution, progress: Progress) -> Answer:
+def answered(fit: Fit, solution: Solution, progress: FitProgress) -> Answer:
     """What a solution says, each estimate with its diagnosis, which is made when it is first asked for; `quick` leaves
     it out."""
     if not solution.converged:

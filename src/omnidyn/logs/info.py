@@ -24,8 +24,8 @@ from omnidyn.logs.readers.read_table import iter_tables, reader_of
 from omnidyn.logs.readers.reader import Options, completed
 from omnidyn.logs.readers.recording import Topic
 from omnidyn.logs.table.table import Table
-from omnidyn.logs.table.text_file import Progress
 from omnidyn.model.robot import Robot
+from omnidyn.progress import Progress, silent
 from omnidyn.statement import Statement, statements
 
 NAMES = {"": "text", "sqlite": "db3"}  # of formats, where the name of the reader is another
@@ -87,11 +87,11 @@ class Info:
 
 def read_info(
     path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None, *,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Info:  # fmt: skip
     """What a file holds. robot, options: as for a log. Raises InputError where nothing can be read.
 
-    progress(bytes_done, bytes_total) is called now and then.
+    progress: hears now and then how many bytes are done, of how many.
     """
     options, reader = options or LogOptions(), reader_of(path)
     kind = NAMES.get(reader.kind, reader.kind)
@@ -143,7 +143,7 @@ class _Seen:
 
 
 def _of_columns(
-    path: str | os.PathLike, kind: str, robot: Robot | None, options: LogOptions, progress: Progress | None
+    path: str | os.PathLike, kind: str, robot: Robot | None, options: LogOptions, progress: Progress
 ) -> Info:
     """A table: a topic for each column. It is read in pieces, whatever its length."""
     seen: dict[str, _Seen] = {}
@@ -167,7 +167,7 @@ def _of_columns(
     return Info(printable(str(path)), kind, topics, mapping, max(0.0, last - first), None, notes, why, table.sha256)
 
 
-def _tables(path: str | os.PathLike, options: LogOptions, progress: Progress | None) -> Iterator[Table]:
+def _tables(path: str | os.PathLike, options: LogOptions, progress: Progress) -> Iterator[Table]:
     tables = map(with_joined_stamp, iter_tables(path, PIECE, progress=progress, **options.of_tables))
     return timed(tables, options.rate, options.skip_bad_rows)
 

@@ -30,11 +30,11 @@ from omnidyn.logs.readers.read_table import iter_tables, read_table
 from omnidyn.logs.readers.reader import Options
 from omnidyn.logs.table.dialect import split_unit
 from omnidyn.logs.table.table import ROWS, Table
-from omnidyn.logs.table.text_file import Progress
 from omnidyn.logs.together import joined_table
 from omnidyn.model.frames import unwrapped
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import MIN_WHEELS, wheel_speed
+from omnidyn.progress import Progress, silent
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
 from omnidyn.statement import NOTE, Statement, statements
 
@@ -131,7 +131,7 @@ def load_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOp
     if options.beside and options.rate is not None:
         raise InputError("files without time cannot be joined by time", got="`rate` with files beside", expected="one")
     if options.beside:
-        how = Options(options.header, options.skip_bad_rows, options.max_bytes, None, options.variables)
+        how = Options(options.header, options.skip_bad_rows, options.max_bytes, variables=options.variables)
         alone = replace(options, overrides=())  # columns of the whole, which one file alone need not have
         table = joined_table([path, *options.beside], how, lambda part: map_columns(part, None, alone))
     else:
@@ -317,11 +317,11 @@ def driven_way(log: Log, robot: Robot | None) -> tuple[FloatArray | None, str]:
 
 def iter_logs(
     path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None, *,
-    rows: int = ROWS, progress: Progress | None = None,
+    rows: int = ROWS, progress: Progress = silent,
 ) -> Iterator[Log]:  # fmt: skip
     """The blocks of a log too long for memory, at most `rows` rows each, all under the map of the first.
 
-    progress(bytes_done, bytes_total) is called now and then. Time counts from the first block. Raises InputError.
+    progress: hears how many bytes are done. Time counts from the first block. Raises InputError.
     """
     options, columns, clock = options or LogOptions(), None, Clock()
     tables = map(with_joined_stamp, iter_tables(path, rows, progress=progress, **options.of_tables))

@@ -7,7 +7,7 @@ from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.joint import join
-from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.question import Question
 from omnidyn.identification.whole_logs import identify_groups
 from omnidyn.model.keys import BOX, Key
@@ -105,12 +105,12 @@ def test_the_best_so_far_is_what_the_state_says_and_the_same_again():
     for _ in range(2):
         joint, states = Fit.of(runs, AXEBOT, Question(free=["friction", TORQUE], **QUIET), names), []
 
-        def watch(state, kept=states):
-            kept.append(state)
+        def listen(report, kept=states):
+            kept += [report.state] if report.state is not None else []
             if len(kept) == 2:
                 raise KeyboardInterrupt
 
-        progress = Progress(watch)
+        progress = FitProgress(listen)
         with pytest.raises(KeyboardInterrupt):
             joint.solve(progress)
         found.append(joint.answer(progress.best))

@@ -56,7 +56,7 @@ def test_what_it_held_at_first_is_read(tmp_path, write):
     before = path.read_bytes()
     quiet = read_table(path)
 
-    def writer(done, total):
+    def writer(report):
         with open(path, "ab") as stream:
             stream.write(more)
 

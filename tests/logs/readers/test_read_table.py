@@ -223,7 +223,7 @@ def test_progress_goes_from_nothing_to_all(tmp_path):
     path = tmp_path / "long.csv"
     path.write_text("t,u\n" + "1,2\n" * 500_000)
     told = []
-    list(iter_tables(path, progress=lambda done, total: told.append((done, total))))
+    list(iter_tables(path, progress=lambda report: told.append((report.done, report.total))))
     size = path.stat().st_size
     assert [total for _, total in told] == [size] * len(told)
     done = [done for done, _ in told]

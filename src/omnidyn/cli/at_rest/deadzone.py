@@ -38,9 +38,9 @@ def deadzone(
 
 
 def _draw(found: DeadZone, path: str, force: bool) -> None:
-    from omnidyn.cli.terminal.progress import progress
+    from omnidyn.cli.terminal.progress import shown_progress
     from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
 
-    with progress("drawing the map"):
+    with shown_progress("drawing the map"):
         name = found.robot.name
         write_picture(draw_dead_zone_map({name: found.robot}, {name: found}), path, force)

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from omnidyn.cli.log_options import WITH, keep_inputs
-from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.telling import tell
 from omnidyn.files import check_output
+from omnidyn.progress import Report
 
 if TYPE_CHECKING:
     from omnidyn.control.tracking import Tracking
@@ -69,9 +70,9 @@ def track(
     asked, options = demand(believed, follow), told_of_loop(believed, around)
     options |= {} if horizon is None else {"horizon": horizon}
     found: list[Tracking] = []
-    with progress("tracking") as now:
+    with shown_progress("tracking") as progress:
         for each in several(controller, believed, no_friction, no_observer, **options):
-            now(f"tracking with {each.name}, {len(found) + 1} of {len(controller)}")
+            progress(Report(f"tracking with {each.name}, {len(found) + 1} of {len(controller)}"))
             found.append(tracked(driven, follow, each, around))
     document = trackings_document(found, notes := [asked.verdict, *asked.statements()])
     record = _record(robot, plant, files)
@@ -108,7 +109,7 @@ def _draw(
 ) -> None:
     from omnidyn.files import write_atomic
 
-    with progress("drawing"):
+    with shown_progress("drawing"):
         if report:
             from omnidyn.report.tracking.page import render_tracking
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from omnidyn.cli.log_options import keep_inputs
-from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.telling import tell
 from omnidyn.files import check_output
 
@@ -42,10 +42,10 @@ def tune(
     others = [input_file("controller" if name == controller else "path", name) for name in files]
     record = provenance([robot_input(robot), *others])
     loaded = load_robot(robot)
-    with progress("tuning") as now:
+    with shown_progress("tuning") as progress:
         found = tune_controller(
             loaded, path, controller, draws=draws, evaluations=evaluations, noise=noise, delay=delay, dt=dt,
-            duration=duration, seed=seed, progress=now,
+            duration=duration, seed=seed, progress=progress,
         )  # fmt: skip
     if out:
         save_controller(found.controller, out, force)

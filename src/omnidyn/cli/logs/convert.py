@@ -12,7 +12,7 @@ import typer
 import omnidyn
 from omnidyn.cli import log_options
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
-from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.streams import say
 from omnidyn.files import check_output
 
@@ -46,7 +46,7 @@ def convert(
 
     check_format(out)
     options, maps = replace(flags.options(), beside=tuple(beside)), flags.maps(force)
-    with progress("reading"):
+    with shown_progress("reading"):
         read = omnidyn.load_log(log, omnidyn.load_robot(robot) if robot else None, options)
         maps.show(log, read.columns)
         runs = [part.to_run(sort=flags.sort) for part in (read.recordings() if split else [read])]

@@ -7,10 +7,11 @@ import typer
 import omnidyn
 from omnidyn.cli import log_options
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
-from omnidyn.cli.terminal.progress import progress
+from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import width
 from omnidyn.cli.terminal.telling import tell
+from omnidyn.progress import Report
 
 
 @reads_logs("latency", "save_map", "sort", "current_unsigned")
@@ -32,12 +33,12 @@ def info(
 
     if file.lower().endswith(".toml"):
         return tell(omnidyn.load_robot(file).document(), json, provenance([robot_input(file)]), width=width())
-    with progress("reading") as now:
+    with shown_progress("reading") as progress:
 
-        def said(count: int, total: int) -> None:
-            now(f"reading {file}, {100 * count // max(total, 1)} %")
+        def listen(report: Report) -> None:
+            progress(report._replace(phase=f"reading {file}"))
 
         loaded = omnidyn.load_robot(robot) if robot else None
-        found = read_info(file, loaded, flags.options(), progress=said)
+        found = read_info(file, loaded, flags.options(), progress=listen)
     inputs = [*([robot_input(robot)] if robot else []), {"role": "log", "name": file, "sha256": found.sha256}]
     tell(found.document(), json, provenance(inputs), width=width())

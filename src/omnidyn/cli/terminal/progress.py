@@ -5,10 +5,11 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from omnidyn.cli.terminal.streams import say
 from omnidyn.compiled.hearing import Compiling, heard
+from omnidyn.progress import Progress, Report
 
 SILENT_S, NEW_S, BEAT_S = 2.0, 3.0, 5.0
 COMPILING = " (a kernel is being compiled: once, the first time)"
@@ -16,24 +17,31 @@ WARM = "omnidyn: a first run waits for the compiler, up to a minute; `omnidyn wa
 
 
 @contextlib.contextmanager
-def progress(step: str, hint: str = WARM) -> Iterator[Callable[[str], None]]:
+def shown_progress(phase: str, hint: str = WARM) -> Iterator[Progress]:
     """Says after 2 s, and then every 5 s, what is being done: every 3 s where that is something new.
 
     hint: said once, where the compiler is waited for; "": nothing.
-    Yields the function that names the next step.
+    Yields the listener; what is urgent is said at once.
     """
-    steps, done = [step], threading.Event()
+    steps, done = [Report(phase)], threading.Event()
+
+    def listen(report: Report) -> None:
+        if report.urgent:
+            say(f"omnidyn: {report}")
+        else:
+            steps[0] = report
+
     with heard() as compiling:
         teller = threading.Thread(target=_tell, args=(steps, done, compiling, hint), daemon=True)
         teller.start()
         try:
-            yield steps.append
+            yield listen
         finally:
             done.set()
             teller.join()
 
 
-def _tell(steps: list[str], done: threading.Event, compiling: Compiling, hint: str) -> None:
+def _tell(steps: list[Report], done: threading.Event, compiling: Compiling, hint: str) -> None:
     said, wait, started = "", SILENT_S, time.monotonic()
     while not done.wait(wait):
         if _now(steps, compiling) == said and done.wait(BEAT_S - NEW_S):
@@ -45,6 +53,6 @@ def _tell(steps: list[str], done: threading.Event, compiling: Compiling, hint: s
         say(f"omnidyn: {said} ... {time.monotonic() - started:.0f} s")
 
 
-def _now(steps: list[str], compiling: Compiling) -> str:
+def _now(steps: list[Report], compiling: Compiling) -> str:
     """What is being done."""
-    return steps[-1] + (COMPILING if compiling.under_way else "")
+    return str(steps[0]) + (COMPILING if compiling.under_way else "")

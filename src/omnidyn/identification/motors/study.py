@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
@@ -33,6 +33,7 @@ from omnidyn.identification.question import MOTOR_FIT, MOTOR_LINES, MOTORS, OUTP
 from omnidyn.logs.log import Log
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.model.robot import Robot
+from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list
 from omnidyn.shown import FIGURE, Shown, make
 from omnidyn.statement import ERROR, NOTE, WARNING, Statement, as_verdict, by_severity, statements
@@ -150,15 +151,14 @@ class MotorStudy(Shown):
 @shows_options(MOTOR_FIT, MOTOR_LINES)
 def identify_motors(
     runs: Run | Sequence[Run] | MotorTable, robot: Robot | None = None, *, question: Question | None = None,
-    logs: Sequence[Log] = (), now: Callable[[str], object] = lambda words: None,
-    tell: Callable[[str], object] = lambda words: None, **options: Unpack[Options],
+    logs: Sequence[Log] = (), progress: Progress = silent, **options: Unpack[Options],
 ) -> MotorStudy:  # fmt: skip
     """Slope, dead band, lag and inertia of every motor of some logs.
 
     Steady state, which is the default, takes windows in integral form and gives the line of all motors together too;
     output error takes free runs of whole logs, with and without a dead band. question, options: see `Question`, such as
     method=, input=, window= or hold_out=. robot: whose heading is the speed, where that is "ground". logs: where the
-    runs come from, to be checked as well. now: is told what is done; tell: what a user must know at once. runs may be a
+    runs come from, to be checked as well. progress: hears what is done. runs may be a
     table of inputs and steady speeds, `read_motor_table`, and rows of a log that are more than 0.1 s apart are points
     like those of a table. Each direction of each motor has its own start, stop, line and lag in `MotorStudy.starts`.
     Raises InputError for options of another method and for a run without the channels, InsufficientDataError where the
@@ -175,10 +175,10 @@ def identify_motors(
         return _of_points(runs, "a table")
     every = as_list(runs)
     more = ["pose"] if asked.speed == GROUND else []
-    verdicts = log_verdicts([of_motors(log, *more) for log in logs], robot, now, tell)
+    verdicts = log_verdicts([of_motors(log, *more) for log in logs], robot, progress)
     with told_why(verdicts, MOTORS_USE):
         if asked.method_asked() == OUTPUT_ERROR:
-            study = _free_runs(every, asked, now)
+            study = _free_runs(every, asked, progress)
         else:
             study = _lines(motor_logs(every, asked.input, asked.speed, robot), asked)
     return replace(study, verdicts=verdicts)
@@ -229,7 +229,7 @@ def _of_points(points: MotorTable, origin: str, remarks: Sequence[Statement] = (
     )  # fmt: skip
 
 
-def _free_runs(runs: Sequence[Run], asked: Question, now: Callable[[str], object]) -> MotorStudy:
+def _free_runs(runs: Sequence[Run], asked: Question, progress: Progress) -> MotorStudy:
     away = held_out([run.source for run in runs], asked.hold_out)
     kept = [run for run, out in zip(runs, away, strict=True) if out]
     logs = logs_of_free_runs([run for run, out in zip(runs, away, strict=True) if not out], asked.input)
@@ -238,7 +238,7 @@ def _free_runs(runs: Sequence[Run], asked: Question, now: Callable[[str], object
     motors = [m for m in range(min(log.motors for log in logs)) if all(_driven(log, m) for log in logs)] or [0]
     latency, pairs = _latency(asked.nuisances), []
     for motor in motors:
-        now(f"fitting motor {motor + 1} of {len(motors)}")
+        progress(Report(f"fitting motor {motor + 1} of {len(motors)}"))
         late = is_late(own, motor, **how) if latency is None else latency
         fits = [fit_motor(own, motor, dead_band=band, latency=late, **how) for band in (True, False)]
         pairs.append([replace(fit, held_out=fit_rmse(fit, kept)) if kept else fit for fit in fits])

@@ -36,7 +36,7 @@ from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point
 from omnidyn.identification.output_error.solve.loop import FINE as LOOP_FINE
 from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_out, retimed, solve_loop
-from omnidyn.identification.output_error.solve.progress import Best, Progress
+from omnidyn.identification.output_error.solve.progress import Best, FitProgress
 from omnidyn.identification.output_error.solve.solver import ENOUGH, Normal, Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import Breakaway, asked_levels, find_breakaway
 from omnidyn.identification.output_error.trust.differences import differences
@@ -48,6 +48,7 @@ from omnidyn.identification.question import AUTO, GAUSS, STUDENT, Question
 from omnidyn.identification.recordings import count_once
 from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Robot
+from omnidyn.progress import silent
 from omnidyn.run import Run, as_list
 from omnidyn.statement import WARNING, Statement
 
@@ -63,7 +64,7 @@ class Fit:
     """A fit of whole logs, ready to be solved.
 
     `solve` finds the best point, `answer` says what it means. After an interrupt, `answer` takes the `best` of the
-    Progress that `solve` was given. began: the robot as it was given. twice: which runs were given twice.
+    FitProgress that `solve` was given. began: the robot as it was given. twice: which runs were given twice.
     """
 
     question: Question
@@ -74,7 +75,7 @@ class Fit:
     @classmethod
     def of(
         cls, runs: Run | Sequence[Run], robot: Robot, question: Question, groups: Sequence[str] | None = None,
-        progress: Progress | None = None, begins: Mapping[str, tuple[Robot, Question]] | None = None,
+        progress: FitProgress | None = None, begins: Mapping[str, tuple[Robot, Question]] | None = None,
     ) -> Fit:  # fmt: skip
         """Make runs of any length and rate, split at gaps, a problem. groups: name of each run's group. begins: group
         -> the robot that it begins from and what is asked of it, where that is not the same in all; then every key of
@@ -92,7 +93,7 @@ class Fit:
         if question.bootstrap:
             refuse_bootstrap(question.bootstrap, Counter(names if joint else [""] * len(names)))
         starts = {name: (begins or {}).get(name, (robot, question)) for name in (dict.fromkeys(names) or [WHOLE])}
-        (progress or Progress()).doing("looking for what moved")
+        (progress or FitProgress()).enter("looking for what moved")
         made = [
             begun(name, [run for run, own in zip(every, names, strict=True) if own == name], *start, joint)
             for name, start in starts.items()
@@ -110,18 +111,18 @@ class Fit:
         """Degrees of freedom of the loss; 0 for Gaussian noise."""
         return degrees(self.question.loss)
 
-    def solve(self, progress: Progress | None = None, unearned: Unearned | None = None) -> Solution:
+    def solve(self, progress: FitProgress | None = None, unearned: Unearned | None = None) -> Solution:
         """The best point; `progress` sees every better state on the way, and hears in words what is done.
 
         unearned: which automatic nuisances a log is better without, see structure/earned.py.
         """
-        progress = progress or Progress()
+        progress = progress or FitProgress()
         if len(self.groups) == 1:
             return self._settled(self.groups[0], progress, unearned)
         return self._solve_joint(self._settled_alone(progress, unearned), progress)
 
     def answer(
-        self, found: Solution | Best, progress: Progress | None = None, moved_by: MovedBy | None = None
+        self, found: Solution | Best, progress: FitProgress | None = None, moved_by: MovedBy | None = None
     ) -> Answer:
         """What the best point says; of the best so far without profile, bootstrap and breakaway.
 
@@ -130,7 +131,7 @@ class Fit:
         Raises InputError for a name to profile that is not free, InsufficientDataError where the logs say nothing about
         any of the robot's numbers.
         """
-        answer = self._answer(found, progress or Progress(), moved_by)
+        answer = self._answer(found, progress or FitProgress(), moved_by)
         note, estimates = band_note(self.began), answer.estimates
         return replace(
             answer,
@@ -140,13 +141,13 @@ class Fit:
             },
         )
 
-    def _answer(self, found: Solution | Best, progress: Progress, moved_by: MovedBy | None) -> Answer:
+    def _answer(self, found: Solution | Best, progress: FitProgress, moved_by: MovedBy | None) -> Answer:
         """The same, of the robot that was fitted."""
         done = isinstance(found, Solution)
         solution, warnings = (found, []) if isinstance(found, Solution) else self._so_far(found)
         warnings, hints = [*self.twice, *warnings], [*solution.notes, *self._hints(solution)]
         solution, levels = self.with_levels(solution, progress) if done else (solution, [])
-        progress.doing("finding how sure the numbers are")
+        progress.enter("finding how sure the numbers are")
         sure = self.weighed(solution, progress, anew=done)
         records = [record for group in self.groups for record in group.records]
         known, rounded = beside_rounding(sure, records, moved_by if done else None)
@@ -200,7 +201,7 @@ class Fit:
         known, group = known_priors(self.began), self.groups[0]
         return {key: known[key][1] for key in guesses(self.began, group.engine == LOOP) if key not in asked}
 
-    def weighed(self, solution: Solution, progress: Progress | None = None, anew: bool = True) -> Weighed:
+    def weighed(self, solution: Solution, progress: FitProgress | None = None, anew: bool = True) -> Weighed:
         """The trust in a solution; where its errors remember, that in the fit made anew for it, and its point.
 
         anew: whether there is time for that; after an interrupt there is none.
@@ -216,13 +217,13 @@ class Fit:
         why = why_not(solution)
         if asked and why:
             raise UnsupportedError(why, got=kind, expected="auto, white or sandwich", where="covariance")
-        found = None if why else whitened(solution, known, (progress or Progress()).doing)
+        found = None if why else whitened(solution, known, progress or silent)
         missed = unexplained(solution.solver, solution)
         if found is None or unexplained(found.plain.solver, found.plain).keys() - missed.keys():
             return as_it_is  # a memory that explains a whole output leaves nothing to the model
         return found
 
-    def _settled(self, group: Group, progress: Progress, unearned: Unearned | None) -> Solution:
+    def _settled(self, group: Group, progress: FitProgress, unearned: Unearned | None) -> Solution:
         """The fit of one group; automatic nuisances that the logs do not support are taken out again."""
         found = self._solve(group, group.problem(), progress)
         if self.question.nuisances is not None:
@@ -231,7 +232,7 @@ class Fit:
         if group.engine == IMPLICIT:
             kept = tuple(name for name in _nuisances(found.solver.problem) if name not in early)
         else:
-            progress.doing("which nuisances the logs support")
+            progress.enter("which nuisances the logs support")
             kept = supported(found.solver, found, (LATENCY,) if group.engine == LOOP else automatic(group.records))
         harmful = unearned(found) if unearned is not None and group.engine != LOOP else ()
         kept = tuple(name for name in kept if name not in harmful)
@@ -244,7 +245,7 @@ class Fit:
             progress = progress.aside(f"once more without {', '.join(lost)}")
         return replace(self._solve(group, group.problem(kept), progress), notes=notes)
 
-    def with_latencies_only(self, found: Solution, progress: Progress) -> Solution | None:
+    def with_latencies_only(self, found: Solution, progress: FitProgress) -> Solution | None:
         """The fit of one group without other automatic nuisances; None where there are none, or they were asked for.
 
         Beside them the logs may tell no number of the robot at all, or trade them without end, until rounding decides.
@@ -258,28 +259,28 @@ class Fit:
         note = Statement("unsettled_nuisances", WARNING, numbers={"nuisances": tuple(lost)})
         return replace(plainer, notes=(*found.notes, note))
 
-    def _solve(self, group: Group, problem: Problem, progress: Progress) -> Solution:
+    def _solve(self, group: Group, problem: Problem, progress: FitProgress) -> Solution:
         """The best point of one group alone."""
         if group.engine == LOOP:
             return solve_loop(problem, self.nu, progress)
         engine = make_engine(group.engine, problem)
         if group.engine == EXACT:
-            progress.doing("looking for a start")
+            progress.enter("looking for a start")
             solver = Solver(problem, engine, self.nu)
-            return solver.minimise(first_point(solver, group.records), watch=progress)
+            return solver.minimise(first_point(solver, group.records), progress=progress)
         near = coarse_point(problem, self.nu, progress)
         halfway = Solver(problem, make_engine(group.engine, problem, HALFWAY), self.nu, ENOUGH)
         scales = near.variance if self.nu else None  # counts find theirs anew: a step a row is too coarse for them
-        nearer = halfway.minimise(near.point, watch=progress, scales=scales)
+        nearer = halfway.minimise(near.point, progress=progress, scales=scales)
         return Solver(problem, engine, self.nu, CLOSE).minimise(
-            nearer.state.point, watch=progress, blocked=nearer.blocked, scales=nearer.state.variance
+            nearer.state.point, progress=progress, blocked=nearer.blocked, scales=nearer.state.variance
         )
 
-    def _settled_alone(self, progress: Progress, unearned: Unearned | None) -> tuple[str, ...] | None:
+    def _settled_alone(self, progress: FitProgress, unearned: Unearned | None) -> tuple[str, ...] | None:
         """The automatic nuisances that every group supports alone; None where they are not automatic, or all stay."""
         if not self._settles:
             return None
-        progress.doing("each group alone")
+        progress.enter("each group alone")
         names = automatic([record for group in self.groups for record in group.records])
         kept: tuple[str, ...] | None = None
         for group in self.groups:
@@ -295,7 +296,7 @@ class Fit:
         exact = all(group.engine == EXACT for group in self.groups)
         return self.question.nuisances is None and (exact or len(self.groups) == 1)
 
-    def _solve_joint(self, nuisances: Sequence[str] | None, progress: Progress) -> Solution:
+    def _solve_joint(self, nuisances: Sequence[str] | None, progress: FitProgress) -> Solution:
         """The best point of all groups together."""
         solver = self._solver(nuisances)
         engine = solver.engine
@@ -304,10 +305,10 @@ class Fit:
         if any(group.engine != EXACT for group in self.groups):  # first a step a row
             coarse = self._solver(nuisances, coarse=True)
             aside = progress.aside("all groups, first a step a row")
-            start = coarse.minimise(start, watch=aside).state.point
+            start = coarse.minimise(start, progress=aside).state.point
             if loop:
-                start = coarse.minimise(retimed(coarse, start, progress), watch=aside).state.point
-        found = solver.minimise(start, watch=progress)
+                start = coarse.minimise(retimed(coarse, start, progress), progress=aside).state.point
+        found = solver.minimise(start, progress=progress)
         return beyond_jumps(found, progress) if loop else found
 
     def _solver(self, nuisances: Sequence[str] | None, coarse: bool = False) -> Solver:
@@ -329,7 +330,7 @@ class Fit:
         else:
             solver = self._solver(None)
             assert isinstance(solver.engine, JointEngine)
-            state = solver.minimise(joint_start(solver.engine, self.nu, Progress(), best.alone), limit=0).state
+            state = solver.minimise(joint_start(solver.engine, self.nu, FitProgress(), best.alone), limit=0).state
             late = [group.name for group in self.groups if group.name not in best.alone]
             warnings += [Statement("group_not_fitted", WARNING, name) for name in late]
         return Solution(state, Normal(solver, state).held, 0, True, solver), warnings
@@ -340,7 +341,7 @@ class Fit:
         alone = len(self.groups) == 1 and group.engine == LOOP
         return left_out(group.records, solution.solver.problem.pieces) if alone else []
 
-    def with_levels(self, solution: Solution, progress: Progress | None = None) -> tuple[Solution, list[Breakaway]]:
+    def with_levels(self, solution: Solution, progress: FitProgress | None = None) -> tuple[Solution, list[Breakaway]]:
         """Breakaway that was asked for, and the fit with it."""
         group = self.groups[0]
         asked = asked_levels(group.robot, self.question.free or (), self.question.fixed)

@@ -16,7 +16,7 @@ from omnidyn.identification.output_error.problem.parameters import AT, Parameter
 from omnidyn.identification.output_error.problem.problem import Parts, PieceSums, Point, Problem
 from omnidyn.identification.output_error.solve.first_point import first_point, moving_start
 from omnidyn.identification.output_error.solve.loop import loop_start
-from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution, Solver, State
 from omnidyn.identification.output_error.trust.uncertainty import SHARE, Trust
 from omnidyn.model.keys import find_key
@@ -170,13 +170,15 @@ def join(
     return JointEngine(joint, found)
 
 
-def joint_start(engine: JointEngine, nu: float, progress: Progress, alone: Mapping[str, State] | None = None) -> Point:
+def joint_start(
+    engine: JointEngine, nu: float, progress: FitProgress, alone: Mapping[str, State] | None = None
+) -> Point:
     """Each group begins where it would alone, or where `alone` says; shared numbers at the median of the groups."""
     values: list[list[float]] = [[] for _ in engine.problem.parameters]
     states: list[FloatArray] = []
     for member in engine.members:
         words = f"looking for a start of {member.name}"
-        progress.doing(words)
+        progress.enter(words)
         if alone and member.name in alone:
             point = alone[member.name].point
         elif member.group.engine == EXACT:

@@ -35,6 +35,7 @@ from omnidyn.logs.readers.parquet_pages import declared_bytes
 from omnidyn.logs.readers.reader import Options, Reader
 from omnidyn.logs.table.rows import refuse_infinite
 from omnidyn.logs.table.table import MAX_CELLS, Said, Table
+from omnidyn.progress import Report
 
 ACTION, STATE = "action", "observation.state"
 STAMP, EPISODE = "timestamp", "episode_index"
@@ -188,8 +189,7 @@ def _parts(
             with damage(pyarrow, source):
                 part = {name: _numbers(batch.column(name)) for name in chosen}
             part.setdefault(EPISODE, np.zeros(batch.num_rows))
-            if options.progress is not None:
-                options.progress(size * (done + batch.num_rows) // max(1, data.metadata.num_rows), size)
+            options.progress(Report("reading", size * (done + batch.num_rows) // max(1, data.metadata.num_rows), size))
             yield part, ""
     yield {}, digest
 

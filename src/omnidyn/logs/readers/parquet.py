@@ -24,6 +24,7 @@ from omnidyn.logs.table.header import MAX_COLUMNS, check_name, split_units
 from omnidyn.logs.table.rows import INFINITE, Column, column_of, refuse_infinite, skip_note
 from omnidyn.logs.table.table import MAX_CELLS, Table
 from omnidyn.logs.table.text_file import BLOCK_BYTES, TOO_LARGE_REMEDY
+from omnidyn.progress import Report
 
 MAX_EXPANSION, MIN_EXPANDED_BYTES = 200, 64 * 2**20
 MAX_THRIFT_STRING, MAX_THRIFT_ITEMS = 16 * 2**20, 10**6
@@ -92,8 +93,7 @@ def parquet_tables(path: str | os.PathLike, rows: int, options: Options) -> Iter
         for done, batch in batches_of(pyarrow, file, max(1, min(rows, MAX_CELLS // len(columns.names))), source):
             with damage(pyarrow, source):
                 values, lines = reader.read(batch, done)
-            if options.progress is not None:
-                options.progress(size * (done + batch.num_rows) // max(1, file.metadata.num_rows), size)
+            options.progress(Report("reading", size * (done + batch.num_rows) // max(1, file.metadata.num_rows), size))
             yield table(values, lines)
         yield table({}, np.zeros(0, dtype=np.int64), digest)
 

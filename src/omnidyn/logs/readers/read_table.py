@@ -17,7 +17,7 @@ from omnidyn.logs.readers.ros.bags import MCAP, ROS1, ROS2
 from omnidyn.logs.readers.text import TEXT
 from omnidyn.logs.readers.wpilib.wpilog import WPILOG
 from omnidyn.logs.table.table import ROWS, Table, join
-from omnidyn.logs.table.text_file import Progress
+from omnidyn.progress import Progress, silent
 
 READERS: tuple[Reader, ...] = (
     TEXT,
@@ -38,7 +38,7 @@ def read_table(
     header: bool = True,
     skip_bad_rows: bool = False,
     max_bytes: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     variables: Sequence[str] = (),
 ) -> Table:
     """Read a table whole, whatever its format. A name that promises another format is noted.
@@ -46,7 +46,7 @@ def read_table(
     header: False where a text file has none; the columns are then called c1, c2, ... skip_bad_rows: leave out rows
     with another number of cells, a broken quote, an infinite number, or text where the column holds numbers; they are
     counted in `notes`. max_bytes: of the file, and of its numbers; a quarter of the memory where it is not given.
-    progress(bytes_done, bytes_total) is called now and then. variables: of a MATLAB file, those to read; none: all.
+    progress: hears how many bytes are done. variables: of a MATLAB file, those to read; none: all.
     Raises InputError for what cannot be read: `file:line, column NAME: what; got ...; expected ...; remedy`; other
     formats are refused by name.
     """
@@ -61,7 +61,7 @@ def iter_tables(
     header: bool = True,
     skip_bad_rows: bool = False,
     max_bytes: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     variables: Sequence[str] = (),
 ) -> Iterator[Table]:
     """The tables of a file of any length, at most `rows` rows each; joined they are what `read_table` reads.

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.recording import Recording
 from omnidyn.logs.table.table import Table
-from omnidyn.logs.table.text_file import Progress
+from omnidyn.progress import Progress, silent
 
 
 class Options(NamedTuple):
@@ -25,7 +25,7 @@ class Options(NamedTuple):
     header: bool = True
     skip_bad_rows: bool = False
     max_bytes: int | None = None
-    progress: Progress | None = None
+    progress: Progress = silent
     variables: tuple[str, ...] = ()
 
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 import codecs
 import hashlib
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from omnidyn.errors import InputError
 from omnidyn.files import empty, file_format, growth, open_regular, text_format, too_large
+from omnidyn.progress import Progress, Report, silent
 
 BLOCK_BYTES = 2**20
 SHOWN_BYTES = 8  # of a file that is no text
@@ -22,8 +23,6 @@ MOST_CONTROLS = 0.01  # of the bytes of a file that is damaged text
 MOST_ODD = 0.3  # of the bytes of a text in an encoding of its own; three in five of mere noise are odd
 _NO_CONTROLS = bytes([0, 9, 10, 12, 13, *range(32, 127), *range(128, 256)])  # zero is judged by itself
 TOO_LARGE_REMEDY = "cut it, allow more with `max_bytes`, or read it in pieces with iter_tables"
-
-Progress = Callable[[int, int], None]
 
 
 class TextBlock(NamedTuple):
@@ -36,11 +35,11 @@ class TextBlock(NamedTuple):
 class TextFile:
     """A text file, read once, in order, by `blocks`. Afterwards `sha256` and `notes` are complete.
 
-    progress(bytes_done, bytes_total) is called after every block. max_bytes: refuse a longer file.
+    progress: hears after every block how many bytes are done, of how many. max_bytes: refuse a longer file.
     Raises InputError when the file is missing, no file, empty, too large or not text.
     """
 
-    def __init__(self, path: str | os.PathLike, progress: Progress | None = None, max_bytes: int | None = None):
+    def __init__(self, path: str | os.PathLike, progress: Progress = silent, max_bytes: int | None = None):
         self.path, self.source = path, str(path)
         self.notes: list[str] = []
         self._progress, self._max_bytes, self._hash = progress, max_bytes, hashlib.sha256()
@@ -98,8 +97,7 @@ class TextFile:
                 self._hash.update(block)
                 done += len(block)
                 yield block
-                if self._progress is not None:
-                    self._progress(done, total)
+                self._progress(Report("reading", done, total))
             self.notes += growth(stream, total)
         if not done:
             raise empty(self.source)

@@ -12,7 +12,7 @@ from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.loop import FEW, loop_start, retimed, solve_loop
-from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.identification.question import Question
 from omnidyn.identification.whole_logs import fit_output_error, identify_groups
@@ -247,7 +247,7 @@ def test_a_latency_of_currents_that_went_astray_is_tried_where_the_others_are(lo
     values = point.values.copy()
     astray = problem.where("latency.current")
     values[astray] = 0.15
-    found = retimed(Solver(problem, LoopEngine(problem)), Point(values, point.states), Progress())
+    found = retimed(Solver(problem, LoopEngine(problem)), Point(values, point.states), FitProgress())
     assert abs(found.values[astray]) <= 0.01
 
 
@@ -256,10 +256,10 @@ def test_motors_that_are_wrong_guesses_come_before_latencies(looped):
     start = wrong(looped, **{KP: 1.0, RESISTANCE: 0.3, TORQUE: 2.0, EMF: 2.0})
     asked = Question(nuisances=("latency",), free=(RESISTANCE, *friction_keys(looped)))
     problem = make_problem(read_records([log(looped, 3, 300)], start, asked), start, asked)
-    solver, watch = Solver(problem, LoopEngine(problem)), Progress()
-    all_at_once = solver.minimise(loop_start(problem, 0.0, watch), FEW)
-    all_at_once = solver.minimise(retimed(solver, all_at_once.state.point, watch))
-    assert solve_loop(problem, 0.0, watch).state.objective < all_at_once.state.objective - 10.0
+    solver, progress = Solver(problem, LoopEngine(problem)), FitProgress()
+    all_at_once = solver.minimise(loop_start(problem, 0.0, progress), FEW)
+    all_at_once = solver.minimise(retimed(solver, all_at_once.state.point, progress))
+    assert solve_loop(problem, 0.0, progress).state.objective < all_at_once.state.objective - 10.0
 
 
 @pytest.mark.parametrize("channel", ["twist", "current"])

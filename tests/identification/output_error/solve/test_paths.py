@@ -8,7 +8,7 @@ from omnidyn.identification.output_error.engines.rates import RateEngine
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.first_point import coarse_point
-from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.identification.question import Question
 from omnidyn.model.first_guess import first_guess
@@ -65,7 +65,7 @@ def test_a_fit_of_counts_from_bad_guesses_finds_what_one_from_the_truth_does(see
     """It ended where an axis creeps that should rest, thousands above."""
     problem, true = problem_of(seed)
     solver = Solver(problem, ImplicitEngine(problem), counted=False)
-    found = solver.state(coarse_point(problem, 0.0, Progress()).point)
+    found = solver.state(coarse_point(problem, 0.0, FitProgress()).point)
     assert found.objective < solver.minimise(true).state.objective + 50.0
 
 

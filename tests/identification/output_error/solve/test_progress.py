@@ -5,10 +5,11 @@ import pytest
 
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import State
 from omnidyn.identification.question import Question
 from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.progress import Report
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.codes import codes
@@ -30,21 +31,21 @@ def log(looped):
     return Run(t=np.arange(250) * 0.01, twist_command=command, twist=twist, current=current, source="log")
 
 
-class Cut(Progress):
+class Cut(FitProgress):
     """Interrupts at so many better states, or at the first of these words."""
 
     def __init__(self, count=0, words=None):
-        super().__init__(self.kept, self.heard_of)
+        super().__init__(self.listen)
         self.states, self.heard, self.count, self.until = [], [], count, words
 
-    def kept(self, state):
-        self.states.append(state)
-        if len(self.states) == self.count:
+    def listen(self, report):
+        if report.state is None:
+            self.heard.append(report.phase)
+        else:
+            self.states.append(report.state)
+        if report.state is not None and len(self.states) == self.count:
             raise KeyboardInterrupt
-
-    def heard_of(self, words):
-        self.heard.append(words)
-        if self.until and words.startswith(self.until):
+        if self.until and report.phase.startswith(self.until):
             raise KeyboardInterrupt
 
 
@@ -65,7 +66,7 @@ def test_an_interrupted_fit_of_set_speeds_leaves_the_best_so_far(looped, log, cu
 
 def test_every_phase_is_told_before_it_begins(looped, log):
     seen = Cut()
-    fit_output_error(log, looped, watch=seen)
+    fit_output_error(log, looped, progress=seen)
     first = [next(k for k, words in enumerate(seen.heard) if words.startswith(phase)) for phase in (
         "looking for what moved", "looking for a start, latencies 1 of 5", "looking for a start, friction and gains 1",
         "trying latency.current, 1 of", "the same as exactly", "looking for a better branch", "finding how sure",
@@ -76,42 +77,42 @@ def test_every_phase_is_told_before_it_begins(looped, log):
 def test_a_robot_of_the_exact_engine_tells_its_phases_too(axebot):
     run = simulate(axebot, np.repeat([[3.0, -1.0, 2.5], [-4.0, 3.0, 1.0]], 50, axis=0), 0.02)
     seen = Cut()
-    fit_output_error(Run(t=run.t, voltage=run.voltage, twist=run.twist, source="log"), axebot, watch=seen)
+    fit_output_error(Run(t=run.t, voltage=run.voltage, twist=run.twist, source="log"), axebot, progress=seen)
     assert {"looking for what moved", "looking for a start", "finding how sure the numbers are"} < set(seen.heard)
 
 
 def test_a_search_that_goes_several_ways_shows_only_what_is_better_than_all_before():
     seen = []
-    watch = Progress(seen.append).below(10.0)
+    progress = FitProgress(lambda report: seen.append(report.state)).below(10.0)
     states = [State(Point(np.zeros(0), ()), [], objective, np.zeros(0)) for objective in (11.0, 9.0, 9.5, 8.0, 8.0)]
     for state in states:
-        watch(state)
+        progress.better(state)
     assert seen == [states[1], states[3]]
 
 
 def test_the_states_of_a_fit_beside_become_words():
-    seen, heard = [], []
-    watch = Progress(seen.append, heard.append).aside("once more")
-    watch(State(Point(np.zeros(0), ()), [], -12.5, np.zeros(0)))
-    watch.doing("trying")
-    assert (seen, heard) == ([], ["once more, -log likelihood -12.5", "trying"])
+    reports = []
+    progress = FitProgress(reports.append).aside("once more")
+    progress.better(State(Point(np.zeros(0), ()), [], -12.5, np.zeros(0)))
+    progress.enter("trying")
+    assert reports == [Report("once more, -log likelihood -12.5"), Report("trying")]
 
 
 def test_any_function_may_look_on():
     seen = []
-    Progress.of(seen.append)("a state")
-    Progress.of(None)("a state")
-    assert seen == ["a state"]
+    FitProgress.of(seen.append).enter("trying")
+    FitProgress.of(None).enter("trying")
+    assert seen == [Report("trying")]
 
 
 def test_a_search_says_how_long_it_will_take(monkeypatch):
     """From the second one on, where it is worth a word."""
     heard, now = [], iter([0.0, 3.0, 9.0, 0.0, 0.1])
     monkeypatch.setattr("omnidyn.identification.output_error.solve.progress.monotonic", lambda: next(now))
-    watch = Progress(words=heard.append)
+    progress = FitProgress(lambda report: heard.append(str(report)))
     for k in range(3):
-        watch.counted("trying", k, 4)
+        progress.counted("trying", k, 4)
     for k in range(2):
-        watch.counted("trying", k, 4)
+        progress.counted("trying", k, 4)
     assert heard == ["trying 1 of 4", "trying 2 of 4, about 9 s left", "trying 3 of 4, about 9 s left", "trying 1 of 4",
                      "trying 2 of 4"]  # fmt: skip

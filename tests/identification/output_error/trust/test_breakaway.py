@@ -8,7 +8,6 @@ from benchmarks.wrong_worlds.log import NOISE as SENSOR
 from benchmarks.wrong_worlds.log import Case, commands, robot_of, truths
 from benchmarks.wrong_worlds.world import World, drive
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.identification.output_error.solve.progress import Progress
 from omnidyn.identification.whole_logs import fit_output_error, identify_groups
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import Key
@@ -74,7 +73,7 @@ def held(fit, truth):
 def test_it_is_found_in_a_turning_frame_too():
     """The implicit engine runs it. Two axes are told well here, turning from below only: that is said."""
     words = []
-    fit, truth = in_a_turning_frame(8, watch=Progress(words=words.append))
+    fit, truth = in_a_turning_frame(8, progress=lambda report: words.append(str(report)))
     assert all(held(fit, truth).values())
     for key in LEVELS[:2]:
         low, high = fit.ci95[key]

@@ -24,7 +24,7 @@ in M. G. Kenward, J. H. Roger, Biometrics 53, 983 (1997)).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import cast
 
@@ -46,6 +46,7 @@ from omnidyn.identification.output_error.memory.whitened import (
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Normal, RowEngine, Solution, Solver, of_states
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, WHITE, Trust, trust
+from omnidyn.progress import Progress, Report, silent
 from omnidyn.statement import NOTE, WARNING, Statement
 from omnidyn.statistics import t_quantile
 
@@ -95,7 +96,7 @@ def why_not(solution: Solution) -> str:
     return ""
 
 
-def whitened(solution: Solution, before: Trust, doing: Callable[[str], object] = lambda words: None) -> Weighed | None:
+def whitened(solution: Solution, before: Trust, progress: Progress = silent) -> Weighed | None:
     """The fit anew with errors that remember; None where they do not, or where no memory makes them white.
 
     solution, before: the fit by residuals as they are, and the trust in it.
@@ -107,7 +108,7 @@ def whitened(solution: Solution, before: Trust, doing: Callable[[str], object] =
         return None
     now, moved, blocked = solution.state.point, np.inf, None
     for each in range(ROUNDS):
-        doing(f"errors with a memory, round {each + 1}")
+        progress(Report(f"errors with a memory, round {each + 1}"))
         models, far = _straight(solver, now, models), moved > NEARBY
         engine = near(below(solver), now) if far else below(solver)
         close = CLOSE_BY if engine is below(solver) else FAR_OFF

@@ -17,7 +17,7 @@ from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.problem.problem import Point, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import friction_values, integral_start
-from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solver, State
 from omnidyn.model.keys import FRICTION, find_key
 
@@ -78,27 +78,27 @@ def _with_latencies(solver: Solver, begun: State) -> State:
     return solver.state(Point(values, point.states))
 
 
-def coarse_point(problem: Problem, nu: float, watch: Progress) -> State:
-    """A state near the best point, by a step a row; a long log is first fitted in part, of which `watch` hears only."""
-    watch.doing("looking for a start")
+def coarse_point(problem: Problem, nu: float, progress: FitProgress) -> State:
+    """A state near the best point, by a step a row; a long log is first fitted in part."""
+    progress.enter("looking for a start")
     rows = sum(piece.last - piece.first for piece in problem.pieces)
     solver, short, own = (
         Solver(problem, implicit_engine(problem), nu, max(NEAR, BIAS * rows)),
         problem.shortened(FEW),
-        moving_start(problem, nu, watch),
+        moving_start(problem, nu, progress),
     )
     if short is problem:
-        return solver.minimise(own, watch=watch).state
+        return solver.minimise(own, progress=progress).state
     found = (
         Solver(short, implicit_engine(short), nu, NEAR)
-        .minimise(own, watch=watch.aside("a part of the log first"))
+        .minimise(own, progress=progress.aside("a part of the log first"))
         .state.point
     )
     states = [solver.state(point) for point in (own, found)]
-    return solver.minimise(min(states, key=lambda state: state.objective).point, watch=watch).state
+    return solver.minimise(min(states, key=lambda state: state.objective).point, progress=progress).state
 
 
-def _timed(problem: Problem, point: Point, nu: float, watch: Progress) -> Point:
+def _timed(problem: Problem, point: Point, nu: float, progress: FitProgress) -> Point:
     """The point with the latencies that go with motors near their own.
 
     The latency of a current meets a jump at every row: a motor that is a wrong guess brings it to the wrong side of it,
@@ -109,7 +109,7 @@ def _timed(problem: Problem, point: Point, nu: float, watch: Progress) -> Point:
     if LATENCY not in parts or (MOTOR not in parts and problem.where(CURRENTS) < 0):
         return point
     held = _on_time(problem)
-    first = Solver(held, implicit_engine(held), nu, NEAR).minimise(point, watch=watch.aside("motors first"))
+    first = Solver(held, implicit_engine(held), nu, NEAR).minimise(point, progress=progress.aside("motors first"))
     return _with_latencies(Solver(problem, implicit_engine(problem), nu), first.state).point
 
 
@@ -119,7 +119,7 @@ def _on_time(problem: Problem) -> Problem:
     return replace(problem, parameters=tuple(still))
 
 
-def _by_rates(problem: Problem, point: Point, nu: float, watch: Progress) -> Point:
+def _by_rates(problem: Problem, point: Point, nu: float, progress: FitProgress) -> Point:
     """The point that fits best what outputs gain from row to row, latencies at their start: one more place to begin.
 
     The path itself has minima far from the best one: an axis that creeps where it should rest makes up for a turn that
@@ -128,11 +128,11 @@ def _by_rates(problem: Problem, point: Point, nu: float, watch: Progress) -> Poi
     """
     held = _on_time(problem)
     solver = Solver(held, RateEngine(held), nu, NEAR, counted=False)
-    found = solver.minimise(point, watch=watch.aside("rates before paths")).state.point
+    found = solver.minimise(point, progress=progress.aside("rates before paths")).state.point
     return Point(found.values, point.states)
 
 
-def _levels_first(problem: Problem, point: Point, nu: float, watch: Progress) -> Point:
+def _levels_first(problem: Problem, point: Point, nu: float, progress: FitProgress) -> Point:
     """The point with the levels of friction that go with the shape of its law as it begins: speeds, stiffness, damping.
 
     Of levels far off, a first step takes all that falls or bends out of the law, and no descent brings it back.
@@ -146,11 +146,11 @@ def _levels_first(problem: Problem, point: Point, nu: float, watch: Progress) ->
         for p, own, v in zip(problem.parameters, shape, point.values.tolist(), strict=True)
     )
     first = replace(problem, parameters=held)
-    aside = watch.aside("levels of friction first")
-    return Solver(first, implicit_engine(first), nu, NEAR).minimise(point, watch=aside).state.point
+    aside = progress.aside("levels of friction first")
+    return Solver(first, implicit_engine(first), nu, NEAR).minimise(point, progress=aside).state.point
 
 
-def moving_start(problem: Problem, nu: float, watch: Progress) -> Point:
+def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
     """The robot as it is, or with less friction where that comes nearer: one that never moves has no slopes.
 
     With the latencies that go with it. Where outputs add up, the better one of that and what their rates say.
@@ -161,8 +161,8 @@ def moving_start(problem: Problem, nu: float, watch: Progress) -> Point:
     points = [own, *(Point(np.where(friction, share * own.values, own.values), own.states) for share in LESS)]
     costs = side_by_side(lambda point: solver.state(point).objective, points)
     best = points[int(np.argmin(costs))]
-    best = _levels_first(short, best, nu, watch)
+    best = _levels_first(short, best, nu, progress)
     begun = [best]
     if any(name in TRAVELS for name, _ in short.columns):
-        begun.append(_by_rates(short, best, nu, watch))
-    return min((_timed(short, one, nu, watch) for one in begun), key=lambda point: solver.state(point).objective)
+        begun.append(_by_rates(short, best, nu, progress))
+    return min((_timed(short, one, nu, progress) for one in begun), key=lambda point: solver.state(point).objective)

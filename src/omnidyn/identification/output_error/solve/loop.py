@@ -20,7 +20,7 @@ from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import measured_twists
-from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
 from omnidyn.identification.question import FREE, REST
 from omnidyn.model.keys import FRICTION, Key, friction_keys, gain_keys
@@ -131,17 +131,17 @@ def _piece(record: Record, first: int, last: int) -> Piece:
     )  # fmt: skip
 
 
-def solve_loop(problem: Problem, nu: float, watch: Progress) -> Solution:
+def solve_loop(problem: Problem, nu: float, progress: FitProgress) -> Solution:
     """Several starts with a step a tick, on what sets off; then all of it, as well as it must be."""
     first = Solver(problem, LoopEngine(problem), nu)
-    coarse = _motors_first(first, first.minimise(loop_start(problem, nu, watch), FEW, watch), watch)
-    coarse = first.minimise(retimed(first, coarse.state.point, watch), watch=watch)
-    watch.doing("the same as exactly as it must be")
+    coarse = _motors_first(first, first.minimise(loop_start(problem, nu, progress), FEW, progress), progress)
+    coarse = first.minimise(retimed(first, coarse.state.point, progress), progress=progress)
+    progress.enter("the same as exactly as it must be")
     fine = Solver(problem, LoopEngine(problem, FINE), nu)
-    return beyond_jumps(fine.minimise(coarse.state.point, watch=watch), watch)
+    return beyond_jumps(fine.minimise(coarse.state.point, progress=progress), progress)
 
 
-def _motors_first(solver: Solver, found: Solution, watch: Progress) -> Solution:
+def _motors_first(solver: Solver, found: Solution, progress: FitProgress) -> Solution:
     """The better one of `found` and a fit from the robot as it is that takes motors first, every latency at its start.
 
     With motors that are guesses a few rows of setting off look like a latency, and no descent comes back from there.
@@ -152,20 +152,20 @@ def _motors_first(solver: Solver, found: Solution, watch: Progress) -> Solution:
         return found
     still = [replace(p, low=p.value, high=p.value) if p.part == LATENCY else p for p in problem.parameters]
     held = replace(problem, parameters=tuple(still))
-    aside = watch.aside("motors first")
-    first = Solver(held, solver.engine.on(held), solver.nu).minimise(problem.start(), watch=aside)
-    other = solver.minimise(first.state.point, FEW, watch.below(found.state.objective))
+    aside = progress.aside("motors first")
+    first = Solver(held, solver.engine.on(held), solver.nu).minimise(problem.start(), progress=aside)
+    other = solver.minimise(first.state.point, FEW, progress.below(found.state.objective))
     return min(found, other, key=lambda solution: solution.state.objective)
 
 
-def loop_start(problem: Problem, nu: float, watch: Progress) -> Point:
+def loop_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
     """Where a fit begins: the best of several starts, tried on what sets off."""
     short = shortened(problem, SETTING_OFF)
-    found = best_start(Solver(short, LoopEngine(short), nu), watch)
+    found = best_start(Solver(short, LoopEngine(short), nu), progress)
     return Point(found.values, problem.start().states)
 
 
-def retimed(solver: Solver, point: Point, watch: Progress) -> Point:
+def retimed(solver: Solver, point: Point, progress: FitProgress) -> Point:
     """The point with the best latency of the currents, of one in the middle of each period of the loop.
 
     A current jumps at every tick: no descent gets a latency across one, and one that has gone astray comes back only if
@@ -188,7 +188,7 @@ def retimed(solver: Solver, point: Point, watch: Progress) -> Point:
         now, states = float(point.values[j]), []
         trials = (now, *middles[(middles > EARLIEST) & (middles < LATEST)])
         for k, each in enumerate(trials):
-            watch.counted(f"trying {problem.names[j]},", k, len(trials))
+            progress.counted(f"trying {problem.names[j]},", k, len(trials))
             values = point.values.copy()
             values[j] = each
             states.append(trial.state(Point(values, point.states), np.ones(len(problem.columns)) if nu else None))
@@ -201,9 +201,9 @@ def shortened(problem: Problem, rows: int) -> Problem:
     return replace(problem, pieces=tuple(replace(p, last=min(p.last, p.first + rows)) for p in problem.pieces))
 
 
-def best_start(solver: Solver, watch: Progress) -> Point:
+def best_start(solver: Solver, progress: FitProgress) -> Point:
     """The best of several starts: all gains, all friction and all latencies by factors, then a few steps of each."""
-    problem, seen = solver.problem, watch.below()
+    problem, seen = solver.problem, progress.below()
     delays = _if_any(problem, LATENCY, LATE, 0.0)
     by_delay = _tried(solver, [(late, 1.0, 1.0) for late in delays], "latencies", seen)
     late = delays[int(np.argmin([state.objective for state in by_delay]))]
@@ -214,13 +214,15 @@ def best_start(solver: Solver, watch: Progress) -> Point:
     return min(tried, key=lambda solution: solution.state.objective).state.point
 
 
-def _tried(solver: Solver, which: Sequence[tuple[float, float, float]], what: str, watch: Progress) -> list[State]:
+def _tried(
+    solver: Solver, which: Sequence[tuple[float, float, float]], what: str, progress: FitProgress
+) -> list[State]:
     """The states at each (latency [s], factor of friction, factor of gains)."""
     found = []
     for k, each in enumerate(which):
-        watch.counted(f"looking for a start, {what}", k, len(which))
+        progress.counted(f"looking for a start, {what}", k, len(which))
         found.append(_moved(solver, *each))
-        watch(found[-1])
+        progress.better(found[-1])
     return found
 
 
@@ -237,7 +239,7 @@ def _moved(solver: Solver, late: float, level: float, gain: float) -> State:
     return solver.state(Point(values, own.states), np.ones(len(problem.columns)) if solver.nu else None)
 
 
-def beyond_jumps(solution: Solution, watch: Progress) -> Solution:
+def beyond_jumps(solution: Solution, progress: FitProgress) -> Solution:
     """The solution, or a better one behind a jump of the likelihood, which no descent crosses.
 
     An integral that stands still at the voltage limit jumps by a whole tick where a number of the robot decides on
@@ -245,8 +247,8 @@ def beyond_jumps(solution: Solution, watch: Progress) -> Solution:
     some standard errors, the others following: where F rises by less than the parabola says, there is another branch to
     descend into. A run away from the limit has no such branch.
     """
-    solver, seen = solution.solver, watch.below(solution.state.objective)
-    watch.doing("looking for a better branch, beyond jumps of the likelihood")
+    solver, seen = solution.solver, progress.below(solution.state.objective)
+    progress.enter("looking for a better branch, beyond jumps of the likelihood")
     if not np.any(solver.problem.robot.drive.ki) or (
         isinstance(solver.engine, LoopEngine) and not solver.engine.meets_limit(solution.state.point)
     ):
@@ -255,12 +257,12 @@ def beyond_jumps(solution: Solution, watch: Progress) -> Solution:
     solution = min(solution, grown, key=lambda each: each.state.objective)
     gains = [j for j, p in enumerate(solver.problem.parameters) if p.part == DRIVE]
     for _ in range(ROUNDS):
-        better = next(_branches(solver, solution, gains, watch), None)
+        better = next(_branches(solver, solution, gains, progress), None)
         found = None if better is None else solver.minimise(better.point, FEW, seen)
         if found is None or found.state.objective >= solution.state.objective - LESS:
             break
         solution = found
-    return solver.minimise(solution.state.point, watch=seen)
+    return solver.minimise(solution.state.point, progress=seen)
 
 
 def _grown(solver: Solver, point: Point) -> Point:
@@ -277,13 +279,13 @@ def _grown(solver: Solver, point: Point) -> Point:
     return point
 
 
-def _branches(solver: Solver, solution: Solution, gains: Sequence[int], watch: Progress) -> Iterator[State]:
+def _branches(solver: Solver, solution: Solution, gains: Sequence[int], progress: FitProgress) -> Iterator[State]:
     """States at some standard errors in a gain where F has risen by less than it should have, nearest first."""
     normal = Normal(solver, solution.state)
     covariance = np.linalg.pinv(normal.information, hermitian=True)
     ways = [*itertools.product(FAR, gains)]
     for k, (far, j) in enumerate(ways):
-        watch.counted("looking for a better branch, beyond jumps of the likelihood,", k, len(ways))
+        progress.counted("looking for a better branch, beyond jumps of the likelihood,", k, len(ways))
         step = far * covariance[:, j] / np.sqrt(max(covariance[j, j], 1e-300))
         values = solver.outer(solver.clipped(normal.inner + step))
         state = solver.state(Point(values, solution.state.point.states), _scale(solver, solution))

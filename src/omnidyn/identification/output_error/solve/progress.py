@@ -1,14 +1,15 @@
-"""How far a fit is: every better state, in words what is being done, and the best so far, which an interrupt leaves."""
+"""How far a fit is: every better state, what is being done, and the best so far, which an interrupt leaves."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from time import monotonic
 
 import numpy as np
 
 from omnidyn.identification.output_error.solve.solver import State
+from omnidyn.progress import Progress, Report, silent
 
 WORTH = 2.0  # [s] of a search that are told
 
@@ -21,64 +22,76 @@ class Best:
     alone: Mapping[str, State]
 
 
-class Progress:
-    """Follows a fit. better: is called with every better state; words: with what is being done, before it is begun."""
+class FitProgress:
+    """A listener that keeps the best state of a fit, and passes on to another what it hears."""
 
-    def __init__(self, better: Callable[[State], object] | None = None, words: Callable[[str], object] | None = None):
-        self._better, self._words = better, words
+    def __init__(self, progress: Progress | None = None):
+        self._progress = progress or silent
         self._state: State | None = None
         self._alone: dict[str, State] = {}
         self._begun = 0.0
 
     @classmethod
-    def of(cls, watch: Callable[[State], object] | None) -> Progress:
-        """Whatever follows a fit, as a Progress."""
-        return watch if isinstance(watch, Progress) else cls(watch)
+    def of(cls, progress: Progress | None) -> FitProgress:
+        """Whatever listens, as a FitProgress."""
+        return progress if isinstance(progress, FitProgress) else cls(progress)
 
     @property
     def best(self) -> Best | None:
         """The best so far; None where there is none yet."""
         return Best(self._state, dict(self._alone)) if self._state is not None or self._alone else None
 
-    def __call__(self, state: State) -> None:
-        """A better state than those before."""
-        self._state = state
-        if self._better is not None:
-            self._better(state)
+    def __call__(self, report: Report) -> None:
+        """A better state than those before, or what is done now."""
+        if report.state is not None:
+            self._state = report.state
+        self._progress(report)
 
-    def doing(self, words: str) -> None:
+    def enter(self, phase: str) -> None:
         """What comes now, such as "looking for a start, 3 of 25"."""
-        if self._words is not None:
-            self._words(words)
+        self(Report(phase))
+
+    def better(self, state: State) -> None:
+        """A better state than those before."""
+        self(Report("fitting", state=state))
 
     def counted(self, words: str, k: int, of: int) -> None:
         """What comes now, the k-th of `of` from 0, and how long they will take, where that is worth a word."""
         now = monotonic()
         self._begun = now if k == 0 else self._begun
         left = (now - self._begun) / k * (of - k) if k else 0.0
-        self.doing(f"{words} {k + 1} of {of}" + (f", about {left:.0f} s left" if left >= WORTH else ""))
+        self.enter(f"{words} {k + 1} of {of}" + (f", about {left:.0f} s left" if left >= WORTH else ""))
 
-    def below(self, objective: float = np.inf) -> Progress:
+    def below(self, objective: float = np.inf) -> FitProgress:
         """The same, of a search that goes several ways: sees only states below all before, and below `objective`."""
         least = objective
 
-        def better(state: State) -> None:
+        def listen(report: Report) -> None:
             nonlocal least
-            if state.objective < least:
-                least = state.objective
-                self(state)
+            if report.state is None:
+                self(report)
+            elif report.state.objective < least:
+                least = report.state.objective
+                self(report)
 
-        return Progress(better, self.doing)
+        return FitProgress(listen)
 
-    def aside(self, words: str) -> Progress:
+    def aside(self, words: str) -> FitProgress:
         """The same, of a fit beside the one that is followed: its states become words, headed by `words`."""
-        return Progress(lambda state: self.doing(f"{words}, -log likelihood {state.objective:.6g}"), self.doing)
 
-    def alone(self, group: str) -> Progress:
+        def listen(report: Report) -> None:
+            if report.state is not None:
+                report = Report(f"{words}, -log likelihood {report.state.objective:.6g}")
+            self(report)
+
+        return FitProgress(listen)
+
+    def alone(self, group: str) -> FitProgress:
         """The same, of the fit of one group alone: its states become words, and its last one is kept."""
 
-        def better(state: State) -> None:
-            self._alone[group] = state
-            self.doing(f"{group} alone, -log likelihood {state.objective:.6g}")
+        def listen(report: Report) -> None:
+            if report.state is not None:
+                self._alone[group] = report.state
+                self.enter(f"{group} alone, -log likelihood {report.state.objective:.6g}")
 
-        return Progress(better)
+        return FitProgress(listen)

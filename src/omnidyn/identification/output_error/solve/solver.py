@@ -8,7 +8,6 @@ scales s_c in turn. Counts (kernel/counts.py) are held like that too, beside the
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, Self, TypeVar
 
@@ -21,6 +20,7 @@ from omnidyn.identification.output_error.problem.problem import Fitted, Parts, P
 from omnidyn.identification.output_error.solve.bend import Bend
 from omnidyn.identification.output_error.solve.edges import Edges
 from omnidyn.identification.output_error.solve.ordered import Order
+from omnidyn.progress import Progress, Report
 from omnidyn.statement import Statement
 
 MAX_ITERATIONS = 60
@@ -127,27 +127,25 @@ class Solver(Generic[P]):
         return np.full(len(self.tick), True) if self.nu else self.tick > 0.0
 
     def minimise(
-        self, start: Point | State, limit: int = MAX_ITERATIONS, watch: Callable[[State], None] | None = None,
+        self, start: Point | State, limit: int = MAX_ITERATIONS, progress: Progress | None = None,
         blocked: BoolArray | None = None, scales: FloatArray | None = None,
     ) -> Solution:  # fmt: skip
-        """The best point from `start`; `watch` sees every better one on the way.
+        """The best point from `start`; `progress` sees every better one on the way.
 
         Where the start is a state that this engine found, the logs are not marched through for it again. blocked (P,):
         latencies that a solution near by has found to stand at an edge. scales (columns,): variances that it has found,
         of Student's t; without them least squares come first, which wild samples lead far away.
         """
         if not self.scaled.any():
-            return self._descend(self._begun(start), limit, watch, blocked)
+            return self._descend(self._begun(start), limit, progress, blocked)
         start = start.point if isinstance(start, State) else start
         if scales is not None:
-            return self._descend(self._rescaled(self.state(self._inside(start), scales))[0], limit, watch, blocked)
+            return self._descend(self._rescaled(self.state(self._inside(start), scales))[0], limit, progress, blocked)
         plain = Solver(self.problem, self.engine, close=self.close, counted=False).minimise(start, limit)
         now = self.state(plain.state.point, np.maximum(plain.state.variance - self.tick**2 / 12.0, self.floor))
-        return self._descend(self._rescaled(now)[0], limit, watch, blocked)
+        return self._descend(self._rescaled(now)[0], limit, progress, blocked)
 
-    def _descend(
-        self, now: State, limit: int, watch: Callable[[State], None] | None, blocked: BoolArray | None
-    ) -> Solution:
+    def _descend(self, now: State, limit: int, progress: Progress | None, blocked: BoolArray | None) -> Solution:
         damping, change = DAMPING, 0.0
         held = np.zeros(len(self.problem.parameters), bool)
         blocked, bend = held if blocked is None else blocked, Bend(len(held))
@@ -183,8 +181,8 @@ class Solver(Generic[P]):
             creeping = creeping + 1 if better and before - now.objective < self.creep else 0
             if self.scaled.any():
                 now, change = self._rescaled(now)
-            if better and watch:
-                watch(now)
+            if better and progress:
+                progress(Report("fitting", state=now))
             if creeping >= STEPS and change < SCALE_CHANGE:
                 return Solution(now, held, iteration + 1, True, self, blocked)
             if not better and blocked.any() and not released:  # a shorter step may stay this side of the edge

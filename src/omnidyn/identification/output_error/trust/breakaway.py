@@ -27,7 +27,7 @@ from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.problem.falling import coulomb_below, falls
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.likely_levels import likely_levels
 from omnidyn.identification.output_error.trust.traded_levels import Place, trade
@@ -36,6 +36,7 @@ from omnidyn.model.friction.kinds import KINDS
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, Key, in_words
 from omnidyn.model.known.holding import slides, slides_least
 from omnidyn.model.robot import Robot
+from omnidyn.progress import Progress, Report, silent
 
 LIMIT = 7.35 / 2.0
 COARSE, NARROWER = 24, 0.2  # levels tried in a round, and the share of the range that the next one looks at
@@ -100,16 +101,16 @@ class _Profile:
 
     def __init__(
         self, solver: Solver, ways: Callable[[Any], list[dict[str, float]]], point: Point, limit: int = REFIT,
-        nearest: bool = False, doing: Callable[[str], None] | None = None,
+        nearest: bool = False, progress: Progress = silent,
     ):  # fmt: skip
         self.solver, self.ways, self.point, self.limit = solver, ways, point, limit
-        self.nearest, self.doing = nearest, doing or (lambda _: None)
+        self.nearest, self.progress = nearest, progress
         self.known: dict[float | Place, Solution] = {}
 
     def at(self, level: float | Place) -> Solution:
         """The fit at a level, made once."""
         if level not in self.known:
-            self.doing(f"fit {len(self.known) + 1}")
+            self.progress(Report(f"fit {len(self.known) + 1}"))
             start = self.point
             if self.nearest and self.known:
                 start = self.known[min(self.known, key=lambda own: _apart(own, level))].state.point
@@ -160,7 +161,7 @@ def levels_of(solution: Solution) -> dict[str, float]:
 
 
 def find_breakaway(
-    solution: Solution, names: Sequence[str], known: Trust, progress: Progress | None = None
+    solution: Solution, names: Sequence[str], known: Trust, progress: FitProgress | None = None
 ) -> tuple[Solution, list[Breakaway]]:
     """Profile levels S by their keys, one after the other, twice where there are several: (solution, levels) there.
 
@@ -184,7 +185,7 @@ def find_breakaway(
 
 
 def _in_common(
-    solution: Solution, names: Sequence[str], known: Trust, progress: Progress | None
+    solution: Solution, names: Sequence[str], known: Trust, progress: FitProgress | None
 ) -> dict[str, float]:  # fmt: skip
     """Levels that are the same times Coulomb friction in each list that holds together, the likeliest one."""
     levels: dict[str, float] = {}
@@ -210,7 +211,8 @@ def _together(name: str, names: Sequence[str]) -> list[str]:
 
 
 def _beside_the_others(
-    solution: Solution, levels: dict[str, float], found: Sequence[Breakaway], known: Trust, progress: Progress | None,
+    solution: Solution, levels: dict[str, float], found: Sequence[Breakaway], known: Trust,
+    progress: FitProgress | None,
 ) -> list[Breakaway]:  # fmt: skip
     """The levels with the intervals that they have whatever the others are that hold together with them."""
     wider = {one.name: one for one in found}
@@ -223,7 +225,7 @@ def _beside_the_others(
 
 def _traded(
     solution: Solution, levels: dict[str, float], group: Sequence[str], wider: dict[str, Breakaway], known: Trust,
-    progress: Progress | None,
+    progress: FitProgress | None,
 ) -> None:  # fmt: skip
     """Widen the intervals of a group by how far its first level goes with the others against it, and they with it."""
     coulomb = {name: _coulomb(solution.solver, solution.state.point, name) for name in group}
@@ -251,14 +253,17 @@ def _traded(
 
 
 def _by_the_engine(
-    solution: Solution, ways: Callable[[Any], list[dict[str, float]]], name: str, progress: Progress | None
+    solution: Solution, ways: Callable[[Any], list[dict[str, float]]], name: str, progress: FitProgress | None
 ) -> _Profile:
     """A profile by the implicit engine, at a tolerance that is enough to tell levels apart."""
-    own, engine, told = solution.solver, solution.solver.engine, progress or Progress()
+    own, engine, listener = solution.solver, solution.solver.engine, progress or silent
     assert isinstance(engine, ImplicitEngine)
     solver = Solver(own.problem, type(engine)(own.problem, TOL), own.nu, NEAR)
-    doing: Callable[[str], None] = lambda words: told.doing(f"{in_words(name)}, {words}")  # noqa: E731
-    return _Profile(solver, ways, solution.state.point, FEW, True, doing)
+
+    def listen(report: Report) -> None:
+        listener(report._replace(phase=f"{in_words(name)}, {report.phase}"))
+
+    return _Profile(solver, ways, solution.state.point, FEW, True, listen)
 
 
 def _steeper(solver: Solver, known: Trust, name: str) -> float:
@@ -296,7 +301,7 @@ def _one_axis(solver: Solver, solution: Solution, levels: dict[str, float], name
 
 def _by_a_grid(
     solution: Solution, levels: dict[str, float], name: str, limit: float, before: Breakaway | None,
-    progress: Progress | None,
+    progress: FitProgress | None,
 ) -> Breakaway:  # fmt: skip
     """The likely levels by the implicit engine. before: what was found with other levels of the others."""
     own, point = solution.solver, solution.state.point

@@ -10,7 +10,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.solve.tied import TiedEngine
 from omnidyn.identification.output_error.trust.uncertainty import Trust
@@ -37,7 +37,7 @@ class Resampled:
 
 def resampled(
     solver: Solver, solution: Solution, known: Trust, profile: Sequence[str] = (), draws: int = 0,
-    strata: Strata | None = None, watch: Progress | None = None,
+    strata: Strata | None = None, progress: FitProgress | None = None,
 ) -> Resampled:  # fmt: skip
     """Intervals by bootstrap of all numbers, and by profile of those named.
 
@@ -51,7 +51,7 @@ def resampled(
     found: dict[str, tuple[float | None, tuple[float, float]]] = {}
     drawn, widening = None, 1.0
     if draws:
-        drawn = bootstrap(solver, solution, draws, strata=strata, watch=watch)
+        drawn = bootstrap(solver, solution, draws, strata=strata, progress=progress)
         widening = small_sample(least_runs(solver, strata))
         for j, p in enumerate(solver.problem.parameters):
             if known.blind[j]:
@@ -63,7 +63,7 @@ def resampled(
             found[p.name] = (spread, (p.outer(low), p.outer(high)))
     for name in profile:
         if not known.blind[j := names.index(name)]:
-            (watch or Progress()).doing(f"the profile of {name}")
+            (progress or FitProgress()).enter(f"the profile of {name}")
             found[name] = (None, profile_interval(solver, solution, known, j))
     return Resampled(found, drawn, widening)
 
@@ -192,7 +192,7 @@ def _rise(solver: Solver, solution: Solution, index: int, inner: float, point: P
 
 def bootstrap(
     solver: Solver, solution: Solution, draws: int, seed: int = SEED, strata: Strata | None = None,
-    watch: Progress | None = None,
+    progress: FitProgress | None = None,
 ) -> FloatArray:  # fmt: skip
     """Fits to runs drawn with replacement, those of each group among themselves. Shape (draws, P).
 
@@ -204,7 +204,7 @@ def bootstrap(
     refuse_few_runs({group: len(runs) for group, runs in of_group.items()})
     rng, found = np.random.default_rng(seed), []
     for draw in range(draws):
-        (watch or Progress()).doing(f"drawing the runs anew, {draw + 1} of {draws}")
+        (progress or FitProgress()).enter(f"drawing the runs anew, {draw + 1} of {draws}")
         drawn = [runs[k] for runs in of_group.values() for k in rng.integers(len(runs), size=len(runs))]
         chosen = [k for run in drawn for k, piece in enumerate(pieces) if id(piece.record) == run]
         problem = replace(solver.problem, pieces=tuple(pieces[k] for k in chosen))

@@ -10,7 +10,7 @@ import numpy as np
 from omnidyn.identification.lack_of_fit import LOSS, LackOfFit
 from omnidyn.identification.ladder import STANDS, Rung
 from omnidyn.identification.output_error.conclusion import unexplained
-from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.structure.diagnosis import Examined
 from omnidyn.identification.structure.ladder.models import Model, Move, tried
 from omnidyn.run import Run
@@ -19,7 +19,7 @@ from omnidyn.statement import NOTE, Statement
 
 def calmed(
     step: int, stands: Model, seen: Mapping[str, Examined], runs: Sequence[Run], names: Sequence[str] | None,
-    progress: Progress, gave_up: bool = False,
+    progress: FitProgress, gave_up: bool = False,
 ) -> tuple[Model, list[Rung]]:  # fmt: skip
     """(the model to go on from, the rungs of a step): of Student's t where that predicts better, by more than a
     standard error, what is not wild; as it stands, and no rungs, where no sample is wild, or a cause gains more.

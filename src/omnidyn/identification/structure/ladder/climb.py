@@ -23,7 +23,7 @@ from omnidyn.identification.ladder import STANDS, Ladder, Rung
 from omnidyn.identification.output_error.begin import WHOLE
 from omnidyn.identification.output_error.conclusion import unexplained
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.structure.diagnosis import Examined, examine
 from omnidyn.identification.structure.ladder.calm import calmed
@@ -52,7 +52,7 @@ Fits = Callable[
 
 
 def climb(
-    fit: Fit, solution: Solution, runs: Sequence[Run], progress: Progress, names: Sequence[str] | None = None
+    fit: Fit, solution: Solution, runs: Sequence[Run], progress: FitProgress, names: Sequence[str] | None = None
 ) -> tuple[Fit, Solution, Ladder]:
     """The best fit of some runs, its solution, and the way to it. fit, solution: of the robot as it was given. names:
     of the group of each run, where there are groups."""
@@ -64,7 +64,7 @@ def climb(
 
     purse, step, most = Purse(), 0, STEPS
     while (step := step + 1) <= most:
-        progress.doing(f"step {step} of the ladder: looking for what the model leaves out")
+        progress.enter(f"step {step} of the ladder: looking for what the model leaves out")
         seen = seen or _examined(stands)
         if not calm:
             made, found = calmed(step, stands, seen, runs, names, progress)

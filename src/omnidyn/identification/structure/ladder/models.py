@@ -20,7 +20,7 @@ from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.joint import JointEngine
 from omnidyn.identification.output_error.prepare import expand_keys
 from omnidyn.identification.output_error.problem.parameters import AT
-from omnidyn.identification.output_error.solve.progress import Progress
+from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.missing.laws import may_break_away, other_laws
@@ -205,7 +205,7 @@ def tried(
     stands: Model,
     runs: Sequence[Run],
     names: Sequence[str] | None,
-    progress: Progress,
+    progress: FitProgress,
     instead: Statement | None = None,
 ) -> list[Model | Untried]:
     """A move, fitted in every way in which it can be switched on. names: of the group of each run."""
@@ -240,7 +240,7 @@ def _begins(stands: Model, ways: Mapping[str, Switch]) -> dict[str, tuple[Robot,
 
 def _fit(
     stands: Model, begins: Mapping[str, tuple[Robot, Question]], runs: Sequence[Run], names: Sequence[str] | None,
-    progress: Progress,
+    progress: FitProgress,
 ) -> Fit:  # fmt: skip
     if names is None:
         return Fit.of(runs, *begins[stands.fit.groups[0].name], progress=progress)

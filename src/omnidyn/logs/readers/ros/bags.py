@@ -21,6 +21,7 @@ from omnidyn.logs.readers.ros.mcap_file import McapFile
 from omnidyn.logs.readers.ros.messages import Bag
 from omnidyn.logs.readers.ros.pack import MAX_EXPANSION, MIN_EXPANDED_BYTES, Unpacker, unpack_file
 from omnidyn.logs.table.table import Table
+from omnidyn.progress import Report
 
 SQLITE, ROSBAG, ZSTD = b"SQLite format 3\x00", b"#ROSBAG V", b"\x28\xb5\x2f\xfd"
 
@@ -38,8 +39,7 @@ def read_files(paths: Sequence[Path], source: str, options: Options) -> Recordin
     for path in paths:
 
         def told(at: int, before: int = done) -> None:
-            if options.progress is not None:
-                options.progress(before + at, total)
+            options.progress(Report("reading", before + at, total))
 
         with open_regular(path) as stream:
             size = os.fstat(stream.fileno()).st_size

@@ -29,6 +29,7 @@ from omnidyn.logs.readers.ros.layout import column
 from omnidyn.logs.readers.wpilib.structs import BadSchemaError, leaves_of
 from omnidyn.logs.table.table import Table
 from omnidyn.logs.table.text_file import BLOCK_BYTES, TOO_LARGE_REMEDY
+from omnidyn.progress import Report
 
 MAGIC = b"WPILOG"
 VERSION = 1  # the major one
@@ -101,8 +102,7 @@ class WpilogFile:
             if len(buffer) - at < 32:  # the longest head takes 17
                 done += at
                 buffer, at = buffer[at:] + self._more(BLOCK_BYTES), 0
-                if self.options.progress is not None:
-                    self.options.progress(done, self.size)
+                self.options.progress(Report("reading", done, self.size))
             if at == len(buffer):
                 return
             sizes = buffer[at]
