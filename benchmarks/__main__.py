@@ -21,7 +21,7 @@ NAMES = {
     "plant": "implicit engine: cost of a step, iterations of the solver, error against cost beside scipy and MuJoCo",
     "big_log": "a log of 1 GB in pieces, CSV and Parquet: processor time and memory (writes it to a temporary folder)",
     "large": "identify on three logs of 40 s at 200 Hz, four wheels, 12 channels: time, memory (ten minutes)",
-    "big_bag": "an MCAP of 2 GB: rate and memory beside rosbags and mcap (writes it to a temporary folder)",
+    "big_bag": "an MCAP of 2 GB: processor time and memory beside rosbags and mcap (writes it to a temporary folder)",
     "fuzz_readers": "every reader on mutated and random bytes, 60 s each: only errors of omnidyn may leave it",
     "real_fit": "output error on real logs: the motor bench and udea, fitted on some runs, run on others",
     "laws_identified": "Stribeck, Dahl, LuGre fitted back from logs of other integrators: coverage, std (an hour)",

@@ -1,7 +1,9 @@
 """MATLAB files of version 5 to 7 (`save` without -v7.3): elements with a type and a length, packed by zlib or not.
 
-The format is that of MathWorks' "MAT-File Format". It is read here and not by scipy, whose reader dies (a segmentation
-fault, found by fuzzing) of a damaged file; nothing is believed before the bytes behind it are there.
+The format is that of MathWorks' "MAT-File Format". It is read here and not by scipy 1.17, which ends the process on a
+damaged file (segmentation fault, after 1 to 370 files with up to three wrong bytes) and takes 1 GB for a bomb of 0.8
+MB; here that is refused within 0.15 GB. The price: 141 MB/s of processor time for packed numbers, checksum included,
+where scipy has 199.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """MCAP: records one after the other (mcap.dev/spec), read from the front, so that a file cut short is no less readable.
 
-A record: opcode (1 byte), length (8), content. What is read: Schema, Channel, Message, Chunk, DataEnd; the index behind
-them is not needed.
+A record: opcode (1 byte), length (8), content. What is read: Schema, Channel, Message, Chunk, DataEnd; the index
+behind them is not needed. The stream reader of the mcap package is as fast (111 MB/s), but believes a declared size:
+a bomb of 15 kB takes it 0.95 GB of memory; and it drops the last chunk of a file that is cut short.
 """
 
 from __future__ import annotations
