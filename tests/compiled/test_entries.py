@@ -220,6 +220,20 @@ def test_what_cannot_be_loaded_our_way_is_loaded_in_numbas(folder, entry, monkey
     assert hits(again) == 1
 
 
+@pytest.mark.parametrize("method", ["_key", "_file", "_rebuilt", "_save"])
+def test_a_numba_whose_cache_works_otherwise_costs_time_and_not_the_run(folder, entry, monkeypatch, method):
+    def refuse(self, *given):
+        raise AttributeError("another numba")
+
+    again = kernel(thrice)
+    monkeypatch.setattr(type(again._cache), method, refuse, raising=False)
+    if method == "_key":  # of the instance, from numba
+        again._cache._key = lambda *given: refuse(None)
+    assert again(3.0) == 9.0
+    assert again(3) == 9.0
+    assert hits(again) == (method == "_save")
+
+
 ASLEEP = """
 import sys
 import numpy as np

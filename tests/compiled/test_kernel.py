@@ -130,9 +130,9 @@ def test_without_a_writable_folder_it_compiles_in_memory(copy, tmp_path):
 def test_a_numba_that_nobody_tried_gives_the_same_numbers(copy):
     """To the last bit; it goes its own way, and takes longer."""
     cache = {"NUMBA_CACHE_DIR": str(copy / "cache")}
-    before, file = fresh(copy, **cache), copy / "omnidyn" / "compiled" / "kernel.py"
+    before, file = fresh(copy, **cache), copy / "omnidyn" / "compiled" / "private.py"
     text = file.read_text()
-    assert text.count("range(61, 69)") == 1, "kernel.py reads differently now"
+    assert text.count("range(61, 69)") == 1, "private.py reads differently now"
     file.write_text(text.replace("range(61, 69)", "range(0)"))
     try:
         after = fresh(copy, **cache)
@@ -140,6 +140,15 @@ def test_a_numba_that_nobody_tried_gives_the_same_numbers(copy):
         file.write_text(text)
     assert after["hits"] == [0, 0]
     assert {**after, "hits": before["hits"]} == before
+
+
+def test_with_all_that_is_private_switched_off_the_numbers_are_the_same(copy):
+    """To the last bit, and nothing is kept on disk."""
+    before = fresh(copy, NUMBA_CACHE_DIR=str(copy / "cache"))
+    after = fresh(copy, NUMBA_CACHE_DIR=str(copy / "other"), OMNIDYN_PLAIN_NUMBA="1")
+    assert {**after, "hits": before["hits"]} == before
+    assert after["hits"] == [0, 0]
+    assert not list((copy / "other").rglob("*.*"))
 
 
 def test_without_a_compiler_it_runs_as_plain_python(copy):

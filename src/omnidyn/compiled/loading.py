@@ -1,6 +1,6 @@
 """Machine code from disk, without waking the compiler.
 
-numba gets ready to compile before it loads what is compiled: two seconds of a command that compiles nothing. A kernel
+numba gets ready to compile before it loads what is compiled: 0.3 to 0.5 s of a command that compiles nothing. A kernel
 needs the runtime that counts arrays, and its own object code. What the compiler would want of it, should it ever be
 called by another kernel, is read when it is asked for. All of that is private to numba: tests watch.
 """
