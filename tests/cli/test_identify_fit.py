@@ -77,7 +77,7 @@ def test_a_model_that_follows_says_so_first(call):
 
 
 def test_output_error_is_the_default_and_predicts_a_log_it_never_saw(call, tmp_path):
-    arguments = ("smooth0.csv", "smooth1.csv", "--robot", "axebot", "--hold-out", "smooth1.csv")
+    arguments = ("smooth0.csv", "smooth1.csv", "--robot", "axebot", "--hold-out", "smooth1.csv", "--full")
     code, out, err = call(*arguments, "-o", str(tmp_path / "fit.toml"), "--report", str(tmp_path / "r.html"))
     assert code == 0
     assert "output error, maximum likelihood" in out
