@@ -94,13 +94,16 @@ def steady_verdict(study: SteadyStudy) -> list[Statement]:
     score, _, share = _best_shape(study)
     lacks = [each for each in study.lack_of_fit.values() if each.found]
     own = [*study.estimates] if study.choice.own else []
-    shapes = {"names": tuple(map(study.choice.of, own)) or (study.choice.chosen,), "groups": tuple(own) or ("",)}
+    shapes = {
+        "names": tuple(study.choice.of(group) for group in own) or (study.choice.chosen,),
+        "groups": tuple(own) or ("",),
+    }
     friction = Statement("steady_friction", WARNING if lacks else NOTE, numbers={
         "levels": tuple(each.mean for each in study.travel.values()), "groups": tuple(study.travel),
         "shapes": Statement("shapes", NOTE, numbers=shapes), "share": share,
         "ties": tuple(each.name for each in study.choice.scores if not each.told_apart and each.name != score.name),
         "misfit": bool(lacks), "cause": next((str(r.words) for each in lacks for r in each.remedies), ""),
-        "known": tuple(each.numbers_known() for each in study.estimates.values()),
+        "known": lines_verdict(study.estimates)[0],
     })  # fmt: skip
     changes = tuple(each.short() for each in study.moments)
     moved = [Statement("force_changes_in_run", WARNING, numbers={"changes": changes})] if changes else []

@@ -78,7 +78,7 @@ def _steady(statement: Statement) -> str:
     error = max(1.0, round(100.0 * numbers["share"]))
     return (
         f"friction along travel is {level}; its shape, {numbers['shapes']}, predicts the force in a direction that was "
-        f"left out within {error:.0f} %{alike}; {_of_groups(statement)}"
+        f"left out within {error:.0f} %{alike}; {numbers['known']}"
     )
 
 
