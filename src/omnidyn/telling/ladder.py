@@ -56,7 +56,7 @@ SENTENCES = {
     "predicts_no_better": Sentence("predicts held-out blocks no better"),
     "costs_more_than_it_explains": Sentence("explains less than its numbers cost"),
     "other_explains_more": Sentence("{cause} would explain more"),
-    "does_not_follow": Sentence("does not follow the logs"),
+    "step_does_not_follow": Sentence("does not follow the logs"),
     "not_fittable": Sentence("cannot be fitted: {error}"),
     "slow_and_not_needed": Sentence(
         "not tried: it explains less than what leaves nothing but noise without it, and its fit takes long"

@@ -228,7 +228,7 @@ def _why_not(
     if (before.left - own.left) / noise - np.log(max(own.rows, 2)) * (own.numbers - before.numbers) < at_least:
         return Statement("other_explains_more", NOTE, numbers={"cause": other})
     if unexplained(model.solution.solver, model.solution):
-        return Statement("does_not_follow", NOTE)
+        return Statement("step_does_not_follow", NOTE)
     return None
 
 
