@@ -44,6 +44,7 @@ NAMES = {
     "exports": "the paper's robot in C, FMU, MuJoCo, python-control, WPILib: errors, drift at rest (a minute)",
     "exported_c": "exported C on a million random calls under sanitizers: findings, the slowest call (four minutes)",
     "stagger": "topics with clocks of their own: check, geometry and fits beside equal stamps (two minutes)",
+    "studies": "intervals and false alarms over many draws: breakaway, laws, rounding, noise, motors (15 minutes)",
     "wrong_worlds": "forty kinds of wrong world, and right ones: what identify says of each (an hour)",
 }
 ANSWERS = "answers"

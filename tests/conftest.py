@@ -6,11 +6,13 @@ OMNIDYN_HYPOTHESIS=thorough tries 50 times as many examples, and other ones in e
 import os
 import signal
 import time
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 from omnidyn.model.robot_file import load_robot
+from tests.support.processor_times import OPTION, ProcessorTimes
 
 # Workers of pytest-xdist have the processors already; set before the first test loads NumPy.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -40,6 +42,13 @@ BEGUN, LAST_LONG = time.monotonic(), 45  # [min] from then on; on most machines 
 
 def pytest_addoption(parser):
     parser.addoption("--long", action="store_true", help="run the long studies as well: those marked long")
+    parser.addoption(OPTION, type=Path, metavar="FILE", help="write the processor time of each test [s] to this file")
+
+
+def pytest_configure(config):
+    """Processor times are counted where a file is named for them."""
+    if config.getoption(OPTION) is not None:
+        config.pluginmanager.register(ProcessorTimes(config.getoption(OPTION)))
 
 
 def pytest_collection_modifyitems(config, items):

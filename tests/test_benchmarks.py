@@ -17,7 +17,7 @@ from benchmarks.answers import differences
 ROOT = Path(__file__).resolve().parents[1]
 QUICK = (
     "house", "accuracy", "simulate", "inductance", "rest", "compare", "check", "exports", "stagger", "identify_loop",
-    "ten_robots",
+    "ten_robots", "studies",
 )  # fmt: skip
 
 
@@ -32,6 +32,8 @@ def test_each_quick_benchmark_runs_at_its_smallest_size(name):
     assert done.returncode == 0, done.stderr[-2000:]
     (table,) = json.loads(done.stdout)
     assert table["rows"]
+    if name == "studies":  # its goals are granted the counting error of few draws
+        assert not [row for row in table["rows"] if row["met"] is False]
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import parse_robot
 from omnidyn.run import Run
 
-SECONDS = 30.0
+SECONDS = 30.0  # of a log, unless its setup says otherwise
 SPEEDS, TWIST, AR, COUNTS, FILTERED, TICKS = "speeds", "twist", "ar", "counts", "filtered", "ticks"
 NOISE, TICK = 0.4, 2.0 * np.pi / 600.0  # [rad/s], [rad]
 FINE = 4  # samples of a filter in a row
@@ -22,7 +22,8 @@ APART = 0.6  # [s] between two moves that must not meet
 
 @dataclass(frozen=True)
 class Setup:
-    """How a log is made. rate [Hz]. sensor: what is logged, and its noise; memory: correlation of it, row to row.
+    """How a log is made. rate [Hz]. seconds: its length. sensor: what is logged, and its noise; memory: correlation of
+    it, row to row.
 
     mix: share of the second direction in moves along two; apart: whether the robot stops between moves; turns: whether
     it turns only to and fro, where false; forward: whether moves along two are along x first. latency [s]. jitter: of
@@ -31,6 +32,7 @@ class Setup:
     """
 
     rate: float = 100.0
+    seconds: float = SECONDS
     sensor: str = SPEEDS
     memory: float = 0.0
     mix: float = 1.0
@@ -82,7 +84,7 @@ def right_case(seed: int) -> Case:
         coulomb=(near(3.9), near(3.9), near(0.2)), viscous=(near(1.2), near(1.2), near(0.012)), frame=seed % 3 == 2,
     )  # fmt: skip
     sensor = (SPEEDS, SPEEDS, TWIST, AR, COUNTS)[seed % 5]
-    return Case(world, world, Setup(100.0 if seed // 2 % 2 else 50.0, sensor, 0.8 if sensor == AR else 0.0))
+    return Case(world, world, Setup(100.0 if seed // 2 % 2 else 50.0, SECONDS, sensor, 0.8 if sensor == AR else 0.0))
 
 
 def robot_of(told: World) -> Robot:
@@ -137,7 +139,7 @@ def truths(world: World, shape: str) -> dict[str, float]:
 def commands(case: Case, rng: np.random.Generator) -> np.ndarray:
     """What a person sends [V]: at rest, then directions and turns at levels of their own, some rest. (rows, n)."""
     told, setup = case.told, case.setup
-    G, rows = told.G, round(SECONDS * setup.rate)
+    G, rows = told.G, round(setup.seconds * setup.rate)
     out = [np.zeros((round(0.5 * setup.rate), G.shape[1]))]
     way = 1.0
     while sum(map(len, out)) < rows:

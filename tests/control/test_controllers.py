@@ -225,7 +225,7 @@ def test_random_calls(name):
 
 @pytest.mark.long
 def test_many_random_calls(name):
-    fuzz(name, 100_000, 2)
+    fuzz(name, 20_000, 2)
 
 
 def test_feed_forward_takes_the_model_where_it_wants():

@@ -74,7 +74,7 @@ def unchanged(file, text, plain):
     return tree(text) == tree(plain)
 
 
-@pytest.mark.parametrize("examples", [12, pytest.param(200, marks=pytest.mark.long)])
+@pytest.mark.parametrize("examples", [12, pytest.param(60, marks=pytest.mark.long)])
 def test_names_change_comments_and_names_alone(examples, tmp_path):
     heads = {"c": [], "java": []}
 

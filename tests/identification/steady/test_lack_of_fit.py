@@ -2,44 +2,11 @@
 
 import json
 
-import numpy as np
 import pytest
 
 from omnidyn.identification.steady.lack_of_fit import REPEATS
-from omnidyn.identification.steady.study import identify_steady
-from omnidyn.model.robot_file import load_robot
-from omnidyn.run import Run
 from tests.support.codes import codes
-from tests.support.plain_world import World, at_wheels, fan, on_rollers, spoiled, steady_logs, turned_box
-
-AXEBOT = load_robot("axebot")
-YAW = ((0.0, 0.0, 1.0), 0.099, 0.099)
-OFFERED = {
-    "box": {"elements": turned_box(0, 2.4, 1.6, 0.099)},
-    "disc": {"cone": (2.0, 2.0), "elements": [YAW]},
-    "ellipse": {"cone": (2.4, 1.6), "elements": [YAW]},
-    "wheel": {"elements": at_wheels(World(), 0.9)},
-}
-NOT_OFFERED = {
-    "box turned by 45 deg": {"elements": turned_box(45, 2.4, 1.6, 0.099)},
-    "rollers": {"elements": [*on_rollers(World(), 1.2), YAW]},
-    "forward and backward": {
-        "elements": [((1.0, 0.0, 0.0), 2.0, 2.6), ((0.0, 1.0, 0.0), 1.6, 1.6), YAW],
-    },
-}
-CLEAN: dict = {}
-
-
-def study(name, seed, speeds=(0.4,), step=15, **noise):
-    """Of spoiled logs of a world, simulated once."""
-    key = name, speeds, step
-    if key not in CLEAN:
-        CLEAN[key] = steady_logs(World(**(OFFERED | NOT_OFFERED)[name]), fan(speeds, step))
-    random, runs = np.random.default_rng(seed), []
-    for twist, log in CLEAN[key]:
-        t, current, speed = spoiled(log, random, **noise)
-        runs.append(Run(t=t, current=current, wheel_speed=speed, twist_command=np.tile(twist, (len(t), 1))))
-    return identify_steady(runs, AXEBOT)
+from tests.support.shapes_offered import NOT_OFFERED, OFFERED, study
 
 
 @pytest.mark.parametrize("world", [*NOT_OFFERED])
@@ -60,19 +27,6 @@ def test_nothing_is_invented_where_a_shape_fits(world):
     assert not found.lack_of_fit["all"].found
     assert found.lack_of_fit["all"].tested
     assert "no_lack_of_fit" in codes(found.statements)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("world", [*OFFERED])
-def test_false_alarms_are_rare(world):
-    """50 of each of the four: at most 2 % in all; here one of 50."""
-    assert sum(study(world, seed).lack_of_fit["all"].found for seed in range(50)) <= 1
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("world", [*NOT_OFFERED])
-def test_detection_is_sure_at_the_noise_of_the_benchmark(world):
-    assert sum(study(world, seed).lack_of_fit["all"].found for seed in range(30)) >= 27
 
 
 def test_errors_that_repeat_tell_by_themselves():

@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 
 from benchmarks.blind.log import robot_of
-from benchmarks.wrong_worlds.world import BOX, ELLIPSE, WHEELS, World, drive
+from benchmarks.wrong_worlds.world import BOX, ELLIPSE, WHEELS, World
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.steady.moment import levelled
 from omnidyn.identification.steady.operating_points import steady_windows
 from omnidyn.identification.steady.study import identify_steady
-from omnidyn.run import Run
 from tests.support.codes import codes
+from tests.support.constant_speeds import HOLD, ROUND, logged, once
 
-RATE, HOLD = 100.0, 1.6  # [Hz], [s] of a command
 LEVEL = 3.9  # [N]
 WORLD = World(coulomb=(LEVEL, LEVEL, 0.2), viscous=(0.0, 0.0, 0.0))
 WAYS = np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
@@ -30,19 +29,6 @@ def run(seed, rounds=6, change=1e9, factor=1.0):
     order = np.concatenate([rng.permutation(len(WAYS)) for _ in range(rounds)])
     world = replace(WORLD, change=change, after_friction=factor)
     return logged(world, 7.0 * WAYS[order] @ shape.T, rng, f"run {seed}")
-
-
-def logged(world, commands, rng, source):
-    """A run under commands (n, wheels) [V] that hold for HOLD each."""
-    volts = np.repeat(commands, round(HOLD * RATE), axis=0)
-    t = np.arange(len(volts)) / RATE
-    moved = drive(world, t, volts, t)
-    back = moved.wheel_speed * world.gear_ratio * np.array(world.torque_constant)
-    current = (volts - back) / np.array(world.resistance)
-    return Run(
-        t, voltage=volts, wheel_speed=moved.wheel_speed + 0.1 * rng.normal(size=volts.shape),
-        current=current + 0.03 * rng.normal(size=volts.shape), source=source,
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize("factor", [1.15, 0.9])
@@ -88,19 +74,6 @@ def test_the_run_that_changed_is_named():
     (moment,) = found.study.moments
     assert moment.source == "run 3"
     assert found.document().data["moments"][0]["source"] == "run 3"
-
-
-ROUND = {"coulomb": (3.9, 3.0, 0.2), "viscous": (0.0, 0.0, 0.0), "rim": (1.6, 0.0)}
-
-
-def once(seed, world, count, swept=False, change=1e9, factor=1.0):
-    """Directions of which none comes again, each at a level of its own, in an order of their own or one round."""
-    rng = np.random.default_rng([seed, count])
-    angle = 2.0 * np.pi / count * (np.arange(count) + rng.uniform(0.2, 0.8, count))
-    angle = angle if swept else rng.permutation(angle)
-    rim = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ np.linalg.pinv(world.G)[:, :2].T
-    rim *= rng.uniform(5.0, 8.0, (count, 1)) / np.abs(rim).max(axis=1, keepdims=True)
-    return logged(replace(world, change=change, after_friction=factor), rim, rng, f"run {seed}")
 
 
 @pytest.mark.parametrize(("shape", "count", "factor"), [(BOX, 12, 1.1), (ELLIPSE, 16, 0.95), (WHEELS, 12, 1.05)])
@@ -164,20 +137,3 @@ def test_a_shape_that_fits_on_neither_side_of_a_change_is_said_behind_it(factor)
     found = [one for one in study.warnings if one.code in ("changes_within_run", "no_shape_fits")]
     assert codes(found) == ["changes_within_run"] * (factor != 1.0) + ["no_shape_fits"]
     assert found[-1].numbers["changes"] == (factor != 1.0)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("shape", [BOX, ELLIPSE, WHEELS])
-def test_changes_by_the_shape_many_times(shape):
-    world, found, held, wrong = World(shape=shape, **ROUND), 0, 0, 0
-    for seed in range(13):
-        count = 12 + seed % 13
-        wrong += bool(identify_steady([once(seed, world, count, seed % 2 == 0)], robot_of(world)).moments)
-        changed, factor = (0.35 + 0.3 * seed / 13) * count * HOLD, (1.05, 1.1)[seed % 2]
-        run = once(100 + seed, world, count, change=changed, factor=factor)
-        for moment in identify_steady([run], robot_of(world)).moments:
-            found += moment.between[0] <= changed <= moment.between[1]
-            held += moment.ci95[0] <= factor - 1.0 <= moment.ci95[1]
-    assert not wrong
-    assert found >= 12
-    assert held >= 11

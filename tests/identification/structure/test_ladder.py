@@ -29,7 +29,7 @@ FREE = ("friction",)
 
 def world(name, size, seed=SEED, sensor=SPEEDS):
     """(log, robot file of an owner who does not know, friction as it is) of a kind of wrong world."""
-    case = by_name(name).make(right_case(seed).setup_but(sensor=sensor, memory=0.0), size)
+    case = by_name(name).make(right_case(seed).setup_but(sensor=sensor, memory=0.0, rate=50.0, seconds=20.0), size)
     return logged(case, seed), robot_of(case.told), truths(case.told, case.told.shape)
 
 

@@ -3,47 +3,13 @@ follows nothing, which only such a level tells from noise."""
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
-from scipy.stats import chi2
 
 from omnidyn.identification.lack_of_fit import HOLDS, NEIGHBOURS, REPEATS, REST
 from omnidyn.identification.validation import validate
 from omnidyn.identification.whole_logs import fit_output_error
-from omnidyn.model.robot_file import load_robot
-from omnidyn.run import Run
-from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE
 from tests.support.codes import codes
-
-AXEBOT, RATE = load_robot("axebot"), 100.0
-
-
-def commands(seed, seconds=30.0, rests=True):
-    """Voltages that are held for 0.3 to 1.5 s, some of them 0. (rows, 3)."""
-    rng, rows = np.random.default_rng([seed, 1]), round(seconds * RATE)
-    out = [np.zeros((round(0.5 * RATE) * rests, 3))]
-    while sum(map(len, out)) < rows:
-        volts = rng.uniform(-6.0, 6.0, 3) * (not rests or rng.random() > 0.15)
-        out.append(np.tile(volts, (round(rng.uniform(0.3, 1.5) * RATE), 1)))
-    return np.concatenate(out)[:rows]
-
-
-def coloured(rho, rows, rng):
-    """Noise of variance NOISE^2 and a correlation from row to row. (rows, 3)."""
-    white = rng.normal(size=(rows + 600, 3))
-    return lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], white, axis=0)[600:] * NOISE
-
-
-def log_of(voltage, disturbed=lambda clean, rng: 0.0, rho=0.0, seed=1, twist=lambda values: values):
-    """A log of the right robot, its twist disturbed."""
-    clean, rng = simulate(AXEBOT, voltage, 1.0 / RATE), np.random.default_rng([seed, 2])
-    values = clean.twist + coloured(rho, len(clean.t), rng) + disturbed(clean, rng)
-    return Run(t=clean.t, voltage=clean.voltage, twist=twist(values), source="log")
-
-
-def lack_of(*args, **options):
-    """Of a fit to such a log."""
-    return fit_output_error(log_of(*args, **options), AXEBOT, nuisances=()).lack_of_fit
+from tests.support.held_commands import AXEBOT, RATE, commands, lack_of, log_of
 
 
 def assert_levels(lack, source):
@@ -174,20 +140,3 @@ def test_a_sensor_that_rounds_says_nothing_at_rest(times):
     step = times * NOISE
     lack = lack_of(commands(4), twist=lambda values: np.round(values / step) * step)
     assert REST not in {one.source for one in (*lack.noise.values(), *lack.at_rest.values())}
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(("rho", "least"), [(0.0, 0.9), (0.5, 0.9), (0.9, 0.88)])
-def test_levels_of_many_logs_and_their_degrees_of_freedom(rho, least):
-    """Bias of the level by repeats, and how often its 95 % interval by chi squared holds the noise that was put in."""
-    ratio, held, beyond = [], [], 0
-    for seed in range(12):
-        lack = lack_of(np.tile(commands(seed, 10.0), (3, 1)), rho=rho, seed=seed)
-        beyond += bool(lack.beyond)
-        for one, std in zip(lack.noise.values(), NOISE, strict=True):
-            low, high = one.level * np.sqrt(one.degrees / chi2.ppf([0.975, 0.025], one.degrees))
-            ratio.append(one.level / std)
-            held.append(low < std < high)
-    assert np.mean(ratio) == pytest.approx(1.0, abs=0.025)
-    assert np.mean(held) >= least
-    assert beyond <= 1

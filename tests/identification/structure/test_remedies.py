@@ -32,7 +32,7 @@ WORLDS = {
 
 
 def log(robot, seed=1):
-    return noisy(simulate(robot, dt=0.01, voltage=excitation(30.0, 100.0, seed)), seed)
+    return noisy(simulate(robot, dt=0.02, voltage=excitation(20.0, 50.0, seed)), seed)
 
 
 @pytest.fixture(scope="module")

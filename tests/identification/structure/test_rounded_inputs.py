@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from benchmarks.wrong_worlds.kinds import KINDS
-from benchmarks.wrong_worlds.log import AR, COUNTS, SPEEDS, logged, right_case, robot_of, truths
+from benchmarks.wrong_worlds.log import COUNTS, SPEEDS, logged, right_case, robot_of
 from omnidyn.identification.output_error.moved_by import beside_rounding
 from omnidyn.identification.output_error.problem.input_steps import input_steps
 from omnidyn.identification.output_error.problem.record import record
@@ -15,21 +15,9 @@ from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, voltages
 from tests.support.codes import codes
+from tests.support.rounded_logs import a_fit, errors, rounded
 
 AXEBOT = load_robot("axebot")
-
-
-def rounded(values, step):
-    return np.round(np.asarray(values) / step) * step
-
-
-def errors(seed, step):
-    """(errors of the friction numbers in standard errors, warnings) of a log whose voltages are rounded."""
-    case = right_case(3 * seed).setup_but(sensor=SPEEDS, memory=0.0, rate=50.0)
-    run = logged(case, 7000 + seed)
-    fit = fit_output_error(run.replace(voltage=rounded(run.voltage, step)), robot_of(case.told), nuisances=())
-    truth = truths(case.told, case.told.shape)
-    return [(fit.value[key] - true) / fit.std[key] for key, true in truth.items()], fit.warnings
 
 
 def test_voltages_that_were_rounded_are_in_the_intervals():
@@ -53,17 +41,6 @@ def test_a_supply_that_is_logged_makes_no_new_rounding_of_every_row():
         for size in (0.0, 0.01)
     )
     assert [uneven[key] / even[key] for key in even] == pytest.approx([1.0] * len(even), abs=0.15)
-
-
-def a_fit(seed, step, make=lambda case: case, sensor=SPEEDS, memory=0.0, duties=False):
-    """The fit to a log of a world whose inputs are rounded."""
-    case = make(right_case(3 * seed).setup_but(sensor=sensor, memory=memory, rate=50.0))
-    run = logged(case, 7000 + seed)
-    volts = rounded(run.voltage, step) if step else run.voltage
-    inputs = (
-        {"voltage": None, "duty": volts / 12.0, "supply": np.full(len(run.t), 12.0)} if duties else {"voltage": volts}
-    )
-    return fit_output_error(run.replace(**inputs), robot_of(case.told), free="friction")
 
 
 @pytest.mark.parametrize(("seed", "step", "duties"), [(0, 0.3, False), (1, 0.1, True), (2, 0.3, False)])
@@ -108,28 +85,6 @@ def test_steps_that_the_motors_take_explain_nothing():
     lack = fit_output_error(a_log(exact, exact, 6), AXEBOT, nuisances=()).lack_of_fit
     assert not lack.found
     assert max(lack.rounded.values()) < 0.01
-
-
-@pytest.mark.long
-def test_right_worlds_over_many_logs():
-    """White noise and noise that remembers, voltages and duties."""
-    found = [
-        a_fit(seed, step, sensor=sensor, memory=memory, duties=bool(seed % 2)).lack_of_fit.found
-        for seed in range(3)
-        for step in (0.05, 0.1, 0.3)
-        for sensor, memory in ((SPEEDS, 0.0), (AR, 0.9))
-    ]
-    print(np.sum(found), len(found))
-    assert np.mean(found) <= 0.06
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("step", [0.05, 0.1])
-def test_intervals_over_many_logs(step):
-    z = np.array([errors(seed, step)[0] for seed in range(60)])
-    print(step, (np.abs(z) < 1.96).mean().round(3), np.sqrt((z**2).mean(axis=0)).round(2))
-    assert (np.abs(z) < 1.96).mean() >= 0.92
-    assert np.sqrt((z**2).mean()) > 1.0 / 1.3  # no more than 1.3 times as wide as they scatter
 
 
 def a_log(voltage, told, seed):

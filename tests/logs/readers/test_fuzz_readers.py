@@ -7,7 +7,7 @@ import pytest
 from benchmarks import fuzz_readers
 from benchmarks.fuzz_readers import FORMATS, READERS, measure
 
-LONG = 12.0  # [s] for a format; bench fuzz_readers takes a minute for each reader
+LONG = 4.0  # [s] for a format; bench fuzz_readers takes a minute for each reader
 
 
 def needed():

@@ -157,10 +157,10 @@ def test_each_law_against_the_events(number):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("tol", [1e-5, 1e-6, 1e-7])
 @pytest.mark.parametrize("number", range(len(ROBOTS)))
-def test_seventy_robots_against_the_events(number, tol):
-    meets_the_events(number, tol)
+def test_seventy_robots_against_the_events(number):
+    """The robots of a law by turns at each tolerance; the first of each at 1e-6 is above."""
+    meets_the_events(number, (1e-7, 1e-5, 1e-6, 1e-5)[ROBOTS[:number].count(ROBOTS[number]) % 4])
 
 
 @pytest.mark.long

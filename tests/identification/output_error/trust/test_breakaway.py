@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import omnidyn
-from benchmarks.wrong_worlds.log import NOISE as SENSOR
-from benchmarks.wrong_worlds.log import Case, commands, robot_of, truths
-from benchmarks.wrong_worlds.world import World, drive
+from benchmarks.wrong_worlds.log import robot_of
+from benchmarks.wrong_worlds.world import World
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.identification.whole_logs import fit_output_error, identify_groups
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
@@ -14,6 +13,7 @@ from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from tests.reference import modes
+from tests.support.starts import LEVELS, OF_TABLE, PLANE, held, in_a_turning_frame, log_of_starts, of_slants, of_starts
 
 SLIDES, HOLDS = 2.2, 5.9  # [N] along x and y
 VISCOUS = (0.94, 0.96, 0.01)
@@ -46,30 +46,6 @@ def test_it_is_found_above_the_last_drive_below_three_times_coulomb():
     assert fit.noise["twist[0]"] < 1.1 * NOISE
 
 
-RATIO = 1.3
-LEVELS = [f"friction.axes.breakaway[{axis}]" for axis in range(3)]
-
-
-def in_a_turning_frame(seed, **options):
-    """(fit, truth) of 30 s in a turning frame, by the simulator of the wrong worlds, which shares no code with src.
-
-    At 0.4 of its voltages, so that some of its drives lie between Coulomb friction and breakaway.
-    """
-    world = World(frame=True, breakaway=RATIO)
-    asked = 0.4 * commands(Case(world, world), np.random.default_rng([seed, 2]))
-    t = np.arange(len(asked)) / 100.0
-    speed = drive(world, t, asked, t).wheel_speed
-    speed = speed + SENSOR * np.random.default_rng([seed, 3]).normal(size=speed.shape)
-    log = Run(t, voltage=asked, wheel_speed=speed)
-    fit = fit_output_error(log, robot_of(world), free=["friction", *LEVELS], **options)
-    levels = zip(LEVELS, (RATIO * level for level in world.coulomb), strict=True)
-    return fit, truths(world, "axes") | dict(levels)
-
-
-def held(fit, truth):
-    return {key: fit.ci95[key][0] <= true <= fit.ci95[key][1] for key, true in truth.items()}
-
-
 def test_it_is_found_in_a_turning_frame_too():
     """The implicit engine runs it. Two axes are told well here, turning from below only: that is said."""
     words = []
@@ -84,53 +60,6 @@ def test_it_is_found_in_a_turning_frame_too():
     assert fit.robot.priors[LEVELS[2]].std is None
     assert any(each.startswith("breakaway friction sideways, fit ") for each in words)
     assert sum(each.startswith("breakaway friction") for each in words) < 300
-
-
-@pytest.mark.long
-def test_intervals_in_a_turning_frame_hold_the_truth():
-    every = [held(*in_a_turning_frame(seed)) for seed in range(5)]
-    levels = [each[key] for each in every for key in LEVELS]
-    others = [each[key] for each in every for key in each if key not in LEVELS]
-    assert np.mean(levels) >= 0.9
-    assert np.mean(others) >= 0.9
-
-
-PLANE = ["friction.direction.breakaway[0]", "friction.direction.breakaway[1]"]
-OF_TABLE = {"direction": [*PLANE, "friction.direction.yaw_breakaway"], "wheels": ["friction.wheels.breakaway"]}
-
-
-def starts(world, rng, count, turns):
-    """Voltages of starts from rest, each its own way: they rise in steps to about twice what Coulomb friction holds,
-    then leap, then end. turns: whether every third turns."""
-    per = world.ke / np.array(world.resistance)
-    out = [np.zeros((30, 3))]
-    for k in range(1, 1 + count):
-        along = bool(k % 3) or not turns
-        angle, way = rng.uniform(-np.pi, np.pi), rng.choice([-1.0, 1.0]) / world.robot_radius
-        rim = np.array([np.cos(angle), np.sin(angle), 0.0] if along else [0.0, 0.0, way]) @ world.G
-        wrench = world.G @ (per * rim)
-        held = world.coulomb[0] / np.hypot(*wrench[:2]) if along else world.coulomb[2] / abs(wrench[2])
-        held = world.rim[0] / np.abs(per * rim).max() if world.shape == "wheels" else held
-        rise = np.concatenate([np.repeat(np.linspace(0.4, 1.0, 10), 10), np.full(40, 3.0)])
-        out += [np.outer(rise, 2.0 * held * rng.uniform(0.8, 1.2) * rim), np.zeros((40, 3))]
-    return np.concatenate(out)
-
-
-def log_of_starts(seed, world, count=14, turns=True):
-    """Starts in a turning frame, by the simulator of the wrong worlds."""
-    asked = starts(world, np.random.default_rng([seed, 4]), count, turns)
-    t = np.arange(len(asked)) / 100.0
-    speed = drive(world, t, asked, t).wheel_speed
-    speed = speed + SENSOR * np.random.default_rng([seed, 5]).normal(size=speed.shape)
-    return Run(t, voltage=asked, wheel_speed=speed)
-
-
-def of_starts(seed, shape, keys, *options):
-    """(fit, truth) of such a log."""
-    world = World(frame=True, breakaway=RATIO, shape=shape)
-    fit = fit_output_error(log_of_starts(seed, world, *options), robot_of(world), free=["friction", *keys])
-    truth = truths(world, shape)
-    return fit, truth | {key: RATIO * truth[key.replace("breakaway", "coulomb")] for key in keys}
 
 
 @pytest.mark.parametrize("shape, keys", [("direction", PLANE), ("wheels", OF_TABLE["wheels"])])
@@ -156,52 +85,11 @@ def test_at_the_wheels_it_is_named_where_it_is_left_out():
     assert not omnidyn.identify([log], robot_of(world), free=["friction", key]).lack_of_fit.found
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("shape", OF_TABLE)
-def test_intervals_hold_the_truth_wherever_friction_acts(shape):
-    keys = OF_TABLE[shape]
-    every = [held(*of_starts(seed, shape, keys)) for seed in range(5)]
-    assert np.mean([each[key] for each in every for key in keys]) >= 0.9
-
-
-def of_slants(seed, count):
-    """(fit, truth) of slow starts near the diagonal alone, which tell what both levels are together, and of fast runs
-    along x and along y, which tell Coulomb friction."""
-    world = World(frame=True, breakaway=RATIO, shape="direction")
-    rng, slides = np.random.default_rng([seed, 7]), world.coulomb[0]
-    volts_of = np.linalg.pinv(world.G * world.ke / np.array(world.resistance))
-    asked = []
-
-    def run(size, angle, turning, rows):
-        force = size * np.cos(angle), size * np.sin(angle), turning
-        asked.append(np.repeat([volts_of @ force], rows, 0))
-
-    for _ in range(count):
-        angle = np.pi / 4.0 + rng.normal(0.0, 0.03) + rng.choice([0.0, np.pi])
-        for size in np.sort(rng.uniform(0.9, 1.55, 5)) * slides:
-            run(size, angle, 0.0, 25)
-        run(0.0, 0.0, 0.0, 25)
-        run(rng.uniform(2.2, 3.2) * slides, rng.integers(4) * np.pi / 2.0, rng.normal() * 0.6, 60)
-        run(0.0, 0.0, 0.0, 40)
-    rows = np.concatenate(asked)
-    t = np.arange(len(rows)) / 100.0
-    speed = drive(world, t, rows, t).wheel_speed
-    speed = speed + SENSOR * np.random.default_rng([seed, 3]).normal(size=speed.shape)
-    fit = fit_output_error(Run(t, voltage=rows, wheel_speed=speed), robot_of(world), free=["friction", *PLANE])
-    return fit, {key: RATIO * slides for key in PLANE}
-
-
 def test_levels_of_an_ellipse_that_one_way_of_starting_tells_together_are_wide():
     """Alone each lies within a percent of a wrong value: that of the other, a little off, made up for it."""
     fit, truth = of_slants(0, 5)
     assert all(held(fit, truth).values())
     assert all(high > 1.3 * low for low, high in map(fit.ci95.get, PLANE))
-
-
-@pytest.mark.long
-def test_intervals_hold_the_truth_where_levels_are_told_together():
-    every = [held(*of_slants(seed, 9)) for seed in range(3)]
-    assert np.mean([each[key] for each in every for key in PLANE]) >= 0.9
 
 
 def test_a_level_that_no_law_has_is_refused_by_name():
