@@ -148,7 +148,7 @@ def test_the_ladder_takes_the_grip_that_the_file_lacks():
     """Of a file without traction_mu, nor any inertia of wheels; a floor that lets them slip at the hardest starts."""
     grippy = ROBOT.replace(wheels=ROBOT.wheels.replace(traction_mu=1.6))
     rolling = AXEBOT.replace(wheels=AXEBOT.wheels.replace(wheel_inertia=0.0))
-    run = log(1, 5.0, robot=grippy)
+    run = log(1, 4.0, robot=grippy)
     best = fit_output_error(run, rolling, free=("friction",), outputs=("twist", "wheel_speed"), ladder=True)
     (step,) = best.ladder.taken
     assert step.key == "wheels.traction_mu"
@@ -161,7 +161,7 @@ def test_the_ladder_takes_the_grip_that_the_file_lacks():
 def test_a_fit_that_wheels_that_slip_led_astray_is_diagnosed_in_bounded_time(monkeypatch):
     """Its friction about yaw went to 1e6 N m: bristles as stiff as that took minutes."""
     grippy = ROBOT.replace(wheels=ROBOT.wheels.replace(traction_mu=0.8))
-    run = log(1, 8.0, robot=grippy)
+    run = log(1, 6.0, robot=grippy)
     astray = fit_output_error(run, AXEBOT, free=("friction",), outputs=("twist", "wheel_speed"))
     assert "search_end" in codes(astray.warnings)
     tried = []

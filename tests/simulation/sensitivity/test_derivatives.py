@@ -309,14 +309,14 @@ def test_the_run_is_that_of_simulate(ellipse, unequal, tol):
 @pytest.mark.parametrize("tol", [None, 1e-6])
 def test_six_keys_cost_at_most_ten_runs(ellipse, unequal, tol):
     keys = [*BODY, "friction.axes.viscous[0]", "motor.emf_constant_Vs_rad"]
-    for robot, program in ((ellipse, np.tile(TURNING, (20, 1))), (unequal, np.tile(FOUR, (20, 1)))):
+    for robot, program in ((ellipse, np.tile(TURNING, (10, 1))), (unequal, np.tile(FOUR, (10, 1)))):
         cost = []
         for call in (
             lambda r=robot, p=program: simulate(r, p, 0.01, tol=tol),
             lambda r=robot, p=program: derivatives(r, p, 0.01, keys, tol=tol),
         ):
             taken = []
-            for _ in range(6):  # the best of a few: what else the machine does only adds
+            for _ in range(4):  # the best of a few: what else the machine does only adds
                 begin = time.process_time()
                 call()
                 taken.append(time.process_time() - begin)

@@ -247,7 +247,7 @@ def test_counts_and_positions_of_an_independent_run(turning):
     run, angle = rolled(turning, excitation(8.0, seed=1), 0.01)
     for kind in ("counts", "pose"):
         z = []
-        for seed in range(6):
+        for seed in range(4):
             log = counted_log(run, angle, seed) if kind == "counts" else captured_log(run, seed)
             fit = fit_output_error(log, turning, start="rest")
             assert not fit.unused

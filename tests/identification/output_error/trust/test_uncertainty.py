@@ -34,17 +34,17 @@ def coloured(run, seed, memory=0.9):
 
 
 def test_coloured_noise_is_seen_and_the_intervals_follow(axebot, clean):
-    """25 logs, 150 intervals: with white intervals fewer than 85 % would hold the truth; those that know of it do."""
+    """12 logs, 72 intervals: with white intervals fewer than 85 % would hold the truth; those that know of it do."""
     held = {"auto": 0, "white": 0}
-    for seed in range(25):
+    for seed in range(12):
         log = coloured(clean, seed)
         for kind in held:
             fit = fit_output_error(log, axebot, start="rest", covariance=kind)
             held[kind] += sum(fit.ci95[key][0] <= true <= fit.ci95[key][1] for key, true in TRUTH.items())
-        assert fit_output_error(log, axebot, start="rest").covariance == "autoregressive"
-        assert fit_output_error(log, axebot, start="rest", covariance="sandwich").covariance == "sandwich"
-    assert held["white"] < 0.85 * 150
-    assert held["auto"] >= 0.90 * 150
+        assert fit.covariance == kind or (kind, fit.covariance) == ("auto", "autoregressive")
+    assert fit_output_error(log, axebot, start="rest", covariance="sandwich").covariance == "sandwich"
+    assert held["white"] < 0.85 * 72
+    assert held["auto"] >= 0.90 * 72
 
 
 def test_no_friction_stands_at_the_bound_with_an_interval_that_holds_it(axebot, clean):
@@ -112,16 +112,16 @@ def test_a_profile_knows_of_colour(axebot, clean, loss):
 
 
 def test_breakaway_knows_of_colour(axebot):
-    """Of 30 intervals 27 or more hold the truth; by the limit for white noise 19 did."""
+    """Of 18 intervals 17 or more hold the truth; by the limit for white noise 19 of 30 did."""
     levels = tuple(1.2 * c for c in axebot.friction.axes.coulomb)
     axes = axebot.friction.axes.model_copy(update={"breakaway": levels})
     robot = axebot.replace(friction=axebot.friction.model_copy(update={"axes": axes}))
     keys, held = [f"friction.axes.breakaway[{axis}]" for axis in range(3)], 0
-    for seed in range(10):
+    for seed in range(6):
         log = coloured(simulate(robot, excitation(30.0, seed=200 + seed), 0.01), seed)
         fit = fit_output_error(log, axebot, free=[*BOX, *keys], start="rest")
         held += sum(fit.ci95[key][0] <= level <= fit.ci95[key][1] for key, level in zip(keys, levels, strict=True))
-    assert held >= 27
+    assert held >= 17
 
 
 def test_bootstrap_over_runs(axebot):
@@ -154,8 +154,9 @@ def test_what_differs_from_run_to_run_is_in_the_intervals(axebot):
         for kind, found in errors.items():
             fit = fit_output_error(runs, axebot, start="rest", covariance=kind)
             found.append((fit.value[key] - TRUTH[key]) / fit.std[key])
-        assert fit_output_error(runs, axebot, start="rest").covariance == "sandwich"
-    assert 25 in [each.numbers.get("runs") for each in fit_output_error(runs, axebot, start="rest").warnings]
+    fit = fit_output_error(runs, axebot, start="rest")
+    assert fit.covariance == "sandwich"
+    assert 25 in [each.numbers.get("runs") for each in fit.warnings]
     assert abs(np.std(errors["auto"]) - 1.0) < 3.0 / np.sqrt(2.0 * 40)
     assert np.std(errors["white"]) > 1.6
 
@@ -204,6 +205,6 @@ def test_a_model_that_does_not_follow_the_log_is_said(axebot, clean):
 
 def test_errors_that_remember_ask_for_no_nuisance(axebot, clean):
     """The scatter of white noise is too small a measure: five of its standard errors are one or two of theirs."""
-    for seed in range(6):
+    for seed in range(3):
         fit = whole.fit_output_error(coloured(clean, seed), axebot, start="rest")
         assert not any(remedy.confident for remedy in fit.lack_of_fit.remedies)
