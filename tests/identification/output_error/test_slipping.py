@@ -148,7 +148,7 @@ def test_the_ladder_takes_the_grip_that_the_file_lacks():
     """Of a file without traction_mu, nor any inertia of wheels; a floor that lets them slip at the hardest starts."""
     grippy = ROBOT.replace(wheels=ROBOT.wheels.replace(traction_mu=1.6))
     rolling = AXEBOT.replace(wheels=AXEBOT.wheels.replace(wheel_inertia=0.0))
-    run = log(1, 4.0, robot=grippy)
+    run = log(1, 5.0, robot=grippy)
     best = fit_output_error(run, rolling, free=("friction",), outputs=("twist", "wheel_speed"), ladder=True)
     (step,) = best.ladder.taken
     assert step.key == "wheels.traction_mu"

@@ -33,6 +33,13 @@ def world(name, size, seed=SEED, sensor=SPEEDS):
     return logged(case, seed), robot_of(case.told), truths(case.told, case.told.shape)
 
 
+@pytest.fixture(scope="module")
+def turning():
+    """(what the ladder makes of a log of a frame that turns, friction as it is)."""
+    run, robot, true = world("turning frame", 1.0)
+    return Identification.of(run, robot, free=FREE, ladder=True), true
+
+
 def climbed(name, size, **options):
     run, robot, true = world(name, size)
     return fit_output_error(run, robot, free=FREE, ladder=True, **options), true
@@ -55,7 +62,6 @@ def test_a_right_world_takes_no_step():
 @pytest.mark.parametrize(
     "name, size, key",
     [
-        ("turning frame", 1.0, "body.rotating_frame"),
         ("voltage drop", 0.106, "motor.voltage_drop_V"),
         ("weak motor", 0.064, "motor.torque_constant_Nm_A[1]"),
         ("mass", 0.5, "body.mass_kg"),
@@ -63,7 +69,15 @@ def test_a_right_world_takes_no_step():
     ],
 )
 def test_what_is_missing_is_switched_on_and_then_nothing_is(name, size, key):
-    estimate, true = climbed(name, size)
+    assert_switched_on(*climbed(name, size), key)
+
+
+def test_a_frame_that_turns_is_switched_on_and_then_nothing_is(turning):
+    found, true = turning
+    assert_switched_on(found.estimate, true, "body.rotating_frame")
+
+
+def assert_switched_on(estimate, true, key):
     (step,) = estimate.ladder.taken
     assert key in (step.key, *step.same_as)
     assert step.gain > step.gain_std > 0.0
@@ -83,8 +97,8 @@ def test_no_ladder_ends_calm_on_a_fit_that_its_answer_finds_wrong():
     assert [rung.key for rung in best.ladder.taken] == ["body.rotating_frame"]
 
 
-def test_the_robot_that_is_written_is_the_fitted_one(tmp_path):
-    estimate, _ = climbed("turning frame", 1.0)
+def test_the_robot_that_is_written_is_the_fitted_one(turning, tmp_path):
+    estimate = turning[0].estimate
     save_robot(estimate.robot, tmp_path / "robot.toml")
     again = load_robot(str(tmp_path / "robot.toml"))
     assert again.body.rotating_frame
@@ -199,9 +213,8 @@ def test_remedies_that_are_worth_a_fit():
     ]  # fmt: skip
 
 
-def test_the_page_and_the_values_for_machines_have_every_model_that_was_fitted():
-    run, robot, _ = world("turning frame", 1.0)
-    found = Identification.of(run, robot, free=FREE, ladder=True)
+def test_the_page_and_the_values_for_machines_have_every_model_that_was_fitted(turning):
+    found, _ = turning
     assert found.verdict.startswith("The ladder took the forces of a turning frame; then ")
     told = found.document()
     data = json.loads(json.dumps(told.data, allow_nan=False))["ladder"]

@@ -28,7 +28,7 @@ TILE = 0.8  # of the Coulomb friction of gray is that of green
 
 def floors(*shapes, **worlds):
     """(a log on each floor, the file of an owner who thinks of a box, the worlds)."""
-    case = right_case(SEED).setup_but(sensor=SPEEDS, memory=0.0)
+    case = right_case(SEED).setup_but(sensor=SPEEDS, memory=0.0, seconds=15.0)
     made, runs = [], []
     for k, (name, shape) in enumerate(zip(("gray", "green"), shapes, strict=True)):
         factor = TILE if k else 1.0
@@ -175,7 +175,7 @@ def test_blocks_of_groups_are_those_of_one_fit_where_all_is_each_groups_own(give
 
 def test_an_ellipse_gets_a_level_for_each_wheel():
     """Three unequal wheels beside an ellipse, under the file of an ellipse."""
-    case = right_case(7101).setup_but(sensor=SPEEDS, memory=0.0, rate=50.0)
+    case = right_case(7101).setup_but(sensor=SPEEDS, memory=0.0, rate=50.0, seconds=20.0)
     world = replace(case.world, shape=ELLIPSE, each_wheel=(1.7, 1.0, 0.3))
     run, robot = logged(replace(case, world=world), 7101), robot_of(replace(case.told, shape=ELLIPSE))
     estimate = fit_output_error(run, robot, free=FREE, ladder=True)

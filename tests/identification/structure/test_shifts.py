@@ -31,13 +31,15 @@ def after(run, t):
     return Run(run.t[kept] - t, **{name: values[kept] for name, values in own.items() if values is not None})
 
 
-@pytest.mark.parametrize(("sensor", "memory"), [(SPEEDS, 0.0), (TWIST, 0.0), (AR, 0.95), (COUNTS, 0.0), (TICKS, 0.0)])
-def test_a_right_world_is_stable(sensor, memory):
-    for seed in (7101, 7102):
-        case = right_case(seed).setup_but(sensor=sensor, memory=memory)
-        fit = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION)
-        assert not fit.stability.found
-        assert not fit.stability.parts()
+@pytest.mark.parametrize(
+    ("sensor", "memory", "seed"),
+    [(SPEEDS, 0.0, 7101), (TWIST, 0.0, 7102), (AR, 0.95, 7101), (COUNTS, 0.0, 7102), (TICKS, 0.0, 7101)],
+)
+def test_a_right_world_is_stable(sensor, memory, seed):
+    case = right_case(seed).setup_but(sensor=sensor, memory=memory, rate=50.0)
+    fit = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION)
+    assert not fit.stability.found
+    assert not fit.stability.parts()
 
 
 @pytest.mark.parametrize("seed", [7201, 7204])
@@ -68,7 +70,8 @@ def test_the_levels_are_those_of_fits_of_the_parts():
 
 
 def test_logs_of_two_floors_differ_and_the_log_is_named():
-    case, robot = right_case(7301), robot_of(right_case(7301).told)
+    case = right_case(7301).setup_but(seconds=20.0)
+    robot = robot_of(case.told)
     rough = case.world_but(coulomb=tuple(1.12 * c for c in case.world.coulomb))
     runs = [logged(each, seed) for seed, each in enumerate((case, case, rough), 7301)]
     runs = [run.replace(source=name) for run, name in zip(runs, ("one", "two", "rough"), strict=True)]
