@@ -25,6 +25,7 @@ class Setup:
     """How a log is made. rate [Hz]. seconds: its length. sensor: what is logged, and its noise; memory: correlation of
     it, row to row.
 
+    sensor: what is logged, and its noise; memory: correlation of it, row to row.
     mix: share of the second direction in moves along two; apart: whether the robot stops between moves; turns: whether
     it turns only to and fro, where false; forward: whether moves along two are along x first. latency [s]. jitter: of
     when a row was measured, a share of a row. smoothing [s] of a first-order filter. missed: share of rows. period [s]

@@ -39,7 +39,7 @@ def write_logs(folder):
     true = robot.replace(friction=friction, body=body, motor=motor)
     rng = np.random.default_rng(0)
     for k in (1, 2, 3):
-        run = simulate(true, excitation(12.0, 50.0, seed=k), 0.02)
+        run = simulate(true, excitation(8.0, 50.0, seed=k), 0.02)
         speed = (run.wheel_speed + 0.3 * rng.normal(size=(len(run), 3))) * 30.0 / np.pi
         twist = (run.twist + [0.01, 0.01, 0.05] * rng.normal(size=(len(run), 3))) * [1.0, 1.0, 180.0 / np.pi]
         rows = np.column_stack([4123 + np.round(1e3 * run.t), run.voltage, speed, twist])

@@ -72,7 +72,7 @@ class World:
         return np.arange(len(twist)) * row, twist, (voltage - self.emf * rim) / self.ohm, rim / self.radius
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _march(mass, g, voltage, per_volt, emf, table, cone, viscous, steps):
     """The twist after each step, shape (steps + 1, 3)."""
     found, v = np.zeros((steps + 1, 3)), np.zeros(3)
@@ -127,7 +127,7 @@ def _march(mass, g, voltage, per_volt, emf, table, cone, viscous, steps):
     return found
 
 
-@numba.njit
+@numba.njit(cache=True)
 def _into_ellipse(x, y, a, b):
     """The point of the ellipse with half axes a, b next to (x, y); the point itself inside."""
     if (x / a) ** 2 + (y / b) ** 2 <= 1.0:

@@ -87,7 +87,8 @@ def test_logs_of_two_floors_differ_and_the_log_is_named():
 
 
 def test_logs_of_one_floor_do_not_differ():
-    case, robot = right_case(7401), robot_of(right_case(7401).told)
+    case = right_case(7401).setup_but(seconds=20.0)
+    robot = robot_of(case.told)
     runs = [logged(case, seed).replace(source=f"log {seed}") for seed in (7401, 7402, 7403)]
     document = Identification.of(runs, robot, free=FRICTION).document()
     assert "not stable" not in document.to_text()

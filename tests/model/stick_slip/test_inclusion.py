@@ -18,7 +18,7 @@ from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import put, start_state
 from tests.support.mixed_robots import random_robot
 
-PROBLEMS = 25  # for each of the 100 robots
+PROBLEMS = 10  # for each of the 100 robots
 ROBOTS = 100
 COUNTS: list[int] = []
 
@@ -135,10 +135,10 @@ def faults(p, x, count):
     return [words for words, wrong in found.items() if wrong]
 
 
-@pytest.mark.parametrize("part", range(10))
+@pytest.mark.parametrize("part", range(4))
 def test_solutions_satisfy_the_law(part):
-    """2500 problems: all shapes, sums, asymmetric levels, breakaway, gears, drops, limits, 3 to 6 wheels, turning."""
-    per_part, wrong = ROBOTS * PROBLEMS // 10, {}
+    """1000 problems: all shapes, sums, asymmetric levels, breakaway, gears, drops, limits, 3 to 6 wheels, turning."""
+    per_part, wrong = ROBOTS * PROBLEMS // 4, {}
     for seed in range(part * per_part, (part + 1) * per_part):
         p, x = problem(seed)
         COUNTS.append(solve(*p, x))
@@ -188,7 +188,7 @@ def potential(p, x):
     return total
 
 
-@pytest.mark.parametrize("seed", range(0, 40, 2))
+@pytest.mark.parametrize("seed", range(0, 40, 4))
 def test_the_solution_is_the_minimum_of_the_potential(seed):
     """Brute force: no point near or far, nor what Nelder-Mead finds from three starts, lies below it."""
     random = np.random.default_rng(seed)

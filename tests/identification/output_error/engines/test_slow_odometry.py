@@ -23,7 +23,7 @@ LEVEL, VISCOUS = 3.0, np.array([1.0, 1.0, 0.05])
 STEP, ROW, SWEEPS = 2e-4, 0.01, 60
 
 
-@numba.njit
+@numba.njit(cache=True)
 def march(command, g, level, mass, give, steps, ticks):
     """The twist at each row of a robot with friction at its wheels behind a PI loop; projected Gauss-Seidel."""
     rows, wheels, arms = len(command), g.shape[1], np.ascontiguousarray(g.T)
