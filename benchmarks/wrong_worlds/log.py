@@ -22,8 +22,7 @@ APART = 0.6  # [s] between two moves that must not meet
 
 @dataclass(frozen=True)
 class Setup:
-    """How a log is made. rate [Hz]. seconds: its length. sensor: what is logged, and its noise; memory: correlation of
-    it, row to row.
+    """How a log is made. rate [Hz]; seconds: its length.
 
     sensor: what is logged, and its noise; memory: correlation of it, row to row.
     mix: share of the second direction in moves along two; apart: whether the robot stops between moves; turns: whether

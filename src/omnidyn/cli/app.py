@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 import omnidyn
-from omnidyn.cli import check, compare, demo, drift, identify, init, robots, simulate, warm
+from omnidyn.cli import check, compare, demo, identify, init, robots, simulate, warm
 from omnidyn.cli.at_rest import deadzone, friction
 from omnidyn.cli.control import track, tune
 from omnidyn.cli.exchange import bring, export
@@ -42,7 +42,7 @@ def _omnidyn(
 
 
 for _command in (
-    demo.demo, init.init, check.check, simulate.simulate, identify.identify, compare.compare, drift.drift,
+    demo.demo, init.init, check.check, simulate.simulate, identify.identify, compare.compare, compare.drift,
     deadzone.deadzone, friction.friction, track.track, tune.tune, info.info, convert.convert, robots.robots,
     export.export, warm.warm,
 ):  # fmt: skip

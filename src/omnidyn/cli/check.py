@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+import omnidyn
 from omnidyn.cli import log_options
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.progress import shown_progress
+from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import painted, say, show, show_json, width
 from omnidyn.errors import InputError, OmnidynError
 from omnidyn.progress import Progress, Report
+from omnidyn.statement import WARNING
 
 if TYPE_CHECKING:
     from omnidyn.findings.finding import Verdict
@@ -80,9 +84,8 @@ def check(
 
 
 def _robot(robot: str) -> Robot | None:
-    from omnidyn.model.robot_file import load_robot
 
-    return load_robot(robot) if robot else None
+    return omnidyn.load_robot(robot) if robot else None
 
 
 def _checked(
@@ -125,7 +128,6 @@ def _draw(done: Checked, picture: str, force: bool) -> None:
 
 def _first(blocks: Iterator[Log]) -> tuple[Log | None, bool, Iterator[Log]]:
     """The first block, which is kept for the picture, whether it is the only one, and all blocks."""
-    from itertools import chain, islice
 
     head = list(islice(blocks, 2))
     return (head[0] if head else None), len(head) == 1, chain(head, blocks)
@@ -155,10 +157,8 @@ class _Digest:
 
 def _compare_data(done: list[Checked]) -> None:
     """Logs that hold the same numbers under two names: evidence that counts once."""
-    from dataclasses import replace
 
     from omnidyn.findings.finding import Finding, in_order
-    from omnidyn.statement import WARNING
 
     first: dict[str, Checked] = {}
     for log in done:
@@ -194,7 +194,6 @@ def _tell(done: list[Checked], json: bool, full: bool, robot: str) -> None:
 
 
 def _document(done: list[Checked], robot: str) -> dict[str, Any]:
-    from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.telling.log_verdict import overall
 
     logs = [

@@ -1,4 +1,4 @@
-"""omnidyn compare LOG... --robot A [--robot B]: what a model says against what the robot did."""
+"""omnidyn compare LOG...: a model against what the robot did; omnidyn drift FIT...: fits of one robot."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+import omnidyn
 from omnidyn.cli import log_options
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.progress import shown_progress
+from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.telling import end_failed, tell
 from omnidyn.progress import Progress
 
@@ -72,10 +74,9 @@ def compare(
 
 
 def _robots(names: Sequence[str], with_: str) -> list[Robot]:
-    from omnidyn.model.robot_file import load_robot
     from omnidyn.model.varied.vary import vary_as
 
-    return [vary_as(load_robot(name), with_) for name in names]
+    return [vary_as(omnidyn.load_robot(name), with_) for name in names]
 
 
 def _runs(
@@ -114,9 +115,8 @@ def _compared(
     band: bool,
     progress: Progress,
 ) -> Comparison:
-    from omnidyn.comparison.compare import compare as compare_robots
 
-    return compare_robots(
+    return omnidyn.compare(
         robots[0],
         runs,
         *robots[1:],
@@ -136,7 +136,26 @@ def _draw(found: Comparison, path: str, channels: Sequence[str], force: bool) ->
 
 
 def _record(robots: Sequence[str], files: Sequence[str], hashes: Sequence[str]) -> dict[str, Any]:
-    from omnidyn.cli.terminal.session import provenance, robot_input
-
     logs = [{"role": "log", "name": path, "sha256": digest} for path, digest in zip(files, hashes, strict=True)]
     return provenance([*map(robot_input, robots), *logs])
+
+
+def drift(
+    fit: list[str] = typer.Argument(..., metavar="FIT...", help="Robot files that identify wrote, oldest first."),
+    picture: str = typer.Option("", "--picture", metavar="FILE", help="Every number, fit by fit, as .png or .svg."),
+    force: bool = typer.Option(False, "--force", help="Replace files that exist."),
+    json: bool = typer.Option(False, "--json", help="The comparison for machines."),
+) -> None:
+    """Which numbers changed between fits of one robot, by more than they may.
+
+    Compares the robot files that `identify -o` wrote for several floors, loads or weeks, by the covariances that they
+    hold: each number by itself, and all of them together.
+    """
+    refuse_picture(picture, force)
+    log_options.keep_inputs([], fit, [], picture)
+    found = omnidyn.drift(fit)
+    tell(found.document(), json, provenance([robot_input(path) for path in fit]))
+    if picture:
+        from omnidyn.report.drift_picture import draw_drift
+
+        write_picture(draw_drift(found), picture, force)

@@ -11,12 +11,16 @@ from typing import Any
 
 import typer
 
+import omnidyn
 from omnidyn.cli import log_options as options
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.flags import flags
 from omnidyn.cli.terminal.help import MORE
+from omnidyn.cli.terminal.numbers import number_list
 from omnidyn.cli.terminal.progress import shown_progress
+from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.telling import end_failed
+from omnidyn.files import check_output
 from omnidyn.identification.question import MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
 from omnidyn.identification.question import options as fields_of_question
 from omnidyn.progress import Report
@@ -69,7 +73,6 @@ def identify(
     """
     from omnidyn.cli.identify_logs import Reading, is_motor_table, is_steady_table
     from omnidyn.cli.identify_show import Out, tell_table
-    from omnidyn.files import check_output
 
     question, to = _question(asked), Out(report, out, force, json, full)
     question = replace(question, method=question.method_asked())
@@ -95,7 +98,6 @@ def identify(
 
 def _question(asked: dict[str, Any]) -> Question:
     """The options as they stand on the command line; an empty one was not given."""
-    from omnidyn.cli.terminal.numbers import number_list
 
     given: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in asked.items()}
     given["window"] = tuple(number_list("--window", given["window"])) if given["window"] else None
@@ -107,14 +109,11 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
     """Read, choose the method, identify, tell."""
     from omnidyn.cli.identify_logs import load_runs
     from omnidyn.cli.identify_show import load_meanwhile, outputs, tell
-    from omnidyn.cli.terminal.session import provenance, robot_input
     from omnidyn.identification.first_runs import shared_out
-    from omnidyn.identification.identify import Identification
     from omnidyn.identification.methods import settle_method
-    from omnidyn.model.robot_file import load_robot
 
     with shown_progress("reading") as progress:
-        start = load_robot(robot) if robot else None
+        start = omnidyn.load_robot(robot) if robot else None
         loaded = load_runs(arguments, question, start, reading, progress)
         record = provenance([*([robot_input(robot)] if robot else []), *loaded.inputs])
         if question.what == MOTORS:
@@ -132,7 +131,7 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
             outputs(to, list(dict.fromkeys(groups)), record["inputs"])  # refused before any work
         load_meanwhile(to, question.quick)
         with shared_out(start) if question.method == OUTPUT_ERROR else nullcontext():
-            found = Identification.of(
+            found = omnidyn.Identification.of(
                 loaded.runs, start, question, logs=logs, progress=progress, keep_best=True,
                 save=lambda fits: to.save({name: fit.robot for name, fit in fits.items()}, record["inputs"]),
             )  # fmt: skip

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from omnidyn.document import WIDTH, Document, Table, Words, interval_cell
+from omnidyn.statement import ERROR, WARNING
 
 if TYPE_CHECKING:
     from omnidyn.identification.estimate import Estimate
@@ -27,7 +28,6 @@ class Brief(Document):
 
 def brief(found: Identification) -> Document:
     """What the result says in at most LINES lines."""
-    from omnidyn.statement import ERROR, WARNING
 
     rows = [row for group, estimate in found.estimates.items() for row in _rows(group, estimate, len(found.estimates))]
     every = dict.fromkeys(one for estimate in found.estimates.values() for one in estimate.warnings)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from omnidyn.cli.log_options import Maps, load_logs, log_files
 from omnidyn.cli.terminal.streams import say
+from omnidyn.errors import InputError
+from omnidyn.files import read_bytes
 from omnidyn.identification.question import Question
 from omnidyn.progress import Progress
 
@@ -53,8 +55,6 @@ def is_motor_table(path: str) -> bool:
 
 def _first_names(path: str) -> set[str]:
     """The cells of the first line of a text file, in small letters; none of a folder, or of a file too large."""
-    from omnidyn.errors import InputError
-    from omnidyn.files import read_bytes
 
     if os.path.isdir(path):
         return set()

@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
+import omnidyn
+from omnidyn.attempts import Attempts, not_made
 from omnidyn.cli.identify_logs import Loaded
 from omnidyn.cli.identify_show import Out, say_written
+from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import end_failed, tell
 from omnidyn.document import apart, sentence
@@ -23,21 +26,17 @@ def run_motors(
     question: Question, loaded: Loaded, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress
 ) -> None:
     """Fit; write robot file and report; show the result."""
-    from omnidyn.identification.motors.study import identify_motors
 
-    study = identify_motors(loaded.runs, robot, question=question, logs=loaded.logs, progress=progress)
+    study = omnidyn.identify_motors(loaded.runs, robot, question=question, logs=loaded.logs, progress=progress)
     _tell(study, robot, record, to, progress)
 
 
 def tell_motor_table(table: str, robot: str, question: Question, to: Out) -> None:
     """The same from a table input,speed[,motor], which has no time."""
-    from omnidyn.cli.terminal.session import provenance, robot_input
-    from omnidyn.identification.motors.study import identify_motors
     from omnidyn.logs.motor_table import read_motor_table
-    from omnidyn.model.robot_file import load_robot
 
-    start, data = load_robot(robot) if robot else None, read_motor_table(table)
-    study = identify_motors(data, start, question=question)
+    start, data = omnidyn.load_robot(robot) if robot else None, read_motor_table(table)
+    study = omnidyn.identify_motors(data, start, question=question)
     inputs = [{"role": "data", "name": table, "sha256": data.sha256}]
     _tell(study, start, provenance([*([robot_input(robot)] if robot else []), *inputs]), to, lambda _: None)
 
@@ -45,7 +44,6 @@ def tell_motor_table(table: str, robot: str, question: Question, to: Out) -> Non
 def _tell(
     study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress
 ) -> None:  # fmt: skip
-    from omnidyn.attempts import Attempts, not_made
 
     attempts, report, numbers = Attempts(), "", _into_file(study, robot, record, to)
     told = study.document()

@@ -11,11 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+import omnidyn
+from omnidyn.attempts import Attempts
 from omnidyn.cli.identify_brief import brief
 from omnidyn.cli.terminal.flags import with_flags
 from omnidyn.cli.terminal.progress import shown_progress
+from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import tell as tell_document
+from omnidyn.errors import InputError
+from omnidyn.files import check_output, keep_apart, write_atomic
 from omnidyn.identification.question import OUTPUT_ERROR, Question
 from omnidyn.progress import Progress, Report
 
@@ -42,18 +47,16 @@ class Out:
 
     def save(self, robots: Mapping[str, Robot], inputs: Sequence[Mapping[str, str]]) -> None:
         """Write the robot of each group, or replace what was written before; `finish` raises what kept it from that."""
-        from omnidyn.model.robot_file import save_robot
 
         try:
             for group, path in outputs(self, list(robots), inputs).items():
-                save_robot(robots[group], path, self.force or group in self.files)
+                omnidyn.save_robot(robots[group], path, self.force or group in self.files)
                 self.files[group] = path
         except Exception as error:
             self.refused.append(error)
 
     def write_report(self, attempts: Attempts, render: Callable[[], str]) -> str:
         """Draw and write the report, with options as the command line writes them: its name where that worked."""
-        from omnidyn.files import write_atomic
 
         def make() -> str:
             write_atomic(self.report, with_flags(render()), self.force)
@@ -88,7 +91,6 @@ def load_meanwhile(to: Out, quick: bool) -> None:
 
 def tell(found: Identification, record: dict[str, Any], to: Out, progress: Progress) -> None:
     """Draw the page of an identification, and show the result."""
-    from omnidyn.attempts import Attempts
 
     attempts, report = Attempts([*found.missing], found.interrupt), ""
     if to.report and _has_page(found):
@@ -123,12 +125,6 @@ def _page(found: Identification, record: dict[str, Any]) -> str:
 
 def tell_table(table: str, robot: str, question: Question, to: Out) -> None:
     """The paper's way, from a table of steady points; what the reader had to decide joins the warnings."""
-    from omnidyn.attempts import Attempts
-    from omnidyn.cli.terminal.session import provenance, robot_input
-    from omnidyn.errors import InputError
-    from omnidyn.identification.steady.steady_state import fit_steady_state
-    from omnidyn.logs.steady_table import read_steady_table
-    from omnidyn.model.robot_file import load_robot
 
     if question.method == OUTPUT_ERROR:
         raise InputError("a table of steady points has no time in it", got="a table axis,speed,force",
@@ -136,8 +132,8 @@ def tell_table(table: str, robot: str, question: Question, to: Out) -> None:
     if to.report:
         raise typer.BadParameter("--report needs logs; a table of points has none.")
     with shown_progress("identifying"):
-        start, data = load_robot(robot), read_steady_table(table)
-        estimate = fit_steady_state(start, data, rest=question.rest)
+        start, data = omnidyn.load_robot(robot), omnidyn.read_steady_table(table)
+        estimate = omnidyn.fit_steady_state(start, data, rest=question.rest)
         estimate = replace(estimate, warnings=(*data.notes, *estimate.warnings))
         record = provenance([robot_input(robot), {"role": "data", "name": table, "sha256": data.sha256}])
     to.save({"": estimate.robot}, record["inputs"])
@@ -152,7 +148,6 @@ def outputs(to: Out, names: Sequence[str], inputs: Sequence[Mapping[str, str]] =
     inputs: the record of what was read. Raises InputError for a file that is there, unless `force` or written here,
     for one file of two groups, and for one that was read.
     """
-    from omnidyn.files import check_output, keep_apart
 
     if not to.out:
         return {}

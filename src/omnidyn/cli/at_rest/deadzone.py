@@ -6,8 +6,12 @@ from typing import TYPE_CHECKING
 
 import typer
 
+import omnidyn
 from omnidyn.cli.log_options import keep_inputs
+from omnidyn.cli.terminal.numbers import number_list
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
+from omnidyn.cli.terminal.progress import shown_progress
+from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.telling import tell
 
 if TYPE_CHECKING:
@@ -25,20 +29,15 @@ def deadzone(
     """Show at which voltage it starts to move, and how sure that is."""
     refuse_picture(picture, force)
     keep_inputs([], [robot], [], picture)
-    from omnidyn.cli.terminal.numbers import number_list
-    from omnidyn.cli.terminal.session import provenance, robot_input
-    from omnidyn.model.known.dead_zone import dead_zone
-    from omnidyn.model.robot_file import load_robot
 
-    loaded, source = load_robot(robot), robot_input(robot)
-    found = dead_zone(loaded, [number_list("--pattern", pattern)] if pattern else None, draws=draws)
+    loaded, source = omnidyn.load_robot(robot), robot_input(robot)
+    found = omnidyn.dead_zone(loaded, [number_list("--pattern", pattern)] if pattern else None, draws=draws)
     tell(found.document(), json, provenance([source]))
     if picture:
         _draw(found, picture, force)
 
 
 def _draw(found: DeadZone, path: str, force: bool) -> None:
-    from omnidyn.cli.terminal.progress import shown_progress
     from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
 
     with shown_progress("drawing the map"):

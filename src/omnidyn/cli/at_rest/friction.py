@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import typer
 
+import omnidyn
 from omnidyn.cli.log_options import keep_inputs
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
+from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.telling import tell
 
 
@@ -18,11 +20,9 @@ def friction(
     """Show its friction: force against speed, presliding, breakaway."""
     refuse_picture(picture, force)
     keep_inputs([], [robot], [], picture)
-    from omnidyn.cli.terminal.session import provenance, robot_input
-    from omnidyn.model.robot_file import load_robot
     from omnidyn.simulation.friction_study import friction_study
 
-    loaded, source = load_robot(robot), robot_input(robot)
+    loaded, source = omnidyn.load_robot(robot), robot_input(robot)
     found = friction_study(loaded)
     tell(found.document(), json, provenance([source]))
     if picture:

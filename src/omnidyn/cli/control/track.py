@@ -6,15 +6,19 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+import omnidyn
 from omnidyn.cli.log_options import WITH, keep_inputs
 from omnidyn.cli.terminal.progress import shown_progress
+from omnidyn.cli.terminal.session import input_file, provenance, robot_input
 from omnidyn.cli.terminal.telling import tell
-from omnidyn.files import check_output
+from omnidyn.errors import InputError
+from omnidyn.files import check_output, write_atomic
 from omnidyn.progress import Report
 
 if TYPE_CHECKING:
     from omnidyn.control.tracking import Tracking
     from omnidyn.model.robot import Robot
+    from omnidyn.statement import Statement
 
 MOST_CONTROLLERS = 12
 
@@ -58,16 +62,13 @@ def track(
     keep_inputs([], [robot, plant], files, out, report, gif)
     from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
     from omnidyn.control.controllers import several
-    from omnidyn.control.demand import demand
-    from omnidyn.control.paths.path import path as path_named
     from omnidyn.control.tracking import trackings_document
-    from omnidyn.model.robot_file import load_robot
     from omnidyn.model.varied.vary import vary_as
 
     around = Circumstances(dt, duration, skip, noise, delay, seed)
-    believed = load_robot(robot)
-    driven, follow = vary_as(load_robot(plant) if plant else believed, with_), path_named(path)
-    asked, options = demand(believed, follow), told_of_loop(believed, around)
+    believed = omnidyn.load_robot(robot)
+    driven, follow = vary_as(omnidyn.load_robot(plant) if plant else believed, with_), omnidyn.path(path)
+    asked, options = omnidyn.demand(believed, follow), told_of_loop(believed, around)
     options |= {} if horizon is None else {"horizon": horizon}
     found: list[Tracking] = []
     with shown_progress("tracking") as progress:
@@ -83,7 +84,6 @@ def track(
 
 def _check_outputs(out: str, report: str, gif: str, force: bool) -> None:
     """Refuse, before anything is simulated, what could not be written in the end."""
-    from omnidyn.errors import InputError
 
     for name, ending in ((report, ".html"), (gif, ".gif")):
         if name and not name.lower().endswith(ending):
@@ -99,15 +99,18 @@ def _check_outputs(out: str, report: str, gif: str, force: bool) -> None:
 
 def _write(found: list[Tracking], out: str, force: bool) -> None:
     if out:
-        from omnidyn.logs.run_file import write_run
-
-        write_run(found[0].run, out, force)
+        omnidyn.write_run(found[0].run, out, force)
 
 
 def _draw(
-    found: list[Tracking], robot: Robot, notes: list[str], record: dict[str, Any], report: str, gif: str, force: bool
+    found: list[Tracking],
+    robot: Robot,
+    notes: list[Statement],
+    record: dict[str, Any],
+    report: str,
+    gif: str,
+    force: bool,
 ) -> None:
-    from omnidyn.files import write_atomic
 
     with shown_progress("drawing"):
         if report:
@@ -121,7 +124,6 @@ def _draw(
 
 
 def _record(robot: str, plant: str, files: list[str]) -> dict[str, Any]:
-    from omnidyn.cli.terminal.session import input_file, provenance, robot_input
 
     robots = [robot_input(robot), *([robot_input(plant)] if plant else [])]
     others = [input_file("controller" if name.endswith(".toml") else "path", name) for name in files]

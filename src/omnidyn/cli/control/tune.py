@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import typer
 
+import omnidyn
 from omnidyn.cli.log_options import keep_inputs
 from omnidyn.cli.terminal.progress import shown_progress
+from omnidyn.cli.terminal.session import input_file, provenance, robot_input
 from omnidyn.cli.terminal.telling import tell
+from omnidyn.errors import InputError
 from omnidyn.files import check_output
 
 
@@ -26,7 +29,6 @@ def tune(
     json: bool = typer.Option(False, "--json", help="For machines."),
 ) -> None:
     """Find the gains of a controller on simulated robots: all that the robot file says may be meant."""
-    from omnidyn.errors import InputError
 
     if out:
         if not out.endswith(".toml"):
@@ -34,14 +36,12 @@ def tune(
         check_output(out, force)
     files = [name for name in (*path, controller) if name.endswith((".toml", ".csv", ".parquet", ".pq"))]
     keep_inputs([], [robot], files, out)
-    from omnidyn.cli.terminal.session import input_file, provenance, robot_input
     from omnidyn.control.controllers import save_controller
     from omnidyn.control.tune import tune as tune_controller
-    from omnidyn.model.robot_file import load_robot
 
     others = [input_file("controller" if name == controller else "path", name) for name in files]
     record = provenance([robot_input(robot), *others])
-    loaded = load_robot(robot)
+    loaded = omnidyn.load_robot(robot)
     with shown_progress("tuning") as progress:
         found = tune_controller(
             loaded, path, controller, draws=draws, evaluations=evaluations, noise=noise, delay=delay, dt=dt,
