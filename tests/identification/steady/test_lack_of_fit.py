@@ -52,7 +52,6 @@ def test_an_estimate_tells_it_as_that_of_whole_logs_does():
     assert not lack.remedies[0].offered
     best = one.lack_of_fit["all"].remedies[0]
     assert lack.remedies[0].gain == pytest.approx(1.0 - (best.error / best.error_before) ** 2)
-    assert "rollers" in lack.words()
     assert not study("box", 0).estimate.lack_of_fit.found
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from benchmarks.wrong_worlds.kinds import by_name
 from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of, truths
+from omnidyn.document import plain
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.ladder import Ladder, Rung
@@ -53,7 +54,7 @@ def test_a_right_world_takes_no_step():
     run, robot, _ = world("mass", 0.0)
     estimate = fit_output_error(run, robot, free=FREE, ladder=True)
     plain = fit_output_error(run, robot, free=FREE)
-    assert estimate.ladder == Ladder((), "the residuals hold nothing but noise")
+    assert (estimate.ladder.rungs, estimate.ladder.end.code) == ((), "only_noise")
     assert plain.ladder is None
     assert estimate.value == plain.value
     assert "ladder" not in plain.to_dict()
@@ -131,7 +132,7 @@ def test_what_the_log_cannot_tell_apart_is_said_and_each_is_fitted():
     assert {"gain", "wheels.wheel_radius_m"} <= group
     rungs = [rung for rung in estimate.ladder.rungs if rung.step == 1 and rung.key in group]
     assert len({rung.key for rung in rungs}) >= 2
-    assert max(rung.bic for rung in rungs if not rung.why.startswith("pays less")) - step.bic < 6.0
+    assert max(rung.bic for rung in rungs if rung.why is None or rung.why.code != "pays_less") - step.bic < 6.0
     assert "ladder_alternatives" in codes(estimate.warnings)
 
 
@@ -218,7 +219,7 @@ def test_the_page_and_the_values_for_machines_have_every_model_that_was_fitted(t
     found, _ = turning
     assert found.verdict.startswith("The ladder took the forces of a turning frame; then ")
     told = found.document()
-    data = json.loads(json.dumps(told.data, allow_nan=False))["ladder"]
+    data = json.loads(json.dumps(plain(told.data), allow_nan=False))["ladder"]
     assert [rung["taken"] for rung in data["rungs"]][:2] == [True, True]
     assert data["rungs"][0]["words"] == "as it is"
     assert "held-out error" in told.to_text()

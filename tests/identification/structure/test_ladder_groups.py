@@ -8,6 +8,7 @@ import pytest
 
 from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of, truths
 from benchmarks.wrong_worlds.world import BOX, ELLIPSE
+from omnidyn.document import plain
 from omnidyn.identification.identify import Identification
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.ladder import STANDS
@@ -85,7 +86,7 @@ def test_the_answer_has_the_ladder_once(mixed):
     )
     assert (found.verdict.count("The ladder"), text.count("held-out error  ")) == (1, 1)
     assert page.count("What was switched on, step by step") in (1, 2)  # its heading, and the table of contents
-    rungs = json.loads(json.dumps(found.document().data, allow_nan=False))["groups"]["gray"]["ladder"]["rungs"]
+    rungs = json.loads(json.dumps(plain(found.document().data), allow_nan=False))["groups"]["gray"]["ladder"]["rungs"]
     assert ["green"] in [rung["groups"] for rung in rungs if rung["taken"]]
 
 
