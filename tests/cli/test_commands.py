@@ -395,7 +395,7 @@ def test_identify_says_its_warnings_in_words(call):
     _, out, err = call("identify", "t.csv", "--robot", "axebot", "--json")
     warnings = strict(out)["warnings"]
     assert warnings
-    assert all(f"omnidyn: warning: {warning}" in err for warning in warnings)
+    assert all(f"omnidyn: {warning['severity']}: {warning['text']}" in err for warning in warnings)
 
 
 @pytest.mark.parametrize(
@@ -431,7 +431,7 @@ def test_our_own_bug_is_exit_1_without_a_traceback(call, monkeypatch):
     def broken(robot):
         raise ZeroDivisionError("oh\nno")
 
-    monkeypatch.setattr("omnidyn.model.robot_file.load_robot", broken)
+    monkeypatch.setattr("omnidyn.load_robot", broken)
     code, out, err = call("deadzone", "axebot")
     assert (code, out) == (1, "")
     assert "omnidyn: bug: ZeroDivisionError: oh no" in err
@@ -444,7 +444,7 @@ def test_a_missing_extra_is_exit_6(call, monkeypatch):
     def missing(robot):
         raise MissingExtraError("mcap is not installed", remedy="pip install omnidyn[logs]")
 
-    monkeypatch.setattr("omnidyn.model.robot_file.load_robot", missing)
+    monkeypatch.setattr("omnidyn.load_robot", missing)
     code, _, err = call("deadzone", "axebot")
     assert code == 6
     assert "pip install omnidyn[logs]" in err
@@ -454,7 +454,7 @@ def test_no_memory_is_no_bug(call, monkeypatch):
     def full(robot):
         raise MemoryError
 
-    monkeypatch.setattr("omnidyn.model.robot_file.load_robot", full)
+    monkeypatch.setattr("omnidyn.load_robot", full)
     code, _, err = call("deadzone", "axebot")
     assert code == 3
     assert "not enough memory" in err
@@ -485,17 +485,17 @@ def test_deadzone_begins_with_a_sentence(call, here):
     from omnidyn import save_robot
 
     assert call("deadzone", "axebot")[1].splitlines()[0] == (
-        "axebot starts to move forward from 0.67 V, sideways from 0.53 V and turning from 0.17 V."
+        "The robot axebot starts to move forward from 0.67 V, sideways from 0.53 V and turning from 0.17 V."
     )
     weak = load_robot("axebot")
     save_robot(weak.replace(motor=weak.motor.replace(voltage_limit=0.5)), here / "weak.toml")
     assert call("deadzone", "weak.toml")[1].splitlines()[0] == (
-        "axebot starts to move turning from 0.17 V; forward and sideways its motors cannot move it."
+        "The robot axebot starts to move turning from 0.17 V; forward and sideways its motors cannot move it."
     )
     save_robot(weak.replace(motor=weak.motor.replace(voltage_limit=0.1)), here / "weaker.toml")
     told = json.loads(call("deadzone", "weaker.toml", "--json")[1])
     assert told["verdict"] == (
-        "axebot does not move forward, sideways and turning, whatever voltage its motors can have."
+        "The robot axebot does not move forward, sideways and turning, whatever voltage its motors can have."
     )
 
 

@@ -10,7 +10,7 @@ from omnidyn.cli.terminal.help import FIRST, MORE
 
 COMMANDS = sorted(get_command(app).commands)  # type: ignore[attr-defined]
 NEEDED_FIRST = (
-    "--robot", "--out", "--report", "--method", "--free", "--fix", "--hold-out", "--per", "--what", "--json",
+    "--robot", "--out", "--report", "--method", "--free", "--fix", "--hold-out", "--per", "--what", "--json", "--full",
     "--column", "--assume",
 )  # fmt: skip
 
@@ -19,7 +19,7 @@ def flags(text):
     return re.findall(r"^  (?:-\w, )?(--[\w-]+)", text, re.MULTILINE)
 
 
-def test_identify_has_the_twelve_that_one_needs_first(call):
+def test_identify_has_what_one_needs_first(call):
     code, out, _ = call("identify", "--help")
     assert code == 0
     first, more = out.partition(f"{FIRST}:\n")[2].split(f"{MORE}:\n")

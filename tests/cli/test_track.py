@@ -29,7 +29,7 @@ SHORT = ("--path", "eight:period_s=4", "--duration", "2")
 def test_controllers_side_by_side(call):
     code, out, _ = call("axebot", *SHORT, "--controller", "pid", "--controller", "pid_no_friction")
     assert code == 0
-    assert out.startswith("Pid keeps axebot within ")
+    assert out.startswith("The controller pid keeps axebot within ")
     assert "pid_no_friction" in out
     rows = {
         line.split()[0]: line.split() for line in out.splitlines() if line.startswith("pid") and "keeps" not in line
@@ -65,7 +65,7 @@ def test_what_it_writes(call, tmp_path):
     assert len(run) == 101
     np.testing.assert_array_equal(run.pose[0], [0.0, 0.0, 0.0])
     page = (tmp_path / "page.html").read_text("utf-8")
-    assert "Pid keeps axebot" in page
+    assert "The controller pid keeps axebot" in page
     assert page.count("data:image/svg+xml;base64,") == 2
     assert page.count("data:image/gif;base64,R0lGOD") == 1
     assert "http" not in page.split("</head>")[1].replace("http-equiv", "")
@@ -117,7 +117,7 @@ def test_the_robot_in_truth_can_be_varied(call, tmp_path):
     (tmp_path / "own.toml").write_text(text, "utf-8")
     code, out, _ = call("own.toml", *SHORT, "--with", "payload=2kg")
     assert code == 0
-    assert out.startswith("Pid keeps axebot with payload 2kg within ")
+    assert out.startswith("The controller pid keeps axebot with payload 2kg within ")
     code, _, err = call("own.toml", *SHORT, "--with", "payload=3kg")
     assert code == 3
     assert "no payload of this name; got 3kg; did you mean 2kg?" in err

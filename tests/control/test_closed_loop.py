@@ -100,7 +100,7 @@ def test_any_drive_is_driven(drive):
 def test_it_says_what_it_found():
     found = omnidyn.track(AXEBOT, "goal:travel_s=1,hold_s=1", "pid")
     words = str(found)
-    assert words.startswith("Pid keeps axebot within ")
+    assert words.startswith("The controller pid keeps axebot within ")
     assert "of the path goal:travel_s=1,hold_s=1" in words
     assert found.statuses == {"path ended: holding its last pose": 49}
     assert "warning" not in words

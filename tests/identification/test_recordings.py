@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from omnidyn.identification.grouping import count_once
 from omnidyn.identification.identify import Identification, identify
-from omnidyn.identification.recordings import count_once
 from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run

@@ -19,8 +19,8 @@ def test_the_same_log_is_the_same_picture_and_the_caption_says_what_was_found():
     verdict = check(log)
     one, two = draw_raw_log(log, verdict), draw_raw_log(log, verdict)
     assert one.png == two.png
-    assert "warn: gap t" in one.caption
-    assert "warn: spike w2" in one.caption
+    assert "warning: gap t" in one.caption
+    assert "warning: spike w2" in one.caption
 
 
 def test_a_log_without_channels_or_rows_is_drawn_too():

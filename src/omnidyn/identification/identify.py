@@ -18,7 +18,7 @@ from omnidyn.findings.guesses import rest_on_guesses
 from omnidyn.identification.advice import advice
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.fit_document import fit_document
-from omnidyn.identification.grouping import group_names, held_out
+from omnidyn.identification.grouping import fingerprint, group_names, held_out
 from omnidyn.identification.log_verdicts import checked, judged_by_fit, log_verdicts, told_why, unfit, verdict_advice
 from omnidyn.identification.methods import as_driven, choose_method, settle_method, why_not_output_error
 from omnidyn.identification.options import Options, shows_options
@@ -26,7 +26,6 @@ from omnidyn.identification.output_error.answer import Answer, OutputErrorEstima
 from omnidyn.identification.output_error.fit import WHOLE, Fit
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.question import AUTO, FIT, MOTORS, OUTPUT_ERROR, STEADY, STEADY_STATE, Question
-from omnidyn.identification.recordings import fingerprint
 from omnidyn.identification.steady.axis_lines import identify_lines
 from omnidyn.identification.steady.study import diagnosed, fit_steady, identify_steady, undiagnosed
 from omnidyn.identification.steady.study_parts import Difference

@@ -15,7 +15,7 @@ def _tracked(statement: Statement) -> str:
     if numbers["saturated"] > 0.0:
         limit = f"; its motors are at their limit in {100.0 * numbers['saturated']:.2g} % of the steps"
     return (
-        f"{statement.subject} keeps {numbers['plant']} within {_length(numbers['worst'])} of the path "
+        f"the controller {statement.subject} keeps {numbers['plant']} within {_length(numbers['worst'])} of the path "
         f"{numbers['path']}, {_length(numbers['rmse'])} in the mean{share}{limit}"
     )
 
@@ -36,13 +36,14 @@ def _can_follow(statement: Statement) -> str:
     """A robot can follow a path, between its corners, and what that takes."""
     corners = statement.numbers["corners"]
     between, jumps = (" between its corners", f"; at its {corners} corners no robot can") if corners else ("", "")
-    return f"{statement.subject} can follow {statement.numbers['path']}{between}: {_volts(statement)}{jumps}"
+    return f"the robot {statement.subject} can follow {statement.numbers['path']}{between}: {_volts(statement)}{jumps}"
 
 
 def _cannot_follow(statement: Statement) -> str:
     """A robot cannot follow a path in some of its time, and what that would take."""
     path, share = statement.numbers["path"], 100.0 * statement.numbers["share"]
-    return f"{statement.subject} cannot follow {path} in {share:.2g} % of its time: that takes {_volts(statement)}"
+    robot = f"the robot {statement.subject}"
+    return f"{robot} cannot follow {path} in {share:.2g} % of its time: that takes {_volts(statement)}"
 
 
 def _volts(statement: Statement) -> str:

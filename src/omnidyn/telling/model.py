@@ -14,7 +14,7 @@ def _starts_to_move(statement: Statement) -> str:
     ways, volts, stuck = (statement.numbers[name] for name in ("ways", "volts", "stuck"))
     words = all_of([f"{way} from {level:.2f} V" for way, level in zip(ways, volts, strict=True)])
     never = f"; {all_of(stuck)} its motors cannot move it" if stuck else ""
-    return f"{statement.subject} starts to move {words}{never}"
+    return f"the robot {statement.subject} starts to move {words}{never}"
 
 
 def _travel_range(statement: Statement) -> str:
@@ -43,7 +43,7 @@ def _dead_zone_rests_on_guesses(statement: Statement) -> str:
 
 SENTENCES = {
     "starts_to_move": Sentence(_starts_to_move),
-    "does_not_move": Sentence("{subject} does not move {ways}, whatever voltage its motors can have"),
+    "does_not_move": Sentence("the robot {subject} does not move {ways}, whatever voltage its motors can have"),
     "travel_range": Sentence(_travel_range),
     "duty_of": Sentence(_duty_of),
     "dead_zone_rests_on_guesses": Sentence(_dead_zone_rests_on_guesses),

@@ -245,7 +245,7 @@ SENTENCES = {
     ),
     "supply_of_logs": Sentence("the supply is the mean of the logs, {supply:.4g} V"),
     "supply_of_file": Sentence("the supply is not logged: that of the file is taken, {supply:g} V"),
-    "no_supply": Sentence(
+    "supply_unknown": Sentence(
         "a duty needs a supply to become volts: log it, or give drive.supply_V; nothing of the motors is written"
     ),
     "floor_friction_kept": Sentence(

@@ -107,7 +107,7 @@ def _supply(study: MotorStudy, robot: Robot) -> tuple[float, list[Statement]]:
         return study.supply / 100.0, [Statement("supply_of_logs", NOTE, numbers={"supply": study.supply})]
     if robot.drive.supply is not None:
         return robot.drive.supply / 100.0, [Statement("supply_of_file", NOTE, numbers={"supply": robot.drive.supply})]
-    return 0.0, [Statement("no_supply")]
+    return 0.0, [Statement("supply_unknown")]
 
 
 def _only_wheels(robot: Robot) -> bool:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from omnidyn.errors import UnsupportedError
+from omnidyn.identification.grouping import count_once
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import WHOLE, begun, group_names
 from omnidyn.identification.output_error.conclusion import conclude, unexplained
@@ -45,7 +46,6 @@ from omnidyn.identification.output_error.trust.resampling import beside, refuse_
 from omnidyn.identification.output_error.trust.support import supported, too_early
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, Trust, trust
 from omnidyn.identification.question import AUTO, GAUSS, STUDENT, Question
-from omnidyn.identification.recordings import count_once
 from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Robot
 from omnidyn.progress import silent

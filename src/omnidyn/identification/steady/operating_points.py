@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.findings.needs import CURRENT, VOLTAGE, force_origin
-from omnidyn.identification.recordings import count_once
+from omnidyn.identification.grouping import count_once
 from omnidyn.identification.steady.points import refuse_losses
 from omnidyn.logs.one_clock import on_clock_of_wheels
 from omnidyn.logs.plateaus import ANGLE, COMMANDS, SAME_COMMAND, Plateau, find_plateaus, pool
