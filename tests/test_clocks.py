@@ -120,4 +120,4 @@ def test_what_a_blank_is_survives_runs_and_their_files(tmp_path):
     kept = read_run(write_run(few, tmp_path / "few.csv"))
     for each in (few, kept):
         assert not Log.of_run(each).own_clocks
-        assert [found.where for found in check(each).findings if found.code == "missing"] == ["w1"]
+        assert [found.subject for found in check(each).findings if found.code == "missing"] == ["w1"]

@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn.findings.check import check
 from omnidyn.identification.motors.line import fit_line
-from omnidyn.identification.motors.log import averaged_words, motor_logs
+from omnidyn.identification.motors.log import averaged_statements, motor_logs
 from omnidyn.identification.motors.study import identify_motors
 from omnidyn.identification.motors.windows import motor_windows
 from omnidyn.logs.averaged import rows_of_mean
@@ -79,7 +79,8 @@ def test_the_dead_band_of_an_averaged_speed_is_the_true_one(motor, rows):
     line = fit_line(motor_windows(logs), 0, "bench")
     assert line.value["dead_band"] == pytest.approx(DEAD_BAND, abs=0.005)
     assert line.value["slope"] == pytest.approx(SLOPE, rel=0.002)
-    assert averaged_words(logs)[0].startswith(f"the speed of motor 1 is a mean of {rows} rows")
+    (statement,) = averaged_statements(logs)
+    assert statement.numbers == {"motors": ("1",), "rows": rows, "allowed": True}
 
 
 @pytest.mark.long
@@ -88,7 +89,7 @@ def test_the_study_of_motors_says_it(motor):
     study = identify_motors(Run(t=t, voltage=voltage[:, None], wheel_speed=mean(speed, 20)[:, None]))
     low, high = study.motors[0].ci95["dead_band"]
     assert low - 1e-3 < DEAD_BAND < high + 1e-3
-    assert any("mean of 20 rows" in words for words in study.warnings)
+    assert [each.numbers["rows"] for each in study.warnings if each.code == "speed_is_mean"] == [20]
 
 
 def test_a_log_of_few_rows_says_nothing():

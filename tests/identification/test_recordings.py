@@ -51,7 +51,7 @@ def test_a_recording_in_two_groups_is_no_evidence_of_their_difference():
     runs = fan_runs()
     study = identify_steady(runs + runs, AXEBOT, groups=["a"] * 24 + ["b"] * 24, shape="disc")
     assert [*study.estimates] == ["a", "b"]
-    assert any("the groups are not independent" in words for words in study.warnings)
+    assert any("the groups are not independent" in str(words) for words in study.warnings)
 
 
 def test_output_error_counts_once_and_says_so():
