@@ -167,10 +167,10 @@ class Identification(Shown):
 
     @property
     def headline(self) -> str:
-        """The verdict in at most two sentences: the gravest statement, and how well the numbers are known."""
+        """The verdict in few sentences: the gravest statement, how well the numbers are known, what was not made."""
         found = self.outcome()
         gravest = min(found, key=lambda each: SEVERITIES.index(each.severity))
-        return _sentences(list(dict.fromkeys([gravest, found[-1]])))
+        return _sentences(list(dict.fromkeys([gravest, found[-1], *not_made(self.missing)])))
 
     def outcome(self) -> list[Statement]:
         """What it came to, as statements."""
