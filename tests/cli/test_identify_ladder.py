@@ -38,7 +38,7 @@ def test_the_best_robot_is_written_and_all_that_was_fitted_told(call, tmp_path):
     found = json.loads(told)
     taken = [rung["key"] for rung in found["ladder"]["rungs"] if rung["taken"]]
     assert taken == ["", "body.rotating_frame"]
-    assert found["ladder"]["end"] == "the residuals hold nothing but noise"
+    assert found["ladder"]["end"]["code"] == "only_noise"
     assert load_robot(str(out)).body.rotating_frame
     assert not found["lack_of_fit"]["found"]
     assert "What was switched on, step by step" in page.read_text("utf-8")

@@ -136,7 +136,7 @@ def test_a_ladder_that_fails_leaves_the_fit_from_which_it_began(call, tmp_path, 
 
 
 def test_a_robot_file_that_cannot_be_written_costs_no_result(call, tmp_path, monkeypatch):
-    monkeypatch.setattr("omnidyn.model.robot_file.save_robot", fails(InputError("the disk is full", where="fit.toml")))
+    monkeypatch.setattr("omnidyn.save_robot", fails(InputError("the disk is full", where="fit.toml")))
     code, text, err = call(*FIT, "--quick", "-o", str(tmp_path / "fit.toml"))
     assert code == 3
     assert "friction.axes.coulomb[0]" in text

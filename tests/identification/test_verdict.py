@@ -18,7 +18,7 @@ from omnidyn.identification.verdict import fit_verdict, fits_verdict, steady_ver
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
-from omnidyn.statement import ERROR
+from omnidyn.statement import ERROR, Statement
 from tests.support.axebot_logs import excitation, noisy_draw
 
 AXEBOT = load_robot("axebot")
@@ -41,7 +41,7 @@ def estimate(std, kind: Any = OutputErrorEstimate, **more) -> Any:
 
 
 def beside(scores, which="fitted") -> Any:
-    return SimpleNamespace(scores={which: scores})
+    return SimpleNamespace(scores={which: scores}, statement=lambda: Statement("held_out_noise"))
 
 
 GOOD = {"w1": Score(0.1, 97.0), "w2": Score(0.1, 99.0)}
@@ -56,8 +56,8 @@ def said(*statements):
 def test_a_good_fit():
     fit = estimate([0.02, 0.18, 0.02, 0.02, 0.02, 0.02])
     assert said(fit_verdict(fit, beside(GOOD, "held out"))) == (
-        "On logs held out the model follows wheel speeds within 3 %; all 6 numbers are known, the widest (viscous "
-        "friction sideways) within 18 %."
+        "On logs held out the model follows wheel speeds within 3 %, as well as the noise allows; all 6 numbers are "
+        "known, the widest (viscous friction sideways) within 18 %."
     )
     assert fit.verdict == "All 6 numbers are known, the widest (viscous friction sideways) within 18 %."
 
@@ -203,4 +203,4 @@ def motor(number, band=0.5, seen=True, slope=(0.1, 0.2)) -> Any:
     ],
 )  # fmt: skip
 def test_motors(motors, words):
-    assert motors_verdict(motors) == words
+    assert said(motors_verdict(motors)) == words

@@ -28,6 +28,8 @@ def fit_verdict(fit: OutputErrorEstimate, validation: Validation | None = None) 
     numbers = {"logs": which, "follows": follows("the model", found)}
     if fit.not_followed or nothing_followed(found):
         return Statement("model_outcome", ERROR, numbers=numbers | {"known": None})
+    if which == HELD_OUT:
+        numbers["held_out"] = validation.statement()
     return Statement("model_outcome", NOTE, numbers=numbers | {"known": fit.numbers_known()})
 
 

@@ -81,6 +81,8 @@ REASONS: dict[str, Wording] = {
     "several_topics": "and so do those of others ({topics})",
 }  # fmt: skip
 
+SETTLED_BY_UNIT, NO_UNIT = ("command_without_unit", "turns_in_degrees", "turn_rate_too_large"), "no unit is given"
+
 
 def _units(statement: Statement) -> tuple[str, ...]:
     return statement.units if isinstance(statement, Doubt) else ()
@@ -119,10 +121,15 @@ def _option(option: str, text: str) -> str:
     return f'`column` "{text}"' if option == "column" else f"`{option}` {text}"
 
 
+def _is_for_want_of_unit(doubt: Doubt) -> bool:
+    """Whether a unit settles it, and none is given."""
+    return doubt.code in SETTLED_BY_UNIT and not doubt.numbers.get("unit")
+
+
 def in_brief(doubt: Doubt) -> str:
     """PWM1 .. PWM4, no unit is given (say `assume` d=V, duty, % or duty/255)."""
     columns = f"{doubt.columns[0]} .. {doubt.columns[-1]}" if len(doubt.columns) > 2 else all_of(doubt.columns)
-    reason = Sentence(REASONS[doubt.code]).of(doubt).removeprefix("but ")
+    reason = NO_UNIT if _is_for_want_of_unit(doubt) else Sentence(REASONS[doubt.code]).of(doubt).removeprefix("but ")
     if not doubt.units:
         return f"{columns}, {reason}"
     *more, last = doubt.units

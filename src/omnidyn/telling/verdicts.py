@@ -26,10 +26,20 @@ def _numbers_known(statement: Statement) -> str:
     return f"{words}; not {names_of(missing)}" if missing else words
 
 
+def _predicted(held_out: Statement | None) -> str:
+    """How near noise the errors on logs held out are; "" where none was, or nothing is sure."""
+    if held_out is None or held_out.code == "held_out_colour":
+        return ""
+    if held_out.code == "held_out_noise":
+        return ", as well as the noise allows"
+    why = ", on the fitted logs too" if held_out.numbers["fitted_too"] else ": something differs between the logs"
+    return f", but its errors are {held_out.numbers['chi2'] ** 0.5:.2g} times the noise{why}"
+
+
 def _outcome(statement: Statement) -> str:
     """How well the model follows the logs, and how well its numbers are known."""
     numbers = statement.numbers
-    words = f"{WHERE[numbers['logs']]} {numbers['follows']}"
+    words = f"{WHERE[numbers['logs']]} {numbers['follows']}{_predicted(numbers.get('held_out'))}"
     return f"{words}; {numbers['known']}" if numbers["known"] else f"{words}: its numbers mean nothing until it does"
 
 
