@@ -239,7 +239,7 @@ def test_motors_of_a_log_with_a_fatal_fault_end_with_4_and_are_shown(call, bench
     assert (code, told["ok"]) == (4, False)
     assert "log.csv is not usable as it stands: the currents are never negative" in told["verdict"]
     assert "omnidyn: Failed: " in err
-    assert any("--current-unsigned" in words for words in told["next"])
+    assert any("--current-unsigned" in step["text"] for step in told["next"])
     assert report.exists()
     code, out, _ = call(*arguments, "--current-unsigned", "--force", "--json")
     assert (code, strict(out)["ok"]) == (0, True)

@@ -151,11 +151,11 @@ def test_a_robot_file_that_cannot_be_written_costs_no_result(call, tmp_path, mon
         (MOTORS, "page", "omnidyn.report.motors_page.render_motors"),
     ],
 )
-@pytest.mark.parametrize("end", ["bug", "interrupt"])
-def test_so_it_is_of_steady_states_and_motors(call, tmp_path, monkeypatch, command, part, place, end):
+@pytest.mark.parametrize("end, shown", [("bug", ()), ("bug", ("--full",)), ("interrupt", ("--json",))])
+def test_so_it_is_of_steady_states_and_motors(call, tmp_path, monkeypatch, command, part, place, end, shown):
     monkeypatch.setattr(place, fails(ERRORS[end]))
     out = tmp_path / "fit.toml"
-    code, text, err = call(*command, "-o", str(out), "--report", str(tmp_path / "fit.html"))
+    code, text, err = call(*command, *shown, "-o", str(out), "--report", str(tmp_path / "fit.html"))
     assert code == ENDS[end], err
     assert f"Not made: the {part}" in " ".join(text.split())
     assert load_robot(out) != load_robot("axebot")

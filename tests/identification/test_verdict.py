@@ -59,6 +59,12 @@ def test_a_good_fit():
         "On logs held out the model follows wheel speeds within 3 %, as well as the noise allows; all 6 numbers are "
         "known, the widest (viscous friction sideways) within 18 %."
     )
+    other_floor = beside(GOOD, "held out")
+    other_floor.statement = lambda: Statement("held_out_misfit", numbers={"chi2": 9.0, "fitted_too": False})
+    assert said(fit_verdict(fit, other_floor)).startswith(
+        "On logs held out the model follows wheel speeds within 3 %, but its errors are 3 times the noise: something "
+        "differs between the logs; "
+    )
     assert fit.verdict == "All 6 numbers are known, the widest (viscous friction sideways) within 18 %."
 
 

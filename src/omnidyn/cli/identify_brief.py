@@ -30,7 +30,8 @@ def brief(found: Identification) -> Document:
     """What the result says in at most LINES lines."""
 
     rows = [row for group, estimate in found.estimates.items() for row in _rows(group, estimate, len(found.estimates))]
-    every = dict.fromkeys(one for estimate in found.estimates.values() for one in estimate.warnings)
+    of_study = found.study.warnings if found.study is not None else ()
+    every = dict.fromkeys([*of_study, *(one for estimate in found.estimates.values() for one in estimate.warnings)])
     grave = [one for severity in (ERROR, WARNING) for one in every if one.severity == severity]
     table = Table(("number", "value", "95 % interval", "unit", "key"), rows[:ROWS], "<>><<")
     room = LINES - SPARE - len([*Words(found.headline).lines(WIDTH, _bare)]) - len(table.rows)
