@@ -50,23 +50,23 @@ def test_it_stays_or_goes_away_with_the_fitted_robot(log, robot):
     swapped = replace(log, channels={**log.channels, "current": log.channels["current"][:, [1, 0, 2]]})
     before = check(swapped, guessed(robot))
     assert before.of("swapped")[0].severity == "warning"
-    (after,) = judged_by_fit([before], [swapped], robot, told.append, told.append)
+    (after,) = judged_by_fit([before], [swapped], robot, told.append)
     assert after.of("swapped")[0].severity == "error"
     assert "so it is with the fitted robot" in str(after.of("swapped")[0])
     # A motor that was guessed wrong explains all of it, and the finding goes away.
     wrong = guessed(robot.replace(motor=robot.motor.replace(emf_constant=2.0 * robot.motor.emf_constant)))
     before = check(log, wrong)
     assert rest_on_guesses(before)
-    (after,) = judged_by_fit([before], [log], robot, told.append, told.append)
+    (after,) = judged_by_fit([before], [log], robot, told.append)
     assert not rest_on_guesses(after)
     assert not after.of("energy")
     assert "with the fitted robot this is gone" in str(after.of("judged_again")[0])
-    assert any("this is gone" in words for words in told)
+    assert any(report.urgent and "this is gone" in str(report) for report in told)
 
 
 def test_nothing_is_checked_twice_where_nothing_was_guessed(log, robot):
     verdict = check(log, robot)
-    assert judged_by_fit([verdict], [], robot, print, print) == (verdict,)
+    assert judged_by_fit([verdict], [], robot, print) == (verdict,)
     assert judged_again(verdict, verdict).findings == verdict.findings
 
 

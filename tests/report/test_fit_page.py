@@ -39,12 +39,11 @@ def page(found):
     return render_fit(found, RECORD)
 
 
-def test_verdict_then_pictures_then_tables(page):
+def test_numbers_and_a_picture_stand_on_the_first_screen(page):
     keys = ["warnings", "next", "runs", "friction", "path", "findings", "residuals", "correlation", "numbers", "scores"]
     places = [page.index(f'<section id="{key}">') for key in keys]
     assert places == sorted(places)
-    first_table = page.index("<table")
-    assert page.index("</figure>") < page.rindex("</figure>", 0, first_table) < first_table
+    assert page.index('<div class="beside">') < page.index("</table>") < page.index("</figure>") < places[0]
 
 
 def test_every_id_is_there_once(page):
