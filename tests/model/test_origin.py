@@ -82,7 +82,7 @@ def test_an_origin_that_is_given_counts_whatever_the_words(origin, source):
     assert robot.priors["body.mass_kg"] == Prior(std=0.1, source=source, origin=origin)
     assert tomllib.loads(robot_to_toml(robot))["body"]["mass_kg"]["origin"] == origin
     assert ("body.mass_kg" in known_priors(robot)) == (origin != "identified")
-    assert ("mass" in guessed(robot)) == (origin == "guess")
+    assert ("mass" in guessed(robot)) == (origin in ("guess", "joint"))
 
 
 GUESSED_OF = {

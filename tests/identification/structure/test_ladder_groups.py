@@ -92,7 +92,7 @@ def test_the_answer_has_the_ladder_once(mixed):
 
 def test_a_number_of_one_group_is_told_with_its_group():
     assert (
-        as_fitted(STANDS, {}, {"body.mass_kg@gray": 2.0, "body.mass_kg@green": 3.0})
+        str(as_fitted(STANDS, {}, {"body.mass_kg@gray": 2.0, "body.mass_kg@green": 3.0}))
         == "mass 2 kg in gray and mass 3 kg in green"
     )
 

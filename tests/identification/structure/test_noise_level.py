@@ -110,7 +110,7 @@ def test_noise_that_comes_of_motion_is_said_and_is_no_misfit():
     assert all(one.level == pytest.approx(std, rel=0.3) for one, std in zip(lack.at_rest.values(), NOISE, strict=True))
     told = "\n".join(map(str, lack.statements()))
     assert "follow nothing that a model should know" in told
-    assert "misfit, or noise that comes of motion" in told
+    assert "misfit, or noise that comes with motion" in told
 
 
 def test_a_log_that_cannot_tell_says_so():

@@ -54,7 +54,7 @@ def test_what_rounding_explains_is_no_lack_of_fit(seed, step, duties):
     assert not fit.stability.found
     assert 0.02 < max(lack.rounded.values()) < 0.5
     assert any(
-        "rounding of the inputs, or rows that are missing" in each and "more digits" in each
+        "rounding of the inputs, or rows that are missing" in str(each) and "more digits" in str(each)
         for each in lack.statements()
     )
     assert lack.to_dict()["rounded_inputs"] == pytest.approx(dict(lack.rounded))

@@ -89,4 +89,4 @@ def test_messages_in_the_journal_of_a_recorder_are_said_to_be_missing(tmp_path):
     recorder.close()
     assert os.path.getsize(f"{copy}-wal") > 0
     assert len(read_log(copy)) == whole
-    assert any("ends in -wal" in note for note in read_info(copy).notes)
+    assert any("ends in -wal" in str(note) for note in read_info(copy).notes)

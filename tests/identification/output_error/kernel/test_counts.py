@@ -217,7 +217,7 @@ def test_wheel_speeds_that_are_differences_of_the_angles_are_left_out(axebot, ro
     both = Run(t=run.t, voltage=run.voltage, wheel_angle=counted, wheel_speed=speed)
     fit = fit_output_error(both, axebot, nuisances=())
     assert list(fit.noise) == [f"wheel_angle[{i}]" for i in range(3)]
-    assert "same_data_twice" in codes(fit.warnings)
+    assert "nothing_new" in codes(fit.warnings)
     tacho = run.wheel_speed + 0.2 * np.random.default_rng(9).normal(size=angle.shape)
     fit = fit_output_error(both.replace(wheel_speed=tacho), axebot, nuisances=())
     assert len(fit.noise) == 6

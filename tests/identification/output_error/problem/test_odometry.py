@@ -92,6 +92,7 @@ def test_it_is_left_out_of_the_fit_and_said(axebot, measured):
     both = run.replace(twist=twist_from_wheel_speed(axebot.wheels, run.wheel_speed))
     found = outputs_of(both, axebot, None, None)
     assert {channel for channel, _ in found.columns} == {"wheel_speed"}
-    assert "its twist is computed from its wheels: the twist says nothing new and is not fitted" in found.notes
+    (note,) = found.notes
+    assert (note.code, note.numbers) == ("nothing_new", {"output": "twist", "computed_from": "wheel_speed"})
     asked = outputs_of(both, axebot, ["twist", "wheel_speed"], None)
     assert "same_data_twice" in codes(asked.notes)

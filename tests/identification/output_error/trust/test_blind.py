@@ -45,9 +45,9 @@ def test_the_answer_holds_it_for_people_and_for_machines():
     setup = BY_NAME["wheel radius and gear, speed over ground"]
     run, robot = logged(setup, 34)
     fit = fit_output_error(run, robot, free=setup.free, nuisances=())
-    words = "wheel radius +10 % and gear ratio +10 %: the same to this log"
+    words = "wheel radius +10 % and gear ratio +10 %: not distinguishable with this log"
     assert words in fit.summary()
-    assert any(each.startswith(words) and "log wheel speeds" in each for each in advice(fit, None))
+    assert any(str(each).startswith(words) and "log wheel speeds" in str(each) for each in advice(fit, None))
     data = json.loads(json.dumps(fit.to_dict()))
     assert data["directions"][0]["changes"] == {RADIUS: pytest.approx(0.01), "motor.gear_ratio": pytest.approx(0.01)}
     assert RADIUS in data["directions"][0]["cures"]
