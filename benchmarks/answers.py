@@ -303,7 +303,7 @@ def tell(old: Mapping[str, Any], new: Mapping[str, Any], kinds: Collection[str])
         found = list(differences(one[name], other[name]))
         for kind in {each.kind for each in found}:
             counts[kind] += 1
-        wanted = [each for each in found if each.kind in kinds]
+        wanted = sorted((each for each in found if each.kind in kinds), key=lambda each: each.kind != NUMBERS)
         if wanted:
             print(name, *(f"    {each.kind} {each.words}" for each in wanted[:SHOWN]), sep="\n")
         if len(wanted) > SHOWN:
