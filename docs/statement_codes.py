@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from omnidyn.telling.codes import ROOMS
+from omnidyn.telling.codes import ROOMS, sentences
 from omnidyn.telling.sentence import Wording
 
 PAGE = Path(__file__).with_name("statements.md")
@@ -19,7 +19,8 @@ def filled(page: str) -> str:
 def table(room: str) -> str:
     """The codes of a room: what is said, and what to do."""
     rows = []
-    for code, sentence in ROOMS[room].items():
+    (name,) = [name for name in ROOMS if name.replace(".", "_") == room]
+    for code, sentence in sentences(name).items():
         remedies = [_cell(remedy) for remedy in (sentence.remedy, *sentence.remedies.values()) if remedy]
         rows.append(f"| `{code}` | {_cell(sentence.text)} | {'; '.join(remedies)} |")
     return "\n".join(["| code | sentence | remedy |", "| --- | --- | --- |", *rows]) + "\n"

@@ -1,54 +1,64 @@
-"""All codes, and the sentence and the remedy of a statement."""
+"""All codes, and the sentence and the remedy of a statement.
+
+A room is imported when one of its statements is told: some name what the rooms below them load slowly.
+"""
 
 from __future__ import annotations
 
+from functools import cache
+from importlib import import_module
+from typing import TYPE_CHECKING, TypeGuard
+
 from omnidyn.document import all_of
-from omnidyn.findings.finding import Finding
 from omnidyn.statement import PLACES, Statement
-from omnidyn.telling import (
-    advice,
-    causes,
-    comparison,
-    control,
-    fit,
-    lack_of_fit,
-    ladder,
-    lines,
-    logs,
-    model,
-    motors,
-    simulation,
-    steady,
-    verdicts,
-)
-from omnidyn.telling.findings import rows, scale, signal, uses, wiring
 from omnidyn.telling.sentence import Sentence
 from omnidyn.telling.words import by_number
 
-ROOMS = {
-    room.__name__.removeprefix("omnidyn.telling.").replace(".", "_"): room.SENTENCES
-    for room in (
-        simulation, fit, lack_of_fit, causes, ladder, advice, verdicts, comparison, steady, lines, logs,
-        rows, signal, wiring, scale, uses, motors, model, control,
-    )
-}  # fmt: skip
-CODES: dict[str, Sentence] = {code: sentence for room in ROOMS.values() for code, sentence in room.items()}
+if TYPE_CHECKING:
+    from omnidyn.findings.finding import Finding
+
+# From what loads at once to what loads slowly; docs/statements.md has a section for each.
+ROOMS = (
+    "simulation", "model", "control", "comparison", "fit", "lack_of_fit", "causes", "ladder", "advice", "verdicts",
+    "logs", "findings.rows", "findings.signal", "findings.wiring", "findings.scale", "findings.uses", "motors",
+    "steady", "lines",
+)  # fmt: skip
+
+
+@cache
+def sentences(room: str) -> dict[str, Sentence]:
+    """Code -> sentence of a room."""
+    return import_module(f"omnidyn.telling.{room}").SENTENCES
+
+
+@cache
+def sentence_of(code: str) -> Sentence:
+    """The sentence of a code. Raises KeyError for a code that no room has."""
+    for room in ROOMS:
+        if code in sentences(room):
+            return sentences(room)[code]
+    raise KeyError(code)
 
 
 def sentence(statement: Statement) -> str:
     """The statement in words, behind the logs, groups or motors that it is about."""
     places = statement.numbers.get(PLACES, ())
-    words = CODES[statement.code].of(statement) + (_support(statement) if isinstance(statement, Finding) else "")
+    words = sentence_of(statement.code).of(statement) + (_support(statement) if _is_finding(statement) else "")
     return ": ".join([*map(_named, places), words])
 
 
 def remedy(statement: Statement) -> str:
     """What to do about it, in words."""
-    words = CODES[statement.code].remedy_of(statement)
-    if not isinstance(statement, Finding) or not statement.rests_on:
+    words = sentence_of(statement.code).remedy_of(statement)
+    if not _is_finding(statement) or not statement.rests_on:
         return words
     them = by_number(statement.rests_on, "it", "them")
     return f"let omnidyn identify fit {them}, and judge this again, or put in what is known; if it stays, {words}"
+
+
+def _is_finding(statement: Statement) -> TypeGuard[Finding]:
+    """Whether a statement is a finding, told without importing what makes findings."""
+    return hasattr(statement, "rests_on")
 
 
 def _named(places: tuple[str, ...]) -> str:
