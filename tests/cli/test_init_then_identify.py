@@ -33,16 +33,10 @@ ROBOTS = {
 }  # fmt: skip
 
 
-# Every two of a robot, an input and a sensor meet.
-PAIRS = [
-    (kind, put_in, [*SENSORS][(k + j) % len(SENSORS)])
-    for k, kind in enumerate(ROBOTS)
-    for j, put_in in enumerate(INPUTS)
-]
-
-
 @pytest.mark.long
-@pytest.mark.parametrize("kind, put_in, sensor", PAIRS)
+@pytest.mark.parametrize("sensor", SENSORS)
+@pytest.mark.parametrize("put_in", INPUTS)
+@pytest.mark.parametrize("kind", ROBOTS)
 def test_init_then_identify(kind, put_in, sensor, tmp_path, capsys):
     world, sensors = ROBOTS[kind], replace(INPUTS[put_in], **SENSORS[sensor])
     more, facts = (), ()
