@@ -9,6 +9,7 @@ from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.robot_file import load_robot
 from omnidyn.paper.experiments import prbs
+from omnidyn.simulation import engine
 from omnidyn.simulation.live import LiveRobot
 from tests.support.friction_shapes import shaped
 
@@ -105,3 +106,16 @@ def test_a_push_that_volts_cannot_stand_for_is_refused():
 def test_a_start_that_is_none_is_refused():
     with pytest.raises(InputError, match="cannot start there"):
         LiveRobot(AXEBOT, 0.02, pose=[np.nan, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("steps", [1, 5])
+def test_rows_in_which_the_solver_hits_its_cap_are_counted_over_the_way(monkeypatch, steps):
+    """At once and step by step: a run that did not converge is never silent."""
+    monkeypatch.setattr(engine, "capped", lambda outcome: len(outcome.iterations))
+    robot, volts = shaped("ellipse"), np.tile([0.0, 3.0, -3.0], (steps, 1))
+    live = LiveRobot(robot, 0.02)
+    for row in volts:
+        live.step(row)
+    for warnings in (omnidyn.simulate(robot, volts, 0.02).warnings, live.warnings):
+        (warning,) = warnings
+        assert (warning.code, warning.numbers) == ("not_converged", {"stopped": steps, "rows": steps})

@@ -67,3 +67,8 @@ def test_a_template_has_no_capital_and_no_full_stop(code):
             assert not wording.endswith("."), wording
         else:
             assert wording.__doc__, f"say in its docstring when {code} is made"
+
+
+def test_intervals_that_are_no_wider_are_not_said_to_be_and_not_to_be():
+    numbers = {"neighbours": 0.03, "runs": 0, "widening": 1.0}
+    assert str(Statement("not_white", numbers=numbers)).endswith("the intervals allow for it; that makes them no wider")

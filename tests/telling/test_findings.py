@@ -8,8 +8,9 @@ import pytest
 import omnidyn
 from omnidyn import shown
 from omnidyn.cli import main
+from omnidyn.findings.finding import Finding, Verdict
 from omnidyn.logs.read_log import LogOptions, load_log
-from omnidyn.statement import Statement
+from omnidyn.statement import ERROR, Statement
 from omnidyn.telling.log_verdict import in_brief, of_several
 from tests.support.codes import codes
 
@@ -106,3 +107,23 @@ def test_a_default_text_is_short_and_names_what_it_leaves_out(faulty):
 def test_statements_of_findings_have_numbers_only_json_holds():
     nested = Statement("reading", numbers={"note": Statement("one_motor", numbers={"numbered": 0})})
     assert json.loads(json.dumps(nested.to_dict()))["numbers"]["note"]["code"] == "one_motor"
+
+
+def verdict_with(*findings):
+    return Verdict(tuple(findings), rows=10, duration=1.0)
+
+
+def test_two_faults_of_one_kind_are_both_shown(by_code):
+    """A dead encoder of one wheel in one log says nothing of another wheel in another log."""
+    logs = {
+        "a.csv": verdict_with(Finding("dead", ERROR, "w1"), Finding("dead", ERROR, "w2")),
+        "b.csv": verdict_with(Finding("dead", ERROR, "w2")),
+    }
+    text = of_several(logs, 110).to_text(110)
+    assert "error    dead w1 (a.csv): dead" in text
+    assert "error    dead w2 (a.csv and 1 more): dead" in text
+
+
+def test_logs_named_by_absolute_and_relative_paths_stand_in_one_table(by_code):
+    text = of_several({"/logs/a.csv": verdict_with(), "b.csv": verdict_with()}, 110).to_text(110)
+    assert [line.split()[0] for line in text.splitlines()[3:5]] == ["/logs/a.csv", "b.csv"]

@@ -84,7 +84,6 @@ def check(
 
 
 def _robot(robot: str) -> Robot | None:
-
     return omnidyn.load_robot(robot) if robot else None
 
 
@@ -128,7 +127,6 @@ def _draw(done: Checked, picture: str, force: bool) -> None:
 
 def _first(blocks: Iterator[Log]) -> tuple[Log | None, bool, Iterator[Log]]:
     """The first block, which is kept for the picture, whether it is the only one, and all blocks."""
-
     head = list(islice(blocks, 2))
     return (head[0] if head else None), len(head) == 1, chain(head, blocks)
 
@@ -157,7 +155,6 @@ class _Digest:
 
 def _compare_data(done: list[Checked]) -> None:
     """Logs that hold the same numbers under two names: evidence that counts once."""
-
     from omnidyn.findings.finding import Finding, in_order
 
     first: dict[str, Checked] = {}

@@ -115,7 +115,6 @@ def _compared(
     band: bool,
     progress: Progress,
 ) -> Comparison:
-
     return omnidyn.compare(
         robots[0],
         runs,

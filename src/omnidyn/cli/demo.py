@@ -38,7 +38,6 @@ def demo(
 
     Prints every claim with its verdict; writes report.html, result.json and the figures.
     """
-
     folder = check_folder(out, force)
     with shown_progress("loading") as progress:
         claims, pictures, record = _made(progress)

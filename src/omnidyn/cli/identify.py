@@ -98,7 +98,6 @@ def identify(
 
 def _question(asked: dict[str, Any]) -> Question:
     """The options as they stand on the command line; an empty one was not given."""
-
     given: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in asked.items()}
     given["window"] = tuple(number_list("--window", given["window"])) if given["window"] else None
     given["free"], given["nuisances"] = given["free"] or None, given["nuisances"] or None

@@ -27,8 +27,7 @@ class Brief(Document):
 
 
 def brief(found: Identification) -> Document:
-    """What the result says in at most LINES lines."""
-
+    """What the result says in about LINES lines."""
     rows = [row for group, estimate in found.estimates.items() for row in _rows(group, estimate, len(found.estimates))]
     of_study = found.study.warnings if found.study is not None else ()
     every = dict.fromkeys([*of_study, *(one for estimate in found.estimates.values() for one in estimate.warnings)])
@@ -65,10 +64,10 @@ def _rows(group: str, estimate: Estimate, groups: int) -> Iterator[Row]:
 
 
 def _that_fit(texts: Sequence[str], room: int) -> list[str]:
-    """The first of some texts, as many as take no more than so many lines."""
+    """The first of some texts, as many as take no more than so many lines; the gravest one always."""
     kept = list[str]()
     for text in texts:
-        if _height([*kept, text]) > room:
+        if kept and _height([*kept, text]) > room:
             break
         kept.append(text)
     return kept

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from omnidyn.cli.log_options import Maps, load_logs, log_files
 from omnidyn.cli.terminal.streams import say
-from omnidyn.errors import InputError
-from omnidyn.files import read_bytes
+from omnidyn.files import open_regular
 from omnidyn.identification.question import Question
 from omnidyn.progress import Progress
 
@@ -54,16 +53,11 @@ def is_motor_table(path: str) -> bool:
 
 
 def _first_names(path: str) -> set[str]:
-    """The cells of the first line of a text file, in small letters; none of a folder, or of a file too large."""
-
+    """The cells of the first line of a text file, in small letters; none of a folder."""
     if os.path.isdir(path):
         return set()
-    try:
-        text = read_bytes(path).decode("utf-8-sig", "replace")[:SNIFF_BYTES]
-    except InputError as error:
-        if "too large" in str(error):  # a log; no table of points is that long
-            return set()
-        raise
+    with open_regular(path) as stream:
+        text = stream.read(SNIFF_BYTES).decode("utf-8-sig", "replace")
     lines = (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#"))
     first = next(lines, "").replace(";", ",").replace("\t", ",")
     cells = first.split(",") if "," in first else first.split()

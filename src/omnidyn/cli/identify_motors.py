@@ -26,7 +26,6 @@ def run_motors(
     question: Question, loaded: Loaded, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress
 ) -> None:
     """Fit; write robot file and report; show the result."""
-
     study = omnidyn.identify_motors(loaded.runs, robot, question=question, logs=loaded.logs, progress=progress)
     _tell(study, robot, record, to, progress)
 
@@ -44,7 +43,6 @@ def tell_motor_table(table: str, robot: str, question: Question, to: Out) -> Non
 def _tell(
     study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress
 ) -> None:  # fmt: skip
-
     attempts, report, numbers = Attempts(), "", _into_file(study, robot, record, to)
     told = study.document()
     if numbers is not None:

@@ -47,7 +47,6 @@ class Out:
 
     def save(self, robots: Mapping[str, Robot], inputs: Sequence[Mapping[str, str]]) -> None:
         """Write the robot of each group, or replace what was written before; `finish` raises what kept it from that."""
-
         try:
             for group, path in outputs(self, list(robots), inputs).items():
                 omnidyn.save_robot(robots[group], path, self.force or group in self.files)
@@ -91,7 +90,6 @@ def load_meanwhile(to: Out, quick: bool) -> None:
 
 def tell(found: Identification, record: dict[str, Any], to: Out, progress: Progress) -> None:
     """Draw the page of an identification, and show the result."""
-
     attempts, report = Attempts([*found.missing], found.interrupt), ""
     if to.report and _has_page(found):
         progress(Report("drawing"))
@@ -125,7 +123,6 @@ def _page(found: Identification, record: dict[str, Any]) -> str:
 
 def tell_table(table: str, robot: str, question: Question, to: Out) -> None:
     """The paper's way, from a table of steady points; what the reader had to decide joins the warnings."""
-
     if question.method == OUTPUT_ERROR:
         raise InputError("a table of steady points has no time in it", got="a table axis,speed,force",
                          expected="logs, or `method` steady-state", where="method")  # fmt: skip
@@ -148,7 +145,6 @@ def outputs(to: Out, names: Sequence[str], inputs: Sequence[Mapping[str, str]] =
     inputs: the record of what was read. Raises InputError for a file that is there, unless `force` or written here,
     for one file of two groups, and for one that was read.
     """
-
     if not to.out:
         return {}
     path = Path(to.out)

@@ -108,7 +108,6 @@ def _refuse_words(given: dict[str, Any], mecanum: bool, friction: str, like: str
 
 def _refuse_numbers(given: dict[str, Any]) -> None:
     """Numbers with which no robot can be guessed, by the names that they have here. Raises InputError."""
-
     azimuth, limit, loop = given["azimuth"], given["voltage_limit"], given["speed_loop"]
     count = given["wheels"] or (azimuth and len(azimuth))
     for key in ("wheel_radius", "robot_radius"):
@@ -157,7 +156,6 @@ def _sizes(given: dict[str, Any], preset: Robot | None) -> dict[str, Any]:
 
 
 def _listed(key: str, text: str) -> list[float] | None:
-
     return number_list(f"--{key.replace('_', '-')}", text) if text else None
 
 
@@ -169,7 +167,6 @@ def _radii(key: str, text: str) -> float | tuple[float, ...] | None:
 
 def _checked_path(name: str, out: str, force: bool) -> str:
     """The file to write, refused before any question is asked. Raises InputError."""
-
     if name in preset_names():
         raise InputError("a preset has this name", got=name, remedy="choose another one, or use --like", where="NAME")
     if not 0 < len(name) <= MAX_NAME or not name.isprintable() or set(name) & set("/\\:") or name[0] in ".- ":
@@ -186,7 +183,6 @@ def _checked_path(name: str, out: str, force: bool) -> str:
 
 
 def _preset(like: str) -> Robot | None:
-
     return omnidyn.load_robot(like) if like else None
 
 

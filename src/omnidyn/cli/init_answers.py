@@ -104,7 +104,6 @@ def _ask_for_wheels(answers: Answers, preset: Robot | None) -> None:
 
 def _ask(question: str, understood: Callable[[str], Any]) -> Any:
     """An answer, asked for on stderr until it can be used; None for Enter."""
-
     while True:
         with contextlib.suppress(BrokenPipeError):
             print(question, end="", file=sys.stderr, flush=True)
@@ -125,7 +124,6 @@ def _one(text: str) -> float:
 
 
 def _several(text: str, count: int, expected: str = "") -> list[float]:
-
     try:
         values = number_list("", text)
     except InputError:
@@ -138,7 +136,6 @@ def _several(text: str, count: int, expected: str = "") -> list[float]:
 
 
 def _count(text: str) -> int:
-
     if text not in map(str, range(LEAST_WHEELS, MOST_WHEELS + 1)):
         raise InputError("cannot use this answer", got=text, expected=f"{LEAST_WHEELS} to {MOST_WHEELS} wheels")
     return int(text)

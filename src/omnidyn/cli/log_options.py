@@ -122,6 +122,8 @@ def reads_logs(*without: str) -> Callable[[Callable[..., None]], Callable[..., N
     ]  # fmt: skip
 
     def with_options(command: Callable[..., None]) -> Callable[..., None]:
+        """The command, which gets its `flags` from these options."""
+
         @functools.wraps(command)
         def run(**given: Any) -> None:
             flags = replace(NO_FLAGS, **{option.name: given.pop(option.name) for option in used})
@@ -142,7 +144,6 @@ def reads_logs(*without: str) -> Callable[[Callable[..., None]], Callable[..., N
 
 
 def _pair(option: str, text: str, example: str) -> tuple[str, str]:
-
     name, equals, value = text.rpartition("=")
     if not equals or not name.strip() or not value.strip():
         raise InputError("cannot read the option", got=text, expected=f"NAME=VALUE, such as {example}", where=option)
@@ -150,7 +151,6 @@ def _pair(option: str, text: str, example: str) -> tuple[str, str]:
 
 
 def _seconds(text: str) -> float:
-
     try:
         return float(text)
     except ValueError:
@@ -162,7 +162,6 @@ def log_files(arguments: Sequence[str]) -> list[str]:
 
     Numbers in names count as numbers (exp2 before exp10). Raises InputError for a folder without logs.
     """
-
     files: list[str] = []
     for argument in arguments:
         if not os.path.isdir(argument) or is_log_folder(argument):
@@ -191,7 +190,6 @@ def keep_inputs(logs: Sequence[str], robots: Sequence[str], others: Sequence[str
 
     others: files that are read beside logs and robots. --force or not. Raises InputError.
     """
-
     files = [robot_path(robot) for robot in robots if robot]
     for path in (path for path in others if path):
         with open_regular(path):
@@ -201,7 +199,6 @@ def keep_inputs(logs: Sequence[str], robots: Sequence[str], others: Sequence[str
 
 def refuse_missing(logs: Sequence[str]) -> None:
     """Logs that are not there, before anything slow is loaded. Raises InputError."""
-
     for path in log_files(logs):
         for file in files_of(path):
             with open_regular(file):
@@ -212,7 +209,6 @@ def load_logs(
     files: Sequence[str], robot: Robot | None, options: LogOptions, progress: Progress = silent
 ) -> Iterator[tuple[str, Log]]:
     """Each file as a Log, in order. Raises InputError at the first that cannot be read."""
-
     for k, path in enumerate(files):
         if len(files) > 1:
             progress(Report(f"reading {k + 1} of {len(files)}"))

@@ -12,7 +12,6 @@ from omnidyn.document import Document, Table
 
 def robots(json: bool = typer.Option(False, "--json", help="For machines.")) -> None:
     """List the robots that come along."""
-
     known = {name: omnidyn.load_robot(name) for name in omnidyn.preset_names()}
     data = [{"name": name, "wheels": robot.wheels.count, "source": robot.source} for name, robot in known.items()]
     rows = [(name, f"{robot.wheels.count} wheels", robot.source) for name, robot in known.items()]

@@ -53,7 +53,6 @@ def simulate(
     The dead zone included. The run is written as CSV.
     Without -o nothing is written: only the summary is shown.
     """
-
     start_twist, start_pose = three("--twist", twist), three("--pose", pose)
     if out == "-" and band:
         raise typer.BadParameter("--band writes two more files beside OUT; -o - has no place for them.")
@@ -89,7 +88,6 @@ def _ends_of(out: str) -> list[str]:
 
 def _refuse_early(robot: str, voltages: str, outputs: list[str], force: bool) -> None:
     """Before any work: an input that is not there, a place where the run could not be written in the end."""
-
     keep_inputs([], [robot], [voltages], *outputs)
     for path in filter(None, outputs):
         from omnidyn.logs.run_file import check_format
@@ -129,7 +127,6 @@ class _Job:
 
     def run(self, **options: Any) -> Run:
         """What the robot does."""
-
         run = omnidyn.simulate(self.robot, **self._commands, **options)
         return run.replace(t=run.t + self.held.t0, warnings=(*self.held.notes, *run.warnings))
 

@@ -60,7 +60,6 @@ def _make(progress: Progress, compiling: Compiling) -> list[Any]:
 
 
 def _tell(result: dict[str, Any], seconds: float, json: bool) -> None:
-
     if json:
         show_json({**result, "provenance": provenance([])})
         return

@@ -147,7 +147,7 @@ class Identification(Shown):
     @property
     def failures(self) -> tuple[Statement, ...]:
         """Why the numbers mean nothing: what of a log is not followed, forces that no shape explains, and
-        fatal findings of `check`; empty for a fit that stands."""
+        errors that `check` found; empty for a fit that stands."""
         found = [steady_failure(self.study)] if self.study is not None else []
         for group, fit in self.fits.items():
             missed = fit_failure(fit, (self.validations or {}).get(group))

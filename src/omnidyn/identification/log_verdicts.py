@@ -21,7 +21,7 @@ OF_MOTORS = ("voltage", "duty", "current", "supply", "wheel_speed", "wheel_angle
 
 
 def log_verdicts(logs: Sequence[Log], robot: Robot | None, progress: Progress) -> tuple[Verdict, ...]:
-    """What check says of each log, where they are not too long; `progress` hears of fatal findings at once."""
+    """What check says of each log, where they are not too long; `progress` hears of errors at once."""
     if sum(len(log) for log in logs) > CHECKED:
         progress(Report("the logs are long: not checked on the way (omnidyn check does)", urgent=True))
         return ()
@@ -77,7 +77,7 @@ def verdict_advice(verdicts: Sequence[Verdict]) -> list[Statement]:
     """What to mend in logs of which `check` says that they give wrong results as they stand."""
     alike: dict[tuple[str, str], list[tuple[str, Finding]]] = {}
     for each in verdicts:
-        for finding in _fatal(each):
+        for finding in _errors(each):
             alike.setdefault((finding.code, finding.remedy_text), []).append((each.source, finding))
     return [
         Statement(
@@ -93,11 +93,11 @@ def unfit(verdicts: Sequence[Verdict]) -> list[Statement]:
     alike: dict[tuple[str, ...], list[Verdict]] = {}
     for each in verdicts:
         if each.has_errors:
-            alike.setdefault(tuple(finding.code for finding in _fatal(each)), []).append(each)
+            alike.setdefault(tuple(finding.code for finding in _errors(each)), []).append(each)
     return [
         Statement(
             "log_not_usable", ERROR, _first(each.source for each in found),
-            {"logs": len(found), "findings": tuple(_fatal(found[0]))},
+            {"logs": len(found), "findings": tuple(_errors(found[0]))},
         )
         for found in alike.values()
     ]  # fmt: skip
@@ -108,7 +108,7 @@ def checked(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
     return [{"source": each.source, "has_errors": each.has_errors, "counts": each.counts} for each in verdicts]
 
 
-def _fatal(verdict: Verdict) -> list[Finding]:
+def _errors(verdict: Verdict) -> list[Finding]:
     return [finding for finding in verdict.findings if finding.severity == ERROR]
 
 

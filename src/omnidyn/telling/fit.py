@@ -130,8 +130,8 @@ def _neighbours(statement: Statement) -> str:
 def _widened(statement: Statement) -> str:
     factor = statement.numbers["widening"]
     if factor < WIDER:
-        return "the intervals are no wider for it"
-    return f"the intervals are up to {short(factor)} times as wide as for white noise"
+        return "that makes them no wider"
+    return f"that makes them up to {short(factor)} times as wide as for white noise"
 
 
 def _short_logs(statement: Statement) -> str:

@@ -109,7 +109,7 @@ def _excited(excitation: Mapping[str, float]) -> Words:
 
 
 def of_several(verdicts: Mapping[str, Verdict | None], width: int, full: bool = False) -> Document:
-    """Several logs: how many can be used for what, a table of them, then their errors and warnings, of one code once.
+    """Several logs: how many can be used for what, a table of them, then what was found in them, each once.
 
     Args:
         verdicts: path -> verdict; None for a log that could not be read.
@@ -160,8 +160,10 @@ def _gravity(verdict: Verdict | None) -> tuple[int, ...]:
 
 
 def _labels(paths: Sequence[str]) -> list[str]:
-    """The paths without the folder that all share."""
-    folder = os.path.commonpath([os.path.dirname(path) for path in paths]) if paths else ""
+    """The paths without the folder that all share; as they are where some are absolute and some are not."""
+    if len({os.path.isabs(path) for path in paths}) != 1 or len({os.path.splitdrive(path)[0] for path in paths}) != 1:
+        return [*paths]
+    folder = os.path.commonpath([os.path.dirname(path) for path in paths])
     return [os.path.relpath(path, folder) if folder else path for path in paths]
 
 
@@ -174,15 +176,15 @@ def _row(label: str, verdict: Verdict | None) -> tuple[str, ...]:
 
 
 def _groups(read: Mapping[str, Verdict]) -> list[list[tuple[str, Finding]]]:
-    """(path, finding) of each code, gravest first, then by the number of logs."""
-    groups: dict[tuple[str, str], list[tuple[str, Finding]]] = {}
+    """(path, finding) of each code and subject, gravest first, then by the number of logs."""
+    groups: dict[tuple[str, str, str], list[tuple[str, Finding]]] = {}
     for path, verdict in read.items():
         for finding in verdict.findings:
-            groups.setdefault((finding.severity, finding.code), []).append((path, finding))
+            groups.setdefault((finding.severity, finding.code, finding.subject), []).append((path, finding))
     return [groups[kind] for kind in sorted(groups, key=lambda kind: (SEVERITIES.index(kind[0]), -len(groups[kind])))]
 
 
 def _where(labels: Sequence[str]) -> str:
-    """ " (a.csv and 2 more logs)": where the first finding of a code stands, and how many others have one."""
+    """ " (a.csv and 2 more logs)": where a finding stands first, and how many other logs have it."""
     others = len(set(labels)) - 1
     return f" ({labels[0]}{f' and {others} more' if others else ''})"

@@ -13,9 +13,9 @@ from omnidyn.telling.words import by_number
 
 def _turns_in_degrees(statement: Statement) -> str:
     """but its angle jumps by 360 as degrees do"""
-    unit = statement.numbers.get("unit")
-    return f"but it jumps by 360 as degrees do, not {'radians' if unit else ''}" if unit else \
-        "but no unit is given, and it jumps by 360 as degrees do"  # fmt: skip
+    if statement.numbers.get("unit"):
+        return "but it jumps by 360 as degrees do, not radians"
+    return "but no unit is given, and it jumps by 360 as degrees do"
 
 
 def _too_much_duty(statement: Statement) -> str:

@@ -84,7 +84,6 @@ def track(
 
 def _check_outputs(out: str, report: str, gif: str, force: bool) -> None:
     """Refuse, before anything is simulated, what could not be written in the end."""
-
     for name, ending in ((report, ".html"), (gif, ".gif")):
         if name and not name.lower().endswith(ending):
             raise InputError("another kind of file", got=name, expected=f"a name that ends in {ending}")
@@ -111,7 +110,6 @@ def _draw(
     gif: str,
     force: bool,
 ) -> None:
-
     with shown_progress("drawing"):
         if report:
             from omnidyn.report.tracking.page import render_tracking
@@ -124,7 +122,6 @@ def _draw(
 
 
 def _record(robot: str, plant: str, files: list[str]) -> dict[str, Any]:
-
     robots = [robot_input(robot), *([robot_input(plant)] if plant else [])]
     others = [input_file("controller" if name.endswith(".toml") else "path", name) for name in files]
     return provenance([*robots, *others])

@@ -29,7 +29,6 @@ def tune(
     json: bool = typer.Option(False, "--json", help="For machines."),
 ) -> None:
     """Find the gains of a controller on simulated robots: all that the robot file says may be meant."""
-
     if out:
         if not out.endswith(".toml"):
             raise InputError("another kind of file", got=out, expected="a name that ends in .toml", where="out")

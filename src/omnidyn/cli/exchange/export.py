@@ -92,7 +92,6 @@ def _options(kind: str, make: Any, given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _run(path: str, robot: Robot, max_bytes: int) -> Run:
-
     return omnidyn.read_log(path, robot=robot, max_bytes=max_bytes or None)
 
 

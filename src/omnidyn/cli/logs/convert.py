@@ -38,7 +38,6 @@ def convert(
 
     As MCAP it opens in Foxglove and PlotJuggler, a simulated run beside the real one.
     """
-
     log_options.keep_inputs([log, *beside], [robot], [flags.map_file], out, flags.save_map)
     if not split:
         check_output(out, force)
@@ -61,7 +60,6 @@ def convert(
 
 def write_all(runs: Sequence[Run], files: Sequence[str], force: bool) -> None:
     """Write each run to its file; none where one of the files must not be replaced."""
-
     for path in files:
         check_output(path, force)
     for run, path in zip(runs, files, strict=True):

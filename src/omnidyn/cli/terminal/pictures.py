@@ -16,7 +16,6 @@ KINDS = (".png", ".svg")
 
 def refuse_picture(path: str, force: bool) -> None:
     """Before any work: a place where the picture could not be written in the end. Raises InputError."""
-
     if path and (not path.endswith(KINDS) or "\0" in path):
         raise InputError("cannot tell the kind of picture", got=path, expected="a name that ends in .png or .svg")
     if path:
@@ -25,6 +24,5 @@ def refuse_picture(path: str, force: bool) -> None:
 
 def write_picture(drawn: Picture, path: str, force: bool, which: str = "") -> None:
     """Write it in the format that its name asks for, and say so. which: what of the data it shows, in words."""
-
     write_atomic(path, drawn.svg if path.endswith(".svg") else drawn.png, force)
     say(f"omnidyn: wrote {path}{which}")

@@ -31,5 +31,4 @@ def input_file(role: str, path: str, max_bytes: int = MAX_TEXT_BYTES) -> dict[st
 
 def robot_input(robot: str) -> dict[str, str]:
     """The record of a robot given by the name of a preset or by a path."""
-
     return {**input_file("robot", robot_path(robot)), "name": robot if robot in preset_names() else str(Path(robot))}

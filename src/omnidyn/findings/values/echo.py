@@ -18,7 +18,7 @@ CHANGES = 5  # of the commands: a robot that rests, or that a simulator moves at
 
 
 def check_echo(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
-    """Fatal where a channel is no measurement; it is masked."""
+    """An error where a channel is no measurement; it is masked."""
     found: list[Finding] = []
     for measured, commanded in PAIRS:
         values, command = work.get(measured), work.get(commanded)

@@ -130,7 +130,7 @@ def _axes_names(work: LogUnderCheck) -> tuple[str, tuple[str, ...]]:
 
 
 def axes_finding(work: LogUnderCheck, answer: Answer) -> Finding:
-    """Fatal: axes of what was measured over the floor are exchanged, or have the opposite sign."""
+    """Errors: axes of what was measured over the floor are exchanged, or have the opposite sign."""
     channel, names = _axes_names(work)
     turn = _turn_of_pose(work, answer.best)
     also = [] if turn is None else turned_names(turn)
@@ -183,7 +183,7 @@ def mended_axes(work: LogUnderCheck, wiring: Wiring) -> LogUnderCheck:
 
 
 def wheels_finding(work: LogUnderCheck, answer: Answer, blamed: str) -> Finding:
-    """Fatal: wheel speeds in another order, or of the opposite sign, than floor or commands say."""
+    """Errors: wheel speeds in another order, or of the opposite sign, than floor or commands say."""
     seen = ground(work)
     against = seen.name if seen is not None else ("twist_command" if work.get("twist_command") is not None else "")
     names = components("wheel_speed", work.wheels)

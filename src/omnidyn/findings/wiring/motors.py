@@ -101,7 +101,7 @@ def by_likeness(work: LogUnderCheck, channel: str) -> Answer | None:
 
 
 def motor_finding(work: LogUnderCheck, channel: str, answer: Answer, rests_on: tuple[str, ...] = ()) -> Finding:
-    """Fatal: columns of one channel of the motors are exchanged, or have the opposite sign."""
+    """Errors: columns of one channel of the motors are exchanged, or have the opposite sign."""
     names = components(channel, work.wheels)
     against = "wheel_speed" if channel != "wheel_speed" else CURRENT_AND_VOLTAGE
     return Finding(
