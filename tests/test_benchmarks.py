@@ -16,7 +16,7 @@ from benchmarks.answers import differences
 
 ROOT = Path(__file__).resolve().parents[1]
 QUICK = (
-    "house", "accuracy", "simulate", "inductance", "rest", "compare", "check", "exports", "stagger", "identify_loop",
+    "house", "path_of_a_value", "accuracy", "simulate", "inductance", "rest", "compare", "check", "exports", "stagger", "identify_loop",
     "ten_robots", "studies",
 )  # fmt: skip
 
