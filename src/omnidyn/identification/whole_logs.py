@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import Unpack
 
 from omnidyn.arguments import check_order
-from omnidyn.arrays import FloatArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.identification.output_error.memory.whitening import Weighed
-from omnidyn.identification.output_error.moved_by import MovedBy
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.question import FIT, OUTPUT_ERROR, Question
@@ -70,7 +67,7 @@ def solved(
 
     without_ladder: is called with the answer of the fit from which a ladder begins, before it does.
     """
-    first = fit.solve(progress, _unearned)
+    first = fit.solve(progress)
     if not fit.question.ladder:
         return answered(fit, first, progress)
     from omnidyn.identification.structure.ladder.climb import climb  # imported lazily: slow to load
@@ -92,12 +89,12 @@ def answered(fit: Fit, solution: Solution, progress: FitProgress) -> Answer:
     if not solution.converged:
         solution = fit.with_latencies_only(solution, progress) or solution
     try:
-        answer = fit.answer(solution, progress, _MOVED_BY)
+        answer = fit.answer(solution, progress)
     except InsufficientDataError:
         plainer = fit.with_latencies_only(solution, progress)
         if plainer is None:
             raise
-        answer = fit.answer(plainer, progress, _MOVED_BY)
+        answer = fit.answer(plainer, progress)
     if fit.question.quick:
         return answer
     found = {
@@ -105,30 +102,6 @@ def answered(fit: Fit, solution: Solution, progress: FitProgress) -> Answer:
         for (group, estimate), seen in zip(answer.estimates.items(), answer.solutions, strict=True)
     }
     return replace(answer, estimates=found)
-
-
-def _moved_by_the_file(sure: Weighed, held: Mapping[str, float]) -> FloatArray:
-    """See structure/rests_on.py."""
-    from omnidyn.identification.structure.rests_on import moved_by_the_file  # here, for it takes time to load
-
-    return moved_by_the_file(sure, held)
-
-
-def _moved_by_rounding(sure: Weighed) -> FloatArray:
-    """See structure/rounded_inputs.py."""
-    from omnidyn.identification.structure.rounded_inputs import moved_by_rounding  # here, for it takes time to load
-
-    return moved_by_rounding(sure)
-
-
-_MOVED_BY = MovedBy(_moved_by_the_file, _moved_by_rounding)
-
-
-def _unearned(found: Solution) -> tuple[str, ...]:
-    """See structure/earned.py."""
-    from omnidyn.identification.structure.earned import unearned  # here, for it takes time to load
-
-    return unearned(found)
 
 
 def _study(solution: Solution) -> Callable[[], Diagnosis]:

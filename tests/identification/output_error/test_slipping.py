@@ -6,12 +6,12 @@ import pytest
 from omnidyn import check
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.slipping import SlipEngine
+from omnidyn.identification.output_error.linear.motion import motions
 from omnidyn.identification.output_error.prepare import make_engine, make_problem, read_records
 from omnidyn.identification.output_error.problem.motion import motion
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.missing import laws
-from omnidyn.identification.structure.motion import motions
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot

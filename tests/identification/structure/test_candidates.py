@@ -10,6 +10,8 @@ import pytest
 from benchmarks.ten_robots.world import World, currents, drive
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.linear.motion import motions
+from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.output_error.prepare import engine_kind
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.missing import refits
@@ -17,8 +19,6 @@ from omnidyn.identification.structure.missing.candidates import CHANGE
 from omnidyn.identification.structure.missing.laws import candidates
 from omnidyn.identification.structure.missing.switches import switches
 from omnidyn.identification.structure.missing.unoffered import unoffered
-from omnidyn.identification.structure.motion import motions
-from omnidyn.identification.structure.workbench import Workbench
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.motor import Motor
 from omnidyn.model.robot import Body, Robot

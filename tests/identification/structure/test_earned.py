@@ -1,13 +1,15 @@
 """Nuisances that soak up what a model misses in a part of the log are taken out; those that are there stay."""
 
+from unittest.mock import patch
+
 import numpy as np
 import pytest
 
+from omnidyn.identification.output_error import fit
 from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.linear import blocks as held_out
+from omnidyn.identification.output_error.linear.blocks import Blocks, _harm, _without, rejected_nuisances
 from omnidyn.identification.question import OUTPUT_ERROR, Question
-from omnidyn.identification.structure import earned
-from omnidyn.identification.structure.earned import _harm, _without, unearned
-from omnidyn.identification.structure.missing.remedies import Blocks
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
@@ -25,7 +27,8 @@ def robot():
 
 def solved(log, robot):
     """The fit with all that is automatic, and supported by the likelihood."""
-    return Fit.of([log], robot, Question.for_method(OUTPUT_ERROR, None, {})).solve()
+    with patch.object(fit, "rejected_nuisances", lambda solution: ()):
+        return Fit.of([log], robot, Question.for_method(OUTPUT_ERROR, None, {})).solve()
 
 
 def lame_for_a_while(robot):
@@ -40,10 +43,10 @@ def lame_for_a_while(robot):
 def test_what_soaks_up_a_part_of_the_log_is_not_fitted(robot):
     log = lame_for_a_while(robot)
     found = solved(log, robot)
-    assert set(unearned(found)) == {"latency.twist", "dead_band"} == set(found.solver.problem.names[6:])
-    fit = fit_output_error(log, robot)
-    assert not fit.nuisances
-    assert codes(fit.warnings).count("harmful_nuisance") == 2
+    assert set(rejected_nuisances(found)) == {"latency.twist", "dead_band"} == set(found.solver.problem.names[6:])
+    estimate = fit_output_error(log, robot)
+    assert not estimate.nuisances
+    assert codes(estimate.warnings).count("harmful_nuisance") == 2
 
 
 @pytest.mark.parametrize("late", [1, 3])
@@ -51,17 +54,17 @@ def test_a_latency_that_is_there_stays(robot, late):
     log = noisy_draw(simulate(robot, VOLTS, 0.01), late)
     twist = log.twist.copy()
     twist[late:] = twist[:-late]
-    assert unearned(solved(log.replace(twist=twist), robot)) == ()
+    assert rejected_nuisances(solved(log.replace(twist=twist), robot)) == ()
 
 
 def test_nothing_is_looked_at_where_the_likelihood_is_sure_of_none(robot, monkeypatch):
-    monkeypatch.setattr(earned, "_blocks", None)
-    assert unearned(solved(noisy_draw(simulate(robot, VOLTS, 0.01), 0), robot)) == ()
+    monkeypatch.setattr(held_out, "_blocks", None)
+    assert rejected_nuisances(solved(noisy_draw(simulate(robot, VOLTS, 0.01), 0), robot)) == ()
 
 
 def test_a_nuisance_that_was_asked_for_is_fitted_whatever_it_does(robot):
-    fit = fit_output_error(lame_for_a_while(robot), robot, nuisances=("latency", "dead_band"))
-    assert set(fit.nuisances) == {"latency.twist", "dead_band"}
+    estimate = fit_output_error(lame_for_a_while(robot), robot, nuisances=("latency", "dead_band"))
+    assert set(estimate.nuisances) == {"latency.twist", "dead_band"}
 
 
 def test_the_error_of_blocks_is_that_of_fits_to_all_others():

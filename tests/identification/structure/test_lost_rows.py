@@ -7,10 +7,10 @@ import pytest
 from benchmarks.wrong_worlds.kinds import by_name
 from benchmarks.wrong_worlds.log import AR, SPEEDS, TICKS, TWIST, logged, right_case, robot_of
 from benchmarks.wrong_worlds.score import drawn
+from omnidyn.identification.output_error.linear.motion import motions
+from omnidyn.identification.output_error.linear.rounded_inputs import losses, shown_by_losses
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.question import Question
-from omnidyn.identification.structure.lost_rows import losses, shown_by_losses
-from omnidyn.identification.structure.motion import motions
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run

@@ -13,8 +13,8 @@ from benchmarks.wrong_worlds.log import COUNTS, TICKS, logged, right_case, robot
 from benchmarks.wrong_worlds.remedies import FRICTION
 from benchmarks.wrong_worlds.score import drawn
 from benchmarks.wrong_worlds.world import World
+from omnidyn.identification.output_error.linear.rows import of_rounding
 from omnidyn.identification.output_error.memory.autoregression import autoregression
-from omnidyn.identification.structure.rounding import of_rounding
 from omnidyn.identification.verdict import fits_verdict
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot

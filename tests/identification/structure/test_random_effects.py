@@ -4,7 +4,7 @@ their variance there is."""
 import numpy as np
 import pytest
 
-from omnidyn.identification.structure.random_effects import RandomEffects, scaled
+from omnidyn.identification.output_error.linear.random_effects import RandomEffects, scaled
 
 RANDOM = np.random.default_rng(3)
 Z = RANDOM.normal(size=(40, 7)) * np.geomspace(1e-3, 4.0, 7)

@@ -7,9 +7,9 @@ from benchmarks.wrong_worlds.kinds import by_name
 from benchmarks.wrong_worlds.log import logged, right_case, robot_of
 from omnidyn.identification.lack_of_fit import LOSS
 from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.linear.rows import Rows
 from omnidyn.identification.output_error.prepare import EXACT, make_engine
 from omnidyn.identification.question import Question
-from omnidyn.identification.structure.linear import Rows
 from omnidyn.identification.structure.tails import as_counted, sprinkled
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot

@@ -8,7 +8,7 @@ correlation that the shared numbers bring about.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,8 +19,10 @@ from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import WHOLE, begun, group_names
 from omnidyn.identification.output_error.conclusion import conclude, unexplained
 from omnidyn.identification.output_error.joint import JointEngine, join, joint_start, own_names
+from omnidyn.identification.output_error.linear.blocks import rejected_nuisances
+from omnidyn.identification.output_error.linear.rounded_inputs import beside_rounding
+from omnidyn.identification.output_error.linear.sensitivity import moved_by_the_file
 from omnidyn.identification.output_error.memory.whitening import Weighed, whitened, why_not
-from omnidyn.identification.output_error.moved_by import MovedBy, beside_rounding
 from omnidyn.identification.output_error.prepare import (
     EXACT,
     FINE,
@@ -51,8 +53,6 @@ from omnidyn.model.robot import Robot
 from omnidyn.progress import silent
 from omnidyn.run import Run, as_list
 from omnidyn.statement import WARNING, Statement
-
-Unearned = Callable[[Solution], Sequence[str]]
 
 NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
 HALFWAY = 3e-4  # [m/s] tolerance of the implicit engine on the way there
@@ -111,27 +111,20 @@ class Fit:
         """Degrees of freedom of the loss; 0 for Gaussian noise."""
         return degrees(self.question.loss)
 
-    def solve(self, progress: FitProgress | None = None, unearned: Unearned | None = None) -> Solution:
-        """The best point; `progress` sees every better state on the way, and hears in words what is done.
-
-        unearned: which automatic nuisances a log is better without, see structure/earned.py.
-        """
+    def solve(self, progress: FitProgress | None = None) -> Solution:
+        """The best point; `progress` sees every better state on the way, and hears in words what is done."""
         progress = progress or FitProgress()
         if len(self.groups) == 1:
-            return self._settled(self.groups[0], progress, unearned)
-        return self._solve_joint(self._settled_alone(progress, unearned), progress)
+            return self._settled(self.groups[0], progress)
+        return self._solve_joint(self._settled_alone(progress), progress)
 
-    def answer(
-        self, found: Solution | Best, progress: FitProgress | None = None, moved_by: MovedBy | None = None
-    ) -> Answer:
+    def answer(self, found: Solution | Best, progress: FitProgress | None = None) -> Answer:
         """What the best point says; of the best so far without profile, bootstrap and breakaway.
-
-        moved_by: what numbers that are taken as they stand move the others by, a std each; see `known_so_far`.
 
         Raises InputError for a name to profile that is not free, InsufficientDataError where the logs say nothing about
         any of the robot's numbers.
         """
-        answer = self._answer(found, progress or FitProgress(), moved_by)
+        answer = self._answer(found, progress or FitProgress())
         note, estimates = band_note(self.began), answer.estimates
         return replace(
             answer,
@@ -141,7 +134,7 @@ class Fit:
             },
         )
 
-    def _answer(self, found: Solution | Best, progress: FitProgress, moved_by: MovedBy | None) -> Answer:
+    def _answer(self, found: Solution | Best, progress: FitProgress) -> Answer:
         """The same, of the robot that was fitted."""
         done = isinstance(found, Solution)
         solution, warnings = (found, []) if isinstance(found, Solution) else self._so_far(found)
@@ -150,7 +143,7 @@ class Fit:
         progress.enter("finding how sure the numbers are")
         sure = self.weighed(solution, progress, anew=done)
         records = [record for group in self.groups for record in group.records]
-        known, rounded = beside_rounding(sure, records, moved_by if done else None)
+        known, rounded = beside_rounding(sure, records) if done else (sure.known, [])
         by, warnings = sure.solution, [*warnings, *sure.warnings, *rounded]
         strata = {id(record): group.name for group in self.groups for record in group.records}
         profile, draws = (self.question.profile, self.question.bootstrap) if done else ((), 0)
@@ -163,14 +156,14 @@ class Fit:
             moves = [one.moves for one in levels if one.moves is not None]
             known = known.beside(np.concatenate(moves, axis=1)) if moves else known
             exact, held, told = without_a_fall(solution, known) if done else (known, {}, [])
-            known = self._beside_what_is_held(exact, sure, moved_by if done else None)
+            known = self._beside_what_is_held(exact, sure) if done else exact
             words, better = [*warnings, *told, *group.warnings, *hints], beside(again, by, sure.known, known).intervals
             estimate = conclude(
                 solver, solution, known, group.records, loss, words, group.bounds, group.moved, levels,
                 held | dict(better), exact
             )  # fmt: skip
             return Answer({group.name: estimate}, (), solver.problem.names, (), (solution,))
-        exact, known = known, self._beside_what_is_held(known, sure, moved_by if done else None)
+        exact, known = known, self._beside_what_is_held(known, sure) if done else known
         engine, estimates, alones, wider = solver.engine, {}, [], beside(again, by, sure.known, known).intervals
         assert isinstance(engine, JointEngine)
         for member in engine.members:
@@ -190,10 +183,10 @@ class Fit:
         between = differences(by, known, again, own, [*estimates], profile, strata)
         return Answer(estimates, own, shared, between, tuple(alones))
 
-    def _beside_what_is_held(self, known: Trust, sure: Weighed, moved_by: MovedBy | None) -> Trust:
+    def _beside_what_is_held(self, known: Trust, sure: Weighed) -> Trust:
         """The same trust, with what the file knows only so far; the same number moves all groups at once."""
         so_far = self.known_so_far(sure.plain.solver.problem)
-        return known.beside(moved_by.file(sure, so_far)) if so_far and moved_by else known
+        return known.beside(moved_by_the_file(sure, so_far)) if so_far else known
 
     def known_so_far(self, problem: Problem) -> dict[str, float]:
         """Key -> std of what the robot file knows only so far, and the fit took as it stands."""
@@ -223,7 +216,7 @@ class Fit:
             return as_it_is  # a memory that explains a whole output leaves nothing to the model
         return found
 
-    def _settled(self, group: Group, progress: FitProgress, unearned: Unearned | None) -> Solution:
+    def _settled(self, group: Group, progress: FitProgress) -> Solution:
         """The fit of one group; automatic nuisances that the logs do not support are taken out again."""
         found = self._solve(group, group.problem(), progress)
         if self.question.nuisances is not None:
@@ -234,7 +227,7 @@ class Fit:
         else:
             progress.enter("which nuisances the logs support")
             kept = supported(found.solver, found, (LATENCY,) if group.engine == LOOP else automatic(group.records))
-        harmful = unearned(found) if unearned is not None and group.engine != LOOP else ()
+        harmful = rejected_nuisances(found) if group.engine != LOOP else ()
         kept = tuple(name for name in kept if name not in harmful)
         lost = [name for name in _nuisances(found.solver.problem) if name not in kept]
         if not lost:
@@ -276,7 +269,7 @@ class Fit:
             nearer.state.point, progress=progress, blocked=nearer.blocked, scales=nearer.state.variance
         )
 
-    def _settled_alone(self, progress: FitProgress, unearned: Unearned | None) -> tuple[str, ...] | None:
+    def _settled_alone(self, progress: FitProgress) -> tuple[str, ...] | None:
         """The automatic nuisances that every group supports alone; None where they are not automatic, or all stay."""
         if not self._settles:
             return None
@@ -285,7 +278,7 @@ class Fit:
         kept: tuple[str, ...] | None = None
         for group in self.groups:
             found = self._solve(group, group.problem(names), progress.alone(group.name))
-            harmful = unearned(found) if unearned is not None else ()
+            harmful = rejected_nuisances(found)
             mine = tuple(name for name in supported(found.solver, found, names) if name not in harmful)
             kept = mine if kept is None else tuple(name for name in kept if name in mine)
         return kept

@@ -8,8 +8,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.lack_of_fit import Binned
-from omnidyn.identification.structure.linear import Rows
-from omnidyn.identification.structure.motion import Motion
+from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.rows import Rows
 from omnidyn.run import UNITS
 
 BINS, LEAST = 16, 5  # of a picture; rows of a bin that is shown

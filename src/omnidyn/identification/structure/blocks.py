@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
+from omnidyn.identification.output_error.linear.rows import SAME, Linear
 from omnidyn.identification.output_error.problem.record import Record
-from omnidyn.identification.structure.linear import SAME, Linear
 
 BLOCKS = 40  # of each log, the same share of its time each
 FIRM = 50.0  # rows that the noise of an output in a part is worth beforehand: that of all logs

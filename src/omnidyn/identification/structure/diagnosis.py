@@ -11,6 +11,10 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.beside import small_matrices
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
+from omnidyn.identification.output_error.linear.motion import motions
+from omnidyn.identification.output_error.linear.rounded_inputs import effects, with_rounding
+from omnidyn.identification.output_error.linear.rows import Linear, Rows
+from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.prepare import engine_kind
 from omnidyn.identification.output_error.problem.bounded import bounded
@@ -18,7 +22,6 @@ from omnidyn.identification.output_error.problem.problem import Parts, Point, Pr
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
 from omnidyn.identification.output_error.trust.breakaway import levels_of
 from omnidyn.identification.structure.binned import binned
-from omnidyn.identification.structure.linear import Linear, Rows
 from omnidyn.identification.structure.misfit import FALSE, Misfit, chance, memory_beside, misfit, with_cause
 from omnidyn.identification.structure.missing.candidates import Candidate, Trial
 from omnidyn.identification.structure.missing.laws import candidates
@@ -26,13 +29,10 @@ from omnidyn.identification.structure.missing.odometry import with_odometry
 from omnidyn.identification.structure.missing.refits import refits
 from omnidyn.identification.structure.missing.remedies import remedies
 from omnidyn.identification.structure.missing.unoffered import unoffered
-from omnidyn.identification.structure.motion import motions
 from omnidyn.identification.structure.noise_level import noise_levels
 from omnidyn.identification.structure.rests_on import rests_on
-from omnidyn.identification.structure.rounded_inputs import effects, with_rounding
 from omnidyn.identification.structure.shifts import stability
 from omnidyn.identification.structure.tails import as_counted, calmer, wild_samples
-from omnidyn.identification.structure.workbench import Workbench
 from omnidyn.model.known.holding import holding
 
 SURE = 2.0  # degrees of freedom with which the power of the slowest errors is known within its own size

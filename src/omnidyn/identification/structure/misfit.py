@@ -13,14 +13,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import fdtrc
 
-from omnidyn.arrays import BoolArray, FloatArray, IntArray
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Found
-from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
-from omnidyn.identification.output_error.memory.innovations import without_gaps
-from omnidyn.identification.output_error.problem.outputs import TRAVEL
+from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.rows import (
+    SAME,
+    TINY,
+    Linear,
+    Rows,
+    Shown,
+    lengths,
+    noise_models,
+    root_of_covariance,
+    solved,
+    solved_by,
+    with_priors,
+)
+from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.structure.disturbances import THEMES, Theme, shown_by_themes
-from omnidyn.identification.structure.linear import TINY, Gram, Linear, Rows, root_of_covariance, solved
-from omnidyn.identification.structure.motion import Motion
 
 FALSE = 0.02  # of right models for which something is found, all tests together
 BENT = 0.01  # of what rounded inputs show: what their first order is off by is no evidence
@@ -90,11 +100,6 @@ def chance(linear: Linear, shown: Sequence[FloatArray]) -> float:
     return _Asked.of(linear, shown, np.zeros(0, dtype=int)).score(np.arange(shown[0].shape[2]))[1]
 
 
-def memory_of(rows: Rows) -> Sequence[AutoRegression]:
-    """The memory of the residuals of each column, as they are."""
-    return _memories(rows, rows.residual, None)
-
-
 def memory_beside(rows: Rows, cause: Sequence[FloatArray]) -> Sequence[AutoRegression]:
     """The memory of each column, of what is left beside what a cause shows (C, rows, K) of each piece."""
     return _whitened(rows, cause)[0].memory
@@ -109,6 +114,58 @@ def _beside(rows: Rows, shown: Sequence[FloatArray], taken: IntArray, own: IntAr
     """The score of some columns, by the memory of what is left where they are taken, too."""
     linear, _ = _whitened(rows, [each[:, :, np.concatenate([taken, own])] for each in shown])
     return _Asked.of(linear, shown, taken).score(own)
+
+
+@dataclass(frozen=True, eq=False)
+class Gram:
+    """Scalar products of the columns of [e, J, Z], columns of J and Z scaled to length 1. rows: how many there are.
+
+    matrix (1 + P + K, 1 + P + K); size (1 + P + K,): what each column was divided by.
+    """
+
+    matrix: FloatArray
+    size: FloatArray
+    rows: int
+    count: int
+
+    @classmethod
+    def of(cls, linear: Linear, shown: Shown) -> Gram:
+        """Those of a fit and of what is shown beside it."""
+        parameters, rows = linear.rows.problem.parameters, 0
+        products = with_priors(linear, shown[0].shape[2])
+        for k, own in enumerate(shown):
+            every = linear.beside(k, [own])
+            products += every.T @ every
+            rows += len(every)
+        size = lengths(products)
+        rows += sum(p.known is not None for p in parameters)
+        return cls(products / np.outer(size, size), size, rows, len(parameters))
+
+    @property
+    def fitted(self) -> IntArray:
+        """Which columns belong to the parameters of the fit."""
+        return np.arange(1, 1 + self.count)
+
+    def left(self, known: IntArray) -> tuple[Gram, int]:
+        """(what is left of all columns once those `known` explain them, how many directions these are)."""
+        values, vectors = np.linalg.eigh(self.matrix[np.ix_(known, known)])
+        kept = values > SAME * max(float(values.max(initial=0.0)), 1e-300)
+        half = (vectors[:, kept] / np.sqrt(values[kept])).T @ self.matrix[known]
+        return replace(self, matrix=self.matrix - half.T @ half, rows=self.rows - int(kept.sum())), int(kept.sum())
+
+    def directions(self, known: IntArray, by: IntArray, least: float) -> tuple[FloatArray, FloatArray]:
+        """(what each direction of columns `by` explains of e once those `known` do, (k,); its weights, (P + K, k)).
+
+        Directions longer than sqrt(least), each of length 1 with all columns of [J, Z] weighed so.
+        """
+        rest, _ = self.left(known)
+        values, vectors = np.linalg.eigh(rest.matrix[np.ix_(by, by)])
+        kept = values > least
+        ways = vectors[:, kept] / np.sqrt(values[kept])
+        weights = np.zeros((len(self.size), ways.shape[1]))
+        weights[by] = ways
+        weights[known] = -solved_by(self.matrix[np.ix_(known, known)], self.matrix[np.ix_(known, by)] @ ways)
+        return (ways.T @ rest.matrix[by, 0]) ** 2, (weights / self.size[:, None])[1:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,33 +218,12 @@ def _whitened(
     What they have taken out of the residuals belongs to the noise, too: see output_error/memory/whitening.py.
     Rounds begin with noise that remembers nothing where inputs are rounded: that shows as a memory, and would stay one.
     """
-    linear = Linear(rows, _memories(rows, rows.residual, None, 0 if rows.rounding else None))
+    linear = Linear(rows, noise_models(rows, rows.residual, None, 0 if rows.rounding else None))
     left, off = list(rows.residual), list(rows.residual)
     for _ in range(ROUNDS):
         left, off, taken = left_beside(rows, linear, kept)
-        linear = Linear(rows, _memories(rows, left, taken))
+        linear = Linear(rows, noise_models(rows, left, taken))
     return linear, (left, off)
-
-
-def _memories(
-    rows: Rows, left: Sequence[FloatArray], taken: Sequence[FloatArray] | None, most: int | None = None
-) -> list[AutoRegression]:
-    """The memory of each column. taken: of each piece (C, rows, K), what a fit has taken out, as likely as it is. most:
-    the highest order."""
-    found = []
-    for c in range(len(rows.problem.columns)):
-        series, moves = list[FloatArray](), list[BoolArray]()
-        for k, own in enumerate(rows.column):
-            for j, column in enumerate(own):
-                if column == c:
-                    there = rows.there[k][j]
-                    more = [] if taken is None else [taken[k][j][there]]
-                    series += without_gaps(np.column_stack([left[k][j][there], *more]), rows.steps[k][j])
-                    moves += without_gaps(rows.moves[k][j, there], rows.steps[k][j])
-        plain, adds_up = autoregression(series, 0), rows.problem.columns[c][0] in TRAVEL
-        is_white = most == 0 or rows.is_rounding(c, plain.variance)
-        found.append(plain if is_white else autoregression(series, may_add_up=adds_up, moves=moves))
-    return found
 
 
 def left_beside(

@@ -24,12 +24,12 @@ from scipy.special import fdtrc
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import HOLDS, NEIGHBOURS, REPEATS, REST, ROUNDING, Noise
+from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.rows import TINY, Linear, Rows
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.problem.outputs import SPEEDS, TRAVEL
 from omnidyn.identification.structure.binned import unit_of
-from omnidyn.identification.structure.linear import TINY, Linear, Rows
 from omnidyn.identification.structure.misfit import left_beside
-from omnidyn.identification.structure.motion import Motion
 from omnidyn.identification.structure.windows import Shown, Windows, shown
 from omnidyn.statistics import sensor_step, stretches
 

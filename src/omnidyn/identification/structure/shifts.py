@@ -15,10 +15,10 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
+from omnidyn.identification.output_error.linear.rows import Linear, Rows
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.stability import LOGS, TIME, Level, Shift, Split, Stability
 from omnidyn.identification.structure.blocks import BLOCKS, Blocks, apart
-from omnidyn.identification.structure.linear import Linear, Rows
 from omnidyn.identification.structure.misfit import TOLD as KNOWN
 from omnidyn.identification.structure.misfit import memory_beside
 from omnidyn.statistics import homogeneity, t_quantile

@@ -20,12 +20,12 @@ from omnidyn.clocks import time_of_row
 from omnidyn.identification.lack_of_fit import LOSS, Remedy, Wild
 from omnidyn.identification.output_error.fit import NU
 from omnidyn.identification.output_error.kernel.of_rows import row_terms
+from omnidyn.identification.output_error.linear.blocks import Blocks
+from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.rows import solved
 from omnidyn.identification.output_error.problem.problem import Parts, Problem
 from omnidyn.identification.output_error.solve.solver import Solution
-from omnidyn.identification.structure.linear import solved
 from omnidyn.identification.structure.misfit import Misfit
-from omnidyn.identification.structure.missing.remedies import Blocks
-from omnidyn.identification.structure.motion import Motion
 from omnidyn.model.mass import mass_matrix
 from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import HUBER_CLIP, huber_loss, robust_std

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.clocks import usual_step
+from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.rows import TINY, Rows
 from omnidyn.identification.output_error.problem.problem import Piece
-from omnidyn.identification.structure.linear import TINY, Rows
-from omnidyn.identification.structure.motion import Motion
 from omnidyn.logs.plateaus import COMMANDS, command_changes
 from omnidyn.statistics import stretches
 

@@ -5,14 +5,14 @@ import pytest
 
 from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of
 from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.linear.random_effects import RandomEffects, drawn_together
+from omnidyn.identification.output_error.linear.rounded_inputs import effects
+from omnidyn.identification.output_error.linear.rows import Linear, Rows, noise_models
 from omnidyn.identification.output_error.memory.autoregression import _without_empty_axes
 from omnidyn.identification.output_error.problem import bounded as module
 from omnidyn.identification.output_error.problem.bounded import ROWS, bounded
 from omnidyn.identification.question import OUTPUT_ERROR, Question
-from omnidyn.identification.structure.linear import Gram, Linear, Rows
-from omnidyn.identification.structure.misfit import memory_of
-from omnidyn.identification.structure.random_effects import RandomEffects, drawn_together
-from omnidyn.identification.structure.rounded_inputs import effects
+from omnidyn.identification.structure.misfit import Gram
 from omnidyn.identification.whole_logs import fit_output_error
 
 
@@ -87,7 +87,7 @@ def test_intervals_beside_a_bounded_diagnosis_are_those_of_all_rows(case, log, m
 def test_sums_over_pieces_are_those_of_all_rows_at_once(solution):
     point, problem = solution.state.point, solution.solver.problem
     rows = Rows.of(problem, point, solution.solver.engine.residuals(point))
-    linear = Linear(rows, memory_of(rows))
+    linear = Linear(rows, noise_models(rows, rows.residual))
     shown = [np.random.default_rng(k).normal(size=(*own.shape, 5)) for k, own in enumerate(rows.residual)]
     e, j = linear.whole()
     every = np.column_stack([e, j, linear.white(shown)])

@@ -23,6 +23,7 @@ from omnidyn.identification.ladder import STANDS, Ladder, Rung
 from omnidyn.identification.output_error.begin import WHOLE
 from omnidyn.identification.output_error.conclusion import unexplained
 from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.linear.motion import motions
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.structure.diagnosis import Examined, examine
@@ -34,7 +35,6 @@ from omnidyn.identification.structure.missing.candidates import cause, sized
 from omnidyn.identification.structure.missing.laws import USUAL_FALL, USUAL_SPEED, other_laws
 from omnidyn.identification.structure.missing.odometry import hidden_by
 from omnidyn.identification.structure.missing.switches import EACH_WHEEL, FALLS, LIMIT, as_fitted, simpler_first
-from omnidyn.identification.structure.motion import motions
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 from omnidyn.model.layout import N_AXES
 from omnidyn.run import Run

@@ -13,12 +13,12 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.joint import JointEngine
+from omnidyn.identification.output_error.linear.blocks import Blocks
+from omnidyn.identification.output_error.linear.rows import Linear, Rows
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.problem.bounded import bounded
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
 from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
-from omnidyn.identification.structure.linear import Linear, Rows
-from omnidyn.identification.structure.missing.remedies import Blocks
 from omnidyn.identification.structure.tails import as_counted
 
 Shows = Callable[[Point], list[Parts]]

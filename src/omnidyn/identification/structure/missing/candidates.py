@@ -16,10 +16,10 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import CHANGE
+from omnidyn.identification.output_error.linear.motion import Motion, in_the_room
+from omnidyn.identification.output_error.linear.workbench import Workbench, scaled
 from omnidyn.identification.output_error.prepare import LOOP
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT
-from omnidyn.identification.structure.motion import Motion, in_the_room
-from omnidyn.identification.structure.workbench import Workbench, scaled
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN, Driver
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.keys import EMF, TORQUE

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
+from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.output_error.prepare import LOOP
 from omnidyn.identification.structure.missing.candidates import (
     CHANGE,
@@ -20,8 +22,6 @@ from omnidyn.identification.structure.missing.candidates import (
     of_the_log,
     sized,
 )
-from omnidyn.identification.structure.motion import Motion
-from omnidyn.identification.structure.workbench import Workbench
 from omnidyn.model.dynamics import frame_wrench
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.friction.kinds import COULOMB, LUGRE

@@ -16,6 +16,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.lack_of_fit import Remedy
+from omnidyn.identification.output_error.linear.workbench import on_time
 from omnidyn.identification.output_error.memory.whitened import OfRows
 from omnidyn.identification.output_error.prepare import (
     EXACT,
@@ -32,7 +33,6 @@ from omnidyn.identification.output_error.solve.solver import Solution, Solver, S
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.missing.candidates import CHANGE, Candidate, Fitted, Trial
 from omnidyn.identification.structure.missing.switches import Switch, as_fitted, simpler_first, switches
-from omnidyn.identification.structure.workbench import on_time
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 
 BEST = 3  # candidates that are fitted beside the shapes

@@ -7,7 +7,6 @@ log where each leaves as much as the other and both together hardly less.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,12 +14,12 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Remedy
-from omnidyn.identification.structure.linear import SAME, Linear, Rows, lengths, with_priors
+from omnidyn.identification.output_error.linear.blocks import Blocks
+from omnidyn.identification.output_error.linear.rows import Linear, Rows
 from omnidyn.identification.structure.missing.candidates import Candidate, Trial
 from omnidyn.model.keys import BODY_AXES, DIRECTION
 
 CLEAR = 2.0  # standard errors by which a remedy may seem worse on blocks it was not fitted to
-BLOCKS = 10  # of the log, each held out once
 NOTHING = 1e-4  # of where a number began, below which there is none of it
 RIVAL = 0.3  # of what the best explains, from which another explanation is worth a look
 TOLD_APART, ROUGHLY = 6.0, 0.05  # of chi squared, or its share, by which one must be better than the other
@@ -43,72 +42,6 @@ class Tried:
     def numbers(self) -> int:
         """How many it fits; one of an axis that never moved is none."""
         return self.trial.fitted.numbers if self.trial.fitted else max(self.shows, 1)
-
-
-class Blocks:
-    """Scalar products of [e, J, Z] in blocks of rows. matrix (B, n, n); shows (n,): which columns are not all 0."""
-
-    def __init__(self, linear: Linear, *shown: Sequence[FloatArray]):
-        number = self._numbers(linear)
-        self.count, self.rows = len(linear.rows.problem.parameters), len(number)
-        self.block = [np.flatnonzero(number == b) for b in range(BLOCKS)]
-        # Priors are held out of no block.
-        self.total: FloatArray = with_priors(linear, sum(each[0].shape[2] for each in shown))
-        self.matrix: FloatArray = np.zeros((BLOCKS, *self.total.shape))
-        first = 0
-        for k in range(len(linear.rows.pieces)):
-            every = linear.beside(k, [each[k] for each in shown])
-            block = number[first : (first := first + len(every))]
-            for b in np.unique(block).tolist():
-                own = every[block == b]
-                self.matrix[b] += own.T @ own
-        self.total += self.matrix.sum(axis=0)
-        self.shows, self.size = np.diag(self.total) > 0.0, lengths(self.total)
-        self.matrix /= np.outer(self.size, self.size)
-        self.total /= np.outer(self.size, self.size)
-
-    def of(self, matrix: FloatArray, total: FloatArray) -> Blocks:
-        """Blocks with other scalar products, of the same rows."""
-        other = copy.copy(self)
-        other.matrix, other.total = matrix, total
-        return other
-
-    def _numbers(self, linear: Linear) -> IntArray:
-        """The block of each row, by its time: blocks are whole stretches of time. -1 of priors, which are in all."""
-        when, pieces = [], linear.rows
-        whole = sum(r.shape[1] for r in pieces.residual)
-        seen = 0
-        for k, there in enumerate(pieces.there):
-            parts = [seen + np.flatnonzero(own) for own in there]
-            own = np.concatenate(parts) if parts else np.zeros(0, int)
-            when.append(np.concatenate([own, np.full(linear.length(k) - len(own), seen)]))
-            seen += there.shape[1]
-        at = np.concatenate(when)
-        number = np.minimum(at * BLOCKS // max(whole, 1), BLOCKS - 1)
-        return np.concatenate([number, np.full(len(pieces.problem.parameters), -1)])
-
-    def fitted(self, matrix: FloatArray, at: IntArray) -> FloatArray:
-        """What the columns `at` are fitted by."""
-        values, vectors = np.linalg.eigh(matrix[np.ix_(at, at)])
-        kept = values > SAME * values[-1]
-        return vectors[:, kept] @ ((vectors[:, kept].T @ matrix[at, 0]) / values[kept])
-
-    def left(self, at: IntArray) -> float:
-        """The sum of squares that is left with these columns."""
-        by = self.fitted(self.total, at)
-        return float(self.total[0, 0] - by @ self.total[at, 0])
-
-    def held_out(self, at: IntArray) -> FloatArray:
-        """The squared error of each block by a fit to all others. Shape (B,)."""
-        found = []
-        for own in self.matrix:
-            by = self.fitted(self.total - own, at)
-            found.append(own[0, 0] - 2.0 * by @ own[at, 0] + by @ own[np.ix_(at, at)] @ by)
-        return np.array(found)
-
-    def predicted(self, at: IntArray) -> FloatArray:
-        """The same, by whatever is known of it beyond a linear step."""
-        return self.held_out(at)
 
 
 def remedies(

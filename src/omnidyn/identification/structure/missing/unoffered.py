@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.identification.output_error.linear.motion import Motion
+from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.structure.missing.candidates import Candidate, Trial, as_it_is
-from omnidyn.identification.structure.motion import Motion
-from omnidyn.identification.structure.workbench import Workbench
 from omnidyn.model.layout import N_AXES
 
 Force = Callable[[Motion, float], FloatArray]

@@ -10,12 +10,12 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
+from omnidyn.identification.output_error.linear.motion import Motion
 from omnidyn.identification.output_error.prepare import EXACT, IMPLICIT, make_engine
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
-from omnidyn.identification.structure.motion import Motion
 from omnidyn.model.actuation import Driver, at_motors
 from omnidyn.model.keys import Key, expand
 from omnidyn.model.robot import Robot

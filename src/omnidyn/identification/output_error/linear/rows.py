@@ -17,11 +17,12 @@ from functools import cached_property
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
-from omnidyn.identification.output_error.memory.autoregression import AutoRegression
+from omnidyn.identification.output_error.linear.random_effects import RandomEffects, drawn_together, scaled
+from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
+from omnidyn.identification.output_error.memory.innovations import without_gaps
 from omnidyn.identification.output_error.memory.whitened import known_rows, moving_rows
+from omnidyn.identification.output_error.problem.outputs import TRAVEL
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
-from omnidyn.identification.structure.random_effects import RandomEffects, drawn_together, scaled
-from omnidyn.identification.structure.rounding import anew, of_rounding
 
 TINY = 1e-300
 SAME = 1e-10  # of the largest eigenvalue of columns of length 1: below it directions are one
@@ -291,58 +292,6 @@ class Linear:
         return np.ascontiguousarray(every[:, 0]), np.ascontiguousarray(every[:, 1:])
 
 
-@dataclass(frozen=True, eq=False)
-class Gram:
-    """Scalar products of the columns of [e, J, Z], columns of J and Z scaled to length 1. rows: how many there are.
-
-    matrix (1 + P + K, 1 + P + K); size (1 + P + K,): what each column was divided by.
-    """
-
-    matrix: FloatArray
-    size: FloatArray
-    rows: int
-    count: int
-
-    @classmethod
-    def of(cls, linear: Linear, shown: Shown) -> Gram:
-        """Those of a fit and of what is shown beside it."""
-        parameters, rows = linear.rows.problem.parameters, 0
-        products = with_priors(linear, shown[0].shape[2])
-        for k, own in enumerate(shown):
-            every = linear.beside(k, [own])
-            products += every.T @ every
-            rows += len(every)
-        size = lengths(products)
-        rows += sum(p.known is not None for p in parameters)
-        return cls(products / np.outer(size, size), size, rows, len(parameters))
-
-    @property
-    def fitted(self) -> IntArray:
-        """Which columns belong to the parameters of the fit."""
-        return np.arange(1, 1 + self.count)
-
-    def left(self, known: IntArray) -> tuple[Gram, int]:
-        """(what is left of all columns once those `known` explain them, how many directions these are)."""
-        values, vectors = np.linalg.eigh(self.matrix[np.ix_(known, known)])
-        kept = values > SAME * max(float(values.max(initial=0.0)), 1e-300)
-        half = (vectors[:, kept] / np.sqrt(values[kept])).T @ self.matrix[known]
-        return replace(self, matrix=self.matrix - half.T @ half, rows=self.rows - int(kept.sum())), int(kept.sum())
-
-    def directions(self, known: IntArray, by: IntArray, least: float) -> tuple[FloatArray, FloatArray]:
-        """(what each direction of columns `by` explains of e once those `known` do, (k,); its weights, (P + K, k)).
-
-        Directions longer than sqrt(least), each of length 1 with all columns of [J, Z] weighed so.
-        """
-        rest, _ = self.left(known)
-        values, vectors = np.linalg.eigh(rest.matrix[np.ix_(by, by)])
-        kept = values > least
-        ways = vectors[:, kept] / np.sqrt(values[kept])
-        weights = np.zeros((len(self.size), ways.shape[1]))
-        weights[by] = ways
-        weights[known] = -solved_by(self.matrix[np.ix_(known, known)], self.matrix[np.ix_(known, by)] @ ways)
-        return (ways.T @ rest.matrix[by, 0]) ** 2, (weights / self.size[:, None])[1:]
-
-
 def with_priors(linear: Linear, more: int) -> FloatArray:
     """Scalar products of [e, J] in the rows of the priors, and 0 of `more` columns. (1 + P + more, 1 + P + more)."""
     return np.pad(linear.priors.T @ linear.priors, (0, more))
@@ -378,3 +327,66 @@ def root_of_covariance(columns: FloatArray) -> FloatArray:
     values, vectors = np.linalg.eigh(columns.T @ columns)
     kept = values > SAME * max(float(values.max(initial=0.0)), TINY)
     return vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
+
+
+def noise_models(
+    rows: Rows, left: Sequence[FloatArray], taken: Sequence[FloatArray] | None = None, most: int | None = None
+) -> list[AutoRegression]:
+    """The memory of each column. taken: of each piece (C, rows, K), what a fit has taken out, as likely as it is. most:
+    the highest order."""
+    found = []
+    for c in range(len(rows.problem.columns)):
+        series, moves = list[FloatArray](), list[BoolArray]()
+        for k, own in enumerate(rows.column):
+            for j, column in enumerate(own):
+                if column == c:
+                    there = rows.there[k][j]
+                    more = [] if taken is None else [taken[k][j][there]]
+                    series += without_gaps(np.column_stack([left[k][j][there], *more]), rows.steps[k][j])
+                    moves += without_gaps(rows.moves[k][j, there], rows.steps[k][j])
+        plain, adds_up = autoregression(series, 0), rows.problem.columns[c][0] in TRAVEL
+        is_white = most == 0 or rows.is_rounding(c, plain.variance)
+        found.append(plain if is_white else autoregression(series, may_add_up=adds_up, moves=moves))
+    return found
+
+
+# What an encoder rounds off, as noise: a function of the angle, which goes round once a tick
+#
+# Rows at a fraction d of a tick from each other have the correlation 1 - 6 d + 6 d^2. So a wheel that turns by a simple
+# share of a tick from row to row repeats its rounding, and sums over rows are off by more than white noise is. As a
+# series over the phase, whose beginning is left to chance: harmonic m has the variance q^2/(2 pi^2 m^2), and noise of
+# std s beside it leaves exp(-(2 pi m s/q)^2) of that in common.
+# Source: B. Widrow, I. Kollar, Quantization Noise (2008).
+
+HARMONICS = 24  # beyond them rounding is as good as white
+APART = 0.2  # of a tick: from there on two rows have no positive correlation
+
+
+def of_rounding(angle: FloatArray, tick: float, ways: FloatArray, beside: float = 0.0) -> FloatArray:
+    """By how much the variance of sums of rounding, w' e, is more than that of white noise w' w, over tick^2/12. (K,).
+
+    angle (rows,): what is rounded [as tick]; ways (rows, K): w. beside: std of the noise beside it, in ticks.
+    """
+    more = np.zeros(ways.shape[1])
+    for m in range(1, HARMONICS + 1):
+        common = 6.0 / (np.pi * m) ** 2 * np.exp(-((2.0 * np.pi * m * beside) ** 2))
+        wave = np.abs(np.exp(2j * np.pi * m * angle / tick) @ ways) ** 2
+        more += common * (wave - (ways**2).sum(axis=0))
+    return more
+
+
+def anew(piece: Piece, residual: FloatArray) -> FloatArray:
+    """Residuals (C, rows) without rows whose rounding is that of rows before.
+
+    Of a wheel that turns by nearly nothing from row to row, or by nearly whole ticks, one row knows nothing of another
+    only where that has brought it round.
+    """
+    out = residual.copy()
+    for c, tick in enumerate(piece.record.ticks):
+        if tick <= 0.0:
+            continue
+        model = np.nan_to_num(piece.record.outputs[piece.first : piece.last + 1, c] - residual[c]) / tick
+        apart = np.abs(np.diff(model) - np.round(np.diff(model)))
+        round_ = np.concatenate([[0.0], np.cumsum(np.where(apart < APART, apart, 1.0))]) // 1.0
+        out[c, 1:][round_[1:] == round_[:-1]] = np.nan
+    return out

@@ -13,7 +13,7 @@ steps that lost something, and none where the motors take just these steps:
 so that a log in which it would show by itself tells how much of it there is. Where it would not, all of it counts.
 
 In the tests of a fit all u are random effects, as many as there are stretches (`with_rounding`), and so is what rows
-that are missing hide (lost_rows.py): what they may explain is a known cause, and no lack of fit. Inputs that are held
+that are missing hide: what they may explain is a known cause, and no lack of fit. Inputs that are held
 for less than HELD leave what the memory of the noise knows.
 """
 
@@ -25,22 +25,39 @@ from itertools import pairwise
 
 import numpy as np
 
-from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
+from omnidyn.clocks import usual_step
+from omnidyn.identification.output_error.linear.motion import Motion, motions
+from omnidyn.identification.output_error.linear.random_effects import share
+from omnidyn.identification.output_error.linear.rows import Rows, lengths, solved_by, with_priors
+from omnidyn.identification.output_error.linear.sensitivity import as_weighed, members_of
 from omnidyn.identification.output_error.memory.whitening import Weighed
+from omnidyn.identification.output_error.problem.differences import JUMP, LOST, NEARLY, UNEVEN
 from omnidyn.identification.output_error.problem.input_steps import as_logged, input_steps
 from omnidyn.identification.output_error.problem.problem import Fitted, Piece, Problem
-from omnidyn.identification.structure.linear import Rows, lengths, solved_by, with_priors
-from omnidyn.identification.structure.lost_rows import losses, shown_by_losses
-from omnidyn.identification.structure.motion import Motion, motions
-from omnidyn.identification.structure.random_effects import share
-from omnidyn.identification.structure.rests_on import as_weighed, members_of
+from omnidyn.identification.output_error.problem.record import Record
+from omnidyn.identification.output_error.trust.uncertainty import Trust
 from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import per_wheel
+from omnidyn.statement import WARNING, Statement
 
 HELD = 0.1  # [s]
+WIDER = 1.1  # times an interval, from which on what widens it is said
 DRAWS = 60  # a variance within a fifth; always the same ones
 SEED = 20_12
+
+
+def beside_rounding(sure: Weighed, records: Sequence[Record]) -> tuple[Trust, list[Statement]]:
+    """(the trust in a fit, with what inputs in steps may have been rounded by; what is to be said of that)."""
+    steps = max(float(input_steps(record).max()) for record in records)
+    if not steps:
+        return sure.known, []
+    known = sure.known.beside(moved_by_rounding(sure))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        wider = float(np.nanmax(known.std / sure.known.std, initial=1.0))
+    rounded = Statement("rounded_inputs", WARNING, numbers={"step": steps, "wider": wider})
+    return known, [rounded] if wider > WIDER else []
 
 
 def moved_by_rounding(sure: Weighed) -> FloatArray:
@@ -141,3 +158,46 @@ def _share(left: FloatArray) -> float:
     apart = float(both.sum() - np.trace(both)) / (DRAWS * (DRAWS - 1))
     seen, noise = float(np.mean(left[0, 1:] ** 2)), float(np.mean(np.diag(left)[1:]))
     return share(seen, noise, apart, float(np.sqrt(2.0 * both.mean())))
+
+
+# What a log does not tell of its inputs where rows are missing: since when the next one has been applied
+#
+# The model holds the last input that was logged. Had the next one come at once, or halfway, the motion would show z
+# beside that, by simulation. Of z there is a share u, even between 0 and 1 and another one at each loss: random effects
+# in the tests of a fit, as inputs that are rounded are (rounded_inputs.py), but all of their variance is there.
+
+LASTS = 3.0  # [s] that a change of speed may be seen
+
+
+def losses(piece: Piece) -> IntArray:
+    """The rows of a piece behind which others are missing and an input is clearly another one. (K,).
+
+    Rows of clocks of their own lack none, and every change has its time. A speed loop is not looked into.
+    """
+    record, rows = piece.record, slice(piece.first, piece.last + 1)
+    row = np.diff(record.t[rows]) / usual_step(record.t[rows])
+    if record.staggered or record.set_point is not None or np.mean(np.abs(row - np.round(row)) <= UNEVEN) < NEARLY:
+        return np.zeros(0, dtype=int)
+    voltage = np.nan_to_num(record.voltage[rows])
+    jumps = (np.abs(np.diff(voltage, axis=0)) > JUMP * np.ptp(voltage, axis=0).max()).any(axis=1)
+    return np.flatnonzero(jumps & (row > LOST))
+
+
+def shown_by_losses(motion: Motion) -> FloatArray:
+    """What the columns show of each input that changed at once, and of one that did halfway, times the root of the mean
+    square of u. (C, rows, 2 K)."""
+    at, voltage = losses(motion.piece), motion.voltage.copy()
+    before, end = motion.piece.record.voltage[motion.piece.last - 1 : motion.piece.last + 1]
+    voltage[-1] += np.nan_to_num(end - before)  # it drives no row
+    change = np.zeros((len(motion.t), 2 * len(at), N_AXES))
+    for k, row in enumerate(at.tolist()):
+        last = int(np.searchsorted(motion.t[:-1], motion.t[row + 1] + LASTS))
+        dt = np.diff(motion.t[row : last + 1])
+        dt = np.concatenate([[0.5 * dt[0]] * 2, dt[1:]])
+        ways = [
+            np.delete(motion.under(voltage[[*first, *range(row + 1, last)]], dt, row), 1, axis=0)
+            for first in ((row, row), (row + 1, row + 1), (row, row + 1))
+        ]
+        change[row : last + 1, 2 * k] = ways[1] - ways[0]
+        change[row : last + 1, 2 * k + 1] = ways[2] - ways[0]
+    return motion.shown(change) / np.sqrt(3.0)
