@@ -82,13 +82,26 @@ class Noise:
 
 
 @dataclass(frozen=True)
+class Force:
+    """Of a remedy, in forces [N]: size: root mean square of what it adds; before, after: of the left-out error without
+    and with it; gain, gain_std: what it takes away of that. p: chance of as much, all tests counted."""
+
+    size: float
+    before: float
+    after: float
+    gain: float
+    gain_std: float
+    p: float
+
+
+@dataclass(frozen=True)
 class Remedy:
     """key: of the robot file, a nuisance or "change". cause: what it is, with its value; text is quoted.
     gain: share of the squared held-out error that it takes away, with its standard error. same_as: keys that the
     log cannot tell from it. share: of all that residuals hold beside noise, that it explains. offered: whether a
     robot file or a fit holds such. chi2: by how much it lowers the sum of squares, in those of the noise; numbers:
     how many it fits. size, at: its fitted change and where it was tried, both of a first step. changes: number ->
-    (what it is, what it would be with it, to first order)."""
+    (what it is, what it would be with it, to first order). force: where it was fitted to forces at steady state."""
 
     key: str
     cause: Statement
@@ -102,6 +115,7 @@ class Remedy:
     size: tuple[float, ...] = ()
     at: float = 0.0
     changes: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    force: Force | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cause", *statements([self.cause]))
@@ -125,7 +139,8 @@ class Remedy:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
-        return {**asdict(self), "words": str(self.cause), "cause": self.cause}
+        fields = {name: value for name, value in asdict(self).items() if name != "force"}
+        return {**fields, "words": str(self.cause), "cause": self.cause}
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +172,7 @@ class LackOfFit:
     beyond: those whose residuals are larger, by a source that decides. at_rest: the same where the robot rests.
     rounded: output -> share of the variance of its residuals that is of inputs that were rounded, or changed while rows
     are missing, which is no lack of fit, but hides one that is smaller. drifts: whether errors last so long that no
-    test tells them from a misfit.
+    test tells them from a misfit. tried: names of what was tried, where all that was tried has one test.
     """
 
     found: bool
@@ -173,6 +188,7 @@ class LackOfFit:
     at_rest: Mapping[str, Noise] = field(default_factory=dict)
     rounded: Mapping[str, float] = field(default_factory=dict)
     drifts: bool = False
+    tried: tuple[str, ...] = ()
 
     @property
     def causes(self) -> tuple[Remedy, ...]:
