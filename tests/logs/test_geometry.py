@@ -7,8 +7,7 @@ import pytest
 
 from omnidyn import load_robot
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.logs.geometry import as_mecanum, wheel_geometry
-from omnidyn.logs.travel import mean_speeds
+from omnidyn.logs.geometry import as_mecanum, mean_speeds, wheel_geometry
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from tests.support.staggered import Logged, Topic, plant

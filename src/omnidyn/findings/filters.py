@@ -13,9 +13,12 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.findings.finding import Finding
+from omnidyn.findings.signal.clocks import at_each_clock
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
+from omnidyn.logs.averaged import rows_of_mean
+from omnidyn.logs.channels import place
 from omnidyn.model.frames import unwrapped, world_to_body
-from omnidyn.statement import NOTE
+from omnidyn.statement import NOTE, WARNING
 from omnidyn.statistics import moving, robust_std
 
 ENOUGH = 60_000  # rows that tell a filter
@@ -160,3 +163,42 @@ def _together(near: BoolArray, count: int) -> BoolArray:
     """Whether `count` + 1 rows from each row on follow one another without a gap. Shape (rows - count,)."""
     far = np.concatenate([[0], np.cumsum(~near)])
     return far[count + 1 :] == far[1 : len(near) - count + 1]
+
+
+# Speeds that are means over a window of rows, as some motor controllers give them: late, and slow to show a change
+
+SPEEDS = ("wheel_speed", "twist")
+
+
+def check_averaged(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """Findings on such speeds, those over one window together; nothing is masked. The work knows by how much they are
+    late."""
+    if not work.step > 0.0:
+        return [], work
+    found, _ = at_each_clock(work, _at_its_clock)
+    late = {place(each.subject.split()[0])[0]: each.numbers["late_s"] for each in found}  # type: ignore[index]
+    return found, work.knowing(late=late)
+
+
+def _at_its_clock(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """The same of the speeds that were sampled in these rows."""
+    alike: dict[tuple[str, int], list[str]] = {}
+    for channel in SPEEDS:
+        if channel not in work.log.channels:  # differences of angles, made here
+            continue
+        for component, values in work.sampled_columns(channel):
+            if rows := rows_of_mean(values):
+                alike.setdefault((channel, rows), []).append(component)
+    return [_averaged_finding(names, rows, work.step) for (_, rows), names in alike.items()], work
+
+
+def late_by(work: LogUnderCheck, channel: str) -> float:
+    """By how many rows of the work a mean makes a channel late; 0 where it is none."""
+    return work.known.get("late", {}).get(channel, 0.0) / work.step
+
+
+def _averaged_finding(names: list[str], rows: int, step: float) -> Finding:
+    return Finding(
+        "averaged", WARNING, " ".join(names),
+        {"rows": rows, "seconds": rows * step, "late_s": 0.5 * (rows - 1) * step},
+    )  # fmt: skip

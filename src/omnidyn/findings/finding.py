@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 from omnidyn.arrays import BoolArray, IntArray
 from omnidyn.document import Document, plain, sentence
-from omnidyn.findings.use import Use
 from omnidyn.logs.log import Log
 from omnidyn.shown import DOCUMENT, FIGURE, Shown, make
 from omnidyn.statement import ERROR, NOTE, SEVERITIES, WARNING, Statement
@@ -16,6 +15,7 @@ from omnidyn.statistics import stretches
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
 
 MAX_SPANS = 20  # spans of rows that a finding keeps; it counts all
 LEAST_WIDTH = 40  # of text
@@ -161,3 +161,24 @@ def merged(findings: Sequence[Finding], blocks: int) -> Finding:
     numbers = {**heaviest.numbers, "blocks": blocks, "in_blocks": len(findings)}
     total = sum(finding.count for finding in findings)
     return replace(heaviest, numbers=numbers, rows=tuple(rows[:MAX_SPANS]), count=total)
+
+
+# One use of a log
+
+
+@dataclass(frozen=True)
+class Use:
+    """One use of a log. good: whether it serves. reason: what is there for it, or what is missing and what to do."""
+
+    name: str
+    good: bool
+    reason: Statement
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {"name": self.name, "good": self.good, **self.reason.to_dict()}
+
+
+def joined(parts: Sequence[Sequence[Use]]) -> tuple[Use, ...]:
+    """The uses of all blocks of one log: good where one block is."""
+    return tuple(next((use for use in uses if use.good), uses[0]) for uses in zip(*parts, strict=True))

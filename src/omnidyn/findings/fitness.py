@@ -12,8 +12,8 @@ import numpy as np
 
 from omnidyn.errors import OmnidynError
 from omnidyn.findings import needs
+from omnidyn.findings.finding import Use
 from omnidyn.findings.signal.log_under_check import MIN_ROWS
-from omnidyn.findings.use import Use
 from omnidyn.logs.columns.mapping import ColumnMap, component_channel
 from omnidyn.logs.geometry import shows_both, wheel_geometry
 from omnidyn.logs.log import Log

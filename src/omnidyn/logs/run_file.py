@@ -10,6 +10,7 @@ Source and warnings of a Run are not in the file.
 
 from __future__ import annotations
 
+import io
 import os
 import re
 from collections.abc import Mapping, Sequence
@@ -27,7 +28,6 @@ from omnidyn.logs.channels import components, si_suffix
 from omnidyn.logs.readers.parquet import SUFFIXES, import_pyarrow, parquet_bytes
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.table.table import Table
-from omnidyn.logs.writers.mat_run import columns_to_mat
 from omnidyn.logs.writers.mcap_run import import_mcap, run_to_mcap
 from omnidyn.run import CHANNELS, SCALAR, Run, as_run
 from omnidyn.statement import Statement, statements
@@ -234,3 +234,18 @@ def _channel(table: Table, channel: str, names: list[str]) -> FloatArray | None:
         raise _not_complete(channel, names, there, table.source)
     values = np.stack([table.numbers(name, missing=True) for name in names], axis=1)
     return values[:, 0] if CHANNELS[channel] == SCALAR else values
+
+
+# A Run as a MATLAB file (version 5, which every MATLAB and Octave opens): each column of a run file is a variable
+
+HEAD, HEAD_SIZE = b"MATLAB 5.0 MAT-file, written by omnidyn", 116  # words for people, by the format
+
+
+def columns_to_mat(columns: Mapping[str, FloatArray]) -> bytes:
+    """Columns as variables of n rows, NaN where missing, to the last bit."""
+    from scipy.io import savemat
+
+    sink = io.BytesIO()
+    savemat(sink, {name: np.ascontiguousarray(values)[:, None] for name, values in columns.items()})
+    content = sink.getvalue()
+    return HEAD.ljust(HEAD_SIZE) + content[HEAD_SIZE:]  # SciPy writes the time of day there

@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, TypeGuard
 
 from omnidyn.document import all_of
 from omnidyn.statement import PLACES, Statement
-from omnidyn.telling.sentence import Sentence
-from omnidyn.telling.words import by_number
+from omnidyn.telling.sentence import Sentence, by_number
 
 if TYPE_CHECKING:
     from omnidyn.findings.finding import Finding
 
 # From what loads at once to what loads slowly; docs/statements.md has a section for each.
 ROOMS = (
-    "simulation", "model", "control", "comparison", "fit", "lack_of_fit", "causes", "ladder", "advice", "verdicts",
+    "model", "control", "comparison", "fit", "lack_of_fit", "causes", "advice", "verdicts",
     "logs", "findings.rows", "findings.signal", "findings.wiring", "findings.scale", "findings.uses", "motors",
     "steady", "lines",
 )  # fmt: skip

@@ -8,11 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from omnidyn.document import Document, Part, Table, Words, short
 from omnidyn.findings.excitation import SECTORS
-from omnidyn.findings.finding import Finding, Verdict
-from omnidyn.findings.use import Use
+from omnidyn.findings.finding import Finding, Use, Verdict
 from omnidyn.statement import SEVERITIES
 from omnidyn.telling.findings.uses import severities, usable_for
-from omnidyn.telling.words import by_number, counted
+from omnidyn.telling.sentence import by_number, counted
 
 INDENT = " " * 11  # of text
 SHOWN_SPANS = 4

@@ -7,8 +7,7 @@ from collections.abc import Callable
 from omnidyn.document import all_of
 from omnidyn.logs.columns.doubt import Doubt
 from omnidyn.statement import Statement
-from omnidyn.telling.sentence import Sentence, Wording
-from omnidyn.telling.words import by_number
+from omnidyn.telling.sentence import Sentence, Wording, by_number
 
 
 def _turns_in_degrees(statement: Statement) -> str:

@@ -1,4 +1,4 @@
-"""What the dead zone and the friction of a robot say."""
+"""What a simulation, the dead zone and the friction of a robot say."""
 
 from __future__ import annotations
 
@@ -41,6 +41,13 @@ def _dead_zone_rests_on_guesses(statement: Statement) -> str:
     return f"{'the duty' if numbers['duty'] else 'it'} rests on guesses: {', '.join([*known, *bare])}"
 
 
+def _slip(statement: Statement) -> str:
+    """Wheels that slipped, and how often."""
+    wheels, shares = statement.numbers["wheels"], statement.numbers["shares"]
+    parts = [f"wheel {wheel} in {100.0 * share:.2g} %" for wheel, share in zip(wheels, shares, strict=True)]
+    return f"wheels slip: {', '.join(parts)} of the samples"
+
+
 SENTENCES = {
     "starts_to_move": Sentence(_starts_to_move),
     "does_not_move": Sentence("the robot {subject} does not move {ways}, whatever voltage its motors can have"),
@@ -59,4 +66,15 @@ SENTENCES = {
     "bristles_damp": Sentence("in a fast ramp the damping of bristles resists too"),
     "wheels_roll": Sentence("the wheels roll here: their slip (traction_mu) is not simulated"),
     "motors_too_weak": Sentence("the motors cannot break it loose far enough along {axes}: no ramp is shown there"),
+    "clipped": Sentence("{subject} above the limit was clipped in {clipped} of {rows} rows, first in row {first}"),
+    "not_converged": Sentence(
+        "the friction solver stopped at its iteration limit in {stopped} of {rows} rows",
+        "compare with a shorter step",
+    ),
+    "wheels_slip": Sentence(_slip),
+    "wheel_lifts": Sentence(
+        "wheel {wheel} leaves the floor in {share:.2%} of the rows and has no grip then; tipping is not modelled"
+    ),
+    "wheel_in_air": Sentence("wheel {wheel} carries no load: it does not touch the floor and has no grip"),
+    "quoted": Sentence("{text}"),
 }

@@ -10,7 +10,7 @@ from omnidyn import read_log
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.readers.reader import Options
-from omnidyn.logs.readers.wpilib.wpilog import read_wpilog
+from omnidyn.logs.readers.wpilog import read_wpilog
 from tests.support.cases import case
 from tests.support.codes import said
 from tests.support.data_logs import data_log, record, start

@@ -1,1 +1,1 @@
-"""What all checks stand on: robust, log_under_check, reference (a channel told by others), predicted_wheel (by all)."""
+"""What all checks stand on: robust, log_under_check, reference (a channel told by others)."""

@@ -1,1 +1,1 @@
-"""Single channels: values, stuck, spikes, codes."""
+"""Single channels: values (and echoes of commands), stuck, codes (and spikes)."""

@@ -7,8 +7,7 @@ import numpy as np
 from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import WHEELS, pose_twist, wheels_twist
-from omnidyn.findings.wiring.orders import means
-from omnidyn.findings.wiring.turned import is_turned, marker_finding, turned, with_marker
+from omnidyn.findings.wiring.orders import is_turned, marker_finding, means, turned, with_marker
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.statement import WARNING
 

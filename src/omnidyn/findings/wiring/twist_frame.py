@@ -12,7 +12,7 @@ from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import WHEELS, pose_twist, wheels_twist
 from omnidyn.findings.signal.robust import smooth
-from omnidyn.findings.wiring.turned import ALIKE, Turned, is_turned, marker_finding, turned, with_marker
+from omnidyn.findings.wiring.orders import TURNED_LIKENESS, Turned, is_turned, marker_finding, turned, with_marker
 from omnidyn.model.frames import unwrapped
 from omnidyn.statement import ERROR, WARNING
 
@@ -54,16 +54,20 @@ def _against_twist(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> 
     plain = _found(work, pose, twist, (1.0, 1.0, 1.0), False)
     if plain is None:
         return [], work
-    if plain.turn.plain > ALIKE and not is_turned(plain.turn):
+    if plain.turn.plain > TURNED_LIKENESS and not is_turned(plain.turn):
         return [], work
     tried = [_found(work, pose, twist, (1.0, 1.0, 1.0), True)]
     tried += [_found(work, pose, twist, (1.0, y, turn), False) for y, turn in product((1.0, -1.0), repeat=2)]
     known = [each for each in tried if each is not None]
     best = min(known, key=lambda each: each.left)
     room = known[0]
-    if room.left < best.left + 0.02 and 1.0 - room.left > ALIKE and room.left < BETTER * (1.0 - plain.turn.plain):
+    if (
+        room.left < best.left + 0.02
+        and 1.0 - room.left > TURNED_LIKENESS
+        and room.left < BETTER * (1.0 - plain.turn.plain)
+    ):
         return [_room_finding(plain, room)], work.replace(twist=_as_in_body(work, pose, twist))
-    if best.signs != (1.0, 1.0, 1.0) and 1.0 - best.left > ALIKE and best.left < BETTER * plain.left:
+    if best.signs != (1.0, 1.0, 1.0) and 1.0 - best.left > TURNED_LIKENESS and best.left < BETTER * plain.left:
         return [_mirror_finding(plain, best)], work.replace(pose=pose * best.signs)
     if is_turned(plain.turn):
         return _turned(work, pose, twist, plain.turn)
@@ -104,7 +108,7 @@ def _turned(
     body, width = pose_twist(work, pose)
     for name, other in _others(work, width):
         against = turned(work, other, smooth(twist[:, :2], width), body[:, 2])
-        if against is None or against.alike < ALIKE:
+        if against is None or against.alike < TURNED_LIKENESS:
             continue
         if abs(against.angle - turn.angle) < abs(against.angle):  # the other agrees with the pose
             return [_sensor_finding(against, name)], work.replace(twist=_turned_back(twist, against.angle))

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError
+from omnidyn.logs.clock.restarts import (
+    Counter,
+    Restart,
+    beside_restarts,
+    counter_restarts,
+    full_counter,
+    overflow,
+    recordings,
+)
+from omnidyn.logs.column import Column
+from omnidyn.logs.segments import segments
+from omnidyn.logs.table.table import Table
 from omnidyn.statistics import median, robust_std
 from omnidyn.units import TURN, parse_unit
 
@@ -257,3 +270,118 @@ def _alone(odd: IntArray, away: FloatArray, last: int) -> BoolArray:
     alone[:-1] &= ~near | (away[1:] < SMALL * away[:-1])
     alone[1:] &= ~near | (away[:-1] < SMALL * away[1:])
     return alone
+
+
+# The columns of a table that count: angles that go on, speeds beyond their bits, and what was found on the way
+
+
+class Counters:
+    """Reads counts and speeds of a table. t [s]: of its rows, shape (rows,). found: restarts of its clock."""
+
+    def __init__(self, table: Table, t: FloatArray, found: Sequence[Restart]):
+        self.table, self.t, self.found = table, t, list(found)
+        self.begins = np.flatnonzero(np.isin(table.lines, [each.line for each in found])).tolist()
+        self.counters: list[Counter] = []
+
+    def angle(self, key: str, column: Column, values: FloatArray) -> FloatArray:
+        """An angle in the unit of its column that goes on; in each recording from where the one before it ended.
+
+        Raises InputError where it turns too far between rows.
+        """
+        parts, periods, again = [], [], []
+        for part in recordings(len(values), self.begins):
+            where = f"{self.table.source}, column {column.name}"
+            readings, period, restarts = unrolled(values[part], column.unit, where, self.t[part])
+            known = [each[np.isfinite(each)] for each in (*parts[-1:], readings)]
+            shift = known[0][-1] - known[1][0] if len(known) == 2 and all(each.size for each in known) else 0.0
+            parts.append(readings + shift)
+            periods += [] if period is None else [period]
+            again += [part.start + row for row in restarts]
+        unit, line = column.unit.partition("/")[0], int(self.table.lines[0]) if len(values) else 0
+        self.found += [full_counter(key, column.name, each, unit, line) for each in dict.fromkeys(periods)]
+        self.counters.append(Counter(key, column.name, values, again))
+        return np.concatenate(parts)
+
+    def speed(self, key: str, column: Column, values: FloatArray) -> FloatArray:
+        """A speed in the unit of its column, put right where it left its 16 bits."""
+        right, jumps, followed = widened(values, self.t)
+        if jumps:
+            self.found.append(overflow(key, column.name, jumps, followed, int(self.table.lines[0])))
+        return right
+
+    def restarts(self) -> list[Restart]:
+        """All that was found."""
+        return [*self.found, *counter_restarts(self.counters, self.table.lines)]
+
+    def beside_restarts(self) -> BoolArray:
+        """The rows to leave out, so that a gap lies where a counter was set to another value. Shape (rows,)."""
+        return beside_restarts(self.t, self.counters)
+
+
+# Speeds that leave the 16 bits they were sent in: beyond 32767 they come out as -32768, or below 0 as 65535
+
+BITS_16 = 2.0**16
+OVERFLOW_JUMP = 0.5  # of the range: a longer step between two rows is a jump
+SLOW = 0.15  # of the range: where the steps beside a jump are shorter, it is seen that the speed goes on over the edge
+MOSTLY = 0.5  # of the jumps, where it is so
+CLEAR = 8.0  # ticks, or noises: a longer step has a direction
+OVERFLOW_RATIO, FOLLOWED = (
+    1.5,
+    0.25,
+)  # of the longest other step: changes of speed over a jump; of the range: longest step
+REST = 0.01  # of the range: what is nearer to 0 is at rest
+WIDE = 0.8  # of the range, between the slowest and the fastest value at least
+
+
+def widened(speeds: FloatArray, t: FloatArray) -> tuple[FloatArray, int, bool]:
+    """(speeds beyond 16 bits put right, how many jumps there were, whether all could be followed).
+
+    speeds: as they stand in the file, shape (rows,), NaN where missing: whole numbers, or such times a scale. t [s].
+    Where not all jumps can be followed the speeds are left as they are.
+    """
+    rows = np.flatnonzero(np.isfinite(speeds) & np.isfinite(t))
+    rows = rows[np.argsort(t[rows], kind="stable")]
+    values, size = speeds[rows], _range(speeds[rows])
+    steps = np.diff(values)
+    jumps = np.abs(steps) > OVERFLOW_JUMP * size
+    if (
+        not size
+        or not jumps.any()
+        or not (jumps & _over_the_edge(compared(steps, t[rows], size / BITS_16), size)).any()
+    ):
+        return speeds, 0, True
+    longest = float(np.abs(steps[~jumps]).max(initial=0.0))
+    across = np.abs(np.abs(steps[jumps]) - size)  # what the speed changed over each jump
+    if longest > FOLLOWED * size or (across > OVERFLOW_RATIO * longest).any():
+        return speeds, int(jumps.sum()), False
+    right = speeds.copy()
+    for part in segments(t[rows]):
+        right[rows[part]] = _from_rest(np.unwrap(values[part], period=size), size)
+    return right, int(jumps.sum()), True
+
+
+def _over_the_edge(steps: Steps, size: float) -> BoolArray:
+    """Steps before and behind which the speed moves on the same way, against the jump between: no reversal does."""
+    away = steps.size - steps.expected
+    onward = (away * steps.expected < 0.0) & (np.abs(steps.expected) > CLEAR * steps.tick)
+    return onward & (steps.beside < SLOW * size) & (np.abs(np.abs(away) - size) < SLOW * size)
+
+
+def _range(values: FloatArray) -> float:
+    """2^16 times the step in which the speeds count, where they lie in such a range and fill it; else 0."""
+    if len(values) <= LEAST_STEPS or not float(np.ptp(values)) > 0.0:
+        return 0.0
+    tick = 1.0 if (values == np.round(values)).all() else tick_of(np.abs(np.diff(values)), float(np.ptp(values)))
+    size = BITS_16 * tick
+    low, high = float(values.min()), float(values.max())
+    signed = low >= -0.5 * size - tick and high <= 0.5 * size
+    unsigned = low >= 0.0 and high < size  # -1 comes out as 65535
+    return size if (signed or unsigned) and high - low > WIDE * size else 0.0
+
+
+def _from_rest(values: FloatArray, size: float) -> FloatArray:
+    """The same, whole ranges away, where most rest is at 0: the first row may be beyond the range already."""
+    ranges = np.round(values / size)
+    rest = ranges[np.abs(values - size * ranges) < REST * size]
+    found, count = np.unique(rest, return_counts=True)
+    return values - size * float(found[np.argmax(count)]) if found.size else values

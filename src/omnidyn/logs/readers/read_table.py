@@ -15,7 +15,7 @@ from omnidyn.logs.readers.matlab.mat import HDF5, MAT
 from omnidyn.logs.readers.reader import Options, Reader, completed
 from omnidyn.logs.readers.ros.bags import MCAP, ROS1, ROS2
 from omnidyn.logs.readers.text import TEXT
-from omnidyn.logs.readers.wpilib.wpilog import WPILOG
+from omnidyn.logs.readers.wpilog import WPILOG
 from omnidyn.logs.table.table import ROWS, Table, join
 from omnidyn.progress import Progress, silent
 

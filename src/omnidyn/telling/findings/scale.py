@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from omnidyn.statement import NOTE, Statement
 from omnidyn.telling.findings.wiring import compared
-from omnidyn.telling.sentence import Sentence
-from omnidyn.telling.words import SOURCES, by_number, names, read_as
+from omnidyn.telling.sentence import SOURCES, Sentence, by_number, names, read_as
 
 REASONS = {
     "motor": "current and speed of its motor change", "voltage": "its motor gets a changing voltage",

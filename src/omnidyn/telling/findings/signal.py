@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from omnidyn.document import all_of, short
 from omnidyn.statement import NOTE, Statement
-from omnidyn.telling.sentence import Sentence
-from omnidyn.telling.words import SOURCES, by_number, counted, names
+from omnidyn.telling.sentence import SOURCES, Sentence, by_number, counted, names
 
 LIMITS = {
     "duty": "full duty", "supply": "the supply", "motor.current_limit_A": "current_limit_A of the robot file",

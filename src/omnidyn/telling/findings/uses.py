@@ -9,8 +9,7 @@ from omnidyn.document import all_of, short
 from omnidyn.findings.needs import LOOP_REMEDY
 from omnidyn.statement import SEVERITIES, Statement
 from omnidyn.telling.logs import in_brief
-from omnidyn.telling.sentence import Sentence
-from omnidyn.telling.words import by_number, counted
+from omnidyn.telling.sentence import Sentence, by_number, counted
 
 OF_ROBOT = {
     "": "", "robot": "; with a robot file", "supply": "; with a robot file that has supply_V",

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from omnidyn.statement import Statement
-from omnidyn.telling.sentence import Sentence
-from omnidyn.telling.words import SOURCES, by_number
+from omnidyn.telling.sentence import SOURCES, Sentence, by_number
 
 SLOTS = "put the columns right in the mapping (`column`)"
 

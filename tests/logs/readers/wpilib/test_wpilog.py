@@ -10,7 +10,7 @@ from omnidyn.errors import InputError
 from omnidyn.logs.read_log import load_log, read_log
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.readers.reader import Options
-from omnidyn.logs.readers.wpilib.wpilog import read_wpilog
+from omnidyn.logs.readers.wpilog import read_wpilog
 
 wpiutil = pytest.importorskip("wpiutil")
 log_entries = pytest.importorskip("wpiutil.log")

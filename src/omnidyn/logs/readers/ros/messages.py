@@ -14,8 +14,17 @@ from omnidyn.files import too_large
 from omnidyn.logs.readers.claims import Claim, Out, tracks_of
 from omnidyn.logs.readers.recording import Topic, Track, topic_of
 from omnidyn.logs.readers.ros.clocks import Clocked, trusted
-from omnidyn.logs.readers.ros.definitions import USUAL, BadDefinitionError, Types, parse_definition, plain
-from omnidyn.logs.readers.ros.layout import BadMessageError, Layout, column, layout_of
+from omnidyn.logs.readers.ros.layout import (
+    USUAL,
+    BadDefinitionError,
+    BadMessageError,
+    Layout,
+    Types,
+    column,
+    layout_of,
+    parse_definition,
+    plain,
+)
 from omnidyn.logs.readers.ros.usual import NANOSECONDS, SECONDS, Rule, rank_of, rule_of
 from omnidyn.logs.table.text_file import TOO_LARGE_REMEDY
 

@@ -1,1 +1,0 @@
-"""WPILib data logs (.wpilog): wpilog (records, entries, the reader) and structs (values that are made of several)."""
