@@ -2,7 +2,7 @@
 
 from types import SimpleNamespace
 
-from omnidyn.cli.identify_brief import LINES, brief
+from omnidyn.cli.identify_show import LINES, brief
 from omnidyn.statement import ERROR, WARNING, quoted
 
 

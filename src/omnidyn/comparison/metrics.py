@@ -11,13 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from scipy.special import chdtrc
 
 from omnidyn.arrays import FloatArray
-from omnidyn.comparison.lag import lag_of
 from omnidyn.comparison.traces import Trace
-from omnidyn.comparison.whiteness import whiteness
 
 CONSTANT = 1e-9  # a measured signal that changes by less than this share of its size is constant
 NOTHING = 1e-150  # what is smaller has no square
@@ -107,3 +107,110 @@ def variance_accounted_for(measured: FloatArray, model: FloatArray) -> float | N
 def is_constant(measured: FloatArray) -> bool:
     """Whether a measured signal never changes, but for rounding."""
     return float(np.ptp(measured)) <= max(CONSTANT * float(np.abs(measured).max()), NOTHING)
+
+
+# How late a measured signal is behind the model: a hint at delays that neither the log nor the model knows of
+
+REACH = 0.5  # [s] lags looked for, both signs
+GRID, ROUNDS = 21, 4  # lags tried at a time; each round looks closer
+WORTH = 0.9  # a lag counts where it takes what the model leaves unexplained below this share
+
+
+def lag_of(traces: Sequence[Trace]) -> float | None:
+    """The delay d [s] at which measured(t) and model(t - d) correlate best, over all traces together.
+
+    Positive: the robot (or its sensor) is later than the model. The correlation does not see gain and offset. 0 where
+    no lag explains clearly more than none; None where a signal is constant, too short, or the best lag is out of reach.
+    """
+    usable = [known for trace in traces if len((known := _known(trace)).t) > 1]
+    if not usable:
+        return None
+    reach = min(REACH, max(float(trace.t[-1] - trace.t[0]) for trace in usable) / 4.0)
+    usual = float(np.median(np.concatenate([np.diff(trace.t) for trace in usable])))
+    none = unexplained(usable, 0.0)
+    if none is None:
+        return None
+    centre, width = 0.0, reach
+    best = none
+    for _ in range(ROUNDS):
+        lags = np.clip(np.linspace(centre - width, centre + width, GRID), -reach, reach)
+        tried = [unexplained(usable, float(lag)) for lag in lags]
+        scores = np.array([np.inf if score is None else score for score in tried])
+        k = int(np.argmin(scores))
+        centre, best, width = float(lags[k]), float(scores[k]), 2.0 * width / (GRID - 1)
+    if best > WORTH * none or abs(centre) < 0.25 * usual:
+        return 0.0
+    return None if abs(centre) > 0.98 * reach else centre
+
+
+def unexplained(traces: Sequence[Trace], lag: float) -> float | None:
+    """1 - r^2 between measured(t) and model(t - lag); beyond its ends the model stays as it was there.
+
+    None where one of the two never changes.
+    """
+    y = np.concatenate([trace.measured for trace in traces])
+    m = np.concatenate([np.interp(trace.t - lag, trace.t, trace.model) for trace in traces])
+    y, m = y - y.mean(), m - m.mean()
+    power = float(y @ y) * float(m @ m)
+    return None if power <= 0.0 else max(0.0, 1.0 - float(y @ m) ** 2 / power)
+
+
+def _known(trace: Trace) -> Trace:
+    """The rows that both have."""
+    known = np.isfinite(trace.measured) & np.isfinite(trace.model)
+    return Trace(trace.t[known], trace.measured[known], trace.model[known])
+
+
+# Are the errors of a model white, that is noise without memory? If not, the model misses something that lasts
+
+LAGS = 10
+FEWEST = 30  # samples
+
+
+class Whiteness(NamedTuple):
+    """p_value: chance that white errors look at least so unlike noise. correlation: at lags 1, 2, .. rows, shape
+    (lags,). bound: what 95 % of white errors keep within at one lag, shape (lags,). statistic: chi-squared with as
+    many degrees of freedom as lags.
+    """
+
+    p_value: float
+    statistic: float
+    correlation: FloatArray
+    bound: FloatArray
+
+
+def whiteness(errors: Sequence[FloatArray], lags: int = LAGS) -> Whiteness | None:
+    """Test a model's errors for memory between rows; one array per piece, shape (n,), NaN where missing.
+
+        Q = sum over lags k of (sum_i e_i e_(i+k))^2 / sum_i (e_i e_(i+k))^2  ~  chi-squared(lags)
+
+    This is the statistic of Ljung & Box (1978) with each lag scaled by its own products instead of by the variance of
+    all errors (Lobato, Nankervis & Savin 2001), so that noise that is louder in motion than at rest is not taken for
+    memory. Pairs never reach across a gap and leave missing rows out. Lags are counted in rows: errors without memory
+    are white at any spacing of the rows, so uneven sampling does not hurt; it only blurs what a lag means in seconds.
+    The mean is taken off: a bias is reported as such. None for fewer than 30 samples, or errors that never change.
+    """
+    known = np.concatenate([error[np.isfinite(error)] for error in errors] or [np.zeros(0)])
+    lags = min(lags, len(known) // 5)
+    if len(known) < FEWEST or float(np.ptp(known)) <= 1e-12 * float(np.abs(known).max()):
+        return None
+    mean, power = known.mean(), float(np.mean((known - known.mean()) ** 2))
+    centred = [error - mean for error in errors]
+    sums = [_products(centred, lag) for lag in range(1, lags + 1)]
+    pairs, total, squares = (np.array(column) for column in zip(*sums, strict=True))
+    if not (squares > 0.0).all():
+        return None
+    statistic = float(np.sum(total**2 / squares))
+    return Whiteness(
+        float(chdtrc(lags, statistic)), statistic, total / (pairs * power), 1.96 * np.sqrt(squares) / (pairs * power)
+    )
+
+
+def _products(errors: list[FloatArray], lag: int) -> tuple[int, float, float]:
+    """Number, sum and sum of squares of e_i e_(i+lag) over all pairs that are there."""
+    count, total, squares = 0, 0.0, 0.0
+    for error in errors:
+        products = error[lag:] * error[: max(0, len(error) - lag)]
+        products = products[np.isfinite(products)]
+        count, total, squares = count + len(products), total + products.sum(), squares + (products**2).sum()
+    return count, float(total), float(squares)

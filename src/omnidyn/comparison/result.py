@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.comparison import text
 from omnidyn.comparison.difference import ModelDifference
 from omnidyn.comparison.metrics import Metrics
 from omnidyn.comparison.traces import Trace, trace_of, unit
@@ -24,6 +23,9 @@ from omnidyn.statement import Statement, as_verdict, by_severity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+from collections.abc import Iterator
+
+from omnidyn.document import Table, cell, chance_cell
 
 
 @dataclass(frozen=True)
@@ -156,20 +158,20 @@ class Comparison(Shown):
         """What the comparison says; with `segments`, of each segment too."""
         parts: list[Part] = []
         for robot in self.robots:
-            parts += [*self._title(robot), "", text.metrics_table(self.channels, self.overall[robot]), ""]
+            parts += [*self._title(robot), "", metrics_table(self.channels, self.overall[robot]), ""]
             for k in range(len(self.segments) if segments else 0):
                 of_segment = {name: found[k] for name, found in self.by_segment[robot].items()}
-                parts += [self._name(k), text.metrics_table(self.channels, of_segment, head=()), ""]
+                parts += [self._name(k), metrics_table(self.channels, of_segment, head=()), ""]
         for robot in self.bands:
             told = f"95 % band of {robot}, from the std of its file: mean half width beside the error"
-            parts += [told, "", text.band_table(self.half_widths(robot), self.overall[robot]), ""]
+            parts += [told, "", band_table(self.half_widths(robot), self.overall[robot]), ""]
         if self.difference:
             first, second = self.robots
             parts += [
                 f"rmse of {first} minus rmse of {second}, with its standard error (block bootstrap)", "",
-                text.difference_table(self.robots, self.difference), "",
+                difference_table(self.robots, self.difference), "",
             ]  # fmt: skip
-        parts += text.legend([each for found in self.overall.values() for each in found.values()])
+        parts += legend([each for found in self.overall.values() for each in found.values()])
         parts += ["currents are compared by size, without sign."] if self.current_unsigned else []
         parts.append(by_severity(self.warnings))
         return Document(parts, self.to_dict(), self.warnings, ascii=True, verdict=self.verdict)
@@ -222,3 +224,48 @@ class Comparison(Shown):
             "current_unsigned": self.current_unsigned,
             "warnings": plain(self.warnings),
         }
+
+
+# What a comparison says in tables and words: one row per component
+
+HEAD = ("", "unit", "samples", "rmse", "max", "bias", "fit %", "VAF %", "white p", "lag s")
+WIDTHS = (8, 6, 7, 9, 9, 9, 7, 7, 7, 6)  # the same for all tables, so that they can be read below each other
+
+
+def metrics_table(names: Sequence[str], found: Mapping[str, Metrics | None], head: Sequence[str] = HEAD) -> Table:
+    """How near a model comes, a row per component."""
+    return Table(head, [_row(name, found[name]) for name in names], "<<>", WIDTHS)
+
+
+def _row(name: str, each: Metrics | None) -> tuple[str, ...]:
+    if each is None:
+        return name, unit(name), "0"
+    return (
+        name, unit(name), f"{each.samples}", f"{each.rmse:.4g}", f"{each.max:.4g}", f"{each.bias:+.3g}",
+        cell(each.fit_percent, ".1f"), cell(each.vaf, ".1f"), chance_cell(each.whiteness), cell(each.lag, "+.3f"),
+    )  # fmt: skip
+
+
+def band_table(half_widths: Mapping[str, float], found: Mapping[str, Metrics]) -> Table:
+    """How wide the band of a model is, a row per component, beside how far the model is off."""
+    rows = [(name, unit(name), f"{half:.4g}", f"{found[name].rmse:.4g}") for name, half in half_widths.items()]
+    return Table(("", "unit", "half width", "rmse"), rows, "<<>", (8, 6, 10, 9))
+
+
+def difference_table(robots: Sequence[str], found: Mapping[str, ModelDifference]) -> Table:
+    """Which of two robots is better, a row per component."""
+    rows = []
+    for name, each in found.items():
+        told = "the same" if each.std_error == 0.0 else "cannot tell"
+        told = told if each.better is None else robots[each.better]
+        rows.append((name, f"{each.rmse_difference:+.4g}", cell(each.std_error, ".2g"), f"{each.blocks}", told))
+    return Table(("", "difference", "std error", "blocks", "better"), rows, "<>>><", (8, 12, 9, 6))
+
+
+def legend(shown: Sequence[Metrics]) -> Iterator[str]:
+    """What the columns mean, where it is not plain."""
+    yield "error = model - measured."
+    if any(each.lag for each in shown):
+        yield "lag: the robot is later than the model by so much, where that explains clearly more; a hint."
+    if any(each.fit_percent is None for each in shown):
+        yield "no fit and no VAF where the measured signal never changes."

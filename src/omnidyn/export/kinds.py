@@ -30,7 +30,7 @@ KINDS = {
     "fmu": Kind("omnidyn.export.code.fmu", "fmu", "an FMI 2 co-simulation FMU, from the same C"),
     "wpilib": Kind("omnidyn.export.feedforward.wpilib", "wpilib", "kS, kV, kA as constants in Java, C++ and Python"),
     "road-runner": Kind("omnidyn.export.feedforward.road_runner", "road_runner", "kS, kV, kA for Road Runner"),
-    "gains": Kind("omnidyn.export.feedforward.table", "gains_csv", "kS, kV, kA with standard errors as CSV"),
+    "gains": Kind("omnidyn.export.feedforward.gains", "gains_csv", "kS, kV, kA with standard errors as CSV"),
     "mjcf": Kind("omnidyn.export.bodies.mjcf", "mjcf", "a MuJoCo model, motors in volts"),
     "urdf": Kind("omnidyn.export.bodies.urdf", "urdf", "base and wheels as links and joints, for ROS"),
     "sdf": Kind("omnidyn.export.bodies.sdf", "sdf", "base and wheels as links and joints, for Gazebo"),

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.export.feedforward.gains import axis_gains, gains
+from omnidyn.export.feedforward.gains import axis_gains, gains, gains_csv
 from omnidyn.export.feedforward.road_runner import road_runner
-from omnidyn.export.feedforward.table import gains_csv
 from omnidyn.export.feedforward.wpilib import wpilib
 from omnidyn.model.deadzone import axis_patterns
 from omnidyn.model.keys import Key

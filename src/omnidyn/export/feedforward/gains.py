@@ -13,6 +13,7 @@ Standard errors: the delta method over the numbers of the file that have a std, 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -20,6 +21,9 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.export.contract import Export
+from omnidyn.export.features import left_out, refuse
+from omnidyn.export.spelling import hash_comment, number
 from omnidyn.model.deadzone import axis_patterns
 from omnidyn.model.keys import Key
 from omnidyn.model.known.told import told
@@ -118,3 +122,26 @@ def _spread(slopes: FloatArray, correlation: FloatArray) -> FloatArray:
     """sqrt(diag(J R J^T)), J the slopes in units of each std. slopes: shape (keys, ...)."""
     variance = np.einsum("k...,kl,l...->...", slopes, correlation, slopes)
     return np.sqrt(np.maximum(variance, 0.0))
+
+
+# gains: kS, kV, kA with standard errors as CSV; and how the snippets spell one
+
+
+def gains_csv(robot: Robot) -> Export:
+    """kS, kV and kA of each axis and of each wheel on it. A std that nothing is known of is an empty cell."""
+    refuse("gains", robot)
+    missing = left_out("gains", robot)
+    lines = ["place,gain,value,std,unit"]
+    lines += [f"{row.place},{row.name},{number(row.value)},{_std(row)},{row.unit}" for row in rows(robot)]
+    head = hash_comment([f"{robot.name}: volts of the most loaded motor, by omnidyn",
+                         *(f"not in it: {words}" for words in missing)])  # fmt: skip
+    return Export("gains", robot.name, {"gains.csv": head + "\n".join(lines) + "\n"}, missing)
+
+
+def _std(row: Row) -> str:
+    return number(row.std) if math.isfinite(row.std) else ""
+
+
+def spread(row: Row) -> str:
+    """How sure a gain is, in words for a comment: "+- 0.02 V", or that nothing is known."""
+    return f"+- {row.std:.2g} {row.unit}" if math.isfinite(row.std) else f"{row.unit}, std not known"

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
-from omnidyn.export.feedforward.gains import AXES, NAMES, rows
-from omnidyn.export.feedforward.table import spread
+from omnidyn.export.feedforward.gains import AXES, NAMES, rows, spread
 from omnidyn.export.spelling import java_comment, number
 from omnidyn.model.robot import Robot
 

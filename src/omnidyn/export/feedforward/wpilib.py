@@ -12,8 +12,7 @@ import numpy as np
 
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
-from omnidyn.export.feedforward.gains import AXES, Row, gains, rows
-from omnidyn.export.feedforward.table import spread
+from omnidyn.export.feedforward.gains import AXES, Row, gains, rows, spread
 from omnidyn.export.spelling import c_comment, java_comment, number, python_comment
 from omnidyn.model.robot import Robot
 
