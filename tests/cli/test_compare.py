@@ -49,7 +49,7 @@ def test_one_robot_one_log(call):
 def test_a_band_in_words_and_values(call):
     known = AXEBOT.replace(name="known", priors={"friction.axes.coulomb[0]": Prior(std=0.1, origin="guess")})
     omnidyn.save_robot(known, "known.toml")
-    code, out, _ = call("run.csv", "--robot", "known.toml", "--band", "--picture", "band.svg")
+    code, out, _ = call("run.csv", "--robot", "known.toml", "--band", "--full", "--picture", "band.svg")
     assert code == 0
     assert "95 % band of known, from the std of its file" in out
     assert "warning: the band of known rests on guesses: friction.axes.coulomb[0]" in out
@@ -61,6 +61,16 @@ def test_a_band_in_words_and_values(call):
     code, out, _ = call("run.csv", "--robot", "axebot", "--band")
     assert code == 0
     assert "warning: axebot has no band: no number of its file has a std" in out
+
+
+@pytest.mark.parametrize("others", [(), ("--band",), ("--robot", "wrong.toml")], ids=["one", "band", "two"])
+def test_prints_one_screen(call, others):
+    code, out, _ = call("run.csv", "gap.csv", "--robot", "axebot", *others)
+    assert code == 0
+    assert len(out.splitlines()) <= 25
+    assert "warning: gap.csv: 1 gap in time" in out
+    whole = call("run.csv", "gap.csv", "--robot", "axebot", *others, "--full")[1]
+    assert len(whole.splitlines()) > len(out.splitlines())
 
 
 def test_for_machines(call):

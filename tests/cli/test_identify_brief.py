@@ -2,7 +2,8 @@
 
 from types import SimpleNamespace
 
-from omnidyn.cli.identify_show import LINES, brief
+from omnidyn.cli.identify_show import brief
+from omnidyn.cli.terminal.telling import BRIEF_LINES
 from omnidyn.statement import ERROR, WARNING, quoted
 
 
@@ -19,7 +20,7 @@ def test_the_gravest_warning_is_shown_whatever_the_room():
     lines = brief(found).to_text().splitlines()
     assert "error: the worst of all" in lines
     assert lines[-1] == "--full shows all: 18 more numbers, 1 more warning."
-    assert len(lines) <= LINES + 5
+    assert len(lines) <= BRIEF_LINES + 5
 
 
 def test_where_there_is_room_all_is_shown():

@@ -13,12 +13,13 @@ from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
 from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
-from omnidyn.cli.terminal.telling import end_failed, tell
+from omnidyn.cli.terminal.telling import brief_document, end_failed, tell
 from omnidyn.progress import Progress
 
 if TYPE_CHECKING:
     from omnidyn.comparison.result import Comparison
     from omnidyn.comparison.threshold import Threshold
+    from omnidyn.document import Document
     from omnidyn.model.robot import Robot
     from omnidyn.run import Run
 
@@ -42,6 +43,7 @@ def compare(
     flags: LogFlags = NO_FLAGS,
     current_unsigned: bool = typer.Option(False, "--current-unsigned", help="Currents are |i|: compare by size."),
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
+    full: bool = typer.Option(False, "--full", help="All that the comparison says, not only the first screen."),
     json: bool = typer.Option(False, "--json", help="The comparison for machines."),
 ) -> None:
     """Compare a model, or two, with the logs of a robot.
@@ -64,7 +66,8 @@ def compare(
         runs, hashes = _runs(files, robots[0], options, flags.sort, maps, progress)
         channels = _channels(robots, runs, apply, rules, show_channels if picture else "")
         found = _compared(robots, runs, apply, hold, current_unsigned, band, progress)
-    tell(found.document(segments), json, _record(robot, files, hashes))
+    told = found.document(segments) if json or full or segments else _brief(found)
+    tell(told, json, _record(robot, files, hashes))
     if picture:
         with shown_progress("drawing"):
             _draw(found, picture, channels, force)
@@ -125,6 +128,11 @@ def _compared(
         progress=progress,
         band=band,
     )
+
+
+def _brief(found: Comparison) -> Document:
+    """The comparison on one screen."""
+    return brief_document(found.verdict, found.brief_table(), found.warnings, head=found.brief_head(), more="component")
 
 
 def _draw(found: Comparison, path: str, channels: Sequence[str], force: bool) -> None:

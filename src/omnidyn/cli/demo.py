@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
+import os
+import shlex
+from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -12,21 +18,15 @@ from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say, to_json, width
 from omnidyn.cli.terminal.telling import as_json, tell
+from omnidyn.errors import InputError
+from omnidyn.files import write_atomic
 from omnidyn.progress import Progress, Report
 
 if TYPE_CHECKING:
     from omnidyn.document import Document
     from omnidyn.paper.claim import Claim
     from omnidyn.report.style import Picture
-import contextlib
-import json
-import os
-import shlex
-from collections.abc import Mapping
-from pathlib import Path
 
-from omnidyn.errors import InputError
-from omnidyn.files import write_atomic
 
 TITLE = "A three-wheeled omnidirectional robot with friction: the paper, recomputed"
 INTRODUCTION = (

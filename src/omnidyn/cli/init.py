@@ -21,14 +21,11 @@ from omnidyn.files import check_output, write_atomic
 from omnidyn.model.presets import preset_names
 
 if TYPE_CHECKING:
-    from omnidyn.model.robot import Robot
-    from omnidyn.model.wheels import Wheels
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
     from omnidyn.logs.geometry import Geometry
     from omnidyn.logs.read_log import LogOptions
     from omnidyn.model.robot import Robot
+    from omnidyn.model.wheels import Wheels
+
 
 MAX_NAME = 60
 KEYS = {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from omnidyn.comparison.difference import ModelDifference
 from omnidyn.comparison.metrics import Metrics
 from omnidyn.comparison.traces import Trace, trace_of, unit
 from omnidyn.comparison.verdict import compared, followed, nothing_followed
-from omnidyn.document import Document, Part, Words, plain
+from omnidyn.document import Document, Part, Table, Words, cell, chance_cell, plain
 from omnidyn.logs.channels import place
 from omnidyn.model.first_guess import guess_line
 from omnidyn.run import Run
@@ -23,9 +23,6 @@ from omnidyn.statement import Statement, as_verdict, by_severity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-from collections.abc import Iterator
-
-from omnidyn.document import Table, cell, chance_cell
 
 
 @dataclass(frozen=True)
@@ -176,13 +173,40 @@ class Comparison(Shown):
         parts.append(by_severity(self.warnings))
         return Document(parts, self.to_dict(), self.warnings, ascii=True, verdict=self.verdict)
 
-    def _title(self, robot: str) -> tuple[Words, ...]:
-        """Which robot met which logs, what drove it, and what of it is a guess."""
+    def brief_table(self) -> Table:
+        """How near one model comes, or which of two is nearer: a row per component, without what is for experts."""
+        first, *others = self.robots
+        found = self.overall[first]
+        if self.difference:
+            second = others[0]
+            rows = [
+                (
+                    name, unit(name), f"{found[name].rmse:.4g}", f"{self.overall[second][name].rmse:.4g}",
+                    self.better(name) or ("the same" if each.std_error == 0.0 else "cannot tell"),
+                )
+                for name, each in self.difference.items()
+            ]  # fmt: skip
+            return Table(("", "unit", f"rmse of {first}", f"rmse of {second}", "nearer"), rows, "<<>><", (8, 6))
+        widths = self.half_widths(first) if self.bands else {}
+        bands = [(f"{widths[name]:.4g}" if name in widths else "",) * bool(self.bands) for name in self.channels]
+        rows = [(*_row(name, found[name]), *extra) for name, extra in zip(self.channels, bands, strict=True)]
+        return Table((*HEAD, *(("band +-",) * bool(self.bands))), rows, "<<>", WIDTHS)
+
+    def brief_head(self) -> list[Words]:
+        """Which robots met which logs, and what drove them."""
+        if len({self.applied_text(robot) for robot in self.robots}) > 1:
+            return [words for robot in self.robots for words in self._title(robot)]
+        title, applied, *_ = self._title(" and ".join(self.robots), self.robots[0])
+        return [title, applied, *(words for robot in self.robots for words in self._title(robot)[2:])]
+
+    def _title(self, names: str, robot: str = "") -> tuple[Words, ...]:
+        """Which robots met which logs, what drove one of them (by default the one named), what of it is a guess."""
+        robot = robot or names
         seconds = sum(segment.end - segment.begin for segment in self.segments)
         logs, count = len(self.measured), len(self.segments)
         where = self.measured[0].source or "one run"
         where = where if logs == 1 else f"{logs} logs, first {where}"
-        title = f"{robot} against {where}: {count} free run{'s' * (count > 1)}, {seconds:.4g} s"
+        title = f"{names} against {where}: {count} free run{'s' * (count > 1)}, {seconds:.4g} s"
         held = [Words(line)] if (line := guess_line(self.rests_on.get(robot, ()))) else []
         return Words(title), Words(f"applied: {self.applied_text(robot)}"), *held
 
