@@ -24,10 +24,10 @@ from scipy.optimize import least_squares
 from benchmarks.identify_log import cpu, cramer_rao, fit_output_error
 from benchmarks.table import Table
 from benchmarks.tanh import run_tanh
+from omnidyn.model.dynamics import state_space
 from omnidyn.model.keys import BOX
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import state_space
 from omnidyn.run import Run
 from tests.support.axebot_logs import NOISE, RATE, bare, noisy_draw, truth, with_friction
 

@@ -18,8 +18,8 @@ from omnidyn.identification.output_error.kernel.counts import information
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.question import Question
 from omnidyn.identification.whole_logs import fit_output_error
-from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.keys import BOX
+from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.wheels import wheel_speed

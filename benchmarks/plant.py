@@ -16,10 +16,10 @@ from scipy.integrate import solve_ivp
 
 from benchmarks.table import Table, Times, machine, one_core
 from benchmarks.tanh import run_tanh
+from omnidyn.model.dynamics import state_space
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.layout import new_state
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import state_space
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.simulation.implicit.march import run_implicit
 from omnidyn.simulation.simulate import simulate

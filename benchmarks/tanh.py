@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from omnidyn.model.dynamics import state_space
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import state_space
 
 
 def run_tanh(

@@ -1,7 +1,6 @@
 """Words of the trade are explained where they occur, and nowhere else."""
 
-from omnidyn.document import Document, Table
-from omnidyn.glossary import explained
+from omnidyn.document import Document, Table, explained
 
 
 def test_only_what_occurs_is_explained():

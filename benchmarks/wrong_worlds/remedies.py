@@ -14,7 +14,7 @@ from omnidyn.errors import OmnidynError
 from omnidyn.identification.identify import identify
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
-from omnidyn.model.surroundings.floor import GRAVITY
+from omnidyn.model.surroundings import GRAVITY
 from omnidyn.run import CHANNELS, Run
 
 NUISANCES = ("gain", "fade", "tilt", "push", "latency", "dead_band")

@@ -57,11 +57,11 @@ _HOME = {
     "read_voltages": "omnidyn.logs.command_file",
     "save_robot": "omnidyn.model.robot_file",
     "simulate": "omnidyn.simulation.simulate",
-    "state_space": "omnidyn.model.statespace",
+    "state_space": "omnidyn.model.dynamics",
     "track": "omnidyn.control.closed_loop",
     "tune": "omnidyn.control.tune",
     "validate": "omnidyn.identification.validation",
-    "vary": "omnidyn.model.varied.vary",
+    "vary": "omnidyn.model.vary",
     "voltage_for": "omnidyn.control.feedforward",
     "write_run": "omnidyn.logs.run_file",
 }
@@ -94,13 +94,12 @@ if TYPE_CHECKING:
     from omnidyn.logs.run_file import write_run
     from omnidyn.logs.steady_table import read_steady_table
     from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
-    from omnidyn.model.dynamics import acceleration
+    from omnidyn.model.dynamics import acceleration, state_space
     from omnidyn.model.known.dead_zone import dead_zone
     from omnidyn.model.known.uncertainty import plausible
     from omnidyn.model.robot import Robot
     from omnidyn.model.robot_file import load_robot, preset_names, save_robot
-    from omnidyn.model.statespace import state_space
-    from omnidyn.model.varied.vary import vary
+    from omnidyn.model.vary import vary
     from omnidyn.run import Run
     from omnidyn.simulation.band import band
     from omnidyn.simulation.simulate import simulate

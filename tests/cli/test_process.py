@@ -238,7 +238,7 @@ def test_a_new_step_is_told_sooner_than_one_that_lasts(capsys, monkeypatch):
 
 def test_progress_says_where_a_kernel_is_compiled(capsys, monkeypatch):
     from omnidyn.cli.terminal.progress import shown_progress
-    from omnidyn.compiled.hearing import told
+    from omnidyn.compiled.listeners import told
 
     monkeypatch.setattr("omnidyn.cli.terminal.progress.SILENT_S", 0.05)
     with shown_progress("walking"), told("a kernel"):

@@ -12,8 +12,8 @@ import pytest
 
 import omnidyn
 from omnidyn.cli import main
-from omnidyn.compiled.hearing import told
 from omnidyn.compiled.kernel import kept, kernel
+from omnidyn.compiled.listeners import told
 from omnidyn.identification.first_runs import first_runs
 from omnidyn.progress import Report
 

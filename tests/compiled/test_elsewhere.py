@@ -8,9 +8,9 @@ import time
 
 import pytest
 
-from omnidyn.compiled import elsewhere
-from omnidyn.compiled.elsewhere import compiled_elsewhere
+from omnidyn.compiled import parallel
 from omnidyn.compiled.kernel import kernel
+from omnidyn.compiled.parallel import compiled_elsewhere
 
 ALONE = """
 from omnidyn.compiled.kernel import kernel
@@ -33,7 +33,7 @@ def alone(folder, monkeypatch):
     (folder / "alone.py").write_text(ALONE)
     monkeypatch.syspath_prepend(folder)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), *sys.path]))
-    monkeypatch.setattr(elsewhere, "_processors", lambda: 2)
+    monkeypatch.setattr(parallel, "_processors", lambda: 2)
     children, popen = [], subprocess.Popen
     monkeypatch.setattr(subprocess, "Popen", lambda *a, **k: children.append(popen(*a, **k)) or children[-1])
     sys.modules.pop("alone", None)
@@ -92,7 +92,7 @@ def test_it_is_not_waited_for(alone):
 
 def test_one_processor_shares_nothing(alone, monkeypatch):
     module, children = alone
-    monkeypatch.setattr(elsewhere, "_processors", lambda: 1)
+    monkeypatch.setattr(parallel, "_processors", lambda: 1)
     with compiled_elsewhere(module.twice, module.needs_it):
         assert children == []
 

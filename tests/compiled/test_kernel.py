@@ -34,7 +34,7 @@ SCRIPT = """
 import json, sys
 import numpy as np
 from omnidyn.model.robot_file import load_robot
-from omnidyn.model.statespace import discretise, state_space
+from omnidyn.model.dynamics import discretise, state_space
 from omnidyn.simulation.exact import march as exact
 from omnidyn.simulation.exact.step import exact_step, pieces, turned_within
 from omnidyn.simulation.simulate import simulate
@@ -261,13 +261,12 @@ def test_no_part_calls_a_maker():
 
 
 def test_nobody_compiles_behind_our_back():
-    """numba is imported in compiled/, of which others import `kernel`, what needs no numba (`hearing`, `beside`,
-    `elsewhere`), and what counts."""
+    """numba is imported in compiled/, of which others import `kernel`, `listeners`, `parallel`, and what counts."""
     for file in PACKAGE.rglob("*.py"):
         if file.parent == PACKAGE / "compiled":
             continue
         inside = re.findall(
-            r"omnidyn\.compiled\b(?!\.(?:kernel|hearing|beside|elsewhere|warmed)\b|\.entries import take_stock)",
+            r"omnidyn\.compiled\b(?!\.(?:kernel|listeners|parallel|warmed)\b|\.entries import take_stock)",
             file.read_text(encoding="utf-8"),
         )
         assert not inside, file

@@ -10,7 +10,7 @@ from numba.core.caching import NullCache
 
 from omnidyn.compiled import kernel as compiled
 from omnidyn.compiled import private
-from omnidyn.compiled.linking import Linked
+from omnidyn.compiled.kernel import Linked
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.control.gains import SWIFT, check_faster, check_integral, pole_rate, pose_gains, speed_gains
+from omnidyn.control.speed_loop import SWIFT, check_faster, check_integral, pole_rate, pose_gains, speed_gains
 from omnidyn.errors import InputError
 
 RATES = np.array([6.7, 2.0, 11.0])

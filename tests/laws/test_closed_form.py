@@ -6,8 +6,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from omnidyn.model.dynamics import state_space
 from omnidyn.model.robot_file import load_robot
-from omnidyn.model.statespace import state_space
 from omnidyn.simulation.simulate import simulate
 from tests.support.strategies import any_robot, volts
 

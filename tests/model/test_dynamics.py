@@ -8,8 +8,7 @@ import pytest
 from scipy.linalg import expm
 
 from omnidyn.errors import InputError
-from omnidyn.model.dynamics import acceleration, drive_wrench, frame_wrench
-from omnidyn.model.statespace import discretise, is_decoupled, state_space
+from omnidyn.model.dynamics import acceleration, discretise, drive_wrench, frame_wrench, is_decoupled, state_space
 from tests.support.robots import random_robot, robot_of
 
 

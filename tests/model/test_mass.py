@@ -8,12 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from omnidyn.errors import InputError
-from omnidyn.model.dynamics import acceleration
+from omnidyn.model.dynamics import acceleration, motor_wrench, state_space
 from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.keys import Key
 from omnidyn.model.mass import added_mass, axis_masses, mass_matrix, masses_couple, of_body_alone, per_mass
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
-from omnidyn.model.statespace import motor_wrench, state_space
 from omnidyn.model.wheels import wheel_speed
 from tests.support.strategies import SMALL, any_wheels
 

@@ -8,13 +8,13 @@ from benchmarks.wrong_worlds.log import robot_of
 from benchmarks.wrong_worlds.world import World, drive
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moves
-from omnidyn.model.drive import Drive
-from omnidyn.model.fitted.log_effects import Lateness, LogEffects
 from omnidyn.model.keys import Key
-from omnidyn.model.surroundings.floor import Floor
-from omnidyn.simulation.clocks import clock
-from omnidyn.simulation.sensitivity.derivatives import derivatives
+from omnidyn.model.log_effects import Lateness, LogEffects
+from omnidyn.model.motor import Drive
+from omnidyn.model.surroundings import Floor
+from omnidyn.simulation.sensitivity.late_sample import derivatives
 from omnidyn.simulation.simulate import simulate
+from omnidyn.simulation.view import clock
 
 DEAD, LATE = 0.7, 0.0173
 WORLD = World(dead=DEAD)

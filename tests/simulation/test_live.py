@@ -5,8 +5,8 @@ import pytest
 
 import omnidyn
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.friction import AxesFriction, Friction
+from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot_file import load_robot
 from omnidyn.paper.experiments import prbs
 from omnidyn.simulation import engine

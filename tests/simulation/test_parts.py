@@ -2,7 +2,7 @@
 
 import pytest
 
-from omnidyn.compiled.linking import Linked
+from omnidyn.compiled.kernel import Linked
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot

@@ -7,13 +7,12 @@ from scipy.integrate import solve_ivp
 import omnidyn
 from omnidyn.errors import UnsupportedError
 from omnidyn.model.deadzone import breakaway_voltage
-from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.dynamics import drive_wrench, state_space
 from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.robot_file import load_robot
-from omnidyn.model.statespace import state_space
-from omnidyn.model.surroundings.floor import GRAVITY, Floor
+from omnidyn.model.surroundings import GRAVITY, Floor
 from omnidyn.simulation.live import LiveRobot
-from omnidyn.simulation.sensitivity.derivatives import derivatives
+from omnidyn.simulation.sensitivity.late_sample import derivatives
 from tests.support.friction_shapes import shaped
 
 AXEBOT = load_robot("axebot")

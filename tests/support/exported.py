@@ -13,7 +13,7 @@ import omnidyn
 from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
-from omnidyn.model.surroundings.floor import Floor
+from omnidyn.model.surroundings import Floor
 from omnidyn.model.wheels import Wheels
 
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wdouble-promotion", "-Werror")

@@ -77,7 +77,7 @@ def compare(
 
 
 def _robots(names: Sequence[str], with_: str) -> list[Robot]:
-    from omnidyn.model.varied.vary import vary_as
+    from omnidyn.model.vary import vary_as
 
     return [vary_as(omnidyn.load_robot(name), with_) for name in names]
 

@@ -107,7 +107,7 @@ class _Job:
     @classmethod
     def read(cls, robot: str, voltages: str, duration: float | None, max_steps: int, with_: str) -> _Job:
         """From the files that the command names."""
-        from omnidyn.model.varied.vary import vary_as
+        from omnidyn.model.vary import vary_as
 
         loaded = vary_as(omnidyn.load_robot(robot), with_)
         held = omnidyn.read_commands(voltages, loaded.wheels.count, duration, max_steps)

@@ -11,7 +11,7 @@ import typer
 from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance
 from omnidyn.cli.terminal.streams import say, show, show_json
-from omnidyn.compiled.hearing import Compiling, heard
+from omnidyn.compiled.listeners import Compiling, heard
 from omnidyn.progress import Progress, Report
 
 

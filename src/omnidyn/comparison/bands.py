@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from omnidyn.comparison.replay import HOLD, replay
 from omnidyn.comparison.result import Comparison
-from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.known.told import told
 from omnidyn.model.known.uncertainty import DRAWS, plausible
+from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.band import Band, band_of, first_order_band
 from omnidyn.statement import Statement

@@ -17,7 +17,7 @@ from omnidyn.comparison.traces import Trace, compared_components, counts_from_st
 from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.logs.channels import components
 from omnidyn.model.first_guess import rests_on
-from omnidyn.model.fitted.log_effects import LogEffects
+from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list

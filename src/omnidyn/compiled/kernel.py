@@ -14,11 +14,16 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numba
+from llvmlite.binding import Linkage
+from numba.core import compiler, typed_passes, types
+from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
+from numba.core.compiler_machinery import LoweringPass, register_pass
+from numba.core.registry import CPUDispatcher
 from numba.extending import is_jitted
 
 from omnidyn.compiled import private
-from omnidyn.compiled.hearing import told
+from omnidyn.compiled.listeners import told
 
 ERROR_MODEL = "numpy"  # a division by zero gives inf or nan, as in NumPy, and needs no branch
 
@@ -35,7 +40,6 @@ class OfBranches(Announced):
     """The same for code that is all branches, see linking.Branches."""
 
     def compile_extra(self, func: Any) -> Any:
-        from omnidyn.compiled.linking import Branches
 
         state: Any = self.state
         state.library = Branches(state.targetctx.codegen(), func.__qualname__)
@@ -126,6 +130,127 @@ def _linked(function: Callable[..., Any], counted: bool) -> Any:
     whole = numba.njit(error_model=ERROR_MODEL, **options)(function)
     if whole is function or not tried:
         return whole
-    from omnidyn.compiled.linking import Linked
 
     return Linked(whole)
+
+
+# Parts of kernels: code to link, optimised once, in the kernel that calls it
+#
+# numba makes wrappers and machine code of every function, and to that end optimises each together with all that it
+# calls: a formula at the bottom once for every function above it. Only kernels are ever called from outside. A linked
+# function therefore stays as it was written until a kernel takes it: a first run takes a third of the time, with the
+# same numbers to the last bit. Compilers of one's own are open to users of numba, the library of code is private to it:
+# tests watch.
+
+
+class Linked(CPUDispatcher):
+    """A function that kernels link; called from Python, which only tests do, it is compiled for itself as well."""
+
+    def __init__(self, whole: Any):
+        options = whole.targetoptions | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        super().__init__(whole.py_func, targetoptions=options, pipeline_class=LinkedCompiler)
+        self.whole = whole
+
+    def __call__(self, *arguments: Any, **names: Any) -> Any:
+        return self.whole(*arguments, **names)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """How a caller sees it: numba would compile it once more for every constant that somebody hands in."""
+        return super().get_call_template([types.unliteral(arg) for arg in args], kws)
+
+    def add_overload(self, cres: Any) -> None:
+        """Remember it for kernels; numba would note it for callers from Python, too."""
+        self.overloads[tuple(cres.signature.args)] = cres
+
+
+class LinkedLibrary(JITCodeLibrary):
+    """The code of a linked function as it was written, which is optimised where it is linked."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        ll_module.data_layout = self._codegen._data_layout
+
+    def finalize(self) -> None:
+        """Nothing more will come. What is called is not linked here: it would be again in every caller."""
+        self._raise_if_finalized()
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def _get_module_for_linking(self) -> Any:
+        """The function and all that it calls, each once: asked for by the kernels that call it, by no other."""
+        self._ensure_finalized()
+        if self._shared_module is None:
+            module = self._final_module.clone()
+            for library in self._below({}):
+                other = library._final_module if isinstance(library, LinkedLibrary) else None
+                module.link_in(other or library._get_module_for_linking(), preserve=True)
+            for function in module.functions:
+                if not function.is_declaration and function.linkage == Linkage.external:
+                    function.linkage = "linkonce_odr"  # there may be the same code from another one
+            self._shared_module = module
+        return self._shared_module
+
+    def _below(self, found: dict[Any, None]) -> dict[Any, None]:
+        """All libraries that this one needs, itself left out, in the order in which they are met."""
+        for library in self._linking_libraries:
+            if library not in found:
+                found[library] = None
+                if isinstance(library, LinkedLibrary):
+                    library._below(found)
+        return found
+
+
+class Branches(JITCodeLibrary):
+    """The code of a kernel that is all branches: optimised in one go, nothing vectorised.
+
+    That saves an eighth of the time to compile it, and the engines run as fast, to the last bit the same.
+    """
+
+    def _optimize_final_module(self) -> None:
+        try:
+            passes, builder = self._codegen._module_pass_manager(opt=2, loop_vectorize=False, slp_vectorize=False)
+        except (TypeError, ValueError, AttributeError):  # an older numba asks for them otherwise
+            super()._optimize_final_module()
+        else:
+            passes.run(self._final_module, builder)
+
+
+@register_pass(mutates_CFG=False, analysis_only=False)
+class _IntoALibrary(LoweringPass):
+    """Before a function is lowered: the library that takes its code."""
+
+    _name = "omnidyn_into_a_library"
+
+    def __init__(self):
+        super().__init__()
+
+    def run_pass(self, state: Any) -> Any:
+        state.library = LinkedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.flags.no_compile = True
+        return True
+
+
+@register_pass(mutates_CFG=False, analysis_only=False)
+class _KnownToCallers(LoweringPass):
+    """After it has been lowered: callers find it. Its name is an object: there is no machine code to point to."""
+
+    _name = "omnidyn_known_to_callers"
+
+    def __init__(self):
+        super().__init__()
+
+    def run_pass(self, state: Any) -> Any:
+        lowered = state["cr"]._replace(cfunc=object())
+        state.targetctx.insert_user_function(lowered.cfunc, lowered.fndesc, [state.library])
+        state["cr"] = lowered
+        return True
+
+
+class LinkedCompiler(compiler.CompilerBase):
+    """numba's own compiler with these two passes."""
+
+    def define_pipelines(self) -> list[Any]:
+        passes = compiler.DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.add_pass_after(_IntoALibrary, typed_passes.AnnotateTypes)
+        passes.add_pass_after(_KnownToCallers, typed_passes.NativeLowering)
+        passes.finalize()
+        return [passes]

@@ -1,7 +1,7 @@
 """Whether private parts of numba are used: they save time, change no number, and may change with any version.
 
-`OMNIDYN_PLAIN_NUMBA=1` switches all of them off, before omnidyn is imported: linking.py, loading.py, entries.py and
-the option `_nrt`. Kernels are then compiled by numba in its own way and kept in memory only, which costs every
+`OMNIDYN_PLAIN_NUMBA=1` switches all of them off, before omnidyn is imported: linking in kernel.py, entries.py and the
+option `_nrt`. Kernels are then compiled by numba in its own way and kept in memory only, which costs every
 process its compile time. Without linking a first `simulate` of the implicit engine takes 45 s of processor time
 instead of 14, a first `identify` 99 s instead of 36; without loading each later command takes 0.3 to 0.5 s more.
 """

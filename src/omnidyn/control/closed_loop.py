@@ -17,7 +17,7 @@ from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import path as path_named
 from omnidyn.control.tracking import Tracking
 from omnidyn.errors import InputError
-from omnidyn.model.drive import DUTY, SPEED
+from omnidyn.model.motor import DUTY, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.live import LiveRobot, check_supply

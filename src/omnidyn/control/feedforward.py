@@ -20,10 +20,10 @@ from omnidyn.arrays import FloatArray
 from omnidyn.control.controller import WHEEL_SPEED, Guarded
 from omnidyn.control.paths.motion import Path
 from omnidyn.errors import InputError
+from omnidyn.model.dynamics import motor_wrench
 from omnidyn.model.inverse import Effort, Inverse, inverse
 from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import motor_wrench
 from omnidyn.model.wheels import per_wheel, wheel_speed
 
 DT = 0.02  # [s] between two steps, where nobody says

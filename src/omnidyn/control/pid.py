@@ -3,9 +3,9 @@
     alpha = R (k_p e + k_i sum e dt) + k_d (nu_ref - nu),      e = pose of the path - pose, in the world
     volts = inverse model of the path's motion, friction included, plus alpha as an acceleration
 
-The gains follow from two poles and a slow one (gains.py). Dry friction is compensated in the direction in which the
-robot is to move, the way back to the path included: nu_ref + (k_p/k_d) e. Without `feedforward` nothing is known of the
-robot but what its volts push.
+The gains follow from two poles and a slow one (speed_loop.py). Dry friction is compensated in the direction in which
+the robot is to move, the way back to the path included: nu_ref + (k_p/k_d) e. Without `feedforward` nothing is known
+of the robot but what its volts push.
 """
 
 from __future__ import annotations
@@ -18,9 +18,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.control.controller import WHEEL_SPEED, Guarded
 from omnidyn.control.feedforward import DT, Volts, check_delay, check_dt, lateness
-from omnidyn.control.gains import check_faster, check_integral, pose_gains
 from omnidyn.control.paths.motion import Path
-from omnidyn.control.speed_loop import MOST_STEPS
+from omnidyn.control.speed_loop import MOST_STEPS, check_faster, check_integral, pose_gains
 from omnidyn.model.frames import world_to_body
 from omnidyn.model.inverse import Effort
 from omnidyn.model.robot import Robot

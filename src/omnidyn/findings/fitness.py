@@ -19,7 +19,7 @@ from omnidyn.logs.geometry import shows_both, wheel_geometry
 from omnidyn.logs.log import Log
 from omnidyn.logs.one_clock import on_clock_of_wheels
 from omnidyn.logs.plateaus import MIN_DURATION, Plateau, first_plateaus
-from omnidyn.model.drive import SPEED
+from omnidyn.model.motor import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.statement import ERROR, NOTE, WARNING, Statement

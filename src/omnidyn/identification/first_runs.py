@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.compiled.elsewhere import compiled_elsewhere
+from omnidyn.compiled.parallel import compiled_elsewhere
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.identify import OUTPUT_ERROR, identify
 from omnidyn.identification.output_error.kernel.of_rows import row_squares, row_terms
 from omnidyn.identification.output_error.memory.autoregression import autoregression
-from omnidyn.model.drive import SPEED
 from omnidyn.model.dynamics import acceleration
-from omnidyn.model.motor import DYNAMIC
+from omnidyn.model.motor import DYNAMIC, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run

@@ -14,16 +14,17 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
+from omnidyn.model.deadzone import push_lost_per_volt
 from omnidyn.model.keys import DEAD_BAND, EMF, GAINS, ROTOR, TORQUE, WHEEL, Key, name_of, unit
 from omnidyn.model.mass import added_mass
 from omnidyn.model.robot import GIVEN, Prior, Robot
-from omnidyn.model.statespace import taken
 
 MASS, INERTIA, RADIUS = "body.mass_kg", "body.inertia_kg_m2", "wheels.wheel_radius_m"
 AT = "@"  # KEY@GROUP is the number that a group has for itself
 RATIO = f"the ratio of {TORQUE} to {EMF}"
 RESISTANCE = "motor.resistance_ohm"
 STEP = 0.1  # [V] of a dead band
+UNITS = "N", "N", "N m"  # of a push
 
 
 def scale_of_motion(robot: Robot, free: Collection[str], current: bool, metres: bool) -> str:
@@ -55,7 +56,7 @@ def scale_of_traction(robot: Robot, from_current: bool) -> str:
 
 def _behind(robot: Robot) -> str:
     """What a dead band, which steady stretches do not tell from Coulomb friction, would take off it."""
-    lost = [f"{STEP * force:.2g} {unit}" for force, unit in zip(taken(robot), ("N", "N", "N m"), strict=True)]
+    lost = [f"{STEP * force:.2g} {unit}" for force, unit in zip(push_lost_per_volt(robot), UNITS, strict=True)]
     band = f"a dead band of {_known(robot, DEAD_BAND)}" if robot.drive.dead_band else "no dead band of the driver"
     return (
         f"of the voltages {band} was taken off: every {STEP:g} V more would be up to {_listed(lost)} less Coulomb "

@@ -41,7 +41,7 @@ from omnidyn.identification.verdict import (
 )
 from omnidyn.identification.whole_logs import fit_output_error, solved
 from omnidyn.logs.log import Log
-from omnidyn.model.drive import SPEED
+from omnidyn.model.motor import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list

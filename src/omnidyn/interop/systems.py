@@ -8,10 +8,9 @@ import numpy as np
 
 from omnidyn.errors import MissingExtraError
 from omnidyn.model.actuation import clip_voltage, reaching
-from omnidyn.model.dynamics import acceleration
+from omnidyn.model.dynamics import StateSpace, acceleration, state_space
 from omnidyn.model.frames import body_to_world
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import StateSpace, state_space
 
 STATES = ("vx", "vy", "omega")
 POSES = ("x", "y", "heading")

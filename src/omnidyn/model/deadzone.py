@@ -20,7 +20,7 @@ from omnidyn.model.dynamics import (
 )
 from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
-from omnidyn.model.surroundings.floor import refuse_slope
+from omnidyn.model.surroundings import refuse_slope
 from omnidyn.model.wheels import refuse_slip
 
 HIGHEST = 1e6  # [V] beyond which a pattern counts as one that never moves the robot
@@ -52,6 +52,16 @@ def axis_patterns(robot: Robot) -> FloatArray:
     """
     check_order("axis_patterns(robot)", (robot, Robot))
     return _scaled(_voltage_per_wrench(robot).T)
+
+
+def push_per_volt(robot: Robot) -> FloatArray:
+    """Wrench at rest per volt of the pattern of each axis, `axis_patterns`, [N/V, N/V, N m/V], (3,)."""
+    return np.diag(drive_wrench(linear_part(robot), np.zeros(3), axis_patterns(robot))).copy()
+
+
+def push_lost_per_volt(robot: Robot) -> FloatArray:
+    """What each volt of a dead band takes of the push along each axis, by `axis_patterns`, [N/V, N/V, N m/V], (3,)."""
+    return np.diag(drive_wrench(linear_part(robot), np.zeros(3), np.sign(axis_patterns(robot)))).copy()
 
 
 def breakaway_voltage(robot: Robot, pattern: ArrayLike, halvings: int = BISECTIONS) -> FloatArray:

@@ -10,13 +10,10 @@ from pydantic import AfterValidator, Field, model_validator
 
 from omnidyn.document import Document
 from omnidyn.errors import printable
-from omnidyn.model.drive import Drive
-from omnidyn.model.fitted.correlation import KeyCorrelation
-from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.friction import Friction
-from omnidyn.model.motor import Motor, mass_at_rim
-from omnidyn.model.surroundings.floor import Floor
-from omnidyn.model.surroundings.variations import FARTHEST, Variations
+from omnidyn.model.log_effects import KeyCorrelation, LogEffects
+from omnidyn.model.motor import Drive, Motor, mass_at_rim
+from omnidyn.model.surroundings import FARTHEST, Floor, Variations
 from omnidyn.model.value import Flag, Text, Value, number, place
 from omnidyn.model.wheels import Wheels, check_count
 from omnidyn.shown import FIGURE, Shown, make

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.model.dynamics import state_space
 from omnidyn.model.frames import AXES, body_to_world, world_to_body
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import state_space
 from omnidyn.model.wheels import rim_speed, twist_from_wheel_speed, wheel_speed, wrench_from_traction
 from omnidyn.paper.claim import ROUNDING, Claim, judge, listed, plain, tiny
 from omnidyn.paper.steady import printed_speed, printed_voltage

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from omnidyn.model.dynamics import state_space
 from omnidyn.model.frames import AXES
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import state_space
 from omnidyn.paper.claim import TOLERANCE, Claim, ClaimVerdict, judge, listed, plain, same
 from omnidyn.paper.reconcile import FRICTION, Reconciliation, reconciliations
 from omnidyn.paper.steady import printed_force

@@ -6,10 +6,9 @@ import numpy as np
 from scipy.optimize import root
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.dynamics import acceleration, drive_wrench, frame_wrench
+from omnidyn.model.dynamics import acceleration, drive_wrench, frame_wrench, state_space
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import state_space
 from omnidyn.paper.claim import ROUNDING, Claim, judge, listed, plain, same, tiny
 from omnidyn.paper.steady import settled_twist
 from omnidyn.paper.tables import EQ_13_POWER_OF_GEAR, EQ_13_SYMBOLS_OF_A33, INERTIA_SENTENCE

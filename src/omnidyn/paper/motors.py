@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from omnidyn.model.dynamics import settled_currents
+from omnidyn.model.dynamics import settled_currents, state_space
 from omnidyn.model.frames import AXES
 from omnidyn.model.motor import back_emf, no_load_speed, traction, wheel_torque
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import state_space
 from omnidyn.paper.claim import ROUNDING, Claim, ClaimVerdict, judge, listed, plain, tiny
 from omnidyn.paper.steady import settled_twist
 from omnidyn.paper.tables import EQ_11_POWER_OF_GEAR, EQ_12, EQ_13_POWER_OF_GEAR, TABLE_4

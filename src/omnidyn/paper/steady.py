@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
 from omnidyn.model.deadzone import moves
+from omnidyn.model.dynamics import state_space
 from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import state_space
 from omnidyn.paper.tables import TABLE_1, TABLE_4, Three
 
 

@@ -11,7 +11,7 @@ from scipy.special import ndtri
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
-from omnidyn.compiled.beside import one_by_one
+from omnidyn.compiled.parallel import one_by_one
 from omnidyn.model.known.uncertainty import DRAWS, Ends, first_order_std, plausible
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from omnidyn.arguments import check_order
 from omnidyn.errors import InputError
-from omnidyn.model.fitted.log_effects import LogEffects
+from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.motor import settled_current
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed

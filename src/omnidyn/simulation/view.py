@@ -8,16 +8,16 @@ tilt: a force that stays in the room.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.model.actuation import Driver, at_motors
-from omnidyn.model.fitted.log_effects import LogEffects
+from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot import Robot
-from omnidyn.simulation.clocks import Clock, clock
 from omnidyn.simulation.commands import Commands
 
 LATE = ("twist", "wheel_speed", "current", "heading", "position", "wheel_angle")  # the first sets where a start is
@@ -106,3 +106,50 @@ def seen_through(
     at = {"voltage": apart.index(0.0)} | {name: apart.index(each) for name, each in late.items()}
     driver, room = Driver(log.gain, robot.drive.dead_band, log.fade), log.tilt if any(log.tilt) else None
     return View(time, at, driver, share, log.push if any(log.push) else None, start is not None, room)
+
+
+# Clocks: commands that take time to reach the motors, and channels that show what was. Times of a simulation, refined
+#
+# A command of row k that is `latency` late acts over [t_k + latency, t_k+1 + latency), and a channel that is `late`
+# shows at t_k what was at t_k - late. Both are exact: the simulation takes steps that end at these times too. Before
+# the start nothing is known: a channel shows the start, and what acted before the first command is what `before` says.
+
+SAME = 1e-9  # of a row: times that are nearer are one
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """dt [s]: steps of the simulation, shape (steps,). row: which command acts over each, -1 before the first.
+
+    at: for every lateness asked for, the samples of the simulation that a channel shows at each row, shape (rows + 1,).
+    """
+
+    dt: FloatArray
+    row: NDArray[np.intp]
+    at: tuple[NDArray[np.intp], ...]
+
+
+def clock(dt: FloatArray, latency: float = 0.0, late: Sequence[float] = (0.0,)) -> Clock:
+    """The steps of a simulation of rows `dt` [s], shape (rows,), where commands are `latency` [s] late.
+
+    late [s]: of the channels. One that is early, below 0, is shown beyond the last row, where the last command still
+    holds.
+    """
+    rows = len(dt)
+    if latency == 0.0 and not any(late):
+        return Clock(dt, np.arange(rows), (np.arange(rows + 1),) * len(late))
+    edges = np.concatenate([[0.0], np.cumsum(dt)])
+    end = edges[-1] + max(0.0, -min(late))
+    acts = edges[:-1] + latency
+    shown = [np.clip(edges - each, 0.0, end) for each in late]
+    times = np.unique(np.concatenate([edges, acts[acts < end], *shown]))
+    near = SAME * float(np.min(dt))
+    times = times[np.concatenate([[True], np.diff(times) > near])]
+    row = np.searchsorted(acts, 0.5 * (times[1:] + times[:-1]), side="right") - 1
+    return Clock(np.diff(times), row, tuple(_nearest(times, each) for each in shown))
+
+
+def _nearest(times: FloatArray, wanted: FloatArray) -> NDArray[np.intp]:
+    """Where the time nearest to each of `wanted` stands."""
+    after = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
+    return np.where(wanted - times[after - 1] <= times[after] - wanted, after - 1, after)

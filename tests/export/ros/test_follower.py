@@ -11,7 +11,7 @@ import pytest
 import omnidyn
 from omnidyn.errors import UnsupportedError
 from omnidyn.export.ros.node import ros2_node
-from omnidyn.model.drive import Drive
+from omnidyn.model.motor import Drive
 from tests.export.ros.test_node import NO_NUMBERS, NO_SUPPLY, NO_TIME, ROBOT, Plant, loaded
 from tests.export.ros.test_node import bus as bus
 from tests.support.exported import STRICT

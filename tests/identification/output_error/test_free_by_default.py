@@ -8,12 +8,13 @@ from omnidyn.identification.output_error.prepare import expand_keys, free_by_def
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.validation import validate
 from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.model.deadzone import push_per_volt
+from omnidyn.model.dynamics import damping
 from omnidyn.model.first_guess import first_guess
 from omnidyn.model.keys import BOX, ROTOR, Key
 from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
-from omnidyn.model.statespace import damping, push_per_volt
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation
 

@@ -15,10 +15,10 @@ from omnidyn.identification.structure.missing import laws
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
-from omnidyn.model.surroundings.floor import GRAVITY
+from omnidyn.model.surroundings import GRAVITY
 from omnidyn.report.dead_zone_section import dead_zone_section
 from omnidyn.run import Run
-from omnidyn.simulation.slip.loads import wheel_loads
+from omnidyn.simulation.slip.plant import wheel_loads
 from tests.support.codes import codes
 from tests.support.slipping import Slip
 

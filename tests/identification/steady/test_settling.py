@@ -5,9 +5,9 @@ import pytest
 
 from omnidyn.identification.methods import choose_method
 from omnidyn.identification.steady.settling import settling_time
+from omnidyn.model.dynamics import state_space
 from omnidyn.model.friction import Friction
 from omnidyn.model.robot_file import load_robot
-from omnidyn.model.statespace import state_space
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from omnidyn.model.deadzone import breakaway_voltage
 from omnidyn.model.dynamics import acceleration, drive_wrench
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
-from omnidyn.model.surroundings.floor import Floor
+from omnidyn.model.surroundings import Floor
 from omnidyn.simulation.simulate import simulate
 from tests.reference import bristles
 from tests.reference.modes import plant_of, reference

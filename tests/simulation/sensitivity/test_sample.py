@@ -5,8 +5,7 @@ import pytest
 
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import Key
-from omnidyn.simulation.sensitivity.derivatives import derivatives
-from omnidyn.simulation.sensitivity.late_sample import Direction, Program, late_samples
+from omnidyn.simulation.sensitivity.late_sample import Direction, Program, derivatives, late_samples
 from omnidyn.simulation.sensitivity.stage import EPS
 from omnidyn.simulation.simulate import simulate
 

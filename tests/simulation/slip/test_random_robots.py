@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.simulation.slip.loads import load_shift, wheel_loads
+from omnidyn.simulation.slip.plant import load_shift, wheel_loads
 from tests.support.random_logs import random_robot
 from tests.support.slipping import EDGE, Slip
 

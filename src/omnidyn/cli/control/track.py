@@ -63,7 +63,7 @@ def track(
     from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
     from omnidyn.control.controllers import several
     from omnidyn.control.tracking import trackings_document
-    from omnidyn.model.varied.vary import vary_as
+    from omnidyn.model.vary import vary_as
 
     around = Circumstances(dt, duration, skip, noise, delay, seed)
     believed = omnidyn.load_robot(robot)

@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator
 
 from omnidyn.cli.terminal.streams import say
-from omnidyn.compiled.hearing import Compiling, heard
+from omnidyn.compiled.listeners import Compiling, heard
 from omnidyn.progress import Progress, Report
 
 SILENT_S, NEW_S, BEAT_S = 2.0, 3.0, 5.0

@@ -1,5 +1,6 @@
 """Model predictive control of one robot in microseconds: a quadratic program, stage by stage, solved to its optimum.
 
-Read in this order: layout (the tables), model (the numbers of a robot), stages (the program of one step), riccati (one
-solve), active_set, interior_point, solve (to the optimum), observer, loop (one step of the controller), controller.
+Read in this order: model (the numbers of a robot), stages and program (of one step), riccati (one solve),
+interior_point (to the optimum, by an active set where that does), observer, settings, loop (one step of the
+controller), controller.
 """

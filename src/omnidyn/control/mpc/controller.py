@@ -33,19 +33,16 @@ from omnidyn.control.controller import (
     output_limit,
     supply_of,
     vector,
+    without_slip,
 )
 from omnidyn.control.feedforward import DT, check_dt
-from omnidyn.control.mpc.batch import Batch
-from omnidyn.control.mpc.loop import control_step
+from omnidyn.control.mpc.loop import Batch, Memory, Room, control_step
 from omnidyn.control.mpc.model import numbers, volts
 from omnidyn.control.mpc.observer import PUSH, SCALE
-from omnidyn.control.mpc.preview import Preview
-from omnidyn.control.mpc.settings import Settings
-from omnidyn.control.mpc.tables import Memory, Room
-from omnidyn.control.without_slip import without_slip
+from omnidyn.control.mpc.settings import Preview, Settings
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.robot import Robot
-from omnidyn.model.surroundings.floor import refuse_slope
+from omnidyn.model.surroundings import refuse_slope
 from omnidyn.model.wheels import wheel_speed
 
 HORIZON, MOST_HORIZON, MOST_DELAY = 20, 500, 50

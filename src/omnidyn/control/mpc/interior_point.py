@@ -11,9 +11,25 @@ are bounded. Source: Mehrotra, SIAM J. Optim. 2 (1992); the start is our own.
 from __future__ import annotations
 
 from omnidyn.compiled.kernel import part
-from omnidyn.control.mpc.active_set import FREE, LOWER, UPPER
-from omnidyn.control.mpc.layout import GX, GY, HP, HV, PULL, WEIGHT, E, V
-from omnidyn.control.mpc.riccati import advance, column, drive_of, factor_stage, forward, vector_stage
+from omnidyn.control.mpc.program import CURRENT, SLEW, SPEED, SPEED_WEIGHT
+from omnidyn.control.mpc.riccati import (
+    GX,
+    GY,
+    HP,
+    HV,
+    PULL,
+    WEIGHT,
+    E,
+    V,
+    advance,
+    backward,
+    column,
+    drive_of,
+    factor_stage,
+    forward,
+    slope_of,
+    vector_stage,
+)
 from omnidyn.control.mpc.small import dot, matrix, plus, put3, tv, vector
 
 LOW, HIGH, DROP_LOW, DROP_HIGH, NEXT, SLOPE = 0, 1, 2, 3, 4, 5  # tables of the room to work in
@@ -175,3 +191,178 @@ def guess(u, bounds, active, room):
                 room[HIGH, k, i] * width > bounds[1, k, i] - u[k, i]
             )  # fmt: skip
             active[k, i] = LOWER if low else (UPPER if high else FREE)
+
+
+# The active set of the bounds on the inputs: guessed, solved, corrected, until it is right
+#
+# guess which inputs stand at a bound -> solve the rest exactly (riccati.py) -> an input beyond its bound is held
+#     there, one whose bound pulls instead of pushing is let go -> again, from the last step that changed
+#
+# A guess that changes nothing is the optimum, to rounding: all conditions of Karush, Kuhn and Tucker hold. From the
+# set of the step before it mostly takes one or two passes. Far from it the guesses can go round in a circle: then
+# interior_point.py takes over. Source: primal-dual active set, Hintermueller, Ito, Kunisch, SIAM J. Optim. 13 (2002).
+
+LOWER, FREE, UPPER = -1, 0, 1
+BEYOND = 1e-10  # [V] an input may be beyond its bound, and as far may a slope, over the weight, be off
+
+
+@part
+def hold(active, bounds, weight, wanted, inverse, target, top):
+    """Write what riccati.py needs to know of the active set, steps 0 to `top`."""
+    for k in range(top + 1):
+        for i in range(active.shape[1]):
+            held = active[k, i] != FREE
+            inverse[k, i] = 0.0 if held else 1.0 / weight[i]
+            target[k, i] = bounds[0 if active[k, i] < 0 else 1, k, i] if held else wanted[k, i]
+
+
+@part
+def corrected(side, u, low, high, slope):
+    """Where an input belongs: LOWER, FREE or UPPER. slope: of the cost by that input [1/V of its weight]."""
+    if side == FREE:
+        return UPPER if u > high + BEYOND else (LOWER if u < low - BEYOND else FREE)
+    return FREE if side * slope > BEYOND else side
+
+
+@part
+def forward_corrected(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted):
+    """Forward pass that corrects the active set as it goes. Returns the last step that changed, -1 if none has."""
+    pose, twist, last = vector(x, 0, 0), vector(x, 0, 3), -1
+    for k in range(len(stage)):
+        g = slope_of(answer, k, pose, twist)
+        for i in range(u.shape[1]):
+            along = dot(column(push, i), g)
+            volts = target[k, i] - inverse[k, i] * along
+            slope = volts - wanted[k, i] + along / weight[i]
+            side = corrected(active[k, i], volts, bounds[0, k, i], bounds[1, k, i], slope)
+            last = k if side != active[k, i] else last
+            active[k, i], u[k, i] = side, volts
+        pose, twist = advance(stage, k, pose, twist, drive_of(push, u, k))
+        put3(x, k + 1, 0, pose)
+        put3(x, k + 1, 3, twist)
+    return last
+
+
+@part
+def active_set(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, most):
+    """Solve from the guess in `active`. Returns the passes it took, most + 1 where they did not do."""
+    top = len(stage) - 1
+    for count in range(most):
+        hold(active, bounds, weight, wanted, inverse, target, top)
+        backward(stage, answer, push, inverse, target, top)
+        top = forward_corrected(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted)
+        if top < 0:
+            return count + 1
+    return most + 1
+
+
+# The program solved: active set from the last step's guess, else interior point, then active set from its answer
+
+FIRST, LAST = 6, 8  # passes of the active set before and after the interior point method
+EARLY, TIGHT = 1e-6, 1e-13  # of the mean of m s that it begins with, where it stops
+
+
+@part
+def solve(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, room):
+    """Optimal inputs u (n, wheels) and states x (n + 1, 6) from its row 0. Returns passes; negative: not to rounding.
+
+    active (n, wheels) holds the guess, and the bounds met afterwards. room (ROOM_SIZE, n, wheels).
+    """
+    count = active_set(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, FIRST)
+    if count <= FIRST:
+        return count
+    begin(stage, push, x, u, bounds, weight, wanted, room)
+    mu = mean_product(u, bounds, room, 0.0, False)
+    total, start = FIRST, mu
+    for until in (EARLY, TIGHT):
+        more, mu = interior_point(
+            stage, answer, push, inverse, target, x, u, bounds, weight, wanted, room, mu, until * start
+        )
+        total += more
+        guess(u, bounds, active, room)
+        for k in range(u.shape[0]):
+            for i in range(u.shape[1]):
+                room[4, k, i] = u[k, i]
+        count = active_set(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, LAST)
+        total += min(count, LAST)
+        if count <= LAST:
+            return total
+        for k in range(u.shape[0]):
+            for i in range(u.shape[1]):
+                u[k, i] = room[4, k, i]
+    for k in range(u.shape[0]):
+        for i in range(u.shape[1]):
+            active[k, i] = FREE
+    return -total
+
+
+# Optional limits: how fast the volts may change, the current of the motors, the speed of the robot
+#
+# slew      |u_k - u of the step before| <= (k + 1) slew dt      what can be reached by then
+# current   |u - K_v l w| <= R i_max, at the speed predicted where the step begins; both narrow the bounds of u
+# speed     |v| <= limit at the end of a step, soft: 1/2 weight (|v| - limit)^2 beyond it, where it is beyond
+
+NARROWEST = 1e-6  # [V] between the bounds of an input
+TRIES = 8  # sets of speeds beyond their limit; the last one is taken
+
+
+@part
+def make_bounds(settings, limit, emf, sent, bounds, x):
+    """Bounds of the volts of all steps. limit (2, wheels): [V], and R i_max [V]; emf (wheels, 3)."""
+    last, slew = len(sent) - 1, settings[SLEW]
+    for k in range(bounds.shape[1]):
+        twist = vector(x, k, 3)
+        for i in range(bounds.shape[2]):
+            low, high = -limit[0, i], limit[0, i]
+            if slew > 0.0:
+                reach = slew * (k + 1)
+                low, high = max(low, sent[last, i] - reach), min(high, sent[last, i] + reach)
+            if settings[CURRENT] != 0.0:
+                free = dot(vector(emf, i, 0), twist)
+                free = min(max(free, low - limit[1, i]), high + limit[1, i])  # as near to it as the others let
+                low, high = max(low, free - limit[1, i]), min(high, free + limit[1, i])
+            if high - low < NARROWEST:
+                low = min(max(0.5 * (low + high - NARROWEST), -limit[0, i]), limit[0, i] - NARROWEST)
+                high = low + NARROWEST
+            bounds[0, k, i], bounds[1, k, i] = low, high
+
+
+@part
+def weigh_speeds(settings, stage, fast, sign):
+    """Add (sign 1) or take back (-1) the cost of speeds that are beyond their limits."""
+    weight = sign * settings[SPEED_WEIGHT]
+    for k in range(len(stage)):
+        for i in range(3):
+            if fast[k, i] != 0:
+                stage[k, WEIGHT + 3 + i] += weight
+                stage[k, PULL + 3 + i] -= weight * settings[SPEED + i] * fast[k, i]
+
+
+@part
+def too_fast(settings, x, fast):
+    """Note which speeds are beyond their limits. Returns whether others than before are."""
+    changed = False
+    for k in range(len(fast)):
+        for i in range(3):
+            limit, speed = settings[SPEED + i], x[k + 1, 3 + i]
+            side = 0 if limit <= 0.0 else (1 if speed > limit else (-1 if speed < -limit else 0))
+            changed |= side != fast[k, i]
+            fast[k, i] = side
+    return changed
+
+
+@part
+def solve_limited(
+    settings, stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, room, fast
+):  # fmt: skip
+    """`solve` with the limits of the speed. Returns passes."""
+    if settings[SPEED_WEIGHT] == 0.0:
+        return abs(solve(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, room))
+    total = 0
+    for _ in range(TRIES):
+        weigh_speeds(settings, stage, fast, 1.0)
+        total += abs(solve(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, room))
+        weigh_speeds(settings, stage, fast, -1.0)
+        if not too_fast(settings, x, fast):
+            break
+    return total

@@ -16,11 +16,10 @@ import numpy as np
 from scipy.linalg import expm
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.dynamics import frame_terms
+from omnidyn.model.dynamics import discretise, frame_terms, is_decoupled, motor_wrench, state_space
 from omnidyn.model.layout import N_AXES, Plant, blank_plant
 from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import discretise, is_decoupled, motor_wrench, state_space
 from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.exact.slopes import hold_slopes
 

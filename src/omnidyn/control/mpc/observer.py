@@ -11,9 +11,8 @@ offset-free MPC, Pannocchia & Rawlings, AIChE J. 49 (2003); the scale is our own
 from __future__ import annotations
 
 from omnidyn.compiled.kernel import part
-from omnidyn.control.mpc.layout import V
 from omnidyn.control.mpc.model import PHI
-from omnidyn.control.mpc.riccati import advance
+from omnidyn.control.mpc.riccati import V, advance
 from omnidyn.control.mpc.small import minus, put3, vector
 from omnidyn.control.mpc.stages import friction_at, linear_stage
 

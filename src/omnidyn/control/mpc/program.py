@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
-from omnidyn.control.mpc.guess import NEAR
-from omnidyn.control.mpc.layout import PULL, WAY, WEIGHT
-from omnidyn.control.mpc.model import DECAY, FEED, TURNING
+from omnidyn.control.mpc.model import DECAY, FALLING, FEED, SLOW, TURNING, WIDTH
 from omnidyn.control.mpc.observer import PUSH, SCALE
-from omnidyn.control.mpc.small import matrix, minus, mv, plus, put3, vector
-from omnidyn.control.mpc.stages import frame_at, friction_at, linear_stage
+from omnidyn.control.mpc.riccati import PULL, WAY, WEIGHT
+from omnidyn.control.mpc.small import dot, matrix, minus, mv, plus, put3, vector
+from omnidyn.control.mpc.stages import frame_at, friction_at, level_at, linear_stage
 
 POSE_WEIGHT, TWIST_WEIGHT, LAST_WEIGHT, AGAIN, LEARN = 0, 3, 6, 7, 8  # entries of `settings`
 SLEW, CURRENT, SPEED, SPEED_WEIGHT, SETTINGS_SIZE = 9, 10, 11, 14, 15  # limits: V a step, whether, [m/s], cost
@@ -72,3 +71,96 @@ def make_stages(linear, levels, estimate, stage, x):
         linear_stage(
             linear, levels, estimate[SCALE], push, stage, k, x[k, 2], vector(x, k, 3), end, sense, 1.0, True
         )  # fmt: skip
+
+
+# The motion along which a step is made linear: that of the step before, shifted by one; and whether to do it again
+
+TURN = 6.283185307179586
+NEAR = tuple(SLOW.tolist())  # [m/s, m/s, rad/s] below which robot and path stand still
+SOON = 21  # steps of the horizon that are compared: later ones are looked at again before they matter
+MOVED, TURNED, PULLED = 0.25, 0.02, 0.05  # share of friction, [rad], [V]: what differs by less is the same motion
+
+
+@part
+def shift(x, u, active, fast, known, preview, start):
+    """The prediction of the last step as guess of this one; the reference where there is none."""
+    n = len(u)
+    if not known:
+        for k in range(n + 1):
+            put3(x, k, 0, vector(preview, start + k, 0))
+            put3(x, k, 3, vector(preview, start + k, 3))
+        for k in range(n):
+            for i in range(u.shape[1]):
+                active[k, i] = 0
+            for i in range(3):
+                fast[k, i] = 0
+        return
+    for k in range(n):
+        put3(x, k, 0, vector(x, k + 1, 0))
+        put3(x, k, 3, vector(x, k + 1, 3))
+        for i in range(u.shape[1]):
+            active[k, i] = active[k + 1, i] if k + 1 < n else 0
+        for i in range(3):
+            fast[k, i] = fast[k + 1, i] if k + 1 < n else 0
+
+
+@part
+def rests(preview, start, x):
+    """Whether robot and path stand still: then the motion predicted last is no guess for this step."""
+    for i in range(3):
+        if abs(x[0, 3 + i]) >= NEAR[i]:
+            return False
+        for k in range(len(x)):
+            if abs(preview[start + k, 3 + i]) >= NEAR[i]:
+                return False
+    return True
+
+
+@part
+def stay(x):
+    """Predict that the robot stays where it is."""
+    for k in range(1, len(x)):
+        put3(x, k, 0, vector(x, 0, 0))
+        put3(x, k, 3, (0.0, 0.0, 0.0))
+
+
+@part
+def nearest_turn(heading, reference):
+    """What to add to headings of the reference so that they are nearest to the robot's [rad]."""
+    return TURN * round((heading - reference) / TURN)
+
+
+@part
+def between(x, before):
+    """Twists half-way between two predictions: what would swing from one direction to the other comes to rest."""
+    for k in range(1, len(x)):
+        for i in range(3, 6):
+            x[k, i] = 0.5 * (x[k, i] + before[k, i])
+
+
+@part
+def moved(levels, emf, limited, x, before):
+    """Whether a prediction differs from the one it was made along: other friction, another heading.
+
+    limited: or, where currents are limited, another back-EMF.
+    """
+    for k in range(1, min(len(x), SOON)):
+        if abs(x[k, 2] - before[k, 2]) > TURNED:
+            return True
+        one, two = vector(x, k, 3), vector(before, k, 3)
+        for e in range(len(levels)):
+            g = vector(levels, e, 0)
+            r = 1.0 / levels[e, WIDTH]
+            a, b = min(max(dot(g, one) * r, -1.0), 1.0), min(max(dot(g, two) * r, -1.0), 1.0)
+            if abs(a - b) > MOVED:
+                return True
+            if levels[e, FALLING] > 0.0:
+                now, then = level_at(levels, e, dot(g, one))[0], level_at(levels, e, dot(g, two))[0]
+                if abs(now - then) > MOVED * now:
+                    return True
+        if limited:
+            change = one[0] - two[0], one[1] - two[1], one[2] - two[2]
+            for i in range(len(emf)):
+                if abs(dot(vector(emf, i, 0), change)) > PULLED:
+                    return True
+    return False

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +23,7 @@ from omnidyn.control.mpc.program import (
     TWIST_WEIGHT,
 )
 from omnidyn.errors import InputError
+from omnidyn.model.frames import world_to_body
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 
@@ -84,3 +87,52 @@ class Settings:
         amperes = np.minimum(*(per_wheel(np.inf if each is None else each, count) for each in (self.current, own)))
         limit = np.array([volts(robot), np.minimum(amperes * per_wheel(robot.motor.resistance, count), 1e9)])
         return table, np.full(count, float(self.volts)), limit, emf(robot)
+
+
+# The part of a path that lies ahead, on the grid of the steps: sampled in blocks, so that a step only looks it up
+
+BLOCK = 512  # steps sampled at once
+OFF_GRID = 1e-6  # of a step
+
+
+class Preview:
+    """Rows of pose and twist of a path, `rows`: shape (samples, 6), dt apart; `end`: of the path [s].
+
+    late: steps until an output acts; ahead: steps of the horizon.
+    """
+
+    def __init__(self, dt: float, late: int, ahead: int) -> None:
+        self._dt, self.late, self.ahead = dt, late, ahead
+        self._need = late + ahead + 1
+        self._path, self._begin, self._most = None, math.nan, -1
+        self.rows, self.end = np.zeros((0, 6)), math.inf
+
+    def another(self) -> Preview:
+        """The same for another path."""
+        return Preview(self._dt, self.late, self.ahead)
+
+    def row_at(self, t: float, path: Any) -> int:
+        """The row of `rows` at which the horizon of a step at time t [s] begins."""
+        if path is self._path:
+            where = (t - self._begin) / self._dt
+            row = round(where)
+            if 0 <= row <= self._most and abs(where - row) < OFF_GRID * max(1.0, abs(row)):
+                return row + self.late
+            aligned = row > self._most and abs(where - row) < OFF_GRID * max(1.0, abs(row))
+        else:
+            aligned = True
+        self._most = BLOCK if aligned else 0  # a clock that trembles meets no row twice
+        self.rows = sampled(path, np.asarray(t + self._dt * np.arange(self._most + self._need), dtype=float))
+        self._path, self._begin = path, t
+        self.end = float(getattr(path, "end", math.inf))
+        return self.late
+
+
+def sampled(path: Any, t: FloatArray) -> FloatArray:
+    """Pose in the world, and twist in the body frame, of a path at times t [s]. Shape (n, 6)."""
+    pose, velocity = path.at(t)[:2]
+    twist = np.einsum("...ij,...j->...i", world_to_body(pose[..., 2]), velocity)
+    rows = np.ascontiguousarray(np.concatenate([pose, twist], axis=-1), dtype=float)
+    if rows.shape != (len(t), 6) or not np.isfinite(rows).all():
+        raise ValueError("a path that says no pose")
+    return rows

@@ -20,7 +20,6 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
-from omnidyn.control.mpc.layout import CP, CV, GX, GY, HP, HV, E, V
 from omnidyn.control.mpc.model import (
     ACROSS,
     BACKWARD,
@@ -41,6 +40,7 @@ from omnidyn.control.mpc.model import (
     TURNING,
     WIDTH,
 )
+from omnidyn.control.mpc.riccati import CP, CV, GX, GY, HP, HV, E, V
 from omnidyn.control.mpc.small import added, inverse, matrix, minus, mm, mv, plus, put3, put9, vector
 from omnidyn.model.friction.stribeck import fall
 

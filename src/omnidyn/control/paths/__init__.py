@@ -1,3 +1,3 @@
 """Where a robot should be when. Read in this order: motion (the contract: Path, Motion), curve (closed curves and what
-the heading does on them), lines (rows joined by straight lines, from a file or a Run), goal (one pose), path (by name).
+the heading does on them; rows joined by straight lines, from a file or a Run), path (by name; one pose).
 """

@@ -9,6 +9,7 @@ Heading: "held" stays, "turning" turns evenly, "along" points where the curve go
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -17,6 +18,10 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
 from omnidyn.control.paths.motion import Motion, Path
+from omnidyn.errors import InputError
+from omnidyn.logs.readers.read_table import read_table
+from omnidyn.model.frames import unwrapped
+from omnidyn.run import Run
 
 Plane = Callable[[FloatArray], FloatArray]  # t, shape (k,) -> position and its first three derivatives, (4, k, 2)
 CORNER = 1e-9  # of a side: so near before a corner, the corner is reached
@@ -152,3 +157,92 @@ def zigzag(speed: float, sideways: float, half: float, lag: float) -> Plane:
 def swinging(turn: float, half: float, lag: float) -> Callable[[FloatArray], FloatArray]:
     """A heading that swings there and back [rad], `lag` [s] ahead."""
     return lambda t: triangle(turn, half, t + lag)[:3]
+
+
+# Rows joined by straight lines: a path from a CSV file `t_s,x_m,y_m,heading_rad`, from a Run, or from an array
+
+COLUMNS = ("t_s", "x_m", "y_m", "heading_rad")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Lines(Path):
+    """t [s], shape (rows,), from 0 on; pose [m, m, rad], shape (rows, 3)."""
+
+    name: str
+    t: FloatArray
+    pose: FloatArray
+
+    @property
+    def duration(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Until the last row [s]."""
+        return float(self.t[-1])
+
+    @property
+    def end(self) -> float:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The last row [s]: it stays there."""
+        return float(self.t[-1])
+
+    def at(self, t: ArrayLike) -> Motion:
+        """See Path. On a row, the velocity is that of the line after it."""
+        time = np.asarray(t, dtype=float)
+        now = time.reshape(-1)
+        line = np.clip(np.searchsorted(self.t, now * (1.0 + 1e-12), side="right") - 1, 0, len(self.t) - 2)
+        span = np.diff(self.t)[line][:, None]
+        share = np.clip((now - self.t[line])[:, None] / span, 0.0, 1.0)
+        step = self.pose[line + 1] - self.pose[line]
+        moving = ((now >= 0.0) & (now < self.t[-1]))[:, None]
+        parts = self.pose[line] + share * step, np.where(moving, step / span, 0.0), np.zeros((len(now), 3))
+        return Motion(*(part.reshape(*time.shape, 3) for part in parts))
+
+
+def lines(t: ArrayLike, pose: ArrayLike, name: str) -> Lines:
+    """A path through poses [m, m, rad], shape (rows, 3), at times t [s], shape (rows,); the first is its t = 0.
+
+    Headings within half a turn of 0 that jump by more than half a turn are taken to be wrapped.
+    Raises InputError for fewer than two rows, other shapes, values that are not finite, or times that do not increase.
+    """
+    time, place = np.asarray(t, dtype=float), np.array(pose, dtype=float)
+    if time.ndim != 1 or place.shape != (len(time), 3) or len(time) < 2:
+        raise InputError(
+            "no path", got=f"{time.shape} times and {place.shape} poses", expected="(rows,) and (rows, 3), rows >= 2",
+            where=name,
+        )  # fmt: skip
+    bad = np.flatnonzero(~np.isfinite(np.column_stack([time, place])).all(axis=1))
+    if bad.size:
+        raise InputError(
+            "not a finite number", got=place[bad[0]].tolist(), expected="numbers", where=f"{name}, row {bad[0]}"
+        )
+    back = np.flatnonzero(np.diff(time) <= 0.0)
+    if back.size:
+        raise InputError(
+            "time does not increase", got=f"{time[back[0] + 1]:.12g} after {time[back[0]]:.12g}",
+            expected="increasing times", remedy="sort the rows by time and keep one of each",
+            where=f"{name}, row {back[0] + 1}",
+        )  # fmt: skip
+    if np.abs(place[:, 2]).max() <= np.pi + 1e-6:
+        place[:, 2] = unwrapped(place[:, 2])
+    return Lines(name, time - time[0], place)
+
+
+def path_of_run(run: Run) -> Lines:
+    """The path that a Run went: its poses. Raises InputError for a Run without, or with gaps in them."""
+    if run.pose is None:
+        raise InputError(
+            "this run has no poses to follow", got=", ".join(run.channels) or "no channel", expected="x, y and heading",
+            remedy="take a run of a simulation, or a log with a pose", where=run.source,
+        )  # fmt: skip
+    known = np.isfinite(run.pose).all(axis=1)
+    return lines(run.t[known], run.pose[known], run.source or "a run")
+
+
+def path_of_file(path: str | os.PathLike) -> Lines:
+    """A path from a table with the columns t_s, x_m, y_m and heading_rad; others, of a run file, are not looked at."""
+    table = read_table(path)
+    missing = [name for name in COLUMNS if name not in table.names]
+    if missing:
+        raise InputError(
+            "no path in this file", got=", ".join(table.names), expected=", ".join(COLUMNS),
+            remedy=f"add {', '.join(missing)}", where=table.source,
+        )  # fmt: skip
+    t, *pose = (table.measured(name) for name in COLUMNS)
+    return lines(t, np.column_stack(pose), str(table.source))

@@ -17,19 +17,18 @@ from omnidyn.export.code.translate import Program
 from omnidyn.export.code.types import INT, REAL, Array, Type
 from omnidyn.export.spelling import SINGLE_MAX, c_number, filled
 from omnidyn.model.actuation import Driver
+from omnidyn.model.dynamics import state_space
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import state_space
 from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.commands import MAX_DT
 from omnidyn.simulation.engine import FARTHEST
-from omnidyn.simulation.exact import inductance_position, march
-from omnidyn.simulation.exact.inductance import axis_laws, current_gain
-from omnidyn.simulation.exact.inductance_position import COUNT, GAUSS, Axes, Nodes
+from omnidyn.simulation.exact import inductance, march
+from omnidyn.simulation.exact.inductance import COUNT, GAUSS, Axes, Nodes, axis_laws, current_gain
 from omnidyn.simulation.exact.inductance_step import AxisLaw
 from omnidyn.simulation.exact.march import NODES, WEIGHTS, axis_levels
 
-MARCH, PLACE = "omnidyn.simulation.exact.march", "omnidyn.simulation.exact.inductance_position"
+MARCH, PLACE = "omnidyn.simulation.exact.march", "omnidyn.simulation.exact.inductance"
 AXES = Array((3,))
 # Of one while loop: pieces of a way, events of an axis. A step of 1 s at 1000 rad/s takes 4000 and 200.
 MOST_TURNS, MOST_TURNS_WITH_INDUCTANCE = 16_000, 1_000
@@ -157,7 +156,7 @@ def _advance(program: Program, robot: Robot) -> str:
     """The step with what it checks before and after."""
     dynamic, single = robot.motor.electrical == DYNAMIC, program.single
     largest = SINGLE_MAX if single else sys.float_info.max
-    piece = inductance_position.PIECE if dynamic else march.PIECE  # [rad] at the most that a turn of the loop takes
+    piece = inductance.PIECE if dynamic else march.PIECE  # [rad] at the most that a turn of the loop takes
     numbers = {
         "LARGEST": largest, "LONGEST": MAX_DT, "TWIST": FARTHEST["twist"], "POSE": FARTHEST["pose"],
         "FULL_TURN": piece * program.most_turns,

@@ -24,13 +24,13 @@ from omnidyn.arrays import FloatArray
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.spelling import hash_comment, number
-from omnidyn.model.deadzone import axis_patterns
+from omnidyn.model.deadzone import axis_patterns, push_per_volt
+from omnidyn.model.dynamics import damping, motor_wrench
 from omnidyn.model.keys import Key
 from omnidyn.model.known.told import told
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import coulomb_along
-from omnidyn.model.statespace import damping, motor_wrench, push_per_volt
 from omnidyn.model.wheels import per_wheel
 
 AXES = ("x", "y", "yaw")

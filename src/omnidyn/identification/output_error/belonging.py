@@ -17,9 +17,9 @@ from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.model import keys
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN
-from omnidyn.model.fitted.log_effects import Lateness, LogEffects, log_mark
 from omnidyn.model.frames import AXES
 from omnidyn.model.keys import find_key, with_priors
+from omnidyn.model.log_effects import Lateness, LogEffects, log_mark
 from omnidyn.model.robot import JOINT, WITH_THE_FIT, Prior, Robot
 from omnidyn.run import Run
 

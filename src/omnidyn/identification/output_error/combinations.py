@@ -17,10 +17,11 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.answer import Combination
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.trust.uncertainty import BLIND, Trust
+from omnidyn.model.deadzone import push_per_volt
+from omnidyn.model.dynamics import damping
 from omnidyn.model.frames import AXES
 from omnidyn.model.keys import VISCOUS, Key
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import damping, push_per_volt
 
 STEP = 1e-4  # of a number or its logarithm: rounding and curvature below 1e-8
 LOST = 1e-3  # share of a lost direction that a combination may have

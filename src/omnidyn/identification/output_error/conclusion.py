@@ -33,8 +33,7 @@ from omnidyn.identification.output_error.trust.ends import at_the_end
 from omnidyn.identification.output_error.trust.support import too_early
 from omnidyn.identification.output_error.trust.uncertainty import Trust
 from omnidyn.model.keys import ROTOR, VISCOUS, WHEEL, Key, unit, with_priors
-from omnidyn.model.known.holding import holding
-from omnidyn.model.known.told import with_correlation
+from omnidyn.model.known.told import holding, with_correlation
 from omnidyn.model.robot import JOINT, WITH_THE_FIT, Prior, Robot
 from omnidyn.statement import ERROR, NOTE, WARNING, Statement
 from omnidyn.statistics import difference_noise

@@ -23,11 +23,11 @@ from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.trust.uncertainty import Trust
 from omnidyn.model.actuation import DEAD_BAND
-from omnidyn.model.deadzone import axis_patterns, breakaway_voltage
+from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, push_lost_per_volt, push_per_volt
+from omnidyn.model.dynamics import damping
 from omnidyn.model.frames import AXES
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import damping, push_per_volt, taken
 
 TRADE = 0.9  # correlation beyond which the sum of two numbers is known 2.3 to 4.4 times as well as they are
 
@@ -63,7 +63,7 @@ def _sums(
     now, slopes = of(problem.robot_at(values)), slopes_of(problem, values, of)
     robot, share, least = problem.robot_at(values), np.ones(3), np.ones(3)
     if trade is OFF:
-        share = taken(robot) / push_per_volt(robot)
+        share = push_lost_per_volt(robot) / push_per_volt(robot)
         patterns = np.abs(axis_patterns(robot))
         least = np.where(patterns > 0.0, patterns, np.inf).min(axis=1)  # all that push are beyond the dead band then
     own = np.zeros(len(values))

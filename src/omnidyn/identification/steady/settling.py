@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from omnidyn.model.dynamics import state_space
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import state_space
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.compiled.beside import small_matrices
+from omnidyn.compiled.parallel import small_matrices
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
 from omnidyn.identification.output_error.linear.motion import motions
 from omnidyn.identification.output_error.linear.rounded_inputs import effects, with_rounding
@@ -33,7 +33,7 @@ from omnidyn.identification.structure.noise_level import noise_levels
 from omnidyn.identification.structure.rests_on import rests_on
 from omnidyn.identification.structure.shifts import stability
 from omnidyn.identification.structure.tails import as_counted, calmer, wild_samples
-from omnidyn.model.known.holding import holding
+from omnidyn.model.known.told import holding
 
 SURE = 2.0  # degrees of freedom with which the power of the slowest errors is known within its own size
 SHOWN = 400  # columns: about what themes and candidates show

@@ -1,5 +1,5 @@
 """What is known of a robot's numbers, and what follows from that.
 
-told (what its file says of them: std, correlations, guesses), holding (levels of breakaway), uncertainty (draws of
+told (what its file says of them: std, correlations, guesses, levels of breakaway), uncertainty (draws of
 robots that may be meant), dead_zone (the dead zone with its interval, in words).
 """

@@ -27,11 +27,10 @@ from scipy.special import ndtri
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
-from omnidyn.compiled.beside import one_by_one
+from omnidyn.compiled.parallel import one_by_one
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.model.keys import Key
-from omnidyn.model.known.holding import holding
-from omnidyn.model.known.told import SIGNED, Told, is_log, numbers_told, told
+from omnidyn.model.known.told import SIGNED, Told, holding, is_log, numbers_told, told
 from omnidyn.model.robot import Robot
 
 DRAWS = 100

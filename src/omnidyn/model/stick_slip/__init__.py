@@ -1,5 +1,5 @@
 """Motion under dry friction, rest included, solved to the last bit: one monotone inclusion in three unknowns.
 
-plant (the constants of a robot; layout.py names them), forces (what acts at a speed), active_set (what is stuck, and
-Newton's step within it), can_hold (whether what is stuck can hold), inclusion (the solver), release (what gives way).
+plant (the constants of a robot; layout.py names them), forces (what acts at a speed), active_set (what is stuck,
+Newton's step within it, and whether what is stuck can hold), inclusion (the solver), release (what gives way).
 """

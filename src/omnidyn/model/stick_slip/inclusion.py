@@ -8,7 +8,7 @@ implicit step is such a problem; with tau = 1, x* = 0 and speeds frozen its solu
 
 Method: all kinks g_e . x = 0 pass through the origin, so space falls into cells (signs of the elements) and their
 faces (an active set: some stuck). Newton within one; on the way, stop at a kink that holds, pass one that gives way; at
-its optimum ask whether the stuck elements can hold (can_hold.py), and if not, release along the direction that they
+its optimum ask whether the stuck elements can hold (active_set.py), and if not, release along the direction that they
 cannot. A stuck element's speed is exactly 0: it is a flag, not a small number.
 
 The problem stands in a Plant, the constants, and in a Stage (layout.py names both).
@@ -29,8 +29,8 @@ from omnidyn.model.stick_slip.active_set import (
     moves_along,
     newton_direction,
     onto_active_set,
+    worst_direction,
 )
-from omnidyn.model.stick_slip.can_hold import worst_direction
 from omnidyn.model.stick_slip.forces import forces_at_work, residual, set_losses
 
 AFRESH = 40  # after so many, begin again from rest: the problem has one solution, whatever the first guess

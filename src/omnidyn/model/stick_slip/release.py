@@ -12,9 +12,8 @@ from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.model.layout import N_AXES, Plant, Problem, Stage, State, many, new_stage, new_states
 from omnidyn.model.stick_slip.band import FIRM, hold_in_band
-from omnidyn.model.stick_slip.forces import residual, winding
+from omnidyn.model.stick_slip.forces import aim_bristles, push_of_laws, residual, winding
 from omnidyn.model.stick_slip.inclusion import solve
-from omnidyn.model.stick_slip.laws import aim_bristles, push_of_laws
 
 
 def with_given_currents(plant: Plant) -> Problem:

@@ -1,4 +1,4 @@
-"""How long a step may be, and what its errors become, where friction falls with the speed or bends; see laws.py."""
+"""How long a step may be, and what its errors become, where friction falls with the speed or bends; see forces.py."""
 
 from __future__ import annotations
 

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel, maker, part
 from omnidyn.errors import InputError
+from omnidyn.model.dynamics import StateSpace, discretise, is_decoupled, state_space
 from omnidyn.model.mass import axis_masses, of_body_alone, spin_couples
 from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import StateSpace, discretise, is_decoupled, state_space
 from omnidyn.simulation.exact.step import exact_step, pieces, speed_within, turned_within
-from omnidyn.simulation.pose import put_next_pose, rotated
 
 # 4 Gauss-Legendre nodes on [0, 1]; a piece is at most PIECE / (fastest rate) long: 2e-13 m over 10 s of 20 ms steps.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
@@ -219,3 +218,27 @@ def _poses(twists, drive, phi, which, steps, rate, coulomb, breakaway, start, no
             turn = turned_within(dt, twists[k, 2], twists[k + 1, 2], event[2], before[2], after[2], rate[2])
             lost = put_next_pose(out, k, x, y, turn, lost)
     return out
+
+
+# From twist to pose, one step at a time: the two lines that every engine shares
+
+
+@part
+def rotated(angle, x, y):
+    """(x, y) turned by `angle` [rad]: from the body frame to one against which the body has turned by it, eq (1)."""
+    cos, sin = math.cos(angle), math.sin(angle)
+    return cos * x - sin * y, sin * x + cos * y
+
+
+@part
+def put_next_pose(poses, k, x, y, turn, lost):
+    """Write row k + 1 of `poses`: row k moved by (x, y) in its own body frame [m], then turned by `turn` [rad].
+
+    Returns what rounding took from the heading; handed in again as `lost` it makes the headings a compensated sum.
+    """
+    east, north = rotated(poses[k, 2], x, y)
+    poses[k + 1, 0] = poses[k, 0] + east
+    poses[k + 1, 1] = poses[k, 1] + north
+    kept = turn - lost
+    poses[k + 1, 2] = poses[k, 2] + kept
+    return (poses[k + 1, 2] - poses[k, 2]) - kept

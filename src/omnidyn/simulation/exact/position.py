@@ -15,10 +15,9 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
-from omnidyn.simulation.exact.march import NODES, WEIGHTS, next_cut, turning
+from omnidyn.simulation.exact.march import NODES, WEIGHTS, next_cut, rotated, turning
 from omnidyn.simulation.exact.slopes import hold_slopes, step_slopes, travel_slopes
 from omnidyn.simulation.exact.step import pieces as pieces_of
-from omnidyn.simulation.pose import rotated
 
 X, Y = 0, 1  # rows of `place`
 VALUE, BY_SPEED, BY_DRIVE, BY_COULOMB, BY_RATE, PLACE_SIZE = 0, 1, 4, 7, 10, 13  # its columns: 3 each, one per axis

@@ -17,9 +17,9 @@ from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.errors import InputError
 from omnidyn.model.layout import N_AXES, Plant, Problem, Stage, State, many, new_stage, new_states
 from omnidyn.model.stick_slip.band import band_error, cross_band, crosses, gather
-from omnidyn.model.stick_slip.copies import copy_row, copy_state, row_of_state, signs_differ, state_of_row
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import CAP
+from omnidyn.model.stick_slip.plant import copy_row, copy_state, row_of_state, signs_differ, state_of_row
 from omnidyn.model.stick_slip.release import put, settle, sticks, with_given_currents
 from omnidyn.model.stick_slip.step_bound import (
     MONOTONE,

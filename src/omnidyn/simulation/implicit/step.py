@@ -14,10 +14,9 @@ import math
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.stick_slip.band import FIRM, hold_in_band, keep_drive
-from omnidyn.model.stick_slip.copies import copy_row
-from omnidyn.model.stick_slip.forces import forces_at_work
+from omnidyn.model.stick_slip.forces import aim_bristles, forces_at_work, keep_bristles
 from omnidyn.model.stick_slip.inclusion import solve
-from omnidyn.model.stick_slip.laws import aim_bristles, keep_bristles
+from omnidyn.model.stick_slip.plant import copy_row
 from omnidyn.model.stick_slip.release import put, take
 
 GAMMA = 1.0 - 1.0 / math.sqrt(2.0)

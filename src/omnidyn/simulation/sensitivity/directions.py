@@ -16,7 +16,7 @@ from omnidyn.model.keys import CENTRE, ROTOR, WHEEL, Key
 from omnidyn.model.layout import N_AXES, Plant, Stage, State, many, new_stage, new_state
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
-from omnidyn.model.surroundings.floor import refuse_slope
+from omnidyn.model.surroundings import refuse_slope
 from omnidyn.model.wheels import refuse_slip
 
 EPS = 1e-5  # relative change of a parameter: rounding 1e-11, curvature 1e-10; all kinks are on their branch

@@ -6,11 +6,9 @@ import numpy as np
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import N_AXES, OPEN, Plant, Stage
-from omnidyn.model.stick_slip.active_set import find_active_set, newton_direction
-from omnidyn.model.stick_slip.can_hold import worst_direction
-from omnidyn.model.stick_slip.copies import copy_state, copy_table, signs_differ
-from omnidyn.model.stick_slip.forces import forces_at_work, residual, set_losses, winding
-from omnidyn.model.stick_slip.laws import aim_bristles
+from omnidyn.model.stick_slip.active_set import find_active_set, newton_direction, worst_direction
+from omnidyn.model.stick_slip.forces import aim_bristles, forces_at_work, residual, set_losses, winding
+from omnidyn.model.stick_slip.plant import copy_state, copy_table, signs_differ
 from omnidyn.model.stick_slip.release import put, settle, sticks
 from omnidyn.simulation.implicit.march import SHORTEST
 from omnidyn.simulation.implicit.step import step

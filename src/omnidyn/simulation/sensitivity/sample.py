@@ -25,7 +25,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import part
 from omnidyn.model.layout import N_AXES
-from omnidyn.model.stick_slip.copies import copy_row, copy_table
+from omnidyn.model.stick_slip.plant import copy_row, copy_table
 from omnidyn.simulation.implicit.step import GAMMA
 from omnidyn.simulation.sensitivity.directions import EPS
 

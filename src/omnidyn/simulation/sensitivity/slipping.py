@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.compiled.beside import side_by_side
+from omnidyn.compiled.parallel import side_by_side
 from omnidyn.model.frames import body_to_world
 from omnidyn.model.motor import DYNAMIC, settled_current
 from omnidyn.model.robot import Robot

@@ -6,7 +6,7 @@ import math
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.stick_slip.step_bound import MONOTONE, grown, share_left
-from omnidyn.simulation.slip.wheel import current_at
+from omnidyn.simulation.slip.body import current_at
 
 SHARE = 0.1  # of an error of the yaw rate, and of a rim, beside one of the speed
 CURRENT_SHARE = 1e-2  # and of a current

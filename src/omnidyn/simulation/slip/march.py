@@ -16,9 +16,10 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.errors import InputError
 from omnidyn.model.layout import N_AXES, Plant, Stage, new_stage, record
-from omnidyn.model.stick_slip.copies import copy_each, copy_row, signs_differ
+from omnidyn.model.stick_slip.plant import copy_each, copy_row, signs_differ
 from omnidyn.model.stick_slip.step_bound import MONOTONE
 from omnidyn.simulation.implicit.march import SIMPSON, advance_pose
+from omnidyn.simulation.slip.body import FREE, GRIPS, LINE
 from omnidyn.simulation.slip.bounds import (
     SHARE,
     bristle_turns,
@@ -30,7 +31,6 @@ from omnidyn.simulation.slip.bounds import (
 )  # fmt: skip
 from omnidyn.simulation.slip.plant import SlipPlant
 from omnidyn.simulation.slip.stage import SWEEPS, slip_step
-from omnidyn.simulation.slip.wheel import FREE, GRIPS, LINE
 from omnidyn.simulation.speed_loop import Loop, passed, tick_answer, tick_branch
 
 SHORT, SHORTEST, ROUNDING = 1.5e-4, 1e-11, 1e-13  # as in implicit/march.py

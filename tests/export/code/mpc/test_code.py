@@ -10,12 +10,12 @@ import pytest
 
 import omnidyn
 from omnidyn.control.controllers import ControllerFile, controller_named, save_controller
-from omnidyn.control.mpc.layout import CP, CV, GX, GY, HP, HV, PULL, WEIGHT, E, V
+from omnidyn.control.mpc.riccati import CP, CV, GX, GY, HP, HV, PULL, WEIGHT, E, V
 from omnidyn.control.paths.path import path
 from omnidyn.errors import UnsupportedError
 from omnidyn.export.code.c_controller import c_controller
-from omnidyn.model.drive import Drive
 from omnidyn.model.friction import DirectionFriction, Friction, WheelFriction
+from omnidyn.model.motor import Drive
 from omnidyn.simulation.live import LiveRobot
 from tests.support.controlled import CController
 from tests.support.exported import STRICT

@@ -12,8 +12,8 @@ from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.question import Question
 from omnidyn.identification.whole_logs import fit_output_error
-from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
+from omnidyn.model.log_effects import LogEffects
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import voltages
 

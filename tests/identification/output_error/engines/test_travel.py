@@ -7,9 +7,9 @@ from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.question import Question
-from omnidyn.model.fitted.log_effects import LogEffects
+from omnidyn.model.dynamics import state_space
 from omnidyn.model.keys import Key
-from omnidyn.model.statespace import state_space
+from omnidyn.model.log_effects import LogEffects
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.march_cases import FACING, ROBOT_KEYS, a_case, truth

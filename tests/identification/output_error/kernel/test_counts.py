@@ -9,9 +9,9 @@ from scipy.stats import truncnorm
 
 from omnidyn.identification.output_error.kernel.counts import count_terms, information, rounding, tail
 from omnidyn.identification.whole_logs import fit_output_error, identify_groups
+from omnidyn.model.deadzone import push_per_volt
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot import Prior
-from omnidyn.model.statespace import push_per_volt
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import voltages

@@ -8,7 +8,7 @@ from benchmarks.wrong_worlds.world import World
 from omnidyn.identification.output_error.problem.driven import least_that_drove
 from omnidyn.identification.output_error.problem.nuisances import nuisance_parameters
 from omnidyn.identification.output_error.problem.record import record
-from omnidyn.model.drive import Drive
+from omnidyn.model.motor import Drive
 from tests.support import real_logs as real
 
 

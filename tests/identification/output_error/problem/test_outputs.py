@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn.errors import InputError
 from omnidyn.identification.whole_logs import fit_output_error
-from omnidyn.model.fitted.log_effects import LogEffects
+from omnidyn.model.log_effects import LogEffects
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, TRUTH, voltages
@@ -83,7 +83,7 @@ def test_an_unknown_output_is_refused(axebot, clean):
 def pushed(robot, voltage, force, dt=0.01, **more):
     """simulate with a push on the body: the volts that push as hard are added, the log does not hold them."""
     mass = np.array([robot.body.mass, robot.body.mass, robot.body.inertia])
-    from omnidyn.model.statespace import state_space
+    from omnidyn.model.dynamics import state_space
 
     wide = robot.replace(motor=robot.motor.replace(voltage_limit=100.0))
     run = simulate(wide, voltage + np.linalg.solve(state_space(robot).B, force / mass), dt, **more)

@@ -11,7 +11,7 @@ from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.output_error.solve.solver import CLOSE, MAX_ITERATIONS, Solver, State
 from omnidyn.identification.question import Question
 from omnidyn.identification.whole_logs import fit_output_error
-from omnidyn.model import dynamics, statespace
+from omnidyn.model import dynamics
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation, noisy_draw
 
@@ -39,9 +39,9 @@ def test_a_fit_derives_the_motors_once(axebot, monkeypatch):
         derived.append(given)
         return wrench(*given)
 
-    monkeypatch.setattr(statespace, "wrench_of_motors", wrench_of_motors)
+    monkeypatch.setattr(dynamics, "wrench_of_motors", wrench_of_motors)
     log = noisy_draw(simulate(axebot, excitation(20.0), 0.01), 0)
-    statespace._motor_wrench.cache_clear()
+    dynamics._motor_wrench.cache_clear()
     derived.clear()
     fit_output_error(log, axebot, start="rest", nuisances=())
     assert len(derived) == 2  # braking and driving

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from omnidyn.control.controller import FARTHEST, WHEEL_SPEED
-from omnidyn.control.mpc import guess, interior_point, observer, program, solve, tables
+from omnidyn.control.mpc import interior_point, loop, observer, program
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.mpc.model import (
     ACROSS,
@@ -96,15 +96,15 @@ def _constants(controller: Mpc) -> str:
         "LEARN": controller.observer, "BOUNDED": _bounded(controller), "CURRENT": _current(controller),
         "SLEW": settings.slew is not None,
         "WHEEL_SPEED": controller.output == WHEEL_SPEED, "LATE_STEPS": controller.steps_late,
-        "PASSES": observer.PASSES, "SOON": guess.SOON, "AGAIN": settings.again,
-        "FIRST_PASSES": solve.FIRST, "LAST_PASSES": solve.LAST, "MOST": MOST,
+        "PASSES": observer.PASSES, "SOON": program.SOON, "AGAIN": settings.again,
+        "FIRST_PASSES": interior_point.FIRST, "LAST_PASSES": interior_point.LAST, "MOST": MOST,
     }  # fmt: skip
     numbers = {
         "FARTHEST": FARTHEST, "EXACT": observer.EXACT, "LAST_WEIGHT": settings.last, "VOLTS_WEIGHT": settings.volts,
         "BEYOND": BEYOND, "BACK_OFF": interior_point.BACK_OFF, "CENTRE": CENTRE,
-        "TIGHT": TIGHT, "LEAST": LEAST, "NARROWEST": NARROWEST, "TURNED": guess.TURNED, "MOVED": guess.MOVED,
-        "PULLED": guess.PULLED, "FARTHEST_OFF": observer.BEYOND, "MOST_SCALE": observer.MOST,
-        "START_PUSH": tables.START_PUSH, "START_SCALE": tables.START_SCALE, "SHARP": settings.volts,
+        "TIGHT": TIGHT, "LEAST": LEAST, "NARROWEST": NARROWEST, "TURNED": program.TURNED, "MOVED": program.MOVED,
+        "PULLED": program.PULLED, "FARTHEST_OFF": observer.BEYOND, "MOST_SCALE": observer.MOST,
+        "START_PUSH": loop.START_PUSH, "START_SCALE": loop.START_SCALE, "SHARP": settings.volts,
     }  # fmt: skip
     if ellipse:
         numbers |= dict(
@@ -128,7 +128,7 @@ def _matrices(controller: Mpc, linear: np.ndarray) -> dict[str, Any]:
     found: dict[str, Any] = {"GAINS": np.concatenate([_square(linear, at) for at in (DECAY, PHI, PSI)])}
     found |= {"FEED": _square(linear, FEED), "PUSH": own.push.T, "PULL": own.pull}
     found |= {"WEIGHT": (*settings.pose, *settings.twist)}
-    found |= {"NEAR": guess.NEAR, "HOME": program.HOME, "ARRIVED": program.ARRIVED}
+    found |= {"NEAR": program.NEAR, "HOME": program.HOME, "ARRIVED": program.ARRIVED}
     if len(own.levels):
         assert (GX, ACROSS, SOFT) == (0, 3, 9)  # columns that model.c counts by hand
         found["LEVEL"] = own.levels[:, : SOFT + 1]  # what falls with the speed has no C

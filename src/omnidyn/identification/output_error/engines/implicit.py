@@ -15,7 +15,7 @@ from typing import Self
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.compiled.beside import side_by_side
+from omnidyn.compiled.parallel import side_by_side
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.actuation import driver_of, late_by
 from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, PUSH, TILT, Weighting
@@ -23,7 +23,7 @@ from omnidyn.identification.output_error.engines.sums import added
 from omnidyn.identification.output_error.problem.heading import headings, in_the_body
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
 from omnidyn.model.actuation import Driver, at_motors, clip_voltage
-from omnidyn.model.known.holding import holding
+from omnidyn.model.known.told import holding
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.sensitivity.directions import EPS, difference

@@ -25,9 +25,9 @@ from omnidyn.compiled.kernel import kernel, part
 from omnidyn.identification.output_error.kernel.counts import count_terms
 from omnidyn.identification.output_error.kernel.pull import add_pull
 from omnidyn.model.actuation import Driver, at_motor
+from omnidyn.simulation.exact.march import rotated
 from omnidyn.simulation.exact.position import move_on, put_displacement
 from omnidyn.simulation.exact.slopes import acceleration_at_end, hold_slopes, step_slopes, travel_slopes
-from omnidyn.simulation.pose import rotated
 
 PATH = 5  # integrals of the twist, then x and y of the displacement
 SAME = 1e-7  # times 1/a [s]: steps that differ by less share one exponential, to first order, which leaves 1e-15

@@ -31,7 +31,7 @@ from typing import cast
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
-from omnidyn.compiled.beside import side_by_side
+from omnidyn.compiled.parallel import side_by_side
 from omnidyn.identification.output_error.memory.across import widening
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
 from omnidyn.identification.output_error.memory.innovations import without_gaps

@@ -16,10 +16,10 @@ from omnidyn.identification.output_error.problem.starts import (
     window_rows,
 )
 from omnidyn.model.actuation import reaching
+from omnidyn.model.dynamics import state_space
 from omnidyn.model.frames import AXES
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import state_space
 from omnidyn.simulation.slip.plant import grips
 from omnidyn.statement import WARNING, Statement
 from omnidyn.statistics import difference_noise

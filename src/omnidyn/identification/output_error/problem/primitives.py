@@ -16,11 +16,10 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.problem.parameters import Parameter, robot_at
-from omnidyn.model.dynamics import settled_currents
+from omnidyn.model.dynamics import MotorWrench, motor_wrench, settled_currents, state_space
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
-from omnidyn.model.statespace import MotorWrench, motor_wrench, state_space
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.exact.march import axis_levels
 

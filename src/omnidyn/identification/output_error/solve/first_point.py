@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.compiled.beside import side_by_side
+from omnidyn.compiled.parallel import side_by_side
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.rates import RateEngine
 from omnidyn.identification.output_error.engines.slipping import implicit_engine

@@ -34,7 +34,7 @@ from omnidyn.identification.output_error.trust.traded_levels import Place, trade
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust
 from omnidyn.model.friction.kinds import KINDS
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, Key, in_words
-from omnidyn.model.known.holding import slides, slides_least
+from omnidyn.model.known.told import slides, slides_least
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 

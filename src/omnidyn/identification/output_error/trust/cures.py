@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.compiled.beside import side_by_side
+from omnidyn.compiled.parallel import side_by_side
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.output_error.engines.actuation import driver_of
 from omnidyn.identification.output_error.problem.problem import Problem

@@ -39,7 +39,7 @@ from omnidyn.identification.structure.missing.laws import (
 )
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, FRICTION, WHEELS, Key, find_key
-from omnidyn.model.known.holding import holding
+from omnidyn.model.known.told import holding
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import per_wheel
 from omnidyn.model.robot import Prior, Robot

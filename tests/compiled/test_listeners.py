@@ -6,9 +6,9 @@ import pytest
 from numba.core.caching import NullCache
 from numba.core.errors import NumbaError
 
-from omnidyn.compiled import hearing
-from omnidyn.compiled.hearing import heard, told
+from omnidyn.compiled import listeners
 from omnidyn.compiled.kernel import kernel
+from omnidyn.compiled.listeners import heard, told
 
 
 def test_who_waits_can_see_that_a_kernel_is_being_compiled(monkeypatch, folder):
@@ -60,4 +60,4 @@ def test_one_hears_what_other_threads_compile_and_only_while_one_listens():
             assert outer.under_way == ["a", "b"]
         assert (inner.under_way, inner.done) == (["a"], [])
     assert [name for name, _ in outer.done] == ["b"]
-    assert hearing._listeners == []
+    assert listeners._listeners == []

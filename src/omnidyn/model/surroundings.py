@@ -1,11 +1,8 @@
-"""Variations of a robot: loads, floors, slopes and batteries that its file knows by name, and how they change it.
+"""The floor a robot stands on, as far as it pulls: one that is not level.
 
-    [variations.payload.2kg]                  mass_kg = 2.0, inertia_kg_m2 = 0.01
-    [variations.floor.carpet.friction.axes]   viscous = .., coulomb = ..
-    [variations.tilt.ramp]                    tilt_deg = 2.0, downhill_deg = 90.0
-    [variations.battery.low]                  supply_V = 10.5
+    F = M g sin(tilt) (cos downhill, sin downhill)      in the room, whichever way the robot faces
 
-varied/vary.py makes the robot that carries, stands on and is fed by them.
+The friction of a floor stands in [friction]; that it presses less on a slope, by cos(tilt), is not in it.
 """
 
 from __future__ import annotations
@@ -13,11 +10,52 @@ from __future__ import annotations
 import re
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from omnidyn.arrays import FloatArray
+from omnidyn.errors import UnsupportedError
 from omnidyn.model.friction import Friction
-from omnidyn.model.surroundings.floor import Floor
 from omnidyn.model.value import PerWheel, Value, number, per_wheel_number, place
+
+GRAVITY = 9.81  # [m/s^2]
+STEEPEST = 45.0  # [degree]
+
+
+class Floor(Value):
+    """tilt: of the floor against the level [degree]. downhill: the direction in which it falls, in the room,
+    counter-clockwise from the x axis of the pose [degree]."""
+
+    tilt: Annotated[Annotated[float, number(0.0, STEEPEST)], Field(alias="tilt_deg", description="0 is level")] = 0.0
+    downhill: Annotated[
+        Annotated[float, number(-360.0, 360.0)],
+        Field(alias="downhill_deg", description="in the room, counter-clockwise from x"),
+    ] = 0.0
+
+    def pull(self, mass: float) -> FloatArray:
+        """The force on a mass [kg] along x and y of the room [N]. Shape (2,)."""
+        size = mass * GRAVITY * np.sin(np.radians(self.tilt))
+        angle = np.radians(self.downhill)
+        return size * np.array([np.cos(angle), np.sin(angle)])
+
+
+def refuse_slope(floor: Floor, who: str) -> None:
+    """Raises UnsupportedError where the floor is not level, for `who` knows level floors only."""
+    if floor.tilt:
+        raise UnsupportedError(
+            f"{who} no floor that is not level", got=f"{floor.tilt:g} degrees", expected="0",
+            remedy="take the robot without it", where="[floor] tilt_deg",
+        )  # fmt: skip
+
+
+# Variations of a robot: loads, floors, slopes and batteries that its file knows by name, and how they change it
+#
+# [variations.payload.2kg]                  mass_kg = 2.0, inertia_kg_m2 = 0.01
+#     [variations.floor.carpet.friction.axes]   viscous = .., coulomb = ..
+#     [variations.tilt.ramp]                    tilt_deg = 2.0, downhill_deg = 90.0
+#     [variations.battery.low]                  supply_V = 10.5
+#
+# varied/vary.py makes the robot that carries, stands on and is fed by them.
 
 _NAME = re.compile(r"[\w-]{1,60}", re.ASCII)
 FARTHEST = 100.0  # [m]

@@ -14,10 +14,9 @@ import numpy as np
 
 from omnidyn.arguments import check_order
 from omnidyn.errors import InputError
-from omnidyn.model.fitted.correlation import KeyCorrelation, key_correlation
+from omnidyn.model.log_effects import KeyCorrelation, key_correlation
 from omnidyn.model.robot import Prior, Robot
-from omnidyn.model.surroundings.floor import Floor
-from omnidyn.model.surroundings.variations import KINDS, Battery, Payload, Surface
+from omnidyn.model.surroundings import KINDS, Battery, Floor, Payload, Surface
 
 ON_FLOOR = ("axes", "direction")  # the parts of friction that a floor has; that at the wheels is of bearings and gears
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from omnidyn.compiled import beside
-from omnidyn.compiled.beside import one_by_one, side_by_side, small_matrices
+from omnidyn.compiled import parallel
+from omnidyn.compiled.parallel import one_by_one, side_by_side, small_matrices
 
 
 @pytest.fixture(autouse=True)
 def two_processors(monkeypatch):
-    monkeypatch.setattr(beside.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(parallel.os, "cpu_count", lambda: 2)
 
 
 def test_results_stand_in_the_order_of_their_items():

@@ -1,1 +1,0 @@
-"""Where a robot stands, and what its file knows by name: its floor, loads, batteries. vary (varied/) applies them."""

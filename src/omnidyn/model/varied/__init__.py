@@ -1,1 +1,0 @@
-"""vary: a robot under another load, on another floor, with another battery."""
