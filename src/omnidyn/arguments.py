@@ -15,7 +15,7 @@ MADE_BY = {
     "Log": "omnidyn.load_log(path) makes one",
     "PathLike": "what stands in a file is read by its path; a Run is ready to use",
     "SteadyTable": "omnidyn.read_steady_table(path) makes one",
-    "OutputErrorEstimate": "omnidyn.fit_output_error(runs, robot) makes one",
+    "OutputErrorEstimate": "omnidyn.identify(logs, robot) makes one",
 }
 
 Kinds = type | tuple[type, ...]

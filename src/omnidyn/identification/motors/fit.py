@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.methods import AUTO, GAUSS, STUDENT
 from omnidyn.identification.motors.bend import Bend, bend
 from omnidyn.identification.motors.between import CURVE, WORDS
 from omnidyn.identification.motors.engine import SPEED, MotorEngine, MotorProblem
@@ -36,7 +37,6 @@ from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.ends import at_the_end
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust, trust
-from omnidyn.identification.question import AUTO, GAUSS, STUDENT
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run, as_list
 from omnidyn.statement import Statement

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from omnidyn.identification.estimate import Estimate
-from omnidyn.identification.question import STEADY_STATE, Question
+from omnidyn.identification.methods import SteadyState
 from omnidyn.identification.steady.operating_points import ForcePoints, force_points
 from omnidyn.identification.steady.points import driven_axes
 from omnidyn.identification.steady.steady_state import fit_steady_state
@@ -21,15 +20,13 @@ from omnidyn.run import Run
 
 
 def identify_lines(
-    runs: Sequence[Run], robot: Robot, *, groups: Sequence[str] | None = None, question: Question | None = None,
-    **options: Any,
+    runs: Sequence[Run], robot: Robot, asked: SteadyState, groups: Sequence[str] | None = None
 ) -> dict[str, Estimate]:  # fmt: skip
-    """B and C of each axis and group: group -> Estimate. Options: see `identify_steady`.
+    """B and C of each axis and group: group -> Estimate. groups: name of each run's group.
 
     Every point counts for the axes that it drives. Friction elsewhere than on the axes is taken off the robot.
     Raises InsufficientDataError when no axis of a group has three points at two speeds or more.
     """
-    asked = Question.for_method(STEADY_STATE, question, options)
     points = force_points(
         runs, robot, groups=groups, speed=asked.speed, force_from=asked.force_from, window=asked.window
     )
