@@ -158,7 +158,13 @@ def tell_motor_table(table: str, robot: str, asked: Asked, to: Out) -> None:
     start, data = omnidyn.load_robot(robot) if robot else None, read_motor_table(table)
     study = omnidyn.identify(data, start, asked.method).study
     inputs = [{"role": "data", "name": table, "sha256": data.sha256}]
-    _tell(cast("MotorStudy", study), start, provenance([*([robot_input(robot)] if robot else []), *inputs]), to, lambda _: None)
+    _tell(
+        cast("MotorStudy", study),
+        start,
+        provenance([*([robot_input(robot)] if robot else []), *inputs]),
+        to,
+        lambda _: None,
+    )
 
 
 def _tell(
