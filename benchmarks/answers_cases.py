@@ -393,5 +393,5 @@ identify([read_log("pose.csv"), read_log("full.csv")], load_robot("box.toml"), O
 compare(load_robot("box.toml"), read_log("full.csv"), load_robot("rough.toml"), seed=3)
 compare(load_robot("mixed.toml"), read_log("mixed.csv"), tol=1e-4)
 compare(load_robot("four-wheel"), read_log("full.csv"))
-"""
+"""  # noqa: E501  one case a line
 CALLS = _CALLS.strip().splitlines()

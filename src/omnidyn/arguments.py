@@ -49,7 +49,8 @@ def check_order(call: str, *places: tuple[object, Kinds]) -> None:
                     got=f"{_kind(places[first][0])} before {_kind(places[second][0])}", expected=call,
                 )  # fmt: skip
     given, wanted = places[wrong[0]]
-    names = [each.__name__ for each in (wanted if isinstance(wanted, tuple) else (wanted,))]
+    kinds = wanted if isinstance(wanted, tuple) else (wanted,)
+    names = [kind.__name__ for kind in kinds if kind is not type(None)]
     raise InputError(
         f"an argument is no {' or '.join(names)}", got=_kind(given), expected=call,
         remedy=next((MADE_BY[name] for name in names if name in MADE_BY), ""),

@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.identify import identify
-from omnidyn.identification.methods import MotorLine
+from omnidyn.identification.methods import MotorFit, MotorLine
 from omnidyn.identification.motors.into_robot import motors_into_robot
 from omnidyn.model.motor import mass_at_rim
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
