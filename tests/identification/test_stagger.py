@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.stagger import OFF_NUMBER, apart, robot_of
+from omnidyn import MotorLine, identify
 from omnidyn.logs.read_log import read_log
 from tests.support.cases import case
 from tests.support.staggered import Logged, topics

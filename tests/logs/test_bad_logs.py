@@ -8,7 +8,7 @@ check/test_values.py, check/test_wiring.py; 27, 28 check/test_motion.py; 29 benc
 import numpy as np
 import pytest
 
-from omnidyn import check, load_log, load_robot, read_log, simulate, write_run
+from omnidyn import SteadyState, check, identify, load_log, load_robot, read_log, simulate, write_run
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.logs.read_log import LogOptions
 from omnidyn.logs.segments import segments

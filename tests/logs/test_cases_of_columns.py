@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from omnidyn import read_log
+from omnidyn import MotorLine, identify, read_log
 from omnidyn.errors import InputError
 from omnidyn.logs.motor_table import read_motor_table
 from omnidyn.logs.read_log import load_log

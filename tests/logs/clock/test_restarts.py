@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn import check, load_robot, read_log
+from omnidyn import MotorLine, check, identify, load_robot, read_log
 from omnidyn.errors import InputError
 from omnidyn.logs.read_log import LogOptions, load_log
 from omnidyn.logs.segments import segments
