@@ -39,7 +39,7 @@ guess = sheet.replace(
 )
 fit = omnidyn.identify(
     [log], guess, omnidyn.OutputError(free=["friction", "motor.resistance_ohm", "motor.rotor_inertia_kg_m2"])
-).estimate
+)
 model = fit.robot.replace(name="identified")
 for name, value in fit.value.items():
     print(f"{name:32} {value:10.4g} +- {fit.std[name]:.1g}")
