@@ -17,7 +17,7 @@ from benchmarks.identify_log import COUNTING, Draws
 from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.output_error.engines.exact import Weighting
+from omnidyn.identification.output_error.engines.engine import Weighting
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.prepare import make_problem
 from omnidyn.identification.output_error.problem.problem import Point

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.output_error.engines.exact import Weighting
+from omnidyn.identification.output_error.engines.engine import Weighting
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.joint import join
 from omnidyn.identification.output_error.solve.progress import FitProgress

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from omnidyn.identification.lack_of_fit import Remedy
-from omnidyn.identification.output_error.engines.slipping import SlipEngine
+from omnidyn.identification.output_error.engines.implicit import SlipEngine
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.ladder.models import Model, Move

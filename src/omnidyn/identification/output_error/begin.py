@@ -8,7 +8,6 @@ from dataclasses import replace
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.findings.needs import is_exact, why_no_inputs
 from omnidyn.identification.output_error.prepare import (
-    LOOP,
     Group,
     expand_keys,
     free_by_default,
@@ -69,7 +68,7 @@ def begun(name: str, runs: Sequence[Run], robot: Robot, question: Question, join
 
 def _refuse_profile(group: Group, question: Question) -> None:
     levels = [each for each in asked_levels(group.robot, question.free or (), question.fixed) if group.tells(each)]
-    why = "a speed loop" if group.engine == LOOP else ""
+    why = "a speed loop" if group.engine.looped else ""
     if group.robot.wheels.traction_mu is not None:
         why = "wheels that may slip"
     if why and levels:

@@ -10,9 +10,9 @@ import numpy as np
 from omnidyn.arrays import BoolArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.findings.needs import is_exact
+from omnidyn.identification.output_error.engines.engine import Engine
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.engines.slipping import implicit_engine
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
 from omnidyn.identification.output_error.problem.band import BANDS
 from omnidyn.identification.output_error.problem.differences import differences
@@ -20,7 +20,6 @@ from omnidyn.identification.output_error.problem.falling import falls, kept_in_o
 from omnidyn.identification.output_error.problem.motion import NOTHING, Motion, motion
 from omnidyn.identification.output_error.problem.nuisances import (
     LATENCY,
-    TRAVELS,
     automatic,
     earliest,
     nuisance_parameters,
@@ -56,9 +55,8 @@ from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.statement import Statement
 
-EXACT, IMPLICIT, LOOP = "exact", "implicit", "loop"  # the engines
+Kind = type[Engine[Problem]]  # of an engine
 FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
-FINER = 1e-6  # the same where a path is fitted: what a speed is off by adds up, to a tick of an encoder in 10 s
 ASIDE = 0.01  # by how much numbers are moved apart to see which engine knows the robots that they may make
 BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
 START_STD = np.array([0.5, 0.5, 5.0])  # [m/s, m/s, rad/s] of the twist of the first rows from that at the start
@@ -89,7 +87,7 @@ class Group:
     records: list[Record]
     robot: Robot
     question: Question
-    engine: str
+    engine: Kind
     usual: tuple[str, ...]
     moved: BoolArray
     bounds: dict[str, float]
@@ -117,8 +115,8 @@ def make_group(
     found = motion(records, robot)
     if looped(records):
         question = _loop_question(question, found, records, robot)
-        return Group(name, records, robot, question, LOOP, usual, found.moved, {}, ())
-    engine, bounds, warnings = EXACT if exact else IMPLICIT, {}, []
+        return Group(name, records, robot, question, LoopEngine, usual, found.moved, {}, ())
+    engine, bounds, warnings = ExactEngine if exact else ImplicitEngine, {}, []
     asked = question.free if question.free is not None else (*dict.fromkeys((*usual, *guesses(robot))),)
     fixed = set(question.fixed)
     for axis in np.flatnonzero(~found.moved).tolist():
@@ -176,7 +174,7 @@ def read_records(runs: Sequence[Run], robot: Robot, question: Question) -> list[
 
 
 def make_problem(
-    records: Sequence[Record], robot: Robot, question: Question, engine: str = "", usual: Sequence[str] = ()
+    records: Sequence[Record], robot: Robot, question: Question, engine: Kind | None = None, usual: Sequence[str] = ()
 ) -> Problem:
     """What is free, and how the pieces start. engine, usual: of `engine_for` and `free_by_default`, where known.
 
@@ -195,10 +193,10 @@ def make_problem(
         raise InputError("nothing is free", got=got, expected="at least one beside breakaway", where="free")
     own = robot_parameters(robot, keys, priors)
     engine = engine or engine_for(records, robot, keys)
-    if engine != EXACT:
+    if not engine.exact:
         drive = _drive(records, robot)
         own = [kept_in_order(_within_reach(p, drive), robot, keys) for p in own]
-    auto = automatic(records, engine == EXACT)
+    auto = automatic(records, engine.exact)
     more = (
         nuisance_parameters(auto, records, robot, earliest(records)) if question.nuisances is None
         else nuisance_parameters(question.nuisances, records, robot)
@@ -207,8 +205,8 @@ def make_problem(
     start = question.start
     parts = (
         loop_pieces(records, robot, start)
-        if engine == LOOP
-        else pieces(records, robot, start, late, START_STD if engine == IMPLICIT else None)
+        if engine.looped
+        else pieces(records, robot, start, late, None if engine.exact else START_STD)
     )
     rows = sum(int(np.isfinite(p.record.outputs[p.first : p.last + 1]).sum()) for p in parts)
     if rows <= len(own) + len(more):
@@ -218,24 +216,11 @@ def make_problem(
     return Problem(robot, (*own, *more), len(own), tuple(parts))
 
 
-def make_engine(kind: str, problem: Problem, tol: float | None = FINE) -> ExactEngine | ImplicitEngine | LoopEngine:
-    """The engine of a problem. tol [m/s]: of an implicit one, finer where a path is fitted; None for a step a row."""
-    if kind == EXACT:
-        return ExactEngine(problem)
-    if kind == LOOP:
-        return LoopEngine(problem, tol)
-    travels = any(name in TRAVELS for name, _ in problem.columns)
-    return implicit_engine(problem, tol if tol is None or not travels else min(tol, FINER))
-
-
-def engine_kind(engine: object) -> str:
-    """Which engine it is: EXACT, IMPLICIT or LOOP."""
-    return LOOP if isinstance(engine, LoopEngine) else IMPLICIT if isinstance(engine, ImplicitEngine) else EXACT
-
-
-def engine_for(records: Sequence[Record], robot: Robot, keys: Sequence[str]) -> str:
+def engine_for(records: Sequence[Record], robot: Robot, keys: Sequence[str]) -> Kind:
     """Which engine fits these keys of the robot to the records."""
-    return LOOP if looped(records) else EXACT if is_exact(robot) and stays_exact(robot, keys) else IMPLICIT
+    if looped(records):
+        return LoopEngine
+    return ExactEngine if is_exact(robot) and stays_exact(robot, keys) else ImplicitEngine
 
 
 def stays_exact(robot: Robot, keys: Sequence[str]) -> bool:

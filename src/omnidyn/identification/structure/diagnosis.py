@@ -16,10 +16,9 @@ from omnidyn.identification.output_error.linear.rounded_inputs import effects, w
 from omnidyn.identification.output_error.linear.rows import Linear, Rows
 from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
-from omnidyn.identification.output_error.prepare import engine_kind
 from omnidyn.identification.output_error.problem.bounded import bounded
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
-from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
+from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import levels_of
 from omnidyn.identification.structure.binned import binned
 from omnidyn.identification.structure.misfit import FALSE, Misfit, chance, memory_beside, misfit, with_cause
@@ -66,13 +65,13 @@ def examine(solution: Solution) -> Examined:
     solver, point = solution.solver, solution.state.point
     whole = with_levels(solver.problem, point, levels_of(solution))
     problem = bounded(whole, SHOWN, effects(whole))
-    engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
+    engine = solver.engine.on(problem)
     parts = engine.residuals(point)
     moved = motions(problem, point)
     rows = with_rounding(Rows.of(problem, point, as_counted(solution, problem, parts)), moved)
     seen = misfit(rows, moved)
     stable = stability(seen.linear)
-    bench = Workbench(problem, point, engine_kind(solver.engine), moved, stable.likely)
+    bench = Workbench(problem, point, type(engine), moved, stable.likely)
     every = [*candidates(bench), *unoffered(bench)]
     tried = _tried(bench, [one for one in every if not one.late])
     ranked = remedies(seen.linear, tried, seen.shown)

@@ -5,8 +5,7 @@ import pytest
 
 from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of, truths
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.engines.slipping import SlipEngine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, SlipEngine
 from omnidyn.identification.output_error.prepare import make_problem
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record

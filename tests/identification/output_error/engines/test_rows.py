@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from omnidyn.identification.output_error.engines.exact import Weighting
-from omnidyn.identification.output_error.engines.sums import added
+from omnidyn.identification.output_error.engines.engine import Weighting, added
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.question import Question
 from omnidyn.model.robot_file import load_robot

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.memory.near import near
+from omnidyn.identification.output_error.memory.whitened import near
 from omnidyn.identification.output_error.prepare import FINE, make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.question import Question

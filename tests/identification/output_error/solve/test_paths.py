@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.engines.rates import RateEngine
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.output_error.solve.first_point import coarse_point
+from omnidyn.identification.output_error.solve.first_point import RateEngine, coarse_point
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.identification.question import Question

@@ -8,16 +8,14 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import OmnidynError
-from omnidyn.identification.output_error.joint import JointEngine
+from omnidyn.identification.output_error.engines.engine import Engine
 from omnidyn.identification.output_error.linear.rows import Linear, Rows, solved
 from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.memory.whitening import Weighed
-from omnidyn.identification.output_error.prepare import engine_kind
 from omnidyn.identification.output_error.problem.bounded import bounded
 from omnidyn.identification.output_error.problem.parameters import robot_parameter
 from omnidyn.identification.output_error.problem.problem import Point, Problem
-from omnidyn.identification.output_error.solve.solver import RowEngine
 
 TRIED = 0.01  # relative change of a fixed number, either way is alike
 
@@ -31,7 +29,7 @@ def moved_by_the_file(sure: Weighed, held: Mapping[str, float]) -> FloatArray:
     """
     linear, engine, point = as_weighed(sure)
     benches = [
-        (Workbench(own, at, engine_kind(by), ()), places)
+        (Workbench(own, at, type(by), ()), places)
         for own, at, by, places in members_of(engine, linear.rows.problem, point)
     ]
     _, j = linear.whole()
@@ -51,12 +49,12 @@ def moved_by_the_file(sure: Weighed, held: Mapping[str, float]) -> FloatArray:
     return found
 
 
-def as_weighed(sure: Weighed) -> tuple[Linear, RowEngine, Point]:
+def as_weighed(sure: Weighed) -> tuple[Linear, Engine, Point]:
     """(the rows of a fit made white by the memory that it was weighed with, what simulates them, its best point)."""
     solver, point = sure.plain.solver, sure.plain.state.point
     assert isinstance(solver.problem, Problem)
     problem, variance = bounded(solver.problem, 1), sure.plain.state.variance
-    engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
+    engine = solver.engine.on(problem)
     rows = Rows.of(problem, point, engine.residuals(point))
     memory = [
         sure.models.get(column, AutoRegression(np.zeros(0), float(variance[c]), 0))
@@ -66,9 +64,9 @@ def as_weighed(sure: Weighed) -> tuple[Linear, RowEngine, Point]:
 
 
 def members_of(
-    engine: RowEngine, problem: Problem, point: Point
-) -> list[tuple[Problem, Point, RowEngine, IntArray]]:  # fmt: skip
+    engine: Engine, problem: Problem, point: Point
+) -> list[tuple[Problem, Point, Engine, IntArray]]:  # fmt: skip
     """(problem, point, engine, which pieces of all are its own) of each group; of one where there are none."""
-    if not isinstance(engine, JointEngine):
+    if not engine.members:
         return [(problem, point, engine, np.arange(len(problem.pieces)))]
     return [(own.problem, own.point(point), own.engine, own.places) for own in engine.members]

@@ -26,25 +26,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import cast
 
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.parallel import side_by_side
+from omnidyn.identification.output_error.engines.engine import Engine
 from omnidyn.identification.output_error.memory.across import widening
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
 from omnidyn.identification.output_error.memory.innovations import without_gaps
-from omnidyn.identification.output_error.memory.near import near
 from omnidyn.identification.output_error.memory.whitened import (
     TangentEngine,
     WhitenedEngine,
     known_rows,
     moving_rows,
+    near,
     spacing,
 )
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
-from omnidyn.identification.output_error.solve.solver import Normal, RowEngine, Solution, Solver, of_states
+from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, of_states
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, WHITE, Trust, trust
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.statement import NOTE, WARNING, Statement
@@ -110,14 +110,14 @@ def whitened(solution: Solution, before: Trust, progress: Progress = silent) -> 
     for each in range(ROUNDS):
         progress(Report(f"errors with a memory, round {each + 1}"))
         models, far = _straight(solver, now, models), moved > NEARBY
-        engine = near(below(solver), now) if far else below(solver)
-        close = CLOSE_BY if engine is below(solver) else FAR_OFF
+        engine = near(solver.engine.unfiltered, now) if far else solver.engine.unfiltered
+        close = CLOSE_BY if engine is solver.engine.unfiltered else FAR_OFF
         found = _filtered(solver, engine, models, close).minimise(now, FEW_STEPS, blocked=None if far else blocked)
         moved, now, blocked = _moved(found, now), found.state.point, found.blocked
         models = _memory(found, _inverse(Normal(found.solver, found.state).information))
         if not far and moved <= SETTLED:
             break
-    filtered = _filtered(solver, below(solver), models, solver.close)
+    filtered = _filtered(solver, solver.engine.unfiltered, models, solver.close)
     found = replace(filtered.minimise(now, blocked=blocked), notes=solution.notes)
     left = trust(filtered, found)
     if left.kind == SANDWICH and solver.counted:
@@ -133,7 +133,7 @@ def _straight(
     solver: Solver[Problem], start: Point, models: Mapping[Column, AutoRegression]
 ) -> Mapping[Column, AutoRegression]:
     """The memory that rows straight near a point settle at, memory and numbers in turn: nothing is simulated for it."""
-    tangent, now = TangentEngine(below(solver), start), start
+    tangent, now = TangentEngine(solver.engine.unfiltered, start), start
     for _ in range(TURNS):
         found = _filtered(solver, tangent, models, solver.close, tangent.moves).minimise(now, FEW_STEPS)
         models = _memory(found, _inverse(Normal(found.solver, found.state).information), tangent.moves)
@@ -144,7 +144,7 @@ def _straight(
 
 
 def _filtered(
-    solver: Solver[Problem], engine: RowEngine[Problem], models: Mapping[Column, AutoRegression], close: float,
+    solver: Solver[Problem], engine: Engine[Problem], models: Mapping[Column, AutoRegression], close: float,
     moves: Sequence[BoolArray] | None = None,
 ) -> Solver[Problem]:  # fmt: skip
     """The solver for errors of these memories, which ends `close` to the best point."""
@@ -161,17 +161,8 @@ def _moved(found: Solution, before: Point) -> float:
 def _as_readings(solution: Solution) -> Solution:
     """The same point, its counts like any other output: rounding is a small part of errors that remember."""
     solver = solution.solver
-    solver = Solver(solver.problem, below(solver), 0.0, solver.close, counted=False)
+    solver = Solver(solver.problem, solver.engine.unfiltered, 0.0, solver.close, counted=False)
     return replace(solution, state=solver.state(solution.state.point), solver=solver)
-
-
-def below(solver: Solver[Problem]) -> RowEngine[Problem]:
-    """The engine that simulates, whose rows are as they are."""
-    engine = solver.engine
-    if isinstance(engine, WhitenedEngine):
-        return engine.engine
-    assert hasattr(engine, "residuals")
-    return cast(RowEngine[Problem], engine)
 
 
 def _memory(
@@ -186,7 +177,7 @@ def _memory(
     series: dict[Column, list[FloatArray]] = {column: [] for column in solver.problem.columns}
     moving: dict[Column, list[BoolArray]] = {column: [] for column in solver.problem.columns}
     taken = None if covariance is None else _roots(_of_pieces(solution, covariance))
-    for k, parts in enumerate(below(solver).residuals(solution.state.point)):
+    for k, parts in enumerate(solver.engine.unfiltered.residuals(solution.state.point)):
         piece = solver.problem.pieces[k]
         mine = moving_rows(piece, parts[0]) if moves is None else moves[k]
         for column, rows, residual, slopes, steps in _columns(piece, parts):
@@ -249,7 +240,7 @@ def _trusted(found: Solution, before: Trust, models: Mapping[Column, AutoRegress
     solver = found.solver
     known = trust(solver, found, WHITE)
     degrees = _degrees(found, known, models)
-    filtered = WhitenedEngine(below(solver), models).residuals(found.state.point)
+    filtered = WhitenedEngine(solver.engine.unfiltered, models).residuals(found.state.point)
     wider = widening(solver.problem, filtered, found.state.variance, _of_pieces(found, known.plain))
     known = replace(known, covariance=_observed(found, known) * np.outer(wider, wider))
     told = ~known.open & ~before.open
@@ -293,7 +284,7 @@ def _degrees(found: Solution, known: Trust, models: Mapping[Column, AutoRegressi
     leaning = {column: np.zeros((1 + model.order, int(told.sum()))) for column, model in models.items()}
     of_pieces = _of_pieces(found, known.plain)
     scale = Normal(solver, found.state).scale[told]
-    pieces = zip(solver.problem.pieces, below(solver).residuals(found.state.point), of_pieces, strict=True)
+    pieces = zip(solver.problem.pieces, solver.engine.unfiltered.residuals(found.state.point), of_pieces, strict=True)
     for piece, parts, covariance in pieces:
         ways = covariance[:, : len(told)][:, told] / scale
         moves = moving_rows(piece, parts[0])

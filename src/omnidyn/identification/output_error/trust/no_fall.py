@@ -53,7 +53,7 @@ def without_a_fall(solution: Solution, known: Trust) -> tuple[Trust, Intervals, 
 def _not_seen(solution: Solution, known: Trust) -> list[tuple[int, int, int]]:
     """Indices of (breakaway, Coulomb friction, Stribeck speed), all free, between which no fall is seen."""
     problem, values = solution.solver.problem, solution.state.point.values
-    if not isinstance(solution.solver.engine, ImplicitEngine):
+    if solution.solver.engine.exact:
         return []
     ended, found = {p.name for p in at_the_end(problem, values)}, []
     for s, c in Order(problem).pairs:

@@ -20,7 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.identification.output_error.engines.exact import Weighting
+from omnidyn.identification.output_error.engines.engine import Weighting
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, LEAST_SHARE, information, rounding
 from omnidyn.identification.output_error.kernel.march import WAVES
 from omnidyn.identification.output_error.problem.problem import PieceSums

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.identification.output_error.engines.exact import Weighting
+from omnidyn.identification.output_error.engines.engine import Weighting
 from omnidyn.identification.output_error.kernel.march import FINAL
 from omnidyn.identification.output_error.problem.problem import PieceSums, per_column
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State

@@ -17,7 +17,6 @@ from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.ladder import STANDS
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.identification.output_error.joint import JointEngine
 from omnidyn.identification.output_error.prepare import expand_keys
 from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.solve.progress import FitProgress
@@ -113,10 +112,8 @@ class Model:
         return self._alone(self.fit.weighed(self.solution).plain)
 
     def _alone(self, solution: Solution) -> dict[str, Solution]:
-        engine = solution.solver.engine
-        if not isinstance(engine, JointEngine):
-            return {self.fit.groups[0].name: solution}
-        return {member.name: engine.alone(member, solution) for member in engine.members}
+        members = solution.solver.engine.members
+        return {one.name: one.alone(solution) for one in members} or {self.fit.groups[0].name: solution}
 
     def robot(self, group: str) -> Robot:
         """The fitted robot of a group."""

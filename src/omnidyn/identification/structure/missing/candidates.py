@@ -18,7 +18,6 @@ from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import CHANGE
 from omnidyn.identification.output_error.linear.motion import Motion, in_the_room
 from omnidyn.identification.output_error.linear.workbench import Workbench, scaled
-from omnidyn.identification.output_error.prepare import LOOP
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN, Driver
 from omnidyn.model.dynamics import drive_wrench
@@ -114,7 +113,7 @@ def _number(robot: Robot, key: str, beside: str = "") -> Iterator[Candidate]:
 
 def of_the_log(bench: Workbench) -> Iterator[Candidate]:
     """What a log does to a right model: nuisances that are not fitted, and a change on the way."""
-    if bench.kind != LOOP:
+    if not bench.kind.looped:
         gain, fade, band = Driver(gain=1.0 + STEP), Driver(fade=STEP), Driver(dead_band=0.1)
         yield Candidate(GAIN, _driver(GAIN, gain, STEP), sized("gain", "", gain=lambda by, _: 1.0 + by))
         yield Candidate(FADE, _driver(FADE, fade, STEP), sized("fading_voltage", "", percent=lambda by, _: 100.0 * by))

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.linear.motion import Motion
 from omnidyn.identification.output_error.linear.workbench import Workbench
-from omnidyn.identification.output_error.prepare import LOOP
 from omnidyn.identification.structure.missing.candidates import (
     CHANGE,
     STEP,
@@ -123,7 +122,7 @@ def _limits(bench: Workbench) -> list[Trial]:
 
 
 def _of_the_floor(bench: Workbench) -> Iterator[Candidate]:
-    if bench.robot.wheels.traction_mu is None and bench.kind != LOOP:
+    if bench.robot.wheels.traction_mu is None and not bench.kind.looped:
         yield Candidate(TRACTION, _grips, sized("slipping_wheels", "", share=lambda _, at: at), late=True)
 
 

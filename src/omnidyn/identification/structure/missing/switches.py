@@ -15,7 +15,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import LOSS, Remedy
 from omnidyn.identification.ladder import STANDS
-from omnidyn.identification.output_error.prepare import LOOP, engine_kind, expand_keys, guesses
+from omnidyn.identification.output_error.prepare import expand_keys, guesses
 from omnidyn.identification.output_error.problem.bending import with_damping
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
 from omnidyn.identification.output_error.problem.parameters import EFFICIENCY, WITHIN
@@ -172,7 +172,7 @@ def _free(asked: Question, *keys: str) -> Question:
 
 def _as_far_as_profiled(way: Switch, found: Solution) -> Switch:
     """The same; where no engine looks for levels of breakaway, of a speed loop or wheels that slip, they stay."""
-    if way.robot.wheels.traction_mu is None and engine_kind(found.solver.engine) != LOOP:
+    if way.robot.wheels.traction_mu is None and not found.solver.engine.looped:
         return way
     return with_levels_as_they_are(way)
 
