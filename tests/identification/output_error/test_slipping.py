@@ -7,8 +7,7 @@ from omnidyn import check
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, SlipEngine
 from omnidyn.identification.output_error.linear.motion import motions
-from omnidyn.identification.output_error.prepare import FINE, make_problem, read_records
-from omnidyn.identification.output_error.problem.motion import motion
+from omnidyn.identification.output_error.prepare import FINE, make_problem, motion, read_records
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.missing import laws

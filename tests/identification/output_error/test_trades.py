@@ -8,7 +8,7 @@ from benchmarks.wrong_worlds.log import NOISE, Case, Setup, logged, robot_of
 from benchmarks.wrong_worlds.world import World, drive
 from omnidyn.identification.output_error.linear.workbench import scaled
 from omnidyn.identification.output_error.problem.parameters import Parameter
-from omnidyn.identification.output_error.trust.ends import at_the_end
+from omnidyn.identification.output_error.trust.support import at_the_end
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import Key, expand
 from omnidyn.model.robot import Prior

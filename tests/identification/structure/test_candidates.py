@@ -15,10 +15,9 @@ from omnidyn.identification.output_error.linear.motion import motions
 from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.question import Question
 from omnidyn.identification.structure.missing import refits
-from omnidyn.identification.structure.missing.candidates import CHANGE
+from omnidyn.identification.structure.missing.candidates import CHANGE, unoffered
 from omnidyn.identification.structure.missing.laws import candidates
 from omnidyn.identification.structure.missing.switches import switches
-from omnidyn.identification.structure.missing.unoffered import unoffered
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.motor import Motor
 from omnidyn.model.robot import Body, Robot

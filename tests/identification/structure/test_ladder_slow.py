@@ -8,8 +8,7 @@ from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.output_error.engines.implicit import SlipEngine
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.question import Question
-from omnidyn.identification.structure.ladder.models import Model, Move
-from omnidyn.identification.structure.ladder.slow import BEYOND, FITS, NOT_NEEDED, Purse, quick_first
+from omnidyn.identification.structure.ladder.models import BEYOND, FITS, NOT_NEEDED, Model, Move, Purse, quick_first
 from omnidyn.identification.whole_logs import fit_output_error
 from tests.identification.structure.test_tails import AXEBOT, log, spoiled
 

@@ -8,7 +8,7 @@ from benchmarks.wrong_worlds.kinds import by_name
 from benchmarks.wrong_worlds.log import AR, SPEEDS, TICKS, TWIST, logged, right_case, robot_of
 from benchmarks.wrong_worlds.score import drawn
 from omnidyn.identification.output_error.linear.motion import motions
-from omnidyn.identification.output_error.linear.rounded_inputs import losses, shown_by_losses
+from omnidyn.identification.output_error.linear.sensitivity import losses, shown_by_losses
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.question import Question
 from omnidyn.identification.whole_logs import fit_output_error

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.structure.rests_on import scaled
+from omnidyn.identification.structure.diagnosis import scaled
 from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run

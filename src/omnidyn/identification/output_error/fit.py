@@ -20,15 +20,14 @@ from omnidyn.identification.output_error.begin import WHOLE, begun, group_names
 from omnidyn.identification.output_error.conclusion import conclude, unexplained
 from omnidyn.identification.output_error.joint import join, joint_start, own_names
 from omnidyn.identification.output_error.linear.blocks import rejected_nuisances
-from omnidyn.identification.output_error.linear.rounded_inputs import beside_rounding
-from omnidyn.identification.output_error.linear.sensitivity import moved_by_the_file
+from omnidyn.identification.output_error.linear.sensitivity import beside_rounding, moved_by_the_file
 from omnidyn.identification.output_error.memory.whitening import Weighed, whitened, why_not
 from omnidyn.identification.output_error.prepare import (
     FINE,
     Group,
     guesses,
 )
-from omnidyn.identification.output_error.problem.band import band_note, with_band
+from omnidyn.identification.output_error.problem.friction_laws import band_note, with_band
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, automatic, implausible
 from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated
 from omnidyn.identification.output_error.problem.problem import Problem
@@ -38,9 +37,8 @@ from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_ou
 from omnidyn.identification.output_error.solve.progress import Best, FitProgress
 from omnidyn.identification.output_error.solve.solver import ENOUGH, Normal, Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import Breakaway, asked_levels, find_breakaway
-from omnidyn.identification.output_error.trust.differences import differences
 from omnidyn.identification.output_error.trust.no_fall import without_a_fall
-from omnidyn.identification.output_error.trust.resampling import beside, refuse_bootstrap, resampled
+from omnidyn.identification.output_error.trust.resampling import beside, differences, refuse_bootstrap, resampled
 from omnidyn.identification.output_error.trust.support import supported, too_early
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, Trust, trust
 from omnidyn.identification.question import AUTO, GAUSS, STUDENT, Question

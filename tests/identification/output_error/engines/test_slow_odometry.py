@@ -8,8 +8,7 @@ from omnidyn import Run, load_robot, read_log
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.identify import identify
 from omnidyn.identification.output_error.begin import begun
-from omnidyn.identification.output_error.prepare import read_records
-from omnidyn.identification.output_error.problem.motion import motion
+from omnidyn.identification.output_error.prepare import motion, read_records
 from omnidyn.identification.output_error.solve.loop import loop_pieces
 from omnidyn.identification.question import Question
 from omnidyn.identification.whole_logs import fit_output_error

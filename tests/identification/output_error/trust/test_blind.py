@@ -11,7 +11,7 @@ from benchmarks.blind.setups import DEFICIENT, FRICTION, FULL, INERTIA, MASS, OH
 from benchmarks.blind.told import named, said
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.advice import advice
-from omnidyn.identification.output_error.trust.blind import _lost, _sparse
+from omnidyn.identification.output_error.trust.cures import _lost, _sparse
 from omnidyn.identification.whole_logs import fit_output_error
 
 BY_NAME = {setup.name: setup for setup in (*DEFICIENT, *FULL)}

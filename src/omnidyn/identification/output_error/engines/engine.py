@@ -11,10 +11,11 @@ from typing import Any, Generic, Self, TypeVar
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.compiled.kernel import kernel
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
-from omnidyn.identification.output_error.kernel.march import FINAL, WAVES
-from omnidyn.identification.output_error.kernel.of_rows import row_squares, row_terms, row_waves
-from omnidyn.identification.output_error.problem.problem import Column, Fitted, Parts, Piece, PieceSums, Point
+from omnidyn.identification.output_error.kernel.march import FINAL, WAVES, add_waves, terms_of
+from omnidyn.identification.output_error.problem.problem import Column, Fitted, Parts, Piece, PieceSums, Point, Problem
+from omnidyn.model.actuation import Driver
 from omnidyn.model.layout import N_AXES
 
 P = TypeVar("P", bound=Fitted)
@@ -134,3 +135,66 @@ def added(piece: Piece, every: tuple[Column, ...], parts: Parts, weighting: Weig
         known, there.sum(axis=1).astype(float), square.sum(axis=1), rho.sum(axis=1), lag, grad, info, score, drift,
         waves,
     )  # fmt: skip
+
+
+# The driver of a problem: what is free of it and what is not
+
+LATE = "latency."
+
+
+def driver_of(problem: Problem, values: FloatArray) -> tuple[Driver, list[int]]:
+    """(the driver at these values, index of each of its numbers among the parameters or -1)."""
+    where = [problem.where(name) for name in Driver._fields]
+    plain = Driver(dead_band=problem.robot.drive.dead_band)
+    return Driver(*(float(values[k]) if k >= 0 else own for k, own in zip(where, plain, strict=True))), where
+
+
+def late_by(problem: Problem, values: FloatArray, columns: Sequence[Column]) -> tuple[list[float], list[int]]:
+    """(by how much each column is late [s], index of that among the parameters or -1: as late as the robot's drive)."""
+    where = [problem.where(LATE + name) for name, _ in columns]
+    return [float(values[k]) if k >= 0 else problem.robot.drive.latency for k in where], where
+
+
+# What rows that were simulated before add up to; apart from the engines, so that few edits compile it anew
+
+
+@kernel
+def row_terms(residual, variance, nu, tick, share, final):
+    """(w r, w r^2, curvature, rho) of every residual (C, rows), see kernel/march.py; 0 where it is NaN."""
+    columns, rows = residual.shape
+    out = np.zeros((4, columns, rows))
+    for c in range(columns):
+        for k in range(rows):
+            if residual[c, k] == residual[c, k]:
+                pull, square, curvature, rho = terms_of(residual[c, k], variance, nu, c, tick, share, final)
+                out[0, c, k], out[1, c, k], out[2, c, k], out[3, c, k] = pull, square, curvature, rho
+    return out
+
+
+@kernel
+def row_waves(slopes, turns, count):
+    """Sum over the rows of (cos, sin)(2 pi m turns) J, m = 1 to `count`; turns (C, rows), NaN where there is none."""
+    columns, rows, width = slopes.shape
+    out = np.zeros((columns, count, 2, width))
+    for c in range(columns):
+        for k in range(rows):
+            if turns[c, k] == turns[c, k]:
+                add_waves(out[c], slopes[c, k], turns[c, k])
+    return out
+
+
+@kernel
+def row_squares(slopes, weight):
+    """Sum over the rows of weight J J'. Shapes (C, rows, U), (C, rows) -> (C, U, U)."""
+    columns, rows, count = slopes.shape
+    out = np.zeros((columns, count, count))
+    for c in range(columns):
+        for k in range(rows):
+            for a in range(count):
+                pulled = weight[c, k] * slopes[c, k, a]
+                for b in range(a + 1):
+                    out[c, a, b] += pulled * slopes[c, k, b]
+        for a in range(count):
+            for b in range(a):
+                out[c, b, a] = out[c, a, b]
+    return out

@@ -8,9 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification.output_error.engines.actuation import LATE as LATE
-from omnidyn.identification.output_error.engines.actuation import driver_of, late_by
-from omnidyn.identification.output_error.engines.engine import Engine, Weighting
+from omnidyn.identification.output_error.engines.engine import LATE as LATE
+from omnidyn.identification.output_error.engines.engine import Engine, Weighting, driver_of, late_by
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
 from omnidyn.identification.output_error.kernel.march import (
     FINAL,

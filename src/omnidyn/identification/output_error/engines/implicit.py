@@ -17,8 +17,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import side_by_side
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.actuation import driver_of, late_by
-from omnidyn.identification.output_error.engines.engine import Engine
+from omnidyn.identification.output_error.engines.engine import Engine, driver_of, late_by
 from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, PUSH, TILT
 from omnidyn.identification.output_error.problem.heading import headings, in_the_body
 from omnidyn.identification.output_error.problem.nuisances import TRAVELS

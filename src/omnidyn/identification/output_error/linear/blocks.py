@@ -21,9 +21,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.linear.rows import SAME, Linear, Rows, lengths, noise_models, with_priors
-from omnidyn.identification.output_error.problem.bounded import bounded
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
-from omnidyn.identification.output_error.problem.problem import Problem
+from omnidyn.identification.output_error.problem.problem import Problem, bounded
 from omnidyn.identification.output_error.solve.solver import Normal, Solution
 from omnidyn.model.actuation import DEAD_BAND
 

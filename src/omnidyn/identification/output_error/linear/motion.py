@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.identification.output_error.engines.actuation import driver_of
+from omnidyn.identification.output_error.engines.engine import driver_of
 from omnidyn.identification.output_error.problem.heading import HEADING, facing_at_start
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.model.actuation import Driver, at_motors

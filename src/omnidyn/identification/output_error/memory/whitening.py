@@ -10,7 +10,7 @@ where the restricted likelihood is largest: its memory is not too short because 
 (D. A. Harville, J. Am. Stat. Assoc. 72, 320 (1977)).
 
 Simulations are dear and memories are not: between two simulations memory and numbers settle in turn on rows that are
-taken as straight, by the residuals and slopes of the last one. Far from the end, simulations are coarse: near.py.
+taken as straight, by the residuals and slopes of the last one. Far from the end, simulations are coarse: `near`.
 
 The covariance is (J~' J~ / s^2)^-1, ~ the filtered rows, and as much wider or narrower as the change of the score
 between the ends of the intervals says: of slow errors only what is fast counts, and there a robot that stops or sets
@@ -28,11 +28,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.special import chdtri
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.parallel import side_by_side
 from omnidyn.identification.output_error.engines.engine import Engine
-from omnidyn.identification.output_error.memory.across import widening
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
 from omnidyn.identification.output_error.memory.innovations import without_gaps
 from omnidyn.identification.output_error.memory.whitened import (
@@ -320,3 +320,69 @@ def _statements(found: Solution, models: Mapping[Column, AutoRegression], known:
     uneven = max(spacing(pieces, column)[2] for column in models)
     if uneven > UNEVEN:
         yield Statement("uneven_rows", NOTE, numbers={"share": uneven})
+
+
+# Errors of several channels that go together: a force on the body moves all its wheels at once
+#
+# Each channel has a memory of its own, and what is new in them is taken as independent. Slow errors that are not have
+# the
+# covariance of what a fit makes of them,
+#
+#     V = V + sum over c, d of rho_cd G_c' G_d,      G_c = J~_c V over the rows of channel c
+#
+# J~ the filtered slopes, rho the correlation of sums of many rows: for what is new at once may be noise of each sensor,
+# and only what is slow goes together. As in A. Zellner, J. Am. Stat. Assoc. 57, 348 (1962), whose estimate would be
+# better; this says how sure the one at hand is.
+
+BLOCK = 50  # rows whose errors are summed
+FALSE = 0.01  # of logs in which channels seem to go together and do not
+LEAST = 0.25  # of a variance: a correlation is not known so well that it could take away more
+
+
+def correlation(problem: Problem, parts: Sequence[Parts]) -> FloatArray | None:
+    """Of the slow errors of the columns of a problem, (C, C); None where they are not seen to go together.
+
+    parts: what is new in the rows of every piece.
+    """
+    count, sums = len(problem.columns), []
+    for piece, (residual, _, _) in zip(problem.pieces, parts, strict=True):
+        blocks = residual.shape[1] // BLOCK
+        own = np.full((count, blocks), np.nan)
+        at = [problem.columns.index(column) for column in piece.record.columns]
+        cut = residual[:, : blocks * BLOCK].reshape(len(at), blocks, BLOCK)
+        own[at] = np.where(np.isfinite(cut).any(axis=2), np.nan_to_num(cut).sum(axis=2), np.nan)
+        sums.append(own)
+    every = np.concatenate(sums, axis=1)
+    there, every = np.isfinite(every), np.nan_to_num(every)
+    size = every**2 @ there.T
+    found = every @ every.T / np.sqrt(np.maximum(size * size.T, 1e-300))
+    both = there.astype(float) @ there.T
+    pairs = np.triu_indices(count, 1)
+    score = float((both[pairs] * found[pairs] ** 2).sum())
+    np.fill_diagonal(found, 1.0)
+    return found if len(pairs[0]) and score > chdtri(len(pairs[0]), FALSE) else None
+
+
+def widening(
+    problem: Problem, parts: Sequence[Parts], variance: FloatArray, covariances: Sequence[FloatArray]
+) -> FloatArray:
+    """By how much standard errors are larger, or smaller, than with errors that go apart; 1 where they do. Shape (P,).
+
+    parts: filtered residuals and slopes of every piece. variance (C,): of what is new. covariances: of each piece, of
+    parameters and states, in the units of its slopes.
+    """
+    rho, count = correlation(problem, parts), len(problem.parameters)
+    own = np.ones(count)
+    if rho is None:
+        return own
+    plain, more = np.diag(covariances[0])[:count], np.zeros(count)
+    for piece, (residual, slopes, at), covariance in zip(problem.pieces, parts, covariances, strict=True):
+        columns = [problem.columns.index(column) for column in piece.record.columns]
+        known = np.isfinite(residual)[:, :, None]
+        ways = np.where(known, slopes, 0.0) @ covariance[at][:, :count] / variance[columns, None, None] ** 0.5
+        for c, own_c in enumerate(columns):
+            for d, own_d in enumerate(columns[:c]):
+                more += 2.0 * rho[own_c, own_d] * (ways[c] * ways[d]).sum(axis=0)
+    told = plain > 0.0
+    own[told] = np.sqrt(np.maximum(1.0 + more[told] / plain[told], LEAST))
+    return own

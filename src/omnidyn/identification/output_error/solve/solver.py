@@ -17,9 +17,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.engine import Engine, P, Weighting
 from omnidyn.identification.output_error.kernel.counts import LEAST_SHARE, information
 from omnidyn.identification.output_error.problem.problem import Fitted, PieceSums, Point, per_column
-from omnidyn.identification.output_error.solve.bend import Bend
-from omnidyn.identification.output_error.solve.edges import Edges
-from omnidyn.identification.output_error.solve.ordered import Order
+from omnidyn.identification.output_error.solve.steps import Bend, Edges, Order
 from omnidyn.progress import Progress, Report
 from omnidyn.statement import Statement
 
@@ -287,7 +285,7 @@ class Normal:
     def moved(self, damping: float, still: BoolArray, bend: FloatArray, onto: FloatArray) -> Point:
         """The point of the damped step, within the bounds, without the parameters that are `still`.
 
-        bend (P, P): what the information lacks, see bend.py. onto (P,): the step of these, see edges.py.
+        bend (P, P): what the information lacks, see `Bend`. onto (P,): the step of these, see `Edges`.
         """
         gradient, information = self._reduced(damping)
         free, fold = ~still, self.solver.order.together(self.inner, still)

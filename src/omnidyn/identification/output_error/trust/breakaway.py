@@ -9,7 +9,7 @@ and the limit higher, as for coulomb (`Trust.rise`).
 
 The exact engine looks at every plateau between the drives of the log. Where axes couple, or friction acts elsewhere,
 what rests balances a force that changes while it rests, and moves with the other numbers: there a grid of levels is
-made ever finer, each fitted by the implicit engine from the nearest that is known (likely_levels.py).
+made ever finer, each fitted by the implicit engine from the nearest that is known (levels.py).
 """
 
 from __future__ import annotations
@@ -23,12 +23,11 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
-from omnidyn.identification.output_error.problem.falling import coulomb_below, falls
+from omnidyn.identification.output_error.problem.friction_laws import coulomb_below, falls
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
-from omnidyn.identification.output_error.trust.likely_levels import likely_levels
-from omnidyn.identification.output_error.trust.traded_levels import Place, trade
+from omnidyn.identification.output_error.trust.levels import Place, likely_levels, trade
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust
 from omnidyn.model.friction.kinds import KINDS
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, Key, in_words

@@ -15,8 +15,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.linear.blocks import Blocks
 from omnidyn.identification.output_error.linear.rows import Linear, Rows
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
-from omnidyn.identification.output_error.problem.bounded import bounded
-from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
+from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem, bounded
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.structure.tails import as_counted
 

@@ -16,7 +16,7 @@ from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import LOSS, Remedy
 from omnidyn.identification.ladder import STANDS
 from omnidyn.identification.output_error.prepare import expand_keys, guesses
-from omnidyn.identification.output_error.problem.bending import with_damping
+from omnidyn.identification.output_error.problem.friction_laws import with_damping
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
 from omnidyn.identification.output_error.problem.parameters import EFFICIENCY, WITHIN
 from omnidyn.identification.output_error.solve.solver import Solution
