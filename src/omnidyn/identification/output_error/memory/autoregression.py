@@ -47,7 +47,7 @@ ANYWHERE = 1e8  # times the variance of what is new: where errors that add up ma
 class AutoRegression:
     """partial (p,): partial correlations, each within -1 to 1, so that the series is stationary. variance: of what is
     new in a row. rows: that it was fitted to. adds_up: whether all this is of the changes from row to row. slopes
-    (p, q): of phi by the q numbers that it was fitted by, where these are not phi itself, see moving.py. moving: phi and
+    (p, q): of phi by the q numbers that it was fitted by, where these are not phi itself. moving: phi and
     lambda of errors that remember only while the robot moves, see moving.py; all else is theirs while it does.
     information (q, q): that all rows have of the q numbers, where they do not tell as much as rows without end."""
 

@@ -9,7 +9,7 @@ blocks that carry the information. Which of the two is used is decided by the re
 each is one block: a floor or a battery that differs from run to run is then in the intervals too (Liang, Zeger,
 Biometrika 73 (1986); n/(n - 1) for n runs).
 
-Counts without noise are neither: their covariance is that of rounding, see below, and more only where the sandwich says so
+Counts without noise are neither: their covariance is that of rounding, and more only where the sandwich says so
 beyond chance. No variance is below the plain one, of a number or of what several do together.
 """
 
