@@ -8,7 +8,6 @@ from functools import cache
 from typing import Unpack
 
 from omnidyn.arguments import check_order
-from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
@@ -86,15 +85,7 @@ def solved(
 def answered(fit: Fit, solution: Solution, progress: FitProgress) -> Answer:
     """What a solution says, each estimate with its diagnosis, which is made when it is first asked for; `quick` leaves
     it out."""
-    if not solution.converged:
-        solution = fit.with_latencies_only(solution, progress) or solution
-    try:
-        answer = fit.answer(solution, progress)
-    except InsufficientDataError:
-        plainer = fit.with_latencies_only(solution, progress)
-        if plainer is None:
-            raise
-        answer = fit.answer(plainer, progress)
+    answer = fit.answer(solution, progress)
     if fit.question.quick:
         return answer
     found = {

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from omnidyn.errors import UnsupportedError
+from omnidyn.errors import InsufficientDataError, UnsupportedError
 from omnidyn.identification.grouping import count_once
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import WHOLE, begun, group_names
@@ -118,7 +118,16 @@ class Fit:
         Raises InputError for a name to profile that is not free, InsufficientDataError where the logs say nothing about
         any of the robot's numbers.
         """
-        answer = self._answer(found, progress or FitProgress())
+        progress = progress or FitProgress()
+        if isinstance(found, Solution) and not found.converged:
+            found = self._with_latencies_only(found, progress) or found
+        try:
+            answer = self._answer(found, progress)
+        except InsufficientDataError:
+            plainer = self._with_latencies_only(found, progress) if isinstance(found, Solution) else None
+            if plainer is None:
+                raise
+            answer = self._answer(plainer, progress)
         note, estimates = band_note(self.began), answer.estimates
         return replace(
             answer,
@@ -231,7 +240,7 @@ class Fit:
             progress = progress.aside(f"once more without {', '.join(lost)}")
         return replace(self._solve(group, group.problem(kept), progress), notes=notes)
 
-    def with_latencies_only(self, found: Solution, progress: FitProgress) -> Solution | None:
+    def _with_latencies_only(self, found: Solution, progress: FitProgress) -> Solution | None:
         """The fit of one group without other automatic nuisances; None where there are none, or they were asked for.
 
         Beside them the logs may tell no number of the robot at all, or trade them without end, until rounding decides.
