@@ -71,12 +71,10 @@ class Blocks:
         count = len(self.size)
         noise, total = self._noise(chosen), np.zeros((1 + count, 1 + count))
         for k, own in enumerate(chosen):
-            if not own.any():
-                continue
-            x = np.einsum("bcij,c->ij", self.products[k][own], 1.0 / noise[self.column[k]])
-            first = np.flatnonzero(self.number[k].sum(axis=1))[:1]
-            known = self.start[k] * bool(own[first].any())
-            total += _without(x, 1 + count, known)
+            if own.any():
+                x = np.einsum("bcij,c->ij", self.products[k][own], 1.0 / noise[self.column[k]])
+                first = np.flatnonzero(self.number[k].sum(axis=1))[:1]
+                total += _without(x, 1 + count, self.start[k] * bool(own[first].any()))
         return total
 
     def scores(self, chosen: BoolArray) -> tuple[FloatArray, FloatArray]:

@@ -56,12 +56,12 @@ def stability(linear: Linear) -> Stability:
 
 def _after(rows: Rows, share: float) -> list[FloatArray]:
     """What the numbers show after a share of each log, and not before: slopes (C, rows, P) of each piece."""
-    found = []
-    for piece, slopes in zip(rows.pieces, rows.slopes, strict=True):
-        t = piece.record.t
-        later = t[piece.first : piece.last + 1] - t[0] >= share * (t[-1] - t[0])
-        found.append(slopes * later[:, None])
-    return found
+    later = [
+        piece.record.t[piece.first : piece.last + 1] - piece.record.t[0]
+        >= share * (piece.record.t[-1] - piece.record.t[0])
+        for piece in rows.pieces
+    ]
+    return [slopes * after[:, None] for slopes, after in zip(rows.slopes, later, strict=True)]
 
 
 class _Look:
@@ -70,25 +70,22 @@ class _Look:
     def __init__(self, linear: Linear):
         self.linear, self.blocks = linear, Blocks.of(linear)
         self.problem, self.values = linear.rows.problem, linear.rows.point.values
-        count = len(self.problem.parameters)
         self.prior, self.pull = _known(self.problem, self.values, self.blocks.size)
         whole = self.blocks.part(np.ones((len(self.blocks.products), BLOCKS), dtype=bool))
         self.told, self.shared = _told(whole, self.problem, self.values, self.prior)
-        assert len(self.told) + len(self.shared) <= count
 
     def stability(self) -> Stability:
         """All comparisons."""
         if not len(self.told):
             return Stability({}, ())
-        tested, splits = {}, []
         logs = len(self.blocks.records)
         cuts = [self._moment(None)]
         if 1 < logs <= MOST_LOGS:
             cuts += [self._moment(log) for log in range(logs)]
         tests = (len(self.told) + 1) * sum(len(found) for found in cuts)
         moments = [split for log, found in enumerate(cuts, -1) if (split := self._split_at(found, log, tests))]
-        tested[TIME] = self._least([one for found in cuts for one in found.values()], tests)
-        splits += sorted(moments, key=lambda split: split.p)[:1]
+        tested = {TIME: self._least([one for found in cuts for one in found.values()], tests)}
+        splits = sorted(moments, key=lambda split: split.p)[:1]
         if logs > 1:
             between = self._compared([self.blocks.log[:, None] == log for log in range(logs)])
             tested[LOGS] = self._least([between], len(self.told) + 1)
@@ -108,12 +105,12 @@ class _Look:
 
     def _compared(self, chosen: Sequence[BoolArray]) -> _Compared:
         """Numbers of parts, each compared, and all together."""
-        wide = (len(self.blocks.products), BLOCKS)
-        parts = [self.blocks.part(np.broadcast_to(own, wide)) for own in chosen]
+        chosen = [np.broadcast_to(own, (len(self.blocks.products), BLOCKS)) for own in chosen]
+        parts = [self.blocks.part(own) for own in chosen]
         steps, covariance = apart(parts, self.told, self.shared, self.prior, self.pull)
         k, t = steps.shape
         open_ = ~np.isfinite(np.diag(covariance)).reshape(k, t)
-        ratio, degrees = self._scatter([np.broadcast_to(own, wide) for own in chosen], steps, covariance)
+        ratio, degrees = self._scatter(chosen, steps, covariance)
         p = np.ones(t)
         for j in range(t):
             own = np.flatnonzero(~open_[:, j])
@@ -207,8 +204,7 @@ class _Look:
             Shift(self.problem.parameters[self.told[j]].name, tuple(self._levels(found, j, names)), float(tests * p))
             for j, p in enumerate(found.p.tolist()) if tests * p <= FALSE
         ]  # fmt: skip
-        shifts = [each for each in shifts if self._possible(each)]
-        shifts.sort(key=lambda shift: shift.p)
+        shifts = sorted(filter(self._possible, shifts), key=lambda shift: shift.p)
         return Split(by, where, *when, share, min(1.0, tests * found.joint[0]), tuple(shifts))
 
     def _possible(self, shift: Shift) -> bool:
@@ -246,20 +242,11 @@ def _told(whole: FloatArray, problem: Problem, values: FloatArray, prior: FloatA
 
     Shared are numbers of the log, such as latencies, and what priors hold. What stands at a bound is neither.
     """
-    count = len(prior)
-    free = np.array(
-        [p.low < value < p.high for p, value in zip(problem.parameters, values.tolist(), strict=True)], dtype=bool
-    )
+    free = np.array([p.low < value < p.high for p, value in zip(problem.parameters, values, strict=True)], dtype=bool)
     at = np.flatnonzero(free)
-    information = whole[1:, 1:][np.ix_(at, at)] + np.diag(prior[at])
-    _, covariance = _solved_apart(information)
-    kept = np.zeros(count)
-    kept[at] = np.sqrt(np.diag(covariance) * prior[at])
-    own = (np.arange(count) < problem.robot_count) & free & ~(kept > TOLD)
+    size, vectors = np.linalg.eigh(whole[1:, 1:][np.ix_(at, at)] + np.diag(prior[at]))
+    seen = size > 1e-12 * max(float(size.max(initial=0.0)), 1e-300)
+    kept = np.zeros(len(prior))
+    kept[at] = np.sqrt(np.diag((vectors[:, seen] / size[seen]) @ vectors[:, seen].T) * prior[at])
+    own = (np.arange(len(prior)) < problem.robot_count) & free & ~(kept > TOLD)
     return np.flatnonzero(own), np.flatnonzero(free & ~own)
-
-
-def _solved_apart(information: FloatArray) -> tuple[FloatArray, FloatArray]:
-    values, vectors = np.linalg.eigh(information)
-    seen = values > 1e-12 * max(float(values.max(initial=0.0)), 1e-300)
-    return values, (vectors[:, seen] / values[seen]) @ vectors[:, seen].T

@@ -186,10 +186,7 @@ def _friction(motion: Motion) -> FloatArray:
 
 def _inertia(motion: Motion) -> FloatArray:
     """Of a mass that is added to the body, and of its inertia."""
-    pace = np.zeros_like(motion.twist)
-    pace[:-1] = np.diff(motion.twist, axis=0) / np.diff(motion.t)[:, None]
-    flat, turn = pace * [1.0, 1.0, 0.0], pace * [0.0, 0.0, 1.0]
-    return -np.stack([flat, turn], axis=1)
+    return -np.stack([motion.pace * [1.0, 1.0, 0.0], motion.pace * [0.0, 0.0, 1.0]], axis=1)
 
 
 def _drive(motion: Motion) -> FloatArray:
@@ -241,9 +238,7 @@ def _drag(motion: Motion, _: float) -> FloatArray:
 
 
 def _waves(motion: Motion, count: float) -> FloatArray:
-    g, step = motion.robot.wheels.wrench_matrix, np.diff(motion.t)[:, None]
-    middle = 0.5 * (motion.twist[1:] + motion.twist[:-1]) * step
-    turned = np.concatenate([np.zeros((1, g.shape[1])), np.cumsum(middle @ g, axis=0)]) / motion.robot.wheels.radii
+    g, turned = motion.robot.wheels.wrench_matrix, motion.turned
     moving = (motion.twist @ g != 0.0).astype(float)
     waves = np.concatenate([np.cos(count * turned) * moving, np.sin(count * turned) * moving], axis=1)
     return waves[:, :, None] * np.concatenate([g, g], axis=1).T
