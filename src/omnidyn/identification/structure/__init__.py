@@ -3,6 +3,6 @@ and which are not the same throughout the logs.
 
 Rests on output_error/linear/. Read in this order: disturbances.py (forces that no model of ours has), misfit.py
 (whether residuals hold them), tails.py (outliers), noise_level.py and windows.py (noise that the log shows without the
-model), missing/ (what would explain a misfit), blocks.py (a fit in parts of its logs) and shifts.py (which numbers
-differ between them), diagnosis.py (all of it), ladder/ (one remedy at a time).
+model), missing/ (what would explain a misfit), shifts.py (which numbers differ between parts of the logs), diagnosis.py
+(all of it), ladder/ (one remedy at a time).
 """

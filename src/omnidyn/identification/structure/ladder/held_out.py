@@ -15,7 +15,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.linear.blocks import Blocks
 from omnidyn.identification.output_error.linear.rows import Linear, Rows
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
-from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem, bounded
+from omnidyn.identification.output_error.problem.problem import Parts, Point, bounded
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.structure.tails import as_counted
 
@@ -84,8 +84,9 @@ def _blocks(
     solution: Solution, memory: Sequence[AutoRegression], margins: Sequence[FloatArray], told: Container[int] = ()
 ) -> tuple[Blocks, int]:
     """(blocks of one group, how many rows they have). told: parameters whose priors another group has already."""
-    problem = bounded(_from(solution.solver.problem, margins))
-    point = solution.state.point
+    whole, point = solution.solver.problem, solution.state.point
+    pieces = [replace(piece, margin=own) for piece, own in zip(whole.pieces, margins, strict=True)]
+    problem = bounded(replace(whole, pieces=tuple(pieces)))
     engine = solution.solver.engine.on(problem)
     shows: Shows = lambda at: as_counted(solution, problem, engine.residuals(at))  # noqa: E731
     bare = [replace(p, prior=None) if k in told else p for k, p in enumerate(problem.parameters)]
@@ -159,8 +160,3 @@ def margins_of(solutions: Sequence[Solution]) -> list[FloatArray]:
     """Of each piece (C,), the margin that leaves the same rows to all these fits: a latency needs one."""
     every = [[piece.margin for piece in solution.solver.problem.pieces] for solution in solutions]
     return [np.max(own, axis=0) for own in zip(*every, strict=True)]
-
-
-def _from(problem: Problem, margins: Sequence[FloatArray]) -> Problem:
-    pieces = [replace(piece, margin=own) for piece, own in zip(problem.pieces, margins, strict=True)]
-    return replace(problem, pieces=tuple(pieces))

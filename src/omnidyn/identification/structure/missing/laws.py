@@ -51,7 +51,7 @@ def candidates(bench: Workbench) -> Iterator[Candidate]:
     """All that may be asked of a fit: numbers, laws, and what the log does; what is free already is left out."""
     taken = set(bench.problem.names)
     taken |= {key.name for name in bench.problem.names if (key := find_key(name))}
-    of_laws = (*_of_the_body(bench), *_of_motors(bench), *_of_the_floor(bench), *_of_friction(bench))
+    of_laws = (*_of_the_body(bench), *_of_motors(bench), *_of_friction(bench))
     for one in (*numbers(bench), *of_laws, *of_the_log(bench)):
         key = find_key(one.key)
         if one.key == CHANGE or not (one.key in taken or (key and key.name in taken)):
@@ -99,6 +99,8 @@ def _of_motors(bench: Workbench) -> Iterator[Candidate]:
             "motor.gear_efficiency", lambda b: [Trial([own / LOSS for own in b.change(lossy)])],
             sized("gear_efficiency", "", efficiency=lambda by, _: 1.0 - by), 0.0,
         )  # fmt: skip
+    if bench.robot.wheels.traction_mu is None and not bench.kind.looped:
+        yield Candidate(TRACTION, _grips, sized("slipping_wheels", "", share=lambda _, at: at), late=True)
 
 
 def _switched_on(robot: Robot, key: str, field: str, size: float) -> Candidate:
@@ -118,11 +120,6 @@ def _limits(bench: Workbench) -> list[Trial]:
     most = np.concatenate([np.abs(m.current).max(axis=1) for m in bench.motions])
     levels = np.unique(np.quantile(most[most > 0.0], LIMITS)).tolist()
     return [Trial(bench.change(_with(bench.robot, current_limit=level)), level) for level in levels]
-
-
-def _of_the_floor(bench: Workbench) -> Iterator[Candidate]:
-    if bench.robot.wheels.traction_mu is None and not bench.kind.looped:
-        yield Candidate(TRACTION, _grips, sized("slipping_wheels", "", share=lambda _, at: at), late=True)
 
 
 def _grips(bench: Workbench) -> list[Trial]:
