@@ -26,6 +26,7 @@ from benchmarks.table import Table
 from benchmarks.tanh import run_tanh
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
+from omnidyn.model.dynamics import state_space
 from omnidyn.model.keys import BOX
 from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot

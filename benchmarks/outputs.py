@@ -18,7 +18,6 @@ from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.kernel.counts import information
 from omnidyn.identification.output_error.prepare import make_problem, read_records
-from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.keys import BOX
 from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot import Robot

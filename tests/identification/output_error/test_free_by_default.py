@@ -9,6 +9,8 @@ from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.prepare import expand_keys, free_by_default, guesses
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.validation import validate
+from omnidyn.model.deadzone import push_per_volt
+from omnidyn.model.dynamics import damping
 from omnidyn.model.first_guess import first_guess
 from omnidyn.model.keys import BOX, ROTOR, Key
 from omnidyn.model.known.told import known_priors

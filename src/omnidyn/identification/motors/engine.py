@@ -13,7 +13,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.motors.estimate import BAND, LATENCY
-from omnidyn.identification.output_error.engines.exact import Weighting, march_piece, padded, used_by
+from omnidyn.identification.output_error.engines.engine import Engine, Weighting
+from omnidyn.identification.output_error.engines.exact import march_piece, padded, used_by
 from omnidyn.identification.output_error.kernel.march import KEEP, PATH, Physics, PhysicsSlopes
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Piece, PieceSums, Point
@@ -31,7 +32,7 @@ class MotorProblem(Fitted):
     pieces: tuple[Piece, ...]
 
 
-class MotorEngine:
+class MotorEngine(Engine[MotorProblem]):
     """Residuals and sensitivities of a motor by the exact step."""
 
     def __init__(self, problem: MotorProblem):

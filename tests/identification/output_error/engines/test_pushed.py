@@ -7,12 +7,10 @@ from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of, tr
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.engines.slipping import SlipEngine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, SlipEngine
 from omnidyn.identification.output_error.prepare import make_problem
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record
-from omnidyn.model.fitted.log_effects import LogEffects
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.log_effects import LogEffects
 from omnidyn.simulation.simulate import simulate

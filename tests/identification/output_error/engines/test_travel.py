@@ -7,7 +7,7 @@ from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.model.fitted.log_effects import LogEffects
+from omnidyn.model.dynamics import state_space
 from omnidyn.model.keys import Key
 from omnidyn.model.log_effects import LogEffects
 from omnidyn.run import Run

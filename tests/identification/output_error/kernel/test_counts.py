@@ -10,6 +10,7 @@ from scipy.stats import truncnorm
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.kernel.counts import count_terms, information, rounding, tail
+from omnidyn.model.deadzone import push_per_volt
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot import Prior
 from omnidyn.run import Run
