@@ -11,7 +11,7 @@ from omnidyn.identification.steady.shapes import SHAPES
 from omnidyn.model.keys import Key, unit
 from omnidyn.model.layout import YAW
 from omnidyn.statement import Statement
-from omnidyn.telling.sentence import Sentence
+from omnidyn.telling.sentence import Sentence, either
 
 PRACTICAL = 50.0  # times as many runs
 LOST = {
@@ -71,12 +71,6 @@ def _better_shape_not_used(statement: Statement) -> str:
     """The best shape is not the chosen one, the data tell the two apart, and why it is not taken."""
     behind, why = _error(statement.numbers["behind"]), NOT_USED[statement.numbers["why"]]
     return f"{statement.subject} does better still, by {behind}, but {why}"
-
-
-def _no_lack_of_fit(statement: Statement) -> str:
-    """No lack of fit is seen: a result too."""
-    sides = BOTH_SIDES if statement.numbers["changes"] else ""
-    return f"no lack of fit is seen{sides}: nothing that was tried beside the shape does better"
 
 
 def _no_shape_fits(statement: Statement) -> str:
@@ -235,7 +229,10 @@ SENTENCES = {
     "shapes_tied": Sentence(_shapes_tied),
     "better_shape_not_used": Sentence(_better_shape_not_used),
     "fit_not_tested": Sentence("whether the shape fits was not tested: too few directions in which all of it moves"),
-    "no_lack_of_fit": Sentence(_no_lack_of_fit),
+    "no_lack_of_fit": Sentence(either("changes",
+        "no lack of fit is seen on both sides of the change within the run: nothing that was tried beside the "
+        "shape does better"
+, "no lack of fit is seen: nothing that was tried beside the shape does better")),
     "no_shape_fits": Sentence(_no_shape_fits),
     "viscous_with_back_emf": Sentence(_viscous_with_back_emf),
     "viscous_not_identifiable": Sentence(_viscous_not_identifiable),
