@@ -25,7 +25,7 @@ def errors_for_whiteness(component: str, traces: Mapping[str, Sequence[Trace]]) 
         along, pairs = PATH.index(component), zip(*(traces[name] for name in PATH), strict=True)
         return [_without_pose(settled(x), settled(y))[along] for x, y in pairs]
     errors = [settled(trace).error for trace in traces[component]]
-    return [_centred(each) for each in errors] if counts_from_start(component) else errors
+    return [_centred(error) for error in errors] if counts_from_start(component) else errors
 
 
 def settled(trace: Trace) -> Trace:

@@ -50,10 +50,10 @@ def compare(
     robots = _named(robot, other)
     channels = what_is_compared([*robots.values()], runs, apply)
     replays: dict[str, list[Replay]] = {name: [] for name in robots}
-    for k, each in enumerate(runs):
-        progress(Report(f"replaying {each.source or 'a run'}, {k + 1} of {len(runs)}"))
+    for k, log_run in enumerate(runs):
+        progress(Report(f"replaying {log_run.source or 'a run'}, {k + 1} of {len(runs)}"))
         for name, model in robots.items():
-            replays[name].append(replay(model, each, apply=apply, hold=hold, tol=tol, log=log))
+            replays[name].append(replay(model, log_run, apply=apply, hold=hold, tol=tol, log=log))
     segments = _segments(runs, next(iter(replays.values())))
     traces = {name: _traces(runs, parts, segments, channels, current_unsigned) for name, parts in replays.items()}
     overall = {name: _overall(by) for name, by in traces.items()}
@@ -126,8 +126,8 @@ def _named(robot: Robot, other: Robot | None) -> dict[str, Robot]:
 def _segments(runs: Sequence[Run], replays: Sequence[Replay]) -> tuple[Segment, ...]:
     return tuple(
         Segment(k, rows.start, rows.stop, float(run.t[rows.start]), float(run.t[rows.stop - 1]))
-        for k, (run, each) in enumerate(zip(runs, replays, strict=True))
-        for rows in each.pieces
+        for k, (run, driven) in enumerate(zip(runs, replays, strict=True))
+        for rows in driven.pieces
     )
 
 
@@ -135,7 +135,7 @@ def _traces(
     runs: Sequence[Run], replays: Sequence[Replay], segments: Sequence[Segment], channels: Sequence[str], unsigned: bool
 ) -> dict[str, list[Trace]]:
     """Component -> a trace per segment, an empty one where its log does not hold the component."""
-    logged = [compared_components(run, each.applied) for run, each in zip(runs, replays, strict=True)]
+    logged = [compared_components(run, driven.applied) for run, driven in zip(runs, replays, strict=True)]
 
     def trace(name: str, at: Segment) -> Trace:
         if name not in logged[at.log]:
@@ -178,7 +178,7 @@ def _differences(
 
 def _applied(replays: Sequence[Replay]) -> tuple[Statement, ...]:
     """What drove a robot, each way once."""
-    return tuple(dict.fromkeys(each.driver for each in replays))
+    return tuple(dict.fromkeys(driven.driver for driven in replays))
 
 
 def _sign_warnings(
@@ -186,11 +186,11 @@ def _sign_warnings(
 ) -> Iterator[Statement]:
     """Currents that are never negative where a model has them both ways: the sensor may have no sign."""
     logged = [run.current for run in runs if run.current is not None]
-    if current_unsigned or not logged or min(np.nanmin(each, initial=np.inf) for each in logged) < 0.0:
+    if current_unsigned or not logged or min(np.nanmin(currents, initial=np.inf) for currents in logged) < 0.0:
         return
     names = components("current", logged[0].shape[1])
     models = [trace.model for by in traces.values() for name in names for trace in by.get(name, [])]
-    if any((each < 0.0).any() for each in models):
+    if any((model < 0.0).any() for model in models):
         yield Statement("currents_never_negative")
 
 

@@ -54,9 +54,9 @@ def difference(
     if power == 0.0 or one + two == 0.0:
         return ModelDifference(0.0, 0.0, None, len(error))
     share = float(error @ apart) / power
-    left = [2.0 * each[:, 1] * (each[:, 0] - share * each[:, 1]) for each in parts]
+    left = [2.0 * part[:, 1] * (part[:, 0] - share * part[:, 1]) for part in parts]
     length = max(map(len, left)) if whole else block_length(left)
-    blocks = sum(max(1, len(each) // length) for each in left)
+    blocks = sum(max(1, len(errors) // length) for errors in left)
     gap = one - two
     if blocks < FEWEST:
         return ModelDifference(gap, None, None, blocks)

@@ -78,7 +78,7 @@ def both_known(traces: Sequence[Trace]) -> tuple[FloatArray, FloatArray]:
     if not traces:
         return np.zeros(0), np.zeros(0)
     measured, model = (
-        np.concatenate(parts) for parts in zip(*[(each.measured, each.model) for each in traces], strict=True)
+        np.concatenate(parts) for parts in zip(*[(trace.measured, trace.model) for trace in traces], strict=True)
     )
     known = np.isfinite(measured) & np.isfinite(model)
     return measured[known], model[known]

@@ -78,9 +78,9 @@ def check_log(log: Log, robot: Robot | None = None) -> Verdict:
             more, changed = family(work)
             said = with_guesses(more, robot, found)
             found += said
-            if not more or any(not each.rests_on for each in said):  # a guess puts nothing right
+            if not more or any(not finding.rests_on for finding in said):  # a guess puts nothing right
                 work = changed
-        good = uses(log, robot, {each.code for each in found})
+        good = uses(log, robot, {finding.code for finding in found})
     length = float(work.t[-1] - work.t[0]) if len(work) > 1 else 0.0
     return Verdict(
         in_order(found), work.known.get("excitation", {}), len(log), length,

@@ -176,7 +176,7 @@ def check_averaged(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     if not work.step > 0.0:
         return [], work
     found, _ = at_each_clock(work, _at_its_clock)
-    late = {place(each.subject.split()[0])[0]: each.numbers["late_s"] for each in found}  # type: ignore[index]
+    late = {place(finding.subject.split()[0])[0]: finding.numbers["late_s"] for finding in found}  # type: ignore[index]
     return found, work.knowing(late=late)
 
 

@@ -33,7 +33,7 @@ def check_limits(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         more = _one_way_drive(work, channel)
         work, found = work.replace(**{channel: None}) if more else work, found + more
     more = _unsigned(work)
-    return found + more, work.replace(current=None) if any(each.severity == ERROR for each in more) else work
+    return found + more, work.replace(current=None) if any(finding.severity == ERROR for finding in more) else work
 
 
 def _one_way_drive(work: LogUnderCheck, channel: str) -> list[Finding]:

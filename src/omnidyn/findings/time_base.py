@@ -100,7 +100,7 @@ def _repeated(log: Log, rows: IntArray, again: BoolArray) -> list[Finding]:
 
 def _gaps(work: LogUnderCheck) -> list[Finding]:
     lines = work.log.lines[work.rows]
-    known = [each.line for each in work.log.restarts if each.is_gap]  # a gap of their own
+    known = [restart.line for restart in work.log.restarts if restart.is_gap]  # a gap of their own
     cuts = [segment.start for segment in work.segments[1:]]
     cuts = [k for k in cuts if not any(lines[k - 1] < line <= lines[k] for line in known)]
     if not cuts:

@@ -23,8 +23,8 @@ def on_clock_of(run: Run, channel: str) -> Run:
     if len(own) < 2:
         return run
     there = {
-        name: _on_line(run.t, each, own) if name in SENSORS else _held(run.t, each, own)
-        for name, each in run.channels.items()
+        name: _on_line(run.t, values, own) if name in SENSORS else _held(run.t, values, own)
+        for name, values in run.channels.items()
     }
     return run.replace(t=own, **there)
 

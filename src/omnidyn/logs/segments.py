@@ -31,8 +31,8 @@ def segments(t: FloatArray, gap: float = GAP, usual: float | None = None) -> lis
 def filled(t: FloatArray, values: FloatArray) -> FloatArray:
     """Each blank between two values on the line between them; outside, and in a gap between values, there is none."""
     whole, known = values.copy(), np.flatnonzero(np.isfinite(values))
-    for each in segments(t[known]):
-        rows = known[each]
+    for segment in segments(t[known]):
+        rows = known[segment]
         if rows.size:
             whole[rows[0] : rows[-1] + 1] = np.interp(t[rows[0] : rows[-1] + 1], t[rows], values[rows])
     return whole

@@ -52,7 +52,7 @@ def _signal_followed(statement: Statement) -> str:
 def _follows(statement: Statement) -> str:
     """A model follows some of what was measured; what it hardly follows, or not at all, is named too."""
     signals = statement.numbers["signals"]
-    good, bad = ([str(one) for one in signals if (one.numbers["level"] in ("hardly", "not")) is poor]
+    good, bad = ([str(signal) for signal in signals if (signal.numbers["level"] in ("hardly", "not")) is poor]
                  for poor in (False, True))  # fmt: skip
     return f"{statement.subject} follows {all_of(good)}{f', but {all_of(bad)}' if bad else ''}"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import string
-from collections.abc import Callable, Sized
+from collections.abc import Callable, Mapping, Sized
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -27,7 +27,7 @@ class Sentence:
 
     text: Wording
     remedy: Wording = ""
-    remedies: dict[str, Wording] = field(default_factory=dict)
+    remedies: Mapping[str, Wording] = field(default_factory=dict)
 
     def of(self, statement: Statement) -> str:
         """The sentence of a statement."""
@@ -43,7 +43,7 @@ def either(name: str, there: str, otherwise: str) -> Callable[[Statement], str]:
 
     def words(statement: Statement) -> str:
         value = statement.numbers.get(name)
-        return _filled(otherwise if value is False or value in (None, "", ()) else there, statement)
+        return _filled(there if value or isinstance(value, float) else otherwise, statement)
 
     words.__doc__ = f"{there} / {otherwise}"
     return words

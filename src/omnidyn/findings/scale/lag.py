@@ -23,7 +23,7 @@ ENOUGH = 60_000  # rows that tell a lag
 SURE, VAGUE = 5.0, 0.4  # standard errors; rows of error beyond which nothing is said
 
 
-class Pair(NamedTuple):
+class LagPair(NamedTuple):
     """Two channels that should be the same. y, x: shape (rows, k). width: rows over which both are means already."""
 
     late: str
@@ -52,7 +52,7 @@ def check_lag(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     return found, work
 
 
-def _finding(work: LogUnderCheck, pair: Pair, line: Slope) -> Finding:
+def _finding(work: LogUnderCheck, pair: LagPair, line: Slope) -> Finding:
     late, early = (pair.late, pair.against) if line.value > 0.0 else (pair.against, pair.late)
     return Finding(
         "lag", NOTE if abs(line.value) < WARN_FROM else WARNING, pair.subject,
@@ -60,7 +60,7 @@ def _finding(work: LogUnderCheck, pair: Pair, line: Slope) -> Finding:
     )  # fmt: skip
 
 
-def _pairs(work: LogUnderCheck) -> Iterator[tuple[LogUnderCheck, Pair]]:
+def _pairs(work: LogUnderCheck) -> Iterator[tuple[LogUnderCheck, LagPair]]:
     """What can be compared, and in which rows; `late` is the channel whose lag is positive."""
     speed = work.full("wheel_speed")
     seen = ground(work)
@@ -69,7 +69,7 @@ def _pairs(work: LogUnderCheck) -> Iterator[tuple[LogUnderCheck, Pair]]:
         assert own is not None
         length = np.array([1.0, 1.0, float(np.mean(work.geometry.wheels.robot_radius))])
         axes = seen.axes
-        pair = Pair("wheel_speed", seen.name, own[:, axes] * length[axes], seen.twist[:, axes] * length[axes],
+        pair = LagPair("wheel_speed", seen.name, own[:, axes] * length[axes], seen.twist[:, axes] * length[axes],
                     f"wheel_speed {seen.name}")  # fmt: skip
         yield work, pair
     # A current jumps with the voltage, a speed does not: between samples of the current nothing is on a line.
@@ -80,10 +80,10 @@ def _pairs(work: LogUnderCheck) -> Iterator[tuple[LogUnderCheck, Pair]]:
     pose, twist = work.get("pose"), work.get("twist")
     if pose is not None and twist is not None and np.isfinite(pose[:, 2]).any() and np.isfinite(twist[:, 2]).any():
         rate = central_rate(unwrapped(pose[:, 2]), work.t, 1)
-        yield work, Pair("omega", "heading", smooth(twist[:, 2], 3)[:, None], rate[:, None], "omega heading")
+        yield work, LagPair("omega", "heading", smooth(twist[:, 2], 3)[:, None], rate[:, None], "omega heading")
 
 
-def _of_motors(work: LogUnderCheck, speed: FloatArray) -> Iterator[Pair]:
+def _of_motors(work: LogUnderCheck, speed: FloatArray) -> Iterator[LagPair]:
     """u = R i + K l w: late voltage, current or speed, each against the two others."""
     voltage, current = volts(work), work.full("current")
     if voltage is None or current is None or electric_speed(work) is None:
@@ -92,7 +92,7 @@ def _of_motors(work: LogUnderCheck, speed: FloatArray) -> Iterator[Pair]:
     if counter is None or lost is None or voltage.shape != lost.shape:
         return
     names = "voltage" if work.get("voltage") is not None else "duty"
-    yield Pair("current", f"{names} wheel_speed", lost, voltage - counter, "current")
+    yield LagPair("current", f"{names} wheel_speed", lost, voltage - counter, "current")
 
 
 def lag(work: LogUnderCheck, y: FloatArray, x: FloatArray) -> Slope | None:

@@ -39,7 +39,7 @@ def _wrapped(work: LogUnderCheck, channel: str, component: str, values: FloatArr
     """Values about 0 and values just below 2^16 (or 2^32), and nothing between."""
     size = _cell_size(work, component)
     cells = values / size
-    wrap = next((each for each in WRAPS if 0.75 * each < np.nanmax(cells) < each), None)
+    wrap = next((size for size in WRAPS if 0.75 * size < np.nanmax(cells) < size), None)
     if channel not in SIGNED or wrap is None or np.nanmin(cells) < 0.0:
         return [], work, values
     with np.errstate(invalid="ignore"):

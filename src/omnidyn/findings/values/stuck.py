@@ -39,7 +39,7 @@ def check_stuck(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         columns = [(name, values, _repeats(values), rest_level(values)) for name, values in sampled]
         for component, values, repeats, rest in sorted(columns, key=lambda each: -_longest(*each[1:])):
             k = place(component)[1]  # type: ignore[index]
-            judge = _Judge(work, values, repeats, rest)
+            judge = _StuckJudge(work, values, repeats, rest)
             judge.steady = _Steady(work, channel, k).during
             if channel == "wheel_speed":
                 judge.predict = partial(predictor.wheel_speed, k)
@@ -71,7 +71,7 @@ def _longest(values: FloatArray, repeats: IntArray, rest: float) -> int:
     return int(np.diff(repeats, axis=1)[np.abs(values[repeats[:, 0]]) > rest].max(initial=0))
 
 
-class _Judge:
+class _StuckJudge:
     """Which of the repeats of one channel are too long for chance, or go on while something else changes."""
 
     predict: Callable[[BoolArray], FloatArray] | None = None  # the channel by all others
@@ -87,9 +87,9 @@ class _Judge:
         self.moving = self.turns[repeats[:, 0]]
 
     @cached_property
-    def predicted(self) -> _Walk | None:
+    def predicted(self) -> _RowWalk | None:
         """How far what all other columns say walks away."""
-        return None if self.predict is None else _Walk(self.values, self.predict(self.repeated), self.repeated)
+        return None if self.predict is None else _RowWalk(self.values, self.predict(self.repeated), self.repeated)
 
     @cached_property
     def repeated(self) -> BoolArray:
@@ -177,7 +177,7 @@ class _Steady:
         return still and bool(self.others) and all(same[a : b - 1].mean() > TOGETHER for same in self.others)
 
 
-class _Walk:
+class _RowWalk:
     """How far a reference walks away during repeats, beside all other stretches of that length in the log."""
 
     def __init__(self, values: FloatArray, reference: FloatArray, repeated: BoolArray) -> None:

@@ -56,7 +56,11 @@ def _with_dead_wheel(work: LogUnderCheck, found: list[Finding]) -> LogUnderCheck
 
     Else it hides what is wrong with them: neither floor nor circuit can be held against a robot with a wheel missing.
     """
-    dead = [at[1] for each in found if each.code == "dead" and (at := place(each.subject)) and at[0] == "wheel_speed"]
+    dead = [
+        at[1]
+        for finding in found
+        if finding.code == "dead" and (at := place(finding.subject)) and at[0] == "wheel_speed"
+    ]
     expected = expected_wheel_speed(work, without="wheel_speed")
     if len(dead) != 1 or expected is None or expected[0] not in MEASUREMENTS or expected[1].shape[1] != work.wheels:
         return work

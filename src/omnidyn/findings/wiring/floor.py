@@ -12,7 +12,17 @@ from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.reference import GEOMETRY, ground, pose_twist, wheels_twist
 from omnidyn.findings.signal.robust import smooth
 from omnidyn.findings.wiring.frame import commands_agree
-from omnidyn.findings.wiring.orders import BETTER, WINDOWS, Answer, Wiring, choose, code_of, means, rivals_of, wirings
+from omnidyn.findings.wiring.orders import (
+    BETTER,
+    WINDOWS,
+    Wiring,
+    WiringChoice,
+    choose,
+    code_of,
+    means,
+    rivals_of,
+    wirings,
+)
 from omnidyn.logs.channels import components
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
@@ -25,13 +35,13 @@ Moments = tuple[FloatArray, FloatArray, FloatArray]  # sums of v v', v w', w w'
 SEEN_BY = (0.0, 0.3, 0.15, 0.01)
 
 
-def by_floor(work: LogUnderCheck) -> tuple[str, Answer] | None:
+def by_floor(work: LogUnderCheck) -> tuple[str, WiringChoice] | None:
     """What is wrong between wheels and floor; wheels that turn as the firmware tells them are wired as it thinks."""
     answer = next(filter(None, (_within(work, seconds) for seconds in WINDOWS)), None)
     return None if answer is not None and answer[0] == "wheels" and commands_agree(work) else answer
 
 
-def _within(work: LogUnderCheck, seconds: float) -> tuple[str, Answer] | None:
+def _within(work: LogUnderCheck, seconds: float) -> tuple[str, WiringChoice] | None:
     """("wheels" or "axes", what is wrong), from the motion over the floor and the wheels' own redundancy."""
     speed, robot = work.full("wheel_speed"), work.geometry
     if speed is None or robot is None:
@@ -66,7 +76,9 @@ def _within(work: LogUnderCheck, seconds: float) -> tuple[str, Answer] | None:
     return _simpler(work, answer, turned)
 
 
-def _simpler(work: LogUnderCheck, answer: Answer | None, turned: Answer | None) -> tuple[str, Answer] | None:
+def _simpler(
+    work: LogUnderCheck, answer: WiringChoice | None, turned: WiringChoice | None
+) -> tuple[str, WiringChoice] | None:
     """Wheels or axes: what explains much more, else what needs fewer changes.
 
     One axis of the floor turned about is rarer than two motors exchanged, which may look the same.
@@ -108,7 +120,7 @@ def _cost(matrix: FloatArray, moments: Moments, scaled: bool) -> float:
     return float(np.trace(vv)) - along * (along / size)
 
 
-def _by_axes(rows: FloatArray, moments: Moments, axes: list[int], total: float) -> Answer | None:
+def _by_axes(rows: FloatArray, moments: Moments, axes: list[int], total: float) -> WiringChoice | None:
     """The same question with the wheels trusted and the axes of the floor's twist exchanged or turned about."""
     vv, vw, ww = moments
     n, free = len(axes), len(vv) - len(axes)
@@ -129,7 +141,7 @@ def _axes_names(work: LogUnderCheck) -> tuple[str, tuple[str, ...]]:
     return seen.name, tuple(names[k] for k in seen.axes)
 
 
-def axes_finding(work: LogUnderCheck, answer: Answer) -> Finding:
+def axes_finding(work: LogUnderCheck, answer: WiringChoice) -> Finding:
     """Errors: axes of what was measured over the floor are exchanged, or have the opposite sign."""
     channel, names = _axes_names(work)
     turn = _turn_of_pose(work, answer.best)
@@ -182,7 +194,7 @@ def mended_axes(work: LogUnderCheck, wiring: Wiring) -> LogUnderCheck:
     return work.replace(**{seen.name: values})
 
 
-def wheels_finding(work: LogUnderCheck, answer: Answer, blamed: str) -> Finding:
+def wheels_finding(work: LogUnderCheck, answer: WiringChoice, blamed: str) -> Finding:
     """Errors: wheel speeds in another order, or of the opposite sign, than floor or commands say."""
     seen = ground(work)
     against = seen.name if seen is not None else ("twist_command" if work.get("twist_command") is not None else "")

@@ -55,7 +55,7 @@ class Wiring(NamedTuple):
         return [names[j] for j in sorted(wrong)]
 
 
-class Answer(NamedTuple):
+class WiringChoice(NamedTuple):
     """best: the right wiring with fewest changes. others: as good ones. left, logged: share that best and log leave."""
 
     best: Wiring
@@ -83,7 +83,7 @@ def wirings(n: int) -> Iterator[Wiring]:
 
 def choose(
     tried: list[Wiring], costs: FloatArray, total: float, better: float = BETTER, poor: float = POOR
-) -> Answer | None:
+) -> WiringChoice | None:
     """The wiring that the costs call for; None where that of the log, the first, is not clearly wrong."""
     logged, least = float(costs[0]), float(costs.min())
     if not np.isfinite(logged) or total <= 0.0 or logged < poor * total or least > better * logged:
@@ -93,7 +93,9 @@ def choose(
     # Of those with fewest changes the cheapest; a rival is one that does not need more changes.
     best = tried[alike[0]]
     rivals = [tried[k] for k in alike[1:] if tried[k].changes == best.changes]
-    return Answer(best, len(rivals), rivals[0] if rivals else None, float(costs[alike[0]]) / total, logged / total)
+    return WiringChoice(
+        best, len(rivals), rivals[0] if rivals else None, float(costs[alike[0]]) / total, logged / total
+    )
 
 
 def means(work: LogUnderCheck, *channels: FloatArray, seconds: float = WINDOWS[0]) -> list[FloatArray]:
@@ -112,7 +114,7 @@ def code_of(wiring: Wiring) -> str:
     return "swapped" if any(k != j for k, j in enumerate(wiring.order)) else "inverted"
 
 
-def rivals_of(answer: Answer, names: tuple[str, ...]) -> dict[str, Statement]:
+def rivals_of(answer: WiringChoice, names: tuple[str, ...]) -> dict[str, Statement]:
     """Another wiring that the log cannot tell from the best one."""
     rival = answer.rival if answer.second is None else answer.second.statement(names)
     return {} if rival is None else {"rival": rival}
@@ -142,7 +144,7 @@ def turned(work: LogUnderCheck, own: FloatArray, other: FloatArray, rate: FloatA
     angle of other/own over short windows = angle + lag * rate + c cos(2 d) + s sin(2 d), d the direction of travel: a
     lag of one of the two and an axis with another scale are no turn. None where too little moves.
     """
-    z, y, turning = (each for each in means(work, own, other, np.nan_to_num(rate)[:, None]))
+    z, y, turning = (mean for mean in means(work, own, other, np.nan_to_num(rate)[:, None]))
     z, y = z @ [1.0, 1.0j], y @ [1.0, 1.0j]
     size = np.abs(z)
     moving = size > MOVING * np.quantile(size, 0.9) if size.size else np.zeros(0, dtype=bool)

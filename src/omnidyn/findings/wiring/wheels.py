@@ -18,7 +18,7 @@ from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import CIRCUIT, CURRENT_AND_VOLTAGE, emf, ohmic, volts
 from omnidyn.findings.wiring.floor import axes_finding, by_floor, mended_axes, wheels_finding
 from omnidyn.findings.wiring.frame import check_frame
-from omnidyn.findings.wiring.orders import Answer, Wiring, choose, code_of, means, rivals_of, wirings
+from omnidyn.findings.wiring.orders import Wiring, WiringChoice, choose, code_of, means, rivals_of, wirings
 from omnidyn.logs.channels import components
 from omnidyn.statement import ERROR
 
@@ -82,10 +82,10 @@ class Circuit(NamedTuple):
     """known: whether u = R i + K l w holds under some wiring. wrong: (channel that is wired wrongly, how), or None."""
 
     known: bool
-    wrong: tuple[str, Answer] | None = None
+    wrong: tuple[str, WiringChoice] | None = None
 
 
-def by_drive(work: LogUnderCheck) -> tuple[str, Answer] | None:
+def by_drive(work: LogUnderCheck) -> tuple[str, WiringChoice] | None:
     """(channel that is wired wrongly, how), from the likeness of voltage or duty and speed."""
     for channel in ("voltage", "duty"):
         if work.full(channel) is not None:
@@ -109,7 +109,7 @@ def by_circuit(work: LogUnderCheck) -> Circuit:
     tried = list(wirings(u.shape[1]))
     total = float((u**2).sum())
     names = ("duty" if work.get("voltage") is None else "voltage", "current", "wheel_speed")
-    best: tuple[str, Answer] | None = None
+    best: tuple[str, WiringChoice] | None = None
     holds = False
     for name, changed, rest in zip(names, (u, r, e), ((r, e, 1), (u, e, -1), (u, r, -1)), strict=True):
         fixed = rest[0] + rest[1] if rest[2] > 0 else rest[0] - rest[1]
@@ -133,7 +133,7 @@ def _by_scaled_speed(tried: list[Wiring], left: FloatArray, e: FloatArray, total
     return Circuit(True, None if answer is None else ("wheel_speed", answer))
 
 
-def by_likeness(work: LogUnderCheck, channel: str) -> Answer | None:
+def by_likeness(work: LogUnderCheck, channel: str) -> WiringChoice | None:
     """Order and signs under which a drive channel and the speed of the same wheel look alike."""
     driven, speed = work.full(channel), work.full("wheel_speed")
     if driven is None or speed is None or driven.shape != speed.shape:
@@ -153,7 +153,7 @@ def by_likeness(work: LogUnderCheck, channel: str) -> Answer | None:
     return answer if answer is not None and (answer.logged - answer.left) * n > 1.0 else None
 
 
-def motor_finding(work: LogUnderCheck, channel: str, answer: Answer, rests_on: tuple[str, ...] = ()) -> Finding:
+def motor_finding(work: LogUnderCheck, channel: str, answer: WiringChoice, rests_on: tuple[str, ...] = ()) -> Finding:
     """Errors: columns of one channel of the motors are exchanged, or have the opposite sign."""
     names = components(channel, work.wheels)
     against = "wheel_speed" if channel != "wheel_speed" else CURRENT_AND_VOLTAGE

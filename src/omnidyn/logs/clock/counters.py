@@ -156,7 +156,7 @@ def _full(readings: FloatArray, steps: FloatArray, unit: str, tick: float) -> fl
         return None
     width, farthest = float(np.ptp(readings)), float(np.abs(steps).max())
     turn = TURN / parse_unit(unit).size
-    periods = [turn, *(tick * each for each in COUNTERS if tick > 0.0)]  # counts, so many of which make a turn
+    periods = [turn, *(tick * size for size in COUNTERS if tick > 0.0)]  # counts, so many of which make a turn
     for period in sorted(periods):
         if MOST_FULL * period < width <= WHOLE * period and farthest > JUMP * period:
             return period if period == turn or _goes_on(steps, period, tick) else None
@@ -230,7 +230,7 @@ def _plainest(period: float, doubt: float, width: float, turn: float, tick: floa
     if tick > 0.0:
         power = tick * 2.0 ** np.round(np.log2(period / tick))
         decades = tick * 10.0 ** np.arange(np.floor(np.log10(period / tick)), -1.0, -1.0)
-        choices += [(power, power), *((each * np.round(period / each), each) for each in decades)]
+        choices += [(power, power), *((decade * np.round(period / decade), decade) for decade in decades)]
     for value, apart in choices:
         near = min(DOUBT * period, ALONE * apart, 5.0 * doubt + TICKS * tick)
         if value > width and doubt <= ALONE * apart and abs(value - period) <= near:
@@ -280,7 +280,7 @@ class Counters:
 
     def __init__(self, table: Table, t: FloatArray, found: Sequence[Restart]):
         self.table, self.t, self.found = table, t, list(found)
-        self.begins = np.flatnonzero(np.isin(table.lines, [each.line for each in found])).tolist()
+        self.begins = np.flatnonzero(np.isin(table.lines, [restart.line for restart in found])).tolist()
         self.counters: list[Counter] = []
 
     def angle(self, key: str, column: Column, values: FloatArray) -> FloatArray:
@@ -298,7 +298,7 @@ class Counters:
             periods += [] if period is None else [period]
             again += [part.start + row for row in restarts]
         unit, line = column.unit.partition("/")[0], int(self.table.lines[0]) if len(values) else 0
-        self.found += [full_counter(key, column.name, each, unit, line) for each in dict.fromkeys(periods)]
+        self.found += [full_counter(key, column.name, period, unit, line) for period in dict.fromkeys(periods)]
         self.counters.append(Counter(key, column.name, values, again))
         return np.concatenate(parts)
 

@@ -61,7 +61,7 @@ def guess_columns(
     himself: nothing is doubted of them. Raises InputError for an unknown unit in `assume`.
     """
     units = {name: text for name, text in (assume or {}).items() if name not in FRAMES}
-    told = {each: unit_and_side(text) for name, text in units.items() for each in _meant(name, table.names)}
+    told = {column: unit_and_side(text) for name, text in units.items() for column in _meant(name, table.names)}
     assumed = {name: unit.text for name, (unit, _) in told.items()}
     found = Guess(robot=robot)
     names = [name for name in table.names if is_numeric(table.columns[name]) and name not in table.says]
@@ -75,12 +75,12 @@ def guess_columns(
     _doubt_letters(names, found)
     if TIME not in found.columns:
         take_time(table, assumed, found)
-    if set(numbers.values()) <= {1} and not any(each.component[1:2].isdigit() for each in table.says.values()):
+    if set(numbers.values()) <= {1} and not any(said.component[1:2].isdigit() for said in table.says.values()):
         _take_bench(table, names, assumed, found)
     _ask_where_motion_differs(table, numbers, found)
     settle_side(table, robot, found)
     take_sides({name: side for name, (_, side) in told.items() if side}, found)
-    found.doubts = [each for each in found.doubts if each.columns[0] not in (taken or {})]
+    found.doubts = [open_doubt for open_doubt in found.doubts if open_doubt.columns[0] not in (taken or {})]
     used = {column.name for column in found.columns.values()}
     unused = tuple(name for name in table.names if name not in used)
     ordered = dict(sorted(found.columns.items(), key=lambda item: _order(item[0])))
@@ -88,7 +88,9 @@ def guess_columns(
         Doubt("assumption_unused", WARNING, "", {"assumption": f"{name}={unit}"}, units=())
         for name, unit in assumed.items()
         if not _is_used(
-            name, table, (*found.columns, *(each.components[0] for each in found.doubts), *(taken or {}).values())
+            name,
+            table,
+            (*found.columns, *(open_doubt.components[0] for open_doubt in found.doubts), *(taken or {}).values()),
         )
     )
     return ColumnMap(ordered, unused, (*joined_doubts(found.doubts), *idle), found.all_notes())
@@ -249,7 +251,9 @@ def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], foun
     """
     alike: dict[str, list[str]] = {}
     numbered = {component for component in found.columns if component[1:2].isdigit()}
-    settled = numbered | {each.components[0] for each in found.doubts if read_name(each.columns[0]).number is not None}
+    settled = numbered | {
+        open_doubt.components[0] for open_doubt in found.doubts if read_name(open_doubt.columns[0]).number is not None
+    }
     body = found.columns.keys() - numbered - {TIME, "supply", "omega", "heading"}
     turning = {column.name for key, column in found.columns.items() if body and key in ("omega", "heading")}
     for name in names:
@@ -304,7 +308,7 @@ def _forget(names: list[str], found: Guess) -> None:
     """Take back what was said about some columns."""
     for component in [key for key, column in found.columns.items() if column.name in names]:
         del found.columns[component]
-    found.doubts = [each for each in found.doubts if each.columns[0] not in names]
+    found.doubts = [open_doubt for open_doubt in found.doubts if open_doubt.columns[0] not in names]
     for name in names:
         found.si.pop(name, None)
 

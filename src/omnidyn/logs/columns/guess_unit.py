@@ -75,7 +75,7 @@ def _most_volts(robot: Robot | None) -> float:
 
 def _scales(largest: float) -> tuple[str, ...]:
     """The units of a duty that numbers up to so large may have."""
-    full = next((each for each in FULL_SCALES if largest <= each), 0)
+    full = next((scale for scale in FULL_SCALES if largest <= scale), 0)
     scale = (f"duty/{full:g}",) if full else ("duty/FULL_SCALE",)
     return ("duty",) * (largest <= MOST_DUTY) + ("%",) * (1.0 < largest <= MOST_PERCENT) + scale * (largest > 1.0)
 

@@ -119,7 +119,8 @@ def proposed_wheels(table: Table, names: Sequence[str], found: Guess) -> str:
         return ""
     t = floats(table.columns[found.columns[TIME].name])
     twist = np.stack(
-        [floats(table.columns[each.name]) * parse_unit(each.unit).size for each in body if each is not None], axis=1
+        [floats(table.columns[column.name]) * parse_unit(column.unit).size for column in body if column is not None],
+        axis=1,
     )
     rows = np.isfinite(t) & np.isfinite(twist).all(axis=1)
     if rows.sum() < LEAST:

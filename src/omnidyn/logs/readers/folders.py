@@ -48,7 +48,7 @@ def files_of(path: str | os.PathLike) -> list[Path]:
 
 
 def _files(folder: Path) -> list[Path]:
-    found = [each for each in folder.iterdir() if each.name.lower().endswith(BAG_SUFFIXES) and each.is_file()]
+    found = [file for file in folder.iterdir() if file.name.lower().endswith(BAG_SUFFIXES) and file.is_file()]
     return sorted(found, key=lambda each: natural(each.name))
 
 

@@ -13,7 +13,7 @@ from omnidyn.logs.table.table import Table
 from omnidyn.progress import Progress, silent
 
 
-class Options(NamedTuple):
+class ReadOptions(NamedTuple):
     """How to read a file.
 
     header: False where the first row of a text file is a row already. skip_bad_rows: leave out rows that cannot be
@@ -39,9 +39,9 @@ class Reader(NamedTuple):
     kind: str
     word: str
     suffixes: tuple[str, ...]
-    tables: Callable[[str | os.PathLike, int, Options], Iterator[Table]]
+    tables: Callable[[str | os.PathLike, int, ReadOptions], Iterator[Table]]
     least: str = "at least one row"
-    recording: Callable[[str | os.PathLike, Options], Recording] | None = None
+    recording: Callable[[str | os.PathLike, ReadOptions], Recording] | None = None
     whole: bool = False
     variables: bool = False
 

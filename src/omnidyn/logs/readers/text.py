@@ -22,7 +22,7 @@ import numpy as np
 from omnidyn.arrays import IntArray
 from omnidyn.errors import InputError
 from omnidyn.files import default_max_bytes, too_large
-from omnidyn.logs.readers.reader import Options, Reader
+from omnidyn.logs.readers.reader import Reader, ReadOptions
 from omnidyn.logs.readers.recording import Recording, Track, topic_of
 from omnidyn.logs.table import dialect
 from omnidyn.logs.table.header import MAX_COLUMNS, TABS_NOTE, FileLine, Layout, find_layout
@@ -35,7 +35,7 @@ HEAD_ROWS = 100  # the first rows are looked at together to tell how a file is w
 KEPT_COMMENTS = 2  # right above a row: names, and perhaps their units
 
 
-def text_tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
+def text_tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
     """The tables of a text file; see the head of this file for what is taken and refused, and the contract.
 
     A list with a row for every value (listed) becomes a table of topics, and is held whole.
@@ -49,7 +49,7 @@ def text_tables(path: str | os.PathLike, rows: int, options: Options) -> Iterato
     yield from recording_of(chain([first], tables), limit).tables(rows)
 
 
-def _as_they_stand(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
+def _as_they_stand(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
     """The rows as they stand in the file."""
     file = TextFile(path, options.progress, options.max_bytes)
     head, blocks = _head(file.blocks(rows))
@@ -191,7 +191,7 @@ def recording_of(tables: Iterable[Table], max_bytes: int) -> Recording:
     tracks = [
         Track(key, np.array(stamps[key], dtype=np.int64), {key: np.array(mine)}) for key, mine in values.items()
     ]  # fmt: skip
-    topics = [topic_of(each.topic, "numbers", each.stamps, True) for each in tracks]
+    topics = [topic_of(track.topic, "numbers", track.stamps, True) for track in tracks]
     lost = sorted(words - set(stamps))
     notes = [*table.notes, "a row for every value: each key is a topic with times of its own"]
     notes += [f"words are not read: {', '.join(lost[:8])}"] if lost else []

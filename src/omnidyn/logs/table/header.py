@@ -125,7 +125,7 @@ def _commented_header(lines: Sequence[FileLine], row: FileLine) -> list[FileLine
     for separator in SEPARATORS:
         counts = set(dialect.counts(row.text, separator)) - {1}
         cells = [[cell.strip() for cell in line.text.split(separator)] for line in comments]
-        fit = [len(each) in counts for each in cells]
+        fit = [len(cell) in counts for cell in cells]
         if len(cells) == 2 and all(fit) and _are_names(cells[0]) and dialect.is_units_row(cells[1]):
             return comments
         if fit[-1] and _are_names(cells[-1]):

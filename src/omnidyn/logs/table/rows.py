@@ -15,7 +15,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.logs.table import dialect
-from omnidyn.logs.table.decimals import Column, Points
+from omnidyn.logs.table.decimals import Column, PointMeaning
 from omnidyn.logs.table.header import Layout
 
 Lines = IntArray
@@ -39,7 +39,7 @@ class RowParser:
         self.layout, self.source, self.skip = layout, source, skip
         self.skipped: dict[str, list[int]] = {}
         self._rows = 0
-        self._points = Points(layout.separator, layout.names, source)
+        self._points = PointMeaning(layout.separator, layout.names, source)
         self._comma = self._point = ""  # the first number of each kind
         self._words: set[str] = set()
         count = len(layout.names)
