@@ -16,13 +16,11 @@ from omnidyn.arguments import check_order
 from omnidyn.findings.energy import check_energy
 from omnidyn.findings.excitation import check_excitation, joined, judge
 from omnidyn.findings.filters import check_averaged, check_filters
-from omnidyn.findings.finding import Finding, Verdict, in_order, merged
+from omnidyn.findings.finding import Finding, Verdict, in_order, merged, with_guesses
 from omnidyn.findings.finding import joined as joined_uses
 from omnidyn.findings.fitness import uses
-from omnidyn.findings.guesses import with_guesses
 from omnidyn.findings.limits import check_limits
-from omnidyn.findings.motion import check_motion
-from omnidyn.findings.oddities import check_oddities
+from omnidyn.findings.motion import check_motion, check_oddities
 from omnidyn.findings.scale.derivatives import check_derivatives
 from omnidyn.findings.scale.lag import check_lag
 from omnidyn.findings.scale.scale import check_dead_wheels, check_scale, check_turn_rate

@@ -17,8 +17,8 @@ from omnidyn.findings.signal.log_under_check import MIN_ROWS
 from omnidyn.logs.columns.mapping import ColumnMap, component_channel
 from omnidyn.logs.geometry import shows_both, wheel_geometry
 from omnidyn.logs.log import Log
-from omnidyn.logs.one_clock import on_clock_of_wheels
 from omnidyn.logs.plateaus import MIN_DURATION, Plateau, first_plateaus
+from omnidyn.logs.segments import on_clock_of_wheels
 from omnidyn.model.motor import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run

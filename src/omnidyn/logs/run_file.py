@@ -25,10 +25,10 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.files import check_output, write_atomic
 from omnidyn.logs.channels import components, si_suffix
+from omnidyn.logs.mcap_run import import_mcap, run_to_mcap
 from omnidyn.logs.readers.parquet import SUFFIXES, import_pyarrow, parquet_bytes
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.table.table import Table
-from omnidyn.logs.writers.mcap_run import import_mcap, run_to_mcap
 from omnidyn.run import CHANNELS, SCALAR, Run, as_run
 from omnidyn.statement import Statement, statements
 from omnidyn.units import DUTY, known_unit, parse_unit

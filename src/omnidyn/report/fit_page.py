@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.comparison.bands import with_fitted_band
+from omnidyn.comparison.compare import with_fitted_band
 from omnidyn.comparison.result import Comparison
 from omnidyn.document import Points, sentence
 from omnidyn.identification.fit_document import difference_table, number_table, short_table, verdict_table

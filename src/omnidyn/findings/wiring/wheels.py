@@ -16,8 +16,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import CIRCUIT, CURRENT_AND_VOLTAGE, emf, ohmic, volts
-from omnidyn.findings.wiring.floor import axes_finding, by_floor, mended_axes, wheels_finding
-from omnidyn.findings.wiring.frame import check_frame
+from omnidyn.findings.wiring.floor import axes_finding, by_floor, check_frame, mended_axes, wheels_finding
 from omnidyn.findings.wiring.orders import Wiring, WiringChoice, choose, code_of, means, rivals_of, wirings
 from omnidyn.logs.channels import components
 from omnidyn.statement import ERROR

@@ -19,11 +19,10 @@ from omnidyn.logs.columns.component import (
     component_of_parts,
     numbered_kind,
 )  # fmt: skip
-from omnidyn.logs.columns.doubt import Doubt, doubt, joined_doubts, letter_of
 from omnidyn.logs.columns.frame_of import FRAMES
 from omnidyn.logs.columns.guess_time import take_time
 from omnidyn.logs.columns.guess_unit import doubt_of_rate, implausible, settle_side, take_sides, unit_of
-from omnidyn.logs.columns.guessed import Guess, first_word, floats, is_numeric
+from omnidyn.logs.columns.guessed import Doubt, Guess, doubt, first_word, floats, is_numeric, joined_doubts, letter_of
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
 from omnidyn.logs.columns.names import BRACKETS, NameParts, read_name
 from omnidyn.logs.columns.wheel_numbers import BY_PLACES, proposed_wheels, wheel_numbers

@@ -11,8 +11,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.logs.channels import si_suffix
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
-from omnidyn.logs.columns.doubt import Doubt, doubt
-from omnidyn.logs.columns.guessed import Guess, floats
+from omnidyn.logs.columns.guessed import Doubt, Guess, doubt, floats
 from omnidyn.logs.columns.mapping import SIDED, component_channel, quantity_of
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot

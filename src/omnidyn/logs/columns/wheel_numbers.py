@@ -13,8 +13,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.logs.channels import TIME
 from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.component import component_of_parts, numbered_kind
-from omnidyn.logs.columns.doubt import doubt
-from omnidyn.logs.columns.guessed import Guess, floats
+from omnidyn.logs.columns.guessed import Guess, doubt, floats
 from omnidyn.logs.columns.names import BRACKETS, read_name, wheels_at
 from omnidyn.logs.table.table import Table
 from omnidyn.model.wheels import MAX_WHEELS, wheel_speed
