@@ -65,7 +65,7 @@ def compare(
         robots=tuple(robots),
         measured=runs,
         simulated={name: tuple(part.run for part in parts) for name, parts in replays.items()},
-        applied={name: _applied(parts) for name, parts in replays.items()},
+        applied={name: tuple(dict.fromkeys(part.driver for part in parts)) for name, parts in replays.items()},
         channels=kept,
         segments=segments,
         overall=overall,
@@ -175,11 +175,6 @@ def _differences(
         for key in channels
     )
     return {key: each for key, each in found if each is not None}
-
-
-def _applied(replays: Sequence[Replay]) -> tuple[Statement, ...]:
-    """What drove a robot, each way once."""
-    return tuple(dict.fromkeys(driven.driver for driven in replays))
 
 
 def _sign_warnings(

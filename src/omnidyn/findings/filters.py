@@ -15,7 +15,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.clocks import at_each_clock
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
-from omnidyn.logs.channels import place
+from omnidyn.logs.channels import components, place
 from omnidyn.logs.resolved import rows_of_mean
 from omnidyn.model.frames import unwrapped, world_to_body
 from omnidyn.statement import NOTE, WARNING
@@ -113,7 +113,10 @@ def _speeds(work: LogUnderCheck) -> Iterator[Speed]:
     t = work.t[:ENOUGH]
     angle, pose = work.get("wheel_angle"), work.get("pose")
     if angle is not None and "wheel_speed" in work.log.channels:
-        of = {component: angle[:ENOUGH, k : k + 1] for k, component in enumerate(_names(angle, "w"))}
+        of = {
+            component: angle[:ENOUGH, k : k + 1]
+            for k, component in enumerate(components("wheel_speed", angle.shape[1]))
+        }
         for component, values in work.columns("wheel_speed"):
             yield from _made(component, "a" + component[1:], values[:ENOUGH], of[component], t, work.step, None)
     if pose is None or work.get("twist") is None:
@@ -126,10 +129,6 @@ def _speeds(work: LogUnderCheck) -> Iterator[Speed]:
         else:
             row = world_to_body(heading)[:, ["vx", "vy"].index(component), :2]
             yield from _made(component, "x y", own, place, t, work.step, row)
-
-
-def _names(values: FloatArray, letter: str) -> list[str]:
-    return [f"{letter}{k + 1}" for k in range(values.shape[1])]
 
 
 def _made(
@@ -189,16 +188,15 @@ def _at_its_clock(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         for component, values in work.sampled_columns(channel):
             if rows := rows_of_mean(values):
                 alike.setdefault((channel, rows), []).append(component)
-    return [_averaged_finding(names, rows, work.step) for (_, rows), names in alike.items()], work
+    return [
+        Finding(
+            "averaged", WARNING, " ".join(names),
+            {"rows": rows, "seconds": rows * work.step, "late_s": 0.5 * (rows - 1) * work.step},
+        )
+        for (_, rows), names in alike.items()
+    ], work  # fmt: skip
 
 
 def late_by(work: LogUnderCheck, channel: str) -> float:
     """By how many rows of the work a mean makes a channel late; 0 where it is none."""
     return work.known.get("late", {}).get(channel, 0.0) / work.step
-
-
-def _averaged_finding(names: list[str], rows: int, step: float) -> Finding:
-    return Finding(
-        "averaged", WARNING, " ".join(names),
-        {"rows": rows, "seconds": rows * step, "late_s": 0.5 * (rows - 1) * step},
-    )  # fmt: skip

@@ -129,7 +129,7 @@ class Log:
         near = NEAR * fastest_step(self.t, self.channels.values())
         at = {key: self.t - seconds for key, seconds in late.items()}
         new = np.unique(np.concatenate([times for times in at.values()]))
-        new = new[(new > self.t[0]) & (new < self.t[-1]) & (_distance(new, self.t) > near)]
+        new = new[(new > self.t[0]) & (new < self.t[-1]) & (np.abs(new - self.t[_nearest(new, self.t)]) > near)]
         t = np.sort(np.concatenate([self.t, new[np.append(True, np.diff(new) > near)]])) if new.size else self.t
         own = np.searchsorted(t, self.t)
         channels = {}
@@ -296,11 +296,6 @@ def _nearest(at: FloatArray, t: FloatArray) -> IntArray:
     """The row of `t`, which increases, whose time is nearest to each of `at`."""
     after = np.clip(np.searchsorted(t, at), 1, len(t) - 1)
     return np.where(at - t[after - 1] <= t[after] - at, after - 1, after)
-
-
-def _distance(at: FloatArray, t: FloatArray) -> FloatArray:
-    """How far each of `at` is from the nearest of `t`."""
-    return np.abs(at - t[_nearest(at, t)])
 
 
 def _far_from(at: FloatArray, known: FloatArray, t: FloatArray) -> BoolArray:

@@ -127,7 +127,7 @@ def _not_followed(statement: Statement) -> str:
     ]
     return (
         f"the model does not follow {', '.join(parts)}: a sign, a unit, the order of the wheels or the robot file is "
-        "wrong; the numbers and intervals of this fit mean nothing until it does"
+        "wrong; the numbers and intervals of this fit are not usable until it does"
     )
 
 
@@ -235,7 +235,7 @@ SENTENCES = {
         "{subject} improves the likelihood but worsens the prediction of held-out blocks of the log: it is not fitted"
     ),
     "unsettled_nuisances": Sentence(
-        "beside {nuisances} these logs do not settle the numbers of the robot: they are not fitted"
+        "together with {nuisances} these logs do not determine the numbers of the robot: {nuisances} are not fitted"
     ),
     "interrupted": Sentence(
         "the fit was interrupted: the numbers are the best so far, their intervals are those of that point"

@@ -54,11 +54,11 @@ def _dead_band_bounded(statement: Statement) -> str:
     numbers = statement.numbers
     (low, high), unit, value = numbers["ci95"], numbers["unit"], numbers["value"]
     between = f"between {low:.3g} and {high:.3g}" if low > 0.0 else f"at most {high:.3g}"
-    known = f"; it is {between} {unit}, for it turned steadily under that" if math.isfinite(high) else ""
+    known = f"; it is {between} {unit}, because it turned steadily at that input" if math.isfinite(high) else ""
     if math.isfinite(value):
         return f"{NOT_IDENTIFIABLE}: {value:.3g} {unit} is no estimate{known}"
     told = "with one speed or one input only they are not distinguishable"
-    return f"{NOT_IDENTIFIABLE}, and any is in the slope: {told}{known}"
+    return f"{NOT_IDENTIFIABLE}, and any dead band is part of the slope: {told}{known}"
 
 
 def _dead_band_seen(statement: Statement) -> str:
@@ -154,7 +154,7 @@ def _other_reading(statement: Statement) -> str:
     numbers = statement.numbers
     verb = "better" if numbers["better"] else "as well"
     return (
-        f"the logs are met {verb} where the input is {WORDS[numbers['other']]} (error {numbers['other_error']:.3g} "
+        f"the logs are fitted {verb} where the input is {WORDS[numbers['other']]} (error {numbers['other_error']:.3g} "
         f"rad/s, {numbers['error']:.3g} where it is {WORDS[numbers['between']]}): the intervals span both"
     )
 
@@ -182,8 +182,8 @@ SENTENCES = {
     "slope_may_be_zero": Sentence(_slope_may_be_zero),
     "dead_band_not_needed": Sentence(_dead_band_not_needed),
     "held_out_no_better": Sentence(
-        "{subject}: held-out logs are met no better with the dead band (error {with_band:.4g} rad/s, {without:.4g} "
-        "without): it may stand for something else"
+        "{subject}: held-out logs are predicted no better with the dead band (error {with_band:.4g} rad/s, "
+        "{without:.4g} without): it may be an effect of something else"
     ),
     "start_not_seen": Sentence(_start_not_seen),
     "never_sets_off": Sentence("{subject}: it rests up to {low:.3g} {unit}, and never sets off"),
@@ -228,7 +228,8 @@ SENTENCES = {
         "a duty needs a supply to become volts: log it, or give drive.supply_V; nothing of the motors is written"
     ),
     "floor_friction_kept": Sentence(
-        "the friction of the floor is as it was: if it was fitted with that of the wheels in it, fit it anew"
+        "the friction of the floor is as it was: if it was fitted with the friction of the wheels included, fit it "
+        "again"
     ),
     "line_not_determined": Sentence("slope and dead band are not determined: nothing is written"),
     "not_written": Sentence(_not_written),

@@ -103,8 +103,8 @@ def _viscous_with_back_emf(statement: Statement) -> str:
     numbers, (key, interval, _) = statement.numbers, _viscous(statement)
     total = f"{numbers['value'] + numbers['back_emf']:.3g} +- {numbers['sum_std']:.2g} {key.unit}"
     return (
-        f"viscous friction is not distinguishable from back-EMF, for {_guesses(numbers['guesses'])}: together they are "
-        f"{key.symbol} + {numbers['back_emf']:.3g} = {total}; with the guess {interval}"
+        f"viscous friction is not distinguishable from back-EMF, because {_guesses(numbers['guesses'])}: together they "
+        f"are {key.symbol} + {numbers['back_emf']:.3g} = {total}; with the guess {interval}"
     )
 
 
@@ -208,7 +208,7 @@ def _rests_on_back_emf(statement: Statement) -> str:
     """Viscous levels are right together with a back-EMF that is a guess only."""
     numbers = statement.numbers
     return (
-        f"{', '.join(numbers['levels'])}: right together with the back-EMF of this file only, for "
+        f"{', '.join(numbers['levels'])}: correct only together with the back-EMF of this file, because "
         f"{_guesses(numbers['guesses'])}; log currents, or measure the no-load speed"
     )
 
@@ -243,7 +243,7 @@ SENTENCES = {
     "changes_within_run": Sentence(_changes_within_run),
     "change_in_run": Sentence(_change_in_run),
     "against_motion": Sentence(_against_motion),
-    "forces_from_voltage": Sentence("forces are from eq (11): as right as the R, K_t and K_v of the robot file"),
+    "forces_from_voltage": Sentence("forces are from eq (11): only as accurate as R, K_t and K_v of the robot file"),
     "not_turned": Sentence("the robot hardly turned: friction about yaw is not in these data"),
     "shapes_not_compared": Sentence(_shapes_not_compared),
     "level_at_bound": Sentence(_level_at_bound),
@@ -272,6 +272,6 @@ SENTENCES = {
     "drive_faster": Sentence("drive much faster than now: the viscous part grows with speed, the rest does not"),
     "more_directions": Sentence(_more_directions),
     "pull_once": Sentence(
-        "pull the robot with a spring scale once: all forces here are as right as the torque constant"
+        "pull the robot with a spring scale once: all forces here are only as accurate as the torque constant"
     ),
 }  # fmt: skip

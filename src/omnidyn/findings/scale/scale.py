@@ -200,7 +200,9 @@ def _ratio_findings(
     if these.linear is not None and these.yaw is not None:
         apart = _apart(these.linear, these.yaw)
         if apart is not None and not these.linear.differs(1.0, LEAST):
-            return [_yaw_only(these.yaw)], work
+            return [
+                Finding("robot_radius", WARNING, "omega", {"ratio": these.yaw.value, "error": these.yaw.error})
+            ], work
     if off_floor and floor is not None and off_motor and electric is not None and _same(floor, electric):
         both = _joined([floor, electric]) or floor
         return [Finding("gear", WARNING, names, {**numbers, "ratio": both.value, "error": both.error})], work.replace(
@@ -222,10 +224,6 @@ def _same(a: Slope, b: Slope) -> bool:
 def _apart(a: Slope, b: Slope) -> float | None:
     away = b.value - a.value
     return away if abs(away) > LEAST and abs(away) > 4.0 * np.hypot(a.error, b.error) else None
-
-
-def _yaw_only(yaw: Slope) -> Finding:
-    return Finding("robot_radius", WARNING, "omega", {"ratio": yaw.value, "error": yaw.error})
 
 
 def _path_ratio(

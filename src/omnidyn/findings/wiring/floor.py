@@ -73,7 +73,11 @@ def _within(work: LogUnderCheck, seconds: float) -> tuple[str, WiringChoice] | N
     moments = target.T @ target, target.T @ w, w.T @ w
     tried = list(wirings(n))
     costs = np.array([_cost(rows @ wiring.matrix, moments, bool(axes)) for wiring in tried])
-    total = float(np.trace(moments[0])) if axes else float(np.trace(rows @ moments[2] @ rows.T) + _size(rows, w))
+    total = (
+        float(np.trace(moments[0]))
+        if axes
+        else float(np.trace(rows @ moments[2] @ rows.T) + (w**2).sum() * (rows**2).sum() / max(rows.shape[1], 1))
+    )
     answer = choose(tried, costs, total)
     turned = _by_axes(rows, moments, axes, total) if axes and seen is not None else None
     return _simpler(work, answer, turned)
@@ -106,10 +110,6 @@ def _null_rows(robot: Robot) -> FloatArray:
     rims = wheel_speed(robot.wheels, np.eye(3))  # (3, wheels): wheel speed per unit of twist
     _, _, basis = np.linalg.svd(rims)
     return basis[3:] * float(np.mean(robot.wheels.radii))
-
-
-def _size(rows: FloatArray, w: FloatArray) -> float:
-    return float((w**2).sum()) * float((rows**2).sum()) / max(rows.shape[1], 1)
 
 
 def _cost(matrix: FloatArray, moments: Moments, scaled: bool) -> float:
@@ -241,7 +241,7 @@ def check_frame(work: LogUnderCheck, left: float) -> tuple[list[Finding], LogUnd
     angle = float(np.degrees(np.angle(slope)))
     trusted = commands_agree(work)
     if trusted and plain < 0.5 and alike < 0.8:
-        return [_unlike(plain)], work.replace(pose=None)
+        return [Finding("pose_unlike", WARNING, "x y heading", {"likeness_as_logged": plain})], work.replace(pose=None)
     if not trusted and left < 0.6 * (1.0 - alike**2) + 0.005:
         return [], work
     if alike < (0.8 if trusted else 0.9) or plain > 0.95 * alike or not (trusted or _turns_say(work, mirror)):
@@ -269,10 +269,6 @@ def _marker(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     if turn is None or not is_turned(turn):
         return [], work
     return [marker_finding(turn, WHEELS)], with_marker(work, pose, turn.angle)
-
-
-def _unlike(plain: float) -> Finding:
-    return Finding("pose_unlike", WARNING, "x y heading", {"likeness_as_logged": plain})
 
 
 def commands_agree(work: LogUnderCheck) -> bool:

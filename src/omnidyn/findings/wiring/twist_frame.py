@@ -66,7 +66,8 @@ def _against_twist(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> 
         and 1.0 - room.left > TURNED_LIKENESS
         and room.left < BETTER * (1.0 - plain.turn.plain)
     ):
-        return [_room_finding(plain, room)], work.replace(twist=_as_in_body(work, pose, twist))
+        likeness = {"likeness": room.turn.plain, "likeness_as_logged": plain.turn.plain}
+        return [Finding("twist_frame", ERROR, "vx vy", likeness)], work.replace(twist=_as_in_body(work, pose, twist))
     if best.signs != (1.0, 1.0, 1.0) and 1.0 - best.left > TURNED_LIKENESS and best.left < BETTER * plain.left:
         return [_mirror_finding(plain, best)], work.replace(pose=pose * best.signs)
     if is_turned(plain.turn):
@@ -87,10 +88,6 @@ def _as_in_body(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> Flo
     """The twist, taken as one in the frame of the room, in that of the robot."""
     plane = (twist @ [1.0, 1.0j, 0.0]) * np.exp(-1j * unwrapped(pose[:, 2]))
     return np.column_stack([plane.real, plane.imag, twist[:, 2]])
-
-
-def _room_finding(plain: FrameCandidate, room: FrameCandidate) -> Finding:
-    return Finding("twist_frame", ERROR, "vx vy", {"likeness": room.turn.plain, "likeness_as_logged": plain.turn.plain})
 
 
 def _mirror_finding(plain: FrameCandidate, best: FrameCandidate) -> Finding:

@@ -24,7 +24,7 @@ from omnidyn.logs.columns.guess_time import take_time
 from omnidyn.logs.columns.guess_unit import doubt_of_rate, implausible, settle_side, take_sides, unit_of
 from omnidyn.logs.columns.guessed import Doubt, Guess, doubt, first_word, floats, is_numeric, joined_doubts, letter_of
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
-from omnidyn.logs.columns.names import BRACKETS, NameParts, read_name
+from omnidyn.logs.columns.names import BRACKETS, read_name
 from omnidyn.logs.columns.wheel_numbers import BY_PLACES, proposed_wheels, wheel_numbers
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
@@ -195,13 +195,13 @@ def _doubt_brackets(name: str, numbers: Mapping[str, int], found: Guess) -> None
 def _doubt_letters(names: list[str], found: Guess) -> None:
     """V1, V2, ..: volts, or speeds of the rims? Nobody knows."""
     parts = {name: read_name(name) for name in names}
-    mine = [name for name in names if _is_letter_v(parts[name])]
+    mine = [
+        name
+        for name, read in parts.items()
+        if read.number is not None and read.unit is None and read.roles == {words.LINEAR}
+    ]
     if mine and "u1" not in found.columns:
         found.doubts += [doubt(name, f"u{parts[name].number}", "volts_or_speeds", (), first=mine[0]) for name in mine]
-
-
-def _is_letter_v(name: NameParts) -> bool:
-    return name.number is not None and name.unit is None and name.roles == {words.LINEAR}
 
 
 def _enter(table: Table, name: str, component: str, unit: Unit, said: bool, found: Guess) -> None:

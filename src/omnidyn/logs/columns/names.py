@@ -118,7 +118,7 @@ def _without_unit(name: str) -> tuple[str, Unit | None]:
         part = _bare(parts[k])
         stem, unit = _split_unit(part)
         if unit is None:
-            stem, unit = _split_unit(_spread(part))  # DriveVelocityRadPerSec
+            stem, unit = _split_unit(re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", part))  # DriveVelocityRadPerSec
         if unit is None or (k < last and len(unit.text) < 2):  # /robot_A/wheel1
             stem, unit = _unit_inside(part)
         if unit is not None:
@@ -129,10 +129,6 @@ def _without_unit(name: str) -> tuple[str, Unit | None]:
 def _bare(part: str) -> str:
     """A part of a topic without the place in an array: currents_A of currents_A[3]."""
     return re.sub(r"\[\d+\]$", "", part)
-
-
-def _spread(part: str) -> str:
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", part)
 
 
 BRACKETS = re.compile(r"(.*\S)\s*[\[(]([^\d\])][^\])]*)[\])]")  # a name and what looks like its unit, not joint[0]

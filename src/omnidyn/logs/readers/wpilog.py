@@ -24,7 +24,7 @@ from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.readers.claims import TopicClaim, TopicColumn, tracks_of
 from omnidyn.logs.readers.reader import Reader, ReadOptions
-from omnidyn.logs.readers.recording import LeftOut, Recording, Topic, topic_of
+from omnidyn.logs.readers.recording import LeftOut, Recording, topic_of
 from omnidyn.logs.readers.ros.layout import Leaf, column
 from omnidyn.logs.table.table import Table
 from omnidyn.logs.table.text_file import BLOCK_BYTES, TOO_LARGE_REMEDY
@@ -209,13 +209,9 @@ def read_wpilog(path: str | os.PathLike, options: ReadOptions) -> Recording:
         outs, why = _outs(entry, schemas, source, notes)
         if outs:
             claims.append(TopicClaim(entry.name, stamps, outs, 1))
-        topics.append(_topic(entry, stamps, bool(outs), why))
+        topics.append(topic_of(printable(entry.name), printable(entry.kind), stamps, bool(outs), why))
     tracks = list(tracks_of(_renamed(claims), notes))
     return Recording(tracks, topics, source, digest.hexdigest(), notes, file.count if file.damage else None)
-
-
-def _topic(entry: Entry, stamps: IntArray, read: bool, why: str) -> Topic:
-    return topic_of(printable(entry.name), printable(entry.kind), stamps, read, why)
 
 
 def _renamed(claims: list[TopicClaim]) -> list[TopicClaim]:

@@ -72,7 +72,7 @@ SENTENCES = {
         "it holds the same numbers as {other}", "leave one of them out: they are one recording, not two"
     ),
     "empty_rows": Sentence(
-        "{count} of {of_rows} rows hold no time or no number", "they are left out; mend the recording"
+        "{count} of {of_rows} rows hold no time or no number", "they are left out; repair the recording"
     ),
     "padding": Sentence(
         "{count} rows at the end all repeat one row, at an earlier time: the recorder filled its buffer up",

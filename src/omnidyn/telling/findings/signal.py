@@ -169,7 +169,7 @@ SENTENCES = {
             " it was blocked",
             "the robot never moves beyond the noise of its sensors: nothing drove it",
         ),
-        "drive with more; such a log bounds friction from below and says nothing else",
+        "drive with a higher voltage; such a log bounds friction from below and says nothing else",
     ),
     "blocked": Sentence(
         "for {seconds:~.3g} s the robot stands although it is driven hard enough to move: it was held, stood "
@@ -182,7 +182,7 @@ SENTENCES = {
         "leave the first half second out of steady values",
     ),
     "burst": Sentence(
-        _burst, "a tracker that slips does so; leave those rows out if the robot cannot turn or drive like that"
+        _burst, "a tracker that loses its target shows this; leave those rows out if the robot cannot move like that"
     ),
     "last_row": Sentence(
         "{subject} is 0 in the last row, and not before: the end of the recording", "leave the last row out"
@@ -220,5 +220,7 @@ SENTENCES = {
         "while it moves, the speed varies by a factor of {speeds:.2g} only",
         "viscous and Coulomb friction cannot be told apart from this log alone; drive at several speeds",
     ),
-    "judged_again": Sentence("with the fitted robot this is gone ({finding}): it rested on the guess of {guesses}"),
+    "judged_again": Sentence(
+        "with the fitted robot this is no longer found ({finding}): it rested on the guess of {guesses}"
+    ),
 }

@@ -16,7 +16,7 @@ def _wiring(statement: Statement) -> str:
     if len(moved) == 2:
         parts.append(f"{slots[moved[0]]} and {slots[moved[1]]} are exchanged")
     elif moved:
-        parts.append("; ".join(f"{columns[k]} is in truth {slots[k]}" for k in moved))
+        parts.append("; ".join(f"{columns[k]} is actually {slots[k]}" for k in moved))
     turned = [column for column, sign in zip(columns, signs, strict=True) if sign < 0.0]
     if turned:
         parts.append(f"{' and '.join(turned)} {by_number(turned, 'has', 'have')} the opposite sign")
