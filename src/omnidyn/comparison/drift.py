@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 LEVEL = 0.05  # chance of any change in fits of one and the same robot
 UPPER = float(ndtri(0.975))
-SAME = 1e-9  # of the largest eigenvalue of a matrix whose diagonal is 1: below it two numbers are one
+SAME_EIGENVALUE = 1e-9  # of the largest eigenvalue of a matrix whose diagonal is 1: below it two numbers are one
 TAKEN = ("body.mass_kg", "body.inertia_kg_m2", CENTRE, "wheels.wheel_radius_m", "wheels.robot_radius_m",
          "motor.resistance_ohm", "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad",
          "motor.gear_ratio")  # fmt: skip
@@ -257,7 +257,7 @@ def _inverse(matrix: FloatArray) -> tuple[FloatArray, int]:
     """(inverse without the directions in which it is 0, how many others there are)."""
     size = np.sqrt(np.diag(matrix))
     values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
-    kept = values > SAME * values[-1]
+    kept = values > SAME_EIGENVALUE * values[-1]
     root = vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
     return root @ root.T, int(kept.sum())
 

@@ -21,7 +21,7 @@ from omnidyn.comparison.traces import Trace
 from omnidyn.statistics import block_length, bootstrap_error, t_quantile
 
 CONSTANT = 1e-9  # a measured signal that changes by less than this share of its size is constant
-NOTHING = 1e-150  # what is smaller has no square
+SMALLEST_SQUARED = 1e-150  # what is smaller has no square
 
 
 @dataclass(frozen=True)
@@ -107,14 +107,14 @@ def variance_accounted_for(measured: FloatArray, model: FloatArray) -> float | N
 
 def is_constant(measured: FloatArray) -> bool:
     """Whether a measured signal never changes, but for rounding."""
-    return float(np.ptp(measured)) <= max(CONSTANT * float(np.abs(measured).max()), NOTHING)
+    return float(np.ptp(measured)) <= max(CONSTANT * float(np.abs(measured).max()), SMALLEST_SQUARED)
 
 
 # How late a measured signal is behind the model: a hint at delays that neither the log nor the model knows of
 
-REACH = 0.5  # [s] lags looked for, both signs
+LONGEST_LAG = 0.5  # [s] lags looked for, both signs
 GRID, ROUNDS = 21, 4  # lags tried at a time; each round looks closer
-WORTH = 0.9  # a lag counts where it takes what the model leaves unexplained below this share
+WORTHWHILE_SHARE = 0.9  # a lag counts where it takes what the model leaves unexplained below this share
 
 
 def lag_of(traces: Sequence[Trace]) -> float | None:
@@ -126,7 +126,7 @@ def lag_of(traces: Sequence[Trace]) -> float | None:
     usable = [known for trace in traces if len((known := _known(trace)).t) > 1]
     if not usable:
         return None
-    reach = min(REACH, max(float(trace.t[-1] - trace.t[0]) for trace in usable) / 4.0)
+    reach = min(LONGEST_LAG, max(float(trace.t[-1] - trace.t[0]) for trace in usable) / 4.0)
     usual = float(np.median(np.concatenate([np.diff(trace.t) for trace in usable])))
     none = unexplained(usable, 0.0)
     if none is None:
@@ -139,7 +139,7 @@ def lag_of(traces: Sequence[Trace]) -> float | None:
         scores = np.array([np.inf if score is None else score for score in tried])
         k = int(np.argmin(scores))
         centre, best, width = float(lags[k]), float(scores[k]), 2.0 * width / (GRID - 1)
-    if best > WORTH * none or abs(centre) < 0.25 * usual:
+    if best > WORTHWHILE_SHARE * none or abs(centre) < 0.25 * usual:
         return 0.0
     return None if abs(centre) > 0.98 * reach else centre
 

@@ -19,7 +19,7 @@ from omnidyn.logs.channels import place
 from omnidyn.statement import ERROR, NOTE, WARNING, Statement
 
 FOLLOWS, HALF, NOTHING = 0.2, 0.5, 1.0  # error over spread
-ROUGH = 3.0  # times what a signal scatters by from row to row: errors beyond are no noise
+ROUGH_ERROR = 3.0  # times what a signal scatters by from row to row: errors beyond are no noise
 WHITE = 0.05  # p-value from which errors are noise
 WELL, NOISE, ROUGHLY, HARDLY, NOT = range(5)  # how a component is followed, best first
 LEVELS = ("well", "noise", "roughly", "hardly", "not")  # the same for machines
@@ -95,7 +95,7 @@ def is_missed(share: float, error: float, scatter: float = 0.0) -> bool:
     share: error over spread. error: its rms. scatter: by how much the signal scatters from row to row
     (`statistics.difference_noise`), in the same unit; a signal of mere noise is not to blame. At 0: of no noise.
     """
-    return share > HALF and error > ROUGH * scatter
+    return share > HALF and error > ROUGH_ERROR * scatter
 
 
 def plain_name(component: str) -> str:

@@ -104,11 +104,11 @@ def _about_columns(log: Log) -> list[Finding]:
     Of a Run, what its reader said.
     """
     columns = log.columns
-    found = [Finding(DOUBT, NOTE, "", {"doubt": doubt}) for doubt in columns.doubts]
+    findings = [Finding(DOUBT, NOTE, "", {"doubt": doubt}) for doubt in columns.doubts]
     if columns.passed_over:
-        found.append(Finding(UNUSED, NOTE, "", {"columns": columns.passed_over}))
+        findings.append(Finding(UNUSED, NOTE, "", {"columns": columns.passed_over}))
     notes = () if columns.columns else log.notes
-    return found + [Finding(READING, NOTE, "", {"note": note}) for note in notes]
+    return findings + [Finding(READING, NOTE, "", {"note": note}) for note in notes]
 
 
 def _other_count(log: Log, robot: Robot | None) -> list[Finding]:

@@ -17,7 +17,8 @@ from omnidyn.statistics import stretches
 
 SETTLE, HELD = 0.4, 0.3  # [s]
 DROOP = 0.05
-MOSTLY, SURELY = 0.99, 1.5  # of noise at rest, a row in some thousands is beyond its level, none beyond 1.5 times that
+NOISE_QUANTILE = 0.99  # of noise at rest: a row in some thousands is beyond its level,
+NOISE_FACTOR = 1.5  # none beyond so many times that
 MOMENT = 0.15  # [s]
 SAFETY = 1.6  # a robot that stands although its voltages are so many times those that move it was held
 
@@ -29,7 +30,7 @@ def check_motion(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     still = _still(work)
     if still is None:
         return [], work
-    if still.mean() > MOSTLY and np.all(_still(work, SURELY)):
+    if still.mean() > NOISE_QUANTILE and np.all(_still(work, NOISE_FACTOR)):
         return [_never_moved(work)], work.knowing(at_rest=True)
     return _start_up(work, still) + _blocked(work, still) + _droop(work), work
 
@@ -170,7 +171,7 @@ def _bursts(work: LogUnderCheck) -> list[Finding]:
     """Speeds over the floor that shoot up for a moment, in a log without wheel speeds to hold them against."""
     if work.get("wheel_speed") is not None:
         return []
-    found = []
+    findings = []
     for component, values in work.columns("twist"):
         size = np.abs(values)
         usual = float(np.nanquantile(size, 0.9))
@@ -180,12 +181,12 @@ def _bursts(work: LogUnderCheck) -> list[Finding]:
         if usual <= 0.0 or not bad.any():
             continue
         top = int(np.flatnonzero(bad)[np.argmax(size[bad])])
-        found.append(Finding(
+        findings.append(Finding(
             "burst", NOTE, component,
             {"farthest": float(values[top]), "usual": usual, "at_s": float(work.t[top]), "longest_s": SHORT},
             rows=work.lines(bad), count=int(bad.sum()),
         ))  # fmt: skip
-    return found
+    return findings
 
 
 def _last_row(work: LogUnderCheck) -> list[Finding]:

@@ -17,7 +17,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.clocks import sampled, samples, usual_step
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.logs.read_log import STILL
+from omnidyn.logs.read_log import STANDSTILL_SPEED
 from omnidyn.logs.segments import GAP
 from omnidyn.model.frames import unwrapped
 from omnidyn.run import Run
@@ -121,12 +121,12 @@ def as_mecanum(seen: Geometry) -> Geometry:
 
 def _moving(twist: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Only the rows in motion."""
-    keep = (np.abs(speed) > STILL).any(axis=1)
+    keep = (np.abs(speed) > STANDSTILL_SPEED).any(axis=1)
     return twist[keep], speed[keep]
 
 
 def _fit(twist: FloatArray, speed: FloatArray, source: str, instead: str) -> Geometry:
-    turned = bool(np.any(np.abs(twist[:, 2]) > STILL))
+    turned = bool(np.any(np.abs(twist[:, 2]) > STANDSTILL_SPEED))
     design = twist if turned else twist[:, :2]
     size = np.sqrt(np.mean(design**2, axis=0))
     if (size == 0.0).any() or np.linalg.cond(design / size) > MAX_CONDITION:

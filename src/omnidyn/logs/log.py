@@ -30,7 +30,7 @@ REFUSED = {
 OFTEN_BACK = 0.005  # of the rows: no recorder writes so many out of order
 MAX_MISSING = 0.2  # share of rows without a time or without any number
 ON_CHANGE = 0.2  # a component with more blank cells than this share, gaps left out, is recorded on change
-NEAR = 1e-6  # of a row: times that are no farther apart are one
+SAME_TIME_SHARE = 1e-6  # of a row: times that are no farther apart are one
 HELD = ("voltage", "duty", "wheel_speed_command", "twist_command")  # what is commanded holds until the next value
 NEVER_MADE_UP = (*HELD, "supply")  # a battery is an input like any other: it holds too
 
@@ -126,7 +126,7 @@ class Log:
         late = {key: column.latency for key, column in self.columns.columns.items() if column.latency and place(key)}
         if not late or len(self) < 2:
             return self
-        near = NEAR * fastest_step(self.t, self.channels.values())
+        near = SAME_TIME_SHARE * fastest_step(self.t, self.channels.values())
         at = {key: self.t - seconds for key, seconds in late.items()}
         new = np.unique(np.concatenate([times for times in at.values()]))
         new = new[(new > self.t[0]) & (new < self.t[-1]) & (np.abs(new - self.t[_nearest(new, self.t)]) > near)]

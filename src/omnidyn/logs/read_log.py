@@ -40,7 +40,7 @@ from omnidyn.progress import Progress, silent
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
 from omnidyn.statement import NOTE, Statement, statements
 
-STILL = 1e-6  # [rad/s] a commanded speed below counts as none
+STANDSTILL_SPEED = 1e-6  # [rad/s] a commanded speed below counts as none
 
 
 @dataclass(frozen=True)
@@ -310,7 +310,7 @@ def driven_way(log: Log, robot: Robot | None) -> tuple[FloatArray | None, str]:
         if np.isfinite(twist).any(axis=0).all():
             speed = wheel_speed(robot.wheels, twist)
     if speed is not None:
-        return np.where(np.abs(speed) < STILL, 0.0, np.sign(speed)), "commanded speed"
+        return np.where(np.abs(speed) < STANDSTILL_SPEED, 0.0, np.sign(speed)), "commanded speed"
     for name in ("voltage", "duty"):
         if name in log.channels:
             return np.sign(log.channels[name]), name

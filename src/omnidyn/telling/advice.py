@@ -9,7 +9,7 @@ from omnidyn.telling.causes import changes, named
 from omnidyn.telling.fit import MEASURED
 from omnidyn.telling.sentence import Sentence
 
-LONGEST = 100.0  # times as long as now: nobody records more
+LONGEST_FACTOR = 100.0  # times as long as now: nobody records more
 WAYS = {  # what to do about a cause
     "fit": "fit it (`nuisances` {key})",
     "look": "look what happened there; fit the parts as logs of their own",
@@ -77,7 +77,7 @@ def _together(statement: Statement) -> str:
 def _wide(statement: Statement) -> str:
     """Intervals are wide; how much longer a log would have to be."""
     longer, goal = statement.numbers["longer"], 100.0 * statement.numbers["goal"]
-    enough = f"a log {longer:.0f} times as long" if longer <= LONGEST else "no log of a usual length"
+    enough = f"a log {longer:.0f} times as long" if longer <= LONGEST_FACTOR else "no log of a usual length"
     them = "it" if len(statement.numbers["keys"]) == 1 else "all of them"
     return (
         f"{_known_roughly(statement)}: {enough} would bring {them} to {goal:.0f} %; more motion where it matters would "

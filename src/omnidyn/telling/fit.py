@@ -10,7 +10,7 @@ from omnidyn.statement import Statement
 from omnidyn.telling.sentence import Sentence, either
 
 WIDER = 1.1  # times the interval for white noise, from which on the factor is named
-SAME = {
+SAME_DATA = {
     "wheel_speed": "its wheel speeds are differences of its wheel angles",
     "twist": "its twist is computed from its wheels",
 }
@@ -57,7 +57,7 @@ def _nothing_new(statement: Statement) -> str:
 
 def _computed(statement: Statement) -> str:
     name, source = statement.numbers["output"], statement.numbers["computed_from"].replace("_", " ")
-    return f"{statement.subject}: {SAME.get(name, f'its {name} is the integral of its own {source}')}"
+    return f"{statement.subject}: {SAME_DATA.get(name, f'its {name} is the integral of its own {source}')}"
 
 
 def _input_not_used(statement: Statement) -> str:

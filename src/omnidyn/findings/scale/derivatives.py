@@ -33,10 +33,10 @@ from omnidyn.logs.channels import components
 from omnidyn.model.frames import unwrapped
 from omnidyn.statement import ERROR, WARNING
 
-LEAST, SURE = 0.03, 6.0  # of the ratio; standard errors
-ALIKE = 0.95  # likeness of window means, from which one channel is taken for a multiple of the other
-HALF = 0.05  # [s] to either side, over which rates are taken
-SAME = 0.03  # ratios that differ by less are one
+LEAST_DEVIATION, SURE_ERRORS = 0.03, 6.0  # of the ratio; standard errors
+LEAST_LIKENESS = 0.95  # likeness of window means, from which one channel is taken for a multiple of the other
+HALF_WIDTH = 0.05  # [s] to either side, over which rates are taken
+SAME_RATIO = 0.03  # ratios that differ by less are one
 SPEED_SIDE, POSITION_SIDE = "speed", "position"
 
 
@@ -67,14 +67,14 @@ def check_derivatives(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck
     lines = [line for pairs in PAIRS for line in _lines(work, pairs)]
     ratios = np.array([line.value for _, line in lines])
     kinds = {pair.kind for pair, _ in lines}
-    if len(kinds) > 1 and np.ptp(ratios) < SAME * np.abs(ratios).mean():
+    if len(kinds) > 1 and np.ptp(ratios) < SAME_RATIO * np.abs(ratios).mean():
         return [_of_time(lines[0])], replace(work, t=work.t * ratios.mean(), step=work.step * float(ratios.mean()))
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for pairs in PAIRS:
         for pair, line in _joined(_lines(work, pairs)):
             finding, work = _judged(work, pair, line)
-            found.append(finding)
-    return found, work
+            findings.append(finding)
+    return findings, work
 
 
 def _lines(work: LogUnderCheck, pairs: Callable[[LogUnderCheck], Iterator[SpeedPair]]) -> list[tuple[SpeedPair, Slope]]:
@@ -86,14 +86,14 @@ def _off(work: LogUnderCheck, pair: SpeedPair) -> Slope | None:
     """rate = slope * speed, where that is surely not 1 and the two are alike otherwise."""
     ids, count = work.windows()
     line = slope(pair.rate, pair.value, ids, count)
-    good = line.value != 0.0 and line.differs(1.0, LEAST, SURE) and line.windows >= 4
-    return line if good and _likeness(pair.rate, pair.value, ids, count) >= ALIKE else None
+    good = line.value != 0.0 and line.differs(1.0, LEAST_DEVIATION, SURE_ERRORS) and line.windows >= 4
+    return line if good and _likeness(pair.rate, pair.value, ids, count) >= LEAST_LIKENESS else None
 
 
 def _joined(lines: list[tuple[SpeedPair, Slope]]) -> list[tuple[SpeedPair, Slope]]:
     """Wheels that are off by one ratio as one pair."""
     wheels, ratios = lines, np.array([line.value for _, line in lines])
-    if len(wheels) < 2 or np.ptp(ratios) > SAME * np.abs(ratios).mean():
+    if len(wheels) < 2 or np.ptp(ratios) > SAME_RATIO * np.abs(ratios).mean():
         return lines
     columns = tuple(k for pair, _ in wheels for k in pair.of[1])
     first = wheels[0][0]
@@ -145,7 +145,7 @@ def _blamed(work: LogUnderCheck, pair: SpeedPair, ratio: float) -> tuple[str, st
     name, values = pair.witness
     ids, count = work.windows()
     line = slope(values, pair.value, ids, count)  # 1 where the speed is right, the ratio where its position is
-    if not np.isfinite(line.error) or line.windows < 4 or _likeness(values, pair.value, ids, count) < ALIKE:
+    if not np.isfinite(line.error) or line.windows < 4 or _likeness(values, pair.value, ids, count) < LEAST_LIKENESS:
         return "", ""
     off_speed, off_position = abs(line.value - 1.0), abs(line.value / ratio - 1.0)
     if min(off_speed, off_position) > 0.5 * max(off_speed, off_position):
@@ -181,7 +181,7 @@ def _likeness(y: FloatArray, x: FloatArray, ids, count: int) -> float:
 
 def _turn(work: LogUnderCheck) -> Iterator[SpeedPair]:
     """heading against omega."""
-    half = max(1, round(HALF / work.step))
+    half = max(1, round(HALF_WIDTH / work.step))
     pose, twist, speed = work.get("pose"), work.get("twist"), work.full("wheel_speed")
     if pose is None or twist is None or not np.isfinite(pose[:, 2]).any() or not np.isfinite(twist[:, 2]).any():
         return
@@ -194,7 +194,7 @@ def _turn(work: LogUnderCheck) -> Iterator[SpeedPair]:
 
 def _wheels(work: LogUnderCheck) -> Iterator[SpeedPair]:
     """The angle of each wheel against its speed."""
-    half = max(1, round(HALF / work.step))
+    half = max(1, round(HALF_WIDTH / work.step))
     angle, speed = work.get("wheel_angle"), work.get("wheel_speed")
     if angle is None or speed is None or angle.shape != speed.shape or "wheel_speed" not in work.log.channels:
         return

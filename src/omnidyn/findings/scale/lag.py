@@ -17,10 +17,10 @@ from omnidyn.findings.signal.robust import Slope, central_rate, clusters, ratio,
 from omnidyn.model.frames import unwrapped
 from omnidyn.statement import NOTE, WARNING
 
-FARTHEST = 8  # rows that are searched to either side
+FARTHEST_ROWS = 8  # rows that are searched to either side
 WARN_FROM, NOTE_FROM = 0.75, 0.35  # rows
-ENOUGH = 60_000  # rows that tell a lag
-SURE, VAGUE = 5.0, 0.4  # standard errors; rows of error beyond which nothing is said
+MOST_ROWS = 60_000  # rows that tell a lag
+SURE_ERRORS, VAGUE_ROWS = 5.0, 0.4  # standard errors; rows of error beyond which nothing is said
 
 
 class LagPair(NamedTuple):
@@ -35,21 +35,21 @@ class LagPair(NamedTuple):
 
 def check_lag(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on lag between channels that are redundant; what follows a command is dynamics and no lag."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     if len(work) < 3 * MIN_ROWS or work.step <= 0.0:
-        return found, work
+        return findings, work
     for own, pair in _pairs(work):
         line = lag(own, pair.y, pair.x)
-        if line is None or not line.error < VAGUE:
+        if line is None or not line.error < VAGUE_ROWS:
             continue
         rows = line.value
-        if abs(rows) < NOTE_FROM or abs(rows) < SURE * line.error:
+        if abs(rows) < NOTE_FROM or abs(rows) < SURE_ERRORS * line.error:
             continue
         of_means = late_by(own, pair.late) - late_by(own, pair.against)
         if of_means and abs(rows - of_means) < 1.0:
             continue  # named already
-        found.append(_finding(own, pair, line))
-    return found, work
+        findings.append(_finding(own, pair, line))
+    return findings, work
 
 
 def _finding(work: LogUnderCheck, pair: LagPair, line: Slope) -> Finding:
@@ -101,16 +101,16 @@ def lag(work: LogUnderCheck, y: FloatArray, x: FloatArray) -> Slope | None:
     A whole number of rows first, by the least residual; then the rest from the residual's part along the slope of x,
     with the slope of y beside it as instrument, so that noise of neither pulls it.
     """
-    y, x = _filled(y)[:ENOUGH], _filled(x)[:ENOUGH]
+    y, x = _filled(y)[:MOST_ROWS], _filled(x)[:MOST_ROWS]
     width = 3
     y, x = smooth(y, width), smooth(x, width)
     n = len(y)
-    inside = slice(FARTHEST + 4, n - FARTHEST - 4)
+    inside = slice(FARTHEST_ROWS + 4, n - FARTHEST_ROWS - 4)
     good = np.asarray(np.isfinite(y).all(axis=1) & np.isfinite(x).all(axis=1))
     for segment in work.segments[1:]:
         if segment.start > n:
             break
-        good[max(0, segment.start - FARTHEST - 4) : segment.start + FARTHEST + 4] = False
+        good[max(0, segment.start - FARTHEST_ROWS - 4) : segment.start + FARTHEST_ROWS + 4] = False
     keep = good[inside]
     if keep.sum() < MIN_ROWS:
         return None
@@ -121,7 +121,7 @@ def lag(work: LogUnderCheck, y: FloatArray, x: FloatArray) -> Slope | None:
         return np.where(keep[:, None] & np.isfinite(part), part, 0.0)
 
     best, least, at = 0, np.inf, {}
-    for by in range(-FARTHEST, FARTHEST + 1):
+    for by in range(-FARTHEST_ROWS, FARTHEST_ROWS + 1):
         shifted = moved(x, by)
         size, along = float((shifted**2).sum()), float((target * shifted).sum())
         left = float((target**2).sum()) - along * (along / size) if size > 0.0 and along > 0.0 else np.inf
@@ -129,7 +129,7 @@ def lag(work: LogUnderCheck, y: FloatArray, x: FloatArray) -> Slope | None:
         if left < least:
             best, least = by, left
     total = float((target**2).sum())
-    if not np.isfinite(least) or least > 0.5 * total or abs(best) == FARTHEST:
+    if not np.isfinite(least) or least > 0.5 * total or abs(best) == FARTHEST_ROWS:
         return None
     shifted = moved(x, best)
     a = float((target * shifted).sum() / (shifted**2).sum())

@@ -123,9 +123,9 @@ def at_each_clock(
     work: LogUnderCheck, family: Callable[[LogUnderCheck], tuple[list[Finding], LogUnderCheck]]
 ) -> tuple[list[Finding], LogUnderCheck]:
     """The findings of a family that judges single channels, each at its own clock; the work without their faults."""
-    found, after = family(work)
+    findings, after = family(work)
     if work.merged is None or len(work.merged.clocks) == 1:
-        return found, after
+        return findings, after
     first, *others = work.merged.clocks
     log, _ = _put(work.merged.log, first, work, after)
     for clock in others:
@@ -133,8 +133,8 @@ def at_each_clock(
         here = here.replace(**{name: None for name in here.channels if name not in after.channels})  # taken out before
         more, judged = family(here)
         log, changed = _put(log, clock, here, judged)
-        found, after = found + more, _again(after, log, first, changed)
-    return found, replace(after, merged=work.merged._replace(log=log))
+        findings, after = findings + more, _again(after, log, first, changed)
+    return findings, replace(after, merged=work.merged._replace(log=log))
 
 
 def _put(log: Log, clock: SensorClock, before: LogUnderCheck, after: LogUnderCheck) -> tuple[Log, frozenset[str]]:

@@ -12,7 +12,7 @@ from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import GEOMETRY, WHEELS, ground, pose_twist, wheels_twist
 from omnidyn.findings.signal.robust import smooth
 from omnidyn.findings.wiring.orders import (
-    BETTER,
+    BEST_SHARE,
     WINDOWS,
     Wiring,
     WiringChoice,
@@ -92,7 +92,7 @@ def _simpler(
     """
     if turned is None:
         return None if answer is None else ("wheels", answer)
-    if answer is None or turned.best.changes + 1 < answer.best.changes or turned.left < BETTER * answer.left:
+    if answer is None or turned.best.changes + 1 < answer.best.changes or turned.left < BEST_SHARE * answer.left:
         return "axes", turned
     if turned.left < 2.0 * answer.left + 0.02:
         answer = answer._replace(rival=turned.best.statement(_axes_names(work)[1]))

@@ -16,7 +16,7 @@ from omnidyn.findings.wiring.orders import TURNED_LIKENESS, Turned, is_turned, m
 from omnidyn.model.frames import unwrapped
 from omnidyn.statement import ERROR, WARNING
 
-BETTER = 0.35  # the right frame leaves at most so much of what the one as logged leaves
+BEST_SHARE = 0.35  # the right frame leaves at most so much of what the one as logged leaves
 NAMES = ("x", "y", "heading")
 
 
@@ -64,11 +64,11 @@ def _against_twist(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> 
     if (
         room.left < best.left + 0.02
         and 1.0 - room.left > TURNED_LIKENESS
-        and room.left < BETTER * (1.0 - plain.turn.plain)
+        and room.left < BEST_SHARE * (1.0 - plain.turn.plain)
     ):
         likeness = {"likeness": room.turn.plain, "likeness_as_logged": plain.turn.plain}
         return [Finding("twist_frame", ERROR, "vx vy", likeness)], work.replace(twist=_as_in_body(work, pose, twist))
-    if best.signs != (1.0, 1.0, 1.0) and 1.0 - best.left > TURNED_LIKENESS and best.left < BETTER * plain.left:
+    if best.signs != (1.0, 1.0, 1.0) and 1.0 - best.left > TURNED_LIKENESS and best.left < BEST_SHARE * plain.left:
         return [_mirror_finding(plain, best)], work.replace(pose=pose * best.signs)
     if is_turned(plain.turn):
         return _turned(work, pose, twist, plain.turn)

@@ -233,7 +233,7 @@ ANGLES = {
 }  # fmt: skip
 FOUR = (45.0, -45.0, 135.0, -135.0)  # in the order of a file of four wheels: front left, front right, rear left, ..
 WIDEST_GAP = 180.0  # [degree] between neighbours of wheels that stand around a robot
-FAR = 40.0  # [degree] from its place beyond which a wheel is another one
+FARTHEST_ANGLE = 40.0  # [degree] from its place beyond which a wheel is another one
 
 
 def place_in(words: Sequence[str], known: Collection[str] = ()) -> tuple[float | None, list[str]]:
@@ -294,7 +294,7 @@ def wheels_at(places: Collection[float], robot: Robot | None = None) -> dict[flo
     stand = _angles(robot)
     apart = np.abs((np.subtract.outer(asked, stand) + 180.0) % 360.0 - 180.0)
     rows, wheels = linear_sum_assignment(apart)
-    if (apart[rows, wheels] > FAR).any():
+    if (apart[rows, wheels] > FARTHEST_ANGLE).any():
         return {}
     return {asked[row]: int(wheel) + 1 for row, wheel in zip(rows, wheels, strict=True)}
 

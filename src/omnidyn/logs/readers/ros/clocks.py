@@ -17,7 +17,7 @@ from omnidyn.errors import shortened
 
 SECOND = 10**9
 SET_BACK, SET_FORWARD = SECOND // 20, 86_400 * SECOND  # a step of the recorder's clock beyond is no recording
-MANY = 20  # times: so often no clock is set back
+MOST_RESETS = 20  # times: so often no clock is set back
 SEAM = SECOND  # what is put where the true time is not known: enough for a gap
 OTHER_CLOCK = SECOND  # two times of one message differ by less, where they are of one clock
 JUMP = SECOND // 2  # of a header against the time of reception
@@ -140,7 +140,7 @@ def _are_shuffled(topics: Sequence[Clocked]) -> bool:
     busiest = max(topics, key=lambda each: len(each.receive)).receive
     if any((np.diff(topic.receive) > SET_FORWARD).any() for topic in topics):
         return False
-    return int((np.diff(busiest) < -SET_BACK).sum()) > MANY or not _overlap(busiest)
+    return int((np.diff(busiest) < -SET_BACK).sum()) > MOST_RESETS or not _overlap(busiest)
 
 
 def _overlap(receive: IntArray) -> bool:
