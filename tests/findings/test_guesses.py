@@ -52,7 +52,7 @@ def test_it_stays_or_goes_away_with_the_fitted_robot(log, robot):
     assert before.of("swapped")[0].severity == "warning"
     (after,) = judged_by_fit([before], [swapped], robot, told.append)
     assert after.of("swapped")[0].severity == "error"
-    assert "so it is with the fitted robot" in str(after.of("swapped")[0])
+    assert "the fitted robot shows it too" in str(after.of("swapped")[0])
     # A motor that was guessed wrong explains all of it, and the finding goes away.
     wrong = guessed(robot.replace(motor=robot.motor.replace(emf_constant=2.0 * robot.motor.emf_constant)))
     before = check(log, wrong)
