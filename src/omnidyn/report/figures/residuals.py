@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.comparison.aligned import errors_for_whiteness
 from omnidyn.comparison.metrics import whiteness
 from omnidyn.comparison.result import Comparison
-from omnidyn.comparison.traces import Trace, unit
+from omnidyn.comparison.traces import Trace, errors_for_whiteness, unit
 from omnidyn.logs.columns.mapping import component_channel
 from omnidyn.report.style import (
     BLUE,

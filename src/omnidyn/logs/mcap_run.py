@@ -121,9 +121,9 @@ def _half_turned(heading: FloatArray) -> FloatArray:
 
 def _joints(run: Run, stamps: IntArray) -> Iterator[Sent]:
     parts = [run.wheel_angle, run.wheel_speed]
-    wheels = next((each.shape[1] for each in parts if each is not None), 0)
+    wheels = next((part.shape[1] for part in parts if part is not None), 0)
     names = [f"wheel_{k + 1}" for k in range(wheels)]
-    told = [set(_told(each)) if each is not None else set() for each in parts]
+    told = [set(_told(part)) if part is not None else set() for part in parts]
     for k in sorted(told[0] | told[1]):
         packed = Packer().header(int(stamps[k])).texts(names)
         for values, rows in zip(parts, told, strict=True):
@@ -172,8 +172,8 @@ class Packer:
     def texts(self, texts: Sequence[str]) -> Packer:
         """A sequence of strings."""
         self.numbers("I", len(texts))
-        for each in texts:
-            self.text(each)
+        for text in texts:
+            self.text(text)
         return self
 
     def array(self, values: Sequence[float]) -> Packer:
