@@ -60,7 +60,7 @@ def _as_they_stand(path: str | os.PathLike, rows: int, options: Options) -> Iter
     if spaced:
         notes = [NOTE if note == TABS_NOTE else note for note in layout.notes]
         layout = replace(layout, notes=tuple(notes))
-    rows_of_head = [text for number, text in head if number >= layout.first and not _is_comment(text)]
+    rows_of_head = [text for number, text in head if number >= layout.first and not dialect.is_comment(text)]
     sample = rows_of_head[: dialect.SAMPLE_ROWS]
     parser = RowParser(layout, file.source, options.skip_bad_rows, sample)
     most = max(1, min(rows, MAX_CELLS // len(layout.names)))
@@ -69,7 +69,8 @@ def _as_they_stand(path: str | os.PathLike, rows: int, options: Options) -> Iter
         notes = (*layout.notes, *file.notes, *parser.notes)
         return Table(layout.names, columns, lines, layout.units, file.source, sha256, notes, layout.titles)
 
-    for block in _cut(blocks, most):
+    pieces = (TextBlock(first + k, texts[k : k + most]) for first, texts in blocks for k in range(0, len(texts), most))
+    for block in pieces:
         texts, lines = _kept(block, layout.first)
         if texts and file.ends_open and lines[-1] == file.last and _is_cut(texts[-1], layout):
             texts, lines = texts[:-1], lines[:-1]
@@ -97,7 +98,7 @@ def _head(blocks: Iterator[TextBlock]) -> tuple[list[FileLine], Iterator[TextBlo
         for number, text in enumerate(block.lines, block.first):
             if not text or text.isspace():
                 continue
-            comments = comments + 1 if _is_comment(text) else 0
+            comments = comments + 1 if dialect.is_comment(text) else 0
             rows += not comments
             lines.append(FileLine(number, text))
             if comments > KEPT_COMMENTS:
@@ -109,11 +110,6 @@ def _head(blocks: Iterator[TextBlock]) -> tuple[list[FileLine], Iterator[TextBlo
     return lines, iter(taken)
 
 
-def _cut(blocks: Iterable[TextBlock], rows: int) -> Iterator[TextBlock]:
-    for first, lines in blocks:
-        yield from (TextBlock(first + k, lines[k : k + rows]) for k in range(0, len(lines), rows))
-
-
 def _tabbed(blocks: Iterable[TextBlock]) -> Iterator[TextBlock]:
     for first, lines in blocks:
         yield TextBlock(first, [tabbed(line) if line else line for line in lines])
@@ -123,7 +119,7 @@ def _kept(block: TextBlock, first: int) -> tuple[list[str], IntArray]:
     """The rows in a block, without blank lines, comments and what stands above line `first`; and their lines."""
     begin = max(0, first - block.first)
     lines = block.lines[begin:]
-    kept = [k for k, line in enumerate(lines) if line and not line.isspace() and not _is_comment(line)]
+    kept = [k for k, line in enumerate(lines) if line and not line.isspace() and not dialect.is_comment(line)]
     texts = lines if len(kept) == len(lines) else [lines[k] for k in kept]
     return texts, np.array(kept, dtype=np.int64) + (block.first + begin)
 
@@ -134,10 +130,6 @@ def _is_cut(text: str, layout: Layout) -> bool:
         return len(layout.cells(text, "")) < len(layout.names)
     except InputError:  # a quote that is never closed
         return True
-
-
-def _is_comment(line: str) -> bool:
-    return ("#" in line or "%" in line) and dialect.is_comment(line)
 
 
 def _texts_from(file: TextFile, layout: Layout, line: int, spaced: bool) -> Iterator[str]:

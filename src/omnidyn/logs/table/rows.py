@@ -78,7 +78,8 @@ class RowParser:
 
     def _plain(self, texts: list[str]) -> dict[str, Column] | None:
         """The columns of rows in which nothing is odd; None where a closer look is needed."""
-        texts, separator, comma, first = self._unended(texts), self.layout.separator, False, ""
+        separator, ending, comma, first = self.layout.separator, self.layout.ending, False, ""
+        texts = [text.rstrip().removesuffix(ending) for text in texts] if ending else texts
         if any('"' in text for text in texts):
             texts = [_unquoted(text, separator) for text in texts]
         if separator != ",":
@@ -117,10 +118,6 @@ class RowParser:
         self._words |= words
         floats = {names[k]: values[:, place].copy() for place, k in enumerate(numeric)}
         return {name: tuple(split[name]) if name in split else floats[name] for name in names}
-
-    def _unended(self, texts: list[str]) -> list[str]:
-        ending = self.layout.ending
-        return [text.rstrip().removesuffix(ending) for text in texts] if ending else texts
 
     # ---- cell by cell ------------------------------------------------------------------------------------
 
