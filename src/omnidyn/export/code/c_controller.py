@@ -23,7 +23,7 @@ from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.paths.motion import Motion, Path
 from omnidyn.control.pid import Pid
 from omnidyn.control.speed_loop import MOST_STEPS, SpeedController
-from omnidyn.export.code.mpc.code import mpc_code, mpc_input, mpc_memory
+from omnidyn.export.code.mpc_code import mpc_code, mpc_input, mpc_memory
 from omnidyn.export.code.trace import Traced, inputs, statements
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse, refuse_controller

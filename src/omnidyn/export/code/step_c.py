@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.export.code import sources
+from omnidyn.export.code.expressions import INT, REAL, Array, Type
 from omnidyn.export.code.translate import Program
-from omnidyn.export.code.types import INT, REAL, Array, Type
 from omnidyn.export.spelling import SINGLE_MAX, c_number, filled
 from omnidyn.model.actuation import Driver
 from omnidyn.model.dynamics import state_space
