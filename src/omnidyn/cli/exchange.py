@@ -19,8 +19,6 @@ from omnidyn.model.presets import robot_path
 
 if TYPE_CHECKING:
     from omnidyn.export.contract import Export
-    from omnidyn.model.robot import Robot
-    from omnidyn.run import Run
 
 
 def bring(
@@ -108,7 +106,9 @@ def export(
     options = _options(kind, make, {**given, "controller": controller or None})
     loaded = omnidyn.load_robot(robot)
     if log:
-        options |= _options(kind, make, {"runs": [_run(path, loaded, max_bytes) for path in log]})
+        options |= _options(
+            kind, make, {"runs": [omnidyn.read_log(path, robot=loaded, max_bytes=max_bytes or None) for path in log]}
+        )
     inputs = [robot_path(robot), *log, *([controller] if controller.endswith(".toml") else [])]
     if out not in ("", "-"):
         keep_apart([out], inputs)
@@ -135,10 +135,6 @@ def _options(kind: str, make: Any, given: dict[str, Any]) -> dict[str, Any]:
             flag = {"runs": "log"}.get(name, name)
             raise typer.BadParameter(f"--{flag} is not for {kind}.")
     return options
-
-
-def _run(path: str, robot: Robot, max_bytes: int) -> Run:
-    return omnidyn.read_log(path, robot=robot, max_bytes=max_bytes or None)
 
 
 def _say_missing(made: Export) -> None:

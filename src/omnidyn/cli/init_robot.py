@@ -98,17 +98,16 @@ def complete(value: dict[str, Any], preset: Robot | None, mecanum: bool) -> Answ
     if _at_terminal() and needed:
         _ask_for(needed, answers, preset)
     elif preset is not None:
-        answers.accepted = {key for key in needed if key != "azimuth" or _fits(preset, value)}
+        answers.accepted = {
+            key
+            for key in needed
+            if key != "azimuth" or (value.get("wheels", preset.wheels.count) == preset.wheels.count)
+        }
         needed = [key for key in needed if key not in answers.accepted]
     if not _at_terminal() and needed:
         flags = ", ".join(f"--{key.replace('_', '-')}" for key in needed)
         raise typer.BadParameter(f"{flags} missing; without them it asks, but only at a terminal.")
     return answers
-
-
-def _fits(preset: Robot, value: dict[str, Any]) -> bool:
-    """Whether the preset has the number of wheels that was asked for."""
-    return value.get("wheels", preset.wheels.count) == preset.wheels.count
 
 
 def _at_terminal() -> bool:
@@ -125,7 +124,7 @@ def _ask_for(needed: list[str], answers: Answers, preset: Robot | None) -> None:
         default = getattr(preset.body if key == "mass" else preset.wheels, key) if preset else DEFAULTS[key]
         typed = _ask(
             f"{QUESTIONS[key]} [{number_words(default)}]: ",
-            lambda text, key=key: _checked(key, _one(text), answers.value),
+            lambda text, key=key: _checked(key, _several(text, 1, "one number, such as 0.05")[0], answers.value),
         )
         if typed is None:
             answers.accepted.add(key)
@@ -168,10 +167,6 @@ def _ask(question: str, understood: Callable[[str], Any]) -> Any:
             return understood(line.strip())
         except InputError as error:
             say(f"omnidyn: {error}")
-
-
-def _one(text: str) -> float:
-    return _several(text, 1, "one number, such as 0.05")[0]
 
 
 def _several(text: str, count: int, expected: str = "") -> list[float]:

@@ -224,16 +224,12 @@ class Expressions:
     def _own(self, called: sources.Source, nodes: list[ast.expr]) -> Typed:
         """A call of another function of the package, translated for arguments of these types."""
         given = [self.of(each) for each in nodes]
-        made = self.program.function(called, tuple(REAL if kind == INT and _is_real(text) else kind
+        made = self.program.function(called, tuple(REAL if kind == INT and ("." in text) else kind
                                                    for text, kind in given))  # fmt: skip
         for position, node in enumerate(nodes):
             if position in made.writes:
                 self.body.writes_to(node)
         return f"{made.name}({', '.join(text for text, _ in given)})", made.returns
-
-
-def _is_real(text: str) -> bool:
-    return "." in text
 
 
 def table_type(value: Any) -> Array | Columns:
