@@ -9,6 +9,7 @@ from typing import Any
 from omnidyn.cli.terminal.numbers import number_words
 from omnidyn.errors import InputError
 
+LEAST_WHEELS, MOST_WHEELS = 3, 16
 WHEEL = (2e-3, 0.5)  # [m] between which the radius of a wheel is
 ROBOT = (5e-3, 5.0)  # [m] from the centre to a wheel
 USUAL_WHEEL, USUAL_ROBOT = (8e-3, 0.3), (0.03, 2.0)  # [m] what most robots have

@@ -20,12 +20,11 @@ from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.validation import FITTED, HELD_OUT, Score, Validation, output_name
 from omnidyn.logs.columns.mapping import component_channel
 from omnidyn.logs.path import BodyPath, body_twist, driven, path_of
-from omnidyn.report.dead_zone_section import dead_zone_section
-from omnidyn.report.estimate_picture import draw_estimates
-from omnidyn.report.figures.correlation import draw_correlation
+from omnidyn.report.figures.dead_zone_map import dead_zone_section
+from omnidyn.report.figures.friction_speed import draw_estimates
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.path import draw_path
-from omnidyn.report.figures.residuals import draw_residuals, residuals_of
+from omnidyn.report.figures.residuals import draw_correlation, draw_residuals, residuals_of
 from omnidyn.report.html import Section, beside, bullets, content, figure, page, paragraph, section
 from omnidyn.report.style import BLUE, GREY, WIDTH, Picture, look, new_figure, picture, thin_out
 from omnidyn.run import Run

@@ -15,7 +15,7 @@ from omnidyn.identification.structure.missing import laws
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.surroundings import GRAVITY
-from omnidyn.report.dead_zone_section import dead_zone_section
+from omnidyn.report.figures.dead_zone_map import dead_zone_section
 from omnidyn.run import Run
 from omnidyn.simulation.slip.plant import wheel_loads
 from tests.support.codes import codes

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.control.tracking import Tracking
+from omnidyn.control.tracking import Tracking, trackings_document
 from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import per_wheel
 from omnidyn.report.figures.robot import wheel_places
-from omnidyn.report.tracking.pictures import COLOURS
+from omnidyn.report.figures.tracking import COLOURS, draw_tracking, draw_voltages
+from omnidyn.report.html import Section, escaped, page, section
+from omnidyn.statement import Statement
 
 SIZE, MARGIN, TEXT = 480, 16, 20  # pixels
 FINE = 2  # drawn so many times larger, then made small: lines are smooth
@@ -114,3 +118,38 @@ def _robot(draw: Any, robot: Robot, pose: FloatArray, scale: float, seen: Any, c
 
 def _around(point: tuple[float, float], radius: float) -> tuple[float, float, float, float]:
     return point[0] - radius, point[1] - radius, point[0] + radius, point[1] + radius
+
+
+# The report of `omnidyn track`: what the path asks for, how near each controller came, pictures, a moving one
+
+
+def render_tracking(
+    found: Sequence[Tracking], robot: Robot, provenance: Mapping[str, Any], *, notes: Sequence[Statement] = ()
+) -> str:
+    """The page as HTML: it needs no other file. robot: that was driven. notes: what the path asks for."""
+    told = trackings_document(found, notes)
+    limit = per_wheel(robot.motor.voltage_limit, robot.wheels.count)
+    sections = [
+        section("controllers", "Controllers", told["controllers"]),
+        section("tracking", "Path and errors", draw_tracking(found)),
+        Section("moving", "In motion", _moving(found, robot)),
+        section("voltages", "Voltages", draw_voltages(found, limit)),
+        section("warnings", "Warnings", told["warnings"], none="None."),
+    ]
+    if notes:
+        sections.insert(1, section("path", "What the path asks for", told["path"]))
+    title = f"{found[0].plant} along {found[0].path}"
+    introduction = (
+        "A simulated robot, driven step by step. Errors are distances from where the path is at that time. Position "
+        "and heading: root mean square; effort: that of a voltage; change: of a voltage from step to step."
+    )
+    return page(title, introduction, sections, provenance, verdict=told.verdict_text)
+
+
+def _moving(found: Sequence[Tracking], robot: Robot) -> str:
+    """The animation inside the page."""
+    data = base64.b64encode(animation(found, robot)).decode()
+    names = ", ".join(each.controller for each in found)
+    words = "The dot is where the path is at that time. To scale, a large robot apart."
+    image = f'<img alt="{escaped(f"{robot.name} driven by {names}")}" src="data:image/gif;base64,{data}">'
+    return f'<figure id="animation"><div class="frame">{image}</div><figcaption>{escaped(words)}</figcaption></figure>'

@@ -43,3 +43,26 @@ def _draw(found: DeadZone, path: str, force: bool) -> None:
     with shown_progress("drawing the map"):
         name = found.robot.name
         write_picture(draw_dead_zone_map({name: found.robot}, {name: found}), path, force)
+
+
+# omnidyn friction ROBOT: what the friction of a robot does, near zero speed above all
+
+
+def friction(
+    robot: str = typer.Argument(metavar="ROBOT", help="A preset (see: omnidyn robots) or a robot file."),
+    picture: str = typer.Option("", "--picture", metavar="FILE", help="Draw it, as .png or .svg."),
+    force: bool = typer.Option(False, "--force", help="Replace the file if it exists."),
+    json: bool = typer.Option(False, "--json", help="For machines."),
+) -> None:
+    """Show its friction: force against speed, presliding, breakaway."""
+    refuse_picture(picture, force)
+    keep_inputs([], [robot], [], picture)
+    from omnidyn.simulation.friction_study import friction_study
+
+    loaded, source = omnidyn.load_robot(robot), robot_input(robot)
+    found = friction_study(loaded)
+    tell(found.document(), json, provenance([source]))
+    if picture:
+        from omnidyn.report.friction_picture import draw_friction
+
+        write_picture(draw_friction({loaded.name: found}), picture, force)

@@ -28,7 +28,7 @@ from omnidyn.errors import UnsupportedError
 from omnidyn.export.spelling import c_number, filled
 from omnidyn.model.wheels import wheel_speed
 
-FOLDER = files("omnidyn.export.code.mpc")
+FOLDER = files("omnidyn.export.code") / "mpc"
 PARTS = ("model.c", "solver.c", "step.c")
 # What float32 asks for in place of the constants of Python, whose rounding is 1e9 times as small.
 BEYOND, NARROWEST = 1e-3, 1e-3  # [V]
