@@ -16,6 +16,7 @@ from typing import Any, Self
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.compiled.kernel import machine_code
 from omnidyn.control.controller import (
     BACKWARDS,
     BAD_PATH,
@@ -85,6 +86,7 @@ class Mpc:
         self._room = Room.of(self.horizon, volts(robot))
         self._numbers = numbers(robot, self.dt, self.friction)
         self._tables = self.settings.tables(robot, self.dt, self.observer)
+        self._control = None  # compiled by the first step
 
     def reset(self) -> None:
         """Forget all steps."""
@@ -164,9 +166,10 @@ class Mpc:
         preview = self._preview
         row = preview.row_at(t, path)
         known = self._known and 0.5 * self.dt < since < 1.5 * self.dt
-        passes = control_step(
-            self._numbers, self._tables, preview.rows, row, self._state, known, self._memory, self._room
-        )
+        given = self._numbers, self._tables, preview.rows, row, self._state, known, self._memory, self._room
+        if self._control is None:
+            self._control = machine_code(control_step, *given)
+        passes = self._control(*given)
         if passes < 0:
             return self._failed(t, passes, begun)
         self._known = True
