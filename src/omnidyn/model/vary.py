@@ -55,7 +55,7 @@ def vary_robot(
 
 
 def vary_as(robot: Robot, text: str) -> Robot:
-    """`vary_robot` by a text such as "payload=2kg,floor=carpet"; the robot itself for an empty one. Raises InputError."""
+    """`vary_robot` by a text such as "payload=2kg,floor=carpet"; the robot for an empty one. Raises InputError."""
     chosen: dict[str, Any] = {}
     for part in filter(None, (each.strip() for each in text.split(","))):
         kind, equals, name = (each.strip() for each in part.partition("="))
