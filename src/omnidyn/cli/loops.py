@@ -69,7 +69,7 @@ def track(
     around = Circumstances(dt, duration, skip, noise, delay, seed)
     believed = omnidyn.load_robot(robot)
     driven, follow = vary_as(omnidyn.load_robot(plant) if plant else believed, with_), omnidyn.path(path)
-    asked, options = omnidyn.demand(believed, follow), told_of_loop(believed, around)
+    asked, options = omnidyn.path_demand(believed, follow), told_of_loop(believed, around)
     options |= {} if horizon is None else {"horizon": horizon}
     found: list[Tracking] = []
     with shown_progress("tracking") as progress:
