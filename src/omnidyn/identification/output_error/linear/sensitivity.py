@@ -31,44 +31,44 @@ from omnidyn.statement import WARNING, Statement
 TRIED = 0.01  # relative change of a fixed number, either way is alike
 
 
-def moved_by_the_file(sure: Weighed, held: Mapping[str, float]) -> FloatArray:
+def moved_by_the_file(weighed: Weighed, held: Mapping[str, float]) -> FloatArray:
     """What one std of each number that the fit took as it stands moves its parameters by, in the numbers that the
     solver sees. Shape (P, K). held: key -> std, as the robot file has it; with groups it is the same number in all.
 
     To first order, as in `rests_on`; 0 for what shows in no row, or cannot be simulated. The covariance of what is
     fitted beside numbers that are taken as they stand: S. F. Schmidt, Adv. Control Syst. 3, 293 (1966).
     """
-    linear, engine, point = as_weighed(sure)
+    linear, engine, point = as_weighed(weighed)
     benches = [
-        (Workbench(own, at, type(by), ()), places)
-        for own, at, by, places in members_of(engine, linear.rows.problem, point)
+        (Workbench(problem, member_point, type(member_engine), ()), places)
+        for problem, member_point, member_engine, places in members_of(engine, linear.rows.problem, point)
     ]
     _, j = linear.whole()
-    found = np.zeros((j.shape[1], len(held)))
+    moved = np.zeros((j.shape[1], len(held)))
     for k, (key, std) in enumerate(held.items()):
-        shown = [np.zeros((*own.shape, 1)) for own in linear.rows.residual]
+        shown = [np.zeros((*residual.shape, 1)) for residual in linear.rows.residual]
         try:
             for bench, places in benches:
                 number = robot_parameter(bench.robot, key, None, tuple(held))
-                by = TRIED * (abs(number.value) or std)
-                change = bench.change(number.on(bench.robot, number.value + by))
-                for place, own in zip(places, change, strict=True):
-                    shown[place] = own / by
+                step = TRIED * (abs(number.value) or std)
+                changes = bench.change(number.on(bench.robot, number.value + step))
+                for place, change in zip(places, changes, strict=True):
+                    shown[place] = change / step
         except OmnidynError:
             continue
-        found[:, k] = solved(j, -linear.white(shown)[:, 0]) * std
-    return found
+        moved[:, k] = solved(j, -linear.white(shown)[:, 0]) * std
+    return moved
 
 
-def as_weighed(sure: Weighed) -> tuple[Linear, Engine, Point]:
+def as_weighed(weighed: Weighed) -> tuple[Linear, Engine, Point]:
     """(the rows of a fit made white by the memory that it was weighed with, what simulates them, its best point)."""
-    solver, point = sure.plain.solver, sure.plain.state.point
+    solver, point = weighed.plain.solver, weighed.plain.state.point
     assert isinstance(solver.problem, Problem)
-    problem, variance = bounded(solver.problem, 1), sure.plain.state.variance
+    problem, variance = bounded(solver.problem, 1), weighed.plain.state.variance
     engine = solver.engine.on(problem)
     rows = Rows.of(problem, point, engine.residuals(point))
     memory = [
-        sure.models.get(column, AutoRegression(np.zeros(0), float(variance[c]), 0))
+        weighed.models.get(column, AutoRegression(np.zeros(0), float(variance[c]), 0))
         for c, column in enumerate(problem.columns)
     ]
     return Linear(rows, memory), engine, point
@@ -80,13 +80,12 @@ def members_of(
     """(problem, point, engine, which pieces of all are its own) of each group; of one where there are none."""
     if not engine.members:
         return [(problem, point, engine, np.arange(len(problem.pieces)))]
-    return [(own.problem, own.point(point), own.engine, own.places) for own in engine.members]
+    return [(member.problem, member.point(point), member.engine, member.places) for member in engine.members]
 
 
 # How far the numbers of a fit are off because the inputs of its log are rounded
 #
-# While an input is held the true one is off by u, even between -q/2 and q/2 of its step q; another one is, by another
-# u.
+# While an input is held the true one is off by u, even between -q/2 and q/2 of its step q; another one by another u.
 # To first order this shows z = sum over such stretches of dy/du u in the rows made white, and moves the numbers by
 #
 #     d = (J'J)^-1 J' z
@@ -108,25 +107,25 @@ DRAWS = 60  # a variance within a fifth; always the same ones
 SEED = 20_12
 
 
-def beside_rounding(sure: Weighed, records: Sequence[Record]) -> tuple[Trust, list[Statement]]:
+def beside_rounding(weighed: Weighed, records: Sequence[Record]) -> tuple[Trust, list[Statement]]:
     """(the trust in a fit, with what inputs in steps may have been rounded by; what is to be said of that)."""
     steps = max(float(input_steps(record).max()) for record in records)
     if not steps:
-        return sure.known, []
-    known = sure.known.beside(moved_by_rounding(sure))
+        return weighed.known, []
+    known = weighed.known.beside(moved_by_rounding(weighed))
     with np.errstate(divide="ignore", invalid="ignore"):
-        wider = float(np.nanmax(known.std / sure.known.std, initial=1.0))
+        wider = float(np.nanmax(known.std / weighed.known.std, initial=1.0))
     rounded = Statement("rounded_inputs", WARNING, numbers={"step": steps, "wider": wider})
     return known, [rounded] if wider > WIDER else []
 
 
-def moved_by_rounding(sure: Weighed) -> FloatArray:
+def moved_by_rounding(weighed: Weighed) -> FloatArray:
     """What the rounding of its inputs moves the parameters of a fit by, in the numbers that the solver sees: their
     covariance is that times its transpose. Shape (P, DRAWS).
 
     One piece after the other. Of logs that are longer than what is looked at as much less as there are more rows.
     """
-    linear, engine, point = as_weighed(sure)
+    linear, engine, point = as_weighed(weighed)
     products, random = with_priors(linear, DRAWS), np.random.default_rng(SEED)
     for problem, own_point, _, places in members_of(engine, linear.rows.problem, point):
         for place, motion in zip(places, motions(problem, own_point), strict=True):
@@ -137,7 +136,7 @@ def moved_by_rounding(sure: Weighed) -> FloatArray:
     j, other = np.arange(1, len(gram) - DRAWS), np.r_[0, len(gram) - DRAWS : len(gram)]
     by = solved_by(gram[np.ix_(j, j)], gram[np.ix_(j, other)])
     left = (gram[np.ix_(other, other)] - by.T @ gram[np.ix_(j, other)]) * np.outer(size[other], size[other])
-    rows, every = (_rows(own) for own in (linear.rows.problem, sure.plain.solver.problem))
+    rows, every = (_rows(own) for own in (linear.rows.problem, weighed.plain.solver.problem))
     return (by * size[other] / size[j, None])[:, 1:] * np.sqrt(_share(left) / DRAWS * rows / every)
 
 
