@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 import omnidyn
-from omnidyn.cli.init_sizes import refuse_sizes
 from omnidyn.cli.log_options import MAX_BYTES
 from omnidyn.cli.terminal.session import input_file, provenance, robot_input
+from omnidyn.cli.terminal.sizes import refuse_sizes
 from omnidyn.cli.terminal.streams import say, show
 from omnidyn.cli.terminal.telling import tell
 from omnidyn.files import check_output, keep_apart, write_atomic

@@ -8,10 +8,10 @@ import typer
 
 import omnidyn
 from omnidyn.cli import log_options
-from omnidyn.cli.init_sizes import LEAST_WHEELS, MOST_WHEELS
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.numbers import number_list, number_words
 from omnidyn.cli.terminal.session import provenance, robot_input
+from omnidyn.cli.terminal.sizes import LEAST_WHEELS, MOST_WHEELS
 from omnidyn.cli.terminal.streams import say, show
 from omnidyn.cli.terminal.telling import tell
 from omnidyn.document import Document

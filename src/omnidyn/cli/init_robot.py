@@ -11,8 +11,8 @@ from typing import Any
 import typer
 
 from omnidyn.cli import log_options
-from omnidyn.cli.init_sizes import LEAST_WHEELS, MOST_WHEELS, refuse_sizes
 from omnidyn.cli.terminal.numbers import number_list, number_words
+from omnidyn.cli.terminal.sizes import LEAST_WHEELS, MOST_WHEELS, refuse_sizes
 from omnidyn.cli.terminal.streams import say
 from omnidyn.errors import InputError
 from omnidyn.logs.geometry import Geometry, as_mecanum, wheel_geometry
