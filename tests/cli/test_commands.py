@@ -221,7 +221,7 @@ def test_simulate_writes_the_run_that_python_gives(call, here):
 
 
 def test_simulate_with_a_band_writes_its_ends_beside_the_run(call, here):
-    from omnidyn import band, read_voltages, save_robot
+    from omnidyn import confidence_band, read_voltages, save_robot
     from omnidyn.model.robot import Prior
 
     known = load_robot("axebot").replace(priors={"friction.axes.coulomb[0]": Prior(std=0.1, origin="guess")})
@@ -232,7 +232,7 @@ def test_simulate_with_a_band_writes_its_ends_beside_the_run(call, here):
     assert "rests on guesses of the robot file: friction" in out
     assert "wrote run.csv, run-low.csv, run-high.csv" in err
     held = read_voltages(here / "u.csv", 3)
-    wanted = band(known, held.voltage, held.dt)
+    wanted = confidence_band(known, held.voltage, held.dt)
     for name, end in (("low", wanted.low), ("high", wanted.high)):
         assert read_run(here / f"run-{name}.csv").twist.tobytes() == end.twist.tobytes()
     code, _, err = call("simulate", "known.toml", "u.csv", "-o", "other.csv", "--band", "--json", "--force")
