@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from omnidyn.findings.check import check
-from omnidyn.identification.motors.line import fit_line
 from omnidyn.identification.motors.log import averaged_statements, motor_logs
 from omnidyn.identification.motors.study import identify_motors
-from omnidyn.identification.motors.windows import motor_windows
+from omnidyn.identification.motors.windows import fit_line, motor_windows
 from omnidyn.logs.averaged import rows_of_mean
 from omnidyn.logs.log import Log
 from omnidyn.logs.read_log import load_log

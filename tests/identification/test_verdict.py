@@ -11,7 +11,7 @@ from omnidyn.document import sentence
 from omnidyn.findings.finding import Finding, Verdict
 from omnidyn.identification.estimate import Correlation, Estimate
 from omnidyn.identification.identify import Identification
-from omnidyn.identification.motors.verdict import motors_verdict
+from omnidyn.identification.motors.study import motors_verdict
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.question import Question
 from omnidyn.identification.verdict import fit_verdict, fits_verdict, steady_verdict

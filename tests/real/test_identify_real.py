@@ -8,8 +8,7 @@ import pytest
 from omnidyn.identification.motors.study import identify_motors
 from omnidyn.identification.steady.line import fit_line
 from omnidyn.identification.steady.operating_points import force_points
-from omnidyn.identification.steady.shape_fit import fit_shape, rms_and_error
-from omnidyn.identification.steady.shapes import SHAPES
+from omnidyn.identification.steady.shapes import SHAPES, fit_shape, rms_and_error
 from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot_file import load_robot
 from tests.support import real_logs as logs

@@ -26,10 +26,9 @@ from omnidyn.identification.output_error.answer import Answer, OutputErrorEstima
 from omnidyn.identification.output_error.fit import WHOLE, Fit
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.question import AUTO, FIT, MOTORS, OUTPUT_ERROR, STEADY, STEADY_STATE, Question
-from omnidyn.identification.steady.axis_lines import identify_lines
+from omnidyn.identification.steady.steady_state import identify_lines
 from omnidyn.identification.steady.study import diagnosed, fit_steady, identify_steady, undiagnosed
-from omnidyn.identification.steady.study_parts import Difference
-from omnidyn.identification.steady.study_table import SteadyStudy
+from omnidyn.identification.steady.study_table import Difference, SteadyStudy
 from omnidyn.identification.validation import Validation, validate
 from omnidyn.identification.verdict import (
     fit_failure,

@@ -9,7 +9,7 @@ import numpy as np
 
 from omnidyn.findings.needs import why_no_inputs
 from omnidyn.identification.question import AUTO, OUTPUT_ERROR, STEADY_STATE, Question
-from omnidyn.identification.steady.settling import why_no_transient
+from omnidyn.identification.steady.operating_points import why_no_transient
 from omnidyn.model.motor import DUTY, SPEED, VOLTAGE
 from omnidyn.model.robot import MEASURED, Prior, Robot
 from omnidyn.progress import Progress, Report

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.motors.static import line_of_speed
+from omnidyn.identification.motors.start import line_of_speed
 from omnidyn.identification.motors.study import identify_motors
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.run import Run

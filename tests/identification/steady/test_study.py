@@ -6,8 +6,7 @@ import pytest
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.steady.choice import choose_shape
 from omnidyn.identification.steady.operating_points import force_points
-from omnidyn.identification.steady.shape_fit import fit_shape
-from omnidyn.identification.steady.shapes import SHAPES
+from omnidyn.identification.steady.shapes import SHAPES, fit_shape
 from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml

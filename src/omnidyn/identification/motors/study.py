@@ -17,17 +17,21 @@ from omnidyn.findings.finding import Verdict
 from omnidyn.findings.fitness import MOTORS as MOTORS_USE
 from omnidyn.identification.grouping import held_out
 from omnidyn.identification.log_verdicts import checked, log_verdicts, of_motors, told_why, unfit, verdict_advice
-from omnidyn.identification.motors.choice import is_late
+from omnidyn.identification.motors.choice import fit_rmse, is_late
 from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, named
 from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
-from omnidyn.identification.motors.free_run import fit_rmse
-from omnidyn.identification.motors.line import fit_line
 from omnidyn.identification.motors.log import GROUND, MotorLog, averaged_statements, motor_logs, orientation_of
 from omnidyn.identification.motors.rest import turned_under
-from omnidyn.identification.motors.start import STARTS_HEAD, MotorStart, motor_starts
-from omnidyn.identification.motors.static import is_slow, points_of_logs, starts_of_points, windows_of_points
-from omnidyn.identification.motors.verdict import motors_verdict, none_answers
-from omnidyn.identification.motors.windows import MotorWindows, motor_windows
+from omnidyn.identification.motors.start import (
+    STARTS_HEAD,
+    MotorStart,
+    is_slow,
+    motor_starts,
+    points_of_logs,
+    starts_of_points,
+    windows_of_points,
+)
+from omnidyn.identification.motors.windows import MotorWindows, fit_line, motor_windows
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.question import MOTOR_FIT, MOTOR_LINES, MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
 from omnidyn.logs.log import Log
@@ -40,6 +44,9 @@ from omnidyn.statement import ERROR, NOTE, WARNING, Statement, as_verdict, by_se
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+from omnidyn.identification.motors.estimate import BAND, SLOPE
+from omnidyn.identification.motors.start import START
 
 SAME_SPEED = 1e-9  # spread of speeds over the largest, below which they are one
 
@@ -290,3 +297,61 @@ def _of_windows(windows: MotorWindows, lines: Sequence[MotorEstimate]) -> Iterat
         yield Statement("windows_thinned", NOTE, numbers={"every": windows.every})
     if any(line.one_way for line in lines):
         yield Statement("turned_one_way")
+
+
+# What a study of motors came to
+
+
+def motors_verdict(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart] = ()) -> Statement:
+    """Which motors answer to their input, and at which input they start: from rest where that was seen, else by the
+    dead band of the line.
+    """
+    lines, blind = _own(motors), unanswering(motors, starts)
+    if len(blind) == len(lines):
+        return Statement("no_motor_answers", ERROR, numbers={"motors": blind})
+    levels = {line.name: _levels(line, starts) for line in lines}
+    seen = [line for line in lines if levels[line.name]]
+    without = [line.name for line in lines if not levels[line.name] and line.name not in blind]
+    total = {"total": len(lines)}
+    parts = [_starts(seen, levels, starts, len(lines))] if seen else []
+    if without:
+        numbers = {"motors": without, "too": bool(seen), **total}
+        parts.append(Statement("motors_without_dead_band", NOTE, numbers=numbers))
+    if blind:
+        parts.append(Statement("motors_not_answering", WARNING, numbers={"motors": blind}))
+    return Statement("motors_answer", WARNING if blind else NOTE, numbers={"parts": parts})
+
+
+def unanswering(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart] = ()) -> list[str]:
+    """Names of the motors that are not seen to answer to their input: their slope may be 0, and no start was seen."""
+    return [one.name for one in _own(motors) if not one.ci95[SLOPE][0] > 0.0 and not _levels(one, starts)]
+
+
+def none_answers(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart] = ()) -> bool:
+    """Whether no motor is seen to answer to its input."""
+    return len(unanswering(motors, starts)) == len(_own(motors))
+
+
+def _own(motors: Sequence[MotorEstimate]) -> list[MotorEstimate]:
+    """The motors without the line of all together, where they have lines of their own."""
+    return [one for one in motors if one.motor is not None] or list(motors)
+
+
+def _levels(motor: MotorEstimate, starts: Sequence[MotorStart]) -> list[float]:
+    """The inputs at which a motor starts; none where that is not known."""
+    sharp = [each.value[START] for each in starts if each.motor == motor.motor and each.sharp]
+    return sharp or ([motor.value[BAND]] if motor.dead_band_seen else [])
+
+
+def _starts(
+    seen: Sequence[MotorEstimate], levels: dict[str, list[float]], starts: Sequence[MotorStart], total: int
+) -> Statement:  # fmt: skip
+    """At which inputs motors start; of a motor alone, in each direction."""
+    both = [start for start in starts if start.sharp]
+    unit = {"unit": seen[0].unit}
+    if total == 1 and len(both) == 2 and both[0].motor == seen[0].motor:
+        ways = {"levels": [start.value[START] for start in both], "directions": [start.direction for start in both]}
+        return Statement("starts_both_ways", NOTE, seen[0].name, ways | unit)
+    numbers = {"motors": [line.name for line in seen], "total": total,
+               "levels": [level for line in seen for level in levels[line.name]]}  # fmt: skip
+    return Statement("motors_start", NOTE, numbers=numbers | unit)

@@ -22,16 +22,17 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.steady.operating_points import CURRENT, ForcePoints
-from omnidyn.identification.steady.shape_fit import (
+from omnidyn.identification.steady.shapes import (
     HUBER,
     RAYLEIGH,
+    SHAPES,
+    VISCOUS,
     ShapeFit,
     fit_shape,
     is_turning,
     mean_error,
     rms_and_error,
 )
-from omnidyn.identification.steady.shapes import SHAPES, VISCOUS
 from omnidyn.model.robot import Robot
 from omnidyn.statistics import huber_loss
 

@@ -20,16 +20,17 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification import lack_of_fit as common
 from omnidyn.identification.steady.choice import APART
 from omnidyn.identification.steady.operating_points import ForcePoints
-from omnidyn.identification.steady.shape_fit import (
+from omnidyn.identification.steady.shapes import (
     HUBER,
     RAYLEIGH,
     ShapeFit,
+    element_speeds,
     fold_numbers,
     is_turning,
     mean_error,
+    on_rollers,
     seen_components,
 )
-from omnidyn.identification.steady.shapes import element_speeds, on_rollers
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import sin_cos_deg
 from omnidyn.statement import quoted

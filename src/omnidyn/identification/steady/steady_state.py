@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -19,14 +20,24 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.estimate import Correlation, Estimate, identified
 from omnidyn.identification.force_scale import scale_of_traction
-from omnidyn.identification.steady.line import PARAMETERS, Line, fit_line
-from omnidyn.identification.steady.line_statements import line_statements, point_statements, rest_statements
+from omnidyn.identification.question import STEADY_STATE, Question
+from omnidyn.identification.steady.line import (
+    PARAMETERS,
+    Line,
+    fit_line,
+    line_statements,
+    point_statements,
+    rest_statements,
+)
+from omnidyn.identification.steady.operating_points import ForcePoints, force_points
+from omnidyn.identification.steady.points import driven_axes
 from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.frames import AXES
-from omnidyn.model.friction import AxesFriction
-from omnidyn.model.keys import with_priors
+from omnidyn.model.friction import AxesFriction, Friction
+from omnidyn.model.keys import DIRECTION, WHEELS, with_priors
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import Robot
+from omnidyn.run import Run
 from omnidyn.statement import NOTE, Statement
 
 REST = ("bound", "line", "ignore")
@@ -262,3 +273,40 @@ def _held(bounds: dict[int, float]) -> list[Statement]:
         Statement("holds_at_least", NOTE, AXES[axis], {"bound": bound, "key": _breakaway(axis)})
         for axis, bound in bounds.items()
     ]
+
+
+# The paper's line on each body axis, eqs (15)-(17), from the steady windows of logs
+
+
+def identify_lines(
+    runs: Sequence[Run], robot: Robot, *, groups: Sequence[str] | None = None, question: Question | None = None,
+    **options: Any,
+) -> dict[str, Estimate]:  # fmt: skip
+    """B and C of each axis and group: group -> Estimate. Options: see `identify_steady`.
+
+    Every point counts for the axes that it drives. Friction elsewhere than on the axes is taken off the robot.
+    Raises InsufficientDataError when no axis of a group has three points at two speeds or more.
+    """
+    asked = Question.for_method(STEADY_STATE, question, options)
+    points = force_points(
+        runs, robot, groups=groups, speed=asked.speed, force_from=asked.force_from, window=asked.window
+    )
+    plain = robot.replace(friction=Friction(axes=robot.friction.axes), priors=_without_other_friction(robot))
+    found = {}
+    for group in points.groups:
+        own = points.chosen(np.array([name == group for name in points.group]))
+        found[group] = fit_steady_state(plain, steady_table(robot, own, group))
+    return found
+
+
+def steady_table(robot: Robot, points: ForcePoints, source: str = "") -> SteadyTable:
+    """The points as rows of a steady table, one for each axis that a point drives."""
+    row, axis = np.nonzero(driven_axes(robot, points.twist, points.wrench) & (points.twist != 0.0))
+    return SteadyTable(
+        axis=[AXES[k] for k in axis], speed=points.twist[row, axis], force=points.wrench[row, axis],
+        twist=points.twist[row], force_from=points.force_from, source=source, notes=points.notes,
+    )  # fmt: skip
+
+
+def _without_other_friction(robot: Robot) -> dict:
+    return {key: prior for key, prior in robot.priors.items() if key.rpartition(".")[0] not in (DIRECTION, WHEELS)}

@@ -17,7 +17,7 @@ import numpy as np
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
-from omnidyn.errors import InsufficientDataError
+from omnidyn.errors import InsufficientDataError, OmnidynError
 from omnidyn.identification.estimate import Correlation, Estimate, identified
 from omnidyn.identification.force_scale import scale_of_traction
 from omnidyn.identification.lack_of_fit import Diagnosis
@@ -26,26 +26,25 @@ from omnidyn.identification.question import STEADY, STEADY_STATE, Question
 from omnidyn.identification.stability import Stability
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
 from omnidyn.identification.steady.lack_of_fit import LackOfFit, lack_of_fit
-from omnidyn.identification.steady.moment import Moment, levelled, moments
-from omnidyn.identification.steady.moment_by_shape import moments_by_shape
+from omnidyn.identification.steady.moment import Moment, levelled, moments, moments_by_shape
 from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE, ForcePoints, SteadyWindows, steady_windows
-from omnidyn.identification.steady.rests_on import moved_by_the_file, rests_on
-from omnidyn.identification.steady.shape_fit import ShapeFit, fit_shape, is_turning
-from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, friction_of
-from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
-from omnidyn.identification.steady.study_statements import (
+from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, ShapeFit, fit_shape, friction_of, is_turning
+from omnidyn.identification.steady.study_table import (
+    Difference,
+    SteadyStudy,
+    Travel,
+    Viscous,
     advice,
     fit_statements,
     lack_statements,
     point_statements,
     result_statements,
 )
-from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.friction import Friction
-from omnidyn.model.keys import BODY_AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, find_key
+from omnidyn.model.keys import BODY_AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, expand, find_key
 from omnidyn.model.keys import VISCOUS as VISCOUS_LEVEL
-from omnidyn.model.known.told import with_correlation
+from omnidyn.model.known.told import known_priors, with_correlation
 from omnidyn.model.layout import YAW
 from omnidyn.model.robot import GUESSES, Prior, Robot
 from omnidyn.run import Run, as_list
@@ -382,3 +381,57 @@ def _internal(robot: Robot, points: ForcePoints) -> float:
 
     against = points.traction @ null_space(robot.wheels.wrench_matrix)
     return float(np.sqrt(np.mean((against**2).sum(axis=1))))
+
+
+# What the levels of a steady state rest on: the logs asked anew with each fixed number 1 % larger
+
+STEP = 0.01
+# Keys, with what follows them: those that forces and speeds are made with.
+FIXED = {
+    TORQUE: (EMF,), "motor.resistance_ohm": (), "motor.gear_ratio": (), "wheels.wheel_radius_m": (),
+    "wheels.robot_radius_m": (), EMF: (),
+}  # fmt: skip
+
+
+def rests_on(
+    robot: Robot, value: Mapping[str, float], again: Callable[[Robot], Mapping[str, float]]
+) -> dict[str, dict[str, float]]:
+    """Number -> fixed key -> relative change of the number per percent of the key. again: the numbers of a robot."""
+    found: dict[str, dict[str, float]] = {name: {} for name in value}
+    for key, beside in FIXED.items():
+        try:
+            other = again(_larger(robot, key, *beside))
+        except OmnidynError:  # no number of this robot, or none that these logs can be read with
+            continue
+        for name, now in value.items():
+            if now > 0.0 and name in other:
+                found[name][key] = other[name] / now - 1.0
+    return found
+
+
+def moved_by_the_file(
+    robot: Robot, value: Mapping[str, float], again: Callable[[Robot], Mapping[str, float]]
+) -> FloatArray:
+    """What one std of each number that the file of the robot knows only so far moves the numbers by, to first order.
+    Shape (numbers, K). A torque constant brings the EMF constant with it: both are one number of the magnet."""
+    known = {key: std for key, (_, std) in known_priors(robot).items() if Key.parse(key).name in FIXED}
+    magnet = any(Key.parse(key).name == TORQUE for key in known)
+    found = []
+    for key, std in known.items():
+        place = Key.parse(key)
+        if magnet and place.name == EMF:
+            continue
+        try:
+            other = again(_larger(robot, key, *(str(Key(name, place.index)) for name in FIXED[place.name])))
+        except OmnidynError:  # no number that these logs are read with
+            continue
+        size = STEP * float(place.get(robot))
+        found.append([std / size * (other.get(name, now) - now) for name, now in value.items()])
+    return np.array(found).reshape(-1, len(value)).T
+
+
+def _larger(robot: Robot, *names: str) -> Robot:
+    for name in names:
+        for key in map(Key.parse, expand(name, robot)):
+            robot = key.set(robot, (1.0 + STEP) * float(key.get(robot)))
+    return robot
