@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
+from omnidyn.identification.steady.levels import FittedLevels
 from omnidyn.identification.steady.operating_points import SPOT_SHARE, ForcePoints
 from omnidyn.model.friction import Friction
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS, Key, expand
@@ -249,10 +250,9 @@ FOLD_DEG = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class ShapeFit:
-    """A shape fitted to the points of one group.
+class ShapeFit(FittedLevels):
+    """A shape fitted to the points of one group; covariance by jackknife.
 
-    level: within level >= 0; free: without that bound. Shape (levels,). covariance: of `free`, by jackknife.
     weight: of each point, 1 or less. fold: number of what was left out together with each point.
     error: measured minus predicted force of each point, fitted without its fold [N]: (F_x, F_y), and T / b where any
     point turns; shape (points, 2 or 3), 0 for what has no part in the fit. along_error: the same along travel, shape
@@ -260,10 +260,6 @@ class ShapeFit:
     """
 
     shape: Shape
-    keys: tuple[str, ...]
-    level: FloatArray
-    free: FloatArray
-    covariance: FloatArray
     weight: FloatArray
     fold: IntArray
     error: FloatArray
@@ -273,11 +269,6 @@ class ShapeFit:
     def degrees_of_freedom(self) -> int:
         """Folds minus levels."""
         return int(self.fold.max()) + 1 - len(self.keys)
-
-    @property
-    def std(self) -> FloatArray:
-        """Standard error of each level. Shape (levels,)."""
-        return np.sqrt(np.diag(self.covariance))
 
 
 def is_turning(robot: Robot, points: ForcePoints) -> bool:

@@ -18,7 +18,7 @@ import numpy as np
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InsufficientDataError, OmnidynError
-from omnidyn.identification.estimate import Correlation, Estimate, identified
+from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.force_scale import scale_of_traction
 from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.options import Options, shows_options
@@ -26,6 +26,7 @@ from omnidyn.identification.question import STEADY, STEADY_STATE, Question
 from omnidyn.identification.stability import Stability
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
 from omnidyn.identification.steady.lack_of_fit import LackOfFit, lack_of_fit
+from omnidyn.identification.steady.levels import estimate_of
 from omnidyn.identification.steady.moment import Moment, levelled, moments, moments_by_shape
 from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE, ForcePoints, SteadyWindows, steady_windows
 from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, ShapeFit, fit_shape, friction_of, is_turning
@@ -44,9 +45,9 @@ from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.friction import Friction
 from omnidyn.model.keys import BODY_AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, expand, find_key
 from omnidyn.model.keys import VISCOUS as VISCOUS_LEVEL
-from omnidyn.model.known.told import known_priors, with_correlation
+from omnidyn.model.known.told import known_priors
 from omnidyn.model.layout import YAW
-from omnidyn.model.robot import GUESSES, Prior, Robot
+from omnidyn.model.robot import GUESSES, Robot
 from omnidyn.run import Run, as_list
 from omnidyn.statement import NOTE, Statement, statements
 from omnidyn.statistics import t_quantile
@@ -188,12 +189,7 @@ def _levels(windows: SteadyWindows, shape: str, group: str, robust: bool, robot:
     own = points.chosen(np.array([name == group for name in points.group]))
     turning = is_turning(robot, own)
     fit = fit_shape(SHAPES[shape], robot, own, turning=turning, robust=robust)
-    return {} if fit is None else _free(fit)
-
-
-def _free(fit: ShapeFit) -> dict[str, float]:
-    """The levels of a fit without their bound at 0."""
-    return dict(zip(fit.keys, fit.free.tolist(), strict=True))
+    return {} if fit is None else fit.by_key(fit.free)
 
 
 def _travel(points: ForcePoints) -> Travel:
@@ -219,7 +215,7 @@ def _viscous(
         fit = fit_shape(SHAPES[name], robot, points, turning=is_turning(robot, points), robust=robust)
     if fit is None:
         return ()
-    emf, fitted = _back_emf(robot, points), _free(fit)
+    emf, fitted = _back_emf(robot, points), fit.by_key(fit.free)
     moved = moved_by_the_file(robot, fitted, partial(_levels, windows, name, group, robust))
     for k, key in enumerate(fit.keys):
         name = Key.parse(key)
@@ -276,62 +272,24 @@ def _estimate(
     again: Callable[[Robot], Mapping[str, float]],
 ) -> Estimate:  # fmt: skip
     alone, emf = choice.fit(group), _back_emf(robot, points)
-    moved = moved_by_the_file(robot, _free(alone), again)
+    moved = moved_by_the_file(robot, alone.by_key(alone.free), again)
     fit = replace(alone, covariance=alone.covariance + moved @ moved.T)
-    value = dict(zip(fit.keys, fit.level.tolist(), strict=True))
-    std = dict(zip(fit.keys, fit.std.tolist(), strict=True))
-    turning = is_turning(robot, points)
-    data = _data(points, group)
-    friction, kept = _friction(robot, fit, value, turning)
-    together = Correlation(fit.keys, _correlation(fit.covariance))
-    fitted = robot.replace(friction=friction, priors=_priors(robot, std, kept, data))
-    return Estimate(
-        robot=with_correlation(fitted, together.names, together.matrix),
-        value=value,
-        std=std,
-        ci95=_intervals(fit),
-        correlation=together,
-        degrees_of_freedom=dict.fromkeys(fit.keys, fit.degrees_of_freedom),
-        at_bound=tuple(key for key, free in zip(fit.keys, fit.free, strict=True) if free < 0.0),
-        warnings=tuple(fit_statements(fit, robust, kept, emf.guesses)),
-        method=_method(points, fit, robust),
-        data=data,
-        scale=scale_of_traction(robot, points.force_from == CURRENT),
-        log_alone=_intervals(alone) if moved.size else {},
-    )
-
-
-def _method(points: ForcePoints, fit: ShapeFit, robust: bool) -> str:
-    """How the numbers were made."""
-    numbers = {
+    name, runs = "" if group == "all" else f"{group}: ", len(set(points.run.tolist()))
+    friction, kept = _friction(robot, fit, fit.by_key(fit.level), is_turning(robot, points))
+    priors = {key: prior for key, prior in robot.priors.items()
+              if key in kept or not ((place := find_key(key)) and place.level)}  # fmt: skip
+    method = {
         "shape": fit.shape.name, "robust": robust, "force_from": points.force_from, "speed_from": points.speed_from,
         "folds": int(fit.fold.max()) + 1,
     }  # fmt: skip
-    return str(Statement("steady_method", NOTE, numbers=numbers))
-
-
-def _data(points: ForcePoints, group: str) -> str:
-    """What the numbers were made from: the source of the numbers in a robot file."""
-    name = "" if group == "all" else f"{group}: "
-    return f"{name}{len(set(points.run.tolist()))} runs, {len(points)} steady points, {int(points.rows.sum())} rows"
-
-
-def _intervals(fit: ShapeFit) -> dict[str, tuple[float, float]]:
-    """95 % intervals; at a bound from 0 to what the free fit would reach from 0, as with a line."""
-    half = t_quantile(fit.degrees_of_freedom) * fit.std
-    low, high = fit.free - half, fit.free + half
-    bound = fit.free < 0.0
-    low = np.where(bound, 0.0, np.minimum(low, fit.level))
-    high = np.where(bound, np.maximum(high, half), np.maximum(high, fit.level))
-    return {key: (float(a), float(b)) for key, a, b in zip(fit.keys, low, high, strict=True)}
-
-
-def _correlation(covariance: FloatArray) -> FloatArray:
-    std = np.sqrt(np.diag(covariance))
-    std = np.where(std > 0.0, std, 1.0)
-    matrix = covariance / np.outer(std, std)
-    np.fill_diagonal(matrix, 1.0)
-    return matrix
+    return estimate_of(
+        [fit], robot.replace(friction=friction, priors=priors),
+        f"{name}{runs} runs, {len(points)} steady points, {int(points.rows.sum())} rows",
+        warnings=tuple(fit_statements(fit, robust, kept, emf.guesses)),
+        method=str(Statement("steady_method", NOTE, numbers=method)),
+        scale=scale_of_traction(robot, points.force_from == CURRENT),
+        log_alone=alone.intervals() if moved.size else {},
+    )  # fmt: skip
 
 
 def _friction(robot: Robot, fit: ShapeFit, value: dict[str, float], turning: bool) -> tuple[Friction, dict[str, float]]:
@@ -347,15 +305,6 @@ def _friction(robot: Robot, fit: ShapeFit, value: dict[str, float], turning: boo
     )  # fmt: skip
     kept = {key: level for key, level in zip(names, (coulomb, viscous), strict=True) if level > 0.0}
     return friction_of(fit.shape, robot, value | kept), kept
-
-
-def _priors(robot: Robot, std: dict[str, float], kept: dict[str, float], data: str) -> dict[str, Prior]:
-    priors = {
-        key: prior
-        for key, prior in robot.priors.items()
-        if key in kept or not ((place := find_key(key)) and place.level)
-    }
-    return priors | {key: identified(deviation, f"steady state, {data}") for key, deviation in std.items()}
 
 
 def _differences(choice: ShapeChoice) -> tuple[Difference, ...]:
