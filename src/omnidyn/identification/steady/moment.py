@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import stdtr
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.identification.steady.lack_of_fit import LinearShape, all_moving, rival_columns
+from omnidyn.identification.steady.lack_of_fit import LinearShape, all_moving, unoffered_columns
 from omnidyn.identification.steady.operating_points import ForcePoints, HeldForces, held_forces
 from omnidyn.identification.steady.shapes import HUBER, RAYLEIGH, ShapeFit, is_turning
 from omnidyn.model.robot import Robot
@@ -236,7 +236,7 @@ def _run(
         return None
     base = problem.base[:, :, problem.sizes]
     rivals = [
-        more for more in rival_columns(robot, own, problem, turning)
+        more for more in unoffered_columns(robot, own, problem, turning)
         if _determined(np.concatenate([base, more], axis=2), int(problem.seen.sum()))
     ]  # fmt: skip
     return _Run(source, fit.shape.name, own.span, problem, rivals)

@@ -20,12 +20,12 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InsufficientDataError, OmnidynError
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.force_scale import scale_of_traction
-from omnidyn.identification.lack_of_fit import Diagnosis
+from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.identification.options import Options, shows_options
 from omnidyn.identification.question import STEADY, STEADY_STATE, Question
 from omnidyn.identification.stability import Stability
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
-from omnidyn.identification.steady.lack_of_fit import LackOfFit, lack_of_fit
+from omnidyn.identification.steady.lack_of_fit import lack_of_fit
 from omnidyn.identification.steady.levels import estimate_of
 from omnidyn.identification.steady.moment import Moment, levelled, moments, moments_by_shape
 from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE, ForcePoints, SteadyWindows, steady_windows
@@ -127,7 +127,7 @@ def diagnosed(fit: SteadyFit) -> SteadyStudy:
     }
     within = {group for group, own in fit.parts.items() if _changed(own, changed, sources)}
     known = {
-        group: Diagnosis(lack[group].as_of_whole_logs(), rests_on(robot, each.value, fit.anew[group]), LASTING)
+        group: Diagnosis(lack[group], rests_on(robot, each.value, fit.anew[group]), LASTING)
         for group, each in fit.estimates.items()
     }  # whether the levels last, `moments` says
     estimates = {group: replace(each, study=partial(known.__getitem__, group)) for group, each in fit.estimates.items()}

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from omnidyn.document import Document, Points, Table, all_of, interval_cell, plain
 from omnidyn.identification.estimate import Estimate
+from omnidyn.identification.lack_of_fit import LackOfFit
 from omnidyn.identification.steady.choice import ShapeChoice
-from omnidyn.identification.steady.lack_of_fit import LackOfFit
+from omnidyn.identification.steady.lack_of_fit import TILTED_FLOOR
 from omnidyn.identification.steady.moment import Moment
 from omnidyn.identification.steady.operating_points import FORCES, SPEEDS, ForcePoints
 from omnidyn.model.keys import Key
@@ -24,7 +25,6 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from omnidyn.identification.steady.choice import ShapeScore
-from omnidyn.identification.steady.lack_of_fit import ROOM
 from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE
 from omnidyn.identification.steady.shapes import ShapeFit
 from omnidyn.model.keys import VISCOUS
@@ -77,13 +77,13 @@ def _lack(lack: LackOfFit | None) -> dict[str, Any] | None:
     """As every method tells it, each remedy with its forces beside."""
     if lack is None:
         return None
-    told = lack.as_of_whole_logs().to_dict()
-    own = [
-        {"size_N": each.size, "error_N": each.error, "error_before_N": each.error_before, "chance": each.probability}
-        for each in lack.remedies
+    forces = [
+        {"size_N": force.size, "error_N": force.after, "error_before_N": force.before, "chance": force.p}
+        for remedy in lack.remedies if (force := remedy.force)
     ]  # fmt: skip
-    remedies = [one | more for one, more in zip(told["remedies"], own, strict=True)]
-    return told | {"remedies": remedies, "tested": list(lack.tested)}
+    record = lack.to_dict()
+    remedies = [remedy | force for remedy, force in zip(record["remedies"], forces, strict=True)]
+    return record | {"remedies": remedies, "tested": list(lack.tried)}
 
 
 def _document(study: SteadyStudy) -> Document:
@@ -199,7 +199,7 @@ def result_statements(
     """What the data say. within: groups in which the force changes within a run."""
     found = [_shape(choice), *_own_shapes(choice), *_ties(choice), *_better_shape(choice)]
     found += [
-        _of(group, Statement("no_lack_of_fit", NOTE, numbers={"changes": group in within}) if one.tested
+        _of(group, Statement("no_lack_of_fit", NOTE, numbers={"changes": group in within}) if one.tried
             else Statement("fit_not_tested", NOTE))
         for group, one in lack.items() if not one.found
     ]  # fmt: skip
@@ -259,11 +259,10 @@ def lack_statements(
     """That no offered shape fits, and what would. within: groups in which the force changes within a run."""
     found = []
     for group, one in lack.items():
-        best = one.remedies[0] if one.remedies else None
-        numbers = {"changes": group in within, "share": one.share, "with": best.words if best else ""}
-        if best:
-            numbers |= {"shape": choice.of(group), "error": best.error, "error_before": best.error_before,
-                        "same": best.same_as}  # fmt: skip
+        numbers = {"changes": group in within, "share": one.channels["force"], "with": ""}
+        if one.remedies and (best := one.remedies[0]).force:
+            numbers |= {"with": best.cause, "shape": choice.of(group), "error": best.force.after,
+                        "error_before": best.force.before, "same": best.same_as}  # fmt: skip
         found += [_of(group, Statement("no_shape_fits", numbers=numbers))] if one.found else []
     return found
 
@@ -326,7 +325,7 @@ def advice(
     found = []
     if any(one.found for one in lack.values()):
         keys = {remedy.key for one in lack.values() for remedy in one.remedies}
-        found.append(Statement("drive_turned_around" if keys & ROOM else "look_beyond_shapes", NOTE))
+        found.append(Statement("drive_turned_around" if keys & TILTED_FLOOR else "look_beyond_shapes", NOTE))
     if not turning:
         found.append(Statement("turn_on_the_spot", NOTE))
     if not any(viscous.values()):
