@@ -131,10 +131,9 @@ def _folds(runs: Sequence[Run]) -> Iterator[tuple[list[Run], Run]]:
     parts = list(runs)
     if len(runs) == 1:
         edges = np.linspace(0, len(runs[0]), SHARES + 1).astype(int)
-        parts = [_rows(runs[0], slice(int(a), int(b))) for a, b in pairwise(edges)]
+        parts = [
+            runs[0].replace(t=runs[0].t[a:b], **{name: values[a:b] for name, values in runs[0].channels.items()})
+            for a, b in pairwise(edges.tolist())
+        ]
     for k, out in enumerate(parts):
         yield [*parts[:k], *parts[k + 1 :]], out
-
-
-def _rows(run: Run, rows: slice) -> Run:
-    return run.replace(t=run.t[rows], **{name: values[rows] for name, values in run.channels.items()})

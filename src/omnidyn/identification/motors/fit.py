@@ -32,7 +32,7 @@ from omnidyn.identification.motors.problem import SPEED, MotorEngine, MotorProbl
 from omnidyn.identification.motors.rest import rested_under, turned_under
 from omnidyn.identification.output_error.conclusion import intervals
 from omnidyn.identification.output_error.fit import degrees
-from omnidyn.identification.output_error.problem.problem import Piece, Point
+from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
 from omnidyn.identification.output_error.trust.ends import at_the_end
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust, trust
@@ -178,10 +178,12 @@ def _answer(
         std[INERTIA], ci95[INERTIA] = float("nan"), (0.0, float("inf"))
     names = [name for name in (SLOPE, BAND, LAG, INERTIA, *problem.names) if name in value]
     rows, rmse = _speed_errors(MotorEngine(problem), solution.state.point)
+    size = known.std[0] * known.std[at]
+    correlation = float(known.covariance[0, at] / size) if at >= 0 and np.isfinite(size) and size > 0.0 else 0.0
     return MotorEstimate(
         motor=motor, kind=logs[0].kind, unit=logs[0].unit, way=FREE_RUN, between=between,
         value={name: value[name] for name in names}, std={name: std[name] for name in names},
-        ci95={name: ci95[name] for name in names}, correlation=_correlation(known, 0, at), rmse=rmse, count=rows,
+        ci95={name: ci95[name] for name in names}, correlation=correlation, rmse=rmse, count=rows,
         source=named([log.run.source for log in logs]),
         at_bound=tuple(name for name, held in zip(problem.names, known.held, strict=True) if held),
         unidentifiable=tuple(name for name in problem.names if name in blind),
@@ -189,12 +191,6 @@ def _answer(
         noise={c[0]: float(np.sqrt(v)) for c, v in zip(problem.columns, solution.state.variance, strict=True)},
         covariance=known.kind, converged=solution.converged,
     )  # fmt: skip
-
-
-def _correlation(known: Trust, one: int, other: int) -> float:
-    """Between two numbers; 0 where one of them is not there, or not known."""
-    size = known.std[one] * known.std[other]
-    return float(known.covariance[one, other] / size) if other >= 0 and np.isfinite(size) and size > 0.0 else 0.0
 
 
 def _of_product(problem: MotorProblem, known: Trust, inertia: float) -> tuple[float, tuple[float, float]]:
@@ -310,17 +306,12 @@ def _regression(solver: Solver[MotorProblem], point: Point) -> tuple[FloatArray,
         known = np.isfinite(own) & np.isfinite(piece.record.outputs[rows, c])
         known[: int(np.searchsorted(t, t[0] + piece.margin[c]))] = False
         starts = np.zeros((int(known.sum()), len(pieces)))
-        starts[:, n] = by[rows, c, _start_of(piece, count)][known]
+        starts[:, n] = by[rows, c, count + int(np.flatnonzero(piece.free)[0])][known]  # by the speed at the start
         bent = np.stack([np.interp(t - late, t, b) for b in _bent(t, own, slope, lag)], axis=1)
         residuals.append((piece.record.outputs[rows, c] - own)[known])
         found.append(np.concatenate([np.nan_to_num(by[rows, c, :count][known]), starts, bent[known]], axis=1))
         numbers.append(np.full(int(known.sum()), n))
     return np.concatenate(residuals), np.concatenate(found), np.concatenate(numbers)
-
-
-def _start_of(piece: Piece, count: int) -> int:
-    """Where the slope by the speed at the start stands."""
-    return count + int(np.flatnonzero(piece.free)[0])
 
 
 def _bent(t: FloatArray, speed: FloatArray, slope: float, lag: float) -> list[FloatArray]:

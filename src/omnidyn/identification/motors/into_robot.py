@@ -73,8 +73,8 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
 
     Raises InputError where the logs have more motors than the robot has wheels.
     """
-    motors = [each for each in study.motors if each.motor is not None]
-    most = max((each.motor or 0) + 1 for each in motors)
+    motors = [motor for motor in study.motors if motor.motor is not None]
+    most = max((motor.motor or 0) + 1 for motor in motors)
     if most > robot.wheels.count:
         raise InputError("the logs have more motors than the robot has wheels", got=most,
                          expected=f"{robot.wheels.count} or fewer, as {robot.name} has")  # fmt: skip
@@ -92,7 +92,8 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
             robot = wheel.put(robot, key, number)
             value[key], std[key] = number, spread
             priors[key] = identified(spread, f"motors by {each.way}, {each.source}")
-    if any(key.startswith(COULOMB) for key in value) and not _only_wheels(robot):
+    floor = [robot.friction.axes, robot.friction.direction]
+    if any(key.startswith(COULOMB) for key in value) and any(np.any(f.coulomb) or np.any(f.viscous) for f in floor):
         remarks.append(Statement("floor_friction_kept", NOTE))
     # Motors that were measured anew, each by itself, are no longer off together with what an earlier fit found.
     told = with_correlation(with_priors(robot, priors), [*priors], np.eye(len(priors)))
@@ -108,12 +109,6 @@ def _supply(study: MotorStudy, robot: Robot) -> tuple[float, list[Statement]]:
     if robot.drive.supply is not None:
         return robot.drive.supply / 100.0, [Statement("supply_of_file", NOTE, numbers={"supply": robot.drive.supply})]
     return 0.0, [Statement("supply_unknown")]
-
-
-def _only_wheels(robot: Robot) -> bool:
-    """Whether all friction of a robot acts at its wheels."""
-    floor = [robot.friction.axes, robot.friction.direction]
-    return all(not np.any(each.coulomb) and not np.any(each.viscous) for each in floor)
 
 
 class _Wheel:

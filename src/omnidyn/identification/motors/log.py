@@ -73,7 +73,7 @@ class MotorLog:
 
     def piece(self, row: int) -> slice:
         """The rows between the two gaps around a row."""
-        return self.pieces[bisect_right([each.start for each in self.pieces], row) - 1]
+        return self.pieces[bisect_right([piece.start for piece in self.pieces], row) - 1]
 
 
 def motor_logs(
@@ -127,8 +127,8 @@ def averaged_statements(logs: Sequence[MotorLog], allowed: bool = True) -> list[
     found: dict[int, list[str]] = {}
     for motor in range(max((log.motors for log in logs), default=0)):
         rows = {log.averaged[motor] for log in logs if motor < log.motors} - {1}
-        for each in rows:
-            found.setdefault(each, []).append(str(motor + 1))
+        for row in rows:
+            found.setdefault(row, []).append(str(motor + 1))
     return [
         Statement("speed_is_mean", numbers={"motors": names, "rows": rows, "allowed": allowed})
         for rows, names in found.items()

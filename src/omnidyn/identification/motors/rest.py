@@ -208,15 +208,10 @@ def _span(edge: _Edge, lag: float, risk: float) -> Span:
     # a row on either side: loggers write an input in the row in which it is set, or in which it is answered
     begin = edge.first + max(int(np.searchsorted(t, first, "right")) - 2, 0)
     end = min(edge.first + int(np.searchsorted(t, last, "right")), len(column.t) - 1)
-    changed = begin - _since_change(column.put_in[: begin + 1])
+    other = np.flatnonzero(column.put_in[:begin] != column.put_in[begin])
+    changed = int(other[-1]) + 1 if other.size else 0  # the last change of the input
     own = column.put_in[max(changed - 1, 0) : end + 1]
     return Span(float(own.min()) + 0.0, float(own.max()) + 0.0)  # no -0
-
-
-def _since_change(put_in: FloatArray) -> int:
-    """Rows since the last change of the input, up to the last row."""
-    same = put_in[:-1] != put_in[-1]
-    return len(put_in) - 2 - int(np.flatnonzero(same)[-1]) if same.any() else len(put_in) - 1
 
 
 def _lags(lag: float, row: float) -> list[float]:
@@ -283,8 +278,8 @@ def _steady(logs: Sequence[MotorLog], motor: int) -> list[_Window]:
 
 
 def _windows_of(log: MotorLog, motor: int) -> Iterator[_Window]:
-    for each in find_plateaus(log.run):
-        put_in, speed = log.put_in[each.rows, motor], log.motion[each.rows, motor]
+    for plateau in find_plateaus(log.run):
+        put_in, speed = log.put_in[plateau.rows, motor], log.motion[plateau.rows, motor]
         if not np.isfinite(put_in).all() or np.isfinite(speed).sum() < 2:
             continue
         half = len(speed) // 2

@@ -34,6 +34,10 @@ from omnidyn.statistics import sensor_step, t_quantile
 START, STOP, OFFSET = "start", "stop", "offset"
 STARTS_HEAD = ("motor", "direction", "start", "95 % interval", "stop", "95 % interval", "slope", "95 % interval",
                "offset", "95 % interval", "lag ms", "95 % interval", "unit")  # fmt: skip
+# Numbers of a line that there is not.
+NO_LINE: dict[str, tuple[float, tuple[float, float]]] = {
+    name: (math.nan, (math.nan, math.nan)) for name in (SLOPE, OFFSET, LAG)
+}
 SHARP = 0.5  # a start whose interval is narrower than this share of it is one that a sentence can name
 HIDDEN = 0.02  # of the change of speed over a window: noise by which the inertia may come out too small
 ONE_WAY = 0.98  # of the sides of a window, so that it belongs to one direction
@@ -134,19 +138,20 @@ def direction_of(
     """One direction from its starts, its stops and its line. numbers: name -> (value, interval). turned: the least
     input under which it turned steadily, which bounds a start that was not seen: it set off somewhere.
     """
-    warnings = []
     known = {START: common(up), STOP: common(down)}
     rest = known[START][0]
     if up and rest.high == math.inf and turned > rest.low:
         known[START] = rest._replace(high=turned), True
-    for name, (_, agree) in known.items():
-        if not agree:
-            warnings.append(Statement("starts_scatter", subject=name))
-    every = {name: (_middle(span), (span.low, span.high)) for name, (span, _) in known.items()} | dict(numbers)
+    warnings = [Statement("starts_scatter", subject=name) for name, (_, agree) in known.items() if not agree]
+    value = {
+        name: 0.5 * (span.low + span.high) if math.isfinite(span.high) and span.low > 0.0 else math.nan
+        for name, (span, _) in known.items()
+    }
+    ci95 = {name: (span.low, span.high) for name, (span, _) in known.items()}
     return MotorStart(
-        motor, side, unit, {name: each[0] for name, each in every.items()},
-        {name: each[1] for name, each in every.items()}, sum(math.isfinite(each.high) for each in up), len(down),
-        tuple(warnings),
+        motor, side, unit, value | {name: number for name, (number, _) in numbers.items()},
+        ci95 | {name: ends for name, (_, ends) in numbers.items()}, sum(math.isfinite(span.high) for span in up),
+        len(down), tuple(warnings),
     )  # fmt: skip
 
 
@@ -154,17 +159,13 @@ def common(spans: Sequence[Span]) -> tuple[Span, bool]:
     """(what all spans have in common, True); where there is nothing, what spans them, False. NaN of no spans."""
     if not spans:
         return Span(math.nan, math.nan), True
-    low, high = max(spans, key=lambda each: each.low), min(spans, key=lambda each: each.high)
+    low, high = max(spans, key=lambda span: span.low), min(spans, key=lambda span: span.high)
     return (Span(low.low, high.high), True) if low.low <= high.high else (Span(high.low, low.high), False)
 
 
-def _middle(span: Span) -> float:
-    return 0.5 * (span.low + span.high) if math.isfinite(span.high) and span.low > 0.0 else math.nan
-
-
-def unknown_line() -> dict[str, tuple[float, tuple[float, float]]]:
-    """Numbers of a line that there is not."""
-    return {name: (math.nan, (math.nan, math.nan)) for name in (SLOPE, OFFSET, LAG)}
+def _turned(ends: tuple[float, float], way: float) -> tuple[float, float]:
+    """An interval of the numbers of the other direction."""
+    return ends if way > 0.0 else (-ends[1], -ends[0])
 
 
 # ---- the line of one direction ------------------------------------------------------------------------------
@@ -179,7 +180,7 @@ def windows_for_a_lag(logs: Sequence[MotorLog], windows: MotorWindows | None, mo
         return windows
     noise = max(_noise_of(log.motion[:, motor]) for log in logs)
     row = max(log.step for log in logs if len(log.t) > 1)
-    for least in (each for each in LENGTHS if each >= windows.length):
+    for least in (length for length in LENGTHS if length >= windows.length):
         try:
             found = motor_windows(logs, least=least) if least > windows.length else windows
         except InsufficientDataError:
@@ -216,12 +217,10 @@ def _numbers(line: MotorEstimate | None, way: float, row: float) -> dict[str, tu
     row, and one that goes on in between, are apart by half a row, and so are a speed and its mean over a row.
     """
     if line is None:
-        return unknown_line()
-    low, high = line.ci95[BAND]
-    turned = (low, high) if way > 0.0 else (-high, -low)
+        return dict(NO_LINE)
     early, late = line.ci95[LAG]
     return {
-        SLOPE: (line.value[SLOPE], line.ci95[SLOPE]), OFFSET: (way * line.value[BAND], turned),
+        SLOPE: (line.value[SLOPE], line.ci95[SLOPE]), OFFSET: (way * line.value[BAND], _turned(line.ci95[BAND], way)),
         LAG: (line.value[LAG], (early - row, late + row)),
     }  # fmt: skip
 
@@ -339,17 +338,13 @@ def starts_of_points(points: MotorTable) -> tuple[MotorStart, ...]:
             up, down = _in_order(level, turns, points.run[own]) if points.run is not None else _in_table(level, turns)
             forward = turns > 0.0
             if up or down or forward.any():
-                numbers = unknown_line()
+                numbers = dict(NO_LINE)
                 if forward.sum() >= LEAST_POINTS:
                     slope, offset = line_of_speed(level[forward], side * speed[forward])
                     numbers |= {SLOPE: (way * slope[0], _turned(slope[1], way)), OFFSET: offset}
                 turned = float(level[forward].min(initial=math.inf))
                 found.append(direction_of(motor, side, points.unit, up, down, numbers, turned))
     return tuple(found)
-
-
-def _turned(ends: tuple[float, float], way: float) -> tuple[float, float]:
-    return ends if way > 0.0 else (-ends[1], -ends[0])
 
 
 def _in_table(level: FloatArray, turns: FloatArray) -> tuple[list[Span], list[Span]]:

@@ -88,13 +88,13 @@ class MotorStudy(Shown):
     @property
     def statements(self) -> tuple[Statement, ...]:
         """What the logs say of each motor, and whether its dead band is any use on held-out logs."""
-        known = {each.motor for each in self.starts if each.sharp}
-        found = [each.statement(started=each.motor in known) for each in self.motors]
+        known = {start.motor for start in self.starts if start.sharp}
+        found = [motor.statement(started=motor.motor in known) for motor in self.motors]
         for band, plain in zip(self.motors, self.plain, strict=False):
             if band.dead_band_seen and band.held_out > (1.0 - PAYS) * plain.held_out:
                 errors = {"with_band": band.held_out, "without": plain.held_out}
                 found.append(Statement("held_out_no_better", WARNING, band.name, errors))
-        return (*found, *(each.statement() for each in self.starts))
+        return (*found, *(start.statement() for start in self.starts))
 
     @property
     def verdict(self) -> Statement:
@@ -106,7 +106,7 @@ class MotorStudy(Shown):
     @property
     def failed(self) -> bool:
         """Whether the numbers mean nothing: no motor is seen to answer to its input, or `check` finds a log unfit."""
-        return bool(unfit(self.verdicts)) or none_answers(self.motors, self.starts)
+        return self.verdict.severity == ERROR
 
     @property
     def advice(self) -> tuple[Statement, ...]:
@@ -131,11 +131,11 @@ class MotorStudy(Shown):
             how = f"windows of {self.windows.length:g} s in integral form"
             if self.windows.settled:
                 how = "steady windows" if math.isfinite(self.windows.length) else "a point per row"
-        pairs = zip(self.motors, self.plain, strict=True) if self.plain else ((each,) for each in self.motors)
+        pairs = zip(self.motors, self.plain, strict=True) if self.plain else ((motor,) for motor in self.motors)
         parts = [
             f"motors: {self.kind} [{self.unit}] against speed from {self.speed_from}, {how}", "",
             Table(HEAD, [each.row() for several in pairs for each in several], name="motors"), "",
-            *([Table(STARTS_HEAD, [each.row() for each in self.starts], name="starts"), ""] if self.starts else []),
+            *([Table(STARTS_HEAD, [start.row() for start in self.starts], name="starts"), ""] if self.starts else []),
             Points(self.statements, name="statements"), by_severity(self.warnings, "warnings"),
             Points(self.advice, "next:", "next"),
         ]  # fmt: skip
@@ -143,14 +143,14 @@ class MotorStudy(Shown):
 
     def to_dict(self) -> dict[str, Any]:
         """The study as JSON can hold it."""
-        motors = [each.to_dict() for each in self.motors]
+        motors = [motor.to_dict() for motor in self.motors]
         for own, plain in zip(motors, self.plain, strict=False):
             own["without_dead_band"] = plain.to_dict()
         return {
             **as_verdict(self.verdict), "ok": not self.failed, "method": self.method, "input": self.kind,
             "unit": self.unit, "speed_from": self.speed_from,
             "window_s": self.windows.length if self.windows is not None else None, "motors": motors,
-            "starts": [each.to_dict() for each in self.starts], "statements": plain_values(self.statements),
+            "starts": [start.to_dict() for start in self.starts], "statements": plain_values(self.statements),
             "warnings": plain_values(self.warnings), "next": plain_values(self.advice), "check": checked(self.verdicts),
         }  # fmt: skip
 
@@ -242,7 +242,9 @@ def _free_runs(runs: Sequence[Run], asked: Question, progress: Progress) -> Moto
     logs = logs_of_free_runs([run for run, out in zip(runs, away, strict=True) if not out], asked.input)
     own: list[Run] = [log.run for log in logs]
     how: dict[str, Any] = {"kind": logs[0].kind, "between": asked.between, "loss": asked.loss}
-    motors = [m for m in range(min(log.motors for log in logs)) if all(_driven(log, m) for log in logs)] or [0]
+    motors = [
+        m for m in range(min(log.motors for log in logs)) if all(np.isfinite(log.put_in[:, m]).any() for log in logs)
+    ] or [0]
     latency, pairs = _latency(asked.nuisances), []
     for motor in motors:
         progress(Report(f"fitting motor {motor + 1} of {len(motors)}"))
@@ -252,20 +254,15 @@ def _free_runs(runs: Sequence[Run], asked: Question, progress: Progress) -> Moto
     bands, plain = zip(*pairs, strict=True)
     origin = logs[0].motion_from if logs[0].speed is None else "wheel_speed"
     slow = is_slow(logs)
-    seen = None if slow else _windows_of(logs)
+    try:
+        seen = None if slow else motor_windows(logs)
+    except InsufficientDataError:  # no window for the line of a direction
+        seen = None
     starts = starts_of_points(points_of_logs(logs)) if slow else motor_starts(logs, seen, motors)
     return MotorStudy(
         OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain, starts=starts, supply=_supply(logs),
         drawn=seen, log_warnings=tuple(averaged_statements(logs, False)),
     )  # fmt: skip
-
-
-def _windows_of(logs: Sequence[MotorLog]) -> MotorWindows | None:
-    """The windows through which the line of a direction goes; None where there are none."""
-    try:
-        return motor_windows(logs)
-    except InsufficientDataError:
-        return None
 
 
 def _latency(nuisances: Sequence[str] | None) -> bool | None:
@@ -280,11 +277,6 @@ def _supply(logs: Sequence[MotorLog]) -> float:
     """Mean supply of the logs [V], NaN where one has none."""
     means = [float(np.nanmean(log.run.supply)) if log.run.supply is not None else math.nan for log in logs]
     return float(np.mean(means))
-
-
-def _driven(log: MotorLog, motor: int) -> bool:
-    """Whether the log has an input of this motor: a robot may have more wheels than the log has motors."""
-    return bool(np.isfinite(log.put_in[:, motor]).any())
 
 
 def _of_windows(windows: MotorWindows, lines: Sequence[MotorEstimate]) -> Iterator[Statement]:
@@ -306,40 +298,27 @@ def motors_verdict(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart]
     """Which motors answer to their input, and at which input they start: from rest where that was seen, else by the
     dead band of the line.
     """
-    lines, blind = _own(motors), unanswering(motors, starts)
+    lines = [motor for motor in motors if motor.motor is not None] or list(motors)  # else that of all together
+    levels = {line.name: _levels(line, starts) for line in lines}
+    blind = [
+        line.name for line in lines if not line.ci95[SLOPE][0] > 0.0 and not levels[line.name]
+    ]  # may have no slope
     if len(blind) == len(lines):
         return Statement("no_motor_answers", ERROR, numbers={"motors": blind})
-    levels = {line.name: _levels(line, starts) for line in lines}
     seen = [line for line in lines if levels[line.name]]
     without = [line.name for line in lines if not levels[line.name] and line.name not in blind]
-    total = {"total": len(lines)}
     parts = [_starts(seen, levels, starts, len(lines))] if seen else []
     if without:
-        numbers = {"motors": without, "too": bool(seen), **total}
+        numbers = {"motors": without, "too": bool(seen), "total": len(lines)}
         parts.append(Statement("motors_without_dead_band", NOTE, numbers=numbers))
     if blind:
         parts.append(Statement("motors_not_answering", WARNING, numbers={"motors": blind}))
     return Statement("motors_answer", WARNING if blind else NOTE, numbers={"parts": parts})
 
 
-def unanswering(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart] = ()) -> list[str]:
-    """Names of the motors that are not seen to answer to their input: their slope may be 0, and no start was seen."""
-    return [one.name for one in _own(motors) if not one.ci95[SLOPE][0] > 0.0 and not _levels(one, starts)]
-
-
-def none_answers(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart] = ()) -> bool:
-    """Whether no motor is seen to answer to its input."""
-    return len(unanswering(motors, starts)) == len(_own(motors))
-
-
-def _own(motors: Sequence[MotorEstimate]) -> list[MotorEstimate]:
-    """The motors without the line of all together, where they have lines of their own."""
-    return [one for one in motors if one.motor is not None] or list(motors)
-
-
 def _levels(motor: MotorEstimate, starts: Sequence[MotorStart]) -> list[float]:
     """The inputs at which a motor starts; none where that is not known."""
-    sharp = [each.value[START] for each in starts if each.motor == motor.motor and each.sharp]
+    sharp = [start.value[START] for start in starts if start.motor == motor.motor and start.sharp]
     return sharp or ([motor.value[BAND]] if motor.dead_band_seen else [])
 
 

@@ -98,7 +98,15 @@ def motor_windows(
     """
     usual = _usual_speed(logs)
     length, sharp = _length(logs, usual, least)
-    if not sharp and not steady and share is None and all(map(_in_steps, logs)):
+    if (
+        not sharp
+        and not steady
+        and share is None
+        and all(
+            np.mean((np.diff(log.put_in, axis=0) != 0.0).any(axis=1)) <= STEPWISE
+            for log in logs  # inputs that stand still
+        )
+    ):
         share = SETTLED_SHARE if all(_windows(log, length, False, SETTLED_SHARE) for log in logs) else None
     windows = [_windows(log, length, steady, share) for log in logs]
     every = max(1, -(-sum(map(len, windows)) // MAX_WINDOWS))
@@ -144,11 +152,6 @@ def _smear(log: MotorLog, length: float) -> float:
     return 2.0 * row * max(1, round(EDGE_SHARE * length / row / 2.0)) if row > 0.0 else 0.0
 
 
-def _in_steps(log: MotorLog) -> bool:
-    """Whether the input stands still most of the time."""
-    return bool(np.mean((np.diff(log.put_in, axis=0) != 0.0).any(axis=1)) <= STEPWISE)
-
-
 def _length(logs: Sequence[MotorLog], usual: float, least: float) -> tuple[float, bool]:
     """The shortest length of a window whose mean speed is sharp and that has rows enough; whether there is one."""
     for length in (each for each in LENGTHS if each >= least):
@@ -170,7 +173,7 @@ def _windows(
     """Windows of about `length` between gaps; each ends on the row where the next begins."""
     if steady or share:
         plateaus = find_plateaus(log.run, start=share[0], end=share[1]) if share else find_plateaus(log.run)
-        return [each.rows for each in plateaus]
+        return [plateau.rows for plateau in plateaus]
     found = []
     for piece in log.pieces:
         t = log.t[piece]
@@ -310,6 +313,7 @@ class _Reader:
 DRAWS, SEED, BLOCK = 1000, 20121, 3
 ITERATIONS, SETTLED = 200, 1e-8
 HUBER = 2.5
+MIDDLE = 0.6827  # of the draws: a few wild ones, of a line that is hardly determined, do not count in a std
 MIN_WINDOWS = 6
 ALIKE = 1e-3  # share of a column that the others leave over: below it they say the same
 
@@ -339,7 +343,7 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
     return MotorEstimate(
         motor=motor, kind=windows.kind, unit=windows.unit, way=WINDOWS, source=source, count=count,
         value={name: float(each[0]) for name, each in numbers.items()},
-        std={name: _robust_std(each[1:]) for name, each in numbers.items()},
+        std={name: 0.5 * float(np.diff(central_interval(each[1:], MIDDLE))[0]) for name, each in numbers.items()},
         ci95={name: central_interval(each[1:]) for name, each in numbers.items()},
         correlation=correlation, rmse=error / abs(slope) if slope else math.inf,
         unidentifiable=tuple(name for name, each in numbers.items() if np.isnan(each[0])),
@@ -449,9 +453,3 @@ def _bootstrap(
     freedom = max(len(blocks) / length - design.shape[1], 1.0)
     wider = np.sqrt(1.0 + design.shape[1] / freedom) * t_quantile(int(max(freedom, 1))) / t_quantile(10**6)
     return fit.parameters + wider * (drawn - fit.parameters)
-
-
-def _robust_std(values: FloatArray) -> float:
-    """Half the width of the middle 68 %: a few wild draws of a line that is hardly determined do not count."""
-    low, high = central_interval(values, 0.6827)
-    return 0.5 * (high - low)

@@ -29,7 +29,6 @@ from omnidyn.identification.steady.shapes import (
     VISCOUS,
     ShapeFit,
     fit_shape,
-    is_turning,
     mean_error,
     rms_and_error,
 )
@@ -98,7 +97,7 @@ class ShapeChoice:
     def error(self) -> float:
         """Root mean square of the left-out error of the full force vector, each group with its shape [N]."""
         groups = next(iter(self.fits.values()))
-        return float(np.sqrt(np.mean(_joined([(self.fit(group).error ** 2).sum(axis=1) for group in groups]))))
+        return float(np.sqrt(np.mean(np.concatenate([(self.fit(group).error ** 2).sum(axis=1) for group in groups]))))
 
     @property
     def score(self) -> ShapeScore:
@@ -116,17 +115,14 @@ def choose_shape(robot: Robot, points: ForcePoints, *, shape: str = AUTO, robust
     if shape not in (AUTO, *SHAPES):
         raise InputError("no such shape", got=shape, expected=", ".join((AUTO, *SHAPES)), where="shape")
     _refuse_lost_signs(points)
-    parts = {group: points.chosen(np.array([name == group for name in points.group])) for group in points.groups}
+    parts = {group: points.of(group) for group in points.groups}
     fits: dict[str, dict[str, ShapeFit]] = {}
     missing: dict[str, str] = {}
     for name, candidate in SHAPES.items():
         if candidate.viscous and not all(map(speeds_differ, parts.values())):
             missing[name] = "one_speed"
             continue
-        fitted = {
-            group: fit_shape(candidate, robot, own, turning=is_turning(robot, own), robust=robust)
-            for group, own in parts.items()
-        }
+        fitted = {group: fit_shape(candidate, robot, own, robust=robust) for group, own in parts.items()}
         if all(fit is not None for fit in fitted.values()):
             fits[name] = {group: fit for group, fit in fitted.items() if fit is not None}
         else:
@@ -154,7 +150,7 @@ def _of_groups(
     """
     rest, own = [*next(iter(fits.values()))], dict[str, str]()
     scored: dict[str, tuple[ShapeScore, ...]] = {}
-    alone = {group: {name: {group: each[group]} for name, each in fits.items()} for group in rest}
+    alone = {group: {name: {group: fit[group]} for name, fit in fits.items()} for group in rest}
     while len(rest) + len(own) > 1 and rest:
         found = {}
         for group in rest:
@@ -168,7 +164,7 @@ def _of_groups(
         own |= found
         rest = [group for group in rest if group not in own]
         if rest:
-            left = {name: {group: each[group] for group in rest} for name, each in fits.items()}
+            left = {name: {group: fit[group] for group in rest} for name, fit in fits.items()}
             judge = _Judge(left, robust)
             chosen = _choice(_scores(left, judge), judge)
     return chosen, own, {group: scored[group] for group in own}
@@ -197,10 +193,15 @@ class _Judge:
 
     def __init__(self, fits: Mapping[str, Mapping[str, ShapeFit]], robust: bool):
         self.squares = {
-            name: _joined([(fit.error**2).sum(axis=1) for fit in own.values()]) for name, own in fits.items()
+            name: np.concatenate([(fit.error**2).sum(axis=1) for fit in own.values()]) for name, own in fits.items()
         }
-        self.fold = _folds(next(iter(fits.values())).values())
-        self._loss = _capped(self.squares) if robust else self.squares
+        folds = [fit.fold for fit in next(iter(fits.values())).values()]
+        before = np.cumsum([0, *(int(fold.max()) + 1 for fold in folds)])
+        self.fold = np.concatenate([fold + first for fold, first in zip(folds, before[:-1], strict=True)])
+        self._loss = self.squares
+        if robust:  # Huber's loss, its bound two scales of the shape that has the least
+            limit = HUBER / RAYLEIGH * float(np.sqrt(min(np.median(square) for square in self.squares.values())))
+            self._loss = {name: huber_loss(square, limit) for name, square in self.squares.items()}
 
     @property
     def order(self) -> list[str]:
@@ -217,7 +218,7 @@ class _Judge:
 
 
 def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], judge: _Judge) -> tuple[ShapeScore, ...]:
-    along = {name: _joined([fit.along_error**2 for fit in own.values()]) for name, own in fits.items()}
+    along = {name: np.concatenate([fit.along_error**2 for fit in own.values()]) for name, own in fits.items()}
     squares, fold, order = judge.squares, judge.fold, judge.order
     found = []
     for name in order:
@@ -233,31 +234,12 @@ def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], judge: _Judge) -> tuple[
     return tuple(found)
 
 
-def _capped(squares: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Huber's loss of squared lengths, its bound two scales of the shape that has the least."""
-    limit = HUBER / RAYLEIGH * float(np.sqrt(min(np.median(each) for each in squares.values())))
-    return {name: huber_loss(each, limit) for name, each in squares.items()}
-
-
 def _difference(first: FloatArray, second: FloatArray, fold: IntArray) -> tuple[float, float]:
     """rms(first) - rms(second) and its standard error, from squared errors at the same points."""
     sizes = float(np.sqrt(np.mean(first))) + float(np.sqrt(np.mean(second)))
     if sizes == 0.0:
         return 0.0, 0.0
     return float(np.mean(first - second)) / sizes, mean_error(first - second, fold) / sizes
-
-
-def _joined(parts: Sequence[FloatArray]) -> FloatArray:
-    return np.concatenate(list(parts))
-
-
-def _folds(fits) -> IntArray:
-    """Numbers of the folds of all groups, one group after the other."""
-    found, first = [], 0
-    for fit in fits:
-        found.append(fit.fold + first)
-        first += int(fit.fold.max()) + 1
-    return np.concatenate(found)
 
 
 def _choice(scores: Sequence[ShapeScore], judge: _Judge) -> str:

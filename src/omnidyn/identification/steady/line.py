@@ -200,16 +200,14 @@ def point_statements(robot: Robot, points: SteadyTable) -> list[Statement]:
     for axis in range(len(AXES)):
         rows = np.flatnonzero(points.axis_index == axis)
         if rows.size:
-            found += _against_motion(axis, points, rows)
+            wrong = int((points.force[rows] * points.speed[rows] < 0.0).sum())
+            against = Statement("axis_against_motion", subject=AXES[axis], numbers={"wrong": wrong, "rows": rows.size})
+            found += [against] if wrong else []
             found += _beyond_no_load(robot, axis, points, rows)
-            found += _disagreements(robot, axis, points, rows)
+            forces = {points.force_from: points.force[rows], **_recomputed(robot, axis, points, rows)}
+            for pair in combinations([name for name in ORIGINS if name in forces], 2):
+                found += _compare(axis, pair, forces[pair[0]], forces[pair[1]])
     return found
-
-
-def _against_motion(axis: int, points: SteadyTable, rows: NDArray[np.intp]) -> list[Statement]:
-    wrong = int((points.force[rows] * points.speed[rows] < 0.0).sum())
-    numbers = {"wrong": wrong, "rows": rows.size}
-    return [Statement("axis_against_motion", subject=AXES[axis], numbers=numbers)] if wrong else []
 
 
 def _beyond_no_load(robot: Robot, axis: int, points: SteadyTable, rows: NDArray[np.intp]) -> list[Statement]:
@@ -240,14 +238,8 @@ def no_load_ratio(robot: Robot, twist: FloatArray, voltage: FloatArray) -> Float
     return np.where((own > 0.0) & np.isfinite(against), ratio, np.nan)
 
 
-def _disagreements(robot: Robot, axis: int, points: SteadyTable, rows: NDArray[np.intp]) -> list[Statement]:
-    """The same force from different measurements, in numbers, where they disagree."""
-    forces = {points.force_from: points.force[rows], **_recomputed(robot, axis, points, rows)}
-    pairs = combinations([name for name in ORIGINS if name in forces], 2)
-    return [one for first, second in pairs for one in _compare(axis, (first, second), forces[first], forces[second])]
-
-
 def _recomputed(robot: Robot, axis: int, points: SteadyTable, rows: NDArray[np.intp]) -> dict[str, FloatArray]:
+    """The same forces from other measurements."""
     twist = points.twists[rows]
     extra = frame_wrench(robot, twist)[:, axis]
     forces: dict[str, FloatArray] = {}

@@ -81,6 +81,10 @@ class ForcePoints:
         """Names of the groups in order of appearance."""
         return tuple(dict.fromkeys(self.group))
 
+    def of(self, group: str) -> ForcePoints:
+        """The points of one group."""
+        return self.chosen(np.array([name == group for name in self.group]))
+
     @property
     def speed(self) -> FloatArray:
         """|(v_x, v_y)| [m/s]. Shape (points,)."""
@@ -160,7 +164,11 @@ def steady_windows(
     origin = _origin(runs, force_from)
     found, empty = [], []
     for number, run in enumerate(runs):
-        _check_wheels(run, robot)
+        if run.wheels is not None and run.wheels != robot.wheels.count:
+            raise InputError(
+                "the run has another number of wheels than the robot", got=str(run.wheels),
+                expected=f"{robot.wheels.count} ({robot.name})", where=run.source,
+            )  # fmt: skip
         run = on_clock_of_wheels(_with_voltage(run, robot) if origin == VOLTAGE else run)
         windows = pool(find_plateaus(run, start=window[0], end=window[1]) if window else find_plateaus(run))
         empty += [] if windows else [run.source]
@@ -215,14 +223,6 @@ def _origin(runs: Sequence[Run], asked: str) -> str:
         "no force can be had from this run", got=", ".join(lacking.channels) or "no channels",
         expected="current, or voltage (or duty and supply) with a speed", where=lacking.source,
     )  # fmt: skip
-
-
-def _check_wheels(run: Run, robot: Robot) -> None:
-    if run.wheels is not None and run.wheels != robot.wheels.count:
-        raise InputError(
-            "the run has another number of wheels than the robot", got=str(run.wheels),
-            expected=f"{robot.wheels.count} ({robot.name})", where=run.source,
-        )  # fmt: skip
 
 
 def _with_voltage(run: Run, robot: Robot) -> Run:
@@ -337,7 +337,7 @@ def _direction(robot: Robot, each: Plateau, twist: FloatArray) -> FloatArray:
 def _refuse_unsigned(runs: Sequence[Run], windows: Sequence[Plateau]) -> None:
     """A sensor without sign: no current is ever below 0 although wheels turn both ways."""
     lowest = min((float(np.nanmin(run.current, initial=0.0)) for run in runs if run.current is not None), default=0.0)
-    speeds = [each.mean.get("wheel_speed", each.mean.get("wheel_speed_command")) for each in windows]
+    speeds = [window.mean.get("wheel_speed", window.mean.get("wheel_speed_command")) for window in windows]
     back = sum(bool((speed < 0.0).any()) for speed in speeds if speed is not None)
     if lowest >= 0.0 and back > UNSIGNED_SHARE * len(windows):
         raise InputError(

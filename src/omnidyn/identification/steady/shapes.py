@@ -278,13 +278,21 @@ def is_turning(robot: Robot, points: ForcePoints) -> bool:
 
 
 def fit_shape(
-    shape: Shape, robot: Robot, points: ForcePoints, *, turning: bool, robust: bool = True, aim: str = VECTOR
+    shape: Shape,
+    robot: Robot,
+    points: ForcePoints,
+    *,
+    turning: bool | None = None,
+    robust: bool = True,
+    aim: str = VECTOR,
 ) -> ShapeFit | None:
     """Fit a shape to points of one group, and leave each direction out once.
 
-    aim: what is fitted, the force "vector" or the force "along" travel only; the errors are of both.
+    turning: to the torque too; by default where `is_turning`. aim: what is fitted, the force "vector" or the force
+    "along" travel only; the errors are of both.
     None where the points do not determine all of its levels, with or without one of the directions.
     """
+    turning = is_turning(robot, points) if turning is None else turning
     keys, fold = shape.keys(robot, turning), fold_numbers(points)
     count = int(fold.max()) + 1
     if count <= len(keys):

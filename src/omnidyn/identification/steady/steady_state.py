@@ -236,7 +236,7 @@ def identify_lines(
     plain = robot.replace(friction=Friction(axes=robot.friction.axes), priors=priors)
     found = {}
     for group in points.groups:
-        own = points.chosen(np.array([name == group for name in points.group]))
+        own = points.of(group)
         found[group] = fit_steady_state(plain, steady_table(robot, own, group))
     return found
 

@@ -105,7 +105,7 @@ def fit_steady(
             "a robot file cannot hold this shape: it is for comparison only", got=choice.chosen,
             expected=", ".join(name for name, each in SHAPES.items() if each.in_model), where="shape",
         )  # fmt: skip
-    parts = {group: points.chosen(np.array([name == group for name in points.group])) for group in points.groups}
+    parts = {group: points.of(group) for group in points.groups}
     anew = {group: partial(_levels, windows, choice.of(group), group, asked.robust) for group in parts}
     estimates = {group: _estimate(robot, own, choice, group, asked.robust, anew[group]) for group, own in parts.items()}
     return SteadyFit(runs, robot, asked, windows, points, choice, parts, anew, estimates)
@@ -127,10 +127,12 @@ def diagnosed(fit: SteadyFit) -> SteadyStudy:
     }
     within = {group for group, own in fit.parts.items() if _changed(own, changed, sources)}
     known = {
-        group: Diagnosis(lack[group], rests_on(robot, each.value, fit.anew[group]), LASTING)
-        for group, each in fit.estimates.items()
+        group: Diagnosis(lack[group], rests_on(robot, estimate.value, fit.anew[group]), LASTING)
+        for group, estimate in fit.estimates.items()
     }  # whether the levels last, `moments` says
-    estimates = {group: replace(each, study=partial(known.__getitem__, group)) for group, each in fit.estimates.items()}
+    estimates = {
+        group: replace(estimate, study=partial(known.__getitem__, group)) for group, estimate in fit.estimates.items()
+    }
     return _study(replace(fit, estimates=estimates), changed, lack, within)
 
 
@@ -145,7 +147,12 @@ def _study(
         for group, own in fit.parts.items()
     }
     differences = _differences(choice)
-    internal = {group: _internal(robot, own) for group, own in fit.parts.items()} if robot.wheels.count > 3 else {}
+    internal = {}
+    if robot.wheels.count > 3:  # the part of the traction that pushes nowhere: G f = 0
+        from scipy.linalg import null_space  # slow to import, and most robots have three wheels
+
+        against = {group: own.traction @ null_space(robot.wheels.wrench_matrix) for group, own in fit.parts.items()}
+        internal = {group: float(np.sqrt(np.mean((f**2).sum(axis=1)))) for group, f in against.items()}
     turning = any(is_turning(robot, own) for own in fit.parts.values())
     return SteadyStudy(
         robot=robot, points=points, choice=choice, estimates=fit.estimates, travel=travel, viscous=viscous,
@@ -156,7 +163,7 @@ def _study(
             scale_of_traction(robot, points.force_from == CURRENT),
         )),
         warnings=(
-            *points.notes, *point_statements(points, choice, turning), *(each.statement() for each in changed),
+            *points.notes, *point_statements(points, choice, turning), *(moment.statement() for moment in changed),
             *lack_statements(lack, choice, within),
         ),
         moments=tuple(changed),
@@ -179,16 +186,13 @@ def _lack(
     fit, own = choice.fit(group), _changed(points, found, sources)
     if own:
         points = levelled(points, own, sources)
-        fit = fit_shape(fit.shape, robot, points, turning=is_turning(robot, points), robust=robust) or fit
+        fit = fit_shape(fit.shape, robot, points, robust=robust) or fit
     return lack_of_fit(robot, points, fit)
 
 
 def _levels(windows: SteadyWindows, shape: str, group: str, robust: bool, robot: Robot) -> dict[str, float]:
     """The levels of a group were the robot another one; empty where the shape has none then."""
-    points = windows.points(robot)
-    own = points.chosen(np.array([name == group for name in points.group]))
-    turning = is_turning(robot, own)
-    fit = fit_shape(SHAPES[shape], robot, own, turning=turning, robust=robust)
+    fit = fit_shape(SHAPES[shape], robot, windows.points(robot).of(group), robust=robust)
     return {} if fit is None else fit.by_key(fit.free)
 
 
@@ -212,11 +216,12 @@ def _viscous(
     name, found = base_name(choice.of(group)) + VISCOUS, []
     fit = choice.fits[name][group] if name in choice.fits else None
     if fit is None and speeds_differ(points):  # the other groups may have one speed only
-        fit = fit_shape(SHAPES[name], robot, points, turning=is_turning(robot, points), robust=robust)
+        fit = fit_shape(SHAPES[name], robot, points, robust=robust)
     if fit is None:
         return ()
-    emf, fitted = _back_emf(robot, points), fit.by_key(fit.free)
-    moved = moved_by_the_file(robot, fitted, partial(_levels, windows, name, group, robust))
+    brake, guesses = _back_emf(robot, points)
+    at_rim = float(np.trace(brake) / np.sum(robot.wheels.wrench_matrix**2))
+    moved = moved_by_the_file(robot, fit.by_key(fit.free), partial(_levels, windows, name, group, robust))
     for k, key in enumerate(fit.keys):
         name = Key.parse(key)
         if name.level != VISCOUS_LEVEL:
@@ -225,53 +230,36 @@ def _viscous(
         if name.axis == YAW:
             turned = np.abs(points.twist[points.turns, 2])
             level, slow, fast = float(np.abs(points.wrench[points.turns, 2]).mean()), turned.min(), turned.max()
-        brake = emf.of(name)
+        on_body = float(brake[name.axis, name.axis] if name.axis is not None else np.mean(np.diag(brake)[:2]))
         value, std = float(fit.free[k]), float(np.linalg.norm([fit.std[k], *moved[k]]))
         half = t_quantile(fit.degrees_of_freedom) * std
         low, high = value - half, value + half
         found.append(
             Viscous(key, value, std, low, high, seen=not low <= 0.0 <= high,
                     effect=max(abs(low), abs(high)) * float(fast - slow), level=level, slow=float(slow),
-                    fast=float(fast), back_emf=brake, guesses=emf.guesses, sum_std=float(fit.std[k]))
+                    fast=float(fast), back_emf=at_rim if name.table == WHEELS else on_body, guesses=guesses,
+                    sum_std=float(fit.std[k]))
         )  # fmt: skip
     return tuple(found)
 
 
-@dataclass(frozen=True, eq=False)
-class _BackEmf:
-    """How the back-EMF brakes: forces from a voltage show its sum with viscous friction, and never one alone.
+def _back_emf(robot: Robot, points: ForcePoints) -> tuple[FloatArray, tuple[str, ...]]:
+    """(-d(wrench)/d(twist) by which the back-EMF brakes, shape (3, 3), the motor constants that are guesses).
 
-    brake: -d(wrench)/d(twist), shape (3, 3). at_rim: the same of one wheel [N s/m]. guesses: the motor constants that
-    are guesses of the robot file.
+    Forces from a voltage show its sum with viscous friction, and never one alone; those from currents show none of it.
     """
-
-    brake: FloatArray
-    at_rim: float
-    guesses: tuple[str, ...] = ()
-
-    def of(self, key: Key) -> float:
-        """The part of a viscous level that is back-EMF, in its unit."""
-        if key.table == WHEELS:
-            return self.at_rim
-        return float(self.brake[key.axis, key.axis] if key.axis is not None else np.mean(np.diag(self.brake)[:2]))
-
-
-def _back_emf(robot: Robot, points: ForcePoints) -> _BackEmf:
-    """None where forces are from currents."""
     if points.force_from != VOLTAGE:
-        return _BackEmf(np.zeros((3, 3)), 0.0)
-    brake = -drive_wrench(linear_part(robot), np.eye(3), np.zeros(robot.wheels.count))
-    matrix = robot.wheels.wrench_matrix
+        return np.zeros((3, 3)), ()
     guesses = [key for key, prior in robot.priors.items()
                if prior.origin in GUESSES and Key.parse(key).name in (TORQUE, EMF)]  # fmt: skip
-    return _BackEmf(brake, float(np.trace(brake) / np.sum(matrix**2)), tuple(guesses))
+    return -drive_wrench(linear_part(robot), np.eye(3), np.zeros(robot.wheels.count)), tuple(guesses)
 
 
 def _estimate(
     robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str, robust: bool,
     again: Callable[[Robot], Mapping[str, float]],
 ) -> Estimate:  # fmt: skip
-    alone, emf = choice.fit(group), _back_emf(robot, points)
+    alone = choice.fit(group)
     moved = moved_by_the_file(robot, alone.by_key(alone.free), again)
     fit = replace(alone, covariance=alone.covariance + moved @ moved.T)
     name, runs = "" if group == "all" else f"{group}: ", len(set(points.run.tolist()))
@@ -285,7 +273,7 @@ def _estimate(
     return estimate_of(
         [fit], robot.replace(friction=friction, priors=priors),
         f"{name}{runs} runs, {len(points)} steady points, {int(points.rows.sum())} rows",
-        warnings=tuple(fit_statements(fit, robust, kept, emf.guesses)),
+        warnings=tuple(fit_statements(fit, robust, kept, _back_emf(robot, points)[1])),
         method=str(Statement("steady_method", NOTE, numbers=method)),
         scale=scale_of_traction(robot, points.force_from == CURRENT),
         log_alone=alone.intervals() if moved.size else {},
@@ -322,14 +310,6 @@ def _differences(choice: ShapeChoice) -> tuple[Difference, ...]:
             gap = values[1] - values[0]
             found.append(Difference(key, first, second, values, gap, std, gap - half, gap + half))
     return tuple(found)
-
-
-def _internal(robot: Robot, points: ForcePoints) -> float:
-    """rms [N] of the part of the traction that pushes nowhere: G f = 0."""
-    from scipy.linalg import null_space  # takes a while to import, and most fits never come here
-
-    against = points.traction @ null_space(robot.wheels.wrench_matrix)
-    return float(np.sqrt(np.mean((against**2).sum(axis=1))))
 
 
 # What the levels of a steady state rest on: the logs asked anew with each fixed number 1 % larger

@@ -24,7 +24,6 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from omnidyn.identification.steady.choice import ShapeScore
 from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE
 from omnidyn.identification.steady.shapes import ShapeFit
 from omnidyn.model.keys import VISCOUS
@@ -66,7 +65,46 @@ class SteadyStudy(Shown):
 
     def document(self) -> Document:
         """What was used, the shapes, the levels, what it says and what it warns of."""
-        return _document(self)
+        fits = [_of(group, warning) for group, fit in self.estimates.items() for warning in fit.warnings]
+        parts = [
+            f"{self.robot.name}: steady state from logs; forces from {FORCES[self.points.force_from]}; friction over "
+            f"the {SPEEDS[self.points.speed_from]}",
+            "", _travel_table(self), "", _shape_table(self), "", _level_table(self),
+            *(table for fit in self.estimates.values() if (table := fit.alone_table())), "",
+            Points(self.statements, name="statements"),
+            by_severity(self.warnings, "warnings"),
+            Points(self.advice, "next:", "next"),
+            by_severity(fits, "warnings of fits"),
+        ]  # fmt: skip
+        return Document(parts, self.to_dict(), self.warnings)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The study as JSON can hold it."""
+        return {
+            "force_from": self.points.force_from,
+            "speed_from": self.points.speed_from,
+            "shape": self.choice.chosen,
+            "shapes": [asdict(score) for score in self.choice.scores],
+            "not_compared": dict(self.choice.missing),
+            "groups": {
+                group: {
+                    **fit.to_dict(),
+                    "shape": self.choice.of(group),
+                    "along_travel": asdict(self.travel[group]),
+                    "viscous": [asdict(level) for level in self.viscous[group]],
+                    "lack_of_fit": _lack(self.lack_of_fit.get(group)),
+                    "rests_on": fit.rests_on,
+                    "internal_force_N": self.internal.get(group),
+                }
+                for group, fit in self.estimates.items()
+            },
+            "lack_of_fit": _lack(next(iter(self.lack_of_fit.values()), None)),
+            "moments": [asdict(moment) for moment in self.moments],
+            "differences": [{**asdict(pair), "differs": pair.differs} for pair in self.differences],
+            "statements": plain(self.statements),
+            "warnings": plain(self.warnings),
+            "advice": plain(self.advice),
+        }
 
     def plot(self) -> Figure:
         """The force of friction over the direction of travel. Needs matplotlib."""
@@ -84,25 +122,6 @@ def _lack(lack: LackOfFit | None) -> dict[str, Any] | None:
     record = lack.to_dict()
     remedies = [remedy | force for remedy, force in zip(record["remedies"], forces, strict=True)]
     return record | {"remedies": remedies, "tested": list(lack.tried)}
-
-
-def _document(study: SteadyStudy) -> Document:
-    """The study: what was used, the shapes, the levels, what it says and what it warns of."""
-    points = study.points
-    of_fits = [
-        warning if group == "all" else warning.of(group)
-        for group, estimate in study.estimates.items() for warning in estimate.warnings
-    ]  # fmt: skip
-    parts = [
-        f"{study.robot.name}: steady state from logs; forces from {FORCES[points.force_from]}; friction over the "
-        f"{SPEEDS[points.speed_from]}",
-        "", _travel_table(study), "", _shape_table(study), "", _level_table(study), *_alone_tables(study), "",
-        Points(study.statements, name="statements"),
-        by_severity(study.warnings, "warnings"),
-        Points(study.advice, "next:", "next"),
-        by_severity(of_fits, "warnings of fits"),
-    ]  # fmt: skip
-    return Document(parts, _data(study), study.warnings)
 
 
 def _travel_table(study: SteadyStudy) -> Table:
@@ -151,40 +170,6 @@ def _level_table(study: SteadyStudy) -> Table:
     )
 
 
-def _alone_tables(study: SteadyStudy) -> list[Table]:
-    """What the intervals of each group owe to what the robot file knows with a std, where that is worth a word."""
-    return [table for each in study.estimates.values() if (table := each.alone_table())]
-
-
-def _data(study: SteadyStudy) -> dict[str, Any]:
-    """The study as JSON can hold it."""
-    return {
-        "force_from": study.points.force_from,
-        "speed_from": study.points.speed_from,
-        "shape": study.choice.chosen,
-        "shapes": [asdict(score) for score in study.choice.scores],
-        "not_compared": dict(study.choice.missing),
-        "groups": {
-            group: {
-                **study.estimates[group].to_dict(),
-                "shape": study.choice.of(group),
-                "along_travel": asdict(study.travel[group]),
-                "viscous": [asdict(each) for each in study.viscous[group]],
-                "lack_of_fit": _lack(study.lack_of_fit.get(group)),
-                "rests_on": study.estimates[group].rests_on,
-                "internal_force_N": study.internal.get(group),
-            }
-            for group in study.estimates
-        },
-        "lack_of_fit": _lack(next(iter(study.lack_of_fit.values()), None)),
-        "moments": [asdict(each) for each in study.moments],
-        "differences": [{**asdict(each), "differs": each.differs} for each in study.differences],
-        "statements": plain(study.statements),
-        "warnings": plain(study.warnings),
-        "advice": plain(study.advice),
-    }
-
-
 # Which statements a steady-state study makes, from its numbers
 
 LOW_WEIGHT = 0.5
@@ -197,14 +182,20 @@ def result_statements(
     internal: Mapping[str, float], lack: Mapping[str, LackOfFit], within: Collection[str],
 ) -> list[Statement]:  # fmt: skip
     """What the data say. within: groups in which the force changes within a run."""
-    found = [_shape(choice), *_own_shapes(choice), *_ties(choice), *_better_shape(choice)]
+    found = _shape_statements(choice)
     found += [
         _of(group, Statement("no_lack_of_fit", NOTE, numbers={"changes": group in within}) if one.tried
             else Statement("fit_not_tested", NOTE))
         for group, one in lack.items() if not one.found
     ]  # fmt: skip
     found += [_of(group, _viscous(level, choice.of(group))) for group, levels in viscous.items() for level in levels]
-    found += [_difference(one) for one in differences]
+    found += [
+        Statement("group_difference", NOTE, pair.key, {
+            "values": pair.values, "difference": pair.difference, "low": pair.low, "high": pair.high,
+            "differs": pair.differs, "groups": [pair.first, pair.second],
+        })
+        for pair in differences
+    ]  # fmt: skip
     found += [
         _of(group, Statement("internal_force", NOTE, numbers={"force": force})) for group, force in internal.items()
     ]
@@ -215,16 +206,14 @@ def _of(group: str, statement: Statement) -> Statement:
     return statement if group == "all" else statement.of(group)
 
 
-def _shape(choice: ShapeChoice) -> Statement:
-    score = choice.score
+def _shape_statements(choice: ShapeChoice) -> list[Statement]:
+    """The shape that was chosen, groups with another one, shapes that the data cannot tell from the best, and the best
+    where it is not the chosen one and the data do tell the two apart.
+    """
+    score, best = choice.score, choice.scores[0]
     box = next((other for other in choice.scores if other.name == "box" and other is not score), None)
     numbers = {"error": (score.loo, score.loo_std), "box": (box.loo, box.loo_std) if box else None}
-    return Statement("shape_chosen", NOTE, score.name, numbers)
-
-
-def _own_shapes(choice: ShapeChoice) -> list[Statement]:
-    """Groups whose shape is not that of the others."""
-    found = []
+    found = [Statement("shape_chosen", NOTE, score.name, numbers)]
     for group, name in choice.own.items():
         scores = {score.name: score for score in choice.scored[group]}
         own, other = scores[name], scores[choice.chosen]
@@ -232,25 +221,15 @@ def _own_shapes(choice: ShapeChoice) -> list[Statement]:
         if name != choice.chosen:
             numbers |= {"other": other.name, "other_error": (other.loo, other.loo_std)}
         found.append(Statement("group_shape", NOTE, group, numbers))
+    first, *ties = [score for score in choice.scores if not score.told_apart] or [choice.score]
+    if ties:
+        numbers = {"shapes": [tie.name for tie in ties], "behind": [(tie.behind, tie.behind_std) for tie in ties]}
+        found.append(Statement("shapes_tied", NOTE, first.name, numbers))
+    if best.name != choice.chosen and score.told_apart:
+        why = "not_in_model" if not best.in_model else "below_zero" if best.at_bound else "not_asked"
+        numbers = {"behind": (score.behind, score.behind_std), "why": why}
+        found.append(Statement("better_shape_not_used", NOTE, best.name, numbers))
     return found
-
-
-def _ties(choice: ShapeChoice) -> list[Statement]:
-    """Shapes that the data cannot tell from the best."""
-    best, *ties = [score for score in choice.scores if not score.told_apart] or [choice.score]
-    behind = [(tie.behind, tie.behind_std) for tie in ties]
-    numbers = {"shapes": [tie.name for tie in ties], "behind": behind}
-    return [Statement("shapes_tied", NOTE, best.name, numbers)] if ties else []
-
-
-def _better_shape(choice: ShapeChoice) -> list[Statement]:
-    """The best shape, where it is not the chosen one and the data do tell the two apart."""
-    best = choice.scores[0]
-    if best.name == choice.chosen or not choice.score.told_apart:
-        return []
-    why = "not_in_model" if not best.in_model else "below_zero" if best.at_bound else "not_asked"
-    behind = (choice.score.behind, choice.score.behind_std)
-    return [Statement("better_shape_not_used", NOTE, best.name, {"behind": behind, "why": why})]
 
 
 def lack_statements(
@@ -277,11 +256,6 @@ def _viscous(level: Viscous, chosen: str) -> Statement:
     if level.value < 0.0:
         return Statement("force_falls_with_speed", NOTE, level.key, numbers)
     return Statement("viscous_seen", NOTE, level.key, numbers | {"in_shape": "viscous" in chosen})
-
-
-def _difference(one: Difference) -> Statement:
-    numbers = {name: getattr(one, name) for name in ("values", "difference", "low", "high", "differs")}
-    return Statement("group_difference", NOTE, one.key, numbers | {"groups": [one.first, one.second]})
 
 
 def point_statements(points: ForcePoints, choice: ShapeChoice, turning: bool) -> list[Statement]:
@@ -334,14 +308,11 @@ def advice(
         found.append(Statement("drive_faster", NOTE))
     tie = next((score for score in choice.scores[1:] if not score.told_apart and score.apart > 0.0), None)
     if tie is not None:
-        found.append(_more_directions(choice.scores[0], tie))
+        numbers = {"best": choice.scores[0].name, "apart": tie.apart}
+        found.append(Statement("more_directions", NOTE, tie.name, numbers))
     if force_from == CURRENT:
         found.append(Statement("pull_once", NOTE))
     return found
-
-
-def _more_directions(best: ShapeScore, tie: ShapeScore) -> Statement:
-    return Statement("more_directions", NOTE, tie.name, {"best": best.name, "apart": tie.apart})
 
 
 # What a steady-state study says of one group, or of two: plain numbers with their uncertainty
