@@ -111,7 +111,7 @@ def logs_of_free_runs(runs: Run | Sequence[Run], kind: str) -> list[MotorLog]:
     return motor_logs(as_list(runs), kind, kinds=FREE_RUN_INPUTS)
 
 
-def _with_bend(fit: MotorEstimate, bent: Bend | None) -> MotorEstimate:
+def _with_bend(fit: MotorEstimate, bent: BentLine | None) -> MotorEstimate:
     """The fit with an interval of the dead band that holds the one with a smooth bend of the line fitted too.
 
     The slope goes with the dead band, as the two are correlated.
@@ -229,7 +229,7 @@ BENDS, LOW = 3, 0.25  # how many; w0 over the highest speed
 
 
 @dataclass(frozen=True, eq=False)
-class Bend:
+class BentLine:
     """The dead band with smooth bends fitted too: value, std, ci95 in units of the input; and whether bends are needed.
 
     left: root mean square of what is left, over that without the bends.
@@ -242,7 +242,7 @@ class Bend:
     left: float
 
 
-def bend(solver: Solver[MotorProblem], state: State) -> Bend | None:
+def bend(solver: Solver[MotorProblem], state: State) -> BentLine | None:
     """None without a dead band or a speed, or where there are too few rows, or too many."""
     problem, name = solver.problem, BAND
     rows = sum(piece.last - piece.first + 1 for piece in problem.pieces)
@@ -279,7 +279,7 @@ def bend(solver: Solver[MotorProblem], state: State) -> Bend | None:
     std = float(np.sqrt(covariance[at, at]) / size[problem.where(name)])
     half = t_quantile(degrees) * std
     share = float(np.sqrt(np.mean(weight * left**2) / np.mean(weight * residual**2)))
-    return Bend(
+    return BentLine(
         max(value, 0.0), std, (max(value - half, 0.0), max(value + half, 0.0)),
         bool(bends > fdtri(BENDS, degrees, SURE)), share,
     )  # fmt: skip

@@ -46,7 +46,7 @@ class Span(NamedTuple):
     high: float
 
 
-class _Column(NamedTuple):
+class _MotorRows(NamedTuple):
     """One motor between two gaps, signed so that the direction looked at is forward."""
 
     t: FloatArray
@@ -60,7 +60,7 @@ class _Column(NamedTuple):
 class _Edge(NamedTuple):
     """A change from rest to motion, or back. row: where it shows; first, last: of the rows that tell of it."""
 
-    column: _Column
+    column: _MotorRows
     row: int
     first: int
     last: int
@@ -90,7 +90,7 @@ def starts_and_stops(
     return spans
 
 
-def _columns(logs: Sequence[MotorLog], motor: int) -> Iterator[_Column]:
+def _columns(logs: Sequence[MotorLog], motor: int) -> Iterator[_MotorRows]:
     """The pieces of all logs in which input and speed of a motor are known, and which way it turns in each row."""
     largest = max((_largest(log, motor) for log in logs), default=0.0)
     for log in logs:
@@ -114,7 +114,7 @@ def _largest(log: MotorLog, motor: int) -> float:
     return float(np.abs(medians).max(initial=0.0))
 
 
-def _column(log: MotorLog, motor: int, rows: slice, largest: float, rough: BoolArray) -> _Column | None:
+def _column(log: MotorLog, motor: int, rows: slice, largest: float, rough: BoolArray) -> _MotorRows | None:
     """None where the speed is lost in noise."""
     t, speed = log.t[rows], log.motion[rows, motor]
     if log.angle is not None:  # of the row before, not of both sides: else a start would show a row early
@@ -129,7 +129,7 @@ def _column(log: MotorLog, motor: int, rows: slice, largest: float, rough: BoolA
     if level > LOST * largest:
         return None
     moving = _without_flicker(np.where(np.abs(smooth) > level, np.sign(smooth), 0.0))
-    return _Column(t, log.put_in[rows, motor], speed, moving, tick, rough)
+    return _MotorRows(t, log.put_in[rows, motor], speed, moving, tick, rough)
 
 
 def _without_flicker(moving: FloatArray) -> FloatArray:
@@ -158,7 +158,7 @@ def _averaged(noise: float, tick: float, largest: float, rows: int) -> int:
     return min(count, max(1, rows // 20)) | 1
 
 
-def _edges_of(column: _Column) -> Iterator[_Edge]:
+def _edges_of(column: _MotorRows) -> Iterator[_Edge]:
     """Starts and stops of the forward direction."""
     runs = _runs(column.moving)
     for (a, b, one), (c, d, other) in pairwise(runs):
@@ -183,7 +183,7 @@ def _runs(moving: FloatArray) -> list[tuple[int, int, float]]:
     return [(a, b, float(moving[a])) for a, b in pairwise(cuts)]
 
 
-def _rests(column: _Column, first: int, last: int) -> bool:
+def _rests(column: _MotorRows, first: int, last: int) -> bool:
     """Whether rows without visible motion are rest: a motor that passes zero goes from one side to the other there."""
     own = column.speed[first:last]
     if len(own) < LEAST_REST:
@@ -220,7 +220,7 @@ def _lags(lag: float, row: float) -> list[float]:
     return [0.3 * row, *around] if around else [row * factor for factor in (0.3, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)]
 
 
-def _rested(column: _Column) -> Iterator[float]:
+def _rested(column: _MotorRows) -> Iterator[float]:
     """Inputs under which the motor rested for LEAST_REST rows, and did not set off forward afterwards."""
     runs = _runs(column.moving)
     for k, (a, b, side) in enumerate(runs):

@@ -98,15 +98,9 @@ def motor_windows(
     """
     usual = _usual_speed(logs)
     length, sharp = _length(logs, usual, least)
-    if (
-        not sharp
-        and not steady
-        and share is None
-        and all(
-            np.mean((np.diff(log.put_in, axis=0) != 0.0).any(axis=1)) <= STEPWISE
-            for log in logs  # inputs that stand still
-        )
-    ):
+    # the input stands still most of the time
+    in_steps = all(np.mean((np.diff(log.put_in, axis=0) != 0.0).any(axis=1)) <= STEPWISE for log in logs)
+    if in_steps and not (sharp or steady or share):
         share = SETTLED_SHARE if all(_windows(log, length, False, SETTLED_SHARE) for log in logs) else None
     windows = [_windows(log, length, steady, share) for log in logs]
     every = max(1, -(-sum(map(len, windows)) // MAX_WINDOWS))
@@ -116,10 +110,10 @@ def motor_windows(
         reader = _Reader(log, usual)
         readers.append(reader)
         for window in several[::every]:
-            rows += [(*each, block) for each in reader.rows_of(window)]
+            rows += [(*row, block) for row in reader.rows_of(window)]
             block += 1
         block += 1  # no block of the bootstrap reaches over the end of a run
-    unresolved, resting = (sum(getattr(each, name) for each in readers) for name in ("unresolved", "resting"))
+    unresolved, resting = (sum(getattr(reader, name) for reader in readers) for name in ("unresolved", "resting"))
     if not rows:
         raise InsufficientDataError(
             "no window tells how the motors answer",
@@ -130,7 +124,7 @@ def motor_windows(
     return MotorWindows(
         *table[:, :5].T, motor=table[:, 5].astype(np.int64), block=table[:, 6].astype(np.int64), unit=first.unit,
         kind=first.kind, speed_from=first.motion_from, length=length, unresolved=unresolved, resting=resting,
-        rest=np.fmax.reduce([each.rest for each in readers]), settled=steady or share is not None, every=every,
+        rest=np.fmax.reduce([reader.rest for reader in readers]), settled=steady or share is not None, every=every,
         smear=max(_smear(log, length) for log in logs),
     )  # fmt: skip
 
@@ -154,7 +148,7 @@ def _smear(log: MotorLog, length: float) -> float:
 
 def _length(logs: Sequence[MotorLog], usual: float, least: float) -> tuple[float, bool]:
     """The shortest length of a window whose mean speed is sharp and that has rows enough; whether there is one."""
-    for length in (each for each in LENGTHS if each >= least):
+    for length in (length for length in LENGTHS if length >= least):
         errors, rows = [], []
         for log in logs:
             for window in _windows(log, length)[:: max(1, len(log.t) // 500)]:
@@ -342,14 +336,14 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
         correlation = float(np.corrcoef(drawn[1:, :2].T)[0, 1])
     return MotorEstimate(
         motor=motor, kind=windows.kind, unit=windows.unit, way=WINDOWS, source=source, count=count,
-        value={name: float(each[0]) for name, each in numbers.items()},
-        std={name: 0.5 * float(np.diff(central_interval(each[1:], MIDDLE))[0]) for name, each in numbers.items()},
-        ci95={name: central_interval(each[1:]) for name, each in numbers.items()},
+        value={name: float(draws[0]) for name, draws in numbers.items()},
+        std={name: 0.5 * float(np.diff(central_interval(draws[1:], MIDDLE))[0]) for name, draws in numbers.items()},
+        ci95={name: central_interval(draws[1:]) for name, draws in numbers.items()},
         correlation=correlation, rmse=error / abs(slope) if slope else math.inf,
-        unidentifiable=tuple(name for name, each in numbers.items() if np.isnan(each[0])),
+        unidentifiable=tuple(name for name, draws in numbers.items() if np.isnan(draws[0])),
         one_way=bool(np.abs(side.sum()) > 0.98 * np.abs(side).sum()),
         rest=float(np.fmax.reduce(windows.rest if motor is None else windows.rest[[motor]])),
-        draws={name: each[1:] for name, each in numbers.items()},
+        draws={name: draws[1:] for name, draws in numbers.items()},
     )  # fmt: skip
 
 

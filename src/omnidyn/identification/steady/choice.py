@@ -133,11 +133,11 @@ def choose_shape(robot: Robot, points: ForcePoints, *, shape: str = AUTO, robust
             got=f"{len(points)} points: {NOT_COMPARED.get(missing.get(shape, ''), 'too few')}",
             expected="steady runs in six directions or more", remedy="drive in more directions, each at a held speed",
         )  # fmt: skip
-    judge = _Judge(fits, robust)
-    scores = _scores(fits, judge)
+    errors = _LeftOutErrors(fits, robust)
+    scores = _scores(fits, errors)
     if shape != AUTO:
         return ShapeChoice(scores, shape, fits, missing)
-    chosen, own, scored = _of_groups(fits, _choice(scores, judge), robust)
+    chosen, own, scored = _of_groups(fits, _choice(scores, errors), robust)
     return ShapeChoice(scores, chosen, fits, missing, own, scored)
 
 
@@ -154,19 +154,19 @@ def _of_groups(
     while len(rest) + len(own) > 1 and rest:
         found = {}
         for group in rest:
-            judge = _Judge(alone[group], robust)
-            scored[group] = _scores(alone[group], judge)
+            errors = _LeftOutErrors(alone[group], robust)
+            scored[group] = _scores(alone[group], errors)
             able = [score.name for score in scored[group] if score.in_model and not score.at_bound]
-            if able and judge.apart(chosen, able[0]) > APART:
-                found[group] = _choice(scored[group], judge)
+            if able and errors.apart(chosen, able[0]) > APART:
+                found[group] = _choice(scored[group], errors)
         if not found:
             break
         own |= found
         rest = [group for group in rest if group not in own]
         if rest:
             left = {name: {group: fit[group] for group in rest} for name, fit in fits.items()}
-            judge = _Judge(left, robust)
-            chosen = _choice(_scores(left, judge), judge)
+            errors = _LeftOutErrors(left, robust)
+            chosen = _choice(_scores(left, errors), errors)
     return chosen, own, {group: scored[group] for group in own}
 
 
@@ -188,7 +188,7 @@ def speeds_differ(points: ForcePoints) -> bool:
     return bool(speed.size > 1 and np.quantile(speed, 0.9) > SPEED_RATIO * np.quantile(speed, 0.1))
 
 
-class _Judge:
+class _LeftOutErrors:
     """What decides between shapes. squares: shape -> squared left-out errors; fold: of each point."""
 
     def __init__(self, fits: Mapping[str, Mapping[str, ShapeFit]], robust: bool):
@@ -217,12 +217,12 @@ class _Judge:
         return behind / error if error > 0.0 else math.copysign(math.inf, behind)
 
 
-def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], judge: _Judge) -> tuple[ShapeScore, ...]:
+def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], errors: _LeftOutErrors) -> tuple[ShapeScore, ...]:
     along = {name: np.concatenate([fit.along_error**2 for fit in own.values()]) for name, own in fits.items()}
-    squares, fold, order = judge.squares, judge.fold, judge.order
+    squares, fold, order = errors.squares, errors.fold, errors.order
     found = []
     for name in order:
-        apart = judge.apart(name, order[0])
+        apart = errors.apart(name, order[0])
         own = list(fits[name].values())
         found.append(
             ShapeScore(
@@ -242,7 +242,7 @@ def _difference(first: FloatArray, second: FloatArray, fold: IntArray) -> tuple[
     return float(np.mean(first - second)) / sizes, mean_error(first - second, fold) / sizes
 
 
-def _choice(scores: Sequence[ShapeScore], judge: _Judge) -> str:
+def _choice(scores: Sequence[ShapeScore], errors: _LeftOutErrors) -> str:
     """The simplest shape that a robot file can hold and that the data cannot tell from the best of those."""
     able = [score for score in scores if score.in_model and not score.at_bound]
     if not able:
@@ -251,7 +251,7 @@ def _choice(scores: Sequence[ShapeScore], judge: _Judge) -> str:
             got=", ".join(score.name for score in scores), expected="forces that point along the motion",
             remedy="check the sign of the currents, and which wheel is which",
         )  # fmt: skip
-    equal = [score for score in able if judge.apart(score.name, able[0].name) <= APART]
+    equal = [score for score in able if errors.apart(score.name, able[0].name) <= APART]
     return min(equal, key=lambda score: (score.levels, score.loo)).name
 
 
