@@ -86,8 +86,8 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
     priors: dict[str, Prior] = {}
     for each in motors if supply else ():
         wheel = _Wheel(robot, each.motor or 0, study.kind)
-        found, own = wheel.numbers(each, supply, 0.0 if study.windows is None else study.windows.smear)
-        remarks += [remark.of(each.name) for remark in own]
+        found, notes = wheel.numbers(each, supply, 0.0 if study.windows is None else study.windows.smear)
+        remarks += [remark.of(each.name) for remark in notes]
         for key, (number, spread) in found.items():
             robot = wheel.put(robot, key, number)
             value[key], std[key] = number, spread
@@ -117,16 +117,16 @@ class _Wheel:
     def __init__(self, robot: Robot, wheel: int, kind: str):
         motor, count = robot.motor, robot.wheels.count
 
-        def own(value: Any) -> float:
+        def at_wheel(value: Any) -> float:
             return float(per_wheel(value, count)[wheel])
 
         self.wheel, self.kind = wheel, kind
-        self.gear, self.radius = own(motor.gear_ratio), own(robot.wheels.wheel_radius)
-        self.resistance = own(motor.resistance)
-        self.torque, self.efficiency = own(motor.torque_constant), own(motor.gear_efficiency)
-        self.tied = self.torque == own(motor.emf_constant)
-        self.wheel_inertia = own(robot.wheels.wheel_inertia)
-        self.drop, self.viscous = own(motor.voltage_drop), own(robot.friction.wheels.viscous)
+        self.gear, self.radius = at_wheel(motor.gear_ratio), at_wheel(robot.wheels.wheel_radius)
+        self.resistance = at_wheel(motor.resistance)
+        self.torque, self.efficiency = at_wheel(motor.torque_constant), at_wheel(motor.gear_efficiency)
+        self.tied = self.torque == at_wheel(motor.emf_constant)
+        self.wheel_inertia = at_wheel(robot.wheels.wheel_inertia)
+        self.drop, self.viscous = at_wheel(motor.voltage_drop), at_wheel(robot.friction.wheels.viscous)
 
     def key(self, name: str) -> str:
         return f"{name}[{self.wheel}]"

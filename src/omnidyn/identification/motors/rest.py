@@ -80,10 +80,10 @@ def starts_and_stops(
     found = [edge for column in columns for edge in _edges_of(column) if _is_slow_enough(edge, lag)]
     spans: tuple[list[Span], list[Span]] = [], []
     for stop in (False, True):
-        own = [edge for edge in found if edge.stop is stop]
-        own = own[:: max(1, -(-len(own) // MOST))]
-        every = [_span(edge, lag, RISK / len(own)) for edge in own]
-        spans[stop].extend(span for span in every if stop or span.high > 0.0)
+        edges = [edge for edge in found if edge.stop is stop]
+        edges = edges[:: max(1, -(-len(edges) // MOST))]
+        ends = [_span(edge, lag, RISK / len(edges)) for edge in edges]
+        spans[stop].extend(span for span in ends if stop or span.high > 0.0)
     bounds = [bound for column in columns for bound in _rested(column)]
     if bounds:
         spans[0].append(Span(max(bounds), math.inf))
@@ -185,14 +185,14 @@ def _runs(moving: FloatArray) -> list[tuple[int, int, float]]:
 
 def _rests(column: _MotorRows, first: int, last: int) -> bool:
     """Whether rows without visible motion are rest: a motor that passes zero goes from one side to the other there."""
-    own = column.speed[first:last]
-    if len(own) < LEAST_REST:
+    speed = column.speed[first:last]
+    if len(speed) < LEAST_REST:
         return False
-    third = max(len(own) // 3, 1)
-    early, late = own[:third], own[-third:]
-    middle = own[third:-third] if len(own) > 2 * third else own
+    third = max(len(speed) // 3, 1)
+    early, late = speed[:third], speed[-third:]
+    middle = speed[third:-third] if len(speed) > 2 * third else speed
     reach = max(float(np.abs(middle).max()), column.tick)
-    error = (noise_of_rows(own) if len(own) > LEAST_REST else reach) * math.sqrt(2.0 / third)
+    error = (noise_of_rows(speed) if len(speed) > LEAST_REST else reach) * math.sqrt(2.0 / third)
     return abs(float(np.median(late) - np.median(early))) <= max(SIGNS * error, column.tick, 1e-9 * reach)
 
 
@@ -210,8 +210,8 @@ def _span(edge: _Edge, lag: float, risk: float) -> Span:
     end = min(edge.first + int(np.searchsorted(t, last, "right")), len(column.t) - 1)
     other = np.flatnonzero(column.put_in[:begin] != column.put_in[begin])
     changed = int(other[-1]) + 1 if other.size else 0  # the last change of the input
-    own = column.put_in[max(changed - 1, 0) : end + 1]
-    return Span(float(own.min()) + 0.0, float(own.max()) + 0.0)  # no -0
+    put_in = column.put_in[max(changed - 1, 0) : end + 1]
+    return Span(float(put_in.min()) + 0.0, float(put_in.max()) + 0.0)  # no -0
 
 
 def _lags(lag: float, row: float) -> list[float]:
@@ -231,9 +231,9 @@ def _rested(column: _MotorRows) -> Iterator[float]:
             a += int(np.argmin(column.put_in[a:b]))
         if b - a < LEAST_REST:
             continue
-        own, speed = column.put_in[a:b], column.speed[a:b]
-        held = float(np.min([own[n : len(own) - LEAST_REST + 1 + n] for n in range(LEAST_REST)], axis=0).max())
-        under = speed[own >= held]
+        put_in, speed = column.put_in[a:b], column.speed[a:b]
+        held = float(np.min([put_in[n : len(put_in) - LEAST_REST + 1 + n] for n in range(LEAST_REST)], axis=0).max())
+        under = speed[put_in >= held]
         if held > 0.0 and float(under.mean()) <= 3.0 * noise_of_rows(speed) / math.sqrt(len(under)):
             yield held
 
@@ -352,8 +352,8 @@ def _stop_left(t: FloatArray, put_in: FloatArray, speed: FloatArray, at: float, 
     table = table / size
     # two directions in which the speed at the stop stays 0
     free = np.linalg.svd(table[-1:])[2][1:].T
-    design, own = table[:-1] @ free, speed[moving]
-    rest = own - design @ np.linalg.lstsq(design, own, rcond=1e-9)[0]
+    design, measured = table[:-1] @ free, speed[moving]
+    rest = measured - design @ np.linalg.lstsq(design, measured, rcond=1e-9)[0]
     return float(rest @ rest)
 
 

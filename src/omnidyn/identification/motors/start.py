@@ -120,8 +120,8 @@ def motor_starts(
     found, row = [], max(log.step for log in logs if len(log.t) > 1)
     for motor in motors:
         way = orientation_of(logs, motor)
-        own = windows_for_a_lag(logs, windows, motor)
-        lines = {side: line_one_way(own, motor, side) for side in (1.0, -1.0)}
+        chosen = windows_for_a_lag(logs, windows, motor)
+        lines = {side: line_one_way(chosen, motor, side) for side in (1.0, -1.0)}
         for side, line in lines.items():
             lag = line.value[LAG] if line is not None else math.nan
             up, down = starts_and_stops(logs, motor, side, way, lag)
@@ -309,7 +309,7 @@ def windows_of_points(points: MotorTable, speed_from: str) -> MotorWindows:
     return MotorWindows(
         points.put_in[turns], points.speed[turns], nothing, side[turns], nothing, motor=points.motor[turns],
         block=np.arange(count), unit=points.unit, kind=points.kind, speed_from=speed_from, length=math.nan,
-        rest=np.array([own.max() if own.size else np.nan for own in resting]), unresolved=0,
+        rest=np.array([levels.max() if levels.size else np.nan for levels in resting]), unresolved=0,
         resting=int((~turns).sum()), settled=True, every=1,
     )  # fmt: skip
 
@@ -318,11 +318,11 @@ def _sides(points: MotorTable) -> FloatArray:
     """+1.0, 0.0 (at rest) or -1.0 of each point."""
     side = np.zeros(len(points))
     for motor in np.unique(points.motor):
-        own = points.motor == motor
-        speed = points.speed[own]
-        off = np.abs(speed[points.put_in[own] == 0.0])
+        rows = points.motor == motor
+        speed = points.speed[rows]
+        off = np.abs(speed[points.put_in[rows] == 0.0])
         level = max(SLOW * float(np.abs(speed).max()), 2.0 * float(off.max(initial=0.0)))
-        side[own] = np.where(np.abs(speed) > level, np.sign(speed), 0.0)
+        side[rows] = np.where(np.abs(speed) > level, np.sign(speed), 0.0)
     return side
 
 
@@ -330,12 +330,12 @@ def starts_of_points(points: MotorTable) -> tuple[MotorStart, ...]:
     """Both directions of each motor, as far as the points show it to turn or to rest there."""
     found, sides = [], _sides(points)
     for motor in np.unique(points.motor).tolist():
-        own = points.motor == motor
-        put_in, speed = points.put_in[own], points.speed[own]
+        rows = points.motor == motor
+        put_in, speed = points.put_in[rows], points.speed[rows]
         way = orientation([(put_in, speed)])
         for side in (1.0, -1.0):
-            level, turns = way * side * put_in, side * sides[own]
-            up, down = _in_order(level, turns, points.run[own]) if points.run is not None else _in_table(level, turns)
+            level, turns = way * side * put_in, side * sides[rows]
+            up, down = _in_order(level, turns, points.run[rows]) if points.run is not None else _in_table(level, turns)
             forward = turns > 0.0
             if up or down or forward.any():
                 numbers = dict(NO_LINE)

@@ -144,8 +144,8 @@ class MotorStudy(Shown):
     def to_dict(self) -> dict[str, Any]:
         """The study as JSON can hold it."""
         motors = [motor.to_dict() for motor in self.motors]
-        for own, plain in zip(motors, self.plain, strict=False):
-            own["without_dead_band"] = plain.to_dict()
+        for record, plain in zip(motors, self.plain, strict=False):
+            record["without_dead_band"] = plain.to_dict()
         return {
             **as_verdict(self.verdict), "ok": not self.failed, "method": self.method, "input": self.kind,
             "unit": self.unit, "speed_from": self.speed_from,
@@ -240,7 +240,7 @@ def _free_runs(runs: Sequence[Run], asked: Question, progress: Progress) -> Moto
     away = held_out([run.source for run in runs], asked.hold_out)
     kept = [run for run, out in zip(runs, away, strict=True) if out]
     logs = logs_of_free_runs([run for run, out in zip(runs, away, strict=True) if not out], asked.input)
-    own: list[Run] = [log.run for log in logs]
+    fitted: list[Run] = [log.run for log in logs]
     how: dict[str, Any] = {"kind": logs[0].kind, "between": asked.between, "loss": asked.loss}
     motors = [
         m for m in range(min(log.motors for log in logs)) if all(np.isfinite(log.put_in[:, m]).any() for log in logs)
@@ -248,8 +248,8 @@ def _free_runs(runs: Sequence[Run], asked: Question, progress: Progress) -> Moto
     latency, pairs = _latency(asked.nuisances), []
     for motor in motors:
         progress(Report(f"fitting motor {motor + 1} of {len(motors)}"))
-        late = is_late(own, motor, **how) if latency is None else latency
-        fits = [fit_motor(own, motor, dead_band=band, latency=late, **how) for band in (True, False)]
+        late = is_late(fitted, motor, **how) if latency is None else latency
+        fits = [fit_motor(fitted, motor, dead_band=band, latency=late, **how) for band in (True, False)]
         pairs.append([replace(fit, held_out=fit_rmse(fit, kept)) if kept else fit for fit in fits])
     bands, plain = zip(*pairs, strict=True)
     origin = logs[0].motion_from if logs[0].speed is None else "wheel_speed"

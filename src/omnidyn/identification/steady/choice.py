@@ -122,7 +122,7 @@ def choose_shape(robot: Robot, points: ForcePoints, *, shape: str = AUTO, robust
         if candidate.viscous and not all(map(speeds_differ, parts.values())):
             missing[name] = "one_speed"
             continue
-        fitted = {group: fit_shape(candidate, robot, own, robust=robust) for group, own in parts.items()}
+        fitted = {group: fit_shape(candidate, robot, part, robust=robust) for group, part in parts.items()}
         if all(fit is not None for fit in fitted.values()):
             fits[name] = {group: fit for group, fit in fitted.items() if fit is not None}
         else:
@@ -193,7 +193,8 @@ class _LeftOutErrors:
 
     def __init__(self, fits: Mapping[str, Mapping[str, ShapeFit]], robust: bool):
         self.squares = {
-            name: np.concatenate([(fit.error**2).sum(axis=1) for fit in own.values()]) for name, own in fits.items()
+            name: np.concatenate([(fit.error**2).sum(axis=1) for fit in groups.values()])
+            for name, groups in fits.items()
         }
         folds = [fit.fold for fit in next(iter(fits.values())).values()]
         before = np.cumsum([0, *(int(fold.max()) + 1 for fold in folds)])
@@ -218,17 +219,17 @@ class _LeftOutErrors:
 
 
 def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], errors: _LeftOutErrors) -> tuple[ShapeScore, ...]:
-    along = {name: np.concatenate([fit.along_error**2 for fit in own.values()]) for name, own in fits.items()}
+    along = {name: np.concatenate([fit.along_error**2 for fit in groups.values()]) for name, groups in fits.items()}
     squares, fold, order = errors.squares, errors.fold, errors.order
     found = []
     for name in order:
         apart = errors.apart(name, order[0])
-        own = list(fits[name].values())
+        groups = list(fits[name].values())
         found.append(
             ShapeScore(
-                name, SHAPES[name].words, len(own[0].keys), *rms_and_error(squares[name], fold),
+                name, SHAPES[name].words, len(groups[0].keys), *rms_and_error(squares[name], fold),
                 *rms_and_error(along[name], fold), *_difference(squares[name], squares[order[0]], fold), apart,
-                apart > APART, SHAPES[name].in_model, any((fit.free <= 0.0).any() for fit in own),
+                apart > APART, SHAPES[name].in_model, any((fit.free <= 0.0).any() for fit in groups),
             )
         )  # fmt: skip
     return tuple(found)

@@ -70,13 +70,13 @@ def levelled(points: ForcePoints, found: Sequence[Moment], sources: Mapping[int,
     and the side on which no force is left, go. sources: of the runs, by number."""
     wrench, kept = points.wrench.copy(), np.ones(len(points), bool)
     for each in found:
-        own = np.array([sources[number] == each.source for number in points.run.tolist()])
-        before, after = own & (points.span[:, 1] <= each.at), own & (points.span[:, 0] >= each.at)
+        of_run = np.array([sources[number] == each.source for number in points.run.tolist()])
+        before, after = of_run & (points.span[:, 1] <= each.at), of_run & (points.span[:, 0] >= each.at)
         if any(each.vanished):
-            kept &= ~own | (after if each.vanished[0] else before)
+            kept &= ~of_run | (after if each.vanished[0] else before)
             continue
         wrench[after] /= 1.0 + each.change
-        kept &= ~own | before | after
+        kept &= ~of_run | before | after
     return replace(points, wrench=wrench).chosen(kept)
 
 
@@ -116,8 +116,8 @@ def _moment(held: HeldForces, source: str, tests: int) -> Moment | None:
     spread = t_quantile(degrees)
     scatter = std * np.sqrt(len(y)) / 2.0  # of one window, over the force
 
-    def level(own: BoolArray) -> tuple[float, tuple[float, float]]:
-        middle, half = force * float(y[own].mean()), float(spread * force * scatter / np.sqrt(own.sum()))
+    def level(rows: BoolArray) -> tuple[float, tuple[float, float]]:
+        middle, half = force * float(y[rows].mean()), float(spread * force * scatter / np.sqrt(rows.sum()))
         return middle, (middle - half, middle + half)
 
     ends = (float(held.start[min(near) - 1]), float(held.end[max(near)]))
@@ -132,10 +132,10 @@ def _along(held: HeldForces) -> tuple[FloatArray, FloatArray]:
     """(force of each window along the mean of its command, over that mean (n,); the mean [N] (n,))."""
     y, size = np.zeros(len(held.start)), np.zeros(len(held.start))
     for c in np.unique(held.command):
-        own = held.command == c
-        mean = held.force[own].mean(axis=0)
-        size[own] = np.linalg.norm(mean)
-        y[own] = held.force[own] @ mean / max(float(mean @ mean), 1e-300)
+        rows = held.command == c
+        mean = held.force[rows].mean(axis=0)
+        size[rows] = np.linalg.norm(mean)
+        y[rows] = held.force[rows] @ mean / max(float(mean @ mean), 1e-300)
     return y, size
 
 

@@ -107,7 +107,9 @@ def fit_steady(
         )  # fmt: skip
     parts = {group: points.of(group) for group in points.groups}
     anew = {group: partial(_levels, windows, choice.of(group), group, asked.robust) for group in parts}
-    estimates = {group: _estimate(robot, own, choice, group, asked.robust, anew[group]) for group, own in parts.items()}
+    estimates = {
+        group: _estimate(robot, part, choice, group, asked.robust, anew[group]) for group, part in parts.items()
+    }
     return SteadyFit(runs, robot, asked, windows, points, choice, parts, anew, estimates)
 
 
@@ -123,9 +125,10 @@ def diagnosed(fit: SteadyFit) -> SteadyStudy:
     sources = {number: run.source for number, run, _ in fit.windows.found}
     changed += moments_by_shape(robot, points, choice.fit, sources, changed)
     lack = {
-        group: _lack(robot, own, choice, group, changed, sources, fit.asked.robust) for group, own in fit.parts.items()
+        group: _lack(robot, part, choice, group, changed, sources, fit.asked.robust)
+        for group, part in fit.parts.items()
     }
-    within = {group for group, own in fit.parts.items() if _changed(own, changed, sources)}
+    within = {group for group, part in fit.parts.items() if _changed(part, changed, sources)}
     known = {
         group: Diagnosis(lack[group], rests_on(robot, estimate.value, fit.anew[group]), LASTING)
         for group, estimate in fit.estimates.items()
@@ -141,19 +144,19 @@ def _study(
 ) -> SteadyStudy:  # fmt: skip
     """The study. changed: inside a run; lack: group -> what its shape leaves out; within: groups with such a change."""
     robot, points, choice, robust = fit.robot, fit.points, fit.choice, fit.asked.robust
-    travel = {group: _travel(own) for group, own in fit.parts.items()}
+    travel = {group: _travel(part) for group, part in fit.parts.items()}
     viscous = {
-        group: _viscous(robot, fit.windows, choice, group, own, travel[group], robust)
-        for group, own in fit.parts.items()
+        group: _viscous(robot, fit.windows, choice, group, part, travel[group], robust)
+        for group, part in fit.parts.items()
     }
     differences = _differences(choice)
     internal = {}
     if robot.wheels.count > 3:  # the part of the traction that pushes nowhere: G f = 0
         from scipy.linalg import null_space  # slow to import, and most robots have three wheels
 
-        against = {group: own.traction @ null_space(robot.wheels.wrench_matrix) for group, own in fit.parts.items()}
+        against = {group: part.traction @ null_space(robot.wheels.wrench_matrix) for group, part in fit.parts.items()}
         internal = {group: float(np.sqrt(np.mean((f**2).sum(axis=1)))) for group, f in against.items()}
-    turning = any(is_turning(robot, own) for own in fit.parts.values())
+    turning = any(is_turning(robot, part) for part in fit.parts.values())
     return SteadyStudy(
         robot=robot, points=points, choice=choice, estimates=fit.estimates, travel=travel, viscous=viscous,
         differences=differences, internal=internal,
@@ -173,8 +176,8 @@ def _study(
 
 def _changed(points: ForcePoints, found: Sequence[Moment], sources: Mapping[int, str]) -> list[Moment]:
     """The changes inside the runs of these points; without those of runs that have one name."""
-    own, names = {sources[number] for number in points.run.tolist()}, [*sources.values()]
-    return [each for each in found if each.source in own and names.count(each.source) == 1]
+    sources_here, names = {sources[number] for number in points.run.tolist()}, [*sources.values()]
+    return [moment for moment in found if moment.source in sources_here and names.count(moment.source) == 1]
 
 
 def _lack(
@@ -183,9 +186,9 @@ def _lack(
 ) -> LackOfFit:  # fmt: skip
     """Whether the shape of a group fits: on both sides of a change inside a run, which would look like another shape
     wherever directions were driven on one side of it only."""
-    fit, own = choice.fit(group), _changed(points, found, sources)
-    if own:
-        points = levelled(points, own, sources)
+    fit, inside = choice.fit(group), _changed(points, found, sources)
+    if inside:
+        points = levelled(points, inside, sources)
         fit = fit_shape(fit.shape, robot, points, robust=robust) or fit
     return lack_of_fit(robot, points, fit)
 

@@ -216,8 +216,8 @@ def _shape_statements(choice: ShapeChoice) -> list[Statement]:
     found = [Statement("shape_chosen", NOTE, score.name, numbers)]
     for group, name in choice.own.items():
         scores = {score.name: score for score in choice.scored[group]}
-        own, other = scores[name], scores[choice.chosen]
-        numbers = {"shape": name, "error": (own.loo, own.loo_std), "other": None}
+        score, other = scores[name], scores[choice.chosen]
+        numbers = {"shape": name, "error": (score.loo, score.loo_std), "other": None}
         if name != choice.chosen:
             numbers |= {"other": other.name, "other_error": (other.loo, other.loo_std)}
         found.append(Statement("group_shape", NOTE, group, numbers))
