@@ -367,31 +367,31 @@ read_voltages("u.csv", 3)
 read_voltages("d.csv", 3)
 read_steady_table("examples/table1.csv")
 read_steady_table("stds.csv")
-fit_steady_state(load_robot("axebot"), read_steady_table("examples/table1.csv"), rest="line")
-fit_steady_state(load_robot("axebot"), read_steady_table("stds.csv"), absolute_std=True)
-fit_steady_state(load_robot("axebot"), read_steady_table("few.csv"))
-fit_output_error(read_log("floor/smooth1.csv"), load_robot("guess.toml"), nuisances=())
-fit_output_error(read_log("floor/smooth1.csv"), load_robot("guess.toml"), covariance="white", nuisances=["latency"])
-fit_output_error(read_log("full.csv"), load_robot("box.toml"), outputs=["twist", "heading"], nuisances=())
-fit_output_error(read_log("wheel_angle.csv"), load_robot("box.toml"), tick_rad=0.0126, nuisances=())
-fit_output_error(read_log("wheel_angle.csv"), load_robot("box.toml"), tick_rad=0.0, nuisances=())
-fit_output_error(read_log("disc.csv"), load_robot("disc.toml"), free=["friction.direction.coulomb[0]"], nuisances=())
-fit_output_error(read_log("pose.csv"), load_robot("ellipse.toml"), outputs=["pose"])
-fit_output_error(read_log("counts.csv", assume={"a": "ticks/25"}), load_robot("box.toml"), outputs=["wheel_angle"])
-identify([read_log("floor/smooth1.csv")], load_robot("box.toml"), nuisances=["tilt.x"], fixed=["friction.axes.viscous"])
-identify([read_log(f"smooth/run{k:02d}.csv") for k in range(12)], load_robot("axebot"), shape="disc")
-identify([read_log("full.csv")], load_robot("box.toml"), method="magic")
-identify_steady([read_log(f"rough/run{k:02d}.csv") for k in range(12)], load_robot("axebot"), robust=False)
-identify_groups([read_log(f"floor/{n}.csv") for n in ("smooth1", "rough1")], load_robot("box.toml"), "sr", nuisances=())
-identify_groups([read_log("floor/smooth1.csv")], load_robot("box.toml"), ["a"])
-identify_motors([read_log("bench3.csv")])
-identify_motors([read_log("full.csv")], input="current", steady=True)
-identify_motors([read_log("floor/smooth1.csv")])
-identify_motors([read_log(f"real/udea/stage1_{k}.txt", assume={"u": "%"}) for k in (1, 2)])
+identify(read_steady_table("examples/table1.csv"), load_robot("axebot"), SteadyState(rest="line")).estimate
+identify(read_steady_table("stds.csv"), load_robot("axebot"), SteadyState(absolute_std=True)).estimate
+identify(read_steady_table("few.csv"), load_robot("axebot"), SteadyState()).estimate
+identify(read_log("floor/smooth1.csv"), load_robot("guess.toml"), OutputError(nuisances=())).estimate
+identify(read_log("floor/smooth1.csv"), load_robot("guess.toml"), OutputError(covariance="white", nuisances=["latency"])).estimate
+identify(read_log("full.csv"), load_robot("box.toml"), OutputError(outputs=["twist", "heading"], nuisances=())).estimate
+identify(read_log("wheel_angle.csv"), load_robot("box.toml"), OutputError(tick_rad=0.0126, nuisances=())).estimate
+identify(read_log("wheel_angle.csv"), load_robot("box.toml"), OutputError(tick_rad=0.0, nuisances=())).estimate
+identify(read_log("disc.csv"), load_robot("disc.toml"), OutputError(free=["friction.direction.coulomb[0]"], nuisances=())).estimate
+identify(read_log("pose.csv"), load_robot("ellipse.toml"), OutputError(outputs=["pose"])).estimate
+identify(read_log("counts.csv", assume={"a": "ticks/25"}), load_robot("box.toml"), OutputError(outputs=["wheel_angle"])).estimate
+identify([read_log("floor/smooth1.csv")], load_robot("box.toml"), OutputError(nuisances=["tilt.x"], fixed=["friction.axes.viscous"])).estimate
+identify([read_log(f"smooth/run{k:02d}.csv") for k in range(12)], load_robot("axebot"), SteadyState(shape="disc")).estimate
+identify([read_log("full.csv")], load_robot("box.toml"), "magic")
+identify([read_log(f"rough/run{k:02d}.csv") for k in range(12)], load_robot("axebot"), SteadyState(robust=False)).study
+identify([read_log(f"floor/{n}.csv") for n in ("smooth1", "rough1")], load_robot("box.toml"), OutputError(nuisances=()), groups=[*"sr"])
+identify([read_log("floor/smooth1.csv")], load_robot("box.toml"), OutputError(), groups=["a"])
+identify([read_log("bench3.csv")], None, MotorLine()).study
+identify([read_log("full.csv")], None, MotorLine(input="current", steady=True)).study
+identify([read_log("floor/smooth1.csv")], None, MotorLine()).study
+identify([read_log(f"real/udea/stage1_{k}.txt", assume={"u": "%"}) for k in (1, 2)], None, MotorLine()).study
 [read_log(f"real/odrive/step{k}.csv", columns={"t": "timestep (8Hz):0.000125 s"}) for k in (1, 2)]
-validate(fit_output_error(read_log("pose.csv"), load_robot("box.toml")), [read_log("full.csv")]).summary()
+identify([read_log("pose.csv"), read_log("full.csv")], load_robot("box.toml"), OutputError(), hold_out="full.csv").validation.summary()
 compare(load_robot("box.toml"), read_log("full.csv"), load_robot("rough.toml"), seed=3)
 compare(load_robot("mixed.toml"), read_log("mixed.csv"), tol=1e-4)
 compare(load_robot("four-wheel"), read_log("full.csv"))
-"""
+"""  # noqa: E501  one case a line
 CALLS = _CALLS.strip().splitlines()

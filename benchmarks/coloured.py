@@ -17,9 +17,11 @@ from scipy.linalg import solve_toeplitz
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from benchmarks.identify_log import COUNTING, Draws, fit_output_error
+from benchmarks.identify_log import COUNTING, Draws
 from benchmarks.size import WHOLE, scaled
 from benchmarks.table import Table
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -108,7 +110,7 @@ def measure_case(
     for kind in ("sandwich", "auto"):
         draws, chosen = Draws(truth(robot)), 0
         for seed in range(LOGS):
-            fit = fit_output_error(log(seed), robot, start="rest", covariance=kind, nuisances=nuisances)
+            fit = identify(log(seed), robot, OutputError(start="rest", covariance=kind, nuisances=nuisances)).estimate
             draws.add(fit)
             chosen += fit.covariance == "autoregressive"
         spread = np.sqrt(np.mean(np.array(draws.error) ** 2, axis=0)) / least
@@ -144,7 +146,7 @@ def measure_peak(
             first = left[:1] * np.sqrt(1.0 - LOOKED_AT**2)
             return (np.concatenate([first, left[1:] - LOOKED_AT * left[:-1]]) / spread).ravel()
 
-        fit = fit_output_error(run, robot, start="rest")
+        fit = identify(run, robot, OutputError(nuisances=(), start="rest")).estimate
         begin = np.array([fit.value[key] for key in truth(robot)]) / true
         found = least_squares(misses, begin, diff_step=STEP, x_scale=least / true, xtol=1e-10, ftol=1e-12)
         errors.append((found.x * true - true) / least)

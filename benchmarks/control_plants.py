@@ -110,7 +110,9 @@ def measure() -> Table:
     ratios: dict[str, list[float]] = {}
     shown = {name: options for name, options in CONTROLLERS.items() if name.partition("_")[0] in NAMES}
     for seed, (kind, (plant, more)) in enumerate(robots().items()):
-        model = omnidyn.identify([log_of(plant, seed)], guessed(plant), free=["friction", *more]).robot
+        model = omnidyn.identify(
+            [log_of(plant, seed)], guessed(plant), omnidyn.OutputError(free=["friction", *more])
+        ).robot
         for name, options in shown.items():
             own, sheet = (mean(errors(each, plant, name, options)) for each in (model, data_sheet(plant, seed)))
             ratios.setdefault(name, []).append(own / sheet)

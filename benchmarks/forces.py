@@ -16,6 +16,7 @@ from benchmarks.wrong_worlds.log import NOISE, SPEEDS, right_case, robot_of, tru
 from benchmarks.wrong_worlds.remedies import FRICTION
 from benchmarks.wrong_worlds.world import World
 from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.run import Run
 
 LOGS = scaled(40, 2)
@@ -68,7 +69,7 @@ def measure() -> Table:
             twist = pushed(world, volts, case.setup.rate, share, seed)
             speed = twist @ world.G / np.array(world.wheel_radius)
             run = Run(t, voltage=volts, wheel_speed=speed + NOISE * rng.normal(size=speed.shape))
-            fit = identify(run, robot_of(world), free=FRICTION)
+            fit = identify(run, robot_of(world), OutputError(free=FRICTION)).estimate
             lack = getattr(fit, "lack_of_fit", None)
             found.append(bool(getattr(lack, "found", False)))
             z.append([(fit.value[n] - true) / fit.std[n] for n, true in truths(world, world.shape).items()])

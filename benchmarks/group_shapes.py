@@ -23,7 +23,8 @@ from benchmarks.wrong_worlds.log import SPEEDS, Case, logged, right_case, robot_
 from benchmarks.wrong_worlds.remedies import FRICTION
 from benchmarks.wrong_worlds.worker import Workers
 from benchmarks.wrong_worlds.world import BOX, ELLIPSE, World
-from omnidyn.identification.whole_logs import fit_output_error, identify_groups
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.friction import Friction
 from omnidyn.run import Run
 
@@ -101,9 +102,9 @@ def climbed(kind: Kind, seed: int) -> Seen:
     began = time.process_time()
     found: dict[str, Any]
     if len(runs) > 1:
-        found = dict(identify_groups(runs, robot, FLOORS, free=FRICTION, ladder=True).estimates)
+        found = dict(identify(runs, robot, OutputError(free=FRICTION, ladder=True), groups=FLOORS).groups)
     else:
-        found = {FLOORS[0]: fit_output_error(runs, robot, free=FRICTION, ladder=True)}
+        found = {FLOORS[0]: identify(runs, robot, OutputError(free=FRICTION, ladder=True)).estimate}
     out = Seen(seconds=time.process_time() - began)
     pairs = list(zip(found.values(), worlds, strict=True))
     out.named = all(shape_of(each.robot.friction) == true_shape(world) for each, world in pairs)

@@ -8,8 +8,9 @@ import numpy as np
 
 from benchmarks.size import scaled
 from benchmarks.table import Table, machine
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.answer import Answer
-from omnidyn.identification.whole_logs import identify_groups
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
@@ -48,7 +49,7 @@ def pair(seed: int, noise: Callable[[Run, int], Run]) -> Answer:
         for k, robot in enumerate(floors().values())
     ]
     free = ["friction", TORQUE]
-    return identify_groups(runs, load_robot("axebot"), [*floors()], free=free, nuisances=(), start="rest")
+    return identify(runs, load_robot("axebot"), OutputError(free=free, nuisances=(), start="rest"), groups=[*floors()])
 
 
 def true_differences() -> dict[str, float]:
@@ -80,8 +81,8 @@ def _bootstrap(table: Table) -> None:
             runs.append(coloured(simulate(robot, excitation(SECONDS, seed=seed), 0.01), seed))
             names.append(name)
     how = {"nuisances": (), "start": "rest"}
-    plain = identify_groups(runs, load_robot("axebot"), names, **how)
-    drawn = identify_groups(runs, load_robot("axebot"), names, bootstrap=DRAWS, **how)
+    plain = identify(runs, load_robot("axebot"), OutputError(**how), groups=names)
+    drawn = identify(runs, load_robot("axebot"), OutputError(bootstrap=DRAWS, **how), groups=names)
     ratio = [b.std / a.std for a, b in zip(plain.differences, drawn.differences, strict=True)]
     mean = float(np.exp(np.mean(np.log(ratio))))
     what = f"std of differences, bootstrap over {RUNS} runs a floor / sandwich, mean"

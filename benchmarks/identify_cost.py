@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import omnidyn
-from benchmarks.identify_log import cpu, fit_output_error
+from benchmarks.identify_log import cpu
 from benchmarks.table import Table
 from benchmarks.wrong_worlds.kinds import by_name
 from benchmarks.wrong_worlds.log import logged, robot_of
@@ -41,23 +41,24 @@ DIAGNOSED = (
 def speed(table: Table, robot: Robot, clean: Run) -> None:
     """One log of 60 s."""
     log = noisy_draw(clean, 0)
-    spent = cpu(lambda: fit_output_error(log, robot, start="rest"), 30)
+    spent = cpu(lambda: omnidyn.identify(log, robot, omnidyn.OutputError(start="rest", nuisances=())), 30)
     table.add("<= 5", spent <= 5.0, what="fit of one log, six numbers", value=spent, unit="ms")
 
 
 _CHILD = """
 import json, resource, sys, time
 import numpy as np
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 with np.load(sys.argv[1]) as f:
     run = Run(**{name: f[name] for name in f.files})
 robot, options = load_robot("axebot"), json.loads(sys.argv[2])
 short = Run(t=run.t[:2000], **{name: value[:2000] for name, value in run.channels.items()})
-fit_output_error(short, robot, **options)
+identify(short, robot, OutputError(**options))
 start = time.process_time()
-fit = fit_output_error(run, robot, **options)
+fit = identify(run, robot, OutputError(**options))
 spent = time.process_time() - start
 try:  # on Linux the other counter begins at what the parent had
     peak = next(int(line.split()[1]) * 1024 for line in open("/proc/self/status") if line.startswith("VmHWM"))
@@ -164,7 +165,7 @@ def _diagnosed(log: Run, robot: Robot) -> tuple[float, float, bool]:
     spent = []
     for _ in range(2):
         began = time.process_time()
-        fit = omnidyn.identify(log, robot, free=FRICTION)
+        fit = omnidyn.identify(log, robot, omnidyn.OutputError(free=FRICTION))
         fitted = time.process_time()
         found = bool(fit.lack_of_fit and fit.lack_of_fit.found)
         spent.append((fitted - began, time.process_time() - fitted))
@@ -177,6 +178,6 @@ def _spent(log: Run, robot: Robot, free: Sequence[str], times: int = 2) -> float
     spent = []
     for _ in range(times):
         began = time.process_time()
-        omnidyn.identify(log, robot, free=free)
+        omnidyn.identify(log, robot, omnidyn.OutputError(free=free))
         spent.append(time.process_time() - began)
     return min(spent)

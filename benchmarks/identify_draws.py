@@ -6,9 +6,11 @@ import time
 
 import numpy as np
 
-from benchmarks.identify_log import COUNTING, Draws, cramer_rao, fit_output_error
+from benchmarks.identify_log import COUNTING, Draws, cramer_rao
 from benchmarks.size import WHOLE, scaled
 from benchmarks.table import Table
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
@@ -26,7 +28,7 @@ def coverage(table: Table, robot: Robot, clean: Run) -> None:
     least = cramer_rao(robot, clean)
     draws = Draws(truth(robot))
     for seed in range(LOGS):
-        draws.add(fit_output_error(noisy_draw(clean, seed), robot, start="rest"))
+        draws.add(identify(noisy_draw(clean, seed), robot, OutputError(nuisances=(), start="rest")).estimate)
     slack = 0.0 if WHOLE else COUNTING * np.sqrt(0.95 * 0.05 / LOGS)
     shared = {"draws": LOGS}
     low, high = draws.coverage.min(), draws.coverage.max()
@@ -46,11 +48,11 @@ def coverage(table: Table, robot: Robot, clean: Run) -> None:
 def starts(table: Table, robot: Robot, clean: Run) -> None:
     """(d) All six numbers wrong by factors of up to 100 either way."""
     log, rng = noisy_draw(clean, 0), np.random.default_rng(7)
-    best = fit_output_error(log, robot, start="rest")
+    best = identify(log, robot, OutputError(nuisances=(), start="rest")).estimate
     good, true = 0, np.array(list(truth(robot).values()))
     for _ in range(STARTS):
         factor = np.exp(rng.uniform(-np.log(100.0), np.log(100.0), 6))
-        fit = fit_output_error(log, with_friction(robot, true * factor), start="rest")
+        fit = identify(log, with_friction(robot, true * factor), OutputError(nuisances=(), start="rest")).estimate
         good += all(abs(fit.value[key] - best.value[key]) < 0.1 * best.std[key] for key in BOX)
     share = good / STARTS
     table.add(
@@ -71,7 +73,7 @@ def impaired(table: Table, robot: Robot, clean: Run) -> None:
         noise = rng.normal(size=twist.shape) * NOISE
         noise += WILD_SIZE * rng.normal(size=twist.shape) * (rng.random(twist.shape) < WILD)
         log = Run(t=clean.t, voltage=clean.voltage, twist=np.round((twist + noise) / NOISE) * NOISE, source="impaired")
-        draws.add(fit_output_error(log, robot, nuisances=NUISANCES, start="rest", loss="student-t"))
+        draws.add(identify(log, robot, OutputError(nuisances=NUISANCES, start="rest", loss="student-t")).estimate)
     spent = (time.process_time() - started) / IMPAIRED * 1e3
     least = draws.coverage.min()
     table.add(">= 0.92", least >= 0.92, what="coverage of nine intervals, least: impaired logs",
@@ -89,7 +91,7 @@ def breakaway(table: Table, robot: Robot, clean: Run) -> None:
         axes = robot.friction.axes.replace(breakaway=(float(level), *coulomb[1:].tolist()))
         true = robot.replace(friction=robot.friction.replace(axes=axes))
         log = noisy_draw(simulate(true, excitation(seed=100 + seed), 1.0 / RATE), seed)
-        low, high = fit_output_error(log, robot, free=[*BOX, key], start="rest").ci95[key]
+        low, high = identify(log, robot, OutputError(nuisances=(), free=[*BOX, key], start="rest")).ci95[key]
         held += low <= level <= high
         widths.append((high - low) / coulomb[0])
     share = held / BREAKAWAYS

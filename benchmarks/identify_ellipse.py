@@ -16,6 +16,8 @@ import numpy as np
 from benchmarks.identify_log import COUNTING, Draws
 from benchmarks.size import scaled
 from benchmarks.table import Table, machine
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
@@ -23,8 +25,6 @@ from omnidyn.identification.output_error.prepare import make_problem
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.output_error.solve.solver import Solver
-from omnidyn.identification.question import Question
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
@@ -71,7 +71,7 @@ def begun(seed: int) -> Robot:
 
 
 def fitted(run: Run, start: Robot) -> OutputErrorEstimate:
-    return fit_output_error(run, start, free=KEYS, nuisances=("latency",), start="rest")
+    return identify(run, start, OutputError(free=KEYS, nuisances=("latency",), start="rest")).estimate
 
 
 def truth() -> dict[str, float]:
@@ -90,7 +90,7 @@ def bound() -> np.ndarray:
 
 
 def _solver(run: Run, tol: float) -> Solver:
-    given = Question(free=KEYS, nuisances=("latency",), start="rest")
+    given = OutputError(free=KEYS, nuisances=("latency",), start="rest")
     problem = make_problem([record(run, ellipse())], ellipse(), given)
     return Solver(problem, ImplicitEngine(problem, tol))
 

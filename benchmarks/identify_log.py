@@ -8,25 +8,23 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
-from omnidyn.identification import whole_logs as whole
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from tests.support.axebot_logs import NOISE, bare
 
-fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a row asks for
-
 COUNTING = 3.0  # standard errors of a counted share, granted where fewer than the full number of draws are done
 
 
 def cramer_rao(robot: Robot, clean: Run) -> np.ndarray:
     """Least standard errors that any unbiased fit of this log has, from the log without noise. Shape (6,)."""
-    fit = fit_output_error(bare(clean), robot, start="rest", covariance="white")
+    fit = identify(bare(clean), robot, OutputError(nuisances=(), start="rest", covariance="white")).estimate
     noise = np.array(list(fit.noise.values()))
     return np.array([fit.std[key] for key in BOX]) / np.tile(noise / NOISE, 2)
 

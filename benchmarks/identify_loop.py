@@ -14,7 +14,8 @@ import numpy as np
 from benchmarks.identify_log import COUNTING, Draws
 from benchmarks.size import scaled
 from benchmarks.table import Table, machine
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.keys import Key, friction_keys, gain_keys
 from omnidyn.model.robot import Robot
@@ -78,7 +79,7 @@ def _coverage(table: Table, robot: Robot) -> None:
         for k, key in enumerate(gain_keys(robot)):
             start = Key.parse(key).set(start, (3.0 if (seed >> k) & 1 else 1.0 / 3.0) * true[key])
         run, began = log(robot, seed), time.process_time()
-        draws.add(fit_output_error(run, start, nuisances=("latency",)))
+        draws.add(identify(run, start, OutputError(nuisances=("latency",))).estimate)
         spent += time.process_time() - began
     shared = {"robot": robot.name, "draws": LOGS}
     slack = COUNTING * np.sqrt(0.92 * 0.08 / LOGS)

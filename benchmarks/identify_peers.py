@@ -21,9 +21,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from benchmarks.identify_log import cpu, cramer_rao, fit_output_error
+from benchmarks.identify_log import cpu, cramer_rao
 from benchmarks.table import Table
 from benchmarks.tanh import run_tanh
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.dynamics import state_space
 from omnidyn.model.keys import BOX
 from omnidyn.model.mass import axis_masses
@@ -119,7 +121,7 @@ def compare(table: Table, robot: Robot, clean: Run) -> None:
 
 def our_fit(robot: Robot, log: Run) -> np.ndarray:
     """The six numbers of our fit."""
-    fit = fit_output_error(log, robot, start="rest")
+    fit = identify(log, robot, OutputError(nuisances=(), start="rest")).estimate
     return np.array([fit.value[key] for key in BOX])
 
 

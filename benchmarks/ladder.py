@@ -25,6 +25,7 @@ from benchmarks.wrong_worlds.sizes import SIZES
 from benchmarks.wrong_worlds.worker import Workers
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
@@ -102,10 +103,10 @@ def on(case: Case, run: Run, key: str) -> Climbed:
     """What the ladder makes of a log. key: of the true cause."""
     out, robot = Climbed(), robot_of(case.told)
     try:
-        plain: Any = identify(run, robot, free=FRICTION)
+        plain: Any = identify(run, robot, OutputError(free=FRICTION)).estimate
         out.found = plain.lack_of_fit.found
         began = time.process_time()
-        best: Any = identify(run, robot, free=FRICTION, ladder=True)
+        best: Any = identify(run, robot, OutputError(free=FRICTION, ladder=True)).estimate
         out.seconds = time.process_time() - began
     except OmnidynError as error:
         out.words = str(error)

@@ -168,7 +168,7 @@ def errors(model: str, folder: Path) -> dict[str, Any]:
 
     bounded.NUMBERS = bounded.ROWS = 10**12
     runs = [omnidyn.read_log(path) for path in sorted(folder.glob("log*.csv"))]
-    fit = omnidyn.identify(runs, omnidyn.load_robot(folder / f"{model}.toml"))
+    fit = omnidyn.identify(runs, omnidyn.load_robot(folder / f"{model}.toml")).estimate
     return {"std": dict(fit.std)}
 
 

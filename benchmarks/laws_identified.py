@@ -16,7 +16,8 @@ from benchmarks.identify_log import COUNTING
 from benchmarks.size import WHOLE, scaled
 from benchmarks.table import Table, machine
 from omnidyn.arrays import FloatArray
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
@@ -127,7 +128,7 @@ def fitted(name: str, seed: int) -> tuple[FloatArray, Sequence[bool]]:
     noise = np.random.default_rng(seed).normal(size=twist.shape) * [law.noise, law.noise, 4.0 * law.noise]
     volts = program(number)
     log = Run(t=np.linspace(0.0, ROWS * DT, ROWS + 1), voltage=np.concatenate([volts, volts[-1:]]), twist=twist + noise)
-    found = fit_output_error([log], robot_of(law, GUESS), free=keys, nuisances=())
+    found = identify([log], robot_of(law, GUESS), OutputError(free=keys, nuisances=())).estimate
     true = np.array([TRUE[each] for each in law.names])
     errors = np.array([found.value[key] for key in keys]) - true
     held = [found.ci95[key][0] <= value <= found.ci95[key][1] for key, value in zip(keys, true.tolist(), strict=True)]

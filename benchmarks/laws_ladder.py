@@ -36,6 +36,7 @@ from benchmarks.table import Table, machine
 from benchmarks.wrong_worlds.remedies import FALL, FRICTION
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.friction import AxesFriction, Friction
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
@@ -120,9 +121,9 @@ def _on(twist: FloatArray, noise: float, seed: int, law: Sequence[str]) -> tuple
     sensed = twist + np.random.default_rng(FIRST_SEED + seed).normal(size=twist.shape) * noise * [1.0, 1.0, 4.0]
     log = Run(t=np.linspace(0.0, ROWS * DT, ROWS + 1), voltage=np.concatenate([volts, volts[-1:]]), twist=sensed)
     out, robot = Climbed(), _plain(1.3)
-    plain: Any = identify([log], robot, free=FRICTION)
+    plain: Any = identify([log], robot, OutputError(free=FRICTION)).estimate
     began = time.process_time()
-    best: Any = identify([log], robot, free=FRICTION, ladder=True)
+    best: Any = identify([log], robot, OutputError(free=FRICTION, ladder=True)).estimate
     out.seconds, out.found, out.words = (
         time.process_time() - began,
         plain.lack_of_fit.found,

@@ -13,11 +13,11 @@ import numpy as np
 from benchmarks.identify_log import Draws
 from benchmarks.size import WHOLE, scaled
 from benchmarks.table import Table, machine
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.kernel.counts import information
 from omnidyn.identification.output_error.prepare import make_problem, read_records
-from omnidyn.identification.question import Question
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import BOX
 from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot import Robot
@@ -57,7 +57,7 @@ def _implicit(table: Table, robot: Robot) -> None:
         for seed in range(IMPLICIT):
             run, angle = runs[seed % len(runs)]
             log = counted_log(run, angle, seed) if "counts" in what else captured_log(run, seed)
-            draws.add(fit_output_error(log, robot, start="rest"))
+            draws.add(identify(log, robot, OutputError(nuisances=(), start="rest")).estimate)
         z = np.asarray(draws.error) / np.asarray(draws.std)
         name = f"turning frame, {what}"
         _cover(table, name, draws, IMPLICIT)
@@ -89,7 +89,7 @@ def counted(angle: np.ndarray, tick: float, jitter: float, rng: np.random.Genera
 
 def least_std(log: Run, robot: Robot, tick: float, deviation: float) -> np.ndarray:
     """Cramer-Rao bound of the six friction numbers: slopes at the truth, Fisher's information of a row of counts."""
-    given = Question(nuisances=(), start="rest", tick_rad=tick)
+    given = OutputError(nuisances=(), start="rest", tick_rad=tick)
     problem = make_problem(read_records([log], robot, given), robot, given)
     ((_, slopes),) = ExactEngine(problem).outputs(problem.start())
     of_row = information(np.full(3, deviation**2), np.full(3, tick))[0] / deviation**2
@@ -108,7 +108,7 @@ def _ticks(table: Table, robot: Robot, counts: int, jitter: float) -> None:
         shown = counted(angle, tick, jitter, np.random.default_rng(seed))
         log = Run(t=run.t, voltage=run.voltage, wheel_angle=shown, source="ticks")
         for way, given in ways.items():
-            draws[way].add(fit_output_error(log, robot, nuisances=(), start="rest", tick_rad=given))
+            draws[way].add(identify(log, robot, OutputError(nuisances=(), start="rest", tick_rad=given)).estimate)
     name = f"{counts} counts a turn, noise {jitter:g} ticks"
     for way in ways:
         least = draws[way].coverage.min()
@@ -129,7 +129,11 @@ def _pose(table: Table, robot: Robot) -> None:
     assert run.pose is not None
     for seed in range(CAPTURED):
         pose = run.pose + CAPTURE * np.random.default_rng(seed).standard_normal(run.pose.shape)
-        draws.add(fit_output_error(Run(t=run.t, voltage=run.voltage, pose=pose), robot, nuisances=(), start="rest"))
+        draws.add(
+            identify(
+                Run(t=run.t, voltage=run.voltage, pose=pose), robot, OutputError(nuisances=(), start="rest")
+            ).estimate
+        )
     _cover(table, "pose by motion capture alone", draws, CAPTURED)
 
 
@@ -145,8 +149,8 @@ def _tilt(table: Table, robot: Robot) -> None:
     for seed in range(TILTED):
         twist = run.twist + NOISE * np.random.default_rng(seed).standard_normal(run.twist.shape)
         log = Run(t=run.t, voltage=held, twist=twist, source="tilted")
-        known.add(fit_output_error(log, robot, nuisances=("tilt",), start="rest"))
-        ignored.add(fit_output_error(log, robot, nuisances=(), start="rest"))
+        known.add(identify(log, robot, OutputError(nuisances=("tilt",), start="rest")).estimate)
+        ignored.add(identify(log, robot, OutputError(nuisances=(), start="rest")).estimate)
     _cover(table, "floor tilted by 1 degree, six numbers and the force", known, TILTED)
     table.add(what="... force along x, std", draws=TILTED, value=known.spread[6], unit="N")
     shift = _shares(ignored, BOX[:1] + BOX[3:4])

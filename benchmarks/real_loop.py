@@ -7,8 +7,8 @@ import time
 import numpy as np
 
 from benchmarks.table import Table
-from omnidyn.identification.steady.study import identify_steady
-from omnidyn.identification.whole_logs import fit_output_error, identify_groups
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError, SteadyState
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
@@ -59,13 +59,17 @@ def robotino(table: Table) -> None:
     (runs, names), (held, their) = floors(FITTED), floors(HELD)
     start = Key.parse(GAIN).set(robot, WRONG * robot.drive.kp)  # type: ignore[operator]
     began = time.process_time()
-    fit = identify_groups(
-        runs, start, names, free=[*LEVELS, GAIN], per_free=LEVELS, nuisances=(), outputs=OUTPUTS, start="rest",
-        loss="student-t",
-    )  # fmt: skip
+    fit = identify(
+        runs,
+        start,
+        OutputError(
+            free=[*LEVELS, GAIN], per_free=LEVELS, nuisances=(), outputs=OUTPUTS, start="rest", loss="student-t"
+        ),
+        groups=names,
+    )
     spent = time.process_time() - began
-    steady = identify_steady(runs, robot, groups=names, shape="ellipse").estimates
-    for floor, estimate in fit.estimates.items():
+    steady = identify(runs, robot, SteadyState(shape="ellipse"), groups=names).study.estimates
+    for floor, estimate in fit.groups.items():
         force, levels = README[floor]
         own = np.array([estimate.value[key] for key in LEVELS])
         along, told = _along(own), _along(np.array(levels))
@@ -84,7 +88,7 @@ def robotino(table: Table) -> None:
             error, mean = _rmse(estimate.robot, mine, name)
             _row(table, "", None, floor, f"rmse of {name}, {len(mine)} held-out free runs", error, unit)
             _row(table, "", None, floor, "... of the mean of each run", mean, unit)
-    one = next(iter(fit.estimates.values()))
+    one = next(iter(fit.groups.values()))
     _row(table, "15 +- 5 (robot file)", None, "both", f"{GAIN}, from {WRONG:g} times 15", one.value[GAIN], "V s/rad",
          one.std[GAIN])  # fmt: skip
     for change in fit.differences:
@@ -98,7 +102,7 @@ def robotino(table: Table) -> None:
         "robotino: the mass from the start is not to be believed: the loop settles within a row, and what the first "
         "rows show is the latency of the log",
     ]
-    table.notes += [f"{floor}: {words}" for floor, each in fit.estimates.items() for words in each.warnings]
+    table.notes += [f"{floor}: {words}" for floor, each in fit.groups.items() for words in each.warnings]
     _transient(table, robot)
 
 
@@ -106,10 +110,16 @@ def _transient(table: Table, robot: Robot) -> None:
     """What the first second shows: when it sets off, and what mass says."""
     gray = [run for run in logs.robotino_groups(logs.folder())["gray 0.2"][::6]]
     runs = [prepared(run, 0.0) for run in gray]
-    fit = fit_output_error(
-        runs, robot, free=[*LEVELS, GAIN, "body.mass_kg"], nuisances=["latency.wheel_speed", "latency.current"],
-        outputs=OUTPUTS, start="rest",
-    )  # fmt: skip
+    fit = identify(
+        runs,
+        robot,
+        OutputError(
+            free=[*LEVELS, GAIN, "body.mass_kg"],
+            nuisances=["latency.wheel_speed", "latency.current"],
+            outputs=OUTPUTS,
+            start="rest",
+        ),
+    ).estimate
     for name, nuisance in fit.nuisances.items():
         _row(table, "", None, "gray 0.2", f"{name}, {len(runs)} runs", nuisance.value, nuisance.unit, nuisance.std)
     _row(table, "", None, "gray 0.2", "body.mass_kg from the start", fit.value["body.mass_kg"], "kg",

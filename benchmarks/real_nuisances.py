@@ -10,9 +10,9 @@ from scipy.stats import trim_mean
 
 from benchmarks import real_loop, udea
 from benchmarks.table import Table
-from omnidyn.identification.question import STUDENT
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import STUDENT, OutputError
 from omnidyn.identification.validation import HELD_OUT, validate
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.first_guess import BODY_AXES, first_guess
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
@@ -69,7 +69,7 @@ def _errors(
 ) -> tuple[dict[str, float], list[str]]:
     """(component -> error of the means of windows in free runs of logs that were not fitted, names of nuisances)."""
     fitted, held = runs
-    fit = fit_output_error(fitted, robot, **asked)
+    fit = identify(fitted, robot, OutputError(**asked)).estimate
     seen = validate(fit, fitted, held)
     compared, found = seen.held_out, {}
     assert compared is not None

@@ -9,7 +9,8 @@ import tempfile
 from pathlib import Path
 
 from omnidyn.cli import main as omnidyn
-from omnidyn.identification.steady.study import identify_steady
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import SteadyState
 from omnidyn.model.robot_file import load_robot
 from omnidyn.report.figures.shapes import draw_polar
 from tests.support import real_logs as logs
@@ -43,7 +44,9 @@ def publish() -> None:
     after = rest.partition(END)[2]
     page.write_text(f"{before}{BEGIN}\n\n```text\n{answer(data)}\n```\n\n{END}{after}", "utf-8")
     named = [(group.split()[0], run) for group, runs in logs.robotino_groups(data).items() for run in runs]
-    study = identify_steady([run for _, run in named], load_robot("robotino"), groups=[floor for floor, _ in named])
+    study = identify(
+        [run for _, run in named], load_robot("robotino"), SteadyState(), groups=[floor for floor, _ in named]
+    ).study
     (DOCS / "images" / "robotino_force.png").write_bytes(draw_polar(study).png)
 
 

@@ -56,7 +56,7 @@ def seen(path: Path, robot: Robot, jitter: float) -> Seen:
 
 def apart(path: Path, equal: Path, robot: Robot) -> float:
     """How far the numbers of two fits are apart, the farthest, in widths of the 95 % interval of equal stamps."""
-    one, other = identify([read_log(equal)], robot), identify([read_log(path)], robot)
+    one, other = identify([read_log(equal)], robot).estimate, identify([read_log(path)], robot).estimate
     if set(one.value) != set(other.value):
         return np.inf
     width = {name: high - low for name, (low, high) in one.ci95.items()}

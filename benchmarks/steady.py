@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.table import Table, machine
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import MotorLine, SteadyState
 from omnidyn.identification.motors.estimate import MotorEstimate
-from omnidyn.identification.motors.study import identify_motors
 from omnidyn.identification.steady.line import fit_line
 from omnidyn.identification.steady.operating_points import ForcePoints, force_points
 from omnidyn.identification.steady.shapes import SHAPES, fit_shape, rms_and_error
-from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -105,7 +105,9 @@ def _study(table: Table, robot: Robot, runs: dict[str, list[Run]], read: float) 
     every = [(run, group.split()[0]) for group, own in runs.items() for run in own]
     for speed in ("set", "wheel"):
         began = time.process_time()
-        study = identify_steady([run for run, _ in every], robot, groups=[name for _, name in every], speed=speed)
+        study = identify(
+            [run for run, _ in every], robot, SteadyState(speed=speed), groups=[name for _, name in every]
+        ).study
         seconds = time.process_time() - began
         ranking = ", ".join(f"{score.name} {score.loo:.2f}+-{score.loo_std:.2f}" for score in study.choice.scores)
         table.add(
@@ -121,7 +123,7 @@ def _study(table: Table, robot: Robot, runs: dict[str, list[Run]], read: float) 
 
 
 def _motors(table: Table, data: Path) -> None:
-    free = identify_motors(logs.robotino_motors(data), input="current", steady=True)
+    free = identify(logs.robotino_motors(data), None, MotorLine(input="current", steady=True)).study
     for line, told in zip(free.motors, ("0.170", "0.142", "0.164", "0.159 +- 0.004"), strict=True):
         _band(table, "free motors: Coulomb [A]", line, told, abs(line.value["dead_band"] - float(told[:5])) < 0.005)
     slope = free.motors[-1]
@@ -130,7 +132,7 @@ def _motors(table: Table, data: Path) -> None:
         where="all", ours=_pm(slope.value["slope"] / 16.0, slope.std["slope"] / 16.0), how="steady windows",
         **{"README or truth": "(3.9 +- 0.3)e-4"},
     )  # fmt: skip
-    stairs = identify_motors(logs.udea_stairs(data)).motors[-1]
+    stairs = identify(logs.udea_stairs(data), None, MotorLine()).motors[-1]
     low, high = np.quantile(stairs.draws["dead_band"], [0.05, 0.95])
     gains = np.quantile(1.0 / stairs.draws["slope"], [0.15865, 0.84135])
     table.add(
@@ -143,14 +145,14 @@ def _motors(table: Table, data: Path) -> None:
         ours=_pm(1.0 / stairs.value["slope"], 0.5 * np.ptp(gains)), how="", **{"README or truth": "0.429 +- 0.073"},
     )  # fmt: skip
     robot, run = logs.udea_turning(data)
-    turning = identify_motors([run], speed="ground", robot=robot).motors[-1]
+    turning = identify([run], robot, MotorLine(speed="ground")).motors[-1]
     _band(table, "turning: dead zone [%]", turning, "0.85 +- 0.54", abs(turning.value["dead_band"] - 0.85) < 0.54)
     table.add(
         "0.09", abs(turning.value["slope"] - 1.96) < 0.09, what="turning: slope [% s/rad]", where="all",
         ours=_pm(turning.value["slope"], turning.std["slope"]), how="speed from heading",
         **{"README or truth": "1.96 +- 0.09"},
     )  # fmt: skip
-    bench = identify_motors(logs.odrive(data, ("step", "chirp"))).motors[0]
+    bench = identify(logs.odrive(data, ("step", "chirp")), None, MotorLine()).motors[0]
     _band(table, "bench: Coulomb [V]", bench, "0.00035 +- 0.00024, none", not bench.dead_band_seen)
     turn = 2.0 * np.pi
     table.add(
@@ -182,8 +184,8 @@ def _simulated(table: Table) -> None:
         held: dict[str, list[bool]] = {key: [] for key in TRUTH[shape]}
         for _ in range(DRAWS):
             runs = [spoiled(run, rng) for run in clean]
-            chosen[identify_steady(runs, axebot).choice.chosen] += 1
-            estimate = identify_steady(runs, axebot, shape=shape).estimate
+            chosen[identify(runs, axebot, SteadyState()).study.choice.chosen] += 1
+            estimate = identify(runs, axebot, SteadyState(shape=shape)).estimate
             for key, truth in TRUTH[shape].items():
                 low, high = estimate.ci95[key]
                 held[key].append(low <= truth <= high)

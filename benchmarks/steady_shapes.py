@@ -9,8 +9,9 @@ import numpy as np
 
 from benchmarks.wrong_worlds.log import right_case, robot_of
 from benchmarks.wrong_worlds.world import BOX, ELLIPSE, World, drive
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import SteadyState
 from omnidyn.identification.steady.choice import base_name
-from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
@@ -81,7 +82,7 @@ def studied(kind: Floors, seed: int, names: tuple[str, str]) -> Seen:
     """Which shapes the floors get."""
     runs, groups, robot, worlds = driven(kind, seed, names)
     began = time.process_time()
-    study = identify_steady(runs, robot, groups=groups)
+    study = identify(runs, robot, SteadyState(), groups=groups).study
     chosen = [study.choice.of(name) for name in names]
     out = Seen([base_name(name) for name in chosen] == kind.true, seconds=time.process_time() - began)
     out.other, out.words = not out.named, " and ".join(chosen)

@@ -22,7 +22,8 @@ from benchmarks.table import Table, machine
 from benchmarks.wrong_worlds.log import AR, SPEEDS
 from benchmarks.wrong_worlds.world import BOX, ELLIPSE, World
 from benchmarks.wrong_worlds.world import WHEELS as AT_WHEELS
-from omnidyn.identification.steady.study import identify_steady
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import SteadyState
 from tests.support import constant_speeds, laws_in_place, rounded_logs, shapes_offered, starts
 from tests.support.axebot_logs import NOISE
 from tests.support.bench_motor import BenchMotor
@@ -186,9 +187,9 @@ def changes(number: int, shape: str) -> Cases:
     plain = constant_speeds.once(number, world, count, number % 2 == 0)
     at, factor = (0.35 + 0.3 * number / 13) * count * constant_speeds.HOLD, (1.05, 1.1)[number % 2]
     run = constant_speeds.once(100 + number, world, count, change=at, factor=factor)
-    moments = identify_steady([run], file_of(world)).moments
+    moments = identify([run], file_of(world), SteadyState()).study.moments
     return {
-        "none": [not identify_steady([plain], file_of(world)).moments],
+        "none": [not identify([plain], file_of(world), SteadyState()).study.moments],
         "when": [any(each.between[0] <= at <= each.between[1] for each in moments)],
         "size": [any(each.ci95[0] <= factor - 1.0 <= each.ci95[1] for each in moments)],
     }

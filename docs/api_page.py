@@ -17,17 +17,24 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
-from omnidyn.identification.question import EVERYONE, MOTORS, Question
+from omnidyn.identification.methods import METHODS
 
 OUTCOME = r"(?:Returns|Raises|Never raises|Errors:)"
 BEGINS = r"(?:^|(?<=\n)|(?<=[.;] ))"  # of the text, a line or a sentence
-NO_SIGNATURE = ("Comparison", "Estimate", "Identification", "Robot", "Question", "OmnidynError")  # made by functions
+NO_SIGNATURE = (
+    "Comparison",
+    "Estimate",
+    "Identification",
+    "Robot",
+    "OmnidynError",
+    *(method.__name__ for method in METHODS),
+)  # made by functions
 
 # What an argument is where its docstring need not say it.
 COMMON = {
     "robot": "as `load_robot` gives it", "run": "of `read_log` or `simulate`", "runs": "of `read_log` or `simulate`",
     "path": "of the file", "force": "replace a file that is there", "draws": "how many plausible robots",
-    "count": "how many", "seed": "of the draws", "question": "all options in one value",
+    "count": "how many", "seed": "of the draws",
     "log": "as `load_log` reads it",
     "duration": "of the whole [s]", "max_steps": "most rows", "wheels": "how many the robot has",
     "progress": "is told what is being done", "watch": "is told what is being done",
@@ -64,13 +71,12 @@ class Told(NamedTuple):
 
 
 def arguments_of(thing: Any) -> list[Argument]:
-    """What a function takes, options of a Question as one; what a value holds."""
+    """What a function takes; what a value holds."""
     if inspect.isclass(thing):
         return _fields_of(thing)
-    options = _options_of(thing)
-    parameters = [each for each in _parameters(thing) if each.name not in options]
-    found = [Argument(_starred(each), short_type(each.annotation), _default(each.default)) for each in parameters]
-    return [*found, Argument("**options", "", "")] if options else found
+    return [
+        Argument(_starred(each), short_type(each.annotation), _default(each.default)) for each in _parameters(thing)
+    ]
 
 
 def _parameters(thing: Any) -> list[inspect.Parameter]:
@@ -80,12 +86,6 @@ def _parameters(thing: Any) -> list[inspect.Parameter]:
 
 def _starred(each: inspect.Parameter) -> str:
     return {each.VAR_KEYWORD: "**", each.VAR_POSITIONAL: "*"}.get(each.kind, "") + each.name
-
-
-def _options_of(thing: Any) -> list[str]:
-    """Names of the options of a Question that a function takes one by one."""
-    names = [each.name for each in _parameters(thing)]
-    return [name for name in Question.__dataclass_fields__ if name in names] if "question" in names else []
 
 
 def _fields_of(thing: type) -> list[Argument]:
@@ -136,14 +136,7 @@ def signature_of(thing: Any) -> tuple[str, str]:
     """(arguments with their defaults, type of what comes back), both without annotations."""
     if inspect.isclass(thing) and thing.__name__ in NO_SIGNATURE:
         return "", ""
-    options = _options_of(thing)
-    plain = [
-        each.replace(annotation=each.empty, default=_shown(each.default))
-        for each in _parameters(thing)
-        if each.name not in options
-    ]
-    if options:
-        plain.append(inspect.Parameter("options", inspect.Parameter.VAR_KEYWORD))
+    plain = [each.replace(annotation=each.empty, default=_shown(each.default)) for each in _parameters(thing)]
     back = inspect.signature(thing).return_annotation
     return str(inspect.Signature(plain)), "" if inspect.isclass(thing) else short_type(back)
 
@@ -195,8 +188,8 @@ def _pieces(text: str, names: Sequence[str]) -> list[str]:
 
 def as_rst(thing: Any, text: str) -> list[str]:
     """The docstring of a function, a value or one of its methods as lines of reStructuredText."""
-    if thing is Question:
-        return [*_escaped(text.partition("\n\n")[0]), "", *_options_table()]
+    if thing in METHODS:
+        return [*_escaped(text.partition("\n\n")[0]), "", *_options_table(thing)]
     takes = arguments_of(thing) if callable(thing) else []
     parts = told(text, [each.name.lstrip("*") for each in takes])
     lines: list[str] = []
@@ -205,10 +198,6 @@ def as_rst(thing: Any, text: str) -> list[str]:
         lines.append("")
     if takes and (len(takes) > 1 or parts.words):
         lines += _table(takes, parts.words, inspect.isclass(thing))
-    options = [] if inspect.isclass(thing) or not takes else _options_of(thing)
-    if options:
-        named = ", ".join(f"``{name}``" for name in options)
-        lines += [f"Options are those of :py:class:`omnidyn.Question`: {named}.", ""]
     for each in parts.outcome:
         lines += [*_escaped(each), ""]
     return lines
@@ -224,15 +213,11 @@ def _table(takes: Iterable[Argument], words: dict[str, str], fields_of_a_value: 
     return _list_table(_without_empty([head, *rows]))
 
 
-def _options_table() -> list[str]:
+def _options_table(method: type) -> list[str]:
     rows = [("option", "default", "what it does")]
-    for each in fields(Question):
-        takers = each.metadata["of"]
-        of = "" if takers == EVERYONE else " Of " + " and ".join(
-            f"{what} by {method}" if what == MOTORS else method for method, what in takers
-        ) + "."  # fmt: skip
-        words = f"{each.metadata['words']} {each.metadata['more']}".rstrip()
-        rows.append((f"``{each.name}``", f"``{each.default!r}``", _escaped(words + of)[0]))
+    for spec in fields(method):
+        words = f"{spec.metadata['words']} {spec.metadata['more']}".rstrip()
+        rows.append((f"``{spec.name}``", f"``{spec.default!r}``", _escaped(words)[0]))
     return _list_table(rows)
 
 

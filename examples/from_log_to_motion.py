@@ -37,7 +37,9 @@ guess = sheet.replace(
     motor=sheet.motor.replace(rotor_inertia=1e-6),
     friction=Friction(direction=DirectionFriction(coulomb=(2, 2), viscous=0.5, yaw_coulomb=0.1, yaw_viscous=0.01)),
 )
-fit = omnidyn.identify([log], guess, free=["friction", "motor.resistance_ohm", "motor.rotor_inertia_kg_m2"])
+fit = omnidyn.identify(
+    [log], guess, omnidyn.OutputError(free=["friction", "motor.resistance_ohm", "motor.rotor_inertia_kg_m2"])
+)
 model = fit.robot.replace(name="identified")
 for name, value in fit.value.items():
     print(f"{name:32} {value:10.4g} +- {fit.std[name]:.1g}")

@@ -9,7 +9,7 @@ TABLE = Path(__file__).parent / "table1.csv"
 robot = omnidyn.load_robot("axebot")
 data = omnidyn.read_steady_table(TABLE)
 for rest in ("line", "bound"):
-    fit = omnidyn.fit_steady_state(robot, data, rest=rest)
+    fit = omnidyn.identify(data, robot, omnidyn.SteadyState(rest=rest)).estimate
     print(f"rest = {rest}")
     for name, value in fit.value.items():
         low, high = fit.ci95[name]

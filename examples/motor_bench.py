@@ -33,6 +33,6 @@ speed += 0.05 * np.random.default_rng(0).standard_normal(len(speed))
 
 run = omnidyn.Run(t=RATE * np.arange(len(voltage)), voltage=voltage[:, None], wheel_speed=speed[:, None])
 omnidyn.write_run(run, "bench.csv", force=True)
-study = omnidyn.identify_motors(run)
+study = omnidyn.identify(run, None, omnidyn.MotorLine())
 print(study.verdict)
 study.plot().savefig("motors.png", dpi=150)

@@ -22,8 +22,8 @@ TABLE = omnidyn.read_steady_table(Path(__file__).resolve().parents[1] / "example
         (lambda: omnidyn.compare(RUN, ROBOT), "a Run before a Robot", r"compare\(robot, run\)"),
         (lambda: omnidyn.compare([RUN, RUN], ROBOT), "a list of Run before a Robot", r"compare\(robot, run\)"),
         (lambda: omnidyn.compare(RUN, ROBOT, ROBOT), "a Run before a Robot", "compare"),
-        (lambda: omnidyn.identify(ROBOT, [RUN]), "a Robot before a list of Run", r"identify\(runs, robot\)"),
-        (lambda: omnidyn.Identification.of(ROBOT, RUN), "a Robot before a Run", "of"),
+        (lambda: omnidyn.identify(ROBOT, [RUN]), "a Robot before a list of Run", r"identify\(logs, robot\)"),
+        (lambda: omnidyn.identify(ROBOT, TABLE), "a Robot before a SteadyTable", r"identify\(logs, robot\)"),
         (lambda: omnidyn.simulate(VOLTS, ROBOT, 0.1), "a ndarray before a Robot", r"simulate\(robot, voltage, dt\)"),
         (
             lambda: omnidyn.simulate(VOLTS.tolist(), ROBOT, 0.1),
@@ -32,13 +32,8 @@ TABLE = omnidyn.read_steady_table(Path(__file__).resolve().parents[1] / "example
         ),
         (lambda: omnidyn.simulate(ROBOT, 0.1, VOLTS), "the time before the voltage", "simulate"),
         (lambda: omnidyn.check(ROBOT, RUN), "a Robot before a Run", r"check\(log\)"),
-        (lambda: omnidyn.fit_output_error(ROBOT, RUN), "a Robot before a Run", "fit_output_error"),
-        (lambda: omnidyn.identify_steady(ROBOT, [RUN]), "a Robot before a list of Run", "identify_steady"),
-        (lambda: omnidyn.identify_groups(ROBOT, [RUN], ["a"]), "a Robot before a list of Run", "identify_groups"),
         (lambda: omnidyn.write_run("run.csv", RUN), "the text 'run.csv' before a Run", r"write_run\(run, path\)"),
         (lambda: omnidyn.save_robot("robot.toml", ROBOT), "the text 'robot.toml' before a Robot", "save_robot"),
-        (lambda: omnidyn.fit_steady_state(TABLE, ROBOT), "a SteadyTable before a Robot", "fit_steady_state"),
-        (lambda: omnidyn.identify_motors(ROBOT, RUN), "a Robot before a Run", "identify_motors"),
         (lambda: omnidyn.breakaway_voltage(VOLTS, ROBOT), "a ndarray before a Robot", "breakaway_voltage"),
         (lambda: omnidyn.moves(VOLTS, ROBOT), "a ndarray before a Robot", r"moves\(robot, voltage\)"),
     ],
@@ -52,16 +47,12 @@ def test_a_swapped_pair_is_recognised(call, got, expected):
     "call, words",
     [
         (lambda: omnidyn.compare("axebot", RUN), "no Robot; got the text 'axebot'; expected compare.*load_robot"),
-        (lambda: omnidyn.identify("log.csv", ROBOT), "no Run; got the text 'log.csv'.*read_log"),
-        (lambda: omnidyn.identify([RUN, ROBOT], ROBOT), "no Run; got a list of Run and Robot"),
+        (lambda: omnidyn.identify("log.csv", ROBOT), "no Run or Log or .*; got the text 'log.csv'.*read_log"),
+        (lambda: omnidyn.identify([RUN, ROBOT], ROBOT), "no Run or Log or .*; got a list of Run and Robot"),
         (lambda: omnidyn.check(None), "no Log or Run; got nothing.*load_log"),
         (
             lambda: omnidyn.read_log(RUN),
             r"no str or PathLike; got a Run; expected read_log.*ready to use",
-        ),
-        (
-            lambda: omnidyn.validate(ROBOT, [RUN]),
-            r"no OutputErrorEstimate; got a Robot; expected validate",
         ),
         (lambda: omnidyn.simulate("axebot", VOLTS, 0.1), "no Robot; got the text 'axebot'"),
     ],
@@ -84,7 +75,7 @@ def test_right_ones_pass_and_what_an_iterator_holds_is_not_asked():
         lambda name: omnidyn.dead_zone_map(name, [0.0]), lambda name: omnidyn.breakaway_voltage(name, VOLTS),
         lambda name: omnidyn.moves(name, VOLTS), lambda name: omnidyn.band(name, VOLTS, 0.1),
         lambda name: omnidyn.acceleration(name, np.zeros(3), np.zeros(3)),
-        lambda name: omnidyn.fit_steady_state(name, TABLE),
+        lambda name: omnidyn.identify(TABLE, name),
     ],
 )  # fmt: skip
 def test_the_name_of_a_robot_is_no_robot_anywhere(call):

@@ -28,16 +28,18 @@ def run():
 
 @pytest.fixture(scope="module")
 def results(run):
-    fit = omnidyn.identify([run], ROBOT, nuisances="none")
+    fit = omnidyn.identify([run], ROBOT, omnidyn.OutputError(nuisances="none")).estimate
     return {
         "run": run,
         "robot": ROBOT,
         "verdict": omnidyn.check(run, ROBOT),
         "comparison": omnidyn.compare(ROBOT, run, coulomb_times(ROBOT, 1.3)),
         "estimate": fit,
-        "identification": omnidyn.Identification.of([run], ROBOT, nuisances="none"),
-        "motors": omnidyn.identify_motors([run]),
-        "steady": omnidyn.identify_steady(clean_runs(robot_with("disc"), AROUND), ROBOT, shape="disc"),
+        "identification": omnidyn.identify([run], ROBOT, omnidyn.OutputError(nuisances="none")),
+        "motors": omnidyn.identify([run], None, omnidyn.MotorLine()).study,
+        "steady": omnidyn.identify(
+            clean_runs(robot_with("disc"), AROUND), ROBOT, omnidyn.SteadyState(shape="disc")
+        ).study,
     }
 
 

@@ -31,7 +31,8 @@ from benchmarks.blind.setups import (
     Setup,
 )
 from benchmarks.wrong_worlds.world import World
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 
 GAIN = "gain"
 OF_MOTORS = (GAIN, OHM, TORQUE, RADIUS)
@@ -126,7 +127,7 @@ def grouped(case: Alike, seed: int) -> tuple[bool, str]:
         f"{case.name}: no fit holds all that is the same"
     )
     run = noisy(setup, driven(case.world(told), setup, seed), seed)
-    lack = fit_output_error(run, robot_of(told), free=setup.free, nuisances=()).lack_of_fit
+    lack = identify(run, robot_of(told), OutputError(free=setup.free, nuisances=())).lack_of_fit
     if lack is None or not lack.remedies:
         return False, "nothing found"
     first = lack.remedies[0]

@@ -5,7 +5,8 @@ from __future__ import annotations
 from benchmarks.blind.log import logged
 from benchmarks.blind.setups import Setup
 from omnidyn.errors import InsufficientDataError
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.keys import Key, in_words
 from omnidyn.model.robot import Robot
 
@@ -16,7 +17,7 @@ def said(setup: Setup, seed: int) -> list[str]:
     """Every statement of what the log does not tell, with what would cure it; none where it tells all."""
     run, robot = logged(setup, seed)
     try:
-        fit = fit_output_error(run, robot, free=setup.free, nuisances=setup.nuisances)
+        fit = identify(run, robot, OutputError(free=setup.free, nuisances=setup.nuisances)).estimate
     except InsufficientDataError as error:
         return [f"{words}; to tell: {error.remedy}" for words in error.what.split("; ")[1:]]
     still = [words for words in map(str, fit.warnings) if STILL in words and _free_there(setup, robot, words)]

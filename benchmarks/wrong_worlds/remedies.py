@@ -12,6 +12,7 @@ from benchmarks.wrong_worlds.log import Case, robot_of, truths
 from benchmarks.wrong_worlds.world import BOX, ELLIPSE, WHEELS, World
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings import GRAVITY
@@ -36,24 +37,26 @@ def refitted(key: str, case: Case, run: Run) -> Any:
     robot = robot_of(case.told)
     try:
         if key == CHANGE:
-            return identify(before(run, WHEN), robot, free=FRICTION)
+            return identify(before(run, WHEN), robot, OutputError(free=FRICTION)).estimate
         if key in SHAPES:
-            return identify(run, robot_of(replace(case.told, shape=SHAPES[key])), free=FRICTION)
+            return identify(run, robot_of(replace(case.told, shape=SHAPES[key])), OutputError(free=FRICTION)).estimate
         if key == FRAME:
             body = robot.body.replace(rotating_frame=True)
-            return identify(run, robot.replace(body=body), free=FRICTION)
+            return identify(run, robot.replace(body=body), OutputError(free=FRICTION)).estimate
         if key == FALL:
             axes = robot.friction.axes
             hold = tuple(1.5 * level for level in axes.coulomb)
             axes = axes.replace(breakaway=hold, stribeck_speed=(0.05, 0.05, 0.5))
             falling = robot.replace(friction=robot.friction.replace(axes=axes))
-            return identify(run, falling, free=(*FRICTION, "friction.axes.breakaway", FALL))
+            return identify(run, falling, OutputError(free=(*FRICTION, "friction.axes.breakaway", FALL))).estimate
         if key == GRIP:
             mu = 1.05 * case.world.traction * robot.wheels.count / (robot.body.mass * GRAVITY)
             slippery = robot.wheels.replace(traction_mu=min(mu, MOST), wheel_inertia=LIGHT)
-            return identify(run, robot.replace(wheels=slippery), free=(*FRICTION, key))
+            return identify(run, robot.replace(wheels=slippery), OutputError(free=(*FRICTION, key))).estimate
         if key.partition(".")[0] in NUISANCES:
-            return identify(run, robot, free=FRICTION, nuisances=tuple(dict.fromkeys((*USUAL, key))))
+            return identify(
+                run, robot, OutputError(free=FRICTION, nuisances=tuple(dict.fromkeys((*USUAL, key))))
+            ).estimate
         return _with_number(key, case, run, robot)
     except OmnidynError:
         return None
@@ -69,11 +72,11 @@ def _with_number(key: str, case: Case, run: Run, robot: Robot) -> Any:
     if start is not None:
         robot = Key.parse(key).set(robot, start)
     try:
-        return identify(run, robot, free=(*FRICTION, key))
+        return identify(run, robot, OutputError(free=(*FRICTION, key))).estimate
     except OmnidynError:
         if true is None:
             raise
-        return identify(run, Key.parse(key).set(robot, true), free=FRICTION)
+        return identify(run, Key.parse(key).set(robot, true), OutputError(free=FRICTION)).estimate
 
 
 def true_value(key: str, world: World) -> Any:

@@ -11,6 +11,7 @@ from benchmarks.wrong_worlds.remedies import FRICTION
 from benchmarks.wrong_worlds.score import is_sure
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 
 FIRST_SEED, SEEDS_EACH = 60_000, 1000
 # Name of a noise -> the sensor, and the correlation of its noise from row to row.
@@ -37,7 +38,7 @@ def score_right(noise: str, number: int) -> Calm:
     seed = FIRST_SEED + SEEDS_EACH * list(NOISES).index(noise) + number
     case = right_case(seed).setup_but(sensor=sensor, memory=memory)
     try:
-        estimate = identify(logged(case, seed), robot_of(case.told), free=FRICTION)
+        estimate = identify(logged(case, seed), robot_of(case.told), OutputError(free=FRICTION)).estimate
     except OmnidynError as error:
         return Calm(words=str(error))
     lack = getattr(estimate, "lack_of_fit", None)

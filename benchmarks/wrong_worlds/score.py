@@ -19,6 +19,7 @@ from benchmarks.wrong_worlds.remedies import FRICTION, NUISANCES, held
 from benchmarks.wrong_worlds.sizes import SIZES
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.run import Run
 
 FIRST_SEED, SEEDS_EACH = 20_000, 100
@@ -104,7 +105,7 @@ def _asked(out: Seen, case: Case, run: Run) -> Any:
     """The estimate of a log, and how far it is off; None of one that is refused."""
     began = time.process_time()
     try:
-        estimate = identify(run, robot_of(case.told), free=FRICTION)
+        estimate = identify(run, robot_of(case.told), OutputError(free=FRICTION)).estimate
         found = bool(getattr(estimate.lack_of_fit, "found", False))
     except OmnidynError as error:  # a refusal is no silence
         out.found, out.words = True, str(error)
@@ -133,7 +134,7 @@ def worst(estimate: Any, rests: Any, true: dict[str, float]) -> tuple[str, bool]
 def _visible(case: Case, seed: int, wrong: Any) -> bool:
     """Whether a test that knows the truth sees it: by how much the same noise fits worse than in the right world."""
     right_log = logged(clean(case), seed)
-    right = identify(right_log, robot_of(case.told), free=FRICTION)
+    right = identify(right_log, robot_of(case.told), OutputError(free=FRICTION)).estimate
     gain = 0.0
     for name in set(right.noise) & set(wrong.noise):  # type: ignore[attr-defined]
         gain += right_log.t.size * np.log(wrong.noise[name] / right.noise[name])  # type: ignore[attr-defined]

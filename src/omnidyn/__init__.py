@@ -22,10 +22,13 @@ _HOME = {
     "Comparison": "omnidyn.comparison.result",
     "Estimate": "omnidyn.identification.estimate",
     "Identification": "omnidyn.identification.identify",
+    "MotorFit": "omnidyn.identification.methods",
+    "MotorLine": "omnidyn.identification.methods",
     "OmnidynError": "omnidyn.errors",
-    "Question": "omnidyn.identification.question",
+    "OutputError": "omnidyn.identification.methods",
     "Robot": "omnidyn.model.robot",
     "Run": "omnidyn.run",
+    "SteadyState": "omnidyn.identification.methods",
     "Tracking": "omnidyn.control.tracking",
     "Tuned": "omnidyn.control.tune",
     "acceleration": "omnidyn.model.dynamics",
@@ -39,12 +42,7 @@ _HOME = {
     "demand": "omnidyn.control.demand",
     "drift": "omnidyn.comparison.drift",
     "feedforward_table": "omnidyn.control.table",
-    "fit_output_error": "omnidyn.identification.whole_logs",
-    "fit_steady_state": "omnidyn.identification.steady.steady_state",
     "identify": "omnidyn.identification.identify",
-    "identify_groups": "omnidyn.identification.whole_logs",
-    "identify_motors": "omnidyn.identification.motors.study",
-    "identify_steady": "omnidyn.identification.steady.study",
     "load_log": "omnidyn.logs.read_log",
     "load_robot": "omnidyn.model.robot_file",
     "moves": "omnidyn.model.deadzone",
@@ -60,7 +58,6 @@ _HOME = {
     "state_space": "omnidyn.model.dynamics",
     "track": "omnidyn.control.closed_loop",
     "tune": "omnidyn.control.tune",
-    "validate": "omnidyn.identification.validation",
     "vary": "omnidyn.model.vary",
     "voltage_for": "omnidyn.control.feedforward",
     "write_run": "omnidyn.logs.run_file",
@@ -83,12 +80,7 @@ if TYPE_CHECKING:
     from omnidyn.findings.check import check
     from omnidyn.identification.estimate import Estimate
     from omnidyn.identification.identify import Identification, identify
-    from omnidyn.identification.motors.study import identify_motors
-    from omnidyn.identification.question import Question
-    from omnidyn.identification.steady.steady_state import fit_steady_state
-    from omnidyn.identification.steady.study import identify_steady
-    from omnidyn.identification.validation import validate
-    from omnidyn.identification.whole_logs import fit_output_error, identify_groups
+    from omnidyn.identification.methods import MotorFit, MotorLine, OutputError, SteadyState
     from omnidyn.logs.command_file import read_commands, read_voltages
     from omnidyn.logs.read_log import load_log, read_log
     from omnidyn.logs.run_file import write_run

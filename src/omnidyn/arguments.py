@@ -15,7 +15,7 @@ MADE_BY = {
     "Log": "omnidyn.load_log(path) makes one",
     "PathLike": "what stands in a file is read by its path; a Run is ready to use",
     "SteadyTable": "omnidyn.read_steady_table(path) makes one",
-    "OutputErrorEstimate": "omnidyn.fit_output_error(runs, robot) makes one",
+    "OutputErrorEstimate": "omnidyn.identify(logs, robot) makes one",
 }
 
 Kinds = type | tuple[type, ...]
@@ -49,7 +49,8 @@ def check_order(call: str, *places: tuple[object, Kinds]) -> None:
                     got=f"{_kind(places[first][0])} before {_kind(places[second][0])}", expected=call,
                 )  # fmt: skip
     given, wanted = places[wrong[0]]
-    names = [each.__name__ for each in (wanted if isinstance(wanted, tuple) else (wanted,))]
+    kinds = wanted if isinstance(wanted, tuple) else (wanted,)
+    names = [kind.__name__ for kind in kinds if kind is not type(None)]
     raise InputError(
         f"an argument is no {' or '.join(names)}", got=_kind(given), expected=call,
         remedy=next((MADE_BY[name] for name in names if name in MADE_BY), ""),

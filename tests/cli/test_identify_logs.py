@@ -124,7 +124,7 @@ def test_unsigned_currents_get_their_sign_when_told(call, floors, tmp_path):
 
 def test_existing_files_are_refused_before_any_work(call, tmp_path, monkeypatch):
     (tmp_path / "fit.toml").write_text("mine")
-    monkeypatch.setattr("omnidyn.identification.steady.study.identify_steady", None)
+    monkeypatch.setattr("omnidyn.identification.identify.fit_steady", None)
     assert call("smooth", "--robot", "axebot", "-o", str(tmp_path / "fit.toml"))[0] == 3
     assert (tmp_path / "fit.toml").read_text() == "mine"
 

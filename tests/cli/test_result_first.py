@@ -9,8 +9,8 @@ import pytest
 import omnidyn
 from omnidyn.cli import main
 from omnidyn.errors import InputError, Terminated
-from omnidyn.identification.identify import Identification
-from omnidyn.identification.question import Question
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.structure import diagnosis
 from omnidyn.identification.structure.ladder import climb
 from omnidyn.logs.read_log import read_log
@@ -71,7 +71,9 @@ def call(folder, monkeypatch, capsys):
 @pytest.fixture(scope="module")
 def undisturbed(folder):
     """The robot file of the fit when nothing fails."""
-    found = Identification.of([read_log(folder / "log0.csv")], load_robot("axebot"), free="friction", nuisances="none")
+    found = identify(
+        [read_log(folder / "log0.csv")], load_robot("axebot"), OutputError(free="friction", nuisances="none")
+    )
     return found.estimate.robot
 
 
@@ -171,11 +173,13 @@ def test_the_phases_have_their_names(folder):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(diagnosis, "diagnose", diagnosing)
-        Identification.of(
-            [read_log(folder / "log0.csv")], robot, Question(free=("friction",), nuisances=()),
+        identify(
+            [read_log(folder / "log0.csv")],
+            robot,
+            OutputError(free=("friction",), nuisances=()),
             progress=lambda report: said.append(str(report)),
             save=lambda fits: said.append(f"saved {', '.join(fits)}"),
-        )  # fmt: skip
+        )
     phases = [words.partition(":")[0].partition(",")[0].partition(" /")[0] for words in said]
     assert [*dict.fromkeys(phases)] == ["fitting", "saved all", "diagnosing", "(diagnosing)", "replaying"]
 
@@ -188,7 +192,9 @@ def test_quick_leaves_out_the_diagnosis_and_says_so(call, tmp_path, monkeypatch,
     assert "Not made: the diagnosis (left out by --quick)." in " ".join(text.split())
     assert "left out by --quick" in page.read_text("utf-8")
     assert load_robot(out).friction == undisturbed.friction
-    fit = omnidyn.identify([read_log("log0.csv")], load_robot("axebot"), quick=True, free="friction", nuisances="none")
+    fit = omnidyn.identify(
+        [read_log("log0.csv")], load_robot("axebot"), omnidyn.OutputError(free="friction", nuisances="none"), quick=True
+    ).estimate
     assert fit.diagnosis is None
     assert fit.lack_of_fit is None
     assert fit.robot.friction == undisturbed.friction

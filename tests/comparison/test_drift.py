@@ -83,7 +83,9 @@ def test_two_floors_of_another_simulator(tmp_path, monkeypatch, capsys):
     rough = case.world_but(coulomb=tuple(1.15 * c for c in case.world.coulomb))
     for seed, (name, world) in enumerate((("first", case), ("second", case), ("rough", rough)), 8101):
         run = logged(world, seed).replace(source=name)
-        omnidyn.save_robot(omnidyn.identify(run, robot_of(case.told), free=FRICTION).robot, f"{name}.toml")
+        omnidyn.save_robot(
+            omnidyn.identify(run, robot_of(case.told), omnidyn.OutputError(free=FRICTION)).robot, f"{name}.toml"
+        )
     assert not drift(["first.toml", "second.toml"]).changed
     found = drift(["first.toml", "second.toml", "rough.toml"])
     assert {KEYS[3], KEYS[4]} <= set(found.changed)

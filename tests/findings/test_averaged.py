@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from omnidyn.findings.check import check
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import MotorLine
 from omnidyn.identification.motors.log import averaged_statements, motor_logs
-from omnidyn.identification.motors.study import identify_motors
 from omnidyn.identification.motors.windows import fit_line, motor_windows
 from omnidyn.logs.averaged import rows_of_mean
 from omnidyn.logs.log import Log
@@ -85,7 +86,7 @@ def test_the_dead_band_of_an_averaged_speed_is_the_true_one(motor, rows):
 @pytest.mark.long
 def test_the_study_of_motors_says_it(motor):
     t, voltage, speed = motor
-    study = identify_motors(Run(t=t, voltage=voltage[:, None], wheel_speed=mean(speed, 20)[:, None]))
+    study = identify(Run(t=t, voltage=voltage[:, None], wheel_speed=mean(speed, 20)[:, None]), None, MotorLine()).study
     low, high = study.motors[0].ci95["dead_band"]
     assert low - 1e-3 < DEAD_BAND < high + 1e-3
     assert [each.numbers["rows"] for each in study.warnings if each.code == "speed_is_mean"] == [20]

@@ -8,6 +8,7 @@ import pytest
 from omnidyn.compiled.kernel import kept
 from omnidyn.identification import first_runs
 from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 
@@ -24,7 +25,7 @@ def test_a_fit_needs_no_other_entries_of_these_kernels():
     run = first_runs._run(load_robot("mecanum"))
     noise = 0.1 * np.random.default_rng(4).standard_normal(run.wheel_speed.shape)
     log = Run(t=run.t, voltage=run.voltage, wheel_speed=run.wheel_speed + noise)  # what most robots record
-    identify(log, load_robot("mecanum"), method="output-error")
+    identify(log, load_robot("mecanum"), OutputError())
     assert asked() == before
 
 

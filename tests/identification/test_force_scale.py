@@ -7,7 +7,7 @@ import pytest
 
 from omnidyn.identification.force_scale import scale_of_motion, scale_of_traction
 from omnidyn.identification.identify import identify
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.methods import OutputError, SteadyState
 from omnidyn.model.keys import BOX, EMF, ROTOR, TORQUE
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
@@ -47,7 +47,10 @@ def part(log, *names):
 
 def test_volts_and_speeds_with_free_motors_scale_with_the_mass(log):
     free = (*BOX, RESISTANCE, INERTIA)
-    one, two = (fit_output_error([part(log, "twist")], robot, free=free) for robot in (AXEBOT, scaled(AXEBOT, mass=2)))
+    one, two = (
+        identify([part(log, "twist")], robot, OutputError(free=free)).estimate
+        for robot in (AXEBOT, scaled(AXEBOT, mass=2))
+    )
     assert one.scale == "all forces scale with body.mass_kg (1.5 kg, given; no rotor is in the robot file)"
     for key in (*BOX, INERTIA):
         assert two.value[key] == pytest.approx(2.0 * one.value[key], rel=1e-3), key
@@ -56,7 +59,7 @@ def test_volts_and_speeds_with_free_motors_scale_with_the_mass(log):
 def test_free_masses_scale_with_the_motors(log):
     free = (*BOX, MASS, INERTIA)
     heavier = scaled(AXEBOT, resistance=0.5)
-    one, two = (fit_output_error([part(log, "twist")], robot, free=free) for robot in (AXEBOT, heavier))
+    one, two = (identify([part(log, "twist")], robot, OutputError(free=free)).estimate for robot in (AXEBOT, heavier))
     assert one.scale == (
         "all forces scale with motor.torque_constant_Nm_A (0.0059 N m/A, given) and motor.resistance_ohm (1.69 ohm, "
         "given)"
@@ -69,7 +72,7 @@ def test_currents_tell_the_resistance_and_leave_the_torque_constant(log):
     logged = part(log, "twist", "current")
     free = (*BOX, MASS, INERTIA, RESISTANCE)
     stronger = scaled(AXEBOT, torque_constant=1.5)
-    one, two = (fit_output_error([logged], robot, free=free) for robot in (AXEBOT, stronger))
+    one, two = (identify([logged], robot, OutputError(free=free)).estimate for robot in (AXEBOT, stronger))
     assert one.scale == "all forces scale with motor.torque_constant_Nm_A (0.0059 N m/A, given)"
     assert two.value[MASS] == pytest.approx(1.5 * one.value[MASS], rel=1e-3)
     assert two.value[RESISTANCE] == pytest.approx(one.value[RESISTANCE], rel=1e-3)
@@ -77,13 +80,13 @@ def test_currents_tell_the_resistance_and_leave_the_torque_constant(log):
 
 def test_wheel_speeds_alone_leave_the_radius_of_the_wheels(log):
     free = (*BOX, RESISTANCE, INERTIA)
-    fit = fit_output_error([part(log, "wheel_speed")], AXEBOT, free=free)
+    fit = identify([part(log, "wheel_speed")], AXEBOT, OutputError(free=free)).estimate
     assert fit.scale.endswith(" and wheels.wheel_radius_m (0.035 m, given)")
-    assert "wheel_radius" not in fit_output_error([part(log, "wheel_speed", "twist")], AXEBOT, free=free).scale
+    assert "wheel_radius" not in identify([part(log, "wheel_speed", "twist")], AXEBOT, OutputError(free=free)).scale
 
 
 def test_both_fixed_both_named(log):
-    fit = fit_output_error([part(log, "twist")], AXEBOT)
+    fit = identify([part(log, "twist")], AXEBOT, OutputError()).estimate
     assert [key in fit.scale for key in (MASS, TORQUE, RESISTANCE)] == [True, True, True]
     assert fit.scale in fit.summary()
     assert json.loads(json.dumps(fit.to_dict()))["scale"] == fit.scale
@@ -131,7 +134,7 @@ def test_steady_stretches_scale_with_the_motors():
     ways = [(np.cos(a), np.sin(a)) for a in np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)]
     levels = [u * np.array([x, y, 0.0]) @ AXEBOT.wheels.wrench_matrix for u in (3.0, 5.0) for x, y in ways]
     run = simulate(AXEBOT, np.repeat(levels, 100, axis=0), 0.02)
-    estimate = identify(run, AXEBOT, method="steady-state", shape="box")
+    estimate = identify(run, AXEBOT, SteadyState(shape="box")).estimate
     words = estimate.scale
     assert words.startswith("all forces scale with motor.torque_constant_Nm_A (0.0059 N m/A, given)")
     assert RADIUS in words

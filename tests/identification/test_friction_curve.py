@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from omnidyn.identification.friction_curve import friction_curve, sliding_force
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import SteadyState
 from omnidyn.identification.steady.line import confidence_band
 from omnidyn.identification.steady.steady_state import fit_steady_state
-from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot_file import load_robot
 from omnidyn.paper.friction import table_1_points
 from tests.support.steady_logs import clean_runs, robot_with, spoiled
@@ -42,8 +43,10 @@ def test_what_is_not_determined_is_named_and_left_out(estimate):
 
 def test_a_disc_is_one_number_and_its_band_that_of_the_number():
     runs = clean_runs(robot_with("disc"), range(0, 360, 30))
-    found = identify_steady(
-        [spoiled(run, np.random.default_rng(k)) for k, run in enumerate(runs)], load_robot("axebot"), shape="disc"
+    found = identify(
+        [spoiled(run, np.random.default_rng(k)) for k, run in enumerate(runs)],
+        load_robot("axebot"),
+        SteadyState(shape="disc"),
     ).estimate
     (name,) = (each for each in found.value if each.startswith("friction.direction.coulomb"))
     curve = friction_curve(found, 1, SPEED)

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from omnidyn import Run, identify, load_robot, simulate
+from omnidyn import Run, load_robot, simulate
 from omnidyn.identification import advice
-from omnidyn.identification.identify import Identification
-from omnidyn.identification.methods import as_driven
+from omnidyn.identification.default_method import as_driven
+from omnidyn.identification.identify import identify
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
 
 
@@ -27,7 +27,7 @@ def duties():
 
 def test_a_robot_fitted_to_duties_has_a_drive_of_duties(duties):
     robot = load_robot("axebot")
-    for fitted in (identify(duties, robot).robot, Identification.of(duties, robot).estimate.robot):
+    for fitted in (identify(duties, robot).robot, identify(duties, robot).estimate.robot):
         assert (fitted.drive.kind, fitted.drive.supply) == ("duty", 6.0)
         again = parse_robot(robot_to_toml(fitted))
         assert again.drive == fitted.drive
@@ -67,5 +67,5 @@ def test_a_fit_to_200_logs_without_noise_that_overlap_ends():
         for k, cut in enumerate(cuts)
     ]
     axes = robot.friction.axes.replace(coulomb=(1.5, 1.0, 0.05))
-    fit = identify(runs, robot.replace(friction=robot.friction.replace(axes=axes)))
+    fit = identify(runs, robot.replace(friction=robot.friction.replace(axes=axes))).estimate
     np.testing.assert_allclose(fit.robot.friction.axes.coulomb, robot.friction.axes.coulomb, rtol=1e-3)

@@ -9,8 +9,9 @@ import pytest
 import omnidyn
 from benchmarks.wrong_worlds.log import NOISE, Case, Setup, logged, robot_of
 from benchmarks.wrong_worlds.world import World, drive
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.validation import validate
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot, save_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -28,7 +29,7 @@ def log():
 
 @pytest.fixture(scope="module")
 def fit(log):
-    return fit_output_error(log, robot_of(World()), nuisances=("latency", "dead_band", "gain", "fade"))
+    return identify(log, robot_of(World()), OutputError(nuisances=("latency", "dead_band", "gain", "fade"))).estimate
 
 
 def test_what_belongs_to_the_robot_is_in_its_file(fit):
@@ -81,11 +82,13 @@ def test_simulate_shows_the_log_as_another_simulator_made_it(fit, log):
 
 
 def test_a_fit_that_starts_from_a_fitted_file_ends_at_the_same_robot(fit, log):
-    again = fit_output_error(log, fit.robot, nuisances=("latency", "dead_band", "gain", "fade"))
+    again = identify(log, fit.robot, OutputError(nuisances=("latency", "dead_band", "gain", "fade"))).estimate
     for key, value in fit.value.items():
         assert again.value[key] == pytest.approx(value, abs=0.02 * fit.std[key])
     assert again.robot.drive.dead_band == pytest.approx(fit.robot.drive.dead_band, rel=1e-3)
-    held = fit_output_error(log, fit.robot, nuisances=("gain", "fade"))  # the file's own dead band and latency hold
+    held = identify(
+        log, fit.robot, OutputError(nuisances=("gain", "fade"))
+    ).estimate  # the file's own dead band and latency hold
     for key, value in fit.value.items():
         assert held.value[key] == pytest.approx(value, abs=0.05 * fit.std[key])
     assert held.robot.drive == fit.robot.drive
@@ -111,9 +114,12 @@ def overlap(one, other):
 def test_two_methods_on_one_log_agree_or_say_why_not():
     """Whole logs tell a dead band from Coulomb friction, steady stretches do not; with the fitted file they agree."""
     log, robot = stairs(971, World(dead=DEAD)), robot_of(World())
-    how = {"method": "steady-state", "shape": "box+viscous"}
-    whole = omnidyn.identify(log, robot)
-    steady, again = omnidyn.identify(log, robot, **how), omnidyn.identify(log, whole.robot, **how)
+    how = omnidyn.SteadyState(shape="box+viscous")
+    whole = omnidyn.identify(log, robot).estimate
+    steady, again = (
+        omnidyn.identify(log, robot, how).estimate,
+        omnidyn.identify(log, whole.robot, how).estimate,
+    )
     for key, interval in whole.ci95.items():
         assert overlap(interval, again.ci95[key]), key
     assert not overlap(whole.ci95["friction.axes.coulomb[0]"], steady.ci95["friction.axes.coulomb[0]"])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from omnidyn.identification.grouping import count_once
-from omnidyn.identification.identify import Identification, identify
-from omnidyn.identification.steady.study import identify_steady
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError, SteadyState
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -40,8 +40,8 @@ def test_another_name_and_another_start_of_time_do_not_make_another_recording():
 
 def test_steady_state_counts_once_and_says_so():
     runs = fan_runs()
-    once = identify_steady(runs, AXEBOT, shape="disc")
-    twice = identify_steady([*runs, *(run.replace(source="again") for run in runs)], AXEBOT, shape="disc")
+    once = identify(runs, AXEBOT, SteadyState(shape="disc")).study
+    twice = identify([*runs, *(run.replace(source="again") for run in runs)], AXEBOT, SteadyState(shape="disc")).study
     assert twice.estimate.std == once.estimate.std
     assert len(twice.points) == len(once.points)
     assert codes(twice.warnings).count("counted_once") == len(runs)
@@ -49,22 +49,20 @@ def test_steady_state_counts_once_and_says_so():
 
 def test_a_recording_in_two_groups_is_no_evidence_of_their_difference():
     runs = fan_runs()
-    study = identify_steady(runs + runs, AXEBOT, groups=["a"] * 24 + ["b"] * 24, shape="disc")
+    study = identify(runs + runs, AXEBOT, SteadyState(shape="disc"), groups=["a"] * 24 + ["b"] * 24).study
     assert [*study.estimates] == ["a", "b"]
     assert any("the groups are not independent" in str(words) for words in study.warnings)
 
 
 def test_output_error_counts_once_and_says_so():
     run = driven(1)
-    once = identify(run, AXEBOT, nuisances=())
-    twice = identify([run, run.replace(source="copy.csv")], AXEBOT, nuisances=())
+    once = identify(run, AXEBOT, OutputError(nuisances=())).estimate
+    twice = identify([run, run.replace(source="copy.csv")], AXEBOT, OutputError(nuisances=())).estimate
     assert twice.std == pytest.approx(once.std)
     assert ("counted_once", "copy.csv") in {(each.code, each.subject) for each in twice.warnings}
 
 
 def test_a_held_out_copy_of_a_fitted_log_proves_nothing():
     run = driven(1)
-    found = Identification.of(
-        [run, run.replace(source="copy.csv")], AXEBOT, hold_out=("copy.csv",), nuisances=()
-    )  # fmt: skip
+    found = identify([run, run.replace(source="copy.csv")], AXEBOT, OutputError(nuisances=()), hold_out=("copy.csv",))
     assert ("held_out_is_fitted", "copy.csv") in {(each.code, each.subject) for each in found.advice}

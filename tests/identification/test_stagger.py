@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.stagger import OFF_NUMBER, apart, robot_of
-from omnidyn import identify_motors
+from omnidyn import MotorLine, identify
 from omnidyn.logs.read_log import read_log
 from tests.support.cases import case
 from tests.support.staggered import Logged, topics
@@ -49,8 +49,8 @@ def bench(path, offset, rows=3000):
 @pytest.mark.parametrize(("offset", "off"), [(3e-6, OFF_NUMBER), (3e-3, 0.5)])
 def test_motors(tmp_path, offset, off):
     """Slope and dead band: off those of equal stamps by so much of their interval; steps come elsewhere in a row."""
-    equal = identify_motors([read_log(bench(tmp_path / "equal.csv", 0.0))]).motors[0]
-    found = identify_motors([read_log(bench(tmp_path / "log.csv", offset))]).motors[0]
+    equal = identify([read_log(bench(tmp_path / "equal.csv", 0.0))], None, MotorLine()).motors[0]
+    found = identify([read_log(bench(tmp_path / "log.csv", offset))], None, MotorLine()).motors[0]
     for name, truth in (("slope", 0.02), ("dead_band", 0.35)):
         low, high = equal.ci95[name]
         assert abs(found.value[name] - equal.value[name]) <= off * (high - low)
@@ -59,7 +59,7 @@ def test_motors(tmp_path, offset, off):
 
 
 def test_the_case_of_a_motor_whose_values_are_appended_one_after_the_other():
-    found = identify_motors([read_log(case("logs/wpilog_stagger/gap3us.wpilog"))]).motors[0]
+    found = identify([read_log(case("logs/wpilog_stagger/gap3us.wpilog"))], None, MotorLine()).motors[0]
     assert found.value["slope"] == pytest.approx(0.0200, abs=0.0001)
     assert found.value["dead_band"] == pytest.approx(0.350, abs=0.002)
     assert found.ci95["dead_band"][0] <= 0.350 <= found.ci95["dead_band"][1]

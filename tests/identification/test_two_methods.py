@@ -7,6 +7,7 @@ from benchmarks.wrong_worlds.log import NOISE, robot_of
 from benchmarks.wrong_worlds.world import World, drive
 from omnidyn.comparison.drift import drift
 from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError, SteadyState
 from omnidyn.run import Run
 
 KEYS = tuple(f"friction.axes.{level}[{axis}]" for level in ("viscous", "coulomb") for axis in range(2))
@@ -26,8 +27,8 @@ def held_commands(seed, world):
 
 def both(seed, world):
     log, robot = held_commands(seed, world), robot_of(World())
-    whole = identify(log, robot, method="output-error")
-    return whole, identify(log, robot, method="steady-state", shape="box+viscous")
+    whole = identify(log, robot, OutputError()).estimate
+    return whole, identify(log, robot, SteadyState(shape="box+viscous")).estimate
 
 
 @pytest.mark.parametrize("seed", range(4))

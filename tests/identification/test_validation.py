@@ -9,12 +9,11 @@ from scipy.signal import lfilter
 
 import omnidyn
 from omnidyn.errors import InputError
-from omnidyn.identification.methods import choose_method
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError, choose_method
 from omnidyn.identification.output_error.conclusion import SCALE_OF_T
 from omnidyn.identification.output_error.fit import NU
-from omnidyn.identification.question import Question
 from omnidyn.identification.validation import Score, coloured, validate
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.actuation import Driver, at_motors
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
@@ -39,7 +38,7 @@ def impaired(seed, seconds=20.0):
 
 @pytest.fixture(scope="module")
 def fit():
-    return fit_output_error(impaired(1), AXEBOT, nuisances=("latency", "gain", "dead_band"), start="rest")
+    return identify(impaired(1), AXEBOT, OutputError(nuisances=("latency", "gain", "dead_band"), start="rest")).estimate
 
 
 def test_a_held_out_log_is_compared_as_it_was_fitted(fit):
@@ -57,7 +56,7 @@ def test_what_lasts_is_not_called_small(fit):
     """A motor twice as weak as the robot file says: the fit takes its errors for noise, the words do not."""
     weak = Key.parse("motor.resistance_ohm").set(AXEBOT, 2.0 * AXEBOT.motor.resistance)
     log = noisy_draw(simulate(weak, excitation(20.0), 0.01), 1)
-    wrong = fit_output_error(log, AXEBOT, nuisances=())
+    wrong = identify(log, AXEBOT, OutputError(nuisances=())).estimate
     found = validate(wrong, [log], [log]).statement()
     assert found.code == "held_out_colour"
     assert found.numbers["share"] > 0.5
@@ -72,7 +71,7 @@ def test_noise_that_remembers_is_not_taken_for_a_fault():
         noise = lfilter([np.sqrt(0.19)], [1.0, -0.9], white, axis=0)[300:] * NOISE
         return Run(t=clean.t, voltage=clean.voltage, twist=clean.twist + noise, source=f"log {seed}")
 
-    fit = fit_output_error(remembered(1), AXEBOT, nuisances=())
+    fit = identify(remembered(1), AXEBOT, OutputError(nuisances=())).estimate
     found = validate(fit, [remembered(1)], [remembered(2)]).statement()
     assert found.code == "held_out_colour"
     assert found.numbers["share"] < 0.01
@@ -80,7 +79,9 @@ def test_noise_that_remembers_is_not_taken_for_a_fault():
 
 def test_another_floor_is_seen(fit):
     rough = Key.parse("friction.axes.coulomb[0]").set(AXEBOT, 3.0)
-    plain = fit_output_error(noisy_draw(simulate(AXEBOT, excitation(20.0), 0.01), 1), AXEBOT, nuisances=())
+    plain = identify(
+        noisy_draw(simulate(AXEBOT, excitation(20.0), 0.01), 1), AXEBOT, OutputError(nuisances=())
+    ).estimate
     other = noisy_draw(simulate(rough, excitation(20.0, seed=5), 0.01), 2)
     found = validate(plain, [other], [other])
     assert found.scores["held out"]["vx"].chi2 > 1.5
@@ -90,7 +91,7 @@ def test_another_floor_is_seen(fit):
 
 def test_a_fit_by_students_t_has_a_chi2_of_one_too():
     run = noisy_draw(simulate(AXEBOT, excitation(20.0), 0.01), 1)
-    fit = fit_output_error(run, AXEBOT, nuisances=(), loss="student-t", start="rest")
+    fit = identify(run, AXEBOT, OutputError(nuisances=(), loss="student-t", start="rest")).estimate
     for score in validate(fit, [run]).scores["fitted"].values():
         assert score.chi2 == pytest.approx(1.0, abs=0.08)
 
@@ -107,7 +108,7 @@ def test_scale_of_students_t_on_gaussian_noise():
 
 def test_without_nuisances_the_run_is_left_alone():
     run = noisy_draw(simulate(AXEBOT, excitation(5.0), 0.01), 1)
-    fit = fit_output_error(run, AXEBOT, nuisances=())
+    fit = identify(run, AXEBOT, OutputError(nuisances=())).estimate
     assert fit.robot.log is None
     assert fit.robot.drive == AXEBOT.drive
 
@@ -123,10 +124,10 @@ def test_voltage_at_the_motors():
 
 def test_identify_takes_output_error_where_it_can():
     run = noisy_draw(simulate(AXEBOT, excitation(10.0), 0.01), 1)
-    estimate = omnidyn.identify([run], AXEBOT)
+    estimate = omnidyn.identify([run], AXEBOT).estimate
     assert estimate.method.startswith("output error")
-    assert estimate.value == fit_output_error(run, AXEBOT).value
-    assert omnidyn.identify(run, AXEBOT, method="output-error", nuisances=()).robot.name == "axebot"
+    assert estimate.value == identify(run, AXEBOT, OutputError()).value
+    assert omnidyn.identify(run, AXEBOT, omnidyn.OutputError(nuisances=())).robot.name == "axebot"
 
 
 def test_what_decides_the_method():
@@ -145,12 +146,12 @@ def test_what_decides_the_method():
 def test_options_of_another_method_are_refused():
     run = noisy_draw(simulate(AXEBOT, excitation(2.0), 0.01), 1)
     with pytest.raises(InputError, match=r"output-error has no such option; got `shape`; expected with steady-state"):
-        omnidyn.identify(run, AXEBOT, method="output-error", shape="disc")
+        omnidyn.identify(run, AXEBOT, omnidyn.SteadyState(shape="disc"))
     with pytest.raises(InputError, match="steady-state has no such option; got `loss`"):
-        omnidyn.identify(run, AXEBOT, method="steady-state", loss="student-t")
+        omnidyn.identify(run, AXEBOT, omnidyn.SteadyState(loss="student-t"))
     with pytest.raises(InputError, match="method: no such method; got magic; expected output-error or steady-state"):
-        omnidyn.identify(run, AXEBOT, method="magic")
-    assert "nuisances (output-error, motors output-error)" in Question.__doc__
+        omnidyn.identify(run, AXEBOT, omnidyn.OutputError())
+    assert "nuisances (output-error, motors output-error)" in OutputError.__doc__
 
 
 def test_one_component_of_many_is_coloured_by_chance_more_often():
@@ -177,7 +178,7 @@ def test_counts_and_positions_are_held_out_too(name):
     robot = AXEBOT.replace(body=AXEBOT.body.replace(rotating_frame=True))
     logs = [counted(robot, seed) for seed in (1, 3, 4)]
     logs = [Run(t=log.t, voltage=log.voltage, **{name: getattr(log, name)}) for log in logs]
-    found = fit_output_error(logs[:2], robot)
+    found = identify(logs[:2], robot, OutputError()).estimate
     for key, value in found.value.items():
         assert abs(value - Key.parse(key).get(robot)) < 4.5 * found.std[key], key
     seen = validate(found, logs[:2], logs[2:])

@@ -10,10 +10,10 @@ import pytest
 from omnidyn.document import sentence
 from omnidyn.findings.finding import Finding, Verdict
 from omnidyn.identification.estimate import Correlation, Estimate
-from omnidyn.identification.identify import Identification
+from omnidyn.identification.identify import Identification, identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.motors.study import motors_verdict
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.question import Question
 from omnidyn.identification.verdict import fit_verdict, fits_verdict, steady_verdict
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot_file import load_robot
@@ -128,7 +128,7 @@ def test_groups_faults_and_interrupts_are_said():
 
 def test_the_sentence_stands_first():
     run = noisy_draw(simulate(AXEBOT, excitation(10.0), 0.01), 1)
-    found = Identification.of(run, AXEBOT)
+    found = identify(run, AXEBOT)
     text = found.document().to_text(400)
     assert text.splitlines()[0] == found.verdict
     assert found.verdict.startswith("On the fitted logs the model follows speed over the ground within ")
@@ -169,7 +169,7 @@ def test_no_shape_fits():
     assert said(*steady_verdict(study(7.0))) == (
         "No shape of friction explains the forces: the best, disc, misses 7 N of 10 N in a direction that was left out."
     )
-    found = Identification(Question(), "steady-state", {"all": estimate([0.02] * 6, Estimate)}, study=study(7.0))
+    found = Identification(OutputError(), "steady-state", {"all": estimate([0.02] * 6, Estimate)}, study=study(7.0))
     assert found.verdict.startswith("Failed: no shape of friction explains the forces: the best, disc, misses 7 N")
     assert found.verdict.endswith("the numbers mean nothing until that is mended.")
     assert replace(found, study=study(0.5)).failures == ()
@@ -178,7 +178,7 @@ def test_no_shape_fits():
 def test_what_the_verdict_calls_meaningless_is_a_failure():
     """The sentence said that the numbers mean nothing, and `failures` was empty: exit 0."""
     lost = estimate([0.02] * 6, not_followed=("wheel_speed[0]",))
-    found = Identification(Question(), "output-error", {"all": lost})
+    found = Identification(OutputError(), "output-error", {"all": lost})
     assert [*map(str, found.failures)] == ["the model does not follow wheel_speed[0]"]
     scores = SimpleNamespace(scores={"fitted": BAD}, not_followed=lambda noise: {})
     hardly = replace(found, estimates={"all": estimate([0.02] * 6)}, validations={"all": scores})

@@ -43,7 +43,7 @@ def test_frames_are_taken_wherever_a_run_is(kind, tmp_path):
     assert str(omnidyn.check(frame, ROBOT)) == str(omnidyn.check(omnidyn.interop.run_of(frame), ROBOT))
     omnidyn.write_run(frame, tmp_path / "run.csv")
     assert np.array_equal(omnidyn.read_log(str(tmp_path / "run.csv")).twist, one.twist)
-    fits = [omnidyn.identify(each, ROBOT, free=["friction.axes.coulomb"])
+    fits = [omnidyn.identify(each, ROBOT, omnidyn.OutputError(free=["friction.axes.coulomb"])).estimate
             for each in (frame, one)]  # fmt: skip
     assert fits[0].value == fits[1].value
 
@@ -105,7 +105,7 @@ def test_without_the_library_it_says_what_to_install(monkeypatch, library):
 @pytest.mark.parametrize("library", ["pandas", "polars"])
 def test_estimates_and_comparisons_as_tables(library):
     pytest.importorskip(library)
-    fit = omnidyn.identify(run(), ROBOT, free=["friction.axes.coulomb"])
+    fit = omnidyn.identify(run(), ROBOT, omnidyn.OutputError(free=["friction.axes.coulomb"])).estimate
     table = fit.to_dataframe(library)
     assert list(table["parameter"]) == list(fit.value)
     assert list(table["value"]) == list(fit.value.values())

@@ -8,7 +8,7 @@ check/test_values.py, check/test_wiring.py; 27, 28 check/test_motion.py; 29 benc
 import numpy as np
 import pytest
 
-from omnidyn import check, identify_steady, load_log, load_robot, read_log, simulate, write_run
+from omnidyn import SteadyState, check, identify, load_log, load_robot, read_log, simulate, write_run
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.logs.read_log import LogOptions
 from omnidyn.logs.segments import segments
@@ -135,7 +135,7 @@ def test_27_a_robot_that_never_moved_gives_no_friction(tmp_path):
     still = simulate(ROBOT, [[0.0, 0.5, -0.5]] * 500, DT)
     assert check(log_of(still, tmp_path), ROBOT).of("never_moved")
     with pytest.raises(InsufficientDataError, match=r"nothing|steady|moved"):
-        identify_steady([still], ROBOT)
+        identify([still], ROBOT, SteadyState())
 
 
 def test_28_a_blocked_robot_is_found(run, tmp_path):

@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from omnidyn import identify_motors, read_log
+from omnidyn import MotorLine, identify, read_log
 from omnidyn.errors import InputError
 from omnidyn.logs.motor_table import read_motor_table
 from omnidyn.logs.read_log import load_log
@@ -23,7 +23,7 @@ def made(name, folder):
 
 def numbers(run):
     """(slope, dead band, lag [s]) of the first motor."""
-    found = identify_motors([run]).to_dict()["motors"][0]["parameters"]
+    found = identify([run], None, MotorLine()).study.to_dict()["motors"][0]["parameters"]
     return [found[key]["value"] for key in ("slope", "dead_band", "lag")]
 
 
@@ -92,7 +92,7 @@ def test_the_array_of_a_board_shifts_no_motor(tmp_path):
         names = {key: column.name for key, column in log.columns.columns.items()}
         assert [names[f"u{k}"] for k in (1, 2, 3, 4)] == [f"/drive/motor{k}/voltage_V" for k in (1, 2, 3, 4)]
         assert [names[f"w{k}"] for k in (1, 2, 3, 4)] == [f"/drive/motor{k}/velocity_rad_s" for k in (1, 2, 3, 4)]
-        motors = identify_motors([log.to_run()]).to_dict()["motors"]
+        motors = identify([log.to_run()], None, MotorLine()).study.to_dict()["motors"]
         bands = [motor["parameters"]["dead_band"]["value"] for motor in motors[:4]]
         assert bands == pytest.approx([0.3, 0.4, 0.5, 0.6], abs=0.01)
 

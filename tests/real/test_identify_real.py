@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from omnidyn.identification.motors.study import identify_motors
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import MotorLine, SteadyState
 from omnidyn.identification.steady.line import fit_line
 from omnidyn.identification.steady.operating_points import force_points
 from omnidyn.identification.steady.shapes import SHAPES, fit_shape, rms_and_error
-from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.robot_file import load_robot
 from tests.support import real_logs as logs
 
@@ -103,7 +103,9 @@ def test_b_of_the_gray_floor_is_not_identifiable(runs, points):
 @pytest.fixture(scope="session")
 def study(runs):
     every = [(run, group.split()[0]) for group, own in runs.items() for run in own]
-    return identify_steady([run for run, _ in every], ROBOTINO, groups=[name for _, name in every], speed="set")
+    return identify(
+        [run for run, _ in every], ROBOTINO, SteadyState(speed="set"), groups=[name for _, name in every]
+    ).study
 
 
 def test_one_call_tells_the_story_of_both_floors(study):
@@ -136,7 +138,7 @@ def test_the_floors_differ_and_it_says_by_how_much(study):
 
 def test_free_motors(data):
     """README: |i| = 0.159+-0.004 + (3.9+-0.3)e-4 |w| at the motor; Coulomb 0.170, 0.142, 0.164 A."""
-    study = identify_motors(logs.robotino_motors(data), input="current", steady=True)
+    study = identify(logs.robotino_motors(data), None, MotorLine(input="current", steady=True)).study
     lines = {line.motor: line for line in study.motors}
     assert lines[None].value["dead_band"] == pytest.approx(0.159, abs=0.005)
     assert lines[None].value["slope"] / 16.0 == pytest.approx(3.9e-4, abs=0.3e-4)
@@ -147,7 +149,7 @@ def test_free_motors(data):
 
 def test_the_dead_zone_of_the_stairs_is_not_identifiable(data):
     """README: slope 0.429+-0.073 (rad/s)/%, zero crossing -1.75 %, 90 % -14..+4.8."""
-    study = identify_motors(logs.udea_stairs(data))
+    study = identify(logs.udea_stairs(data), None, MotorLine()).study
     line = study.motors[-1]
     assert 1.0 / line.value["slope"] == pytest.approx(0.429, abs=0.073)
     assert -14.0 < line.value["dead_band"] < 4.8
@@ -160,7 +162,7 @@ def test_the_dead_zone_of_the_stairs_is_not_identifiable(data):
 def test_the_motors_of_a_robot_that_turns_on_the_spot(data):
     """README: u = (1.96+-0.09) w + (0.85+-0.54) sgn w, slope 0.51 (rad/s)/%; the speed from the heading."""
     robot, run = logs.udea_turning(data)
-    line = identify_motors([run], speed="ground", robot=robot).motors[-1]
+    line = identify([run], robot, MotorLine(speed="ground")).motors[-1]
     assert line.value["slope"] == pytest.approx(1.96, abs=0.09)
     assert line.value["dead_band"] == pytest.approx(0.85, abs=0.54)
     assert line.std["dead_band"] == pytest.approx(0.54, rel=0.3)
@@ -169,7 +171,7 @@ def test_the_motors_of_a_robot_that_turns_on_the_spot(data):
 
 def test_no_friction_is_invented_on_the_bench(data):
     """The negative control: Coulomb 0.35+-0.24 mV, that is none; 0.05509 V/(turn/s)."""
-    study = identify_motors(logs.odrive(data, ("step", "chirp")))
+    study = identify(logs.odrive(data, ("step", "chirp")), None, MotorLine()).study
     (line,) = study.motors
     assert not line.dead_band_seen
     low, high = line.ci95["dead_band"]
@@ -179,5 +181,5 @@ def test_no_friction_is_invented_on_the_bench(data):
 
 
 def test_noise_whose_input_is_not_in_the_log_is_not_replayed(data):
-    windows = identify_motors(logs.odrive(data, ("step", "chirp", "noise"))).windows
+    windows = identify(logs.odrive(data, ("step", "chirp", "noise")), None, MotorLine()).study.windows
     assert windows.unresolved > 10

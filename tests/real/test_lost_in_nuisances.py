@@ -3,7 +3,8 @@
 import pytest
 
 from benchmarks import real_nuisances, udea
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.run import Run
 from tests.support import real_logs as logs
 
@@ -18,7 +19,7 @@ def turning(data):
 
 def test_the_answer_does_without_a_dead_band_and_a_gain(turning):
     robot = real_nuisances._udea()
-    fit = fit_output_error(turning, robot)
+    fit = identify(turning, robot, OutputError()).estimate
     assert [*fit.nuisances] == ["latency.heading"]
     assert ("dead_band", "gain") in [each.numbers.get("nuisances") for each in fit.warnings]
     assert fit.converged

@@ -31,7 +31,9 @@ def duty_log(seed):
 def found():
     runs = [duty_log(seed) for seed in (1, 2)]
     logs = [Log.of_run(run) for run in runs]
-    return omnidyn.Identification.of(runs, ROBOT, logs=logs, hold_out="drive2.csv", nuisances=("latency", "dead_band"))
+    return omnidyn.identify(
+        runs, ROBOT, omnidyn.OutputError(nuisances=("latency", "dead_band")), check=logs, hold_out="drive2.csv"
+    )
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +95,7 @@ def counted():
     tick = 2.0 * np.pi / 2048
     angle = np.cumsum(np.vstack([np.zeros(3), 0.5 * (run.wheel_speed[1:] + run.wheel_speed[:-1]) * 0.01]), axis=0)
     kept = omnidyn.Run(t=run.t, voltage=run.voltage, wheel_angle=np.floor(angle / tick) * tick, source="counts.csv")
-    return omnidyn.Identification.of([kept], ROBOT, nuisances="none")
+    return omnidyn.identify([kept], ROBOT, omnidyn.OutputError(nuisances="none"))
 
 
 def test_labels_of_residuals_are_whole_and_rounding_is_part_of_the_noise_of_counts(counted):

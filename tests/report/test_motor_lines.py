@@ -80,9 +80,9 @@ def test_a_start_that_was_seen_stands_where_the_line_does_not_cross():
 def test_free_runs_have_a_picture_too():
     t, put_in = ramps([3.0, -3.0], 0.8, 0.01)
     speed, *_ = BenchMotor().turn(t, put_in)
-    study = omnidyn.identify_motors(
-        omnidyn.Run(t=t, voltage=put_in[:, None], wheel_speed=speed[:, None] + 1e-3), method="output-error"
-    )
+    study = omnidyn.identify(
+        omnidyn.Run(t=t, voltage=put_in[:, None], wheel_speed=speed[:, None] + 1e-3), None, omnidyn.MotorFit()
+    ).study
     (panel,) = study.plot().axes
     assert len(labelled(panel, STARTS)) == 2
     assert "<figure" in render_motors(study, {"omnidyn": "0.1.0", "command": "", "inputs": []})

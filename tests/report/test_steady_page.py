@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.motors.study import identify_motors
-from omnidyn.identification.steady.study import identify_steady
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import MotorLine, SteadyState
 from omnidyn.model.known.dead_zone import dead_zone
 from omnidyn.model.robot_file import load_robot
 from omnidyn.report.figures.motor_lines import draw_motor_lines
@@ -25,7 +25,9 @@ RECORD = {
 def study():
     rng = np.random.default_rng(0)
     runs = [spoiled(run, rng) for run in clean_runs(robot_with("ellipse"), range(0, 360, 30))]
-    return identify_steady([*runs, *runs], load_robot("axebot"), groups=["first"] * 12 + ["<second>"] * 12)
+    return identify(
+        [*runs, *runs], load_robot("axebot"), SteadyState(), groups=["first"] * 12 + ["<second>"] * 12
+    ).study
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +35,7 @@ def motors():
     t = np.arange(600) * 0.01
     speed = np.repeat([2.0, -3.0, 5.0, -6.0, 4.0, 1.0], 100)[:, None]
     angle = np.cumsum(np.vstack([[[0.0]], speed[:-1]]) * 0.01, axis=0)
-    return identify_motors([Run(t=t, voltage=0.5 * speed + 0.4 * np.sign(speed), wheel_angle=angle)])
+    return identify([Run(t=t, voltage=0.5 * speed + 0.4 * np.sign(speed), wheel_angle=angle)], None, MotorLine()).study
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,8 @@
 import pytest
 
 from omnidyn.compiled.kernel import Linked
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
@@ -50,6 +51,8 @@ def test_a_simulation_calls_kernels_alone(name):
 @pytest.mark.usefixtures("_linked_only")
 def test_a_diagnosis_calls_kernels_alone():
     """It tries a fall and bristles, which the robot has not."""
-    estimate = fit_output_error(noisy(simulate(AXEBOT, excitation(5.0, 100.0, 3), 0.01), 4), AXEBOT, nuisances=())
+    estimate = identify(
+        noisy(simulate(AXEBOT, excitation(5.0, 100.0, 3), 0.01), 4), AXEBOT, OutputError(nuisances=())
+    ).estimate
     assert estimate.lack_of_fit is not None
     assert not estimate.lack_of_fit.found

@@ -210,7 +210,9 @@ def test_a_live_robot_feels_it_as_well(kind):
         lambda robot: omnidyn.acceleration(robot, np.zeros(3), np.zeros(3)),
         lambda robot: derivatives(robot, np.ones((5, 3)), 0.01, ["friction.axes.viscous[0]"]),
         lambda robot: omnidyn.track(robot, "circle"),
-        lambda robot: omnidyn.fit_output_error(omnidyn.simulate(AXEBOT, np.ones((50, 3)), 0.01), robot),
+        lambda robot: (
+            omnidyn.identify(omnidyn.simulate(AXEBOT, np.ones((50, 3)), 0.01), robot, omnidyn.OutputError()).estimate
+        ),
     ],
     ids=["dead zone", "acceleration", "derivatives", "control", "fit"],
 )

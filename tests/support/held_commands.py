@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -37,4 +38,4 @@ def log_of(voltage, disturbed=lambda clean, rng: 0.0, rho=0.0, seed=1, twist=lam
 
 def lack_of(*args, **options):
     """Of a fit to such a log."""
-    return fit_output_error(log_of(*args, **options), AXEBOT, nuisances=()).lack_of_fit
+    return identify(log_of(*args, **options), AXEBOT, OutputError(nuisances=())).lack_of_fit

@@ -8,7 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.friction import DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import Key, friction_keys
 from omnidyn.model.robot_file import load_robot
@@ -83,7 +84,9 @@ def log_of(place, law, seed, noise):
 def climbed(place, law, seed, noise):
     """What the ladder makes of a log under the file of plain friction, 1.3 times as large."""
     robot = robot_of(place, "none", 1.3)
-    return fit_output_error([log_of(place, law, seed, noise)], robot, free=("friction",), nuisances=(), ladder=True)
+    return identify(
+        [log_of(place, law, seed, noise)], robot, OutputError(free=("friction",), nuisances=(), ladder=True)
+    ).estimate
 
 
 def numbers_of(place, law):

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from omnidyn.identification.motors.study import identify_motors
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import MotorLine
 from omnidyn.run import Run
 from tests.support.bench_motor import BenchMotor, encoder, ramps
 
@@ -28,7 +29,9 @@ def held_of(motor, seed, names=("start",), **how):
     """name -> whether the interval holds the truth, of each direction of a draw."""
     run, stops = bench(motor, seed, **how)
     held = {name: [] for name in names}
-    for each, hold, slide in zip(both_ways(identify_motors([run])), motor.hold, motor.slide, strict=True):
+    for each, hold, slide in zip(
+        both_ways(identify([run], None, MotorLine()).study), motor.hold, motor.slide, strict=True
+    ):
         rest = np.mean([side * put_in for side, put_in in stops if side == each.side])
         true = {"start": hold, "stop": rest, "slope": motor.slope, "offset": slide}
         true["lag"] = motor.inertia / motor.slope

@@ -3,7 +3,8 @@
 import numpy as np
 
 from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of, truths
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 
 
 def rounded(values, step):
@@ -14,7 +15,9 @@ def errors(seed, step):
     """(errors of the friction numbers in standard errors, warnings) of a log whose voltages are rounded."""
     case = right_case(3 * seed).setup_but(sensor=SPEEDS, memory=0.0, rate=50.0)
     run = logged(case, 7000 + seed)
-    fit = fit_output_error(run.replace(voltage=rounded(run.voltage, step)), robot_of(case.told), nuisances=())
+    fit = identify(
+        run.replace(voltage=rounded(run.voltage, step)), robot_of(case.told), OutputError(nuisances=())
+    ).estimate
     truth = truths(case.told, case.told.shape)
     return [(fit.value[key] - true) / fit.std[key] for key, true in truth.items()], fit.warnings
 
@@ -27,4 +30,4 @@ def a_fit(seed, step, make=lambda case: case, sensor=SPEEDS, memory=0.0, duties=
     inputs = (
         {"voltage": None, "duty": volts / 12.0, "supply": np.full(len(run.t), 12.0)} if duties else {"voltage": volts}
     )
-    return fit_output_error(run.replace(**inputs), robot_of(case.told), free="friction")
+    return identify(run.replace(**inputs), robot_of(case.told), OutputError(free="friction")).estimate

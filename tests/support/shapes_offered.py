@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from omnidyn.identification.steady.study import identify_steady
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import SteadyState
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from tests.support.plain_world import World, at_wheels, fan, on_rollers, spoiled, steady_logs, turned_box
@@ -34,4 +35,4 @@ def study(name, seed, speeds=(0.4,), step=15, **noise):
     for twist, log in CLEAN[key]:
         t, current, speed = spoiled(log, random, **noise)
         runs.append(Run(t=t, current=current, wheel_speed=speed, twist_command=np.tile(twist, (len(t), 1))))
-    return identify_steady(runs, AXEBOT)
+    return identify(runs, AXEBOT, SteadyState()).study

@@ -5,7 +5,8 @@ import numpy as np
 from benchmarks.wrong_worlds.log import NOISE as SENSOR
 from benchmarks.wrong_worlds.log import Case, commands, robot_of, truths
 from benchmarks.wrong_worlds.world import World, drive
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.run import Run
 
 RATIO = 1.3
@@ -23,7 +24,7 @@ def in_a_turning_frame(seed, **options):
     speed = drive(world, t, asked, t).wheel_speed
     speed = speed + SENSOR * np.random.default_rng([seed, 3]).normal(size=speed.shape)
     log = Run(t, voltage=asked, wheel_speed=speed)
-    fit = fit_output_error(log, robot_of(world), free=["friction", *LEVELS], **options)
+    fit = identify(log, robot_of(world), OutputError(free=["friction", *LEVELS], **options)).estimate
     levels = zip(LEVELS, (RATIO * level for level in world.coulomb), strict=True)
     return fit, truths(world, "axes") | dict(levels)
 
@@ -65,7 +66,9 @@ def log_of_starts(seed, world, count=14, turns=True):
 def of_starts(seed, shape, keys, *options):
     """(fit, truth) of such a log."""
     world = World(frame=True, breakaway=RATIO, shape=shape)
-    fit = fit_output_error(log_of_starts(seed, world, *options), robot_of(world), free=["friction", *keys])
+    fit = identify(
+        log_of_starts(seed, world, *options), robot_of(world), OutputError(free=["friction", *keys])
+    ).estimate
     truth = truths(world, shape)
     return fit, truth | {key: RATIO * truth[key.replace("breakaway", "coulomb")] for key in keys}
 
@@ -93,5 +96,7 @@ def of_slants(seed, count):
     t = np.arange(len(rows)) / 100.0
     speed = drive(world, t, rows, t).wheel_speed
     speed = speed + SENSOR * np.random.default_rng([seed, 3]).normal(size=speed.shape)
-    fit = fit_output_error(Run(t, voltage=rows, wheel_speed=speed), robot_of(world), free=["friction", *PLANE])
+    fit = identify(
+        Run(t, voltage=rows, wheel_speed=speed), robot_of(world), OutputError(free=["friction", *PLANE])
+    ).estimate
     return fit, {key: RATIO * slides for key in PLANE}

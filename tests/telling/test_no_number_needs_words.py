@@ -7,8 +7,8 @@ import pytest
 import omnidyn
 from omnidyn import shown
 from omnidyn.cli import main
-from omnidyn.identification.motors.study import identify_motors
-from omnidyn.identification.steady.study import identify_steady
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import MotorLine, SteadyState
 from tests.support.steady_logs import clean_runs, robot_with
 
 AXEBOT = omnidyn.load_robot("axebot")
@@ -26,11 +26,11 @@ def comparison() -> dict:
 
 
 def steady_study() -> dict:
-    return identify_steady(clean_runs(robot_with("disc"), range(0, 360, 15)), AXEBOT).document().data
+    return identify(clean_runs(robot_with("disc"), range(0, 360, 15)), AXEBOT, SteadyState()).study.document().data
 
 
 def motor_fit() -> dict:
-    return identify_motors([gapped_run()]).to_dict()
+    return identify([gapped_run()], None, MotorLine()).study.to_dict()
 
 
 def without_words(value):

@@ -3,7 +3,8 @@
 import numpy as np
 
 from omnidyn import shown
-from omnidyn.identification.identify import Identification
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.robot_file import load_robot, robot_to_toml
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation, noisy_draw
@@ -15,7 +16,7 @@ HEAVY = AXEBOT.replace(body=AXEBOT.body.replace(inertia=4.0 * AXEBOT.body.inerti
 def identified():
     """All that the fit of a robot with a wrong inertia says in numbers and codes."""
     run = noisy_draw(simulate(AXEBOT, excitation(8.0), 0.01), 1)
-    found = Identification.of(run, HEAVY, nuisances=())
+    found = identify(run, HEAVY, OutputError(nuisances=()))
     fit = found.fits["all"]
     lack = fit.lack_of_fit
     assert lack is not None

@@ -7,27 +7,27 @@ import os
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import typer
 
 import omnidyn
 from omnidyn.attempts import Attempts, not_made
+from omnidyn.cli import identify_options
 from omnidyn.cli import log_options as options
 from omnidyn.cli.identify_logs import Loaded
+from omnidyn.cli.identify_options import MOTORS, Asked
 from omnidyn.cli.identify_show import Out, say_written
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.flags import flags
 from omnidyn.cli.terminal.help import MORE
-from omnidyn.cli.terminal.numbers import number_list
 from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import end_failed, tell
 from omnidyn.document import apart, sentence
 from omnidyn.files import check_output
-from omnidyn.identification.question import MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
-from omnidyn.identification.question import options as fields_of_question
+from omnidyn.identification.methods import OutputError, SteadyState
 from omnidyn.progress import Progress, Report
 
 if TYPE_CHECKING:
@@ -37,23 +37,19 @@ if TYPE_CHECKING:
 
 
 def _asks(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with an option for every field of a Question that has a flag, after --robot, --out and --report."""
-    asked = []
-    for each in fields_of_question():
-        if each.metadata["flag"] is None:
-            continue
-        many = isinstance(each.default, tuple) or each.name in ("free", "nuisances")
-        words = f"{each.metadata['words']}{' Repeatable.' if many else ''}"
-        default: Any = [] if many else "" if each.default is None else each.default
+    """The command with every option of a method that has a flag, after --robot, --out and --report."""
+    flagged = []
+    for name, spec in identify_options.options().items():
+        default = identify_options.default_of(spec)
+        many = isinstance(default, list)
+        words = f"{spec.metadata['words']}{' Repeatable.' if many else ''}"
         kind: Any = list[str] if many else type(default)
-        least, metavar = 0 if kind is int else None, each.metadata["metavar"] or None
-        panel = None if each.metadata["first"] else MORE
-        option = typer.Option(
-            default, flags()[each.name], metavar=metavar, help=words, min=least, rich_help_panel=panel
-        )
-        asked.append(inspect.Parameter(each.name, inspect.Parameter.KEYWORD_ONLY, default=option, annotation=kind))
+        least, metavar = 0 if kind is int else None, spec.metadata["metavar"] or None
+        panel = None if spec.metadata["first"] else MORE
+        option = typer.Option(default, flags()[name], metavar=metavar, help=words, min=least, rich_help_panel=panel)
+        flagged.append(inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=option, annotation=kind))
     own = [p for p in inspect.signature(command).parameters.values() if p.kind is not p.VAR_KEYWORD]
-    command.__signature__ = inspect.Signature([*own[:4], *asked, *own[4:]])  # type: ignore[attr-defined]
+    command.__signature__ = inspect.Signature([*own[:4], *flagged, *own[4:]])  # type: ignore[attr-defined]
     return command
 
 
@@ -72,7 +68,7 @@ def identify(
     json: bool = typer.Option(False, "--json", help="The result for machines."),
     full: bool = typer.Option(False, "--full", help="All that the result says, not only the first screen."),
     flags: LogFlags = NO_FLAGS,
-    **asked: Any,
+    **given: Any,
 ) -> None:
     """Identify a robot from its logs: friction, and what --free names.
 
@@ -84,9 +80,8 @@ def identify(
     from omnidyn.cli.identify_logs import Reading, is_motor_table, is_steady_table
     from omnidyn.cli.identify_show import Out, tell_table
 
-    question, to = _question(asked), Out(report, out, force, json, full)
-    question = replace(question, method=question.method_asked())
-    if not robot and question.what != MOTORS:
+    asked, to = identify_options.asked(given), Out(report, out, force, json, full)
+    if not robot and asked.what != MOTORS:
         of_motors = len(logs) == 1 and os.path.isfile(logs[0]) and is_motor_table(logs[0])
         table = f" {logs[0]} is a table of motors: say --what motors, which needs no robot." if of_motors else ""
         raise typer.BadParameter(f"Missing option '--robot'.{table}")
@@ -95,54 +90,50 @@ def identify(
             check_output(path, force)
     options.keep_inputs(logs, [robot], [flags.map_file], out, report, flags.save_map)
     options.refuse_missing(logs)
-    if question.what != MOTORS and len(logs) == 1 and is_steady_table(logs[0]):
-        tell_table(logs[0], robot, question, to)
+    if asked.what != MOTORS and len(logs) == 1 and is_steady_table(logs[0]):
+        tell_table(logs[0], robot, asked, to)
         return
-    if question.what == MOTORS and len(logs) == 1 and flags.rate is None and is_motor_table(logs[0]):
-        tell_motor_table(logs[0], robot, question, to)
+    if asked.what == MOTORS and len(logs) == 1 and flags.rate is None and is_motor_table(logs[0]):
+        tell_motor_table(logs[0], robot, asked, to)
         return
-    _identify(logs, robot, question, Reading(flags.options(), flags.sort, flags.maps(force)), to)
+    _identify(logs, robot, asked, Reading(flags.options(), flags.sort, flags.maps(force)), to)
 
 
-def _question(asked: dict[str, Any]) -> Question:
-    """The options as they stand on the command line; an empty one was not given."""
-    given: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in asked.items()}
-    given["window"] = tuple(number_list("--window", given["window"])) if given["window"] else None
-    given["free"], given["nuisances"] = given["free"] or None, given["nuisances"] or None
-    return Question(**given)
-
-
-def _identify(arguments: list[str], robot: str, question: Question, reading: Any, to: Any) -> None:
+def _identify(arguments: list[str], robot: str, asked: Asked, reading: Any, to: Any) -> None:
     """Read, choose the method, identify, tell."""
     from omnidyn.cli.identify_logs import load_runs
     from omnidyn.cli.identify_show import load_meanwhile, outputs, tell
+    from omnidyn.identification.default_method import as_driven, default_method
     from omnidyn.identification.first_runs import shared_out
-    from omnidyn.identification.methods import settle_method
 
     with shown_progress("reading") as progress:
         start = omnidyn.load_robot(robot) if robot else None
-        loaded = load_runs(arguments, question, start, reading, progress)
+        loaded = load_runs(arguments, asked, start, reading, progress)
         record = provenance([*([robot_input(robot)] if robot else []), *loaded.inputs])
-        if question.what == MOTORS:
-            run_motors(question, loaded, start, record, to, progress)
+        if asked.what == MOTORS:
+            run_motors(asked, loaded, start, record, to, progress)
             return
         assert start is not None
-        question, logs = settle_method(loaded.runs, start, question, progress), loaded.logs
-        if loaded.folders and question.method == STEADY_STATE:
-            question = replace(question, group=loaded.folders)
+        method = asked.method or default_method(loaded.runs, as_driven(start, loaded.runs), progress)[0]
+        groups = asked.groups
+        if loaded.folders and isinstance(method, SteadyState):
+            groups = loaded.folders
         elif loaded.folders:
             progress(Report("all folders are fitted together; `per` NAME=GLOB makes groups of them", urgent=True))
-        if groups := [each.partition("=")[0] for each in question.per or question.group]:
-            outputs(to, list(dict.fromkeys(groups)), record["inputs"])  # refused before any work
-        load_meanwhile(to, question.quick)
-        with shared_out(start) if question.method == OUTPUT_ERROR else nullcontext():
-            found = omnidyn.Identification.of(
-                loaded.runs, start, question, logs=logs, progress=progress, keep_best=True,
+        if groups:
+            names = dict.fromkeys(pattern.partition("=")[0] for pattern in groups)
+            outputs(to, [*names], record["inputs"])  # refused before any work
+        load_meanwhile(to, asked.quick)
+        with shared_out(start) if isinstance(method, OutputError) else nullcontext():
+            found = omnidyn.identify(
+                loaded.runs, start, method, hold_out=asked.hold_out, groups=groups, quick=asked.quick,
+                progress=progress, check=loaded.logs, keep_best=True,
                 save=lambda fits: to.save({name: fit.robot for name, fit in fits.items()}, record["inputs"]),
             )  # fmt: skip
+            attempts = found.after.attempts
         if found.interrupted:
             progress(Report("interrupted: the numbers are the best so far, not the best there are", urgent=True))
-        tell(found, record, to, progress)
+        tell(found, attempts, record, to, progress)
     if found.failures:
         end_failed(found.verdict)
 
@@ -151,21 +142,29 @@ def _identify(arguments: list[str], robot: str, question: Question, reading: Any
 
 
 def run_motors(
-    question: Question, loaded: Loaded, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress
+    asked: Asked, loaded: Loaded, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress
 ) -> None:
     """Fit; write robot file and report; show the result."""
-    study = omnidyn.identify_motors(loaded.runs, robot, question=question, logs=loaded.logs, progress=progress)
-    _tell(study, robot, record, to, progress)
+    found = omnidyn.identify(
+        loaded.runs, robot, asked.method, hold_out=asked.hold_out, progress=progress, check=loaded.logs
+    )
+    _tell(cast("MotorStudy", found.study), robot, record, to, progress)
 
 
-def tell_motor_table(table: str, robot: str, question: Question, to: Out) -> None:
+def tell_motor_table(table: str, robot: str, asked: Asked, to: Out) -> None:
     """The same from a table input,speed[,motor], which has no time."""
     from omnidyn.logs.motor_table import read_motor_table
 
     start, data = omnidyn.load_robot(robot) if robot else None, read_motor_table(table)
-    study = omnidyn.identify_motors(data, start, question=question)
+    study = omnidyn.identify(data, start, asked.method).study
     inputs = [{"role": "data", "name": table, "sha256": data.sha256}]
-    _tell(study, start, provenance([*([robot_input(robot)] if robot else []), *inputs]), to, lambda _: None)
+    _tell(
+        cast("MotorStudy", study),
+        start,
+        provenance([*([robot_input(robot)] if robot else []), *inputs]),
+        to,
+        lambda _: None,
+    )
 
 
 def _tell(

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from omnidyn.cli.identify_options import Asked
 from omnidyn.cli.log_options import Maps, load_logs, log_files
 from omnidyn.cli.terminal.streams import say
 from omnidyn.files import open_regular
-from omnidyn.identification.question import Question
 from omnidyn.progress import Progress
 
 if TYPE_CHECKING:
@@ -65,12 +65,12 @@ def _first_names(path: str) -> set[str]:
 
 
 def load_runs(
-    arguments: Sequence[str], question: Question, robot: Robot | None, reading: Reading, progress: Progress
+    arguments: Sequence[str], asked: Asked, robot: Robot | None, reading: Reading, progress: Progress
 ) -> Loaded:
     """The runs of LOG... that belong to a group, where there are any; what the readers had to decide is said once."""
     files = log_files(arguments)
-    folders = () if question.per or question.group else _folders(arguments)
-    used = _of_groups(files, question.per or question.group or folders, "per" if question.per else "group")
+    folders = () if asked.groups else _folders(arguments)
+    used = _of_groups(files, asked.groups or folders, asked.group_option)
     found, said = Loaded([], [], [], folders), {}
     for path, log in load_logs(used, robot, reading.options, progress):
         reading.maps.show(path, log.columns)

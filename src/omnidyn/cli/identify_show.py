@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ import typer
 
 import omnidyn
 from omnidyn.attempts import Attempts
+from omnidyn.cli.identify_options import Asked
 from omnidyn.cli.terminal.flags import with_flags
 from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
@@ -20,9 +21,9 @@ from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import brief_document
 from omnidyn.cli.terminal.telling import tell as tell_document
 from omnidyn.document import Document, Table, interval_cell
-from omnidyn.errors import InputError
 from omnidyn.files import check_output, keep_apart, write_atomic
-from omnidyn.identification.question import OUTPUT_ERROR, Question
+from omnidyn.identification.methods import OutputError
+from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.progress import Progress, Report
 
 if TYPE_CHECKING:
@@ -90,14 +91,13 @@ def load_meanwhile(to: Out, quick: bool) -> None:
     threading.Thread(target=load).start()
 
 
-def tell(found: Identification, record: dict[str, Any], to: Out, progress: Progress) -> None:
+def tell(found: Identification, attempts: Attempts, record: dict[str, Any], to: Out, progress: Progress) -> None:
     """Draw the page of an identification, and show the result."""
-    attempts, report = Attempts([*found.missing], found.interrupt), ""
+    report = ""
     if to.report and _has_page(found):
         progress(Report("drawing"))
         report = to.write_report(attempts, lambda: _page(found, record))
     progress(Report("writing"))
-    found = replace(found, missing=tuple(attempts.missing), interrupt=attempts.interrupt)
     written = [*to.files.values(), *([report] if report else [])]
     told = found.document() if to.json or to.full else brief(found)
     tell_document(told, to.json, record, output=to.files or None, report=report or None)
@@ -107,14 +107,14 @@ def tell(found: Identification, record: dict[str, Any], to: Out, progress: Progr
 
 def _has_page(found: Identification) -> bool:
     """Whether there is a report to write."""
-    if found.study is None and found.method != OUTPUT_ERROR:
+    if found.study is None and not isinstance(found.method, OutputError):
         say("omnidyn: --shape line has no page; --report is not used")
-    return found.study is not None or found.method == OUTPUT_ERROR
+    return found.study is not None or isinstance(found.method, OutputError)
 
 
 def _page(found: Identification, record: dict[str, Any]) -> str:
     """The report."""
-    if found.study is not None:
+    if isinstance(found.study, SteadyStudy):
         from omnidyn.report.steady_page import render_study
 
         return render_study(found.study, record, verdict=found.verdict, verdicts=found.verdicts)
@@ -123,17 +123,13 @@ def _page(found: Identification, record: dict[str, Any]) -> str:
     return render_fit(found, record)
 
 
-def tell_table(table: str, robot: str, question: Question, to: Out) -> None:
+def tell_table(table: str, robot: str, asked: Asked, to: Out) -> None:
     """The paper's way, from a table of steady points; what the reader had to decide joins the warnings."""
-    if question.method == OUTPUT_ERROR:
-        raise InputError("a table of steady points has no time in it", got="a table axis,speed,force",
-                         expected="logs, or `method` steady-state", where="method")  # fmt: skip
     if to.report:
         raise typer.BadParameter("--report needs logs; a table of points has none.")
     with shown_progress("identifying"):
         start, data = omnidyn.load_robot(robot), omnidyn.read_steady_table(table)
-        estimate = omnidyn.fit_steady_state(start, data, rest=question.rest)
-        estimate = replace(estimate, warnings=(*data.notes, *estimate.warnings))
+        estimate = omnidyn.identify(data, start, asked.method).estimate
         record = provenance([robot_input(robot), {"role": "data", "name": table, "sha256": data.sha256}])
     to.save({"": estimate.robot}, record["inputs"])
     tell_document(estimate.document(), to.json, record, output=to.files.get(""))
@@ -171,10 +167,10 @@ def say_written(paths: Iterable[str]) -> None:
 
 def brief(found: Identification) -> Document:
     """What the result says in about 20 lines: verdict, numbers, the gravest warnings, the next step."""
-    groups = len(found.estimates)
-    rows = [row for group, estimate in found.estimates.items() for row in _rows(group, estimate, groups)]
+    groups = len(found.groups)
+    rows = [row for group, estimate in found.groups.items() for row in _rows(group, estimate, groups)]
     of_study = found.study.warnings if found.study is not None else ()
-    warnings = [*of_study, *(warning for estimate in found.estimates.values() for warning in estimate.warnings)]
+    warnings = [*of_study, *(warning for estimate in found.groups.values() for warning in estimate.warnings)]
     table = Table(("number", "value", "95 % interval", "unit", "key"), rows, "<>><<")
     return brief_document(found.headline, table, warnings, found.advice)
 

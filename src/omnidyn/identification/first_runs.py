@@ -13,7 +13,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import compiled_elsewhere
 from omnidyn.identification.estimate import Estimate
-from omnidyn.identification.identify import OUTPUT_ERROR, identify
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.kernel.of_rows import row_squares, row_terms
 from omnidyn.identification.output_error.memory.autoregression import autoregression
 from omnidyn.model.dynamics import acceleration
@@ -101,7 +102,7 @@ def _fit(robot: Robot, *sensors: str, memory: FloatArray = MEMORY[:1], **options
     seen["wheel_angle"] = np.round(np.cumsum(run.channels["wheel_speed"], axis=0) * DT / TICK) * TICK
     given = Run(t=run.t, voltage=None if robot.drive.kind == SPEED else run.voltage, twist_command=run.twist_command)
     log = given.replace(**{name: seen[name] for name in sensors})
-    return identify(log, robot, method=OUTPUT_ERROR, **options)
+    return identify(log, robot, OutputError(**options)).estimate
 
 
 def _remembered(errors: FloatArray, memory: FloatArray) -> FloatArray:

@@ -9,8 +9,8 @@ from omnidyn.findings.finding import Verdict
 from omnidyn.identification.estimate import NOT_DETERMINED
 from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.log_verdicts import checked
+from omnidyn.identification.methods import OUTPUT_ERROR
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.question import OUTPUT_ERROR
 from omnidyn.identification.steady.study_table import Difference
 from omnidyn.identification.validation import Validation
 from omnidyn.model.actuation import DEAD_BAND

@@ -59,6 +59,23 @@ def group_names(sources: Sequence[str], patterns: Sequence[str], option: str) ->
     return found
 
 
+def names_of_groups(groups: str | Sequence[str] | None, sources: Sequence[str]) -> list[str] | None:
+    """The group of each run, "" for one of none; None where there are no groups.
+
+    groups: NAME=GLOB each, of the sources of runs, or a name for every run. Raises InputError as `group_names` does,
+    and for names that are not one for each run.
+    """
+    words = [groups] if isinstance(groups, str) else list(groups or ())
+    if not words:
+        return None
+    if isinstance(groups, str) or any("=" in word for word in words):
+        return group_names(sources, words, "groups")
+    if len(words) != len(sources):
+        got = f"{len(words)} names, {len(set(words))} of them different, for {len(sources)} runs"
+        raise InputError("groups need a name for every run", got=got, expected="two groups or more", where="groups")
+    return words
+
+
 def _pair(text: str, option: str) -> tuple[str, str]:
     name, equals, pattern = text.partition("=")
     if not equals or not name.strip() or not pattern.strip():

@@ -1,33 +1,44 @@
-"""identify: logs and a robot in, an Estimate out, by the method that they allow; Identification: all of it, checked,
-fitted, validated, with advice."""
+"""identify: logs and a robot in, an Identification out: fitted, checked, validated, with advice."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import partial
-from typing import TYPE_CHECKING, Unpack
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from omnidyn.arguments import check_order
+from omnidyn.arguments import MADE_BY, check_order, is_frame
 from omnidyn.attempts import COMPARISON, DIAGNOSIS, JUDGEMENT, LADDER, QUICK, Attempts, Missing, not_made
 from omnidyn.document import Document, Points, apart, sentence
-from omnidyn.errors import INTERRUPTS, InputError, UnsupportedError, told_by
+from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.findings.finding import Verdict
 from omnidyn.findings.fitness import STEADY as STEADY_USE
 from omnidyn.findings.guesses import rest_on_guesses
 from omnidyn.identification.advice import advice
+from omnidyn.identification.default_method import as_driven, default_method, why_not_output_error
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.fit_document import fit_document
-from omnidyn.identification.grouping import fingerprint, group_names, held_out
+from omnidyn.identification.grouping import fingerprint, held_out, names_of_groups
 from omnidyn.identification.log_verdicts import checked, judged_by_fit, log_verdicts, told_why, unfit, verdict_advice
-from omnidyn.identification.methods import as_driven, choose_method, settle_method, why_not_output_error
-from omnidyn.identification.options import Options, shows_options
+from omnidyn.identification.methods import (
+    GROUPS,
+    HOLD_OUT,
+    LINE,
+    MOTOR_METHODS,
+    STEADY_STATE,
+    Method,
+    MotorFit,
+    MotorLine,
+    OutputError,
+    SteadyState,
+    refuse_unless_method,
+)
+from omnidyn.identification.methods import QUICK as QUICKLY
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import WHOLE, Fit
 from omnidyn.identification.output_error.solve.progress import FitProgress
-from omnidyn.identification.question import AUTO, FIT, MOTORS, OUTPUT_ERROR, STEADY, STEADY_STATE, Question
-from omnidyn.identification.steady.steady_state import identify_lines
-from omnidyn.identification.steady.study import diagnosed, fit_steady, identify_steady, undiagnosed
+from omnidyn.identification.steady.steady_state import fit_steady_state, identify_lines
+from omnidyn.identification.steady.study import diagnosed, fit_steady, undiagnosed
 from omnidyn.identification.steady.study_table import Difference, SteadyStudy
 from omnidyn.identification.validation import Validation, validate
 from omnidyn.identification.verdict import (
@@ -38,125 +49,205 @@ from omnidyn.identification.verdict import (
     steady_failure,
     steady_verdict,
 )
-from omnidyn.identification.whole_logs import fit_output_error, solved
+from omnidyn.identification.whole_logs import solved
 from omnidyn.logs.log import Log
+from omnidyn.logs.motor_table import MotorTable
+from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.motor import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list
-from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.shown import FIGURE, FRAME, Shown, make
 from omnidyn.statement import ERROR, NOTE, SEVERITIES, WARNING, Statement, statements
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from omnidyn.identification.motors.study import MotorStudy
+
+Logs = Run | Log | Sequence[Run | Log] | SteadyTable | MotorTable
 Save = Callable[[Mapping[str, Estimate]], object]
 
-LINE = "line"  # a shape: the paper's line on each axis
 
-
-@shows_options(FIT, STEADY)
 def identify(
-    runs: Run | Sequence[Run], robot: Robot, *, question: Question | None = None, **options: Unpack[Options]
-) -> Estimate:
-    """Fit the robot to logs. Returns an Estimate: robot, value, std, ci95, correlation, warnings.
+    logs: Logs, robot: Robot | None = None, method: Method | None = None, *, hold_out: str | Sequence[str] = (),
+    groups: str | Sequence[str] | None = None, quick: bool = False, progress: Progress = silent,
+    check: Sequence[Log] = (), keep_best: bool = False, save: Save | None = None,
+) -> Identification:  # fmt: skip
+    """Identify a robot from logs: its numbers with intervals, what the model misses, and what to do next.
 
-    question, options: see `Question`, such as method=, free=, nuisances=, loss= or shape=. With the method "auto" the
-    options choose it, else robot and logs: output error where they support it, else steady state, with a warning that
-    says why.
-    Raises InputError for options of another method and for what cannot be used, InsufficientDataError where the logs
-    cannot answer.
+    The result has what an Estimate has: robot, value, std, ci95, correlation, warnings, lack_of_fit, ...
+
+    Args:
+        logs: one or several, of `read_log` or `load_log`; the latter are checked as well. Or a table of steady points,
+            `read_steady_table`, or of motors.
+        robot: where the fit starts; what is not fitted is taken as it is. Motors need none.
+        method: `OutputError`, `SteadyState`, `MotorLine` or `MotorFit`, with their options. None: output error where
+            robot and logs support it, else steady state; a note says why. The line of motors for a table of motors.
+        hold_out: globs, or folders, of the sources of runs that are not fitted but predicted.
+        groups: NAME=GLOB each, of the sources of runs, or a name for every run: logs with friction of their own, such
+            as those of a floor or a load.
+        quick: leave out the diagnosis: what the model misses, and what the numbers rest on.
+        progress: hears what is done.
+        check: logs behind the runs, to be checked as well.
+        keep_best: whether an interrupt leaves the best so far, instead of being raised.
+        save: is called with the estimates of all groups as soon as they are there.
+
+    Raises InputError for what cannot be used and for what a method does not take, InsufficientDataError where the logs
+    cannot answer, UnsupportedError for robots and logs that a method does not know.
     """
-    check_order("identify(runs, robot)", (runs, Run), (robot, Robot))
-    every = as_list(runs)
-    robot = as_driven(robot, every)
-    asked = Question.for_method("", question, options)
-    method, why = (
-        choose_method(every, robot, [*options, *asked.given()]) if asked.method == AUTO else (asked.method, "")
-    )
-    asked = replace(asked, method=method)
-    if method == OUTPUT_ERROR:
-        return fit_output_error(every, robot, question=asked)
-    estimate = identify_steady(every, robot, question=asked).estimate
-    chosen = Statement("method_chosen", NOTE, numbers={"method": method, "why": why})
-    return replace(estimate, warnings=(chosen, *estimate.warnings)) if why else estimate
+    check_order("identify(logs, robot)", (logs, (Run, Log, SteadyTable, MotorTable)), (robot, (Robot, type(None))))
+    refuse_unless_method(method)
+    asked = _Asked(
+        robot, groups, (hold_out,) if isinstance(hold_out, str) else tuple(hold_out), quick, progress,
+        save or _discard, Attempts(keep=keep_best),
+    )  # fmt: skip
+    if isinstance(logs, SteadyTable):
+        return _of_steady_table(logs, method or SteadyState(), asked)
+    if isinstance(logs, MotorTable):
+        return _of_motors(logs, method or MotorLine(), (), asked)
+    given: list[Any] = [logs] if isinstance(logs, Run | Log) or is_frame(logs) else list(logs)
+    runs = as_list([log.to_run() if isinstance(log, Log) else log for log in given])
+    check = check or [log for log in given if isinstance(log, Log)]
+    if isinstance(method, MOTOR_METHODS):
+        return _of_motors(runs, method, check, asked)
+    why = ""
+    asked = replace(asked, robot=as_driven(asked.of_friction(), runs))
+    if method is None:
+        method, why = (OutputError(), "") if asked.hold_out else default_method(runs, asked.of_friction(), progress)
+    asked.refuse(method)
+    if isinstance(method, SteadyState):
+        found = _steady(runs, method, check, asked)
+    else:
+        assert isinstance(method, OutputError)
+        found = _fitted(runs, method, check, asked)
+    if not why:
+        return found
+    chosen = Statement("method_chosen", NOTE, numbers={"method": method.name, "why": why})
+    return replace(found, groups={
+        name: replace(estimate, warnings=(chosen, *estimate.warnings)) for name, estimate in found.groups.items()
+    })  # fmt: skip
+
+
+class After(NamedTuple):
+    """What follows a fit. fits: by output error, with their diagnosis. verdicts: of `check` on each log."""
+
+    fits: Mapping[str, OutputErrorEstimate]
+    validations: Mapping[str, Validation]
+    verdicts: tuple[Verdict, ...]
+    advice: tuple[Statement, ...]
+    attempts: Attempts
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(Shown):
     """All that logs say about a robot: estimates of each group, differences between groups, and what to do next.
 
-    method: that was taken. estimates: group -> Estimate; one, "all", where there are no groups. validations: group ->
-    Validation, by output error. study: by steady state, but for the shape "line". verdicts: of `check` on each log.
-    advice: what to mend, to measure or to ask for next, gravest first. interrupted: whether an interrupt cut
-    the fit off. missing: parts that were not made, and why. interrupt: the interrupt that ended it.
+    It has what the Estimate of its only group has, such as value, std, ci95, robot or lack_of_fit; one of motors has
+    what its study has, such as motors, a MotorEstimate each.
+
+    method: that was taken. groups: name -> Estimate; one, "all", where there are no groups; none of motors. study: by
+    steady state, but for the shape "line", or of motors. interrupted: whether an interrupt cut the fit off. follow:
+    makes what follows the fit, when it is first asked for.
     """
 
-    question: Question
-    method: str
-    estimates: Mapping[str, Estimate]
+    method: Method
+    groups: Mapping[str, Estimate]
+    follow: Callable[[], After]
     differences: tuple[Difference, ...] = ()
-    validations: Mapping[str, Validation] | None = None
-    study: SteadyStudy | None = None
-    verdicts: tuple[Verdict, ...] = ()
-    advice: tuple[Statement, ...] = ()
+    study: SteadyStudy | MotorStudy | None = None
     interrupted: bool = False
-    missing: tuple[Missing, ...] = ()
-    interrupt: BaseException | None = None
 
-    @classmethod
-    @shows_options(FIT, STEADY)
-    def of(
-        cls, runs: Run | Sequence[Run], robot: Robot, question: Question | None = None, *, logs: Sequence[Log] = (),
-        progress: Progress = silent, keep_best: bool = False, save: Save | None = None,
-        **options: Unpack[Options],
-    ) -> Identification:  # fmt: skip
-        """Choose the method; check, fit, validate and advise.
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        if len(self.groups) > 1 and hasattr(self._first(), name):
+            first, groups = next(iter(self.groups)), ", ".join(self.groups)
+            raise AttributeError(f"each group has its own {name}: say .groups[{first!r}].{name}; groups: {groups}")
+        return getattr(self._first(), name)
 
-        question, options: see `Question`; the sources of the runs tell their groups, and which are held out. logs:
-        where the runs come from, to be checked as well. progress: hears what is done.
-        keep_best: an interrupt leaves the best so far, instead of being raised. save: is called
-        with the estimates of all groups as soon as they are there, and again where a later step changes them.
-        What follows the fit may fail: `missing` names it then, with the reason.
-        Errors: as `identify` raises.
-        """
-        check_order("Identification.of(runs, robot)", (runs, Run), (robot, Robot))
-        every = as_list(runs)
-        robot = as_driven(robot, every)
-        asked = (question or Question()).but(options)
-        heard = _Heard(progress, save or _discard, Attempts(keep=keep_best))
-        if asked.what == MOTORS:
-            raise UnsupportedError("motors have functions of their own", got=MOTORS, where="what")
-        asked = settle_method(every, robot, asked, progress)
-        if asked.method == STEADY_STATE:
-            return _steady(every, robot, asked, log_verdicts(logs, robot, heard.progress), heard)
-        why = why_not_output_error(every, robot) if robot.drive.kind == SPEED else ""
-        if why:
-            words = f"{why}; `method` {STEADY_STATE} (`group` instead of `per`) answers in seconds"
-            progress(Report(words, urgent=True))
-        return _fitted(every, robot, asked, logs, heard)
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *(name for name in dir(self._first()) if not name.startswith("_"))})
 
     def __repr__(self) -> str:
-        return f"<Identification by {self.method}: {', '.join(f'{g} {e!r}' for g, e in self.estimates.items())}>"
+        if not self.groups:
+            return f"<Identification {self.study!r}>"
+        return f"<Identification by {self.method.name}: {', '.join(f'{g} {e!r}' for g, e in self.groups.items())}>"
+
+    @property
+    def _motors(self) -> MotorStudy | None:
+        """The study of motors."""
+        return None if self.groups else self.study  # type: ignore[return-value]
+
+    def _first(self) -> Any:
+        """The estimate of the first group; the study of motors."""
+        return next(iter(self.groups.values()), self.study)
+
+    @property
+    def estimate(self) -> Estimate:
+        """The estimate of the only group. Raises InputError where there are several, or none."""
+        if len(self.groups) != 1:
+            names = ", ".join(self.groups) or "a study of motors"
+            raise InputError("no single estimate", got=names, expected="one group", remedy='say .groups["NAME"]')
+        return self._first()
+
+    @cached_property
+    def after(self) -> After:
+        """What follows the fit, made when it is first asked for."""
+        return self.follow()
+
+    @property
+    def validations(self) -> Mapping[str, Validation]:
+        """Group -> its robot as a free run beside the logs, by output error only."""
+        return self.after.validations
+
+    @property
+    def validation(self) -> Validation | None:
+        """The same of the only group; None where there is none. Raises InputError where there are several groups."""
+        return self.validations.get(WHOLE) if self.estimate else None
+
+    @property
+    def verdicts(self) -> tuple[Verdict, ...]:
+        """Of `check` on each log."""
+        return self.after.verdicts
+
+    @property
+    def advice(self) -> tuple[Statement, ...]:
+        """What to mend, to measure or to ask for next, gravest first."""
+        return self.after.advice
+
+    @property
+    def missing(self) -> tuple[Missing, ...]:
+        """Parts that were not made, and why."""
+        return tuple(self.after.attempts.missing)
+
+    @property
+    def fits(self) -> Mapping[str, OutputErrorEstimate]:
+        """The estimates by output error with their diagnosis: group -> Estimate."""
+        return self.after.fits
 
     def plot(self) -> Figure:
-        """Friction against speed with its 95 % band, of each group, as a matplotlib Figure."""
+        """Friction against speed with its 95 % band, of each group; of motors, input against speed."""
         return make(FIGURE, self)
+
+    def to_dataframe(self, library: str = "pandas") -> Any:
+        """A DataFrame with a row for each number of each group: value, std, 95 % interval, unit.
+
+        library: "pandas" or "polars". Raises MissingExtraError where it is not installed.
+        """
+        return make(FRAME, self, library=library)
 
     @property
     def failures(self) -> tuple[Statement, ...]:
         """Why the numbers mean nothing: what of a log is not followed, forces that no shape explains, and
         errors that `check` found; empty for a fit that stands."""
-        found = [steady_failure(self.study)] if self.study is not None else []
+        if self._motors is not None:
+            return (self._motors.verdict,) if self._motors.failed else ()
+        found = [steady_failure(self.study)] if isinstance(self.study, SteadyStudy) else []
         for group, fit in self.fits.items():
-            missed = fit_failure(fit, (self.validations or {}).get(group))
-            found.append(of_group(group, missed) if missed and len(self.estimates) > 1 else missed)
+            missed = fit_failure(fit, self.validations.get(group))
+            found.append(of_group(group, missed) if missed and len(self.groups) > 1 else missed)
         return (*filter(None, found), *unfit(self.verdicts))
-
-    @property
-    def estimate(self) -> Estimate:
-        """The estimate of the first group; the only one where there are no groups."""
-        return next(iter(self.estimates.values()))
 
     @property
     def verdict(self) -> str:
@@ -173,13 +264,15 @@ class Identification(Shown):
 
     def outcome(self) -> list[Statement]:
         """What it came to, as statements."""
+        if self._motors is not None:
+            return [self._motors.verdict]
         if self.failures and not self.interrupted:
             return [Statement("failed", ERROR, numbers={"failures": self.failures})]
-        if self.study is not None:
+        if isinstance(self.study, SteadyStudy):
             return steady_verdict(self.study)
-        if self.method == OUTPUT_ERROR:
-            return fits_verdict(self.fits, self.validations or {}, self.verdicts, self.interrupted)
-        return lines_verdict(self.estimates)
+        if isinstance(self.method, OutputError):
+            return fits_verdict(self.fits, self.validations, self.verdicts, self.interrupted)
+        return lines_verdict(self.groups)
 
     def document(self) -> Document:
         """All of it, as text, page and machines have it."""
@@ -187,33 +280,58 @@ class Identification(Shown):
         return replace(told, verdict=self.verdict, data={**told.data, "missing": [*map(asdict, self.missing)]})
 
     def _told(self) -> Document:
+        if self._motors is not None:
+            return self._motors.document()
         if self.study is not None:
             told = self.study.document()
             return replace(told, data={"ok": not self.failures, **told.data, "check": checked(self.verdicts)})
-        if self.method == OUTPUT_ERROR:
-            told = fit_document(self.fits, self.validations or {}, self.differences, self.verdicts, self.advice)
+        if isinstance(self.method, OutputError):
+            told = fit_document(self.fits, self.validations, self.differences, self.verdicts, self.advice)
             return replace(told, data={"ok": not self.failures, **told.data})
-        lines = {group: estimate.document() for group, estimate in self.estimates.items()}
+        lines = {group: estimate.document() for group, estimate in self.groups.items()}
         data = {
-            "ok": not self.failures, "shape": self.question.shape,
+            "ok": not self.failures, "shape": LINE,
             "groups": {group: each.data for group, each in lines.items()}, "check": checked(self.verdicts),
         }  # fmt: skip
         mend = [Points(self.advice, "next:", "next")] if self.advice else []
         return Document(apart(*(each.parts for each in lines.values()), mend), data, ascii=True)
 
-    @property
-    def fits(self) -> dict[str, OutputErrorEstimate]:
-        """The estimates by output error: group -> Estimate."""
-        return {name: each for name, each in self.estimates.items() if isinstance(each, OutputErrorEstimate)}
-
 
 @dataclass(frozen=True)
-class _Heard:
-    """Who hears what is done, what must be known at once, and estimates that are done; what was not made."""
+class _Asked:
+    """What is asked beside the method, who hears what is done, who takes estimates, and what was not made."""
 
+    robot: Robot | None
+    groups: str | Sequence[str] | None
+    hold_out: tuple[str, ...]
+    quick: bool
     progress: Progress
     save: Save
     attempts: Attempts
+
+    def of_friction(self) -> Robot:
+        """The robot. Raises InputError where there is none."""
+        if self.robot is None:
+            raise InputError("friction is identified of a robot", got="none", expected="identify(logs, robot)",
+                             remedy=MADE_BY["Robot"], where="robot")  # fmt: skip
+        return self.robot
+
+    def refuse(self, method: Method) -> None:
+        """Refuse what the method does not take. Raises InputError."""
+        given = {HOLD_OUT: self.hold_out, GROUPS: self.groups, QUICKLY: self.quick}
+        for name, value in given.items():
+            if value and name not in method.takes:
+                raise InputError(f"{type(method).__name__} has no use for it", got=f"`{name}`", where=name,
+                                 remedy="leave it out")  # fmt: skip
+        if self.quick and isinstance(method, OutputError) and method.ladder:
+            raise InputError(
+                "the ladder climbs by the diagnosis, which `quick` leaves out", got="`quick` and `ladder`",
+                remedy="leave out one of them",
+            )  # fmt: skip
+
+    def without_more(self, verdicts: tuple[Verdict, ...] = (), mend: tuple[Statement, ...] = ()) -> Callable[[], After]:
+        """Makes what follows a method that is not validated: nothing more."""
+        return lambda: After({}, {}, verdicts, mend, self.attempts)
 
 
 def _sentences(found: Sequence[Statement]) -> str:
@@ -225,90 +343,127 @@ def _discard(told: object) -> None:
     """Discards what is told."""
 
 
-def _steady(
-    runs: Sequence[Run], robot: Robot, asked: Question, verdicts: tuple[Verdict, ...], heard: _Heard
-) -> Identification:  # fmt: skip
-    names = group_names([run.source for run in runs], asked.group, "group") if asked.group else None
+def _of_steady_table(table: SteadyTable, method: Method, asked: _Asked) -> Identification:
+    """The paper's line on each axis."""
+    if not isinstance(method, SteadyState):
+        raise InputError("a table of steady points has no time in it", got="a table axis,speed,force",
+                         expected="logs, or `method` steady-state", where="method")  # fmt: skip
+    asked.refuse(method)
+    how = {"rest": method.rest, "rest_speed": method.rest_speed, "absolute_std": method.absolute_std}
+    estimate = fit_steady_state(asked.of_friction(), table, **how)
+    estimate = replace(estimate, warnings=(*table.notes, *estimate.warnings))
+    asked.save({WHOLE: estimate})
+    return Identification(method, {WHOLE: estimate}, asked.without_more())
+
+
+def _of_motors(runs: Sequence[Run] | MotorTable, method: Method, check: Sequence[Log], asked: _Asked) -> Identification:
+    """Every motor of some logs, or of a table."""
+    from omnidyn.identification.motors.study import study_motors, study_points  # imported lazily: slow to load
+
+    if not isinstance(runs, MotorTable):
+        assert isinstance(method, MotorLine | MotorFit)
+        asked.refuse(method)
+        study = study_motors(runs, asked.robot, method, asked.hold_out, check, asked.progress)
+    elif isinstance(method, MotorLine):
+        study = study_points(runs)
+    else:
+        raise InputError("a table of steady speeds has no time in it", got="a table input,speed",
+                         expected="logs, or `method` steady-state", where="method")  # fmt: skip
+    return Identification(method, {}, asked.without_more(study.verdicts, study.advice), study=study)
+
+
+def _steady(runs: Sequence[Run], method: SteadyState, check: Sequence[Log], asked: _Asked) -> Identification:
+    robot = asked.of_friction()
+    verdicts = log_verdicts(check, robot, asked.progress)
+    names = names_of_groups(asked.groups, [run.source for run in runs])
     used = runs if names is None else [run for run, name in zip(runs, names, strict=True) if name]
     groups = None if names is None else [name for name in names if name]
-    plain = replace(asked, group=())
     mend = tuple(verdict_advice(verdicts))
-    heard.progress(Report("fitting"))
-    if asked.shape == LINE:
-        lines = identify_lines(used, robot, groups=groups, question=plain)
-        heard.save(lines)
-        return Identification(asked, STEADY_STATE, lines, verdicts=verdicts, advice=mend)
+    asked.progress(Report("fitting"))
+    if method.shape == LINE:
+        lines = identify_lines(used, robot, method, groups)
+        asked.save(lines)
+        return Identification(method, lines, asked.without_more(verdicts, mend))
     with told_why(verdicts, STEADY_USE):
-        fit = fit_steady(used, robot, groups=groups, question=plain)
-    heard.save(fit.estimates)
-    heard.progress(Report("diagnosing"))
+        fit = fit_steady(used, robot, method, groups)
+    asked.save(fit.estimates)
+    asked.progress(Report("diagnosing"))
     if asked.quick:
-        heard.attempts.leave_out(DIAGNOSIS, QUICK)
-    found = None if asked.quick else heard.attempts.make(DIAGNOSIS, partial(diagnosed, fit))
+        asked.attempts.leave_out(DIAGNOSIS, QUICK)
+    found = None if asked.quick else asked.attempts.make(DIAGNOSIS, partial(diagnosed, fit))
     study = found or undiagnosed(fit)
     study = replace(study, advice=(*map(str, mend), *study.advice))
-    return Identification(
-        asked, STEADY_STATE, study.estimates, study.differences, study=study, verdicts=verdicts,
-        advice=statements(study.advice),
-        missing=tuple(heard.attempts.missing), interrupt=heard.attempts.interrupt,
-    )  # fmt: skip
+    follow = asked.without_more(verdicts, statements(study.advice))
+    return Identification(method, study.estimates, follow, study.differences, study)
 
 
-def _fitted(runs: Sequence[Run], robot: Robot, asked: Question, logs: Sequence[Log], heard: _Heard) -> Identification:
+def _fitted(runs: Sequence[Run], method: OutputError, check: Sequence[Log], asked: _Asked) -> Identification:
+    robot = asked.of_friction()
+    if robot.drive.kind == SPEED and (why := why_not_output_error(runs, robot)):
+        words = f"{why}; `method` {STEADY_STATE} answers in seconds"
+        asked.progress(Report(words, urgent=True))
     sources = [run.source for run in runs]
-    groups = group_names(sources, asked.per, "per") if asked.per else [WHOLE] * len(runs)
+    named = names_of_groups(asked.groups, sources)
+    groups = named or [WHOLE] * len(runs)
     held = held_out(sources, asked.hold_out)
     chosen = [(run, group) for run, group, out in zip(runs, groups, held, strict=True) if group and not out]
     names = list(dict.fromkeys(group for _, group in chosen))
-    if asked.per and len(names) == 1:
-        raise InputError("the logs have only one group", got=names[0], expected="two or more", where="per")
-    verdicts = log_verdicts(logs, robot, heard.progress)
-    heard.progress(Report("fitting: loading"))
-    plain = replace(asked, per=(), hold_out=())
+    if named and len(names) == 1:
+        raise InputError("the logs have only one group", got=names[0], expected="two or more", where="groups")
+    verdicts = log_verdicts(check, robot, asked.progress)
+    asked.progress(Report("fitting: loading"))
     answer, cut = _answered(
-        [run for run, _ in chosen], robot, plain, [g for _, g in chosen] if asked.per else None, heard
+        [run for run, _ in chosen], method, [group for _, group in chosen] if named else None, asked
     )
     aside = {
         name: [run for run, own, out in zip(runs, groups, held, strict=True) if out and own == name]
         for name in answer.estimates
     }
-    answer = replace(answer, estimates={name: fit.beside(aside[name]) for name, fit in answer.estimates.items()})
-    heard.save(answer.estimates)
-    answer = replace(answer, estimates=_diagnosed(answer.estimates, asked, heard))
-    own = {name: [run for run, group in chosen if group == name] for name in answer.estimates}
+    fits = {name: fit.beside(aside[name]) for name, fit in answer.estimates.items()}
+    asked.save(fits)
+    own = {name: [run for run, group in chosen if group == name] for name in fits}
+
+    def follow() -> After:
+        return _after(fits, own, aside, verdicts, check, _not_independent(runs, held), asked)
+
+    return Identification(method, fits, follow, answer.differences, interrupted=cut)
+
+
+def _after(
+    fits: Mapping[str, OutputErrorEstimate], own: Mapping[str, list[Run]], aside: Mapping[str, list[Run]],
+    verdicts: tuple[Verdict, ...], check: Sequence[Log], repeated: Sequence[Statement], asked: _Asked,
+) -> After:  # fmt: skip
+    """What follows fits to whole logs. own, aside: group -> the runs it was fitted to, and those held out of it.
+    repeated: what is said of logs that are both."""
+    attempts, progress = asked.attempts, asked.progress
+    fits = _diagnosed(fits, asked)
     compared = {
-        name: heard.attempts.make(
-            f"{COMPARISON}{_of_group(name, own)}", partial(validate, fit, own[name], aside[name], heard.progress)
+        name: attempts.make(
+            f"{COMPARISON}{_of_group(name, fits)}", partial(validate, fit, own[name], aside[name], progress)
         )
-        for name, fit in answer.estimates.items()
+        for name, fit in fits.items()
     }
     validations = {name: found for name, found in compared.items() if found is not None}
     if any(map(rest_on_guesses, verdicts)):
-        first = next(iter(answer.estimates.values())).robot
-        judged = partial(judged_by_fit, verdicts, logs, first, heard.progress)
-        verdicts = heard.attempts.make(JUDGEMENT, judged) or verdicts
-    steps = [*verdict_advice(verdicts), *_not_independent(runs, held)]
-    for group, fit in answer.estimates.items():
-        own = advice(fit, validations.get(group))
-        steps += own if len(answer.estimates) == 1 else [of_group(group, each) for each in own]
-    return Identification(
-        asked, OUTPUT_ERROR, answer.estimates, answer.differences, validations, None, verdicts, tuple(steps), cut,
-        tuple(heard.attempts.missing), heard.attempts.interrupt,
-    )  # fmt: skip
+        first = next(iter(fits.values())).robot
+        verdicts = attempts.make(JUDGEMENT, partial(judged_by_fit, verdicts, check, first, progress)) or verdicts
+    steps = [*verdict_advice(verdicts), *repeated]
+    for group, fit in fits.items():
+        mine = advice(fit, validations.get(group))
+        steps += mine if len(fits) == 1 else [of_group(group, step) for step in mine]
+    return After(fits, validations, verdicts, tuple(steps), attempts)
 
 
-def _diagnosed(
-    fits: Mapping[str, OutputErrorEstimate], asked: Question, heard: _Heard
-) -> dict[str, OutputErrorEstimate]:
+def _diagnosed(fits: Mapping[str, OutputErrorEstimate], asked: _Asked) -> dict[str, OutputErrorEstimate]:
     """The fits with their diagnosis; without one where it fails, or is not asked for."""
     if asked.quick:
-        heard.attempts.leave_out(DIAGNOSIS, QUICK)
+        asked.attempts.leave_out(DIAGNOSIS, QUICK)
         return dict(fits)
     found = {}
     for name, fit in fits.items():
         of = _of_group(name, fits)
-        heard.progress(Report(f"diagnosing{of}"))
-        made = heard.attempts.make(f"{DIAGNOSIS}{of}", lambda fit=fit: fit.diagnosis)
+        asked.progress(Report(f"diagnosing{of}"))
+        made = asked.attempts.make(f"{DIAGNOSIS}{of}", lambda fit=fit: fit.diagnosis)
         found[name] = fit if made is not None else replace(fit, study=None)
     return found
 
@@ -329,7 +484,7 @@ def _not_independent(runs: Sequence[Run], held: Sequence[bool]) -> list[Statemen
 
 
 def _answered(
-    runs: Sequence[Run], robot: Robot, asked: Question, groups: Sequence[str] | None, heard: _Heard
+    runs: Sequence[Run], method: OutputError, groups: Sequence[str] | None, asked: _Asked
 ) -> tuple[Answer, bool]:
     """(answer, whether an interrupt cut the fit off)."""
     steps = 0
@@ -338,26 +493,26 @@ def _answered(
         nonlocal steps
         steps += report.state is not None
         words = f", step {steps}, -log likelihood {report.state.objective:.6g}" if report.state else f": {report.phase}"
-        heard.progress(Report(f"fitting{words}"))
+        asked.progress(Report(f"fitting{words}", state=report.state))
 
     plain: list[Answer] = []
 
     def keep(answer: Answer) -> None:
         plain.append(answer)
-        heard.save(answer.estimates)
+        asked.save(answer.estimates)
 
     progress = FitProgress(listen)
-    fit = Fit.of(runs, robot, asked, groups, progress)
+    fit = Fit.of(runs, asked.of_friction(), method, groups, progress)
     try:
-        return solved(fit, runs, progress, groups, keep), False
+        return solved(fit, runs, progress, groups, keep, asked.quick), False
     except (*INTERRUPTS, Exception) as raised:
         error = told_by(raised)
-        if plain and (heard.attempts.keep or isinstance(error, Exception)):
-            heard.attempts.give_up(LADDER, error)
+        if plain and (asked.attempts.keep or isinstance(error, Exception)):
+            asked.attempts.give_up(LADDER, error)
             return plain[0], False
-        if isinstance(error, Exception) or not heard.attempts.keep or progress.best is None:
+        if isinstance(error, Exception) or not asked.attempts.keep or progress.best is None:
             raise
-        heard.attempts.interrupt = error
-        heard.progress(Report("finishing with the best so far"))
-        heard.progress(Report("interrupted: finishing with the best so far (again: give up)", urgent=True))
+        asked.attempts.interrupt = error
+        asked.progress(Report("finishing with the best so far"))
+        asked.progress(Report("interrupted: finishing with the best so far (again: give up)", urgent=True))
         return fit.answer(progress.best), True

@@ -1,61 +1,260 @@
-"""Which method a robot and its logs allow: output error, or where they do not allow that, steady state."""
+"""The methods of an identification: a type each, with its own options, as Python and the command line both take them.
+
+What an option does stands in the metadata of its field: the command line makes its flags and help of it, and the page
+of the API its tables.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+import textwrap
+from dataclasses import dataclass, field, fields
+from functools import cache
+from typing import Any, ClassVar, Literal, get_args, get_type_hints
 
-import numpy as np
+from omnidyn.errors import InputError
 
-from omnidyn.findings.needs import why_no_inputs
-from omnidyn.identification.question import AUTO, OUTPUT_ERROR, STEADY_STATE, Question
-from omnidyn.identification.steady.operating_points import why_no_transient
-from omnidyn.model.motor import DUTY, SPEED, VOLTAGE
-from omnidyn.model.robot import MEASURED, Prior, Robot
-from omnidyn.progress import Progress, Report
-from omnidyn.run import Run
+AUTO, NONE = "auto", "none"
+OUTPUT_ERROR, STEADY_STATE = "output-error", "steady-state"
+GAUSS, STUDENT = "gaussian", "student-t"
+REST, FREE = "rest", "free"
+LINE = "line"  # a shape: the paper's line on each axis
+HOLD_OUT, GROUPS, QUICK = "hold_out", "groups", "quick"  # what `identify` takes for some of the methods
+
+# What is wrong with a word that is none of the choices of an option, where "unknown NAME" does not say it.
+WRONG = {
+    "method": "no such method", "what": "nothing of that name", "speed": "no such speed",
+    "force_from": "no such origin of the force", "rest": "unknown use of rows at rest",
+}  # fmt: skip
 
 
-def as_driven(robot: Robot, runs: Sequence[Run]) -> Robot:
-    """The robot with the drive that its logs show: one of duties where they hold duties and no voltage.
+def option(
+    default: Any, words: str, more: str = "", *, metavar: str = "", flag: str | None = "", first: bool = False
+) -> Any:
+    """A field: `words` say what it does, `more` what only Python need know.
 
-    A file without it would take the next set of duties for volts. The supply is the median of the logged one, where
-    the file has none.
+    Args:
+        metavar, flag: on the command line; "" for the name of the field, None for an option that it does not have.
+        first: whether a user needs it first, in the help of the command line.
     """
-    if robot.drive.kind != VOLTAGE or not runs or any(run.duty is None or run.voltage is not None for run in runs):
-        return robot
-    drive, priors = robot.drive.replace(kind=DUTY), robot.priors
-    supplies = [run.supply[np.isfinite(run.supply)] for run in runs if run.supply is not None]
-    logged = np.concatenate(supplies) if supplies else np.zeros(0)
-    if drive.supply is None and logged.size and float(np.median(logged)) > 0.0:
-        drive = drive.replace(supply=round(float(np.median(logged)), 3))
-        priors = {**priors, "drive.supply_V": Prior(source="median of the logs", origin=MEASURED)}
-    return robot.replace(drive=drive, priors=priors)
+    return field(default=default, metadata={
+        "words": words, "more": more, "metavar": metavar, "flag": flag, "first": first
+    })  # fmt: skip
 
 
-def choose_method(runs: Sequence[Run], robot: Robot, options: Sequence[str] = ()) -> tuple[str, str]:
-    """(method, why it is not output error; "" where it is, or where an option decides). options: names of those."""
-    method = Question().method_asked(options)
-    if method != AUTO:
-        return method, ""
-    why = why_not_output_error(runs, robot)
-    return (STEADY_STATE if why else OUTPUT_ERROR), why
+@cache
+def choices(kind: type) -> dict[str, tuple[str, ...]]:
+    """Option of a method -> the words that it may be, by its type."""
+    return {name: words for name, hint in get_type_hints(kind).items() if (words := _words(hint))}
 
 
-def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
-    """Why whole logs are not fitted by output error unless it is asked for, in words; "" where they are."""
-    why = why_no_inputs(runs, robot)
-    if why or robot.drive.kind != SPEED or any(run.voltage is not None or run.duty is not None for run in runs):
-        return why
-    return why_no_transient(runs, robot)
+def _words(hint: Any) -> tuple[str, ...]:
+    return get_args(hint) if getattr(hint, "__origin__", None) is Literal else ()
 
 
-def settle_method(runs: Sequence[Run], robot: Robot, question: Question, progress: Progress) -> Question:
-    """The question with its method, by name, by options, or by what robot and logs support; `progress` hears why."""
-    method = question.method_asked()
-    if method == AUTO:
-        why = why_not_output_error(runs, robot)
-        method = STEADY_STATE if why else OUTPUT_ERROR
-        if why:
-            progress(Report(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {why}", urgent=True))
-    return replace(question, method=method)
+def refuse_word(name: str, value: str, known: tuple[str, ...]) -> None:
+    """Refuse a value that is none of the known words. Raises InputError."""
+    if value not in known:
+        *first, last = filter(None, known)
+        words = WRONG.get(name, f"unknown {name}")
+        raise InputError(words, got=value, expected=f"{', '.join(first)} or {last}", where=name)
+
+
+@dataclass(frozen=True)
+class Method:
+    """How robots are identified. A single name stands for a tuple of it.
+
+    name: on the command line. takes: which arguments of `identify` it has a use for.
+    Raises InputError for words that mean nothing.
+    """
+
+    name: ClassVar[str] = ""
+    takes: ClassVar[tuple[str, ...]] = ()
+
+    def __post_init__(self) -> None:
+        known = choices(type(self))
+        for spec in fields(self):
+            value = getattr(self, spec.name)
+            if isinstance(spec.default, tuple) or spec.name in ("free", "nuisances", "outputs"):
+                value = value if value is None else (value,) if isinstance(value, str) else tuple(value)
+            elif spec.name in known:
+                refuse_word(spec.name, value, known[spec.name])
+            value = ADAPTED[spec.name](value) if spec.name in ADAPTED else value
+            object.__setattr__(self, spec.name, value)
+
+    def __init_subclass__(cls) -> None:
+        """Add every option to the docstring, for help()."""
+        lines = []
+        for name in cls.__annotations__:
+            spec = cls.__dict__.get(name)
+            if metadata := getattr(spec, "metadata", None):
+                text = f"{name}: {metadata['words']} {metadata['more']}".rstrip()
+                lines += textwrap.wrap(text, 112, initial_indent="    ", subsequent_indent="        ")
+        cls.__doc__ = f"{cls.__doc__}\n\n" + "\n".join(lines) + "\n    "
+
+
+def _nuisances(names: tuple[str, ...] | None) -> tuple[str, ...] | None:
+    """None for automatic ones, () for none."""
+    if names is None or not {AUTO, NONE} & set(names):
+        return names
+    if len(set(names)) > 1:
+        raise InputError("none and auto stand alone", got=", ".join(names), where="nuisances")
+    return () if NONE in names else None
+
+
+def _shares(window: Any) -> tuple[float, float] | None:
+    """Two shares, or None."""
+    if window is None:
+        return None
+    values = tuple(float(share) for share in window)
+    if len(values) != 2 or not 0.0 <= values[0] < values[1] <= 1.0:
+        got = ",".join(f"{share:g}" for share in values)
+        raise InputError("not two shares", got=got, expected="such as 0.4,0.95", where="window")
+    return values
+
+
+ADAPTED = {"nuisances": _nuisances, "window": _shares}
+NUISANCES = (
+    "Fit what the log does: latency, gain, dead_band, fade, tilt, push, none; default: auto.",
+    '"latency.twist" is that of one channel, "push.x" of one axis; a tilt stays in the room. None or "auto": '
+    "latency and dead band, and the gain where the supply is only nominal, as far as the logs determine them; a "
+    'warning says what else would fit the logs better. () or "none": none. Of the motors: latency only.',
+)
+LOSS = "gaussian, or student-t for logs with outliers."
+SPEED = "Which speed friction is a function of: wheel, set or ground."
+WINDOW = ("Use these shares of each command's rows, such as 0.4,0.95.", "None: the steady rows found.")
+MOTOR_INPUT = "Of the motors: voltage, duty or current; default: the first."
+
+
+@dataclass(frozen=True)
+class OutputError(Method):
+    """Whole logs: the numbers whose free run under the logged inputs comes nearest to all that was measured."""
+
+    name: ClassVar[str] = OUTPUT_ERROR
+    takes: ClassVar[tuple[str, ...]] = (HOLD_OUT, GROUPS, QUICK)
+
+    free: tuple[str, ...] | None = option(
+        None, "Fit this instead of the friction and all guesses; friction is all of it.",
+        'Keys of the robot file, such as "body.mass_kg"; that of a list stands for its items. None: the friction that '
+        "the robot has, and every number that has a std which no earlier fit wrote. Such a std is a prior, listed or "
+        "not. The EMF constant follows the torque constant, wheel by wheel, unless both are listed. Breakaway "
+        'follows coulomb, or stays as the robot has it; "friction.axes.breakaway[0]" asks for its interval, without '
+        '"[0]" for all; so do those of friction.direction and friction.wheels.',
+        metavar="KEY", first=True,
+    )  # fmt: skip
+    fixed: tuple[str, ...] = option(
+        (), "Leave this as the robot file has it.", metavar="KEY", flag="fix", first=True
+    )  # fmt: skip
+    nuisances: tuple[str, ...] | None = option(None, *NUISANCES, metavar="NAME", flag="nuisance")
+    loss: Literal["gaussian", "student-t"] = option(GAUSS, LOSS)
+    per_free: tuple[str, ...] = option(
+        (), "What each group has for itself instead.",
+        "Of the free numbers, or of the nuisances; the others are shared. By default all friction that is free.",
+        metavar="KEY",
+    )  # fmt: skip
+    profile: tuple[str, ...] = option(
+        (), "Interval by profile of the likelihood.",
+        "It is scaled by the sandwich where that is used. A number that each group has for itself is profiled in each, "
+        "and so are its differences.",
+        metavar="KEY",
+    )  # fmt: skip
+    bootstrap: int = option(
+        0, "Intervals from N draws of whole runs instead.",
+        "Std and intervals of all come from them; runs of a group are drawn among themselves. Deterministic.",
+        metavar="N",
+    )  # fmt: skip
+    ladder: bool = option(
+        False, "Switch on what the model leaves out, step by step, while it pays.",
+        "Each step fits the logs with each of the best remedies of `lack_of_fit`, and takes the one that best predicts "
+        "blocks of the logs that it was not fitted to, where BIC says so too; the simpler one within a standard error. "
+        "`Estimate.ladder` has all that was tried.",
+    )  # fmt: skip
+    start: Literal["auto", "rest", "free"] = option(
+        AUTO, "How logs begin: rest, free, or auto: at rest where that shows."
+    )
+    outputs: tuple[str, ...] | None = option(
+        None, "What is fitted to.",
+        'Of "twist", "wheel_speed", "current", "pose" (or of "heading", "position"), "wheel_angle". None: all that '
+        "the log has, but for what is computed from another one: that would count the same data twice.",
+        flag=None,
+    )  # fmt: skip
+    covariance: Literal["auto", "white", "autoregressive", "sandwich"] = option(
+        AUTO, "white, autoregressive, sandwich, or auto: autoregressive where residuals are not white.",
+        "An autoregression of the errors sets estimate and intervals. The sandwich stays where there is none: for "
+        "Student's t, for counts, from 20 runs on, and where none makes the residuals white.",
+        flag=None,
+    )  # fmt: skip
+    tick_rad: float | None = option(
+        None, "Of the encoders behind wheel angles [rad].",
+        "None: found in the log. Their likelihood is that of counts; 0 takes them like any other output, and wheel "
+        "speeds that are differences of counts as they are.",
+        flag=None,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SteadyState(Method):
+    """Friction from stretches of constant speed, or from a table of steady points (the paper's way)."""
+
+    name: ClassVar[str] = STEADY_STATE
+    takes: ClassVar[tuple[str, ...]] = (GROUPS, QUICK)
+
+    shape: str = option(
+        AUTO, "box, disc, ellipse, wheel, wheels, disc+wheel, ...; auto: the best; line: per axis, the paper."
+    )
+    speed: Literal["wheel", "set", "ground"] = option("wheel", SPEED)
+    force_from: Literal["current", "voltage", ""] = option(
+        "", "current or voltage; default: current where all logs have it.", "A current is signed as the torque."
+    )
+    window: tuple[float, float] | None = option(None, *WINDOW, metavar="A,B")
+    rest: Literal["bound", "line", "ignore"] = option(
+        "bound", "Of a table: what a row at rest says: bound, line (the paper) or ignore."
+    )
+    robust: bool = option(True, "Points far from the shape pull less.", flag=None)
+    rest_speed: tuple[float, float, float] = option(
+        (0.0, 0.0, 0.0), "Of a table: speeds up to this count as rest, per axis [m/s, m/s, rad/s].", flag=None
+    )
+    absolute_std: bool = option(
+        False, "Of a table: its stds are exact; else only their ratios count.", flag=None
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class MotorLine(Method):
+    """The line of each motor, input against speed, wheels off the ground: from windows, or from a table of motors."""
+
+    name: ClassVar[str] = STEADY_STATE
+
+    input: str = option("", MOTOR_INPUT)
+    speed: Literal["wheel", "set", "ground"] = option("wheel", SPEED)
+    window: tuple[float, float] | None = option(None, *WINDOW, metavar="A,B")
+    steady: bool = option(
+        False, "Of the motors: only rows that are steady.", "Else windows that need not be, start-ups too.", flag=None
+    )
+
+
+@dataclass(frozen=True)
+class MotorFit(Method):
+    """Each motor as a free run of whole logs, wheels off the ground: with a dead band and without."""
+
+    name: ClassVar[str] = OUTPUT_ERROR
+    takes: ClassVar[tuple[str, ...]] = (HOLD_OUT,)
+
+    input: str = option("", MOTOR_INPUT)
+    between: str = option(AUTO, "Of the motors: input holds, mean of two rows, or a curve.")
+    nuisances: tuple[str, ...] | None = option(None, *NUISANCES, metavar="NAME", flag="nuisance")
+    loss: Literal["gaussian", "student-t"] = option(GAUSS, LOSS)
+
+
+FRICTION_METHODS, MOTOR_METHODS = (OutputError, SteadyState), (MotorFit, MotorLine)
+METHODS = (OutputError, SteadyState, MotorLine, MotorFit)
+
+
+def refuse_unless_method(method: object) -> None:
+    """Refuse what is neither a method nor None, such as its name. Raises InputError."""
+    if method is not None and not isinstance(method, Method):
+        spellings = ", ".join(f"omnidyn.{kind.__name__}()" for kind in METHODS)
+        got = method if isinstance(method, str) else getattr(method, "__name__", type(method).__name__)
+        raise InputError(
+            "a method is a value with its options, not a name", got=got, expected="one of the four methods",
+            where="method", remedy=f"say one of {spellings}",
+        )  # fmt: skip

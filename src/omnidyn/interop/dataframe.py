@@ -16,6 +16,7 @@ from omnidyn.comparison.result import Comparison
 from omnidyn.comparison.traces import unit as component_unit
 from omnidyn.errors import InputError, MissingExtraError
 from omnidyn.identification.estimate import Estimate
+from omnidyn.identification.identify import Identification
 from omnidyn.logs.run_file import run_columns, unit_of_column
 from omnidyn.model.keys import unit
 from omnidyn.run import Run
@@ -26,7 +27,7 @@ INSTALL = 'pip install "omnidyn[arrays]"'
 METRICS = ("samples", "rmse", "max", "bias", "fit_percent", "vaf", "whiteness", "lag")
 
 
-def to_dataframe(value: Run | Estimate | Comparison, library: str = PANDAS) -> Any:
+def to_dataframe(value: Run | Estimate | Identification | Comparison, library: str = PANDAS) -> Any:
     """A data frame. Of a Run: columns u1_V, w1_rad_s, vx_m_s, ... over t_s; NaN where a value is missing.
 
     Of an Estimate: a row for each number, with value, std, its 95 % interval and unit. Of a Comparison: a row for each
@@ -40,7 +41,9 @@ def to_dataframe(value: Run | Estimate | Comparison, library: str = PANDAS) -> A
     made = _library(library)
     if isinstance(value, Run):
         return _of_run(value, made, library)
-    if isinstance(value, Estimate):
+    if isinstance(value, Identification):
+        columns, attributes = _of_groups(value)
+    elif isinstance(value, Estimate):
         columns, attributes = _of_estimate(value)
     else:
         columns, attributes = _of_comparison(value)
@@ -66,6 +69,19 @@ def _of_run(run: Run, made: Any, library: str) -> Any:
     frame = made.DataFrame(columns, index=index)
     frame.attrs |= {"source": run.source, "warnings": [*map(str, run.warnings)], "units": units}
     return frame
+
+
+def _of_groups(found: Identification) -> tuple[Mapping[str, list[Any]], dict[str, Any]]:
+    """The rows of all groups, with a column for the group where there are several."""
+    if len(found.groups) == 1:
+        return _of_estimate(found.estimate)
+    if not found.groups:
+        raise InputError("a study of motors has no data frame", expected="an identification of friction")
+    tables = {group: _of_estimate(estimate) for group, estimate in found.groups.items()}
+    names = [group for group, (columns, _) in tables.items() for _ in columns["parameter"]]
+    first = next(iter(tables.values()))[0]
+    columns = {name: [cell for columns, _ in tables.values() for cell in columns[name]] for name in first}
+    return {"group": names, **columns}, {"warnings": [w for _, more in tables.values() for w in more["warnings"]]}
 
 
 def _of_estimate(estimate: Estimate) -> tuple[Mapping[str, list[Any]], dict[str, Any]]:

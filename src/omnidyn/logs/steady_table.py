@@ -37,7 +37,7 @@ _UNITS = {
 
 @dataclass(frozen=True, eq=False)
 class SteadyTable:
-    """Points at constant speed: what the friction balances there. The one input of `fit_steady_state`.
+    """Points at constant speed: what the friction balances there. What `identify` takes for logs.
 
     axis: "x", "y" or "yaw" of each point (v, v_n and w are taken for them). Shape (points,); one word for all will do.
     speed: along or about that axis [m/s or rad/s]. force: what drives it there [N or N m]. Shape (points,).

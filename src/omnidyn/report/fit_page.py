@@ -36,7 +36,7 @@ Bands = tuple[Comparison, Comparison | None]
 
 def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
     """The page of an identification by output error, as HTML."""
-    fits, validations = found.fits, found.validations or {}
+    fits, validations = found.fits, found.validations
     with ThreadPoolExecutor(1) as pool:  # bands take many runs, which leave the interpreter to whoever draws
         banded = {group: pool.submit(_with_bands, fits, group, each) for group, each in validations.items()}
         return _page(found, fits, validations, banded, provenance)
@@ -47,7 +47,7 @@ def _page(
     provenance: Mapping[str, Any],
 ) -> str:  # fmt: skip
     """All of it. banded: group -> its comparisons with the band of the model, which are on their way."""
-    first = found.estimate
+    first = next(iter(fits.values()))
     robot = first.robot.name
     made = (
         f"Numbers of {robot} for which the model, run freely under the logged inputs, comes nearest to all that was "

@@ -98,7 +98,7 @@ PICTURES: dict[type, Callable[..., Picture]] = {
     Comparison: draw_overlay,
     Drift: draw_drift,
     Estimate: lambda estimate: draw_estimates({WHOLE: estimate}),
-    Identification: lambda found: draw_estimates(found.estimates),
+    Identification: lambda found: draw_estimates(found.groups) if found.groups else _motors(found.study),
     MotorStudy: _motors,
     SteadyStudy: draw_polar,
     Tracking: draw_tracking,

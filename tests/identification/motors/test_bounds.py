@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import MotorLine
 from omnidyn.identification.motors.fit import fit_motor
 from omnidyn.identification.motors.log import motor_logs
 from omnidyn.identification.motors.rest import turned_under
-from omnidyn.identification.motors.study import identify_motors
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.run import Run
 
@@ -34,7 +35,7 @@ def steps(*levels):
 
 def test_a_line_that_is_too_short_says_no_more_than_that_it_turned():
     """It rested at 0.35 V and turned at 2 V; the line alone would say up to 5 V and more."""
-    study = identify_motors([motor(steps(0.35, 2.0, 2.0))])
+    study = identify([motor(steps(0.35, 2.0, 2.0))], None, MotorLine()).study
     low, high = study.motors[0].ci95["dead_band"]
     assert low <= BAND
     assert high == pytest.approx(2.0, abs=1e-6)
@@ -60,7 +61,7 @@ def test_a_motor_that_a_positive_input_turns_backward():
     (log,) = motor_logs([backward])
     assert turned_under([log], 0, way=-1.0) == pytest.approx(1.5)
     assert turned_under([log], 0, side=1.0, way=-1.0) == pytest.approx(2.0)
-    forward, backward = (identify_motors([each]).starts for each in (forward, backward))
+    forward, backward = (identify([each], None, MotorLine()).study.starts for each in (forward, backward))
     assert [each.ci95["start"] for each in forward] == [each.ci95["start"] for each in backward]
 
 
@@ -80,7 +81,7 @@ def test_a_free_run_at_one_speed_says_between_what():
 def test_a_table_with_few_inputs_is_bounded_by_them():
     put_in = np.array([0.35, 0.35, 2.0, 2.0, 2.05, 2.05, 2.1, 2.1])
     speed = np.array([0.0, 0.0, 3.2, 2.8, 3.0, 3.3, 3.0, 3.4])
-    study = identify_motors(MotorTable(put_in, speed, np.zeros(8, dtype=np.int64), "voltage", "V"))
+    study = identify(MotorTable(put_in, speed, np.zeros(8, dtype=np.int64), "voltage", "V"), None, MotorLine()).study
     assert study.motors[0].ci95["dead_band"][1] == pytest.approx(2.0)
     assert study.starts[0].ci95["start"] == pytest.approx((0.35, 2.0))
 
@@ -91,6 +92,6 @@ def test_slow_rows_that_show_rest_and_motion_apart_bound_a_start():
     put_in = np.concatenate([np.full(6, 0.35), np.repeat([2.0, 2.4], 4)])
     speed = np.where(put_in > BAND, (put_in - BAND) / SLOPE, 0.0)
     speed += np.where(speed > 0.0, 0.05 * np.random.default_rng(2).normal(size=len(t)), 0.0)
-    study = identify_motors([Run(t=t, voltage=put_in[:, None], wheel_speed=speed[:, None])])
+    study = identify([Run(t=t, voltage=put_in[:, None], wheel_speed=speed[:, None])], None, MotorLine()).study
     assert study.starts[0].ci95["start"] == pytest.approx((0.35, 2.0))
     assert "it sets off between 0.35 and 2 V" in str(study.starts[0].statement())

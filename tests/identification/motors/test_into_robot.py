@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import MotorFit, MotorLine
 from omnidyn.identification.motors.into_robot import motors_into_robot
-from omnidyn.identification.motors.study import identify_motors
 from omnidyn.model.motor import mass_at_rim
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.run import Run
@@ -57,17 +58,16 @@ def tied():
     return load_robot("robotino")
 
 
-@pytest.mark.parametrize("method", ["steady-state", "output-error"])
+@pytest.mark.parametrize("method", [MotorLine(), MotorFit(between="hold", nuisances="none")])
 def test_the_numbers_come_back(method):
     """Within four standard errors, and what steps of 0.5 ms are off by."""
-    how = {"between": "hold", "nuisances": "none"} if method == "output-error" else {}
-    numbers = motors_into_robot(identify_motors([log()], method=method, **how), tied())
+    numbers = motors_into_robot(identify([log()], None, method).study, tied())
     for m, (constant, coulomb) in enumerate(TRUE):
         for key, true in ((EMF, constant), (TORQUE, constant), (COULOMB, coulomb)):
             own = f"{key}[{m}]"
             assert abs(numbers.value[own] - true) < 4.0 * numbers.std[own] + 0.02 * true
             assert numbers.std[own] < 0.1 * true
-    if method == "output-error":
+    if isinstance(method, MotorFit):
         assert len(numbers.value) == 12
     else:  # 3.7 ms, with rows every 10 ms
         assert len(numbers.value) == 9
@@ -77,11 +77,10 @@ def test_the_numbers_come_back(method):
 HEAVY = 4e-3  # at the wheel [kg m^2]: a lag of 37 ms
 
 
-@pytest.mark.parametrize("method", ["steady-state", "output-error"])
+@pytest.mark.parametrize("method", [MotorLine(), MotorFit(between="hold", nuisances="none")])
 def test_a_rotor_comes_back(method):
     """Within four standard errors, and what steps of 0.5 ms are off by."""
-    how = {"between": "hold", "nuisances": "none"} if method == "output-error" else {}
-    numbers = motors_into_robot(identify_motors([log(inertia=HEAVY)], method=method, **how), tied())
+    numbers = motors_into_robot(identify([log(inertia=HEAVY)], None, method).study, tied())
     for m in range(3):
         rotor, true = f"{ROTOR}[{m}]", HEAVY / GEAR**2
         assert abs(numbers.value[rotor] - true) < 4.0 * numbers.std[rotor] + 0.02 * true
@@ -91,7 +90,7 @@ def test_a_rotor_comes_back(method):
 
 def test_the_rotor_is_what_the_wheel_leaves():
     """In the file as in the mass matrix: J l^2 + J_w is what was measured."""
-    study, robot = identify_motors([log(inertia=HEAVY)]), tied()
+    study, robot = identify([log(inertia=HEAVY)], None, MotorLine()).study, tied()
     bare = motors_into_robot(study, robot)
     heavy = motors_into_robot(study, robot.replace(wheels=robot.wheels.replace(wheel_inertia=1e-4)))
     for m in range(3):
@@ -107,13 +106,13 @@ def test_the_rotor_is_what_the_wheel_leaves():
 
 
 def test_steady_windows_give_no_inertia_and_say_so():
-    numbers = motors_into_robot(identify_motors([log(hold=100)], window=(0.5, 1.0)), tied())
+    numbers = motors_into_robot(identify([log(hold=100)], None, MotorLine(window=(0.5, 1.0))).study, tied())
     assert not [key for key in numbers.value if key.startswith(ROTOR)]
     assert ROTOR in [remark.subject for remark in numbers.remarks]
 
 
 def test_they_stand_in_the_file_with_std_and_source():
-    study = identify_motors([log()])
+    study = identify([log()], None, MotorLine()).study
     numbers = motors_into_robot(study, tied())
     robot = parse_robot(robot_to_toml(numbers.robot))
     for key, number in numbers.value.items():
@@ -132,7 +131,7 @@ def test_a_voltage_drop_and_viscous_friction_of_the_file_count():
         motor=robot.motor.replace(voltage_drop=0.3),
         friction=robot.friction.replace(wheels=robot.friction.wheels.replace(viscous=10.0)),
     )
-    numbers = motors_into_robot(identify_motors([log(viscous=10.0, drop=0.3)]), robot)
+    numbers = motors_into_robot(identify([log(viscous=10.0, drop=0.3)], None, MotorLine()).study, robot)
     for m, (constant, coulomb) in enumerate(TRUE):
         for key, true in ((f"{EMF}[{m}]", constant), (f"{COULOMB}[{m}]", coulomb)):
             assert abs(numbers.value[key] - true) < 4.0 * numbers.std[key] + 0.02 * true
@@ -140,19 +139,21 @@ def test_a_voltage_drop_and_viscous_friction_of_the_file_count():
 
 def test_a_torque_constant_of_its_own_stays():
     robot = tied().replace(motor=tied().motor.replace(torque_constant=0.04))
-    numbers = motors_into_robot(identify_motors([log()]), robot)
+    numbers = motors_into_robot(identify([log()], None, MotorLine()).study, robot)
     assert not [key for key in numbers.value if key.startswith(TORQUE)]
     assert numbers.robot.motor.torque_constant == 0.04
-    band = identify_motors([log()]).motors[0].value["dead_band"]
+    band = identify([log()], None, MotorLine()).motors[0].value["dead_band"]
     assert numbers.value[f"{COULOMB}[0]"] == pytest.approx(GEAR * 0.04 / (RESISTANCE * RADIUS) * band)
 
 
 def test_a_duty_is_taken_times_its_supply():
-    volts, duty = (motors_into_robot(identify_motors([log(kind)]), tied()) for kind in ("voltage", "duty"))
+    volts, duty = (
+        motors_into_robot(identify([log(kind)], None, MotorLine()).study, tied()) for kind in ("voltage", "duty")
+    )
     for key, number in volts.value.items():
         assert duty.value[key] == pytest.approx(number, rel=1e-6)
         assert duty.std[key] == pytest.approx(volts.std[key], rel=1e-3)
-    study = identify_motors([log("duty").replace(supply=None)])
+    study = identify([log("duty").replace(supply=None)], None, MotorLine()).study
     assert motors_into_robot(study, tied()).value == {}
     nominal = tied().replace(drive=tied().drive.replace(supply=12.0))
     assert motors_into_robot(study, nominal).value == pytest.approx(duty.value)
@@ -162,7 +163,7 @@ def test_a_current_gives_friction_alone():
     """From steady windows, by the torque constant of the file."""
     robot = tied().replace(motor=tied().motor.replace(torque_constant=0.05))
     run = log("current", motors=((0.05, 3.0),) * 3, viscous=10.0, noise=0.0, hold=100)
-    numbers = motors_into_robot(identify_motors([run], input="current", window=(0.5, 1.0)), robot)
+    numbers = motors_into_robot(identify([run], None, MotorLine(input="current", window=(0.5, 1.0))).study, robot)
     for m in range(3):
         assert numbers.value[f"{COULOMB}[{m}]"] == pytest.approx(3.0, rel=0.05)
         assert numbers.value[f"{VISCOUS}[{m}]"] == pytest.approx(10.0, rel=0.15)
@@ -170,27 +171,27 @@ def test_a_current_gives_friction_alone():
 
 
 def test_what_is_not_determined_is_not_written_and_said():
-    free = motors_into_robot(identify_motors([log(motors=((0.05, 0.0),) * 3)]), tied())
+    free = motors_into_robot(identify([log(motors=((0.05, 0.0),) * 3)], None, MotorLine()).study, tied())
     assert not [key for key in free.value if key.startswith(COULOMB)]
     assert "no_dead_band" in [remark.numbers.get("why") for remark in free.remarks]
     one = log().replace(voltage=np.full((ROWS, 3), 6.0), wheel_speed=np.full((ROWS, 3), 7.0))
     with pytest.raises(InsufficientDataError, match="a line needs several speeds; got 7 rad/s in every window"):
-        identify_motors([one])
+        identify([one], None, MotorLine())
 
 
 def test_motors_that_were_not_logged_keep_their_numbers():
-    numbers = motors_into_robot(identify_motors([log(motors=TRUE[:1])]), tied())
+    numbers = motors_into_robot(identify([log(motors=TRUE[:1])], None, MotorLine()).study, tied())
     assert numbers.robot.motor.emf_constant[1:] == (0.0514, 0.0514)
     assert numbers.robot.motor.emf_constant[0] == numbers.value[f"{EMF}[0]"]
     with pytest.raises(InputError, match="more motors than the robot has wheels; got 4; expected 3 or fewer"):
-        motors_into_robot(identify_motors([log(motors=(*TRUE, TRUE[0]))]), tied())
+        motors_into_robot(identify([log(motors=(*TRUE, TRUE[0]))], None, MotorLine()).study, tied())
 
 
 def test_levels_of_breakaway_go_along():
     robot = tied()
     wheels = robot.friction.wheels.replace(coulomb=1.0, coulomb_backward=1.2, breakaway=1.5, breakaway_backward=9.0)
     robot = robot.replace(friction=robot.friction.replace(wheels=wheels))
-    numbers = motors_into_robot(identify_motors([log()]), robot)
+    numbers = motors_into_robot(identify([log()], None, MotorLine()).study, robot)
     again = parse_robot(robot_to_toml(numbers.robot)).friction.wheels
     assert again.breakaway == again.coulomb_backward == again.coulomb
     assert again.breakaway_backward == (9.0, 9.0, 9.0)

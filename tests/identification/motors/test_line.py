@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import MotorLine
 from omnidyn.identification.motors.log import motor_logs
-from omnidyn.identification.motors.study import identify_motors
 from omnidyn.identification.motors.windows import motor_windows
 from omnidyn.run import Run
 
@@ -49,7 +50,7 @@ def bench(band, seed=0, noise=0.0, with_angle=True, **how):
 
 
 def line_of(run, **how):
-    return identify_motors([run], **how).motors[0]
+    return identify([run], None, MotorLine(**how)).motors[0]
 
 
 def test_a_clean_motor_gives_its_line():
@@ -85,13 +86,15 @@ def test_noise_of_the_speed_does_not_flatten_the_slope():
     low, high = line.ci95["slope"]
     assert low <= SLOPE <= high
     assert not line.dead_band_seen
-    assert "not identifiable here" in str(identify_motors([run]).statements[0])
+    assert "not identifiable here" in str(identify([run], None, MotorLine()).study.statements[0])
 
 
 def test_one_speed_gives_no_dead_band_and_says_so():
     voltage = np.full(600, 2.0)
     _speed, angle = motor(voltage, 0.01, 0.3)
-    study = identify_motors([Run(t=np.arange(600) * 0.01, voltage=voltage[:, None], wheel_angle=angle[:, None])])
+    study = identify(
+        [Run(t=np.arange(600) * 0.01, voltage=voltage[:, None], wheel_angle=angle[:, None])], None, MotorLine()
+    ).study
     assert np.isnan(study.motors[0].value["dead_band"])
     assert "nan" not in str(study)  # what is not known is a dash
     assert study.statements[0].numbers["dead_band"].code == "dead_band_bounded"
@@ -136,7 +139,7 @@ def test_several_motors_have_a_line_each_and_one_together():
         t=one.t, voltage=np.hstack([one.voltage, other.voltage]),
         wheel_angle=np.hstack([one.wheel_angle, other.wheel_angle]),
     )  # fmt: skip
-    lines = {line.motor: line for line in identify_motors([both]).motors}
+    lines = {line.motor: line for line in identify([both], None, MotorLine()).motors}
     assert lines[0].value["dead_band"] == pytest.approx(0.2, abs=0.05)
     assert lines[1].value["dead_band"] == pytest.approx(0.6, abs=0.05)
     assert 0.2 < lines[None].value["dead_band"] < 0.6
@@ -161,11 +164,11 @@ def test_the_same_data_give_the_same_intervals():
 )
 def test_wrong_options_are_refused(how, words):
     with pytest.raises(InputError, match=words):
-        identify_motors([bench(0.4)], **how)
+        identify([bench(0.4)], None, MotorLine(**how))
 
 
 def test_too_few_windows_are_refused():
     run = bench(0.4)
     short = Run(t=run.t[:60], voltage=run.voltage[:60] + 2.0, wheel_angle=run.t[:60, None] * 4.0)
     with pytest.raises(InsufficientDataError, match=r"too few windows for a line with intervals.*6 or more"):
-        identify_motors([short])
+        identify([short], None, MotorLine())

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.motors.study import identify_motors
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import MotorLine
 from omnidyn.run import Run
 from tests.support.bench_motor import BenchMotor
 from tests.support.codes import codes
@@ -13,7 +14,7 @@ from tests.support.motor_ramps import ALL, DT, EQUAL, STICKY, bench, both_ways, 
 def test_each_direction_has_its_own_start_stop_line_and_lag():
     """Stiction 0.6 and 0.9 V, sliding friction 0.4 and 0.55 V: a line through all of it meets zero in between."""
     run, _ = bench()
-    study = identify_motors([run])
+    study = identify([run], None, MotorLine()).study
     for each, hold, slide in zip(both_ways(study), STICKY.hold, STICKY.slide, strict=True):
         assert each.sharp
         assert each.value["start"] == pytest.approx(hold, abs=0.02)
@@ -31,7 +32,7 @@ def test_each_direction_has_its_own_start_stop_line_and_lag():
 def test_a_bend_of_the_line_moves_no_start():
     """A drag that doubles what the motor needs at full speed moves the line's crossing by half a volt."""
     motor = BenchMotor(hold=(0.6, 0.6), slide=(0.6, 0.6), drag=0.05)
-    study = identify_motors([bench(motor)[0]])
+    study = identify([bench(motor)[0]], None, MotorLine()).study
     for each in both_ways(study):
         low, high = each.ci95["start"]
         assert low <= 0.6 <= high
@@ -50,7 +51,7 @@ def test_duty_is_in_percent_and_a_reversed_motor_has_sizes():
     """The same motor, plugged in the other way round: what was the start forward is that backward."""
     run, _ = bench()
     turned = Run(t=run.t, duty=run.voltage / 10.0, wheel_speed=-run.wheel_speed)
-    back, ahead = both_ways(identify_motors([turned]))[::-1]
+    back, ahead = both_ways(identify([turned], None, MotorLine()).study)[::-1]
     assert (back.unit, back.direction) == ("%", "-")
     assert back.value["start"] == pytest.approx(6.0, abs=0.2)
     assert ahead.value["start"] == pytest.approx(9.0, abs=0.2)
@@ -60,7 +61,7 @@ def test_duty_is_in_percent_and_a_reversed_motor_has_sizes():
 
 def test_a_direction_in_which_it_never_sets_off_has_a_bound():
     run, _ = bench(peaks=(3.0, -0.7, 3.0, -0.7))
-    ahead, back = both_ways(identify_motors([run]))
+    ahead, back = both_ways(identify([run], None, MotorLine()).study)
     assert ahead.sharp
     low, high = back.ci95["start"]
     assert 0.5 < low <= 0.9
@@ -74,7 +75,9 @@ def test_steps_alone_give_bounds():
     put_in = np.repeat([0.0, 2.0, 0.0, 2.5, 0.0, -2.0, 0.0, -3.0], 100)
     speed, *_ = STICKY.turn(t, put_in)
     noisy = speed + 0.02 * np.random.default_rng(0).standard_normal(len(t))
-    for each in both_ways(identify_motors([Run(t=t, voltage=put_in[:, None], wheel_speed=noisy[:, None])])):
+    for each in both_ways(
+        identify([Run(t=t, voltage=put_in[:, None], wheel_speed=noisy[:, None])], None, MotorLine()).study
+    ):
         assert each.ci95["start"] == (0.0, 2.0)
         assert np.isnan(each.value["start"])
         assert each.statement().code == "sets_off_below"
@@ -86,7 +89,7 @@ def test_passing_zero_is_no_rest():
     put_in = 3.0 * np.sin(2.0 * np.pi * 0.5 * t)
     speed, *_ = BenchMotor(hold=(0.0, 0.0), slide=(0.0, 0.0)).turn(t, put_in)
     noisy = speed + 0.05 * np.random.default_rng(0).standard_normal(len(t))
-    study = identify_motors([Run(t=t, voltage=put_in[:, None], wheel_speed=noisy[:, None])])
+    study = identify([Run(t=t, voltage=put_in[:, None], wheel_speed=noisy[:, None])], None, MotorLine()).study
     assert not any(each.sharp for each in study.starts)
     assert codes(study.verdict.numbers["parts"]) == ["motors_without_dead_band"]
 
@@ -96,7 +99,7 @@ def test_reversals_through_a_dead_band_count():
     put_in = 3.0 * np.sin(2.0 * np.pi * 0.1 * t)
     speed, *_ = STICKY.turn(t, put_in)
     noisy = speed + 0.05 * np.random.default_rng(0).standard_normal(len(t))
-    study = identify_motors([Run(t=t, voltage=put_in[:, None], wheel_speed=noisy[:, None])])
+    study = identify([Run(t=t, voltage=put_in[:, None], wheel_speed=noisy[:, None])], None, MotorLine()).study
     for each, hold in zip(both_ways(study), STICKY.hold, strict=True):
         low, high = each.ci95["start"]
         assert low <= hold <= high
@@ -107,7 +110,7 @@ def test_reversals_through_a_dead_band_count():
 def test_starts_that_differ_from_time_to_time_are_spanned():
     """Cogging: 0.6 V at one angle, 0.8 at another."""
     runs = [bench(BenchMotor(hold=(hold, hold)), seed)[0] for seed, hold in enumerate((0.6, 0.8))]
-    for each in both_ways(identify_motors(runs)):
+    for each in both_ways(identify(runs, None, MotorLine()).study):
         low, high = each.ci95["start"]
         assert low <= 0.6 < 0.8 <= high
         assert "starts_scatter" in codes(each.warnings)

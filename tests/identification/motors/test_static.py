@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import MotorFit, MotorLine
 from omnidyn.identification.motors.start import line_of_speed
-from omnidyn.identification.motors.study import identify_motors
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.run import Run
 from tests.support.codes import codes
@@ -48,7 +49,7 @@ def table(put_in, speed, motor=None, **how):
 @pytest.mark.parametrize("how", [{}, {"hold": 5}, {"later": True}], ids=str)
 def test_a_sweep_of_a_row_a_second_tells_all(how):
     """Up, down and either way: it used to be refused, there being no window of half a second."""
-    study = identify_motors([slow_log(**how)])
+    study = identify([slow_log(**how)], None, MotorLine()).study
     for each, hold, slide in zip(study.starts, HOLD, SLIDE, strict=True):
         assert each.ci95["start"] == pytest.approx((hold, hold + 2.0))
         low, high = each.ci95["stop"]
@@ -61,7 +62,7 @@ def test_a_sweep_of_a_row_a_second_tells_all(how):
 
 
 def test_whole_logs_of_a_row_a_second_have_the_same_starts():
-    study = identify_motors([slow_log()], method="output-error", between="hold", nuisances="none")
+    study = identify([slow_log()], None, MotorFit(between="hold", nuisances="none")).study
     assert [each.ci95["start"] for each in study.starts] == [
         pytest.approx((hold, hold + 2.0)) for hold in HOLD
     ]  # fmt: skip
@@ -69,7 +70,7 @@ def test_whole_logs_of_a_row_a_second_have_the_same_starts():
 
 def test_a_table_has_the_largest_input_at_rest_and_the_smallest_that_moves():
     put_in = np.arange(0.0, 60.0, 4.0)
-    study = identify_motors(table(put_in, settled(put_in)))
+    study = identify(table(put_in, settled(put_in)), None, MotorLine()).study
     (each,) = study.starts
     assert each.ci95["start"] == (20.0, 24.0)
     assert np.isnan(each.value["stop"])
@@ -80,7 +81,9 @@ def test_rows_of_a_table_have_no_order():
     put_in = sweep(4.0)
     speed = settled(np.concatenate([np.zeros(0), put_in]))
     order = np.random.default_rng(1).permutation(len(put_in))
-    one, other = (identify_motors(table(put_in[rows], speed[rows])).starts for rows in (slice(None), order))
+    one, other = (
+        identify(table(put_in[rows], speed[rows]), None, MotorLine()).study.starts for rows in (slice(None), order)
+    )
     assert [each.ci95["start"] for each in one] == [each.ci95["start"] for each in other]
     assert any("starts_scatter" in codes(each.warnings) for each in one)  # up and down are in one table
 
@@ -88,7 +91,9 @@ def test_rows_of_a_table_have_no_order():
 def test_motors_of_a_table_are_told_apart():
     put_in = np.arange(0.0, 60.0, 4.0)
     motor = np.repeat([0, 1], len(put_in))
-    study = identify_motors(table(np.tile(put_in, 2), np.concatenate([settled(put_in), settled(put_in - 8.0)]), motor))
+    study = identify(
+        table(np.tile(put_in, 2), np.concatenate([settled(put_in), settled(put_in - 8.0)]), motor), None, MotorLine()
+    ).study
     assert [(each.motor, each.ci95["start"]) for each in study.starts] == [(0, (20.0, 24.0)), (1, (28.0, 32.0))]
 
 
@@ -111,6 +116,6 @@ def test_a_line_without_a_slope_has_no_end():
 
 def test_a_table_at_rest_and_one_of_whole_logs_are_refused():
     with pytest.raises(InsufficientDataError, match=r"no row tells how the motors answer; got 3 rows at rest"):
-        identify_motors(table([0.0, 10.0, 12.0], [0.0, 0.0, 0.0]))
+        identify(table([0.0, 10.0, 12.0], [0.0, 0.0, 0.0]), None, MotorLine())
     with pytest.raises(InputError, match=r"a table of steady speeds has no time in it"):
-        identify_motors(table([0.0, 10.0], [0.0, 1.0]), method="output-error")
+        identify(table([0.0, 10.0], [0.0, 1.0]), None, MotorFit())

@@ -1,17 +1,14 @@
 """The six friction numbers of the axebot from a simulated log with the noise of EVIDENCE: truth, size of the errors."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
-from omnidyn.identification import whole_logs as whole
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.keys import Key
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, TRUTH, noisy, voltages
-
-fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a test asks for
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +21,9 @@ def test_a_clean_log_gives_the_truth(axebot, clean):
     start = axebot
     for key, value in TRUTH.items():
         start = Key.parse(key).set(start, 3.0 * value)
-    fit = fit_output_error(Run(t=clean.t, voltage=clean.voltage, twist=clean.twist), start, start="rest")
+    fit = identify(
+        Run(t=clean.t, voltage=clean.voltage, twist=clean.twist), start, OutputError(nuisances=(), start="rest")
+    ).estimate
     assert fit.converged
     for key, value in TRUTH.items():
         assert fit.value[key] == pytest.approx(value, rel=1e-6)
@@ -32,7 +31,9 @@ def test_a_clean_log_gives_the_truth(axebot, clean):
 
 def test_noise_is_found_and_the_intervals_hold_the_truth(axebot, clean):
     """12 draws of noise: 72 intervals of 95 %, of which 63 or more hold the truth with probability 0.997."""
-    fits = [fit_output_error(noisy(clean, seed), axebot, start="rest") for seed in range(12)]
+    fits = [
+        identify(noisy(clean, seed), axebot, OutputError(nuisances=(), start="rest")).estimate for seed in range(12)
+    ]
     held = sum(f.ci95[key][0] <= value <= f.ci95[key][1] for f in fits for key, value in TRUTH.items())
     assert held >= 63
     assert all(f.covariance == "white" for f in fits)

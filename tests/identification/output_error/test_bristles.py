@@ -111,7 +111,7 @@ def log_of(robot, seed, noise=0.002, voltage=None):
 )
 def test_a_soft_bristle_is_found(true, guess, keys):
     """From a damping that the file leaves to the critical rule, too."""
-    fit = omnidyn.identify([log_of(true, 0)], guess, free=keys)
+    fit = omnidyn.identify([log_of(true, 0)], guess, omnidyn.OutputError(free=keys)).estimate
     for key in keys:
         value = Key.parse(key).get(true)
         assert abs(fit.value[key] - value) <= 3.0 * fit.std[key]
@@ -121,7 +121,7 @@ def test_a_soft_bristle_is_found(true, guess, keys):
 def test_a_stiffness_that_the_log_does_not_show_is_not_determined():
     """A bristle that bends by 22 micrometres, once, under noise of 2 cm/s."""
     true, guess = dahl(stiffness=1e5), dahl(1.2, 2.0, 3e4)
-    fit = omnidyn.identify([log_of(true, 0, 0.02, fast())], guess, free=OF_DAHL)
+    fit = omnidyn.identify([log_of(true, 0, 0.02, fast())], guess, omnidyn.OutputError(free=OF_DAHL)).estimate
     assert OF_DAHL[2] in fit.unidentifiable
     assert ("not_identifiable", OF_DAHL[2]) in {(each.code, each.subject) for each in fit.warnings}
     for key in OF_DAHL[:2]:

@@ -32,7 +32,7 @@ def check(fit, keys, robot):
 
 def test_it_is_found_from_the_middle(log):
     """Its own place and friction, from a robot file without it; the truth is that of the simulation."""
-    fit = omnidyn.identify([log], TURNING, free=["friction", "body.centre_m"])
+    fit = omnidyn.identify([log], TURNING, omnidyn.OutputError(free=["friction", "body.centre_m"])).estimate
     check(fit, [*CENTRE, "friction.axes.coulomb[0]", "friction.axes.viscous[2]"], BESIDE)
     assert max(fit.std[key] for key in CENTRE) < 2e-4
     assert fit.robot.priors[CENTRE[0]].origin == "identified"
@@ -40,7 +40,7 @@ def test_it_is_found_from_the_middle(log):
 
 def test_a_robot_that_knows_it_is_fitted_by_the_implicit_engine(log):
     """Friction comes out as it is; without the centre it would not, by many of its errors."""
-    fit = omnidyn.identify([log], BESIDE.replace(body=BESIDE.body.replace(rotating_frame=True)))
+    fit = omnidyn.identify([log], BESIDE.replace(body=BESIDE.body.replace(rotating_frame=True))).estimate
     check(fit, ["friction.axes.coulomb[0]", "friction.axes.coulomb[1]", "friction.axes.viscous[0]"], BESIDE)
     assert not fit.lack_of_fit.found
     assert set(CENTRE) <= set(fit.rests_on["friction.axes.coulomb[1]"])
@@ -60,7 +60,7 @@ def test_its_std_counts_on_either_side_and_in_the_middle():
         twist = run.twist + noise * ([1.0, -1.0, -1.0] if side < 0.0 else 1.0)
         log = run.replace(twist=twist, wheel_speed=None, pose=None, current=None)
         assert CENTRE[1] in guesses(robot)
-        fit = omnidyn.identify([log], robot, free="friction", nuisances=())
+        fit = omnidyn.identify([log], robot, omnidyn.OutputError(free="friction", nuisances=())).estimate
         found.append(np.array([fit.std[name] for name in BOX]))
         alone = np.array([np.ptp(fit.log_alone[name]) for name in BOX]) / (2.0 * 1.96)
         assert found[-1][2] > 1.3 * alone[2]
@@ -76,5 +76,5 @@ def test_a_paper_robot_whose_centre_is_free_leaves_the_exact_engine(log):
         wheel_speed=run.wheel_speed + random.normal(0.0, 0.1, run.wheel_speed.shape),
         twist=None, pose=None, current=None,
     )  # fmt: skip
-    fit = omnidyn.identify([noisy], AXEBOT, free=["friction", "body.centre_m"])
+    fit = omnidyn.identify([noisy], AXEBOT, omnidyn.OutputError(free=["friction", "body.centre_m"])).estimate
     check(fit, CENTRE, BESIDE)

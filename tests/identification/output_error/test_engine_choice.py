@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.prepare import EXACT, is_exact, stays_exact
-from omnidyn.identification.question import Question
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import BOX, Key
 from omnidyn.simulation.simulate import simulate
 
@@ -27,7 +27,7 @@ def log(axebot):
 def test_a_number_of_one_wheel_is_found_from_equal_motors(axebot, log, share):
     """The axes couple as soon as one motor differs: from the start alone that cannot be seen (it said 2.14)."""
     start = Key.parse("motor.resistance_ohm[1]").set(axebot, share * axebot.motor.resistance)
-    fit = fit_output_error(log, start, free=[RESISTANCE], nuisances=(), start="rest")
+    fit = identify(log, start, OutputError(free=[RESISTANCE], nuisances=(), start="rest")).estimate
     low, high = fit.ci95[RESISTANCE]
     assert fit.value[RESISTANCE] == pytest.approx(2.3, abs=0.005)
     assert low - 0.002 < 2.3 < high + 0.002
@@ -50,7 +50,7 @@ def test_the_choice_is_made_once_a_fit(axebot, log, monkeypatch):
     """It builds a state space: four times a fit was a tenth of it."""
     asked = []
     monkeypatch.setattr("omnidyn.findings.needs.why_not_exact", lambda robot: asked.append(robot) or [])
-    fit = Fit.of(log, axebot, Question(nuisances=(), start="rest"))
+    fit = Fit.of(log, axebot, OutputError(nuisances=(), start="rest"))
     fit.answer(fit.solve())
     assert len(asked) <= 1
     assert [group.engine for group in fit.groups] == [EXACT]

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from omnidyn.identification.advice import advice
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.prepare import expand_keys, free_by_default, guesses
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.validation import validate
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.deadzone import push_per_volt
 from omnidyn.model.dynamics import damping
 from omnidyn.model.first_guess import first_guess
@@ -64,7 +65,7 @@ def log_of(robot, resistance):
 def wrong(robot):
     """A log of motors of 0.6 times the resistance that `init` guessed, and the fit that follows from `init`."""
     log, true = log_of(robot, 0.6)
-    return log, true, fit_output_error(log, robot, start="rest", nuisances=())
+    return log, true, identify(log, robot, OutputError(start="rest", nuisances=())).estimate
 
 
 def test_guesses_are_free_so_that_friction_comes_out_right_beside_a_wrong_motor(wrong):
@@ -79,7 +80,7 @@ def test_guesses_are_free_so_that_friction_comes_out_right_beside_a_wrong_motor(
 def test_rotors_that_are_a_guess_are_in_the_intervals(new):
     """They may weigh a tenth of the robot: friction is told to a tenth, and no better."""
     log, true = log_of(new, 0.6)
-    fit = fit_output_error(log, new, start="rest", nuisances=())
+    fit = identify(log, new, OutputError(start="rest", nuisances=())).estimate
     assert set(fit.value) == {*DIRECTION, *GUESSES, ROTOR}
     assert ROTOR in fit.unidentifiable
     for name in (DIRECTION[0], DIRECTION[1], DIRECTION[3], RESISTANCE):
@@ -131,12 +132,12 @@ def test_the_robot_that_is_written_moves_as_the_log_does_and_keeps_its_guesses(w
 
 def test_a_guess_that_is_held_is_named_where_the_model_misses_something(wrong, robot):
     log, _, _ = wrong
-    fit = fit_output_error(log, robot, start="rest", nuisances=(), free="friction")
+    fit = identify(log, robot, OutputError(start="rest", nuisances=(), free="friction")).estimate
     told = " ".join(str(one) for one in advice(fit, validate(fit, [log])))
     assert "motor.resistance_ohm" in told
     assert "are guesses of the robot file" in told
     assert "(`free` friction `free` motor.torque_constant_Nm_A `free` motor.resistance_ohm `free` body.inertia" in told
-    fixed = fit_output_error(log, robot, start="rest", nuisances=(), fixed=[RESISTANCE])
+    fixed = identify(log, robot, OutputError(start="rest", nuisances=(), fixed=[RESISTANCE])).estimate
     assert "motor.gear_ratio" in fixed.value
     assert RESISTANCE not in fixed.value
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.prepare import expand_keys
-from omnidyn.identification.whole_logs import fit_output_error, identify_groups
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
@@ -34,7 +35,7 @@ def clean():
 
 def fitted(clean, seed, **options):
     runs = [noisy_draw(run, 10 * seed + k) for k, run in enumerate(clean.values())]
-    return runs, identify_groups(runs, AXEBOT, [*clean], free=FREE, nuisances=(), start="rest", **options)
+    return runs, identify(runs, AXEBOT, OutputError(free=FREE, nuisances=(), start="rest", **options), groups=[*clean])
 
 
 def test_differences_and_shared_numbers_hold_the_truth(clean):
@@ -46,7 +47,7 @@ def test_differences_and_shared_numbers_hold_the_truth(clean):
             true = ROUGH - 2.2 if d.key == COULOMB else 0.0
             held += d.low <= true <= d.high
             coulomb += d.key == COULOMB and d.differs
-        ends = {group: e.ci95[TORQUE] for group, e in study.estimates.items()}
+        ends = {group: e.ci95[TORQUE] for group, e in study.groups.items()}
         assert ends["smooth"] == ends["rough"]
         held += ends["smooth"][0] <= MAGNET <= ends["smooth"][1]
     assert held >= 126
@@ -56,9 +57,9 @@ def test_differences_and_shared_numbers_hold_the_truth(clean):
 def test_with_nothing_shared_it_is_two_fits(clean):
     """Independent: each group alone. The noise is common, so that the weights, hence the last digits, differ."""
     runs = [noisy_draw(run, k) for k, run in enumerate(clean.values())]
-    study = identify_groups(runs, AXEBOT, [*clean], nuisances=(), start="rest", covariance="white")
-    for run, estimate in zip(runs, study.estimates.values(), strict=True):
-        alone = fit_output_error(run, AXEBOT, nuisances=(), start="rest", covariance="white")
+    study = identify(runs, AXEBOT, OutputError(nuisances=(), start="rest", covariance="white"), groups=[*clean])
+    for run, estimate in zip(runs, study.groups.values(), strict=True):
+        alone = identify(run, AXEBOT, OutputError(nuisances=(), start="rest", covariance="white")).estimate
         for key in BOX:
             assert abs(estimate.value[key] - alone.value[key]) < 0.02 * alone.std[key]
             assert estimate.std[key] == pytest.approx(alone.std[key], rel=0.05)
@@ -68,20 +69,25 @@ def test_with_nothing_shared_it_is_two_fits(clean):
 def test_with_everything_shared_it_is_one_fit(clean):
     """All but one number shared between two logs of the same floor: the shared ones are those of one fit to both."""
     runs = [noisy_draw(clean["smooth"], k) for k in range(2)]
-    both = fit_output_error(runs, AXEBOT, free=[*BOX, TORQUE], nuisances=(), start="rest")
-    study = identify_groups(
-        runs, AXEBOT, ["a", "b"], free=FREE, per_free=["friction.axes.viscous[2]"], nuisances=(), start="rest"
+    both = identify(runs, AXEBOT, OutputError(free=[*BOX, TORQUE], nuisances=(), start="rest")).estimate
+    study = identify(
+        runs,
+        AXEBOT,
+        OutputError(free=FREE, per_free=["friction.axes.viscous[2]"], nuisances=(), start="rest"),
+        groups=["a", "b"],
     )
     for name in study.shared:
-        assert abs(study.estimates["a"].value[name] - both.value[name]) < 0.3 * both.std[name]
+        assert abs(study.groups["a"].value[name] - both.value[name]) < 0.3 * both.std[name]
     assert set(study.shared) == {*BOX, TORQUE} - {"friction.axes.viscous[2]"}
 
 
 def test_sharing_makes_the_motor_surer(clean):
     runs, study = fitted(clean, 3)
-    alone = [fit_output_error(run, AXEBOT, free=[*BOX, TORQUE], nuisances=(), start="rest") for run in runs]
+    alone = [
+        identify(run, AXEBOT, OutputError(free=[*BOX, TORQUE], nuisances=(), start="rest")).estimate for run in runs
+    ]
     expected = sum(a.std[TORQUE] ** -2 for a in alone) ** -0.5  # independent logs, to first order
-    assert study.estimates["smooth"].std[TORQUE] == pytest.approx(expected, rel=0.05)
+    assert study.groups["smooth"].std[TORQUE] == pytest.approx(expected, rel=0.05)
 
 
 def test_a_load_is_a_mass_of_its_own():
@@ -89,8 +95,11 @@ def test_a_load_is_a_mass_of_its_own():
     runs = []
     for k, mass in enumerate((1.5, 1.8)):
         runs.append(noisy_draw(simulate(Key.parse(MASS).set(AXEBOT, mass), excitation(20.0, seed=k), 0.01), k))
-    study = identify_groups(
-        runs, AXEBOT, ["empty", "loaded"], free=["friction", MASS], per_free=[MASS], nuisances=(), start="rest"
+    study = identify(
+        runs,
+        AXEBOT,
+        OutputError(free=["friction", MASS], per_free=[MASS], nuisances=(), start="rest"),
+        groups=["empty", "loaded"],
     )
     (difference,) = study.differences
     assert difference.key == MASS
@@ -100,8 +109,8 @@ def test_a_load_is_a_mass_of_its_own():
 
 def test_automatic_nuisances_are_those_that_every_group_supports(clean):
     runs = [noisy_draw(run, k) for k, run in enumerate(clean.values())]
-    study = identify_groups(runs, AXEBOT, [*clean], free=FREE, start="rest")
-    for estimate in study.estimates.values():
+    study = identify(runs, AXEBOT, OutputError(free=FREE, start="rest"), groups=[*clean])
+    for estimate in study.groups.values():
         late = estimate.nuisances["latency.twist"]
         assert abs(late.value) < 4.0 * late.std
         assert late.std < 5e-3
@@ -117,16 +126,16 @@ def test_refusals(clean):
     with pytest.raises(
         InputError, match="groups need a name for every run; got 2 names, 1 of them different, for 2 runs"
     ):
-        identify_groups(runs, AXEBOT, ["a", "a"])
+        identify(runs, AXEBOT, OutputError(), groups=["a", "a"])
     with pytest.raises(InputError, match=r"not free, so no group can have its own; got body\.mass_kg"):
-        identify_groups(runs, AXEBOT, ["a", "b"], per_free=[MASS])
+        identify(runs, AXEBOT, OutputError(per_free=[MASS]), groups=["a", "b"])
     with pytest.raises(InputError, match="nothing differs between the groups"):
-        identify_groups(runs, AXEBOT, ["a", "b"], free=[TORQUE], nuisances=())
+        identify(runs, AXEBOT, OutputError(free=[TORQUE], nuisances=()), groups=["a", "b"])
     slips = AXEBOT.replace(wheels=AXEBOT.wheels.replace(traction_mu=0.4, wheel_inertia=2e-5))
     with pytest.raises(InputError, match=r"an engine which does not know all that is asked for; got tilt\.x"):
-        identify_groups(runs, slips, ["a", "b"], nuisances=["tilt"])
+        identify(runs, slips, OutputError(nuisances=["tilt"]), groups=["a", "b"])
     with pytest.raises(UnsupportedError, match="holds no voltage"):
-        identify_groups([np_free(run) for run in runs], AXEBOT, ["a", "b"])
+        identify([np_free(run) for run in runs], AXEBOT, OutputError(), groups=["a", "b"])
 
 
 def np_free(run):
@@ -142,11 +151,11 @@ def test_a_held_number_that_the_file_knows_only_so_far_moves_all_groups_at_once(
     std = {key: share * size[key] for key, share in zip(keys, (0.02, 0.04), strict=True)}
     floors = (Key.parse(COULOMB).set(plain, level) for level in (2.2, ROUGH))
     runs = [noisy_draw(simulate(own, excitation(15.0, seed=k), 0.01), k) for k, own in enumerate(floors)]
-    fit = partial(identify_groups, runs, groups=["a", "b"], free="friction", nuisances=(), start="rest")
+    fit = partial(identify, runs, groups=["a", "b"], method=OutputError(free="friction", nuisances=(), start="rest"))
     told, alone = fit(plain.replace(priors={key: Prior(std=std[key], origin="measured") for key in keys})), fit(plain)
 
     def each(study, of):
-        values = [getattr(own, of)[name] for own in study.estimates.values() for name in BOX]
+        values = [getattr(own, of)[name] for own in study.groups.values() for name in BOX]
         between = [d.std if of == "std" else d.difference for d in study.differences]
         return np.array(values + between)
 
@@ -158,7 +167,7 @@ def test_a_held_number_that_the_file_knows_only_so_far_moves_all_groups_at_once(
     wider = each(told, "std") / each(alone, "std")
     assert wider[:2].min() > 2.0
     assert wider[-6:].max() < 0.6 * wider[:2].min()  # both groups go the same way
-    for own, before in zip(told.estimates.values(), alone.estimates.values(), strict=True):
+    for own, before in zip(told.groups.values(), alone.groups.values(), strict=True):
         for name in BOX:
             assert own.log_alone[name] == pytest.approx(before.ci95[name], rel=1e-6)
         assert not any("exact" in str(each) for each in own.warnings)

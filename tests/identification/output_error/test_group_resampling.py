@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.joint import join
 from omnidyn.identification.output_error.solve.progress import FitProgress
-from omnidyn.identification.question import Question
-from omnidyn.identification.whole_logs import identify_groups
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
@@ -38,16 +38,16 @@ def drawn():
     """Ten runs a floor whose noise remembers (0.9 from row to row at 50 Hz): by sandwich, and by 100 draws."""
     runs, names = floors(10, coloured)
     how = {"free": ["friction"], **QUIET}
-    plain = identify_groups(runs, AXEBOT, names, covariance="sandwich", **how)
-    return plain, identify_groups(runs, AXEBOT, names, bootstrap=100, **how), (runs, names, how)
+    plain = identify(runs, AXEBOT, OutputError(covariance="sandwich", **how), groups=names)
+    return plain, identify(runs, AXEBOT, OutputError(bootstrap=100, **how), groups=names), (runs, names, how)
 
 
 def test_a_bootstrap_is_as_wide_as_the_sandwich(drawn):
     """Two ways to the same: 100 draws know a std within 7 %, ten runs within 24 %, the sandwich about as well."""
     plain, again, _ = drawn
     ratio = []
-    for group, estimate in plain.estimates.items():
-        ratio += [again.estimates[group].std[key] / estimate.std[key] for key in BOX]
+    for group, estimate in plain.groups.items():
+        ratio += [again.groups[group].std[key] / estimate.std[key] for key in BOX]
     ratio += [b.std / a.std for a, b in zip(plain.differences, again.differences, strict=True)]
     assert np.exp(np.mean(np.log(ratio))) == pytest.approx(1.0, abs=0.2)
     assert min(ratio) > 0.5
@@ -56,8 +56,8 @@ def test_a_bootstrap_is_as_wide_as_the_sandwich(drawn):
 
 def test_values_stay_and_intervals_hold_them(drawn):
     plain, again, _ = drawn
-    for group, estimate in plain.estimates.items():
-        assert again.estimates[group].value == estimate.value
+    for group, estimate in plain.groups.items():
+        assert again.groups[group].value == estimate.value
     for d in again.differences:
         assert d.low < d.difference < d.high
         assert d.low <= (0.4 if d.key == COULOMB else 0.0) + 1.5 * d.std
@@ -66,36 +66,36 @@ def test_values_stay_and_intervals_hold_them(drawn):
 
 def test_the_same_draws_again(drawn):
     _, _, (runs, names, how) = drawn
-    first, second = (identify_groups(runs, AXEBOT, names, bootstrap=20, **how) for _ in range(2))
+    first, second = (identify(runs, AXEBOT, OutputError(bootstrap=20, **how), groups=names) for _ in range(2))
     assert first.differences == second.differences
-    for group in first.estimates:
-        assert first.estimates[group].ci95 == second.estimates[group].ci95
+    for group in first.groups:
+        assert first.groups[group].ci95 == second.groups[group].ci95
 
 
 def test_each_group_needs_runs_to_draw_from():
     runs, names = floors(5)
     with pytest.raises(InsufficientDataError, match="too few runs for a bootstrap; got 4 in rough; expected 5"):
-        identify_groups(runs[:-1], AXEBOT, names[:-1], bootstrap=5, **QUIET)
+        identify(runs[:-1], AXEBOT, OutputError(bootstrap=5, **QUIET), groups=names[:-1])
 
 
 def test_a_profile_of_a_number_that_is_all_but_linear_is_the_interval_of_the_information():
     """White noise and much of it: 2 F is a parabola, so that both intervals are the same."""
     runs, names = floors(2)
-    plain = identify_groups(runs, AXEBOT, names, free=["friction", TORQUE], covariance="white", **QUIET)
+    plain = identify(runs, AXEBOT, OutputError(free=["friction", TORQUE], covariance="white", **QUIET), groups=names)
     how = {"free": ["friction", TORQUE], "profile": [COULOMB, TORQUE], "covariance": "white", **QUIET}
-    profiled = identify_groups(runs, AXEBOT, names, **how)
-    for group, estimate in plain.estimates.items():
+    profiled = identify(runs, AXEBOT, OutputError(**how), groups=names)
+    for group, estimate in plain.groups.items():
         for key in (COULOMB, TORQUE):
             np.testing.assert_allclose(
-                profiled.estimates[group].ci95[key], estimate.ci95[key], atol=0.2 * estimate.std[key]
+                profiled.groups[group].ci95[key], estimate.ci95[key], atol=0.2 * estimate.std[key]
             )
-    ends = [e.ci95[TORQUE] for e in profiled.estimates.values()]
+    ends = [e.ci95[TORQUE] for e in profiled.groups.values()]
     assert ends[0] == ends[1]
     for ours, first in zip(profiled.differences, plain.differences, strict=True):
         assert ((ours.low, ours.high) != (first.low, first.high)) == (ours.key == COULOMB)
         np.testing.assert_allclose((ours.low, ours.high), (first.low, first.high), atol=0.2 * first.std)
     with pytest.raises(InputError, match=r"profile: not a free number; got body\.mass_kg"):
-        identify_groups(runs, AXEBOT, names, profile=[MASS], **QUIET)
+        identify(runs, AXEBOT, OutputError(profile=[MASS], **QUIET), groups=names)
 
 
 def test_the_best_so_far_is_what_the_state_says_and_the_same_again():
@@ -103,7 +103,7 @@ def test_the_best_so_far_is_what_the_state_says_and_the_same_again():
     runs, names = floors(2)
     found = []
     for _ in range(2):
-        joint, states = Fit.of(runs, AXEBOT, Question(free=["friction", TORQUE], **QUIET), names), []
+        joint, states = Fit.of(runs, AXEBOT, OutputError(free=["friction", TORQUE], **QUIET), names), []
 
         def listen(report, kept=states):
             kept += [report.state] if report.state is not None else []
@@ -129,7 +129,7 @@ def test_logs_with_other_channels_in_another_order():
     robot = Key.parse(COULOMB).set(AXEBOT, 2.6)
     wheels = simulate(robot, excitation(6.0, 50.0, seed=5), 0.02)
     runs[3] = wheels.replace(twist=None, pose=None, current=None)
-    joint = Fit.of(runs, AXEBOT, Question(free=["friction"], **QUIET), names)
+    joint = Fit.of(runs, AXEBOT, OutputError(free=["friction"], **QUIET), names)
     groups = joint.groups
     engine = join(groups, [group.problem() for group in groups], BOX)
     problem = engine.problem
@@ -160,7 +160,7 @@ def test_floors_of_a_robot_of_the_implicit_engine():
         run = simulate(own, volts, 0.05)
         noise = 0.005 * rng.standard_normal(run.twist.shape)
         runs.append(run.replace(twist=run.twist + noise, wheel_speed=None, current=None, pose=None))
-    study = identify_groups(runs, robot, [*true], free=[*keys, MASS], per_free=keys[:1], **QUIET)
+    study = identify(runs, robot, OutputError(free=[*keys, MASS], per_free=keys[:1], **QUIET), groups=[*true])
     (difference,) = study.differences
     assert study.shared == (keys[1], MASS)
     assert difference.difference == pytest.approx(-5.0, abs=4.0 * difference.std)

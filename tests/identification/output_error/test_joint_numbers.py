@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.steady.steady_state import fit_steady_state
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.keys import BOX, EMF, TORQUE
 from omnidyn.model.known.dead_zone import dead_zone
@@ -25,7 +26,7 @@ TRUE = np.array([row.scale for row in dead_zone(AXEBOT).rows])
 
 def fitted(number, seconds=10.0, **options):
     run = simulate(AXEBOT, voltages(np.random.default_rng(number), seconds), 0.01)
-    return fit_output_error(noisy_draw(run, number), START, **options)
+    return identify(noisy_draw(run, number), START, OutputError(**options)).estimate
 
 
 @pytest.fixture(scope="module")
@@ -46,14 +47,14 @@ def test_the_robot_file_holds_what_the_fit_knows(fit):
 def test_an_emf_constant_goes_with_its_torque_constant():
     run = simulate(AXEBOT, voltages(np.random.default_rng(3), 6.0), 0.01)
     log = Run(t=run.t, voltage=run.voltage, twist=noisy_draw(run, 3).twist, current=run.current)
-    fit = fit_output_error(log, START, free=(TORQUE, *BOX))
+    fit = identify(log, START, OutputError(free=(TORQUE, *BOX))).estimate
     assert fit.robot.correlation.of((TORQUE, EMF))[0, 1] == 1.0
     assert fit.robot.correlation.of((BOX[3], EMF))[0, 1] == fit.robot.correlation.of((BOX[3], TORQUE))[0, 1] != 0.0
 
 
 def test_a_later_fit_of_fewer_numbers_keeps_what_it_does_not_touch(fit):
     run = simulate(AXEBOT, voltages(np.random.default_rng(4), 6.0), 0.01)
-    later = fit_output_error(noisy_draw(run, 4), fit.robot, free=BOX[3:])
+    later = identify(noisy_draw(run, 4), fit.robot, OutputError(free=BOX[3:])).estimate
     kept = later.robot.correlation
     assert kept.of((BOX[0], BOX[1]))[0, 1] == fit.robot.correlation.of((BOX[0], BOX[1]))[0, 1]
     assert kept.of((BOX[0], BOX[3]))[0, 1] == 0.0

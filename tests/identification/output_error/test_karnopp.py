@@ -38,7 +38,7 @@ def log():
 
 def test_its_levels_are_found_and_the_answer_keeps_the_law():
     guess = robot_with(1.2, 2.0)
-    fit = omnidyn.identify([log()], guess, free=KEYS)
+    fit = omnidyn.identify([log()], guess, omnidyn.OutputError(free=KEYS)).estimate
     for key, value in zip(KEYS[:2], (0.94, 2.2), strict=True):
         assert abs(fit.value[key] - value) <= 3.0 * fit.std[key]
     low, high = fit.ci95[KEYS[2]]
@@ -70,7 +70,7 @@ def test_so_it_is_elsewhere(place):
     guess = robot
     for key in map(Key.parse, keys):
         guess = key.set(guess, 0.9 * key.get(guess))
-    fit = omnidyn.identify([seen], guess, free=keys)
+    fit = omnidyn.identify([seen], guess, omnidyn.OutputError(free=keys)).estimate
     for key in keys:
         assert abs(fit.value[key] - Key.parse(key).get(robot)) <= 3.0 * fit.std[key]
     found = getattr(fit.robot.friction, place)
@@ -78,10 +78,10 @@ def test_so_it_is_elsewhere(place):
     assert "karnopp_as_coulomb" in codes(fit.warnings)
     assert not fit.lack_of_fit.found
     with pytest.raises(InputError, match="cannot be free"):
-        omnidyn.identify([seen], robot, free=(*keys, f"{table}.karnopp_speed"))
+        omnidyn.identify([seen], robot, omnidyn.OutputError(free=(*keys, f"{table}.karnopp_speed")))
 
 
 def test_the_band_is_never_free():
     with pytest.raises(InputError, match="cannot be free"):
-        omnidyn.identify([log()], robot_with(), free=(*KEYS, f"{BAND}[0]"))
+        omnidyn.identify([log()], robot_with(), omnidyn.OutputError(free=(*KEYS, f"{BAND}[0]")))
     assert guesses(robot_with().replace(priors={BAND: Prior(std=1e-5, origin="guess")})) == ()

@@ -3,8 +3,9 @@ its entries."""
 
 import numpy as np
 
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.problem.parameters import robot_parameters
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import BOX, EMF, TORQUE, Key, expand
 from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Prior
@@ -40,7 +41,7 @@ def test_a_motor_that_is_weaker_is_found(axebot):
     constants = (0.0059, 0.0053, 0.0059)
     start = with_motor(axebot, torque_constant=(0.0059,) * 3, emf_constant=(0.0059,) * 3)
     log = driven(with_motor(axebot, torque_constant=constants, emf_constant=constants))
-    fit = fit_output_error(log, start, free=["friction", TORQUE], nuisances=(), start="rest")
+    fit = identify(log, start, OutputError(free=["friction", TORQUE], nuisances=(), start="rest")).estimate
     for key, true in zip(expand(TORQUE, start), constants, strict=True):
         assert abs(fit.value[key] - true) < 4.0 * fit.std[key], key
         assert fit.std[key] < 0.01 * true
@@ -80,7 +81,7 @@ def test_a_prior_of_four_resistances(four_wheel):
     """It holds each of them, and what is known of those that were not free stays in the file."""
     robot = with_motor(four_wheel, resistance=(1.6, 1.7, 1.8, 1.9)).replace(priors={RESISTANCE: SHEET})
     first = f"{RESISTANCE}[0]"
-    fit = fit_output_error(driven(robot), robot, free=["friction", first], nuisances=(), start="rest")
+    fit = identify(driven(robot), robot, OutputError(free=["friction", first], nuisances=(), start="rest")).estimate
     assert fit.std[first] <= 0.05
     assert abs(fit.value[first] - 1.6) < 4.0 * fit.std[first]
     assert RESISTANCE not in fit.robot.priors
@@ -92,10 +93,10 @@ def test_a_prior_of_four_resistances(four_wheel):
 def test_python_takes_names_that_stand_for_several(axebot):
     """As the command line does: "friction" for all that the robot has, a list for its entries."""
     log, plain, coulomb = driven(axebot), {"nuisances": (), "start": "rest"}, "friction.axes.coulomb"
-    every = fit_output_error(log, axebot, free="friction", profile=coulomb, **plain)
+    every = identify(log, axebot, OutputError(free="friction", profile=coulomb, **plain)).estimate
     assert tuple(every.value) == BOX
-    assert tuple(fit_output_error(log, axebot, free=[coulomb, TORQUE], **plain).value) == (*BOX[3:], TORQUE)
-    held = fit_output_error(log, axebot, fixed=coulomb, **plain)
+    assert tuple(identify(log, axebot, OutputError(free=[coulomb, TORQUE], **plain)).value) == (*BOX[3:], TORQUE)
+    held = identify(log, axebot, OutputError(fixed=coulomb, **plain)).estimate
     assert tuple(held.value) == BOX[:3]
-    alone = fit_output_error(log, axebot, **plain)
+    alone = identify(log, axebot, OutputError(**plain)).estimate
     assert [key for key in BOX if every.ci95[key] != alone.ci95[key]] == [*BOX[3:]]

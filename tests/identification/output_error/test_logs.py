@@ -1,20 +1,17 @@
 """Logs as they come: gaps, several runs, missing rows, duty and supply, latency, outliers; and what is refused."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
-from omnidyn.identification import whole_logs as whole
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.solve.solver import of_states
 from omnidyn.model.keys import BOX
 from omnidyn.model.robot import Prior
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, TRUTH, noisy, voltages
-
-fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a test asks for
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +34,7 @@ def test_a_log_with_gaps_is_split_and_each_piece_starts_where_it_starts(axebot, 
     keep = np.ones(len(log), bool)
     for start, length in ((400, 150), (1300, 300), (2200, 280)):
         keep[start : start + length] = False
-    fit = fit_output_error(rows(log, keep), axebot)
+    fit = identify(rows(log, keep), axebot, OutputError(nuisances=())).estimate
     assert holds(fit)
     assert fit.covariance == "white"  # a piece that starts wrong would leave a tail
 
@@ -46,7 +43,7 @@ def test_rows_without_input_split_the_log_too(axebot, clean):
     log = noisy(clean, 2)
     voltage = log.voltage.copy()
     voltage[1000:1040] = np.nan
-    fit = fit_output_error(log.replace(voltage=voltage), axebot)
+    fit = identify(log.replace(voltage=voltage), axebot, OutputError(nuisances=())).estimate
     assert holds(fit)
     assert [each.numbers["rows"] for each in fit.warnings if each.code == "split_at_missing_inputs"] == [40]
 
@@ -54,9 +51,9 @@ def test_rows_without_input_split_the_log_too(axebot, clean):
 def test_two_runs_are_worth_two(axebot, clean):
     other = simulate(axebot, voltages(np.random.default_rng(12)), 0.01)
     logs = [noisy(clean, 3), noisy(other, 4)]
-    both = fit_output_error(logs, axebot)
+    both = identify(logs, axebot, OutputError(nuisances=())).estimate
     assert holds(both)
-    single = [fit_output_error(log, axebot) for log in logs]
+    single = [identify(log, axebot, OutputError(nuisances=())).estimate for log in logs]
     for key in BOX:
         together = 1.0 / np.sqrt(sum(1.0 / fit.std[key] ** 2 for fit in single))
         assert both.std[key] == pytest.approx(together, rel=0.05)
@@ -68,13 +65,13 @@ def test_irregular_steps_and_missing_outputs(axebot):
     run = noisy(simulate(axebot, voltages(rng, 25.0)[:2500], dt), 5)
     twist = run.twist.copy()
     twist[rng.random(twist.shape) < 0.3] = np.nan
-    assert holds(fit_output_error(run.replace(twist=twist), axebot))
+    assert holds(identify(run.replace(twist=twist), axebot, OutputError(nuisances=())).estimate)
 
 
 def test_wheel_speeds_alone(axebot, clean):
     rng = np.random.default_rng(6)
     speed = clean.wheel_speed + 0.5 * rng.normal(size=clean.wheel_speed.shape)
-    fit = fit_output_error(Run(t=clean.t, voltage=clean.voltage, wheel_speed=speed), axebot)
+    fit = identify(Run(t=clean.t, voltage=clean.voltage, wheel_speed=speed), axebot, OutputError(nuisances=())).estimate
     assert holds(fit)
     assert list(fit.noise) == ["wheel_speed[0]", "wheel_speed[1]", "wheel_speed[2]"]
     assert list(fit.noise.values()) == pytest.approx([0.5] * 3, rel=0.05)
@@ -86,7 +83,9 @@ def test_a_heading_alone_gives_the_friction_about_yaw(axebot, clean):
     pose = np.full(clean.pose.shape, np.nan)
     pose[:, 2] = clean.pose[:, 2] + 0.7 + 0.002 * rng.normal(size=len(clean))
     keys = ["friction.axes.viscous[2]", "friction.axes.coulomb[2]"]
-    fit = fit_output_error(Run(t=clean.t, voltage=clean.voltage, pose=pose), axebot, free=keys)
+    fit = identify(
+        Run(t=clean.t, voltage=clean.voltage, pose=pose), axebot, OutputError(nuisances=(), free=keys)
+    ).estimate
     for key in keys:
         assert abs(fit.value[key] - TRUTH[key]) < 4.5 * fit.std[key]
         assert fit.std[key] < 0.05 * TRUTH[key]
@@ -96,8 +95,10 @@ def test_a_duty_with_its_supply_is_a_voltage(axebot, clean):
     log = noisy(clean, 8)
     supply = np.linspace(12.6, 11.4, len(log))
     duty = log.voltage / supply[:, None]
-    fit = fit_output_error(Run(t=log.t, duty=duty, supply=supply, twist=log.twist), axebot, start="rest")
-    direct = fit_output_error(log, axebot, start="rest")
+    fit = identify(
+        Run(t=log.t, duty=duty, supply=supply, twist=log.twist), axebot, OutputError(nuisances=(), start="rest")
+    ).estimate
+    direct = identify(log, axebot, OutputError(nuisances=(), start="rest")).estimate
     for key in BOX:
         assert fit.value[key] == pytest.approx(direct.value[key], rel=1e-6)
 
@@ -107,7 +108,7 @@ def test_a_nominal_supply_is_uncertain(axebot, clean):
     log = noisy(clean, 9)
     robot = axebot.replace(drive=axebot.drive.replace(kind="duty", supply=12.0))
     run = Run(t=log.t, duty=log.voltage / 11.0, twist=log.twist)
-    fit = fit_output_error(run, robot, nuisances=["gain"])
+    fit = identify(run, robot, OutputError(nuisances=["gain"])).estimate
     assert fit.nuisances["gain"].value == pytest.approx(11.0 / 12.0, rel=0.02)
     assert holds(fit)
     assert [each.numbers["supply"] for each in fit.warnings if each.code == "supply_nominal"] == [12.0]
@@ -123,7 +124,7 @@ def test_latency_gain_dead_band_and_outliers_at_once(axebot):
     twist = twist + rng.normal(size=twist.shape) * NOISE
     twist += rng.normal(size=twist.shape) * (rng.random(twist.shape) < 0.02)
     run = Run(t=np.arange(len(voltage)) * 0.01, voltage=voltage, twist=np.round(twist / NOISE) * NOISE)
-    fit = fit_output_error(run, axebot, nuisances=["latency", "gain", "dead_band"], loss="student-t")
+    fit = identify(run, axebot, OutputError(nuisances=["latency", "gain", "dead_band"], loss="student-t")).estimate
     assert holds(fit)
     for name, true in (("latency.twist", 0.013), ("gain", 0.97), ("dead_band", 0.15)):
         assert abs(fit.nuisances[name].value - true) < 4.5 * fit.nuisances[name].std
@@ -136,7 +137,7 @@ def test_a_current_that_comes_late(axebot, clean):
     fine = simulate(axebot, np.repeat(voltage, 10, axis=0), 0.001)
     seen = np.maximum(np.arange(len(clean)) * 10 - 17, 0)
     current = fine.current[seen] + 0.05 * rng.normal(size=clean.current.shape)
-    fit = fit_output_error(noisy(clean, 15).replace(current=current), axebot, nuisances=["latency"])
+    fit = identify(noisy(clean, 15).replace(current=current), axebot, OutputError(nuisances=["latency"])).estimate
     assert fit.nuisances["latency.current"].value == pytest.approx(0.017, abs=1e-3)
     assert holds(fit)
 
@@ -146,9 +147,11 @@ def test_breakaway_is_bracketed(axebot, clean):
     axes = axebot.friction.axes.replace(breakaway=(2.75, *coulomb[1:]))
     sticky = axebot.replace(friction=axebot.friction.replace(axes=axes))
     key = "friction.axes.breakaway[0]"
-    fit = fit_output_error(
-        noisy(simulate(sticky, clean.voltage[:-1], 0.01), 16), axebot, free=[*BOX, key], start="rest"
-    )
+    fit = identify(
+        noisy(simulate(sticky, clean.voltage[:-1], 0.01), 16),
+        axebot,
+        OutputError(nuisances=(), free=[*BOX, key], start="rest"),
+    ).estimate
     low, high = fit.ci95[key]
     assert low <= 2.75 <= high
     assert low > 2.25  # told from coulomb
@@ -160,7 +163,7 @@ def test_breakaway_is_bracketed(axebot, clean):
 def test_an_axis_that_never_moved_is_bounded_from_below(axebot, clean):
     """The yaw part of the voltages shrunk until it is below breakaway: 0.099 N m."""
     voltage = clean.voltage[:-1] - 0.98 * clean.voltage[:-1].mean(axis=1, keepdims=True)
-    fit = fit_output_error(noisy(simulate(axebot, voltage, 0.01), 17), axebot, start="rest")
+    fit = identify(noisy(simulate(axebot, voltage, 0.01), 17), axebot, OutputError(nuisances=(), start="rest")).estimate
     bound = fit.lower_bound["friction.axes.breakaway[2]"]
     assert 0.0 < bound < 0.099
     assert "friction.axes.coulomb[2]" not in fit.value
@@ -169,7 +172,9 @@ def test_an_axis_that_never_moved_is_bounded_from_below(axebot, clean):
 
 def test_a_dead_sensor_bounds_nothing(axebot, clean):
     log = noisy(clean, 17)
-    fit = fit_output_error(log.replace(twist=log.twist * [1.0, 1.0, 0.0]), axebot, start="rest")
+    fit = identify(
+        log.replace(twist=log.twist * [1.0, 1.0, 0.0]), axebot, OutputError(nuisances=(), start="rest")
+    ).estimate
     assert not fit.lower_bound
     (still,) = [each for each in fit.warnings if each.code == "axis_not_moved"]
     assert (still.subject, still.numbers["dead"]) == ("yaw", True)
@@ -178,24 +183,28 @@ def test_a_dead_sensor_bounds_nothing(axebot, clean):
 def test_what_has_a_std_is_free_with_it_as_a_prior_but_never_one_of_an_earlier_fit(axebot, clean):
     log, key = noisy(clean, 18), "motor.resistance_ohm"
     robot = axebot.replace(priors={key: Prior(std=0.05, source="datasheet"), BOX[0]: Prior(std=1e-6)})
-    plain = fit_output_error(log, robot, start="rest", fixed=[key])
+    plain = identify(log, robot, OutputError(nuisances=(), start="rest", fixed=[key])).estimate
     assert key not in plain.value
-    known = fit_output_error(log, robot, start="rest")
+    known = identify(log, robot, OutputError(nuisances=(), start="rest")).estimate
     assert abs(known.value[key] - 1.69) < 0.15
     assert known.std[key] < 0.05
     assert known.value[BOX[0]] == pytest.approx(0.94, abs=1e-5)  # its prior is narrow
     assert BOX[0] in known.unidentifiable  # and the logs tell less of it
-    loose = fit_output_error(log, axebot.replace(priors={key: Prior(std=0.05)}), start="rest")
-    alone = fit_output_error(log, axebot, start="rest")
+    loose = identify(
+        log, axebot.replace(priors={key: Prior(std=0.05)}), OutputError(nuisances=(), start="rest")
+    ).estimate
+    alone = identify(log, axebot, OutputError(nuisances=(), start="rest")).estimate
     assert loose.std[BOX[3]] > alone.std[BOX[3]]  # an uncertain resistance makes friction uncertain
-    again = fit_output_error(log, alone.robot, start="rest")
+    again = identify(log, alone.robot, OutputError(nuisances=(), start="rest")).estimate
     assert again.std[BOX[0]] == pytest.approx(alone.std[BOX[0]], rel=1e-3)
 
 
 def test_what_is_written_can_be_read_and_says_where_it_comes_from(axebot, clean, tmp_path):
     from omnidyn.model.robot_file import load_robot, save_robot
 
-    fit = fit_output_error(noisy(clean, 19).replace(source="yard.csv"), axebot, start="rest")
+    fit = identify(
+        noisy(clean, 19).replace(source="yard.csv"), axebot, OutputError(nuisances=(), start="rest")
+    ).estimate
     robot = load_robot(save_robot(fit.robot, tmp_path / "fit.toml"))
     assert robot.friction == fit.robot.friction
     assert robot.priors[BOX[0]].origin == "identified"
@@ -223,48 +232,50 @@ def test_what_is_written_can_be_read_and_says_where_it_comes_from(axebot, clean,
 )
 def test_options_that_cannot_be_used(axebot, clean, options, message):
     with pytest.raises(InputError, match=message.replace("[", r"\[")):
-        fit_output_error(noisy(clean, 1), axebot, **options)
+        identify(noisy(clean, 1), axebot, OutputError(nuisances=(), **options))
 
 
 def test_logs_that_cannot_be_used(axebot, four_wheel, clean):
     log = noisy(clean, 1)
     with pytest.raises(InputError, match="nothing to fit to; got no runs"):
-        fit_output_error([], axebot)
+        identify([], axebot, OutputError(nuisances=()))
     with pytest.raises(InputError, match="the log has no input; got twist; expected voltage or duty"):
-        fit_output_error(Run(t=log.t, twist=log.twist), axebot)
+        identify(Run(t=log.t, twist=log.twist), axebot, OutputError(nuisances=()))
     with pytest.raises(InputError, match="a duty needs a supply"):
-        fit_output_error(Run(t=log.t, twist=log.twist, duty=log.voltage / 6.0), axebot)
+        identify(Run(t=log.t, twist=log.twist, duty=log.voltage / 6.0), axebot, OutputError(nuisances=()))
     with pytest.raises(UnsupportedError, match="only set speeds are logged"):
-        fit_output_error(Run(t=log.t, twist=log.twist, twist_command=log.twist), axebot)
+        identify(Run(t=log.t, twist=log.twist, twist_command=log.twist), axebot, OutputError(nuisances=()))
     with pytest.raises(InputError, match="the log has another number of wheels; got 3; expected 4"):
-        fit_output_error(log, four_wheel)
+        identify(log, four_wheel, OutputError(nuisances=()))
     fourth = log.replace(voltage=np.column_stack([log.voltage, np.full(len(log), np.nan)]), current=None)
     with pytest.raises(InputError, match=r"wheels without any input; got none for wheel 4; expected one for each of"):
-        fit_output_error(fourth.replace(wheel_speed=None), four_wheel)
+        identify(fourth.replace(wheel_speed=None), four_wheel, OutputError(nuisances=()))
     slips = axebot.replace(wheels=axebot.wheels.replace(traction_mu=0.4, wheel_inertia=2e-5))
     with pytest.raises(UnsupportedError, match=r"does not know all that is asked for; got tilt\.x"):
-        fit_output_error(log, slips, nuisances=["tilt.x"])
+        identify(log, slips, OutputError(nuisances=["tilt.x"]))
     still = np.random.default_rng(1).normal(size=log.twist.shape) * NOISE
     with pytest.raises(InsufficientDataError, match=r"the robot never visibly moved.*x held 0"):
-        fit_output_error(log.replace(voltage=log.voltage * 0.01, twist=still), axebot)
+        identify(log.replace(voltage=log.voltage * 0.01, twist=still), axebot, OutputError(nuisances=()))
     with pytest.raises(InsufficientDataError, match="no stretch of the log has inputs throughout"):
-        fit_output_error(log.replace(voltage=np.full(log.voltage.shape, np.nan)), axebot)
+        identify(log.replace(voltage=np.full(log.voltage.shape, np.nan)), axebot, OutputError(nuisances=()))
 
 
 def test_nuisances_by_default_are_those_that_a_log_supports(axebot, clean):
     """Latency and dead band are fitted where the log tells them; a gain of 0.96 is not, but the diagnosis names it."""
     log = noisy(clean, 20)
-    fit = whole.fit_output_error(log, axebot)
+    fit = identify(log, axebot, OutputError()).estimate
     assert set(fit.nuisances) == {"latency.twist", "dead_band"}
     assert holds(fit)
     assert not fit.warnings
-    wrong = whole.fit_output_error(log.replace(voltage=log.voltage / 0.96), axebot)
+    wrong = identify(log.replace(voltage=log.voltage / 0.96), axebot, OutputError()).estimate
     remedies = wrong.lack_of_fit.remedies
     assert "gain" in {remedies[0].key, *remedies[0].same_as}
     (gain,) = [remedy for remedy in remedies if remedy.key == "gain"]
     found = dict(zip(gain.cause.numbers["keys"], gain.cause.numbers["values"], strict=True))
     assert found["gain"] == pytest.approx(0.96, abs=0.02)
-    again = whole.fit_output_error(log.replace(voltage=log.voltage / 0.96), axebot, nuisances=["latency", "gain"])
+    again = identify(
+        log.replace(voltage=log.voltage / 0.96), axebot, OutputError(nuisances=["latency", "gain"])
+    ).estimate
     assert holds(again)
 
 

@@ -6,7 +6,8 @@ The logs come from the Moreau stepper of tests/reference, which shares no code w
 import numpy as np
 import pytest
 
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import ROTOR
 from omnidyn.model.motor import Motor
@@ -73,7 +74,7 @@ def test_the_friction_comes_out_right_with_the_rotor_in_the_file(friction):
     free, fits = ("friction", "motor.resistance_ohm", "body.inertia_kg_m2"), {}
     for rotor in (J, 0.0):
         start = heavy(halved(friction), rotor)
-        fit = fits[rotor] = fit_output_error([log(friction)], start, free=free, covariance="sandwich")
+        fit = fits[rotor] = identify([log(friction)], start, OutputError(free=free, covariance="sandwich")).estimate
         print(f"{key} = {fit.value[key]:.3f} +- {fit.std[key]:.3f}, noise {fit.noise['twist[0]']:.4g}")
     right, wrong = fits[J], fits[0.0]
     assert abs(right.value[key] - 14.0) < 4.0 * right.std[key]
@@ -95,7 +96,7 @@ def halved(friction):
 def test_the_rotor_itself_can_be_fitted(friction):
     """Mass and motors known, friction and rotor free: both engines."""
     start = heavy(halved(friction), 0.6e-6)
-    fit = fit_output_error([log(friction)], start, free=("friction", ROTOR))
+    fit = identify([log(friction)], start, OutputError(free=("friction", ROTOR))).estimate
     print(fit.value[ROTOR], fit.std[ROTOR])
     assert abs(fit.value[ROTOR] - J) < 4.0 * fit.std[ROTOR]
     assert fit.std[ROTOR] < 0.1 * J
@@ -105,7 +106,7 @@ def test_the_rotor_itself_can_be_fitted(friction):
 def test_the_rotor_of_one_motor():
     """It couples the axes: fitted by the engine that knows that, from a robot that the other one could serve."""
     robot = heavy(BOX, (J, J, 3 * J, J))
-    fit = fit_output_error([log_of(robot)], heavy(BOX, J), free=("friction", f"{ROTOR}[2]"))
+    fit = identify([log_of(robot)], heavy(BOX, J), OutputError(free=("friction", f"{ROTOR}[2]"))).estimate
     print(fit.value[f"{ROTOR}[2]"], fit.std[f"{ROTOR}[2]"])
     assert abs(fit.value[f"{ROTOR}[2]"] - 3 * J) < 4.0 * fit.std[f"{ROTOR}[2]"]
     assert fit.std[f"{ROTOR}[2]"] < 0.2 * J
@@ -114,7 +115,7 @@ def test_the_rotor_of_one_motor():
 def test_a_prior_of_the_rotor_is_heard():
     """With mass free beside it, only the prior tells which of the two it is."""
     start = heavy(halved(BOX), 1.6e-6).replace(priors={ROTOR: Prior(std=0.1e-6, origin="guess")})
-    fit = fit_output_error([log(BOX)], start, free=("friction", "body.mass_kg", ROTOR))
+    fit = identify([log(BOX)], start, OutputError(free=("friction", "body.mass_kg", ROTOR))).estimate
     print(fit.value[ROTOR], fit.std[ROTOR], fit.value["body.mass_kg"], fit.std["body.mass_kg"])
     assert fit.value[ROTOR] == pytest.approx(1.6e-6, rel=0.1)
     assert abs(fit.value["body.mass_kg"] - 6.2) < 4.0 * fit.std["body.mass_kg"]

@@ -5,14 +5,14 @@ import pytest
 
 from omnidyn import check
 from omnidyn.errors import UnsupportedError
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.slipping import SlipEngine
 from omnidyn.identification.output_error.linear.motion import motions
 from omnidyn.identification.output_error.prepare import make_engine, make_problem, read_records
 from omnidyn.identification.output_error.problem.motion import motion
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.question import Question
 from omnidyn.identification.structure.missing import laws
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.surroundings import GRAVITY
@@ -53,9 +53,11 @@ def fit():
     guess = ROBOT.replace(
         wheels=ROBOT.wheels.replace(traction_mu=0.45), friction=ROBOT.friction.replace(axes=axes)
     )  # fmt: skip
-    return fit_output_error(
-        log(1, 6.0), guess, free=("friction", "wheels.traction_mu"), outputs=("twist", "wheel_speed"), nuisances=()
-    )
+    return identify(
+        log(1, 6.0),
+        guess,
+        OutputError(free=("friction", "wheels.traction_mu"), outputs=("twist", "wheel_speed"), nuisances=()),
+    ).estimate
 
 
 def test_what_the_floor_takes_comes_back_with_the_friction(fit):
@@ -73,15 +75,17 @@ def test_a_right_model_of_wheels_that_slip_is_found_right(fit):
 
 def test_a_wrong_mass_is_found_though_wheels_slip():
     heavy = ROBOT.replace(body=ROBOT.body.replace(mass=1.4 * ROBOT.body.mass))
-    wrong = fit_output_error(
-        log(1, 3.0), heavy, free=("friction", "wheels.traction_mu"), outputs=("twist", "wheel_speed"), nuisances=()
-    )
+    wrong = identify(
+        log(1, 3.0),
+        heavy,
+        OutputError(free=("friction", "wheels.traction_mu"), outputs=("twist", "wheel_speed"), nuisances=()),
+    ).estimate
     assert wrong.lack_of_fit.found
 
 
 def test_which_wheels_roll_is_seen_as_the_reference_has_it():
     run = log(2, 3.0, noisy=False)
-    question = Question(
+    question = OutputError(
         free=("friction.axes.coulomb[0]",), outputs=("twist", "wheel_speed"), nuisances=(), start="rest"
     )
     problem = make_problem(read_records([run], ROBOT, question), ROBOT, question)
@@ -107,7 +111,7 @@ def test_derivatives_are_those_of_the_runs_themselves():
     """Its run is that of the reference; a number moved by a hundredth of a percent leads to as exact a run."""
     run = log(2, 1.5, noisy=False)
     keys = ("friction.axes.coulomb[0]", "friction.axes.viscous[1]", "wheels.traction_mu")
-    question = Question(free=keys, outputs=("twist", "wheel_speed"), nuisances=(), start="rest")
+    question = OutputError(free=keys, outputs=("twist", "wheel_speed"), nuisances=(), start="rest")
     problem = make_problem(read_records([run], ROBOT, question), ROBOT, question)
     engine, point = make_engine("implicit", problem), problem.start()
     assert isinstance(engine, SlipEngine)
@@ -126,7 +130,7 @@ def test_a_speed_loop_with_wheels_that_slip_is_refused():
     run = log(2, 1.5)
     looped = ROBOT.replace(drive=ROBOT.drive.replace(kind="speed", kp=0.1, ki=1.0, rate=100.0))
     with pytest.raises(UnsupportedError, match="slip"):
-        fit_output_error(run.replace(voltage=None, wheel_speed_command=run.wheel_speed), looped)
+        identify(run.replace(voltage=None, wheel_speed_command=run.wheel_speed), looped, OutputError())
 
 
 def test_what_an_axis_has_held_is_no_more_than_the_floor_takes():
@@ -135,10 +139,10 @@ def test_what_an_axis_has_held_is_no_more_than_the_floor_takes():
     turning = np.random.default_rng(3).normal(size=(300, 3)) * [1e-4, 1e-4, 1e-3]
     turning[100:200, 2] += 1.0
     run = Run(t=DT * np.arange(300), voltage=np.tile(volts, (300, 1)), twist=turning)
-    (free,) = read_records([run], AXEBOT, Question(outputs=("twist",)))
+    (free,) = read_records([run], AXEBOT, OutputError(outputs=("twist",)))
     drive = motion([free], AXEBOT).held
     assert np.isfinite(drive).all()
-    (slips,) = read_records([run], ROBOT, Question(outputs=("twist",)))
+    (slips,) = read_records([run], ROBOT, OutputError(outputs=("twist",)))
     held = motion([slips], ROBOT).held
     assert held[0] <= MU * ROBOT.body.mass * GRAVITY
     assert held[0] < drive[0]
@@ -149,7 +153,9 @@ def test_the_ladder_takes_the_grip_that_the_file_lacks():
     grippy = ROBOT.replace(wheels=ROBOT.wheels.replace(traction_mu=1.6))
     rolling = AXEBOT.replace(wheels=AXEBOT.wheels.replace(wheel_inertia=0.0))
     run = log(1, 5.0, robot=grippy)
-    best = fit_output_error(run, rolling, free=("friction",), outputs=("twist", "wheel_speed"), ladder=True)
+    best = identify(
+        run, rolling, OutputError(free=("friction",), outputs=("twist", "wheel_speed"), ladder=True)
+    ).estimate
     (step,) = best.ladder.taken
     assert step.key == "wheels.traction_mu"
     assert abs(best.value["wheels.traction_mu"] / 1.6 - 1.0) < 0.02
@@ -162,7 +168,7 @@ def test_a_fit_that_wheels_that_slip_led_astray_is_diagnosed_in_bounded_time(mon
     """Its friction about yaw went to 1e6 N m: bristles as stiff as that took minutes."""
     grippy = ROBOT.replace(wheels=ROBOT.wheels.replace(traction_mu=0.8))
     run = log(1, 6.0, robot=grippy)
-    astray = fit_output_error(run, AXEBOT, free=("friction",), outputs=("twist", "wheel_speed"))
+    astray = identify(run, AXEBOT, OutputError(free=("friction",), outputs=("twist", "wheel_speed"))).estimate
     assert "search_end" in codes(astray.warnings)
     tried = []
     raw, words = laws.BRISTLES[laws.DAMPING]
@@ -182,6 +188,6 @@ def test_a_right_fit_asks_nothing_of_the_engine_of_wheels_that_slip(monkeypatch)
     monkeypatch.setattr(laws, "slippery", lambda robot, mu: asked.append(mu))
     rolls = ROBOT.replace(wheels=ROBOT.wheels.replace(traction_mu=50.0))
     known = ROBOT.replace(wheels=ROBOT.wheels.replace(traction_mu=None))
-    fit = fit_output_error(log(1, 5.0, robot=rolls), known, free=("friction",), outputs=("twist",))
+    fit = identify(log(1, 5.0, robot=rolls), known, OutputError(free=("friction",), outputs=("twist",))).estimate
     assert not fit.lack_of_fit.found
     assert not asked

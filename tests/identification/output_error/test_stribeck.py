@@ -82,7 +82,9 @@ def test_breakaway_is_found_with_the_speed_over_which_it_falls(truth):
     """Four logs: of sixteen numbers none is further off than 3.5 standard errors, and few beyond 1.96."""
     beyond = 0
     for seed in range(4):
-        fit = omnidyn.identify([log_of(truth, seed)], robot_with(1.2, 2.0, 2.5, 0.03), free=KEYS)
+        fit = omnidyn.identify(
+            [log_of(truth, seed)], robot_with(1.2, 2.0, 2.5, 0.03), omnidyn.OutputError(free=KEYS)
+        ).estimate
         off = [abs(fit.value[key] - value) / fit.std[key] for key, value in zip(KEYS, TRUE, strict=True)]
         assert max(off) <= 3.5
         beyond += sum(each > 1.96 for each in off)
@@ -94,7 +96,10 @@ def test_breakaway_is_found_with_the_speed_over_which_it_falls(truth):
 def test_the_answer_rests_on_a_breakaway_that_is_held(truth):
     """What it says of 1 % more is what a fit with 1 % more finds."""
     free = tuple(key for key in KEYS if key != HELD)
-    one, other = (omnidyn.identify([log_of(truth, 1)], robot_with(breakaway=s), free=free) for s in (2.8, 2.8 * 1.01))
+    one, other = (
+        omnidyn.identify([log_of(truth, 1)], robot_with(breakaway=s), omnidyn.OutputError(free=free)).estimate
+        for s in (2.8, 2.8 * 1.01)
+    )
     assert isinstance(one, OutputErrorEstimate)
     for key in free:
         said = one.rests_on[key][HELD]
@@ -106,7 +111,7 @@ def test_what_is_guessed_is_free_by_itself(truth):
     guessed = {HELD: Prior(std=0.5, origin="guess"), KEYS[3]: Prior(std=0.02, origin="guess")}
     robot = robot_with(1.2, 2.0, 2.5, 0.03).replace(priors=guessed)
     assert guesses(robot) == (HELD, KEYS[3])
-    fit = omnidyn.identify([log_of(truth, 1)], robot)
+    fit = omnidyn.identify([log_of(truth, 1)], robot).estimate
     assert {HELD, KEYS[3]} <= fit.value.keys()
     assert abs(fit.value[HELD] - 2.8) <= 3.0 * fit.std[HELD]
 
@@ -132,7 +137,7 @@ def test_without_a_fall_there_is_no_stribeck_speed(seed):
     """What is told of breakaway is what the robot held: at least Coulomb friction, below the 2.8 N that it is not."""
     plain = AXEBOT.replace(friction=Friction(axes=AxesFriction(viscous=(0.94, 0.96, 0.01), coulomb=(2.2, 1.5, 0.099))))
     log = log_of(reference(plain, ramps(), 0.02), seed)
-    fit = omnidyn.identify([log], robot_with(1.2, 2.0, 2.5, 0.03), free=KEYS)
+    fit = omnidyn.identify([log], robot_with(1.2, 2.0, 2.5, 0.03), omnidyn.OutputError(free=KEYS)).estimate
     low, high = fit.ci95[HELD]
     assert fit.ci95[KEYS[1]][0] <= low <= 2.2 <= high <= 2.7
     assert fit.value[HELD] >= fit.value[KEYS[1]]
@@ -145,6 +150,8 @@ def test_a_breakaway_that_only_holds_is_within_what_held():
     """It falls within less than the log shows: the speed is no estimate, the level is between the drives of the log."""
     holds = AXEBOT.replace(friction=Friction(axes=AxesFriction(
         viscous=(0.94, 0.96, 0.01), coulomb=(2.2, 1.5, 0.099), breakaway=(2.8, 1.5, 0.099))))  # fmt: skip
-    fit = omnidyn.identify([log_of(reference(holds, ramps(), 0.02), 2)], robot_with(1.2, 2.0, 2.5, 0.03), free=KEYS)
+    fit = omnidyn.identify(
+        [log_of(reference(holds, ramps(), 0.02), 2)], robot_with(1.2, 2.0, 2.5, 0.03), omnidyn.OutputError(free=KEYS)
+    ).estimate
     low, high = fit.ci95[HELD]
     assert fit.ci95[KEYS[1]][0] <= low <= 2.8 <= high <= 3.6

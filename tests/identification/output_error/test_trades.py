@@ -6,10 +6,11 @@ from scipy.special import ndtri
 
 from benchmarks.wrong_worlds.log import NOISE, Case, Setup, logged, robot_of
 from benchmarks.wrong_worlds.world import World, drive
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.linear.workbench import scaled
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.trust.ends import at_the_end
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import Key, expand
 from omnidyn.model.robot import Prior
 from omnidyn.run import Run
@@ -38,7 +39,7 @@ def test_a_dead_band_and_coulomb_friction_that_trade_are_told_together():
     truth = DEAD + WORLD.coulomb[2] / push
     off = []
     for seed in range(960, 966):
-        fit = fit_output_error(turning(seed), robot_of(World()), nuisances=("dead_band",))
+        fit = identify(turning(seed), robot_of(World()), OutputError(nuisances=("dead_band",))).estimate
         one = sums(fit)["sets_off.yaw"]
         assert one.correlation < -0.9
         assert one.std < 0.3 * fit.nuisances["dead_band"].std
@@ -51,12 +52,14 @@ def test_a_dead_band_and_coulomb_friction_that_trade_are_told_together():
 
 
 def test_numbers_that_the_log_tells_apart_have_no_sum():
-    fit = fit_output_error(logged(Case(WORLD, World()), 967), robot_of(World()), nuisances=("latency", "dead_band"))
+    fit = identify(
+        logged(Case(WORLD, World()), 967), robot_of(World()), OutputError(nuisances=("latency", "dead_band"))
+    ).estimate
     assert not [name for name in sums(fit) if name.startswith(("sets_off", "follows"))]
 
 
 def test_a_latency_beyond_the_search_is_no_estimate():
-    fit = fit_output_error(turning(968, World(), 0.36), robot_of(World()), nuisances=("latency",))
+    fit = identify(turning(968, World(), 0.36), robot_of(World()), OutputError(nuisances=("latency",))).estimate
     assert "latency.wheel_speed" in fit.unidentifiable
     assert "latency.wheel_speed: not determined" in fit.summary()
     assert [each.subject for each in fit.warnings if each.code == "search_end"] == ["latency.wheel_speed"]
@@ -87,10 +90,12 @@ def test_the_log_alone_is_a_fit_of_the_same_log_with_the_file_taken_as_exact():
     log = logged(Case(World(), World(), Setup()), 969)
     robot = robot_of(World())
     key = "body.mass_kg"
-    free = fit_output_error(log, robot.replace(priors={key: Prior(std=0.1, source="scales")}), nuisances=())
+    free = identify(
+        log, robot.replace(priors={key: Prior(std=0.1, source="scales")}), OutputError(nuisances=())
+    ).estimate
     assert key in free.value
     at = robot.replace(body=robot.body.replace(mass=free.value[key]))
-    held = fit_output_error(log, at, nuisances=())
+    held = identify(log, at, OutputError(nuisances=())).estimate
     assert set(free.log_alone) == set(held.value)
     for name, (low, high) in free.log_alone.items():
         assert high - low == pytest.approx(np.diff(held.ci95[name])[0], rel=0.05), name
@@ -108,12 +113,14 @@ def test_a_number_that_is_not_fitted_counts_with_its_std(asked):
     run, plain = logged(Case(World(), World()), 971), robot_of(World())
     size = {key: float(Key.parse(expand(key, plain)[0]).get(plain)) for key in HELD}
     priors = {key: Prior(std=share * size[key], origin="measured") for key, share in HELD.items()}
-    told = fit_output_error(run, plain.replace(priors=priors), **asked, nuisances=())
-    alone = fit_output_error(run, plain, free="friction", nuisances=())
+    told = identify(run, plain.replace(priors=priors), OutputError(**asked, nuisances=())).estimate
+    alone = identify(run, plain, OutputError(free="friction", nuisances=())).estimate
     assert told.value == pytest.approx(alone.value, rel=1e-6)
     variance = {name: std**2 for name, std in alone.std.items()}
     for key, share in HELD.items():
-        other = fit_output_error(run, scaled(plain, key, 1.0 + 0.2 * share), free="friction", nuisances=())
+        other = identify(
+            run, scaled(plain, key, 1.0 + 0.2 * share), OutputError(free="friction", nuisances=())
+        ).estimate
         for name in variance:
             variance[name] += ((other.value[name] - alone.value[name]) / 0.2) ** 2
     assert np.sqrt(list(variance.values())) == pytest.approx([told.std[name] for name in variance], rel=0.05)
@@ -134,7 +141,7 @@ def test_it_counts_in_a_profile_and_a_bootstrap_too(more):
     fits = []
     for asked in ({}, more):
         for robot in (plain, plain.replace(priors={"motor.gear_ratio": gear})):
-            fits.append(fit_output_error(runs, robot, free="friction", nuisances=(), **asked))
+            fits.append(identify(runs, robot, OutputError(free="friction", nuisances=(), **asked)).estimate)
     bare, told, alone, both = fits
     moved = np.sqrt(told.std[key] ** 2 - bare.std[key] ** 2)
     assert moved > bare.std[key]
@@ -152,7 +159,7 @@ def test_a_number_that_is_not_fitted_and_is_off_is_in_the_interval():
         world = World(gear_ratio=off * World().gear_ratio)
         std = share * World().gear_ratio
         told = robot_of(World()).replace(priors={"motor.gear_ratio": Prior(std=std, origin="datasheet")})
-        fit = fit_output_error(logged(Case(world, World()), seed), told, free="friction", nuisances=())
+        fit = identify(logged(Case(world, World()), seed), told, OutputError(free="friction", nuisances=())).estimate
         for axis in range(2):
             name = f"friction.axes.viscous[{axis}]"
             for found, (low, high) in ((held, fit.ci95[name]), (alone, fit.log_alone[name])):

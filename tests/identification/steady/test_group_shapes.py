@@ -7,9 +7,9 @@ from benchmarks import steady_shapes
 from benchmarks.steady_shapes import KINDS, driven
 from benchmarks.wrong_worlds.log import truths
 from benchmarks.wrong_worlds.world import ELLIPSE
-from omnidyn.identification.identify import Identification
-from omnidyn.identification.question import STEADY_STATE
-from omnidyn.identification.steady.study import identify_steady
+from omnidyn.attempts import Attempts
+from omnidyn.identification.identify import After, Identification, identify
+from omnidyn.identification.methods import SteadyState
 from tests.support.codes import codes
 
 FLOORS = ("gray", "green")
@@ -19,7 +19,7 @@ SEED = 31  # of no benchmark
 
 def study_of(kind, **options):
     runs, groups, robot, worlds = driven(kind, SEED, FLOORS)
-    return identify_steady(runs, robot, groups=groups, **options), worlds
+    return identify(runs, robot, SteadyState(**options), groups=groups).study, worlds
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def test_the_answer_says_so(mixed):
     assert codes(study.statements).count("group_shape") == len(study.choice.own) >= 1
     text = study.document().to_text()
     assert all(f"chosen in {floor}" in text for floor in study.choice.own)
-    found = Identification(question=None, method=STEADY_STATE, estimates=study.estimates, study=study)  # type: ignore[arg-type]
+    found = Identification(SteadyState(), study.estimates, lambda: After({}, {}, (), (), Attempts()), study=study)
     assert "its shape, box (gray) and ellipse (green), predicts" in found.verdict
 
 

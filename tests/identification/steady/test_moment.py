@@ -9,10 +9,10 @@ import pytest
 
 from benchmarks.blind.log import robot_of
 from benchmarks.wrong_worlds.world import BOX, ELLIPSE, WHEELS, World
-from omnidyn.identification.identify import Identification
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import SteadyState
 from omnidyn.identification.steady.moment import levelled
 from omnidyn.identification.steady.operating_points import steady_windows
-from omnidyn.identification.steady.study import identify_steady
 from tests.support.codes import codes
 from tests.support.constant_speeds import HOLD, ROUND, logged, once
 
@@ -34,7 +34,7 @@ def run(seed, rounds=6, change=1e9, factor=1.0):
 @pytest.mark.parametrize("factor", [1.15, 0.9])
 def test_a_change_is_found_with_its_time_and_both_levels(factor):
     changed = 21.4
-    study = identify_steady([run(1, change=changed, factor=factor)], robot_of(WORLD))
+    study = identify([run(1, change=changed, factor=factor)], robot_of(WORLD), SteadyState()).study
     (moment,) = study.moments
     assert moment.between[0] <= changed <= moment.between[1]
     assert moment.at == pytest.approx(changed, abs=HOLD)
@@ -51,7 +51,7 @@ def test_currents_that_are_gone_on_one_side_are_not_scaled(late):
     whole = run(1)
     gone, count = whole.current.copy(), len(whole.current)
     gone[slice(count // 2, None) if late else slice(count // 2)] = 0.0
-    study = identify_steady([whole.replace(current=gone)], robot_of(WORLD))
+    study = identify([whole.replace(current=gone)], robot_of(WORLD), SteadyState()).study
     (moment,) = study.moments
     side = "after" if late else "before"
     assert side in [w.numbers["vanished"] for w in study.warnings if w.code == "changes_within_run"]
@@ -63,13 +63,13 @@ def test_currents_that_are_gone_on_one_side_are_not_scaled(late):
 
 
 def test_a_right_run_does_not_change():
-    found = [identify_steady([run(seed)], robot_of(WORLD)).moments for seed in range(10, 18)]
+    found = [identify([run(seed)], robot_of(WORLD), SteadyState()).study.moments for seed in range(10, 18)]
     assert not any(found)
 
 
 def test_the_run_that_changed_is_named():
     runs = [run(2), run(3, change=17.0, factor=1.2)]
-    found = Identification.of(runs, robot_of(WORLD), method="steady-state")
+    found = identify(runs, robot_of(WORLD), SteadyState())
     assert found.study is not None
     (moment,) = found.study.moments
     assert moment.source == "run 3"
@@ -79,7 +79,7 @@ def test_the_run_that_changed_is_named():
 @pytest.mark.parametrize(("shape", "count", "factor"), [(BOX, 12, 1.1), (ELLIPSE, 16, 0.95), (WHEELS, 12, 1.05)])
 def test_a_change_is_found_by_the_shape_where_no_command_comes_again(shape, count, factor):
     world, changed = World(shape=shape, **ROUND), 0.55 * count * HOLD
-    study = identify_steady([once(5, world, count, change=changed, factor=factor)], robot_of(world))
+    study = identify([once(5, world, count, change=changed, factor=factor)], robot_of(world), SteadyState()).study
     (moment,) = study.moments
     assert moment.between[0] <= changed <= moment.between[1]
     assert moment.at == pytest.approx(changed, abs=HOLD)
@@ -94,23 +94,21 @@ def test_a_change_is_found_by_the_shape_where_no_command_comes_again(shape, coun
 @pytest.mark.parametrize("shape", [BOX, ELLIPSE, WHEELS])
 def test_a_right_shape_does_not_change(shape):
     world = World(shape=shape, **ROUND)
-    assert not identify_steady([once(6, world, 14)], robot_of(world)).moments
+    assert not identify([once(6, world, 14)], robot_of(world), SteadyState()).study.moments
 
 
 def test_a_wrong_shape_that_is_driven_round_is_no_change():
     """A box turned by 25 degrees against the body: what it leaves over follows the direction, which follows time."""
     world = World(shape=BOX, **ROUND)
     told = replace(world, azimuth=tuple(angle - 25.0 for angle in world.azimuth))
-    assert not identify_steady([once(7, world, 24, swept=True)], robot_of(told)).moments
+    assert not identify([once(7, world, 24, swept=True)], robot_of(told), SteadyState()).study.moments
 
 
 @pytest.mark.parametrize("shape", [BOX, ELLIPSE, WHEELS])
 def test_a_change_is_told_first_and_the_shape_fits_on_both_sides_of_it(shape):
     """One round: left is driven before it, right after, which looks like another level to the left."""
     world, changed = World(shape=shape, **ROUND), 0.55 * 20 * HOLD
-    found = Identification.of(
-        [once(102, world, 20, swept=True, change=changed, factor=1.25)], robot_of(world), method="steady-state"
-    )
+    found = identify([once(102, world, 20, swept=True, change=changed, factor=1.25)], robot_of(world), SteadyState())
     study = found.study
     assert study is not None
     assert [moment.shape for moment in study.moments] == [study.choice.chosen]
@@ -131,7 +129,7 @@ def test_a_shape_that_fits_on_neither_side_of_a_change_is_said_behind_it(factor)
     rim = np.stack([np.cos(angle), np.sin(angle)], axis=1)[order] @ np.linalg.pinv(world.G)[:, :2].T
     rim *= 7.0 / np.abs(rim).max(axis=1, keepdims=True)
     run = logged(replace(world, change=36.0, after_friction=factor), rim, rng, "round")
-    study = identify_steady([run], robot_of(told))
+    study = identify([run], robot_of(told), SteadyState()).study
     assert len(study.moments) == (factor != 1.0)
     assert study.lack_of_fit["all"].found
     found = [one for one in study.warnings if one.code in ("changes_within_run", "no_shape_fits")]

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import SteadyState
 from omnidyn.identification.steady.choice import choose_shape
 from omnidyn.identification.steady.operating_points import force_points
 from omnidyn.identification.steady.shapes import SHAPES, fit_shape
-from omnidyn.identification.steady.study import identify_steady
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.run import Run
@@ -33,14 +34,14 @@ def noisy(shape, seed=0, **how):
 
 @pytest.mark.parametrize("shape", [*FRICTIONS])
 def test_clean_logs_give_the_truth(shape):
-    study = identify_steady(clean(shape), AXEBOT, shape=shape)
+    study = identify(clean(shape), AXEBOT, SteadyState(shape=shape)).study
     for key, value in TRUTH[shape].items():
         assert study.estimate.value[key] == pytest.approx(value, rel=2e-3)
 
 
 @pytest.mark.parametrize("force_from", ["current", "voltage"])
 def test_both_origins_of_the_force_agree_on_a_clean_log(force_from):
-    study = identify_steady(clean("ellipse"), AXEBOT, force_from=force_from, shape="ellipse")
+    study = identify(clean("ellipse"), AXEBOT, SteadyState(force_from=force_from, shape="ellipse")).study
     assert study.estimate.value["friction.direction.coulomb[0]"] == pytest.approx(2.4, rel=2e-3)
     assert study.points.force_from == force_from
 
@@ -50,7 +51,7 @@ def test_the_true_shape_is_chosen_and_its_intervals_hold_the_truth(shape):
     """Three draws of each; the benchmark does hundreds. No box is taken for a disc, and no disc for a box."""
     held = []
     for seed in range(3):
-        study = identify_steady(noisy(shape, seed), AXEBOT)
+        study = identify(noisy(shape, seed), AXEBOT, SteadyState()).study
         assert study.choice.chosen == shape
         held += [low <= TRUTH[shape][key] <= high for key, (low, high) in study.estimate.ci95.items()]
     assert np.mean(held) >= 0.6
@@ -63,12 +64,12 @@ def test_wheels_at_rest_do_not_decide_the_shape():
     for number in range(173):
         runs = [spoiled(run, rng) for run in clean("wheel")]
         if number in (51, 53, 172):
-            chosen.append(identify_steady(runs, AXEBOT).choice.chosen)
+            chosen.append(identify(runs, AXEBOT, SteadyState()).study.choice.chosen)
     assert chosen == ["wheel"] * 3
 
 
 def test_a_disc_is_told_from_a_box_in_words():
-    study = identify_steady(noisy("disc"), AXEBOT)
+    study = identify(noisy("disc"), AXEBOT, SteadyState()).study
     box = next(score for score in study.choice.scores if score.name == "box")
     assert box.told_apart
     assert (study.statements[0].code, study.statements[0].subject) == ("shape_chosen", "disc")
@@ -77,7 +78,7 @@ def test_a_disc_is_told_from_a_box_in_words():
 
 
 def test_the_robot_that_comes_back_has_the_friction_with_its_std_and_survives_its_file():
-    study = identify_steady(noisy("ellipse"), AXEBOT)
+    study = identify(noisy("ellipse"), AXEBOT, SteadyState()).study
     back = parse_robot(robot_to_toml(study.estimate.robot))
     assert back.friction.direction.coulomb == pytest.approx((2.4, 1.6), rel=0.05)
     assert back.friction.axes.coulomb == (0.0, 0.0, 0.0)
@@ -88,7 +89,7 @@ def test_the_robot_that_comes_back_has_the_friction_with_its_std_and_survives_it
 
 
 def test_yaw_friction_that_was_not_measured_stays_and_is_named():
-    estimate = identify_steady(noisy("disc"), AXEBOT).estimate
+    estimate = identify(noisy("disc"), AXEBOT, SteadyState()).estimate
     assert estimate.robot.friction.direction.yaw_coulomb == AXEBOT.friction.axes.coulomb[2]
     assert any(one.numbers == {"level": pytest.approx(0.099)} for one in estimate.warnings if one.code == "level_kept")
 
@@ -96,7 +97,7 @@ def test_yaw_friction_that_was_not_measured_stays_and_is_named():
 def test_turning_robots_give_yaw_friction():
     robot = robot_with("disc")
     runs = clean("disc") + [turning_run(robot, omega) for omega in (-4, -3, -2, -1.5, 1.5, 2, 3, 4)]
-    study = identify_steady(runs, AXEBOT, shape="disc")
+    study = identify(runs, AXEBOT, SteadyState(shape="disc")).study
     assert study.estimate.value["friction.direction.yaw_coulomb"] == pytest.approx(0.099, rel=0.01)
     assert study.estimate.value["friction.direction.coulomb"] == pytest.approx(2.0, rel=0.01)
 
@@ -113,7 +114,7 @@ def test_viscous_friction_is_found_where_there_is_some():
     robot = AXEBOT.replace(friction=Friction(direction=DirectionFriction(coulomb=(2.0, 2.0), viscous=1.5)))
     rng = np.random.default_rng(3)
     runs = [spoiled(run, rng, between=0.02) for run in clean_runs(robot, DIRECTIONS, (0.15, 0.5))]
-    study = identify_steady(runs, AXEBOT)
+    study = identify(runs, AXEBOT, SteadyState()).study
     assert study.choice.chosen == "disc+viscous"
     low, high = study.estimate.ci95["friction.direction.viscous"]
     assert low <= 1.5 <= high
@@ -123,7 +124,7 @@ def test_viscous_friction_is_found_where_there_is_some():
 def test_viscous_friction_that_the_data_do_not_show_is_bounded_in_words_and_left_at_0():
     rng = np.random.default_rng(4)
     runs = [spoiled(run, rng) for run in clean("disc", (0.3, 0.45))]
-    study = identify_steady(runs, AXEBOT)
+    study = identify(runs, AXEBOT, SteadyState()).study
     assert study.estimate.robot.friction.direction.viscous == 0.0
     (level,) = study.viscous["all"]
     assert level.low <= 0.0 <= level.high
@@ -140,7 +141,7 @@ def test_groups_that_differ_and_groups_that_do_not():
     rough = [spoiled(run, rng) for run in clean_runs(other, DIRECTIONS)]
     again = [spoiled(run, rng) for run in clean("disc")]
     groups = ["slick"] * 24 + ["rough"] * 24 + ["again"] * 24
-    study = identify_steady(slick + rough + again, AXEBOT, groups=groups, shape="disc")
+    study = identify(slick + rough + again, AXEBOT, SteadyState(shape="disc"), groups=groups).study
     found = {(each.first, each.second): each for each in study.differences}
     assert found["slick", "rough"].differs
     assert found["slick", "rough"].low <= 0.6 <= found["slick", "rough"].high
@@ -154,7 +155,7 @@ def test_groups_of_which_only_one_turns_are_compared_in_what_both_tell(turns):
     shape, robot = "disc", robot_with("disc")
     turning = [turning_run(robot, omega) for omega in (-4, -3, -2, -1.5, 1.5, 2, 3, 4)]
     runs, groups = clean(shape) + turning + clean(shape), ["first"] * 24 + [turns] * len(turning) + ["second"] * 24
-    study = identify_steady(runs, AXEBOT, groups=groups, shape=shape)
+    study = identify(runs, AXEBOT, SteadyState(shape=shape), groups=groups).study
     assert any("yaw" in key for key in study.estimates[turns].value)
     straight = study.estimates["second" if turns == "first" else "first"].value
     assert [each.key for each in study.differences] == list(straight)
@@ -170,20 +171,20 @@ def test_internal_forces_of_four_wheels_are_told():
     assert np.abs(robot.wheels.wrench_matrix @ against).max() < 1e-12
     fighting = [run.replace(current=run.current + 0.2 * against) for run in runs]
     per_ampere = 19.0 * 0.0059 / 0.035
-    study = identify_steady(fighting, robot, shape="box", force_from="current")
+    study = identify(fighting, robot, SteadyState(shape="box", force_from="current")).study
     assert study.internal["all"] == pytest.approx(0.2 * per_ampere * 2.0, rel=0.01)
     assert "internal_force" in codes(study.statements)
     assert study.estimate.value["friction.axes.coulomb[0]"] == pytest.approx(
-        identify_steady(runs, robot, shape="box").estimate.value["friction.axes.coulomb[0]"], rel=1e-9
+        identify(runs, robot, SteadyState(shape="box")).estimate.value["friction.axes.coulomb[0]"], rel=1e-9
     )
 
 
 def test_one_wild_run_hardly_moves_the_answer():
     runs = noisy("disc")
     broken = [*runs[:5], runs[5].replace(current=runs[5].current * 4.0), *runs[6:]]
-    value = identify_steady(broken, AXEBOT, shape="disc").estimate.value["friction.direction.coulomb"]
+    value = identify(broken, AXEBOT, SteadyState(shape="disc")).estimate.value["friction.direction.coulomb"]
     assert value == pytest.approx(2.0, rel=0.04)
-    plain = identify_steady(broken, AXEBOT, shape="disc", robust=False)
+    plain = identify(broken, AXEBOT, SteadyState(shape="disc", robust=False)).study
     assert plain.estimate.value["friction.direction.coulomb"] > 2.15
 
 
@@ -202,7 +203,7 @@ def test_leaving_one_out_is_what_it_says():
 
 def test_the_speed_that_was_used_is_stated():
     for speed, words in (("set", "set speed"), ("wheel", "speed of the wheels")):
-        study = identify_steady(noisy("disc"), AXEBOT, speed=speed)
+        study = identify(noisy("disc"), AXEBOT, SteadyState(speed=speed)).study
         assert words in study.estimate.method
         assert words in study.document().to_text()
 
@@ -210,7 +211,7 @@ def test_the_speed_that_was_used_is_stated():
 def test_the_summary_and_the_dictionary_hold_all_of_it():
     import json
 
-    study = identify_steady(noisy("disc"), AXEBOT)
+    study = identify(noisy("disc"), AXEBOT, SteadyState()).study
     told = study.document()
     text, record = told.to_text(), told.data
     json.dumps(record)
@@ -229,31 +230,31 @@ def test_signs_that_are_lost_are_not_taken_for_friction():
     with pytest.raises(
         InsufficientDataError, match=r"against the motion.*in 24 of 24 points.*check the sign of the cur"
     ):
-        identify_steady(runs, AXEBOT)
+        identify(runs, AXEBOT, SteadyState())
 
 
 def test_a_robot_that_never_moved_only_bounds_friction():
     t = np.arange(200) * 0.01
     still = Run(t=t, current=np.full((200, 3), 0.1), wheel_speed=np.zeros((200, 3)))
     with pytest.raises(InsufficientDataError, match=r"never moved: it stayed inside its dead zone"):
-        identify_steady([still], AXEBOT)
+        identify([still], AXEBOT, SteadyState())
 
 
 def test_nothing_steady_is_said():
     t = np.arange(20) * 0.01
     short = Run(t=t, current=np.zeros((20, 3)), wheel_speed=np.ones((20, 3)))
     with pytest.raises(InsufficientDataError, match=r"no steady window was found.*hold each command longer"):
-        identify_steady([short], AXEBOT)
+        identify([short], AXEBOT, SteadyState())
 
 
 def test_too_few_directions_fit_no_shape():
     with pytest.raises(InsufficientDataError, match=r"no shape can be fitted.*drive in more directions"):
-        identify_steady(noisy("disc")[:1], AXEBOT)
+        identify(noisy("disc")[:1], AXEBOT, SteadyState())
 
 
 def test_a_shape_for_comparison_cannot_be_asked_for():
     with pytest.raises(InsufficientDataError, match=r"a robot file cannot hold this shape.*got ellipse-plain"):
-        identify_steady(noisy("disc"), AXEBOT, shape="ellipse-plain")
+        identify(noisy("disc"), AXEBOT, SteadyState(shape="ellipse-plain"))
 
 
 @pytest.mark.parametrize(
@@ -268,31 +269,31 @@ def test_a_shape_for_comparison_cannot_be_asked_for():
 )
 def test_wrong_options_are_refused(how, words):
     with pytest.raises(InputError, match=words):
-        identify_steady(noisy("disc"), AXEBOT, **how)
+        identify(noisy("disc"), AXEBOT, SteadyState(**how))
 
 
 def test_a_run_without_forces_is_refused():
     t = np.arange(100) * 0.01
     with pytest.raises(InputError, match=r"no force can be had from this run; got wheel_speed"):
-        identify_steady([Run(t=t, wheel_speed=np.ones((100, 3)))], AXEBOT)
+        identify([Run(t=t, wheel_speed=np.ones((100, 3)))], AXEBOT, SteadyState())
 
 
 def test_a_duty_without_a_supply_is_refused():
     t = np.arange(100) * 0.01
     run = Run(t=t, wheel_speed=np.ones((100, 3)), duty=np.full((100, 3), 0.5))
     with pytest.raises(InputError, match=r"a duty needs the voltage of the supply"):
-        identify_steady([run], AXEBOT)
+        identify([run], AXEBOT, SteadyState())
 
 
 def test_another_number_of_wheels_is_refused():
     with pytest.raises(InputError, match=r"another number of wheels than the robot; got 3; expected 4"):
-        identify_steady(noisy("disc"), load_robot("four-wheel"))
+        identify(noisy("disc"), load_robot("four-wheel"), SteadyState())
 
 
 def test_a_lossy_gear_is_refused():
     lossy = AXEBOT.replace(motor=AXEBOT.motor.replace(gear_efficiency=0.8))
     with pytest.raises(UnsupportedError, match="gear_efficiency below 1"):
-        identify_steady(noisy("disc"), lossy)
+        identify(noisy("disc"), lossy, SteadyState())
 
 
 def test_unknown_shapes_are_never_chosen_alone():

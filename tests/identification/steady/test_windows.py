@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import SteadyState
 from omnidyn.identification.steady.operating_points import force_points
-from omnidyn.identification.steady.study import identify_steady
 from omnidyn.logs.plateaus import find_plateaus
 from omnidyn.model.robot import GUESS, Prior
 from omnidyn.model.robot_file import load_robot
@@ -49,7 +50,7 @@ def mecanum_runs(spots):
 
 
 def test_turns_on_the_spot_have_no_share_in_the_friction_along_travel():
-    found = identify_steady(mecanum_runs(SPOTS * 6), MECANUM)
+    found = identify(mecanum_runs(SPOTS * 6), MECANUM, SteadyState()).study
     assert found.choice.chosen == "ellipse"
     value = found.estimate.value
     assert value["friction.direction.coulomb[0]"] == pytest.approx(8.0, rel=0.01)
@@ -59,7 +60,7 @@ def test_turns_on_the_spot_have_no_share_in_the_friction_along_travel():
 
 
 def test_four_turns_are_enough_for_the_friction_about_yaw():
-    found = identify_steady(mecanum_runs(SPOTS), MECANUM)
+    found = identify(mecanum_runs(SPOTS), MECANUM, SteadyState()).study
     assert found.estimate.value["friction.direction.yaw_coulomb"] == pytest.approx(1.5, rel=0.02)
     assert "turn_on_the_spot" not in codes(found.advice)
 
@@ -78,7 +79,7 @@ def test_logs_without_currents_are_not_said_to_have_lost_the_sign_of_these():
     random = np.random.default_rng(0)
     world = mecanum(cone=(3.0, 3.0), elements=[YAW])
     runs = [as_run(log, world.voltage(twist), random) for twist, log in steady_logs(world, fan((0.1, 0.1, 0.5), 20))]
-    found = identify_steady(runs, wrong, shape="disc")
+    found = identify(runs, wrong, SteadyState(shape="disc")).study
     (words,) = [str(one) for one in found.warnings if one.code == "against_motion"]
     assert "current" not in words
     assert "K_v" in words
@@ -101,12 +102,12 @@ def heavy_runs(random, noise=0.3):
 def test_mass_times_acceleration_is_taken_off_the_force():
     robot = AXEBOT.replace(body=AXEBOT.body.replace(mass=9.0))
     runs = heavy_runs(np.random.default_rng(0))
-    found = identify_steady(runs, robot, shape="disc")
+    found = identify(runs, robot, SteadyState(shape="disc")).study
     assert found.estimate.value["friction.direction.coulomb"] == pytest.approx(6.0, rel=0.002)
     (level,) = found.viscous["all"]
     assert level.low <= 0.0 <= level.high  # and no viscous friction where there is none
     assert "windows_accelerate" in codes(found.warnings)
-    light = identify_steady(runs, robot.replace(body=robot.body.replace(mass=0.01)), shape="disc")
+    light = identify(runs, robot.replace(body=robot.body.replace(mass=0.01)), SteadyState(shape="disc")).study
     assert light.estimate.value["friction.direction.coulomb"] > 6.03  # what was said without
 
 
@@ -145,7 +146,7 @@ def test_viscous_friction_beside_a_guessed_motor_constant_is_the_sum_that_it_is(
     guess = Prior(std=0.2 * AXEBOT.motor.torque_constant, origin=GUESS)
     robot = AXEBOT.replace(priors={"motor.torque_constant_Nm_A": guess})
     runs = viscous_runs()
-    found = identify_steady(runs, robot, force_from="voltage", shape="disc+viscous")
+    found = identify(runs, robot, SteadyState(force_from="voltage", shape="disc+viscous")).study
     (level,) = found.viscous["all"]
     push = 0.0059 * 19.0 / 0.035
     brake = 1.5 * push**2 / 1.69  # of three wheels, 120 degrees apart
@@ -166,7 +167,9 @@ def test_viscous_friction_beside_a_guessed_motor_constant_is_the_sum_that_it_is(
 @pytest.mark.parametrize("force_from, guessed", [("current", True), ("voltage", False)])
 def test_currents_or_a_known_constant_separate_it(force_from, guessed):
     priors = {"motor.torque_constant_Nm_A": Prior(std=0.001, origin=GUESS)} if guessed else {}
-    found = identify_steady(viscous_runs(), AXEBOT.replace(priors=priors), force_from=force_from, shape="disc+viscous")
+    found = identify(
+        viscous_runs(), AXEBOT.replace(priors=priors), SteadyState(force_from=force_from, shape="disc+viscous")
+    ).study
     (level,) = found.viscous["all"]
     assert level.guesses == ()
     assert level.low <= 3.0 <= level.high
@@ -177,8 +180,8 @@ def test_what_the_file_knows_only_so_far_is_in_the_intervals():
     """From currents every level is proportional to the torque constant, F = K l i/r: its std is a share of each."""
     share, name = 0.05, "motor.torque_constant_Nm_A"
     known = AXEBOT.replace(priors={name: Prior(std=share * AXEBOT.motor.torque_constant, origin="datasheet")})
-    told = identify_steady(viscous_runs(), known, force_from="current", shape="disc+viscous").estimate
-    alone = identify_steady(viscous_runs(), AXEBOT, force_from="current", shape="disc+viscous").estimate
+    told = identify(viscous_runs(), known, SteadyState(force_from="current", shape="disc+viscous")).estimate
+    alone = identify(viscous_runs(), AXEBOT, SteadyState(force_from="current", shape="disc+viscous")).estimate
     assert told.value == pytest.approx(alone.value, rel=1e-9)
     for key, value in told.value.items():
         assert told.std[key] == pytest.approx(np.hypot(alone.std[key], share * value), rel=0.01)

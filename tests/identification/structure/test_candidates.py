@@ -9,11 +9,11 @@ import pytest
 
 from benchmarks.ten_robots.world import World, currents, drive
 from omnidyn.identification.lack_of_fit import Remedy
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.linear.motion import motions
 from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.output_error.prepare import engine_kind
-from omnidyn.identification.question import Question
 from omnidyn.identification.structure.missing import refits
 from omnidyn.identification.structure.missing.candidates import CHANGE
 from omnidyn.identification.structure.missing.laws import candidates
@@ -78,7 +78,7 @@ def log_of(layout, every=False):
 
 def begun(layout, every=False):
     """A fit that has hardly begun, its workbench, and all that is tried of it."""
-    fit = Fit.of([log_of(layout, every)], robot_of(layout, PLACES[layout]), Question(nuisances=("latency",)))
+    fit = Fit.of([log_of(layout, every)], robot_of(layout, PLACES[layout]), OutputError(nuisances=("latency",)))
     solver = fit._solver(("latency",))
     solution = solver.minimise(solver.problem.start(), limit=0)
     problem, point = solution.solver.problem, solution.state.point

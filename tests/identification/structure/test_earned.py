@@ -5,12 +5,12 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error import fit
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.linear import blocks as held_out
 from omnidyn.identification.output_error.linear.blocks import Blocks, _harm, _without, rejected_nuisances
-from omnidyn.identification.question import OUTPUT_ERROR, Question
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation, noisy_draw
@@ -28,7 +28,7 @@ def robot():
 def solved(log, robot):
     """The fit with all that is automatic, and supported by the likelihood."""
     with patch.object(fit, "rejected_nuisances", lambda solution: ()):
-        return Fit.of([log], robot, Question.for_method(OUTPUT_ERROR, None, {})).solve()
+        return Fit.of([log], robot, OutputError()).solve()
 
 
 def lame_for_a_while(robot):
@@ -44,7 +44,7 @@ def test_what_soaks_up_a_part_of_the_log_is_not_fitted(robot):
     log = lame_for_a_while(robot)
     found = solved(log, robot)
     assert set(rejected_nuisances(found)) == {"latency.twist", "dead_band"} == set(found.solver.problem.names[6:])
-    estimate = fit_output_error(log, robot)
+    estimate = identify(log, robot, OutputError()).estimate
     assert not estimate.nuisances
     assert codes(estimate.warnings).count("harmful_nuisance") == 2
 
@@ -63,7 +63,7 @@ def test_nothing_is_looked_at_where_the_likelihood_is_sure_of_none(robot, monkey
 
 
 def test_a_nuisance_that_was_asked_for_is_fitted_whatever_it_does(robot):
-    estimate = fit_output_error(lame_for_a_while(robot), robot, nuisances=("latency", "dead_band"))
+    estimate = identify(lame_for_a_while(robot), robot, OutputError(nuisances=("latency", "dead_band"))).estimate
     assert set(estimate.nuisances) == {"latency.twist", "dead_band"}
 
 

@@ -9,15 +9,14 @@ import pytest
 from benchmarks.wrong_worlds.kinds import by_name
 from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of, truths
 from omnidyn.document import plain
-from omnidyn.identification.identify import Identification
+from omnidyn.identification.identify import identify
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.ladder import Ladder, Rung
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
-from omnidyn.identification.question import Question
 from omnidyn.identification.structure.ladder.climb import offered
 from omnidyn.identification.structure.ladder.held_out import Errors, errors, margins_of
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot, save_robot
 from omnidyn.report.fit_page import render_fit
 from omnidyn.statement import quoted
@@ -38,12 +37,12 @@ def world(name, size, seed=SEED, sensor=SPEEDS, rate=50.0, seconds=20.0):
 def turning():
     """(what the ladder makes of a log of a frame that turns, friction as it is)."""
     run, robot, true = world("turning frame", 1.0)
-    return Identification.of(run, robot, free=FREE, ladder=True), true
+    return identify(run, robot, OutputError(free=FREE, ladder=True)), true
 
 
 def climbed(name, size, **options):
     run, robot, true = world(name, size)
-    return fit_output_error(run, robot, free=FREE, ladder=True, **options), true
+    return identify(run, robot, OutputError(free=FREE, ladder=True, **options)).estimate, true
 
 
 def held(estimate, true):
@@ -52,8 +51,8 @@ def held(estimate, true):
 
 def test_a_right_world_takes_no_step():
     run, robot, _ = world("mass", 0.0)
-    estimate = fit_output_error(run, robot, free=FREE, ladder=True)
-    plain = fit_output_error(run, robot, free=FREE)
+    estimate = identify(run, robot, OutputError(free=FREE, ladder=True)).estimate
+    plain = identify(run, robot, OutputError(free=FREE)).estimate
     assert (estimate.ladder.rungs, estimate.ladder.end.code) == ((), "only_noise")
     assert plain.ladder is None
     assert estimate.value == plain.value
@@ -93,8 +92,8 @@ def test_no_ladder_ends_calm_on_a_fit_that_its_answer_finds_wrong():
     seed = 134_004
     case = by_name("turning frame").make(right_case(seed), 0.39462)
     run, robot = logged(case, seed), robot_of(case.told)
-    assert fit_output_error(run, robot, free=FREE).lack_of_fit.causes[0].key == "body.rotating_frame"
-    best = fit_output_error(run, robot, free=FREE, ladder=True)
+    assert identify(run, robot, OutputError(free=FREE)).lack_of_fit.causes[0].key == "body.rotating_frame"
+    best = identify(run, robot, OutputError(free=FREE, ladder=True)).estimate
     assert [rung.key for rung in best.ladder.taken] == ["body.rotating_frame"]
 
 
@@ -109,7 +108,7 @@ def test_the_robot_that_is_written_is_the_fitted_one(turning, tmp_path):
 def test_another_shape_takes_the_place_of_the_one_given():
     """An ellipse under the file of a box: the levels of the truth, and no box is left."""
     run, robot, _ = world("ellipse", 0.3)
-    estimate = fit_output_error(run, robot, free=FREE, ladder=True)
+    estimate = identify(run, robot, OutputError(free=FREE, ladder=True)).estimate
     assert [rung.key for rung in estimate.ladder.taken] == ["friction.direction"]
     assert not any(estimate.robot.friction.axes.coulomb)
     case = by_name("ellipse").make(right_case(SEED), 0.3)
@@ -144,7 +143,7 @@ def test_a_pull_in_the_room_is_taken_as_one_of_these_logs():
 
 def test_what_no_robot_file_holds_is_said_and_not_taken():
     run, robot, _ = world("sag", 0.4, rate=100.0, seconds=30.0)  # fewer rows tell less, and more is tried
-    estimate = fit_output_error(run, robot, free=FREE, ladder=True)
+    estimate = identify(run, robot, OutputError(free=FREE, ladder=True)).estimate
     assert estimate.ladder.taken == ()
     assert codes(estimate.ladder.end.numbers["causes"]) == ["looks_like"]
     assert estimate.lack_of_fit.found
@@ -153,9 +152,9 @@ def test_what_no_robot_file_holds_is_said_and_not_taken():
 def test_a_remedy_says_what_it_would_change():
     """A first step goes most of the way to what the fit with it then finds, in standard errors of all numbers."""
     run, robot, _ = world("mass", 0.2)
-    without = fit_output_error(run, robot, free=FREE)
+    without = identify(run, robot, OutputError(free=FREE)).estimate
     best = next(each for each in without.lack_of_fit.remedies if each.key == "body.mass_kg")
-    with_it = fit_output_error(run, robot, free=(*FREE, "body.mass_kg"))
+    with_it = identify(run, robot, OutputError(free=(*FREE, "body.mass_kg"))).estimate
     far = []
     for name, (now, then) in best.changes.items():
         assert now == pytest.approx(without.value[name], rel=1e-3)
@@ -175,7 +174,7 @@ def test_words_of_a_change():
 def test_blocks_held_out_by_a_step_are_those_that_a_fit_without_them_misses():
     """The squared error of tenths of a log, by fits that really never saw them; friction at rest has kinks."""
     run, robot, _ = world("turning frame", 0.3)
-    question = Question(free=FREE, nuisances=())
+    question = OutputError(free=FREE, nuisances=())
     whole = Fit.of(run, robot, question).solve()
     variance = float(whole.state.variance[0])
     memory = [AutoRegression(np.zeros(0), variance, len(run))] * 3
@@ -232,7 +231,7 @@ def test_a_model_that_follows_nothing_is_not_mended():
     robot = load_robot("axebot")
     run = noisy_of(robot)
     twist = run.twist * [1.0, 1.0, -1.0]  # the gyroscope upside down
-    estimate = fit_output_error(run.replace(wheel_speed=None, twist=twist), robot, ladder=True)
+    estimate = identify(run.replace(wheel_speed=None, twist=twist), robot, OutputError(ladder=True)).estimate
     assert estimate.ladder.rungs == ()
     assert estimate.ladder.end.code == "mend_first"
 

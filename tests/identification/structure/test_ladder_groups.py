@@ -9,16 +9,15 @@ import pytest
 from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of, truths
 from benchmarks.wrong_worlds.world import BOX, ELLIPSE
 from omnidyn.document import plain
-from omnidyn.identification.identify import Identification
+from omnidyn.identification.identify import identify
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.ladder import STANDS
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
-from omnidyn.identification.question import Question
 from omnidyn.identification.structure.ladder.held_out import errors, margins_of
 from omnidyn.identification.structure.ladder.models import Model, can, is_own, moves, moves_apart
 from omnidyn.identification.structure.missing.switches import as_fitted
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.report.fit_page import render_fit
 
@@ -49,7 +48,7 @@ def ladder(found):
 def mixed():
     """A box on gray, an ellipse on green."""
     runs, robot, worlds = floors(BOX, ELLIPSE)
-    return Identification.of(runs, robot, free=FREE, ladder=True, per=PER), worlds
+    return identify(runs, robot, OutputError(free=FREE, ladder=True), groups=PER), worlds
 
 
 def test_each_group_gets_the_shape_of_its_own(mixed):
@@ -57,7 +56,7 @@ def test_each_group_gets_the_shape_of_its_own(mixed):
     (step,) = ladder(found).taken
     assert (step.key, step.groups) == ("friction.direction", ("green",))
     assert str(step.cause).endswith("an ellipse in green")
-    for (_, estimate), world in zip(found.estimates.items(), worlds, strict=True):
+    for (_, estimate), world in zip(found.groups.items(), worlds, strict=True):
         true = truths(world, world.shape)
         assert set(true) == set(estimate.value)
         held = [low <= true[name] <= high for name, (low, high) in estimate.ci95.items()]
@@ -66,7 +65,7 @@ def test_each_group_gets_the_shape_of_its_own(mixed):
 
 def test_the_robot_of_each_group_has_its_shape_and_what_is_shared_stays_so(mixed):
     found, _ = mixed
-    gray, green = (estimate.robot for estimate in found.estimates.values())
+    gray, green = (estimate.robot for estimate in found.groups.values())
     assert any(gray.friction.axes.coulomb)
     assert not any(gray.friction.direction.coulomb)
     assert any(green.friction.direction.coulomb)
@@ -99,7 +98,7 @@ def test_a_number_of_one_group_is_told_with_its_group():
 
 def test_a_shape_that_all_have_is_one():
     runs, robot, _ = floors(ELLIPSE, ELLIPSE)
-    found = Identification.of(runs, robot, free=FREE, ladder=True, per=PER)
+    found = identify(runs, robot, OutputError(free=FREE, ladder=True), groups=PER)
     (step,) = ladder(found).taken
     assert (step.key, step.groups) == ("friction.direction", ())
     assert {d.key for d in found.differences} >= {"friction.direction.coulomb[0]", "friction.direction.coulomb[1]"}
@@ -107,7 +106,7 @@ def test_a_shape_that_all_have_is_one():
 
 def test_right_floors_take_no_step():
     runs, robot, _ = floors(BOX, BOX)
-    found = Identification.of(runs, robot, free=FREE, ladder=True, per=PER)
+    found = identify(runs, robot, OutputError(free=FREE, ladder=True), groups=PER)
     assert ladder(found).taken == ()
     assert ladder(found).end.code == "only_noise"
 
@@ -116,17 +115,17 @@ def test_what_is_shared_is_switched_on_in_all():
     """A frame that turns, of which the file knows nothing."""
     runs, robot, _ = floors(BOX, BOX, frame=True)
     robot = robot.replace(body=robot.body.replace(rotating_frame=False))
-    found = Identification.of(runs, robot, free=FREE, ladder=True, per=PER)
+    found = identify(runs, robot, OutputError(free=FREE, ladder=True), groups=PER)
     (step,) = ladder(found).taken
     assert (step.key, step.groups) == ("body.rotating_frame", ())
-    assert all(each.robot.body.rotating_frame for each in found.estimates.values())
+    assert all(each.robot.body.rotating_frame for each in found.groups.values())
 
 
 @pytest.fixture(scope="module")
 def given():
     """The two floors as they are given, before any step."""
     runs, robot, _ = floors(BOX, ELLIPSE)
-    fit = Fit.of(runs, robot, Question(free=FREE, nuisances=()), ["gray", "green"])
+    fit = Fit.of(runs, robot, OutputError(free=FREE, nuisances=()), ["gray", "green"])
     return Model.first(fit, fit.solve())
 
 
@@ -145,12 +144,12 @@ def test_what_is_tried(given):
 
 
 def test_what_each_group_has_for_itself():
-    assert is_own("friction.direction", Question())
-    assert is_own("friction.axes.stribeck_speed", Question(per_free=("friction.axes.coulomb[0]",)))
-    assert not is_own("friction.direction", Question(per_free=("body.mass_kg",)))
-    assert is_own("body.mass_kg", Question(per_free=("body.mass_kg",)))
-    assert is_own("tilt", Question(per_free=("tilt.x", "tilt.y")))
-    assert not is_own("motor.resistance_ohm", Question())
+    assert is_own("friction.direction", OutputError())
+    assert is_own("friction.axes.stribeck_speed", OutputError(per_free=("friction.axes.coulomb[0]",)))
+    assert not is_own("friction.direction", OutputError(per_free=("body.mass_kg",)))
+    assert is_own("body.mass_kg", OutputError(per_free=("body.mass_kg",)))
+    assert is_own("tilt", OutputError(per_free=("tilt.x", "tilt.y")))
+    assert not is_own("motor.resistance_ohm", OutputError())
 
 
 def test_no_robot_gets_a_shape_that_it_has():
@@ -179,7 +178,7 @@ def test_an_ellipse_gets_a_level_for_each_wheel():
     case = right_case(7101).setup_but(sensor=SPEEDS, memory=0.0, rate=50.0, seconds=20.0)
     world = replace(case.world, shape=ELLIPSE, each_wheel=(1.7, 1.0, 0.3))
     run, robot = logged(replace(case, world=world), 7101), robot_of(replace(case.told, shape=ELLIPSE))
-    estimate = fit_output_error(run, robot, free=FREE, ladder=True)
+    estimate = identify(run, robot, OutputError(free=FREE, ladder=True)).estimate
     assert estimate.ladder is not None
     assert [rung.key for rung in estimate.ladder.taken] == ["friction.wheels.coulomb"]
     true = truths(world, ELLIPSE) | {f"friction.wheels.coulomb[{k}]": own for k, own in enumerate(world.each_wheel)}

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InsufficientDataError
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.identification.structure.test_tails import AXEBOT, CLEAN
@@ -28,7 +29,7 @@ def climbed(run, monkeypatch):
     """(what the ladder says, how many fits were begun, the estimate)."""
     made, raw = [], Fit.solve
     monkeypatch.setattr(Fit, "solve", lambda self, *a: made.append(self) or raw(self, *a))
-    estimate = fit_output_error(run, AXEBOT, nuisances=(), ladder=True)
+    estimate = identify(run, AXEBOT, OutputError(nuisances=(), ladder=True)).estimate
     assert estimate.ladder is not None
     return estimate.ladder, len(made), estimate
 
@@ -61,14 +62,16 @@ def test_a_wheel_that_stands_still_as_the_model_has_it_is_no_dead_one():
     assert made.wheel_speed is not None
     speed = made.wheel_speed + [0.0, 0.1, 0.1] * np.random.default_rng(2).normal(size=(400, 3))
     speed[:, 0] = 0.0
-    estimate = fit_output_error(run.replace(wheel_speed=speed), AXEBOT, nuisances=(), free=("friction.axes.coulomb",))
+    estimate = identify(
+        run.replace(wheel_speed=speed), AXEBOT, OutputError(nuisances=(), free=("friction.axes.coulomb",))
+    ).estimate
     assert estimate.not_followed == ()
 
 
 @pytest.mark.parametrize("rows", [slice(0, 20), slice(0, None)])
 def test_signals_that_are_constant_say_that_nothing_moved(rows):
     with pytest.raises(InsufficientDataError, match="never visibly moved"):
-        fit_output_error(wheels(np.zeros_like(noisy()), rows), AXEBOT, nuisances=(), ladder=True)
+        identify(wheels(np.zeros_like(noisy()), rows), AXEBOT, OutputError(nuisances=(), ladder=True))
 
 
 def test_twenty_rows_end(monkeypatch):

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import pytest
 
+from omnidyn.identification.identify import identify
 from omnidyn.identification.lack_of_fit import Remedy
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.slipping import SlipEngine
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.identification.question import Question
 from omnidyn.identification.structure.ladder.models import Model, Move
 from omnidyn.identification.structure.ladder.slow import BEYOND, FITS, NOT_NEEDED, Purse, quick_first
-from omnidyn.identification.whole_logs import fit_output_error
 from tests.identification.structure.test_tails import AXEBOT, log, spoiled
 
 GRIP, MASS = "wheels.traction_mu", "body.mass_kg"
@@ -19,7 +19,7 @@ GRIP, MASS = "wheels.traction_mu", "body.mass_kg"
 @pytest.fixture(scope="module")
 def rolls():
     """A fit of wheels that roll."""
-    fit = Fit.of(log(0.0), AXEBOT, Question(nuisances=()))
+    fit = Fit.of(log(0.0), AXEBOT, OutputError(nuisances=()))
     return Model.first(fit, fit.solve())
 
 
@@ -57,7 +57,7 @@ def test_a_wrong_mass_under_wild_samples_needs_no_fit_of_wheels_that_slip(monkey
     made, raw = [], Fit.solve
     monkeypatch.setattr(Fit, "solve", lambda self, *a: made.append(self.groups[0].robot) or raw(self, *a))
     light = AXEBOT.replace(body=AXEBOT.body.replace(mass=0.7 * AXEBOT.body.mass))
-    estimate = fit_output_error(spoiled(4, 100.0), light, nuisances=(), ladder=True)
+    estimate = identify(spoiled(4, 100.0), light, OutputError(nuisances=(), ladder=True)).estimate
     assert estimate.ladder is not None
     assert [rung.key for rung in estimate.ladder.taken] == ["loss", MASS]
     assert abs(estimate.value[MASS] / AXEBOT.body.mass - 1.0) < 3e-3
@@ -76,6 +76,6 @@ def test_a_fit_by_students_t_goes_on_from_the_scales_that_it_has(monkeypatch):
     assert run.voltage is not None
     assert run.twist is not None
     short = run.replace(t=run.t[:120], voltage=run.voltage[:120], twist=run.twist[:120])
-    fit_output_error(short, grippy, nuisances=(), loss="student-t", free=("friction",))
+    identify(short, grippy, OutputError(nuisances=(), loss="student-t", free=("friction",)))
     assert {nu for tol, nu in asked if tol is None} == {0.0, 4.0}
     assert {nu for tol, nu in asked if tol is not None} == {4.0}

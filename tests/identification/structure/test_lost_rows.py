@@ -7,11 +7,11 @@ import pytest
 from benchmarks.wrong_worlds.kinds import by_name
 from benchmarks.wrong_worlds.log import AR, SPEEDS, TICKS, TWIST, logged, right_case, robot_of
 from benchmarks.wrong_worlds.score import drawn
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.linear.motion import motions
 from omnidyn.identification.output_error.linear.rounded_inputs import losses, shown_by_losses
 from omnidyn.identification.output_error.prepare import make_problem, read_records
-from omnidyn.identification.question import Question
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from tests.support.codes import codes
@@ -30,7 +30,7 @@ def lacking(run, seed):
 
 
 def motion_of(run, robot):
-    question = Question(start="rest", nuisances=())
+    question = OutputError(start="rest", nuisances=())
     problem = make_problem(read_records([run], robot, question), robot, question)
     return motions(problem, problem.start())[0]
 
@@ -73,7 +73,7 @@ def test_what_lost_rows_explain_is_no_lack_of_fit(seed, sensor):
     """Right worlds, which were said to leave something out."""
     case = right_case(seed).setup_but(sensor=sensor, memory=0.8 if sensor == AR else 0.0)
     case = case if sensor == AR else case.setup_but(rate=50.0, seconds=20.0)
-    lack = fit_output_error(lacking(logged(case, seed), seed), robot_of(case.told), free="friction").lack_of_fit
+    lack = identify(lacking(logged(case, seed), seed), robot_of(case.told), OutputError(free="friction")).lack_of_fit
     assert not lack.found
     assert max(lack.rounded.values()) > 0.3
     assert "rounding_may_hide" in codes(lack.statements())
@@ -87,7 +87,7 @@ def test_losses_that_hid_nothing_say_nothing_of_the_one_that_did():
     end = changed[-1] + 2
     whole = Run(run.t[:end], voltage=run.voltage[:end], wheel_angle=run.wheel_angle[:end])
     lost = without(whole, [*(changed[[5, 12, -3]] - 1), changed[-1]])
-    lack = fit_output_error(lost, robot_of(case.told), free="friction").lack_of_fit
+    lack = identify(lost, robot_of(case.told), OutputError(free="friction")).lack_of_fit
     assert not lack.found
     assert max(lack.rounded.values()) > 0.3
 
@@ -95,6 +95,6 @@ def test_losses_that_hid_nothing_say_nothing_of_the_one_that_did():
 def test_a_misfit_is_found_beside_lost_rows():
     """A fading battery, its numbers 6.9 standard errors off."""
     case, seed, _ = drawn(by_name("fade"), 6)
-    lack = fit_output_error(lacking(logged(case, seed), seed), robot_of(case.told), free="friction").lack_of_fit
+    lack = identify(lacking(logged(case, seed), seed), robot_of(case.told), OutputError(free="friction")).lack_of_fit
     assert lack.found
     assert lack.remedies[0].key == "fade"

@@ -13,10 +13,11 @@ from benchmarks.wrong_worlds.log import COUNTS, TICKS, logged, right_case, robot
 from benchmarks.wrong_worlds.remedies import FRICTION
 from benchmarks.wrong_worlds.score import drawn
 from benchmarks.wrong_worlds.world import World
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.linear.rows import of_rounding
 from omnidyn.identification.output_error.memory.autoregression import autoregression
 from omnidyn.identification.verdict import fits_verdict
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -36,12 +37,12 @@ def remembered(rho, seed):
 
 @pytest.mark.parametrize(("rho", "seed"), [(0.0, 7), (0.5, 8), (0.9, 7), (0.9, 9), (0.98, 8), (0.98, 9)])
 def test_a_memory_alone_is_no_lack_of_fit(rho, seed):
-    assert not fit_output_error(remembered(rho, seed), AXEBOT, nuisances=()).lack_of_fit.found
+    assert not identify(remembered(rho, seed), AXEBOT, OutputError(nuisances=())).lack_of_fit.found
 
 
 def test_errors_that_last_as_long_as_the_log_are_not_called_noise():
     """Of a right robot, with a memory of twenty seconds in a log of thirty. Nothing is found, and that is said."""
-    fit = fit_output_error(remembered(0.999, 7), AXEBOT, nuisances=())
+    fit = identify(remembered(0.999, 7), AXEBOT, OutputError(nuisances=())).estimate
     lack = fit.lack_of_fit
     assert not lack.found
     assert lack.drifts
@@ -55,7 +56,7 @@ def test_friction_at_the_wheels_under_a_box_is_found_by_counts():
     seed = 142_004
     case = by_name("wheels").make(right_case(seed), 0.00638747)
     assert case.setup.sensor == COUNTS
-    fit = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION)
+    fit = identify(logged(case, seed), robot_of(case.told), OutputError(free=FRICTION)).estimate
     assert fit.value["friction.axes.coulomb[1]"] < 0.5
     assert fit.lack_of_fit.found
     assert fit.lack_of_fit.remedies[0].key == "friction.wheels"
@@ -66,7 +67,7 @@ def test_a_gross_misfit_of_angles_is_found():
     next to nothing are no rows of the residuals: taken as if none were missing there, their memory told nothing."""
     case, seed, _ = drawn(by_name("current limit"), 4)
     case = case.setup_but(sensor=TICKS, memory=0.0)
-    fit = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION)
+    fit = identify(logged(case, seed), robot_of(case.told), OutputError(free=FRICTION)).estimate
     assert fit.value["friction.axes.viscous[0]"] > 5.0 * case.told.viscous[0]
     assert fit.lack_of_fit.found
     assert not fit.lack_of_fit.drifts
@@ -76,7 +77,7 @@ def test_a_gross_misfit_of_angles_is_found():
     noise = fit.lack_of_fit.noise["wheel_angle[0]"]
     assert noise.residual == pytest.approx(fit.noise["wheel_angle[0]"], rel=0.1)  # of the fit, not of a step beyond it
     right = case.world_but(limit=World.limit)
-    fit = fit_output_error(logged(right, seed), robot_of(right.told), free=FRICTION)
+    fit = identify(logged(right, seed), robot_of(right.told), OutputError(free=FRICTION)).estimate
     assert not fit.lack_of_fit.found
     assert not fit.lack_of_fit.drifts
 
@@ -109,7 +110,7 @@ def counted(robot, seed, rate=50.0):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_what_an_encoder_rounds_is_no_lack_of_fit(seed):
     """Rounding repeats itself where a wheel turns by simple shares of a tick from row to row."""
-    found = fit_output_error(counted(AXEBOT, seed), AXEBOT, nuisances=()).lack_of_fit
+    found = identify(counted(AXEBOT, seed), AXEBOT, OutputError(nuisances=())).lack_of_fit
     assert not found.found
 
 
@@ -120,7 +121,7 @@ def test_wheels_that_slip_at_random_are_no_lack_of_fit(seed):
     slipped = np.cumsum(np.random.default_rng(seed).normal(size=log.wheel_speed.shape) * 0.5, axis=0)
     angle = np.cumsum(log.wheel_speed, axis=0) / 50.0 + np.round(slipped) * COUNTED
     log = log.replace(wheel_speed=None, wheel_angle=angle)
-    assert not fit_output_error(log, AXEBOT, nuisances=()).lack_of_fit.found
+    assert not identify(log, AXEBOT, OutputError(nuisances=())).lack_of_fit.found
 
 
 @pytest.mark.parametrize("kind", ["resistance", "voltage drop", "wheel radius", "umbilical", "Stribeck"])
@@ -160,7 +161,7 @@ def lack(kind, number=61):
     assert large
     if kind != "payload":
         case = case.setup_but(seconds=20.0)
-    return fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION).lack_of_fit
+    return identify(logged(case, seed), robot_of(case.told), OutputError(free=FRICTION)).lack_of_fit
 
 
 @pytest.mark.parametrize("kind", ["backward", "sag", "eccentric"])
@@ -200,7 +201,7 @@ def test_a_gyro_alone_leaves_the_other_axes_unasked():
     gyro = np.full(run.twist.shape, np.nan)
     gyro[:, 2] = run.twist[:, 2] + 0.02 * random.standard_normal(len(gyro))
     wheels = run.wheel_speed + 0.1 * random.standard_normal(run.wheel_speed.shape)
-    fit = fit_output_error(Run(t=run.t, voltage=run.voltage, twist=gyro, wheel_speed=wheels), robot)
+    fit = identify(Run(t=run.t, voltage=run.voltage, twist=gyro, wheel_speed=wheels), robot, OutputError()).estimate
     assert fit.lack_of_fit is not None
     assert not fit.lack_of_fit.found
     assert fit.lack_of_fit.channels["twist[0]"] == fit.lack_of_fit.channels["twist[1]"] == 0.0
@@ -212,4 +213,4 @@ def test_gaps_leave_pieces_that_tell_their_starts_unequally():
     kept = np.ones(len(log.t), dtype=bool)
     kept[510:760] = kept[1300:1400] = False
     cut = Run(t=log.t[kept], voltage=log.voltage[kept], twist=log.twist[kept], source="log")
-    assert not fit_output_error(cut, AXEBOT, nuisances=()).lack_of_fit.found
+    assert not identify(cut, AXEBOT, OutputError(nuisances=())).lack_of_fit.found

@@ -4,9 +4,10 @@ follows nothing, which only such a level tells from noise."""
 import numpy as np
 import pytest
 
+from omnidyn.identification.identify import identify
 from omnidyn.identification.lack_of_fit import HOLDS, NEIGHBOURS, REPEATS, REST
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.validation import validate
-from omnidyn.identification.whole_logs import fit_output_error
 from tests.support.axebot_logs import NOISE
 from tests.support.codes import codes
 from tests.support.held_commands import AXEBOT, RATE, commands, lack_of, log_of
@@ -72,7 +73,7 @@ def test_misfit_that_comes_again_with_the_commands_is_found_by_repeats_and_chi2_
     """White, so that nothing else finds it, but the same each time."""
     again = 1.5 * NOISE * np.random.default_rng(5).normal(size=(1000, 3))
     log = log_of(np.tile(commands(1, 10.0), (3, 1)), lambda clean, rng: np.resize(again, clean.twist.shape))
-    fit = fit_output_error(log, AXEBOT, nuisances=())
+    fit = identify(log, AXEBOT, OutputError(nuisances=())).estimate
     lack, seen = fit.lack_of_fit, validate(fit, [log], [log])
     assert all(score.chi2 == pytest.approx(1.0 + 1.5**2, rel=0.25) for score in seen.scores["fitted"].values())
     assert seen.statement().numbers["fitted_too"]

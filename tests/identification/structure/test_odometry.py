@@ -6,7 +6,8 @@ That they are the same to such a log is shown by the equations of motion in test
 import numpy as np
 import pytest
 
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.wheels import twist_from_wheel_speed
 from omnidyn.run import Run
@@ -30,7 +31,7 @@ def log(wheels):
 @pytest.mark.parametrize("key", WORLDS)
 def test_a_log_of_odometry_names_the_radius_beside_what_looks_like_it(key):
     wheels, looks = WORLDS[key]
-    lack = fit_output_error(log(wheels), AXEBOT).lack_of_fit
+    lack = identify(log(wheels), AXEBOT, OutputError()).lack_of_fit
     assert lack.found
     for each in lack.remedies:
         if looks in each.key and "[" not in each.key:
@@ -39,7 +40,7 @@ def test_a_log_of_odometry_names_the_radius_beside_what_looks_like_it(key):
 
 
 def test_the_ladder_says_it_of_the_step_that_it_takes():
-    best = fit_output_error(log(WORLDS["wheels.robot_radius_m"][0]), AXEBOT, ladder=True)
+    best = identify(log(WORLDS["wheels.robot_radius_m"][0]), AXEBOT, OutputError(ladder=True)).estimate
     assert best.ladder.taken[0].key == "body.inertia_kg_m2"
     assert best.ladder.taken[0].same_as == ("wheels.robot_radius_m",)
     assert best.value["body.inertia_kg_m2"] == pytest.approx(AXEBOT.body.inertia / 1.4**2, rel=0.02)  # by hand

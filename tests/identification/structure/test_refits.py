@@ -5,9 +5,10 @@ import pytest
 from benchmarks.wrong_worlds.kinds import by_name
 from benchmarks.wrong_worlds.log import logged, robot_of
 from benchmarks.wrong_worlds.score import FRICTION, drawn
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.structure import diagnosis
 from omnidyn.identification.structure.missing import refits
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.keys import WHEELS
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
@@ -18,7 +19,7 @@ from tests.support.axebot_logs import excitation, noisy_draw
 def test_friction_at_the_wheels_under_the_file_of_a_box_is_named_first(number):
     """A simulator that shares no code; a column near the fit named limits, radii and resistances instead."""
     case, seed, _ = drawn(by_name("wheels"), number)
-    lack = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION).lack_of_fit
+    lack = identify(logged(case, seed), robot_of(case.told), OutputError(free=FRICTION)).lack_of_fit
     assert lack.found
     first = lack.remedies[0]
     assert first.key == WHEELS
@@ -31,7 +32,7 @@ def test_a_right_model_costs_no_fit_of_others(monkeypatch):
     monkeypatch.setattr(diagnosis, "refits", lambda *args: asked.append(args) or {})
     robot = load_robot("axebot")
     log = noisy_draw(simulate(robot, excitation(20.0, 100.0), 0.01), 3)
-    assert not fit_output_error(log, robot).lack_of_fit.found
+    assert not identify(log, robot, OutputError()).lack_of_fit.found
     assert not asked
 
 
@@ -40,7 +41,7 @@ def test_steps_are_few(monkeypatch):
     taken, own = [], refits._Refit.gone_on
     monkeypatch.setattr(refits._Refit, "gone_on", lambda self, steps: taken.append(steps) or own(self, steps))
     case, seed, _ = drawn(by_name("resistance"), 61)
-    lack = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION).lack_of_fit
+    lack = identify(logged(case, seed), robot_of(case.told), OutputError(free=FRICTION)).lack_of_fit
     assert lack.found
     assert sum(steps == refits.MORE for steps in taken) <= refits.GO_ON
     assert sum(steps == refits.STEPS for steps in taken) <= refits.BEST + 2 * len(refits.SHAPES)

@@ -7,7 +7,8 @@ its own.
 import numpy as np
 import pytest
 
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -37,12 +38,12 @@ def log(robot, seed=1):
 
 @pytest.fixture(scope="module")
 def right():
-    return fit_output_error(log(AXEBOT), AXEBOT)
+    return identify(log(AXEBOT), AXEBOT, OutputError()).estimate
 
 
 @pytest.mark.parametrize("key", WORLDS)
 def test_what_is_missing_is_named_first(key):
-    lack = fit_output_error(log(WORLDS[key]), AXEBOT).lack_of_fit
+    lack = identify(log(WORLDS[key]), AXEBOT, OutputError()).lack_of_fit
     assert lack.found
     best = lack.remedies[0]
     assert key in (best.key, *best.same_as)
@@ -60,7 +61,7 @@ def test_a_right_model_leaves_nothing(right):
 
 def test_a_gain_goes_with_what_scales_all_forces():
     """A wheel 3 % smaller is the same to a log as motors that push 3 % more, and as a supply that is 3 % higher."""
-    best = fit_output_error(log(WORLDS["wheels.wheel_radius_m"]), AXEBOT).lack_of_fit.remedies[0]
+    best = identify(log(WORLDS["wheels.wheel_radius_m"]), AXEBOT, OutputError()).lack_of_fit.remedies[0]
     assert {"gain", "motor.torque_constant_Nm_A", "wheels.wheel_radius_m"} <= {best.key, *best.same_as}
 
 
@@ -83,14 +84,14 @@ def disc():
 
 
 def test_a_disc_fitted_as_a_box_is_told_from_one(disc):
-    lack = fit_output_error(drives(disc, ROUND), AXEBOT, nuisances=()).lack_of_fit
+    lack = identify(drives(disc, ROUND), AXEBOT, OutputError(nuisances=())).lack_of_fit
     assert lack.found
     assert lack.remedies[0].key == "friction.direction"
 
 
 def test_a_box_fitted_as_a_box_is_not_doubted():
-    assert not fit_output_error(drives(AXEBOT, ROUND), AXEBOT, nuisances=()).lack_of_fit.found
+    assert not identify(drives(AXEBOT, ROUND), AXEBOT, OutputError(nuisances=())).lack_of_fit.found
 
 
 def test_drives_along_the_axes_say_nothing_of_the_shape(disc):
-    assert not fit_output_error(drives(disc, ROUND[::2]), AXEBOT, nuisances=()).lack_of_fit.found
+    assert not identify(drives(disc, ROUND[::2]), AXEBOT, OutputError(nuisances=())).lack_of_fit.found

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.structure.rests_on import scaled
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -23,7 +24,7 @@ def run():
 
 @pytest.fixture(scope="module")
 def fit(run):
-    return fit_output_error(run, AXEBOT, nuisances=())
+    return identify(run, AXEBOT, OutputError(nuisances=())).estimate
 
 
 @pytest.mark.parametrize(
@@ -33,7 +34,7 @@ def test_a_refit_moves_each_number_as_said(run, fit, key):
     """Rows weigh the same in all three: what a wrong file leaves may look like errors that remember."""
     assert fit.covariance == "white"
     up, down = (
-        fit_output_error(run, scaled(AXEBOT, key, factor), nuisances=(), covariance="white")
+        identify(run, scaled(AXEBOT, key, factor), OutputError(nuisances=(), covariance="white")).estimate
         for factor in (1.005, 0.995)
     )
     for name, value in fit.value.items():
@@ -42,7 +43,7 @@ def test_a_refit_moves_each_number_as_said(run, fit, key):
 
 
 def test_what_is_free_is_no_ground(run):
-    fit = fit_output_error(run, AXEBOT, nuisances=(), free=["friction", "motor.resistance_ohm"])
+    fit = identify(run, AXEBOT, OutputError(nuisances=(), free=["friction", "motor.resistance_ohm"])).estimate
     assert all("motor.resistance_ohm" not in by for by in fit.rests_on.values())
 
 

@@ -6,10 +6,11 @@ import pytest
 
 from benchmarks.wrong_worlds.kinds import KINDS
 from benchmarks.wrong_worlds.log import COUNTS, SPEEDS, logged, right_case, robot_of
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.linear.rounded_inputs import beside_rounding
 from omnidyn.identification.output_error.problem.input_steps import input_steps
 from omnidyn.identification.output_error.problem.record import record
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -35,8 +36,10 @@ def test_a_supply_that_is_logged_makes_no_new_rounding_of_every_row():
     run, robot = logged(case, 7000), robot_of(case.told)
     duty, ripple = rounded(run.voltage / 12.0, 0.025), np.random.default_rng(1).normal(size=len(run.t))
     even, uneven = (
-        fit_output_error(
-            run.replace(voltage=None, duty=duty, supply=12.0 + size * ripple), robot, nuisances=(), free="friction"
+        identify(
+            run.replace(voltage=None, duty=duty, supply=12.0 + size * ripple),
+            robot,
+            OutputError(nuisances=(), free="friction"),
         ).std
         for size in (0.0, 0.01)
     )
@@ -82,7 +85,7 @@ def test_a_misfit_beyond_rounding_is_found_with_its_cause():
 
 def test_steps_that_the_motors_take_explain_nothing():
     exact = rounded(voltages(np.random.default_rng(5), 30.0), 0.3)
-    lack = fit_output_error(a_log(exact, exact, 6), AXEBOT, nuisances=()).lack_of_fit
+    lack = identify(a_log(exact, exact, 6), AXEBOT, OutputError(nuisances=())).lack_of_fit
     assert not lack.found
     assert max(lack.rounded.values()) < 0.01
 
@@ -99,13 +102,13 @@ def test_motors_that_take_just_these_steps_cost_little(monkeypatch):
     exact = rounded(voltages(np.random.default_rng(5), 30.0), 0.3)
     with monkeypatch.context() as without:
         without.setattr(f"{beside_rounding.__module__}.input_steps", lambda one: np.zeros(3))
-        fine = fit_output_error(a_log(exact, exact, 6), AXEBOT, nuisances=())
-    steps = fit_output_error(a_log(exact, exact, 6), AXEBOT, nuisances=())
+        fine = identify(a_log(exact, exact, 6), AXEBOT, OutputError(nuisances=())).estimate
+    steps = identify(a_log(exact, exact, 6), AXEBOT, OutputError(nuisances=())).estimate
     wider = [steps.std[key] / fine.std[key] for key in steps.value]
     print(np.round(wider, 2))
     assert 1.05 < min(wider) < max(wider) < 1.5
     lost = voltages(np.random.default_rng(5), 30.0)
-    off = fit_output_error(a_log(lost, rounded(lost, 0.3), 6), AXEBOT, nuisances=())
+    off = identify(a_log(lost, rounded(lost, 0.3), 6), AXEBOT, OutputError(nuisances=())).estimate
     assert min(off.std[key] / steps.std[key] for key in off.value) > 3.0
 
 

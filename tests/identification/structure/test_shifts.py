@@ -10,8 +10,8 @@ import pytest
 
 from benchmarks.wrong_worlds.log import AR, COUNTS, SPEEDS, TICKS, TWIST, logged, right_case, robot_of
 from benchmarks.wrong_worlds.remedies import FRICTION, before
-from omnidyn.identification.identify import Identification
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.run import CHANNELS, Run
 
 CHANGED = 17.3  # [s]
@@ -37,7 +37,7 @@ def after(run, t):
 )
 def test_a_right_world_is_stable(sensor, memory, seed):
     case = right_case(seed).setup_but(sensor=sensor, memory=memory, rate=50.0)
-    fit = fit_output_error(logged(case, seed), robot_of(case.told), free=FRICTION)
+    fit = identify(logged(case, seed), robot_of(case.told), OutputError(free=FRICTION)).estimate
     assert not fit.stability.found
     assert not fit.stability.parts()
 
@@ -45,7 +45,7 @@ def test_a_right_world_is_stable(sensor, memory, seed):
 @pytest.mark.parametrize("seed", [7201, 7204])
 def test_a_change_of_floor_is_found_with_its_time_and_both_levels(seed):
     case, run = floor(seed, 1.15)
-    found = fit_output_error(run, robot_of(case.told), free=FRICTION).stability
+    found = identify(run, robot_of(case.told), OutputError(free=FRICTION)).stability
     split = found.splits[0]
     assert split.between[0] <= CHANGED <= split.between[1]
     assert split.at == pytest.approx(CHANGED, abs=0.05 * 30.0)
@@ -60,9 +60,9 @@ def test_a_change_of_floor_is_found_with_its_time_and_both_levels(seed):
 def test_the_levels_are_those_of_fits_of_the_parts():
     case, run = floor(7207, 1.1)
     robot = robot_of(case.told)
-    split = fit_output_error(run, robot, free=FRICTION, nuisances=()).stability.splits[0]
+    split = identify(run, robot, OutputError(free=FRICTION, nuisances=())).stability.splits[0]
     parts = [before(run, split.at), after(run, split.at)]
-    alone = [fit_output_error(part, robot, free=FRICTION, nuisances=()) for part in parts]
+    alone = [identify(part, robot, OutputError(free=FRICTION, nuisances=())).estimate for part in parts]
     for shift in split.shifts:
         for level, fit in zip(shift.levels, alone, strict=True):
             assert level.value == pytest.approx(fit.value[shift.key], abs=0.35 * fit.std[shift.key])
@@ -75,7 +75,7 @@ def test_logs_of_two_floors_differ_and_the_log_is_named():
     rough = case.world_but(coulomb=tuple(1.12 * c for c in case.world.coulomb))
     runs = [logged(each, seed) for seed, each in enumerate((case, case, rough), 7301)]
     runs = [run.replace(source=name) for run, name in zip(runs, ("one", "two", "rough"), strict=True)]
-    found = Identification.of(runs, robot, free=FRICTION)
+    found = identify(runs, robot, OutputError(free=FRICTION))
     split = next(each for each in found.fits["all"].stability.splits if each.by == "logs")
     shift = next(each for each in split.shifts if each.key == COULOMB)
     level = {each.part: each for each in shift.levels}
@@ -90,7 +90,7 @@ def test_logs_of_one_floor_do_not_differ():
     case = right_case(7401).setup_but(seconds=20.0)
     robot = robot_of(case.told)
     runs = [logged(case, seed).replace(source=f"log {seed}") for seed in (7401, 7402, 7403)]
-    document = Identification.of(runs, robot, free=FRICTION).document()
+    document = identify(runs, robot, OutputError(free=FRICTION)).document()
     assert "not stable" not in document.to_text()
     assert not document.data["stability"]["found"]
     assert set(document.data["stability"]["tested"]) == {"time", "logs"}
@@ -98,6 +98,8 @@ def test_logs_of_one_floor_do_not_differ():
 
 def test_a_number_at_a_bound_and_one_that_a_prior_holds_are_not_compared():
     case = right_case(7501).both_but(viscous=(0.0, 1.2, 0.012), frame=False)
-    fit = fit_output_error(logged(case, 7501), robot_of(replace(case.told, viscous=(1.0, 1.2, 0.012))), free=FRICTION)
+    fit = identify(
+        logged(case, 7501), robot_of(replace(case.told, viscous=(1.0, 1.2, 0.012))), OutputError(free=FRICTION)
+    ).estimate
     assert not fit.stability.found
     assert np.isfinite(fit.stability.tested["time"])

@@ -5,13 +5,13 @@ import pytest
 
 from benchmarks.wrong_worlds.kinds import by_name
 from benchmarks.wrong_worlds.log import logged, right_case, robot_of
+from omnidyn.identification.identify import identify
 from omnidyn.identification.lack_of_fit import LOSS
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.linear.rows import Rows
 from omnidyn.identification.output_error.prepare import EXACT, make_engine
-from omnidyn.identification.question import Question
 from omnidyn.identification.structure.tails import as_counted, sprinkled
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -35,7 +35,7 @@ def spoiled(seed, times, share=0.02):
 
 @pytest.mark.parametrize("times", [15.0, 100.0])
 def test_wild_samples_are_named_with_the_way_out(times):
-    estimate = fit_output_error(spoiled(1, times), AXEBOT, nuisances=())
+    estimate = identify(spoiled(1, times), AXEBOT, OutputError(nuisances=())).estimate
     lack = estimate.lack_of_fit
     assert set(lack.wild) == {"twist[0]", "twist[1]", "twist[2]"}
     for one in lack.wild.values():
@@ -49,8 +49,8 @@ def test_wild_samples_are_named_with_the_way_out(times):
 def test_the_ladder_takes_the_loss_that_bears_them(times):
     """It is the last remedy, for it is no cause, and the first step; what it says is what Student's t says."""
     run = spoiled(3, times)
-    estimate = fit_output_error(run, AXEBOT, nuisances=(), ladder=True)
-    plain = fit_output_error(run, AXEBOT, nuisances=())
+    estimate = identify(run, AXEBOT, OutputError(nuisances=(), ladder=True)).estimate
+    plain = identify(run, AXEBOT, OutputError(nuisances=())).estimate
     assert not plain.lack_of_fit.found
     (remedy,) = plain.lack_of_fit.remedies
     assert remedy.key == "loss"
@@ -58,7 +58,7 @@ def test_the_ladder_takes_the_loss_that_bears_them(times):
     assert remedy.gain > remedy.gain_std > 0.0
     assert plain.lack_of_fit.causes == ()
     assert [rung.key for rung in estimate.ladder.taken] == ["loss"]
-    asked = fit_output_error(run, AXEBOT, nuisances=(), loss="student-t")
+    asked = identify(run, AXEBOT, OutputError(nuisances=(), loss="student-t")).estimate
     assert estimate.value == pytest.approx(asked.value, rel=1e-3)
     assert "Student's t" in estimate.method
 
@@ -67,8 +67,8 @@ def test_a_cause_that_wild_samples_hide_is_found_behind_them():
     """A mass 5 % below the true one: unseen among samples 100 times off, and found by the loss that bears them."""
     light = AXEBOT.replace(body=AXEBOT.body.replace(mass=AXEBOT.body.mass * 0.95))
     run = spoiled(4, 100.0)
-    assert not fit_output_error(run, light, nuisances=()).lack_of_fit.found
-    assert fit_output_error(run, light, nuisances=(), loss="student-t").lack_of_fit.found
+    assert not identify(run, light, OutputError(nuisances=())).lack_of_fit.found
+    assert identify(run, light, OutputError(nuisances=(), loss="student-t")).lack_of_fit.found
 
 
 @pytest.mark.long
@@ -80,7 +80,7 @@ def test_the_loss_is_tried_where_the_cause_that_gains_more_does_not_pay():
     far = rng.normal(size=run.wheel_speed.shape) * np.where(rng.random(run.wheel_speed.shape) < 0.02, 1.0, 0.0)
     level = np.median(np.abs(np.diff(run.wheel_speed, n=2, axis=0)), axis=0)  # about 1.6 times the noise
     wild = run.replace(wheel_speed=run.wheel_speed + 10.0 * level * far)
-    best = fit_output_error(wild, robot, free=("friction",), ladder=True)
+    best = identify(wild, robot, OutputError(free=("friction",), ladder=True)).estimate
     rungs = [rung for rung in best.ladder.rungs if rung.step == 1]
     assert any(rung.key == "fade" and rung.gain > rung.gain_std and not rung.taken for rung in rungs)
     assert [rung.key for rung in best.ladder.taken] == ["loss"]
@@ -90,7 +90,7 @@ def test_the_loss_is_tried_where_the_cause_that_gains_more_does_not_pay():
 
 def test_pulled_in_residuals_leave_a_robust_fit_where_it_is():
     """Least squares of them go nowhere from its best point, in standard errors; of the residuals as they are, far."""
-    solution = Fit.of(spoiled(5, 30.0), AXEBOT, Question(nuisances=(), loss="student-t")).solve()
+    solution = Fit.of(spoiled(5, 30.0), AXEBOT, OutputError(nuisances=(), loss="student-t")).solve()
     problem, point, variance = solution.solver.problem, solution.state.point, solution.state.variance
     parts = make_engine(EXACT, problem).residuals(point)
     far = []
@@ -105,7 +105,7 @@ def test_pulled_in_residuals_leave_a_robust_fit_where_it_is():
 
 def test_a_fit_that_counts_them_little_is_not_held_against_rows_that_hold_them():
     """Neighbours in the log scatter by wild samples too: of that the residuals, pulled in, would be next to none."""
-    lack = fit_output_error(spoiled(3, 100.0), AXEBOT, nuisances=(), loss="student-t").lack_of_fit
+    lack = identify(spoiled(3, 100.0), AXEBOT, OutputError(nuisances=(), loss="student-t")).lack_of_fit
     assert all(one.chi2 > 0.8 for one in lack.noise.values())
 
 
@@ -113,10 +113,10 @@ def test_student_t_counts_them_little():
     """Its intervals are those of a log without wild samples, within a fifth; Gauss's are not."""
     bare, wild = spoiled(2, 1.0), spoiled(2, 30.0)
     name = "friction.axes.viscous[0]"
-    clean = fit_output_error(bare, AXEBOT, nuisances=()).std[name]
-    robust = fit_output_error(wild, AXEBOT, nuisances=(), loss="student-t")
+    clean = identify(bare, AXEBOT, OutputError(nuisances=())).std[name]
+    robust = identify(wild, AXEBOT, OutputError(nuisances=(), loss="student-t")).estimate
     assert robust.std[name] == pytest.approx(clean, rel=0.2)
-    assert fit_output_error(wild, AXEBOT, nuisances=()).std[name] > 2.0 * clean
+    assert identify(wild, AXEBOT, OutputError(nuisances=())).std[name] > 2.0 * clean
     assert not robust.lack_of_fit.wild
     low, high = robust.ci95[name]
     assert low <= AXEBOT.friction.axes.viscous[0] <= high
@@ -124,14 +124,14 @@ def test_student_t_counts_them_little():
 
 @pytest.mark.parametrize("seed", range(3))
 def test_normal_noise_has_no_heavy_tails(seed):
-    assert not fit_output_error(spoiled(seed, 1.0), AXEBOT, nuisances=()).lack_of_fit.wild
+    assert not identify(spoiled(seed, 1.0), AXEBOT, OutputError(nuisances=())).lack_of_fit.wild
 
 
 def test_quantised_speeds_have_none():
     step = 0.02
     run = log(np.random.default_rng(4).normal(size=CLEAN.twist.shape) * NOISE)
     rounded = Run(t=run.t, voltage=run.voltage, twist=np.round(run.twist / step) * step, source="log")
-    assert not fit_output_error(rounded, AXEBOT, nuisances=()).lack_of_fit.wild
+    assert not identify(rounded, AXEBOT, OutputError(nuisances=())).lack_of_fit.wild
 
 
 def test_samples_that_a_wrong_model_leaves_far_out_are_not_wild():
@@ -139,7 +139,7 @@ def test_samples_that_a_wrong_model_leaves_far_out_are_not_wild():
     where the robot speeds up or slows down. Student's t, which counts them little, hid the load."""
     seed = 136_000
     case = by_name("payload").make(right_case(seed), 2.7)
-    lack = fit_output_error(logged(case, seed), robot_of(case.told), free=("friction",)).lack_of_fit
+    lack = identify(logged(case, seed), robot_of(case.told), OutputError(free=("friction",))).lack_of_fit
     assert lack.found
     assert not lack.wild
     assert LOSS not in [remedy.key for remedy in lack.remedies]
@@ -163,7 +163,7 @@ def test_bursts_in_one_output_are_the_cause_of_what_is_far_out_in_the_others():
     rng = np.random.default_rng(8)
     noise = rng.normal(size=CLEAN.twist.shape) * NOISE
     noise[:, 0] *= np.where(rng.random(len(noise)) < 0.02, 30.0, 1.0)
-    assert set(fit_output_error(log(noise), AXEBOT, nuisances=()).lack_of_fit.wild) == {"twist[0]"}
+    assert set(identify(log(noise), AXEBOT, OutputError(nuisances=())).lack_of_fit.wild) == {"twist[0]"}
     for start in range(200, 3000, 400):
         noise[start : start + 40 : 4, 1] *= 30.0
-    assert not fit_output_error(log(noise), AXEBOT, nuisances=()).lack_of_fit.wild
+    assert not identify(log(noise), AXEBOT, OutputError(nuisances=())).lack_of_fit.wild

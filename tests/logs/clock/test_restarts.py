@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn import check, identify_motors, load_robot, read_log
+from omnidyn import MotorLine, check, identify, load_robot, read_log
 from omnidyn.errors import InputError
 from omnidyn.logs.read_log import LogOptions, load_log
 from omnidyn.logs.segments import segments
@@ -56,7 +56,7 @@ def test_a_motor_is_identified_across_a_restart(tmp_path, motor):
     seen = counts.copy()
     seen[2700:] -= seen[2700]
     path = write_columns(tmp_path / "reset.csv", "t_s,voltage_V,enc", t, volts, seen)
-    (found,) = identify_motors([read_log(path, assume=TICKS)]).motors
+    (found,) = identify([read_log(path, assume=TICKS)], None, MotorLine()).motors
     assert found.value["slope"] == pytest.approx(0.1, rel=2e-3)
 
 
@@ -141,5 +141,5 @@ def test_the_cases_of_counters_and_boards():
 @pytest.mark.long
 def test_the_cases_give_the_right_motor():
     run = read_log(case("logs/count_restart/reset.csv"), assume=TICKS)
-    (motor,) = identify_motors([run]).motors
+    (motor,) = identify([run], None, MotorLine()).motors
     assert motor.value["slope"] == pytest.approx(0.02, rel=1e-3)

@@ -8,7 +8,8 @@ import pytest
 
 import omnidyn
 from omnidyn.findings.check import check
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.logs.read_log import load_log, read_log
 from omnidyn.logs.run_file import run_columns, write_run
 from omnidyn.logs.writers.mcap_run import messages
@@ -89,7 +90,7 @@ def test_every_format_gives_the_same_verdict_and_the_same_fit(run, tmp_path):
         path = others.get(suffix, write_run)(run, tmp_path / f"a{suffix}")
         again = read_log(path, robot)
         assert again.replace(source="", warnings=()) == run
-        fit = fit_output_error(again.replace(source=""), robot, nuisances=(), start="rest")
+        fit = identify(again.replace(source=""), robot, OutputError(nuisances=(), start="rest")).estimate
         answers[suffix] = json.dumps([fit.value, fit.std], default=float)
         verdict = check(load_log(path, robot), robot)
         grave = {(finding.code, finding.subject) for finding in verdict.findings if finding.severity != "note"}

@@ -209,6 +209,6 @@ def test_what_is_known_of_a_variation_is_in_no_one_s_way():
     t = np.arange(600) * 0.02
     volts = np.sin(t)[:, None] * [3.0, -3.0, 0.0] + np.cos(0.7 * t)[:, None] * [1.0, 1.0, 2.5]
     run = omnidyn.simulate(robot, volts[:-1], 0.02)
-    found = omnidyn.identify(run, robot, free=("friction",))
+    found = omnidyn.identify(run, robot, omnidyn.OutputError(free=("friction",))).estimate
     assert found.value["friction.axes.coulomb[0]"] == pytest.approx(axes.coulomb[0], rel=0.01)
     assert "variations.payload.2kg.mass_kg" in with_gear(found.robot, 20.0, "weighed").priors

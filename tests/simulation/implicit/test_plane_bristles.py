@@ -137,7 +137,7 @@ def test_a_fit_finds_its_numbers(law):
     for key, factor in zip(keys, (1.15, 0.9, 1.15 if law == "dahl" else 0.9), strict=True):
         place = Key.parse(key)
         guess = place.set(guess, factor * place.get(guess))
-    fit = omnidyn.identify([log], guess, free=keys)
+    fit = omnidyn.identify([log], guess, omnidyn.OutputError(free=keys)).estimate
     for key in keys:
         low, high = fit.ci95[key]
         assert low <= Key.parse(key).get(robot) <= high, key

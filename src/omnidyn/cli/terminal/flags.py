@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from functools import cache
 
-# Options beside those of a Question, and those whose flag is not their name.
+# Options beside those of `omnidyn identify`, and those whose flag is not their name.
 OTHERS = (
     "assume", "azimuth", "column", "controller", "current_unsigned", "delay", "draws", "dt", "duration", "evaluations",
     "fail_if", "force", "full", "horizon", "map", "max_bytes", "max_steps", "no_header", "no_observer", "noise", "path",
@@ -17,9 +17,10 @@ _NAMED = re.compile(r"`([a-z_]+)`")
 @cache
 def flags() -> dict[str, str]:
     """Option -> flag."""
-    from omnidyn.identification.question import options
+    from omnidyn.cli.identify_options import options
 
-    asked = {each.name: each.metadata["flag"] or each.name for each in options() if each.metadata["flag"] is not None}
+    asked = {name: spec.metadata["flag"] or name for name, spec in options().items()}
+    asked["groups"] = "per"
     asked["beside"] = "with"
     asked["variables"] = "var"  # of a file of MATLAB
     return {name: f"--{word.replace('_', '-')}" for name, word in {**{name: name for name in OTHERS}, **asked}.items()}

@@ -17,6 +17,7 @@ from scipy.special import fdtri
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.identification.methods import AUTO, GAUSS, STUDENT
 from omnidyn.identification.motors.estimate import (
     BAND,
     FREE_RUN,
@@ -36,7 +37,6 @@ from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
 from omnidyn.identification.output_error.trust.ends import at_the_end
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust, trust
-from omnidyn.identification.question import AUTO, GAUSS, STUDENT
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run, as_list
 from omnidyn.statement import Statement

@@ -1,15 +1,14 @@
-"""identify_motors: every motor of some logs, by one of two ways, and what they say together."""
+"""study_motors: every motor of some logs, by one of two ways, and what they say together."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from omnidyn.arguments import check_order
 from omnidyn.document import Document, Points, Table
 from omnidyn.document import plain as plain_values
 from omnidyn.errors import InputError, InsufficientDataError
@@ -17,6 +16,7 @@ from omnidyn.findings.finding import Verdict
 from omnidyn.findings.fitness import MOTORS as MOTORS_USE
 from omnidyn.identification.grouping import held_out
 from omnidyn.identification.log_verdicts import checked, log_verdicts, of_motors, told_why, unfit, verdict_advice
+from omnidyn.identification.methods import OUTPUT_ERROR, STEADY_STATE, MotorFit, MotorLine
 from omnidyn.identification.motors.choice import fit_rmse, is_late
 from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, named
 from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
@@ -32,13 +32,11 @@ from omnidyn.identification.motors.start import (
     windows_of_points,
 )
 from omnidyn.identification.motors.windows import MotorWindows, fit_line, motor_windows
-from omnidyn.identification.options import Options, shows_options
-from omnidyn.identification.question import MOTOR_FIT, MOTOR_LINES, MOTORS, OUTPUT_ERROR, STEADY_STATE, Question
 from omnidyn.logs.log import Log
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
-from omnidyn.run import Run, as_list
+from omnidyn.run import Run
 from omnidyn.shown import FIGURE, Shown, make
 from omnidyn.statement import ERROR, NOTE, WARNING, Statement, as_verdict, by_severity, statements
 
@@ -155,46 +153,36 @@ class MotorStudy(Shown):
         }  # fmt: skip
 
 
-@shows_options(MOTOR_FIT, MOTOR_LINES)
-def identify_motors(
-    runs: Run | Sequence[Run] | MotorTable, robot: Robot | None = None, *, question: Question | None = None,
-    logs: Sequence[Log] = (), progress: Progress = silent, **options: Unpack[Options],
+def study_motors(
+    runs: Sequence[Run], robot: Robot | None, asked: MotorLine | MotorFit, hold_out: Sequence[str] = (),
+    logs: Sequence[Log] = (), progress: Progress = silent,
 ) -> MotorStudy:  # fmt: skip
     """Slope, dead band, lag and inertia of every motor of some logs.
 
-    Steady state, which is the default, takes windows in integral form and gives the line of all motors together too;
-    output error takes free runs of whole logs, with and without a dead band. question, options: see `Question`, such as
-    method=, input=, window= or hold_out=. robot: whose heading is the speed, where that is "ground". logs: where the
-    runs come from, to be checked as well. progress: hears what is done. runs may be a
-    table of inputs and steady speeds, `read_motor_table`, and rows of a log that are more than 0.1 s apart are points
-    like those of a table. Each direction of each motor has its own start, stop, line and lag in `MotorStudy.starts`.
-    Raises InputError for options of another method and for a run without the channels, InsufficientDataError where the
-    motors say nothing.
+    Each direction of each motor has its own start, stop, line and lag in `MotorStudy.starts`. Rows of a log that are
+    more than 0.1 s apart are points like those of a table.
+
+    Args:
+        robot: whose heading is the speed, where that is "ground".
+        asked: windows in integral form, with the line of all motors together; or free runs of whole logs.
+        hold_out: globs of the sources of runs that are predicted, by free runs only.
+        logs: where the runs come from, to be checked as well.
+    Raises InputError for a run without the channels, InsufficientDataError where the motors say nothing.
     """
-    asked = (question or Question()).but({**options, "what": MOTORS})
-    check_order(
-        "identify_motors(runs) or identify_motors(runs, robot)", (runs, (Run, MotorTable)), (robot, (Robot, type(None)))
-    )
-    if isinstance(runs, MotorTable):
-        if asked.method_asked() == OUTPUT_ERROR:
-            raise InputError("a table of steady speeds has no time in it", got="a table input,speed",
-                             expected="logs, or `method` steady-state", where="method")  # fmt: skip
-        return _of_points(runs, "a table")
-    every = as_list(runs)
-    more = ["pose"] if asked.speed == GROUND else []
+    more = ["pose"] if isinstance(asked, MotorLine) and asked.speed == GROUND else []
     verdicts = log_verdicts([of_motors(log, *more) for log in logs], robot, progress)
     with told_why(verdicts, MOTORS_USE):
-        if asked.method_asked() == OUTPUT_ERROR:
-            study = _free_runs(every, asked, progress)
+        if isinstance(asked, MotorFit):
+            study = _free_runs(runs, asked, hold_out, progress)
         else:
-            study = _lines(motor_logs(every, asked.input, asked.speed, robot), asked)
+            study = _lines(motor_logs(runs, asked.input, asked.speed, robot), asked)
     return replace(study, verdicts=verdicts)
 
 
-def _lines(logs: Sequence[MotorLog], asked: Question) -> MotorStudy:
+def _lines(logs: Sequence[MotorLog], asked: MotorLine) -> MotorStudy:
     if is_slow(logs):
         points = points_of_logs(logs)
-        study = _of_points(points, logs[0].motion_from, [Statement("rows_as_points")])
+        study = study_points(points, logs[0].motion_from, [Statement("rows_as_points")])
         return replace(study, supply=_supply(logs))
     windows = motor_windows(logs, steady=asked.steady, share=asked.window)
     source = named([log.run.source for log in logs])
@@ -223,7 +211,7 @@ def _of_each(windows: MotorWindows, source: str) -> tuple[list[int], tuple[Motor
     return motors, lines
 
 
-def _of_points(points: MotorTable, origin: str, remarks: Sequence[Statement] = ()) -> MotorStudy:
+def study_points(points: MotorTable, origin: str = "a table", remarks: Sequence[Statement] = ()) -> MotorStudy:
     """The study of points of steady speed."""
     windows = windows_of_points(points, origin)
     _, lines = _of_each(windows, points.source)
@@ -236,8 +224,8 @@ def _of_points(points: MotorTable, origin: str, remarks: Sequence[Statement] = (
     )  # fmt: skip
 
 
-def _free_runs(runs: Sequence[Run], asked: Question, progress: Progress) -> MotorStudy:
-    away = held_out([run.source for run in runs], asked.hold_out)
+def _free_runs(runs: Sequence[Run], asked: MotorFit, hold_out: Sequence[str], progress: Progress) -> MotorStudy:
+    away = held_out([run.source for run in runs], hold_out)
     kept = [run for run, out in zip(runs, away, strict=True) if out]
     logs = logs_of_free_runs([run for run, out in zip(runs, away, strict=True) if not out], asked.input)
     fitted: list[Run] = [log.run for log in logs]

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.findings.needs import is_exact, why_no_inputs
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.prepare import (
     LOOP,
     Group,
@@ -21,7 +22,6 @@ from omnidyn.identification.output_error.problem.band import without_band
 from omnidyn.identification.output_error.problem.bending import with_damping
 from omnidyn.identification.output_error.problem.parameters import refuse_unknown
 from omnidyn.identification.output_error.trust.breakaway import asked_levels, refuse_level
-from omnidyn.identification.question import Question
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
@@ -29,11 +29,13 @@ from omnidyn.run import Run
 WHOLE = "all"  # the name of the group where there are none
 
 
-def group_names(runs: Sequence[Run], question: Question, groups: Sequence[str] | None) -> list[str]:
+def group_names(runs: Sequence[Run], question: OutputError, groups: Sequence[str] | None) -> list[str]:
     """The group of each run. Raises InputError for names that are not one for each, or where there is one group."""
     if groups is None:
         if question.per_free:
-            raise InputError("there are no groups", got=question.per_free[0], expected="with `per`", where="per_free")
+            raise InputError(
+                "there are no groups", got=question.per_free[0], expected="with `groups`", where="per_free"
+            )
         return [WHOLE] * len(runs)
     if len(groups) != len(runs) or len(set(groups)) < 2:
         got = f"{len(groups)} names, {len(set(groups))} of them different, for {len(runs)} runs"
@@ -41,7 +43,9 @@ def group_names(runs: Sequence[Run], question: Question, groups: Sequence[str] |
     return list(groups)
 
 
-def begun(name: str, runs: Sequence[Run], robot: Robot, question: Question, joint: bool) -> tuple[Group, Question]:
+def begun(
+    name: str, runs: Sequence[Run], robot: Robot, question: OutputError, joint: bool
+) -> tuple[Group, OutputError]:
     """(the group of these runs, its question with every key written out). robot: as it is given; joint: whether there
     are other groups.
 
@@ -67,7 +71,7 @@ def begun(name: str, runs: Sequence[Run], robot: Robot, question: Question, join
     return group, asked
 
 
-def _refuse_profile(group: Group, question: Question) -> None:
+def _refuse_profile(group: Group, question: OutputError) -> None:
     levels = [each for each in asked_levels(group.robot, question.free or (), question.fixed) if group.tells(each)]
     why = "a speed loop" if group.engine == LOOP else ""
     if group.robot.wheels.traction_mu is not None:
@@ -81,7 +85,7 @@ def _refuse_profile(group: Group, question: Question) -> None:
         )  # fmt: skip
 
 
-def _written_out(question: Question, robot: Robot, usual: Sequence[str]) -> Question:
+def _written_out(question: OutputError, robot: Robot, usual: Sequence[str]) -> OutputError:
     """The question with every key written out, as this robot has them."""
 
     def every(keys: Iterable[str]) -> tuple[str, ...]:
@@ -94,7 +98,7 @@ def _written_out(question: Question, robot: Robot, usual: Sequence[str]) -> Ques
     )  # fmt: skip
 
 
-def _refuse_joint(runs: Sequence[Run], robot: Robot, question: Question) -> None:
+def _refuse_joint(runs: Sequence[Run], robot: Robot, question: OutputError) -> None:
     levels = asked_levels(robot, question.free or ())
     if levels:
         raise UnsupportedError(

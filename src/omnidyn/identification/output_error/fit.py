@@ -15,6 +15,7 @@ import numpy as np
 
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.grouping import count_once
+from omnidyn.identification.methods import AUTO, GAUSS, STUDENT, OutputError
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import WHOLE, begun, group_names
 from omnidyn.identification.output_error.conclusion import conclude, unexplained
@@ -47,7 +48,6 @@ from omnidyn.identification.output_error.trust.no_fall import without_a_fall
 from omnidyn.identification.output_error.trust.resampling import beside, refuse_bootstrap, resampled
 from omnidyn.identification.output_error.trust.support import supported, too_early
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, Trust, trust
-from omnidyn.identification.question import AUTO, GAUSS, STUDENT, Question
 from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Robot
 from omnidyn.progress import silent
@@ -67,15 +67,15 @@ class Fit:
     FitProgress that `solve` was given. began: the robot as it was given. twice: which runs were given twice.
     """
 
-    question: Question
+    question: OutputError
     groups: tuple[Group, ...]
     began: Robot
     twice: tuple[Statement, ...] = ()
 
     @classmethod
     def of(
-        cls, runs: Run | Sequence[Run], robot: Robot, question: Question, groups: Sequence[str] | None = None,
-        progress: FitProgress | None = None, begins: Mapping[str, tuple[Robot, Question]] | None = None,
+        cls, runs: Run | Sequence[Run], robot: Robot, question: OutputError, groups: Sequence[str] | None = None,
+        progress: FitProgress | None = None, begins: Mapping[str, tuple[Robot, OutputError]] | None = None,
     ) -> Fit:  # fmt: skip
         """Make runs of any length and rate, split at gaps, a problem. groups: name of each run's group. begins: group
         -> the robot that it begins from and what is asked of it, where that is not the same in all; then every key of

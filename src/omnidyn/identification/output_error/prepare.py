@@ -10,6 +10,7 @@ import numpy as np
 from omnidyn.arrays import BoolArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.findings.needs import is_exact
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.slipping import implicit_engine
@@ -31,7 +32,6 @@ from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.problem.record import Record, record
 from omnidyn.identification.output_error.solve.loop import loop_keys, loop_pieces, looped
 from omnidyn.identification.output_error.trust.breakaway import is_profiled
-from omnidyn.identification.question import Question
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.frames import AXES
 from omnidyn.model.keys import (
@@ -88,7 +88,7 @@ class Group:
     name: str
     records: list[Record]
     robot: Robot
-    question: Question
+    question: OutputError
     engine: str
     usual: tuple[str, ...]
     moved: BoolArray
@@ -107,7 +107,7 @@ class Group:
 
 
 def make_group(
-    name: str, records: list[Record], robot: Robot, question: Question, exact: bool, usual: tuple[str, ...],
+    name: str, records: list[Record], robot: Robot, question: OutputError, exact: bool, usual: tuple[str, ...],
     alone: bool,
 ) -> Group:  # fmt: skip
     """The group of these records. exact: whether the exact engine fits them; usual: what is free by default.
@@ -151,7 +151,7 @@ def _never_moved(found: Motion, source: str) -> InsufficientDataError:
     )  # fmt: skip
 
 
-def _loop_question(question: Question, found: Motion, records: Sequence[Record], robot: Robot) -> Question:
+def _loop_question(question: OutputError, found: Motion, records: Sequence[Record], robot: Robot) -> OutputError:
     """By default friction of what moved, guesses and gains. Raises InsufficientDataError where nothing moved."""
     still = np.flatnonzero(~found.moved).tolist()
     own = [key for key in guesses(robot, looped=True) if Key.parse(key).axis not in still]
@@ -160,7 +160,7 @@ def _loop_question(question: Question, found: Motion, records: Sequence[Record],
     return question if question.free is not None else replace(question, free=free, fixed=())
 
 
-def read_records(runs: Sequence[Run], robot: Robot, question: Question) -> list[Record]:
+def read_records(runs: Sequence[Run], robot: Robot, question: OutputError) -> list[Record]:
     """The runs as a fit sees them. Raises InputError where there is none, and for logs that do not go together."""
     if not runs:
         raise InputError("nothing to fit to", got="no runs", expected="one or more", where="runs")
@@ -176,7 +176,7 @@ def read_records(runs: Sequence[Run], robot: Robot, question: Question) -> list[
 
 
 def make_problem(
-    records: Sequence[Record], robot: Robot, question: Question, engine: str = "", usual: Sequence[str] = ()
+    records: Sequence[Record], robot: Robot, question: OutputError, engine: str = "", usual: Sequence[str] = ()
 ) -> Problem:
     """What is free, and how the pieces start. engine, usual: of `engine_for` and `free_by_default`, where known.
 

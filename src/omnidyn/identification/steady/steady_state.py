@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.estimate import Estimate, identified
 from omnidyn.identification.force_scale import scale_of_traction
-from omnidyn.identification.question import STEADY_STATE, Question
+from omnidyn.identification.methods import SteadyState
 from omnidyn.identification.steady.levels import estimate_of
 from omnidyn.identification.steady.line import (
     PARAMETERS,
@@ -220,15 +219,13 @@ def _friction(before: AxesFriction, found: _Findings) -> AxesFriction:
 
 
 def identify_lines(
-    runs: Sequence[Run], robot: Robot, *, groups: Sequence[str] | None = None, question: Question | None = None,
-    **options: Any,
+    runs: Sequence[Run], robot: Robot, asked: SteadyState, groups: Sequence[str] | None = None
 ) -> dict[str, Estimate]:  # fmt: skip
-    """B and C of each axis and group: group -> Estimate. Options: see `identify_steady`.
+    """B and C of each axis and group: group -> Estimate. groups: name of each run's group.
 
     Every point counts for the axes that it drives. Friction elsewhere than on the axes is taken off the robot.
     Raises InsufficientDataError when no axis of a group has three points at two speeds or more.
     """
-    asked = Question.for_method(STEADY_STATE, question, options)
     points = force_points(
         runs, robot, groups=groups, speed=asked.speed, force_from=asked.force_from, window=asked.window
     )

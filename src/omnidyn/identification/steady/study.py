@@ -11,18 +11,15 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
-from typing import Unpack
 
 import numpy as np
 
-from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InsufficientDataError, OmnidynError
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.force_scale import scale_of_traction
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
-from omnidyn.identification.options import Options, shows_options
-from omnidyn.identification.question import STEADY, STEADY_STATE, Question
+from omnidyn.identification.methods import SteadyState
 from omnidyn.identification.stability import Stability
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
 from omnidyn.identification.steady.lack_of_fit import lack_of_fit
@@ -48,29 +45,11 @@ from omnidyn.model.keys import VISCOUS as VISCOUS_LEVEL
 from omnidyn.model.known.told import known_priors
 from omnidyn.model.layout import YAW
 from omnidyn.model.robot import GUESSES, Robot
-from omnidyn.run import Run, as_list
+from omnidyn.run import Run
 from omnidyn.statement import NOTE, Statement, statements
 from omnidyn.statistics import t_quantile
 
 LASTING = Stability({}, ())  # whether levels last, `moments` says
-
-
-@shows_options(STEADY)
-def identify_steady(
-    runs: Sequence[Run], robot: Robot, *, groups: Sequence[str] | None = None, question: Question | None = None,
-    **options: Unpack[Options],
-) -> SteadyStudy:  # fmt: skip
-    """Identify friction from the steady windows of runs.
-
-    groups: name of each run's group (a floor, a load); every group has its own levels of one shape, and where its
-    points tell another shape from that one, a shape of its own. question, options: those of `Question` that belong to
-    steady state, such as shape=, speed=, window=.
-    The friction of `robot` is replaced; its motor and wheels are taken as they are.
-    Raises InsufficientDataError when nothing is steady, nothing moves, or no shape is determined; InputError for a run
-    without the channels needed, or for a wrong option.
-    """
-    fit = fit_steady(runs, robot, groups=groups, question=Question.for_method(STEADY_STATE, question, options))
-    return undiagnosed(fit) if fit.asked.quick else diagnosed(fit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +59,7 @@ class SteadyFit:
 
     runs: Sequence[Run]
     robot: Robot
-    asked: Question
+    asked: SteadyState
     windows: SteadyWindows
     points: ForcePoints
     choice: ShapeChoice
@@ -90,11 +69,16 @@ class SteadyFit:
 
 
 def fit_steady(
-    runs: Sequence[Run], robot: Robot, *, groups: Sequence[str] | None = None, question: Question
+    runs: Sequence[Run], robot: Robot, asked: SteadyState, groups: Sequence[str] | None = None
 ) -> SteadyFit:  # fmt: skip
-    """The levels of friction of each group. Arguments and errors as of `identify_steady`."""
-    check_order("identify_steady(runs, robot)", (runs, Run), (robot, Robot))
-    runs, asked = as_list(runs), question
+    """The levels of friction of each group, from the steady windows of runs.
+
+    groups: name of each run's group (a floor, a load); every group has its own levels of one shape, and where its
+    points tell another shape from that one, a shape of its own.
+    The friction of `robot` is replaced; its motor and wheels are taken as they are.
+    Raises InsufficientDataError when nothing is steady, nothing moves, or no shape is determined; InputError for a run
+    without the channels needed.
+    """
     windows = steady_windows(
         runs, robot, groups=groups, speed=asked.speed, force_from=asked.force_from, window=asked.window
     )

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.exact import ExactEngine, Weighting
 from omnidyn.identification.output_error.kernel.march import FINAL
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point, per_column
-from omnidyn.identification.question import Question
 from omnidyn.model.keys import Key
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -18,7 +18,7 @@ TRUE = {"latency": 0.0137, "gain": 1.07, "dead_band": 0.21, "fade": 0.06}
 
 
 def problem_of(robot, run, free=ROBOT_KEYS, nuisances=(), outputs=("twist", "wheel_speed", "current", "heading")):
-    given = Question(free=free, nuisances=nuisances, start="free", outputs=outputs)
+    given = OutputError(free=free, nuisances=nuisances, start="free", outputs=outputs)
     return make_problem(read_records([run], robot, given), robot, given)
 
 
@@ -143,7 +143,7 @@ def test_both_marches_add_up_the_same(axebot, nu):
     twist = run.twist + np.random.default_rng(1).normal(size=run.twist.shape) * 0.05
     twist[7] = np.nan
     run = Run(t=run.t, voltage=run.voltage, twist=twist)
-    given = Question(start="free", nuisances=())
+    given = OutputError(start="free", nuisances=())
     problem = make_problem(read_records([run], axebot, given), axebot, given)
     weighting = Weighting(np.array([0.01, 0.02, 0.3]), nu, FINAL, 40)
     fast, slow = (ExactEngine(problem, fast).sums(problem.start(), weighting)[0] for fast in (True, False))

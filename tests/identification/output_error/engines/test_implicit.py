@@ -9,14 +9,14 @@ from scipy.integrate import cumulative_simpson
 from scipy.optimize import least_squares
 
 from omnidyn.errors import UnsupportedError
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, LastPoints
 from omnidyn.identification.output_error.prepare import make_problem
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.output_error.solve.solver import Solver
-from omnidyn.identification.question import Question
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import Key, find_key
 from omnidyn.run import Run
@@ -56,7 +56,7 @@ def test_an_ellipse_in_a_turning_frame_seen_late(ellipse, log):
     start = ellipse
     for key, true in TRUTH.items():
         start = Key.parse(key).set(start, 1.4 * true)
-    fit = fit_output_error(log, start, free=list(TRUTH), start="rest")
+    fit = identify(log, start, OutputError(free=list(TRUTH), start="rest")).estimate
     for key, true in TRUTH.items():
         assert abs(fit.value[key] - true) < 4.5 * fit.std[key]
         assert fit.std[key] < 0.3 * true
@@ -69,8 +69,8 @@ def test_an_ellipse_in_a_turning_frame_seen_late(ellipse, log):
 def test_what_the_second_engine_does_not_know(ellipse, log):
     slips = ellipse.replace(wheels=ellipse.wheels.replace(traction_mu=0.8, wheel_inertia=1e-5))
     with pytest.raises(UnsupportedError, match=r"breakaway is profiled .*; got wheels that may slip"):
-        fit_output_error(log, slips, free=[*TRUTH, "friction.direction.breakaway[0]"], start="rest", nuisances=())
-    problem = make_problem([record(log, ellipse)], ellipse, Question(free=tuple(TRUTH), start="rest", nuisances=()))
+        identify(log, slips, OutputError(free=[*TRUTH, "friction.direction.breakaway[0]"], start="rest", nuisances=()))
+    problem = make_problem([record(log, ellipse)], ellipse, OutputError(free=tuple(TRUTH), start="rest", nuisances=()))
     unknown = replace(problem, parameters=(*problem.parameters, Parameter("slip", 0.0, 0.0, 1.0)))
     with pytest.raises(UnsupportedError, match=r"does not know all that is asked for; got slip.*leave it out"):
         ImplicitEngine(unknown)
@@ -78,7 +78,7 @@ def test_what_the_second_engine_does_not_know(ellipse, log):
 
 def test_the_fast_fit_ends_where_an_independent_optimiser_does(ellipse, log):
     """scipy's least_squares on runs of simulate() at tol 1e-7, with a row at every t - latency."""
-    fit = fit_output_error(log, ellipse, free=list(TRUTH), start="rest", nuisances=["latency"])
+    fit = identify(log, ellipse, OutputError(free=list(TRUTH), start="rest", nuisances=["latency"])).estimate
     noise, t = np.array(list(fit.noise.values())), log.t
     rows = t - t[0] >= 0.3  # of which a fit with a latency makes use
 
@@ -105,7 +105,7 @@ def test_no_row_comes_or_goes_where_a_latency_passes_0(ellipse, log):
     """The likelihood would jump by the density of these rows, and a descent from 0 would end there."""
     lacks = replace(log, voltage=np.vstack([log.voltage[:-1], np.full((1, 3), np.nan)]))  # the last row needs none
     for run in (log, lacks):
-        problem = make_problem([record(run, ellipse)], ellipse, Question(free=tuple(TRUTH), start="rest"))
+        problem = make_problem([record(run, ellipse)], ellipse, OutputError(free=tuple(TRUTH), start="rest"))
         solver, late = Solver(problem, ImplicitEngine(problem, 1e-6)), problem.names.index("latency.twist")
         objectives, used = [], []
         for value in (-1e-6, 0.0, 1e-6):
@@ -173,7 +173,9 @@ def test_every_slope_against_differences_of_simulated_logs(ellipse, geometry):
         current=clean[:, 6:9], pose=clean[:, [10, 11, 9]], wheel_angle=clean[:, 12:],
     )  # fmt: skip
     keys = [*TRUTH, "body.mass_kg", "motor.resistance_ohm", *geometry]
-    given = Question(free=tuple(keys), nuisances=("gain", "dead_band", "fade", "latency"), start="free", tick_rad=0.0)
+    given = OutputError(
+        free=tuple(keys), nuisances=("gain", "dead_band", "fade", "latency"), start="free", tick_rad=0.0
+    )
     problem = make_problem([record(run, ellipse, tick_rad=0.0)], ellipse, given)
     columns = [name for name, width in CHANNELS.items() for _ in range(width)]
     assert [name for name, _ in problem.columns] == columns
@@ -225,7 +227,7 @@ def test_gain_dead_band_and_latency_from_a_log_that_starts_in_motion(ellipse):
     assert np.abs(full[200, :3]).max() > 0.2
     wanted = ["gain", "dead_band", "latency"]
     for start in ("free", "auto"):
-        fit = fit_output_error(log, ellipse, free=list(TRUTH), nuisances=wanted, start=start)
+        fit = identify(log, ellipse, OutputError(free=list(TRUTH), nuisances=wanted, start=start)).estimate
         found = {**{k: (v, fit.std[k]) for k, v in fit.value.items()}}
         found |= {k: (n.value, n.std) for k, n in fit.nuisances.items()}
         assert set(found) == set(true) - {"fade"}
@@ -249,7 +251,7 @@ def test_counts_and_positions_of_an_independent_run(turning):
         z = []
         for seed in range(4):
             log = counted_log(run, angle, seed) if kind == "counts" else captured_log(run, seed)
-            fit = fit_output_error(log, turning, start="rest")
+            fit = identify(log, turning, OutputError(start="rest")).estimate
             assert not fit.unused
             assert not fit.unidentifiable
             z.append([(v - float(Key.parse(key).get(turning))) / fit.std[key] for key, v in fit.value.items()])
@@ -257,8 +259,8 @@ def test_counts_and_positions_of_an_independent_run(turning):
         assert len(z[0]) == 6
         assert np.abs(z).max() < 4.5
         assert 0.7 < np.sqrt(np.mean(np.square(z))) < 1.35
-    plain = fit_output_error(counted_log(run, angle, 1), turning, start="rest", tick_rad=0.0)
-    counts = fit_output_error(counted_log(run, angle, 1), turning, start="rest")
+    plain = identify(counted_log(run, angle, 1), turning, OutputError(start="rest", tick_rad=0.0)).estimate
+    counts = identify(counted_log(run, angle, 1), turning, OutputError(start="rest")).estimate
     for name in ("wheel_angle[0]", "wheel_angle[1]"):  # of a tick: what is rounded off, and next to no other noise
         assert 0.5 < plain.noise[name] / (TICK / np.sqrt(12.0)) < 1.1  # rows at rest repeat
         assert counts.noise[name] < 0.15 * TICK
@@ -284,7 +286,7 @@ def test_many_logs_take_as_many_runs_as_one(turning, monkeypatch):
         return plain(self, robot, moved, scales, piece, *rest)
 
     monkeypatch.setattr(ImplicitEngine, "_piece", counting)
-    fit = fit_output_error(logs, start)
+    fit = identify(logs, start, OutputError()).estimate
     assert rows < 15 * sum(len(log) for log in logs)
     for key, value in fit.value.items():
         assert abs(value - float(Key.parse(key).get(turning))) < 4.5 * fit.std[key]

@@ -5,13 +5,12 @@ import pytest
 
 from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of, truths
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.engines.slipping import SlipEngine
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, SlipEngine
 from omnidyn.identification.output_error.prepare import make_problem
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.problem.record import record
-from omnidyn.identification.question import Question
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.log_effects import LogEffects
 from omnidyn.simulation.simulate import simulate
@@ -52,7 +51,7 @@ def a_log(robot, push=(0.0, 0.0, 0.0), tilt=(0.0, 0.0), seed=3, duration=6.0):
 
 
 def problem_of(robot, run):
-    asked = Question(free=KEYS, start="rest", nuisances=("push", "tilt"), outputs=("twist", "pose"))
+    asked = OutputError(free=KEYS, start="rest", nuisances=("push", "tilt"), outputs=("twist", "pose"))
     return make_problem([record(run, robot, ("twist", "heading"))], robot, asked)
 
 
@@ -88,7 +87,7 @@ def test_logs_of_another_simulator_on_a_slope(seed):
     assert case.told.frame
     pull = (1.1, -0.7)
     run, robot = logged(case.world_but(pull=pull), 500 + seed), robot_of(case.told)
-    fit = fit_output_error(run, robot, nuisances=("tilt",))
+    fit = identify(run, robot, OutputError(nuisances=("tilt",))).estimate
     truth = truths(case.told, case.told.shape)
     z = [abs(fit.value[key] - true) / fit.std[key] for key, true in truth.items()]
     z += [abs(fit.nuisances[f"tilt.{axis}"].value - own) / fit.nuisances[f"tilt.{axis}"].std

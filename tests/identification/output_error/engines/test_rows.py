@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.exact import Weighting
 from omnidyn.identification.output_error.engines.sums import added
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.identification.question import Question
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation, noisy
@@ -27,7 +27,7 @@ def logs(robot):
 @pytest.mark.parametrize("robot", [AXEBOT, TURNING], ids=["exact", "implicit"])
 @pytest.mark.parametrize("groups", [None, ("a", "b")], ids=["alone", "joint"])
 def test_the_rows_of_an_engine_add_up_to_its_sums(robot, groups):
-    fit = Fit.of(list(logs(robot)), robot, Question(), groups)
+    fit = Fit.of(list(logs(robot)), robot, OutputError(), groups)
     solver = fit._solver(None)
     start = solver.problem.start()
     point = type(start)(start.values * 1.02 + 1e-4, start.states)

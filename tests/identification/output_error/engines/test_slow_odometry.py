@@ -7,12 +7,11 @@ import pytest
 from omnidyn import Run, load_robot, read_log
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.begin import begun
 from omnidyn.identification.output_error.prepare import read_records
 from omnidyn.identification.output_error.problem.motion import motion
 from omnidyn.identification.output_error.solve.loop import loop_pieces
-from omnidyn.identification.question import Question
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.first_guess import first_guess
 from omnidyn.model.wheels import Wheels
 from tests.support.cases import case
@@ -93,7 +92,7 @@ def run_of(driven, every, first=0, moved=0, channels=("twist", "wheel_speed")):
 @pytest.mark.parametrize("every, first", [(1, 0), (2, 0), (2, 1), (5, 3), (10, 0), (10, 9)])
 @pytest.mark.parametrize("channels", [("twist", "wheel_speed"), ("twist",)])
 def test_a_log_begins_at_rest_whatever_the_clock_of_its_odometry(driven, robot, every, first, channels):
-    records = read_records([run_of(driven, every, first, channels=channels)], robot, Question())
+    records = read_records([run_of(driven, every, first, channels=channels)], robot, OutputError())
     (piece,) = loop_pieces(records, robot, "auto")
     assert (piece.first, piece.last) == (0, len(driven[0]) - 1)
 
@@ -101,7 +100,7 @@ def test_a_log_begins_at_rest_whatever_the_clock_of_its_odometry(driven, robot, 
 @pytest.mark.parametrize("every", [1, 2, 10])
 def test_a_log_that_begins_in_motion_is_refused_all_the_same(driven, robot, every):
     moving = int(np.flatnonzero(np.abs(driven[1]).max(axis=1) > 0.2)[30])
-    records = read_records([run_of(driven, every, moved=moving)], robot, Question())
+    records = read_records([run_of(driven, every, moved=moving)], robot, OutputError())
     with pytest.raises(InsufficientDataError, match="no log begins at rest"):
         loop_pieces(records, robot, "auto")
 
@@ -111,7 +110,7 @@ def test_a_gyroscope_beside_wheel_speeds_is_a_log_too(driven, robot):
     twist = run.twist.copy()
     twist[:, :2] = np.nan
     whole = Run(run.t, twist_command=run.twist_command, wheel_speed=run.wheel_speed, twist=twist)
-    records = read_records([whole], robot, Question())
+    records = read_records([whole], robot, OutputError())
     assert len(loop_pieces(records, robot, "auto")) == 1
 
 
@@ -122,16 +121,16 @@ def test_guesses_of_an_axis_that_rested_are_not_asked_for(driven, robot):
     still["twist_command"][:, 1:] = 0.0
     still["twist"][:, 1:] = 1e-3 * np.sin(np.arange(len(run)) * 1.7)[:, None] * np.isfinite(still["twist"][:, 1:])
     only_x = Run(run.t, twist_command=still["twist_command"], twist=still["twist"])
-    records = read_records([only_x], robot, Question())
+    records = read_records([only_x], robot, OutputError())
     assert motion(records, robot).moved.tolist() == [True, False, False]
-    free = begun("all", [only_x], robot, Question(), joint=False)[0].question.free
+    free = begun("all", [only_x], robot, OutputError(), joint=False)[0].question.free
     assert not [key for key in free if key.startswith("friction.direction.yaw")]
 
 
 @pytest.mark.long
 def test_the_case_runs():
     robot = load_robot(case("logs/slow_odometry/rosbot.toml"))
-    fit = fit_output_error([read_log(case("logs/slow_odometry/rest.csv"), robot)], robot)
+    fit = identify([read_log(case("logs/slow_odometry/rest.csv"), robot)], robot, OutputError()).estimate
     assert not [key for key in fit.value if "yaw" in key]
     push = next(each for each in fit.combinations if each.name == "push.x")
     assert push.ci95[0] < push.value < push.ci95[1]
@@ -141,7 +140,7 @@ def test_the_case_runs():
 @pytest.mark.long
 def test_friction_at_the_wheels_is_named_behind_a_loop(robot):
     """The file says that it acts along travel; the log is of wheels that each hold 3 N."""
-    fit = identify([run_of(drive(20.0), 2)], robot)
+    fit = identify([run_of(drive(20.0), 2)], robot).estimate
     lack = fit.lack_of_fit
     assert lack.found
     assert lack.remedies[0].key == "friction.wheels"

@@ -7,6 +7,7 @@ from scipy.optimize import least_squares
 
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
 from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.prepare import make_problem, read_records
@@ -14,8 +15,6 @@ from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.loop import FEW, loop_start, retimed, solve_loop
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solver
-from omnidyn.identification.question import Question
-from omnidyn.identification.whole_logs import fit_output_error, identify_groups
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import EMF, TORQUE, Key, friction_keys, gain_keys
 from omnidyn.run import Run
@@ -74,7 +73,7 @@ def assert_near(fit, robot, most=4.5):
 
 def test_gains_and_friction_that_are_not_known(looped):
     start = wrong(looped, **{KI: 0.3, "friction.axes.coulomb[0]": 0.5, "friction.axes.viscous[2]": 2.0})
-    fit = fit_output_error(log(looped, 1), start, nuisances=())
+    fit = identify(log(looped, 1), start, OutputError(nuisances=())).estimate
     assert list(fit.value) == [*friction_keys(looped), *gain_keys(looped)]
     assert {KP, KI} < set(fit.value)
     assert_near(fit, looped)
@@ -84,7 +83,7 @@ def test_gains_and_friction_that_are_not_known(looped):
 
 def test_an_ellipse_robot_seen_late(ellipse):
     run = log(ellipse, 2, late=7, channels=("twist", "current"))
-    fit = fit_output_error(run, wrong(ellipse, **{"friction.direction.coulomb[1]": 0.6}))
+    fit = identify(run, wrong(ellipse, **{"friction.direction.coulomb[1]": 0.6}), OutputError()).estimate
     assert_near(fit, ellipse)
     for name in ("latency.twist", "latency.current"):
         late = fit.nuisances[name]
@@ -109,7 +108,7 @@ def test_an_independent_optimiser_ends_at_the_same_point(ellipse):
         return np.hstack(parts).ravel()
 
     found = least_squares(residual, np.ones(3), diff_step=1e-4, x_scale=0.1)
-    fit = fit_output_error(run, ellipse, free=keys, nuisances=())
+    fit = identify(run, ellipse, OutputError(free=keys, nuisances=())).estimate
     for key, value in zip(keys, found.x * true, strict=True):
         assert abs(fit.value[key] - value) < 0.15 * fit.std[key], key  # its noise is estimated, not given
 
@@ -120,8 +119,8 @@ def test_outputs_and_slopes(ellipse, late):
     run = log(ellipse, 4, 200)
     run = run.replace(wheel_speed=np.zeros((200, 3)), pose=np.zeros((200, 3)), wheel_angle=np.zeros((200, 3)))
     free = (*friction_keys(ellipse), KP, "body.mass_kg", "wheels.robot_radius_m")
-    records = read_records([run], ellipse, Question(free=free, nuisances=()))
-    problem = make_problem(records, ellipse, Question(free=free, nuisances=("latency",)))
+    records = read_records([run], ellipse, OutputError(free=free, nuisances=()))
+    problem = make_problem(records, ellipse, OutputError(free=free, nuisances=("latency",)))
     engine, piece, start = LoopEngine(problem, 1e-8), problem.pieces[0], problem.start()
     values = start.values.copy()
     values[problem.robot_count :] = late
@@ -174,10 +173,10 @@ def test_two_floors_share_the_gains(looped):
         key = f"friction.axes.coulomb[{axis}]"
         rough = Key.parse(key).set(rough, 1.3 * Key.parse(key).get(looped))
     runs = [log(looped, 5, 300), log(rough, 6, 300), log(looped, 7, 300), log(rough, 8, 300)]
-    found = identify_groups(runs, wrong(looped), ["smooth", "rough"] * 2, nuisances=())
+    found = identify(runs, wrong(looped), OutputError(nuisances=()), groups=["smooth", "rough"] * 2)
     assert set(found.shared) == {KP, KI}
-    assert_near(found.estimates["smooth"], looped)
-    assert_near(found.estimates["rough"], rough)
+    assert_near(found.groups["smooth"], looped)
+    assert_near(found.groups["rough"], rough)
     change = {d.key: d for d in found.differences}["friction.axes.coulomb[0]"]
     assert abs(change.difference - 0.66) < 4.5 * change.std
 
@@ -187,8 +186,8 @@ def test_groups_find_the_latency_of_currents_behind_a_slow_loop(looped):
     slow = looped.replace(drive=looped.drive.replace(rate=50.0))
     runs = [log(slow, seed, late=23) for seed in (1, 2)]
     for own in ((), ("friction", "latency.current")):
-        found = identify_groups(runs, slow, ["a", "b"], per_free=own, nuisances=("latency",))
-        for estimate in found.estimates.values():
+        found = identify(runs, slow, OutputError(per_free=own, nuisances=("latency",)), groups=["a", "b"])
+        for estimate in found.groups.values():
             late = estimate.nuisances["latency.current"]
             assert abs(late.value - 0.023) < max(4.5 * late.std, 5e-4)
             assert late.std < 1e-3
@@ -199,35 +198,35 @@ def test_a_voltage_beside_the_set_speeds_is_the_input_unless_a_gain_is_asked_for
     clean = simulate(looped, dt=0.01, twist_command=command[:-1])
     noise = np.random.default_rng(9).normal(size=clean.twist.shape) * NOISE
     run = Run(t=clean.t, twist_command=clean.twist_command, voltage=clean.voltage, twist=clean.twist + noise)
-    plain = fit_output_error(run, looped, nuisances=())
+    plain = identify(run, looped, OutputError(nuisances=())).estimate
     assert KP not in plain.value
-    both = fit_output_error(run, wrong(looped), free=[*plain.value, KP], nuisances=())
+    both = identify(run, wrong(looped), OutputError(free=[*plain.value, KP], nuisances=())).estimate
     assert_near(both, looped)
 
 
 def test_a_robot_without_a_loop_is_told_what_to_write(axebot, looped):
     run = log(looped, 10, 100)
     with pytest.raises(UnsupportedError, match=r"no speed loop.*\[drive\] kind = \"speed\", kp_V_s_rad, ki_V_rad"):
-        identify(run, axebot, method="output-error")
+        identify(run, axebot, OutputError())
     still = log(looped, 1, 300, channels=("twist", "current"))
-    assert "output error" in identify(still, looped).method
+    assert "output error" in identify(still, looped).estimate.method
 
 
 def test_what_cannot_be_used(looped):
     run = log(looped, 11, 200)
     with pytest.raises(UnsupportedError, match="no voltage that could be changed on its way; got gain"):
-        fit_output_error(run, looped, nuisances=["gain"])
+        identify(run, looped, OutputError(nuisances=["gain"]))
     with pytest.raises(UnsupportedError, match="integral of the loop is not known elsewhere"):
-        fit_output_error(run, looped, start="free")
+        identify(run, looped, OutputError(start="free"))
     moving = Run(t=run.t[60:], twist_command=run.twist_command[60:], twist=run.twist[60:] + 0.5, source="moving")
     with pytest.raises(InsufficientDataError, match="no log begins at rest"):
-        fit_output_error(moving, looped)
+        identify(moving, looped, OutputError())
     silent = Run(t=run.t, twist_command=0.0 * run.twist_command, twist=0.0 * run.twist)
     with pytest.raises(InsufficientDataError, match="never visibly moved"):
-        fit_output_error(silent, looped)
+        identify(silent, looped, OutputError())
     powered = run.replace(voltage=np.zeros_like(run.twist))
     with pytest.raises(InputError, match="some logs have voltages, others set speeds only"):
-        fit_output_error([run, powered], looped)
+        identify([run, powered], looped, OutputError())
 
 
 def test_friction_keys_name_what_is_there(looped, ellipse):
@@ -241,7 +240,7 @@ def test_friction_keys_name_what_is_there(looped, ellipse):
 def test_a_latency_of_currents_that_went_astray_is_tried_where_the_others_are(looped):
     """A loop of 500 Hz in rows at 100 Hz: after a few steps with wrong gains a latency may stand anywhere."""
     fast = looped.replace(drive=looped.drive.replace(rate=500.0))
-    given = Question(nuisances=("latency",), free=(KP,))
+    given = OutputError(nuisances=("latency",), free=(KP,))
     problem = make_problem(read_records([log(fast, 3, 300)], fast, given), fast, given)
     point = problem.start()
     values = point.values.copy()
@@ -254,7 +253,7 @@ def test_a_latency_of_currents_that_went_astray_is_tried_where_the_others_are(lo
 def test_motors_that_are_wrong_guesses_come_before_latencies(looped):
     """Torque twice too large, a resistance that is a guess: with all at once the latencies end in another valley."""
     start = wrong(looped, **{KP: 1.0, RESISTANCE: 0.3, TORQUE: 2.0, EMF: 2.0})
-    asked = Question(nuisances=("latency",), free=(RESISTANCE, *friction_keys(looped)))
+    asked = OutputError(nuisances=("latency",), free=(RESISTANCE, *friction_keys(looped)))
     problem = make_problem(read_records([log(looped, 3, 300)], start, asked), start, asked)
     solver, progress = Solver(problem, LoopEngine(problem)), FitProgress()
     all_at_once = solver.minimise(loop_start(problem, 0.0, progress), FEW)
@@ -265,7 +264,7 @@ def test_motors_that_are_wrong_guesses_come_before_latencies(looped):
 @pytest.mark.parametrize("channel", ["twist", "current"])
 def test_a_channel_that_is_early_shows_as_many_rows(ellipse, channel):
     """Else the likelihood of those that are left would jump at a latency of 0, and no descent would cross it."""
-    given = Question(nuisances=("latency",))
+    given = OutputError(nuisances=("latency",))
     problem = make_problem(read_records([log(ellipse, 5, 150)], ellipse, given), ellipse, given)
     solver, point = Solver(problem, LoopEngine(problem, 1e-6)), problem.start()
     found = []
@@ -283,7 +282,7 @@ def test_a_fit_is_at_least_as_good_as_one_from_the_truth(ellipse, seed):
     """Where rows stand on ticks, F has a valley with a sharp floor at a latency of 0, and for currents a jump."""
     robot = ellipse.replace(drive=ellipse.drive.replace(ki=4.0))
     start = wrong(robot, **{KP: 1.0, "friction.direction.coulomb[1]": 0.7, "friction.direction.viscous": 1.5})
-    fit = Fit.of(log(robot, seed, 400), start, Question(fixed=(KP, KI)))
+    fit = Fit.of(log(robot, seed, 400), start, OutputError(fixed=(KP, KI)))
     found = fit.solve()
     solver = found.solver
     values = found.state.point.values.copy()

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.question import Question
 from omnidyn.model.dynamics import state_space
 from omnidyn.model.keys import Key
 from omnidyn.model.log_effects import LogEffects
@@ -25,7 +25,7 @@ def problem_of(robot, voltage, dt, values, nuisances=(), free=ROBOT_KEYS):
     count = robot.wheels.count
     pose = np.column_stack([values[:, 1:3], values[:, :1]])
     run = Run(t=t, voltage=np.vstack([voltage, voltage[-1:]]), pose=pose, wheel_angle=values[:, 3 : 3 + count])
-    given = Question(free=free, nuisances=nuisances, start="free", outputs=OUTPUTS, tick_rad=0.0)
+    given = OutputError(free=free, nuisances=nuisances, start="free", outputs=OUTPUTS, tick_rad=0.0)
     return make_problem(read_records([run], robot, given), robot, given)
 
 

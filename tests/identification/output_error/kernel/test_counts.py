@@ -7,8 +7,9 @@ from scipy.optimize import minimize
 from scipy.special import log_ndtr
 from scipy.stats import truncnorm
 
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.kernel.counts import count_terms, information, rounding, tail
-from omnidyn.identification.whole_logs import fit_output_error, identify_groups
 from omnidyn.model.deadzone import push_per_volt
 from omnidyn.model.keys import BOX, Key
 from omnidyn.model.robot import Prior
@@ -99,7 +100,7 @@ def test_without_noise_the_spread_of_the_draws_is_what_a_fit_says(axebot, rolled
     for seed in range(40):
         counted = ticks_of(angle, 2.0 * np.pi / 512, np.random.default_rng(seed), 0.0)
         log = Run(t=run.t, voltage=run.voltage, wheel_angle=counted)
-        fit = fit_output_error(log, axebot, nuisances=(), start="rest")
+        fit = identify(log, axebot, OutputError(nuisances=(), start="rest")).estimate
         z.append([(v - float(Key.parse(key).get(axebot))) / fit.std[key] for key, v in fit.value.items()])
     sizes = np.sqrt(np.mean(np.square(z), axis=0))  # 1, +- 0.11 by 40 draws
     assert sizes.max() < 1.33
@@ -119,7 +120,9 @@ def test_the_spread_of_a_product_is_what_a_fit_says_though_its_factors_are_guess
     for seed in range(40):
         counted = ticks_of(angle, 2.0 * np.pi / 512, np.random.default_rng(seed), 0.0)
         log = Run(t=run.t, voltage=run.voltage, wheel_angle=counted)
-        fit = fit_output_error(log, axebot.replace(priors=guess), free=(*BOX, *factors), nuisances=(), start="rest")
+        fit = identify(
+            log, axebot.replace(priors=guess), OutputError(free=(*BOX, *factors), nuisances=(), start="rest")
+        ).estimate
         true = push_per_volt(axebot)
         pushes = {f"push.{axis}": value for axis, value in zip(["x", "y", "yaw"], true, strict=True)}
         z.append([(one.value - pushes[one.name]) / one.std for one in fit.combinations if one.name in pushes])
@@ -135,11 +138,11 @@ def test_groups_of_counts_without_noise_say_what_each_says_alone(axebot, rolled)
         Run(t=run.t, voltage=run.voltage, wheel_angle=ticks_of(angle, 2.0 * np.pi / 512, np.random.default_rng(s), 0.0))
         for s in (1, 2)
     ]
-    both = identify_groups(logs, axebot, ["a", "b"], nuisances=(), start="rest")
+    both = identify(logs, axebot, OutputError(nuisances=(), start="rest"), groups=["a", "b"])
     for name, log in zip(("a", "b"), logs, strict=True):
-        alone = fit_output_error(log, axebot, nuisances=(), start="rest")
+        alone = identify(log, axebot, OutputError(nuisances=(), start="rest")).estimate
         for key, std in alone.std.items():
-            assert both.estimates[name].std[key] == pytest.approx(std, rel=0.05)
+            assert both.groups[name].std[key] == pytest.approx(std, rel=0.05)
 
 
 def ticks_of(angle, tick, rng, jitter):
@@ -163,7 +166,7 @@ def test_a_log_of_ticks_alone_against_another_optimiser(axebot, rolled):
     counted = ticks_of(angle[rows], tick, np.random.default_rng(1), 0.3)
     log = Run(t=run.t[rows], voltage=run.voltage[rows], wheel_angle=counted)
     free = ["friction.axes.viscous[0]", "friction.axes.coulomb[0]"]
-    fit = fit_output_error(log, axebot, free=free, nuisances=(), start="rest")
+    fit = identify(log, axebot, OutputError(free=free, nuisances=(), start="rest")).estimate
 
     own, std = np.array([fit.value[key] for key in free]), np.array([fit.std[key] for key in free])
 
@@ -191,7 +194,7 @@ def test_fine_ticks_give_the_gaussian_answer(axebot, rolled):
     noise = 0.02 * np.random.default_rng(5).normal(size=angle.shape)
     tick = 2e-4
     log = Run(t=run.t, voltage=run.voltage, wheel_angle=np.round((angle + noise) / tick) * tick)
-    counts, plain = (fit_output_error(log, axebot, nuisances=(), tick_rad=q) for q in (tick, 0.0))
+    counts, plain = (identify(log, axebot, OutputError(nuisances=(), tick_rad=q)).estimate for q in (tick, 0.0))
     for key, std in plain.std.items():
         assert counts.value[key] == pytest.approx(plain.value[key], abs=1e-2 * std)
         assert counts.std[key] == pytest.approx(std, rel=0.25)  # a sandwich of 100 blocks
@@ -202,7 +205,7 @@ def test_ticks_are_found_and_hold_the_truth(axebot, rolled):
     run, angle = rolled
     tick = 2.0 * np.pi / 512
     log = Run(t=run.t, voltage=run.voltage, wheel_angle=ticks_of(angle, tick, np.random.default_rng(7), 0.3))
-    fit = fit_output_error(log, axebot, nuisances=())
+    fit = identify(log, axebot, OutputError(nuisances=())).estimate
     for key, value in fit.value.items():
         assert abs(value - float(Key.parse(key).get(axebot))) <= 4.5 * fit.std[key]
     assert list(fit.noise) == [f"wheel_angle[{i}]" for i in range(3)]
@@ -215,9 +218,9 @@ def test_wheel_speeds_that_are_differences_of_the_angles_are_left_out(axebot, ro
     counted = ticks_of(angle, tick, np.random.default_rng(8), 0.3)
     speed = np.vstack([np.zeros(3), np.diff(counted, axis=0) / 0.01])
     both = Run(t=run.t, voltage=run.voltage, wheel_angle=counted, wheel_speed=speed)
-    fit = fit_output_error(both, axebot, nuisances=())
+    fit = identify(both, axebot, OutputError(nuisances=())).estimate
     assert list(fit.noise) == [f"wheel_angle[{i}]" for i in range(3)]
     assert "nothing_new" in codes(fit.warnings)
     tacho = run.wheel_speed + 0.2 * np.random.default_rng(9).normal(size=angle.shape)
-    fit = fit_output_error(both.replace(wheel_speed=tacho), axebot, nuisances=())
+    fit = identify(both.replace(wheel_speed=tacho), axebot, OutputError(nuisances=())).estimate
     assert len(fit.noise) == 6

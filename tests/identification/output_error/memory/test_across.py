@@ -1,18 +1,16 @@
 """Errors of channels that go together: a force on the body moves all wheels, and their fit must know."""
 
-from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 from scipy.signal import lfilter
 
-from omnidyn.identification import whole_logs as whole
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.memory.across import correlation
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import TRUTH, voltages
-
-fit_output_error = partial(whole.fit_output_error, nuisances=(), start="rest")
 
 
 def test_a_body_that_is_pushed_along_the_floor_says_less_of_that_and_no_less_of_turning(axebot):
@@ -23,7 +21,9 @@ def test_a_body_that_is_pushed_along_the_floor_says_less_of_that_and_no_less_of_
         rng = np.random.default_rng(seed)
         slow = lfilter([1.0], [1.0, -0.95], 0.0125 * rng.normal(size=clean.twist.shape) * [1.0, 1.0, 0.0], axis=0)
         speed = clean.wheel_speed + slow @ to_wheels + 0.4 * rng.normal(size=clean.wheel_speed.shape)
-        fit = fit_output_error(Run(t=clean.t, voltage=clean.voltage, wheel_speed=speed), axebot)
+        fit = identify(
+            Run(t=clean.t, voltage=clean.voltage, wheel_speed=speed), axebot, OutputError(start="rest", nuisances=())
+        ).estimate
         errors.append([(fit.value[key] - value) / fit.std[key] for key, value in TRUTH.items() if "coulomb" in key])
     x, y, turning = np.sqrt(np.mean(np.square(errors), axis=0))
     assert max(x, y) < 1.25

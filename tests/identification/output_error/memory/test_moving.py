@@ -8,13 +8,13 @@ import pytest
 from benchmarks.forces import FIRST_SEED, pushed
 from benchmarks.wrong_worlds.log import right_case, robot_of, voltages
 from benchmarks.wrong_worlds.remedies import FRICTION
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.memory.autoregression import autoregression
 from omnidyn.identification.output_error.memory.moving import Moving, _likelihood, new_while_moving, while_moving
 from omnidyn.identification.output_error.memory.whitened import moving_rows
 from omnidyn.identification.output_error.memory.whitening import below, whitened
 from omnidyn.identification.output_error.trust.uncertainty import WHITE, trust
-from omnidyn.identification.question import Question
 from omnidyn.run import Run
 
 PHI, SHARE = 0.9, 0.3
@@ -147,7 +147,7 @@ def test_a_fit_of_a_pushed_robot_knows_when_its_errors_remember():
         t, volts = voltages(case, seed)
         twist = pushed(case.told, volts, case.setup.rate, 0.1, seed)
         noise = [0.012, 0.012, 0.1] * np.random.default_rng(seed).normal(size=twist.shape)
-        fit = Fit.of([Run(t, voltage=volts, twist=twist + noise)], robot_of(case.told), Question(free=FRICTION))
+        fit = Fit.of([Run(t, voltage=volts, twist=twist + noise)], robot_of(case.told), OutputError(free=FRICTION))
         found = whitened(solution := fit.solve(), trust(solution.solver, solution, WHITE))
         assert found is not None
         words += "moving" in [each.numbers.get("beside_white") for each in found.warnings]

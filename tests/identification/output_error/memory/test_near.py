@@ -5,12 +5,12 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.memory.near import near
 from omnidyn.identification.output_error.prepare import FINE, make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.question import Question
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model.first_guess import first_guess, with_gear
 from omnidyn.model.robot import GIVEN
 from omnidyn.run import Run
@@ -36,7 +36,7 @@ def log(axebot):
 
 @pytest.fixture
 def problem(log, guessed):
-    asked = Question()
+    asked = OutputError()
     return make_problem(read_records([log], guessed, asked), guessed, asked)
 
 
@@ -72,7 +72,7 @@ def test_a_model_that_misses_something_takes_few_dear_marches(log, guessed, monk
         return simulated(engine, point)
 
     monkeypatch.setattr(ImplicitEngine, "_simulated", counted)
-    found = fit_output_error(log, guessed)
+    found = identify(log, guessed, OutputError()).estimate
     assert found.converged
     assert found.covariance == "autoregressive"
     assert sum(marched.values()) - marched[None] <= 22

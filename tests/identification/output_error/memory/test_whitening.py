@@ -1,25 +1,22 @@
 """Fits to errors with a memory: against the bound of that noise, with rows missing, and where they cannot be had."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 from scipy.linalg import solve_toeplitz
 from scipy.signal import lfilter
 
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification import whole_logs as whole
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.memory.whitened import WhitenedEngine
-from omnidyn.identification.question import Question
 from omnidyn.model.keys import BOX
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, TRUTH, noisy, voltages, with_friction
 from tests.support.codes import codes
 
-fit_output_error = partial(whole.fit_output_error, nuisances=(), start="rest")
 KNOWN = np.array(list(TRUTH.values()))
 
 
@@ -56,7 +53,7 @@ def test_slow_errors_cost_what_they_must(axebot, clean):
     knows the bound within 17 %, so 1.35 times it are two of its standard errors."""
     least, errors, held = bound(axebot, clean, 0.98), [], 0
     for seed in range(12):
-        fit = fit_output_error(remembering(clean, 0.98, seed), axebot)
+        fit = identify(remembering(clean, 0.98, seed), axebot, OutputError(start="rest", nuisances=())).estimate
         assert fit.covariance == "autoregressive"
         errors.append([(fit.value[key] - TRUTH[key]) for key in BOX])
         held += sum(fit.ci95[key][0] <= TRUTH[key] <= fit.ci95[key][1] for key in BOX)
@@ -68,7 +65,10 @@ def test_slow_errors_cost_what_they_must(axebot, clean):
 
 def test_white_logs_stay_as_they_are(axebot, clean):
     log = noisy(clean, 4)
-    fit, white = (fit_output_error(log, axebot, covariance=kind) for kind in ("auto", "white"))
+    fit, white = (
+        identify(log, axebot, OutputError(start="rest", nuisances=(), covariance=kind)).estimate
+        for kind in ("auto", "white")
+    )
     assert fit.covariance == "white"
     assert (fit.value, fit.std) == (white.value, white.std)
 
@@ -79,7 +79,10 @@ def test_rows_that_are_missing_cost_what_they_tell(axebot, clean):
     twist, rng = log.twist.copy(), np.random.default_rng(0)
     twist[rng.random(len(log)) < 0.1, 0] = np.nan
     twist[1::2, 1] = np.nan
-    full, less = (fit_output_error(each, axebot) for each in (log, log.replace(twist=twist)))
+    full, less = (
+        identify(each, axebot, OutputError(start="rest", nuisances=())).estimate
+        for each in (log, log.replace(twist=twist))
+    )
     assert less.covariance == "autoregressive"
     ratio = np.array([less.std[key] / full.std[key] for key in BOX])
     assert (ratio > 0.9).all()
@@ -93,7 +96,7 @@ def test_a_piece_that_starts_at_rest_is_fitted_with_one_that_starts_in_motion(ax
     log = remembering(clean, 0.9, 5)
     voltage = log.voltage.copy()
     voltage[1500:1600] = np.nan
-    fit = fit_output_error(log.replace(voltage=voltage), axebot)
+    fit = identify(log.replace(voltage=voltage), axebot, OutputError(start="rest", nuisances=())).estimate
     assert fit.covariance == "autoregressive"
     for key in BOX:
         assert abs(fit.value[key] - TRUTH[key]) < 4.0 * fit.std[key]
@@ -103,7 +106,7 @@ def test_what_the_fit_has_swallowed_is_counted(axebot, clean):
     """Over 15 logs the memory found is the true one, 0.98: its mean is known to 0.0036/sqrt(45)."""
     found = []
     for seed in range(15):
-        fit = Fit.of(remembering(clean, 0.98, seed), axebot, Question(nuisances=(), start="rest"))
+        fit = Fit.of(remembering(clean, 0.98, seed), axebot, OutputError(nuisances=(), start="rest"))
         models = fit.weighed(fit.solve()).models
         found += [model.autocovariance(2)[1] / model.autocovariance(1)[0] for model in models.values()]
     assert np.mean(found) == pytest.approx(0.98, abs=4.0 * 0.0036 / np.sqrt(45))
@@ -112,7 +115,7 @@ def test_what_the_fit_has_swallowed_is_counted(axebot, clean):
 def test_the_engine_filters_residuals_and_slopes_alike(axebot, clean):
     """The sums of filtered rows are products with the inverse of the dense covariance."""
     short = Run(t=clean.t[:200], voltage=clean.voltage[:200], twist=noisy(clean, 1).twist[:200])
-    solver = Fit.of(short, axebot, Question(nuisances=(), start="rest"))._solver(())
+    solver = Fit.of(short, axebot, OutputError(nuisances=(), start="rest"))._solver(())
     model = AutoRegression(np.array([0.6, 0.3]), 1.0, 1)
     engine = WhitenedEngine(solver.engine, {("twist", 0): model})
     point = solver.problem.start()
@@ -125,19 +128,23 @@ def test_the_engine_filters_residuals_and_slopes_alike(axebot, clean):
 
 def test_a_log_that_is_too_short_is_said(axebot, clean):
     short = Run(t=clean.t[:1500], voltage=clean.voltage[:1500], twist=clean.twist[:1500])
-    fit = fit_output_error(remembering(short, 0.998, 1), axebot)
+    fit = identify(remembering(short, 0.998, 1), axebot, OutputError(start="rest", nuisances=())).estimate
     assert "short_for_memory" in codes(fit.warnings)
 
 
 def test_groups_share_a_memory(axebot, clean):
     logs = [remembering(clean, 0.9, seed).replace(source=f"{seed}.csv") for seed in (1, 2)]
-    answer = whole.identify_groups(logs, axebot, ["wood", "tiles"], nuisances=(), start="rest")
-    assert all(fit.covariance == "autoregressive" for fit in answer.estimates.values())
-    for fit in answer.estimates.values():
+    answer = identify(logs, axebot, OutputError(nuisances=(), start="rest"), groups=["wood", "tiles"])
+    assert all(fit.covariance == "autoregressive" for fit in answer.groups.values())
+    for fit in answer.groups.values():
         for key in BOX:
             assert abs(fit.value[key] - TRUTH[key]) < 4.0 * fit.std[key]
 
 
 def test_an_autoregression_that_cannot_be_had_is_refused(axebot, clean):
     with pytest.raises(UnsupportedError, match=r"Student's t has no autoregression here; got autoregressive"):
-        fit_output_error(noisy(clean, 1), axebot, loss="student-t", covariance="autoregressive")
+        identify(
+            noisy(clean, 1),
+            axebot,
+            OutputError(start="rest", nuisances=(), loss="student-t", covariance="autoregressive"),
+        )

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.linear.random_effects import RandomEffects, drawn_together
 from omnidyn.identification.output_error.linear.rounded_inputs import effects
@@ -11,9 +13,7 @@ from omnidyn.identification.output_error.linear.rows import Linear, Rows, noise_
 from omnidyn.identification.output_error.memory.autoregression import _without_empty_axes
 from omnidyn.identification.output_error.problem import bounded as module
 from omnidyn.identification.output_error.problem.bounded import ROWS, bounded
-from omnidyn.identification.question import OUTPUT_ERROR, Question
 from omnidyn.identification.structure.misfit import Gram
-from omnidyn.identification.whole_logs import fit_output_error
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def solution(case, log):
     return Fit.of(
         [log, log.replace(source="again")],
         robot_of(case.told),
-        Question.for_method(OUTPUT_ERROR, None, {"free": "friction", "nuisances": ()}),
+        OutputError(free="friction", nuisances=()),
     ).solve()
 
 
@@ -73,7 +73,7 @@ def test_intervals_beside_a_bounded_diagnosis_are_those_of_all_rows(case, log, m
     for numbers, rows in ((10**9, 10**9), (300_000, 10**9), (10**9, 750)):
         monkeypatch.setattr(module, "NUMBERS", numbers)
         monkeypatch.setattr(module, "ROWS", rows)
-        fits.append(fit_output_error(log, robot_of(case.told), free="friction", nuisances=()))
+        fits.append(identify(log, robot_of(case.told), OutputError(free="friction", nuisances=())).estimate)
     every, part, half = fits
     assert [f"{each.numbers['wider']:.2g}" for each in every.warnings if each.code == "rounded_inputs"] == ["3.2"]
     for name, std in every.std.items():

@@ -9,10 +9,11 @@ from benchmarks.wrong_worlds.kinds import by_name
 from benchmarks.wrong_worlds.log import TICK as TICKS
 from benchmarks.wrong_worlds.log import logged, right_case
 from omnidyn.comparison.compare import compare
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.problem.differences import added_up, differences
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.validation import validate
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.run import Run
 from tests.support.axebot_logs import TRUTH, voltages
 
@@ -155,13 +156,13 @@ def test_the_fit_to_them_is_as_sharp_as_counts_are(axebot, make):
     (Four to eight times while only an autoregression told their errors: differences of rounding want mixed.py.)
     """
     miss, logs = [], [make(seed) for seed in range(4)]
-    fits = [fit_output_error(log, axebot) for log in logs]
+    fits = [identify(log, axebot, OutputError()).estimate for log in logs]
     for fit in fits:
         assert "wheel speeds are differences of encoder counts (tick 0.00517 rad)" in " ".join(map(str, fit.warnings))
         assert set(fit.noise) == {f"wheel_angle[{i}]" for i in range(3)}
         assert abs(fit.nuisances["latency.wheel_angle"].value) < 1e-4 if fit.nuisances else True
         miss += [(fit.value[key] - true) / fit.std[key] for key, true in TRUTH.items()]
-    plain = fit_output_error(logs[0], axebot, tick_rad=0.0)
+    plain = identify(logs[0], axebot, OutputError(tick_rad=0.0)).estimate
     assert set(plain.noise) == {f"wheel_speed[{i}]" for i in range(3)}
     assert plain.nuisances["latency.wheel_speed"].value == pytest.approx(0.5 / RATE, abs=2e-4)
     wider = [plain.std[key] / fits[0].std[key] for key in TRUTH]
@@ -175,18 +176,18 @@ def test_the_fit_to_them_is_as_sharp_as_counts_are(axebot, make):
 def test_no_misfit_is_found_where_there_is_none(axebot, make):
     """The mean over a row is half a row late; taken as the speed of a moment it was a misfit in every log."""
     for seed in (11, 12):
-        lack = fit_output_error(make(seed), axebot).lack_of_fit
+        lack = identify(make(seed), axebot, OutputError()).lack_of_fit
         assert lack is not None
         assert not lack.found
 
 
 def test_a_latency_of_the_speeds_is_that_of_the_angles(axebot, log):
-    fit = fit_output_error(log, axebot, nuisances=("latency.wheel_speed",))
+    fit = identify(log, axebot, OutputError(nuisances=("latency.wheel_speed",))).estimate
     assert set(fit.nuisances) == {"latency.wheel_angle"}
 
 
 def test_free_runs_are_compared_half_a_row_earlier(axebot, log):
-    fit = fit_output_error(log, axebot, nuisances=())
+    fit = identify(log, axebot, OutputError(nuisances=())).estimate
     assert fit.robot.log.latency.of("wheel_speed", 0.0, 1.0 / RATE) == pytest.approx(0.5 / RATE)
     assert fit.robot.log.is_of(log)
     found, anew = validate(fit, [log]).fitted, compare(fit.robot.replace(log=None), log)
@@ -200,7 +201,7 @@ def test_forces_that_no_model_has_are_errors_with_a_memory(axebot, make):
     run = counted(axebot, volts + forces)(1).replace(voltage=np.vstack([volts, volts[-1:]]))
     found = {}
     for tick in (None, 0.0):
-        fit = fit_output_error(run, axebot, nuisances=(), tick_rad=tick)
+        fit = identify(run, axebot, OutputError(nuisances=(), tick_rad=tick)).estimate
         assert fit.covariance == "autoregressive"
         found[tick] = np.sqrt(np.mean([(fit.value[key] / true - 1.0) ** 2 for key, true in TRUTH.items()]))
         if tick is None:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.log_effects import LogEffects
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -31,7 +32,7 @@ def captured(run, seed, **channels):
 
 
 def test_a_pose_alone(axebot, clean):
-    fit = fit_output_error(captured(clean, 1), axebot, nuisances=())
+    fit = identify(captured(clean, 1), axebot, OutputError(nuisances=())).estimate
     assert holds(fit)
     assert list(fit.noise) == ["heading[0]", "position[0]", "position[1]"]
     assert list(fit.noise.values()) == pytest.approx([0.005, 0.002, 0.002], rel=0.05)
@@ -40,8 +41,8 @@ def test_a_pose_alone(axebot, clean):
 
 def test_a_pose_beside_the_twist_narrows_the_intervals(axebot, clean):
     twist = clean.twist + np.random.default_rng(2).normal(size=clean.twist.shape) * NOISE
-    both = fit_output_error(captured(clean, 3, twist=twist), axebot, nuisances=())
-    plain = fit_output_error(Run(t=clean.t, voltage=clean.voltage, twist=twist), axebot, nuisances=())
+    both = identify(captured(clean, 3, twist=twist), axebot, OutputError(nuisances=())).estimate
+    plain = identify(Run(t=clean.t, voltage=clean.voltage, twist=twist), axebot, OutputError(nuisances=())).estimate
     assert holds(both)
     assert len(both.noise) == 6
     assert all(both.std[key] < 0.7 * std for key, std in plain.std.items())
@@ -51,7 +52,7 @@ def test_a_position_without_heading_finds_where_the_robot_faced(axebot, clean):
     log = captured(clean, 4)
     pose = log.pose.copy()
     pose[:, 2] = np.nan
-    fit = fit_output_error(log.replace(pose=pose), axebot, nuisances=("latency",))
+    fit = identify(log.replace(pose=pose), axebot, OutputError(nuisances=("latency",))).estimate
     assert holds(fit)
     assert list(fit.nuisances) == ["latency.position"]
     assert list(fit.noise) == ["position[0]", "position[1]"]
@@ -67,17 +68,17 @@ def test_odometry_that_is_the_integral_of_its_twist_is_left_out(axebot, clean, h
     north = np.sin(heading[:-1]) * rate[:, 0] + np.cos(heading[:-1]) * rate[:, 1]
     path = np.vstack([[0.0, 0.0], np.cumsum(np.column_stack([east, north]) * 0.01, axis=0)])
     log = Run(t=clean.t, voltage=clean.voltage, twist=twist, pose=np.round(np.column_stack([path, heading]), 5))
-    fit = fit_output_error(log, axebot, nuisances=())
+    fit = identify(log, axebot, OutputError(nuisances=())).estimate
     assert list(fit.noise) == ["twist[0]", "twist[1]", "twist[2]"]
     assert codes(fit.warnings).count("nothing_new") == 2
-    asked = fit_output_error(log, axebot, nuisances=(), outputs=["twist", "pose"])
+    asked = identify(log, axebot, OutputError(nuisances=(), outputs=["twist", "pose"])).estimate
     assert len(asked.noise) == 6
     assert "same_data_twice" in codes(asked.warnings)
 
 
 def test_an_unknown_output_is_refused(axebot, clean):
     with pytest.raises(InputError, match="no such output"):
-        fit_output_error(captured(clean, 1), axebot, outputs=["place"])
+        identify(captured(clean, 1), axebot, OutputError(outputs=["place"]))
 
 
 def pushed(robot, voltage, force, dt=0.01, **more):
@@ -95,7 +96,7 @@ def test_a_push_is_found_and_friction_with_it(axebot, clean):
     log = Run(
         t=run.t, voltage=run.voltage, twist=run.twist + np.random.default_rng(6).normal(size=run.twist.shape) * NOISE
     )
-    fit = fit_output_error(log, axebot, nuisances=("push",))
+    fit = identify(log, axebot, OutputError(nuisances=("push",))).estimate
     assert holds(fit)
     for axis, true in zip(("x", "y", "yaw"), PUSHED, strict=True):
         own = fit.nuisances[f"push.{axis}"]
@@ -124,7 +125,7 @@ def on_a_slope(robot, clean, seed):
 def test_a_slope_is_found_and_friction_with_it(axebot, clean, heading):
     run, log = on_a_slope(axebot, clean, 6)
     assert np.ptp(run.pose[:, 2]) > 2.0  # it turns
-    fit = fit_output_error(log if heading else log.replace(pose=None), axebot, nuisances=("tilt",))
+    fit = identify(log if heading else log.replace(pose=None), axebot, OutputError(nuisances=("tilt",))).estimate
     assert holds(fit)
     for axis, true in zip("xy", SLOPE, strict=True):
         own = fit.nuisances[f"tilt.{axis}"]
@@ -137,7 +138,7 @@ def test_a_slope_is_found_and_friction_with_it(axebot, clean, heading):
 
 def test_the_diagnosis_names_a_slope_of_a_robot_that_turns(axebot, clean):
     _, log = on_a_slope(axebot, clean, 7)
-    fit = fit_output_error(log, axebot)
+    fit = identify(log, axebot, OutputError()).estimate
     assert fit.lack_of_fit is not None
     first = fit.lack_of_fit.remedies[0]
     assert (first.key, first.same_as) == ("tilt", ())
@@ -150,33 +151,39 @@ def test_the_diagnosis_names_a_push_in_the_body(axebot, clean):
     log = Run(
         t=run.t, voltage=run.voltage, twist=run.twist + np.random.default_rng(7).normal(size=run.twist.shape) * NOISE
     )
-    fit = fit_output_error(log, axebot)
+    fit = identify(log, axebot, OutputError()).estimate
     assert fit.lack_of_fit is not None
     first = fit.lack_of_fit.remedies[0]
     assert "push" in {first.key, *first.same_as}
     assert "constant push in the body" in str(fit.lack_of_fit.statement())
     assert "push.x" not in fit.nuisances
     level = Run(t=clean.t, voltage=clean.voltage, twist=clean.twist + (log.twist - run.twist))
-    assert not fit_output_error(level, axebot).lack_of_fit.remedies
+    assert not identify(level, axebot, OutputError()).lack_of_fit.remedies
 
 
 def test_an_axis_that_is_none_is_refused(axebot, clean):
     with pytest.raises(InputError, match="no such axis"):
-        fit_output_error(captured(clean, 1), axebot, nuisances=("tilt.yaw",))
+        identify(captured(clean, 1), axebot, OutputError(nuisances=("tilt.yaw",)))
     with pytest.raises(InputError, match="no such axis"):
-        fit_output_error(captured(clean, 1), axebot, nuisances=("push.z",))
+        identify(captured(clean, 1), axebot, OutputError(nuisances=("push.z",)))
 
 
 def test_the_noise_of_a_student_t_fit_is_a_standard_deviation(axebot, clean):
     """Of the Gaussian noise: 2 % wild samples change it by less than what they add to the plain one."""
     rng = np.random.default_rng(8)
     noise = rng.normal(size=clean.twist.shape) * NOISE
-    fit = fit_output_error(Run(t=clean.t, voltage=clean.voltage, twist=clean.twist + noise), axebot, nuisances=(),
-                           loss="student-t")  # fmt: skip
+    fit = identify(
+        Run(t=clean.t, voltage=clean.voltage, twist=clean.twist + noise),
+        axebot,
+        OutputError(nuisances=(), loss="student-t"),
+    ).estimate
     assert list(fit.noise.values()) == pytest.approx(list(NOISE), rel=0.04)
     noise += 1.0 * rng.normal(size=noise.shape) * (rng.random(noise.shape) < 0.02)
-    wild = fit_output_error(Run(t=clean.t, voltage=clean.voltage, twist=clean.twist + noise), axebot, nuisances=(),
-                            loss="student-t")  # fmt: skip
+    wild = identify(
+        Run(t=clean.t, voltage=clean.voltage, twist=clean.twist + noise),
+        axebot,
+        OutputError(nuisances=(), loss="student-t"),
+    ).estimate
     assert list(wild.noise.values()) == pytest.approx(list(NOISE), rel=0.1)
 
 
@@ -186,10 +193,12 @@ def test_what_a_log_holds_and_a_fit_does_not_use_is_listed_with_the_reason(axebo
         log = captured(clean, 9, twist=clean.twist + np.random.default_rng(9).normal(size=clean.twist.shape) * NOISE)
         log = Run(**{"t": log.t[:300]} | {name: values[:300] for name, values in log.channels.items()})
         log = log.replace(wheel_angle=np.floor(np.cumsum(clean.wheel_speed[:300], axis=0) * 0.01 / 1e-3) * 1e-3)
-        whole = fit_output_error(log, robot, nuisances=())
+        whole = identify(log, robot, OutputError(nuisances=())).estimate
         assert whole.unused == ()
         assert {name.partition("[")[0] for name in whole.noise} == {"twist", "heading", "position", "wheel_angle"}
-    asked = fit_output_error(log.replace(twist_command=log.twist), axebot, outputs=["twist"], nuisances=())
+    asked = identify(
+        log.replace(twist_command=log.twist), axebot, OutputError(outputs=["twist"], nuisances=())
+    ).estimate
     assert (*map(str, asked.unused),) == (
         "twist_command: the voltage that reached the motors drives the model",
         "heading: not among the outputs asked for",
@@ -198,7 +207,9 @@ def test_what_a_log_holds_and_a_fit_does_not_use_is_listed_with_the_reason(axebo
     )
     assert "not used: heading: not among the outputs asked for" in asked.summary()
     assert asked.to_dict()["unused"] == [each.to_dict() for each in asked.unused]
-    both = fit_output_error([log, log.replace(pose=None, source="bare")], axebot, outputs=["twist"], nuisances=())
+    both = identify(
+        [log, log.replace(pose=None, source="bare")], axebot, OutputError(outputs=["twist"], nuisances=())
+    ).estimate
     assert "heading: not among the outputs asked for (1 of 2 logs, such as a log)" in [*map(str, both.unused)]
 
 
@@ -209,9 +220,9 @@ def test_an_interval_over_many_powers_of_ten_is_none(axebot):
     assert 0.0 < np.abs(run.twist[:, 2]).max() < 0.1
     twist = run.twist + np.random.default_rng(1).normal(size=run.twist.shape) * [0.01, 0.01, 0.2]
     free = ["friction.axes.coulomb[0]", "body.inertia_kg_m2"]
-    fit = fit_output_error(
-        Run(t=run.t, voltage=run.voltage, twist=twist), axebot, free=free, nuisances=(), start="rest"
-    )
+    fit = identify(
+        Run(t=run.t, voltage=run.voltage, twist=twist), axebot, OutputError(free=free, nuisances=(), start="rest")
+    ).estimate
     print(fit.summary())
     assert fit.unidentifiable == ("body.inertia_kg_m2",)
     assert np.isfinite(fit.std["friction.axes.coulomb[0]"])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.engines.rates import RateEngine
 from omnidyn.identification.output_error.prepare import make_problem, read_records
@@ -10,7 +11,6 @@ from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.first_point import coarse_point
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solver
-from omnidyn.identification.question import Question
 from omnidyn.model.first_guess import first_guess
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
@@ -54,7 +54,7 @@ def problem_of(seed, missing=()):
     start = robot
     for key in KEYS:
         start = Key.parse(key).set(start, Key.parse(key).get(robot) * float(np.exp(SPREAD * rng.normal())))
-    question = Question(free=KEYS, start="rest", tick_rad=TICK)
+    question = OutputError(free=KEYS, start="rest", tick_rad=TICK)
     problem = make_problem(read_records([log], start, question), start, question)
     true = [Key.parse(p.name).get(robot) if k < problem.robot_count else 0.0 for k, p in enumerate(problem.parameters)]
     return problem, Point(np.array(true), problem.start().states)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import State
-from omnidyn.identification.question import Question
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.progress import Report
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
@@ -40,7 +40,7 @@ class Cut(FitProgress):
 
     def listen(self, report):
         if report.state is None:
-            self.heard.append(report.phase)
+            self.heard.append(report.phase.removeprefix("fitting: "))
         else:
             self.states.append(report.state)
         if report.state is not None and len(self.states) == self.count:
@@ -54,7 +54,7 @@ class Cut(FitProgress):
 )
 def test_an_interrupted_fit_of_set_speeds_leaves_the_best_so_far(looped, log, cut):
     """In the first search for a start, between two descents, and after the last one."""
-    asked = Fit.of(log, looped, Question())
+    asked = Fit.of(log, looped, OutputError())
     with pytest.raises(KeyboardInterrupt):
         asked.answer(asked.solve(cut), cut)
     fit = asked.answer(cut.best).estimate
@@ -66,7 +66,7 @@ def test_an_interrupted_fit_of_set_speeds_leaves_the_best_so_far(looped, log, cu
 
 def test_every_phase_is_told_before_it_begins(looped, log):
     seen = Cut()
-    fit_output_error(log, looped, progress=seen)
+    identify(log, looped, OutputError(), progress=seen)
     first = [next(k for k, words in enumerate(seen.heard) if words.startswith(phase)) for phase in (
         "looking for what moved", "looking for a start, latencies 1 of 5", "looking for a start, friction and gains 1",
         "trying latency.current, 1 of", "the same as exactly", "looking for a better branch", "finding how sure",
@@ -77,7 +77,7 @@ def test_every_phase_is_told_before_it_begins(looped, log):
 def test_a_robot_of_the_exact_engine_tells_its_phases_too(axebot):
     run = simulate(axebot, np.repeat([[3.0, -1.0, 2.5], [-4.0, 3.0, 1.0]], 50, axis=0), 0.02)
     seen = Cut()
-    fit_output_error(Run(t=run.t, voltage=run.voltage, twist=run.twist, source="log"), axebot, progress=seen)
+    identify(Run(t=run.t, voltage=run.voltage, twist=run.twist, source="log"), axebot, OutputError(), progress=seen)
     assert {"looking for what moved", "looking for a start", "finding how sure the numbers are"} < set(seen.heard)
 
 

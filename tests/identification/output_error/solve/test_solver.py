@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import omnidyn.identification.output_error.solve.solver as solver_module
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.motion import motion
 from omnidyn.identification.output_error.problem.record import record
 from omnidyn.identification.output_error.solve.solver import CLOSE, MAX_ITERATIONS, Solver, State
-from omnidyn.identification.question import Question
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.model import dynamics
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation, noisy_draw
@@ -26,7 +26,7 @@ def test_a_fit_marches_through_no_point_twice(axebot, monkeypatch):
 
     monkeypatch.setattr(ExactEngine, "sums", sums)
     log = noisy_draw(simulate(axebot, excitation(20.0), 0.01), 0)
-    found = fit_output_error(log, axebot, start="rest", nuisances=())
+    found = identify(log, axebot, OutputError(start="rest", nuisances=())).estimate
     assert found.converged
     assert len(asked) == len(set(asked))
 
@@ -43,7 +43,7 @@ def test_a_fit_derives_the_motors_once(axebot, monkeypatch):
     log = noisy_draw(simulate(axebot, excitation(20.0), 0.01), 0)
     dynamics._motor_wrench.cache_clear()
     derived.clear()
-    fit_output_error(log, axebot, start="rest", nuisances=())
+    identify(log, axebot, OutputError(start="rest", nuisances=()))
     assert len(derived) == 2  # braking and driving
 
 
@@ -90,7 +90,7 @@ class Downhill:
 @pytest.fixture
 def on_a_kink(axebot, monkeypatch):
     """(close, drops of F) -> the Solution."""
-    asked = Question(nuisances=())
+    asked = OutputError(nuisances=())
     log = noisy_draw(simulate(axebot, excitation(2.0), 0.01), 0)
     problem = make_problem(read_records([log], axebot, asked), axebot, asked)
     monkeypatch.setattr(solver_module, "Normal", Downhill)

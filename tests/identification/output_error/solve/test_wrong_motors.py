@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.whole_logs import fit_output_error
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.first_guess import first_guess
 from omnidyn.model.keys import EMF, TORQUE, Key
 from omnidyn.model.robot_file import load_robot
@@ -38,7 +39,7 @@ def test_currents_find_their_latency_beside_a_motor_that_is_a_wrong_guess(true, 
     start = Key.parse(RESISTANCE).set(true, resistance * true.motor.resistance)
     for key in (TORQUE, EMF):
         start = Key.parse(key).set(start, constant * true.motor.torque_constant)
-    fit = fit_output_error(log, start, start="rest")
+    fit = identify(log, start, OutputError(start="rest")).estimate
     assert abs(fit.nuisances["latency.current"].value) < 0.1 * STEP
     assert fit.noise["current[0]"] < 0.025
     assert abs(fit.value[RESISTANCE] - true.motor.resistance) < 4.0 * fit.std[RESISTANCE]
@@ -50,7 +51,7 @@ def test_a_path_finds_its_latency_beside_a_motor_that_is_a_wrong_guess(true, run
     start = Key.parse(RESISTANCE).set(true, 4.0 * true.motor.resistance)
     for key in (TORQUE, EMF):
         start = Key.parse(key).set(start, 0.5 * true.motor.torque_constant)
-    fit = fit_output_error(log, start, start="rest")
+    fit = identify(log, start, OutputError(start="rest")).estimate
     assert abs(fit.nuisances["latency.position"].value) < 0.1 * STEP
     assert all(std < 0.0023 for std in fit.noise.values())
     for k in (0, 1):
@@ -62,10 +63,10 @@ def test_a_speed_long_before_its_voltage_is_no_automatic_latency(true, run):
     """Speeds 120 ms early; rows are 40 ms apart."""
     early = np.vstack([run.twist[3:], np.repeat(run.twist[-1:], 3, axis=0)])
     log = run.replace(twist=noisy(early, 0.005), current=None, wheel_speed=None, pose=None)
-    fit = fit_output_error(log, true, start="rest")
+    fit = identify(log, true, OutputError(start="rest")).estimate
     assert "latency.twist" not in fit.nuisances
     (early,) = [each for each in fit.warnings if each.code == "implausible_latency"]
     assert (early.subject, early.numbers["fitted"]) == ("latency.twist", False)
-    asked = fit_output_error(log, true, start="rest", nuisances="latency")
+    asked = identify(log, true, OutputError(start="rest", nuisances="latency")).estimate
     assert asked.nuisances["latency.twist"].value < -0.08
     assert ("implausible_latency", "latency.twist") in {(each.code, each.subject) for each in asked.warnings}

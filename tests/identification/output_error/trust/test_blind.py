@@ -11,8 +11,9 @@ from benchmarks.blind.setups import DEFICIENT, FRICTION, FULL, INERTIA, MASS, OH
 from benchmarks.blind.told import named, said
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.advice import advice
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.trust.blind import _lost, _sparse
-from omnidyn.identification.whole_logs import fit_output_error
 
 BY_NAME = {setup.name: setup for setup in (*DEFICIENT, *FULL)}
 
@@ -33,7 +34,7 @@ def test_the_scale_of_all_forces_is_one_direction_with_equal_changes():
     """Masses and friction as much larger as the resistance is smaller move the robot in the same way."""
     setup = BY_NAME["masses, resistance and friction"]
     run, robot = logged(Setup("", (*setup.free, RADIUS), logged=("twist", "wheel_speed")), 33)
-    (lost,) = fit_output_error(run, robot, free=(*setup.free, RADIUS), nuisances=()).directions
+    (lost,) = identify(run, robot, OutputError(free=(*setup.free, RADIUS), nuisances=())).directions
     share = {key: change / lost.changes[MASS] for key, change in lost.changes.items()}
     assert share == pytest.approx(dict.fromkeys((MASS, INERTIA, *FRICTION), 1.0) | {OHM: -1.0}, rel=0.02)
     assert lost.exact
@@ -44,7 +45,7 @@ def test_the_scale_of_all_forces_is_one_direction_with_equal_changes():
 def test_the_answer_holds_it_for_people_and_for_machines():
     setup = BY_NAME["wheel radius and gear, speed over ground"]
     run, robot = logged(setup, 34)
-    fit = fit_output_error(run, robot, free=setup.free, nuisances=())
+    fit = identify(run, robot, OutputError(free=setup.free, nuisances=())).estimate
     words = "wheel radius +10 % and gear ratio +10 %: not distinguishable with this log"
     assert words in fit.summary()
     assert any(str(each).startswith(words) and "log wheel speeds" in str(each) for each in advice(fit, None))
@@ -57,7 +58,7 @@ def test_a_refusal_names_the_direction_and_what_would_tell_it():
     setup = BY_NAME["wheel radius and masses, wheel speeds only"]
     run, robot = logged(setup, 35)
     with pytest.raises(InsufficientDataError, match=r"wheel radius \+5 %, mass -10 %.*weigh the robot.*speed over the"):
-        fit_output_error(run, robot, free=setup.free, nuisances=())
+        identify(run, robot, OutputError(free=setup.free, nuisances=()))
 
 
 def test_directions_are_told_apart_so_that_each_holds_few_numbers():

@@ -7,7 +7,8 @@ import omnidyn
 from benchmarks.wrong_worlds.log import robot_of
 from benchmarks.wrong_worlds.world import World
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.identification.whole_logs import fit_output_error, identify_groups
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
@@ -36,7 +37,7 @@ def test_it_is_found_above_the_last_drive_below_three_times_coulomb():
     t = DT * np.arange(len(truth.twist))
     log = Run(t=t, voltage=np.concatenate([volts, volts[-1:]]), twist=truth.twist + noise)
     keys = [f"friction.axes.{name}[{axis}]" for name in ("viscous", "coulomb", "breakaway") for axis in (0, 1)]
-    fit = fit_output_error(log, robot, free=keys, nuisances=())
+    fit = identify(log, robot, OutputError(free=keys, nuisances=())).estimate
     for key, true in zip(keys[:4], (*VISCOUS[:2], SLIDES, SLIDES), strict=True):
         assert abs(fit.value[key] - true) < 4.5 * fit.std[key]
         assert fit.std[key] < 0.05
@@ -82,7 +83,7 @@ def test_at_the_wheels_it_is_named_where_it_is_left_out():
     lack = omnidyn.identify([log], robot_of(world)).lack_of_fit
     assert lack.found
     assert lack.remedies[0].key == key
-    assert not omnidyn.identify([log], robot_of(world), free=["friction", key]).lack_of_fit.found
+    assert not omnidyn.identify([log], robot_of(world), omnidyn.OutputError(free=["friction", key])).lack_of_fit.found
 
 
 def test_levels_of_an_ellipse_that_one_way_of_starting_tells_together_are_wide():
@@ -96,12 +97,12 @@ def test_a_level_that_no_law_has_is_refused_by_name():
     log = Run(t=DT * np.arange(5), voltage=np.ones((5, 3)), twist=np.zeros((5, 3)))
     box, round_ = robot_of(World()), robot_of(World(shape="direction"))
     with pytest.raises(InputError, match=r"no Coulomb friction .*; got friction\.wheels\.breakaway, .*coulomb is 0"):
-        fit_output_error(log, box, free=["friction", "friction.wheels.breakaway"])
+        identify(log, box, OutputError(free=["friction", "friction.wheels.breakaway"]))
     bristles = DirectionFriction(coulomb=(3.9, 3.9), law="dahl", stiffness=1e3)
     bends = round_.replace(friction=Friction(direction=bristles))
     with pytest.raises(
         InputError, match=r'bristles bend before .*; got friction\.direction\.breakaway\[0\] of law = "dahl"'
     ):
-        fit_output_error(log, bends, free=["friction", "friction.direction.breakaway"])
+        identify(log, bends, OutputError(free=["friction", "friction.direction.breakaway"]))
     with pytest.raises(UnsupportedError, match=r"not profiled in groups; got friction\.direction\.breakaway\[0\]"):
-        identify_groups([log, log], round_, ["a", "b"], free=["friction", "friction.direction.breakaway"])
+        identify([log, log], round_, OutputError(free=["friction", "friction.direction.breakaway"]), groups=["a", "b"])

@@ -1,19 +1,16 @@
 """Intervals under colour, at bounds, from profiles and bootstrap; directions that the data do not show."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification import whole_logs as whole
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from omnidyn.model.keys import BOX, Key
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE, TRUTH, excitation, noisy, voltages
 from tests.support.codes import codes
-
-fit_output_error = partial(whole.fit_output_error, nuisances=())  # but for those a test asks for
 
 KT = "motor.torque_constant_Nm_A"
 
@@ -39,10 +36,12 @@ def test_coloured_noise_is_seen_and_the_intervals_follow(axebot, clean):
     for seed in range(12):
         log = coloured(clean, seed)
         for kind in held:
-            fit = fit_output_error(log, axebot, start="rest", covariance=kind)
+            fit = identify(log, axebot, OutputError(nuisances=(), start="rest", covariance=kind)).estimate
             held[kind] += sum(fit.ci95[key][0] <= true <= fit.ci95[key][1] for key, true in TRUTH.items())
         assert fit.covariance == kind or (kind, fit.covariance) == ("auto", "autoregressive")
-    assert fit_output_error(log, axebot, start="rest", covariance="sandwich").covariance == "sandwich"
+    assert (
+        identify(log, axebot, OutputError(nuisances=(), start="rest", covariance="sandwich")).covariance == "sandwich"
+    )
     assert held["white"] < 0.85 * 72
     assert held["auto"] >= 0.90 * 72
 
@@ -51,7 +50,9 @@ def test_no_friction_stands_at_the_bound_with_an_interval_that_holds_it(axebot, 
     none = axebot
     for key in BOX:
         none = Key.parse(key).set(none, 0.0)
-    fit = fit_output_error(noisy(simulate(none, clean.voltage[:-1], 0.01), 5), axebot, start="rest")
+    fit = identify(
+        noisy(simulate(none, clean.voltage[:-1], 0.01), 5), axebot, OutputError(nuisances=(), start="rest")
+    ).estimate
     assert all(fit.ci95[key][0] <= 0.0 <= fit.ci95[key][1] for key in BOX)
     assert fit.at_bound
     for key in fit.at_bound:
@@ -62,7 +63,9 @@ def test_no_friction_stands_at_the_bound_with_an_interval_that_holds_it(axebot, 
 def test_what_only_the_product_shows_is_named(axebot, clean):
     """Torque constant times gear ratio is all that voltage and speed see of the two; from 1.5x wrong constants."""
     start = Key.parse("motor.emf_constant_Vs_rad").set(Key.parse(KT).set(axebot, 1.5 * 0.0059), 1.5 * 0.0059)
-    fit = fit_output_error(noisy(clean, 1), start, free=[*BOX, KT, "motor.gear_ratio"], start="rest")
+    fit = identify(
+        noisy(clean, 1), start, OutputError(nuisances=(), free=[*BOX, KT, "motor.gear_ratio"], start="rest")
+    ).estimate
     assert set(fit.unidentifiable) == {KT, "motor.gear_ratio"}
     assert fit.value[KT] * fit.value["motor.gear_ratio"] == pytest.approx(0.0059 * 19.0, rel=0.01)
     (lost,) = fit.directions
@@ -81,7 +84,7 @@ def test_physical_numbers_with_currents(axebot, clean):
     start = axebot
     for key, wrong in zip((*keys, "motor.emf_constant_Vs_rad"), (2.5, 0.015, 2.6, 0.009, 0.009), strict=True):
         start = Key.parse(key).set(start, wrong)
-    fit = fit_output_error(log, start, free=[*BOX, *keys], start="rest")
+    fit = identify(log, start, OutputError(nuisances=(), free=[*BOX, *keys], start="rest")).estimate
     for key, true in zip(keys, (1.5, 0.025, 1.69, 0.0059), strict=True):
         assert abs(fit.value[key] - true) < 4.0 * fit.std[key]
         assert fit.std[key] < 0.005 * true
@@ -91,11 +94,11 @@ def test_physical_numbers_with_currents(axebot, clean):
 def test_the_profile_agrees_where_the_likelihood_is_quadratic(axebot, clean):
     key = BOX[0]
     log = noisy(clean, 3)
-    plain = fit_output_error(log, axebot, start="rest")
-    profiled = fit_output_error(log, axebot, start="rest", profile=[key])
+    plain = identify(log, axebot, OutputError(nuisances=(), start="rest")).estimate
+    profiled = identify(log, axebot, OutputError(nuisances=(), start="rest", profile=[key])).estimate
     np.testing.assert_allclose(profiled.ci95[key], plain.ci95[key], atol=0.15 * plain.std[key])
     with pytest.raises(InputError, match=r"not a free number; got body\.mass_kg"):
-        fit_output_error(log, axebot, profile=["body.mass_kg"])
+        identify(log, axebot, OutputError(nuisances=(), profile=["body.mass_kg"]))
 
 
 @pytest.mark.parametrize("loss", ["gaussian", "student-t"])
@@ -103,9 +106,9 @@ def test_a_profile_knows_of_colour(axebot, clean, loss):
     """Errors that remember make the likelihood too steep; it is all but a parabola, so both ways say the same."""
     keys, how = [BOX[0], BOX[4]], {"start": "rest", "loss": loss}
     log = coloured(clean, 3)
-    plain = fit_output_error(log, axebot, **how)
-    profiled = fit_output_error(log, axebot, profile=keys, **how)
-    white = fit_output_error(log, axebot, covariance="white", **how)
+    plain = identify(log, axebot, OutputError(nuisances=(), **how)).estimate
+    profiled = identify(log, axebot, OutputError(nuisances=(), profile=keys, **how)).estimate
+    white = identify(log, axebot, OutputError(nuisances=(), covariance="white", **how)).estimate
     for key in keys:
         assert plain.std[key] > 2.0 * white.std[key]
         assert np.ptp(profiled.ci95[key]) == pytest.approx(np.ptp(plain.ci95[key]), rel=0.15)
@@ -119,7 +122,7 @@ def test_breakaway_knows_of_colour(axebot):
     keys, held = [f"friction.axes.breakaway[{axis}]" for axis in range(3)], 0
     for seed in range(6):
         log = coloured(simulate(robot, excitation(30.0, seed=200 + seed), 0.01), seed)
-        fit = fit_output_error(log, axebot, free=[*BOX, *keys], start="rest")
+        fit = identify(log, axebot, OutputError(nuisances=(), free=[*BOX, *keys], start="rest")).estimate
         held += sum(fit.ci95[key][0] <= level <= fit.ci95[key][1] for key, level in zip(keys, levels, strict=True))
     assert held >= 17
 
@@ -127,14 +130,16 @@ def test_breakaway_knows_of_colour(axebot):
 def test_bootstrap_over_runs(axebot):
     rng = np.random.default_rng(4)
     runs = [noisy(simulate(axebot, voltages(rng, 10.0), 0.01), k) for k in range(12)]
-    plain = fit_output_error(runs, axebot, start="rest")
-    drawn, again = (fit_output_error(runs, axebot, start="rest", bootstrap=60) for _ in range(2))
+    plain = identify(runs, axebot, OutputError(nuisances=(), start="rest")).estimate
+    drawn, again = (
+        identify(runs, axebot, OutputError(nuisances=(), start="rest", bootstrap=60)).estimate for _ in range(2)
+    )
     assert drawn.std == again.std
     ratio = np.array([drawn.std[key] / plain.std[key] for key in BOX])
     assert (ratio > 0.5).all()
     assert (ratio < 2.0).all()
     with pytest.raises(InsufficientDataError, match="too few runs for a bootstrap; got 1; expected 5"):
-        fit_output_error(runs[0], axebot, bootstrap=10)
+        identify(runs[0], axebot, OutputError(nuisances=(), bootstrap=10))
 
 
 def test_what_differs_from_run_to_run_is_in_the_intervals(axebot):
@@ -152,9 +157,9 @@ def test_what_differs_from_run_to_run_is_in_the_intervals(axebot):
             run = simulate(Key.parse(key).set(axebot, float(level)), base, 0.01)
             runs.append(Run(t=run.t, voltage=run.voltage, twist=run.twist + rng.normal(size=run.twist.shape) * NOISE))
         for kind, found in errors.items():
-            fit = fit_output_error(runs, axebot, start="rest", covariance=kind)
+            fit = identify(runs, axebot, OutputError(nuisances=(), start="rest", covariance=kind)).estimate
             found.append((fit.value[key] - TRUTH[key]) / fit.std[key])
-    fit = fit_output_error(runs, axebot, start="rest")
+    fit = identify(runs, axebot, OutputError(nuisances=(), start="rest")).estimate
     assert fit.covariance == "sandwich"
     assert 25 in [each.numbers.get("runs") for each in fit.warnings]
     assert abs(np.std(errors["auto"]) - 1.0) < 3.0 / np.sqrt(2.0 * 40)
@@ -167,13 +172,15 @@ def test_a_number_with_a_small_share_of_a_lost_direction_is_lost_too(axebot, cle
     for key in (KT, "motor.emf_constant_Vs_rad"):
         start = Key.parse(key).set(start, 0.95 * 0.0059)
     resistance = "motor.resistance_ohm"
-    fit = fit_output_error(noisy(clean, 1), start, free=[*BOX, KT, resistance], start="rest")
+    fit = identify(
+        noisy(clean, 1), start, OutputError(nuisances=(), free=[*BOX, KT, resistance], start="rest")
+    ).estimate
     lost = {KT, resistance, *BOX[:3]}
     assert set(fit.unidentifiable) == lost
     assert all(np.isinf(fit.std[key]) for key in lost)
     (direction,) = fit.directions
     assert set(direction.changes) == lost
-    known = fit_output_error(noisy(clean, 1), axebot, start="rest")
+    known = identify(noisy(clean, 1), axebot, OutputError(nuisances=(), start="rest")).estimate
     for key in BOX[3:]:  # as well known as where the other numbers are: no better
         assert fit.value[key] == pytest.approx(known.value[key], abs=0.2 * known.std[key])
         assert 0.95 * known.std[key] < fit.std[key] < 2.0 * known.std[key]
@@ -186,25 +193,27 @@ def test_what_lies_on_the_other_side_of_a_bound_is_lost_too(axebot, clean):
     start = axebot
     for key in (KT, "motor.emf_constant_Vs_rad"):
         start = Key.parse(key).set(start, 1.3 * 0.0059)
-    fit = fit_output_error(noisy(clean, 1), start, free=[*BOX, KT, "motor.resistance_ohm"], start="rest")
+    fit = identify(
+        noisy(clean, 1), start, OutputError(nuisances=(), free=[*BOX, KT, "motor.resistance_ohm"], start="rest")
+    ).estimate
     assert {KT, "motor.resistance_ohm"} <= set(fit.unidentifiable)
 
 
 def test_a_model_that_does_not_follow_the_log_is_said(axebot, clean):
     log = noisy(clean, 1)
-    assert "not_followed" not in codes(fit_output_error(log, axebot, start="rest").warnings)
+    assert "not_followed" not in codes(identify(log, axebot, OutputError(nuisances=(), start="rest")).warnings)
     wrong = Run(t=log.t, voltage=log.voltage, twist=log.twist * [1.0, -1.0, 1.0])
-    fit = fit_output_error(wrong, axebot, start="rest")
+    fit = identify(wrong, axebot, OutputError(nuisances=(), start="rest")).estimate
     assert [each.numbers["outputs"] for each in fit.warnings if each.code == "not_followed"] == [("twist[1]",)]
     for key in fit.unidentifiable:
         assert fit.value[key] == TRUTH[key]  # as the robot had it
     backward = Run(t=log.t, voltage=-log.voltage, twist=log.twist)
     with pytest.raises(InsufficientDataError, match=r"the robot moved, but with no value .* check signs, units"):
-        fit_output_error(backward, axebot, start="rest")
+        identify(backward, axebot, OutputError(nuisances=(), start="rest"))
 
 
 def test_errors_that_remember_ask_for_no_nuisance(axebot, clean):
     """The scatter of white noise is too small a measure: five of its standard errors are one or two of theirs."""
     for seed in range(3):
-        fit = whole.fit_output_error(coloured(clean, seed), axebot, start="rest")
+        fit = identify(coloured(clean, seed), axebot, OutputError(start="rest")).estimate
         assert not any(remedy.confident for remedy in fit.lack_of_fit.remedies)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.identification.whole_logs import fit_output_error
 from omnidyn.logs.plateaus import find_plateaus
 from omnidyn.logs.read_log import load_log
 from omnidyn.model.wheels import wheel_speed
@@ -12,6 +11,8 @@ from tests.support.axebot_logs import TRUTH
 
 pytest.importorskip("rosbags")
 pytest.importorskip("mcap")
+from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import OutputError
 from tests.support.bags import BagMaker, write_mcap
 from tests.support.codes import said
 
@@ -52,9 +53,9 @@ def test_a_run_holds_commands_and_is_blank_where_a_sensor_gave_nothing(path):
 
 def test_the_fit_takes_each_sensor_where_it_measured(path):
     robot = omnidyn.load_robot("axebot")
-    fit = fit_output_error(
-        omnidyn.read_log(path, robot), robot, outputs=["twist", "wheel_speed"], nuisances=(), start="rest"
-    )
+    fit = identify(
+        omnidyn.read_log(path, robot), robot, OutputError(outputs=["twist", "wheel_speed"], nuisances=(), start="rest")
+    ).estimate
     assert all(abs(fit.value[key] - true) < 4.0 * fit.std[key] for key, true in TRUTH.items())
     assert fit.covariance == "white"
 
@@ -88,7 +89,7 @@ def test_intervals_hold_what_they_promise_with_three_clocks(tmp_path):
     robot, scores, held = omnidyn.load_robot("axebot"), [], []
     for seed in range(1000, 1060):
         run = omnidyn.read_log(drive(tmp_path / "a.mcap", seed), robot)
-        fit = fit_output_error(run, robot, outputs=["twist", "wheel_speed"], nuisances=(), start="rest")
+        fit = identify(run, robot, OutputError(outputs=["twist", "wheel_speed"], nuisances=(), start="rest")).estimate
         scores += [(fit.value[key] - true) / fit.std[key] for key, true in TRUTH.items()]
         held += [fit.ci95[key][0] <= true <= fit.ci95[key][1] for key, true in TRUTH.items()]
     assert np.mean(held) == pytest.approx(0.95, abs=0.03)

@@ -18,12 +18,12 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
+from omnidyn.identification.methods import AUTO, REST
 from omnidyn.identification.output_error.problem.driven import least_that_drove
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import measured_twist
-from omnidyn.identification.question import AUTO, REST
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN
 from omnidyn.model.first_guess import GRAVITY
 from omnidyn.model.frames import AXES

@@ -14,6 +14,7 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InsufficientDataError, UnsupportedError
+from omnidyn.identification.methods import FREE, REST
 from omnidyn.identification.output_error.engines.speed_loop import SLOW_LOOP, LoopEngine
 from omnidyn.identification.output_error.problem.nuisances import EARLIEST, LATEST, TRAVELS
 from omnidyn.identification.output_error.problem.parameters import Parameter
@@ -22,7 +23,6 @@ from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import measured_twists
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
-from omnidyn.identification.question import FREE, REST
 from omnidyn.model.keys import FRICTION, Key, friction_keys, gain_keys
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import GIVEN, Robot

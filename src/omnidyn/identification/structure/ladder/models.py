@@ -16,13 +16,13 @@ import numpy as np
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.ladder import STANDS
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.joint import JointEngine
 from omnidyn.identification.output_error.prepare import expand_keys
 from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution
-from omnidyn.identification.question import Question
 from omnidyn.identification.structure.missing.laws import may_break_away, other_laws
 from omnidyn.identification.structure.missing.switches import (
     BREAKS,
@@ -80,7 +80,7 @@ class Model:
 
     fit: Fit
     solution: Solution
-    begins: Mapping[str, tuple[Robot, Question]]
+    begins: Mapping[str, tuple[Robot, OutputError]]
     move: Move | None = None
     cause: Statement = STANDS
     numbers: int = 0
@@ -175,7 +175,7 @@ def _numbered(remedies: Sequence[Remedy]) -> dict[tuple[str, int], Remedy]:
     return {(key, keys[:k].count(key)): remedy for k, (key, remedy) in enumerate(zip(keys, remedies, strict=True))}
 
 
-def is_own(key: str, question: Question) -> bool:
+def is_own(key: str, question: OutputError) -> bool:
     """Whether each group of a fit has for itself what this is about: friction, unless other numbers are asked for."""
     own = question.per_free
     if key.partition(".")[0] == FRICTION:
@@ -228,7 +228,7 @@ def tried(
     return found
 
 
-def _begins(stands: Model, ways: Mapping[str, Switch]) -> dict[str, tuple[Robot, Question]]:
+def _begins(stands: Model, ways: Mapping[str, Switch]) -> dict[str, tuple[Robot, OutputError]]:
     """Each group as it is switched on, or as it ended."""
     found = {}
     for group, start in stands.begins.items():
@@ -239,7 +239,7 @@ def _begins(stands: Model, ways: Mapping[str, Switch]) -> dict[str, tuple[Robot,
 
 
 def _fit(
-    stands: Model, begins: Mapping[str, tuple[Robot, Question]], runs: Sequence[Run], names: Sequence[str] | None,
+    stands: Model, begins: Mapping[str, tuple[Robot, OutputError]], runs: Sequence[Run], names: Sequence[str] | None,
     progress: FitProgress,
 ) -> Fit:  # fmt: skip
     if names is None:
@@ -253,7 +253,7 @@ def _fit(
     return Fit.of(runs, stands.fit.began, question, names, progress, begins)
 
 
-def _own(stands: Model, begins: Mapping[str, tuple[Robot, Question]]) -> tuple[str, ...]:
+def _own(stands: Model, begins: Mapping[str, tuple[Robot, OutputError]]) -> tuple[str, ...]:
     """The numbers that each group has for itself: where friction is its own, all of it that was not shared before."""
     asked = stands.fit.question.per_free
     if not is_own(FRICTION, stands.fit.question):

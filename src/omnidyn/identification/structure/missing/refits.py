@@ -16,6 +16,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.lack_of_fit import Remedy
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.linear.workbench import on_time
 from omnidyn.identification.output_error.memory.whitened import OfRows
 from omnidyn.identification.output_error.prepare import (
@@ -30,7 +31,6 @@ from omnidyn.identification.output_error.prepare import (
 )
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
-from omnidyn.identification.question import Question
 from omnidyn.identification.structure.missing.candidates import CHANGE, Candidate, Fitted, Trial
 from omnidyn.identification.structure.missing.switches import Switch, as_fitted, simpler_first, switches
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
@@ -95,9 +95,9 @@ def _asked(ranked: Sequence[Remedy], candidates: Sequence[Candidate]) -> Iterato
             yield known[key], Remedy(key, known[key].cause(0.0, 0.0), 0.0, 0.0)
 
 
-def _question(problem: Problem) -> Question:
+def _question(problem: Problem) -> OutputError:
     """That of the fit itself, written out."""
-    return Question(free=problem.names[: problem.robot_count], nuisances=problem.names[problem.robot_count :])
+    return OutputError(free=problem.names[: problem.robot_count], nuisances=problem.names[problem.robot_count :])
 
 
 class _Coarse(OfRows):

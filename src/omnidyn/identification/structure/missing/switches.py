@@ -15,13 +15,13 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import LOSS, Remedy
 from omnidyn.identification.ladder import STANDS
+from omnidyn.identification.methods import STUDENT, OutputError
 from omnidyn.identification.output_error.prepare import LOOP, engine_kind, expand_keys, guesses
 from omnidyn.identification.output_error.problem.bending import with_damping
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
 from omnidyn.identification.output_error.problem.parameters import EFFICIENCY, WITHIN
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, is_profiled, levels_of
-from omnidyn.identification.question import STUDENT, Question
 from omnidyn.identification.structure.missing.laws import (
     BEND,
     BRISTLES,
@@ -68,12 +68,12 @@ class Switch:
     """What to fit. cause: what is different. numbers: that the logs decide on beside the parameters of the fit."""
 
     robot: Robot
-    question: Question
+    question: OutputError
     cause: Statement
     numbers: int = 0
 
 
-def switches(remedy: Remedy, robot: Robot, question: Question, found: Solution) -> list[Switch]:
+def switches(remedy: Remedy, robot: Robot, question: OutputError, found: Solution) -> list[Switch]:
     """The ways in which a remedy can be switched on; none where no robot file and no fit holds it.
 
     robot, question: of the fit before, and `found` what it came to.
@@ -85,7 +85,7 @@ def switches(remedy: Remedy, robot: Robot, question: Question, found: Solution) 
         return []
 
 
-def as_it_ended(robot: Robot, question: Question, found: Solution) -> Switch:
+def as_it_ended(robot: Robot, question: OutputError, found: Solution) -> Switch:
     """A fit as it ended, nothing switched on."""
     way = Switch(_where_it_ended(robot, found), _as_it_settled(robot, question, found), STANDS)
     return _as_far_as_profiled(way, found)
@@ -107,7 +107,7 @@ def as_fitted(cause: Statement, before: Mapping[str, float], after: Mapping[str,
     return Statement("fitted_numbers", NOTE, numbers={"keys": tuple(new), "values": tuple(after[key] for key in new)})
 
 
-def _ways(remedy: Remedy, robot: Robot, asked: Question) -> Iterator[Switch]:
+def _ways(remedy: Remedy, robot: Robot, asked: OutputError) -> Iterator[Switch]:
     key, cause = remedy.key, remedy.cause
     friction = robot.friction
     if key.partition(".")[0] in NUISANCES:
@@ -157,7 +157,7 @@ def _where_it_ended(robot: Robot, found: Solution) -> Robot:
     return robot.replace(friction=holding(robot, levels_of(found)).friction.replace())
 
 
-def _as_it_settled(robot: Robot, question: Question, found: Solution) -> Question:
+def _as_it_settled(robot: Robot, question: OutputError, found: Solution) -> OutputError:
     """The question with every key that was free, and every nuisance that stayed, written out."""
     names = question.free if question.free is not None else (FRICTION, *guesses(robot))
     keys, fixed = expand_keys(names, robot), set(expand_keys(question.fixed, robot))
@@ -166,7 +166,7 @@ def _as_it_settled(robot: Robot, question: Question, found: Solution) -> Questio
     return replace(question, free=tuple(key for key in keys if key not in fixed), fixed=(), nuisances=stayed)
 
 
-def _free(asked: Question, *keys: str) -> Question:
+def _free(asked: OutputError, *keys: str) -> OutputError:
     return replace(asked, free=tuple(dict.fromkeys((*(asked.free or ()), *keys))))
 
 
@@ -190,13 +190,13 @@ def _balanced(robot: Robot, by: Sequence[float]) -> Robot:
     return robot.replace(body=robot.body.replace(centre=np.clip(np.add(robot.body.centre, by), -most, most)))
 
 
-def _of_another_shape(asked: Question) -> Question:
+def _of_another_shape(asked: OutputError) -> OutputError:
     """All friction of the robot is free, in the place of what was."""
     others = [key for key in asked.free or () if Key.parse(key).part != FRICTION]
     return replace(asked, free=(FRICTION, *others), profile=())
 
 
-def _breaking_away(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
+def _breaking_away(remedy: Remedy, robot: Robot, asked: OutputError) -> Switch:
     """Levels above Coulomb friction as the first step has them; a profile finds better ones."""
     table = remedy.key.rpartition(".")[0]
     above = np.clip(1.0 + remedy.at * np.asarray(remedy.size), 1.0, HIGHEST)
@@ -206,7 +206,7 @@ def _breaking_away(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
     return Switch(changed, _free(asked, *keys), remedy.cause, len(keys))
 
 
-def _of_another_law(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
+def _of_another_law(remedy: Remedy, robot: Robot, asked: OutputError) -> Switch:
     """Levels and speeds from which a fit finds how friction falls, those of the first step; Dahl's law; or LuGre's with
     the critical damping to begin from."""
     table, _, law = remedy.key.rpartition(".")
@@ -221,7 +221,7 @@ def _of_another_law(remedy: Remedy, robot: Robot, asked: Question) -> Switch:
     return _rough(with_damping(robot.replace(friction=friction), keys), asked, keys, remedy.cause)
 
 
-def _rough(robot: Robot, asked: Question, names: Sequence[str], cause: Statement) -> Switch:
+def _rough(robot: Robot, asked: OutputError, names: Sequence[str], cause: Statement) -> Switch:
     """What a law begins with, free; what of it must be positive stays where it begins if a log says nothing of it."""
     own = {Key.parse(key).axis for key in asked.free or ()}  # of an axis that never moved nothing is asked
     keys = [key for name in names for key in expand_keys(name, robot) if Key.parse(key).axis in own | {None}]
@@ -232,7 +232,7 @@ def _rough(robot: Robot, asked: Question, names: Sequence[str], cause: Statement
     return Switch(robot.replace(priors={**robot.priors, **rough}), _free(asked, *keys), cause)
 
 
-def _at_wheels(robot: Robot, asked: Question) -> Iterator[Switch]:
+def _at_wheels(robot: Robot, asked: OutputError) -> Iterator[Switch]:
     """In the place of what acts on the body, at the levels that come nearest to it; and Coulomb friction beside it."""
     g = robot.wheels.wrench_matrix
     viscous, coulomb = _on_axes(robot.friction)
@@ -246,7 +246,7 @@ def _at_wheels(robot: Robot, asked: Question) -> Iterator[Switch]:
         yield _beside(robot, asked, False, 0.5 * level)
 
 
-def _at_each_wheel(robot: Robot, asked: Question) -> Switch:
+def _at_each_wheel(robot: Robot, asked: OutputError) -> Switch:
     """A level of each wheel: of the friction that is there already, else beside that on the body."""
     wheels, count = robot.friction.wheels, robot.wheels.count
     if not np.any(wheels.coulomb):
@@ -259,7 +259,7 @@ def _at_each_wheel(robot: Robot, asked: Question) -> Switch:
     )
 
 
-def _beside(robot: Robot, asked: Question, each: bool, level: float | tuple[float, ...]) -> Switch:
+def _beside(robot: Robot, asked: OutputError, each: bool, level: float | tuple[float, ...]) -> Switch:
     """Coulomb friction at the wheels beside that on the body, of which half is left."""
     direction = robot.friction.direction
     viscous, coulomb = _on_axes(robot.friction)

@@ -1,0 +1,48 @@
+"""Which method a robot and its logs allow: output error, or where they do not allow that, steady state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from omnidyn.findings.needs import why_no_inputs
+from omnidyn.identification.methods import OUTPUT_ERROR, STEADY_STATE, Method, OutputError, SteadyState
+from omnidyn.identification.steady.operating_points import why_no_transient
+from omnidyn.model.motor import DUTY, SPEED, VOLTAGE
+from omnidyn.model.robot import MEASURED, Prior, Robot
+from omnidyn.progress import Progress, Report
+from omnidyn.run import Run
+
+
+def as_driven(robot: Robot, runs: Sequence[Run]) -> Robot:
+    """The robot with the drive that its logs show: one of duties where they hold duties and no voltage.
+
+    A file without it would take the next set of duties for volts. The supply is the median of the logged one, where
+    the file has none.
+    """
+    if robot.drive.kind != VOLTAGE or not runs or any(run.duty is None or run.voltage is not None for run in runs):
+        return robot
+    drive, priors = robot.drive.replace(kind=DUTY), robot.priors
+    supplies = [run.supply[np.isfinite(run.supply)] for run in runs if run.supply is not None]
+    logged = np.concatenate(supplies) if supplies else np.zeros(0)
+    if drive.supply is None and logged.size and float(np.median(logged)) > 0.0:
+        drive = drive.replace(supply=round(float(np.median(logged)), 3))
+        priors = {**priors, "drive.supply_V": Prior(source="median of the logs", origin=MEASURED)}
+    return robot.replace(drive=drive, priors=priors)
+
+
+def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
+    """Why whole logs are not fitted by output error unless it is asked for, in words; "" where they are."""
+    why = why_no_inputs(runs, robot)
+    if why or robot.drive.kind != SPEED or any(run.voltage is not None or run.duty is not None for run in runs):
+        return why
+    return why_no_transient(runs, robot)
+
+
+def default_method(runs: Sequence[Run], robot: Robot, progress: Progress) -> tuple[Method, str]:
+    """(the method that robot and logs support, why it is not output error, "" where it is); `progress` hears why."""
+    why = why_not_output_error(runs, robot)
+    if why:
+        progress(Report(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {why}", urgent=True))
+    return (SteadyState() if why else OutputError()), why
