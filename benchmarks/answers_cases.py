@@ -322,7 +322,7 @@ load_robot("axbot")
 [breakaway_voltage(load_robot(f"{name}.toml"), [[1, -2, 0.5], [0, 0, 0]]) for name in ("mixed", "ellipse", "limits")]
 breakaway_voltage(load_robot("axebot"), [1, 2])
 [dead_zone_map(load_robot(f"{name}.toml"), np.arange(0, 6.3, 0.7)) for name in ("box", "disc", "ellipse", "wheels")]
-[moves(load_robot(f"{name}.toml"), np.outer(np.arange(5), [0, 0.3, -0.3])) for name in ("box", "sticky", "mixed")]
+[moving_axes(load_robot(f"{name}.toml"), np.outer(np.arange(5), [0, 0.3, -0.3])) for name in ("box", "sticky", "mixed")]
 acceleration(load_robot("box.toml"), [[0.1, 0.2, -1], [0, 0, 0]], [[1, 2, 3], [0.1, 0, 0]])
 acceleration(load_robot("mixed.toml"), [[0.1, 0.2, -1], [0, 0, 0]], [[1, 2, 3], [0.1, 0, 0]])
 acceleration(load_robot("ellipse.toml"), [0.1, 0, 0], [4, 1])

@@ -164,9 +164,9 @@ def identified(model: str, folder: Path) -> dict[str, Any]:
 def errors(model: str, folder: Path) -> dict[str, Any]:
     """The standard errors of a fit alone, by all rows."""
     import omnidyn
-    from omnidyn.identification.output_error.problem import bounded
+    from omnidyn.identification.output_error.problem import problem
 
-    bounded.NUMBERS = bounded.ROWS = 10**12
+    problem.NUMBERS = problem.ROWS = 10**12
     runs = [omnidyn.read_log(path) for path in sorted(folder.glob("log*.csv"))]
     fit = omnidyn.identify(runs, omnidyn.load_robot(folder / f"{model}.toml")).estimate
     return {"std": dict(fit.std)}

@@ -1,14 +1,19 @@
 """The path of a value through the package: which functions hold it on its way from a call to its result.
 
-python -m benchmarks path_of_a_value    # of a voltage, from `omnidyn.simulate(robot, voltage, dt)` to the Run
+python -m benchmarks path_of_a_value
+
+of a voltage, from `omnidyn.simulate(robot, voltage, dt)` to the Run; of a cell of a CSV file, from
+`omnidyn.read_log(path, robot)` to the Run.
 
 A function holds a value if the value is one of its arguments or local variables, or what it returns. Code that numba
-compiled is not seen: a kernel counts with the function that calls it.
+compiled is not seen: a kernel counts with the function that calls it, as a comprehension does.
 """
 
 from __future__ import annotations
 
+import re
 import sys
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +29,9 @@ from tests.house.test_import_direction import FLOORS
 PACKAGE = Path(omnidyn.__file__).parent
 Holds = Callable[[Any], bool]
 GOAL_STAYS, GOAL_CLIMBS = 8, 1  # of a voltage
+GOAL_STAYS_OF_CELL, GOAL_CLIMBS_OF_CELL = 45, 5
+DIGITS = 3.0123456789  # that nothing else has: a copy of an array is found too
+_COMPREHENSION = re.compile(r"\.<(?:locals|listcomp|genexpr|dictcomp|setcomp)>")
 
 
 class Place(NamedTuple):
@@ -117,7 +125,7 @@ def trail(call: Callable[[], Any], holds: Holds, package: Path = PACKAGE) -> Tra
 
 
 def _place(frame: FrameType, root: str) -> Place:
-    return Place(frame.f_code.co_filename.removeprefix(root), frame.f_code.co_qualname.replace(".<locals>", ""))
+    return Place(frame.f_code.co_filename.removeprefix(root), _COMPREHENSION.sub("", frame.f_code.co_qualname))
 
 
 def _caller(frame: FrameType, root: str) -> Place | None:
@@ -131,10 +139,21 @@ def _caller(frame: FrameType, root: str) -> Place | None:
 def path_of_a_voltage() -> Trail:
     """From `omnidyn.simulate` to the Run: the paper's robot, voltages within its limits."""
     robot = omnidyn.load_robot("axebot")
-    volts = 3.0123456789  # digits that nothing else has: a copy of the array is found too
-    voltage = np.full((10, robot.wheels.count), volts)
+    voltage = np.full((10, robot.wheels.count), DIGITS)
     omnidyn.simulate(robot, voltage, 0.01)  # imports, kernels
-    return trail(lambda: omnidyn.simulate(robot, voltage, 0.01), shows_number(volts, f"{volts}"))
+    return trail(lambda: omnidyn.simulate(robot, voltage, 0.01), shows_number(DIGITS, f"{DIGITS}"))
+
+
+def path_of_a_cell() -> Trail:
+    """From `omnidyn.read_log` of a CSV file to the Run: a voltage in one row of a simulated log."""
+    robot = omnidyn.load_robot("axebot")
+    voltage = 2.0 + 0.1 * np.sin(np.arange(300.0))[:, None] * np.arange(1.0, robot.wheels.count + 1.0)
+    voltage[11, 0] = DIGITS
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log.csv"
+        omnidyn.write_run(omnidyn.simulate(robot, voltage, 0.01), path)
+        omnidyn.read_log(path, robot)  # imports
+        return trail(lambda: omnidyn.read_log(path, robot), shows_number(DIGITS, f"{DIGITS}"))
 
 
 def as_row(table: Table, name: str, path: Trail, stays: int, climbs: int) -> None:
@@ -147,7 +166,8 @@ def as_row(table: Table, name: str, path: Trail, stays: int, climbs: int) -> Non
 
 
 def measure() -> Table:
-    """The path of a voltage."""
+    """The paths of a voltage and of a cell."""
     table = Table("the path of a value", ["what", "stays", "rooms", "climbs", "returns"])
     as_row(table, "voltage", path_of_a_voltage(), GOAL_STAYS, GOAL_CLIMBS)
+    as_row(table, "cell", path_of_a_cell(), GOAL_STAYS_OF_CELL, GOAL_CLIMBS_OF_CELL)
     return table

@@ -29,6 +29,7 @@ def table(room: str) -> str:
 def _cell(wording: Wording) -> str:
     """A template with the names of its numbers; of a function, what its docstring says."""
     text = wording if isinstance(wording, str) else " ".join((wording.__doc__ or "").split()).rstrip(".")
+    text = re.sub(r"\{\w+:[^}|]*\|([^}]*)\}", r"\1", text)  # the plural of two words
     return re.sub(r"\{(\w+)[^}]*\}", r"*\1*", text).replace("|", "\\|")
 
 

@@ -35,7 +35,7 @@ TABLE = omnidyn.read_steady_table(Path(__file__).resolve().parents[1] / "example
         (lambda: omnidyn.write_run("run.csv", RUN), "the text 'run.csv' before a Run", r"write_run\(run, path\)"),
         (lambda: omnidyn.save_robot("robot.toml", ROBOT), "the text 'robot.toml' before a Robot", "save_robot"),
         (lambda: omnidyn.breakaway_voltage(VOLTS, ROBOT), "a ndarray before a Robot", "breakaway_voltage"),
-        (lambda: omnidyn.moves(VOLTS, ROBOT), "a ndarray before a Robot", r"moves\(robot, voltage\)"),
+        (lambda: omnidyn.moving_axes(VOLTS, ROBOT), "a ndarray before a Robot", r"moving_axes\(robot, voltage\)"),
     ],
 )
 def test_a_swapped_pair_is_recognised(call, got, expected):
@@ -73,7 +73,7 @@ def test_right_ones_pass_and_what_an_iterator_holds_is_not_asked():
     [
         omnidyn.dead_zone, omnidyn.axis_patterns, omnidyn.state_space, omnidyn.plausible,
         lambda name: omnidyn.dead_zone_map(name, [0.0]), lambda name: omnidyn.breakaway_voltage(name, VOLTS),
-        lambda name: omnidyn.moves(name, VOLTS), lambda name: omnidyn.band(name, VOLTS, 0.1),
+        lambda name: omnidyn.moving_axes(name, VOLTS), lambda name: omnidyn.confidence_band(name, VOLTS, 0.1),
         lambda name: omnidyn.acceleration(name, np.zeros(3), np.zeros(3)),
         lambda name: omnidyn.identify(TABLE, name),
     ],

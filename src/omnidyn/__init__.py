@@ -33,20 +33,20 @@ _HOME = {
     "Tuned": "omnidyn.control.tune",
     "acceleration": "omnidyn.model.dynamics",
     "axis_patterns": "omnidyn.model.deadzone",
-    "band": "omnidyn.simulation.band",
     "breakaway_voltage": "omnidyn.model.deadzone",
     "check": "omnidyn.findings.check",
     "compare": "omnidyn.comparison.compare",
+    "confidence_band": "omnidyn.simulation.band",
     "dead_zone": "omnidyn.model.known.dead_zone",
     "dead_zone_map": "omnidyn.model.deadzone",
-    "demand": "omnidyn.control.demand",
     "drift": "omnidyn.comparison.drift",
     "feedforward_table": "omnidyn.control.table",
     "identify": "omnidyn.identification.identify",
     "load_log": "omnidyn.logs.read_log",
     "load_robot": "omnidyn.model.robot_file",
-    "moves": "omnidyn.model.deadzone",
+    "moving_axes": "omnidyn.model.deadzone",
     "path": "omnidyn.control.paths.path",
+    "path_demand": "omnidyn.control.demand",
     "plausible": "omnidyn.model.known.uncertainty",
     "preset_names": "omnidyn.model.robot_file",
     "read_commands": "omnidyn.logs.command_file",
@@ -58,7 +58,7 @@ _HOME = {
     "state_space": "omnidyn.model.dynamics",
     "track": "omnidyn.control.closed_loop",
     "tune": "omnidyn.control.tune",
-    "vary": "omnidyn.model.vary",
+    "vary_robot": "omnidyn.model.vary",
     "voltage_for": "omnidyn.control.feedforward",
     "write_run": "omnidyn.logs.run_file",
 }
@@ -70,7 +70,7 @@ if TYPE_CHECKING:
     from omnidyn.comparison.drift import drift
     from omnidyn.comparison.result import Comparison
     from omnidyn.control.closed_loop import track
-    from omnidyn.control.demand import demand
+    from omnidyn.control.demand import path_demand
     from omnidyn.control.feedforward import voltage_for
     from omnidyn.control.paths.path import path
     from omnidyn.control.table import feedforward_table
@@ -85,15 +85,15 @@ if TYPE_CHECKING:
     from omnidyn.logs.read_log import load_log, read_log
     from omnidyn.logs.run_file import write_run
     from omnidyn.logs.steady_table import read_steady_table
-    from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
+    from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moving_axes
     from omnidyn.model.dynamics import acceleration, state_space
     from omnidyn.model.known.dead_zone import dead_zone
     from omnidyn.model.known.uncertainty import plausible
     from omnidyn.model.robot import Robot
     from omnidyn.model.robot_file import load_robot, preset_names, save_robot
-    from omnidyn.model.vary import vary
+    from omnidyn.model.vary import vary_robot
     from omnidyn.run import Run
-    from omnidyn.simulation.band import band
+    from omnidyn.simulation.band import confidence_band
     from omnidyn.simulation.simulate import simulate
 
 

@@ -180,7 +180,7 @@ def test_with_the_load_of_the_log(call, tmp_path, offset):
     load = f"mass_kg = 1\ninertia_kg_m2 = 0.01\noffset_m = {list(offset)}\n"
     file = robot_to_toml(turns) + f"\n[variations.payload.crate]\n{load}"
     (tmp_path / "own.toml").write_text(file, "utf-8")
-    loaded = omnidyn.vary(load_robot("own.toml"), payload="crate")
+    loaded = omnidyn.vary_robot(load_robot("own.toml"), payload="crate")
     omnidyn.write_run(noisy(clean_log(loaded, 1), 1), "loaded.csv")
     found = {}
     for name, more in (("with", ("--with", "payload=crate")), ("without", ())):

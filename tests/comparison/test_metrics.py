@@ -5,9 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from omnidyn.comparison.aligned import errors_for_whiteness, settled
 from omnidyn.comparison.metrics import metrics
-from omnidyn.comparison.traces import Trace, compared_components, trace_of, unit, unwrapped
+from omnidyn.comparison.traces import (
+    Trace,
+    compared_components,
+    errors_for_whiteness,
+    settled,
+    trace_of,
+    unit,
+    unwrapped,
+)
 from omnidyn.run import Run
 
 N = 1000

@@ -111,20 +111,20 @@ def test_it_says_what_it_found():
 
 def test_a_demand_by_hand():
     """A circle along at v: v/r about yaw; a square jumps by sqrt 2 v at its corners."""
-    asked = omnidyn.demand(AXEBOT, "circle:radius_m=0.5,speed_m_s=0.4,heading=along")
+    asked = omnidyn.path_demand(AXEBOT, "circle:radius_m=0.5,speed_m_s=0.4,heading=along")
     assert (asked.speed, asked.turn) == (pytest.approx(0.4), pytest.approx(0.8))
     assert asked.corners == 0
     assert asked.follows
     volts = omnidyn.voltage_for(AXEBOT, [0.4, 0.0, 0.8], [0.0, 0.0, 0.0])
     assert asked.voltage == pytest.approx(np.abs(volts).max(), rel=1e-9)
-    corners = omnidyn.demand(AXEBOT, "square:speed_m_s=0.5,rounds=1")
+    corners = omnidyn.path_demand(AXEBOT, "square:speed_m_s=0.5,rounds=1")
     assert corners.corners == 3
     assert corners.jump == pytest.approx(0.5 * np.sqrt(2.0))
     assert "between its corners" in str(corners.verdict)
-    fast = omnidyn.demand(AXEBOT, "eight:period_s=2")
+    fast = omnidyn.path_demand(AXEBOT, "eight:period_s=2")
     assert not fast.follows
     assert "cannot follow" in str(fast.verdict)
-    warm = omnidyn.demand(shaped("disc", current_limit=0.5), "eight:period_s=4")
+    warm = omnidyn.path_demand(shaped("disc", current_limit=0.5), "eight:period_s=4")
     assert not warm.follows
     assert "A of 0.5 A" in str(warm.verdict)
 

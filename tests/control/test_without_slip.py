@@ -59,7 +59,7 @@ def test_a_run_says_which_wheels_slipped():
 
 def test_a_path_asks_no_more_than_the_floor_takes():
     """The current at which a wheel slips is a limit, as that of a motor is: a floor that takes half as much."""
-    asked = omnidyn.demand(AXEBOT, "eight:period_s=4")
+    asked = omnidyn.path_demand(AXEBOT, "eight:period_s=4")
     assert asked.follows
     assert not asked.grip
     amperes = (
@@ -70,7 +70,7 @@ def test_a_path_asks_no_more_than_the_floor_takes():
         * AXEBOT.wheels.wheel_radius
         / (AXEBOT.motor.gear_ratio * AXEBOT.motor.torque_constant)
     )
-    found = omnidyn.demand(gripping(0.1), "eight:period_s=4")
+    found = omnidyn.path_demand(gripping(0.1), "eight:period_s=4")
     assert found.current == pytest.approx(asked.current, rel=0.05)  # a wheel has some inertia here
     assert found.current_limit == pytest.approx(amperes, rel=1e-9)
     assert found.grip

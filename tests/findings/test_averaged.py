@@ -8,9 +8,9 @@ from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import MotorLine
 from omnidyn.identification.motors.log import averaged_statements, motor_logs
 from omnidyn.identification.motors.windows import fit_line, motor_windows
-from omnidyn.logs.averaged import rows_of_mean
 from omnidyn.logs.log import Log
 from omnidyn.logs.read_log import load_log
+from omnidyn.logs.resolved import rows_of_mean
 from omnidyn.run import Run
 from tests.findings.redundant import ROBOT, recorded
 from tests.support.cases import case

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.findings.check import check
-from omnidyn.findings.guesses import judged_again, rest_on_guesses
+from omnidyn.findings.finding import judged_again, rest_on_guesses
 from omnidyn.identification.log_verdicts import judged_by_fit
 from omnidyn.logs.columns.mapping import load_map
 from omnidyn.logs.read_log import LogOptions, load_log
@@ -52,7 +52,7 @@ def test_it_stays_or_goes_away_with_the_fitted_robot(log, robot):
     assert before.of("swapped")[0].severity == "warning"
     (after,) = judged_by_fit([before], [swapped], robot, told.append)
     assert after.of("swapped")[0].severity == "error"
-    assert "so it is with the fitted robot" in str(after.of("swapped")[0])
+    assert "the fitted robot shows it too" in str(after.of("swapped")[0])
     # A motor that was guessed wrong explains all of it, and the finding goes away.
     wrong = guessed(robot.replace(motor=robot.motor.replace(emf_constant=2.0 * robot.motor.emf_constant)))
     before = check(log, wrong)
@@ -60,8 +60,8 @@ def test_it_stays_or_goes_away_with_the_fitted_robot(log, robot):
     (after,) = judged_by_fit([before], [log], robot, told.append)
     assert not rest_on_guesses(after)
     assert not after.of("energy")
-    assert "with the fitted robot this is gone" in str(after.of("judged_again")[0])
-    assert any(report.urgent and "this is gone" in str(report) for report in told)
+    assert "with the fitted robot this is no longer found" in str(after.of("judged_again")[0])
+    assert any(report.urgent and "this is no longer found" in str(report) for report in told)
 
 
 def test_nothing_is_checked_twice_where_nothing_was_guessed(log, robot):

@@ -54,7 +54,7 @@ def test_a_longer_log_is_asked_for_against_noise_only(right):
     )  # fmt: skip
     words = str(*advice._wide(fit))
     assert ("times as long" in words) is right
-    assert ("no longer log mends that" in words) is not right
+    assert ("a longer log does not help" in words) is not right
 
 
 def test_a_fit_to_200_logs_without_noise_that_overlap_ends():

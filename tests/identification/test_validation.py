@@ -9,8 +9,9 @@ from scipy.signal import lfilter
 
 import omnidyn
 from omnidyn.errors import InputError
+from omnidyn.identification.default_method import why_not_output_error
 from omnidyn.identification.identify import identify
-from omnidyn.identification.methods import OutputError, choose_method
+from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.conclusion import SCALE_OF_T
 from omnidyn.identification.output_error.fit import NU
 from omnidyn.identification.validation import Score, coloured, validate
@@ -132,26 +133,21 @@ def test_identify_takes_output_error_where_it_can():
 
 def test_what_decides_the_method():
     run = noisy_draw(simulate(AXEBOT, excitation(2.0), 0.01), 1)
-    assert choose_method([run], AXEBOT) == ("output-error", "")
-    assert choose_method([run], AXEBOT, ["shape"]) == ("steady-state", "")
-    assert choose_method([run], load_robot("robotino"), ["free"]) == ("output-error", "")
-    assert choose_method([run], load_robot("robotino")) == ("output-error", "")  # by the implicit engine
+    assert why_not_output_error([run], AXEBOT) == ""
+    assert why_not_output_error([run], load_robot("robotino")) == ""  # by the implicit engine
     angles = run.replace(twist=None, wheel_angle=run.voltage)
-    assert choose_method([angles], AXEBOT) == ("output-error", "")
-    assert choose_method([angles], load_robot("robotino")) == ("output-error", "")
-    assert "no voltage and no duty" in choose_method([run.replace(voltage=None)], AXEBOT)[1]
-    assert "no speed, angle, current or pose" in choose_method([run.replace(twist=None)], AXEBOT)[1]
+    assert why_not_output_error([angles], AXEBOT) == ""
+    assert why_not_output_error([angles], load_robot("robotino")) == ""
+    assert "no voltage and no duty" in why_not_output_error([run.replace(voltage=None)], AXEBOT)
+    assert "no speed, angle, current or pose" in why_not_output_error([run.replace(twist=None)], AXEBOT)
 
 
-def test_options_of_another_method_are_refused():
+def test_arguments_that_a_method_does_not_take_are_refused():
     run = noisy_draw(simulate(AXEBOT, excitation(2.0), 0.01), 1)
-    with pytest.raises(InputError, match=r"output-error has no such option; got `shape`; expected with steady-state"):
-        omnidyn.identify(run, AXEBOT, omnidyn.SteadyState(shape="disc"))
-    with pytest.raises(InputError, match="steady-state has no such option; got `loss`"):
-        omnidyn.identify(run, AXEBOT, omnidyn.SteadyState(loss="student-t"))
-    with pytest.raises(InputError, match="method: no such method; got magic; expected output-error or steady-state"):
-        omnidyn.identify(run, AXEBOT, omnidyn.OutputError())
-    assert "nuisances (output-error, motors output-error)" in OutputError.__doc__
+    with pytest.raises(InputError, match=r"steady-state has no such option; got `hold_out`"):
+        omnidyn.identify(run, AXEBOT, omnidyn.SteadyState(), hold_out="*")
+    with pytest.raises(InputError, match=r"got `groups`"):
+        omnidyn.identify(run, AXEBOT, omnidyn.MotorLine(), groups=["a"])
 
 
 def test_one_component_of_many_is_coloured_by_chance_more_often():

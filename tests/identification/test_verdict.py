@@ -81,10 +81,10 @@ def test_a_half_good_fit():
 def test_a_bad_fit():
     assert said(fit_verdict(estimate([0.02] * 6), beside(BAD))) == (
         "On the fitted logs the model does not follow: wheel speeds not at all (rms error 9 rad/s): "
-        "its numbers mean nothing until it does."
+        "its numbers are not usable until it does."
     )
     lost = estimate([0.02] * 6, not_followed=("wheel_speed[0]",))
-    assert lost.verdict == "The model does not follow wheel_speed[0]: its numbers mean nothing until it does."
+    assert lost.verdict == "The model does not follow wheel_speed[0]: its numbers are not usable until it does."
     assert fit_verdict(lost, beside(GOOD)).numbers["known"] is None
 
 
@@ -116,11 +116,11 @@ def test_groups_faults_and_interrupts_are_said():
     verdicts = [Verdict((Finding("wrapped", ERROR, "i1", {"bits": 16}),))]
     fits = {"all": estimate([0.02] * 6)}
     assert said(*fits_verdict(fits, {}, verdicts)).startswith(
-        "The log has an error, to be mended first: i1 is near 0 or near 2^16"
+        "The log has an error that must be corrected first: i1 is near 0 or near 2^16"
     )
     both = said(*fits_verdict({"oak": fits["all"], "felt": fits["all"]}, {"oak": beside(GOOD)}, cut=True))
     assert both.startswith(
-        "Cut short: the numbers are the best so far, not the best there are. Oak: on the fitted logs the model follows "
+        "Cut short: the numbers are the best so far, not the final ones. Oak: on the fitted logs the model follows "
         "wheel speeds within 3 %"
     )
     assert "Felt: all 6 numbers are known" in both
@@ -171,7 +171,7 @@ def test_no_shape_fits():
     )
     found = Identification(OutputError(), "steady-state", {"all": estimate([0.02] * 6, Estimate)}, study=study(7.0))
     assert found.verdict.startswith("Failed: no shape of friction explains the forces: the best, disc, misses 7 N")
-    assert found.verdict.endswith("the numbers mean nothing until that is mended.")
+    assert found.verdict.endswith("the numbers are not usable until that is corrected.")
     assert replace(found, study=study(0.5)).failures == ()
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moves
+from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moving_axes
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.simulation.simulate import simulate
 from tests.support.strategies import any_robot, volts
@@ -17,7 +17,7 @@ def test_what_moves_is_what_does_not_stay_at_rest(robot, data):
     rows = np.array([data.draw(volts(robot.wheels.count, limit)) for limit in (0.1, 0.5, 1.0, 6.0)])
     wrench = drive_wrench(robot, np.zeros((4, 3)), rows)
     assume((np.abs(np.abs(wrench) - robot.friction.axes.levels[2]) > EDGE).all())
-    for row, expected in zip(rows, moves(robot, rows), strict=True):
+    for row, expected in zip(rows, moving_axes(robot, rows), strict=True):
         run = simulate(robot, np.tile(row, (3, 1)), [1e-6, 1e-3, 0.1])
         assert ((run.twist[1:] != 0.0) == expected).all()
         assert (run.pose[3] != 0.0).any() == expected.any()

@@ -15,11 +15,12 @@ from omnidyn.interop.robot_json import robot_of_json
 from omnidyn.logs.columns.mapping import parse_column
 from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.read_log import read_log
+from omnidyn.logs.readers import text
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.readers.ros.layout import parse_definition
 from omnidyn.logs.readers.wpilog import leaves_of
 from omnidyn.logs.run_file import write_run
-from omnidyn.logs.table import dialect, spaced
+from omnidyn.logs.table import dialect
 from omnidyn.model.keys import Key
 from omnidyn.run import Run
 from omnidyn.units import known_unit
@@ -32,7 +33,7 @@ PIECES = [
 ]  # fmt: skip
 READERS = {
     "name": read_name, "unit": known_unit, "brackets": dialect.split_unit, "cell": dialect.looks_like_number,
-    "row": dialect.looks_like_data, "spaces": spaced.cells, "threshold": parse_threshold, "key": Key.parse,
+    "row": dialect.looks_like_data, "spaces": text.cells, "threshold": parse_threshold, "key": Key.parse,
     "column": lambda text: parse_column(f"u1={text}"), "toml": lambda text: parse_toml(text, "x"),
     "toml key": lambda text: parse_toml(f"a = {text}", "x"), "json": robot_of_json,
     "definition": lambda text: parse_definition("a/b", text), "struct": lambda text: leaves_of("a", {"a": text}),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.logs.one_clock import on_clock_of, on_clock_of_wheels
+from omnidyn.logs.segments import on_clock_of, on_clock_of_wheels
 from omnidyn.run import Run
 
 STEP = 0.02

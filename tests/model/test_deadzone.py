@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError
-from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moves
+from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moving_axes
 from omnidyn.model.first_guess import even_azimuths, first_guess
 from omnidyn.model.wheels import Wheels
 
@@ -44,7 +44,7 @@ def test_breakaway_counts_not_coulomb(axebot):
 
 def test_moves_tells_the_axes(axebot):
     volts = [[0.0, 0.66, -0.66], [0.0, 0.68, -0.68], [0.54, -0.27, -0.27], [0.18, 0.18, 0.18], [0.0, 0.0, 0.0]]
-    assert moves(axebot, volts).tolist() == [
+    assert moving_axes(axebot, volts).tolist() == [
         [False, False, False],
         [True, False, False],
         [False, True, False],
@@ -66,6 +66,6 @@ def test_a_push_along_one_axis_moves_no_other(count):
     robot = first_guess("even", wheels, 2.0, None, "direction")
     for pattern, alone in zip(axis_patterns(robot), np.eye(3, dtype=bool), strict=True):
         scale = breakaway_voltage(robot, pattern)
-        assert (moves(robot, 2.0 * scale * pattern) == alone).all()
-        assert (moves(robot, (1.0 + 1e-9) * scale * pattern) == alone).all()
-        assert not moves(robot, (1.0 - 1e-9) * scale * pattern).any()
+        assert (moving_axes(robot, 2.0 * scale * pattern) == alone).all()
+        assert (moving_axes(robot, (1.0 + 1e-9) * scale * pattern) == alone).all()
+        assert not moving_axes(robot, (1.0 - 1e-9) * scale * pattern).any()

@@ -48,7 +48,7 @@ def test_a_way_of_reading_the_input_that_the_logs_refute_claims_no_friction(benc
     assert not fit.dead_band_seen
     low, high = fit.ci95["dead_band"]
     assert low == 0.0 <= 0.35e-3 < high < 0.03 * 0.25
-    assert "the logs are met better where the input is the mean of two rows" in str(fit.warnings[0])
+    assert "the logs are fitted better where the input is the mean of two rows" in str(fit.warnings[0])
 
 
 def test_the_way_is_chosen_on_training_logs_alone(bench):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from omnidyn.report.formulas import formula
+from omnidyn.report.page import formula
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,7 @@ import numpy as np
 
 import omnidyn
 from omnidyn.logs.path import path_of
-from omnidyn.report.estimate_picture import estimate_curves
-from omnidyn.report.figures.friction_speed import draw_friction_speed
+from omnidyn.report.figures.friction_speed import draw_friction_speed, estimate_curves
 from omnidyn.report.figures.path import SECTORS, draw_path
 from omnidyn.run import Run
 from tests.support.figures import shown_texts

@@ -11,7 +11,7 @@ from omnidyn.model.keys import Key
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot
-from omnidyn.simulation.band import band, first_order_band
+from omnidyn.simulation.band import confidence_band, first_order_band
 from omnidyn.simulation.simulate import simulate
 
 AXEBOT = load_robot("axebot")
@@ -28,7 +28,7 @@ def known(robot, key, std):
 @pytest.mark.parametrize("robot, key", [(AXEBOT, C_X["axes"]), (ELLIPSE, C_X["direction"])], ids=["exact", "implicit"])
 def test_the_width_is_that_of_the_slope(robot, key):
     """Sliding forward: v is linear in C_x."""
-    low, high, draws = band(known(robot, key, 0.022), FORWARD, 2e-3)
+    low, high, draws = confidence_band(known(robot, key, 0.022), FORWARD, 2e-3)
     step = 0.01
     up, down = (simulate(Key.parse(key).set(robot, 2.2 + sign * step), FORWARD, 2e-3) for sign in (1.0, -1.0))
     slope = (up.twist[:, 0] - down.twist[:, 0]) / (2.0 * step)
@@ -40,7 +40,7 @@ def test_the_width_is_that_of_the_slope(robot, key):
 
 def test_what_all_is_known_of_has_no_width():
     run = simulate(AXEBOT, FORWARD, 2e-3)
-    low, high, _ = band(known(AXEBOT, "friction.axes.coulomb[1]", 0.1), FORWARD, 2e-3)
+    low, high, _ = confidence_band(known(AXEBOT, "friction.axes.coulomb[1]", 0.1), FORWARD, 2e-3)
     for name in ("voltage", "current", "wheel_speed", "twist", "pose"):
         np.testing.assert_array_equal(getattr(low, name), getattr(run, name))
         np.testing.assert_array_equal(getattr(high, name), getattr(run, name))
@@ -50,31 +50,33 @@ def test_a_robot_that_may_or_may_not_move():
     """0.66 V for a dead zone of 0.67 +- 0.03 V: no slope at all, and yet it may move."""
     volts = np.tile([0.0, 0.66, -0.66], (300, 1))
     assert not simulate(AXEBOT, volts, 2e-3).twist.any()
-    low, high, _ = band(known(AXEBOT, C_X["axes"], 0.1), volts, 2e-3)
+    low, high, _ = confidence_band(known(AXEBOT, C_X["axes"], 0.1), volts, 2e-3)
     assert not low.twist.any()
     assert high.twist[-1, 0] > 0.01
 
 
 def test_the_same_seed_is_the_same_band_whatever_the_threads(monkeypatch):
     robot = AXEBOT.replace(priors={"motor.resistance_ohm": Prior(std=0.1), C_X["axes"]: Prior(std=0.1)})
-    one = band(robot, FORWARD, 2e-3, draws=20)
-    assert one == band(robot, FORWARD, 2e-3, draws=20)
+    one = confidence_band(robot, FORWARD, 2e-3, draws=20)
+    assert one == confidence_band(robot, FORWARD, 2e-3, draws=20)
     monkeypatch.setattr("os.cpu_count", lambda: 1)
-    assert one == band(robot, FORWARD, 2e-3, draws=20)
-    assert one.high != band(robot, FORWARD, 2e-3, draws=20, seed=1).high
+    assert one == confidence_band(robot, FORWARD, 2e-3, draws=20)
+    assert one.high != confidence_band(robot, FORWARD, 2e-3, draws=20, seed=1).high
 
 
 def test_it_takes_what_simulate_takes():
     robot = known(load_robot("robotino"), "drive.kp_V_s_rad", 1.0)
     commands = np.tile([0.5, 0.0, -0.5], (20, 1))
-    low, high, _ = omnidyn.band(robot, wheel_speed_command=commands, dt=0.01, draws=20, twist=(0.1, 0.0, 0.0))
+    low, high, _ = omnidyn.confidence_band(
+        robot, wheel_speed_command=commands, dt=0.01, draws=20, twist=(0.1, 0.0, 0.0)
+    )
     assert (high.voltage[1] > low.voltage[1]).any()
     np.testing.assert_array_equal(low.twist[0], high.twist[0])
 
 
 def test_a_robot_without_std_has_no_band():
     with pytest.raises(InsufficientDataError, match="nothing says how far the numbers of this robot may be off"):
-        band(AXEBOT, FORWARD, 2e-3)
+        confidence_band(AXEBOT, FORWARD, 2e-3)
 
 
 # ---- to first order ---------------------------------------------------------------------------------------
@@ -116,7 +118,7 @@ def test_what_is_known_together_is_known_however_little_each_is():
         return first_order_band(robot, run, lambda each: simulate(each, turning, 5e-3, tol=None))
 
     assert width(together, sloped) < 1e-6 < 1e-2 < width(robot, sloped)
-    assert width(together, lambda each: band(each, turning, 5e-3)) > 100.0 * width(together, sloped)
+    assert width(together, lambda each: confidence_band(each, turning, 5e-3)) > 100.0 * width(together, sloped)
 
 
 def test_a_number_at_the_end_of_its_range_has_one_side():

@@ -7,7 +7,7 @@ import omnidyn
 from benchmarks.wrong_worlds.log import robot_of
 from benchmarks.wrong_worlds.world import World, drive
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moves
+from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moving_axes
 from omnidyn.model.keys import Key
 from omnidyn.model.log_effects import Lateness, LogEffects
 from omnidyn.model.motor import Drive
@@ -94,8 +94,8 @@ def test_the_dead_zone_has_the_dead_band_in_it():
     assert 2 in equal
     assert after[equal] == pytest.approx(before[equal] + DEAD, rel=1e-9)
     yaw = np.ones(3) * after[2]
-    assert moves(real, 1.001 * yaw)[2]
-    assert not moves(real, 0.999 * yaw)[2]
+    assert moving_axes(real, 1.001 * yaw)[2]
+    assert not moving_axes(real, 0.999 * yaw)[2]
 
 
 def test_steps_of_a_simulation_end_where_commands_act_and_channels_look():

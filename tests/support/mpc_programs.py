@@ -9,7 +9,7 @@ import numpy as np
 
 from omnidyn import load_robot
 from omnidyn.compiled.kernel import kernel
-from omnidyn.control.mpc.interior_point import ROOM_SIZE, solve
+from omnidyn.control.mpc.interior_point import ROOM_SIZE, Program, solve
 from omnidyn.control.mpc.model import numbers, volts
 from omnidyn.control.mpc.observer import ESTIMATE_SIZE, SCALE
 from omnidyn.control.mpc.program import make_costs, make_stages
@@ -19,7 +19,7 @@ from omnidyn.control.mpc.settings import Settings
 SPREAD = np.array([0.3, 0.3, 1.0, 1.0, 1.0, 6.0])  # of states, as in the stress test of the peers
 
 
-class Program(NamedTuple):
+class Problem(NamedTuple):
     """A program of n steps: bounds (2, n, wheels), weight (wheels,), wanted (n, wheels), start (6,)."""
 
     stage: np.ndarray
@@ -31,14 +31,14 @@ class Program(NamedTuple):
 
 
 @kernel
-def _make(linear, levels, estimate, settings, stage, wanted, pull, bounds, preview, x):
-    make_costs(linear, levels, estimate, settings, stage, wanted, pull, bounds, preview, 0, 0.0, x)
-    make_stages(linear, levels, estimate, stage, x)
+def _make(numbers, settings, estimate, program, preview):
+    make_costs(numbers, settings, estimate, program, preview, 0, 0.0)
+    make_stages(numbers, estimate, program)
 
 
 @kernel
-def _solve(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, room):
-    return solve(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, room)
+def _solve(program):
+    return solve(program)
 
 
 @lru_cache
@@ -62,8 +62,9 @@ def random_program(rng: np.random.Generator, scale: float, n: int = 20, robot: s
     estimate = np.zeros((ESTIMATE_SIZE, 3))
     estimate[SCALE] = 1.0
     stage, wanted = np.zeros((n, STAGE_SIZE)), np.zeros((n, known.wheels.count))
-    _make(table.linear, table.levels, estimate, settings, stage, wanted, table.pull, bounds, preview, along)
-    return Program(stage, table.push, bounds, weight, wanted, start)
+    problem = Problem(stage, table.push, bounds, weight, wanted, start)
+    _make(table, settings, estimate, Solver(n, known.wheels.count).program(problem, along), preview)
+    return problem
 
 
 class Solver:
@@ -74,18 +75,22 @@ class Solver:
         self.inverse, self.target, self.u = (np.zeros((n, wheels)) for _ in range(3))
         self.active, self.room = np.zeros((n, wheels), np.int64), np.zeros((ROOM_SIZE, n, wheels))
 
-    def solve(self, program: Program, warm: bool = False) -> tuple[np.ndarray, int]:
+    def program(self, problem: Problem, x: np.ndarray) -> Program:
+        """The program, with the arrays that it is solved in."""
+        return Program(
+            problem.push, problem.weight, problem.stage, problem.wanted, problem.bounds, self.answer, self.inverse,
+            self.target, x, self.u, self.active, self.room,
+        )  # fmt: skip
+
+    def solve(self, problem: Problem, warm: bool = False) -> tuple[np.ndarray, int]:
         if not warm:
             self.active[:] = 0
-        self.x[0] = program.start
-        passes = _solve(
-            program.stage, self.answer, program.push, self.inverse, self.target, self.x, self.u, self.active,
-            program.bounds, program.weight, program.wanted, self.room,
-        )  # fmt: skip
+        self.x[0] = problem.start
+        passes = _solve(self.program(problem, self.x))
         return self.u.copy(), passes
 
 
-def dense(program: Program) -> tuple[np.ndarray, np.ndarray]:
+def dense(program: Problem) -> tuple[np.ndarray, np.ndarray]:
     """(H, f) of 1/2 u^T H u + f . u over all inputs, by substitution of the states; nothing of riccati.py in it."""
     n, wheels = program.wanted.shape
     size = n * wheels
@@ -104,7 +109,7 @@ def dense(program: Program) -> tuple[np.ndarray, np.ndarray]:
     return hessian, slope
 
 
-def residual(program: Program, hessian: np.ndarray, slope: np.ndarray, u: np.ndarray) -> float:
+def residual(program: Problem, hessian: np.ndarray, slope: np.ndarray, u: np.ndarray) -> float:
     """By how much inputs miss the conditions of an optimum [V]: of |u - clip(u - slope of the cost / its scale)|."""
     low, high = (each.ravel() for each in program.bounds)
     along = hessian @ u.ravel() + slope

@@ -1,17 +1,16 @@
-"""The commands, one file each. What a command needs is imported when it runs: --help must be quick."""
+"""The commands. What a command needs is imported when it runs: --help must be quick."""
 
 from __future__ import annotations
 
 import typer
 
 import omnidyn
-from omnidyn.cli import check, compare, demo, identify, init, robots, simulate, warm
-from omnidyn.cli.at_rest import deadzone, friction
-from omnidyn.cli.control import track, tune
-from omnidyn.cli.exchange import bring, export
-from omnidyn.cli.logs import convert, info
+from omnidyn.cli import at_rest, check, compare, demo, exchange, identify, init, logs, loops, simulate, warm
 from omnidyn.cli.terminal.help import Grouped
+from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import show
+from omnidyn.cli.terminal.telling import tell
+from omnidyn.document import Document, Table
 
 app = typer.Typer(
     name="omnidyn", add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False,
@@ -23,6 +22,14 @@ def _version(wanted: bool) -> None:
     if wanted:
         show(f"omnidyn {omnidyn.__version__}")
         raise typer.Exit
+
+
+def robots(json: bool = typer.Option(False, "--json", help="For machines.")) -> None:
+    """List the robots that come along."""
+    known = {name: omnidyn.load_robot(name) for name in omnidyn.preset_names()}
+    data = [{"name": name, "wheels": robot.wheels.count, "source": robot.source} for name, robot in known.items()]
+    rows = [(name, f"{robot.wheels.count} wheels", robot.source) for name, robot in known.items()]
+    tell(Document([Table((), rows, "<")], {"robots": data}), json, provenance([robot_input(name) for name in known]))
 
 
 @app.callback(invoke_without_command=True)
@@ -43,8 +50,8 @@ def _omnidyn(
 
 for _command in (
     demo.demo, init.init, check.check, simulate.simulate, identify.identify, compare.compare, compare.drift,
-    deadzone.deadzone, friction.friction, track.track, tune.tune, info.info, convert.convert, robots.robots,
-    export.export, warm.warm,
+    at_rest.deadzone, at_rest.friction, loops.track, loops.tune, logs.info, logs.convert, robots,
+    exchange.export, warm.warm,
 ):  # fmt: skip
     app.command(cls=Grouped)(_command)
-app.command("import", cls=Grouped)(bring.bring)
+app.command("import", cls=Grouped)(exchange.bring)

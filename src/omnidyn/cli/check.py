@@ -71,7 +71,7 @@ def check(
     options, maps = flags.options(), flags.maps(force)
     with shown_progress("reading") as progress:
         files = log_options.log_files(log)
-        loaded = _robot(robot)
+        loaded = omnidyn.load_robot(robot) if robot else None
         done = [_checked(path, loaded, options, maps, progress, bool(picture)) for path in files]
     _compare_data(done)
     _tell(done, json, full, robot)
@@ -81,10 +81,6 @@ def check(
         raise typer.Exit(BAD_INPUT)
     if any(log.verdict is not None and (log.verdict.has_errors or log.verdict.useless) for log in done):
         raise typer.Exit(INSUFFICIENT)
-
-
-def _robot(robot: str) -> Robot | None:
-    return omnidyn.load_robot(robot) if robot else None
 
 
 def _checked(

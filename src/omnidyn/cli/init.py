@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
 import omnidyn
 from omnidyn.cli import log_options
-from omnidyn.cli.init_answers import LEAST_WHEELS, MOST_WHEELS, Answers, complete
-from omnidyn.cli.init_sizes import refuse_sizes
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal.numbers import number_list, number_words
 from omnidyn.cli.terminal.session import provenance, robot_input
+from omnidyn.cli.terminal.sizes import LEAST_WHEELS, MOST_WHEELS
 from omnidyn.cli.terminal.streams import say, show
 from omnidyn.cli.terminal.telling import tell
 from omnidyn.document import Document
@@ -20,19 +19,7 @@ from omnidyn.errors import InputError, printable
 from omnidyn.files import check_output, write_atomic
 from omnidyn.model.presets import preset_names
 
-if TYPE_CHECKING:
-    from omnidyn.logs.geometry import Geometry
-    from omnidyn.logs.read_log import LogOptions
-    from omnidyn.model.robot import Robot
-    from omnidyn.model.wheels import Wheels
-
-
 MAX_NAME = 60
-KEYS = {
-    "azimuth": "wheels.azimuth_deg", "wheel_radius": "wheels.wheel_radius_m", "robot_radius": "wheels.robot_radius_m",
-    "mass": "body.mass_kg", "voltage_limit": "motor.voltage_limit_V", "roller": "wheels.roller_angle_deg",
-    "gear_ratio": "motor.gear_ratio", "rotor_inertia": "motor.rotor_inertia_kg_m2",
-}  # fmt: skip
 
 
 @reads_logs("latency", "save_map", "sort", "skip_bad_rows", "current_unsigned")
@@ -77,19 +64,15 @@ def init(
     path = _checked_path(name := name.removesuffix(".toml"), out, force)
     log_options.keep_inputs(log, [like], [flags.map_file], "" if path == "-" else path)
     log_options.refuse_missing(log)
-    preset, told = _preset(like), _said(given)
+    from omnidyn.cli import init_robot
+
+    preset = omnidyn.load_robot(like) if like else None
+    told = [key for key, value in given.items() if value is not None]
     if not log and flags != NO_FLAGS:
         raise typer.BadParameter("--map, --column, --assume, --no-header, --rate, --max-bytes and --var are for --log.")
-    seen = from_logs(given, log, flags.options(), mecanum, bool(like)) if log else None
-    found = {KEYS[key] for key in KEYS.keys() & (_said(given).keys() - told.keys())}
-    answers = _answers(given, preset, mecanum)
-    robot = _with_motor(as_seen(_robot(name, answers, preset, mecanum, friction), seen, found), given, bool(like))
-    _write(robot, path, force, json, like)
-
-
-def _said(given: dict[str, Any]) -> dict[str, Any]:
-    """The numbers that are known, by their names here."""
-    return {key: value for key, value in given.items() if value is not None}
+    seen = init_robot.from_logs(given, log, flags.options(), mecanum, bool(like)) if log else None
+    robot = init_robot.robot_of(name, given, told, preset, mecanum, friction, seen)
+    _write(robot.name, *init_robot.file_of(robot), path, force, json, like)
 
 
 def _refuse_words(given: dict[str, Any], mecanum: bool, friction: str, like: str, out: str, json: bool) -> None:
@@ -140,23 +123,6 @@ def _refuse_numbers(given: dict[str, Any]) -> None:
         )
 
 
-def _answers(given: dict[str, Any], preset: Robot | None, mecanum: bool) -> Answers:
-    """All that is needed, with sizes that a robot may have. Raises InputError."""
-    refuse_sizes(_sizes(given, preset))
-    answers = complete({key: value for key, value in given.items() if value is not None}, preset, mecanum)
-    refuse_sizes(_sizes(answers.value, preset))
-    return answers
-
-
-def _sizes(given: dict[str, Any], preset: Robot | None) -> dict[str, Any]:
-    """What is given of lengths, angles and the mass, the rest from the preset."""
-    of_preset = {} if preset is None else {
-        "wheel_radius": preset.wheels.wheel_radius, "robot_radius": preset.wheels.robot_radius,
-        "mass": preset.body.mass,
-    }  # fmt: skip
-    return of_preset | {key: value for key, value in given.items() if value is not None}
-
-
 def _listed(key: str, text: str) -> list[float] | None:
     return number_list(f"--{key.replace('_', '-')}", text) if text else None
 
@@ -184,159 +150,15 @@ def _checked_path(name: str, out: str, force: bool) -> str:
     return path
 
 
-def _preset(like: str) -> Robot | None:
-    return omnidyn.load_robot(like) if like else None
-
-
-def _robot(name: str, answers: Answers, preset: Robot | None, mecanum: bool, friction: str) -> Robot:
-    """The robot of these answers. Raises InputError, also where no guess makes sense."""
-    from omnidyn.model.first_guess import DIRECTION, default_prior, first_guess, like
-    from omnidyn.model.robot import Body
-
-    value = answers.value
-    wheels, mass = _wheels(value, preset, mecanum), value.get("mass", preset.body.mass if preset else None)
-    Body(mass=mass, inertia=1.0)
-    told = {KEYS[key] for key in value if key in KEYS and key not in answers.accepted}
-    told |= {KEYS["azimuth"], KEYS["roller"]} if mecanum else set()
-    try:
-        if preset is not None:
-            robot = like(preset, name, wheels, mass, value.get("voltage_limit"), told)
-        else:
-            robot = first_guess(
-                name, wheels, mass, value.get("voltage_limit"), friction or DIRECTION, value.get("speed_loop", ())
-            )
-    except InputError as error:
-        raise InputError(
-            "cannot make such a robot", got=str(error), remedy="check the units: m, kg, V, degree", where=name
-        ) from None
-    accepted = {KEYS[key]: value[key] for key in answers.accepted if key in value}
-    return robot.replace(priors=robot.priors | {key: default_prior(key, one) for key, one in accepted.items()})
-
-
-def _with_motor(robot: Robot, given: dict[str, Any], copied: bool) -> Robot:
-    """The robot with the gear and the rotor that were given. copied: from a preset, whose motors stay as they are.
-
-    Raises InputError for a rotor behind a gear that is only guessed: at the wheel it counts with its square.
-    """
-    from omnidyn.model.first_guess import GEAR, with_gear, with_rotor
-    from omnidyn.model.robot import GIVEN, GUESS, Prior
-
-    gear, rotor = given["gear_ratio"], given["rotor_inertia"]
-    if gear is not None and copied:
-        known = {key: prior for key, prior in robot.priors.items() if not key.startswith(GEAR)}
-        motor = robot.motor.replace(gear_ratio=gear)
-        robot = robot.replace(motor=motor, priors=known | {GEAR: Prior(origin=GIVEN)})
-    elif gear is not None:
-        robot = with_gear(robot, gear, "", GIVEN)
-    if rotor is None:
-        return robot
-    if GEAR in robot.priors and robot.priors[GEAR].origin == GUESS:
-        raise InputError(
-            "a rotor needs its gear: at the wheel its inertia is J l^2", got=f"{rotor:g} kg m2 and no gear ratio",
-            expected="both", remedy="give --gear-ratio too", where="--rotor-inertia",
-        )  # fmt: skip
-    return with_rotor(robot, rotor)
-
-
-def _wheels(value: dict[str, Any], preset: Robot | None, mecanum: bool) -> Wheels:
-    from omnidyn.model.first_guess import mecanum_wheels
-    from omnidyn.model.wheels import Wheels
-
-    known: dict[str, Any] = {key: value[key] for key in ("wheel_radius", "robot_radius") if key in value}
-    if preset is not None and not mecanum:
-        changed = {"azimuth_deg": value["azimuth"]} if "azimuth" in value else {}
-        return preset.wheels.replace(**known, **changed)
-    if preset is not None:
-        known = {"wheel_radius": preset.wheels.wheel_radius, "robot_radius": preset.wheels.robot_radius} | known
-    return mecanum_wheels(**known) if mecanum else Wheels(azimuth_deg=value["azimuth"], **known)
-
-
-def _write(robot: Robot, path: str, force: bool, json: bool, like: str) -> None:
-    from omnidyn.model.first_guess import guessed
-    from omnidyn.model.robot_file import robot_to_toml
-
-    text = _head(robot) + robot_to_toml(robot)
+def _write(name: str, text: str, guesses: list[str], path: str, force: bool, json: bool, like: str) -> None:
     if path == "-":
         show(text.rstrip("\n"))
     else:
         write_atomic(path, text, force)
     if path != "-":
-        told = Document([printable(path)], {"robot": robot.name, "output": path, "guessed": guessed(robot)})
+        told = Document([printable(path)], {"robot": name, "output": path, "guessed": guesses})
         tell(told, json, provenance([robot_input(like)] if like else []))
-    if guessed(robot):
-        say(f"omnidyn: guessed: {', '.join(guessed(robot))}")
+    if guesses:
+        say(f"omnidyn: guessed: {', '.join(guesses)}")
     if like:
         say(f"omnidyn: what was not given is like {like}; inertia and friction are scaled to the size")
-
-
-def _head(robot: Robot) -> str:
-    """Comments for whoever opens the file."""
-    from omnidyn.model.first_guess import reasons
-
-    lines = [
-        "Written by omnidyn init. SI units; azimuths count counter-clockwise from forward (x forward, y left).",
-        'The origin of a number stands beside it: "given" by you, a "guess", "imported" from another robot. std is the',
-        'standard deviation. Put in what you know, such as { value = 1.7, std = 0.1, origin = "datasheet" }.',
-    ]
-    guesses = reasons(robot)
-    if guesses:
-        lines += ["", "How it was guessed (M mass, b centre to wheel):"]
-        lines += [f"  {key}: {why}" for key, why in guesses]
-    return "".join(f"# {line}".rstrip() + "\n" for line in lines) + "\n"
-
-
-# What `omnidyn init` takes from logs: where the wheels stand, the radius of the robot, a gear
-
-LEAST_RADIUS, LARGEST_RADIUS = 0.012, 0.3  # [m] of a wheel; what is outside is no radius, the speeds are of a motor
-GEARED = 1.5  # logged speeds so many times those of the wheels are speeds before a gear
-
-
-def from_logs(given: dict[str, Any], log: list[str], options: LogOptions, mecanum: bool, copied: bool) -> Geometry:
-    """Azimuths and radii, of the robot where it turned, from logs; what is given on the command line stays.
-
-    copied: the wheels are those of a preset, whose radius then tells the gear.
-    """
-    from omnidyn.logs.geometry import as_mecanum, wheel_geometry
-
-    runs, maps = [], log_options.Maps()
-    for path, each in log_options.load_logs(log_options.log_files(log), None, options):
-        maps.show(path, each.columns)
-        runs.append(each.to_run())
-    seen = wheel_geometry(runs, "--robot-radius" if mecanum else "`azimuth`")
-    azimuth = [round(angle, 2) for angle in seen.azimuth_deg]
-    where = "pushing towards" if mecanum else "at"
-    told = f"from {seen.source} ({seen.residual:.1%} unexplained)"
-    say(f"omnidyn: wheels {where} {number_words(tuple(azimuth))} degrees, {told}")
-    if mecanum:
-        seen = as_mecanum(seen)
-    elif given["azimuth"] is None and given["wheels"] in (None, len(azimuth)):
-        given["azimuth"], given["wheels"] = azimuth, len(azimuth)
-    if given["robot_radius"] is None and seen.robot_radius is not None and seen.robot_radius > 0.0:
-        given["robot_radius"] = round(seen.robot_radius, 4)
-        say(f"omnidyn: centre to wheel {given['robot_radius']:g} m")
-    elif given["robot_radius"] is None:
-        say("omnidyn: the logs do not turn, or hold no turn rate: the distance from centre to wheel is not in them")
-    radius = 1.0 / seen.per_metre
-    if given["wheel_radius"] is None and seen.measured and not copied and LEAST_RADIUS < radius < LARGEST_RADIUS:
-        given["wheel_radius"] = round(radius, 4)
-        say(f"omnidyn: wheel radius {radius:.4g} m, if the logged speeds are those of the wheels, behind the gear")
-    return seen
-
-
-def as_seen(robot: Robot, seen: Geometry | None, from_logs: set[str]) -> Robot:
-    """The robot with the gear that the logged speeds show: those of the motor shaft are faster by it.
-
-    from_logs: keys of the robot file whose numbers the logs gave; their source says so.
-    """
-    from omnidyn.model.first_guess import with_gear
-    from omnidyn.model.robot import MEASURED, Prior
-
-    if seen is None:
-        return robot
-    told = Prior(source=f"logs: {seen.source}", origin=MEASURED)
-    robot = robot.replace(priors=robot.priors | dict.fromkeys(from_logs, told))
-    ratio = seen.per_metre * float(robot.wheels.radii.mean())
-    if ratio < GEARED:
-        return robot
-    say(f"omnidyn: logged speeds are {ratio:.4g} times those of such wheels: taken as those of the motor, gear ratio")
-    return with_gear(robot, round(ratio, 3), "logs: speed of the motor shaft over that of the wheel")

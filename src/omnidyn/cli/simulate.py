@@ -132,9 +132,9 @@ class _Job:
 
     def band(self, run: Run, **options: Any) -> Band:
         """Between which lines it may lie, at the times of the run."""
-        from omnidyn.simulation.band import band as band_of_run
+        from omnidyn.simulation.band import confidence_band
 
-        found = band_of_run(self.robot, **self._commands, **options)
+        found = confidence_band(self.robot, **self._commands, **options)
         return found._replace(low=found.low.replace(t=run.t), high=found.high.replace(t=run.t))
 
 

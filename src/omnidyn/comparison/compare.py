@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from omnidyn.arguments import check_order
-from omnidyn.comparison.aligned import errors_for_whiteness
-from omnidyn.comparison.bands import with_bands
-from omnidyn.comparison.difference import ModelDifference, difference
-from omnidyn.comparison.metrics import Metrics, metrics
+from omnidyn.comparison.metrics import Metrics, ModelDifference, difference, metrics
 from omnidyn.comparison.replay import HOLD, Replay, choose_input, refuse_other_robot, replay
 from omnidyn.comparison.result import Comparison, Segment
-from omnidyn.comparison.traces import Trace, compared_components, counts_from_start, trace_of
+from omnidyn.comparison.traces import Trace, compared_components, counts_from_start, errors_for_whiteness, trace_of
 from omnidyn.errors import InputError, InsufficientDataError, OmnidynError
 from omnidyn.logs.channels import components
 from omnidyn.model.first_guess import rests_on
+from omnidyn.model.known.told import told
+from omnidyn.model.known.uncertainty import DRAWS, plausible
 from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run, as_list
+from omnidyn.simulation.band import Band, band_of, first_order_band
 from omnidyn.simulation.engine import TOLERANCE
 from omnidyn.statement import Statement
 
@@ -50,10 +51,10 @@ def compare(
     robots = _named(robot, other)
     channels = what_is_compared([*robots.values()], runs, apply)
     replays: dict[str, list[Replay]] = {name: [] for name in robots}
-    for k, each in enumerate(runs):
-        progress(Report(f"replaying {each.source or 'a run'}, {k + 1} of {len(runs)}"))
+    for k, log_run in enumerate(runs):
+        progress(Report(f"replaying {log_run.source or 'a run'}, {k + 1} of {len(runs)}"))
         for name, model in robots.items():
-            replays[name].append(replay(model, each, apply=apply, hold=hold, tol=tol, log=log))
+            replays[name].append(replay(model, log_run, apply=apply, hold=hold, tol=tol, log=log))
     segments = _segments(runs, next(iter(replays.values())))
     traces = {name: _traces(runs, parts, segments, channels, current_unsigned) for name, parts in replays.items()}
     overall = {name: _overall(by) for name, by in traces.items()}
@@ -64,7 +65,7 @@ def compare(
         robots=tuple(robots),
         measured=runs,
         simulated={name: tuple(part.run for part in parts) for name, parts in replays.items()},
-        applied={name: _applied(parts) for name, parts in replays.items()},
+        applied={name: tuple(dict.fromkeys(part.driver for part in parts)) for name, parts in replays.items()},
         channels=kept,
         segments=segments,
         overall=overall,
@@ -126,8 +127,8 @@ def _named(robot: Robot, other: Robot | None) -> dict[str, Robot]:
 def _segments(runs: Sequence[Run], replays: Sequence[Replay]) -> tuple[Segment, ...]:
     return tuple(
         Segment(k, rows.start, rows.stop, float(run.t[rows.start]), float(run.t[rows.stop - 1]))
-        for k, (run, each) in enumerate(zip(runs, replays, strict=True))
-        for rows in each.pieces
+        for k, (run, driven) in enumerate(zip(runs, replays, strict=True))
+        for rows in driven.pieces
     )
 
 
@@ -135,7 +136,7 @@ def _traces(
     runs: Sequence[Run], replays: Sequence[Replay], segments: Sequence[Segment], channels: Sequence[str], unsigned: bool
 ) -> dict[str, list[Trace]]:
     """Component -> a trace per segment, an empty one where its log does not hold the component."""
-    logged = [compared_components(run, each.applied) for run, each in zip(runs, replays, strict=True)]
+    logged = [compared_components(run, driven.applied) for run, driven in zip(runs, replays, strict=True)]
 
     def trace(name: str, at: Segment) -> Trace:
         if name not in logged[at.log]:
@@ -176,21 +177,16 @@ def _differences(
     return {key: each for key, each in found if each is not None}
 
 
-def _applied(replays: Sequence[Replay]) -> tuple[Statement, ...]:
-    """What drove a robot, each way once."""
-    return tuple(dict.fromkeys(each.driver for each in replays))
-
-
 def _sign_warnings(
     runs: Sequence[Run], traces: Mapping[str, Mapping[str, list[Trace]]], current_unsigned: bool
 ) -> Iterator[Statement]:
     """Currents that are never negative where a model has them both ways: the sensor may have no sign."""
     logged = [run.current for run in runs if run.current is not None]
-    if current_unsigned or not logged or min(np.nanmin(each, initial=np.inf) for each in logged) < 0.0:
+    if current_unsigned or not logged or min(np.nanmin(currents, initial=np.inf) for currents in logged) < 0.0:
         return
     names = components("current", logged[0].shape[1])
     models = [trace.model for by in traces.values() for name in names for trace in by.get(name, [])]
-    if any((each < 0.0).any() for each in models):
+    if any((model < 0.0).any() for model in models):
         yield Statement("currents_never_negative")
 
 
@@ -203,3 +199,52 @@ def _warnings(runs: Sequence[Run], replays: Mapping[str, Sequence[Replay]]) -> I
             logs.setdefault(warning, []).append(run.source or f"log {k + 1}")
     for warning, names in logs.items():
         yield warning if len(runs) == 1 else warning.of(*names)
+
+
+# Bands of a comparison: what of the distance between model and robot the std of the robot file may explain
+
+COARSE = 1e-4  # [m/s] of the implicit engine: a band is a hundred times as wide, or of no interest
+
+
+def with_bands(
+    found: Comparison, robots: Sequence[Robot], *, logs: Sequence[int] | None = None, apply: str | None = None,
+    hold: float = HOLD, tol: float | None = COARSE, draws: int = DRAWS, seed: int = 0, log: LogEffects | None = None,
+) -> Comparison:  # fmt: skip
+    """The comparison with the band of each model: the same free runs by plausible robots.
+
+    robots: those compared, in order. logs: which logs, all by default. apply, hold, tol, log: as they were compared. A
+    robot whose file has no std has no band, and a warning says so.
+    """
+    which = range(len(found.measured)) if logs is None else logs
+    bands: dict[str, Mapping[int, Band]] = {}
+    warnings, guessed = [], {}
+    for name, robot in zip(found.robots, robots, strict=True):
+        known = told(robot)
+        if not known.keys:
+            warnings.append(Statement("no_band", subject=name))
+            continue
+        drawn = plausible(robot, draws, seed)
+        bands[name] = {
+            k: band_of(
+                drawn, lambda each, k=k: replay(each, found.measured[k], apply=apply, hold=hold, tol=tol, log=log).run
+            )
+            for k in which
+        }  # fmt: skip
+        guessed[name] = known.guessed
+        if known.guessed:
+            warnings.append(Statement("band_rests_on_guesses", subject=name, numbers={"guesses": known.guessed}))
+    return replace(found, bands=bands, guesses=guessed, warnings=(*found.warnings, *warnings))
+
+
+def with_fitted_band(found: Comparison, robot: Robot, log: int = 0) -> Comparison:
+    """The comparison with the band of a robot that was fitted, in one of its logs: to first order.
+
+    That is what a fit knows of its numbers, and some of them it knows only together: see `first_order_std`. The runs
+    that slopes are taken from have one step a row, as those of the fit. No band where no number has a std.
+    """
+    (name,) = found.robots
+    if not told(robot).keys:
+        return found
+    run = found.simulated[name][log]
+    band = first_order_band(robot, run, lambda each: replay(each, found.measured[log], tol=None, log=robot.log).run)
+    return replace(found, bands={name: {log: band}})

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 LEVEL = 0.05  # chance of any change in fits of one and the same robot
 UPPER = float(ndtri(0.975))
-SAME = 1e-9  # of the largest eigenvalue of a matrix whose diagonal is 1: below it two numbers are one
+SAME_EIGENVALUE = 1e-9  # of the largest eigenvalue of a matrix whose diagonal is 1: below it two numbers are one
 TAKEN = ("body.mass_kg", "body.inertia_kg_m2", CENTRE, "wheels.wheel_radius_m", "wheels.robot_radius_m",
          "motor.resistance_ohm", "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad",
          "motor.gear_ratio")  # fmt: skip
@@ -98,17 +98,17 @@ class Drift(Shown):
     @property
     def changed(self) -> tuple[str, ...]:
         """Keys of the numbers that changed by more than their errors allow."""
-        return tuple(each.key for each in self.numbers if each.changed)
+        return tuple(number.key for number in self.numbers if number.changed)
 
     @property
     def verdict(self) -> Statement:
         """What changed, the surest first."""
-        changed = sorted((each for each in self.numbers if each.changed), key=lambda each: each.p)
+        changed = sorted((number for number in self.numbers if number.changed), key=lambda each: each.p)
         if not changed and self.together[2] <= LEVEL:
             return Statement("fits_differ_together", WARNING, numbers={"fits": len(self.fits)})
         if not changed:
             return Statement("no_number_changed", NOTE, numbers={"count": len(self.numbers)})
-        numbers = {"count": len(self.numbers), "changed": [each.statement() for each in changed]}
+        numbers = {"count": len(self.numbers), "changed": [number.statement() for number in changed]}
         return Statement("numbers_changed", WARNING, numbers=numbers)
 
     def document(self) -> Document:
@@ -123,13 +123,13 @@ class Drift(Shown):
     def table(self) -> Table:
         """A row for every number of every fit."""
         rows = []
-        for each in self.numbers:
-            for k, name in enumerate(each.fits):
+        for number in self.numbers:
+            for k, name in enumerate(number.fits):
                 first = k == 0
                 rows.append((
-                    in_words(each.key) if first else "", each.key if first else "", name, f"{each.value[k]:.4g}",
-                    interval_cell(each.ci95[k]), unit(each.key), chance_cell(min(each.p, 1.0)) if first else "",
-                    ("changed" if each.changed else "no change seen") if first else "",
+                    in_words(number.key) if first else "", number.key if first else "", name, f"{number.value[k]:.4g}",
+                    interval_cell(number.ci95[k]), unit(number.key), chance_cell(min(number.p, 1.0)) if first else "",
+                    ("changed" if number.changed else "no change seen") if first else "",
                 ))  # fmt: skip
         head = ("number", "key", "fit", "value", "95 % interval", "unit", "chance", "")
         return Table(head, rows, "<<<>><><")
@@ -138,15 +138,15 @@ class Drift(Shown):
         """As JSON has it."""
         chi2, degrees, p = self.together
         numbers = {
-            each.key: {
-                "words": in_words(each.key), "unit": unit(each.key), "chi2": each.chi2, "degrees": each.degrees,
-                "p": each.p, "changed": each.changed,
+            number.key: {
+                "words": in_words(number.key), "unit": unit(number.key), "chi2": number.chi2, "degrees": number.degrees,
+                "p": number.p, "changed": number.changed,
                 "fits": {
-                    name: {"value": each.value[k], "std": each.std[k], "ci95": each.ci95[k]}
-                    for k, name in enumerate(each.fits)
+                    name: {"value": number.value[k], "std": number.std[k], "ci95": number.ci95[k]}
+                    for k, name in enumerate(number.fits)
                 },
             }
-            for each in self.numbers
+            for number in self.numbers
         }  # fmt: skip
         return plain({
             **as_verdict(self.verdict), "fits": self.fits, "changed": self.changed, "numbers": numbers,
@@ -166,18 +166,18 @@ def drift(fits: Sequence[Robot | str | os.PathLike], names: Sequence[str] = ()) 
     if len(fits) < 2 or isinstance(fits, str | os.PathLike | Robot):
         got = "one" if isinstance(fits, str | os.PathLike | Robot) else str(len(fits))
         raise InputError("drift compares fits", got=got, expected="two robots or more", where="fits")
-    robots = [each if isinstance(each, Robot) else load_robot(each) for each in fits]
+    robots = [fit if isinstance(fit, Robot) else load_robot(fit) for fit in fits]
     called = _names(fits, robots, names)
     known = [_fitted(robot, name) for robot, name in zip(robots, called, strict=True)]
-    keys = list(dict.fromkeys(key for each in known for key in each))
-    shared = [key for key in keys if sum(key in each for each in known) > 1]
+    keys = list(dict.fromkeys(key for numbers in known for key in numbers))
+    shared = [key for key in keys if sum(key in numbers for numbers in known) > 1]
     if not shared:
         raise InsufficientDataError(
             "no number is in two of the fits", got="; ".join(f"{n}: {', '.join(k)}" for n, k in zip(called, known,
             strict=True)), expected="fits of the same numbers", where="fits",
         )  # fmt: skip
     numbers = [_number(key, called, known, len(shared)) for key in shared]
-    everywhere = [key for key in shared if all(key in each for each in known)]
+    everywhere = [key for key in shared if all(key in numbers for numbers in known)]
     return Drift(
         robots[0].name,
         tuple(called),
@@ -218,7 +218,7 @@ def _names(fits: Sequence[Any], robots: Sequence[Robot], names: Sequence[str]) -
 
 
 def _number(key: str, called: Sequence[str], known: Sequence[Fitted], tests: int) -> Drifting:
-    at = [k for k, each in enumerate(known) if key in each]
+    at = [k for k, numbers in enumerate(known) if key in numbers]
     value, std = (np.array([known[k][key][i] for k in at]) for i in (0, 1))
     log = all(known[k][key][2] for k in at)
     # A logarithm where all have one: what is far from 0 is as far off as a share of itself.
@@ -235,12 +235,12 @@ def _together(robots: Sequence[Robot], known: Sequence[Fitted], keys: Sequence[s
     if not keys:
         return 0.0, 0, 1.0
     first = np.array([known[0][key][0] for key in keys])
-    unit_ = np.array([max(each[key][1] for each in known) for key in keys])
+    unit_ = np.array([max(numbers[key][1] for numbers in known) for key in keys])
     total, pulled, chi2, degrees = np.zeros((len(keys), len(keys))), np.zeros(len(keys)), 0.0, 0
-    for robot, each in zip(robots, known, strict=True):
-        std = np.array([each[key][1] for key in keys])
+    for robot, numbers in zip(robots, known, strict=True):
+        std = np.array([numbers[key][1] for key in keys])
         weight, rank = _inverse(_correlation(told(robot), keys) * np.outer(std / unit_, std / unit_))
-        off = (np.array([each[key][0] for key in keys]) - first) / unit_
+        off = (np.array([numbers[key][0] for key in keys]) - first) / unit_
         total, pulled = total + weight, pulled + weight @ off
         chi2, degrees = chi2 + float(off @ weight @ off), degrees + rank
     common, rank = _inverse(total)
@@ -257,7 +257,7 @@ def _inverse(matrix: FloatArray) -> tuple[FloatArray, int]:
     """(inverse without the directions in which it is 0, how many others there are)."""
     size = np.sqrt(np.diag(matrix))
     values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
-    kept = values > SAME * values[-1]
+    kept = values > SAME_EIGENVALUE * values[-1]
     root = vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
     return root @ root.T, int(kept.sum())
 

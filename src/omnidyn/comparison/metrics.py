@@ -18,9 +18,10 @@ from scipy.special import chdtrc
 
 from omnidyn.arrays import FloatArray
 from omnidyn.comparison.traces import Trace
+from omnidyn.statistics import block_length, bootstrap_error, t_quantile
 
 CONSTANT = 1e-9  # a measured signal that changes by less than this share of its size is constant
-NOTHING = 1e-150  # what is smaller has no square
+SMALLEST_SQUARED = 1e-150  # what is smaller has no square
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def both_known(traces: Sequence[Trace]) -> tuple[FloatArray, FloatArray]:
     if not traces:
         return np.zeros(0), np.zeros(0)
     measured, model = (
-        np.concatenate(parts) for parts in zip(*[(each.measured, each.model) for each in traces], strict=True)
+        np.concatenate(parts) for parts in zip(*[(trace.measured, trace.model) for trace in traces], strict=True)
     )
     known = np.isfinite(measured) & np.isfinite(model)
     return measured[known], model[known]
@@ -106,14 +107,14 @@ def variance_accounted_for(measured: FloatArray, model: FloatArray) -> float | N
 
 def is_constant(measured: FloatArray) -> bool:
     """Whether a measured signal never changes, but for rounding."""
-    return float(np.ptp(measured)) <= max(CONSTANT * float(np.abs(measured).max()), NOTHING)
+    return float(np.ptp(measured)) <= max(CONSTANT * float(np.abs(measured).max()), SMALLEST_SQUARED)
 
 
 # How late a measured signal is behind the model: a hint at delays that neither the log nor the model knows of
 
-REACH = 0.5  # [s] lags looked for, both signs
+LONGEST_LAG = 0.5  # [s] lags looked for, both signs
 GRID, ROUNDS = 21, 4  # lags tried at a time; each round looks closer
-WORTH = 0.9  # a lag counts where it takes what the model leaves unexplained below this share
+WORTHWHILE_SHARE = 0.9  # a lag counts where it takes what the model leaves unexplained below this share
 
 
 def lag_of(traces: Sequence[Trace]) -> float | None:
@@ -125,7 +126,7 @@ def lag_of(traces: Sequence[Trace]) -> float | None:
     usable = [known for trace in traces if len((known := _known(trace)).t) > 1]
     if not usable:
         return None
-    reach = min(REACH, max(float(trace.t[-1] - trace.t[0]) for trace in usable) / 4.0)
+    reach = min(LONGEST_LAG, max(float(trace.t[-1] - trace.t[0]) for trace in usable) / 4.0)
     usual = float(np.median(np.concatenate([np.diff(trace.t) for trace in usable])))
     none = unexplained(usable, 0.0)
     if none is None:
@@ -138,7 +139,7 @@ def lag_of(traces: Sequence[Trace]) -> float | None:
         scores = np.array([np.inf if score is None else score for score in tried])
         k = int(np.argmin(scores))
         centre, best, width = float(lags[k]), float(scores[k]), 2.0 * width / (GRID - 1)
-    if best > WORTH * none or abs(centre) < 0.25 * usual:
+    if best > WORTHWHILE_SHARE * none or abs(centre) < 0.25 * usual:
         return 0.0
     return None if abs(centre) > 0.98 * reach else centre
 
@@ -164,7 +165,7 @@ def _known(trace: Trace) -> Trace:
 # Are the errors of a model white, that is noise without memory? If not, the model misses something that lasts
 
 LAGS = 10
-FEWEST = 30  # samples
+FEWEST_SAMPLES = 30  # samples
 
 
 class Whiteness(NamedTuple):
@@ -192,7 +193,7 @@ def whiteness(errors: Sequence[FloatArray], lags: int = LAGS) -> Whiteness | Non
     """
     known = np.concatenate([error[np.isfinite(error)] for error in errors] or [np.zeros(0)])
     lags = min(lags, len(known) // 5)
-    if len(known) < FEWEST or float(np.ptp(known)) <= 1e-12 * float(np.abs(known).max()):
+    if len(known) < FEWEST_SAMPLES or float(np.ptp(known)) <= 1e-12 * float(np.abs(known).max()):
         return None
     mean, power = known.mean(), float(np.mean((known - known.mean()) ** 2))
     centred = [error - mean for error in errors]
@@ -214,3 +215,66 @@ def _products(errors: list[FloatArray], lag: int) -> tuple[int, float, float]:
         products = products[np.isfinite(products)]
         count, total, squares = count + len(products), total + products.sum(), squares + (products**2).sum()
     return count, float(total), float(squares)
+
+
+# Which of two models is nearer to the robot, component by component, and whether that is more than chance
+#
+# The errors of a free run are not independent from row to row: standard errors come from a moving block bootstrap
+# (Kunsch 1989), whose blocks are longer than the memory of the errors. No block reaches across a gap.
+
+BOOTSTRAP_DRAWS = 400  # of the bootstrap
+ALPHA = 0.05  # chance of calling any component better by noise, all components together
+FEWEST_BLOCKS = 8  # blocks below which nothing can be told
+
+
+@dataclass(frozen=True)
+class ModelDifference:
+    """rmse_difference: rmse of the first model minus that of the second, in the unit of the component; std_error: of
+    that, None where there are too few independent stretches. better: 0 or 1 for the model that is surely better, None
+    where chance could have done it. blocks: how many independent stretches the samples are worth.
+    """
+
+    rmse_difference: float
+    std_error: float | None
+    better: int | None
+    blocks: int
+
+
+def difference(
+    first: Sequence[Trace], second: Sequence[Trace], tests: int = 1, seed: int = 0, whole: bool = False
+) -> ModelDifference | None:
+    """Compare two models a, b on the same measured traces y.
+
+    With the midpoint m = (a + b)/2 and the gap g = a - b, the difference of the squared errors is 2 g (m - y): what
+    decides is on which side of the midpoint y lies. The part of y - m along g is signal; what is left, n, is noise and
+    what both models miss, and the standard error is that of mean(2 g n)/(rmse a + rmse b). The inputs of the logs are
+    taken as given. tests: how many components are judged together; the level of each is ALPHA / tests (Bonferroni),
+    with Student's t for the number of blocks. whole: every piece is one block, for a pose: what its start was off by
+    stays in all of the piece and is one draw of chance. None where they share no sample.
+    """
+    parts = [known for a, b in zip(first, second, strict=True) if len(known := _midpoint_and_gap(a, b))]
+    if not parts:
+        return None
+    error, apart = np.concatenate(parts).T
+    one, two = (float(np.sqrt(np.mean((error + half * apart) ** 2))) for half in (0.5, -0.5))
+    power = float(apart @ apart)
+    if power == 0.0 or one + two == 0.0:
+        return ModelDifference(0.0, 0.0, None, len(error))
+    share = float(error @ apart) / power
+    left = [2.0 * part[:, 1] * (part[:, 0] - share * part[:, 1]) for part in parts]
+    length = max(map(len, left)) if whole else block_length(left)
+    blocks = sum(max(1, len(errors) // length) for errors in left)
+    gap = one - two
+    if blocks < FEWEST_BLOCKS:
+        return ModelDifference(gap, None, None, blocks)
+    # the mean and the share were fitted to the blocks: two degrees of freedom
+    loss = np.sqrt(blocks / (blocks - 2.0))
+    spread = loss * bootstrap_error(left, length, blocks, BOOTSTRAP_DRAWS, np.random.default_rng(seed)) / (one + two)
+    sure = t_quantile(blocks - 2, 1.0 - 0.5 * ALPHA / tests) * spread
+    return ModelDifference(gap, spread, (0 if gap < 0.0 else 1) if abs(gap) > sure else None, blocks)
+
+
+def _midpoint_and_gap(first: Trace, second: Trace) -> FloatArray:
+    """Error of the mean of two models, and first minus second, where all is known. Shape (n, 2)."""
+    both = np.stack([0.5 * (first.error + second.error), first.error - second.error], axis=1)
+    return both[np.isfinite(both).all(axis=1)]

@@ -37,7 +37,7 @@ SET_SPEEDS = INPUTS[2:]
 STARTS = ("twist", "wheel_speed", "wheel_angle", "heading", "position")  # which channel tells where a run starts
 SIMULATED = ("voltage", "current", "wheel_speed", "wheel_angle", "twist", "pose")
 HOLD = 0.2  # [s] a missing input keeps its last value for so long
-FEWEST = 3  # rows of a piece
+FEWEST_ROWS = 3  # rows of a piece
 SHOWN = 3  # warnings of one kind
 FINEST, MOST_PARTS = 2.5e-3, 20  # [s] rows over which the angles of wheels are summed, and half their number in a row
 
@@ -169,11 +169,11 @@ def _prepared(
     for rows in stretches:
         held[rows], usable[rows] = held_inputs(run.t[rows], table[rows], hold)
     pieces = [piece for rows in stretches for piece in _usable_pieces(rows, usable)]
-    kept = [piece for piece in pieces if piece.stop - piece.start >= FEWEST]
+    kept = [piece for piece in pieces if piece.stop - piece.start >= FEWEST_ROWS]
     if not kept:
         raise InsufficientDataError(
             "nothing can be replayed", got=f"{len(pieces)} stretches with inputs, the longest too short",
-            expected=f"{FEWEST} rows in a row without a gap", remedy="look at the log with omnidyn check",
+            expected=f"{FEWEST_ROWS} rows in a row without a gap", remedy="look at the log with omnidyn check",
         )  # fmt: skip
     left = len(run) - sum(piece.stop - piece.start for piece in kept)
     warnings = []

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.comparison.difference import ModelDifference
-from omnidyn.comparison.metrics import Metrics
+from omnidyn.comparison.metrics import Metrics, ModelDifference
 from omnidyn.comparison.traces import Trace, trace_of, unit
 from omnidyn.comparison.verdict import compared, followed, nothing_followed
 from omnidyn.document import Document, Part, Table, Words, cell, chance_cell, plain
@@ -168,7 +167,7 @@ class Comparison(Shown):
                 f"rmse of {first} minus rmse of {second}, with its standard error (block bootstrap)", "",
                 difference_table(self.robots, self.difference), "",
             ]  # fmt: skip
-        parts += legend([each for found in self.overall.values() for each in found.values()])
+        parts += legend([metrics for found in self.overall.values() for metrics in found.values()])
         parts += ["currents are compared by size, without sign."] if self.current_unsigned else []
         parts.append(by_severity(self.warnings))
         return Document(parts, self.to_dict(), self.warnings, ascii=True, verdict=self.verdict)
@@ -182,9 +181,9 @@ class Comparison(Shown):
             rows = [
                 (
                     name, unit(name), f"{found[name].rmse:.4g}", f"{self.overall[second][name].rmse:.4g}",
-                    self.better(name) or ("the same" if each.std_error == 0.0 else "cannot tell"),
+                    self.better(name) or ("the same" if gap.std_error == 0.0 else "cannot tell"),
                 )
-                for name, each in self.difference.items()
+                for name, gap in self.difference.items()
             ]  # fmt: skip
             return Table(("", "unit", f"rmse of {first}", f"rmse of {second}", "nearer"), rows, "<<>><", (8, 6))
         widths = self.half_widths(first) if self.bands else {}
@@ -227,7 +226,7 @@ class Comparison(Shown):
                 "rests_on_guesses": list(self.rests_on.get(name, ())),
                 "overall": {key: asdict(each) for key, each in self.overall[name].items()},
                 "by_segment": {
-                    key: [None if each is None else asdict(each) for each in row]
+                    key: [None if metrics is None else asdict(metrics) for metrics in row]
                     for key, row in self.by_segment[name].items()
                 },
             }
@@ -240,7 +239,7 @@ class Comparison(Shown):
             "segments": [asdict(segment) for segment in self.segments],
             "units": {name: unit(name) for name in self.channels},
             "robots": robots,
-            "difference": {key: {**asdict(each), "better": self.better(key)} for key, each in self.difference.items()},
+            "difference": {key: {**asdict(gap), "better": self.better(key)} for key, gap in self.difference.items()},
             "bands": {
                 name: {"half_width": self.half_widths(name), "guesses": list(self.guesses.get(name, ()))}
                 for name in self.bands
@@ -279,17 +278,17 @@ def band_table(half_widths: Mapping[str, float], found: Mapping[str, Metrics]) -
 def difference_table(robots: Sequence[str], found: Mapping[str, ModelDifference]) -> Table:
     """Which of two robots is better, a row per component."""
     rows = []
-    for name, each in found.items():
-        told = "the same" if each.std_error == 0.0 else "cannot tell"
-        told = told if each.better is None else robots[each.better]
-        rows.append((name, f"{each.rmse_difference:+.4g}", cell(each.std_error, ".2g"), f"{each.blocks}", told))
+    for name, gap in found.items():
+        nearer = "the same" if gap.std_error == 0.0 else "cannot tell"
+        nearer = nearer if gap.better is None else robots[gap.better]
+        rows.append((name, f"{gap.rmse_difference:+.4g}", cell(gap.std_error, ".2g"), f"{gap.blocks}", nearer))
     return Table(("", "difference", "std error", "blocks", "better"), rows, "<>>><", (8, 12, 9, 6))
 
 
 def legend(shown: Sequence[Metrics]) -> Iterator[str]:
     """What the columns mean, where it is not plain."""
     yield "error = model - measured."
-    if any(each.lag for each in shown):
+    if any(metrics.lag for metrics in shown):
         yield "lag: the robot is later than the model by so much, where that explains clearly more; a hint."
-    if any(each.fit_percent is None for each in shown):
+    if any(metrics.fit_percent is None for metrics in shown):
         yield "no fit and no VAF where the measured signal never changes."

@@ -14,13 +14,13 @@ from omnidyn.run import Run
 from omnidyn.statistics import find_tick, robust_std
 
 WINDOW = 0.05  # [s] the first samples: well below the time constants of a robot, about 0.15 s
-FEWEST, MOST = 5, 65  # samples of a line through the first ones; each try doubles them
-LONGEST = 0.25  # [s] FEWEST samples that take longer are no neighbours: only the first one counts
-SURE = 2.0  # standard errors beyond which a difference is believed
+FEWEST_SAMPLES, MOST_SAMPLES = 5, 65  # samples of a line through the first ones; each try doubles them
+LONGEST_TIME = 0.25  # [s] FEWEST_SAMPLES samples that take longer are no neighbours: only the first one counts
+SURE_ERRORS = 2.0  # standard errors beyond which a difference is believed
 END_OF_LINE = 2.2  # standard error of a Theil-Sen line at its end, times sqrt(n) over the noise
 FIT, FLAT = 4.0, 0.1  # noises, and shares of its bend, that the samples of a parabola may be away from it
 REST = "rest"  # where no speed was logged
-FAR = 3.0  # a first sample so many ranges of the next ones away from them is a spike
+SPIKE_RANGES = 3.0  # a first sample so many ranges of the next ones away from them is a spike
 
 
 class Start(NamedTuple):
@@ -70,17 +70,20 @@ def first_level(t: FloatArray, values: FloatArray, at_rest: bool = False) -> flo
     if not len(t):
         return 0.0
     t = t - t[0]
-    noise = noise if len(t) >= FEWEST else 0.0  # of rows so far apart, what scatters is motion
-    level, error, count = float(values[0]), noise, FEWEST
-    if len(t) >= FEWEST and _is_spike(t, values, noise, at_rest):
-        level, error = theil_sen(t[1:FEWEST], values[1:FEWEST])[1], END_OF_LINE * noise / np.sqrt(FEWEST - 1)
+    noise = noise if len(t) >= FEWEST_SAMPLES else 0.0  # of rows so far apart, what scatters is motion
+    level, error, count = float(values[0]), noise, FEWEST_SAMPLES
+    if len(t) >= FEWEST_SAMPLES and _is_spike(t, values, noise, at_rest):
+        level, error = (
+            theil_sen(t[1:FEWEST_SAMPLES], values[1:FEWEST_SAMPLES])[1],
+            END_OF_LINE * noise / np.sqrt(FEWEST_SAMPLES - 1),
+        )
         t, values = t[1:], values[1:]
     while count <= len(t):
         line, surer = theil_sen(t[:count], values[:count])[1], END_OF_LINE * noise / np.sqrt(count)
-        if abs(line - level) > SURE * error:
+        if abs(line - level) > SURE_ERRORS * error:
             break
         level, error, count = line, min(error, surer), 2 * count - 1
-    return 0.0 if at_rest and abs(level) <= SURE * error else level
+    return 0.0 if at_rest and abs(level) <= SURE_ERRORS * error else level
 
 
 def scatter(t: FloatArray, values: FloatArray) -> float:
@@ -100,9 +103,9 @@ def scatter(t: FloatArray, values: FloatArray) -> float:
 
 def _is_spike(t: FloatArray, values: FloatArray, noise: float, at_rest: bool) -> bool:
     """Whether the first sample has nothing to do with the next four."""
-    slope, level = theil_sen(t[1:FEWEST], values[1:FEWEST])
+    slope, level = theil_sen(t[1:FEWEST_SAMPLES], values[1:FEWEST_SAMPLES])
     expected = level + slope * t[0]
-    far = abs(values[0] - expected) > FAR * (float(np.ptp(values[1:FEWEST])) + SURE * noise)
+    far = abs(values[0] - expected) > SPIKE_RANGES * (float(np.ptp(values[1:FEWEST_SAMPLES])) + SURE_ERRORS * noise)
     return bool(far and not (at_rest and abs(values[0]) < abs(expected)))
 
 
@@ -120,17 +123,20 @@ def _levels(t: FloatArray, values: FloatArray, at_rest: bool = False) -> FloatAr
 
 
 def _first_samples(t: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """What there is within WINDOW of the first number, at least FEWEST rows where these are near, thinned to MOST."""
+    """What there is within WINDOW of the first number, FEWEST_SAMPLES rows or more where these are near.
+
+    They are thinned to MOST_SAMPLES.
+    """
     known = np.flatnonzero(np.isfinite(values))
     if not len(known):
         return t[:0], values[:0]
     t, values = t[known[0] :], values[known[0] :]
     rows = int(np.searchsorted(t, t[0] + WINDOW, side="right"))
-    if len(t) >= FEWEST and t[FEWEST - 1] - t[0] <= LONGEST:
-        rows = max(FEWEST, rows)
+    if len(t) >= FEWEST_SAMPLES and t[FEWEST_SAMPLES - 1] - t[0] <= LONGEST_TIME:
+        rows = max(FEWEST_SAMPLES, rows)
     t, values = t[:rows], values[:rows]
     kept = np.flatnonzero(np.isfinite(values))
-    kept = kept[:: max(1, -(-len(kept) // MOST))]
+    kept = kept[:: max(1, -(-len(kept) // MOST_SAMPLES))]
     return t[kept], values[kept]
 
 
@@ -161,16 +167,18 @@ def first_slope(t: FloatArray, values: FloatArray) -> float:
         return 0.0
     t = t - t[0]
     slope, error = theil_sen(t, values)[0], noise / (float(np.std(t)) * np.sqrt(len(t)))
-    if len(t) >= FEWEST:
+    if len(t) >= FEWEST_SAMPLES:
         design = np.vander(t, 3, increasing=True)
         found = np.linalg.lstsq(design, values, rcond=None)[0]
         errors = noise * np.sqrt(np.diag(np.linalg.pinv(design.T @ design, rcond=1e-20, hermitian=True)))
         left, bend = np.abs(values - design @ found).max(), abs(found[2])
-        if bend > SURE * errors[2] and left <= FIT * noise + FLAT * bend * t[-1] ** 2:  # and none of them is a spike
+        if (
+            bend > SURE_ERRORS * errors[2] and left <= FIT * noise + FLAT * bend * t[-1] ** 2
+        ):  # and none of them is a spike
             slope, error = float(found[1]), float(errors[1])
-    return slope if abs(slope) > SURE * error else 0.0
+    return slope if abs(slope) > SURE_ERRORS * error else 0.0
 
 
 def _seen(values: FloatArray) -> bool:
     """Whether every component has a number among the first samples."""
-    return bool(np.isfinite(values[:MOST]).any(axis=0).all())
+    return bool(np.isfinite(values[:MOST_SAMPLES]).any(axis=0).all())

@@ -62,15 +62,16 @@ def exceeded(comparison: Comparison, thresholds: Sequence[Threshold], robot: str
     Raises InsufficientDataError where the metric is not known, such as the fit of a signal that never changes.
     """
     found, words = comparison.overall[robot or comparison.robots[0]], []
-    for each in thresholds:
-        value = getattr(found[each.component], each.metric) if each.component in found else None
+    for threshold in thresholds:
+        value = getattr(found[threshold.component], threshold.metric) if threshold.component in found else None
         if value is None:
             raise InsufficientDataError(
-                f"the data do not tell {each.component}.{each.metric}", got=str(each),
+                f"the data do not tell {threshold.component}.{threshold.metric}", got=str(threshold),
                 expected="a signal that changes, and enough samples", where="`fail_if`",
             )  # fmt: skip
-        if _OPERATORS[each.sign](value, each.number):
-            words.append(f"{each.component}.{each.metric} = {value:.6g} ({each.sign} {each.number:g})")
+        if _OPERATORS[threshold.sign](value, threshold.number):
+            name = f"{threshold.component}.{threshold.metric}"
+            words.append(f"{name} = {value:.6g} ({threshold.sign} {threshold.number:g})")
     return words
 
 

@@ -19,7 +19,7 @@ from omnidyn.logs.channels import place
 from omnidyn.statement import ERROR, NOTE, WARNING, Statement
 
 FOLLOWS, HALF, NOTHING = 0.2, 0.5, 1.0  # error over spread
-ROUGH = 3.0  # times what a signal scatters by from row to row: errors beyond are no noise
+ROUGH_ERROR = 3.0  # times what a signal scatters by from row to row: errors beyond are no noise
 WHITE = 0.05  # p-value from which errors are noise
 WELL, NOISE, ROUGHLY, HARDLY, NOT = range(5)  # how a component is followed, best first
 LEVELS = ("well", "noise", "roughly", "hardly", "not")  # the same for machines
@@ -45,7 +45,7 @@ class Scored(Protocol):
 
 
 @dataclass(frozen=True)
-class Followed:
+class FollowedSignal:
     """How a model follows one kind of measurement. name: in plain words. level: WELL to NOT. share: error over spread,
     and error: its rms in `unit`, each the largest of the components.
     """
@@ -62,31 +62,31 @@ class Followed:
         return Statement("signal_followed", NOTE if self.level <= ROUGHLY else WARNING, self.name, numbers)
 
 
-def followed(scores: Mapping[str, Scored]) -> list[Followed]:
+def followed(scores: Mapping[str, Scored]) -> list[FollowedSignal]:
     """How well each kind of measurement is followed, best first; components of one kind apart where they differ.
 
     What never changes is left out: there is nothing to follow.
     """
-    kinds: dict[str, list[tuple[str, Followed]]] = {}
+    kinds: dict[str, list[tuple[str, FollowedSignal]]] = {}
     for name, score in scores.items():
         if score.fit_percent is not None:
-            each = Followed(name, _level(score), _share(score), score.rmse, unit(name))
+            each = FollowedSignal(name, _level(score), _share(score), score.rmse, unit(name))
             kinds.setdefault(plain_name(name), []).append((name, each))
     found = []
     for plain, members in kinds.items():
-        alike: dict[int, list[tuple[str, Followed]]] = {}
+        alike: dict[int, list[tuple[str, FollowedSignal]]] = {}
         for member in members:
             alike.setdefault(member[1].level, []).append(member)
         for same in alike.values():
             share, error = (max(values) for values in zip(*((each.share, each.error) for _, each in same), strict=True))
             called = plain if len(alike) == 1 else f"{all_of([name for name, _ in same])} ({plain})"
-            found.append(Followed(called, same[0][1].level, share, error, same[0][1].unit))
+            found.append(FollowedSignal(called, same[0][1].level, share, error, same[0][1].unit))
     return sorted(found, key=lambda each: each.level)
 
 
-def nothing_followed(found: Sequence[Followed]) -> bool:
+def nothing_followed(found: Sequence[FollowedSignal]) -> bool:
     """Whether the model does not follow: something changes, and nothing of it is followed even roughly."""
-    return bool(found) and all(each.level >= HARDLY for each in found)
+    return bool(found) and all(signal.level >= HARDLY for signal in found)
 
 
 def is_missed(share: float, error: float, scatter: float = 0.0) -> bool:
@@ -95,7 +95,7 @@ def is_missed(share: float, error: float, scatter: float = 0.0) -> bool:
     share: error over spread. error: its rms. scatter: by how much the signal scatters from row to row
     (`statistics.difference_noise`), in the same unit; a signal of mere noise is not to blame. At 0: of no noise.
     """
-    return share > HALF and error > ROUGH * scatter
+    return share > HALF and error > ROUGH_ERROR * scatter
 
 
 def plain_name(component: str) -> str:
@@ -120,9 +120,9 @@ def _level(score: Scored) -> int:
     return ROUGHLY if share <= HALF else HARDLY if share < NOTHING else NOT
 
 
-def follows(model: str, found: Sequence[Followed]) -> Statement:
+def follows(model: str, found: Sequence[FollowedSignal]) -> Statement:
     """How well a model follows each kind of measurement. model: its name."""
-    signals = {"signals": [each.statement() for each in found]}
+    signals = {"signals": [signal.statement() for signal in found]}
     if not found:
         return Statement("nothing_changes", WARNING, model)
     if nothing_followed(found):
@@ -136,7 +136,7 @@ def compared(
     """The verdict of a comparison. better: component -> the robot that is surely nearer, None where none is."""
     if len(robots) == 1:
         return follows(THE_MODEL, followed(scores[0]))
-    models = [follows(robot, followed(own)) for robot, own in zip(robots, scores, strict=True)]
+    models = [follows(robot, followed(score)) for robot, score in zip(robots, scores, strict=True)]
     nearer = [
         Statement("nearer", NOTE, robot, {"components": components}) for robot in robots
         if (components := [name for name, best in better.items() if best == robot])

@@ -69,6 +69,19 @@ def _entry_point(function: Callable[..., Any], compiler: type[Compiler]) -> Call
     return compiled
 
 
+def machine_code(kernel: Callable[..., Any], *arguments: Any) -> Callable[..., Any]:
+    """What numba calls for arguments of these types, without asking at each call what they are: 1 to 3 us less.
+
+    For loops whose arguments keep their types, down to whether an array is contiguous and writable: none is checked.
+    """
+    if not is_jitted(kernel):  # numba is switched off
+        return kernel
+    compiled: Any = kernel
+    signature = tuple(numba.typeof(argument) for argument in arguments)
+    compiled.compile(signature)
+    return compiled.get_overload(signature)
+
+
 def kept() -> list[Any]:
     """What keeps the kernels of the package that have been imported, see entries.py; nothing keeps those in memory."""
     modules = [module for name, module in tuple(sys.modules.items()) if name.startswith("omnidyn.")]

@@ -16,13 +16,11 @@ from omnidyn.arguments import check_order
 from omnidyn.findings.energy import check_energy
 from omnidyn.findings.excitation import check_excitation, joined, judge
 from omnidyn.findings.filters import check_averaged, check_filters
-from omnidyn.findings.finding import Finding, Verdict, in_order, merged
+from omnidyn.findings.finding import Finding, Verdict, in_order, merged, with_guesses
 from omnidyn.findings.finding import joined as joined_uses
 from omnidyn.findings.fitness import uses
-from omnidyn.findings.guesses import with_guesses
 from omnidyn.findings.limits import check_limits
-from omnidyn.findings.motion import check_motion
-from omnidyn.findings.oddities import check_oddities
+from omnidyn.findings.motion import check_motion, check_oddities
 from omnidyn.findings.scale.derivatives import check_derivatives
 from omnidyn.findings.scale.lag import check_lag
 from omnidyn.findings.scale.scale import check_dead_wheels, check_scale, check_turn_rate
@@ -78,9 +76,9 @@ def check_log(log: Log, robot: Robot | None = None) -> Verdict:
             more, changed = family(work)
             said = with_guesses(more, robot, found)
             found += said
-            if not more or any(not each.rests_on for each in said):  # a guess puts nothing right
+            if not more or any(not finding.rests_on for finding in said):  # a guess puts nothing right
                 work = changed
-        good = uses(log, robot, {each.code for each in found})
+        good = uses(log, robot, {finding.code for finding in found})
     length = float(work.t[-1] - work.t[0]) if len(work) > 1 else 0.0
     return Verdict(
         in_order(found), work.known.get("excitation", {}), len(log), length,
@@ -106,11 +104,11 @@ def _about_columns(log: Log) -> list[Finding]:
     Of a Run, what its reader said.
     """
     columns = log.columns
-    found = [Finding(DOUBT, NOTE, "", {"doubt": doubt}) for doubt in columns.doubts]
+    findings = [Finding(DOUBT, NOTE, "", {"doubt": doubt}) for doubt in columns.doubts]
     if columns.passed_over:
-        found.append(Finding(UNUSED, NOTE, "", {"columns": columns.passed_over}))
+        findings.append(Finding(UNUSED, NOTE, "", {"columns": columns.passed_over}))
     notes = () if columns.columns else log.notes
-    return found + [Finding(READING, NOTE, "", {"note": note}) for note in notes]
+    return findings + [Finding(READING, NOTE, "", {"note": note}) for note in notes]
 
 
 def _other_count(log: Log, robot: Robot | None) -> list[Finding]:

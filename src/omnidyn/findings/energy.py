@@ -22,7 +22,7 @@ from omnidyn.statement import ERROR
 
 MARGIN = 0.08  # of the power that turns with the back-EMF: K, R and the gear are not known better
 WINDOW = 0.4  # [s]
-MOVING = 0.2  # of the back-EMF that 95 % of the rows stay below: a robot at rest says nothing
+MOVING_SHARE = 0.2  # of the back-EMF that 95 % of the rows stay below: a robot at rest says nothing
 LEAST_SHARE = 0.02  # of the rows
 OF_BACK_EMF = (EMF, "motor.gear_ratio", "wheels.wheel_radius_m")
 
@@ -69,7 +69,7 @@ def _points(robot: Robot, voltage: FloatArray, speed: FloatArray) -> tuple[BoolA
     power, scale = _power(robot, voltage, speed)
     counter = np.sqrt((back_emf(robot.motor, speed) ** 2).sum(axis=1))
     with np.errstate(invalid="ignore"):
-        bad = (power < -MARGIN * scale) & (counter > MOVING * np.nanquantile(counter, 0.95))
+        bad = (power < -MARGIN * scale) & (counter > MOVING_SHARE * np.nanquantile(counter, 0.95))
     return bad, float(-power[bad].min()) if bad.any() else 0.0
 
 
@@ -104,7 +104,7 @@ def _windows(work: LogUnderCheck, robot: Robot, voltage: FloatArray, speed: Floa
     # Only where the back-EMF is the larger of the two, and the robot moves.
     counter = np.sqrt((back_emf(robot.motor, mean) ** 2).sum(axis=1))
     applied = np.sqrt((voltage[:-1] ** 2).sum(axis=1))
-    bar = MOVING * float(np.nanquantile(counter, 0.95))
+    bar = MOVING_SHARE * float(np.nanquantile(counter, 0.95))
     e, u = (np.concatenate([[0.0], np.cumsum(np.nan_to_num(each))]) for each in (counter, applied))
     wrong &= (e[high] - e[low] > 1.02 * (u[high] - u[low])) & (e[high] - e[low] > bar * (high - low))
     # Noise of the speed makes E[w^2] too large, which looks like back-EMF.

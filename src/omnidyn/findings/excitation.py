@@ -85,20 +85,20 @@ def _of_axis(values: FloatArray, axis: str, top: float, length: float) -> dict[s
 
 def judge(known: Mapping[str, float], length: float = 0.15) -> list[Finding]:
     """Notes on what such a log cannot tell."""
-    found = []
+    findings = []
     sizes = {axis: known[axis] * (length if axis == "yaw" else 1.0) for axis in AXES if axis in known}
     if not sizes or max(sizes.values()) <= 0.0:
-        return found
+        return findings
     for axis, size in sizes.items():
         if size < HARDLY * max(sizes.values()):
-            found.append(Finding("not_excited", NOTE, axis, {"rms": known[axis]}))
+            findings.append(Finding("not_excited", NOTE, axis, {"rms": known[axis]}))
         elif known[f"forward_{axis}"] > 0.05 > 20.0 * known[f"backward_{axis}"] or (
             known[f"backward_{axis}"] > 0.05 > 20.0 * known[f"forward_{axis}"]
         ):
-            found.append(Finding("one_way", NOTE, axis))
+            findings.append(Finding("one_way", NOTE, axis))
     if known.get("speeds", SPEEDS) < SPEEDS:
-        found.append(Finding("one_speed", NOTE, "", {"speeds": known["speeds"]}))
-    return found
+        findings.append(Finding("one_speed", NOTE, "", {"speeds": known["speeds"]}))
+    return findings
 
 
 def joined(parts: Sequence[Mapping[str, float]]) -> dict[str, float]:

@@ -15,24 +15,24 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.clocks import at_each_clock
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
-from omnidyn.logs.averaged import rows_of_mean
-from omnidyn.logs.channels import place
+from omnidyn.logs.channels import components, place
+from omnidyn.logs.resolved import rows_of_mean
 from omnidyn.model.frames import unwrapped, world_to_body
 from omnidyn.statement import NOTE, WARNING
 from omnidyn.statistics import moving, robust_std
 
-ENOUGH = 60_000  # rows that tell a filter
-ALIKE = 0.2  # of the noise of the differences: a speed that comes nearer has that very noise
+MOST_ROWS = 60_000  # rows that tell a filter
+NOISE_SHARE = 0.2  # of the noise of the differences: a speed that comes nearer has that very noise
 FOURTH = np.sqrt(70.0)  # spread of fourth differences of white noise; a smooth motion has next to none
-MOST = 0.9  # of the rows must be alike
-LONGEST = 8  # rows of a mean
+ALIKE_SHARE = 0.9  # of the rows must be alike
+LONGEST_MEAN = 8  # rows of a mean
 STRONGEST, PLAIN = 0.02, 0.95  # share of the new value in a low-pass: below it nothing is told, above it there is none
 LATE_STEP = 1.5  # steps of time beyond which two rows are no neighbours
 
 
 class Speed(NamedTuple):
     """A speed, shape (rows,), and what it may be made of. rates (rows, n): of the positions, over one row back, over
-    one back and one on, over two back, and so on to LONGEST. noise: of the first of these, by their positions.
+    one back and one on, over two back, and so on to LONGEST_MEAN. noise: of the first of these, by their positions.
     """
 
     component: str
@@ -60,9 +60,9 @@ def check_filters(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         return [], work
     alike: dict[Filter, list[Speed]] = {}
     for speed in _speeds(work):
-        found = _filter_of(speed, work.step)
-        if found is not None:
-            alike.setdefault(found, []).append(speed)
+        filtered = _filter_of(speed, work.step)
+        if filtered is not None:
+            alike.setdefault(filtered, []).append(speed)
     return [_finding(each, speeds, work.step) for each, speeds in alike.items()], work
 
 
@@ -79,10 +79,10 @@ def _filter_of(speed: Speed, step: float) -> Filter | None:
     """How a speed was made; None where it has no noise of the positions, as one that was measured."""
     if not speed.noise > 0.0:
         return None
-    if _off(speed.values - speed.centred, speed.back) < ALIKE * 0.5 * speed.noise:
+    if _off(speed.values - speed.centred, speed.back) < NOISE_SHARE * 0.5 * speed.noise:
         return Filter("centred", 0.0)  # fmt: skip
     for rows, rate in enumerate(speed.over, 1):
-        if _off(speed.values - rate, speed.back) < ALIKE * speed.noise / rows:
+        if _off(speed.values - rate, speed.back) < NOISE_SHARE * speed.noise / rows:
             return Filter("backward", 0.5 * rows)
     return _low_pass(speed, step)
 
@@ -93,7 +93,7 @@ def _low_pass(speed: Speed, step: float) -> Filter | None:
     good = np.isfinite(change) & np.isfinite(ahead)
     power = float((ahead[good] ** 2).sum())
     share = float((change[good] * ahead[good]).sum()) / power if power > 0.0 else 0.0
-    if not STRONGEST < share < PLAIN or not _off(change - share * ahead, ahead) < ALIKE * share * speed.noise:
+    if not STRONGEST < share < PLAIN or not _off(change - share * ahead, ahead) < NOISE_SHARE * share * speed.noise:
         return None
     constant = (1.0 - share) / share
     return Filter("low_pass", 0.5 + round(constant, 1), float(f"{constant * step * 1e3:.2g}") * 1e-3)  # fmt: skip
@@ -105,31 +105,30 @@ def _off(errors: FloatArray, rate: FloatArray) -> float:
     A speed that is made of positions is so in every row; the middle error would be that of rest.
     """
     good = np.isfinite(errors) & np.isfinite(rate) & moving(rate)
-    return float(np.quantile(np.abs(errors[good]), MOST)) if good.sum() >= MIN_ROWS else np.inf
+    return float(np.quantile(np.abs(errors[good]), ALIKE_SHARE)) if good.sum() >= MIN_ROWS else np.inf
 
 
 def _speeds(work: LogUnderCheck) -> Iterator[Speed]:
     """Speeds that were recorded beside the positions that they could be made of."""
-    t = work.t[:ENOUGH]
+    t = work.t[:MOST_ROWS]
     angle, pose = work.get("wheel_angle"), work.get("pose")
     if angle is not None and "wheel_speed" in work.log.channels:
-        of = {component: angle[:ENOUGH, k : k + 1] for k, component in enumerate(_names(angle, "w"))}
+        of = {
+            component: angle[:MOST_ROWS, k : k + 1]
+            for k, component in enumerate(components("wheel_speed", angle.shape[1]))
+        }
         for component, values in work.columns("wheel_speed"):
-            yield from _made(component, "a" + component[1:], values[:ENOUGH], of[component], t, work.step, None)
+            yield from _made(component, "a" + component[1:], values[:MOST_ROWS], of[component], t, work.step, None)
     if pose is None or work.get("twist") is None:
         return
-    place, heading = pose[:ENOUGH, :2], unwrapped(pose[:ENOUGH, 2])
+    place, heading = pose[:MOST_ROWS, :2], unwrapped(pose[:MOST_ROWS, 2])
     for component, values in work.columns("twist"):
-        own = values[:ENOUGH]
+        own = values[:MOST_ROWS]
         if component == "omega":
             yield from _made(component, "heading", own, heading[:, None], t, work.step, None)
         else:
             row = world_to_body(heading)[:, ["vx", "vy"].index(component), :2]
             yield from _made(component, "x y", own, place, t, work.step, row)
-
-
-def _names(values: FloatArray, letter: str) -> list[str]:
-    return [f"{letter}{k + 1}" for k in range(values.shape[1])]
 
 
 def _made(
@@ -149,7 +148,7 @@ def _made(
         own[inside][~_together(near, back + on)] = np.nan
         return own
 
-    over = tuple(rate(rows, 0) for rows in range(1, LONGEST + 1))
+    over = tuple(rate(rows, 0) for rows in range(1, LONGEST_MEAN + 1))
     turns = np.isfinite(over[0]) & moving(over[0])
     if turns.sum() < MIN_ROWS or np.nanmin(values) == np.nanmax(values):
         return
@@ -175,9 +174,9 @@ def check_averaged(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     late."""
     if not work.step > 0.0:
         return [], work
-    found, _ = at_each_clock(work, _at_its_clock)
-    late = {place(each.subject.split()[0])[0]: each.numbers["late_s"] for each in found}  # type: ignore[index]
-    return found, work.knowing(late=late)
+    findings, _ = at_each_clock(work, _at_its_clock)
+    late = {place(finding.subject.split()[0])[0]: finding.numbers["late_s"] for finding in findings}  # type: ignore[index]
+    return findings, work.knowing(late=late)
 
 
 def _at_its_clock(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -189,16 +188,15 @@ def _at_its_clock(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         for component, values in work.sampled_columns(channel):
             if rows := rows_of_mean(values):
                 alike.setdefault((channel, rows), []).append(component)
-    return [_averaged_finding(names, rows, work.step) for (_, rows), names in alike.items()], work
+    return [
+        Finding(
+            "averaged", WARNING, " ".join(names),
+            {"rows": rows, "seconds": rows * work.step, "late_s": 0.5 * (rows - 1) * work.step},
+        )
+        for (_, rows), names in alike.items()
+    ], work  # fmt: skip
 
 
 def late_by(work: LogUnderCheck, channel: str) -> float:
     """By how many rows of the work a mean makes a channel late; 0 where it is none."""
     return work.known.get("late", {}).get(channel, 0.0) / work.step
-
-
-def _averaged_finding(names: list[str], rows: int, step: float) -> Finding:
-    return Finding(
-        "averaged", WARNING, " ".join(names),
-        {"rows": rows, "seconds": rows * step, "late_s": 0.5 * (rows - 1) * step},
-    )  # fmt: skip

@@ -17,8 +17,8 @@ from omnidyn.findings.signal.log_under_check import MIN_ROWS
 from omnidyn.logs.columns.mapping import ColumnMap, component_channel
 from omnidyn.logs.geometry import shows_both, wheel_geometry
 from omnidyn.logs.log import Log
-from omnidyn.logs.one_clock import on_clock_of_wheels
 from omnidyn.logs.plateaus import MIN_DURATION, Plateau, first_plateaus
+from omnidyn.logs.segments import on_clock_of_wheels
 from omnidyn.model.motor import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
@@ -26,9 +26,9 @@ from omnidyn.statement import ERROR, NOTE, WARNING, Statement
 
 WHOLE, STEADY, MOTORS, GEOMETRY = "whole logs", "steady state", "motors", "geometry"
 USES = (WHOLE, STEADY, MOTORS, GEOMETRY)
-ENOUGH = 12  # steady windows that are counted
+MOST_WINDOWS = 12  # steady windows that are counted
 AT_REST = 0.02  # [rad/s] of a wheel: 1 mm/s at the rim of one of 5 cm
-SURE = 2.0  # standard errors: a mean speed below is not known to be one
+SURE_ERRORS = 2.0  # standard errors: a mean speed below is not known to be one
 NEVER, FEW = "never_moved", "few_rows"  # findings that leave nothing to do
 INPUTS, SET_SPEEDS = ("voltage", "duty"), ("wheel_speed_command", "twist_command")
 WHEELS = ("wheel_speed", "wheel_angle")
@@ -135,12 +135,12 @@ def _steady(run: Run, robot: Robot | None, columns: ColumnMap) -> Use:
         return use
     if robot is not None and needs.loses_in_gear(robot):
         return _not(STEADY, "lossy_gear", columns)
-    windows = first_plateaus(on_clock_of_wheels(run), ENOUGH)
+    windows = first_plateaus(on_clock_of_wheels(run), MOST_WINDOWS)
     count = sum(map(_moves, windows))
     if not count:
         return _not(STEADY, "no_steady_stretch", columns, hold_s=MIN_DURATION, at_rest=len(windows))
     drives = "duty" if origin == needs.VOLTAGE and run.voltage is None else origin
-    more = len(windows) == ENOUGH
+    more = len(windows) == MOST_WINDOWS
     return _yes(STEADY, "serves_steady", stretches=count, more=more, force_from=drives,
                 needs=_needs_of_robot(run, robot, drives))  # fmt: skip
 
@@ -150,7 +150,7 @@ def _moves(window: Plateau) -> bool:
     speed, std = window.mean.get("wheel_speed"), window.std.get("wheel_speed")
     if speed is None or std is None:
         return False
-    return bool((np.abs(speed) > np.maximum(AT_REST, SURE * np.nan_to_num(std))).any())
+    return bool((np.abs(speed) > np.maximum(AT_REST, SURE_ERRORS * np.nan_to_num(std))).any())
 
 
 def _motors(run: Run, columns: ColumnMap) -> Use:

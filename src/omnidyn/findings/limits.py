@@ -25,15 +25,15 @@ def check_limits(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on saturation, supply and signs; the work without what has lost its sign."""
     if len(work) < MIN_ROWS:
         return [], work
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for channel in ("voltage", "duty", "current"):
-        found += _saturated(work, channel)
-    found += at_each_clock(work, _too_fast)[0] + _sag(work) + _no_supply(work)
+        findings += _saturated(work, channel)
+    findings += at_each_clock(work, _too_fast)[0] + _sag(work) + _no_supply(work)
     for channel in ("voltage", "duty"):
         more = _one_way_drive(work, channel)
-        work, found = work.replace(**{channel: None}) if more else work, found + more
+        work, findings = work.replace(**{channel: None}) if more else work, findings + more
     more = _unsigned(work)
-    return found + more, work.replace(current=None) if any(each.severity == ERROR for each in more) else work
+    return findings + more, work.replace(current=None) if any(finding.severity == ERROR for finding in more) else work
 
 
 def _one_way_drive(work: LogUnderCheck, channel: str) -> list[Finding]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.findings.finding import Finding
-from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
+from omnidyn.findings.signal.log_under_check import INPUTS, MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import ground, volts
 from omnidyn.findings.signal.robust import quantum, slope, smooth, white_noise
 from omnidyn.logs.channels import components
@@ -17,7 +17,8 @@ from omnidyn.statistics import stretches
 
 SETTLE, HELD = 0.4, 0.3  # [s]
 DROOP = 0.05
-MOSTLY, SURELY = 0.99, 1.5  # of noise at rest, a row in some thousands is beyond its level, none beyond 1.5 times that
+NOISE_QUANTILE = 0.99  # of noise at rest: a row in some thousands is beyond its level,
+NOISE_FACTOR = 1.5  # none beyond so many times that
 MOMENT = 0.15  # [s]
 SAFETY = 1.6  # a robot that stands although its voltages are so many times those that move it was held
 
@@ -29,7 +30,7 @@ def check_motion(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     still = _still(work)
     if still is None:
         return [], work
-    if still.mean() > MOSTLY and np.all(_still(work, SURELY)):
+    if still.mean() > NOISE_QUANTILE and np.all(_still(work, NOISE_FACTOR)):
         return [_never_moved(work)], work.knowing(at_rest=True)
     return _start_up(work, still) + _blocked(work, still) + _droop(work), work
 
@@ -152,3 +153,47 @@ def _droop(work: LogUnderCheck) -> list[Finding]:
         "droop", WARNING, " ".join(components("wheel_speed", speed.shape[1])),
         {"ratio": line.value, "error": line.error, "command": name}, rows=work.lines(settled), count=int(settled.sum()),
     )]  # fmt: skip
+
+
+# Small things that a reader of the log should know: bursts of a tracker, a last row that is not like the others
+
+BURST, SHORT = 10.0, 0.25  # times what 90 % of the rows stay below; [s]
+
+
+def check_oddities(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """Notes; nothing is masked."""
+    if len(work) < MIN_ROWS:
+        return [], work
+    return _bursts(work) + _last_row(work), work
+
+
+def _bursts(work: LogUnderCheck) -> list[Finding]:
+    """Speeds over the floor that shoot up for a moment, in a log without wheel speeds to hold them against."""
+    if work.get("wheel_speed") is not None:
+        return []
+    findings = []
+    for component, values in work.columns("twist"):
+        size = np.abs(values)
+        usual = float(np.nanquantile(size, 0.9))
+        bad = np.zeros(len(work), dtype=bool)
+        for a, b in stretches(size > BURST * usual):
+            bad[a:b] = work.t[min(b, len(work) - 1)] - work.t[a] < SHORT
+        if usual <= 0.0 or not bad.any():
+            continue
+        top = int(np.flatnonzero(bad)[np.argmax(size[bad])])
+        findings.append(Finding(
+            "burst", NOTE, component,
+            {"farthest": float(values[top]), "usual": usual, "at_s": float(work.t[top]), "longest_s": SHORT},
+            rows=work.lines(bad), count=int(bad.sum()),
+        ))  # fmt: skip
+    return findings
+
+
+def _last_row(work: LogUnderCheck) -> list[Finding]:
+    """Commands that are 0 in the last row only: the recorder stopped the robot, the row is no part of the run."""
+    for channel in INPUTS:
+        values = work.get(channel)
+        if values is not None and not values[-1].any() and values[-2].any() and np.isfinite(values[-2:]).all():
+            bad = np.arange(len(work)) == len(work) - 1
+            return [Finding("last_row", NOTE, channel, rows=work.lines(bad), count=1)]
+    return []

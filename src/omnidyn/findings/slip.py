@@ -18,10 +18,10 @@ from omnidyn.statement import WARNING
 from omnidyn.statistics import robust_std
 
 WINDOW, SHORTEST = 0.15, 0.4  # [s]
-LEAST, SURE = 0.025, 5.5  # of the ratio; standard errors, over all stretches that are looked at
+LEAST_DEVIATION, SURE_ERRORS = 0.025, 5.5  # of the ratio; standard errors, over all stretches that are looked at
 STAND_IN = 0.1  # the least where one wheel is dead and another channel stands in for it
 APART = 0.03  # of the ratio, between two axes
-MANY = 12  # windows in motion along an axis
+MANY_WINDOWS = 12  # windows in motion along an axis
 STRETCHES = 3
 FASTER = 12.0  # mean square of the speed in one part of the log over that in the other, at most
 SPINS = 0.25  # of the path: less is no slip but a wheel that spins
@@ -31,7 +31,7 @@ MAX_WINDOWS = 400
 
 def check_slip(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on stretches that slip; the motion over the floor is masked there."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for _ in range(STRETCHES):
         stretch = _worst(work)
         if stretch is None:
@@ -41,7 +41,7 @@ def check_slip(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         assert seen is not None
         names = " ".join(components("wheel_speed", work.wheels))
         rows = np.flatnonzero(bad)
-        found.append(Finding(
+        findings.append(Finding(
             "slip", WARNING, names,
             {"ratio": inside / outside, "error": error, "from_s": float(work.t[rows[0]]),
              "to_s": float(work.t[rows[-1]]), "inside": inside, "outside": outside, **_against_the_limit(work, bad)},
@@ -50,7 +50,7 @@ def check_slip(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         values = work.channels[seen.name].copy()
         values[bad] = np.nan
         work = work.replace(**{seen.name: values})
-    return found, work
+    return findings, work
 
 
 def _against_the_limit(work: LogUnderCheck, bad: BoolArray) -> dict[str, Any]:
@@ -120,15 +120,15 @@ def check_axes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     k = int(np.argmax([abs(line.value - 1.0) for line in lines]))
     off, other = lines[k], lines[1 - k]
     apart, error = abs(off.value - other.value), float(np.hypot(off.error, other.error))
-    if min(line.windows for line in lines) < MANY or not apart > max(APART, SURE * error):
+    if min(line.windows for line in lines) < MANY_WINDOWS or not apart > max(APART, SURE_ERRORS * error):
         return [], work
     if not (min(off.value, other.value) > 0.1 and abs(other.value - 1.0) < 0.5 * apart):
         return [], work
     axis = ("x", "y")[k]
-    found = Finding("axis_ratio", WARNING, axis, {"ratio": off.value, "error": off.error, "other": other.value})
+    finding = Finding("axis_ratio", WARNING, axis, {"ratio": off.value, "error": off.error, "other": other.value})
     values = work.channels[seen.name].copy()
     values[:, k] = values[:, k] / off.value if seen.name == "twist" else np.nan
-    return [found], work.replace(**{seen.name: values})
+    return [finding], work.replace(**{seen.name: values})
 
 
 def _contrast(
@@ -168,8 +168,8 @@ def _contrast(
     rows = (ids >= starts[k]) & (ids < ends[k])
     if inside > outside:  # then the rest is what slips
         inside, outside, rows = outside, inside, ~rows
-    least = LEAST if work.known.get("dead_wheel") is None else STAND_IN
-    if sure[k] < SURE or not 0.1 < outside < 2.0 or (outside - inside) / outside < least:
+    least = LEAST_DEVIATION if work.known.get("dead_wheel") is None else STAND_IN
+    if sure[k] < SURE_ERRORS or not 0.1 < outside < 2.0 or (outside - inside) / outside < least:
         return None
     if inside < SPINS * outside and not 0.5 < (d_in[k] / b_in[k]) / (d_out[k] / b_out[k]) < 2.0:
         return None  # wheels that are said to spin while the robot stands: then as fast as they turn elsewhere

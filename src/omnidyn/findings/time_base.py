@@ -24,24 +24,24 @@ LONGEST_STEP, SHORTEST_STEP = 2.0, 2e-5  # [s] outside of which no robot is logg
 
 def begin(log: Log, robot: Robot | None) -> tuple[list[Finding], LogUnderCheck]:
     """The findings on time, and the log under check: the rows that have a time, sorted, each time once."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     rows = np.arange(len(log))
     empty = log.empty_rows() if len(log) else np.zeros(0, dtype=bool)
-    found += _empty_rows(log, empty)
+    findings += _empty_rows(log, empty)
     rows = rows[~empty]
     padding = log.rows(rows).padding_rows() if rows.size else np.zeros(0, dtype=bool)
-    found += _padded(log, rows[padding])
+    findings += _padded(log, rows[padding])
     rows = rows[~padding]
-    found += _backward(log, rows)
+    findings += _backward(log, rows)
     rows = rows[np.argsort(log.t[rows], kind="stable")]
     again = np.concatenate([[False], np.diff(log.t[rows]) == 0.0]) if rows.size else np.zeros(0, dtype=bool)
-    found += _repeated(log, rows, again) + restarts_of(log)
+    findings += _repeated(log, rows, again) + restarts_of(log)
     rows = rows[~again]
     more, work = at_each_clock(leading(log, robot, rows), check_counters)
-    found, work = found + more, with_speed(work)
+    findings, work = findings + more, with_speed(work)
     if work.get("wheel_speed") is not None and work.derived_speed:
-        found.append(Finding("speed_from_angle", NOTE))
-    return found + _gaps(work) + _jitter(work) + _unit(work) + _few(work), work
+        findings.append(Finding("speed_from_angle", NOTE))
+    return findings + _gaps(work) + _jitter(work) + _unit(work) + _few(work), work
 
 
 def _empty_rows(log: Log, empty: BoolArray) -> list[Finding]:
@@ -100,7 +100,7 @@ def _repeated(log: Log, rows: IntArray, again: BoolArray) -> list[Finding]:
 
 def _gaps(work: LogUnderCheck) -> list[Finding]:
     lines = work.log.lines[work.rows]
-    known = [each.line for each in work.log.restarts if each.is_gap]  # a gap of their own
+    known = [restart.line for restart in work.log.restarts if restart.is_gap]  # a gap of their own
     cuts = [segment.start for segment in work.segments[1:]]
     cuts = [k for k in cuts if not any(lines[k - 1] < line <= lines[k] for line in known)]
     if not cuts:
@@ -184,9 +184,9 @@ def restarts_of(log: Log) -> list[Finding]:
 
 def check_counters(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Jumps of angles that no reader saw, as those of a Run made in memory; they are taken out."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     if work.log.columns.columns:
-        return found, work
+        return findings, work
     for component, values in work.sampled_columns("wheel_angle"):
         try:
             going_on, period, rows = unrolled(values, "rad", component, work.t)
@@ -196,11 +196,11 @@ def check_counters(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             continue
         bad = np.zeros(len(work), dtype=bool)
         bad[list(rows)] = True
-        found.append(Finding(
+        findings.append(Finding(
             COUNTER if rows else FULL, ERROR, component, {} if period is None else {"period_rad": period},
             "of_run", rows=work.lines(bad), count=len(rows),
         ))  # fmt: skip
         angle = work.channels["wheel_angle"].copy()
         angle[:, place(component)[1]] = going_on  # type: ignore[index]
         work = work.replace(wheel_angle=angle)
-    return found, work
+    return findings, work

@@ -15,7 +15,7 @@ from omnidyn.compiled.parallel import compiled_elsewhere
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.kernel.of_rows import row_squares, row_terms
+from omnidyn.identification.output_error.engines.engine import row_squares, row_terms
 from omnidyn.identification.output_error.memory.autoregression import autoregression
 from omnidyn.model.dynamics import acceleration
 from omnidyn.model.motor import DYNAMIC, SPEED

@@ -11,9 +11,8 @@ from omnidyn.arguments import MADE_BY, check_order, is_frame
 from omnidyn.attempts import COMPARISON, DIAGNOSIS, JUDGEMENT, LADDER, QUICK, Attempts, Missing, not_made
 from omnidyn.document import Document, Points, apart, sentence
 from omnidyn.errors import INTERRUPTS, InputError, told_by
-from omnidyn.findings.finding import Verdict
+from omnidyn.findings.finding import Verdict, rest_on_guesses
 from omnidyn.findings.fitness import STEADY as STEADY_USE
-from omnidyn.findings.guesses import rest_on_guesses
 from omnidyn.identification.advice import advice
 from omnidyn.identification.default_method import as_driven, default_method, why_not_output_error
 from omnidyn.identification.estimate import Estimate

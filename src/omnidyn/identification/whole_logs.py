@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 
-from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.fit import Fit
@@ -43,15 +42,7 @@ def solved(
 def answered(fit: Fit, solution: Solution, progress: FitProgress, quick: bool = False) -> Answer:
     """What a solution says, each estimate with its diagnosis, which is made when it is first asked for; `quick` leaves
     it out."""
-    if not solution.converged:
-        solution = fit.with_latencies_only(solution, progress) or solution
-    try:
-        answer = fit.answer(solution, progress)
-    except InsufficientDataError:
-        plainer = fit.with_latencies_only(solution, progress)
-        if plainer is None:
-            raise
-        answer = fit.answer(plainer, progress)
+    answer = fit.answer(solution, progress)
     if quick:
         return answer
     found = {

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.arrays import FloatArray
 from omnidyn.clocks import sampled, samples, usual_step
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.logs.read_log import STILL
+from omnidyn.logs.read_log import STANDSTILL_SPEED
 from omnidyn.logs.segments import GAP
 from omnidyn.model.frames import unwrapped
 from omnidyn.run import Run
@@ -121,12 +121,12 @@ def as_mecanum(seen: Geometry) -> Geometry:
 
 def _moving(twist: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Only the rows in motion."""
-    keep = (np.abs(speed) > STILL).any(axis=1)
+    keep = (np.abs(speed) > STANDSTILL_SPEED).any(axis=1)
     return twist[keep], speed[keep]
 
 
 def _fit(twist: FloatArray, speed: FloatArray, source: str, instead: str) -> Geometry:
-    turned = bool(np.any(np.abs(twist[:, 2]) > STILL))
+    turned = bool(np.any(np.abs(twist[:, 2]) > STANDSTILL_SPEED))
     design = twist if turned else twist[:, :2]
     size = np.sqrt(np.mean(design**2, axis=0))
     if (size == 0.0).any() or np.linalg.cond(design / size) > MAX_CONDITION:
@@ -229,13 +229,7 @@ def _between(t: FloatArray, way: FloatArray, edges: FloatArray) -> FloatArray:
     """How far a component went from each edge to the next, shape (edges - 1,); NaN across a gap of its samples."""
     gone = np.diff(np.interp(edges, t, way))
     gaps = np.append(0, np.cumsum(np.diff(t) > GAP * usual_step(t)))
-    crossed = gaps[_after(t, edges[1:])] - gaps[_before(t, edges[:-1])]
+    after = np.clip(np.searchsorted(t, edges[1:]), 0, len(t) - 1)
+    before = np.clip(np.searchsorted(t, edges[:-1], side="right") - 1, 0, len(t) - 1)
+    crossed = gaps[after] - gaps[before]
     return np.where(crossed > 0, np.nan, gone)
-
-
-def _before(t: FloatArray, at: FloatArray) -> IntArray:
-    return np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 1)
-
-
-def _after(t: FloatArray, at: FloatArray) -> IntArray:
-    return np.clip(np.searchsorted(t, at), 0, len(t) - 1)

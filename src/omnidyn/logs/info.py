@@ -20,7 +20,7 @@ from omnidyn.logs.clock.stamps import timed, with_joined_stamp
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.logs.read_log import LogOptions, map_columns
 from omnidyn.logs.readers.read_table import iter_tables, reader_of
-from omnidyn.logs.readers.reader import Options, completed
+from omnidyn.logs.readers.reader import ReadOptions, completed
 from omnidyn.logs.readers.recording import Topic
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
@@ -32,7 +32,7 @@ PIECE = 200_000  # rows looked at together
 
 
 @dataclass(frozen=True)
-class Info:
+class LogInfo:
     """What a file holds. format: mcap, db3, bag, wpilog, mat, hdf5, parquet or text. topics: or columns. mapping: what
     would be taken, None where nothing tells the time, and why. span [s]. salvaged: messages, where it is cut short.
     """
@@ -53,9 +53,9 @@ class Info:
         if self.salvaged is not None:
             head += f"; cut short, {self.salvaged} messages salvaged"
         rows = [
-            (each.name, each.type, str(each.count), f"{each.rate:.4g}" if each.rate else "",
-             f"{each.longest_gap:.4g}" if each.longest_gap else "", each.why)
-            for each in self.topics
+            (topic.name, topic.type, str(topic.count), f"{topic.rate:.4g}" if topic.rate else "",
+             f"{topic.longest_gap:.4g}" if topic.longest_gap else "", topic.why)
+            for topic in self.topics
         ]  # fmt: skip
         table = Cells(("topic", "type", "count", "rate [Hz]", "longest gap [s]", ""), rows, "<<>>><", name="topics")
         lines = self.mapping.lines() if self.mapping is not None else [f"nothing: {self.why}"]
@@ -74,9 +74,9 @@ class Info:
         return {
             "source": self.source, "format": self.format, "span_s": self.span, "salvaged": self.salvaged,
             "topics": [
-                {"name": each.name, "type": each.type, "count": each.count, "rate_hz": each.rate,
-                 "longest_gap_s": each.longest_gap, "read": each.read, "why": each.why}
-                for each in self.topics
+                {"name": topic.name, "type": topic.type, "count": topic.count, "rate_hz": topic.rate,
+                 "longest_gap_s": topic.longest_gap, "read": topic.read, "why": topic.why}
+                for topic in self.topics
             ],
             "mapping": {key: {"column": column.name, "unit": column.unit} for key, column in columns.items()},
             "doubts": [doubt.to_dict() for doubt in self.mapping.doubts] if self.mapping is not None else [self.why],
@@ -87,7 +87,7 @@ class Info:
 def read_info(
     path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None, *,
     progress: Progress = silent,
-) -> Info:  # fmt: skip
+) -> LogInfo:  # fmt: skip
     """What a file holds. robot, options: as for a log. Raises InputError where nothing can be read.
 
     progress: hears now and then how many bytes are done, of how many.
@@ -97,7 +97,7 @@ def read_info(
     if reader.recording is None:
         return _of_columns(path, kind, robot, options, progress)
     limit = default_max_bytes() if options.max_bytes is None else options.max_bytes
-    recording = reader.recording(path, Options(max_bytes=limit, progress=progress))
+    recording = reader.recording(path, ReadOptions(max_bytes=limit, progress=progress))
     if not any(topic.count for topic in recording.topics):
         raise InputError("no messages", got="0 messages", expected=reader.least, where=str(path))
     topics, span, mapping, why = tuple(recording.topics), 0.0, None, ""
@@ -111,7 +111,7 @@ def read_info(
         last = max(int(track.stamps.max()) for track in recording.tracks if len(track.stamps))
         span = (last - first) / 1e9
     notes = statements((*recording.notes, *(mapping.notes if mapping is not None else ())))
-    return Info(printable(str(path)), kind, topics, mapping, span, recording.salvaged, notes, why, recording.sha256)
+    return LogInfo(printable(str(path)), kind, topics, mapping, span, recording.salvaged, notes, why, recording.sha256)
 
 
 @dataclass
@@ -143,7 +143,7 @@ class _Seen:
 
 def _of_columns(
     path: str | os.PathLike, kind: str, robot: Robot | None, options: LogOptions, progress: Progress
-) -> Info:
+) -> LogInfo:
     """A table: a topic for each column. It is read in pieces, whatever its length."""
     seen: dict[str, _Seen] = {}
     mapping, why, clock, table = None, "", Clock(), None
@@ -161,9 +161,9 @@ def _of_columns(
             first, last = min(first, float(np.nanmin(t))), max(last, float(np.nanmax(t)))
     assert table is not None
     taken = {column.name for column in mapping.columns.values()} if mapping is not None else set()
-    topics = tuple(_topic(name, each, table, name in taken) for name, each in seen.items())
+    topics = tuple(_topic(name, values, table, name in taken) for name, values in seen.items())
     notes = statements((*table.notes, *(mapping.notes if mapping is not None else ())))
-    return Info(printable(str(path)), kind, topics, mapping, max(0.0, last - first), None, notes, why, table.sha256)
+    return LogInfo(printable(str(path)), kind, topics, mapping, max(0.0, last - first), None, notes, why, table.sha256)
 
 
 def _tables(path: str | os.PathLike, options: LogOptions, progress: Progress) -> Iterator[Table]:

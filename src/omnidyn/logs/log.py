@@ -30,7 +30,7 @@ REFUSED = {
 OFTEN_BACK = 0.005  # of the rows: no recorder writes so many out of order
 MAX_MISSING = 0.2  # share of rows without a time or without any number
 ON_CHANGE = 0.2  # a component with more blank cells than this share, gaps left out, is recorded on change
-NEAR = 1e-6  # of a row: times that are no farther apart are one
+SAME_TIME_SHARE = 1e-6  # of a row: times that are no farther apart are one
 HELD = ("voltage", "duty", "wheel_speed_command", "twist_command")  # what is commanded holds until the next value
 NEVER_MADE_UP = (*HELD, "supply")  # a battery is an input like any other: it holds too
 
@@ -88,7 +88,7 @@ class Log:
         """The log cut where its clock or a counter begins again, and where its time goes back now and then."""
         back = np.flatnonzero(np.diff(self.t) < 0.0) + 1
         cuts = back if back.size <= OFTEN_BACK * len(self) else back[:0]
-        lines = [each.line for each in self.restarts if each.is_gap]
+        lines = [restart.line for restart in self.restarts if restart.is_gap]
         begins = np.searchsorted(self.lines, lines).tolist()
         edges = sorted({0, *cuts.tolist(), *begins, len(self)})
         parts = [self.rows(slice(a, b)) for a, b in pairwise(edges)]
@@ -123,13 +123,13 @@ class Log:
 
         No number is changed, and none stands between two rows. Times increase. What happened before the first row goes.
         """
-        late = {key: each.latency for key, each in self.columns.columns.items() if each.latency and place(key)}
+        late = {key: column.latency for key, column in self.columns.columns.items() if column.latency and place(key)}
         if not late or len(self) < 2:
             return self
-        near = NEAR * fastest_step(self.t, self.channels.values())
+        near = SAME_TIME_SHARE * fastest_step(self.t, self.channels.values())
         at = {key: self.t - seconds for key, seconds in late.items()}
-        new = np.unique(np.concatenate([each for each in at.values()]))
-        new = new[(new > self.t[0]) & (new < self.t[-1]) & (_distance(new, self.t) > near)]
+        new = np.unique(np.concatenate([times for times in at.values()]))
+        new = new[(new > self.t[0]) & (new < self.t[-1]) & (np.abs(new - self.t[_nearest(new, self.t)]) > near)]
         t = np.sort(np.concatenate([self.t, new[np.append(True, np.diff(new) > near)]])) if new.size else self.t
         own = np.searchsorted(t, self.t)
         channels = {}
@@ -142,7 +142,7 @@ class Log:
                 table[rows[there], k] = columns[there, k]
             channels[name] = table[:, 0] if CHANNELS[name] == SCALAR else table
         warnings += [Statement("latency_taken_out", NOTE, key, {"seconds": seconds}) for key, seconds in late.items()]
-        settled = {key: replace(each, latency=0.0) for key, each in self.columns.columns.items()}
+        settled = {key: replace(column, latency=0.0) for key, column in self.columns.columns.items()}
         lines = self.lines[np.searchsorted(self.t, t, side="right") - 1]
         log = replace(
             self, t=t, channels=channels, lines=lines, columns=replace(self.columns, columns=settled),
@@ -296,11 +296,6 @@ def _nearest(at: FloatArray, t: FloatArray) -> IntArray:
     """The row of `t`, which increases, whose time is nearest to each of `at`."""
     after = np.clip(np.searchsorted(t, at), 1, len(t) - 1)
     return np.where(at - t[after - 1] <= t[after] - at, after - 1, after)
-
-
-def _distance(at: FloatArray, t: FloatArray) -> FloatArray:
-    """How far each of `at` is from the nearest of `t`."""
-    return np.abs(at - t[_nearest(at, t)])
 
 
 def _far_from(at: FloatArray, known: FloatArray, t: FloatArray) -> BoolArray:

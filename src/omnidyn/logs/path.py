@@ -18,7 +18,7 @@ POSE, TWIST, WHEELS = "measured positions", "integrated body speeds", "integrate
 
 
 @dataclass(frozen=True, eq=False)
-class Path:
+class BodyPath:
     """position: (x, y) in the world [m], shape (samples, 2), NaN where it is not known. step: (x, y) moved from each
     sample to the next, in the body frame [m], shape (samples - 1, 2). origin: from what, POSE, TWIST or WHEELS.
     """
@@ -38,7 +38,7 @@ class Path:
         return np.arctan2(self.step[:, 1], self.step[:, 0])
 
 
-def path_of(run: Run, robot: Robot | None = None) -> Path | None:
+def path_of(run: Run, robot: Robot | None = None) -> BodyPath | None:
     """The path of a run: its measured positions, else its speeds integrated from the origin; None where it has neither.
 
     robot: tells body speeds from wheel speeds, where no others were measured. Steps across a gap are not known.
@@ -46,7 +46,7 @@ def path_of(run: Run, robot: Robot | None = None) -> Path | None:
     if run.pose is not None and np.isfinite(run.pose).all(axis=1).sum() > 1:
         pose = _filled(run.t if run.staggered else np.arange(len(run), dtype=float), run.pose)
         body = _turned(np.diff(pose[:, :2], axis=0), -0.5 * (pose[1:, 2] + pose[:-1, 2]))
-        return Path(pose[:, :2], _without_gaps(run, body), POSE)
+        return BodyPath(pose[:, :2], _without_gaps(run, body), POSE)
     twist, origin = _twist(run, robot)
     if twist is None:
         return None
@@ -57,7 +57,7 @@ def path_of(run: Run, robot: Robot | None = None) -> Path | None:
     heading = np.append(0.0, np.cumsum(middle[:, 2]))
     world = _turned(middle[:, :2], 0.5 * (heading[1:] + heading[:-1]))
     position = np.vstack([np.zeros(2), np.cumsum(world, axis=0)])
-    return Path(position, middle[:, :2], origin)
+    return BodyPath(position, middle[:, :2], origin)
 
 
 def body_twist(run: Run, robot: Robot | None = None) -> FloatArray | None:
@@ -69,7 +69,7 @@ def driven(twists: Sequence[FloatArray | None]) -> list[tuple[float, float] | No
     """The middle 90 % of the speeds at which logs moved along x, along y and about yaw; None for an axis without."""
     found: list[tuple[float, float] | None] = []
     for axis in range(3):
-        speeds = np.concatenate([np.zeros(0), *(each[:, axis] for each in twists if each is not None)])
+        speeds = np.concatenate([np.zeros(0), *(twist[:, axis] for twist in twists if twist is not None)])
         speeds = speeds[np.isfinite(speeds) & moving(speeds)]
         found.append((float(np.quantile(speeds, 0.05)), float(np.quantile(speeds, 0.95))) if speeds.size else None)
     return found

@@ -96,11 +96,11 @@ def pool(plateaus: Sequence[Plateau]) -> tuple[Plateau, ...]:
 
 def _pooled(windows: Sequence[Plateau]) -> Plateau:
     first, last = windows[0], windows[-1]
-    weight = np.array([each.count for each in windows], dtype=float)
+    weight = np.array([window.count for window in windows], dtype=float)
     weight /= weight.sum()
-    mean, rate = (_averaged([getattr(each, part) for each in windows], weight) for part in ("mean", "rate"))
-    std, rate_std = (_error([getattr(each, part) for each in windows], weight) for part in ("std", "rate_std"))
-    rows, count = slice(first.rows.start, last.rows.stop), sum(each.count for each in windows)
+    mean, rate = (_averaged([getattr(window, part) for window in windows], weight) for part in ("mean", "rate"))
+    std, rate_std = (_error([getattr(window, part) for window in windows], weight) for part in ("std", "rate_std"))
+    rows, count = slice(first.rows.start, last.rows.stop), sum(window.count for window in windows)
     return replace(
         first, rows=rows, end=last.end, mean=mean, std=std, count=count, rate=rate, rate_std=rate_std
     )  # fmt: skip
@@ -114,8 +114,8 @@ def _averaged(parts: Sequence[Mapping[str, FloatArray]], weight: FloatArray) -> 
 
 def _error(parts: Sequence[Mapping[str, FloatArray]], weight: FloatArray) -> dict[str, FloatArray]:
     """The standard error of that average."""
-    squares = _averaged([{name: each**2 for name, each in part.items()} for part in parts], weight**2)
-    return {name: np.sqrt(each) for name, each in squares.items()}
+    squares = _averaged([{name: value**2 for name, value in part.items()} for part in parts], weight**2)
+    return {name: np.sqrt(square) for name, square in squares.items()}
 
 
 def _plateau(run: Run, rows: slice, angle: FloatArray | None) -> Plateau:
@@ -134,10 +134,10 @@ def _plateau(run: Run, rows: slice, angle: FloatArray | None) -> Plateau:
         at, pose = t[seen], run.pose[rows][seen]
         mean["twist"], std["twist"] = _body_rate(at, pose)
         speeds["twist"] = _middle(at), _body_steps(pose) / np.diff(at)[:, None]
-    rates = {name: _rate_of_change(*each) for name, each in speeds.items()}
+    rates = {name: _rate_of_change(*speed) for name, speed in speeds.items()}
     return Plateau(
         rows, float(t[0]), float(t[-1]), mean, std, speed_from, count=rows.stop - rows.start,
-        rate={name: each[0] for name, each in rates.items()}, rate_std={name: each[1] for name, each in rates.items()},
+        rate={name: rate[0] for name, rate in rates.items()}, rate_std={name: rate[1] for name, rate in rates.items()},
     )  # fmt: skip
 
 

@@ -29,7 +29,7 @@ from omnidyn.logs.columns.guess_time import refuse_second_time
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, load_map, parse_column
 from omnidyn.logs.log import Log
 from omnidyn.logs.readers.read_table import iter_tables, read_table, reader_of
-from omnidyn.logs.readers.reader import Options, completed
+from omnidyn.logs.readers.reader import ReadOptions, completed
 from omnidyn.logs.readers.recording import Recording, Track
 from omnidyn.logs.table.dialect import split_unit
 from omnidyn.logs.table.table import ROWS, Table, join
@@ -40,7 +40,7 @@ from omnidyn.progress import Progress, silent
 from omnidyn.run import CHANNELS, SCALAR, WHEEL, Run
 from omnidyn.statement import NOTE, Statement, statements
 
-STILL = 1e-6  # [rad/s] a commanded speed below counts as none
+STANDSTILL_SPEED = 1e-6  # [rad/s] a commanded speed below counts as none
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def read_log(
         given = load_map(columns)  # type: ignore[arg-type]
     options = LogOptions(
         given, overrides, assume or {}, latency or {}, header, skip_bad_rows, current_unsigned, max_bytes,
-        tuple(variables), tuple(str(each) for each in beside), rate,
+        tuple(variables), tuple(str(file) for file in beside), rate,
     )  # fmt: skip
     log = load_log(path, robot, options)
     run = log.to_run(sort=sort)
@@ -133,7 +133,7 @@ def load_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOp
     if options.beside and options.rate is not None:
         raise InputError("files without time cannot be joined by time", got="`rate` with files beside", expected="one")
     if options.beside:
-        how = Options(options.header, options.skip_bad_rows, options.max_bytes, variables=options.variables)
+        how = ReadOptions(options.header, options.skip_bad_rows, options.max_bytes, variables=options.variables)
         alone = replace(options, overrides=())  # columns of the whole, which one file alone need not have
         table = joined_table([path, *options.beside], how, lambda part: map_columns(part, None, alone))
     else:
@@ -225,7 +225,7 @@ def log_from_table(
         channels[name] = channels[name][:, 0]
     notes += turn_to_body(t, channels, columns, table.source)
     restarts = counters.restarts()
-    notes += [each.statement for each in restarts if each.where != TIME]
+    notes += [restart.statement for restart in restarts if restart.where != TIME]
     log = Log(
         t, channels, table.lines, columns, table.source, table.sha256, False, statements(notes), table.own_clocks,
         tuple(restarts),
@@ -310,7 +310,7 @@ def driven_way(log: Log, robot: Robot | None) -> tuple[FloatArray | None, str]:
         if np.isfinite(twist).any(axis=0).all():
             speed = wheel_speed(robot.wheels, twist)
     if speed is not None:
-        return np.where(np.abs(speed) < STILL, 0.0, np.sign(speed)), "commanded speed"
+        return np.where(np.abs(speed) < STANDSTILL_SPEED, 0.0, np.sign(speed)), "commanded speed"
     for name in ("voltage", "duty"):
         if name in log.channels:
             return np.sign(log.channels[name]), name
@@ -337,7 +337,7 @@ def iter_logs(
 Mapped = Callable[[Table], ColumnMap]
 
 
-def joined_table(paths: Sequence[str | os.PathLike], options: Options, mapped: Mapped) -> Table:
+def joined_table(paths: Sequence[str | os.PathLike], options: ReadOptions, mapped: Mapped) -> Table:
     """The topics and columns of all files, a row for each stamp, blank where a file has nothing there.
 
     mapped(table): which column is what, for the time of a table. A name that two files have is told by the file.
@@ -346,25 +346,25 @@ def joined_table(paths: Sequence[str | os.PathLike], options: Options, mapped: M
     limit = default_max_bytes() if options.max_bytes is None else options.max_bytes
     options = options._replace(max_bytes=limit)
     found = [_recording(path, options, mapped) for path in paths]
-    spans = [_span(each) for each in found]
-    for each, (first, last) in zip(found[1:], spans[1:], strict=True):
+    spans = [_span(recording) for recording in found]
+    for recording, (first, last) in zip(found[1:], spans[1:], strict=True):
         if first > spans[0][1] or last < spans[0][0]:
             raise InputError(
-                "the files were not recorded at the same time", got=f"{_moments(first, last)}, {each.source}",
+                "the files were not recorded at the same time", got=f"{_moments(first, last)}, {recording.source}",
                 expected=f"times within {_moments(*spans[0])}, as in {found[0].source}",
                 remedy="give stamps of one clock, such as seconds since 1970; logs of several runs need no joining",
-                where=each.source,
+                where=recording.source,
             )  # fmt: skip
     taken: set[str] = set()
-    tracks = [_renamed(track, Path(each.source).stem, taken) for each in found for track in each.tracks]
-    notes = [f"{len(found)} files are one experiment: {', '.join(each.source for each in found)}"]
-    notes += [note for each in found for note in each.notes]
-    digest = sha256("".join(each.sha256 for each in found))
+    tracks = [_renamed(track, Path(recording.source).stem, taken) for recording in found for track in recording.tracks]
+    notes = [f"{len(found)} files are one experiment: {', '.join(recording.source for recording in found)}"]
+    notes += [note for recording in found for note in recording.notes]
+    digest = sha256("".join(recording.sha256 for recording in found))
     tables = Recording(tracks, [], found[0].source, digest, notes).tables(ROWS)
     return join(completed(tables, "one row"), limit)
 
 
-def _recording(path: str | os.PathLike, options: Options, mapped: Mapped) -> Recording:
+def _recording(path: str | os.PathLike, options: ReadOptions, mapped: Mapped) -> Recording:
     """A file as topics with stamps; a table is one topic, by its own time."""
     reader = reader_of(path)
     if reader.recording is not None:
@@ -395,7 +395,7 @@ def _span(recording: Recording) -> tuple[int, int]:
     stamps = [track.stamps for track in recording.tracks if len(track.stamps)]
     if not stamps:
         raise InputError("no numbers to join", got="no rows", expected="stamps and numbers", where=recording.source)
-    return min(int(each.min()) for each in stamps), max(int(each.max()) for each in stamps)
+    return min(int(stamp.min()) for stamp in stamps), max(int(stamp.max()) for stamp in stamps)
 
 
 def _moments(first: int, last: int) -> str:

@@ -25,10 +25,10 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.files import check_output, write_atomic
 from omnidyn.logs.channels import components, si_suffix
+from omnidyn.logs.mcap_run import import_mcap, run_to_mcap
 from omnidyn.logs.readers.parquet import SUFFIXES, import_pyarrow, parquet_bytes
 from omnidyn.logs.readers.read_table import read_table
 from omnidyn.logs.table.table import Table
-from omnidyn.logs.writers.mcap_run import import_mcap, run_to_mcap
 from omnidyn.run import CHANNELS, SCALAR, Run, as_run
 from omnidyn.statement import Statement, statements
 from omnidyn.units import DUTY, known_unit, parse_unit
@@ -78,20 +78,16 @@ def _finite(run: Run) -> Run:
 
 def check_format(path: str | os.PathLike) -> None:
     """Raises InputError for the name of another format, and MissingExtraError for a Parquet file without pyarrow."""
-    if _is_parquet(path):
-        import_pyarrow(str(path))
-    if Path(path).suffix.lower() == MCAP:
-        import_mcap(str(path))
     suffix = Path(path).suffix.lower()
+    if suffix in SUFFIXES:
+        import_pyarrow(str(path))
+    if suffix == MCAP:
+        import_mcap(str(path))
     if suffix in _OTHERS:
         raise InputError(
             "a run is not written in this format", got=suffix, expected=".csv, .parquet, .mcap or .mat",
             remedy="spreadsheets open CSV" if suffix in _SHEETS else "", where=str(path),
         )  # fmt: skip
-
-
-def _is_parquet(path: str | os.PathLike) -> bool:
-    return Path(path).suffix.lower() in SUFFIXES
 
 
 def run_to_parquet(run: Run) -> bytes:
@@ -151,7 +147,15 @@ def read_run(path: str | os.PathLike) -> Run:
     known = {channel: columns_of(channel, wheels) for channel in CHANNELS}
     table.check_names(["t_s"], [name for names in known.values() for name in names])
     refuse_other_units(table)
-    channels: dict[str, Any] = {channel: _channel(table, channel, names) for channel, names in known.items()}
+    channels: dict[str, Any] = {
+        channel: _complete(
+            {name: table.numbers(name, missing=True) for name in names if name in table.names},
+            channel,
+            names,
+            table.source,
+        )
+        for channel, names in known.items()
+    }
     time = table.numbers("t_s")
     bad = np.flatnonzero(~(np.diff(time) > 0.0))
     if bad.size:
@@ -187,17 +191,13 @@ def _complete(columns: Mapping[str, FloatArray], channel: str, names: list[str],
     if not there:
         return None
     if len(there) < len(names):
-        raise _not_complete(channel, names, there, source)
+        absent = [name for name in names if name not in there]
+        raise InputError(
+            f"the channel {channel} is not complete", got=", ".join(there), expected=", ".join(names),
+            remedy=f"add {', '.join(absent)}", where=source,
+        )  # fmt: skip
     values = np.stack([columns[name] for name in names], axis=1)
     return values[:, 0] if CHANNELS[channel] == SCALAR else values
-
-
-def _not_complete(channel: str, names: list[str], there: list[str], source: str) -> InputError:
-    absent = [name for name in names if name not in there]
-    return InputError(
-        f"the channel {channel} is not complete", got=", ".join(there), expected=", ".join(names),
-        remedy=f"add {', '.join(absent)}", where=source,
-    )  # fmt: skip
 
 
 def refuse_other_units(table: Table) -> None:
@@ -223,17 +223,6 @@ def _wheel_count(names: Sequence[str]) -> int:
     """The highest number of a wheel in the names of the columns; no more than there are columns."""
     numbered = (re.fullmatch(r"[udiaw](\d{1,4})_\w+", name, re.ASCII) for name in names)
     return min(max((int(match[1]) for match in numbered if match), default=0), len(names))
-
-
-def _channel(table: Table, channel: str, names: list[str]) -> FloatArray | None:
-    """A channel from its columns, None where the file has none of them."""
-    there = [name for name in names if name in table.names]
-    if not there:
-        return None
-    if len(there) < len(names):
-        raise _not_complete(channel, names, there, table.source)
-    values = np.stack([table.numbers(name, missing=True) for name in names], axis=1)
-    return values[:, 0] if CHANNELS[channel] == SCALAR else values
 
 
 # A Run as a MATLAB file (version 5, which every MATLAB and Octave opens): each column of a run file is a variable

@@ -174,7 +174,7 @@ def _per_wheel(table: Table, letter: str, unit: str) -> FloatArray | None:
 
 
 def _alias_notes(words: Sequence[str]) -> list[str]:
-    used = [word for word in ALIASES if word in {each.lower() for each in words}]
+    used = [word for word in ALIASES if word in {word.lower() for word in words}]
     return [f"axis {word} was read as {ALIASES[word]}" for word in used]
 
 

@@ -28,12 +28,12 @@ BISECTIONS = 60
 ROUNDING = 1e-12  # of what drives the robot: less is none
 
 
-def moves(robot: Robot, voltage: ArrayLike) -> BoolArray:
+def moving_axes(robot: Robot, voltage: ArrayLike) -> BoolArray:
     """Which axes of a robot at rest start to move under a held voltage [V].
 
     `voltage` has shape (*batch, wheels); returns (*batch, 3) for x, y, yaw. The voltage limit is not applied.
     """
-    check_order("moves(robot, voltage)", (robot, Robot), (voltage, object))
+    check_order("moving_axes(robot, voltage)", (robot, Robot), (voltage, object))
     voltage = reaching(robot, _patterns(robot, voltage))
     at_rest = np.zeros((*voltage.shape[:-1], 3))
     if axes_move_alone(robot):

@@ -21,7 +21,7 @@ from omnidyn.model.surroundings import KINDS, Battery, Floor, Payload, Surface
 ON_FLOOR = ("axes", "direction")  # the parts of friction that a floor has; that at the wheels is of bearings and gears
 
 
-def vary(
+def vary_robot(
     robot: Robot, *, payload: str | Payload = "", floor: str | Surface = "", tilt: str | Floor = "",
     battery: str | Battery = "",
 ) -> Robot:  # fmt: skip
@@ -34,7 +34,7 @@ def vary(
     the kinds that were chosen. Raises InputError for a name that the file does not have, or a load under which the
     robot would tip over.
     """
-    check_order("vary(robot)", (robot, Robot))
+    check_order("vary_robot(robot)", (robot, Robot))
     chosen = {"payload": payload, "floor": floor, "tilt": tilt, "battery": battery}
     said = []
     own = robot
@@ -55,7 +55,7 @@ def vary(
 
 
 def vary_as(robot: Robot, text: str) -> Robot:
-    """`vary` by a text such as "payload=2kg,floor=carpet"; the robot itself for an empty one. Raises InputError."""
+    """`vary_robot` by a text such as "payload=2kg,floor=carpet"; the robot for an empty one. Raises InputError."""
     chosen: dict[str, Any] = {}
     for part in filter(None, (each.strip() for each in text.split(","))):
         kind, equals, name = (each.strip() for each in part.partition("="))
@@ -66,7 +66,7 @@ def vary_as(robot: Robot, text: str) -> Robot:
         if kind in chosen:
             raise InputError("asked for twice", got=f"{kind}={chosen[kind]}, {part}", expected="one", where="with")
         chosen[kind] = name
-    return vary(robot, **chosen)
+    return vary_robot(robot, **chosen)
 
 
 def _named(robot: Robot, kind: str, name: str) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.deadzone import breakaway_voltage, moves
+from omnidyn.model.deadzone import breakaway_voltage, moving_axes
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.frames import AXES
 from omnidyn.model.keys import Key
@@ -71,7 +71,7 @@ def _steady_speed(robot: Robot, axis: str) -> Claim:
 
 def _rest_row(robot: Robot, axis: str) -> Claim:
     voltage = printed_voltage(axis)[0]
-    moving = bool(moves(robot, voltage)[AXES.index(axis)])
+    moving = bool(moving_axes(robot, voltage)[AXES.index(axis)])
     speed, needed = model_speed(robot, axis)[0], float(breakaway_voltage(robot, pattern_of(axis)))
     level = float(np.abs(voltage).max())
     return Claim(

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.deadzone import moves
+from omnidyn.model.deadzone import moving_axes
 from omnidyn.model.dynamics import state_space
 from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
@@ -22,7 +22,7 @@ def settled_twist(robot: Robot, voltage: ArrayLike) -> FloatArray:
     system = state_space(robot)
     drive = voltage @ system.B.T
     sliding = drive + np.sign(drive) * np.diag(system.K)
-    return np.where(moves(robot, voltage), sliding / -np.diag(system.A), 0.0)
+    return np.where(moving_axes(robot, voltage), sliding / -np.diag(system.A), 0.0)
 
 
 def settled_speed(robot: Robot, axis: str, voltage: ArrayLike) -> float:

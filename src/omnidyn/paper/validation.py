@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from omnidyn.model.deadzone import breakaway_voltage, moves
+from omnidyn.model.deadzone import breakaway_voltage, moving_axes
 from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.paper.claim import TOLERANCE, Claim, ClaimVerdict, judge, listed, plain, same
@@ -20,7 +20,7 @@ def validation_claims(robot: Robot) -> tuple[Claim, ...]:
 
 def _table_4(robot: Robot) -> Claim:
     volts = np.array([row for axis in AXES for row in TABLE_4[axis]])
-    moving = moves(robot, volts)
+    moving = moving_axes(robot, volts)
     alone = bool((moving.sum(axis=1) == 1).all())
     inside = bool(np.abs(volts).max() <= np.min(robot.motor.voltage_limit))
     speeds = {axis: [settled_speed(robot, axis, row) for row in TABLE_4[axis]] for axis in AXES}

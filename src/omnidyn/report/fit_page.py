@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.comparison.bands import with_fitted_band
+from omnidyn.comparison.compare import with_fitted_band
 from omnidyn.comparison.result import Comparison
 from omnidyn.document import Points, sentence
 from omnidyn.identification.fit_document import difference_table, number_table, short_table, verdict_table
@@ -19,13 +19,12 @@ from omnidyn.identification.lack_of_fit import Binned
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.validation import FITTED, HELD_OUT, Score, Validation, output_name
 from omnidyn.logs.columns.mapping import component_channel
-from omnidyn.logs.path import Path, body_twist, driven, path_of
-from omnidyn.report.dead_zone_section import dead_zone_section
-from omnidyn.report.estimate_picture import draw_estimates
-from omnidyn.report.figures.correlation import draw_correlation
+from omnidyn.logs.path import BodyPath, body_twist, driven, path_of
+from omnidyn.report.figures.dead_zone_map import dead_zone_section
+from omnidyn.report.figures.friction_speed import draw_estimates
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.path import draw_path
-from omnidyn.report.figures.residuals import draw_residuals, residuals_of
+from omnidyn.report.figures.residuals import draw_correlation, draw_residuals, residuals_of
 from omnidyn.report.html import Section, beside, bullets, content, figure, page, paragraph, section
 from omnidyn.report.style import BLUE, GREY, WIDTH, Picture, look, new_figure, picture, thin_out
 from omnidyn.run import Run
@@ -180,7 +179,7 @@ def _driven(fits: Fits, validations: Mapping[str, Validation]) -> list[tuple[flo
     return driven([body_twist(run, fits[group].robot) for group, run in _measured(validations)])
 
 
-def _paths(fits: Fits, validations: Mapping[str, Validation]) -> list[Path]:
+def _paths(fits: Fits, validations: Mapping[str, Validation]) -> list[BodyPath]:
     every = (path_of(run, fits[group].robot) for group, run in _measured(validations))
     return [path for path in every if path is not None]
 

@@ -22,18 +22,17 @@ from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import top_speeds
 from omnidyn.report.drift_picture import draw_drift
-from omnidyn.report.estimate_picture import WHOLE, draw_estimates
 from omnidyn.report.figures.channels import draw_run
 from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
-from omnidyn.report.figures.friction_speed import draw_friction_speed, speeds_up_to
+from omnidyn.report.figures.friction_speed import WHOLE, draw_estimates, draw_friction_speed, speeds_up_to
 from omnidyn.report.figures.motor_lines import draw_motor_lines
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.path import draw_path
 from omnidyn.report.figures.raw_log import draw_raw_log
 from omnidyn.report.figures.robot import draw_robot
 from omnidyn.report.figures.shapes import draw_polar
+from omnidyn.report.figures.tracking import draw_tracking
 from omnidyn.report.style import Picture
-from omnidyn.report.tracking.pictures import draw_tracking
 from omnidyn.run import Run
 
 

@@ -33,7 +33,7 @@ class Band(NamedTuple):
     draws: int
 
 
-def band(
+def confidence_band(
     robot: Robot, voltage: ArrayLike | None = None, dt: ArrayLike | None = None, *, draws: int = DRAWS, seed: int = 0,
     **options: Any,
 ) -> Band:  # fmt: skip
@@ -41,7 +41,7 @@ def band(
 
     Raises InsufficientDataError where no number of the robot has a std, and what `simulate` raises.
     """
-    check_order("band(robot, voltage, dt)", (robot, Robot), (voltage, object))
+    check_order("confidence_band(robot, voltage, dt)", (robot, Robot), (voltage, object))
     return band_of(plausible(robot, draws, seed), lambda each: simulate(each, voltage, dt, **options))
 
 

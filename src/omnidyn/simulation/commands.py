@@ -55,11 +55,18 @@ def commands(
             expected=f"one of {', '.join(given)}, and dt",
         )  # fmt: skip
     name, width = named[0], 3 if named[0] == "twist_command" else robot.wheels.count
-    rows = _rows(name, given[name], width)
+    rows = as_floats(name, given[name])
+    if rows.ndim != 2 or rows.shape[1] != width or not len(rows):
+        raise InputError("wrong shape", got=rows.shape, expected=f"(n, {width}), n >= 1", where=name)
+    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if bad.size:
+        raise InputError(
+            "not a finite number", got=rows[bad[0]].tolist(), expected="numbers", where=f"{name} row {bad[0]}"
+        )
     steps = _steps(dt, len(rows))
     if name == "voltage":
         applied = clip_voltage(robot.motor, rows)
-        return Commands(steps, applied, warnings=_clipped("voltage", rows, applied))
+        return Commands(steps, applied, warnings=_clipped("voltage", rows != applied))
     if name == "duty":
         return _from_duty(robot, rows, steps, supply)
     if robot.drive.kind != SPEED:
@@ -89,7 +96,7 @@ def _from_duty(robot: Robot, rows: FloatArray, steps: FloatArray, supply: ArrayL
     applied = voltage_of_duty(duty, battery)
     held = clip_voltage(robot.motor, applied)
     coasts = (duty == 0.0) if robot.drive.coasts else None
-    warnings = _clipped("duty", rows, duty) + _clipped("voltage", applied, held)
+    warnings = _clipped("duty", rows != duty) + _clipped("voltage", applied != held)
     return Commands(steps, held, open_circuit=coasts, duty=duty, supply=battery, warnings=warnings)
 
 
@@ -140,19 +147,6 @@ def loop_gains(robot: Robot) -> tuple[FloatArray, FloatArray, FloatArray, FloatA
     return per_wheel(drive.kp, n), per_wheel(drive.ki, n), per_wheel(robot.motor.voltage_limit, n), robot.wheels.radii
 
 
-def _rows(name: str, value: ArrayLike | None, width: int) -> FloatArray:
-    """Commands of shape (n, width), finite."""
-    rows = as_floats(name, value)
-    if rows.ndim != 2 or rows.shape[1] != width or not len(rows):
-        raise InputError("wrong shape", got=rows.shape, expected=f"(n, {width}), n >= 1", where=name)
-    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
-    if bad.size:
-        raise InputError(
-            "not a finite number", got=rows[bad[0]].tolist(), expected="numbers", where=f"{name} row {bad[0]}"
-        )
-    return rows
-
-
 def _steps(dt: ArrayLike, count: int) -> FloatArray:
     """dt as one positive length per row."""
     steps = as_floats("dt", dt)
@@ -176,11 +170,12 @@ def as_floats(name: str, value: ArrayLike | None) -> FloatArray:
         raise InputError("not numbers", got=value, expected="an array of numbers", where=name) from None
 
 
-def _clipped(name: str, wanted: FloatArray, applied: FloatArray) -> tuple[Statement, ...]:
-    rows = np.flatnonzero((wanted != applied).any(axis=1))
+def _clipped(name: str, changed: BoolArray) -> tuple[Statement, ...]:
+    """The warning that values were clipped; none where nothing changed."""
+    rows = np.flatnonzero(changed.any(axis=1))
     if not rows.size:
         return ()
-    return (Statement("clipped", WARNING, name, {"clipped": rows.size, "rows": len(wanted), "first": int(rows[0])}),)
+    return (Statement("clipped", WARNING, name, {"clipped": rows.size, "rows": len(changed), "first": int(rows[0])}),)
 
 
 def current_bounds(robot: Robot, given: Commands, rows: int) -> FloatArray:

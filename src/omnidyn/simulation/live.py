@@ -66,7 +66,7 @@ class LiveRobot:
         """Hold a command for dt: volts, a duty, or wheel speeds, shape (wheels,), whichever the drive takes."""
         given = np.array(command, dtype=float)
         if self._kind != SPEED:
-            self.voltage = self._volts(given)
+            given = self.voltage = self._volts(given)
         self._queue.append(given)
         self._fresh = True
         parts = [(1.0, self._queue[0])]
@@ -90,7 +90,7 @@ class LiveRobot:
         if self._kind == SPEED:
             return Commands(dt, None, set_point=command[None])
         coasts = (command == 0.0)[None] if self.robot.drive.coasts else None
-        return Commands(dt, reaching(self.robot, self._volts(command))[None], open_circuit=coasts)
+        return Commands(dt, reaching(self.robot, command)[None], open_circuit=coasts)
 
     def _volts(self, command: FloatArray) -> FloatArray:
         """What a command asks of the drivers [V]."""

@@ -49,7 +49,11 @@ def simulate(
     Raises InputError for wrong shapes, NaN, infinite values, a start beyond 1e3 m/s, dt outside 1e-9..3600 s, a missing
     supply, or a tol outside 1e-10..1 m/s.
     """
-    _check_order(robot, voltage, dt)
+    call = "simulate(robot, voltage, dt)"
+    if not isinstance(robot, Robot):
+        check_order(call, (robot, Robot), (voltage, type(robot)), (dt, object))
+    if isinstance(voltage, int | float) and isinstance(dt, list | tuple | np.ndarray):
+        raise InputError("two arguments stand in each other's place", got="the time before the voltage", expected=call)
     given = commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
     view = seen_at_once(robot, given) if log is None else seen_through(robot, given, log)
     return simulate_seen(robot, given, view, twist=twist, pose=pose, current=current, tol=tol)
@@ -70,15 +74,6 @@ def simulate_seen(
     engine = choose_engine(robot, around, tol)
     motion = engine.advance(engine.start(*start), acting)
     return as_run(robot, given, acting, motion, engine.name, engine.statements(motion.state), view)
-
-
-def _check_order(robot: Robot, voltage: object, dt: object) -> None:
-    """Refuses a robot, a voltage and a time in each other's place."""
-    call = "simulate(robot, voltage, dt)"
-    if not isinstance(robot, Robot):
-        check_order(call, (robot, Robot), (voltage, type(robot)), (dt, object))
-    if isinstance(voltage, int | float) and isinstance(dt, list | tuple | np.ndarray):
-        raise InputError("two arguments stand in each other's place", got="the time before the voltage", expected=call)
 
 
 def as_run(

@@ -9,7 +9,7 @@ from omnidyn.telling.causes import changes, named
 from omnidyn.telling.fit import MEASURED
 from omnidyn.telling.sentence import Sentence
 
-LONGEST = 100.0  # times as long as now: nobody records more
+LONGEST_FACTOR = 100.0  # times as long as now: nobody records more
 WAYS = {  # what to do about a cause
     "fit": "fit it (`nuisances` {key})",
     "look": "look what happened there; fit the parts as logs of their own",
@@ -77,7 +77,7 @@ def _together(statement: Statement) -> str:
 def _wide(statement: Statement) -> str:
     """Intervals are wide; how much longer a log would have to be."""
     longer, goal = statement.numbers["longer"], 100.0 * statement.numbers["goal"]
-    enough = f"a log {longer:.0f} times as long" if longer <= LONGEST else "no log of a usual length"
+    enough = f"a log {longer:.0f} times as long" if longer <= LONGEST_FACTOR else "no log of a usual length"
     them = "it" if len(statement.numbers["keys"]) == 1 else "all of them"
     return (
         f"{_known_roughly(statement)}: {enough} would bring {them} to {goal:.0f} %; more motion where it matters would "
@@ -88,7 +88,7 @@ def _wide(statement: Statement) -> str:
 def _wide_by_misfit(statement: Statement) -> str:
     """Intervals are wide because the model misses something."""
     them = "it" if len(statement.numbers["keys"]) == 1 else "them"
-    return f"{_known_roughly(statement)}: what the model misses widens {them}, and no longer log mends that"
+    return f"{_known_roughly(statement)}: what the model misses widens {them}, and a longer log does not help"
 
 
 def _known_roughly(statement: Statement) -> str:
@@ -123,7 +123,7 @@ def _nothing_pays(statement: Statement) -> str:
     """No step pays; what a misfit looks like that no robot file holds."""
     groups, causes = statement.numbers["groups"], statement.numbers["causes"]
     looks = [f"; {group}: {cause}" if group else f"; {cause}" for group, cause in zip(groups, causes, strict=True)]
-    return f"nothing that was tried pays{''.join(looks)}"
+    return f"nothing that was tried improves the prediction{''.join(looks)}"
 
 
 SENTENCES = {
@@ -158,7 +158,7 @@ SENTENCES = {
     "step_with_others": Sentence(_with_others),
     "ladder_alternatives": Sentence(_alternatives),
     "mend_first": Sentence(
-        "the model does not follow the logs: first mend signs, units, the order of wheels, dead sensors"
+        "the model does not follow the logs: first correct signs, units, the order of wheels and dead sensors"
     ),
     "nothing_pays": Sentence(_nothing_pays),
     "step_limit": Sentence("{steps} steps are the most that it takes"),

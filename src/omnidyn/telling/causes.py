@@ -25,7 +25,7 @@ UNOFFERED = {
     "pull": "a constant pull, by a floor that is not level or an offset of sensors",
     "turning left and right": "another level turning left than right",
 }
-NONE = 1e-3  # of what a number was, below which nothing is left of it
+NO_REST = 1e-3  # of what a number was, below which nothing is left of it
 SHAPES = {DIRECTION: "an ellipse", BODY_AXES: "a box"}
 
 
@@ -38,7 +38,7 @@ def changes(statement: Statement) -> str:
     """ "viscous friction forward 0.5 -> 0.3 N s/m": the numbers that a cause would change, as many as are given."""
     names, before, after = (statement.numbers[name] for name in ("changed", "before", "after"))
     return all_of([
-        f"{in_words(name)} {now:.3g} -> {then if abs(then) > NONE * abs(now) else 0.0:.3g} {unit(name)}".rstrip()
+        f"{in_words(name)} {now:.3g} -> {then if abs(then) > NO_REST * abs(now) else 0.0:.3g} {unit(name)}".rstrip()
         for name, now, then in zip(names, before, after, strict=True)
     ])  # fmt: skip
 

@@ -72,4 +72,4 @@ def _support(finding: Finding) -> str:
         f"; but {all_of(guesses)} of the robot file {by_number(guesses, 'is', 'are')} only guessed" if guesses else ""
     )
     words += f" (so in {numbers['in_blocks']} of {numbers['blocks']} blocks of the log)" if "blocks" in numbers else ""
-    return words + ("; so it is with the fitted robot" if "by_fit" in numbers else "")
+    return words + ("; the fitted robot shows it too" if "by_fit" in numbers else "")

@@ -38,21 +38,6 @@ def _input(statement: Statement) -> str:
     ).format(speeds, *gains, numbers["rate"])
 
 
-def _restarts_at_gaps(statement: Statement) -> str:
-    """The log has gaps in time: each piece starts anew from the measured state."""
-    count = statement.numbers["gaps"]
-    return f"{count} gap{'s' * (count > 1)} in time: each piece starts anew from the measured state"
-
-
-def _loop_faster_than_log(statement: Statement) -> str:
-    """The speed loop sets the voltage more often than the log has one."""
-    loop, log = (1e3 * statement.numbers[name] for name in ("loop_period", "log_period"))
-    return (
-        f"the speed loop sets the voltage every {loop:.3g} ms, the log has one every {log:.3g} ms: between its rows "
-        "the voltage is taken as held"
-    )
-
-
 def _signal_followed(statement: Statement) -> str:
     """How a model follows one kind of measurement: *level* is "well", "noise", "roughly", "hardly" or "not"."""
     numbers = statement.numbers
@@ -67,7 +52,7 @@ def _signal_followed(statement: Statement) -> str:
 def _follows(statement: Statement) -> str:
     """A model follows some of what was measured; what it hardly follows, or not at all, is named too."""
     signals = statement.numbers["signals"]
-    good, bad = ([str(one) for one in signals if (one.numbers["level"] in ("hardly", "not")) is poor]
+    good, bad = ([str(signal) for signal in signals if (signal.numbers["level"] in ("hardly", "not")) is poor]
                  for poor in (False, True))  # fmt: skip
     return f"{statement.subject} follows {all_of(good)}{f', but {all_of(bad)}' if bad else ''}"
 
@@ -113,7 +98,7 @@ SENTENCES = {
     "effects_of_other_log": Sentence(
         "{subject} was fitted together with effects of its own logs ({effects}); they are not applied to this other log"
     ),
-    "restarts_at_gaps": Sentence(_restarts_at_gaps),
+    "restarts_at_gaps": Sentence("{gaps} {gaps:gap|gaps} in time: each piece starts anew from the measured state"),
     "rows_not_replayed": Sentence(
         "{left} of {rows} rows are not replayed: inputs missing for more than {hold:g} s, or alone"
     ),
@@ -122,7 +107,10 @@ SENTENCES = {
     "integral_not_logged": Sentence(
         "the integral of the speed loop was not logged: it starts at 0 in {pieces} pieces that start moving"
     ),
-    "loop_faster_than_log": Sentence(_loop_faster_than_log),
+    "loop_faster_than_log": Sentence(
+        "the speed loop sets the voltage every {loop_period:m.3g} ms, the log has one every {log_period:m.3g} ms:"
+        " between its rows the voltage is taken as held"
+    ),
     "currents_never_negative": Sentence(
         "no measured current is negative: the sensor may have no sign (`current_unsigned`)"
     ),

@@ -63,11 +63,6 @@ def _gains_tuned(statement: Statement) -> str:
     return f"with {gains}, {statement.subject} is {after:.3g} mm off in the mean, {before:.3g} mm before"
 
 
-def _gains_kept(statement: Statement) -> str:
-    """Tuning found nothing better."""
-    return f"the gains it began with are as good as any that were tried: {1e3 * statement.numbers['after']:.3g} mm"
-
-
 def _optimised(statement: Statement) -> str:
     """What was optimised, over which robots."""
     numbers = statement.numbers
@@ -79,21 +74,6 @@ def _optimised(statement: Statement) -> str:
         f"{robots}; noise {numbers['noise']:g} m/s, delay {numbers['delay']} steps, {numbers['dt']:g} s a step; "
         f"{numbers['evaluations']} settings tried"
     )
-
-
-def _given_up_on_file(statement: Statement) -> str:
-    """The robot of the file got worse: the price of being right for the others."""
-    after, before = (1e3 * statement.numbers[name] for name in ("after", "before"))
-    return (
-        f"given up: the robot as the file says it: {after:.3g} mm, {before:.3g} mm before: the price of being right "
-        "for the others"
-    )
-
-
-def _given_up_on_worst(statement: Statement) -> str:
-    """The worst robot got worse."""
-    after, before = (1e3 * statement.numbers[name] for name in ("after", "before"))
-    return f"given up: the worst robot: {after:.3g} mm, {before:.3g} mm before"
 
 
 SENTENCES = {
@@ -108,13 +88,16 @@ SENTENCES = {
     ),
     "speed_jumps": Sentence("its speed jumps at {corners} corners, by up to {jump:.3g} m/s and {turn_jump:.3g} rad/s"),
     "gains_tuned": Sentence(_gains_tuned),
-    "gains_kept": Sentence(_gains_kept),
+    "gains_kept": Sentence("the gains it began with are as good as any that were tried: {after:m.3g} mm"),
     "optimised": Sentence(_optimised),
     "judged_on_other_draws": Sentence(
         "the numbers are those of as many other draws and of other noise, which the search has not seen"
     ),
     "given_up_rest": Sentence("given up: rest: a voltage changes by {after:.3g} V a step, {before:.3g} V before"),
-    "given_up_on_file": Sentence(_given_up_on_file),
-    "given_up_on_worst": Sentence(_given_up_on_worst),
+    "given_up_on_file": Sentence(
+        "given up: the robot as the file says it: {after:m.3g} mm, {before:m.3g} mm before: the price of being "
+        "right for the others"
+    ),
+    "given_up_on_worst": Sentence("given up: the worst robot: {after:m.3g} mm, {before:m.3g} mm before"),
     "given_up_nothing": Sentence("given up: nothing that was measured"),
 }

@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 from omnidyn.document import all_of, short
 from omnidyn.model.keys import CENTRE, EMF, ROTOR, TORQUE, WHEEL, find_key, in_words
 from omnidyn.statement import Statement
-from omnidyn.telling.sentence import Sentence
+from omnidyn.telling.sentence import Sentence, either
 
 WIDER = 1.1  # times the interval for white noise, from which on the factor is named
-SAME = {
+SAME_DATA = {
     "wheel_speed": "its wheel speeds are differences of its wheel angles",
     "twist": "its twist is computed from its wheels",
 }
@@ -57,7 +57,7 @@ def _nothing_new(statement: Statement) -> str:
 
 def _computed(statement: Statement) -> str:
     name, source = statement.numbers["output"], statement.numbers["computed_from"].replace("_", " ")
-    return f"{statement.subject}: {SAME.get(name, f'its {name} is the integral of its own {source}')}"
+    return f"{statement.subject}: {SAME_DATA.get(name, f'its {name} is the integral of its own {source}')}"
 
 
 def _input_not_used(statement: Statement) -> str:
@@ -78,22 +78,6 @@ def _not_moved(statement: Statement) -> str:
         return f"{words}; nothing drove it"
     dead = ", or its sensor is dead: not one row differs from another, so that no bound is known"
     return f"{words}; it held {held:.4g} {'N m' if axis == 'yaw' else 'N'}{dead if numbers['dead'] else ''}"
-
-
-def _not_measured(statement: Statement) -> str:
-    """An axis was not measured: its friction is not fitted."""
-    group = statement.numbers.get("group")
-    return f"axis {statement.subject} was not measured{f' in {group}' if group else ''}: its friction is not fitted"
-
-
-def _implausible(statement: Statement) -> str:
-    """A channel shows what the voltage does only later; whether it is fitted all the same."""
-    words = (
-        f"{statement.subject} of {1e3 * statement.numbers['latency']:.0f} ms is implausible: the channel would show "
-        "what the voltage does only later. The clocks differ, a filter looks ahead (centred speeds), or it stands in "
-        "for another fault"
-    )
-    return words if statement.numbers["fitted"] else f"{words}: it is not fitted"
 
 
 def _search_end(statement: Statement) -> str:
@@ -134,37 +118,6 @@ def _widened(statement: Statement) -> str:
     return f"that makes them up to {short(factor)} times as wide as for white noise"
 
 
-def _short_logs(statement: Statement) -> str:
-    """The logs last only a few times as long as their errors remember."""
-    memory, times = statement.numbers["memory"], statement.numbers["times"]
-    return (
-        f"the errors of {statement.subject} remember {short(memory)} s, and the logs last {times:.1f} times that: the "
-        f"memory is hardly known, nor are the intervals; record {short(statement.numbers['enough'])} s or more"
-    )
-
-
-def _rounded_inputs(statement: Statement) -> str:
-    """Inputs are logged in coarse steps, and the intervals are wider for it."""
-    step, wider = statement.numbers["step"], short(statement.numbers["wider"])
-    return (
-        f"inputs are logged in steps of {step:.2g} V: the intervals hold what rounding may have changed, and are up to "
-        f"{wider} times as wide for it"
-    )
-
-
-def _no_fall(statement: Statement) -> str:
-    """The log shows no fall from breakaway to Coulomb friction."""
-    high = statement.numbers["high"]
-    how_far = (
-        "how far it lies above that is not known" if high is None
-        else f"it lies between that and {high:.3g}, at which the robot would have been held"
-    )  # fmt: skip
-    return (
-        f"{statement.subject}: the log shows no fall from it to Coulomb friction, so {statement.numbers['speed']} is "
-        f"no estimate; {how_far}"
-    )
-
-
 def _not_followed(statement: Statement) -> str:
     """The model does not follow outputs: by how much it misses each."""
     still = "it never changes, and the model moves it: a dead sensor"
@@ -174,7 +127,7 @@ def _not_followed(statement: Statement) -> str:
     ]
     return (
         f"the model does not follow {', '.join(parts)}: a sign, a unit, the order of the wheels or the robot file is "
-        "wrong; the numbers and intervals of this fit mean nothing until it does"
+        "wrong; the numbers and intervals of this fit are not usable until it does"
     )
 
 
@@ -261,13 +214,28 @@ SENTENCES = {
     ),
     "used_to_first_gap": Sentence("{logs} logs have gaps: only what stands before the first gap is used"),
     "axis_not_moved": Sentence(_not_moved),
-    "axis_not_measured": Sentence(_not_measured),
-    "implausible_latency": Sentence(_implausible),
+    "axis_not_measured": Sentence(
+        either(
+            "group",
+            "axis {subject} was not measured in {group}: its friction is not fitted",
+            "axis {subject} was not measured: its friction is not fitted",
+        )
+    ),
+    "implausible_latency": Sentence(
+        either(
+            "fitted",
+            "{subject} of {latency:m.0f} ms is implausible: the channel would show what the voltage does only later. "
+            "The clocks differ, a filter looks ahead (centred speeds), or it stands in for another fault",
+            "{subject} of {latency:m.0f} ms is implausible: the channel would show what the voltage does only later. "
+            "The clocks differ, a filter looks ahead (centred speeds), or it stands in for another fault: it is not "
+            "fitted",
+        )
+    ),
     "harmful_nuisance": Sentence(
         "{subject} improves the likelihood but worsens the prediction of held-out blocks of the log: it is not fitted"
     ),
     "unsettled_nuisances": Sentence(
-        "beside {nuisances} these logs do not settle the numbers of the robot: they are not fitted"
+        "together with {nuisances} these logs do not determine the numbers of the robot: {nuisances} are not fitted"
     ),
     "interrupted": Sentence(
         "the fit was interrupted: the numbers are the best so far, their intervals are those of that point"
@@ -283,13 +251,27 @@ SENTENCES = {
     "bound": Sentence("{subject} is at its bound {value:.4g}: the best fit lies beyond it"),
     "not_white": Sentence(_not_white),
     "autocorrelated_noise": Sentence(_memory),
-    "short_for_memory": Sentence(_short_logs),
+    "short_for_memory": Sentence(
+        "the errors of {subject} remember {memory:~.2g} s, and the logs last {times:.1f} times that: the memory "
+        "is hardly known, nor are the intervals; record {enough:~.2g} s or more"
+    ),
     "uneven_rows": Sentence(
         "{share:.0%} of the rows do not come at even times: the errors are taken to forget as much from each row to "
         "the next"
     ),
-    "rounded_inputs": Sentence(_rounded_inputs),
-    "no_fall": Sentence(_no_fall),
+    "rounded_inputs": Sentence(
+        "inputs are logged in steps of {step:.2g} V: the intervals hold what rounding may have changed, and are "
+        "up to {wider:~.2g} times as wide for it"
+    ),
+    "no_fall": Sentence(
+        either(
+            "high",
+            "{subject}: the log shows no fall from it to Coulomb friction, so {speed} is no estimate; it lies between"
+            " that and {high:.3g}, at which the robot would have been held",
+            "{subject}: the log shows no fall from it to Coulomb friction, so {speed} is no estimate; how far it lies"
+            " above that is not known",
+        )
+    ),
     "karnopp_as_coulomb": Sentence(
         'law = "karnopp" is fitted as Coulomb friction with breakaway: logs do not distinguish the two; karnopp_speed '
         "is numerical and stays as it is"
@@ -301,4 +283,4 @@ SENTENCES = {
     "not_followed": Sentence(_not_followed),
     "not_shown": Sentence(_not_shown),
     "cures": Sentence(_cures),
-}  # fmt: skip
+}

@@ -10,8 +10,9 @@ from omnidyn.telling.causes import UNOFFERED
 from omnidyn.telling.sentence import Sentence
 
 NAMED = 4  # numbers that a sentence names
-LARGE = 100.0  # chi2 of which nobody needs decimals
-MOSTLY, WORTH = 0.5, 0.01  # share of the variance of errors that is not noise, from which on most is, or any
+LARGE_CHI2 = 100.0  # chi2 of which nobody needs decimals
+MAJORITY_SHARE = 0.5  # of the variance of errors that is not noise, from which on most of it is
+WORTHWHILE_SHARE = 0.01  # and from which on any is
 WHERE = {  # how a log shows its noise, and what more than that is
     REPEATS: ("repeats within", "not noise"), HOLDS: ("scatters, while commands are held, by", "not noise"),
     NEIGHBOURS: ("scatters from row to row by", "misfit, or slower noise"),
@@ -72,7 +73,7 @@ def _noise_level(statement: Statement) -> str:
         f"{name} {level:.2g} {unit}"
         for name, level, unit in zip(numbers["outputs"], numbers["levels"], numbers["units"], strict=True)
     )
-    chi2 = " to ".join(dict.fromkeys(f"{x:.2f}" if x < LARGE else short(x, ".3g") for x in numbers["chi2"]))
+    chi2 = " to ".join(dict.fromkeys(f"{x:.2f}" if x < LARGE_CHI2 else short(x, ".3g") for x in numbers["chi2"]))
     return (
         f"noise: the log {WHERE[statement.subject][0]} {levels}, at most {short(100.0 * numbers['of_moves'])} % of "
         f"what moves; chi2 of the residuals by that: {chi2}"
@@ -143,10 +144,10 @@ def _held_out_colour(statement: Statement) -> str:
     words = f"on held-out logs the errors of {names} are no larger than on the fitted ones"
     if share is None:
         return f"{words}, but not white: autocorrelated noise, or something that the model misses"
-    if share < WORTH:
+    if share < WORTHWHILE_SHARE:
         no = "are not what the model misses" if numbers["misfit"] else "follow nothing that the model should know"
         return f"{words}; they are not white, but {no}: autocorrelated noise"
-    most = "most of them" if share > MOSTLY else "some of them"
+    most = "most of them" if share > MAJORITY_SHARE else "some of them"
     return (
         f"{words}, but {most} is not noise (up to {100.0 * share:.0f} % of their variance): the model misses that much"
     )

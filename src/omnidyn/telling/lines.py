@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from omnidyn.document import short
 from omnidyn.identification.steady.operating_points import FORCES
 from omnidyn.model.keys import unit
 from omnidyn.statement import Statement
-from omnidyn.telling.sentence import Sentence
+from omnidyn.telling.sentence import Sentence, either
 
 ORIGIN = {"table": "the table", **FORCES}
 AT_REST = {"bound": "bound breakaway", "line": "count as sliding", "ignore": "are not used"}
@@ -19,16 +18,6 @@ def _line_method(statement: Statement) -> str:
     weights += ", std taken as exact" if numbers["absolute_std"] else ""
     forces = ORIGIN[numbers["force_from"]]
     return f"steady state, eqs (15)-(17), {weights}; forces from {forces}; rows at rest {AT_REST[numbers['rest']]}"
-
-
-def _few_degrees(statement: Statement) -> str:
-    """A line through hardly more rows than it has parameters: its intervals are wide."""
-    numbers = statement.numbers
-    return (
-        f"axis {statement.subject}: {_count(numbers['degrees'], 'degree')} of freedom ({numbers['rows']} rows, 2 "
-        f"parameters): the 95 % interval reaches {numbers['quantile']:.3g} standard errors to each side, 1.96 with "
-        "many rows"
-    )
 
 
 def _coefficient_at_bound(statement: Statement) -> str:
@@ -45,25 +34,6 @@ def _interval_contains_zero(statement: Statement) -> str:
     low, high = statement.numbers["ci95"]
     key = statement.subject
     return f"{key}: the 95 % interval [{low:.3g}, {high:.3g}] {unit(key)} contains zero: the data do not show it"
-
-
-def _scatter_contradicts_std(statement: Statement) -> str:
-    """Points scatter more, or less, than the std that came with them."""
-    numbers = statement.numbers
-    used = "the std given" if numbers["absolute_std"] else "the scatter itself"
-    return (
-        f"axis {statement.subject}: the points scatter {short(numbers['times'])} times as much as their std says; the "
-        f"intervals follow {used}"
-    )
-
-
-def _axis_against_motion(statement: Statement) -> str:
-    """In some rows of an axis the force points against the motion."""
-    wrong, rows = _count(statement.numbers["wrong"], "row"), statement.numbers["rows"]
-    return (
-        f"axis {statement.subject}: in {wrong} of {rows} the force points against the motion, as if friction drove the "
-        "robot: a sign is lost (an unsigned current sensor?) or a motor constant is wrong"
-    )
 
 
 def _beyond_no_load(statement: Statement) -> str:
@@ -88,20 +58,6 @@ def _forces_disagree(statement: Statement) -> str:
     )
 
 
-def _rest_as_sliding(statement: Statement) -> str:
-    """Rows at rest were used as points of the sliding line."""
-    rows = _count(statement.numbers["rows"], "row")
-    return (
-        f"axis {statement.subject}: {rows} at rest used as a sliding point: there friction only balances the drive, "
-        "anywhere up to breakaway, so B and C may be wrong by more than the intervals say"
-    )
-
-
-def _rest_not_used(statement: Statement) -> str:
-    """Rows at rest were not used."""
-    return f"axis {statement.subject}: {_count(statement.numbers['rows'], 'row')} at rest not used"
-
-
 def _breakaway_from_rest(statement: Statement) -> str:
     """A row at rest held more than Coulomb friction: breakaway is at least that."""
     key, numbers = statement.subject, statement.numbers
@@ -117,20 +73,30 @@ def _holds_at_least(statement: Statement) -> str:
     return f"axis {statement.subject} holds at least {bound:.4g} {unit(key)}"
 
 
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'s' * (number != 1)}"
-
-
 SENTENCES = {
     "line_method": Sentence(_line_method),
-    "few_degrees": Sentence(_few_degrees),
+    "few_degrees": Sentence(
+        "axis {subject}: {degrees} {degrees:degree|degrees} of freedom ({rows} rows, 2 parameters): the 95 % "
+        "interval reaches {quantile:.3g} standard errors to each side, 1.96 with many rows"
+    ),
     "coefficient_at_bound": Sentence(_coefficient_at_bound),
     "interval_contains_zero": Sentence(_interval_contains_zero),
     "speed_std_not_settled": Sentence(
         "axis {subject}: the iteration for speed_std did not settle; the numbers are of its last step"
     ),
-    "scatter_contradicts_std": Sentence(_scatter_contradicts_std),
-    "axis_against_motion": Sentence(_axis_against_motion),
+    "scatter_contradicts_std": Sentence(
+        either(
+            "absolute_std",
+            "axis {subject}: the points scatter {times:~.2g} times as much as their std says; the intervals follow "
+            "the std given",
+            "axis {subject}: the points scatter {times:~.2g} times as much as their std says; the intervals follow "
+            "the scatter itself",
+        )
+    ),
+    "axis_against_motion": Sentence(
+        "axis {subject}: in {wrong} {wrong:row|rows} of {rows} the force points against the motion, as if "
+        "friction drove the robot: a sign is lost (an unsigned current sensor?) or a motor constant is wrong"
+    ),
     "beyond_no_load": Sentence(_beyond_no_load),
     "forces_disagree": Sentence(_forces_disagree),
     "axis_without_data": Sentence("axis {subject}: no data, B and C stay as they were"),
@@ -140,8 +106,11 @@ SENTENCES = {
         "were; only their sum is known there, B speed + C = {sum:.4g}"
     ),
     "axis_beyond_any_robot": Sentence("axis {subject}: the fit gives {level:.3g}, beyond any robot; B and C stay"),
-    "rest_as_sliding": Sentence(_rest_as_sliding),
-    "rest_not_used": Sentence(_rest_not_used),
+    "rest_as_sliding": Sentence(
+        "axis {subject}: {rows} {rows:row|rows} at rest used as a sliding point: there friction only balances the"
+        " drive, anywhere up to breakaway, so B and C may be wrong by more than the intervals say"
+    ),
+    "rest_not_used": Sentence("axis {subject}: {rows} {rows:row|rows} at rest not used"),
     "breakaway_raised": Sentence("{subject} raised from {before:.4g} to the new coulomb friction"),
     "breakaway_kept": Sentence("{subject} stays at {level:.4g}: rows in motion do not show it"),
     "breakaway_from_rest": Sentence(_breakaway_from_rest),

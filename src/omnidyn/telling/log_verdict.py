@@ -126,7 +126,7 @@ def of_several(verdicts: Mapping[str, Verdict | None], width: int, full: bool = 
         parts.append(f"and {counted(len(verdicts) - len(shown), 'log')} with fewer findings")
     parts.append("")
     groups = _groups(read)
-    blocks = [[*_paragraphs(found[0][1], _where([labels[path] for path, _ in found]))] for found in groups]
+    blocks = [[*_paragraphs(group[0][1], _where([labels[path] for path, _ in group]))] for group in groups]
     verdict = overall(verdicts)
     lines = 10**9 if full else LINES_OF_SEVERAL - 1 - _height([Words(verdict), *parts], width)
     parts += _shown(blocks, [found[0][1] for found in groups], lines, width)

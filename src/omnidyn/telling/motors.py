@@ -54,11 +54,11 @@ def _dead_band_bounded(statement: Statement) -> str:
     numbers = statement.numbers
     (low, high), unit, value = numbers["ci95"], numbers["unit"], numbers["value"]
     between = f"between {low:.3g} and {high:.3g}" if low > 0.0 else f"at most {high:.3g}"
-    known = f"; it is {between} {unit}, for it turned steadily under that" if math.isfinite(high) else ""
+    known = f"; it is {between} {unit}, because it turned steadily at that input" if math.isfinite(high) else ""
     if math.isfinite(value):
         return f"{NOT_IDENTIFIABLE}: {value:.3g} {unit} is no estimate{known}"
     told = "with one speed or one input only they are not distinguishable"
-    return f"{NOT_IDENTIFIABLE}, and any is in the slope: {told}{known}"
+    return f"{NOT_IDENTIFIABLE}, and any dead band is part of the slope: {told}{known}"
 
 
 def _dead_band_seen(statement: Statement) -> str:
@@ -115,12 +115,6 @@ def _start_seen(statement: Statement) -> str:
     return words
 
 
-def _no_motor_answers(statement: Statement) -> str:
-    """No motor is seen to answer to its input."""
-    motors = all_of(statement.numbers["motors"])
-    return f"no motor is seen to answer to its input: the slope of {motors} may as well be 0"
-
-
 def _motors_answer(statement: Statement) -> str:
     """Which motors start at which input, which show no dead band, and which do not answer."""
     return "; ".join(map(str, statement.numbers["parts"]))
@@ -151,12 +145,6 @@ def _motors_without_dead_band(statement: Statement) -> str:
     return f"{who} answer{'s' * one}{too}, and show{'s' * one} no dead band"
 
 
-def _motors_not_answering(statement: Statement) -> str:
-    """Motors that are not seen to answer."""
-    names = statement.numbers["motors"]
-    return f"{all_of(names)} {'is' if len(names) == 1 else 'are'} not seen to answer to the input"
-
-
 def _counted(statement: Statement) -> tuple[tuple[str, ...], int]:
     return statement.numbers["motors"], statement.numbers["total"]
 
@@ -166,7 +154,7 @@ def _other_reading(statement: Statement) -> str:
     numbers = statement.numbers
     verb = "better" if numbers["better"] else "as well"
     return (
-        f"the logs are met {verb} where the input is {WORDS[numbers['other']]} (error {numbers['other_error']:.3g} "
+        f"the logs are fitted {verb} where the input is {WORDS[numbers['other']]} (error {numbers['other_error']:.3g} "
         f"rad/s, {numbers['error']:.3g} where it is {WORDS[numbers['between']]}): the intervals span both"
     )
 
@@ -184,15 +172,6 @@ def _not_written(statement: Statement) -> str:
     return f"{statement.subject} is not written: {NOT_WRITTEN[statement.numbers['why']]}"
 
 
-def _lag_too_short(statement: Statement) -> str:
-    """The lag of a motor is shorter than what windows blur."""
-    lag, smear = (1e3 * statement.numbers[name] for name in ("lag", "smear"))
-    return (
-        f"{statement.subject} is not written: a lag of {lag:.2g} ms is too short for windows, which blur {smear:.2g} "
-        "ms; `method` output-error fits it"
-    )
-
-
 SENTENCES = {
     "motor_line": Sentence(_motor_line),
     "dead_band_not_asked": Sentence("no dead band asked for"),
@@ -203,8 +182,8 @@ SENTENCES = {
     "slope_may_be_zero": Sentence(_slope_may_be_zero),
     "dead_band_not_needed": Sentence(_dead_band_not_needed),
     "held_out_no_better": Sentence(
-        "{subject}: held-out logs are met no better with the dead band (error {with_band:.4g} rad/s, {without:.4g} "
-        "without): it may stand for something else"
+        "{subject}: held-out logs are predicted no better with the dead band (error {with_band:.4g} rad/s, "
+        "{without:.4g} without): it may be an effect of something else"
     ),
     "start_not_seen": Sentence(_start_not_seen),
     "never_sets_off": Sentence("{subject}: it rests up to {low:.3g} {unit}, and never sets off"),
@@ -213,12 +192,12 @@ SENTENCES = {
     ),
     "start_seen": Sentence(_start_seen),
     "starts_scatter": Sentence("its {subject}s scatter by more than their intervals: the interval spans them"),
-    "no_motor_answers": Sentence(_no_motor_answers),
+    "no_motor_answers": Sentence("no motor is seen to answer to its input: the slope of {motors} may as well be 0"),
     "motors_answer": Sentence(_motors_answer),
     "starts_both_ways": Sentence(_starts_both_ways),
     "motors_start": Sentence(_motors_start),
     "motors_without_dead_band": Sentence(_motors_without_dead_band),
-    "motors_not_answering": Sentence(_motors_not_answering),
+    "motors_not_answering": Sentence("{motors} {motors:is|are} not seen to answer to the input"),
     "at_its_bound": Sentence("{subject} is at its bound"),
     "errors_with_memory": Sentence("the intervals allow for autocorrelated errors"),
     "motor_fit_cut_short": Sentence("the fit was cut short: the numbers are of its last step"),
@@ -249,11 +228,15 @@ SENTENCES = {
         "a duty needs a supply to become volts: log it, or give drive.supply_V; nothing of the motors is written"
     ),
     "floor_friction_kept": Sentence(
-        "the friction of the floor is as it was: if it was fitted with that of the wheels in it, fit it anew"
+        "the friction of the floor is as it was: if it was fitted with the friction of the wheels included, fit it "
+        "again"
     ),
     "line_not_determined": Sentence("slope and dead band are not determined: nothing is written"),
     "not_written": Sentence(_not_written),
-    "lag_too_short": Sentence(_lag_too_short),
+    "lag_too_short": Sentence(
+        "{subject} is not written: a lag of {lag:m.2g} ms is too short for windows, which blur {smear:m.2g} ms; "
+        "`method` output-error fits it"
+    ),
     "wheel_explains_inertia": Sentence(
         "{subject} is not written: the wheel of the file explains all of {inertia:.3g} kg m^2 there"
     ),

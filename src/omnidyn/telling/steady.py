@@ -11,7 +11,7 @@ from omnidyn.identification.steady.shapes import SHAPES
 from omnidyn.model.keys import Key, unit
 from omnidyn.model.layout import YAW
 from omnidyn.statement import Statement
-from omnidyn.telling.sentence import Sentence
+from omnidyn.telling.sentence import Sentence, either
 
 PRACTICAL = 50.0  # times as many runs
 LOST = {
@@ -73,12 +73,6 @@ def _better_shape_not_used(statement: Statement) -> str:
     return f"{statement.subject} does better still, by {behind}, but {why}"
 
 
-def _no_lack_of_fit(statement: Statement) -> str:
-    """No lack of fit is seen: a result too."""
-    sides = BOTH_SIDES if statement.numbers["changes"] else ""
-    return f"no lack of fit is seen{sides}: nothing that was tried beside the shape does better"
-
-
 def _no_shape_fits(statement: Statement) -> str:
     """No offered shape fits, and what would."""
     numbers = statement.numbers
@@ -109,8 +103,8 @@ def _viscous_with_back_emf(statement: Statement) -> str:
     numbers, (key, interval, _) = statement.numbers, _viscous(statement)
     total = f"{numbers['value'] + numbers['back_emf']:.3g} +- {numbers['sum_std']:.2g} {key.unit}"
     return (
-        f"viscous friction is not distinguishable from back-EMF, for {_guesses(numbers['guesses'])}: together they are "
-        f"{key.symbol} + {numbers['back_emf']:.3g} = {total}; with the guess {interval}"
+        f"viscous friction is not distinguishable from back-EMF, because {_guesses(numbers['guesses'])}: together they "
+        f"are {key.symbol} + {numbers['back_emf']:.3g} = {total}; with the guess {interval}"
     )
 
 
@@ -214,7 +208,7 @@ def _rests_on_back_emf(statement: Statement) -> str:
     """Viscous levels are right together with a back-EMF that is a guess only."""
     numbers = statement.numbers
     return (
-        f"{', '.join(numbers['levels'])}: right together with the back-EMF of this file only, for "
+        f"{', '.join(numbers['levels'])}: correct only together with the back-EMF of this file, because "
         f"{_guesses(numbers['guesses'])}; log currents, or measure the no-load speed"
     )
 
@@ -235,7 +229,10 @@ SENTENCES = {
     "shapes_tied": Sentence(_shapes_tied),
     "better_shape_not_used": Sentence(_better_shape_not_used),
     "fit_not_tested": Sentence("whether the shape fits was not tested: too few directions in which all of it moves"),
-    "no_lack_of_fit": Sentence(_no_lack_of_fit),
+    "no_lack_of_fit": Sentence(either("changes",
+        "no lack of fit is seen on both sides of the change within the run: nothing that was tried beside the "
+        "shape does better"
+, "no lack of fit is seen: nothing that was tried beside the shape does better")),
     "no_shape_fits": Sentence(_no_shape_fits),
     "viscous_with_back_emf": Sentence(_viscous_with_back_emf),
     "viscous_not_identifiable": Sentence(_viscous_not_identifiable),
@@ -246,7 +243,7 @@ SENTENCES = {
     "changes_within_run": Sentence(_changes_within_run),
     "change_in_run": Sentence(_change_in_run),
     "against_motion": Sentence(_against_motion),
-    "forces_from_voltage": Sentence("forces are from eq (11): as right as the R, K_t and K_v of the robot file"),
+    "forces_from_voltage": Sentence("forces are from eq (11): only as accurate as R, K_t and K_v of the robot file"),
     "not_turned": Sentence("the robot hardly turned: friction about yaw is not in these data"),
     "shapes_not_compared": Sentence(_shapes_not_compared),
     "level_at_bound": Sentence(_level_at_bound),
@@ -275,6 +272,6 @@ SENTENCES = {
     "drive_faster": Sentence("drive much faster than now: the viscous part grows with speed, the rest does not"),
     "more_directions": Sentence(_more_directions),
     "pull_once": Sentence(
-        "pull the robot with a spring scale once: all forces here are as right as the torque constant"
+        "pull the robot with a spring scale once: all forces here are only as accurate as the torque constant"
     ),
 }  # fmt: skip

@@ -40,7 +40,7 @@ def _outcome(statement: Statement) -> str:
     """How well the model follows the logs, and how well its numbers are known."""
     numbers = statement.numbers
     words = f"{WHERE[numbers['logs']]} {numbers['follows']}{_predicted(numbers.get('held_out'))}"
-    return f"{words}; {numbers['known']}" if numbers["known"] else f"{words}: its numbers mean nothing until it does"
+    return f"{words}; {numbers['known']}" if numbers["known"] else f"{words}: its numbers are not usable until it does"
 
 
 def _outputs_missed(statement: Statement) -> str:
@@ -55,7 +55,7 @@ def _outputs_missed(statement: Statement) -> str:
 def _failed(statement: Statement) -> str:
     """Why the numbers mean nothing."""
     failures = "; ".join(map(str, statement.numbers["failures"]))
-    return f"failed: {failures}: the numbers mean nothing until that is mended"
+    return f"failed: {failures}: the numbers are not usable until that is corrected"
 
 
 def _not_usable(statement: Statement) -> str:
@@ -70,7 +70,7 @@ def _logs_with_errors(statement: Statement) -> str:
     """How many logs have an error, by `check`, and the first one."""
     logs, of = statement.numbers["logs"], statement.numbers["of"]
     have = "the log has" if of == 1 else f"{logs} of {of} logs have"
-    return f"{have} an error, to be mended first: {statement.numbers['first']}"
+    return f"{have} an error that must be corrected first: {statement.numbers['first']}"
 
 
 def _steady(statement: Statement) -> str:
@@ -108,11 +108,11 @@ SENTENCES = {
     "numbers_known": Sentence(_numbers_known),
     "model_outcome": Sentence(_outcome),
     "not_compared": Sentence("{known}; no log was compared with the model"),
-    "not_followed_at_all": Sentence("the model does not follow {outputs}: its numbers mean nothing until it does"),
+    "not_followed_at_all": Sentence("the model does not follow {outputs}: its numbers are not usable until it does"),
     "outputs_missed": Sentence(_outputs_missed),
     "nothing_followed": Sentence("{follows}"),
     "failed": Sentence(_failed),
-    "cut_short": Sentence("cut short: the numbers are the best so far, not the best there are"),
+    "cut_short": Sentence("cut short: the numbers are the best so far, not the final ones"),
     "log_not_usable": Sentence(_not_usable),
     "logs_with_errors": Sentence(_logs_with_errors),
     "not_made": Sentence("not made: {parts} ({reason})"),

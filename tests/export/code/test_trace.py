@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from omnidyn.export.code.expressions import TranslationError
 from omnidyn.export.code.trace import inputs, statements
-from omnidyn.export.code.types import TranslationError
 
 
 def lines(value, single=False):

@@ -6,9 +6,9 @@ import subprocess
 
 import pytest
 
+from omnidyn.export.code.expressions import INT, REAL, Array, TranslationError
 from omnidyn.export.code.sources import Source, function
 from omnidyn.export.code.translate import Program
-from omnidyn.export.code.types import INT, REAL, Array, TranslationError
 
 
 def source(text):

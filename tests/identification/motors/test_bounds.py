@@ -75,7 +75,7 @@ def test_a_free_run_at_one_speed_says_between_what():
     assert fit.ci95["dead_band"] == pytest.approx((0.35, 2.0))
     assert fit.ci95["slope"][0] < 0.01  # that of a dead band just below 2 V; rounding had it at 0.37 on some processors
     assert not fit.statement().numbers["lag_known"]
-    assert "it is between 0.35 and 2 V, for it turned steadily under that" in str(fit.statement())
+    assert "it is between 0.35 and 2 V, because it turned steadily at that input" in str(fit.statement())
 
 
 def test_a_table_with_few_inputs_is_bounded_by_them():

@@ -84,7 +84,7 @@ def test_how_the_input_goes_between_rows_is_found(clean):
 
 
 def test_a_refuted_way_widens_the_intervals_and_says_so(clean):
-    """The input is held. Asked for the mean of two rows, the fit must say that the logs are met better otherwise."""
+    """The input is held. Asked for the mean of two rows, the fit must say that the logs are fitted better otherwise."""
     asked, right = fit_motor(run_of(clean, BAND, 1), between="mean"), fit_motor(run_of(clean, BAND, 1))
     assert asked.warnings[0].code == "other_reading"
     assert (asked.warnings[0].numbers["better"], asked.warnings[0].numbers["other"]) == (True, HOLD)

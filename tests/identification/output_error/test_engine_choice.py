@@ -5,8 +5,9 @@ import pytest
 
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
+from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.identification.output_error.prepare import EXACT, is_exact, stays_exact
+from omnidyn.identification.output_error.prepare import is_exact, stays_exact
 from omnidyn.model.keys import BOX, Key
 from omnidyn.simulation.simulate import simulate
 
@@ -53,4 +54,4 @@ def test_the_choice_is_made_once_a_fit(axebot, log, monkeypatch):
     fit = Fit.of(log, axebot, OutputError(nuisances=(), start="rest"))
     fit.answer(fit.solve())
     assert len(asked) <= 1
-    assert [group.engine for group in fit.groups] == [EXACT]
+    assert [group.engine for group in fit.groups] == [ExactEngine]

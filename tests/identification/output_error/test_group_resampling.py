@@ -6,7 +6,7 @@ import pytest
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.engines.exact import Weighting
+from omnidyn.identification.output_error.engines.engine import Weighting
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.joint import join
 from omnidyn.identification.output_error.solve.progress import FitProgress

@@ -11,7 +11,7 @@ from omnidyn.model.keys import BOX, EMF, TORQUE
 from omnidyn.model.known.dead_zone import dead_zone
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.run import Run
-from omnidyn.simulation.band import band
+from omnidyn.simulation.band import confidence_band
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import noisy_draw, voltages
 
@@ -78,7 +78,7 @@ def held(numbers):
         robot = fitted(number).robot
         ends = np.array([row.scale_interval for row in dead_zone(robot).rows])
         inside.append((ends[:, 0] <= TRUE) & (ends[:, 1] >= TRUE))
-        low, high, _ = band(robot, test, 0.01, draws=50)
+        low, high, _ = confidence_band(robot, test, 0.01, draws=50)
         share.append(np.mean((low.twist - 1e-9 <= true) & (true <= high.twist + 1e-9)))
     return np.array(inside), np.array(share)
 

@@ -7,16 +7,15 @@ from omnidyn import check
 from omnidyn.errors import UnsupportedError
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.engines.slipping import SlipEngine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, SlipEngine
 from omnidyn.identification.output_error.linear.motion import motions
-from omnidyn.identification.output_error.prepare import make_engine, make_problem, read_records
-from omnidyn.identification.output_error.problem.motion import motion
+from omnidyn.identification.output_error.prepare import FINE, make_problem, motion, read_records
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.structure.missing import laws
 from omnidyn.model.keys import Key
 from omnidyn.model.robot_file import load_robot
 from omnidyn.model.surroundings import GRAVITY
-from omnidyn.report.dead_zone_section import dead_zone_section
+from omnidyn.report.figures.dead_zone_map import dead_zone_section
 from omnidyn.run import Run
 from omnidyn.simulation.slip.plant import wheel_loads
 from tests.support.codes import codes
@@ -113,7 +112,7 @@ def test_derivatives_are_those_of_the_runs_themselves():
     keys = ("friction.axes.coulomb[0]", "friction.axes.viscous[1]", "wheels.traction_mu")
     question = OutputError(free=keys, outputs=("twist", "wheel_speed"), nuisances=(), start="rest")
     problem = make_problem(read_records([run], ROBOT, question), ROBOT, question)
-    engine, point = make_engine("implicit", problem), problem.start()
+    engine, point = ImplicitEngine.of(problem, FINE), problem.start()
     assert isinstance(engine, SlipEngine)
     ((residual, slopes, at),) = engine.residuals(point)
     assert np.nanmax(np.abs(residual[:3])) < 2e-5

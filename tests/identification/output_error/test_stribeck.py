@@ -8,7 +8,7 @@ from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.prepare import guesses
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted
-from omnidyn.identification.output_error.solve.ordered import Order
+from omnidyn.identification.output_error.solve.steps import Order
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Prior

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.methods import choose_method
+from omnidyn.identification.default_method import why_not_output_error
 from omnidyn.identification.steady.operating_points import settling_time
 from omnidyn.model.dynamics import state_space
 from omnidyn.model.friction import Friction
@@ -29,12 +29,10 @@ def test_a_loop_that_settles_within_a_row_is_steady_state_by_default():
     robot = load_robot("robotino")
     speeds = np.ones((50, 3))
     run = Run(t=0.03 * np.arange(50), wheel_speed_command=speeds, wheel_speed=speeds, current=speeds)
-    method, why = choose_method([run], robot)
-    assert method == "steady-state"
+    why = why_not_output_error([run], robot)
     assert "the speed loop of robotino settles in 8 ms, a row comes every 30 ms" in why
-    assert choose_method([run], robot, ["free"]) == ("output-error", "")
-    assert choose_method([run.replace(t=0.002 * np.arange(50))], robot) == ("output-error", "")
-    assert choose_method([run.replace(current=None)], robot) == ("output-error", "")
+    assert why_not_output_error([run.replace(t=0.002 * np.arange(50))], robot) == ""
+    assert why_not_output_error([run.replace(current=None)], robot) == ""
 
 
 def test_an_integral_alone_swings_and_fades_twice_as_slowly_as_the_robot(axebot):

@@ -10,15 +10,14 @@ import pytest
 from benchmarks.ten_robots.world import World, currents, drive
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.methods import OutputError
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.linear.motion import motions
 from omnidyn.identification.output_error.linear.workbench import Workbench
-from omnidyn.identification.output_error.prepare import engine_kind
 from omnidyn.identification.structure.missing import refits
-from omnidyn.identification.structure.missing.candidates import CHANGE
+from omnidyn.identification.structure.missing.candidates import CHANGE, unoffered
 from omnidyn.identification.structure.missing.laws import candidates
 from omnidyn.identification.structure.missing.switches import switches
-from omnidyn.identification.structure.missing.unoffered import unoffered
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.motor import Motor
 from omnidyn.model.robot import Body, Robot
@@ -82,7 +81,7 @@ def begun(layout, every=False):
     solver = fit._solver(("latency",))
     solution = solver.minimise(solver.problem.start(), limit=0)
     problem, point = solution.solver.problem, solution.state.point
-    bench = Workbench(problem, point, engine_kind(solver.engine), motions(problem, point), (0.5,))
+    bench = Workbench(problem, point, type(solver.engine), motions(problem, point), (0.5,))
     return solution, bench, [*candidates(bench), *unoffered(bench)]
 
 
@@ -116,14 +115,14 @@ def test_every_candidate_that_a_fit_can_hold_begins_to_be_fitted(layout):
     """Its numbers begin where its column has them, and what it shows there is finite."""
     solution, bench, every = begun(layout)
     problem, parts = bench.problem, solution.solver.engine.residuals(solution.state.point)
-    off = refits._by_coarse_steps(problem, parts, solution.state.point, refits.IMPLICIT)
+    off = refits._by_coarse_steps(problem, parts, solution.state.point, ImplicitEngine)
     for one in every:
         if not one.offered or one.key == CHANGE:
             continue
         for trial in one.trials(bench)[:1]:
             remedy = Remedy(one.key, "", 0.0, 0.0, size=(0.02,) * trial.shown[0].shape[2], at=trial.at)
             for way in switches(remedy, problem.robot, refits._question(problem), solution):
-                start = refits._begun(one, way, problem, solution, off, refits.IMPLICIT)
+                start = refits._begun(one, way, problem, solution, off, ImplicitEngine)
                 assert np.isfinite(start.state.objective), one.key
                 for own in refits._trial(start, problem, parts, solution).shown:
                     assert np.isfinite(own).all(), one.key

@@ -7,10 +7,9 @@ import pytest
 from omnidyn.identification.identify import identify
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.engines.slipping import SlipEngine
+from omnidyn.identification.output_error.engines.implicit import SlipEngine
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.identification.structure.ladder.models import Model, Move
-from omnidyn.identification.structure.ladder.slow import BEYOND, FITS, NOT_NEEDED, Purse, quick_first
+from omnidyn.identification.structure.ladder.models import BEYOND, FITS, NOT_NEEDED, Model, Move, Purse, quick_first
 from tests.identification.structure.test_tails import AXEBOT, log, spoiled
 
 GRIP, MASS = "wheels.traction_mu", "body.mass_kg"

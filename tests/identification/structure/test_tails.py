@@ -8,9 +8,9 @@ from benchmarks.wrong_worlds.log import logged, right_case, robot_of
 from omnidyn.identification.identify import identify
 from omnidyn.identification.lack_of_fit import LOSS
 from omnidyn.identification.methods import OutputError
+from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.linear.rows import Rows
-from omnidyn.identification.output_error.prepare import EXACT, make_engine
 from omnidyn.identification.structure.tails import as_counted, sprinkled
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
@@ -92,7 +92,7 @@ def test_pulled_in_residuals_leave_a_robust_fit_where_it_is():
     """Least squares of them go nowhere from its best point, in standard errors; of the residuals as they are, far."""
     solution = Fit.of(spoiled(5, 30.0), AXEBOT, OutputError(nuisances=(), loss="student-t")).solve()
     problem, point, variance = solution.solver.problem, solution.state.point, solution.state.variance
-    parts = make_engine(EXACT, problem).residuals(point)
+    parts = ExactEngine(problem).residuals(point)
     far = []
     for own in (as_counted(solution, problem, parts), parts):
         rows = Rows.of(problem, point, own)

@@ -9,7 +9,7 @@ import pytest
 from omnidyn import read_log
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import read_table
-from omnidyn.logs.readers.reader import Options
+from omnidyn.logs.readers.reader import ReadOptions
 from omnidyn.logs.readers.wpilog import read_wpilog
 from tests.support.cases import case
 from tests.support.codes import said
@@ -58,7 +58,7 @@ def test_an_odd_record_of_a_data_log_costs_itself(tmp_path, odd, words):
 
 def test_many_strays_in_a_row_are_damage(tmp_path):
     path = motor_log(tmp_path / "bad.wpilog", record(9, 1_500_000, b"1") * 50)
-    recording = read_wpilog(path, Options())
+    recording = read_wpilog(path, ReadOptions())
     assert recording.salvaged == 100
     assert any("the file is damaged: a value of entry 9" in note for note in said(recording.notes))
 

@@ -9,7 +9,7 @@ import pytest
 
 from omnidyn.errors import InputError
 from omnidyn.logs.readers.read_table import iter_tables, read_table
-from omnidyn.logs.readers.reader import Options
+from omnidyn.logs.readers.reader import ReadOptions
 from omnidyn.logs.readers.text import text_tables
 
 
@@ -466,7 +466,7 @@ def test_a_million_rows_take_seconds(write, separator, limit):
 
 def test_the_reader_of_text_refuses_another_format_by_its_name(write):
     with pytest.raises(InputError, match="this is not a text file; got a Parquet file"):  # 37
-        list(text_tables(write(b"PAR1\x00\x01"), 10, Options()))
+        list(text_tables(write(b"PAR1\x00\x01"), 10, ReadOptions()))
 
 
 MEGABYTE = 2**20

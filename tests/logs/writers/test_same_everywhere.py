@@ -10,9 +10,9 @@ import omnidyn
 from omnidyn.findings.check import check
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
+from omnidyn.logs.mcap_run import messages
 from omnidyn.logs.read_log import load_log, read_log
 from omnidyn.logs.run_file import run_columns, write_run
-from omnidyn.logs.writers.mcap_run import messages
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from tests.support.axebot_logs import voltages

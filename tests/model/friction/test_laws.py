@@ -7,7 +7,7 @@ from omnidyn.control.feedforward import voltage_for
 from omnidyn.control.table import feedforward_table
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.export.features import refuse
-from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moves
+from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, moving_axes
 from omnidyn.model.dynamics import acceleration
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import Key
@@ -51,8 +51,8 @@ def test_the_dead_zone_of_what_falls_or_bends_is_that_of_its_breakaway():
         robot = of(axes=AxesFriction(**LEVELS, **more))
         np.testing.assert_allclose(breakaway_voltage(robot, axis_patterns(robot)), edges, rtol=1e-9)
         for axis, edge in enumerate(edges):
-            assert not moves(robot, 0.999 * edge * axis_patterns(robot)[axis]).any()
-            assert moves(robot, 1.001 * edge * axis_patterns(robot)[axis])[axis]
+            assert not moving_axes(robot, 0.999 * edge * axis_patterns(robot)[axis]).any()
+            assert moving_axes(robot, 1.001 * edge * axis_patterns(robot)[axis])[axis]
 
 
 def test_a_file_keeps_every_law():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog, lsq_linear
 
-from omnidyn.model.deadzone import breakaway_voltage, moves
+from omnidyn.model.deadzone import breakaway_voltage, moving_axes
 from omnidyn.model.dynamics import acceleration
 from omnidyn.model.robot_file import load_robot
 from tests.support.mixed_robots import random_robot
@@ -68,7 +68,7 @@ def test_what_holds_is_what_the_program_says(seed):
         level = breakaway_voltage(robot, row)
         row *= level * random.choice([0.3, 0.9, 0.999, 1.001, 1.1, 3.0]) if np.isfinite(level) else 1.0
         held, _ = holds(robot, row)
-        assert moves(robot, row).any() != held
+        assert moving_axes(robot, row).any() != held
         judged[held] += 1
     assert min(judged.values()) >= 5
 
@@ -121,7 +121,7 @@ def test_the_paper_holds_up_to_its_levels():
         ([-1.0, 0.5, 0.5], 1.5 / (1.5 * per_volt)),
         ([1.0, 1.0, 1.0], 0.099 / (0.3 * per_volt)),
     ):
-        assert not moves(robot, 0.9999 * level * np.array(pattern)).any()
-        assert moves(robot, 1.0001 * level * np.array(pattern)).sum() == 1
+        assert not moving_axes(robot, 0.9999 * level * np.array(pattern)).any()
+        assert moving_axes(robot, 1.0001 * level * np.array(pattern)).sum() == 1
         assert holds(robot, 0.9999 * level * np.array(pattern))[0]
         assert not holds(robot, 1.0001 * level * np.array(pattern))[0]

@@ -54,7 +54,7 @@ def test_a_robot_without_any_writes_none():
 
 
 def test_a_payload_adds_mass_and_inertia():
-    varied = omnidyn.vary(ROBOT, payload="2kg")
+    varied = omnidyn.vary_robot(ROBOT, payload="2kg")
     assert varied.body == ROBOT.body.replace(mass=3.5, inertia=0.035)
     assert varied.priors["body.mass_kg"].std == pytest.approx(0.5)  # 0.3 and 0.4
     assert varied.name == "axebot with payload 2kg"
@@ -65,36 +65,36 @@ def test_a_payload_adds_mass_and_inertia():
 def test_a_heavier_robot_is_slower_by_its_mass():
     u = np.tile([0.0, 4.0, -4.0], (5, 1))
     plain, heavy = (
-        omnidyn.simulate(each, u, 1e-3).twist[-1, 0] for each in (ROBOT, omnidyn.vary(ROBOT, payload="2kg"))
+        omnidyn.simulate(each, u, 1e-3).twist[-1, 0] for each in (ROBOT, omnidyn.vary_robot(ROBOT, payload="2kg"))
     )
     assert plain / heavy == pytest.approx(3.5 / 1.5, rel=0.03)
 
 
 def test_a_floor_takes_the_place_of_the_friction_that_floors_have():
-    carpet, ice = (omnidyn.vary(ROBOT, floor=name) for name in ("carpet", "ice"))
+    carpet, ice = (omnidyn.vary_robot(ROBOT, floor=name) for name in ("carpet", "ice"))
     assert carpet.friction.axes == AxesFriction(viscous=(1.5, 1.6, 0.02), coulomb=(3.0, 2.0, 0.12))
     assert carpet.priors["friction.axes.coulomb[0]"].std == 0.2
     assert not any(ice.friction.axes.coulomb)
     assert ice.friction.direction.coulomb == (0.1, 0.1)
     bearings = ROBOT.replace(friction=ROBOT.friction.replace(wheels=ROBOT.friction.wheels.replace(coulomb=0.3)))
-    assert omnidyn.vary(bearings, floor="carpet").friction.wheels == bearings.friction.wheels
+    assert omnidyn.vary_robot(bearings, floor="carpet").friction.wheels == bearings.friction.wheels
 
 
 def test_a_battery_is_what_duties_are_shares_of_and_the_most_a_motor_gets():
     duty = ROBOT.replace(drive=ROBOT.drive.replace(kind="duty", supply=12.0))
-    low = omnidyn.vary(duty, battery="low")
+    low = omnidyn.vary_robot(duty, battery="low")
     assert low.drive.supply == 4.5
     assert low.motor.voltage_limit == 4.5
     run = omnidyn.simulate(low, duty=np.full((3, 3), 0.5), dt=0.01)
     assert (run.voltage == 2.25).all()
-    full = omnidyn.vary(duty, battery=Battery(supply=12.0))
+    full = omnidyn.vary_robot(duty, battery=Battery(supply=12.0))
     assert full.motor.voltage_limit == 6.0
 
 
 def test_several_at_once_and_one_after_the_other_are_the_same_robot():
     both = vary_as(ROBOT, "payload=2kg, tilt=ramp")
     assert both.floor == Floor(tilt=2.0, downhill=90.0)
-    one = omnidyn.vary(omnidyn.vary(ROBOT, payload="2kg"), tilt="ramp")
+    one = omnidyn.vary_robot(omnidyn.vary_robot(ROBOT, payload="2kg"), tilt="ramp")
     assert one.replace(name=both.name) == both
     assert parse_robot(robot_to_toml(both)) == both
     assert both.variations.names == {"floor": ("carpet", "ice"), "battery": ("low",)}
@@ -104,7 +104,7 @@ def test_several_at_once_and_one_after_the_other_are_the_same_robot():
 def test_by_value():
     robot = load_robot("axebot")
     surface = Surface(friction=Friction(axes=AxesFriction(viscous=(1.0, 1.0, 0.01), coulomb=(0.5, 0.5, 0.05))))
-    varied = omnidyn.vary(robot, payload=Payload(mass=0.5), floor=surface, tilt=Floor(tilt=1.0))
+    varied = omnidyn.vary_robot(robot, payload=Payload(mass=0.5), floor=surface, tilt=Floor(tilt=1.0))
     assert (varied.body.mass, varied.friction.axes.coulomb[0], varied.floor.tilt) == (2.0, 0.5, 1.0)
     assert varied.name == "axebot with payload, floor, tilt"
 
@@ -129,13 +129,13 @@ def test_a_robot_that_knows_none_says_which_table_is_missing():
     with pytest.raises(
         InputError, match=r"axebot knows no floor by name; got carpet; expected \[variations.floor.carpet\]"
     ):
-        omnidyn.vary(load_robot("axebot"), floor="carpet")
+        omnidyn.vary_robot(load_robot("axebot"), floor="carpet")
 
 
 def test_a_load_beside_the_middle_is_a_body_of_two_points():
     """Against the sums over three point masses: two of the body, one of the load."""
     robot = ROBOT.replace(body=ROBOT.body.replace(mass=2.0, inertia=2.0 * 0.09**2, centre=(0.01, 0.02)))
-    loaded = omnidyn.vary(robot, payload=Payload(mass=0.5, offset=(-0.03, 0.06), inertia=0.001))
+    loaded = omnidyn.vary_robot(robot, payload=Payload(mass=0.5, offset=(-0.03, 0.06), inertia=0.001))
     places = np.array([[0.01, 0.02 + 0.09], [0.01, 0.02 - 0.09], [-0.03, 0.06]])
     masses = np.array([1.0, 1.0, 0.5])
     centre = masses @ places / masses.sum()
@@ -144,15 +144,15 @@ def test_a_load_beside_the_middle_is_a_body_of_two_points():
     np.testing.assert_allclose(loaded.body.centre, centre, rtol=1e-14)
     assert loaded.body.inertia == pytest.approx(inertia, rel=1e-14)
     half = Payload(mass=0.25, offset=(-0.03, 0.06), inertia=0.0005)
-    twice = omnidyn.vary(omnidyn.vary(robot, payload=half), payload=half)
+    twice = omnidyn.vary_robot(omnidyn.vary_robot(robot, payload=half), payload=half)
     np.testing.assert_allclose(twice.body.centre, centre, rtol=1e-14)
     assert twice.body.inertia == pytest.approx(inertia, rel=1e-14)
 
 
 def test_loads_that_balance_each_other_are_one_in_the_middle():
-    one = omnidyn.vary(omnidyn.vary(ROBOT, payload=Payload(mass=1.0, offset=(0.05, 0.0))),
+    one = omnidyn.vary_robot(omnidyn.vary_robot(ROBOT, payload=Payload(mass=1.0, offset=(0.05, 0.0))),
                        payload=Payload(mass=1.0, offset=(-0.05, 0.0)))  # fmt: skip
-    both = omnidyn.vary(ROBOT, payload=Payload(mass=2.0, inertia=2.0 * 0.05**2))
+    both = omnidyn.vary_robot(ROBOT, payload=Payload(mass=2.0, inertia=2.0 * 0.05**2))
     np.testing.assert_allclose(one.body.centre, (0.0, 0.0), atol=1e-17)
     assert one.body.inertia == pytest.approx(both.body.inertia, rel=1e-14)
 
@@ -161,7 +161,7 @@ def test_what_is_known_of_the_offset_is_known_of_the_centre():
     text = robot_to_toml(load_robot("axebot")) + (
         "[variations.payload.box]\nmass_kg = 1.5\noffset_m = [{ value = 0.04, std = 0.01 }, 0.02]\n"
     )
-    loaded = omnidyn.vary(parse_robot(text), payload="box")
+    loaded = omnidyn.vary_robot(parse_robot(text), payload="box")
     assert loaded.body.centre == pytest.approx((0.02, 0.01))
     assert loaded.priors["body.centre_m[0]"].std == pytest.approx(0.005)
     assert "body.centre_m[1]" not in loaded.priors
@@ -173,12 +173,12 @@ def test_what_is_known_of_the_offset_is_known_of_the_centre():
 def test_a_load_that_tips_the_robot_over_is_refused():
     words = r"payload: \[body\] centre_m lies 0.18.* m from the centre .* beyond all of them \(0.1 m\)"
     with pytest.raises(InputError, match=words):
-        omnidyn.vary(ROBOT, payload=Payload(mass=10.0, offset=(0.21, 0.0)))
+        omnidyn.vary_robot(ROBOT, payload=Payload(mass=10.0, offset=(0.21, 0.0)))
 
 
 def test_something_else_is_refused():
     with pytest.raises(InputError, match=r"not a variation; got 3; expected a name, or Payload"):
-        omnidyn.vary(ROBOT, payload=3)  # pyright: ignore[reportArgumentType]
+        omnidyn.vary_robot(ROBOT, payload=3)  # pyright: ignore[reportArgumentType]
 
 
 @pytest.mark.parametrize(

@@ -373,7 +373,7 @@ def test_a_floor_of_the_file_can_be_slippery():
     )
     robot = parse_robot(text)
     assert parse_robot(robot_to_toml(robot)) == robot
-    ice = omnidyn.vary(robot, floor="ice")
+    ice = omnidyn.vary_robot(robot, floor="ice")
     assert ice.wheels.traction_mu == 0.1
     tracked = omnidyn.track(robot, "circle", "pid", plant=ice, duration=1.0)
     rim = np.abs(tracked.run.wheel_speed * 0.035 - tracked.run.twist @ robot.wheels.wrench_matrix)

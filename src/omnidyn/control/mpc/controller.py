@@ -16,6 +16,7 @@ from typing import Any, Self
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.compiled.kernel import machine_code
 from omnidyn.control.controller import (
     BACKWARDS,
     BAD_PATH,
@@ -82,25 +83,16 @@ class Mpc:
         self.steps_late = latency if self.delay is None else self.delay
         self._zeros = np.zeros(robot.wheels.count)
         self._preview = Preview(self.dt, self.steps_late, self.horizon)
-        self._room = Room.of(self.horizon, robot.wheels.count)
+        self._room = Room.of(self.horizon, volts(robot))
         self._numbers = numbers(robot, self.dt, self.friction)
-        self._bounds = np.ascontiguousarray(
-            np.broadcast_to(np.array([-volts(robot), volts(robot)])[:, None], (2, self.horizon, robot.wheels.count))
-        )
-        self._fixed = (*self._numbers, *self.settings.tables(robot, self.dt, self.observer), self._bounds)
+        self._tables = self.settings.tables(robot, self.dt, self.observer)
+        self._control = None  # compiled by the first step
 
     def reset(self) -> None:
         """Forget all steps."""
         self._memory = Memory.of(self.horizon, self.robot.wheels.count, self.steps_late, self.settings)
         self._known, self._t, self._last, self._asked = False, math.nan, self._zeros.copy(), (WAITING, 0, 0.0)
         self._state = np.zeros(6)
-        self._bind()
-
-    def _bind(self) -> None:
-        """The tables that each step works in, in the order of `control_step`."""
-        memory, room = self._memory, self._room
-        self._tables = (memory.estimate, memory.sent, *room.first, memory.x, room.before, memory.u, memory.active,
-                        memory.fast, room.interior)  # fmt: skip
 
     def replace(self, *, robot: Robot) -> Self:
         """The same controller for another robot. Where the friction is another, its share is learned anew."""
@@ -114,7 +106,6 @@ class Mpc:
         other._memory, other._state = self._memory.copied(None if same else self.settings), self._state.copy()
         other._preview = copy(self._preview)  # what it has sampled stays as it is, to the last bit
         other._last = np.clip(self._last, -other.limit, other.limit)
-        other._bind()
         return other
 
     @property
@@ -124,7 +115,9 @@ class Mpc:
 
     def batch(self, count: int) -> Batch:
         """As many controllers of the same robot as asked for, in one: `Batch.step_batch`. They begin anew."""
-        return Batch(self._fixed, self._room, self.settings, self._preview, _whole("count", count, 1, 10_000_000))
+        return Batch(
+            self._numbers, self._tables, self._room, self.settings, self._preview, _whole("count", count, 1, 10_000_000)
+        )
 
     @property
     def info(self) -> Info:
@@ -136,10 +129,10 @@ class Mpc:
 
     def _met(self) -> tuple[str, ...]:
         """The limits that the last output met."""
-        memory, (_, _, limit, emf) = self._memory, self._fixed[4:8]
+        memory, limit = self._memory, self._tables.limit
         volts, held = memory.u[0], memory.active[0] != 0
         at_voltage = np.abs(volts) >= limit[0] - MET
-        at_current = np.abs(volts - emf @ memory.x[0, 3:]) >= limit[1] - MET
+        at_current = np.abs(volts - self._tables.emf @ memory.x[0, 3:]) >= limit[1] - MET
         met = {
             "voltage": at_voltage.any(), "current": at_current.any(), "slew": (held & ~at_voltage & ~at_current).any(),
             "speed": memory.fast[0].any(),
@@ -173,8 +166,10 @@ class Mpc:
         preview = self._preview
         row = preview.row_at(t, path)
         known = self._known and 0.5 * self.dt < since < 1.5 * self.dt
-        fixed = self._fixed
-        passes = control_step(*fixed, preview.rows, row, self._state, known, *self._tables)
+        given = self._numbers, self._tables, preview.rows, row, self._state, known, self._memory, self._room
+        if self._control is None:
+            self._control = machine_code(control_step, *given)
+        passes = self._control(*given)
         if passes < 0:
             return self._failed(t, passes, begun)
         self._known = True

@@ -10,6 +10,9 @@ are bounded. Source: Mehrotra, SIAM J. Optim. 2 (1992); the start is our own.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import part
 from omnidyn.control.mpc.program import CURRENT, SLEW, SPEED, SPEED_WEIGHT
 from omnidyn.control.mpc.riccati import (
@@ -40,9 +43,48 @@ MOST = 40
 LEAST = 1e-14  # [V] from a bound: rounding takes less than that to 0
 
 
+class Program(NamedTuple):
+    """A quadratic program of n steps, and the arrays that it is solved in.
+
+    Args:
+        push: B (3, wheels).
+        weight: of each input, (wheels,).
+        stage: the tables of the steps, (n, STAGE_SIZE).
+        wanted: inputs that cost nothing, (n, wheels).
+        bounds: low and high, (2, n, wheels).
+        answer: of a backward pass, (n, ANSWER_SIZE).
+        inverse, target: of the weights, and what inputs are drawn to, (n, wheels).
+        x: states, (n + 1, 6), row 0 given.
+        u: inputs, (n, wheels).
+        active: which inputs are held, (n, wheels).
+        room: of the interior point method, (ROOM_SIZE, n, wheels).
+    """
+
+    push: FloatArray
+    weight: FloatArray
+    stage: FloatArray
+    wanted: FloatArray
+    bounds: FloatArray
+    answer: FloatArray
+    inverse: FloatArray
+    target: FloatArray
+    x: FloatArray
+    u: FloatArray
+    active: IntArray
+    room: FloatArray
+
+
 @part
-def slopes(stage, push, x, u, weight, wanted, out):
+def slopes(program, out):
     """Slope of the cost by every input, `out` (n, wheels), at inputs u; fills x from its row 0."""
+    push, weight, stage, wanted, x, u = (
+        program.push,
+        program.weight,
+        program.stage,
+        program.wanted,
+        program.x,
+        program.u,
+    )
     n = len(stage)
     pose, twist = vector(x, 0, 0), vector(x, 0, 3)
     for k in range(n):
@@ -67,15 +109,16 @@ def slopes(stage, push, x, u, weight, wanted, out):
 
 
 @part
-def begin(stage, push, x, u, bounds, weight, wanted, room):
+def begin(program):
     """Inputs well inside their bounds and multipliers that balance the slope there."""
+    bounds, u, room = program.bounds, program.u, program.room
     n, m = u.shape
     for k in range(n):
         for i in range(m):
             low, high = bounds[0, k, i], bounds[1, k, i]
             margin = MARGIN * (high - low)
             u[k, i] = min(max(u[k, i], low + margin), high - margin)
-    slopes(stage, push, x, u, weight, wanted, room[SLOPE])
+    slopes(program, room[SLOPE])
     size = 0.0
     for k in range(n):
         for i in range(m):
@@ -89,8 +132,9 @@ def begin(stage, push, x, u, bounds, weight, wanted, room):
 
 
 @part
-def mean_product(u, bounds, room, along, change):
+def mean_product(program, along, change):
     """Mean of m s after a step of `along` to u = NEXT with the changes of the multipliers, if `change`."""
+    bounds, u, room = program.bounds, program.u, program.room
     total = 0.0
     n, m = u.shape
     for k in range(n):
@@ -104,8 +148,10 @@ def mean_product(u, bounds, room, along, change):
 
 
 @part
-def barrier(u, bounds, weight, wanted, inverse, target, room, mu, correct):
+def barrier(program, mu, correct):
     """Weights and targets of the inputs with their barrier; `correct`: with what the predictor found."""
+    weight, wanted, bounds = program.weight, program.wanted, program.bounds
+    u, room = program.u, program.room
     for k in range(u.shape[0]):
         for i in range(u.shape[1]):
             sl, sh = max(u[k, i] - bounds[0, k, i], LEAST), max(bounds[1, k, i] - u[k, i], LEAST)
@@ -116,14 +162,15 @@ def barrier(u, bounds, weight, wanted, inverse, target, room, mu, correct):
                 du = room[NEXT, k, i] - u[k, i]
                 tl, th = mu - du * room[DROP_LOW, k, i], mu + du * room[DROP_HIGH, k, i]
             r = 1.0 / (weight[i] + d)
-            inverse[k, i] = r
-            target[k, i] = r * (weight[i] * wanted[k, i] + d * u[k, i] + tl * rl - th * rh)
+            program.inverse[k, i] = r
+            program.target[k, i] = r * (weight[i] * wanted[k, i] + d * u[k, i] + tl * rl - th * rh)
             room[DROP_LOW, k, i], room[DROP_HIGH, k, i] = tl * rl, th * rh
 
 
 @part
-def reach(u, bounds, room):
+def reach(program):
     """Changes of the multipliers of a step to NEXT, in place of t/s, and how far it may go."""
+    bounds, u, room = program.bounds, program.u, program.room
     along = 1.0 / BACK_OFF
     for k in range(u.shape[0]):
         for i in range(u.shape[1]):
@@ -140,8 +187,9 @@ def reach(u, bounds, room):
 
 
 @part
-def move(u, room, along):
+def move(program, along):
     """Take the step."""
+    u, room = program.u, program.room
     for k in range(u.shape[0]):
         for i in range(u.shape[1]):
             u[k, i] += along * (room[NEXT, k, i] - u[k, i])
@@ -150,36 +198,39 @@ def move(u, room, along):
 
 
 @part
-def newton(stage, answer, push, inverse, target, x, room, again):
+def newton(program, again):
     """Inputs of the next point into NEXT; `again`: with the matrices of the pass before."""
+    push, stage, answer = program.push, program.stage, program.answer
+    inverse, target = program.inverse, program.target
     n = len(stage)
     for k in range(n - 1, -1, -1):
         if not again:
             factor_stage(stage, answer, push, inverse, k, n)
         vector_stage(stage, answer, push, target, k, n)
-    forward(stage, answer, push, inverse, target, x, room[NEXT])
+    forward(stage, answer, push, inverse, target, program.x, program.room[NEXT])
 
 
 @part
-def interior_point(stage, answer, push, inverse, target, x, u, bounds, weight, wanted, room, mu, until):
+def interior_point(program, mu, until):
     """Go on from `u` and multipliers in `room` until the mean of m s is below `until`. Returns (passes, mu)."""
     count = 0
     while mu > until and count < MOST:
-        barrier(u, bounds, weight, wanted, inverse, target, room, 0.0, False)
-        newton(stage, answer, push, inverse, target, x, room, False)
-        along = reach(u, bounds, room)
-        least = mean_product(u, bounds, room, along, True)
-        barrier(u, bounds, weight, wanted, inverse, target, room, mu * (least / mu) ** 3, True)
-        newton(stage, answer, push, inverse, target, x, room, True)
-        move(u, room, reach(u, bounds, room))
-        mu = mean_product(u, bounds, room, 0.0, False)
+        barrier(program, 0.0, False)
+        newton(program, False)
+        along = reach(program)
+        least = mean_product(program, along, True)
+        barrier(program, mu * (least / mu) ** 3, True)
+        newton(program, True)
+        move(program, reach(program))
+        mu = mean_product(program, 0.0, False)
         count += 1
     return count, mu
 
 
 @part
-def guess(u, bounds, active, room):
+def guess(program):
     """Which inputs stand at a bound: those that are nearer to it, in their own scale, than their multiplier to 0."""
+    bounds, u, active, room = program.bounds, program.u, program.active, program.room
     scale = 1e-300
     for k in range(u.shape[0]):
         for i in range(u.shape[1]):
@@ -207,13 +258,14 @@ BEYOND = 1e-10  # [V] an input may be beyond its bound, and as far may a slope, 
 
 
 @part
-def hold(active, bounds, weight, wanted, inverse, target, top):
+def hold(program, top):
     """Write what riccati.py needs to know of the active set, steps 0 to `top`."""
+    weight, wanted, bounds, active = program.weight, program.wanted, program.bounds, program.active
     for k in range(top + 1):
         for i in range(active.shape[1]):
             held = active[k, i] != FREE
-            inverse[k, i] = 0.0 if held else 1.0 / weight[i]
-            target[k, i] = bounds[0 if active[k, i] < 0 else 1, k, i] if held else wanted[k, i]
+            program.inverse[k, i] = 0.0 if held else 1.0 / weight[i]
+            program.target[k, i] = bounds[0 if active[k, i] < 0 else 1, k, i] if held else wanted[k, i]
 
 
 @part
@@ -225,15 +277,17 @@ def corrected(side, u, low, high, slope):
 
 
 @part
-def forward_corrected(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted):
+def forward_corrected(program):
     """Forward pass that corrects the active set as it goes. Returns the last step that changed, -1 if none has."""
+    push, stage, wanted, bounds, answer = program.push, program.stage, program.wanted, program.bounds, program.answer
+    x, u, active = program.x, program.u, program.active
     pose, twist, last = vector(x, 0, 0), vector(x, 0, 3), -1
     for k in range(len(stage)):
         g = slope_of(answer, k, pose, twist)
         for i in range(u.shape[1]):
             along = dot(column(push, i), g)
-            volts = target[k, i] - inverse[k, i] * along
-            slope = volts - wanted[k, i] + along / weight[i]
+            volts = program.target[k, i] - program.inverse[k, i] * along
+            slope = volts - wanted[k, i] + along / program.weight[i]
             side = corrected(active[k, i], volts, bounds[0, k, i], bounds[1, k, i], slope)
             last = k if side != active[k, i] else last
             active[k, i], u[k, i] = side, volts
@@ -244,13 +298,13 @@ def forward_corrected(stage, answer, push, inverse, target, x, u, active, bounds
 
 
 @part
-def active_set(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, most):
+def active_set(program, most):
     """Solve from the guess in `active`. Returns the passes it took, most + 1 where they did not do."""
-    top = len(stage) - 1
+    top = len(program.stage) - 1
     for count in range(most):
-        hold(active, bounds, weight, wanted, inverse, target, top)
-        backward(stage, answer, push, inverse, target, top)
-        top = forward_corrected(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted)
+        hold(program, top)
+        backward(program.stage, program.answer, program.push, program.inverse, program.target, top)
+        top = forward_corrected(program)
         if top < 0:
             return count + 1
     return most + 1
@@ -263,27 +317,26 @@ EARLY, TIGHT = 1e-6, 1e-13  # of the mean of m s that it begins with, where it s
 
 
 @part
-def solve(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, room):
+def solve(program):
     """Optimal inputs u (n, wheels) and states x (n + 1, 6) from its row 0. Returns passes; negative: not to rounding.
 
     active (n, wheels) holds the guess, and the bounds met afterwards. room (ROOM_SIZE, n, wheels).
     """
-    count = active_set(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, FIRST)
+    u, active, room = program.u, program.active, program.room
+    count = active_set(program, FIRST)
     if count <= FIRST:
         return count
-    begin(stage, push, x, u, bounds, weight, wanted, room)
-    mu = mean_product(u, bounds, room, 0.0, False)
+    begin(program)
+    mu = mean_product(program, 0.0, False)
     total, start = FIRST, mu
     for until in (EARLY, TIGHT):
-        more, mu = interior_point(
-            stage, answer, push, inverse, target, x, u, bounds, weight, wanted, room, mu, until * start
-        )
+        more, mu = interior_point(program, mu, until * start)
         total += more
-        guess(u, bounds, active, room)
+        guess(program)
         for k in range(u.shape[0]):
             for i in range(u.shape[1]):
                 room[4, k, i] = u[k, i]
-        count = active_set(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, LAST)
+        count = active_set(program, LAST)
         total += min(count, LAST)
         if count <= LAST:
             return total
@@ -307,11 +360,12 @@ TRIES = 8  # sets of speeds beyond their limit; the last one is taken
 
 
 @part
-def make_bounds(settings, limit, emf, sent, bounds, x):
-    """Bounds of the volts of all steps. limit (2, wheels): [V], and R i_max [V]; emf (wheels, 3)."""
+def make_bounds(tables, program, sent):
+    """Bounds of the volts of all steps, along the states predicted."""
+    settings, limit, emf, bounds = tables.settings, tables.limit, tables.emf, program.bounds
     last, slew = len(sent) - 1, settings[SLEW]
     for k in range(bounds.shape[1]):
-        twist = vector(x, k, 3)
+        twist = vector(program.x, k, 3)
         for i in range(bounds.shape[2]):
             low, high = -limit[0, i], limit[0, i]
             if slew > 0.0:
@@ -352,17 +406,15 @@ def too_fast(settings, x, fast):
 
 
 @part
-def solve_limited(
-    settings, stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, room, fast
-):  # fmt: skip
+def solve_limited(settings, program, fast):
     """`solve` with the limits of the speed. Returns passes."""
     if settings[SPEED_WEIGHT] == 0.0:
-        return abs(solve(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, room))
+        return abs(solve(program))
     total = 0
     for _ in range(TRIES):
-        weigh_speeds(settings, stage, fast, 1.0)
-        total += abs(solve(stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, room))
-        weigh_speeds(settings, stage, fast, -1.0)
-        if not too_fast(settings, x, fast):
+        weigh_speeds(settings, program.stage, fast, 1.0)
+        total += abs(solve(program))
+        weigh_speeds(settings, program.stage, fast, -1.0)
+        if not too_fast(settings, program.x, fast):
             break
     return total

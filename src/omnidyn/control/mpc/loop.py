@@ -12,7 +12,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel, part
-from omnidyn.control.mpc.interior_point import ROOM_SIZE, make_bounds, solve_limited
+from omnidyn.control.mpc.interior_point import ROOM_SIZE, Program, make_bounds, solve_limited
+from omnidyn.control.mpc.model import Numbers
 from omnidyn.control.mpc.observer import (
     DD,
     ESTIMATE_SIZE,
@@ -47,107 +48,11 @@ from omnidyn.control.mpc.program import (
     stay,
 )
 from omnidyn.control.mpc.riccati import ANSWER_SIZE, STAGE_SIZE, drive_of
-from omnidyn.control.mpc.settings import Preview, Settings
+from omnidyn.control.mpc.settings import Preview, Settings, Tables
 from omnidyn.control.mpc.small import put3, vector
 from omnidyn.errors import InputError
 
 FARTHEST = 1e9  # of any number of a state
-
-
-@part
-def past_delay(linear, levels, estimate, push, stage, sent, x):
-    """Move row 0 of x on by the inputs that are under way: rows 1.. of `sent`."""
-    for j in range(1, len(sent)):
-        drive = drive_of(push, sent, j)
-        pose, twist = run_on(linear, levels, estimate, stage, vector(x, 0, 0), vector(x, 0, 3), drive)
-        put3(x, 0, 0, pose)
-        put3(x, 0, 3, twist)
-
-
-@part
-def control(
-    linear, push, pull, levels, settings, weight, limit, emf, bounds, preview, start, state, known, estimate, sent,
-    stage, answer, inverse, target, wanted, x, before, u, active, fast, room,
-):  # fmt: skip
-    """One step from a measured state (6,). Returns passes of the solver; u[0] is the answer, within bounds.
-
-    -1 where the state is no number, or no place; -2 where no input was found: then nothing of the step is of use.
-    """
-    for i in range(6):
-        if not abs(state[i]) <= FARTHEST:
-            return -1
-    shift(x, u, active, fast, known, preview, start)
-    if settings[LEARN] != 0.0:
-        if known:
-            observe(linear, levels, estimate, stage, state, drive_of(push, sent, 0))
-        else:
-            begin_with(estimate, state)
-        put3(x, 0, 0, vector(estimate, POSE, 0))
-        put3(x, 0, 3, vector(estimate, TWIST, 0))
-    else:
-        for i in range(6):
-            x[0, i] = state[i]
-    past_delay(linear, levels, estimate, push, stage, sent, x)
-    add = nearest_turn(x[0, 2], preview[start, 2])
-    if not known:
-        for k in range(1, len(x)):
-            x[k, 2] += add
-    if rests(preview, start, x):
-        stay(x)
-    limited = settings[CURRENT] != 0.0
-    if limited | (settings[SLEW] > 0.0):
-        make_bounds(settings, limit, emf, sent, bounds, x)
-    make_costs(linear, levels, estimate, settings, stage, wanted, pull, bounds, preview, start, add, x)
-    total = 0
-    for again in range(settings[AGAIN]):
-        if again > 0:
-            between(x, before)
-            if limited:
-                make_bounds(settings, limit, emf, sent, bounds, x)
-        make_stages(linear, levels, estimate, stage, x)
-        for k in range(len(x)):
-            put3(before, k, 0, vector(x, k, 0))
-            put3(before, k, 3, vector(x, k, 3))
-        total += solve_limited(
-            settings, stage, answer, push, inverse, target, x, u, active, bounds, weight, wanted, room, fast
-        )  # fmt: skip
-        if not moved(levels, emf, limited, x, before):
-            break
-    for i in range(u.shape[1]):
-        if not abs(u[0, i]) <= FARTHEST:
-            return -2
-        u[0, i] = min(max(u[0, i], bounds[0, 0, i]), bounds[1, 0, i])
-        u[0, i] = min(max(u[0, i], -limit[0, i]), limit[0, i])  # bounds that leave no room are off by rounding
-        for j in range(len(sent) - 1):
-            sent[j, i] = sent[j + 1, i]
-        sent[len(sent) - 1, i] = u[0, i]
-    return total
-
-
-@kernel
-def control_step(
-    linear, push, pull, levels, settings, weight, limit, emf, bounds, preview, start, state, known, estimate, sent,
-    stage, answer, inverse, target, wanted, x, before, u, active, fast, room,
-):  # fmt: skip
-    """`control` of one robot."""
-    return control(
-        linear, push, pull, levels, settings, weight, limit, emf, bounds, preview, start, state, known, estimate, sent,
-        stage, answer, inverse, target, wanted, x, before, u, active, fast, room,
-    )  # fmt: skip
-
-
-@kernel
-def control_batch(
-    linear, push, pull, levels, settings, weight, limit, emf, bounds, preview, which, start, state, known, estimate,
-    sent, stage, answer, inverse, target, wanted, x, before, u, active, fast, room, passes,
-):  # fmt: skip
-    """`control` of many robots: what each remembers has one more axis in front. which: the `preview` of each."""
-    for i in range(len(state)):
-        passes[i] = control(
-            linear, push, pull, levels, settings, weight, limit, emf, bounds, preview[which[i]], start, state[i],
-            known[i], estimate[i], sent[i], stage, answer, inverse, target, wanted, x[i], before, u[i], active[i],
-            fast[i], room,
-        )  # fmt: skip
 
 
 # The arrays that a controller works in: what it remembers from step to step, and room that it does not
@@ -198,17 +103,123 @@ def _unlearn(estimate: FloatArray, settings: Settings) -> None:
 
 
 class Room(NamedTuple):
-    """first: stage, answer, inverse, target, wanted of `control_step`; before (n + 1, 6); interior: of the fallback."""
+    """What a step works in: stage, answer, inverse, target, wanted, bounds, interior of its Program; before (n + 1, 6):
+    the motion along which it was made."""
 
-    first: tuple[FloatArray, ...]
+    stage: FloatArray
+    answer: FloatArray
+    inverse: FloatArray
+    target: FloatArray
+    wanted: FloatArray
+    bounds: FloatArray
     before: FloatArray
     interior: FloatArray
 
     @classmethod
-    def of(cls, n: int, wheels: int) -> Self:
-        """For n steps of a robot with so many wheels."""
-        each = tuple(np.zeros((n, size)) for size in (STAGE_SIZE, ANSWER_SIZE, wheels, wheels, wheels))
-        return cls(each, np.zeros((n + 1, 6)), np.zeros((ROOM_SIZE, n, wheels)))
+    def of(cls, n: int, limit: FloatArray) -> Self:
+        """For n steps of a robot with these limits of the voltage [V], shape (wheels,)."""
+        wheels = len(limit)
+        bounds = np.ascontiguousarray(np.broadcast_to(np.array([-limit, limit])[:, None], (2, n, wheels)))
+        return cls(
+            np.zeros((n, STAGE_SIZE)), np.zeros((n, ANSWER_SIZE)), np.zeros((n, wheels)), np.zeros((n, wheels)),
+            np.zeros((n, wheels)), bounds, np.zeros((n + 1, 6)), np.zeros((ROOM_SIZE, n, wheels)),
+        )  # fmt: skip
+
+
+@part
+def past_delay(numbers, memory, stage):
+    """Move row 0 of x on by the inputs that are under way: rows 1.. of `sent`."""
+    x = memory.x
+    for j in range(1, len(memory.sent)):
+        drive = drive_of(numbers.push, memory.sent, j)
+        pose, twist = run_on(numbers, memory.estimate, stage, vector(x, 0, 0), vector(x, 0, 3), drive)
+        put3(x, 0, 0, pose)
+        put3(x, 0, 3, twist)
+
+
+@part
+def control(numbers, tables, preview, start, state, known, memory, room):
+    """One step from a measured state (6,). Returns passes of the solver; u[0] is the answer, within bounds.
+
+    -1 where the state is no number, or no place; -2 where no input was found: then nothing of the step is of use.
+    """
+    settings, limit = tables.settings, tables.limit
+    estimate, sent, x, u, fast = memory.estimate, memory.sent, memory.x, memory.u, memory.fast
+    stage, bounds, before = room.stage, room.bounds, room.before
+    for i in range(6):
+        if not abs(state[i]) <= FARTHEST:
+            return -1
+    shift(memory, known, preview, start)
+    if settings[LEARN] != 0.0:
+        if known:
+            observe(numbers, estimate, stage, state, drive_of(numbers.push, sent, 0))
+        else:
+            begin_with(estimate, state)
+        put3(x, 0, 0, vector(estimate, POSE, 0))
+        put3(x, 0, 3, vector(estimate, TWIST, 0))
+    else:
+        for i in range(6):
+            x[0, i] = state[i]
+    past_delay(numbers, memory, stage)
+    add = nearest_turn(x[0, 2], preview[start, 2])
+    if not known:
+        for k in range(1, len(x)):
+            x[k, 2] += add
+    if rests(preview, start, x):
+        stay(x)
+    limited = settings[CURRENT] != 0.0
+    program = Program(
+        numbers.push, tables.weight, stage, room.wanted, bounds, room.answer, room.inverse, room.target, x, u,
+        memory.active, room.interior,
+    )  # fmt: skip
+    if limited | (settings[SLEW] > 0.0):
+        make_bounds(tables, program, sent)
+    make_costs(numbers, settings, estimate, program, preview, start, add)
+    total = 0
+    for again in range(settings[AGAIN]):
+        if again > 0:
+            between(x, before)
+            if limited:
+                make_bounds(tables, program, sent)
+        make_stages(numbers, estimate, program)
+        for k in range(len(x)):
+            put3(before, k, 0, vector(x, k, 0))
+            put3(before, k, 3, vector(x, k, 3))
+        total += solve_limited(settings, program, fast)
+        if not moved(numbers.levels, tables.emf, limited, x, before):
+            break
+    for i in range(u.shape[1]):
+        if not abs(u[0, i]) <= FARTHEST:
+            return -2
+        u[0, i] = min(max(u[0, i], bounds[0, 0, i]), bounds[1, 0, i])
+        u[0, i] = min(max(u[0, i], -limit[0, i]), limit[0, i])  # bounds that leave no room are off by rounding
+        for j in range(len(sent) - 1):
+            sent[j, i] = sent[j + 1, i]
+        sent[len(sent) - 1, i] = u[0, i]
+    return total
+
+
+@kernel
+def control_step(numbers, tables, preview, start, state, known, memory, room):
+    """`control` of one robot."""
+    return control(numbers, tables, preview, start, state, known, memory, room)
+
+
+@kernel
+def control_batch(numbers, tables, previews, start, states, known, memories, room):
+    """`control` of many robots: what each remembers has one more axis in front. Returns the passes of each.
+
+    start: (which of the previews, its row) of each robot.
+    """
+    passes = np.empty(len(states), np.int64)
+    for i in range(len(states)):
+        memory = Memory(
+            memories.estimate[i], memories.sent[i], memories.x[i], memories.u[i], memories.active[i], memories.fast[i]
+        )
+        passes[i] = control(
+            numbers, tables, previews[start[i, 0]], start[i, 1], states[i], known[i], memory, room
+        )  # fmt: skip
+    return passes
 
 
 # Many robots of one kind, one call a step: each with a state and a memory of its own
@@ -218,18 +229,17 @@ class Batch:
     """The controllers of `count` robots; made by `Mpc.batch`. Gives volts."""
 
     def __init__(
-        self, fixed: tuple[FloatArray, ...], room: Room, settings: Settings, preview: Preview, count: int
+        self, numbers: Numbers, tables: Tables, room: Room, settings: Settings, preview: Preview, count: int
     ) -> None:
-        self.count, self._fixed, self._room, self._settings = count, fixed, room, settings
+        self.count, self._numbers, self._tables, self._room, self._settings = count, numbers, tables, room, settings
         self._like = preview
         self.reset()
 
     def reset(self) -> None:
         """Forget all steps."""
-        wheels = self._fixed[1].shape[1]
-        one = Memory.of(self._like.ahead, wheels, self._like.late, self._settings)
+        one = Memory.of(self._like.ahead, len(self._tables.weight), self._like.late, self._settings)
         self._memory = Memory._make(np.repeat(each[None], self.count, axis=0) for each in one)
-        self._known, self._passes = np.zeros(self.count, bool), np.zeros(self.count, np.int64)
+        self._known = np.zeros(self.count, bool)
         self._previews: list[Preview] = []
 
     def step_batch(self, t: float, pose: FloatArray, twist: FloatArray, path: Any | Sequence[Any]) -> FloatArray:
@@ -247,14 +257,13 @@ class Batch:
             self._previews.append(self._like.another())
         rows = [preview.row_at(t, each) for preview, each in zip(self._previews, paths, strict=False)]
         need = self._like.ahead + 1
-        preview = np.stack([each.rows[row : row + need] for each, row in zip(self._previews, rows, strict=False)])
-        which = np.arange(self.count) if len(paths) > 1 else np.zeros(self.count, np.int64)
-        memory, room = self._memory, self._room
-        control_batch(
-            *self._fixed, preview, which, 0, state, self._known, memory.estimate, memory.sent, *room.first, memory.x,
-            room.before, memory.u, memory.active, memory.fast, room.interior, self._passes,
-        )  # fmt: skip
-        self._known = self._passes >= 0
+        previews = np.stack([each.rows[row : row + need] for each, row in zip(self._previews, rows, strict=False)])
+        start = np.zeros((self.count, 2), np.int64)
+        if len(paths) > 1:
+            start[:, 0] = np.arange(self.count)
+        memory = self._memory
+        passes = control_batch(self._numbers, self._tables, previews, start, state, self._known, memory, self._room)
+        self._known = passes >= 0
         sent = memory.u[:, 0].copy()
         sent[~self._known] = 0.0
         memory.sent[~self._known] = 0.0

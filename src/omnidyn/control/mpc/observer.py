@@ -27,13 +27,12 @@ EXACT = 0.0001  # of the speed below which friction falls to 0 in the program: h
 
 
 @part
-def run_on(linear, levels, estimate, stage, pose, twist, drive):
+def run_on(numbers, estimate, stage, pose, twist, drive):
     """(pose, twist) a step on, by the model with what was learned; row 0 of `stage` is room for it."""
     end, after = (0.0, 0.0, 0.0), pose  # from rest: what slides then finds its direction, and does not swing
     for _ in range(PASSES):
-        linear_stage(
-            linear, levels, estimate[SCALE], vector(estimate, PUSH, 0), stage, 0, pose[2], twist, end, end, EXACT, False
-        )  # fmt: skip
+        friction = friction_at(numbers.linear, numbers.levels, estimate[SCALE], end, EXACT, False)
+        linear_stage(numbers.linear, friction, vector(estimate, PUSH, 0), stage, 0, pose[2], twist, end)
         after, then = advance(stage, 0, pose, twist, drive)
         gap = minus(then, end)
         end = then
@@ -52,17 +51,15 @@ def begin_with(estimate, state):
 
 
 @part
-def observe(linear, levels, estimate, stage, state, drive):
+def observe(numbers, estimate, stage, state, drive):
     """Update `estimate` (ESTIMATE_SIZE, 3) by the state (6,) that a step under `drive` [m/s^2] has led to."""
-    pose, twist = run_on(
-        linear, levels, estimate, stage, vector(estimate, POSE, 0), vector(estimate, TWIST, 0), drive
-    )  # fmt: skip
+    pose, twist = run_on(numbers, estimate, stage, vector(estimate, POSE, 0), vector(estimate, TWIST, 0), drive)
     ones = (1.0, 1.0, 1.0)
-    force = friction_at(linear, levels, ones, twist, 1.0, False)[0]
+    force = friction_at(numbers.linear, numbers.levels, ones, twist, 1.0, False)[0]
     put3(estimate, TWIST, 0, twist)
     put3(estimate, POSE, 0, pose)
     for i in range(3):
-        phi, decay = linear[0, PHI + 4 * i], stage[0, V + 4 * i]
+        phi, decay = numbers.linear[0, PHI + 4 * i], stage[0, V + 4 * i]
         observe_axis(estimate, i, decay, phi, -phi * force[i], state[3 + i])
         var, noise = estimate[PP, i] + estimate[WALK_POSE, i] ** 2, estimate[POSE_NOISE, i] ** 2
         left = state[i] - estimate[POSE, i]

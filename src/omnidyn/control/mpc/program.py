@@ -29,8 +29,10 @@ def homeward(preview, row, add, x, k):
 
 
 @part
-def make_costs(linear, levels, estimate, settings, stage, wanted, pull, bounds, preview, start, add, x):
+def make_costs(numbers, settings, estimate, program, preview, start, add):
     """Costs of all steps and the inputs that the reference asks for, friction and push included."""
+    linear, levels, pull = numbers.linear, numbers.levels, numbers.pull
+    stage, bounds = program.stage, program.bounds
     n = len(stage)
     scale, push = estimate[SCALE], vector(estimate, PUSH, 0)
     feed, decay = matrix(linear, 0, FEED), matrix(linear, 0, DECAY)
@@ -43,7 +45,7 @@ def make_costs(linear, levels, estimate, settings, stage, wanted, pull, bounds, 
             stage[k, WEIGHT + i], stage[k, PULL + i] = weight, -weight * goal
         now, then = vector(preview, row, 3), vector(preview, row + 1, 3)
         middle = 0.5 * (now[0] + then[0]), 0.5 * (now[1] + then[1]), 0.5 * (now[2] + then[2])
-        way = homeward(preview, row, add, x, k)
+        way = homeward(preview, row, add, program.x, k)
         put3(stage, k, WAY, way)
         way = plus(middle, way)
         drive = plus(mv(feed, minus(then, mv(decay, now))), friction_at(linear, levels, scale, way, 1.0, False)[0])
@@ -52,15 +54,16 @@ def make_costs(linear, levels, estimate, settings, stage, wanted, pull, bounds, 
             drive = minus(drive, frame_at(linear, middle)[0])
         for i in range(pull.shape[0]):
             volts = pull[i, 0] * drive[0] + pull[i, 1] * drive[1] + pull[i, 2] * drive[2]
-            wanted[k, i] = min(max(volts, bounds[0, k, i]), bounds[1, k, i])
+            program.wanted[k, i] = min(max(volts, bounds[0, k, i]), bounds[1, k, i])
 
 
 @part
-def make_stages(linear, levels, estimate, stage, x):
-    """All steps along the motion predicted in x.
+def make_stages(numbers, estimate, program):
+    """All steps along the motion predicted in x of a program.
 
     What is predicted to rest meets friction against the way back to the path: it has to be overcome to go there.
     """
+    linear, levels, stage, x = numbers.linear, numbers.levels, program.stage, program.x
     push = vector(estimate, PUSH, 0)
     for k in range(len(stage)):
         end, way = vector(x, k + 1, 3), vector(stage, k, WAY)
@@ -68,9 +71,8 @@ def make_stages(linear, levels, estimate, stage, x):
             end[0] + min(max(way[0], -NEAR[0]), NEAR[0]), end[1] + min(max(way[1], -NEAR[1]), NEAR[1]),
             end[2] + min(max(way[2], -NEAR[2]), NEAR[2]),
         )  # fmt: skip
-        linear_stage(
-            linear, levels, estimate[SCALE], push, stage, k, x[k, 2], vector(x, k, 3), end, sense, 1.0, True
-        )  # fmt: skip
+        friction = friction_at(linear, levels, estimate[SCALE], sense, 1.0, True)
+        linear_stage(linear, friction, push, stage, k, x[k, 2], vector(x, k, 3), end)
 
 
 # The motion along which a step is made linear: that of the step before, shifted by one; and whether to do it again
@@ -82,8 +84,9 @@ MOVED, TURNED, PULLED = 0.25, 0.02, 0.05  # share of friction, [rad], [V]: what 
 
 
 @part
-def shift(x, u, active, fast, known, preview, start):
+def shift(memory, known, preview, start):
     """The prediction of the last step as guess of this one; the reference where there is none."""
+    x, u, active, fast = memory.x, memory.u, memory.active, memory.fast
     n = len(u)
     if not known:
         for k in range(n + 1):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,6 +28,18 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 
 Three = tuple[float, float, float]
+
+
+class Tables(NamedTuple):
+    """Settings as kernels read them: settings (SETTINGS_SIZE,); weight of each wheel's volts, (wheels,).
+
+    limit (2, wheels): of volts [V], and R i_max [V]. emf (wheels, 3): back-EMF.
+    """
+
+    settings: FloatArray
+    weight: FloatArray
+    limit: FloatArray
+    emf: FloatArray
 
 
 @dataclass(frozen=True)
@@ -74,8 +86,8 @@ class Settings:
             if not low <= getattr(self, name) <= high:
                 raise InputError("out of range", got=getattr(self, name), expected=f"{low:g} to {high:g}", where=name)
 
-    def tables(self, robot: Robot, dt: float, learn: bool) -> tuple[FloatArray, ...]:
-        """(settings, weight of each wheel's volts, limits (2, wheels), back-EMF (wheels, 3)) as loop.py reads them."""
+    def tables(self, robot: Robot, dt: float, learn: bool) -> Tables:
+        """The settings for a robot and steps of dt [s]; learn: whether the observer runs."""
         table, count = np.zeros(SETTINGS_SIZE), robot.wheels.count
         table[POSE_WEIGHT : POSE_WEIGHT + 3], table[TWIST_WEIGHT : TWIST_WEIGHT + 3] = self.pose, self.twist
         table[LAST_WEIGHT], table[AGAIN], table[LEARN] = self.last, self.again, learn
@@ -86,7 +98,7 @@ class Settings:
             table[SPEED : SPEED + 3], table[SPEED_WEIGHT] = self.speed, self.speed_weight
         amperes = np.minimum(*(per_wheel(np.inf if each is None else each, count) for each in (self.current, own)))
         limit = np.array([volts(robot), np.minimum(amperes * per_wheel(robot.motor.resistance, count), 1e9)])
-        return table, np.full(count, float(self.volts)), limit, emf(robot)
+        return Tables(table, np.full(count, float(self.volts)), limit, emf(robot))
 
 
 # The part of a path that lies ahead, on the grid of the steps: sampled in blocks, so that a step only looks it up

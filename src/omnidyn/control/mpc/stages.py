@@ -127,13 +127,13 @@ def frame_at(linear, twist):
 
 
 @part
-def linear_stage(linear, levels, scale, push, stage, k, heading, twist, end, sense, narrow, soft):
+def linear_stage(linear, friction, push, stage, k, heading, twist, end):
     """Step k of `stage` along a predicted motion: heading and twist where it starts, twist where it ends.
 
-    push: d, what else speeds the robot up [m/s^2, m/s^2, rad/s^2].
+    friction: of `friction_at`. push: d, what else speeds the robot up [m/s^2, m/s^2, rad/s^2].
     """
     phi, psi = matrix(linear, 0, PHI), matrix(linear, 0, PSI)
-    f, slope = friction_at(linear, levels, scale, sense, narrow, soft)
+    f, slope = friction
     const = minus(plus(push, mv(slope, end)), f)
     v, hv = matrix(linear, 0, DECAY), phi
     m, hd = phi, psi

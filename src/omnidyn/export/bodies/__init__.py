@@ -1,4 +1,4 @@
-"""Robots for simulators of bodies and joints. shape: inertias, wheels, friction that all of them share.
+"""Robots for simulators of bodies and joints.
 
 mjcf: MuJoCo. links: base and wheels as links and joints, which urdf and sdf write down.
 """

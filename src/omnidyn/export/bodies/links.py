@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from omnidyn.export.bodies.shape import Place, inertias, places
-from omnidyn.export.spelling import identifier
+from omnidyn.errors import InputError
+from omnidyn.export.spelling import identifier, number
 from omnidyn.model.motor import no_load_speed, settled_current, wheel_torque
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
@@ -99,3 +99,54 @@ def _joint(robot: Robot, wheel: int) -> tuple[float, float, float, float]:
         float(stall), float(free), float(per_wheel(friction.viscous, n)[wheel] * radius**2),
         float(per_wheel(friction.coulomb, n)[wheel] * radius),
     )  # fmt: skip
+
+
+# What simulators of bodies ask beyond the model: inertias about the other axes, wheels as parts, friction per axis
+#
+# A body of height h that is alike from all sides has, with the inertia I_n about the vertical axis,
+#
+#     I_xx = I_yy = I_n/2 + M h^2/12
+#
+# which satisfies the triangle inequality whatever h > 0 is: simulators refuse inertias that no body can have.
+
+HIGHEST = 100.0  # [m]
+
+
+class Place(NamedTuple):
+    """Where a wheel stands: x, y [m], azimuth [rad] of its axle, radius [m]."""
+
+    x: float
+    y: float
+    azimuth: float
+    radius: float
+
+
+def height_of(robot: Robot, height: float | None) -> float:
+    """The height of the body [m]: as given, else the diameter of the largest wheel. Raises InputError."""
+    if height is None:
+        return 2.0 * float(robot.wheels.radii.max())
+    if not 0.0 < height <= HIGHEST:
+        raise InputError("no body has this height", got=height, expected=f"more than 0 and at most {HIGHEST:g} m",
+                         where="height")  # fmt: skip
+    return float(height)
+
+
+def inertias(mass: float, about_vertical: float, height: float) -> tuple[float, float, float]:
+    """(I_xx, I_yy, I_zz) [kg m^2] of a body of this height that is alike from all sides."""
+    across = 0.5 * about_vertical + mass * height**2 / 12.0
+    return across, across, about_vertical
+
+
+def places(robot: Robot) -> list[Place]:
+    """Where each wheel stands: at its azimuth, at the distance b from the centre."""
+    wheels = robot.wheels
+    far = per_wheel(wheels.robot_radius, wheels.count)
+    return [
+        Place(float(b * np.cos(phi)), float(b * np.sin(phi)), float(phi), float(r))
+        for b, phi, r in zip(far, wheels.azimuth, wheels.radii, strict=True)
+    ]
+
+
+def several(*values: float) -> str:
+    """Numbers in an attribute, a space between them."""
+    return " ".join(map(number, values))

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from omnidyn.export.bodies.shape import height_of, inertias, places, several
+from omnidyn.export.bodies.links import height_of, inertias, places, several
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.spelling import attribute, number, xml_comment

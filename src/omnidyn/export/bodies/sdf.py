@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from omnidyn.export.bodies.links import Links, Wheel, links
-from omnidyn.export.bodies.shape import height_of, several
+from omnidyn.export.bodies.links import Links, Wheel, height_of, links, several
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.spelling import number, xml_comment

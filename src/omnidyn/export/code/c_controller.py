@@ -23,7 +23,7 @@ from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.paths.motion import Motion, Path
 from omnidyn.control.pid import Pid
 from omnidyn.control.speed_loop import MOST_STEPS, SpeedController
-from omnidyn.export.code.mpc.code import mpc_code, mpc_input, mpc_memory
+from omnidyn.export.code.mpc_code import mpc_code, mpc_input, mpc_memory
 from omnidyn.export.code.trace import Traced, inputs, statements
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse, refuse_controller
@@ -188,13 +188,9 @@ def _within(controller: AnyOf) -> list[str]:
     text = filled(
         _WITHIN, CURRENT=" || fabsf(current[k]) > CURRENT_LIMIT[k]" if current else "", OWN=own,
         EACH=(_SHARE if together else _EACH).lstrip("\n"), TOGETHER=_TOGETHER if together else "",
-        PER_VOLT=_c(_per_volt(controller)),
+        PER_VOLT=_c(float(controller._sent(np.ones(1))[0])),
     )  # fmt: skip
     return [text.strip()]
-
-
-def _per_volt(controller: Safe) -> float:
-    return float(controller._sent(np.ones(1))[0])
 
 
 class _Given(Path):

@@ -4,27 +4,13 @@ from __future__ import annotations
 
 import ast
 import math
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
 from omnidyn.export.code import sources
-from omnidyn.export.code.types import (
-    BOOL,
-    INT,
-    REAL,
-    Array,
-    Columns,
-    Many,
-    Scalar,
-    Struct,
-    TranslationError,
-    Type,
-    joined,
-)
 from omnidyn.export.spelling import c_number
-
-Typed = tuple[str, Type]
 
 _BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/"}
 _BITS = {ast.BitAnd: "&", ast.BitOr: "|"}
@@ -238,16 +224,12 @@ class Expressions:
     def _own(self, called: sources.Source, nodes: list[ast.expr]) -> Typed:
         """A call of another function of the package, translated for arguments of these types."""
         given = [self.of(each) for each in nodes]
-        made = self.program.function(called, tuple(REAL if kind == INT and _is_real(text) else kind
+        made = self.program.function(called, tuple(REAL if kind == INT and ("." in text) else kind
                                                    for text, kind in given))  # fmt: skip
         for position, node in enumerate(nodes):
             if position in made.writes:
                 self.body.writes_to(node)
         return f"{made.name}({', '.join(text for text, _ in given)})", made.returns
-
-
-def _is_real(text: str) -> bool:
-    return "." in text
 
 
 def table_type(value: Any) -> Array | Columns:
@@ -259,3 +241,72 @@ def table_type(value: Any) -> Array | Columns:
         if INT in kinds:
             return Columns(len(value), tuple(kinds))
     return Array(np.shape(value))
+
+
+# What a value of a kernel is in C: a number, a truth value, several of them, a table, a named tuple
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """real, int or bool. In C a bool is an int."""
+
+    name: str
+
+
+REAL, INT, BOOL = Scalar("real"), Scalar("int"), Scalar("bool")
+
+
+@dataclass(frozen=True)
+class Many:
+    """Several values that a function returns: a struct."""
+
+    items: tuple[Type, ...]
+
+
+@dataclass(frozen=True)
+class Array:
+    """A table of numbers of fixed shape."""
+
+    shape: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Struct:
+    """A NamedTuple. Where it holds tables it is handed on by its address, as Python does."""
+
+    name: str
+    fields: tuple[tuple[str, Type], ...]
+
+    @property
+    def by_address(self) -> bool:
+        """Whether it holds tables, into which functions write."""
+        return any(isinstance(each, Array) for _, each in self.fields)
+
+    def field(self, name: str) -> Type:
+        """The type of a field."""
+        return dict(self.fields)[name]
+
+
+@dataclass(frozen=True)
+class Columns:
+    """A constant table whose columns have types of their own, such as ((4, 0.25), (8, 3.0))."""
+
+    rows: int
+    columns: tuple[Scalar, ...]
+
+
+Type = Scalar | Many | Array | Struct | Columns
+Typed = tuple[str, Type]
+
+
+class TranslationError(Exception):
+    """A kernel uses what the translator does not know: a fault of ours, found by tests, never by a user."""
+
+
+def joined(one: Type | None, other: Type) -> Type:
+    """The type of a name that holds the one and the other."""
+    if one is None or one == other:
+        return other
+    if isinstance(one, Scalar) and isinstance(other, Scalar):
+        return REAL if REAL in (one, other) else INT
+    raise TranslationError(f"a name holds {one} and {other}")

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.export.code import sources
+from omnidyn.export.code.expressions import INT, REAL, Array, Type
 from omnidyn.export.code.translate import Program
-from omnidyn.export.code.types import INT, REAL, Array, Type
 from omnidyn.export.spelling import SINGLE_MAX, c_number, filled
 from omnidyn.model.actuation import Driver
 from omnidyn.model.dynamics import state_space
@@ -70,7 +70,7 @@ def step_code(robot: Robot, single: bool = False) -> StepCode:
     tables = {**_common(robot), **(_tables_with_inductance(robot) if dynamic else _tables(robot))}
     text = "\n\n".join(
         [
-            "\n".join(_table(program, name, values) for name, values in tables.items()),
+            "\n".join(program.table(name, np.asarray(values, dtype=float)) for name, values in tables.items()),
             program.text(),
             _drive(program, robot),
             _advance(program, robot),
@@ -134,10 +134,6 @@ def _rates(laws: np.ndarray) -> np.ndarray:
     """How fast the axes change: made inside kernels, called here as it stands."""
     made = sources.value(PLACE, "_rates")
     return getattr(made, "py_func", made)(laws)
-
-
-def _table(program: Program, name: str, values: np.ndarray) -> str:
-    return program.table(name, np.asarray(values, dtype=float))
 
 
 def _drive(program: Program, robot: Robot) -> str:

@@ -15,17 +15,19 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from omnidyn.export.code import sources
-from omnidyn.export.code.expressions import Expressions, c_name, table_type
-from omnidyn.export.code.types import (
+from omnidyn.export.code.expressions import (
     INT,
     REAL,
     Array,
+    Expressions,
     Many,
     Scalar,
     Struct,
     TranslationError,
     Type,
+    c_name,
     joined,
+    table_type,
 )
 from omnidyn.export.spelling import c_number
 

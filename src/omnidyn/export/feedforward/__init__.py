@@ -1,5 +1,4 @@
 """kS, kV, kA: the volts that a motion takes, as FRC and FTC libraries want them.
 
 gains: those of each axis and of each wheel on it, with standard errors. wpilib, road_runner: snippets.
-table: the same as CSV.
 """

@@ -25,18 +25,18 @@ def road_runner(robot: Robot) -> Export:
     for row in rows(robot):
         if row.place in AXES:
             inches = 1.0 if row.name == NAMES[0] or row.place == "yaw" else INCH
-            own = row._replace(value=row.value * inches, std=row.std * inches, unit=_unit(row.unit, inches))
+            own = row._replace(
+                value=row.value * inches,
+                std=row.std * inches,
+                unit=(row.unit.replace("/m", "/in") if inches != 1.0 else row.unit),
+            )
             name = f"{NAMED[row.place]}{row.name.upper()}" if row.place != "x" else row.name
             lines.append(f"public double {name} = {number(own.value)}; // {spread(own)}")
     about = java_comment(
-        [f"{robot.name}: feed-forward gains by omnidyn, volts and inches.", *NOTES, *_not_in_it(missing)]
+        [
+            f"{robot.name}: feed-forward gains by omnidyn, volts and inches.",
+            *NOTES,
+            *[f"Not in it: {words}" for words in missing],
+        ]
     )
     return Export("road-runner", robot.name, {"gains.java": about + "\n".join(lines) + "\n"}, missing, NOTES)
-
-
-def _not_in_it(missing: tuple[str, ...]) -> list[str]:
-    return [f"Not in it: {words}" for words in missing]
-
-
-def _unit(unit: str, inches: float) -> str:
-    return unit.replace("/m", "/in") if inches != 1.0 else unit

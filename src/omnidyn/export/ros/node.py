@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from omnidyn.control.controllers import controller_spec
+from omnidyn.control.feedforward import DT
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.export.code.c_controller import c_controller
@@ -44,7 +45,6 @@ def ros2_node(
     two steps; 0.01, or 0.02 with a controller. timeout [s]: without a command for so long the robot stops. Raises
     InputError, and UnsupportedError for a robot or a controller that cannot be exported.
     """
-    from omnidyn.control.feedforward import DT
 
     dt = dt if dt is not None else (DT if controller else 1.0 / RATE)
     for name, value, most in (("dt", dt, 1.0), ("timeout", timeout, 60.0)):

@@ -14,8 +14,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
-from omnidyn.export.bodies.links import links
-from omnidyn.export.bodies.shape import height_of
+from omnidyn.export.bodies.links import height_of, links
 from omnidyn.export.bodies.urdf import description
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse

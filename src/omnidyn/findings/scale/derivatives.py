@@ -33,14 +33,14 @@ from omnidyn.logs.channels import components
 from omnidyn.model.frames import unwrapped
 from omnidyn.statement import ERROR, WARNING
 
-LEAST, SURE = 0.03, 6.0  # of the ratio; standard errors
-ALIKE = 0.95  # likeness of window means, from which one channel is taken for a multiple of the other
-HALF = 0.05  # [s] to either side, over which rates are taken
-SAME = 0.03  # ratios that differ by less are one
+LEAST_DEVIATION, SURE_ERRORS = 0.03, 6.0  # of the ratio; standard errors
+LEAST_LIKENESS = 0.95  # likeness of window means, from which one channel is taken for a multiple of the other
+HALF_WIDTH = 0.05  # [s] to either side, over which rates are taken
+SAME_RATIO = 0.03  # ratios that differ by less are one
 SPEED_SIDE, POSITION_SIDE = "speed", "position"
 
 
-class Pair(NamedTuple):
+class SpeedPair(NamedTuple):
     """A speed and the rate of its position, shapes (rows, k), means over the same rows. kind: turn, wheels or path.
 
     of: channel and columns of the speed; on: those of the position. witness: another channel that says the same.
@@ -64,36 +64,36 @@ def check_derivatives(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck
         return [], work
     if work.get("pose") is None and work.get("wheel_angle") is None:
         return [], work
-    lines = [each for pairs in PAIRS for each in _lines(work, pairs)]
+    lines = [line for pairs in PAIRS for line in _lines(work, pairs)]
     ratios = np.array([line.value for _, line in lines])
     kinds = {pair.kind for pair, _ in lines}
-    if len(kinds) > 1 and np.ptp(ratios) < SAME * np.abs(ratios).mean():
+    if len(kinds) > 1 and np.ptp(ratios) < SAME_RATIO * np.abs(ratios).mean():
         return [_of_time(lines[0])], replace(work, t=work.t * ratios.mean(), step=work.step * float(ratios.mean()))
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for pairs in PAIRS:
         for pair, line in _joined(_lines(work, pairs)):
             finding, work = _judged(work, pair, line)
-            found.append(finding)
-    return found, work
+            findings.append(finding)
+    return findings, work
 
 
-def _lines(work: LogUnderCheck, pairs: Callable[[LogUnderCheck], Iterator[Pair]]) -> list[tuple[Pair, Slope]]:
+def _lines(work: LogUnderCheck, pairs: Callable[[LogUnderCheck], Iterator[SpeedPair]]) -> list[tuple[SpeedPair, Slope]]:
     """The pairs that are surely not 1."""
     return [(pair, line) for pair in pairs(work) if (line := _off(work, pair)) is not None]
 
 
-def _off(work: LogUnderCheck, pair: Pair) -> Slope | None:
+def _off(work: LogUnderCheck, pair: SpeedPair) -> Slope | None:
     """rate = slope * speed, where that is surely not 1 and the two are alike otherwise."""
     ids, count = work.windows()
     line = slope(pair.rate, pair.value, ids, count)
-    good = line.value != 0.0 and line.differs(1.0, LEAST, SURE) and line.windows >= 4
-    return line if good and _likeness(pair.rate, pair.value, ids, count) >= ALIKE else None
+    good = line.value != 0.0 and line.differs(1.0, LEAST_DEVIATION, SURE_ERRORS) and line.windows >= 4
+    return line if good and _likeness(pair.rate, pair.value, ids, count) >= LEAST_LIKENESS else None
 
 
-def _joined(lines: list[tuple[Pair, Slope]]) -> list[tuple[Pair, Slope]]:
+def _joined(lines: list[tuple[SpeedPair, Slope]]) -> list[tuple[SpeedPair, Slope]]:
     """Wheels that are off by one ratio as one pair."""
     wheels, ratios = lines, np.array([line.value for _, line in lines])
-    if len(wheels) < 2 or np.ptp(ratios) > SAME * np.abs(ratios).mean():
+    if len(wheels) < 2 or np.ptp(ratios) > SAME_RATIO * np.abs(ratios).mean():
         return lines
     columns = tuple(k for pair, _ in wheels for k in pair.of[1])
     first = wheels[0][0]
@@ -102,13 +102,13 @@ def _joined(lines: list[tuple[Pair, Slope]]) -> list[tuple[Pair, Slope]]:
         speed=" ".join(pair.speed for pair, _ in wheels), position=" ".join(pair.position for pair, _ in wheels),
         value=np.hstack([pair.value for pair, _ in wheels]), rate=np.hstack([pair.rate for pair, _ in wheels]),
         of=(first.of[0], columns), on=(first.on[0], columns),
-        witness=None if None in witness else (witness[0][0], np.hstack([each[1] for each in witness])),  # type: ignore[index]
+        witness=None if None in witness else (witness[0][0], np.hstack([channel[1] for channel in witness])),  # type: ignore[index]
     )  # fmt: skip
     line = Slope(float(ratios.mean()), max(each.error for _, each in wheels), wheels[0][1].windows)
     return [(joined, line)]
 
 
-def _judged(work: LogUnderCheck, pair: Pair, line: Slope) -> tuple[Finding, LogUnderCheck]:
+def _judged(work: LogUnderCheck, pair: SpeedPair, line: Slope) -> tuple[Finding, LogUnderCheck]:
     """What is wrong, and the work with it put right."""
     ratio = line.value  # the speed is 1/ratio times too large, or the position ratio times
     by, side = _blamed(work, pair, ratio)
@@ -138,14 +138,14 @@ def _judged(work: LogUnderCheck, pair: Pair, line: Slope) -> tuple[Finding, LogU
     )
 
 
-def _blamed(work: LogUnderCheck, pair: Pair, ratio: float) -> tuple[str, str]:
+def _blamed(work: LogUnderCheck, pair: SpeedPair, ratio: float) -> tuple[str, str]:
     """(what else was measured, which of the two it contradicts); "" and "" where nothing else tells."""
     if pair.witness is None:
         return "", ""
     name, values = pair.witness
     ids, count = work.windows()
     line = slope(values, pair.value, ids, count)  # 1 where the speed is right, the ratio where its position is
-    if not np.isfinite(line.error) or line.windows < 4 or _likeness(values, pair.value, ids, count) < ALIKE:
+    if not np.isfinite(line.error) or line.windows < 4 or _likeness(values, pair.value, ids, count) < LEAST_LIKENESS:
         return "", ""
     off_speed, off_position = abs(line.value - 1.0), abs(line.value / ratio - 1.0)
     if min(off_speed, off_position) > 0.5 * max(off_speed, off_position):
@@ -153,7 +153,7 @@ def _blamed(work: LogUnderCheck, pair: Pair, ratio: float) -> tuple[str, str]:
     return name, POSITION_SIDE if off_speed < off_position else SPEED_SIDE
 
 
-def _of_time(which: tuple[Pair, Slope]) -> Finding:
+def _of_time(which: tuple[SpeedPair, Slope]) -> Finding:
     pair, line = which
     clock = unit_of(1.0 / line.value, TIME_UNITS)
     return Finding(
@@ -179,22 +179,22 @@ def _likeness(y: FloatArray, x: FloatArray, ids, count: int) -> float:
     return float(abs(a @ b) / max(np.sqrt((a @ a) * (b @ b)), 1e-300))
 
 
-def _turn(work: LogUnderCheck) -> Iterator[Pair]:
+def _turn(work: LogUnderCheck) -> Iterator[SpeedPair]:
     """heading against omega."""
-    half = max(1, round(HALF / work.step))
+    half = max(1, round(HALF_WIDTH / work.step))
     pose, twist, speed = work.get("pose"), work.get("twist"), work.full("wheel_speed")
     if pose is None or twist is None or not np.isfinite(pose[:, 2]).any() or not np.isfinite(twist[:, 2]).any():
         return
     own = None if speed is None else wheels_twist(work, speed, 2 * half + 1)
     rate = central_rate(unwrapped(pose[:, 2]), work.t, half)
     witness = None if own is None else ("wheels", own[:, 2:])
-    yield Pair("turn", "omega", "heading", smooth(twist[:, 2:], 2 * half + 1), rate[:, None], ("twist", (2,)),
+    yield SpeedPair("turn", "omega", "heading", smooth(twist[:, 2:], 2 * half + 1), rate[:, None], ("twist", (2,)),
                ("pose", (2,)), witness, TURN_UNITS, ANGLE_UNITS)  # fmt: skip
 
 
-def _wheels(work: LogUnderCheck) -> Iterator[Pair]:
+def _wheels(work: LogUnderCheck) -> Iterator[SpeedPair]:
     """The angle of each wheel against its speed."""
-    half = max(1, round(HALF / work.step))
+    half = max(1, round(HALF_WIDTH / work.step))
     angle, speed = work.get("wheel_angle"), work.get("wheel_speed")
     if angle is None or speed is None or angle.shape != speed.shape or "wheel_speed" not in work.log.channels:
         return
@@ -202,11 +202,11 @@ def _wheels(work: LogUnderCheck) -> Iterator[Pair]:
     for k, name in enumerate(components("wheel_speed", speed.shape[1])):
         witness = None if expected is None else (expected[0], smooth(expected[1][:, [k]], 2 * half + 1))
         rate = central_rate(angle[:, k], work.t, half)[:, None]
-        yield Pair("wheels", name, name.replace("w", "a"), smooth(speed[:, [k]], 2 * half + 1), rate,
+        yield SpeedPair("wheels", name, name.replace("w", "a"), smooth(speed[:, [k]], 2 * half + 1), rate,
                    ("wheel_speed", (k,)), ("wheel_angle", (k,)), witness, TURN_UNITS, ANGLE_UNITS)  # fmt: skip
 
 
-def _path(work: LogUnderCheck) -> Iterator[Pair]:
+def _path(work: LogUnderCheck) -> Iterator[SpeedPair]:
     """x and y against vx and vy."""
     pose, twist, speed = work.full("pose"), work.full("twist"), work.full("wheel_speed")
     if pose is None or twist is None or len(work) < 3 * MIN_ROWS:
@@ -214,8 +214,18 @@ def _path(work: LogUnderCheck) -> Iterator[Pair]:
     body, width = pose_twist(work, pose)
     own = None if speed is None else wheels_twist(work, speed, width)
     witness = None if own is None else ("wheels", own[:, :2])
-    yield Pair("path", "vx vy", "x y", smooth(twist[:, :2], width), body[:, :2], ("twist", (0, 1)), ("pose", (0, 1)),
-               witness, SPEED_UNITS, LENGTH_UNITS)  # fmt: skip
+    yield SpeedPair(
+        "path",
+        "vx vy",
+        "x y",
+        smooth(twist[:, :2], width),
+        body[:, :2],
+        ("twist", (0, 1)),
+        ("pose", (0, 1)),
+        witness,
+        SPEED_UNITS,
+        LENGTH_UNITS,
+    )
 
 
-PAIRS: tuple[Callable[[LogUnderCheck], Iterator[Pair]], ...] = (_turn, _wheels, _path)
+PAIRS: tuple[Callable[[LogUnderCheck], Iterator[SpeedPair]], ...] = (_turn, _wheels, _path)

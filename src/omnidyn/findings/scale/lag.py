@@ -17,13 +17,13 @@ from omnidyn.findings.signal.robust import Slope, central_rate, clusters, ratio,
 from omnidyn.model.frames import unwrapped
 from omnidyn.statement import NOTE, WARNING
 
-FARTHEST = 8  # rows that are searched to either side
+FARTHEST_ROWS = 8  # rows that are searched to either side
 WARN_FROM, NOTE_FROM = 0.75, 0.35  # rows
-ENOUGH = 60_000  # rows that tell a lag
-SURE, VAGUE = 5.0, 0.4  # standard errors; rows of error beyond which nothing is said
+MOST_ROWS = 60_000  # rows that tell a lag
+SURE_ERRORS, VAGUE_ROWS = 5.0, 0.4  # standard errors; rows of error beyond which nothing is said
 
 
-class Pair(NamedTuple):
+class LagPair(NamedTuple):
     """Two channels that should be the same. y, x: shape (rows, k). width: rows over which both are means already."""
 
     late: str
@@ -35,24 +35,24 @@ class Pair(NamedTuple):
 
 def check_lag(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on lag between channels that are redundant; what follows a command is dynamics and no lag."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     if len(work) < 3 * MIN_ROWS or work.step <= 0.0:
-        return found, work
+        return findings, work
     for own, pair in _pairs(work):
         line = lag(own, pair.y, pair.x)
-        if line is None or not line.error < VAGUE:
+        if line is None or not line.error < VAGUE_ROWS:
             continue
         rows = line.value
-        if abs(rows) < NOTE_FROM or abs(rows) < SURE * line.error:
+        if abs(rows) < NOTE_FROM or abs(rows) < SURE_ERRORS * line.error:
             continue
         of_means = late_by(own, pair.late) - late_by(own, pair.against)
         if of_means and abs(rows - of_means) < 1.0:
             continue  # named already
-        found.append(_finding(own, pair, line))
-    return found, work
+        findings.append(_finding(own, pair, line))
+    return findings, work
 
 
-def _finding(work: LogUnderCheck, pair: Pair, line: Slope) -> Finding:
+def _finding(work: LogUnderCheck, pair: LagPair, line: Slope) -> Finding:
     late, early = (pair.late, pair.against) if line.value > 0.0 else (pair.against, pair.late)
     return Finding(
         "lag", NOTE if abs(line.value) < WARN_FROM else WARNING, pair.subject,
@@ -60,7 +60,7 @@ def _finding(work: LogUnderCheck, pair: Pair, line: Slope) -> Finding:
     )  # fmt: skip
 
 
-def _pairs(work: LogUnderCheck) -> Iterator[tuple[LogUnderCheck, Pair]]:
+def _pairs(work: LogUnderCheck) -> Iterator[tuple[LogUnderCheck, LagPair]]:
     """What can be compared, and in which rows; `late` is the channel whose lag is positive."""
     speed = work.full("wheel_speed")
     seen = ground(work)
@@ -69,7 +69,7 @@ def _pairs(work: LogUnderCheck) -> Iterator[tuple[LogUnderCheck, Pair]]:
         assert own is not None
         length = np.array([1.0, 1.0, float(np.mean(work.geometry.wheels.robot_radius))])
         axes = seen.axes
-        pair = Pair("wheel_speed", seen.name, own[:, axes] * length[axes], seen.twist[:, axes] * length[axes],
+        pair = LagPair("wheel_speed", seen.name, own[:, axes] * length[axes], seen.twist[:, axes] * length[axes],
                     f"wheel_speed {seen.name}")  # fmt: skip
         yield work, pair
     # A current jumps with the voltage, a speed does not: between samples of the current nothing is on a line.
@@ -80,10 +80,10 @@ def _pairs(work: LogUnderCheck) -> Iterator[tuple[LogUnderCheck, Pair]]:
     pose, twist = work.get("pose"), work.get("twist")
     if pose is not None and twist is not None and np.isfinite(pose[:, 2]).any() and np.isfinite(twist[:, 2]).any():
         rate = central_rate(unwrapped(pose[:, 2]), work.t, 1)
-        yield work, Pair("omega", "heading", smooth(twist[:, 2], 3)[:, None], rate[:, None], "omega heading")
+        yield work, LagPair("omega", "heading", smooth(twist[:, 2], 3)[:, None], rate[:, None], "omega heading")
 
 
-def _of_motors(work: LogUnderCheck, speed: FloatArray) -> Iterator[Pair]:
+def _of_motors(work: LogUnderCheck, speed: FloatArray) -> Iterator[LagPair]:
     """u = R i + K l w: late voltage, current or speed, each against the two others."""
     voltage, current = volts(work), work.full("current")
     if voltage is None or current is None or electric_speed(work) is None:
@@ -92,7 +92,7 @@ def _of_motors(work: LogUnderCheck, speed: FloatArray) -> Iterator[Pair]:
     if counter is None or lost is None or voltage.shape != lost.shape:
         return
     names = "voltage" if work.get("voltage") is not None else "duty"
-    yield Pair("current", f"{names} wheel_speed", lost, voltage - counter, "current")
+    yield LagPair("current", f"{names} wheel_speed", lost, voltage - counter, "current")
 
 
 def lag(work: LogUnderCheck, y: FloatArray, x: FloatArray) -> Slope | None:
@@ -101,16 +101,16 @@ def lag(work: LogUnderCheck, y: FloatArray, x: FloatArray) -> Slope | None:
     A whole number of rows first, by the least residual; then the rest from the residual's part along the slope of x,
     with the slope of y beside it as instrument, so that noise of neither pulls it.
     """
-    y, x = _filled(y)[:ENOUGH], _filled(x)[:ENOUGH]
+    y, x = _filled(y)[:MOST_ROWS], _filled(x)[:MOST_ROWS]
     width = 3
     y, x = smooth(y, width), smooth(x, width)
     n = len(y)
-    inside = slice(FARTHEST + 4, n - FARTHEST - 4)
+    inside = slice(FARTHEST_ROWS + 4, n - FARTHEST_ROWS - 4)
     good = np.asarray(np.isfinite(y).all(axis=1) & np.isfinite(x).all(axis=1))
     for segment in work.segments[1:]:
         if segment.start > n:
             break
-        good[max(0, segment.start - FARTHEST - 4) : segment.start + FARTHEST + 4] = False
+        good[max(0, segment.start - FARTHEST_ROWS - 4) : segment.start + FARTHEST_ROWS + 4] = False
     keep = good[inside]
     if keep.sum() < MIN_ROWS:
         return None
@@ -121,7 +121,7 @@ def lag(work: LogUnderCheck, y: FloatArray, x: FloatArray) -> Slope | None:
         return np.where(keep[:, None] & np.isfinite(part), part, 0.0)
 
     best, least, at = 0, np.inf, {}
-    for by in range(-FARTHEST, FARTHEST + 1):
+    for by in range(-FARTHEST_ROWS, FARTHEST_ROWS + 1):
         shifted = moved(x, by)
         size, along = float((shifted**2).sum()), float((target * shifted).sum())
         left = float((target**2).sum()) - along * (along / size) if size > 0.0 and along > 0.0 else np.inf
@@ -129,7 +129,7 @@ def lag(work: LogUnderCheck, y: FloatArray, x: FloatArray) -> Slope | None:
         if left < least:
             best, least = by, left
     total = float((target**2).sum())
-    if not np.isfinite(least) or least > 0.5 * total or abs(best) == FARTHEST:
+    if not np.isfinite(least) or least > 0.5 * total or abs(best) == FARTHEST_ROWS:
         return None
     shifted = moved(x, best)
     a = float((target * shifted).sum() / (shifted**2).sum())

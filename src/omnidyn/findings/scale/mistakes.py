@@ -8,7 +8,7 @@ import numpy as np
 
 from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import LogUnderCheck
-from omnidyn.findings.signal.reference import BEYOND, CIRCUIT, beyond_stall, emf, stall_current, volts
+from omnidyn.findings.signal.reference import BEYOND_RATIO, CIRCUIT, beyond_stall, emf, stall_current, volts
 from omnidyn.findings.signal.robust import slope
 from omnidyn.logs.channels import components
 from omnidyn.statement import ERROR
@@ -20,7 +20,7 @@ UNIT_OFF = 0.12  # how far off its factor a unit mistake may be: the robot file 
 
 Mistake = tuple[str, str]  # (unit it is in, unit it was read in)
 Mistakes = Mapping[Mistake, float]
-NONE: Mistake = ("", "")
+NO_MISTAKE: Mistake = ("", "")
 
 # How many times too large a value is, if it is read in the second unit.
 TURN_UNITS: Mistakes = {
@@ -37,12 +37,12 @@ MOTOR_RPM: Mistake = ("rpm@motor", "rad/s@wheel")
 
 
 def unit_of(factor: float, units: Mistakes) -> Mistake:
-    """The unit mistake that makes values so many times too large; NONE where none does."""
+    """The unit mistake that makes values so many times too large; NO_MISTAKE where none does."""
     if not np.isfinite(factor) or factor <= 0.0:
-        return NONE
+        return NO_MISTAKE
     off = {mistake: abs(np.log(factor / size)) for mistake, size in units.items()}
     mistake = min(off, key=lambda key: off[key])
-    return mistake if off[mistake] < UNIT_OFF else NONE
+    return mistake if off[mistake] < UNIT_OFF else NO_MISTAKE
 
 
 def unit_finding(
@@ -53,7 +53,7 @@ def unit_finding(
     Args:
         subject: components.
         factor: how many times too large they are.
-        mistake: the likely unit mistake; NONE where none is likely.
+        mistake: the likely unit mistake; NO_MISTAKE where none is likely.
         rests_on: keys of the robot file behind it.
         numbers: what shows it: `shown_by` and what was measured.
     """
@@ -81,11 +81,11 @@ def current_unit(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     names = " ".join(components("current", work.wheels))
     stall = stall_current(robot)
     high = beyond_stall(robot, current) * stall
-    if high > BEYOND * stall:
+    if high > BEYOND_RATIO * stall:
         milli = high < 3e3 * stall
-        mistake = ("mA", "A") if milli else NONE
-        found = unit_finding(names, high / stall, mistake, RESISTANCE, shown_by="stall", high_A=high, stall_A=stall)
-        return [found], work.replace(current=current * (1e-3 if milli else np.nan))
+        mistake = ("mA", "A") if milli else NO_MISTAKE
+        finding = unit_finding(names, high / stall, mistake, RESISTANCE, shown_by="stall", high_A=high, stall_A=stall)
+        return [finding], work.replace(current=current * (1e-3 if milli else np.nan))
     speed = work.full("wheel_speed")
     counter = None if speed is None else emf(work, speed)
     if voltage is None or counter is None or work.log.current_unsigned:
@@ -93,10 +93,10 @@ def current_unit(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     ids, count = work.windows()
     ohm = current * np.mean(robot.motor.resistance)
     line = slope(voltage - counter, ohm, ids, count)
-    mistake = unit_of(1.0 / line.value, CURRENT_UNITS) if np.isfinite(line.error) and line.value > 0.0 else NONE
+    mistake = unit_of(1.0 / line.value, CURRENT_UNITS) if np.isfinite(line.error) and line.value > 0.0 else NO_MISTAKE
     if any(mistake) and line.differs(1.0, 0.5):
-        found = unit_finding(names, 1.0 / line.value, mistake, CIRCUIT, shown_by="circuit")
-        return [found], work.replace(current=current * line.value)
+        finding = unit_finding(names, 1.0 / line.value, mistake, CIRCUIT, shown_by="circuit")
+        return [finding], work.replace(current=current * line.value)
     return [], work
 
 
@@ -111,7 +111,7 @@ def duty_as_voltage(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     needed = 0.0 if counter is None else float(np.nanquantile(np.abs(counter), 0.95))
     if high > 1.5 * limit:
         pwm = 2.0 * limit < high <= 256.0 and limit < 100.0
-        mistake = ("duty/255", "V") if pwm else ("mV", "V") if high > 100.0 * limit else NONE
+        mistake = ("duty/255", "V") if pwm else ("mV", "V") if high > 100.0 * limit else NO_MISTAKE
         measured = {"shown_by": "driver", "high_V": high, "limit_V": limit}
     elif high <= 1.0 < 0.5 * limit and needed > 1.5 * high:
         mistake, measured = ("duty", "V"), {"shown_by": "speed", "high_V": high, "needed_V": needed}
@@ -138,6 +138,6 @@ def emf_alone(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     # At the voltages given a motor turns at most 1, usually 0.5 to 1 times as fast as without load.
     fits = {mistake: factor for mistake, factor in {**TURN_UNITS, MOTOR_SPEED: gear}.items()
             if 0.2 < excess / factor < 1.15}  # fmt: skip
-    likely = max(fits, key=lambda mistake: -abs(np.log(excess / fits[mistake] / 0.7))) if fits else NONE
+    likely = max(fits, key=lambda mistake: -abs(np.log(excess / fits[mistake] / 0.7))) if fits else NO_MISTAKE
     names = " ".join(components("wheel_speed", work.wheels))
     return [unit_finding(names, excess, likely, CIRCUIT[1:], shown_by="emf")], work.replace(wheel_speed=speed * np.nan)

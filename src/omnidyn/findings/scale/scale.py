@@ -11,7 +11,7 @@ from omnidyn.findings.finding import Finding
 from omnidyn.findings.scale.mistakes import (
     MOTOR_RPM,
     MOTOR_SPEED,
-    NONE,
+    NO_MISTAKE,
     TURN_UNITS,
     current_unit,
     duty_as_voltage,
@@ -38,8 +38,8 @@ from omnidyn.logs.channels import components
 from omnidyn.statement import ERROR, NOTE, WARNING
 from omnidyn.units import TURN
 
-LEAST = 0.02  # a scale that is off by less is not worth a word
-NOTHING = 0.003  # of the motion: no unit mistake makes as little of it
+LEAST_DEVIATION = 0.02  # a scale that is off by less is not worth a word
+NO_MOTION_SHARE = 0.003  # of the motion: no unit mistake makes as little of it
 FOLLOWS = 0.95  # likeness of a wheel and what the other channels say of it, lag, slip and scale apart
 ALONE = 0.15  # of the motion: an axis that moves less is no witness
 
@@ -59,11 +59,11 @@ def check_scale(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on units and scales; the work with the wheel speeds put right."""
     if len(work) < MIN_ROWS:
         return [], work
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for part in (current_unit, duty_as_voltage, _speeds, _single_wheels):
         more, work = part(work)
-        found += more
-    return found, work
+        findings += more
+    return findings, work
 
 
 def check_dead_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -137,22 +137,22 @@ def _speeds(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     factor = floor if floor is not None else electric
     if factor is None:
         return emf_alone(work)
-    if floor is not None and not floor.value > max(4.0 * floor.error, NOTHING):
+    if floor is not None and not floor.value > max(4.0 * floor.error, NO_MOTION_SHARE):
         return _against(work, floor), work
     work = work.knowing(floor_ratio=floor, electric_ratio=electric)
     gear = float(np.mean(robot.motor.gear_ratio))
     units = {**TURN_UNITS, MOTOR_SPEED: gear, MOTOR_RPM: gear * 60.0 / TURN}
     if not factor.value > 0.0:
         return [], work  # a current that says the motors run backward: its wiring or sign was named before
-    mistake = unit_of(1.0 / factor.value, units) if abs(np.log(factor.value)) > 0.5 else NONE
+    mistake = unit_of(1.0 / factor.value, units) if abs(np.log(factor.value)) > 0.5 else NO_MISTAKE
     names = " ".join(components("wheel_speed", work.wheels))
     if any(mistake) and (
         electric is None or floor is None or abs(np.log(max(electric.value, 1e-9) / factor.value)) < 0.5
     ):
         speed = work.channels["wheel_speed"]
         source = FLOOR if floor is not None else CURRENT_AND_VOLTAGE
-        found = unit_finding(names, 1.0 / factor.value, mistake, keys_behind(source), shown_by="ratio", source=source)
-        return [found], work.replace(wheel_speed=speed * factor.value)
+        finding = unit_finding(names, 1.0 / factor.value, mistake, keys_behind(source), shown_by="ratio", source=source)
+        return [finding], work.replace(wheel_speed=speed * factor.value)
     return _ratio_findings(work, these, floor, electric, names)
 
 
@@ -190,8 +190,8 @@ def _joined(lines: list[Slope]) -> Slope | None:
 def _ratio_findings(
     work: LogUnderCheck, these: Scales, floor: Slope | None, electric: Slope | None, names: str
 ) -> tuple[list[Finding], LogUnderCheck]:
-    off_floor = floor is not None and floor.differs(1.0, LEAST)
-    off_motor = electric is not None and electric.differs(1.0, LEAST)
+    off_floor = floor is not None and floor.differs(1.0, LEAST_DEVIATION)
+    off_motor = electric is not None and electric.differs(1.0, LEAST_DEVIATION)
     numbers = {}
     for name, line in (("floor_ratio", floor), ("electric_ratio", electric)):
         if line is not None:
@@ -199,19 +199,21 @@ def _ratio_findings(
     speed = work.channels["wheel_speed"]
     if these.linear is not None and these.yaw is not None:
         apart = _apart(these.linear, these.yaw)
-        if apart is not None and not these.linear.differs(1.0, LEAST):
-            return [_yaw_only(these.yaw)], work
+        if apart is not None and not these.linear.differs(1.0, LEAST_DEVIATION):
+            return [
+                Finding("robot_radius", WARNING, "omega", {"ratio": these.yaw.value, "error": these.yaw.error})
+            ], work
     if off_floor and floor is not None and off_motor and electric is not None and _same(floor, electric):
         both = _joined([floor, electric]) or floor
         return [Finding("gear", WARNING, names, {**numbers, "ratio": both.value, "error": both.error})], work.replace(
             wheel_speed=speed * both.value
         ).knowing(floor_ratio=None)
-    found = []
+    findings = []
     if off_floor and floor is not None:
-        found.append(_path_ratio(floor, electric, off_motor, names, numbers))
+        findings.append(_path_ratio(floor, electric, off_motor, names, numbers))
     if off_motor and electric is not None:
-        found.append(_motor_constants(floor, off_floor, names, numbers))
-    return found, work
+        findings.append(_motor_constants(floor, off_floor, names, numbers))
+    return findings, work
 
 
 def _same(a: Slope, b: Slope) -> bool:
@@ -221,11 +223,7 @@ def _same(a: Slope, b: Slope) -> bool:
 
 def _apart(a: Slope, b: Slope) -> float | None:
     away = b.value - a.value
-    return away if abs(away) > LEAST and abs(away) > 4.0 * np.hypot(a.error, b.error) else None
-
-
-def _yaw_only(yaw: Slope) -> Finding:
-    return Finding("robot_radius", WARNING, "omega", {"ratio": yaw.value, "error": yaw.error})
+    return away if abs(away) > LEAST_DEVIATION and abs(away) > 4.0 * np.hypot(a.error, b.error) else None
 
 
 def _path_ratio(
@@ -247,22 +245,22 @@ def _motor_constants(floor: Slope | None, off_floor: bool, names: str, numbers: 
 
 def _dead_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """A wheel whose speed is noise only, while floor or motor says that it turns."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     line = _wheel_lines(work)
     if line is None:
-        return found, work
+        return findings, work
     source, slopes, sizes = line
     for k, (a, size) in enumerate(zip(slopes, sizes, strict=True)):
         name = components("wheel_speed", work.wheels)[k]
         coarse = 4.0 * quantum(work.channels["wheel_speed"][:, k])
         sure = np.isfinite(a.error) and a.windows >= 4 and abs(a.value) < 0.1 and a.error < 0.05
         if sure and size > max(0.2 * max(sizes), coarse) and not _told_to_rest(work, k):
-            found.append(Finding(
+            findings.append(Finding(
                 "dead", ERROR, name, {"slope": a.value, "error": a.error, "source": source},
                 rows=work.lines(work.everywhere), count=len(work), rests_on=keys_behind(source),
             ))  # fmt: skip
             work = work.masked("wheel_speed", k, work.everywhere)
-    return found, work
+    return findings, work
 
 
 def _told_to_rest(work: LogUnderCheck, k: int) -> bool:
@@ -302,7 +300,7 @@ def _single_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             if np.isfinite(a.error) and a.windows >= 4 and sizes[k] > max(0.2 * max(sizes), coarse[k])]  # fmt: skip
     if len(good) < 3:
         return [], work
-    found = []
+    findings = []
     for k in good:
         others = [slopes[j].value for j in good if j != k]
         if np.ptp(others) > 0.02 or not slopes[k].differs(float(np.mean(others)), 0.03, 5.0):
@@ -310,18 +308,20 @@ def _single_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         off = slopes[k].value / float(np.mean(others))
         name = components("wheel_speed", work.wheels)[k]
         if off < 0.0:
-            found.append(Finding(
+            findings.append(Finding(
                 "inverted", ERROR, name, {"ratio": off, "error": slopes[k].error, "source": source},
                 rests_on=keys_behind(source),
             ))  # fmt: skip
             continue
-        found.append(Finding("wheel_scale", WARNING, name, {"ratio": off, "error": slopes[k].error, "source": source}))
-    return (found, work) if len(found) == 1 else ([], work)
+        findings.append(
+            Finding("wheel_scale", WARNING, name, {"ratio": off, "error": slopes[k].error, "source": source})
+        )
+    return (findings, work) if len(findings) == 1 else ([], work)
 
 
 # A gyroscope in another unit than the wheels: deg/s read as rad/s, where the wheels say how fast the robot turns
 
-NEAR = 0.5  # of the logarithm: what is off by less is in the right unit
+SAME_UNIT_LOG = 0.5  # of the logarithm: what is off by less is in the right unit
 
 
 def check_turn_rate(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -335,22 +335,22 @@ def check_turn_rate(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     if own is None or twist is None or not np.isfinite(twist[:, 2]).any():
         return [], work
     sizes = [float(np.sqrt(np.nanmean(values[:, 2] ** 2))) for values in (twist, own)]
-    if not sizes[1] > 0.0 or abs(np.log(max(sizes[0], 1e-300) / sizes[1])) < NEAR:
+    if not sizes[1] > 0.0 or abs(np.log(max(sizes[0], 1e-300) / sizes[1])) < SAME_UNIT_LOG:
         return [], work
     ids, count = work.windows()
     yaw = slope(twist[:, 2], own[:, 2], ids, count)
-    mistake = unit_of(yaw.value, possible(TURN_UNITS, work, "omega")) if yaw.windows >= 4 else NONE
-    if not any(mistake) or not yaw.differs(1.0, NEAR):
+    mistake = unit_of(yaw.value, possible(TURN_UNITS, work, "omega")) if yaw.windows >= 4 else NO_MISTAKE
+    if not any(mistake) or not yaw.differs(1.0, SAME_UNIT_LOG):
         return [], work
     for axes in ([0], [1]):
         if np.isfinite(twist[:, axes]).any():
             path = slope(twist[:, axes], own[:, axes], ids, count)
-            if path.windows >= 4 and path.value > 0.0 and abs(np.log(path.value)) > NEAR:
+            if path.windows >= 4 and path.value > 0.0 and abs(np.log(path.value)) > SAME_UNIT_LOG:
                 return [], work
     implied = electric_speed(work)
     if implied is not None:
         turned = slope(implied, speed, ids, count)  # type: ignore[arg-type]
-        if turned.windows >= 4 and turned.value > 0.0 and abs(np.log(turned.value)) > NEAR:
+        if turned.windows >= 4 and turned.value > 0.0 and abs(np.log(turned.value)) > SAME_UNIT_LOG:
             return [], work
     values = twist.copy()
     values[:, 2] /= yaw.value

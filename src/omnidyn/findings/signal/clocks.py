@@ -14,7 +14,7 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.clocks import usual_step
 from omnidyn.findings.finding import Finding
-from omnidyn.findings.signal.log_under_check import MIN_ROWS, Clock, LogUnderCheck, Merged
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck, Merged, SensorClock
 from omnidyn.logs.channels import components, place
 from omnidyn.logs.log import NEVER_MADE_UP, Log
 from omnidyn.logs.segments import segments
@@ -24,7 +24,7 @@ from omnidyn.run import SENSORS
 SHARED = 0.8  # of the samples of a clock: a component that has so many of them, and no others, is on it
 
 
-def clocks_of(log: Log) -> tuple[Clock, ...]:
+def clocks_of(log: Log) -> tuple[SensorClock, ...]:
     """The clocks of a log in order of time, that of the wheels first; one where no component has its own."""
     groups: list[tuple[BoolArray, set[str]]] = []
     for name, column in _columns(log):
@@ -35,13 +35,13 @@ def clocks_of(log: Log) -> tuple[Clock, ...]:
         else:
             groups[same] = (groups[same][0] | there, {*groups[same][1], name})
     if not groups:
-        return (Clock(np.arange(len(log)), frozenset()),)
+        return (SensorClock(np.arange(len(log)), frozenset()),)
     first = _leading(groups)
     ordered = [groups[first], *(group for k, group in enumerate(groups) if k != first)]
     # An input that a Run holds in every row keeps no stamps of its own: it is judged where the wheels were sampled.
     held = {name for rows, names in ordered[1:] if rows.all() for name in names if place(name)[0] in NEVER_MADE_UP}  # type: ignore[index]
     ordered = [(rows, names | held if k == 0 else names - held) for k, (rows, names) in enumerate(ordered)]
-    return tuple(Clock(np.flatnonzero(rows), frozenset(names)) for rows, names in ordered if names)
+    return tuple(SensorClock(np.flatnonzero(rows), frozenset(names)) for rows, names in ordered if names)
 
 
 def _columns(log: Log) -> Iterator[tuple[str, FloatArray]]:
@@ -74,12 +74,12 @@ def leading(log: Log, robot: Robot | None, rows: IntArray) -> LogUnderCheck:
     return _in_rows(LogUnderCheck(log, robot, rows, in_order.t, 0.0, (), {}, merged=merged), merged.clocks[0])
 
 
-def at_clock(work: LogUnderCheck, clock: Clock) -> LogUnderCheck:
+def at_clock(work: LogUnderCheck, clock: SensorClock) -> LogUnderCheck:
     """The work in the rows of a clock; what is not on it is held, or on the line between two measurements."""
     return with_speed(_in_rows(work, clock))
 
 
-def _in_rows(work: LogUnderCheck, clock: Clock) -> LogUnderCheck:
+def _in_rows(work: LogUnderCheck, clock: SensorClock) -> LogUnderCheck:
     assert work.merged is not None
     log, rows, clocks = work.merged
     t = log.t[clock.rows]
@@ -123,9 +123,9 @@ def at_each_clock(
     work: LogUnderCheck, family: Callable[[LogUnderCheck], tuple[list[Finding], LogUnderCheck]]
 ) -> tuple[list[Finding], LogUnderCheck]:
     """The findings of a family that judges single channels, each at its own clock; the work without their faults."""
-    found, after = family(work)
+    findings, after = family(work)
     if work.merged is None or len(work.merged.clocks) == 1:
-        return found, after
+        return findings, after
     first, *others = work.merged.clocks
     log, _ = _put(work.merged.log, first, work, after)
     for clock in others:
@@ -133,11 +133,11 @@ def at_each_clock(
         here = here.replace(**{name: None for name in here.channels if name not in after.channels})  # taken out before
         more, judged = family(here)
         log, changed = _put(log, clock, here, judged)
-        found, after = found + more, _again(after, log, first, changed)
-    return found, replace(after, merged=work.merged._replace(log=log))
+        findings, after = findings + more, _again(after, log, first, changed)
+    return findings, replace(after, merged=work.merged._replace(log=log))
 
 
-def _put(log: Log, clock: Clock, before: LogUnderCheck, after: LogUnderCheck) -> tuple[Log, frozenset[str]]:
+def _put(log: Log, clock: SensorClock, before: LogUnderCheck, after: LogUnderCheck) -> tuple[Log, frozenset[str]]:
     """(the log of all clocks with what a family changed in the components of one of them, those components)."""
     channels, changed = dict(log.channels), set()
     for name in clock.components:
@@ -152,7 +152,7 @@ def _put(log: Log, clock: Clock, before: LogUnderCheck, after: LogUnderCheck) ->
     return replace(log, channels=channels), frozenset(changed)
 
 
-def _again(work: LogUnderCheck, log: Log, clock: Clock, changed: frozenset[str]) -> LogUnderCheck:
+def _again(work: LogUnderCheck, log: Log, clock: SensorClock, changed: frozenset[str]) -> LogUnderCheck:
     """The work in the rows of its clock with some components of other clocks as they now are."""
     for channel, k in (place(name) for name in changed):  # type: ignore[misc]
         values = work.channels[channel].copy()

@@ -30,7 +30,7 @@ SENSORS = ("current", "wheel_speed", "twist")
 MIN_ROWS = 40  # below that nothing is said from statistics
 
 
-class Clock(NamedTuple):
+class SensorClock(NamedTuple):
     """Rows of a log in which a sensor has its samples, and the components that were sampled then."""
 
     rows: IntArray
@@ -42,7 +42,7 @@ class Merged(NamedTuple):
 
     log: Log
     rows: IntArray
-    clocks: tuple[Clock, ...]
+    clocks: tuple[SensorClock, ...]
 
 
 @dataclass(frozen=True, eq=False)

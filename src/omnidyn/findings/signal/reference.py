@@ -21,7 +21,7 @@ CURRENT_AND_VOLTAGE, DRIVE, FLOOR, WHEELS = "circuit", "drive", "floor", "wheels
 MEASUREMENTS = ("twist", "pose", CURRENT_AND_VOLTAGE)  # those that say what it did
 GEOMETRY = ("wheels.azimuth_deg", "wheels.robot_radius_m", "wheels.wheel_radius_m")
 CIRCUIT = ("motor.resistance_ohm", EMF, "motor.gear_ratio")  # what a speed by voltage and current is made of
-BEYOND = 20.0
+BEYOND_RATIO = 20.0
 POSE_WINDOW = 0.12  # [s] over which a speed is taken from a pose
 POSE_TURN = 0.35  # [rad] that the robot may turn in it: a chord is then 0.5 % shorter than its arc
 
@@ -106,7 +106,7 @@ def stall_current(robot: Robot) -> float:
 
 
 def beyond_stall(robot: Robot, current: FloatArray) -> float:
-    """How many times the current of a blocked motor is usually reached; above BEYOND it is no current in amperes."""
+    """How many times the current of a blocked motor is usually reached; above BEYOND_RATIO it is no current in A."""
     return float(np.nanquantile(np.abs(current), 0.95)) / stall_current(robot)
 
 
@@ -122,7 +122,7 @@ def electric_speed(work: LogUnderCheck) -> FloatArray | None:
     voltage, current, robot = volts(work), work.get("current"), work.geometry
     if voltage is None or current is None or robot is None or work.log.current_unsigned:
         return None
-    if beyond_stall(robot, current) > BEYOND:
+    if beyond_stall(robot, current) > BEYOND_RATIO:
         return None
     lost = ohmic(work, current)
     return None if lost is None else no_load_speed(robot.motor, voltage - lost)

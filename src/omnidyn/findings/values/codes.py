@@ -15,37 +15,37 @@ from omnidyn.statement import ERROR, WARNING
 from omnidyn.statistics import robust_std
 
 CODES = frozenset((999, 9999, 99999, 999999, 32767, 32768, 65535, 2147483647, 2147483648, 4294967295))
-FAR = 3.0  # times all other values: what stands for no value lies so far out
+FAR_RATIO = 3.0  # times all other values: what stands for no value lies so far out
 WRAPS = (2.0**16, 2.0**32)  # a negative number of two or four bytes, read as unsigned, is so much too large
-EITHER = 0.01  # of the rows on either side of 0
+EITHER_SHARE = 0.01  # of the rows on either side of 0
 Changed = tuple[list[Finding], LogUnderCheck, FloatArray]  # the findings, the work and the component without the fault
 SIGNED = ("current", "wheel_speed", "voltage", "duty", "twist")
 
 
 def check_codes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on such cells; they are put right, or masked."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     if len(work) < MIN_ROWS:
-        return found, work
+        return findings, work
     for channel in work.channels:
         for component, values in work.sampled_columns(channel):
             more, work, values = _wrapped(work, channel, component, values)
             also, work, _ = _placeholder(work, channel, component, values)
-            found += more + also
-    return found, work
+            findings += more + also
+    return findings, work
 
 
 def _wrapped(work: LogUnderCheck, channel: str, component: str, values: FloatArray) -> Changed:
     """Values about 0 and values just below 2^16 (or 2^32), and nothing between."""
     size = _cell_size(work, component)
     cells = values / size
-    wrap = next((each for each in WRAPS if 0.75 * each < np.nanmax(cells) < each), None)
+    wrap = next((size for size in WRAPS if 0.75 * size < np.nanmax(cells) < size), None)
     if channel not in SIGNED or wrap is None or np.nanmin(cells) < 0.0:
         return [], work, values
     with np.errstate(invalid="ignore"):
         low, high = cells < 0.25 * wrap, cells > 0.75 * wrap
         between = bool(((cells >= 0.25 * wrap) & (cells <= 0.75 * wrap)).any())
-    if between or low.mean() < EITHER or high.mean() < EITHER:
+    if between or low.mean() < EITHER_SHARE or high.mean() < EITHER_SHARE:
         return [], work, values
     bits = round(np.log2(wrap))
     finding = Finding(
@@ -64,7 +64,7 @@ def _placeholder(work: LogUnderCheck, channel: str, component: str, values: Floa
     bad = size == top
     others = float(np.max(size[~bad & np.isfinite(size)], initial=0.0))
     code = round(top) in CODES and abs(top - round(top)) <= 1e-9 * top
-    if not code or bad.sum() < 2 or bad.mean() > MAX_MISSING or not 0.0 < FAR * others < top:
+    if not code or bad.sum() < 2 or bad.mean() > MAX_MISSING or not 0.0 < FAR_RATIO * others < top:
         return [], work, values
     cell = float(cells[np.flatnonzero(bad)[0]])
     finding = Finding(
@@ -99,7 +99,7 @@ SPIKE = 10.0  # a single value so many times the noise away from both its neighb
 
 def check_spikes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Single values (or two) far away from both neighbours, which agree with each other."""
-    found = []
+    findings = []
     changed = _spikes_changed(work)
     for channel in MEASURED:
         for component, values in work.sampled_columns(channel):
@@ -110,13 +110,13 @@ def check_spikes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             if not bad.any() or bad.mean() > 0.2:
                 continue
             worst = int(np.flatnonzero(bad)[np.argmax(np.abs(values[bad] - np.nanmedian(values)))])
-            found.append(Finding(
+            findings.append(Finding(
                 "spike", WARNING, component,
                 {"farthest": float(values[worst]), "share": float(bad.mean()), "at_s": float(work.t[worst])},
                 rows=work.lines(bad), count=int(bad.sum()),
             ))  # fmt: skip
             work = work.masked(channel, k, bad)
-    return found, work
+    return findings, work
 
 
 def _spikes_changed(work: LogUnderCheck) -> IntArray:

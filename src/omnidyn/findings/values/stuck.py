@@ -19,10 +19,10 @@ from omnidyn.logs.channels import place
 from omnidyn.statement import WARNING
 from omnidyn.statistics import robust_std, stretches
 
-LONG = 5  # rows
+LONG_ROWS = 5  # rows
 FOLLOWS = 0.5  # [s] after which a wheel follows its command
 IMPOSSIBLE = 1e-6  # chance, over the whole log, below which repeated values are no chance
-SURE = 2.0  # standard errors that a chance may be larger than seen
+SURE_ERRORS = 2.0  # standard errors that a chance may be larger than seen
 PARTS = 4  # of a stretch, whose means are compared
 MARGIN = 1.25  # by which a stretch must differ more than any other of its length
 TOGETHER = 0.8  # of the rows of a stretch: so many repeats of all others say that the robot keeps its speed
@@ -31,7 +31,7 @@ RESOLVES = 0.1  # of the top speed: a reference as exact as this would have seen
 
 def check_stuck(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Stretches in which a sensor repeats one value to the last digit while it should not."""
-    found, predictor = [], WheelPredictor(work)
+    findings, predictor = [], WheelPredictor(work)
     expected = expected_wheel_speed(work, without="wheel_speed")
     for channel in SENSORS:
         # The longest repeat first: a wheel that sticks is no witness against the others.
@@ -39,7 +39,7 @@ def check_stuck(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         columns = [(name, values, _repeats(values), rest_level(values)) for name, values in sampled]
         for component, values, repeats, rest in sorted(columns, key=lambda each: -_longest(*each[1:])):
             k = place(component)[1]  # type: ignore[index]
-            judge = _Judge(work, values, repeats, rest)
+            judge = _StuckJudge(work, values, repeats, rest)
             judge.steady = _Steady(work, channel, k).during
             if channel == "wheel_speed":
                 judge.predict = partial(predictor.wheel_speed, k)
@@ -51,14 +51,14 @@ def check_stuck(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
                 continue
             each = stretches(bad)
             longest = max(work.t[b - 1] - work.t[a] for a, b in each)
-            found.append(Finding(
+            findings.append(Finding(
                 "stuck", WARNING, component,
                 {"longest_s": float(longest), "share": float(bad.mean()), "times": len(each)},
                 rows=work.lines(bad), count=int(bad.sum()),
             ))  # fmt: skip
             work = work.masked(channel, k, bad)
             predictor = WheelPredictor(work)
-    return found, work
+    return findings, work
 
 
 def _repeats(values: FloatArray) -> IntArray:
@@ -71,7 +71,7 @@ def _longest(values: FloatArray, repeats: IntArray, rest: float) -> int:
     return int(np.diff(repeats, axis=1)[np.abs(values[repeats[:, 0]]) > rest].max(initial=0))
 
 
-class _Judge:
+class _StuckJudge:
     """Which of the repeats of one channel are too long for chance, or go on while something else changes."""
 
     predict: Callable[[BoolArray], FloatArray] | None = None  # the channel by all others
@@ -83,19 +83,19 @@ class _Judge:
         self.values, self.repeats, self.slow = values, repeats, max(10, round(FOLLOWS / work.step))
         self.turns = np.abs(values) > rest
         self.lengths = repeats[:, 1] - repeats[:, 0]
-        self.long = self.lengths >= LONG
+        self.long = self.lengths >= LONG_ROWS
         self.moving = self.turns[repeats[:, 0]]
 
     @cached_property
-    def predicted(self) -> _Walk | None:
+    def predicted(self) -> _RowWalk | None:
         """How far what all other columns say walks away."""
-        return None if self.predict is None else _Walk(self.values, self.predict(self.repeated), self.repeated)
+        return None if self.predict is None else _RowWalk(self.values, self.predict(self.repeated), self.repeated)
 
     @cached_property
     def repeated(self) -> BoolArray:
         """Rows in repeats that are asked about: nothing is taken from them."""
         edges = np.zeros(len(self.values) + 1, dtype=np.int64)
-        asked = self.repeats[self.lengths >= max(LONG, self.slow // 2)]
+        asked = self.repeats[self.lengths >= max(LONG_ROWS, self.slow // 2)]
         np.add.at(edges, asked[:, 0], 1)
         np.add.at(edges, asked[:, 1], -1)
         return np.cumsum(edges[:-1]) > 0
@@ -177,7 +177,7 @@ class _Steady:
         return still and bool(self.others) and all(same[a : b - 1].mean() > TOGETHER for same in self.others)
 
 
-class _Walk:
+class _RowWalk:
     """How far a reference walks away during repeats, beside all other stretches of that length in the log."""
 
     def __init__(self, values: FloatArray, reference: FloatArray, repeated: BoolArray) -> None:
@@ -266,7 +266,7 @@ def _chance_of_a_repeat(lengths: IntArray) -> tuple[float, float]:
     rest = np.sort(lengths)[:-3] - 1  # number of repeats in each stretch
     repeats, again = float(rest.sum()), float((rest - 1).sum())
     seen = (again + 3.0) / (repeats + 6.0)
-    seen = min(1.0, seen + SURE * math.sqrt(seen * max(0.0, 1.0 - seen) / (repeats + 6.0)))
+    seen = min(1.0, seen + SURE_ERRORS * math.sqrt(seen * max(0.0, 1.0 - seen) / (repeats + 6.0)))
     after, middle = _repeats_by_noise()
     return float(np.interp(seen, after[::-1], middle[::-1])), float(rest.max(initial=0) + 1)
 

@@ -29,26 +29,26 @@ from omnidyn.statistics import moving
 from omnidyn.units import known_unit
 
 TINY = 1e-9  # a step so small is what rounding leaves of a constant
-SAME = 0.03  # a scale so near 1 is 1, within what noise makes of it
+SAME_SCALE = 0.03  # a scale so near 1 is 1, within what noise makes of it
 
 
 def check_values(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """All findings on single channels, each at its own clock; what sticks, spikes or is dead is masked."""
-    found, work = at_each_clock(work, _at_its_clock)
-    return found, work if len(work) < MIN_ROWS else _with_dead_wheel(work, found)
+    findings, work = at_each_clock(work, _at_its_clock)
+    return findings, work if len(work) < MIN_ROWS else _with_dead_wheel(work, findings)
 
 
 def _at_its_clock(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """The same of the channels that were sampled in these rows."""
-    found = _missing(work)
+    findings = _missing(work)
     if len(work) < MIN_ROWS:
-        return found, work
+        return findings, work
     more, work = check_codes(work)
-    found += more + _quantised(work)
+    findings += more + _quantised(work)
     for family in (_constant, check_stuck, check_spikes):
         more, work = family(work)
-        found += more
-    return found, work
+        findings += more
+    return findings, work
 
 
 def _with_dead_wheel(work: LogUnderCheck, found: list[Finding]) -> LogUnderCheck:
@@ -56,7 +56,11 @@ def _with_dead_wheel(work: LogUnderCheck, found: list[Finding]) -> LogUnderCheck
 
     Else it hides what is wrong with them: neither floor nor circuit can be held against a robot with a wheel missing.
     """
-    dead = [at[1] for each in found if each.code == "dead" and (at := place(each.subject)) and at[0] == "wheel_speed"]
+    dead = [
+        at[1]
+        for finding in found
+        if finding.code == "dead" and (at := place(finding.subject)) and at[0] == "wheel_speed"
+    ]
     expected = expected_wheel_speed(work, without="wheel_speed")
     if len(dead) != 1 or expected is None or expected[0] not in MEASUREMENTS or expected[1].shape[1] != work.wheels:
         return work
@@ -68,30 +72,30 @@ def _with_dead_wheel(work: LogUnderCheck, found: list[Finding]) -> LogUnderCheck
     if not size > 0.0 or not turned > 0.0:
         return work
     ratio = float(np.sqrt(turned / size))
-    speed[:, dead[0]] = expected[1][:, dead[0]] * (ratio if abs(ratio - 1.0) > SAME else 1.0)
+    speed[:, dead[0]] = expected[1][:, dead[0]] * (ratio if abs(ratio - 1.0) > SAME_SCALE else 1.0)
     return work.replace(wheel_speed=speed).knowing(dead_wheel=dead[0])
 
 
 def _missing(work: LogUnderCheck) -> list[Finding]:
-    found: list[Finding] = []
+    findings: list[Finding] = []
     if work.log.own_clocks:  # a topic has nothing to say before its first message and behind its last
-        return found
+        return findings
     for channel in work.channels:
         for component, values in work.sampled_columns(channel):
             bad = ~np.isfinite(values)
             share = float(bad.mean())
             if share > 0.0:
                 grave = share > MAX_MISSING and channel not in ("pose", "twist", "supply")
-                found.append(Finding(
+                findings.append(Finding(
                     "missing", WARNING if grave else NOTE, component, {"share": share}, rows=work.lines(bad),
                     count=int(bad.sum()),
                 ))  # fmt: skip
-    return found
+    return findings
 
 
 def _quantised(work: LogUnderCheck) -> list[Finding]:
     """Steps of a sensor that matter: 2 % of what it usually reads, or more; sensors of one step in one finding."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     command = work.get("wheel_speed_command")
     expected = ("wheel_speed_command", command) if command is not None else expected_wheel_speed(work)
     groups: dict[tuple[str, float], list[tuple[str, float, float]]] = {}
@@ -108,15 +112,15 @@ def _quantised(work: LogUnderCheck) -> list[Finding]:
                        (channel, step))  # fmt: skip
             groups.setdefault(key, []).append((component, step / usual, white_noise(own)))
             if channel == "wheel_speed" and expected is not None and expected[1].shape[1] > k:
-                found += _reads_zero(work, component, values, step, expected[0], expected[1][:, k])
+                findings += _reads_zero(work, component, values, step, expected[0], expected[1][:, k])
     for (_, step), members in groups.items():
         names = [name for name, _, _ in members]
         share, noise = max(each for _, each, _ in members), max(each for _, _, each in members)
-        found.append(Finding(
+        findings.append(Finding(
             "quantised", NOTE, " ".join(names),
             {"step": step, "share": share, "noise": noise, **_in_column(work, names[0], step)},
         ))  # fmt: skip
-    return found
+    return findings
 
 
 def _reads_zero(
@@ -152,7 +156,7 @@ def _in_column(work: LogUnderCheck, component: str, step: float) -> dict[str, ob
 
 def _constant(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Channels that never change, while something says they should."""
-    found = []
+    findings = []
     for channel in work.channels:
         columns = work.columns(channel)
         flat = {name: bool(np.nanmax(values) == np.nanmin(values)) for name, values in columns}
@@ -162,13 +166,13 @@ def _constant(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             k = place(component)[1]  # type: ignore[index]
             reason = _should_move(work, channel, k, all(flat.values()))
             if reason:
-                found.append(Finding(
+                findings.append(Finding(
                     "dead", ERROR if channel not in ("pose", "twist_command", "wheel_speed_command") else WARNING,
                     component, {"value": float(np.nanmax(values)), "reason": reason},
                     rows=work.lines(work.everywhere), count=len(work), rests_on=_behind(work, channel),
                 ))  # fmt: skip
                 work = work.masked(channel, k, work.everywhere)
-    return found, work
+    return findings, work
 
 
 def _should_move(work: LogUnderCheck, channel: str, k: int, all_flat: bool) -> str:
@@ -261,29 +265,29 @@ def _told(work: LogUnderCheck, source: str) -> IntArray:
 # A measurement that is the command of rows before: software that logs what it sent, in the place of a sensor
 
 PAIRS = (("twist", "twist_command"), ("wheel_speed", "wheel_speed_command"))
-FARTHEST = 3  # rows by which the command may have been written late
+LATEST_ROWS = 3  # rows by which the command may have been written late
 ECHO_TOLERANCE = 2e-6  # of the largest command: a number in single precision, written with its digits
-ALWAYS = 0.99  # share of the rows in which both are the same
+SAME_SHARE = 0.99  # share of the rows in which both are the same
 CHANGES = 5  # of the commands: a robot that rests, or that a simulator moves at one speed, says nothing
 
 
 def check_echo(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """An error where a channel is no measurement; it is masked."""
-    found: list[Finding] = []
+    findings: list[Finding] = []
     for measured, commanded in PAIRS:
         values, command = work.get(measured), work.get(commanded)
         if values is None or command is None or len(work) < MIN_ROWS:
             continue
-        rows = next((k for k in range(FARTHEST + 1) if _is_command(work, values, command, k)), None)
+        rows = next((k for k in range(LATEST_ROWS + 1) if _is_command(work, values, command, k)), None)
         if rows is None:
             continue
         measured_rows = np.asarray(np.isfinite(values).any(axis=1))
-        found.append(Finding(
+        findings.append(Finding(
             "echo", ERROR, " ".join(components(measured, values.shape[1])),
             {"rows": float(rows), "channel": measured}, rows=work.lines(measured_rows), count=len(work),
         ))  # fmt: skip
         work = work.replace(**{measured: None})
-    return found, work
+    return findings, work
 
 
 def _is_command(work: LogUnderCheck, values: FloatArray, command: FloatArray, rows: int) -> bool:
@@ -298,4 +302,4 @@ def _is_command(work: LogUnderCheck, values: FloatArray, command: FloatArray, ro
     size = np.nanmax(np.abs(command), axis=0, initial=0.0)
     same = np.abs(later - before) <= ECHO_TOLERANCE * np.maximum(size, 1e-9)
     changes = [int(np.count_nonzero(np.diff(own[np.isfinite(own)]))) for own in command.T]
-    return sum(changes) >= CHANGES and bool(known.any()) and float(same[known].mean()) >= ALWAYS
+    return sum(changes) >= CHANGES and bool(known.any()) and float(same[known].mean()) >= SAME_SHARE

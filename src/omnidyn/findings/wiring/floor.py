@@ -8,15 +8,28 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import Finding
-from omnidyn.findings.signal.log_under_check import LogUnderCheck
-from omnidyn.findings.signal.reference import GEOMETRY, ground, pose_twist, wheels_twist
+from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
+from omnidyn.findings.signal.reference import GEOMETRY, WHEELS, ground, pose_twist, wheels_twist
 from omnidyn.findings.signal.robust import smooth
-from omnidyn.findings.wiring.frame import commands_agree
-from omnidyn.findings.wiring.orders import BETTER, WINDOWS, Answer, Wiring, choose, code_of, means, rivals_of, wirings
+from omnidyn.findings.wiring.orders import (
+    BEST_SHARE,
+    WINDOWS,
+    Wiring,
+    WiringChoice,
+    choose,
+    code_of,
+    is_turned,
+    marker_finding,
+    means,
+    rivals_of,
+    turned,
+    wirings,
+    with_marker,
+)
 from omnidyn.logs.channels import components
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
-from omnidyn.statement import ERROR
+from omnidyn.statement import ERROR, WARNING
 
 Moments = tuple[FloatArray, FloatArray, FloatArray]  # sums of v v', v w', w w'
 
@@ -25,13 +38,13 @@ Moments = tuple[FloatArray, FloatArray, FloatArray]  # sums of v v', v w', w w'
 SEEN_BY = (0.0, 0.3, 0.15, 0.01)
 
 
-def by_floor(work: LogUnderCheck) -> tuple[str, Answer] | None:
+def by_floor(work: LogUnderCheck) -> tuple[str, WiringChoice] | None:
     """What is wrong between wheels and floor; wheels that turn as the firmware tells them are wired as it thinks."""
     answer = next(filter(None, (_within(work, seconds) for seconds in WINDOWS)), None)
     return None if answer is not None and answer[0] == "wheels" and commands_agree(work) else answer
 
 
-def _within(work: LogUnderCheck, seconds: float) -> tuple[str, Answer] | None:
+def _within(work: LogUnderCheck, seconds: float) -> tuple[str, WiringChoice] | None:
     """("wheels" or "axes", what is wrong), from the motion over the floor and the wheels' own redundancy."""
     speed, robot = work.full("wheel_speed"), work.geometry
     if speed is None or robot is None:
@@ -60,20 +73,26 @@ def _within(work: LogUnderCheck, seconds: float) -> tuple[str, Answer] | None:
     moments = target.T @ target, target.T @ w, w.T @ w
     tried = list(wirings(n))
     costs = np.array([_cost(rows @ wiring.matrix, moments, bool(axes)) for wiring in tried])
-    total = float(np.trace(moments[0])) if axes else float(np.trace(rows @ moments[2] @ rows.T) + _size(rows, w))
+    total = (
+        float(np.trace(moments[0]))
+        if axes
+        else float(np.trace(rows @ moments[2] @ rows.T) + (w**2).sum() * (rows**2).sum() / max(rows.shape[1], 1))
+    )
     answer = choose(tried, costs, total)
     turned = _by_axes(rows, moments, axes, total) if axes and seen is not None else None
     return _simpler(work, answer, turned)
 
 
-def _simpler(work: LogUnderCheck, answer: Answer | None, turned: Answer | None) -> tuple[str, Answer] | None:
+def _simpler(
+    work: LogUnderCheck, answer: WiringChoice | None, turned: WiringChoice | None
+) -> tuple[str, WiringChoice] | None:
     """Wheels or axes: what explains much more, else what needs fewer changes.
 
     One axis of the floor turned about is rarer than two motors exchanged, which may look the same.
     """
     if turned is None:
         return None if answer is None else ("wheels", answer)
-    if answer is None or turned.best.changes + 1 < answer.best.changes or turned.left < BETTER * answer.left:
+    if answer is None or turned.best.changes + 1 < answer.best.changes or turned.left < BEST_SHARE * answer.left:
         return "axes", turned
     if turned.left < 2.0 * answer.left + 0.02:
         answer = answer._replace(rival=turned.best.statement(_axes_names(work)[1]))
@@ -93,10 +112,6 @@ def _null_rows(robot: Robot) -> FloatArray:
     return basis[3:] * float(np.mean(robot.wheels.radii))
 
 
-def _size(rows: FloatArray, w: FloatArray) -> float:
-    return float((w**2).sum()) * float((rows**2).sum()) / max(rows.shape[1], 1)
-
-
 def _cost(matrix: FloatArray, moments: Moments, scaled: bool) -> float:
     """Least sum of squares of target - a matrix w over a scale a > 0, or a = 1 where there is no target."""
     vv, vw, ww = moments
@@ -108,7 +123,7 @@ def _cost(matrix: FloatArray, moments: Moments, scaled: bool) -> float:
     return float(np.trace(vv)) - along * (along / size)
 
 
-def _by_axes(rows: FloatArray, moments: Moments, axes: list[int], total: float) -> Answer | None:
+def _by_axes(rows: FloatArray, moments: Moments, axes: list[int], total: float) -> WiringChoice | None:
     """The same question with the wheels trusted and the axes of the floor's twist exchanged or turned about."""
     vv, vw, ww = moments
     n, free = len(axes), len(vv) - len(axes)
@@ -129,7 +144,7 @@ def _axes_names(work: LogUnderCheck) -> tuple[str, tuple[str, ...]]:
     return seen.name, tuple(names[k] for k in seen.axes)
 
 
-def axes_finding(work: LogUnderCheck, answer: Answer) -> Finding:
+def axes_finding(work: LogUnderCheck, answer: WiringChoice) -> Finding:
     """Errors: axes of what was measured over the floor are exchanged, or have the opposite sign."""
     channel, names = _axes_names(work)
     turn = _turn_of_pose(work, answer.best)
@@ -182,7 +197,7 @@ def mended_axes(work: LogUnderCheck, wiring: Wiring) -> LogUnderCheck:
     return work.replace(**{seen.name: values})
 
 
-def wheels_finding(work: LogUnderCheck, answer: Answer, blamed: str) -> Finding:
+def wheels_finding(work: LogUnderCheck, answer: WiringChoice, blamed: str) -> Finding:
     """Errors: wheel speeds in another order, or of the opposite sign, than floor or commands say."""
     seen = ground(work)
     against = seen.name if seen is not None else ("twist_command" if work.get("twist_command") is not None else "")
@@ -193,3 +208,89 @@ def wheels_finding(work: LogUnderCheck, answer: Answer, blamed: str) -> Finding:
          "as_good": float(answer.others), "channel": "wheel_speed", "against": against, "blamed": blamed,
          "wiring": answer.best.statement(names), **rivals_of(answer, names)}, "wheels", rests_on=GEOMETRY,
     )  # fmt: skip
+
+
+# The frame of a pose against its own heading: turned, or mirrored; and whether the pose follows the wheels at all
+
+
+def check_frame(work: LogUnderCheck, left: float) -> tuple[list[Finding], LogUnderCheck]:
+    """A pose whose x and y belong to another frame than its heading: turned, or mirrored as a picture from above is.
+
+    left: what the best other wiring of the wheels leaves unexplained.
+    """
+    speed, pose, robot = work.full("wheel_speed"), work.full("pose"), work.geometry
+    if speed is None or pose is None or robot is None or work.get("twist") is not None or len(work) < 3 * MIN_ROWS:
+        return [], work
+    best, plain = (0.0, 0.0 + 0.0j, 1.0), 0.0
+    for mirror in (1.0, -1.0):
+        turned = pose * [1.0, mirror, mirror]
+        twist, width = pose_twist(work, turned)
+        own = wheels_twist(work, speed, width)
+        assert own is not None
+        w, g = means(work, own[:, :2], twist[:, :2])
+        if len(w) < 8:
+            return [], work
+        wheel, floor = w @ [1.0, 1.0j], g @ [1.0, 1.0j]
+        size = np.sqrt((np.abs(wheel) ** 2).sum() * (np.abs(floor) ** 2).sum())
+        slope = (np.conj(wheel) * floor).sum() / size if size > 0.0 else 0.0j
+        if mirror > 0.0:
+            plain = float(slope.real)
+        if abs(slope) > best[0] + 0.05 * (mirror < 0.0):
+            best = float(abs(slope)), complex(slope), mirror
+    alike, slope, mirror = best
+    angle = float(np.degrees(np.angle(slope)))
+    trusted = commands_agree(work)
+    if trusted and plain < 0.5 and alike < 0.8:
+        return [Finding("pose_unlike", WARNING, "x y heading", {"likeness_as_logged": plain})], work.replace(pose=None)
+    if not trusted and left < 0.6 * (1.0 - alike**2) + 0.005:
+        return [], work
+    if alike < (0.8 if trusted else 0.9) or plain > 0.95 * alike or not (trusted or _turns_say(work, mirror)):
+        return _marker(work) if mirror > 0.0 else ([], work)
+    mended = pose * [1.0, mirror, mirror]
+    unit = np.exp(-1.0j * np.radians(angle))
+    place = (mended[:, 0] + 1.0j * mended[:, 1]) * unit
+    mended = np.column_stack([place.real, place.imag, mended[:, 2]])
+    return [Finding(
+        "pose_frame", WARNING, "x y",
+        {"angle_deg": angle, "mirrored": float(mirror < 0.0), "likeness": alike, "likeness_as_logged": plain},
+        "mirrored" if mirror < 0.0 else "turned",
+    )], work.replace(pose=mended)  # fmt: skip
+
+
+def _marker(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
+    """A marker that is mounted at an angle, by its own error: one too small to show in the likeness, too."""
+    speed, pose = work.full("wheel_speed"), work.full("pose")
+    assert speed is not None
+    assert pose is not None
+    body, width = pose_twist(work, pose)
+    own = wheels_twist(work, speed, width)
+    assert own is not None
+    turn = turned(work, body[:, :2], own[:, :2], body[:, 2])
+    if turn is None or not is_turned(turn):
+        return [], work
+    return [marker_finding(turn, WHEELS)], with_marker(work, pose, turn.angle)
+
+
+def commands_agree(work: LogUnderCheck) -> bool:
+    """Whether the wheels turn as the commanded twist says: then they are wired as the firmware thinks."""
+    orders, speed, robot = work.full("twist_command"), work.full("wheel_speed"), work.geometry
+    if orders is None or speed is None or robot is None:
+        return False
+    wanted, turned = means(work, wheel_speed(robot.wheels, orders), speed)
+    size = np.sqrt((wanted**2).sum() * (turned**2).sum())
+    return bool(size > 0.0 and (wanted * turned).sum() > 0.9 * size)
+
+
+def _turns_say(work: LogUnderCheck, mirror: float) -> bool:
+    """Whether the robot turns enough to see that its wheels are right about yaw, whatever they are about x and y."""
+    speed, pose = work.full("wheel_speed"), work.full("pose")
+    if speed is None or pose is None:
+        return False
+    twist, width = pose_twist(work, pose * [1.0, mirror, mirror])
+    own = wheels_twist(work, speed, width)
+    assert own is not None
+    w, g = means(work, own[:, 2:], twist[:, 2:])
+    size = np.sqrt((w**2).sum() * (g**2).sum())
+    moved = np.sqrt((w**2).sum()) * float(np.mean(work.geometry.wheels.robot_radius))  # type: ignore[union-attr]
+    planar = np.sqrt((means(work, own[:, :2])[0] ** 2).sum())
+    return bool(size > 0.0 and (w * g).sum() > 0.97 * size and moved > 0.3 * planar)

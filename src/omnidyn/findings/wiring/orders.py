@@ -14,9 +14,9 @@ from omnidyn.findings.signal.log_under_check import LogUnderCheck
 from omnidyn.findings.signal.robust import windowed
 from omnidyn.statement import NOTE, WARNING, Statement
 
-BETTER = 0.35  # the right wiring leaves at most so much of what the logged one leaves
+BEST_SHARE = 0.35  # the right wiring leaves at most so much of what the logged one leaves
 POOR = 0.02  # a wiring that leaves less than this share of the motion unexplained is not doubted
-ALIKE = 0.15  # a wiring so close to the best one, of the way to the logged one, is as good
+AS_GOOD_SHARE = 0.15  # a wiring so close to the best one, of the way to the logged one, is as good
 MAX_TRIED = 4  # wheels up to which every order is tried; beyond, exchanges of two
 WINDOWS = (0.12, 0.5)  # [s]; the long one for speeds that drown in noise
 
@@ -55,7 +55,7 @@ class Wiring(NamedTuple):
         return [names[j] for j in sorted(wrong)]
 
 
-class Answer(NamedTuple):
+class WiringChoice(NamedTuple):
     """best: the right wiring with fewest changes. others: as good ones. left, logged: share that best and log leave."""
 
     best: Wiring
@@ -82,18 +82,20 @@ def wirings(n: int) -> Iterator[Wiring]:
 
 
 def choose(
-    tried: list[Wiring], costs: FloatArray, total: float, better: float = BETTER, poor: float = POOR
-) -> Answer | None:
+    tried: list[Wiring], costs: FloatArray, total: float, better: float = BEST_SHARE, poor: float = POOR
+) -> WiringChoice | None:
     """The wiring that the costs call for; None where that of the log, the first, is not clearly wrong."""
     logged, least = float(costs[0]), float(costs.min())
     if not np.isfinite(logged) or total <= 0.0 or logged < poor * total or least > better * logged:
         return None
-    alike = [k for k in np.flatnonzero(costs <= least + ALIKE * (logged - least))]
+    alike = [k for k in np.flatnonzero(costs <= least + AS_GOOD_SHARE * (logged - least))]
     alike.sort(key=lambda k: (tried[k].changes, costs[k]))
     # Of those with fewest changes the cheapest; a rival is one that does not need more changes.
     best = tried[alike[0]]
     rivals = [tried[k] for k in alike[1:] if tried[k].changes == best.changes]
-    return Answer(best, len(rivals), rivals[0] if rivals else None, float(costs[alike[0]]) / total, logged / total)
+    return WiringChoice(
+        best, len(rivals), rivals[0] if rivals else None, float(costs[alike[0]]) / total, logged / total
+    )
 
 
 def means(work: LogUnderCheck, *channels: FloatArray, seconds: float = WINDOWS[0]) -> list[FloatArray]:
@@ -112,7 +114,7 @@ def code_of(wiring: Wiring) -> str:
     return "swapped" if any(k != j for k, j in enumerate(wiring.order)) else "inverted"
 
 
-def rivals_of(answer: Answer, names: tuple[str, ...]) -> dict[str, Statement]:
+def rivals_of(answer: WiringChoice, names: tuple[str, ...]) -> dict[str, Statement]:
     """Another wiring that the log cannot tell from the best one."""
     rival = answer.rival if answer.second is None else answer.second.statement(names)
     return {} if rival is None else {"rival": rival}
@@ -120,10 +122,10 @@ def rivals_of(answer: Answer, names: tuple[str, ...]) -> dict[str, Statement]:
 
 # By which angle one velocity in the plane is turned against another
 
-MOVING = 0.2  # of what 90 % of the windows stay below
-FEWEST = 12  # windows
-LEAST, SURE = np.radians(3.0), 6.0  # a marker is mounted no better than that; standard errors
-FAR = np.radians(18.0)  # a turn that shows in the likeness, too
+MOVING_SHARE = 0.2  # of what 90 % of the windows stay below
+FEWEST_WINDOWS = 12  # windows
+LEAST_ANGLE, SURE_ERRORS = np.radians(3.0), 6.0  # a marker is mounted no better than that; standard errors
+FAR_ANGLE = np.radians(18.0)  # a turn that shows in the likeness, too
 TURNED_LIKENESS = 0.9  # likeness of what is the same once it is turned
 
 
@@ -142,11 +144,11 @@ def turned(work: LogUnderCheck, own: FloatArray, other: FloatArray, rate: FloatA
     angle of other/own over short windows = angle + lag * rate + c cos(2 d) + s sin(2 d), d the direction of travel: a
     lag of one of the two and an axis with another scale are no turn. None where too little moves.
     """
-    z, y, turning = (each for each in means(work, own, other, np.nan_to_num(rate)[:, None]))
+    z, y, turning = (mean for mean in means(work, own, other, np.nan_to_num(rate)[:, None]))
     z, y = z @ [1.0, 1.0j], y @ [1.0, 1.0j]
     size = np.abs(z)
-    moving = size > MOVING * np.quantile(size, 0.9) if size.size else np.zeros(0, dtype=bool)
-    if moving.sum() < FEWEST:
+    moving = size > MOVING_SHARE * np.quantile(size, 0.9) if size.size else np.zeros(0, dtype=bool)
+    if moving.sum() < FEWEST_WINDOWS:
         return None
     z, y, turning, size = z[moving], y[moving], turning[moving, 0], size[moving]
     slope = (np.conj(z) * y).sum() / max(float(np.sqrt((size**2).sum() * (np.abs(y) ** 2).sum())), 1e-300)
@@ -164,8 +166,10 @@ def turned(work: LogUnderCheck, own: FloatArray, other: FloatArray, rate: FloatA
 
 def is_turned(turn: Turned) -> bool:
     """Whether a turn is sure, and no matter of noise."""
-    far = turn.alike > TURNED_LIKENESS and abs(turn.angle) > FAR
-    return far or (turn.alike > TURNED_LIKENESS and abs(turn.angle) > LEAST and abs(turn.angle) > SURE * turn.error)
+    far = turn.alike > TURNED_LIKENESS and abs(turn.angle) > FAR_ANGLE
+    return far or (
+        turn.alike > TURNED_LIKENESS and abs(turn.angle) > LEAST_ANGLE and abs(turn.angle) > SURE_ERRORS * turn.error
+    )
 
 
 def marker_finding(turn: Turned, source: str, agrees: str = "") -> Finding:

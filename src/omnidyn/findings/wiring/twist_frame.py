@@ -16,11 +16,11 @@ from omnidyn.findings.wiring.orders import TURNED_LIKENESS, Turned, is_turned, m
 from omnidyn.model.frames import unwrapped
 from omnidyn.statement import ERROR, WARNING
 
-BETTER = 0.35  # the right frame leaves at most so much of what the one as logged leaves
+BEST_SHARE = 0.35  # the right frame leaves at most so much of what the one as logged leaves
 NAMES = ("x", "y", "heading")
 
 
-class Found(NamedTuple):
+class FrameCandidate(NamedTuple):
     """signs: of x, y and heading. room: whether the twist is in the frame of the room. turn: what is left."""
 
     signs: tuple[float, float, float]
@@ -58,16 +58,17 @@ def _against_twist(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> 
         return [], work
     tried = [_found(work, pose, twist, (1.0, 1.0, 1.0), True)]
     tried += [_found(work, pose, twist, (1.0, y, turn), False) for y, turn in product((1.0, -1.0), repeat=2)]
-    known = [each for each in tried if each is not None]
+    known = [candidate for candidate in tried if candidate is not None]
     best = min(known, key=lambda each: each.left)
     room = known[0]
     if (
         room.left < best.left + 0.02
         and 1.0 - room.left > TURNED_LIKENESS
-        and room.left < BETTER * (1.0 - plain.turn.plain)
+        and room.left < BEST_SHARE * (1.0 - plain.turn.plain)
     ):
-        return [_room_finding(plain, room)], work.replace(twist=_as_in_body(work, pose, twist))
-    if best.signs != (1.0, 1.0, 1.0) and 1.0 - best.left > TURNED_LIKENESS and best.left < BETTER * plain.left:
+        likeness = {"likeness": room.turn.plain, "likeness_as_logged": plain.turn.plain}
+        return [Finding("twist_frame", ERROR, "vx vy", likeness)], work.replace(twist=_as_in_body(work, pose, twist))
+    if best.signs != (1.0, 1.0, 1.0) and 1.0 - best.left > TURNED_LIKENESS and best.left < BEST_SHARE * plain.left:
         return [_mirror_finding(plain, best)], work.replace(pose=pose * best.signs)
     if is_turned(plain.turn):
         return _turned(work, pose, twist, plain.turn)
@@ -76,11 +77,11 @@ def _against_twist(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> 
 
 def _found(
     work: LogUnderCheck, pose: FloatArray, twist: FloatArray, signs: tuple[float, float, float], room: bool
-) -> Found | None:
+) -> FrameCandidate | None:
     body, width = pose_twist(work, pose * signs)
     own = smooth(twist[:, :2], width) if not room else smooth(_as_in_body(work, pose, twist)[:, :2], width)
     turn = turned(work, body[:, :2], own, body[:, 2])
-    return None if turn is None else Found(signs, room, turn)
+    return None if turn is None else FrameCandidate(signs, room, turn)
 
 
 def _as_in_body(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> FloatArray:
@@ -89,11 +90,7 @@ def _as_in_body(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> Flo
     return np.column_stack([plane.real, plane.imag, twist[:, 2]])
 
 
-def _room_finding(plain: Found, room: Found) -> Finding:
-    return Finding("twist_frame", ERROR, "vx vy", {"likeness": room.turn.plain, "likeness_as_logged": plain.turn.plain})
-
-
-def _mirror_finding(plain: Found, best: Found) -> Finding:
+def _mirror_finding(plain: FrameCandidate, best: FrameCandidate) -> Finding:
     wrong = [name for name, sign in zip(NAMES, best.signs, strict=True) if sign < 0.0]
     return Finding(
         "pose_frame", ERROR, " ".join(wrong),

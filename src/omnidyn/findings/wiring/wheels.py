@@ -16,9 +16,8 @@ from omnidyn.arrays import FloatArray
 from omnidyn.findings.finding import Finding
 from omnidyn.findings.signal.log_under_check import MIN_ROWS, LogUnderCheck
 from omnidyn.findings.signal.reference import CIRCUIT, CURRENT_AND_VOLTAGE, emf, ohmic, volts
-from omnidyn.findings.wiring.floor import axes_finding, by_floor, mended_axes, wheels_finding
-from omnidyn.findings.wiring.frame import check_frame
-from omnidyn.findings.wiring.orders import Answer, Wiring, choose, code_of, means, rivals_of, wirings
+from omnidyn.findings.wiring.floor import axes_finding, by_floor, check_frame, mended_axes, wheels_finding
+from omnidyn.findings.wiring.orders import Wiring, WiringChoice, choose, code_of, means, rivals_of, wirings
 from omnidyn.logs.channels import components
 from omnidyn.statement import ERROR
 
@@ -29,32 +28,32 @@ def check_wiring(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Findings on order and sign of the columns of motors and axes; the work with them put right."""
     if len(work) < MIN_ROWS or work.wheels < 1:
         return [], work
-    found: list[Finding] = []
+    findings: list[Finding] = []
     circuit = by_circuit(work)  # of each motor for itself: it names the column, so it comes first
     if circuit.wrong is not None:
-        found.append(motor_finding(work, *circuit.wrong, CIRCUIT))
+        findings.append(motor_finding(work, *circuit.wrong, CIRCUIT))
         work = _mended(work, (circuit.wrong[0],), circuit.wrong[1].best)
     floor = by_floor(work)
     framed, turned = check_frame(work, floor[1].left if floor is not None else 1.0)
     if framed:
-        found, work, floor = found + framed, turned, by_floor(turned)
+        findings, work, floor = findings + framed, turned, by_floor(turned)
     likeness = None if circuit.known else by_drive(work)
     if floor is not None and floor[0] == "axes":
-        found.append(axes_finding(work, floor[1]))
+        findings.append(axes_finding(work, floor[1]))
         work = mended_axes(work, floor[1].best)
     elif floor is not None:
         whole = circuit.known or (motor_known(work) and likeness is None)
-        found.append(wheels_finding(work, floor[1], "motors" if whole else "wheel_speed"))
+        findings.append(wheels_finding(work, floor[1], "motors" if whole else "wheel_speed"))
         work = _mended(work, MOTOR if whole else ("wheel_speed", "wheel_angle"), floor[1].best)
         likeness = None if circuit.known else by_drive(work)
     if likeness is not None:
-        found.append(motor_finding(work, *likeness))
+        findings.append(motor_finding(work, *likeness))
         work = _mended(work, (likeness[0],), likeness[1].best)
     command = by_likeness(work, "wheel_speed_command")
     if command is not None:
-        found.append(motor_finding(work, "wheel_speed_command", command))
+        findings.append(motor_finding(work, "wheel_speed_command", command))
         work = _mended(work, ("wheel_speed_command",), command.best)
-    return found, work
+    return findings, work
 
 
 def _mended(work: LogUnderCheck, channels: tuple[str, ...], wiring: Wiring) -> LogUnderCheck:
@@ -68,7 +67,7 @@ def _mended(work: LogUnderCheck, channels: tuple[str, ...], wiring: Wiring) -> L
 # Order and sign of the columns of motors: by u = R i + K l w, or by the likeness of drive and speed
 
 HOLDS = 0.25  # of the voltage: where more is left of it under every wiring, a scale is wrong, and no wiring is told
-EXACT = 0.004  # of the voltage: what less is left of it is the noise of an exact relation
+EXACT_SHARE = 0.004  # of the voltage: what less is left of it is the noise of an exact relation
 
 
 def motor_known(work: LogUnderCheck) -> bool:
@@ -82,10 +81,10 @@ class Circuit(NamedTuple):
     """known: whether u = R i + K l w holds under some wiring. wrong: (channel that is wired wrongly, how), or None."""
 
     known: bool
-    wrong: tuple[str, Answer] | None = None
+    wrong: tuple[str, WiringChoice] | None = None
 
 
-def by_drive(work: LogUnderCheck) -> tuple[str, Answer] | None:
+def by_drive(work: LogUnderCheck) -> tuple[str, WiringChoice] | None:
     """(channel that is wired wrongly, how), from the likeness of voltage or duty and speed."""
     for channel in ("voltage", "duty"):
         if work.full(channel) is not None:
@@ -109,7 +108,7 @@ def by_circuit(work: LogUnderCheck) -> Circuit:
     tried = list(wirings(u.shape[1]))
     total = float((u**2).sum())
     names = ("duty" if work.get("voltage") is None else "voltage", "current", "wheel_speed")
-    best: tuple[str, Answer] | None = None
+    best: tuple[str, WiringChoice] | None = None
     holds = False
     for name, changed, rest in zip(names, (u, r, e), ((r, e, 1), (u, e, -1), (u, r, -1)), strict=True):
         fixed = rest[0] + rest[1] if rest[2] > 0 else rest[0] - rest[1]
@@ -117,7 +116,7 @@ def by_circuit(work: LogUnderCheck) -> Circuit:
         size = float((changed**2).sum() + (fixed**2).sum())
         costs = np.array([size - 2.0 * float((wiring.matrix * m.T).sum()) for wiring in tried])
         holds |= bool(costs.min() < HOLDS * total)
-        answer = choose(tried, costs, total, poor=EXACT)
+        answer = choose(tried, costs, total, poor=EXACT_SHARE)
         if answer is not None and (best is None or answer.left < best[1].left):
             best = (name, answer)
     return Circuit(True, best) if holds or best is not None else _by_scaled_speed(tried, u - r, e, total)
@@ -129,11 +128,11 @@ def _by_scaled_speed(tried: list[Wiring], left: FloatArray, e: FloatArray, total
     costs = float((left**2).sum()) - np.maximum(along, 0.0) ** 2 / max(float((e**2).sum()), 1e-300)
     if not costs.min() < HOLDS * total:
         return Circuit(False)
-    answer = choose(tried, costs, total, poor=EXACT)
+    answer = choose(tried, costs, total, poor=EXACT_SHARE)
     return Circuit(True, None if answer is None else ("wheel_speed", answer))
 
 
-def by_likeness(work: LogUnderCheck, channel: str) -> Answer | None:
+def by_likeness(work: LogUnderCheck, channel: str) -> WiringChoice | None:
     """Order and signs under which a drive channel and the speed of the same wheel look alike."""
     driven, speed = work.full(channel), work.full("wheel_speed")
     if driven is None or speed is None or driven.shape != speed.shape:
@@ -153,7 +152,7 @@ def by_likeness(work: LogUnderCheck, channel: str) -> Answer | None:
     return answer if answer is not None and (answer.logged - answer.left) * n > 1.0 else None
 
 
-def motor_finding(work: LogUnderCheck, channel: str, answer: Answer, rests_on: tuple[str, ...] = ()) -> Finding:
+def motor_finding(work: LogUnderCheck, channel: str, answer: WiringChoice, rests_on: tuple[str, ...] = ()) -> Finding:
     """Errors: columns of one channel of the motors are exchanged, or have the opposite sign."""
     names = components(channel, work.wheels)
     against = "wheel_speed" if channel != "wheel_speed" else CURRENT_AND_VOLTAGE

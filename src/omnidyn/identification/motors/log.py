@@ -14,10 +14,9 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.clocks import usual_step
 from omnidyn.errors import InputError
 from omnidyn.findings.needs import MOTOR_INPUTS, motor_input
-from omnidyn.logs.averaged import rows_of_mean
-from omnidyn.logs.one_clock import on_clock_of
 from omnidyn.logs.plateaus import STEPWISE, live_angle
-from omnidyn.logs.segments import segments
+from omnidyn.logs.resolved import rows_of_mean
+from omnidyn.logs.segments import on_clock_of, segments
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import SENSORS, Run

@@ -11,7 +11,8 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.motors.estimate import BAND, LAG, LATENCY, SLOPE
 from omnidyn.identification.motors.log import CURVE, MEAN, SUB, MotorLog, refined, rows_with
-from omnidyn.identification.output_error.engines.exact import Weighting, march_piece, padded, used_by
+from omnidyn.identification.output_error.engines.engine import Engine, Weighting
+from omnidyn.identification.output_error.engines.exact import march_piece, padded, used_by
 from omnidyn.identification.output_error.kernel.march import KEEP, PATH, Physics, PhysicsSlopes
 from omnidyn.identification.output_error.problem.nuisances import EARLIEST, LATEST
 from omnidyn.identification.output_error.problem.parameters import Parameter
@@ -120,7 +121,7 @@ class MotorProblem(Fitted):
     pieces: tuple[Piece, ...]
 
 
-class MotorEngine:
+class MotorEngine(Engine[MotorProblem]):
     """Residuals and sensitivities of a motor by the exact step."""
 
     def __init__(self, problem: MotorProblem):

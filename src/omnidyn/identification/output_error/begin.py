@@ -9,7 +9,6 @@ from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.findings.needs import is_exact, why_no_inputs
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.prepare import (
-    LOOP,
     Group,
     expand_keys,
     free_by_default,
@@ -18,8 +17,7 @@ from omnidyn.identification.output_error.prepare import (
     read_records,
     stays_exact,
 )
-from omnidyn.identification.output_error.problem.band import without_band
-from omnidyn.identification.output_error.problem.bending import with_damping
+from omnidyn.identification.output_error.problem.friction_laws import with_damping, without_band
 from omnidyn.identification.output_error.problem.parameters import refuse_unknown
 from omnidyn.identification.output_error.trust.breakaway import asked_levels, refuse_level
 from omnidyn.model.keys import Key
@@ -73,7 +71,7 @@ def begun(
 
 def _refuse_profile(group: Group, question: OutputError) -> None:
     levels = [each for each in asked_levels(group.robot, question.free or (), question.fixed) if group.tells(each)]
-    why = "a speed loop" if group.engine == LOOP else ""
+    why = "a speed loop" if group.engine.looped else ""
     if group.robot.wheels.traction_mu is not None:
         why = "wheels that may slip"
     if why and levels:

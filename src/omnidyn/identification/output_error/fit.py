@@ -13,27 +13,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from omnidyn.errors import UnsupportedError
+from omnidyn.errors import InsufficientDataError, UnsupportedError
 from omnidyn.identification.grouping import count_once
 from omnidyn.identification.methods import AUTO, GAUSS, STUDENT, OutputError
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import WHOLE, begun, group_names
 from omnidyn.identification.output_error.conclusion import conclude, unexplained
-from omnidyn.identification.output_error.joint import JointEngine, join, joint_start, own_names
+from omnidyn.identification.output_error.joint import join, joint_start, own_names
 from omnidyn.identification.output_error.linear.blocks import rejected_nuisances
-from omnidyn.identification.output_error.linear.rounded_inputs import beside_rounding
-from omnidyn.identification.output_error.linear.sensitivity import moved_by_the_file
+from omnidyn.identification.output_error.linear.sensitivity import beside_rounding, moved_by_the_file
 from omnidyn.identification.output_error.memory.whitening import Weighed, whitened, why_not
 from omnidyn.identification.output_error.prepare import (
-    EXACT,
     FINE,
-    IMPLICIT,
-    LOOP,
     Group,
     guesses,
-    make_engine,
 )
-from omnidyn.identification.output_error.problem.band import band_note, with_band
+from omnidyn.identification.output_error.problem.friction_laws import band_note, with_band
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, automatic, implausible
 from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated
 from omnidyn.identification.output_error.problem.problem import Problem
@@ -43,9 +38,8 @@ from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_ou
 from omnidyn.identification.output_error.solve.progress import Best, FitProgress
 from omnidyn.identification.output_error.solve.solver import ENOUGH, Normal, Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import Breakaway, asked_levels, find_breakaway
-from omnidyn.identification.output_error.trust.differences import differences
 from omnidyn.identification.output_error.trust.no_fall import without_a_fall
-from omnidyn.identification.output_error.trust.resampling import beside, refuse_bootstrap, resampled
+from omnidyn.identification.output_error.trust.resampling import beside, differences, refuse_bootstrap, resampled
 from omnidyn.identification.output_error.trust.support import supported, too_early
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, Trust, trust
 from omnidyn.model.known.told import known_priors
@@ -124,7 +118,16 @@ class Fit:
         Raises InputError for a name to profile that is not free, InsufficientDataError where the logs say nothing about
         any of the robot's numbers.
         """
-        answer = self._answer(found, progress or FitProgress())
+        progress = progress or FitProgress()
+        if isinstance(found, Solution) and not found.converged:
+            found = self._with_latencies_only(found, progress) or found
+        try:
+            answer = self._answer(found, progress)
+        except InsufficientDataError:
+            plainer = self._with_latencies_only(found, progress) if isinstance(found, Solution) else None
+            if plainer is None:
+                raise
+            answer = self._answer(plainer, progress)
         note, estimates = band_note(self.began), answer.estimates
         return replace(
             answer,
@@ -165,12 +168,11 @@ class Fit:
             return Answer({group.name: estimate}, (), solver.problem.names, (), (solution,))
         exact, known = known, self._beside_what_is_held(known, sure) if done else known
         engine, estimates, alones, wider = solver.engine, {}, [], beside(again, by, sure.known, known).intervals
-        assert isinstance(engine, JointEngine)
         for member in engine.members:
             words = [*warnings, *member.group.warnings]
-            better = engine.named_alone(member, wider)
-            seen, alone = engine.seen_alone(member, solution, known)
-            as_exact = alone if exact is known else engine.seen_alone(member, solution, exact)[1]
+            better = member.named_alone(solver.problem, wider)
+            seen, alone = member.alone(solution), member.trust_alone(solver.problem, known)
+            as_exact = alone if exact is known else member.trust_alone(solver.problem, exact)
             estimate = conclude(
                 seen.solver, seen, alone, member.group.records, loss, words, {}, member.group.moved, (), better,
                 as_exact,
@@ -192,7 +194,7 @@ class Fit:
         """Key -> std of what the robot file knows only so far, and the fit took as it stands."""
         asked = {*(name.partition(AT)[0] for name in problem.names), *(self.question.free or ())}
         known, group = known_priors(self.began), self.groups[0]
-        return {key: known[key][1] for key in guesses(self.began, group.engine == LOOP) if key not in asked}
+        return {key: known[key][1] for key in guesses(self.began, group.engine.looped) if key not in asked}
 
     def weighed(self, solution: Solution, progress: FitProgress | None = None, anew: bool = True) -> Weighed:
         """The trust in a solution; where its errors remember, that in the fit made anew for it, and its point.
@@ -222,23 +224,23 @@ class Fit:
         if self.question.nuisances is not None:
             return found
         early = too_early(found.solver, found)
-        if group.engine == IMPLICIT:
+        if not group.engine.exact and not group.engine.looped:
             kept = tuple(name for name in _nuisances(found.solver.problem) if name not in early)
         else:
             progress.enter("which nuisances the logs support")
-            kept = supported(found.solver, found, (LATENCY,) if group.engine == LOOP else automatic(group.records))
-        harmful = rejected_nuisances(found) if group.engine != LOOP else ()
+            kept = supported(found.solver, found, (LATENCY,) if group.engine.looped else automatic(group.records))
+        harmful = rejected_nuisances(found) if not group.engine.looped else ()
         kept = tuple(name for name in kept if name not in harmful)
         lost = [name for name in _nuisances(found.solver.problem) if name not in kept]
         if not lost:
             return found
         notes = tuple(implausible(name, value, fitted=False) for name, value in early.items())
         notes += tuple(Statement("harmful_nuisance", WARNING, name) for name in harmful if name not in early)
-        if group.engine == LOOP:  # from its start on: until it is done, the fit with all of them is the best so far
+        if group.engine.looped:  # from its start on: until it is done, the fit with all of them is the best so far
             progress = progress.aside(f"once more without {', '.join(lost)}")
         return replace(self._solve(group, group.problem(kept), progress), notes=notes)
 
-    def with_latencies_only(self, found: Solution, progress: FitProgress) -> Solution | None:
+    def _with_latencies_only(self, found: Solution, progress: FitProgress) -> Solution | None:
         """The fit of one group without other automatic nuisances; None where there are none, or they were asked for.
 
         Beside them the logs may tell no number of the robot at all, or trade them without end, until rounding decides.
@@ -254,15 +256,15 @@ class Fit:
 
     def _solve(self, group: Group, problem: Problem, progress: FitProgress) -> Solution:
         """The best point of one group alone."""
-        if group.engine == LOOP:
+        if group.engine.looped:
             return solve_loop(problem, self.nu, progress)
-        engine = make_engine(group.engine, problem)
-        if group.engine == EXACT:
+        engine = group.engine.of(problem, FINE)
+        if group.engine.exact:
             progress.enter("looking for a start")
             solver = Solver(problem, engine, self.nu)
             return solver.minimise(first_point(solver, group.records), progress=progress)
         near = coarse_point(problem, self.nu, progress)
-        halfway = Solver(problem, make_engine(group.engine, problem, HALFWAY), self.nu, ENOUGH)
+        halfway = Solver(problem, group.engine.of(problem, HALFWAY), self.nu, ENOUGH)
         scales = near.variance if self.nu else None  # counts find theirs anew: a step a row is too coarse for them
         nearer = halfway.minimise(near.point, progress=progress, scales=scales)
         return Solver(problem, engine, self.nu, CLOSE).minimise(
@@ -286,16 +288,15 @@ class Fit:
     @property
     def _settles(self) -> bool:
         """Whether nuisances are taken out again that the logs do not support."""
-        exact = all(group.engine == EXACT for group in self.groups)
+        exact = all(group.engine.exact for group in self.groups)
         return self.question.nuisances is None and (exact or len(self.groups) == 1)
 
     def _solve_joint(self, nuisances: Sequence[str] | None, progress: FitProgress) -> Solution:
         """The best point of all groups together."""
         solver = self._solver(nuisances)
         engine = solver.engine
-        assert isinstance(engine, JointEngine)
-        start, loop = joint_start(engine, self.nu, progress), self.groups[0].engine == LOOP
-        if any(group.engine != EXACT for group in self.groups):  # first a step a row
+        start, loop = joint_start(engine, self.nu, progress), self.groups[0].engine.looped
+        if any(not group.engine.exact for group in self.groups):  # first a step a row
             coarse = self._solver(nuisances, coarse=True)
             aside = progress.aside("all groups, first a step a row")
             start = coarse.minimise(start, progress=aside).state.point
@@ -309,7 +310,7 @@ class Fit:
         problems, tol = [group.problem(nuisances) for group in self.groups], None if coarse else FINE
         if len(problems) == 1:
             kind = self.groups[0].engine
-            return Solver(problems[0], make_engine(kind, problems[0], LOOP_FINE if kind == LOOP else tol), self.nu)
+            return Solver(problems[0], kind.of(problems[0], LOOP_FINE if kind.looped else tol), self.nu)
         engine = join(self.groups, problems, own_names(self.question.per_free, problems), tol)
         return Solver(engine.problem, engine, self.nu)
 
@@ -322,7 +323,6 @@ class Fit:
             state = solver.state(state.point, state.variance if solver.scaled.any() else None)
         else:
             solver = self._solver(None)
-            assert isinstance(solver.engine, JointEngine)
             state = solver.minimise(joint_start(solver.engine, self.nu, FitProgress(), best.alone), limit=0).state
             late = [group.name for group in self.groups if group.name not in best.alone]
             warnings += [Statement("group_not_fitted", WARNING, name) for name in late]
@@ -331,7 +331,7 @@ class Fit:
     def _hints(self, solution: Solution) -> list[Statement]:
         """Which logs of a speed loop are not used."""
         group = self.groups[0]
-        alone = len(self.groups) == 1 and group.engine == LOOP
+        alone = len(self.groups) == 1 and group.engine.looped
         return left_out(group.records, solution.solver.problem.pieces) if alone else []
 
     def with_levels(self, solution: Solution, progress: FitProgress | None = None) -> tuple[Solution, list[Breakaway]]:

@@ -10,14 +10,14 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError
-from omnidyn.identification.output_error.engines.exact import Weighting
-from omnidyn.identification.output_error.prepare import EXACT, FINE, LOOP, Group, make_engine
+from omnidyn.identification.output_error.engines.engine import Engine, Weighting
+from omnidyn.identification.output_error.prepare import FINE, Group
 from omnidyn.identification.output_error.problem.parameters import AT, Parameter
 from omnidyn.identification.output_error.problem.problem import Parts, PieceSums, Point, Problem
 from omnidyn.identification.output_error.solve.first_point import first_point, moving_start
 from omnidyn.identification.output_error.solve.loop import loop_start
 from omnidyn.identification.output_error.solve.progress import FitProgress
-from omnidyn.identification.output_error.solve.solver import RowEngine, Solution, Solver, State
+from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
 from omnidyn.identification.output_error.trust.uncertainty import SHARE, Trust
 from omnidyn.model.keys import find_key
 
@@ -30,7 +30,7 @@ class Member:
 
     group: Group
     problem: Problem
-    engine: RowEngine
+    engine: Engine[Problem]
     at: IntArray
     places: IntArray
 
@@ -43,13 +43,40 @@ class Member:
         """The point of this group alone."""
         return Point(joint.values[self.at], tuple(joint.states[k] for k in self.places))
 
+    def columns_of(self, joint: Problem) -> IntArray:
+        """Where the columns of this group stand among all."""
+        return np.array([joint.columns.index(column) for column in self.problem.columns])
 
-class JointEngine:
+    def alone(self, solution: Solution) -> Solution:
+        """What a solution of all groups is for this one."""
+        at, now, solver = self.at, solution.state, solution.solver
+        variance = now.variance[self.columns_of(solver.problem)]
+        state = State(self.point(now.point), [now.sums[k] for k in self.places], now.objective, variance)
+        own = Solver(self.problem, self.engine, solver.nu, counted=solver.counted)
+        return Solution(state, solution.held[at], solution.iterations, solution.converged, own)
+
+    def trust_alone(self, joint: Problem, known: Trust) -> Trust:
+        """What the trust in a solution of all groups is for this one."""
+        at, columns = self.at, self.columns_of(joint)
+        return replace(
+            known, covariance=known.covariance[np.ix_(at, at)], held=known.held[at], blind=known.blind[at],
+            unseen=known.unseen[at], free_step=known.free_step[at], neighbours=known.neighbours[columns],
+            plain=known.plain[np.ix_(at, at)], guessed=known.guessed[at],
+            directions=tuple((v, way[at]) for v, way in known.directions if np.abs(way[at]).max() > SHARE),
+            ways=tuple(replace(way, step=way.step[at], size=way.size[at]) for way in known.ways if way.step[at].any()),
+        )  # fmt: skip
+
+    def named_alone(self, joint: Problem, found: Mapping[str, T]) -> dict[str, T]:
+        """What was found by the names of all groups, by the names of this one."""
+        names = (joint.names[k] for k in self.at)
+        return {p.name: found[name] for p, name in zip(self.problem.parameters, names, strict=True) if name in found}
+
+
+class JointEngine(Engine[Problem]):
     """The engines of all groups as one: the sums of each piece, put where its parameters stand among all."""
 
     def __init__(self, problem: Problem, members: Sequence[Member]):
         self.problem, self.members = problem, tuple(members)
-        self._columns = {column: k for k, column in enumerate(problem.columns)}
 
     def on(self, problem: Problem) -> JointEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
@@ -65,14 +92,14 @@ class JointEngine:
         """Sums of all pieces, each over all parameters: 0 for those of other groups."""
         found: dict[int, PieceSums] = {}
         for member in self.members:
-            columns = self.columns_of(member)
+            columns = member.columns_of(self.problem)
             own = replace(weighting, variance=weighting.variance[columns])
             for place, sums in zip(member.places, member.engine.sums(member.point(point), own), strict=True):
                 found[int(place)] = _widened(sums, member.at, columns, len(self.problem.parameters))
         return [found[k] for k in range(len(self.problem.pieces))]
 
     def residuals(self, point: Point) -> list[Parts]:
-        """(residuals, slopes, at) of every piece, see engines/sums.py; at: among the parameters of all groups."""
+        """(residuals, slopes, at) of every piece, see engines/engine.py; at: among the parameters of all groups."""
         found: dict[int, Parts] = {}
         for member in self.members:
             more = len(self.problem.parameters) - len(member.at)
@@ -82,35 +109,6 @@ class JointEngine:
                 own = at < len(member.at)
                 found[int(place)] = residual, slopes, np.where(own, member.at[np.where(own, at, 0)], at + more)
         return [found[k] for k in range(len(self.problem.pieces))]
-
-    def columns_of(self, member: Member) -> IntArray:
-        """Where the columns of a group stand among all."""
-        return np.array([self._columns[column] for column in member.problem.columns])
-
-    def alone(self, member: Member, solution: Solution) -> Solution:
-        """What a solution of all groups is for one of them."""
-        at, now = member.at, solution.state
-        variance = now.variance[self.columns_of(member)]
-        state = State(member.point(now.point), [now.sums[k] for k in member.places], now.objective, variance)
-        solver = Solver(member.problem, member.engine, solution.solver.nu, counted=solution.solver.counted)
-        return Solution(state, solution.held[at], solution.iterations, solution.converged, solver)
-
-    def seen_alone(self, member: Member, solution: Solution, known: Trust) -> tuple[Solution, Trust]:
-        """What a solution of all groups and the trust in it are for one of them."""
-        at, columns = member.at, self.columns_of(member)
-        own = replace(
-            known, covariance=known.covariance[np.ix_(at, at)], held=known.held[at], blind=known.blind[at],
-            unseen=known.unseen[at], free_step=known.free_step[at], neighbours=known.neighbours[columns],
-            plain=known.plain[np.ix_(at, at)], guessed=known.guessed[at],
-            directions=tuple((v, way[at]) for v, way in known.directions if np.abs(way[at]).max() > SHARE),
-            ways=tuple(replace(way, step=way.step[at], size=way.size[at]) for way in known.ways if way.step[at].any()),
-        )  # fmt: skip
-        return self.alone(member, solution), own
-
-    def named_alone(self, member: Member, found: Mapping[str, T]) -> dict[str, T]:
-        """What was found by the names of all groups, by the names of one of them."""
-        names = (self.problem.names[k] for k in member.at)
-        return {p.name: found[name] for p, name in zip(member.problem.parameters, names, strict=True) if name in found}
 
 
 def _widened(sums: PieceSums, at: IntArray, columns: IntArray, count: int) -> PieceSums:
@@ -165,13 +163,13 @@ def join(
     for group, problem, mine in zip(groups, problems, names, strict=True):
         places = np.arange(first, first + len(problem.pieces))
         at = np.array([joint.where(name) for name in mine])
-        found.append(Member(group, problem, make_engine(group.engine, problem, tol), at, places))
+        found.append(Member(group, problem, group.engine.of(problem, tol), at, places))
         first += len(places)
     return JointEngine(joint, found)
 
 
 def joint_start(
-    engine: JointEngine, nu: float, progress: FitProgress, alone: Mapping[str, State] | None = None
+    engine: Engine[Problem], nu: float, progress: FitProgress, alone: Mapping[str, State] | None = None
 ) -> Point:
     """Each group begins where it would alone, or where `alone` says; shared numbers at the median of the groups."""
     values: list[list[float]] = [[] for _ in engine.problem.parameters]
@@ -181,9 +179,9 @@ def joint_start(
         progress.enter(words)
         if alone and member.name in alone:
             point = alone[member.name].point
-        elif member.group.engine == EXACT:
+        elif member.engine.exact:
             point = first_point(Solver(member.problem, member.engine, nu), member.group.records).point
-        elif member.group.engine == LOOP:
+        elif member.engine.looped:
             point = loop_start(member.problem, nu, progress.aside(words))
         else:
             point = moving_start(member.problem, nu, progress)

@@ -7,21 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from omnidyn.arrays import BoolArray
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.methods import OutputError
+from omnidyn.identification.output_error.engines.engine import Engine
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.engines.slipping import implicit_engine
 from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
-from omnidyn.identification.output_error.problem.band import BANDS
 from omnidyn.identification.output_error.problem.differences import differences
-from omnidyn.identification.output_error.problem.falling import falls, kept_in_order
-from omnidyn.identification.output_error.problem.motion import NOTHING, Motion, motion
+from omnidyn.identification.output_error.problem.friction_laws import BANDS, falls, kept_in_order
 from omnidyn.identification.output_error.problem.nuisances import (
     LATENCY,
-    TRAVELS,
     automatic,
     earliest,
     nuisance_parameters,
@@ -30,9 +27,16 @@ from omnidyn.identification.output_error.problem.nuisances import (
 from omnidyn.identification.output_error.problem.parameters import Parameter, names_of, robot_parameters
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.problem.record import Record, record
+from omnidyn.identification.output_error.problem.starts import (
+    count_far,
+    measured_rows,
+    measured_twist,
+    window_rows,
+)
 from omnidyn.identification.output_error.solve.loop import loop_keys, loop_pieces, looped
 from omnidyn.identification.output_error.trust.breakaway import is_profiled
-from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.actuation import reaching
+from omnidyn.model.dynamics import drive_wrench, state_space
 from omnidyn.model.frames import AXES
 from omnidyn.model.keys import (
     BODY_AXES,
@@ -52,13 +56,15 @@ from omnidyn.model.keys import (
 )
 from omnidyn.model.keys import LATENCY as DRIVE_LATENCY
 from omnidyn.model.known.told import known_priors
+from omnidyn.model.mass import mass_matrix
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
-from omnidyn.statement import Statement
+from omnidyn.simulation.slip.plant import grips
+from omnidyn.statement import WARNING, Statement
+from omnidyn.statistics import difference_noise
 
-EXACT, IMPLICIT, LOOP = "exact", "implicit", "loop"  # the engines
+Kind = type[Engine[Problem]]  # of an engine
 FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
-FINER = 1e-6  # the same where a path is fitted: what a speed is off by adds up, to a tick of an encoder in 10 s
 ASIDE = 0.01  # by how much numbers are moved apart to see which engine knows the robots that they may make
 BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
 START_STD = np.array([0.5, 0.5, 5.0])  # [m/s, m/s, rad/s] of the twist of the first rows from that at the start
@@ -89,7 +95,7 @@ class Group:
     records: list[Record]
     robot: Robot
     question: OutputError
-    engine: str
+    engine: Kind
     usual: tuple[str, ...]
     moved: BoolArray
     bounds: dict[str, float]
@@ -117,8 +123,8 @@ def make_group(
     found = motion(records, robot)
     if looped(records):
         question = _loop_question(question, found, records, robot)
-        return Group(name, records, robot, question, LOOP, usual, found.moved, {}, ())
-    engine, bounds, warnings = EXACT if exact else IMPLICIT, {}, []
+        return Group(name, records, robot, question, LoopEngine, usual, found.moved, {}, ())
+    engine, bounds, warnings = ExactEngine if exact else ImplicitEngine, {}, []
     asked = question.free if question.free is not None else (*dict.fromkeys((*usual, *guesses(robot))),)
     fixed = set(question.fixed)
     for axis in np.flatnonzero(~found.moved).tolist():
@@ -176,7 +182,11 @@ def read_records(runs: Sequence[Run], robot: Robot, question: OutputError) -> li
 
 
 def make_problem(
-    records: Sequence[Record], robot: Robot, question: OutputError, engine: str = "", usual: Sequence[str] = ()
+    records: Sequence[Record],
+    robot: Robot,
+    question: OutputError,
+    engine: Kind | None = None,
+    usual: Sequence[str] = (),
 ) -> Problem:
     """What is free, and how the pieces start. engine, usual: of `engine_for` and `free_by_default`, where known.
 
@@ -195,10 +205,10 @@ def make_problem(
         raise InputError("nothing is free", got=got, expected="at least one beside breakaway", where="free")
     own = robot_parameters(robot, keys, priors)
     engine = engine or engine_for(records, robot, keys)
-    if engine != EXACT:
+    if not engine.exact:
         drive = _drive(records, robot)
         own = [kept_in_order(_within_reach(p, drive), robot, keys) for p in own]
-    auto = automatic(records, engine == EXACT)
+    auto = automatic(records, engine.exact)
     more = (
         nuisance_parameters(auto, records, robot, earliest(records)) if question.nuisances is None
         else nuisance_parameters(question.nuisances, records, robot)
@@ -207,8 +217,8 @@ def make_problem(
     start = question.start
     parts = (
         loop_pieces(records, robot, start)
-        if engine == LOOP
-        else pieces(records, robot, start, late, START_STD if engine == IMPLICIT else None)
+        if engine.looped
+        else pieces(records, robot, start, late, None if engine.exact else START_STD)
     )
     rows = sum(int(np.isfinite(p.record.outputs[p.first : p.last + 1]).sum()) for p in parts)
     if rows <= len(own) + len(more):
@@ -218,24 +228,11 @@ def make_problem(
     return Problem(robot, (*own, *more), len(own), tuple(parts))
 
 
-def make_engine(kind: str, problem: Problem, tol: float | None = FINE) -> ExactEngine | ImplicitEngine | LoopEngine:
-    """The engine of a problem. tol [m/s]: of an implicit one, finer where a path is fitted; None for a step a row."""
-    if kind == EXACT:
-        return ExactEngine(problem)
-    if kind == LOOP:
-        return LoopEngine(problem, tol)
-    travels = any(name in TRAVELS for name, _ in problem.columns)
-    return implicit_engine(problem, tol if tol is None or not travels else min(tol, FINER))
-
-
-def engine_kind(engine: object) -> str:
-    """Which engine it is: EXACT, IMPLICIT or LOOP."""
-    return LOOP if isinstance(engine, LoopEngine) else IMPLICIT if isinstance(engine, ImplicitEngine) else EXACT
-
-
-def engine_for(records: Sequence[Record], robot: Robot, keys: Sequence[str]) -> str:
+def engine_for(records: Sequence[Record], robot: Robot, keys: Sequence[str]) -> Kind:
     """Which engine fits these keys of the robot to the records."""
-    return LOOP if looped(records) else EXACT if is_exact(robot) and stays_exact(robot, keys) else IMPLICIT
+    if looped(records):
+        return LoopEngine
+    return ExactEngine if is_exact(robot) and stays_exact(robot, keys) else ImplicitEngine
 
 
 def stays_exact(robot: Robot, keys: Sequence[str]) -> bool:
@@ -301,3 +298,74 @@ def expand_keys(names: str | Sequence[str], robot: Robot, usual: Sequence[str] =
     """
     each = ((usual or free_by_default(robot)) if name == FRICTION else expand(name, robot) for name in names_of(names))
     return tuple(dict.fromkeys(key for keys in each for key in keys))
+
+
+# Which axes visibly moved in a log, and what drive those that did not have held
+
+NOTHING = 1e-9  # [N, N m] a drive that is only rounding
+CLEAR = 6.0  # standard errors of a short mean that noise does not reach in any log
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """moved (3,): whether an axis visibly moved; True where no twist is known.
+
+    held (3,): largest drive [N, N, N m] of the axes that were measured; 0 where all have moved, and nothing was held.
+    seen (3,): whether anything tells of an axis; what was not measured has held nothing. dead (3,): whether no row of
+    an axis differs from another, where others moved: it stood still, or its sensor is dead.
+    """
+
+    moved: BoolArray
+    held: FloatArray
+    seen: BoolArray
+    dead: BoolArray
+
+    def unfitted(self, axis: int, group: str | None = None) -> Statement:
+        """Why the friction of an axis that did not move is not fitted. group: that of several; None: the only one."""
+        if not self.seen[axis]:
+            return Statement("axis_not_measured", WARNING, AXES[axis], {} if group is None else {"group": group})
+        if group is not None:
+            return Statement("axis_not_moved", WARNING, AXES[axis], {"group": group})
+        held = float(self.held[axis]) if self.held[axis] > NOTHING else 0.0
+        return Statement("axis_not_moved", WARNING, AXES[axis], {"held": held, "dead": bool(self.dead[axis])})
+
+
+def motion(records: Sequence[Record], robot: Robot) -> Motion:
+    """What all logs together show."""
+    moved, seen, dead = np.zeros(3, bool), np.zeros(3, bool), np.ones(3, bool)
+    measured = []
+    for log in records:
+        twist = measured_twist(log, robot)
+        if twist is None:
+            return Motion(np.ones(3, bool), np.zeros(3), np.ones(3, bool), np.zeros(3, bool))
+        known = np.array([np.isfinite(twist[:, axis]).any() for axis in range(3)])
+        measured.append(known)
+        others = any(name != "twist" for name, _ in log.columns)  # which may tell of an axis without a speed
+        seen |= known | others
+        moved |= others & ~known
+        dead &= known & [not np.any(np.diff(own[np.isfinite(own)])) for own in twist.T]
+        for first, last in log.pieces:
+            rows = max(window_rows(log, first, last) // 2, 1)
+            for axis in np.flatnonzero(known).tolist():
+                moved[axis] |= _moved(twist, axis, first, last, rows)
+    held = np.zeros(3) if moved.all() else _most_drive(records, measured, robot)
+    return Motion(moved, held, seen, dead & bool(moved.any()))
+
+
+def _most_drive(records: Sequence[Record], measured: Sequence[BoolArray], robot: Robot) -> FloatArray:
+    """The largest drive of each axis [N, N, N m] in logs that have measured it, each (3,). Shape (3,)."""
+    drive, mass, most = state_space(robot).B, mass_matrix(robot), np.zeros(3)
+    for log, known in zip(records, measured, strict=True):
+        for first, last in log.pieces:
+            wrench = reaching(robot, log.voltage[first:last]) @ drive.T @ mass
+            most = np.maximum(most, np.where(known, np.abs(wrench).max(axis=0), 0.0))
+    if robot.wheels.traction_mu is None:
+        return most
+    return np.minimum(most, np.abs(robot.wheels.wrench_matrix) @ grips(robot))  # beyond it wheels slip
+
+
+def _moved(twist: FloatArray, axis: int, first: int, last: int, rows: int) -> bool:
+    """Whether the mean over so many rows is beyond what noise makes of it, in as many rows."""
+    own = twist[first : last + 1, axis]
+    clear = CLEAR * difference_noise(own) / np.sqrt(measured_rows(own, rows))
+    return int(count_far(twist, axis, first, last, rows, clear)) >= rows

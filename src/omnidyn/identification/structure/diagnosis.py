@@ -10,29 +10,26 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import small_matrices
+from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit, Remedy
 from omnidyn.identification.output_error.linear.motion import motions
-from omnidyn.identification.output_error.linear.rounded_inputs import effects, with_rounding
-from omnidyn.identification.output_error.linear.rows import Linear, Rows
-from omnidyn.identification.output_error.linear.workbench import Workbench
+from omnidyn.identification.output_error.linear.rows import Linear, Rows, solved
+from omnidyn.identification.output_error.linear.sensitivity import effects, with_rounding
+from omnidyn.identification.output_error.linear.workbench import Workbench, scaled
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
-from omnidyn.identification.output_error.prepare import engine_kind
-from omnidyn.identification.output_error.problem.bounded import bounded
-from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
-from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
+from omnidyn.identification.output_error.problem.friction_laws import bending_keys, falls
+from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem, bounded
+from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import levels_of
-from omnidyn.identification.structure.binned import binned
 from omnidyn.identification.structure.misfit import FALSE, Misfit, chance, memory_beside, misfit, with_cause
-from omnidyn.identification.structure.missing.candidates import Candidate, Trial
+from omnidyn.identification.structure.missing.candidates import Candidate, Trial, unoffered
 from omnidyn.identification.structure.missing.laws import candidates
-from omnidyn.identification.structure.missing.odometry import with_odometry
 from omnidyn.identification.structure.missing.refits import refits
-from omnidyn.identification.structure.missing.remedies import remedies
-from omnidyn.identification.structure.missing.unoffered import unoffered
-from omnidyn.identification.structure.noise_level import noise_levels
-from omnidyn.identification.structure.rests_on import rests_on
+from omnidyn.identification.structure.missing.remedies import remedies, with_odometry
+from omnidyn.identification.structure.noise_level import binned, noise_levels
 from omnidyn.identification.structure.shifts import stability
 from omnidyn.identification.structure.tails import as_counted, calmer, wild_samples
+from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
 from omnidyn.model.known.told import holding
 
 SURE = 2.0  # degrees of freedom with which the power of the slowest errors is known within its own size
@@ -66,13 +63,13 @@ def examine(solution: Solution) -> Examined:
     solver, point = solution.solver, solution.state.point
     whole = with_levels(solver.problem, point, levels_of(solution))
     problem = bounded(whole, SHOWN, effects(whole))
-    engine: RowEngine = solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]  # those of whole logs are
+    engine = solver.engine.on(problem)
     parts = engine.residuals(point)
     moved = motions(problem, point)
     rows = with_rounding(Rows.of(problem, point, as_counted(solution, problem, parts)), moved)
     seen = misfit(rows, moved)
     stable = stability(seen.linear)
-    bench = Workbench(problem, point, engine_kind(solver.engine), moved, stable.likely)
+    bench = Workbench(problem, point, type(engine), moved, stable.likely)
     every = [*candidates(bench), *unoffered(bench)]
     tried = _tried(bench, [one for one in every if not one.late])
     ranked = remedies(seen.linear, tried, seen.shown)
@@ -150,3 +147,57 @@ def _sizes(rows: Rows, channels: Mapping[str, float]) -> dict[str, float]:
     """How large a share of the residual of each column is, root mean square."""
     mean = rows.squares(rows.residual) / np.maximum(rows.added(lambda k, j: rows.there[k][j]), 1.0)
     return dict(zip(channels, np.sqrt(np.array([*channels.values()]) * mean).tolist(), strict=True))
+
+
+# What each fitted number rests on: how far it would move if a number that was taken as it stands were another one
+
+PERCENT = 0.01
+TRIED = 0.01  # relative change of a fixed number, either way is alike
+FIXED = (
+    "body.mass_kg", "body.inertia_kg_m2", "wheels.wheel_radius_m", "wheels.robot_radius_m", "motor.resistance_ohm",
+    TORQUE, EMF, "motor.gear_ratio", "motor.rotor_inertia_kg_m2", "wheels.inertia_kg_m2", "motor.voltage_drop_V",
+    "motor.current_limit_A", "wheels.traction_mu", f"{CENTRE}[0]", f"{CENTRE}[1]",
+)  # fmt: skip
+
+LEVELS = (f"{BODY_AXES}.breakaway", f"{DIRECTION}.breakaway", f"{DIRECTION}.yaw_breakaway", f"{WHEELS}.breakaway")
+TRIED_FALL = 1e-3  # the same of a level at which things break away: a larger change may move that to another row
+
+
+def rests_on(linear: Linear, bench: Workbench) -> dict[str, dict[str, float]]:
+    """Number -> fixed key -> relative change of the number per percent of the key, gravest first.
+
+    To first order: what the change shows in the log, as the parameters of the fit would make up for it.
+    """
+    _, j = linear.whole()
+    problem = bench.problem
+    values = bench.point.values
+    found: dict[str, dict[str, float]] = {p.name: {} for p in problem.robot_parameters}
+    taken = {Key.parse(p.name).name for p in problem.robot_parameters}
+    fixed = [(name, TRIED) for name in FIXED if Key.parse(name).name not in taken]
+    for name, tried in [*fixed, *((name, TRIED_FALL) for name in _of_laws(bench))]:
+        robot = scaled(bench.robot, name, 1.0 + tried)
+        if robot is None:
+            continue
+        try:
+            shown = bench.change(robot)
+        except OmnidynError:
+            continue
+        if not any(own.any() for own in shown):
+            continue  # of an axis that never moved
+        step = solved(j, -linear.white(shown)[:, 0]) / tried * PERCENT
+        for p, value, change in zip(problem.robot_parameters, values, step, strict=False):
+            share = change if p.log else change / value if value else np.nan
+            if np.isfinite(share):
+                found[p.name][name] = float(share)
+    return {
+        name: dict(sorted(by.items(), key=lambda item: -abs(item[1]))) for name, by in found.items()
+    }  # fmt: skip
+
+
+def _of_laws(bench: Workbench) -> list[str]:
+    """What a law that falls with the speed, or bends, has beside Coulomb friction, and the fit takes as it stands."""
+    robot, free = bench.robot, bench.problem.names
+    levels = [key for name in LEVELS for key in expand(name, robot) if falls(key, robot)]
+    speeds = [key.replace(BREAKAWAY, "stribeck_speed").removesuffix("_backward") for key in levels]
+    bends = [key for name in bending_keys(robot) for key in expand(name, robot)]
+    return [key for key in dict.fromkeys((*levels, *speeds, *bends)) if key not in free]

@@ -49,11 +49,9 @@ def _speed(motion: Motion, top: FloatArray) -> FloatArray:
 
 def _one_way(motion: Motion, top: FloatArray) -> FloatArray:
     """Forces that do not turn with the direction: a slope, more friction forwards than backwards."""
-    found = []
-    for axis in range(N_AXES):
-        share = np.abs(motion.twist[:, axis]) / top[axis]
-        found += [(axis, np.ones(len(share))), (axis, (share > 0.0).astype(float)), (axis, share)]
-    return _on_axes(found)
+    shares = np.abs(motion.twist) / top
+    sizes = np.ones_like(shares), (shares > 0.0).astype(float), shares
+    return _on_axes([(axis, size[:, axis]) for axis in range(N_AXES) for size in sizes])
 
 
 def _travel(motion: Motion, top: FloatArray) -> FloatArray:
@@ -82,18 +80,15 @@ def _wheels(motion: Motion, top: FloatArray) -> FloatArray:
 
 def _acceleration(motion: Motion, top: FloatArray) -> FloatArray:
     """Mass and inertia that are other than said, and the terms of a turning frame."""
-    pace = np.zeros_like(motion.twist)
-    pace[:-1] = np.diff(motion.twist, axis=0) / np.diff(motion.t)[:, None]
     x, y, w = motion.twist.T
-    found = [(axis, pace[:, other]) for axis in range(N_AXES) for other in range(N_AXES)]
+    found = [(axis, motion.pace[:, other]) for axis in range(N_AXES) for other in range(N_AXES)]
     return _on_axes([*found, (0, w * y), (1, w * x), (0, w**2), (1, w**2), (0, w * np.abs(w)), (1, w * np.abs(w))])
 
 
 def _inputs(motion: Motion, top: FloatArray) -> FloatArray:
     """Motors and drivers that give more or less than said: each, by its voltage, its current and what all draw."""
     g, u, i = motion.robot.wheels.wrench_matrix, motion.voltage, motion.current
-    most = max(float(np.abs(u).max()), 1e-12)
-    peak = max(float(np.abs(i).max()), 1e-12)
+    most, peak = (max(float(np.abs(values).max()), 1e-12) for values in (u, i))
     draw = np.abs(i).sum(axis=1, keepdims=True) / peak
     share, load = u / most, i / peak
     each = np.concatenate([share, np.sign(u)], axis=1)[:, :, None] * np.concatenate([g, g], axis=1).T
@@ -102,47 +97,33 @@ def _inputs(motion: Motion, top: FloatArray) -> FloatArray:
         (np.sign(i) * np.maximum(np.abs(load) - 0.5, 0.0)) @ g.T, load @ g.T,
         (np.sign(u) * np.exp(-np.abs(share) / 0.15)) @ g.T,
     ], axis=1)  # fmt: skip
-    loaded = np.abs(load) @ np.abs(g).T
-    dry = np.sign(motion.twist) * loaded  # friction that grows with what the gears carry
+    dry = np.sign(motion.twist) * (np.abs(load) @ np.abs(g).T)  # friction that grows with what the gears carry
     return np.concatenate([each, along, _on_axes([(a, dry[:, a]) for a in range(N_AXES)])], axis=1)
 
 
 def _time(motion: Motion, top: FloatArray) -> FloatArray:
     """What is not the same at the end of the log as at its start: friction, mass, supply."""
     tau = 2.0 * motion.share - 1.0
-    g = motion.robot.wheels.wrench_matrix
-    share = motion.twist / top
-    found = []
-    for shape in (tau, tau**2, np.sign(tau - 0.0)):
-        found += [(a, np.sign(motion.twist[:, a]) * shape) for a in range(N_AXES)]
-        found += [(a, share[:, a] * shape) for a in range(N_AXES)]
-    drive = (motion.voltage @ g.T) / max(float(np.abs(motion.voltage).max()), 1e-12)
-    more = np.stack([drive * shape[:, None] for shape in (tau, tau**2, np.sign(tau))], axis=1)
-    return np.concatenate([_on_axes(found), more], axis=1)
-
-
-def _heading(motion: Motion, top: FloatArray) -> FloatArray:
-    """A force that stays in the room: a slope under a robot that turns, a cable."""
-    return in_the_room(motion)
+    shapes = tau, tau**2, np.sign(tau)
+    sizes = np.sign(motion.twist), motion.twist / top
+    friction = [(a, size[:, a] * shape) for shape in shapes for size in sizes for a in range(N_AXES)]
+    drive = (motion.voltage @ motion.robot.wheels.wrench_matrix.T) / max(float(np.abs(motion.voltage).max()), 1e-12)
+    supply = np.stack([drive * shape[:, None] for shape in shapes], axis=1)
+    return np.concatenate([_on_axes(friction), supply], axis=1)
 
 
 def _angles(motion: Motion, top: FloatArray) -> FloatArray:
     """What comes back with every turn of a wheel: an eccentric wheel, a bent axle, teeth. On force and on speed."""
     g = motion.robot.wheels.wrench_matrix
-    turned = np.zeros_like(motion.voltage)
-    radii = motion.robot.wheels.radii
-    middle = 0.5 * (motion.twist[1:] + motion.twist[:-1]) * np.diff(motion.t)[:, None]
-    turned[1:] = np.cumsum(middle @ g, axis=0) / radii
     return np.concatenate(
-        [wave(n * turned)[:, :, None] * g.T for n in (1.0, 2.0) for wave in (np.cos, np.sin)], axis=1
+        [wave(n * motion.turned)[:, :, None] * g.T for n in (1.0, 2.0) for wave in (np.cos, np.sin)], axis=1
     )  # fmt: skip
 
 
 def _sensors(motion: Motion, top: FloatArray) -> FloatArray:
     """Sensors that show more or less, later or one-sided: each column by itself. Shape (C, n, K)."""
-    speed = motion.shown(motion.twist[:, None, :])[:, :, 0]
+    speed, dt = motion.shown(motion.twist[:, None, :])[:, :, 0], np.diff(motion.t)
     count = len(speed)
-    dt = np.diff(motion.t)
     out = np.zeros((count, len(motion.t), 4 * count))
     for c, own in enumerate(speed):
         pace = np.zeros_like(own)
@@ -162,7 +143,7 @@ THEMES = (
     Theme("the acceleration", _acceleration),
     Theme("voltages and currents", _inputs),
     Theme("the time in the log", _time),
-    Theme("the heading in the room", _heading),
+    Theme("the heading in the room", lambda motion, _: in_the_room(motion)),
     Theme("the angle of the wheels", _angles),
     Theme("what each sensor shows", _sensors, sensed=True),
 )
@@ -171,18 +152,7 @@ THEMES = (
 def shown_by_themes(motion: Motion, top: FloatArray, themes: Sequence[Theme] = THEMES) -> tuple[FloatArray, list[int]]:
     """(what all directions of all themes show of a motion (C, n, K), how many of the K each theme has)."""
     forces = [theme.directions(motion, top) for theme in themes if not theme.sensed]
-    pushed = motion.shown_by(np.concatenate(forces, axis=1)) if forces else None
-    sensed = [theme.directions(motion, top) for theme in themes if theme.sensed]
-    counts, seen = [], 0
-    found = []
-    rest, more = iter(forces), iter(sensed)
-    for theme in themes:
-        if theme.sensed:
-            found.append(next(more))
-        else:
-            assert pushed is not None
-            k = next(rest).shape[1]
-            found.append(pushed[:, :, seen : seen + k])
-            seen += k
-        counts.append(found[-1].shape[2])
-    return np.concatenate(found, axis=2), counts
+    ends = np.cumsum([force.shape[1] for force in forces])[:-1]
+    pushed = iter(np.split(motion.shown_by(np.concatenate(forces, axis=1)), ends, axis=2) if forces else ())
+    columns = [theme.directions(motion, top) if theme.sensed else next(pushed) for theme in themes]
+    return np.concatenate(columns, axis=2), [own.shape[2] for own in columns]

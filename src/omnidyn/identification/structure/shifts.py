@@ -1,6 +1,6 @@
 """Which numbers differ between parts of the logs by more than they may: before and after a moment, from log to log.
 
-Each part is fitted for itself to first order, from the best point of all (blocks.py); estimates of one number in K
+Each part is fitted for itself to first order, from the best point of all (`Blocks`); estimates of one number in K
 parts are compared by chi squared with K - 1 degrees of freedom, over F where the noise is known by few. What was tested
 counts: p is multiplied by the number of tests (Bonferroni). A moment is looked for at 33 shares of each log, and is the
 one that explains most; J. Bai, P. Perron, Econometrica 66, 47 (1998).
@@ -15,14 +15,16 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
-from omnidyn.identification.output_error.linear.rows import Linear, Rows
+from omnidyn.identification.output_error.linear.rows import SAME, Linear, Rows
 from omnidyn.identification.output_error.problem.problem import Problem
+from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.stability import LOGS, TIME, Level, Shift, Split, Stability
-from omnidyn.identification.structure.blocks import BLOCKS, Blocks, apart
 from omnidyn.identification.structure.misfit import TOLD as KNOWN
 from omnidyn.identification.structure.misfit import memory_beside
 from omnidyn.statistics import homogeneity, t_quantile
 
+BLOCKS = 40  # of each log, the same share of its time each
+FIRM = 50.0  # rows that the noise of an output in a part is worth beforehand: that of all logs
 FALSE = 0.01  # of right logs in which some moment is found; the same between logs
 FIRST = BLOCKS // 10  # blocks before the first moment, and after the last
 MOST_LOGS = 30  # logs that are each looked through for a moment
@@ -56,12 +58,12 @@ def stability(linear: Linear) -> Stability:
 
 def _after(rows: Rows, share: float) -> list[FloatArray]:
     """What the numbers show after a share of each log, and not before: slopes (C, rows, P) of each piece."""
-    found = []
-    for piece, slopes in zip(rows.pieces, rows.slopes, strict=True):
-        t = piece.record.t
-        later = t[piece.first : piece.last + 1] - t[0] >= share * (t[-1] - t[0])
-        found.append(slopes * later[:, None])
-    return found
+    later = [
+        piece.record.t[piece.first : piece.last + 1] - piece.record.t[0]
+        >= share * (piece.record.t[-1] - piece.record.t[0])
+        for piece in rows.pieces
+    ]
+    return [slopes * after[:, None] for slopes, after in zip(rows.slopes, later, strict=True)]
 
 
 class _Look:
@@ -70,25 +72,22 @@ class _Look:
     def __init__(self, linear: Linear):
         self.linear, self.blocks = linear, Blocks.of(linear)
         self.problem, self.values = linear.rows.problem, linear.rows.point.values
-        count = len(self.problem.parameters)
         self.prior, self.pull = _known(self.problem, self.values, self.blocks.size)
         whole = self.blocks.part(np.ones((len(self.blocks.products), BLOCKS), dtype=bool))
         self.told, self.shared = _told(whole, self.problem, self.values, self.prior)
-        assert len(self.told) + len(self.shared) <= count
 
     def stability(self) -> Stability:
         """All comparisons."""
         if not len(self.told):
             return Stability({}, ())
-        tested, splits = {}, []
         logs = len(self.blocks.records)
         cuts = [self._moment(None)]
         if 1 < logs <= MOST_LOGS:
             cuts += [self._moment(log) for log in range(logs)]
         tests = (len(self.told) + 1) * sum(len(found) for found in cuts)
         moments = [split for log, found in enumerate(cuts, -1) if (split := self._split_at(found, log, tests))]
-        tested[TIME] = self._least([one for found in cuts for one in found.values()], tests)
-        splits += sorted(moments, key=lambda split: split.p)[:1]
+        tested = {TIME: self._least([one for found in cuts for one in found.values()], tests)}
+        splits = sorted(moments, key=lambda split: split.p)[:1]
         if logs > 1:
             between = self._compared([self.blocks.log[:, None] == log for log in range(logs)])
             tested[LOGS] = self._least([between], len(self.told) + 1)
@@ -108,12 +107,12 @@ class _Look:
 
     def _compared(self, chosen: Sequence[BoolArray]) -> _Compared:
         """Numbers of parts, each compared, and all together."""
-        wide = (len(self.blocks.products), BLOCKS)
-        parts = [self.blocks.part(np.broadcast_to(own, wide)) for own in chosen]
+        chosen = [np.broadcast_to(own, (len(self.blocks.products), BLOCKS)) for own in chosen]
+        parts = [self.blocks.part(own) for own in chosen]
         steps, covariance = apart(parts, self.told, self.shared, self.prior, self.pull)
         k, t = steps.shape
         open_ = ~np.isfinite(np.diag(covariance)).reshape(k, t)
-        ratio, degrees = self._scatter([np.broadcast_to(own, wide) for own in chosen], steps, covariance)
+        ratio, degrees = self._scatter(chosen, steps, covariance)
         p = np.ones(t)
         for j in range(t):
             own = np.flatnonzero(~open_[:, j])
@@ -207,14 +206,13 @@ class _Look:
             Shift(self.problem.parameters[self.told[j]].name, tuple(self._levels(found, j, names)), float(tests * p))
             for j, p in enumerate(found.p.tolist()) if tests * p <= FALSE
         ]  # fmt: skip
-        shifts = [each for each in shifts if self._possible(each)]
-        shifts.sort(key=lambda shift: shift.p)
+        # A level that no friction can have is another one than any friction: it is no change of that.
+        bounds = dict(zip(self.problem.names, self.problem.parameters, strict=True))
+        shifts = [
+            one for one in sorted(shifts, key=lambda shift: shift.p)
+            if all(at.ci95[1] > bounds[one.key].low and at.ci95[0] < bounds[one.key].high for at in one.levels)
+        ]  # fmt: skip
         return Split(by, where, *when, share, min(1.0, tests * found.joint[0]), tuple(shifts))
-
-    def _possible(self, shift: Shift) -> bool:
-        """Whether its levels are ones that it can have: what is another one than any friction is no change of that."""
-        p = self.problem.parameters[self.problem.names.index(shift.key)]
-        return all(level.ci95[1] > p.low and level.ci95[0] < p.high for level in shift.levels)
 
     def _levels(self, found: _Compared, j: int, names: Sequence[str]) -> list[Level]:
         """What a number is in each part that tells it."""
@@ -246,20 +244,159 @@ def _told(whole: FloatArray, problem: Problem, values: FloatArray, prior: FloatA
 
     Shared are numbers of the log, such as latencies, and what priors hold. What stands at a bound is neither.
     """
-    count = len(prior)
-    free = np.array(
-        [p.low < value < p.high for p, value in zip(problem.parameters, values.tolist(), strict=True)], dtype=bool
-    )
+    free = np.array([p.low < value < p.high for p, value in zip(problem.parameters, values, strict=True)], dtype=bool)
     at = np.flatnonzero(free)
-    information = whole[1:, 1:][np.ix_(at, at)] + np.diag(prior[at])
-    _, covariance = _solved_apart(information)
-    kept = np.zeros(count)
-    kept[at] = np.sqrt(np.diag(covariance) * prior[at])
-    own = (np.arange(count) < problem.robot_count) & free & ~(kept > TOLD)
+    size, vectors = np.linalg.eigh(whole[1:, 1:][np.ix_(at, at)] + np.diag(prior[at]))
+    seen = size > 1e-12 * max(float(size.max(initial=0.0)), 1e-300)
+    kept = np.zeros(len(prior))
+    kept[at] = np.sqrt(np.diag((vectors[:, seen] / size[seen]) @ vectors[:, seen].T) * prior[at])
+    own = (np.arange(len(prior)) < problem.robot_count) & free & ~(kept > TOLD)
     return np.flatnonzero(own), np.flatnonzero(free & ~own)
 
 
-def _solved_apart(information: FloatArray) -> tuple[FloatArray, FloatArray]:
-    values, vectors = np.linalg.eigh(information)
-    seen = values > 1e-12 * max(float(values.max(initial=0.0)), 1e-300)
-    return values, (vectors[:, seen] / values[seen]) @ vectors[:, seen].T
+# A fit in blocks of its logs: what each alone says of the numbers, to first order around the fit of all
+#
+# Scalar products of [e, J, Z] of every piece, block by block and output by output; e: residuals made white, J: slopes
+# by the parameters, Z: by the start of the piece. A part of the logs is some of the blocks: theirs are added, each
+# output over the noise that it has in this part, and the start is taken out, in each part anew, as if it were fitted
+# alone. What rounded inputs show is a part of the errors: rows are white beside it, too (random_effects.py).
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """products: of each piece (B, C, n, n), n = 1 + P + S; number: of each piece (B, C) rows. column: of each piece
+    (C,), which of the outputs it is. start: of each piece (S, S), what is known of its start. log: of each piece (K,),
+    which log it belongs to. size (P,): what the columns of J were divided by."""
+
+    products: list[FloatArray]
+    number: list[FloatArray]
+    column: list[IntArray]
+    start: list[FloatArray]
+    log: IntArray
+    records: list[Record]
+    size: FloatArray
+
+    @classmethod
+    def of(cls, linear: Linear) -> Blocks:
+        """The blocks of a fit in white rows."""
+        rows, found = linear.rows, cls([], [], [], [], np.zeros(0, dtype=int), [], np.zeros(0))
+        of_pieces = [_white(linear, k) for k in range(len(rows.pieces))]
+        count = len(rows.problem.parameters)
+        size = np.sqrt(sum((x[:, 1 : 1 + count] ** 2).sum(axis=0) for x, _, _ in of_pieces))
+        size = np.where(size > 0.0, size, 1.0)
+        places: dict[int, int] = {}
+        log = []
+        for k, (piece, (x, block, column)) in enumerate(zip(rows.pieces, of_pieces, strict=True)):
+            x[:, 1 : 1 + count] /= size
+            products = np.zeros((BLOCKS, len(rows.column[k]), x.shape[1], x.shape[1]))
+            number = np.zeros(products.shape[:2])
+            for b in np.unique(block).tolist():
+                for c in range(products.shape[1]):
+                    own = x[(block == b) & (column == c)]
+                    products[b, c], number[b, c] = own.T @ own, len(own)
+            known = piece.start_prior(rows.point.states[k])[1]
+            wide = np.zeros(x.shape[1] - 1 - count)
+            held = np.flatnonzero(piece.free)[: len(wide)]
+            wide[: len(held)] = np.append(known, np.zeros(len(piece.free)))[held]
+            found.products.append(products)
+            found.number.append(number)
+            found.column.append(np.array(rows.column[k]))
+            found.start.append(np.diag(wide))
+            log.append(places.setdefault(id(piece.record), len(places)))
+            if len(places) > len(found.records):
+                found.records.append(piece.record)
+        return cls(found.products, found.number, found.column, found.start, np.array(log), found.records, size)
+
+    def part(self, chosen: BoolArray) -> FloatArray:
+        """Scalar products [e, J] (1 + P, 1 + P) of the blocks `chosen` (pieces, B), their starts taken out."""
+        count = len(self.size)
+        noise, total = self._noise(chosen), np.zeros((1 + count, 1 + count))
+        for k, own in enumerate(chosen):
+            if own.any():
+                x = np.einsum("bcij,c->ij", self.products[k][own], 1.0 / noise[self.column[k]])
+                first = np.flatnonzero(self.number[k].sum(axis=1))[:1]
+                total += _without(x, 1 + count, self.start[k] * bool(own[first].any()))
+        return total
+
+    def scores(self, chosen: BoolArray) -> tuple[FloatArray, FloatArray]:
+        """(gradients (N, P), information (N, P, P)) of the blocks `chosen` (pieces, B), one by one."""
+        noise, count = self._noise(chosen), len(self.size)
+        x = [
+            np.einsum("bcij,c->bij", self.products[k][own], 1.0 / noise[self.column[k]])[:, : 1 + count, : 1 + count]
+            for k, own in enumerate(chosen)
+        ]
+        every = np.concatenate(x)
+        return every[:, 1:, 0], every[:, 1:, 1:]
+
+    def _noise(self, chosen: BoolArray) -> FloatArray:
+        """Variance of the white rows of each output in a part. Shape (outputs,)."""
+        outputs = 1 + max(int(each.max(initial=0)) for each in self.column)
+        square, number = np.full(outputs, FIRM), np.full(outputs, FIRM)
+        for k, own in enumerate(chosen):
+            np.add.at(square, self.column[k], self.products[k][own][:, :, 0, 0].sum(axis=0))
+            np.add.at(number, self.column[k], self.number[k][own].sum(axis=0))
+        return square / number
+
+
+def _white(linear: Linear, k: int) -> tuple[FloatArray, IntArray, IntArray]:
+    """(white [e, J, Z] (N, 1 + P + S), the block of each row (N,), its output (N,)) of a piece."""
+    rows, piece = linear.rows, linear.rows.pieces[k]
+    every = np.concatenate([rows.residual[k][:, :, None], rows.slopes[k], rows.own[k]], axis=2)
+    x = linear.with_start(k, every)
+    share = piece.record.share[piece.first : piece.last + 1]
+    number = np.minimum((share * BLOCKS).astype(int), BLOCKS - 1)
+    there = rows.there[k]
+    block = np.concatenate([number[own] for own in there])
+    column = np.concatenate([np.full(int(own.sum()), c) for c, own in enumerate(there)])
+    return x, block, column
+
+
+def _without(x: FloatArray, kept: int, known: FloatArray) -> FloatArray:
+    """Scalar products (n, n) without what the columns after the first `kept` explain. known: of these, beforehand."""
+    own = x[kept:, kept:] + known
+    size = np.sqrt(np.maximum(np.diag(own), 0.0))
+    there = size > 0.0
+    if not there.any():
+        return x[:kept, :kept]
+    size = size[there]
+    values, vectors = np.linalg.eigh(own[np.ix_(there, there)] / np.outer(size, size))
+    seen = values > SAME * values[-1]
+    half = (vectors[:, seen] / np.sqrt(values[seen])).T @ (x[kept:, :kept][there] / size[:, None])
+    return x[:kept, :kept] - half.T @ half
+
+
+def apart(
+    parts: Sequence[FloatArray], told: IntArray, shared: IntArray, prior: FloatArray, pull: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(steps (K, T), their covariance (K T, K T)) of the numbers `told`, fitted in each of K parts for itself.
+
+    parts: scalar products [e, J] (1 + P, 1 + P) of each. shared: numbers that all parts have in common, with what is
+    known of them beforehand: `prior` (P,) of the information, `pull` (P,) of the gradient. A number that a part does
+    not tell has an infinite variance there.
+    """
+    k, t = len(parts), len(told)
+    wide = k * t + len(shared)
+    information, gradient = np.zeros((wide, wide)), np.zeros(wide)
+    common = np.arange(k * t, wide)
+    information[common, common], gradient[common] = prior[shared], pull[shared]
+    for i, each in enumerate(parts):
+        at = np.concatenate([np.arange(i * t, (i + 1) * t), common])
+        own = np.concatenate([told, shared])
+        information[np.ix_(at, at)] += each[1:, 1:][np.ix_(own, own)]
+        gradient[at] += each[1:, 0][own]
+    step, covariance = _solved(information, gradient)
+    return step[: k * t].reshape(k, t), covariance[: k * t, : k * t]
+
+
+def _solved(information: FloatArray, gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(step, covariance), infinite for what has a part in a direction that is not seen."""
+    size = np.sqrt(np.maximum(np.diag(information), 0.0))
+    there = size > 1e-9 * size.max(initial=0.0)
+    size = np.where(there, size, 1.0)
+    values, vectors = np.linalg.eigh(information / np.outer(size, size))
+    seen = values > 1e-9
+    root = vectors[:, seen] / np.sqrt(values[seen]) / size[:, None]
+    lost = ~there | ((vectors[:, ~seen] ** 2).sum(axis=1) > 1e-4)
+    covariance = root @ root.T
+    covariance[lost, lost] = np.inf
+    return root @ (root.T @ gradient), covariance

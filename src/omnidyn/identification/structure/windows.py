@@ -118,13 +118,9 @@ class _Column:
 
 def slowest(motions: Sequence[Motion]) -> float:
     """The slowest time constant of the fitted robot [s], in the median of rows."""
-    found = []
-    for motion in motions:
-        left = np.abs(np.linalg.eigvals(motion.decay)).max(axis=1)
-        decays = (left > 0.0) & (left < 1.0)
-        found.append(-np.diff(motion.t)[decays] / np.log(left[decays]))
-    every = np.concatenate(found)
-    return float(np.median(every)) if every.size else np.inf
+    left = np.concatenate([np.abs(np.linalg.eigvals(motion.decay)).max(axis=1) for motion in motions])
+    steps, decays = np.concatenate([np.diff(motion.t) for motion in motions]), (left > 0.0) & (left < 1.0)
+    return float(np.median(-steps[decays] / np.log(left[decays]))) if decays.any() else np.inf
 
 
 def shown(rows: Rows, motions: Sequence[Motion]) -> list[Shown]:
@@ -133,8 +129,7 @@ def shown(rows: Rows, motions: Sequence[Motion]) -> list[Shown]:
     commands = _commands(rows.pieces)
     holds = [_holds(piece, own) for piece, own in zip(rows.pieces, commands, strict=True)]
     repeats = _repeats(rows.pieces, commands, FORGOTTEN * constant)
-    settled = SETTLED * constant
-    return [_of_column(rows, motions, c, settled, repeats, holds) for c in range(len(rows.problem.columns))]
+    return [_of_column(rows, motions, c, SETTLED * constant, repeats, holds) for c in range(len(rows.problem.columns))]
 
 
 def _of_column(
@@ -160,8 +155,7 @@ def _of_column(
             for a, b in each.runs(mask):
                 into += [(each.k, each.j, first, (each.k, first)) for first in range(a, b - length + 1, length)]
     again, apart = _again(parts, repeats, length)
-    made = [Windows.of(rows, found, length) for found in (held, busy, resting, again)]
-    return Shown(step, made[0], made[1], made[2], made[3], apart)
+    return Shown(step, *(Windows.of(rows, found, length) for found in (held, busy, resting, again)), apart=apart)
 
 
 def _column(
@@ -171,8 +165,7 @@ def _column(
     stands = (motion.twist == 0.0).all(axis=1)
     moved = np.maximum.accumulate(np.where(stands, 0, at))
     rests = stands & (motion.t - motion.t[moved] >= settled)
-    step = usual_step(motion.t[known])
-    moves = rows.moves[k][j] & ~stands
+    moves, step = rows.moves[k][j] & ~stands, usual_step(motion.t[known])
     return _Column(k, j, known, rows.steps[k][j] == 1, moves[known], rests[known], since[known], holds[known], step)
 
 

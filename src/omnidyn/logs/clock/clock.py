@@ -20,7 +20,8 @@ Notes = list[Statement | str]
 EPOCH = 1e8  # [s]; a later time counts from 1970: the start of the log is taken off, so that no digits are lost
 DAY = 86_400.0  # [s]
 COUNTERS = (2.0**16, 2.0**32)  # counts that fit into two and four bytes
-NEAR, LONG = 50.0, 1000.0  # usual steps: the rows about the jump are no farther apart; a period is longer
+NEAR_STEPS = 50.0  # usual steps: the rows about the jump are no farther apart
+LONG_PERIOD_STEPS = 1000.0  # a period is longer
 EARLY = 0.1  # of what had passed: a clock that restarted is back as near to its begin, or some line is no row
 FOLLOWING = 5  # rows at most, two at least, that then go on
 SELDOM = 0.005  # of the rows: a clock that goes back more often is read wrong
@@ -34,7 +35,7 @@ _STEP_NAME = re.compile(
     re.IGNORECASE,
 )
 _STEP_UNIT = re.compile(r"_(?:s|ms|us|ns|sec|secs|seconds|millis|micros)$", re.IGNORECASE)
-MOSTLY = 0.8  # of the rows
+MAJORITY_SHARE = 0.8  # of the rows
 _FRACTION = re.compile(r"(?<=:\d\d)[.,](\d{1,3})(?!\d)", re.ASCII)
 _OF_DAY = re.compile(_TIME, re.ASCII)
 _WITH_POINTS = re.compile(rf"(\d{{1,2}})\.(\d{{1,2}})\.(\d{{4}})[ T]+{_TIME}", re.ASCII)  # day, month, year
@@ -122,10 +123,10 @@ class Clock:
         steps = np.diff(read)
         usual = float(np.median(steps[steps > 0.0]))
         for period in (*COUNTERS, DAY / abs(column.factor)):
-            over = np.abs(steps + period) < NEAR * usual
+            over = np.abs(steps + period) < NEAR_STEPS * usual
             low = 0.0 if read.min() >= 0.0 else -0.5 * period  # counters of some have a sign
             within = read.min() >= low and read.max() < low + period and (low == 0.0 or period in COUNTERS)
-            if within and (over == (steps < 0.0)).all() and LONG * usual < period:
+            if within and (over == (steps < 0.0)).all() and LONG_PERIOD_STEPS * usual < period:
                 notes.append(f"{column.name} starts over after {period:.6g} {column.unit}: it is taken to go on")
                 return np.where(over, period, 0.0)
         return None
@@ -207,7 +208,7 @@ def are_steps(name: str, values: FloatArray) -> bool:
         return False
     usual = float(np.median(known))
     alike = float(np.mean((known > 0.5 * usual) & (known < 2.0 * usual)))
-    return usual > 0.0 and alike > MOSTLY and float(np.mean(np.diff(known) > 0.0)) < MOSTLY
+    return usual > 0.0 and alike > MAJORITY_SHARE and float(np.mean(np.diff(known) > 0.0)) < MAJORITY_SHARE
 
 
 def _are_bare(cells: tuple[str, ...]) -> bool:

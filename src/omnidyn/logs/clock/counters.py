@@ -28,21 +28,23 @@ COUNTERS = (2.0**16, 2.0**32)  # counts that fit into two and four bytes
 WHOLE = 1.01  # readings of what starts over stay within this many periods
 MOST_FULL = 0.9  # and come as near to a period
 JUMP = 0.5  # of a period: more than that between two rows is no motion
-FAST = 0.3  # of a period: a wheel that usually goes so far between rows cannot be followed
+FAST_SHARE = 0.3  # of a period: a wheel that usually goes so far between rows cannot be followed
 NEAR_HALF = 0.46  # of a period: a wheel that is followed from rest up to such steps can go so fast
 USUAL = 0.99
 FILLED, OFTEN = 0.99, 0.05  # of a period; of the steps: so full, and so often over the end
-FASTEST, TICKS = 1.5, 2.0  # where a counter starts over, it moves no farther than that many times its longest step
+OVER_STEP_RATIO = 1.5  # where a counter starts over, it moves no farther than so many times its longest step
+TICKS = 2.0  # and so many ticks
 WHOLE_TICKS = 0.1  # readings that were counted are as near to whole ticks
 NEIGHBOURS = 3  # steps to either side that tell how a wheel moves
 LEAST_STEPS = 4 * NEIGHBOURS
 ODD, SLACK = 2.0, 8.0  # a step is odd beyond so many neighbouring steps and so many ticks (or times the noise)
-BACK, ON = 3.0, 20.0  # an odd step is no motion beyond so many of the longest steps: against, along the motion
+STEPS_AGAINST_MOTION = 3.0  # an odd step against the motion is none beyond so many of the longest steps
+STEPS_ALONG_MOTION = 20.0  # the same along the motion
 TO_ZERO = 6.0  # and beyond so many of the steps beside it, where the counter is at 0 behind it
 DOUBT = 0.01  # of a period at most
 ALONE = 0.1  # of the distance to the next number as plain: so small is the doubt of a period
-MOVING = 0.1  # of the rows at least: else the log has too little motion to compare with
-SMALL = 0.1  # of an odd step: a smaller one beside it does not matter
+MOVING_SHARE = 0.1  # of the rows at least: else the log has too little motion to compare with
+SMALL_STEP_SHARE = 0.1  # of an odd step: a smaller one beside it does not matter
 TOP_SPEED = 2000.0  # [turns/s] no motor turns faster
 LATE = 1.5  # usual steps of time: a longer one hides what the wheel did
 
@@ -107,10 +109,10 @@ def _without_padding(rows: IntArray, t: FloatArray) -> IntArray:
 
 def _refuse_fast(steps: FloatArray, period: float | None, where: str) -> None:
     usual = float(np.quantile(np.abs(steps), USUAL))
-    if period is not None and usual > FAST * period and not _is_followed(steps, period):
+    if period is not None and usual > FAST_SHARE * period and not _is_followed(steps, period):
         raise InputError(
             f"an angle starts over after {period:.6g} and moves too far between rows",
-            got=f"steps of {usual:.4g}", expected=f"steps below {FAST * period:.4g}",
+            got=f"steps of {usual:.4g}", expected=f"steps below {FAST_SHARE * period:.4g}",
             remedy="log faster, or log the speed", where=where,
         )  # fmt: skip
 
@@ -156,7 +158,7 @@ def _full(readings: FloatArray, steps: FloatArray, unit: str, tick: float) -> fl
         return None
     width, farthest = float(np.ptp(readings)), float(np.abs(steps).max())
     turn = TURN / parse_unit(unit).size
-    periods = [turn, *(tick * each for each in COUNTERS if tick > 0.0)]  # counts, so many of which make a turn
+    periods = [turn, *(tick * size for size in COUNTERS if tick > 0.0)]  # counts, so many of which make a turn
     for period in sorted(periods):
         if MOST_FULL * period < width <= WHOLE * period and farthest > JUMP * period:
             return period if period == turn or _goes_on(steps, period, tick) else None
@@ -167,7 +169,7 @@ def _goes_on(steps: FloatArray, period: float, tick: float) -> bool:
     """Whether the wheel moves on over every jump as fast as it does elsewhere, at most."""
     jumps = np.abs(steps) > JUMP * period
     longest = float(np.abs(steps[~jumps]).max(initial=0.0))
-    return bool((np.abs(_wrapped(steps[jumps], period)) <= FASTEST * longest + TICKS * tick).all())
+    return bool((np.abs(_wrapped(steps[jumps], period)) <= OVER_STEP_RATIO * longest + TICKS * tick).all())
 
 
 def tick_of(size: FloatArray, width: float) -> float:
@@ -230,7 +232,7 @@ def _plainest(period: float, doubt: float, width: float, turn: float, tick: floa
     if tick > 0.0:
         power = tick * 2.0 ** np.round(np.log2(period / tick))
         decades = tick * 10.0 ** np.arange(np.floor(np.log10(period / tick)), -1.0, -1.0)
-        choices += [(power, power), *((each * np.round(period / each), each) for each in decades)]
+        choices += [(power, power), *((decade * np.round(period / decade), decade) for decade in decades)]
     for value, apart in choices:
         near = min(DOUBT * period, ALONE * apart, 5.0 * doubt + TICKS * tick)
         if value > width and doubt <= ALONE * apart and abs(value - period) <= near:
@@ -250,8 +252,8 @@ def _restarts(readings: FloatArray, steps: Steps, turn: float, tick: float) -> I
         return odd[:0]
     away, longest = (steps.size - steps.expected)[odd], float(speeds.max()) * steps.rows[odd] + steps.tick
     along = away * steps.expected[odd] > 0.0
-    beyond = np.abs(away) > np.where(along, ON, BACK) * longest
-    beyond &= (float((speeds > (0.5 * tick or 2.0 * steps.tick)).mean()) > MOVING) | (np.abs(away) < speeds.sum())
+    beyond = np.abs(away) > np.where(along, STEPS_ALONG_MOTION, STEPS_AGAINST_MOTION) * longest
+    beyond &= (float((speeds > (0.5 * tick or 2.0 * steps.tick)).mean()) > MOVING_SHARE) | (np.abs(away) < speeds.sum())
     beyond |= np.abs(away) > TOP_SPEED * turn * steps.seconds[odd]
     beside = np.abs(np.pad(steps.size, 2, mode="reflect"))
     most = np.stack([beside[odd + k] for k in (0, 1, 3, 4)]).max(axis=0)
@@ -267,8 +269,8 @@ def _alone(odd: IntArray, away: FloatArray, last: int) -> BoolArray:
     """
     near = np.diff(odd) <= NEIGHBOURS
     alone = (odd > 0) & (odd < last)
-    alone[:-1] &= ~near | (away[1:] < SMALL * away[:-1])
-    alone[1:] &= ~near | (away[:-1] < SMALL * away[1:])
+    alone[:-1] &= ~near | (away[1:] < SMALL_STEP_SHARE * away[:-1])
+    alone[1:] &= ~near | (away[:-1] < SMALL_STEP_SHARE * away[1:])
     return alone
 
 
@@ -280,7 +282,7 @@ class Counters:
 
     def __init__(self, table: Table, t: FloatArray, found: Sequence[Restart]):
         self.table, self.t, self.found = table, t, list(found)
-        self.begins = np.flatnonzero(np.isin(table.lines, [each.line for each in found])).tolist()
+        self.begins = np.flatnonzero(np.isin(table.lines, [restart.line for restart in found])).tolist()
         self.counters: list[Counter] = []
 
     def angle(self, key: str, column: Column, values: FloatArray) -> FloatArray:
@@ -298,7 +300,7 @@ class Counters:
             periods += [] if period is None else [period]
             again += [part.start + row for row in restarts]
         unit, line = column.unit.partition("/")[0], int(self.table.lines[0]) if len(values) else 0
-        self.found += [full_counter(key, column.name, each, unit, line) for each in dict.fromkeys(periods)]
+        self.found += [full_counter(key, column.name, period, unit, line) for period in dict.fromkeys(periods)]
         self.counters.append(Counter(key, column.name, values, again))
         return np.concatenate(parts)
 
@@ -322,15 +324,13 @@ class Counters:
 
 BITS_16 = 2.0**16
 OVERFLOW_JUMP = 0.5  # of the range: a longer step between two rows is a jump
-SLOW = 0.15  # of the range: where the steps beside a jump are shorter, it is seen that the speed goes on over the edge
-MOSTLY = 0.5  # of the jumps, where it is so
-CLEAR = 8.0  # ticks, or noises: a longer step has a direction
-OVERFLOW_RATIO, FOLLOWED = (
-    1.5,
-    0.25,
-)  # of the longest other step: changes of speed over a jump; of the range: longest step
+SLOW_STEP_SHARE = 0.15  # of the range: shorter steps beside a jump show that the speed goes on over the edge
+MAJORITY_SHARE = 0.5  # of the jumps, where it is so
+CLEAR_TICKS = 8.0  # ticks, or noises: a longer step has a direction
+OVERFLOW_RATIO = 1.5  # of the longest other step: changes of speed over a jump
+FOLLOWED = 0.25  # of the range: longest step
 REST = 0.01  # of the range: what is nearer to 0 is at rest
-WIDE = 0.8  # of the range, between the slowest and the fastest value at least
+WIDTH_SHARE = 0.8  # of the range, between the slowest and the fastest value at least
 
 
 def widened(speeds: FloatArray, t: FloatArray) -> tuple[FloatArray, int, bool]:
@@ -363,8 +363,8 @@ def widened(speeds: FloatArray, t: FloatArray) -> tuple[FloatArray, int, bool]:
 def _over_the_edge(steps: Steps, size: float) -> BoolArray:
     """Steps before and behind which the speed moves on the same way, against the jump between: no reversal does."""
     away = steps.size - steps.expected
-    onward = (away * steps.expected < 0.0) & (np.abs(steps.expected) > CLEAR * steps.tick)
-    return onward & (steps.beside < SLOW * size) & (np.abs(np.abs(away) - size) < SLOW * size)
+    onward = (away * steps.expected < 0.0) & (np.abs(steps.expected) > CLEAR_TICKS * steps.tick)
+    return onward & (steps.beside < SLOW_STEP_SHARE * size) & (np.abs(np.abs(away) - size) < SLOW_STEP_SHARE * size)
 
 
 def _range(values: FloatArray) -> float:
@@ -376,7 +376,7 @@ def _range(values: FloatArray) -> float:
     low, high = float(values.min()), float(values.max())
     signed = low >= -0.5 * size - tick and high <= 0.5 * size
     unsigned = low >= 0.0 and high < size  # -1 comes out as 65535
-    return size if (signed or unsigned) and high - low > WIDE * size else 0.0
+    return size if (signed or unsigned) and high - low > WIDTH_SHARE * size else 0.0
 
 
 def _from_rest(values: FloatArray, size: float) -> FloatArray:

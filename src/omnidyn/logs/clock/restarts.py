@@ -67,7 +67,7 @@ def counter_restarts(counters: Sequence[Counter], lines: Sequence[int] | np.ndar
         known = known[np.isfinite(known)]
         numbers = {"columns": [counter.column for counter in members], "after": members[0].values[row]}
         numbers |= {"before": known[-1]} if known.size else {}
-        found.append(Restart(COUNTER, " ".join(each.component for each in members), int(lines[row]), numbers))
+        found.append(Restart(COUNTER, " ".join(member.component for member in members), int(lines[row]), numbers))
     return found
 
 

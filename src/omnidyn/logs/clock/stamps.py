@@ -21,18 +21,18 @@ _REST = {"nanoseconds": 1e-9, "nanosecs": 1e-9, "nanosec": 1e-9, "nsecs": 1e-9, 
          "microseconds": 1e-6, "usecs": 1e-6, "usec": 1e-6}  # fmt: skip
 _NAME = re.compile(rf"(?P<stem>.*?)(?P<rest>{'|'.join(_REST)})", re.IGNORECASE | re.DOTALL)
 
-MANY, FEW = 10, 0.01  # stamps of which some may be astray; the share that may be
+MANY_STAMPS, ASTRAY_SHARE = 10, 0.01  # stamps of which some may be astray; the share that may be
 LENGTHS = 10.0  # lengths of the recording: what is farther from its middle, and more than a day, is astray
 
 
 def astray(stamps: FloatArray | IntArray, day: float) -> BoolArray:
     """Which of the stamps, shape (n,), are no time of their recording: a few far from the rest. day: in their unit."""
-    if len(stamps) < MANY:
+    if len(stamps) < MANY_STAMPS:
         return np.zeros(len(stamps), dtype=bool)
     times = stamps.astype(float)
-    low, middle, high = np.quantile(times, [FEW, 0.5, 1.0 - FEW])
+    low, middle, high = np.quantile(times, [ASTRAY_SHARE, 0.5, 1.0 - ASTRAY_SHARE])
     far = np.abs(times - middle) > max(abs(day), LENGTHS * float(high - low))
-    return far if far.sum() <= max(1.0, FEW * len(far)) else np.zeros(len(far), dtype=bool)
+    return far if far.sum() <= max(1.0, ASTRAY_SHARE * len(far)) else np.zeros(len(far), dtype=bool)
 
 
 def with_joined_stamp(table: Table) -> Table:

@@ -19,13 +19,12 @@ from omnidyn.logs.columns.component import (
     component_of_parts,
     numbered_kind,
 )  # fmt: skip
-from omnidyn.logs.columns.doubt import Doubt, doubt, joined_doubts, letter_of
 from omnidyn.logs.columns.frame_of import FRAMES
 from omnidyn.logs.columns.guess_time import take_time
 from omnidyn.logs.columns.guess_unit import doubt_of_rate, implausible, settle_side, take_sides, unit_of
-from omnidyn.logs.columns.guessed import Guess, first_word, floats, is_numeric
+from omnidyn.logs.columns.guessed import Doubt, Guess, doubt, first_word, floats, is_numeric, joined_doubts, letter_of
 from omnidyn.logs.columns.mapping import SIDED, ColumnMap, component_channel, is_of_rim, quantity_of, unit_and_side
-from omnidyn.logs.columns.names import BRACKETS, NameParts, read_name
+from omnidyn.logs.columns.names import BRACKETS, read_name
 from omnidyn.logs.columns.wheel_numbers import BY_PLACES, proposed_wheels, wheel_numbers
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
@@ -61,7 +60,7 @@ def guess_columns(
     himself: nothing is doubted of them. Raises InputError for an unknown unit in `assume`.
     """
     units = {name: text for name, text in (assume or {}).items() if name not in FRAMES}
-    told = {each: unit_and_side(text) for name, text in units.items() for each in _meant(name, table.names)}
+    told = {column: unit_and_side(text) for name, text in units.items() for column in _meant(name, table.names)}
     assumed = {name: unit.text for name, (unit, _) in told.items()}
     found = Guess(robot=robot)
     names = [name for name in table.names if is_numeric(table.columns[name]) and name not in table.says]
@@ -75,12 +74,12 @@ def guess_columns(
     _doubt_letters(names, found)
     if TIME not in found.columns:
         take_time(table, assumed, found)
-    if set(numbers.values()) <= {1} and not any(each.component[1:2].isdigit() for each in table.says.values()):
+    if set(numbers.values()) <= {1} and not any(said.component[1:2].isdigit() for said in table.says.values()):
         _take_bench(table, names, assumed, found)
     _ask_where_motion_differs(table, numbers, found)
     settle_side(table, robot, found)
     take_sides({name: side for name, (_, side) in told.items() if side}, found)
-    found.doubts = [each for each in found.doubts if each.columns[0] not in (taken or {})]
+    found.doubts = [open_doubt for open_doubt in found.doubts if open_doubt.columns[0] not in (taken or {})]
     used = {column.name for column in found.columns.values()}
     unused = tuple(name for name in table.names if name not in used)
     ordered = dict(sorted(found.columns.items(), key=lambda item: _order(item[0])))
@@ -88,7 +87,9 @@ def guess_columns(
         Doubt("assumption_unused", WARNING, "", {"assumption": f"{name}={unit}"}, units=())
         for name, unit in assumed.items()
         if not _is_used(
-            name, table, (*found.columns, *(each.components[0] for each in found.doubts), *(taken or {}).values())
+            name,
+            table,
+            (*found.columns, *(open_doubt.components[0] for open_doubt in found.doubts), *(taken or {}).values()),
         )
     )
     return ColumnMap(ordered, unused, (*joined_doubts(found.doubts), *idle), found.all_notes())
@@ -194,13 +195,13 @@ def _doubt_brackets(name: str, numbers: Mapping[str, int], found: Guess) -> None
 def _doubt_letters(names: list[str], found: Guess) -> None:
     """V1, V2, ..: volts, or speeds of the rims? Nobody knows."""
     parts = {name: read_name(name) for name in names}
-    mine = [name for name in names if _is_letter_v(parts[name])]
+    mine = [
+        name
+        for name, read in parts.items()
+        if read.number is not None and read.unit is None and read.roles == {words.LINEAR}
+    ]
     if mine and "u1" not in found.columns:
         found.doubts += [doubt(name, f"u{parts[name].number}", "volts_or_speeds", (), first=mine[0]) for name in mine]
-
-
-def _is_letter_v(name: NameParts) -> bool:
-    return name.number is not None and name.unit is None and name.roles == {words.LINEAR}
 
 
 def _enter(table: Table, name: str, component: str, unit: Unit, said: bool, found: Guess) -> None:
@@ -249,7 +250,9 @@ def _take_bench(table: Table, names: list[str], assumed: Mapping[str, str], foun
     """
     alike: dict[str, list[str]] = {}
     numbered = {component for component in found.columns if component[1:2].isdigit()}
-    settled = numbered | {each.components[0] for each in found.doubts if read_name(each.columns[0]).number is not None}
+    settled = numbered | {
+        open_doubt.components[0] for open_doubt in found.doubts if read_name(open_doubt.columns[0]).number is not None
+    }
     body = found.columns.keys() - numbered - {TIME, "supply", "omega", "heading"}
     turning = {column.name for key, column in found.columns.items() if body and key in ("omega", "heading")}
     for name in names:
@@ -304,7 +307,7 @@ def _forget(names: list[str], found: Guess) -> None:
     """Take back what was said about some columns."""
     for component in [key for key, column in found.columns.items() if column.name in names]:
         del found.columns[component]
-    found.doubts = [each for each in found.doubts if each.columns[0] not in names]
+    found.doubts = [open_doubt for open_doubt in found.doubts if open_doubt.columns[0] not in names]
     for name in names:
         found.si.pop(name, None)
 

@@ -14,8 +14,7 @@ from omnidyn.logs.channels import TIME
 from omnidyn.logs.clock.clock import are_steps, is_dates
 from omnidyn.logs.column import Column
 from omnidyn.logs.columns import names as words
-from omnidyn.logs.columns.doubt import UNIT, doubt
-from omnidyn.logs.columns.guessed import Guess, first_word, floats, is_numeric
+from omnidyn.logs.columns.guessed import UNIT, Guess, doubt, first_word, floats, is_numeric
 from omnidyn.logs.columns.mapping import ColumnMap
 from omnidyn.logs.columns.names import read_name
 from omnidyn.logs.table.table import Table
@@ -47,7 +46,9 @@ def take_time(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
         cell = first_word(table.columns[wordy[0]])
         found.doubts.append(doubt(wordy[0], TIME, "cells_not_dates", (), cell=cell))
         return
-    steps = [name for name in table.names if is_numeric(table.columns[name]) and _are_steps(table, name)]
+    steps = [
+        name for name in table.names if is_numeric(cells := table.columns[name]) and are_steps(name, floats(cells))
+    ]
     if steps and (not candidates or candidates == steps):
         _take_steps(table, steps[0], assumed, found)
         return
@@ -70,10 +71,6 @@ def take_time(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
 def _is_span(name: str) -> bool:
     """Whether a name says a difference of times, or how long something takes: dt, period, time step."""
     return bool(re.search(r"(?:^|[\W_])(?:d|dt|delta|diff|step|period|cycle|remaining|left)(?:$|[\W_])", name.lower()))
-
-
-def _are_steps(table: Table, name: str) -> bool:
-    return are_steps(name, floats(table.columns[name]))
 
 
 def _take_steps(table: Table, name: str, assumed: Mapping[str, str], found: Guess) -> None:

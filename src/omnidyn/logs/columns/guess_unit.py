@@ -11,8 +11,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.logs.channels import si_suffix
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
-from omnidyn.logs.columns.doubt import Doubt, doubt
-from omnidyn.logs.columns.guessed import Guess, floats
+from omnidyn.logs.columns.guessed import Doubt, Guess, doubt, floats
 from omnidyn.logs.columns.mapping import SIDED, component_channel, quantity_of
 from omnidyn.logs.table.table import Table
 from omnidyn.model.robot import Robot
@@ -75,7 +74,7 @@ def _most_volts(robot: Robot | None) -> float:
 
 def _scales(largest: float) -> tuple[str, ...]:
     """The units of a duty that numbers up to so large may have."""
-    full = next((each for each in FULL_SCALES if largest <= each), 0)
+    full = next((scale for scale in FULL_SCALES if largest <= scale), 0)
     scale = (f"duty/{full:g}",) if full else ("duty/FULL_SCALE",)
     return ("duty",) * (largest <= MOST_DUTY) + ("%",) * (1.0 < largest <= MOST_PERCENT) + scale * (largest > 1.0)
 

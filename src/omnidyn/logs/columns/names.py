@@ -118,7 +118,7 @@ def _without_unit(name: str) -> tuple[str, Unit | None]:
         part = _bare(parts[k])
         stem, unit = _split_unit(part)
         if unit is None:
-            stem, unit = _split_unit(_spread(part))  # DriveVelocityRadPerSec
+            stem, unit = _split_unit(re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", part))  # DriveVelocityRadPerSec
         if unit is None or (k < last and len(unit.text) < 2):  # /robot_A/wheel1
             stem, unit = _unit_inside(part)
         if unit is not None:
@@ -129,10 +129,6 @@ def _without_unit(name: str) -> tuple[str, Unit | None]:
 def _bare(part: str) -> str:
     """A part of a topic without the place in an array: currents_A of currents_A[3]."""
     return re.sub(r"\[\d+\]$", "", part)
-
-
-def _spread(part: str) -> str:
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", part)
 
 
 BRACKETS = re.compile(r"(.*\S)\s*[\[(]([^\d\])][^\])]*)[\])]")  # a name and what looks like its unit, not joint[0]
@@ -237,7 +233,7 @@ ANGLES = {
 }  # fmt: skip
 FOUR = (45.0, -45.0, 135.0, -135.0)  # in the order of a file of four wheels: front left, front right, rear left, ..
 WIDEST_GAP = 180.0  # [degree] between neighbours of wheels that stand around a robot
-FAR = 40.0  # [degree] from its place beyond which a wheel is another one
+FARTHEST_ANGLE = 40.0  # [degree] from its place beyond which a wheel is another one
 
 
 def place_in(words: Sequence[str], known: Collection[str] = ()) -> tuple[float | None, list[str]]:
@@ -298,7 +294,7 @@ def wheels_at(places: Collection[float], robot: Robot | None = None) -> dict[flo
     stand = _angles(robot)
     apart = np.abs((np.subtract.outer(asked, stand) + 180.0) % 360.0 - 180.0)
     rows, wheels = linear_sum_assignment(apart)
-    if (apart[rows, wheels] > FAR).any():
+    if (apart[rows, wheels] > FARTHEST_ANGLE).any():
         return {}
     return {asked[row]: int(wheel) + 1 for row, wheel in zip(rows, wheels, strict=True)}
 

@@ -13,8 +13,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.logs.channels import TIME
 from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.component import component_of_parts, numbered_kind
-from omnidyn.logs.columns.doubt import doubt
-from omnidyn.logs.columns.guessed import Guess, floats
+from omnidyn.logs.columns.guessed import Guess, doubt, floats
 from omnidyn.logs.columns.names import BRACKETS, read_name, wheels_at
 from omnidyn.logs.table.table import Table
 from omnidyn.model.wheels import MAX_WHEELS, wheel_speed
@@ -102,8 +101,9 @@ def _leave_out_boards(families: dict[Family, dict[str, int]], found: Guess) -> N
 
 # Which wheel is which, where names do not say: the motion of the body tells, if something else has measured it
 
-LIKE, MOST_WHEELS, LEAST = 0.8, 6, 40  # correlation of a wheel with its column; wheels that are tried; rows needed
-CLEARLY = 0.05  # of the correlation: by so much the best order is better than the next
+SURE_CORRELATION = 0.8  # of a wheel with its column
+MOST_WHEELS, LEAST_ROWS = 6, 40  # wheels that are tried; rows needed
+CLEAR_LEAD = 0.05  # of the correlation: by so much the best order is better than the next
 
 
 def proposed_wheels(table: Table, names: Sequence[str], found: Guess) -> str:
@@ -119,17 +119,18 @@ def proposed_wheels(table: Table, names: Sequence[str], found: Guess) -> str:
         return ""
     t = floats(table.columns[found.columns[TIME].name])
     twist = np.stack(
-        [floats(table.columns[each.name]) * parse_unit(each.unit).size for each in body if each is not None], axis=1
+        [floats(table.columns[column.name]) * parse_unit(column.unit).size for column in body if column is not None],
+        axis=1,
     )
     rows = np.isfinite(t) & np.isfinite(twist).all(axis=1)
-    if rows.sum() < LEAST:
+    if rows.sum() < LEAST_ROWS:
         return ""
     columns = np.stack([_at(t[rows], t, floats(table.columns[name])) for name in names], axis=1)
     alike = _correlation(wheel_speed(robot.wheels, twist[rows]), columns)
     orders = sorted(permutations(range(len(names))), key=lambda order: -_fit(alike, order))
     best = orders[0]
-    known = min(abs(alike[wheel, column]) for wheel, column in enumerate(best)) > LIKE
-    if not known or (len(orders) > 1 and _fit(alike, best) - _fit(alike, orders[1]) < CLEARLY):
+    known = min(abs(alike[wheel, column]) for wheel, column in enumerate(best)) > SURE_CORRELATION
+    if not known or (len(orders) > 1 and _fit(alike, best) - _fit(alike, orders[1]) < CLEAR_LEAD):
         return ""
     return ", ".join(
         f"w{wheel + 1}={'-' * bool(alike[wheel, column] < 0.0)}{names[column]}" for wheel, column in enumerate(best)

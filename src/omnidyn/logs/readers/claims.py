@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.logs.columns.doubt import NO_NUMBER
+from omnidyn.logs.columns.guessed import NO_NUMBER
 from omnidyn.logs.readers.recording import Track
 from omnidyn.logs.table.table import Said
 from omnidyn.statement import Statement
@@ -16,7 +16,7 @@ from omnidyn.statement import Statement
 USUAL_NAMES = ("odom", "cmd_vel", "joint_states", "battery_state", "data", "pose", "tf")
 
 
-class Out(NamedTuple):
+class TopicColumn(NamedTuple):
     """A column made of a topic. component: what it is; "" for nothing by itself; None where its name says it."""
 
     name: str
@@ -25,23 +25,23 @@ class Out(NamedTuple):
     component: str | None = None
 
 
-class Claim(NamedTuple):
+class TopicClaim(NamedTuple):
     """The columns of a topic, and its stamps [ns]. rank: of what gives the same component, the least is taken."""
 
     topic: str
     stamps: IntArray
-    columns: Sequence[Out]
+    columns: Sequence[TopicColumn]
     rank: int = 0
 
 
-def tracks_of(claims: Sequence[Claim], notes: list[str]) -> Iterator[Track]:
+def tracks_of(claims: Sequence[TopicClaim], notes: list[str]) -> Iterator[Track]:
     """The tracks, each component given to one topic; what was passed over goes to `notes`."""
-    wanted: dict[str, list[Claim]] = {}
+    wanted: dict[str, list[TopicClaim]] = {}
     for claim in claims:
         for out in claim.columns:
             if out.component and not np.isnan(out.values).all():
                 wanted.setdefault(out.component, []).append(claim)
-    owners = {component: _owner(each) for component, each in wanted.items()}
+    owners = {component: _owner(claim) for component, claim in wanted.items()}
     _say(wanted, owners, notes)
     for claim in claims:
         says = {
@@ -54,7 +54,11 @@ def tracks_of(claims: Sequence[Claim], notes: list[str]) -> Iterator[Track]:
 
 
 def _said(
-    out: Out, component: str, claim: Claim, wanted: dict[str, list[Claim]], owners: dict[str, str | None]
+    out: TopicColumn,
+    component: str,
+    claim: TopicClaim,
+    wanted: dict[str, list[TopicClaim]],
+    owners: dict[str, str | None],
 ) -> Said:
     """What a column is; why it is not taken."""
     if component and component not in wanted:
@@ -68,7 +72,7 @@ def _said(
     return Said(component if owner == claim.topic else "")
 
 
-def _owner(claims: Sequence[Claim]) -> str | None:
+def _owner(claims: Sequence[TopicClaim]) -> str | None:
     """The topic that gives a component: of the least rank, and of those the one with a usual name; None where two."""
     least = min(claim.rank for claim in claims)
     topics = [claim.topic for claim in claims if claim.rank == least]
@@ -77,7 +81,7 @@ def _owner(claims: Sequence[Claim]) -> str | None:
     return topics[0] if len(topics) == 1 else None
 
 
-def _say(wanted: dict[str, list[Claim]], owners: dict[str, str | None], notes: list[str]) -> None:
+def _say(wanted: dict[str, list[TopicClaim]], owners: dict[str, str | None], notes: list[str]) -> None:
     """Which topics give the same as another, and are not taken."""
     passed: dict[tuple[str, str], list[str]] = {}
     for component, claims in wanted.items():

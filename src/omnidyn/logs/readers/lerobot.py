@@ -19,7 +19,6 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, shortened
 from omnidyn.files import open_regular, read_text
-from omnidyn.logs.readers.folders import INFO, data_files, is_dataset_folder
 from omnidyn.logs.readers.parquet import (
     SUFFIXES,
     batches_of,
@@ -32,7 +31,7 @@ from omnidyn.logs.readers.parquet import (
     sha256_of,
 )
 from omnidyn.logs.readers.parquet_pages import declared_bytes
-from omnidyn.logs.readers.reader import Options, Reader
+from omnidyn.logs.readers.reader import INFO, Reader, ReadOptions, data_files, is_dataset_folder
 from omnidyn.logs.table.rows import refuse_infinite
 from omnidyn.logs.table.table import MAX_CELLS, Said, Table
 from omnidyn.progress import Report
@@ -65,7 +64,7 @@ class _Clock:
         return out
 
 
-def tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
+def tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
     """The tables of a Parquet file or of a dataset; see the contract."""
     files = data_files(Path(path)) if is_dataset_folder(path) else [Path(path)]
     lists = _lists(files[0])
@@ -120,7 +119,7 @@ def _names_of(info: Mapping[str, Any], feature: str) -> list[str]:
 
 
 def _dataset_tables(
-    files: Sequence[Path], names: Mapping[str, list[str]], source: str, rows: int, options: Options
+    files: Sequence[Path], names: Mapping[str, list[str]], source: str, rows: int, options: ReadOptions
 ) -> Iterator[Table]:
     """The tables of the files of a dataset, one after the other."""
     found = {
@@ -168,7 +167,7 @@ def _notes(episodes: int, others: list[str]) -> tuple[str, ...]:
 
 
 def _parts(
-    file: Path, features: list[str], count: int, rows: int, options: Options
+    file: Path, features: list[str], count: int, rows: int, options: ReadOptions
 ) -> Iterator[tuple[dict[str, FloatArray], str]]:
     """(column -> numbers, "") of each block of a file; ({}, sha256) at its end. Lists are (rows, numbers)."""
     source = str(file)

@@ -19,7 +19,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, MissingExtraError
 from omnidyn.files import growth, open_regular, pieces, too_large
 from omnidyn.logs.readers.parquet_pages import declared_bytes
-from omnidyn.logs.readers.reader import Options
+from omnidyn.logs.readers.reader import ReadOptions
 from omnidyn.logs.table.header import MAX_COLUMNS, check_name, split_units
 from omnidyn.logs.table.rows import INFINITE, Column, column_of, refuse_infinite, skip_note
 from omnidyn.logs.table.table import MAX_CELLS, Table
@@ -69,7 +69,7 @@ def parquet_bytes(columns: Mapping[str, FloatArray], units: Mapping[str, str]) -
 # ---- reading -------------------------------------------------------------------------------------------
 
 
-def parquet_tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
+def parquet_tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
     """The tables of a Parquet file, its rows numbered from 1 in `Table.lines`; see the contract.
 
     Raises InputError for a file that is damaged, has nested columns, or whose rows take more than `max_bytes`, or 200
@@ -84,7 +84,7 @@ def parquet_tables(path: str | os.PathLike, rows: int, options: Options) -> Iter
             file, columns = _opened(pyarrow, parquet, stream, source)
             pages = declared_bytes(stream)
         check_size(file.metadata, pages, len(columns.names), size, options.max_bytes, source)
-        reader = _Rows(columns, source, options.skip_bad_rows)
+        reader = _RowGroups(columns, source, options.skip_bad_rows)
 
         def table(values: dict[str, Column], lines: Any, sha256: str = "") -> Table:
             notes = (*reader.notes, *(growth(stream, size) if sha256 else ()))
@@ -230,7 +230,7 @@ def _kind(types: Any, kind: Any) -> str:
     return next((name for name, test in tests.items() if test(kind)), "")
 
 
-class _Rows:
+class _RowGroups:
     """Batches into columns of floats and words."""
 
     def __init__(self, columns: _Columns, source: str, skip: bool):

@@ -9,10 +9,9 @@ from pathlib import Path
 
 from omnidyn.errors import InputError
 from omnidyn.files import default_max_bytes, format_of
-from omnidyn.logs.readers.folders import files_of, is_bag_folder, is_log_folder
 from omnidyn.logs.readers.lerobot import PARQUET
 from omnidyn.logs.readers.matlab.mat import HDF5, MAT
-from omnidyn.logs.readers.reader import Options, Reader, completed
+from omnidyn.logs.readers.reader import Reader, ReadOptions, completed, files_of, is_bag_folder, is_log_folder
 from omnidyn.logs.readers.ros.bags import MCAP, ROS1, ROS2
 from omnidyn.logs.readers.text import TEXT
 from omnidyn.logs.readers.wpilog import WPILOG
@@ -51,7 +50,7 @@ def read_table(
     formats are refused by name.
     """
     limit = default_max_bytes() if max_bytes is None else max_bytes
-    return join(_tables(path, ROWS, Options(header, skip_bad_rows, limit, progress, tuple(variables))), limit)
+    return join(_tables(path, ROWS, ReadOptions(header, skip_bad_rows, limit, progress, tuple(variables))), limit)
 
 
 def iter_tables(
@@ -73,7 +72,7 @@ def iter_tables(
     limit = default_max_bytes() if max_bytes is None else max_bytes
     if not reader_of(path).whole:
         rows, limit = min(rows, max(1, limit // ROW_BYTES)), None
-    return _tables(path, rows, Options(header, skip_bad_rows, limit, progress, tuple(variables)))
+    return _tables(path, rows, ReadOptions(header, skip_bad_rows, limit, progress, tuple(variables)))
 
 
 def reader_of(path: str | os.PathLike) -> Reader:
@@ -82,10 +81,10 @@ def reader_of(path: str | os.PathLike) -> Reader:
     kind = format_of(files[0])
     if is_bag_folder(path):
         return ROS2 if kind is not None and kind.name in ("sqlite", "zstd") else MCAP
-    return next((each for each in READERS if kind is not None and each.kind == kind.name), TEXT)
+    return next((reader for reader in READERS if kind is not None and reader.kind == kind.name), TEXT)
 
 
-def _tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
+def _tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
     if rows < 1:
         raise InputError("no rows in a piece", got=rows, expected="1 or more")
     reader, suffix = reader_of(path), Path(path).suffix
@@ -96,7 +95,7 @@ def _tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Ta
         )  # fmt: skip
     if is_log_folder(path):
         suffix = ""
-    promised = next((each for each in READERS if suffix.lower() in each.suffixes), TEXT)
+    promised = next((reader for reader in READERS if suffix.lower() in reader.suffixes), TEXT)
     tables = completed(reader.tables(path, rows, options), reader.least)
     if promised is reader or not suffix:
         return tables

@@ -129,7 +129,7 @@ class Recording:
         return [track for track in self.tracks if longest[id(track)] <= MAX_NAME]
 
     def _nothing(self) -> InputError:
-        told = [f"{each.name} ({each.type}, {each.count})" for each in self.topics if each.count]
+        told = [f"{topic.name} ({topic.type}, {topic.count})" for topic in self.topics if topic.count]
         return InputError(
             "no topic holds numbers that can be read", got=shortened(", ".join(told), 400) or "no messages",
             expected="JointState, Odometry, Twist, BatteryState, Imu or messages with plain numbers",
@@ -182,11 +182,11 @@ def _blocks(tracks: Sequence[Track], most: int) -> Iterator[tuple[IntArray, dict
 def _until(tracks: Sequence[Track], done: Sequence[int], most: int) -> int:
     """The latest stamp [ns] up to which all topics have at most `most` messages more; the next one at least."""
     ahead = [track.stamps[at : at + most + 1] for at, track in zip(done, tracks, strict=True)]
-    ahead = [each for each in ahead if len(each)]
-    low, high = min(int(each[0]) for each in ahead), max(int(each[-1]) for each in ahead)
+    ahead = [stamps for stamps in ahead if len(stamps)]
+    low, high = min(int(stamps[0]) for stamps in ahead), max(int(stamps[-1]) for stamps in ahead)
     while low < high:
         middle = (low + high + 1) // 2
-        count = sum(int(np.searchsorted(each, middle, side="right")) for each in ahead)
+        count = sum(int(np.searchsorted(stamps, middle, side="right")) for stamps in ahead)
         low, high = (middle, high) if count <= most else (low, middle - 1)
     return low
 

@@ -11,7 +11,9 @@ never closed, 1e400, 1_000, 0x10, #N/A, blank cells where a number is needed.
 from __future__ import annotations
 
 import os
+import re
 from array import array
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -22,12 +24,12 @@ import numpy as np
 from omnidyn.arrays import IntArray
 from omnidyn.errors import InputError
 from omnidyn.files import default_max_bytes, too_large
-from omnidyn.logs.readers.reader import Options, Reader
+from omnidyn.logs.readers.reader import Reader, ReadOptions
 from omnidyn.logs.readers.recording import Recording, Track, topic_of
 from omnidyn.logs.table import dialect
+from omnidyn.logs.table.dialect import SAMPLE_ROWS, SEPARATORS, counts, is_comment, looks_like_number
 from omnidyn.logs.table.header import MAX_COLUMNS, TABS_NOTE, FileLine, Layout, find_layout
 from omnidyn.logs.table.rows import Column, RowParser
-from omnidyn.logs.table.spaced import NOTE, is_spaced, tabbed
 from omnidyn.logs.table.table import MAX_CELLS, ROWS, Table
 from omnidyn.logs.table.text_file import TOO_LARGE_REMEDY, TextBlock, TextFile
 
@@ -35,7 +37,7 @@ HEAD_ROWS = 100  # the first rows are looked at together to tell how a file is w
 KEPT_COMMENTS = 2  # right above a row: names, and perhaps their units
 
 
-def text_tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
+def text_tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
     """The tables of a text file; see the head of this file for what is taken and refused, and the contract.
 
     A list with a row for every value (listed) becomes a table of topics, and is held whole.
@@ -49,7 +51,7 @@ def text_tables(path: str | os.PathLike, rows: int, options: Options) -> Iterato
     yield from recording_of(chain([first], tables), limit).tables(rows)
 
 
-def _as_they_stand(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
+def _as_they_stand(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
     """The rows as they stand in the file."""
     file = TextFile(path, options.progress, options.max_bytes)
     head, blocks = _head(file.blocks(rows))
@@ -60,7 +62,7 @@ def _as_they_stand(path: str | os.PathLike, rows: int, options: Options) -> Iter
     if spaced:
         notes = [NOTE if note == TABS_NOTE else note for note in layout.notes]
         layout = replace(layout, notes=tuple(notes))
-    rows_of_head = [text for number, text in head if number >= layout.first and not _is_comment(text)]
+    rows_of_head = [text for number, text in head if number >= layout.first and not dialect.is_comment(text)]
     sample = rows_of_head[: dialect.SAMPLE_ROWS]
     parser = RowParser(layout, file.source, options.skip_bad_rows, sample)
     most = max(1, min(rows, MAX_CELLS // len(layout.names)))
@@ -69,7 +71,8 @@ def _as_they_stand(path: str | os.PathLike, rows: int, options: Options) -> Iter
         notes = (*layout.notes, *file.notes, *parser.notes)
         return Table(layout.names, columns, lines, layout.units, file.source, sha256, notes, layout.titles)
 
-    for block in _cut(blocks, most):
+    pieces = (TextBlock(first + k, texts[k : k + most]) for first, texts in blocks for k in range(0, len(texts), most))
+    for block in pieces:
         texts, lines = _kept(block, layout.first)
         if texts and file.ends_open and lines[-1] == file.last and _is_cut(texts[-1], layout):
             texts, lines = texts[:-1], lines[:-1]
@@ -97,7 +100,7 @@ def _head(blocks: Iterator[TextBlock]) -> tuple[list[FileLine], Iterator[TextBlo
         for number, text in enumerate(block.lines, block.first):
             if not text or text.isspace():
                 continue
-            comments = comments + 1 if _is_comment(text) else 0
+            comments = comments + 1 if dialect.is_comment(text) else 0
             rows += not comments
             lines.append(FileLine(number, text))
             if comments > KEPT_COMMENTS:
@@ -109,11 +112,6 @@ def _head(blocks: Iterator[TextBlock]) -> tuple[list[FileLine], Iterator[TextBlo
     return lines, iter(taken)
 
 
-def _cut(blocks: Iterable[TextBlock], rows: int) -> Iterator[TextBlock]:
-    for first, lines in blocks:
-        yield from (TextBlock(first + k, lines[k : k + rows]) for k in range(0, len(lines), rows))
-
-
 def _tabbed(blocks: Iterable[TextBlock]) -> Iterator[TextBlock]:
     for first, lines in blocks:
         yield TextBlock(first, [tabbed(line) if line else line for line in lines])
@@ -123,7 +121,7 @@ def _kept(block: TextBlock, first: int) -> tuple[list[str], IntArray]:
     """The rows in a block, without blank lines, comments and what stands above line `first`; and their lines."""
     begin = max(0, first - block.first)
     lines = block.lines[begin:]
-    kept = [k for k, line in enumerate(lines) if line and not line.isspace() and not _is_comment(line)]
+    kept = [k for k, line in enumerate(lines) if line and not line.isspace() and not dialect.is_comment(line)]
     texts = lines if len(kept) == len(lines) else [lines[k] for k in kept]
     return texts, np.array(kept, dtype=np.int64) + (block.first + begin)
 
@@ -134,10 +132,6 @@ def _is_cut(text: str, layout: Layout) -> bool:
         return len(layout.cells(text, "")) < len(layout.names)
     except InputError:  # a quote that is never closed
         return True
-
-
-def _is_comment(line: str) -> bool:
-    return ("#" in line or "%" in line) and dialect.is_comment(line)
 
 
 def _texts_from(file: TextFile, layout: Layout, line: int, spaced: bool) -> Iterator[str]:
@@ -191,7 +185,7 @@ def recording_of(tables: Iterable[Table], max_bytes: int) -> Recording:
     tracks = [
         Track(key, np.array(stamps[key], dtype=np.int64), {key: np.array(mine)}) for key, mine in values.items()
     ]  # fmt: skip
-    topics = [topic_of(each.topic, "numbers", each.stamps, True) for each in tracks]
+    topics = [topic_of(track.topic, "numbers", track.stamps, True) for track in tracks]
     lost = sorted(words - set(stamps))
     notes = [*table.notes, "a row for every value: each key is a topic with times of its own"]
     notes += [f"words are not read: {', '.join(lost[:8])}"] if lost else []
@@ -206,3 +200,74 @@ def _number(cells: Column, row: int) -> float | None:
     if cell.lower() in TRUTH:
         return TRUTH[cell.lower()]
     return dialect.to_float(cell) if dialect.NUMBER.fullmatch(cell) or dialect.MISSING.fullmatch(cell) else None
+
+
+# Tables whose columns are separated by runs of spaces or tabs, as many loggers and `numpy.savetxt` write them
+#
+# A file is taken for one only where no other separator fits, so that a name or a word with a space in it stays whole.
+# Its lines then get one tab between two cells, and all else is as in a file separated by tabs.
+
+NOTE = "columns are separated by spaces"
+HEAD = 3  # lines above the first row that may hold titles, names and units
+LEAST_NUMBERS = 2  # in a row: words alone may be one column of text
+
+_CELL = re.compile(r'(?:"[^"]*"|[^ \t"]|")+')
+_BRACKETS = re.compile(r"\[[^\[\]]*\]|\([^()]*\)")
+
+
+def is_spaced(lines: Sequence[str]) -> bool:
+    """Whether the lines of a file (comments and blank lines among them) are cells between spaces.
+
+    They are where no comma, semicolon or tab separates them all, the first line and most others have the same number
+    of cells, two or more, and most rows hold two numbers or more.
+    """
+    kept = [line for line in lines if line.strip() and not is_comment(line)][: SAMPLE_ROWS + HEAD]
+    if not kept or not _has_spaces(kept[0]) or _separated(kept):
+        return False
+    first, rows = cells(kept[0]), [cells(line) for line in kept[1:]] or [cells(kept[0])]
+    width, often = Counter(map(len, rows)).most_common(1)[0]
+    body = rows[HEAD:] or rows[-1:]
+    numbers = sum(sum(map(looks_like_number, row)) >= LEAST_NUMBERS for row in body)
+    return width > 1 and len(first) == width and 2 * often > len(rows) and 2 * numbers > len(body)
+
+
+def _has_spaces(line: str) -> bool:
+    return " " in line.strip() or "\t" in line.strip()
+
+
+def _separated(kept: Sequence[str]) -> bool:
+    """Whether a comma or semicolon separates the first line, or tabs separate it and most others."""
+    for separator in SEPARATORS:
+        count = min(counts(kept[0], separator))
+        fits = sum(count in counts(row, separator) for row in kept[1:])
+        if count > 1 and (separator != "\t" or (2 * fits >= len(kept) - 1 and not _numbers_between_tabs(kept[1:]))):
+            return True
+    return False
+
+
+def _numbers_between_tabs(rows: Sequence[str]) -> bool:
+    """Whether a cell between tabs holds several numbers: then tabs are not all that separates."""
+    parts = (cell.split() for row in rows for cell in row.split("\t"))
+    return any(len(part) > 1 and all(map(looks_like_number, part)) for part in parts)
+
+
+def cells(line: str) -> list[str]:
+    """The cells of a line: a quoted one may hold spaces; a unit in brackets belongs to the name before it."""
+    if '"' not in line and "[" not in line and "(" not in line:
+        return [cell for cell in line.replace("\t", " ").split(" ") if cell]
+    found: list[str] = []
+    for cell in _CELL.findall(line):
+        unit = bool(found) and _BRACKETS.fullmatch(cell) and not _BRACKETS.fullmatch(found[-1])
+        if unit:
+            found[-1] = f"{found[-1]} {cell}"
+        else:
+            found.append(cell)
+    return found
+
+
+def tabbed(line: str) -> str:
+    """The line with one tab between two cells; in a comment, between those behind its sign."""
+    if is_comment(line):
+        start = line.lstrip()
+        return f"{start[0]} " + "\t".join(cells(start[1:]))
+    return "\t".join(cells(line))

@@ -22,9 +22,9 @@ from omnidyn.errors import InputError, printable
 from omnidyn.files import default_max_bytes, growth, open_regular, pieces, too_large
 from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.names import read_name
-from omnidyn.logs.readers.claims import Claim, Out, tracks_of
-from omnidyn.logs.readers.reader import Options, Reader
-from omnidyn.logs.readers.recording import LeftOut, Recording, Topic, topic_of
+from omnidyn.logs.readers.claims import TopicClaim, TopicColumn, tracks_of
+from omnidyn.logs.readers.reader import Reader, ReadOptions
+from omnidyn.logs.readers.recording import LeftOut, Recording, topic_of
 from omnidyn.logs.readers.ros.layout import Leaf, column
 from omnidyn.logs.table.table import Table
 from omnidyn.logs.table.text_file import BLOCK_BYTES, TOO_LARGE_REMEDY
@@ -64,7 +64,7 @@ class _Ends(Exception):
 class WpilogFile:
     """The entries of a log; `damage` says why it could not be read to its end."""
 
-    def __init__(self, stream: BinaryIO, size: int, source: str, options: Options):
+    def __init__(self, stream: BinaryIO, size: int, source: str, options: ReadOptions):
         self.stream, self.size, self.source, self.options = stream, size, source, options
         self.max_bytes = options.max_bytes if options.max_bytes is not None else default_max_bytes()
         self.entries: dict[tuple[str, str], Entry] = {}
@@ -185,7 +185,7 @@ def _text(value: bytes, at: int) -> tuple[str, int]:
     return value[at + 4 : at + 4 + size].decode("utf-8", "replace"), at + 4 + size
 
 
-def read_wpilog(path: str | os.PathLike, options: Options) -> Recording:
+def read_wpilog(path: str | os.PathLike, options: ReadOptions) -> Recording:
     """A data log. Raises InputError where not one record is whole, or its numbers take more than `max_bytes`."""
     source, digest = str(path), hashlib.sha256()
     with open_regular(path) as stream:
@@ -199,26 +199,22 @@ def read_wpilog(path: str | os.PathLike, options: Options) -> Recording:
     if file.damage:
         notes.append(f"the file is damaged: {file.damage}; {file.count} values before that were read")
     schemas = {
-        name.removeprefix(SCHEMA_ENTRY): bytes(each.values[: each.sizes[0]]).decode("utf-8", "replace")
-        for (name, kind), each in file.entries.items()
-        if kind == SCHEMA and name.startswith(SCHEMA_ENTRY) and len(each.sizes)
+        name.removeprefix(SCHEMA_ENTRY): bytes(entry.values[: entry.sizes[0]]).decode("utf-8", "replace")
+        for (name, kind), entry in file.entries.items()
+        if kind == SCHEMA and name.startswith(SCHEMA_ENTRY) and len(entry.sizes)
     }
     claims, topics = [], []
     for entry in file.entries.values():
         stamps = np.array(entry.stamps, dtype=np.int64) * 1000
         outs, why = _outs(entry, schemas, source, notes)
         if outs:
-            claims.append(Claim(entry.name, stamps, outs, 1))
-        topics.append(_topic(entry, stamps, bool(outs), why))
+            claims.append(TopicClaim(entry.name, stamps, outs, 1))
+        topics.append(topic_of(printable(entry.name), printable(entry.kind), stamps, bool(outs), why))
     tracks = list(tracks_of(_renamed(claims), notes))
     return Recording(tracks, topics, source, digest.hexdigest(), notes, file.count if file.damage else None)
 
 
-def _topic(entry: Entry, stamps: IntArray, read: bool, why: str) -> Topic:
-    return topic_of(printable(entry.name), printable(entry.kind), stamps, read, why)
-
-
-def _renamed(claims: list[Claim]) -> list[Claim]:
+def _renamed(claims: list[TopicClaim]) -> list[TopicClaim]:
     """Two entries of one name and two types are told apart by a number: no column may be called as another."""
     seen: set[str] = set()
     found = []
@@ -232,7 +228,7 @@ def _renamed(claims: list[Claim]) -> list[Claim]:
     return found
 
 
-def _outs(entry: Entry, schemas: dict[str, str], source: str, notes: list[str]) -> tuple[list[Out], str]:
+def _outs(entry: Entry, schemas: dict[str, str], source: str, notes: list[str]) -> tuple[list[TopicColumn], str]:
     """(the columns of an entry, why there are none)."""
     if not entry.keeps or entry.kind == SCHEMA or not len(entry.stamps):
         return [], "" if not len(entry.stamps) else "no numbers"
@@ -263,14 +259,16 @@ def _block(content: np.ndarray, starts: IntArray, size: int) -> np.ndarray:
     return content[starts[:, None] + np.arange(size)]
 
 
-def _plain(entry: Entry, sizes: IntArray, starts: IntArray, content: np.ndarray) -> list[Out]:
+def _plain(entry: Entry, sizes: IntArray, starts: IntArray, content: np.ndarray) -> list[TopicColumn]:
     """Numbers, and arrays of them: a column for each place. Values of another size are missing."""
     code, size = SIZES[entry.kind.removesuffix("[]")]
     if not entry.kind.endswith("[]"):
-        return [Out(entry.name, _numbers(sizes == size, starts, content, size, f"<{code}"))]
+        return [TopicColumn(entry.name, _numbers(sizes == size, starts, content, size, f"<{code}"))]
     longest = min(int(sizes.max()) // size, MAX_ARRAY)
     return [
-        Out(f"{entry.name}[{k}]", _numbers(sizes >= (k + 1) * size, starts + k * size, content, size, f"<{code}"))
+        TopicColumn(
+            f"{entry.name}[{k}]", _numbers(sizes >= (k + 1) * size, starts + k * size, content, size, f"<{code}")
+        )
         for k in range(longest)
     ]
 
@@ -284,14 +282,14 @@ def _numbers(there: np.ndarray, starts: IntArray, content: np.ndarray, size: int
 
 def _struct(
     entry: Entry, schemas: dict[str, str], sizes: IntArray, starts: IntArray, content: np.ndarray
-) -> list[Out]:  # fmt: skip
+) -> list[TopicColumn]:  # fmt: skip
     """The numbers of a struct, or of each in an array of them."""
     kind = entry.kind.removeprefix(STRUCT)
     leaves, size = leaves_of(kind.removesuffix("[]"), schemas)
     if not size:
         return []
     many = min(int(sizes.max()) // size, MAX_ARRAY) if kind.endswith("[]") else 1
-    found: list[Out] = []
+    found: list[TopicColumn] = []
     for k in range(many):
         there = sizes >= (k + 1) * size if kind.endswith("[]") else sizes == size
         if not there.any():
@@ -301,7 +299,7 @@ def _struct(
             values = np.full(len(sizes), np.nan)
             values[there] = column(block, leaf)
             index = f"[{k}]" if kind.endswith("[]") else ""
-            found.append(Out(f"{entry.name}{index}/{path}", values))
+            found.append(TopicColumn(f"{entry.name}{index}/{path}", values))
     return [_known(kind, entry.name, out) for out in found]
 
 
@@ -309,7 +307,7 @@ _POSE = {"translation/x": ("x", "m"), "translation/y": ("y", "m"), "rotation/val
 _SPEEDS = {"vx": ("vx", "m/s"), "vy": ("vy", "m/s"), "omega": ("omega", "rad/s")}
 
 
-def _known(kind: str, name: str, out: Out) -> Out:
+def _known(kind: str, name: str, out: TopicColumn) -> TopicColumn:
     """What the usual structs say: a pose of the robot, speeds of its body, commanded or measured."""
     of = {"Pose2d": _POSE, "ChassisSpeeds": _SPEEDS}.get(kind, {})
     component, unit = of.get(out.name.removeprefix(f"{name}/"), (None, ""))
@@ -319,7 +317,7 @@ def _known(kind: str, name: str, out: Out) -> Out:
     return out._replace(unit=unit, component=f"{component}{'_cmd' * command}")
 
 
-def _tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
+def _tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
     yield from read_wpilog(path, options).tables(rows)
 
 

@@ -18,7 +18,7 @@ Column = FloatArray | tuple[str, ...]
 THOUSAND = 1000
 
 
-class Points:
+class PointMeaning:
     """What the points of one table mean, from its rows in order, given in blocks.
 
     names: of the columns. source: the path.

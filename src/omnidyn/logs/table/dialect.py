@@ -40,6 +40,8 @@ def is_comment(line: str) -> bool:
 
     A cell that is only % or # is a unit: `%,V` is no comment.
     """
+    if "#" not in line and "%" not in line:
+        return False
     start = line.lstrip()
     if not start.startswith(("#", "%")) or _SPREADSHEET_ERROR.match(start):
         return False

@@ -15,7 +15,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.logs.table import dialect
-from omnidyn.logs.table.decimals import Column, Points
+from omnidyn.logs.table.decimals import Column, PointMeaning
 from omnidyn.logs.table.header import Layout
 
 Lines = IntArray
@@ -39,7 +39,7 @@ class RowParser:
         self.layout, self.source, self.skip = layout, source, skip
         self.skipped: dict[str, list[int]] = {}
         self._rows = 0
-        self._points = Points(layout.separator, layout.names, source)
+        self._points = PointMeaning(layout.separator, layout.names, source)
         self._comma = self._point = ""  # the first number of each kind
         self._words: set[str] = set()
         count = len(layout.names)
@@ -78,7 +78,8 @@ class RowParser:
 
     def _plain(self, texts: list[str]) -> dict[str, Column] | None:
         """The columns of rows in which nothing is odd; None where a closer look is needed."""
-        texts, separator, comma, first = self._unended(texts), self.layout.separator, False, ""
+        separator, ending, comma, first = self.layout.separator, self.layout.ending, False, ""
+        texts = [text.rstrip().removesuffix(ending) for text in texts] if ending else texts
         if any('"' in text for text in texts):
             texts = [_unquoted(text, separator) for text in texts]
         if separator != ",":
@@ -117,10 +118,6 @@ class RowParser:
         self._words |= words
         floats = {names[k]: values[:, place].copy() for place, k in enumerate(numeric)}
         return {name: tuple(split[name]) if name in split else floats[name] for name in names}
-
-    def _unended(self, texts: list[str]) -> list[str]:
-        ending = self.layout.ending
-        return [text.rstrip().removesuffix(ending) for text in texts] if ending else texts
 
     # ---- cell by cell ------------------------------------------------------------------------------------
 

@@ -67,10 +67,13 @@ class TextFile:
             yield TextBlock(first, pending)
 
     def _whole_lines(self) -> Iterator[bytes]:
-        """Blocks that end where a line ends, the last line end of each cut off."""
+        """Blocks that end where a line ends, the last line end of each cut off; every line end is \n."""
         rest = b""
-        for block in self._unix(self._utf8(self._blocks())):
+        for block in self._utf8(self._blocks()):
             rest += block
+            if b"\r" in rest:
+                half = b"\r" * rest.endswith(b"\r")  # \r\n may be cut by the end of a block
+                rest = rest.removesuffix(half).replace(b"\r\n", b"\n").replace(b"\r", b"\n") + half
             end = rest.rfind(b"\n")
             if end >= 0:
                 yield rest[:end]
@@ -80,7 +83,9 @@ class TextFile:
                     "this is not a table", got=f"a line of more than {MAX_LINE_BYTES} bytes",
                     expected="lines of cells", where=self.source,
                 )  # fmt: skip
-        if rest:
+        if rest.endswith(b"\r"):
+            yield rest[:-1]
+        elif rest:
             self.ends_open = True
             yield rest
 
@@ -92,7 +97,14 @@ class TextFile:
                 raise too_large(self.path, self._max_bytes, TOO_LARGE_REMEDY)
             while block := stream.read(min(total - done, BLOCK_BYTES if done else max(BLOCK_BYTES, START_BYTES))):
                 if not done:
-                    self._refuse_format(block)
+                    kind = file_format(block)
+                    what = "this is not a text file" if kind else "this is not a table"
+                    kind = kind or text_format(block)
+                    if kind is not None:
+                        raise InputError(
+                            what, got=kind.words, expected="text with a row for each moment", remedy=kind.remedy,
+                            where=self.source,
+                        )  # fmt: skip
                     self._start = block[:SHOWN_BYTES]
                 self._hash.update(block)
                 done += len(block)
@@ -101,15 +113,6 @@ class TextFile:
             self.notes += growth(stream, total)
         if not done:
             raise empty(self.source)
-
-    def _refuse_format(self, start: bytes) -> None:
-        kind = file_format(start)
-        what = "this is not a text file" if kind else "this is not a table"
-        kind = kind or text_format(start)
-        if kind is not None:
-            raise InputError(
-                what, got=kind.words, expected="text with a row for each moment", remedy=kind.remedy, where=self.source
-            )
 
     def _utf8(self, blocks: Iterator[bytes]) -> Iterator[bytes]:
         """The same text without a byte order mark, UTF-16 turned into UTF-8.
@@ -155,17 +158,6 @@ class TextFile:
                 "this is not a text file", got="no valid UTF-16 after its byte order mark", expected="text",
                 remedy="save it as UTF-8", where=self.source,
             ) from None  # fmt: skip
-
-    @staticmethod
-    def _unix(blocks: Iterator[bytes]) -> Iterator[bytes]:
-        """The same text with \\n at the end of lines; a \\r\\n may be cut by the end of a block."""
-        held = b""
-        for block in blocks:
-            block, held = held + block, b""
-            if block.endswith(b"\r"):
-                block, held = block[:-1], b"\r"
-            yield block.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in block else block
-        yield held.replace(b"\r", b"\n")
 
     def _decoded(self, block: bytes, first: int) -> str:
         try:

@@ -14,7 +14,7 @@ from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Part, Table, Words, all_of, plain
 from omnidyn.model.actuation import clip_voltage
-from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moves
+from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, dead_zone_map, moving_axes
 from omnidyn.model.frames import AXES
 from omnidyn.model.known.told import numbers_told, told
 from omnidyn.model.known.uncertainty import DRAWS, Interval, effects, interval_of
@@ -229,7 +229,7 @@ def _row(
     if not np.isfinite(scale):
         return Breakaway("", pattern, scale, duty, ends, duty_ends, False)
     volts = np.multiply(scale, pattern)
-    moving = [axis for axis, moved in zip(AXES, moves(robot, BEYOND * volts), strict=True) if moved]
+    moving = [axis for axis, moved in zip(AXES, moving_axes(robot, BEYOND * volts), strict=True) if moved]
     reachable = bool((clip_voltage(robot.motor, volts) == volts).all())
     return Breakaway("+".join(moving), pattern, scale, duty, ends, duty_ends, reachable)
 

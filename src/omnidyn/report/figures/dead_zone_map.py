@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import cast
 
@@ -10,9 +11,11 @@ import numpy as np
 from matplotlib.projections.polar import PolarAxes
 
 from omnidyn.arrays import FloatArray
+from omnidyn.document import Points
 from omnidyn.model.deadzone import dead_zone_force, dead_zone_map
-from omnidyn.model.known.dead_zone import DeadZone
+from omnidyn.model.known.dead_zone import DeadZone, dead_zone
 from omnidyn.model.robot import Robot
+from omnidyn.report.html import Section, content, paragraph
 from omnidyn.report.style import (
     BLUE,
     GREEN,
@@ -91,3 +94,22 @@ def _caption(robots: Mapping[str, Robot], found: Mapping[str, DeadZone]) -> str:
         "loaded motor (left) and the push of the motors (right) at which it starts to move. Below that it stays "
         f"exactly at rest. The voltages push along the direction, without a torque.{band}"
     )
+
+
+# The section of a report that says at which voltage the identified robot starts to move
+
+
+def dead_zone_section(robots: Mapping[str, Robot]) -> Section:
+    """Volts and duty of each group's robot, with their intervals, and the map of all directions."""
+    parts = [paragraph(f"{group}:") + _one(group, robot) if len(robots) > 1 else _one("", robot)
+             for group, robot in robots.items()]  # fmt: skip
+    return Section("dead-zone", "Dead zone", "".join(parts))
+
+
+def _one(group: str, robot: Robot) -> str:
+    if robot.wheels.traction_mu is not None:
+        return paragraph("Wheels may slip (traction_mu): at which voltage this robot starts to move is not worked out.")
+    found = dead_zone(robot)
+    drawn = draw_dead_zone_map({robot.name: robot}, {robot.name: found})
+    anchor = "".join(c if c.isalnum() or c in "-_." else "-" for c in f"{drawn.name}{group}")
+    return content(found.table(), Points(found.statements()), replace(drawn, name=anchor))

@@ -9,8 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from omnidyn.arrays import FloatArray
-from omnidyn.identification.friction_curve import FrictionCurve
+from omnidyn.identification.estimate import Estimate
+from omnidyn.identification.friction_curve import FrictionCurve, friction_curve
 from omnidyn.model.frames import AXES
+from omnidyn.model.sliding import top_speeds
 from omnidyn.report.style import (
     BLUE,
     GREEN,
@@ -99,3 +101,20 @@ def _caption(curves: Mapping[str, Sequence[FrictionCurve]], driven: bool, banded
         f"What friction takes from a robot that moves along {AXES[0]}, along {AXES[1]}, or turns about {AXES[2]}; at "
         f"speed 0 it holds anything up to the jump.{band}{lost}{range_words}"
     )
+
+
+# The friction of an estimate against speed, or of the groups of one identification
+
+WHOLE = "all"  # the name of the one group where there are no groups
+
+
+def estimate_curves(estimate: Estimate) -> list[FrictionCurve]:
+    """The curves of an estimate along x, along y and about yaw, up to the speeds that its robot can reach."""
+    tops = top_speeds(estimate.robot)
+    return [friction_curve(estimate, axis, speeds_up_to(float(top))) for axis, top in enumerate(tops)]
+
+
+def draw_estimates(estimates: Mapping[str, Estimate], **how: Any) -> Picture:
+    """Friction against speed of one estimate, or of the groups of one identification."""
+    names = {name: estimate.robot.name if name == WHOLE else name for name, estimate in estimates.items()}
+    return draw_friction_speed({names[name]: estimate_curves(each) for name, each in estimates.items()}, **how)

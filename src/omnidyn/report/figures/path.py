@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.projections.polar import PolarAxes
 
-from omnidyn.logs.path import Path
+from omnidyn.logs.path import BodyPath
 from omnidyn.report.style import (
     BLUE,
     GREEN,
@@ -31,7 +31,7 @@ SECTORS = 36
 MAX_POINTS = 4000
 
 
-def draw_path(paths: Sequence[Path], name: str = "where_it_went", of: str = "") -> Picture:
+def draw_path(paths: Sequence[BodyPath], name: str = "where_it_went", of: str = "") -> Picture:
     """The paths seen from above, a start as a ring and an end as a dot; and the metres driven per direction."""
     with look():
         figure = new_figure(WIDTH, 4.3)
@@ -48,7 +48,7 @@ def draw_path(paths: Sequence[Path], name: str = "where_it_went", of: str = "") 
         return picture(name, f"Where the log{'s' * (len(paths) > 1)} went{of}", _caption(paths), figure)
 
 
-def _path(axes: Axes, path: Path, colour: str) -> None:
+def _path(axes: Axes, path: BodyPath, colour: str) -> None:
     every = max(1, len(path.position) // MAX_POINTS)
     x, y = path.position[::every].T
     axes.plot(x, y, color=colour, linewidth=1.1, alpha=0.9)
@@ -57,7 +57,7 @@ def _path(axes: Axes, path: Path, colour: str) -> None:
     axes.plot(*known[-1], "o", color=colour, markersize=6, zorder=5)
 
 
-def _directions(axes: PolarAxes, paths: Sequence[Path]) -> None:
+def _directions(axes: PolarAxes, paths: Sequence[BodyPath]) -> None:
     length = np.concatenate([path.length for path in paths])
     direction = np.concatenate([path.direction for path in paths])
     width = 2.0 * np.pi / SECTORS
@@ -68,7 +68,7 @@ def _directions(axes: PolarAxes, paths: Sequence[Path]) -> None:
     axes.set_axisbelow(False)  # numbers stand above the bars
 
 
-def _caption(paths: Sequence[Path]) -> str:
+def _caption(paths: Sequence[BodyPath]) -> str:
     origins = " or ".join(dict.fromkeys(path.origin for path in paths))
     total = sum(float(path.length.sum()) for path in paths)
     drift = "" if origins == "measured positions" else " Integrated speeds drift: only the shape of the path counts."

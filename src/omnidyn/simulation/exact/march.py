@@ -7,6 +7,7 @@ turning frame, no current limit. `why_not_exact` says by name what stands agains
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,14 +65,32 @@ def why_not_exact(robot: Robot) -> list[str]:
     return reasons
 
 
+class Grid(NamedTuple):
+    """Rows of time. steps [s]: the lengths that occur, shape (m,); which: of them each row has, shape (n,).
+
+    phi [s]: of `discretise`, for each length, shape (m, 3).
+    """
+
+    steps: FloatArray
+    which: NDArray[np.intp]
+    phi: FloatArray
+
+
+class AxisLevels(NamedTuple):
+    """rate a [1/s], coulomb c, breakaway S [m/s^2, m/s^2, rad/s^2] of the three axes. Shape (3,) each."""
+
+    rate: FloatArray
+    coulomb: FloatArray
+    breakaway: FloatArray
+
+
 class ExactMarch:
     """Runs of one robot; what does not change between them is made once."""
 
     def __init__(self, robot: Robot) -> None:
         self._system = state_space(robot)
-        self._levels = axis_levels(robot, self._system)
-        self._phi: dict[float, FloatArray] = {}
-        self._first = np.zeros(1, np.intp)
+        self._per_volt, self._levels = np.ascontiguousarray(self._system.B), axis_levels(robot, self._system)
+        self._grids: dict[float, Grid] = {}
 
     def run(
         self, voltage: FloatArray, dt: FloatArray, twist: FloatArray, pose: FloatArray
@@ -81,28 +100,27 @@ class ExactMarch:
         `voltage` [V] is within limits, shape (n, wheels); `dt` [s], shape (n,); `twist` and `pose` the start, shape
         (3,). Raises InputError when one step turns the robot further than MAX_TURN_PER_STEP.
         """
-        rate, coulomb, breakaway = self._levels
-        drive = drive_acceleration(self._system, voltage)
-        steps, which, phi = self._steps(dt)
-        twists = _twists(drive, phi, which, rate, coulomb, breakaway, twist)
-        refuse_spin(np.abs(twists[:-1, 2]) * dt)
-        poses = _poses(twists, drive, phi, which, steps, rate, coulomb, breakaway, pose, NODES, WEIGHTS)
+        if not (voltage.flags.c_contiguous and voltage.flags.writeable):
+            voltage = voltage.copy()  # one kernel for all
+        twists, poses = _run(voltage, self._per_volt, self._levels, self._grid(dt), twist, pose, (NODES, WEIGHTS))
+        if not len(poses):
+            refuse_spin(np.abs(twists[:-1, 2]) * dt)
         return twists, poses
 
-    def _steps(self, dt: FloatArray) -> tuple[FloatArray, NDArray[np.intp], FloatArray]:
-        """(the lengths that occur, which of them each row has, their phi); of one row kept for the next call."""
+    def _grid(self, dt: FloatArray) -> Grid:
+        """The lengths of steps; of one row kept for the next call."""
         if len(dt) > 1:
             steps, which = np.unique(dt, return_inverse=True)
-            return steps, which, discretise(self._system, steps)
-        phi = self._phi.get(dt[0])
-        if phi is None:
-            phi = self._phi[dt[0]] = discretise(self._system, dt)
-        return dt, self._first, phi
+            return Grid(steps, which, discretise(self._system, steps))
+        grid = self._grids.get(dt[0])
+        if grid is None:
+            grid = self._grids[dt[0]] = Grid(dt.copy(), np.zeros(1, np.intp), discretise(self._system, dt))
+        return grid
 
 
-def axis_levels(robot: Robot, system: StateSpace) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """(rate a [1/s], coulomb c, breakaway S [m/s^2, m/s^2, rad/s^2]) of the three axes. Shape (3,) each."""
-    return -np.diag(system.A), -np.diag(system.K), robot.friction.axes.levels[2] / axis_masses(robot)
+def axis_levels(robot: Robot, system: StateSpace) -> AxisLevels:
+    """What brakes each axis, of eqs (13) (14)."""
+    return AxisLevels(-np.diag(system.A), -np.diag(system.K), robot.friction.axes.levels[2] / axis_masses(robot))
 
 
 def drive_acceleration(system: StateSpace, voltage: FloatArray) -> FloatArray:
@@ -126,11 +144,27 @@ def refuse_spin(turn: FloatArray) -> None:
 
 
 @kernel
-def _twists(drive, phi, which, rate, coulomb, breakaway, start):
+def _run(voltage, per_volt, levels, grid, twist, pose, rule):
+    """(twists, poses) after each step; no poses where one step turns the robot further than MAX_TURN_PER_STEP."""
+    drive = np.zeros((len(voltage), 3))
+    for k in range(len(voltage)):
+        for axis in range(3):
+            for wheel in range(voltage.shape[1]):  # in a fixed order: equal voltages cancel to an exact 0
+                drive[k, axis] += voltage[k, wheel] * per_volt[axis, wheel]
+    twists = _twists(drive, levels, grid, twist)
+    for k in range(len(drive)):
+        if not abs(twists[k, 2]) * grid.steps[grid.which[k]] <= MAX_TURN_PER_STEP:
+            return twists, np.empty((0, 3))
+    return twists, _poses(twists, drive, levels, grid, pose, rule)
+
+
+@maker
+def _twists(drive, levels, grid, start):
     """Twist after each step; axis by axis, which keeps the state in registers."""
+    phi, which = grid.phi, grid.which
     out = np.empty((len(drive) + 1, 3))
     for axis in range(3):
-        speed, a, c, s = start[axis], rate[axis], coulomb[axis], breakaway[axis]
+        speed, a, c, s = start[axis], levels.rate[axis], levels.coulomb[axis], levels.breakaway[axis]
         out[0, axis] = speed
         for k in range(len(drive)):
             speed = exact_step(speed, drive[k, axis], c, s, a, phi[which[k], axis], 0.0)
@@ -196,9 +230,12 @@ def _travel(start, end, event, before, after, rate, dt, nodes, weights):
     return x, y
 
 
-@kernel
-def _poses(twists, drive, phi, which, steps, rate, coulomb, breakaway, start, nodes, weights):
+@maker
+def _poses(twists, drive, levels, grid, start, rule):
     """Pose after each step from the twists; the heading is a compensated sum of closed forms."""
+    rate, coulomb, breakaway = levels
+    steps, which, phi = grid
+    nodes, weights = rule
     out = np.empty((len(drive) + 1, 3))
     for i in range(3):  # row by row, numba compiles the words of an error too: 1.2 s
         out[0, i] = start[i]

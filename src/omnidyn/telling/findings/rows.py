@@ -12,11 +12,6 @@ SPLIT = "split the file where two logs were joined (`convert` with `split`); whe
 sort them, or give identify and compare `sort`"
 
 
-def _settled(statement: Statement) -> str:
-    """What settles a doubt."""
-    return statement.numbers["doubt"].remedy_text
-
-
 def _no_channel(statement: Statement) -> str:
     """No column but the time is known."""
     unused = statement.numbers["unused"]
@@ -24,31 +19,11 @@ def _no_channel(statement: Statement) -> str:
     return f"no column but the time is known: nothing was checked{of}"
 
 
-def _wheel_count(statement: Statement) -> str:
-    """Log and robot have different numbers of wheels."""
-    wheels, of_robot = statement.numbers["wheels"], statement.numbers["of_robot"]
-    return f"the log has {wheels} {by_number(wheels, 'wheel or motor', 'wheels or motors')}, the robot {of_robot}: \
-what needs the robot was not checked"
-
-
 def _time_repeats(statement: Statement) -> str:
     """Rows with the time of the row before."""
     coarse = statement.severity == ERROR
     why = ": the clock is too coarse for this rate, or the time stands still" if coarse else ""
     return f"{vars(statement)['count']} rows have the same time as the row before{why}"
-
-
-def _gap(statement: Statement) -> str:
-    """Rows are missing: time between two of them is far longer than usual."""
-    n, count = statement.numbers, vars(statement)["count"]
-    return f"{counted(count, 'gap')}, about {n['lost_rows']:.0f} rows lost; the longest lasts {n['longest_s']:.4g} s, \
-at t = {n['at_s']:.6g} s"
-
-
-def _jitter(statement: Statement) -> str:
-    """Steps of time that vary."""
-    usual, low, high = (1e3 * statement.numbers[name] for name in ("step_s", "low_s", "high_s"))
-    return f"the steps of time vary: usually {usual:.4g} ms, 90 % between {low:.4g} and {high:.4g} ms"
 
 
 def _counter(statement: Statement) -> str:
@@ -85,15 +60,19 @@ def _overflow_remedy(statement: Statement) -> str:
 
 SENTENCES = {
     "no_channel": Sentence(_no_channel, "say which column is what: `column` w1=NAME:rad/s, or `map` FILE"),
-    "not_taken": Sentence("{doubt}", _settled),
+    "not_taken": Sentence("{doubt}", "{doubt.remedy_text}"),
     "not_used": Sentence("columns not used: {columns}"),
     "reading": Sentence("{note}"),
-    "wheel_count": Sentence(_wheel_count, "give the robot that the log is of"),
+    "wheel_count": Sentence(
+        "the log has {wheels} {wheels:wheel or motor|wheels or motors}, the robot {of_robot}: what needs the "
+        "robot was not checked",
+        "give the robot that the log is of",
+    ),
     "same_data": Sentence(
         "it holds the same numbers as {other}", "leave one of them out: they are one recording, not two"
     ),
     "empty_rows": Sentence(
-        "{count} of {of_rows} rows hold no time or no number", "they are left out; mend the recording"
+        "{count} of {of_rows} rows hold no time or no number", "they are left out; repair the recording"
     ),
     "padding": Sentence(
         "{count} rows at the end all repeat one row, at an earlier time: the recorder filled its buffer up",
@@ -104,8 +83,15 @@ SENTENCES = {
         _time_repeats, "only the first of them is used", {"often": "only the first of them is used; log a finer clock"}
     ),
     "speed_from_angle": Sentence("no speed of wheels was logged: w1, .. are differences of their angles"),
-    "gap": Sentence(_gap, "nothing is integrated across a gap: the pieces count as separate runs"),
-    "jitter": Sentence(_jitter, "the times as logged are used, not a fixed rate"),
+    "gap": Sentence(
+        "{count} {count:gap|gaps}, about {lost_rows:.0f} rows lost; the longest lasts {longest_s:.4g} s, at t = "
+        "{at_s:.6g} s",
+        "nothing is integrated across a gap: the pieces count as separate runs",
+    ),
+    "jitter": Sentence(
+        "the steps of time vary: usually {step_s:m.4g} ms, 90 % between {low_s:m.4g} and {high_s:m.4g} ms",
+        "the times as logged are used, not a fixed rate",
+    ),
     "few_rows": Sentence(
         "{rows:.0f} rows with a time: too few to judge noise, wiring or scale from", "log longer, 10 s or more"
     ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from omnidyn.statement import NOTE, Statement
 from omnidyn.telling.findings.wiring import compared
-from omnidyn.telling.sentence import SOURCES, Sentence, by_number, names, read_as
+from omnidyn.telling.sentence import SOURCES, Sentence, by_number, either, names, read_as
 
 REASONS = {
     "motor": "current and speed of its motor change", "voltage": "its motor gets a changing voltage",
@@ -53,14 +53,6 @@ def _scale(statement: Statement) -> str:
     return f"{compared(statement)} (+-{statement.numbers['error']:.2g})"
 
 
-def _scale_remedy(statement: Statement) -> str:
-    """Which of the two is wrong."""
-    blamed = statement.numbers["blamed"]
-    if blamed:
-        return f"{blamed} has a wrong scale: correct it in the mapping"
-    return "one of the two has a wrong scale, or the rows are too far apart to show how it moves"
-
-
 def _dead(statement: Statement) -> str:
     """A channel that does not change though something says it should."""
     n, subject = statement.numbers, statement.subject
@@ -80,41 +72,6 @@ def _dead_remedy(statement: Statement) -> str:
     if statement.numbers.keys() & {"value", "source"}:
         return "look at its sensor, its cable and its column; leave it out otherwise"
     return "leave it out of the mapping"
-
-
-def _gear(statement: Statement) -> str:
-    """Wheel speeds with a wrong gear ratio."""
-    n = statement.numbers
-    if "ratio" in n:
-        return (
-            f"floor and motors agree that the wheels turn {n['ratio']:.4g} times (+-{n['error']:.2g}) what wheel_speed \
-says: a wrong gear ratio or a wrong number of counts per turn in the log"
-        )
-    return f"{_by_motor(statement)}: the gear ratio, the counts per turn, or K and R of the robot file are off"
-
-
-def _gear_remedy(statement: Statement) -> str:
-    """The right gear ratio."""
-    if "ratio" in statement.numbers:
-        return "divide by the right gear ratio, or give the right counts per turn"
-    return f"check the gear ratio; {BY_HAND}"
-
-
-def _by_motor(statement: Statement) -> str:
-    """What voltage and current say of the wheel speeds."""
-    n = statement.numbers
-    return (
-        f"by voltage and current the wheels turn {n['electric_ratio']:.4g} times (+-{n['electric_ratio_error']:.2g}) \
-what wheel_speed says"
-    )
-
-
-def _motor_constants(statement: Statement) -> str:
-    """Constants of the motor that are off."""
-    return (
-        f"{_by_motor(statement)}, while the floor agrees with the wheels: K, R or the gear ratio of the robot file, or \
-the scale of voltage or current, is off"
-    )
 
 
 def _covers(statement: Statement) -> str:
@@ -147,21 +104,6 @@ def _grip(statement: Statement) -> str:
         return f"; {floor}"
     return f"; the motors push with up to {n['push_N']:.3g} N a wheel there, beyond the limit in \
 {100 * n['beyond']:.2g} % of the rows: {floor}"
-
-
-def _slip_remedy(statement: Statement) -> str:
-    """What to do about slip."""
-    if "from_s" in statement.numbers:
-        return "leave those rows out of fits of wheel speed against ground speed"
-    return "take the motion over the floor for friction; measure the wheel radius by rolling slowly"
-
-
-def _wheel_radius(statement: Statement) -> str:
-    """A wheel radius that is too small."""
-    return (
-        f"{_covers(statement)}, while voltage and current agree with the wheels: the wheel radius of the file is too \
-small, or the ground speed has a wrong scale"
-    )
 
 
 def _path_ratio(statement: Statement) -> str:
@@ -202,22 +144,52 @@ def _lag_remedy(statement: Statement) -> str:
     return f"move its times back by {1e3 * abs(statement.numbers['seconds']):.3g} ms: latency in the mapping"
 
 
-def _wheel_scale(statement: Statement) -> str:
-    """One wheel with a scale of its own."""
-    n = statement.numbers
-    return f"{statement.subject} reads {n['ratio']:.4g} times what {SOURCES[n['source']]} says, measured by the other \
-wheels"
-
-
 SENTENCES = {
     "unit": Sentence(_unit, "give the unit of the column (`column` NAME:UNIT) or its side of the gear"),
     "time_unit": Sentence(_time_unit, "give the unit of the time column, such as `column` t=NAME:ms"),
-    "scale": Sentence(_scale, _scale_remedy),
+    "scale": Sentence(
+        _scale,
+        either(
+            "blamed",
+            "{blamed} has a wrong scale: correct it in the mapping",
+            "one of the two has a wrong scale, or the rows are too far apart to show how it moves",
+        ),
+    ),
     "dead": Sentence(_dead, _dead_remedy),
-    "gear": Sentence(_gear, _gear_remedy),
-    "motor_constants": Sentence(_motor_constants, "identify the motor from this log"),
-    "slip": Sentence(_slip, _slip_remedy),
-    "wheel_radius": Sentence(_wheel_radius, "try a wheel radius {floor_ratio:.4g} times as large"),
+    "gear": Sentence(
+        either(
+            "ratio",
+            "floor and motors agree that the wheels turn {ratio:.4g} times (+-{error:.2g}) what wheel_speed says: a "
+            "wrong gear ratio or a wrong number of counts per turn in the log",
+            "by voltage and current the wheels turn {electric_ratio:.4g} times (+-{electric_ratio_error:.2g}) what "
+            "wheel_speed says: the gear ratio, the counts per turn, or K and R of the robot file are off",
+        ),
+        either(
+            "ratio",
+            "divide by the right gear ratio, or give the right counts per turn",
+            "check the gear ratio; roll the robot over a measured distance by hand",
+        ),
+    ),
+    "motor_constants": Sentence(
+        "by voltage and current the wheels turn {electric_ratio:.4g} times (+-{electric_ratio_error:.2g}) what "
+        "wheel_speed says, while the floor agrees with the wheels: K, R or the gear ratio of the robot file, or "
+        "the scale of voltage or current, is off",
+        "identify the motor from this log",
+    ),
+    "slip": Sentence(
+        _slip,
+        either(
+            "from_s",
+            "leave those rows out of fits of wheel speed against ground speed",
+            "take the motion over the floor for friction; measure the wheel radius by rolling slowly",
+        ),
+    ),
+    "wheel_radius": Sentence(
+        "the robot covers {floor_ratio:.4g} (+-{floor_ratio_error:.2g}) of the path that its wheels roll, while "
+        "voltage and current agree with the wheels: the wheel radius of the file is too small, or the ground "
+        "speed has a wrong scale",
+        "try a wheel radius {floor_ratio:.4g} times as large",
+    ),
     "path_ratio": Sentence(_path_ratio, f"{BY_HAND}: that tells slip from a wrong radius or gear"),
     "robot_radius": Sentence(
         "the robot turns {ratio:.4g} times (+-{error:.2g}) as fast as its wheels say, while it drives as far as they "
@@ -228,7 +200,8 @@ SENTENCES = {
         _axis_ratio, "check azimuth_deg; else take the motion over the floor for friction along this axis"
     ),
     "wheel_scale": Sentence(
-        _wheel_scale, "that wheel has another radius, gear or counter; give it its own in the mapping or the robot file"
+        "{subject} reads {ratio:.4g} times what {source!t} says, measured by the other wheels",
+        "that wheel has another radius, gear or counter; give it its own in the mapping or the robot file",
     ),
     "lag": Sentence(_lag, _lag_remedy),
-}  # fmt: skip
+}

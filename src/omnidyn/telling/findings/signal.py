@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-from omnidyn.document import all_of, short
+from omnidyn.document import all_of
 from omnidyn.statement import NOTE, Statement
-from omnidyn.telling.sentence import SOURCES, Sentence, by_number, counted, names
+from omnidyn.telling.sentence import Sentence, by_number, either, names
 
 LIMITS = {
     "duty": "full duty", "supply": "the supply", "motor.current_limit_A": "current_limit_A of the robot file",
     "motor.voltage_limit_V": "voltage_limit_V of the robot file",
 }  # fmt: skip
-
-
-def _missing(statement: Statement) -> str:
-    """Values are missing."""
-    return f"{100 * statement.numbers['share']:.3g} % of {statement.subject} is missing"
-
-
-def _blocked(statement: Statement) -> str:
-    """The robot stands although it is driven."""
-    return f"for {short(statement.numbers['seconds'], '.3g')} s the robot stands although it is driven hard enough to \
-move: it was held, stood against something, or its friction is far above that of the robot file"
 
 
 def _quantised(statement: Statement) -> str:
@@ -31,30 +20,6 @@ def _quantised(statement: Statement) -> str:
     hidden = f", hidden in a noise of {n['noise']:.3g}" if n["noise"] > n["step"] else ""
     return f"{names(statement)} {by_number(statement.subject, 'counts', 'count')} in steps of {n['step']:.4g}{unit}\
 {cells}, up to {100 * n['share']:.0f} % of the usual value{hidden}"
-
-
-def _reads_zero(statement: Statement) -> str:
-    """A wheel slower than its encoder can measure."""
-    n = statement.numbers
-    return (
-        f"{statement.subject} reads 0 in {100 * n['share']:.0f} % of the rows while {SOURCES[n['source']]} says that \
-it turns, \
-slower than two steps of its encoder ({n['step']:.4g} rad/s)"
-    )
-
-
-def _spike(statement: Statement) -> str:
-    """Single values far from both neighbours."""
-    n, count = statement.numbers, vars(statement)["count"]
-    return f"{counted(count, 'value')} of {statement.subject} alone, far from the rows before and after, the farthest \
-{n['farthest']:.4g} at t = {n['at_s']:.6g} s"
-
-
-def _stuck(statement: Statement) -> str:
-    """A sensor repeats one value although it should change."""
-    n = statement.numbers
-    return f"{statement.subject} repeats one value to the last digit {counted(n['times'], 'time')}, for up to \
-{short(n['longest_s'], '.3g')} s, while the robot moves"
 
 
 def _echo(statement: Statement) -> str:
@@ -94,34 +59,6 @@ def _saturation(statement: Statement) -> str:
 {LIMITS[n['limited_by']]}) in {100 * n['share']:.2g} % of the rows"
 
 
-def _too_fast(statement: Statement) -> str:
-    """An input that changes more from row to row than the rows can show."""
-    change = by_number(statement.subject, "changes", "change")
-    return f"{names(statement)} {change} so much from row to row in {100 * statement.numbers['share']:.2g} % of the \
-rows that what the motors got between them is not in the log"
-
-
-def _sag(statement: Statement) -> str:
-    """A supply that drops under load."""
-    n = statement.numbers
-    return f"the supply drops by {100 * n['drop']:.3g} %, from {n['high_V']:.4g} to {n['low_V']:.4g} V, at its lowest \
-at t = {n['lowest_at_s']:.5g} s"
-
-
-def _no_supply(statement: Statement) -> str:
-    """A duty without its supply."""
-    nominal = statement.numbers.get("nominal_V")
-    taken = f"the {nominal:g} V of the robot file are taken" if nominal else "no voltage can be made of it"
-    return f"duty was logged, the supply was not: {taken}, and a sag cannot be seen"
-
-
-def _never_moved(statement: Statement) -> str:
-    """The robot rests throughout."""
-    driven = statement.numbers["driven"]
-    why = "it was driven, but never beyond its dead zone, or it was blocked" if driven else "nothing drove it"
-    return f"the robot never moves beyond the noise of its sensors: {why}"
-
-
 def _droop(statement: Statement) -> str:
     """Settled wheels that do not turn as commanded."""
     n = statement.numbers
@@ -140,14 +77,6 @@ def _burst(statement: Statement) -> str:
 {abs(n['farthest']) / n['usual']:.0f} times what it stays below in 90 % of the rows"
 
 
-def _averaged(statement: Statement) -> str:
-    """A speed that is a mean over a window of rows."""
-    n = statement.numbers
-    mean = by_number(statement.subject, "is a mean", "are means")
-    return f"{names(statement)} {mean} over {n['rows']} rows ({1e3 * n['seconds']:.3g} ms): {1e3 * n['late_s']:.3g} ms \
-late, and slow to show a start"
-
-
 def _filtered(statement: Statement) -> str:
     """A speed that the recorder made of positions."""
     n = statement.numbers
@@ -159,11 +88,6 @@ def _filtered(statement: Statement) -> str:
     }[n["filter"]]
     are = by_number(statement.subject, "is", "are")
     return f"{names(statement)} {are} {how} of {all_of(' '.join(n['positions']).split())}"
-
-
-def _late(statement: Statement) -> str:
-    """A speed late by half its differences."""
-    return f"they are {1e3 * statement.numbers['seconds_late']:.3g} ms late: latency in the mapping"
 
 
 def _not_excited(statement: Statement) -> str:
@@ -190,13 +114,25 @@ SENTENCES = {
         "leave those cells blank",
     ),
     "missing": Sentence(
-        _missing,
+        "{share:%.3g} % of {subject} is missing",
         "rows without it are not used where it is needed",
     ),
     "quantised": Sentence(_quantised, "average over longer windows; a sample alone says little"),
-    "reads_zero": Sentence(_reads_zero, "take its speed from counts over a longer time, or from the other wheels"),
-    "spike": Sentence(_spike, "they are left out where a mean is taken"),
-    "stuck": Sentence(_stuck, "those rows of it are not used; look at the encoder and its cable"),
+    "reads_zero": Sentence(
+        "{subject} reads 0 in {share:%.0f} % of the rows while {source!t} says that it turns, slower than two "
+        "steps of its encoder ({step:.4g} rad/s)",
+        "take its speed from counts over a longer time, or from the other wheels",
+    ),
+    "spike": Sentence(
+        "{count} {count:value|values} of {subject} alone, far from the rows before and after, the farthest "
+        "{farthest:.4g} at t = {at_s:.6g} s",
+        "they are left out where a mean is taken",
+    ),
+    "stuck": Sentence(
+        "{subject} repeats one value to the last digit {times} {times:time|times}, for up to {longest_s:~.3g} s, "
+        "while the robot moves",
+        "those rows of it are not used; look at the encoder and its cable",
+    ),
     "echo": Sentence(
         _echo,
         "log what the encoders, the gyroscope or a camera measure; of a robot whose software does not, leave the "
@@ -206,18 +142,38 @@ SENTENCES = {
     "saturation": Sentence(
         _saturation, "what was asked for beyond it was not applied: fit from what was applied, or drive with less"
     ),
-    "too_fast": Sentence(_too_fast, "log faster, or drive more slowly; a fit of the motors leaves these rows out"),
+    "too_fast": Sentence(
+        "{subject!w} {subject:changes|change} so much from row to row in {share:%.2g} % of the rows that what the"
+        " motors got between them is not in the log",
+        "log faster, or drive more slowly; a fit of the motors leaves these rows out",
+    ),
     "sag": Sentence(
-        _sag,
+        "the supply drops by {drop:%.3g} %, from {high_V:.4g} to {low_V:.4g} V, at its lowest at t = "
+        "{lowest_at_s:.5g} s",
         "use the supply row by row (the voltage applied), never one number for it",
         {"of_duty": "use the supply row by row (voltage = duty x supply), never one number for it"},
     ),
-    "no_supply": Sentence(_no_supply, "log the battery voltage; give its nominal value as [drive] supply_V"),
+    "no_supply": Sentence(
+        either(
+            "nominal_V",
+            "duty was logged, the supply was not: the {nominal_V:g} V of the robot file are taken, and a sag cannot "
+            "be seen",
+            "duty was logged, the supply was not: no voltage can be made of it, and a sag cannot be seen",
+        ),
+        "log the battery voltage; give its nominal value as [drive] supply_V",
+    ),
     "never_moved": Sentence(
-        _never_moved, "drive with more; such a log bounds friction from below and says nothing else"
+        either(
+            "driven",
+            "the robot never moves beyond the noise of its sensors: it was driven, but never beyond its dead zone, or"
+            " it was blocked",
+            "the robot never moves beyond the noise of its sensors: nothing drove it",
+        ),
+        "drive with a higher voltage; such a log bounds friction from below and says nothing else",
     ),
     "blocked": Sentence(
-        _blocked,
+        "for {seconds:~.3g} s the robot stands although it is driven hard enough to move: it was held, stood "
+        "against something, or its friction is far above that of the robot file",
         "leave those rows out",
     ),
     "droop": Sentence(_droop, "fit friction against measured speed, not against the commanded one"),
@@ -226,13 +182,14 @@ SENTENCES = {
         "leave the first half second out of steady values",
     ),
     "burst": Sentence(
-        _burst, "a tracker that slips does so; leave those rows out if the robot cannot turn or drive like that"
+        _burst, "a tracker that loses its target shows this; leave those rows out if the robot cannot move like that"
     ),
     "last_row": Sentence(
         "{subject} is 0 in the last row, and not before: the end of the recording", "leave the last row out"
     ),
     "averaged": Sentence(
-        _averaged,
+        "{subject!w} {subject:is a mean|are means} over {rows} rows ({seconds:m.3g} ms): {late_s:m.3g} ms late, "
+        "and slow to show a start",
         "log the speed of a shorter window (a setting of many motor controllers), or the position; `what` motors of "
         "identify takes the mean into account, other fits may find too small a dead band",
     ),
@@ -242,7 +199,7 @@ SENTENCES = {
         {
             "centred": "they show a motion a row before it begins: where that matters, fit to the positions, without "
             "the speeds",
-            "backward": _late,
+            "backward": "they are {seconds_late:m.3g} ms late: latency in the mapping",
             "low_pass": "they lag and hide what is fast: log the speed without the filter, or fit to the positions, "
             "without the speeds",
         },
@@ -263,5 +220,7 @@ SENTENCES = {
         "while it moves, the speed varies by a factor of {speeds:.2g} only",
         "viscous and Coulomb friction cannot be told apart from this log alone; drive at several speeds",
     ),
-    "judged_again": Sentence("with the fitted robot this is gone ({finding}): it rested on the guess of {guesses}"),
+    "judged_again": Sentence(
+        "with the fitted robot this is no longer found ({finding}): it rested on the guess of {guesses}"
+    ),
 }

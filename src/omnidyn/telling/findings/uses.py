@@ -9,7 +9,7 @@ from omnidyn.document import all_of, short
 from omnidyn.findings.needs import LOOP_REMEDY
 from omnidyn.statement import SEVERITIES, Statement
 from omnidyn.telling.logs import in_brief
-from omnidyn.telling.sentence import Sentence, by_number, counted
+from omnidyn.telling.sentence import Sentence, by_number, counted, either
 
 OF_ROBOT = {
     "": "", "robot": "; with a robot file", "supply": "; with a robot file that has supply_V",
@@ -63,29 +63,6 @@ def _lacking(text: str) -> Callable[[Statement], str]:
     return sentence
 
 
-def _refused(statement: Statement) -> str:
-    """The log cannot be made a run."""
-    n = statement.numbers
-    return f"{n['what']}; {n['remedy']}" if n["remedy"] else n["what"]
-
-
-def _incomplete(statement: Statement) -> str:
-    """No row has the input of all wheels."""
-    n = statement.numbers
-    if n["missing"]:
-        return f"no {n['channel']} of wheel {all_of([*map(str, n['missing'])])}"
-    return f"hardly a row has the {n['channel']} of all wheels"
-
-
-def _no_steady(statement: Statement) -> str:
-    """No stretch of constant speed."""
-    n = statement.numbers
-    return (
-        f"no stretch of constant speed{', only at rest' if n['at_rest'] else ''}: hold commands for {n['hold_s']:g} s \
-or more"
-    )
-
-
 def _whole(statement: Statement) -> str:
     """A fit of whole logs is possible."""
     n = statement.numbers
@@ -121,7 +98,7 @@ SENTENCES = {
         "{rows} rows, too few to tell motion from noise: {least} or more are needed, 10 s are better"
     ),
     "robot_rests": Sentence("the robot never moves: drive it beyond its dead zone"),
-    "refused": Sentence(_refused),
+    "refused": Sentence(either("remedy", "{what}; {remedy}", "{what}")),
     "set_speeds_only": Sentence(f"holds set speeds only; to fit it whole, {LOOP_REMEDY}"),
     "no_input": Sentence(_lacking("holds no voltage and no duty")),
     "no_output": Sentence(_lacking("holds no speed, angle, current or pose")),
@@ -129,11 +106,19 @@ SENTENCES = {
     "no_battery": Sentence(
         _lacking("a duty needs its battery: a column supply, or [drive] supply_V in the robot file")
     ),
-    "input_incomplete": Sentence(_incomplete),
+    "input_incomplete": Sentence(
+        either("missing", "no {channel} of wheel {missing}", "hardly a row has the {channel} of all wheels")
+    ),
     "no_force": Sentence(_lacking("no current and no motor input")),
     "no_wheel_motion": Sentence(_lacking("no speed or angle of the wheels")),
     "lossy_gear": Sentence("the robot file has a lossy gear, which a steady state does not know"),
-    "no_steady_stretch": Sentence(_no_steady),
+    "no_steady_stretch": Sentence(
+        either(
+            "at_rest",
+            "no stretch of constant speed, only at rest: hold commands for {hold_s:g} s or more",
+            "no stretch of constant speed: hold commands for {hold_s:g} s or more",
+        )
+    ),
     "no_motor_input": Sentence(_lacking("no motor input")),
     "no_motor_motion": Sentence(_lacking("no speed or angle of the motors")),
     "no_two_motions": Sentence("no motion of both the body and the wheels"),
@@ -142,4 +127,4 @@ SENTENCES = {
     "serves_steady": Sentence(_steady),
     "serves_motors": Sentence("{input} against {speeds}, if the wheels were off the ground"),
     "serves_geometry": Sentence(_geometry),
-}  # fmt: skip
+}

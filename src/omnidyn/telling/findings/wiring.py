@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from omnidyn.statement import Statement
-from omnidyn.telling.sentence import SOURCES, Sentence, by_number
+from omnidyn.telling.sentence import SOURCES, Sentence, by_number, either
 
 SLOTS = "put the columns right in the mapping (`column`)"
 
@@ -16,7 +16,7 @@ def _wiring(statement: Statement) -> str:
     if len(moved) == 2:
         parts.append(f"{slots[moved[0]]} and {slots[moved[1]]} are exchanged")
     elif moved:
-        parts.append("; ".join(f"{columns[k]} is in truth {slots[k]}" for k in moved))
+        parts.append("; ".join(f"{columns[k]} is actually {slots[k]}" for k in moved))
     turned = [column for column, sign in zip(columns, signs, strict=True) if sign < 0.0]
     if turned:
         parts.append(f"{' and '.join(turned)} {by_number(turned, 'has', 'have')} the opposite sign")
@@ -55,12 +55,6 @@ def _of_wheels(statement: Statement) -> str:
     rival = f" (or, not distinguishable with this log, {n['rival']}{more})" if "rival" in n else ""
     return f"{n['channel']} against {against}: {n['wiring']}{motors}{rival}; as logged \
 {100 * n['unexplained_as_logged']:.0f} % remains unexplained, after correction {100 * n['unexplained_put_right']:.1f} %"
-
-
-def _axes_remedy(statement: Statement) -> str:
-    """Another sign for columns."""
-    columns = by_number(statement.subject, "that column", "these columns")
-    return f"set `invert` for {columns} in the mapping, or turn the wheels' signs in the same way"
 
 
 def _inverted(statement: Statement) -> str:
@@ -126,18 +120,11 @@ def _turned_frame(statement: Statement) -> str:
     return f"turn the frame of the pose, or take the angle off its heading: `assume` marker={angle:.0f}deg"
 
 
-def _twist_frame(statement: Statement) -> str:
-    """A twist that is not in the frame of the robot."""
-    n = statement.numbers
-    if "angle_deg" in n:
-        return f"vx and vy are turned by {n['angle_deg']:.1f} deg (+-{n['error_deg']:.1g}) against the pose, and \
-{SOURCES[n['agrees']]} agrees with the pose: their sensor is mounted at an angle"
-    return f"vx and vy are in the frame of the room, not of the robot: they are the rates of x and y (likeness \
-{n['likeness']:.2f}; {n['likeness_as_logged']:.2f} as logged)"
-
-
 OF_WHEELS = {
-    "axes": _axes_remedy, "motors": SLOTS,
+    "axes":
+        "set `invert` for {subject:that column|these columns} in the mapping, or turn the wheels' signs in the "
+        "same way"
+, "motors": SLOTS,
     "wheels": f"{SLOTS}, or the order and signs of the wheels in the robot file",
 }  # fmt: skip
 SENTENCES = {
@@ -146,7 +133,8 @@ SENTENCES = {
     "inverted": Sentence(_inverted, _inverted_remedy, OF_WHEELS),
     "marker_angle": Sentence(_marker_angle, "take the angle off: `assume` marker={angle_deg:.1f}deg"),
     "pose_frame": Sentence(
-        _pose_frame, "set `invert` for those columns in the mapping",
+        _pose_frame,
+        "set `invert` for those columns in the mapping",
         {"turned": _turned_frame, "mirrored": "turn the frame of the pose, or mirror it back"},
     ),
     "pose_unlike": Sentence(
@@ -155,7 +143,14 @@ SENTENCES = {
         "look at the tracking of the pose; it was not used",
     ),
     "twist_frame": Sentence(
-        _twist_frame, "turn them by the heading: `assume` twist=room",
+        either(
+            "angle_deg",
+            "vx and vy are turned by {angle_deg:.1f} deg (+-{error_deg:.1g}) against the pose, and {agrees!t} agrees "
+            "with the pose: their sensor is mounted at an angle",
+            "vx and vy are in the frame of the room, not of the robot: they are the rates of x and y (likeness "
+            "{likeness:.2f}; {likeness_as_logged:.2f} as logged)",
+        ),
+        "turn them by the heading: `assume` twist=room",
         {"turned": "turn them back: `assume` twist={angle_deg:.1f}deg"},
     ),
-}  # fmt: skip
+}

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.output_error.engines.exact import Weighting
-from omnidyn.identification.output_error.engines.sums import added
+from omnidyn.identification.output_error.engines.engine import Weighting, added
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate

@@ -13,7 +13,7 @@ from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.memory.autoregression import autoregression
 from omnidyn.identification.output_error.memory.moving import Moving, _likelihood, new_while_moving, while_moving
 from omnidyn.identification.output_error.memory.whitened import moving_rows
-from omnidyn.identification.output_error.memory.whitening import below, whitened
+from omnidyn.identification.output_error.memory.whitening import whitened
 from omnidyn.identification.output_error.trust.uncertainty import WHITE, trust
 from omnidyn.run import Run
 
@@ -152,7 +152,7 @@ def test_a_fit_of_a_pushed_robot_knows_when_its_errors_remember():
         assert found is not None
         words += "moving" in [each.numbers.get("beside_white") for each in found.warnings]
         solver = found.solution.solver
-        (piece,), (plain,) = solver.problem.pieces, below(solver).residuals(found.solution.state.point)
+        (piece,), (plain,) = solver.problem.pieces, solver.engine.unfiltered.residuals(found.solution.state.point)
         (new,) = solver.engine.residuals(found.solution.state.point)
         for own, moves, variance in zip(
             new[0], moving_rows(piece, plain[0]), found.solution.state.variance, strict=True

@@ -8,7 +8,7 @@ import pytest
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.memory.near import near
+from omnidyn.identification.output_error.memory.whitened import near
 from omnidyn.identification.output_error.prepare import FINE, make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.model.first_guess import first_guess, with_gear

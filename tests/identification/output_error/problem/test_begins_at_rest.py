@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from omnidyn.identification.methods import AUTO
 from omnidyn.identification.output_error.problem.nuisances import pieces
 from omnidyn.identification.output_error.problem.record import record
-from omnidyn.identification.question import AUTO
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
 

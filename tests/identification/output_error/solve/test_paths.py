@@ -5,10 +5,9 @@ import pytest
 
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.engines.rates import RateEngine
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.output_error.solve.first_point import coarse_point
+from omnidyn.identification.output_error.solve.first_point import RateEngine, coarse_point
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.model.first_guess import first_guess

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.output_error.trust.traded_levels import trade
+from omnidyn.identification.output_error.trust.levels import trade
 
 ANYWHERE = lambda place: 0.1 < place.q < 10.0  # noqa: E731
 LIMIT = 4.0

@@ -9,7 +9,7 @@ import pytest
 from omnidyn.errors import InputError
 from omnidyn.logs.read_log import load_log
 from omnidyn.logs.readers.read_table import read_table
-from omnidyn.logs.readers.reader import Options
+from omnidyn.logs.readers.reader import ReadOptions
 from omnidyn.logs.readers.ros.bags import read_bag
 
 pytest.importorskip("rosbags")
@@ -62,7 +62,7 @@ def test_a_custom_type_without_definition_is_named(tmp_path):
     with sqlite3.connect(lone) as db:
         db.execute("delete from message_definitions")
     db.close()
-    topics = {topic.name: topic for topic in read_bag(lone, Options()).topics}
+    topics = {topic.name: topic for topic in read_bag(lone, ReadOptions()).topics}
     assert topics["/motors"].why == "the file holds no definition of its type"
     assert topics["/odom"].read
 

@@ -11,7 +11,7 @@ import pytest
 from omnidyn.errors import InputError
 from omnidyn.logs.read_log import load_log
 from omnidyn.logs.readers.read_table import iter_tables, read_table
-from omnidyn.logs.readers.reader import Options
+from omnidyn.logs.readers.reader import ReadOptions
 from omnidyn.logs.readers.recording import Recording, Track
 from omnidyn.logs.readers.ros.bags import read_bag
 
@@ -191,7 +191,7 @@ def test_a_topic_with_messages_of_two_types_is_read_by_the_first(tmp_path):
             maker.twist(k / 50 + 0.001, (-1.0, 0.0, 0.5), stamped=True)
     path = write_mcap(maker, tmp_path / "a.mcap")
     np.testing.assert_array_equal(seen(path, "/cmd_vel/vx")[1], np.arange(40.0))
-    topics = {each.type: each for each in read_bag(path, Options()).topics}
+    topics = {each.type: each for each in read_bag(path, ReadOptions()).topics}
     assert topics["geometry_msgs/msg/Twist"].read
     assert "of another type" in topics["geometry_msgs/msg/TwistStamped"].why
 
@@ -221,7 +221,7 @@ def test_pictures_are_not_read(tmp_path):
         )
         maker.add("/camera", "sensor_msgs/msg/CompressedImage", 0.1 * k, picture)
         maker.odometry(0.1 * k, (0, 0, 0), (1, 0, 0))
-    recording = read_bag(write_mcap(maker, tmp_path / "a.mcap"), Options())
+    recording = read_bag(write_mcap(maker, tmp_path / "a.mcap"), ReadOptions())
     camera = next(topic for topic in recording.topics if topic.name == "/camera")
     assert (camera.count, camera.read, camera.why) == (5, False, "pictures, scans and maps are not read")
     assert camera.rate == pytest.approx(10.0)
@@ -243,7 +243,7 @@ def test_a_truncated_file_is_read_to_its_last_whole_record(tmp_path):
     content = write_mcap(maker, tmp_path / "a.mcap", "none", chunk=2000).read_bytes()
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(content[: len(content) // 2])
-    recording = read_bag(cut, Options())
+    recording = read_bag(cut, ReadOptions())
     assert recording.salvaged is not None
     assert 50 < recording.salvaged < 314
     assert f"{recording.salvaged} messages before that were read" in said(recording.notes)[0]
@@ -259,7 +259,7 @@ def test_a_wrong_checksum_stops_the_reading_there(tmp_path):
     content[len(content) // 2] ^= 1
     bad = tmp_path / "bad.mcap"
     bad.write_bytes(content)
-    recording = read_bag(bad, Options())
+    recording = read_bag(bad, ReadOptions())
     assert recording.salvaged is not None
     assert 0 < recording.salvaged < 314
     assert "another checksum" in said(recording.notes)[0]

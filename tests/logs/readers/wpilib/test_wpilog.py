@@ -9,7 +9,7 @@ import pytest
 from omnidyn.errors import InputError
 from omnidyn.logs.read_log import load_log, read_log
 from omnidyn.logs.readers.read_table import read_table
-from omnidyn.logs.readers.reader import Options
+from omnidyn.logs.readers.reader import ReadOptions
 from omnidyn.logs.readers.wpilog import read_wpilog
 
 wpiutil = pytest.importorskip("wpiutil")
@@ -94,7 +94,7 @@ def test_what_is_written_on_change_is_held_where_it_is_a_command(path):
 
 
 def test_topics_are_listed(path):
-    topics = {topic.name: topic for topic in read_wpilog(path, Options()).topics}
+    topics = {topic.name: topic for topic in read_wpilog(path, ReadOptions()).topics}
     assert topics["/drive/wheel1/velocity_rad_s"].count == 40
     assert topics["/drive/wheel1/velocity_rad_s"].rate == pytest.approx(50.0)
     assert (topics["/mode"].type, topics["/mode"].read, topics["/mode"].why) == ("string", False, "no numbers")
@@ -134,7 +134,7 @@ def test_structs_are_read_by_the_schemas_in_the_log(tmp_path):
     assert np.array_equal(log.channels["twist_command"][:, 2], 0.1 * np.arange(10))
     assert np.array_equal(table.numbers("/modules[1]/speed"), np.arange(10) + 0.5)
     assert np.array_equal(table.numbers("/odd/volts[1]"), np.arange(10) + 0.5)
-    why = {topic.name: topic.why for topic in read_wpilog(path, Options()).topics}
+    why = {topic.name: topic.why for topic in read_wpilog(path, ReadOptions()).topics}
     assert why["/bits"] == "its values cannot be read: int8 a : 4 in Bits"
     assert why["/lost"] == "its values cannot be read: no schema of Nowhere"
 
@@ -142,11 +142,11 @@ def test_structs_are_read_by_the_schemas_in_the_log(tmp_path):
 def test_a_cut_log_says_how_much_was_saved(path, tmp_path):
     cut = tmp_path / "cut.wpilog"
     cut.write_bytes(path.read_bytes()[:-3])
-    recording = read_wpilog(cut, Options())
+    recording = read_wpilog(cut, ReadOptions())
     assert recording.notes[0] == (
         f"the file is damaged: it ends in the middle of a record; {recording.salvaged} values before that were read"
     )
-    assert recording.salvaged == sum(topic.count for topic in read_wpilog(path, Options()).topics) - 1
+    assert recording.salvaged == sum(topic.count for topic in read_wpilog(path, ReadOptions()).topics) - 1
 
 
 def test_damage_within_stops_the_reading_there(path, tmp_path):
@@ -154,7 +154,7 @@ def test_damage_within_stops_the_reading_there(path, tmp_path):
     content[1500:1520] = b"\xff" * 20
     bad = tmp_path / "bad.wpilog"
     bad.write_bytes(content)
-    recording = read_wpilog(bad, Options())
+    recording = read_wpilog(bad, ReadOptions())
     assert recording.salvaged is not None
     assert "damaged" in recording.notes[0]
 
@@ -178,4 +178,4 @@ def test_what_is_no_log_is_refused(tmp_path, content, words):
 
 def test_a_log_is_held_within_bounds(path):
     with pytest.raises(InputError, match=r"the file is too large; got more than 1000 bytes"):
-        read_wpilog(path, Options(max_bytes=1000))
+        read_wpilog(path, ReadOptions(max_bytes=1000))

@@ -1,1 +1,1 @@
-"""The model in place of the robot: exact, implicit, speed_loop; sums and actuation are shared."""
+"""The model in place of the robot: engine (the contract), exact, implicit, speed_loop."""

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification.output_error.engines.actuation import LATE as LATE
-from omnidyn.identification.output_error.engines.actuation import driver_of, late_by
+from omnidyn.identification.output_error.engines.engine import LATE as LATE
+from omnidyn.identification.output_error.engines.engine import Engine, Weighting, driver_of, late_by
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
 from omnidyn.identification.output_error.kernel.march import (
     FINAL,
@@ -36,7 +35,7 @@ from omnidyn.identification.output_error.kernel.march_axis import (
 )
 from omnidyn.identification.output_error.kernel.pull import Room
 from omnidyn.identification.output_error.problem.heading import facing_at_start, headings, in_the_body
-from omnidyn.identification.output_error.problem.primitives import Mapping, Primitives
+from omnidyn.identification.output_error.problem.primitives import PrimitiveMap, Primitives
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
 from omnidyn.model.actuation import at_motors
 from omnidyn.model.frames import body_to_world
@@ -50,32 +49,23 @@ PUSH = ("push.x", "push.y", "push.yaw")  # constant in the body
 TILT = ("tilt.x", "tilt.y")  # constant in the room
 
 
-@dataclass(frozen=True)
-class Weighting:
-    """variance (columns,) by Problem.columns; nu of Student's t, 0 for Gauss; mode and block as in kernel/march.py.
-
-    counted: whether counts are taken as such, or like any other output.
-    """
-
-    variance: FloatArray
-    nu: float = 0.0
-    mode: int = 0
-    block: int = 1
-    counted: bool = False
-
-
-class ExactEngine:
+class ExactEngine(Engine[Problem]):
     """Residuals and sensitivities of a problem by the exact step.
 
     fast: whether the march of kernel/march_axis.py may serve where it can.
     """
 
+    exact = True
+
+    @classmethod
+    def of(cls, problem: Problem, tol: float | None = None) -> ExactEngine:
+        """The engine of a problem; it needs no tolerance."""
+        return cls(problem)
+
     def __init__(self, problem: Problem, fast: bool = True):
         self.problem = problem
-        self.mapping = Mapping(problem.robot, problem.robot_parameters)
-        self.levels: dict[str, float] = {}
-        self._columns = problem.columns
-        twists = all(name == "twist" for name, _ in self._columns)
+        self.mapping = PrimitiveMap(problem.robot, problem.robot_parameters)
+        twists = all(name == "twist" for name, _ in problem.columns)
         margins = any(piece.margin.any() for piece in problem.pieces)
         friction = self.mapping.linear and problem.robot_count == len(problem.parameters)
         ideal = problem.robot.drive.dead_band == 0.0 and problem.robot.drive.latency == 0.0
@@ -84,10 +74,10 @@ class ExactEngine:
     def on(self, problem: Problem) -> ExactEngine:
         """The same engine on other pieces of the same logs, with the same parameters."""
         engine = copy.copy(self)
-        engine.problem, engine._columns = problem, problem.columns
+        engine.problem = problem
         return engine
 
-    def with_levels(self, levels: dict[str, float]) -> ExactEngine:
+    def with_levels(self, levels: Mapping[str, float]) -> ExactEngine:
         """The same engine with these levels of breakaway of the axes, key -> [N, N, N m]; see implicit.py."""
         engine = copy.copy(self)
         engine.levels, engine.mapping = levels, self.mapping.with_levels(levels)
@@ -126,14 +116,14 @@ class ExactEngine:
     def outputs(self, point: Point) -> list[tuple[FloatArray, FloatArray]]:
         """(outputs, slopes) of every piece, rows of its record, NaN outside: (rows, C) and (rows, C, P + 3 + C)."""
         now, slopes = self.mapping.at(point.values[: self.problem.robot_count])
-        plain = Weighting(np.ones(len(self._columns)), mode=KEEP)
+        plain = Weighting(np.ones(len(self.problem.columns)), mode=KEEP)
         return [
             self._piece(piece, state, point.values, now, slopes, plain)[1]
             for piece, state in zip(self.problem.pieces, point.states, strict=True)
         ]
 
     def residuals(self, point: Point) -> list[Parts]:
-        """(residuals (C, rows), slopes (C, rows, U), at (U,)) of the rows of every piece; see engines/sums.py."""
+        """(residuals (C, rows), slopes (C, rows, U), at (U,)) of the rows of every piece; see engines/engine.py."""
         found, count = [], len(self.problem.parameters)
         for piece, (value, slopes) in zip(self.problem.pieces, self.outputs(point), strict=True):
             rows, used = slice(piece.first, piece.last + 1), used_by(piece, count)
@@ -173,7 +163,7 @@ class ExactEngine:
         count, used = len(self.problem.parameters), used_by(piece, len(self.problem.parameters))
         physics, slopes, groups = self._numbers(piece, state, values, now, by, padded(used))
         room = self._room(piece, state, values, now, by, padded(used))
-        return march_piece(piece, state, self._columns, count, (physics, slopes, groups), weighting, room)
+        return march_piece(piece, state, self.problem.columns, count, (physics, slopes, groups), weighting, room)
 
     def _room(
         self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, space: int

@@ -7,21 +7,21 @@ run is sampled between its rows (sensitivity/sample.py).
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from threading import Lock
-from typing import Self
+from typing import Self, cast
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import side_by_side
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.actuation import driver_of, late_by
-from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, PUSH, TILT, Weighting
-from omnidyn.identification.output_error.engines.sums import added
+from omnidyn.identification.output_error.engines.engine import Engine, driver_of, late_by
+from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, PUSH, TILT
 from omnidyn.identification.output_error.problem.heading import headings, in_the_body
-from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, PieceSums, Point, Problem
+from omnidyn.identification.output_error.problem.nuisances import TRAVELS
+from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
 from omnidyn.model.actuation import Driver, at_motors, clip_voltage
 from omnidyn.model.known.told import holding
 from omnidyn.model.layout import N_AXES
@@ -29,7 +29,11 @@ from omnidyn.model.robot import Robot
 from omnidyn.simulation.sensitivity.directions import EPS, difference
 from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, Program, late_samples
 from omnidyn.simulation.sensitivity.sample import PATH, PLACE, TURN
+from omnidyn.simulation.sensitivity.slipping import slipping_samples
 
+FINER = 1e-6  # [m/s] where a path is fitted: what a speed is off by adds up, to a tick of an encoder in 10 s
+STEPS = 2  # a row, of derivatives at the end of a fit; it begins with one
+LEAST_TOL = 1e-5  # [m/s] of the run itself
 Shown = tuple[FloatArray, FloatArray, FloatArray]  # value (rows, m), its time derivative (rows, m), (rows, K, m)
 
 
@@ -55,7 +59,7 @@ class LastPoints:
         return found
 
 
-class ImplicitEngine:
+class ImplicitEngine(Engine[Problem]):
     """Residuals and sensitivities of a problem by the implicit engine. tol [m/s]: its tolerance, None a step a row.
 
     A force that stays in the room is turned by the headings of the log. pushes: whether it knows such forces, and those
@@ -64,8 +68,15 @@ class ImplicitEngine:
 
     pushes = True
 
+    @classmethod
+    def of(cls, problem: Problem, tol: float | None = None) -> ImplicitEngine:
+        """The engine of wheels that roll, or of wheels that may slip. tol [m/s]: finer where a path is fitted."""
+        travels = any(name in TRAVELS for name, _ in problem.columns)
+        kind = ImplicitEngine if problem.robot.wheels.traction_mu is None else SlipEngine
+        return kind(problem, tol if tol is None or not travels else min(tol, FINER))
+
     def __init__(self, problem: Problem, tol: float | None = None):
-        self.problem, self.tol, self._columns = problem, tol, problem.columns
+        self.problem, self.tol = problem, tol
         nuisances = [p.name for p in problem.parameters[problem.robot_count :]]
         known = (*Driver._fields, *((*TILT, *PUSH) if self.pushes else ()))
         other = [name for name in nuisances if not name.startswith(LATE) and name not in known]
@@ -76,9 +87,8 @@ class ImplicitEngine:
                 remedy="leave it out of the nuisances", where=problem.robot.name,
             )  # fmt: skip
         self.last = LastPoints()
-        self.levels: dict[str, float] = {}
 
-    def with_levels(self, levels: dict[str, float]) -> Self:
+    def with_levels(self, levels: Mapping[str, float]) -> Self:
         """The same engine with these levels of breakaway, key -> [N], about yaw [N m]; 0 follows coulomb. All others
         stay as the robot has them."""
         engine = copy.copy(self)
@@ -88,16 +98,8 @@ class ImplicitEngine:
     def on(self, problem: Problem) -> Self:
         """The same engine on other pieces of the same logs, with the same parameters."""
         engine = copy.copy(self)
-        engine.problem, engine._columns, engine.last = problem, problem.columns, LastPoints()
+        engine.problem, engine.last = problem, LastPoints()
         return engine
-
-    def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
-        """What the residuals of every piece add up to; see kernel/march.py."""
-        count = len(self.problem.parameters)
-        return [
-            added(piece, self._columns, parts, weighting, count)
-            for piece, parts in zip(self.problem.pieces, self.residuals(point), strict=True)
-        ]
 
     def residuals(self, point: Point) -> list[Parts]:
         """(residuals, slopes, at) of every piece, see `_piece`; those of `last` are not simulated again."""
@@ -229,6 +231,19 @@ class ImplicitEngine:
         factors = np.ones(len(at))
         factors[: self.problem.robot_count] = 1.0 / np.array(scales[: self.problem.robot_count])
         return voltage, directions, at, factors
+
+
+class SlipEngine(ImplicitEngine):
+    """Residuals and sensitivities of a problem whose robot has a `traction_mu`, by differences of whole runs."""
+
+    pushes = False
+
+    def _sampled(
+        self, robot: Robot, program: Program, directions: Sequence[Direction], late: Sequence[float], travel: int
+    ) -> list[LateSample]:
+        steps, tol = (1, 0.0) if self.tol is None else (STEPS, max(self.tol, LEAST_TOL))
+        seen = slipping_samples(robot, program, directions, late, steps, tol)
+        return cast(list[LateSample], seen)  # what is asked of both is the same
 
 
 def _between(headings: FloatArray) -> FloatArray:

@@ -31,6 +31,13 @@ class LoopEngine(ImplicitEngine):
     Raises UnsupportedError for nuisances other than latencies.
     """
 
+    looped = True
+
+    @classmethod
+    def of(cls, problem: Problem, tol: float | None = None) -> LoopEngine:
+        """The engine of a problem. tol [m/s]: None for a step a tick."""
+        return cls(problem, tol)
+
     def __init__(self, problem: Problem, tol: float | None = None):
         other = [p.name for p in problem.parameters[problem.robot_count :] if not p.name.startswith(LATE)]
         if other:

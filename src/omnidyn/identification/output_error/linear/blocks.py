@@ -21,10 +21,9 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.linear.rows import SAME, Linear, Rows, lengths, noise_models, with_priors
-from omnidyn.identification.output_error.problem.bounded import bounded
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
-from omnidyn.identification.output_error.problem.problem import Problem
-from omnidyn.identification.output_error.solve.solver import Normal, RowEngine, Solution
+from omnidyn.identification.output_error.problem.problem import Problem, bounded
+from omnidyn.identification.output_error.solve.solver import Normal, Solution
 from omnidyn.model.actuation import DEAD_BAND
 
 BLOCKS = 10  # of the log, each held out once
@@ -132,7 +131,7 @@ def _blocks(solution: Solution) -> Blocks:
     whole = solution.solver.problem
     assert isinstance(whole, Problem)
     problem = bounded(whole)
-    engine: RowEngine = solution.solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]
+    engine = solution.solver.engine.on(problem)
     rows = Rows.of(problem, solution.state.point, engine.residuals(solution.state.point))
     slopes = [np.where(solution.held, 0.0, own) for own in rows.slopes]  # what a bound holds, holds in every block
     linear = Linear(replace(rows, slopes=slopes), noise_models(rows, rows.residual))

@@ -8,11 +8,12 @@ length of a row.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.identification.output_error.engines.actuation import driver_of
+from omnidyn.identification.output_error.engines.engine import driver_of
 from omnidyn.identification.output_error.problem.heading import HEADING, facing_at_start
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.model.actuation import Driver, at_motors
@@ -46,6 +47,18 @@ class Motion:
     decay: FloatArray
     gain: FloatArray
     rolls: BoolArray
+
+    @cached_property
+    def pace(self) -> FloatArray:
+        """The change of the twist over each row, a second; 0 over the last. Shape (n, 3)."""
+        return np.append(np.diff(self.twist, axis=0) / np.diff(self.t)[:, None], np.zeros((1, N_AXES)), axis=0)
+
+    @cached_property
+    def turned(self) -> FloatArray:
+        """How far each wheel has turned since the first row [rad]. Shape (n, W)."""
+        way = 0.5 * (self.twist[1:] + self.twist[:-1]) * np.diff(self.t)[:, None]
+        turned = np.cumsum(way @ self.robot.wheels.wrench_matrix, axis=0) / self.robot.wheels.radii
+        return np.append(np.zeros_like(turned[:1]), turned, axis=0)
 
     def twist_by(self, force: FloatArray) -> FloatArray:
         """The change of the twist by forces [N, N, N m] from each row on. Shapes (n, K, 3) -> (n, K, 3)."""

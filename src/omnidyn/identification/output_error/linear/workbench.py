@@ -10,8 +10,9 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
+from omnidyn.identification.output_error.engines.engine import Engine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.linear.motion import Motion
-from omnidyn.identification.output_error.prepare import EXACT, IMPLICIT, make_engine
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
@@ -30,10 +31,10 @@ class Workbench:
 
     problem: Problem
     point: Point
-    kind: str
+    kind: type[Engine[Problem]]
     motions: Sequence[Motion]
     moments: Sequence[float] = ()
-    _before: dict[str, list[FloatArray]] = field(default_factory=dict)
+    _before: dict[type[Engine[Problem]], list[FloatArray]] = field(default_factory=dict)
 
     @property
     def robot(self) -> Robot:
@@ -47,15 +48,15 @@ class Workbench:
         what that is off by goes out of the difference. Raises OmnidynError for what cannot be simulated.
         """
         other = robot or self.robot
-        kind = self.kind if self.kind != EXACT else EXACT if is_exact(other) else IMPLICIT
+        kind = self.kind if not self.kind.exact or is_exact(other) else ImplicitEngine
         if kind not in self._before:
             self._before[kind] = self._residuals(self.robot, IDEAL, kind)
         return _apart(self._before[kind], self._residuals(other, driver, kind))
 
     def changes(self, before: Robot, after: Sequence[Robot]) -> list[list[FloatArray]]:
         """What the columns show of other robots less what they show of one that the same engine simulates."""
-        own = self._residuals(before, IDEAL, IMPLICIT)
-        return [_apart(own, self._residuals(other, IDEAL, IMPLICIT)) for other in after]
+        own = self._residuals(before, IDEAL, ImplicitEngine)
+        return [_apart(own, self._residuals(other, IDEAL, ImplicitEngine)) for other in after]
 
     def on_time(self) -> Workbench:
         """The same with channels that are not late."""
@@ -77,11 +78,11 @@ class Workbench:
                 own.append(part)
         return found
 
-    def _residuals(self, robot: Robot, driver: Driver, kind: str) -> list[FloatArray]:
+    def _residuals(self, robot: Robot, driver: Driver, kind: type[Engine[Problem]]) -> list[FloatArray]:
         known, records = self.problem.robot_count, dict[int, Record]()
         pieces = [replace(piece, record=_driven(piece, driver, records)) for piece in self.problem.pieces]
         bare = Problem(robot, self.problem.parameters[known:], 0, tuple(pieces))
-        parts = make_engine(kind, bare, None).residuals(Point(self.point.values[known:], self.point.states))
+        parts = kind.of(bare).residuals(Point(self.point.values[known:], self.point.states))
         return [residual for residual, _, _ in parts]
 
 

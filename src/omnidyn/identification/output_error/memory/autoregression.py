@@ -23,8 +23,14 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel
 from omnidyn.identification.output_error.memory.innovations import innovations
-from omnidyn.identification.output_error.memory.mixed import coefficients, mixed, told_by_many
-from omnidyn.identification.output_error.memory.moving import Moving, new_while_moving, while_moving
+from omnidyn.identification.output_error.memory.moving import (
+    Moving,
+    coefficients,
+    mixed,
+    new_while_moving,
+    told_by_many,
+    while_moving,
+)
 
 ORDERS = 10.0  # times log10 of the number of rows: the highest order that is tried
 SHARE = 0.1  # of the rows that may be coefficients
@@ -41,7 +47,7 @@ ANYWHERE = 1e8  # times the variance of what is new: where errors that add up ma
 class AutoRegression:
     """partial (p,): partial correlations, each within -1 to 1, so that the series is stationary. variance: of what is
     new in a row. rows: that it was fitted to. adds_up: whether all this is of the changes from row to row. slopes
-    (p, q): of phi by the q numbers that it was fitted by, where these are not phi itself, see mixed.py. moving: phi and
+    (p, q): of phi by the q numbers that it was fitted by, where these are not phi itself. moving: phi and
     lambda of errors that remember only while the robot moves, see moving.py; all else is theirs while it does.
     information (q, q): that all rows have of the q numbers, where they do not tell as much as rows without end."""
 
@@ -217,7 +223,7 @@ def _of_motion(found: Moving, rows: int) -> AutoRegression:
 
 
 def _fitted(stretches: Sequence[FloatArray], most: int | None) -> tuple[AutoRegression, float]:
-    """(the autoregression of series as they are, its BIC); by two numbers where that says as much: mixed.py."""
+    """(the autoregression of series as they are, its BIC); by two numbers where that says as much: moving.py."""
     rows = sum(len(each) for each in stretches)
     if not rows:
         return AutoRegression(np.zeros(0), 0.0, 0), 0.0

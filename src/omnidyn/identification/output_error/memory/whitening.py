@@ -10,7 +10,7 @@ where the restricted likelihood is largest: its memory is not too short because 
 (D. A. Harville, J. Am. Stat. Assoc. 72, 320 (1977)).
 
 Simulations are dear and memories are not: between two simulations memory and numbers settle in turn on rows that are
-taken as straight, by the residuals and slopes of the last one. Far from the end, simulations are coarse: near.py.
+taken as straight, by the residuals and slopes of the last one. Far from the end, simulations are coarse: `near`.
 
 The covariance is (J~' J~ / s^2)^-1, ~ the filtered rows, and as much wider or narrower as the change of the score
 between the ends of the intervals says: of slow errors only what is fast counts, and there a robot that stops or sets
@@ -26,25 +26,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import cast
 
 import numpy as np
+from scipy.special import chdtri
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.parallel import side_by_side
-from omnidyn.identification.output_error.memory.across import widening
+from omnidyn.identification.output_error.engines.engine import Engine
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
 from omnidyn.identification.output_error.memory.innovations import without_gaps
-from omnidyn.identification.output_error.memory.near import near
 from omnidyn.identification.output_error.memory.whitened import (
     TangentEngine,
     WhitenedEngine,
     known_rows,
     moving_rows,
+    near,
     spacing,
 )
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
-from omnidyn.identification.output_error.solve.solver import Normal, RowEngine, Solution, Solver, of_states
+from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, of_states
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, WHITE, Trust, trust
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.statement import NOTE, WARNING, Statement
@@ -110,14 +110,14 @@ def whitened(solution: Solution, before: Trust, progress: Progress = silent) -> 
     for each in range(ROUNDS):
         progress(Report(f"errors with a memory, round {each + 1}"))
         models, far = _straight(solver, now, models), moved > NEARBY
-        engine = near(below(solver), now) if far else below(solver)
-        close = CLOSE_BY if engine is below(solver) else FAR_OFF
+        engine = near(solver.engine.unfiltered, now) if far else solver.engine.unfiltered
+        close = CLOSE_BY if engine is solver.engine.unfiltered else FAR_OFF
         found = _filtered(solver, engine, models, close).minimise(now, FEW_STEPS, blocked=None if far else blocked)
         moved, now, blocked = _moved(found, now), found.state.point, found.blocked
         models = _memory(found, _inverse(Normal(found.solver, found.state).information))
         if not far and moved <= SETTLED:
             break
-    filtered = _filtered(solver, below(solver), models, solver.close)
+    filtered = _filtered(solver, solver.engine.unfiltered, models, solver.close)
     found = replace(filtered.minimise(now, blocked=blocked), notes=solution.notes)
     left = trust(filtered, found)
     if left.kind == SANDWICH and solver.counted:
@@ -133,7 +133,7 @@ def _straight(
     solver: Solver[Problem], start: Point, models: Mapping[Column, AutoRegression]
 ) -> Mapping[Column, AutoRegression]:
     """The memory that rows straight near a point settle at, memory and numbers in turn: nothing is simulated for it."""
-    tangent, now = TangentEngine(below(solver), start), start
+    tangent, now = TangentEngine(solver.engine.unfiltered, start), start
     for _ in range(TURNS):
         found = _filtered(solver, tangent, models, solver.close, tangent.moves).minimise(now, FEW_STEPS)
         models = _memory(found, _inverse(Normal(found.solver, found.state).information), tangent.moves)
@@ -144,7 +144,7 @@ def _straight(
 
 
 def _filtered(
-    solver: Solver[Problem], engine: RowEngine[Problem], models: Mapping[Column, AutoRegression], close: float,
+    solver: Solver[Problem], engine: Engine[Problem], models: Mapping[Column, AutoRegression], close: float,
     moves: Sequence[BoolArray] | None = None,
 ) -> Solver[Problem]:  # fmt: skip
     """The solver for errors of these memories, which ends `close` to the best point."""
@@ -161,17 +161,8 @@ def _moved(found: Solution, before: Point) -> float:
 def _as_readings(solution: Solution) -> Solution:
     """The same point, its counts like any other output: rounding is a small part of errors that remember."""
     solver = solution.solver
-    solver = Solver(solver.problem, below(solver), 0.0, solver.close, counted=False)
+    solver = Solver(solver.problem, solver.engine.unfiltered, 0.0, solver.close, counted=False)
     return replace(solution, state=solver.state(solution.state.point), solver=solver)
-
-
-def below(solver: Solver[Problem]) -> RowEngine[Problem]:
-    """The engine that simulates, whose rows are as they are."""
-    engine = solver.engine
-    if isinstance(engine, WhitenedEngine):
-        return engine.engine
-    assert hasattr(engine, "residuals")
-    return cast(RowEngine[Problem], engine)
 
 
 def _memory(
@@ -186,7 +177,7 @@ def _memory(
     series: dict[Column, list[FloatArray]] = {column: [] for column in solver.problem.columns}
     moving: dict[Column, list[BoolArray]] = {column: [] for column in solver.problem.columns}
     taken = None if covariance is None else _roots(_of_pieces(solution, covariance))
-    for k, parts in enumerate(below(solver).residuals(solution.state.point)):
+    for k, parts in enumerate(solver.engine.unfiltered.residuals(solution.state.point)):
         piece = solver.problem.pieces[k]
         mine = moving_rows(piece, parts[0]) if moves is None else moves[k]
         for column, rows, residual, slopes, steps in _columns(piece, parts):
@@ -249,7 +240,7 @@ def _trusted(found: Solution, before: Trust, models: Mapping[Column, AutoRegress
     solver = found.solver
     known = trust(solver, found, WHITE)
     degrees = _degrees(found, known, models)
-    filtered = WhitenedEngine(below(solver), models).residuals(found.state.point)
+    filtered = WhitenedEngine(solver.engine.unfiltered, models).residuals(found.state.point)
     wider = widening(solver.problem, filtered, found.state.variance, _of_pieces(found, known.plain))
     known = replace(known, covariance=_observed(found, known) * np.outer(wider, wider))
     told = ~known.open & ~before.open
@@ -293,7 +284,7 @@ def _degrees(found: Solution, known: Trust, models: Mapping[Column, AutoRegressi
     leaning = {column: np.zeros((1 + model.order, int(told.sum()))) for column, model in models.items()}
     of_pieces = _of_pieces(found, known.plain)
     scale = Normal(solver, found.state).scale[told]
-    pieces = zip(solver.problem.pieces, below(solver).residuals(found.state.point), of_pieces, strict=True)
+    pieces = zip(solver.problem.pieces, solver.engine.unfiltered.residuals(found.state.point), of_pieces, strict=True)
     for piece, parts, covariance in pieces:
         ways = covariance[:, : len(told)][:, told] / scale
         moves = moving_rows(piece, parts[0])
@@ -329,3 +320,69 @@ def _statements(found: Solution, models: Mapping[Column, AutoRegression], known:
     uneven = max(spacing(pieces, column)[2] for column in models)
     if uneven > UNEVEN:
         yield Statement("uneven_rows", NOTE, numbers={"share": uneven})
+
+
+# Errors of several channels that go together: a force on the body moves all its wheels at once
+#
+# Each channel has a memory of its own, and what is new in them is taken as independent. Slow errors that are not have
+# the
+# covariance of what a fit makes of them,
+#
+#     V = V + sum over c, d of rho_cd G_c' G_d,      G_c = J~_c V over the rows of channel c
+#
+# J~ the filtered slopes, rho the correlation of sums of many rows: for what is new at once may be noise of each sensor,
+# and only what is slow goes together. As in A. Zellner, J. Am. Stat. Assoc. 57, 348 (1962), whose estimate would be
+# better; this says how sure the one at hand is.
+
+BLOCK = 50  # rows whose errors are summed
+FALSE = 0.01  # of logs in which channels seem to go together and do not
+LEAST = 0.25  # of a variance: a correlation is not known so well that it could take away more
+
+
+def correlation(problem: Problem, parts: Sequence[Parts]) -> FloatArray | None:
+    """Of the slow errors of the columns of a problem, (C, C); None where they are not seen to go together.
+
+    parts: what is new in the rows of every piece.
+    """
+    count, sums = len(problem.columns), []
+    for piece, (residual, _, _) in zip(problem.pieces, parts, strict=True):
+        blocks = residual.shape[1] // BLOCK
+        own = np.full((count, blocks), np.nan)
+        at = [problem.columns.index(column) for column in piece.record.columns]
+        cut = residual[:, : blocks * BLOCK].reshape(len(at), blocks, BLOCK)
+        own[at] = np.where(np.isfinite(cut).any(axis=2), np.nan_to_num(cut).sum(axis=2), np.nan)
+        sums.append(own)
+    every = np.concatenate(sums, axis=1)
+    there, every = np.isfinite(every), np.nan_to_num(every)
+    size = every**2 @ there.T
+    found = every @ every.T / np.sqrt(np.maximum(size * size.T, 1e-300))
+    both = there.astype(float) @ there.T
+    pairs = np.triu_indices(count, 1)
+    score = float((both[pairs] * found[pairs] ** 2).sum())
+    np.fill_diagonal(found, 1.0)
+    return found if len(pairs[0]) and score > chdtri(len(pairs[0]), FALSE) else None
+
+
+def widening(
+    problem: Problem, parts: Sequence[Parts], variance: FloatArray, covariances: Sequence[FloatArray]
+) -> FloatArray:
+    """By how much standard errors are larger, or smaller, than with errors that go apart; 1 where they do. Shape (P,).
+
+    parts: filtered residuals and slopes of every piece. variance (C,): of what is new. covariances: of each piece, of
+    parameters and states, in the units of its slopes.
+    """
+    rho, count = correlation(problem, parts), len(problem.parameters)
+    own = np.ones(count)
+    if rho is None:
+        return own
+    plain, more = np.diag(covariances[0])[:count], np.zeros(count)
+    for piece, (residual, slopes, at), covariance in zip(problem.pieces, parts, covariances, strict=True):
+        columns = [problem.columns.index(column) for column in piece.record.columns]
+        known = np.isfinite(residual)[:, :, None]
+        ways = np.where(known, slopes, 0.0) @ covariance[at][:, :count] / variance[columns, None, None] ** 0.5
+        for c, own_c in enumerate(columns):
+            for d, own_d in enumerate(columns[:c]):
+                more += 2.0 * rho[own_c, own_d] * (ways[c] * ways[d]).sum(axis=0)
+    told = plain > 0.0
+    own[told] = np.sqrt(np.maximum(1.0 + more[told] / plain[told], LEAST))
+    return own

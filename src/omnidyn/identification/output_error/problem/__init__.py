@@ -1,5 +1,6 @@
 """What is fitted to what.
 
-parameters and primitives (from them to numbers of the step), record (a log), outputs with redundant (channels computed
-from others), starts (where friction begins), motion (what moved), nuisances (what the log does), problem (all of it).
+parameters and primitives (from them to numbers of the step), friction_laws (of which numbers need care), record (a
+log), outputs (channels, those computed from others too), starts (where friction begins), nuisances (what the log does),
+problem (all of it).
 """

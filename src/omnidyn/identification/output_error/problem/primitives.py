@@ -8,7 +8,7 @@ numbers, and the whole fit.
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -62,7 +62,7 @@ def primitives(robot: Robot, motors: MotorWrench | None = None) -> Primitives:
     )  # fmt: skip
 
 
-class Mapping:
+class PrimitiveMap:
     """From the free parameters of a robot to its primitives and their derivatives.
 
     breakaway (3,): levels S that stay [N, N, N m], as the robot file has them; NaN where S follows coulomb.
@@ -78,7 +78,7 @@ class Mapping:
         self._base, self._masses = primitives(robot, motors), axis_masses(robot)
         self._probe = self._friction_slopes(robot, self._base, motors)
 
-    def with_levels(self, levels: dict[str, float]) -> Self:
+    def with_levels(self, levels: Mapping[str, float]) -> Self:
         """The same with these levels of breakaway, by key; 0 follows coulomb."""
         other = copy.copy(self)
         other.breakaway = self.breakaway.copy()

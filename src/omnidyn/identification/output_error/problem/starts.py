@@ -17,7 +17,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.clocks import time_of_row, usual_step
 from omnidyn.compiled.kernel import kernel, maker
-from omnidyn.identification.output_error.problem.primitives import Mapping
+from omnidyn.identification.output_error.problem.primitives import PrimitiveMap
 from omnidyn.logs.segments import filled
 from omnidyn.model.frames import world_to_body
 from omnidyn.model.keys import BOX
@@ -97,7 +97,7 @@ def _rates(record: Record, columns: Sequence[int]) -> FloatArray:
     return found
 
 
-def integral_start(mapping: Mapping, values: FloatArray, records: Sequence[Record]) -> FloatArray:
+def integral_start(mapping: PrimitiveMap, values: FloatArray, records: Sequence[Record]) -> FloatArray:
     """Rates and levels of the axes by the integral form. Shape (2, 3), NaN where an axis has too few windows."""
     now, _ = mapping.at(values)
     found = np.full((2, 3), np.nan)
@@ -116,7 +116,7 @@ def integral_start(mapping: Mapping, values: FloatArray, records: Sequence[Recor
     return found
 
 
-def friction_values(mapping: Mapping, values: FloatArray, found: FloatArray) -> FloatArray:
+def friction_values(mapping: PrimitiveMap, values: FloatArray, found: FloatArray) -> FloatArray:
     """The friction parameters among `values` that give the rates and levels `found`, as far as 0 allows."""
     now, slopes = mapping.at(values)
     values = values.copy()

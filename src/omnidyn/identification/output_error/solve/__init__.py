@@ -1,1 +1,1 @@
-"""To the minimum: solver, first_point, loop (firmware loops), tied (two numbers), progress."""
+"""To the minimum: solver, steps (bends, edges and order of numbers), first_point, loop (firmware loops), progress."""

@@ -10,16 +10,17 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import side_by_side
 from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.engines.rates import RateEngine
-from omnidyn.identification.output_error.engines.slipping import implicit_engine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, TRAVELS
 from omnidyn.identification.output_error.problem.parameters import AT
-from omnidyn.identification.output_error.problem.problem import Point, Problem, per_column
+from omnidyn.identification.output_error.problem.primitives import PrimitiveMap
+from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem, per_column
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import friction_values, integral_start
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solver, State
 from omnidyn.model.keys import FRICTION, find_key
+from omnidyn.model.robot import Robot
 
 CURRENTS, MOTOR = f"{LATENCY}.current", "motor"
 MANY = 100_000  # rows to which a long log is first fitted
@@ -35,13 +36,13 @@ def first_point(solver: Solver, records: Sequence[Record]) -> State:
 
     A state of the problem that was marched through: of the first part, it says where to start and no more.
     """
-    problem, engine = solver.problem, solver.engine
-    assert isinstance(engine, ExactEngine)
+    problem = solver.problem
+    mapping = PrimitiveMap(problem.robot, problem.robot_parameters)
     own = problem.start()
     count = problem.robot_count
-    found = integral_start(engine.mapping, own.values[:count], records)
+    found = integral_start(mapping, own.values[:count], records)
     values = own.values.copy()
-    values[:count] = friction_values(engine.mapping, own.values[:count], found)
+    values[:count] = friction_values(mapping, own.values[:count], found)
     short = problem.shortened(MANY)
     trial = solver if short is problem else Solver(short, ExactEngine(short))
     states = [trial.state(own), trial.state(Point(values, own.states))]
@@ -83,14 +84,14 @@ def coarse_point(problem: Problem, nu: float, progress: FitProgress) -> State:
     progress.enter("looking for a start")
     rows = sum(piece.last - piece.first for piece in problem.pieces)
     solver, short, own = (
-        Solver(problem, implicit_engine(problem), nu, max(NEAR, BIAS * rows)),
+        Solver(problem, ImplicitEngine.of(problem), nu, max(NEAR, BIAS * rows)),
         problem.shortened(FEW),
         moving_start(problem, nu, progress),
     )
     if short is problem:
         return solver.minimise(own, progress=progress).state
     found = (
-        Solver(short, implicit_engine(short), nu, NEAR)
+        Solver(short, ImplicitEngine.of(short), nu, NEAR)
         .minimise(own, progress=progress.aside("a part of the log first"))
         .state.point
     )
@@ -109,14 +110,36 @@ def _timed(problem: Problem, point: Point, nu: float, progress: FitProgress) -> 
     if LATENCY not in parts or (MOTOR not in parts and problem.where(CURRENTS) < 0):
         return point
     held = _on_time(problem)
-    first = Solver(held, implicit_engine(held), nu, NEAR).minimise(point, progress=progress.aside("motors first"))
-    return _with_latencies(Solver(problem, implicit_engine(problem), nu), first.state).point
+    first = Solver(held, ImplicitEngine.of(held), nu, NEAR).minimise(point, progress=progress.aside("motors first"))
+    return _with_latencies(Solver(problem, ImplicitEngine.of(problem), nu), first.state).point
 
 
 def _on_time(problem: Problem) -> Problem:
     """The problem with every latency held at its start."""
     still = [replace(p, low=p.value, high=p.value) if p.part == LATENCY else p for p in problem.parameters]
     return replace(problem, parameters=tuple(still))
+
+
+class RateEngine(ImplicitEngine):
+    """The implicit engine, of headings, positions and angles of wheels their differences alone.
+
+    A path keeps what went wrong long ago: one turn too far spoils all that follows, and a later error that takes a part
+    of it back is a minimum of its own, as far as anything from the best point. A difference forgets. It says less of
+    the slow numbers, for the noise of neighbours is one and the same: it is where to start, not where to end.
+    """
+
+    def _piece(
+        self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, state: FloatArray,
+        values: FloatArray,
+    ) -> Parts:  # fmt: skip
+        residual, slopes, at = super()._piece(robot, moved, scales, piece, state, values)
+        for c, (name, _) in enumerate(piece.record.columns):
+            if name in TRAVELS:
+                known = np.flatnonzero(np.isfinite(residual[c]))
+                gained, by = np.diff(residual[c][known]), np.diff(slopes[c][known], axis=0)
+                residual[c] = np.nan
+                residual[c][known[1:]], slopes[c][known[1:]] = gained, by
+        return residual, slopes, at
 
 
 def _by_rates(problem: Problem, point: Point, nu: float, progress: FitProgress) -> Point:
@@ -147,7 +170,7 @@ def _levels_first(problem: Problem, point: Point, nu: float, progress: FitProgre
     )
     first = replace(problem, parameters=held)
     aside = progress.aside("levels of friction first")
-    return Solver(first, implicit_engine(first), nu, NEAR).minimise(point, progress=aside).state.point
+    return Solver(first, ImplicitEngine.of(first), nu, NEAR).minimise(point, progress=aside).state.point
 
 
 def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
@@ -156,7 +179,7 @@ def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
     With the latencies that go with it. Where outputs add up, the better one of that and what their rates say.
     """
     own, short = problem.start(), problem.shortened(FEW)
-    solver = Solver(short, implicit_engine(short), nu)
+    solver = Solver(short, ImplicitEngine.of(short), nu)
     friction = np.array([p.part == FRICTION for p in problem.parameters], bool)
     points = [own, *(Point(np.where(friction, share * own.values, own.values), own.states) for share in LESS)]
     costs = side_by_side(lambda point: solver.state(point).objective, points)

@@ -249,9 +249,7 @@ def beyond_jumps(solution: Solution, progress: FitProgress) -> Solution:
     """
     solver, seen = solution.solver, progress.below(solution.state.objective)
     progress.enter("looking for a better branch, beyond jumps of the likelihood")
-    if not np.any(solver.problem.robot.drive.ki) or (
-        isinstance(solver.engine, LoopEngine) and not solver.engine.meets_limit(solution.state.point)
-    ):
+    if not np.any(solver.problem.robot.drive.ki) or not solver.engine.meets_limit(solution.state.point):
         return solution
     grown = solver.minimise(_grown(solver, solution.state.point), FEW, seen)
     solution = min(solution, grown, key=lambda each: each.state.objective)

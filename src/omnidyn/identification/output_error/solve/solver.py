@@ -9,17 +9,15 @@ scales s_c in turn. Counts (kernel/counts.py) are held like that too, beside the
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, Self, TypeVar
+from typing import Any, Generic
 
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.identification.output_error.engines.exact import Weighting
+from omnidyn.identification.output_error.engines.engine import Engine, P, Weighting
 from omnidyn.identification.output_error.kernel.counts import LEAST_SHARE, information
-from omnidyn.identification.output_error.problem.problem import Fitted, Parts, PieceSums, Point, per_column
-from omnidyn.identification.output_error.solve.bend import Bend
-from omnidyn.identification.output_error.solve.edges import Edges
-from omnidyn.identification.output_error.solve.ordered import Order
+from omnidyn.identification.output_error.problem.problem import Fitted, PieceSums, Point, per_column
+from omnidyn.identification.output_error.solve.steps import Bend, Edges, Order
 from omnidyn.progress import Progress, Report
 from omnidyn.statement import Statement
 
@@ -33,31 +31,6 @@ FIRM, SHORT = 1e-2, 10.0  # least damping after a step that failed; that of a st
 PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
 UNSEEN = 1e-100  # information on the start of a piece that is none: divided by it, nothing is finite
 SCALE_CHANGE = 1e-3  # of a variance, relative, at which it counts as found
-
-
-P = TypeVar("P", bound=Fitted)
-
-
-class Engine(Protocol[P]):
-    """What simulates a problem with its sensitivities: engines/exact.py, engines/implicit.py."""
-
-    problem: P
-
-    def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
-        """What the residuals of every piece add up to; see kernel/march.py."""
-        ...
-
-    def on(self, problem: P) -> Self:
-        """The same engine on other pieces of the same logs, with the same parameters."""
-        ...
-
-
-class RowEngine(Engine[P], Protocol[P]):
-    """An engine that shows the rows as well, where memory may grow with the log."""
-
-    def residuals(self, point: Point) -> list[Parts]:
-        """Residuals and slopes of every row of every piece."""
-        ...
 
 
 FASTEST = np.array([30.0, 30.0, 300.0])  # [m/s, m/s, rad/s] no robot sets off faster; a step astray would not end
@@ -312,7 +285,7 @@ class Normal:
     def moved(self, damping: float, still: BoolArray, bend: FloatArray, onto: FloatArray) -> Point:
         """The point of the damped step, within the bounds, without the parameters that are `still`.
 
-        bend (P, P): what the information lacks, see bend.py. onto (P,): the step of these, see edges.py.
+        bend (P, P): what the information lacks, see `Bend`. onto (P,): the step of these, see `Edges`.
         """
         gradient, information = self._reduced(damping)
         free, fold = ~still, self.solver.order.together(self.inner, still)

@@ -1,2 +1,2 @@
-"""How sure: uncertainty, rounding, support (of nuisances), resampling,
-breakaway, no_fall."""
+"""How sure: uncertainty, support (of nuisances), resampling, cures (of what the logs do not show), breakaway, levels,
+no_fall."""

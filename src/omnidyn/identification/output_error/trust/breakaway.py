@@ -9,7 +9,7 @@ and the limit higher, as for coulomb (`Trust.rise`).
 
 The exact engine looks at every plateau between the drives of the log. Where axes couple, or friction acts elsewhere,
 what rests balances a force that changes while it rests, and moves with the other numbers: there a grid of levels is
-made ever finer, each fitted by the implicit engine from the nearest that is known (likely_levels.py).
+made ever finer, each fitted by the implicit engine from the nearest that is known (levels.py).
 """
 
 from __future__ import annotations
@@ -23,14 +23,11 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
-from omnidyn.identification.output_error.engines.exact import ExactEngine
-from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.problem.falling import coulomb_below, falls
+from omnidyn.identification.output_error.problem.friction_laws import coulomb_below, falls
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
-from omnidyn.identification.output_error.trust.likely_levels import likely_levels
-from omnidyn.identification.output_error.trust.traded_levels import Place, trade
+from omnidyn.identification.output_error.trust.levels import Place, likely_levels, trade
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust
 from omnidyn.model.friction.kinds import KINDS
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, Key, in_words
@@ -146,14 +143,13 @@ def _apart(one: float | Place, other: float | Place) -> float:
 
 def with_levels(solver: Solver, levels: dict[str, float]) -> Solver:
     """The solver at fixed levels of breakaway, by their keys; 0 follows coulomb."""
-    assert isinstance(solver.engine, (ExactEngine, ImplicitEngine))
     return Solver(solver.problem, solver.engine.with_levels(levels), solver.nu, solver.close)
 
 
 def levels_of(solution: Solution) -> dict[str, float]:
     """Key -> level of breakaway that was found beside the numbers of a solution [N], about yaw [N m]; none where all
     are those of Coulomb friction."""
-    problem, found = solution.solver.problem, getattr(solution.solver.engine, "levels", {})
+    problem, found = solution.solver.problem, solution.solver.engine.levels
     robot = problem.robot_at(solution.state.point.values)
     levels = {name: (level, slides_least(robot, name)) for name, level in found.items()}
     above = any(level > least for level, least in levels.values())
@@ -174,7 +170,7 @@ def find_breakaway(
         before, found = {one.name: one for one in found}, []
         for name in names:
             limit = LIMIT * _steeper(solver, known, name)
-            if isinstance(solver.engine, ExactEngine):
+            if solver.engine.exact:
                 one = _one_axis(solver, solution, levels, name, limit)
             else:
                 one = _by_a_grid(solution, levels, name, limit, before.get(name), progress)
@@ -256,9 +252,8 @@ def _by_the_engine(
     solution: Solution, ways: Callable[[Any], list[dict[str, float]]], name: str, progress: FitProgress | None
 ) -> _Profile:
     """A profile by the implicit engine, at a tolerance that is enough to tell levels apart."""
-    own, engine, listener = solution.solver, solution.solver.engine, progress or silent
-    assert isinstance(engine, ImplicitEngine)
-    solver = Solver(own.problem, type(engine)(own.problem, TOL), own.nu, NEAR)
+    own, listener = solution.solver, progress or silent
+    solver = Solver(own.problem, own.engine.of(own.problem, TOL), own.nu, NEAR)
 
     def listen(report: Report) -> None:
         listener(report._replace(phase=f"{in_words(name)}, {report.phase}"))
@@ -332,7 +327,6 @@ def _coulomb(solver: Solver, point: Point, name: str) -> float:
 def _edges(solver: Solver, point: Point, axis: int, lowest: float) -> FloatArray:
     """Drives of the log at which S may matter, increasing: from `lowest` to HIGHEST times twice that, and the next one,
     where the last plateau below that ends."""
-    assert isinstance(solver.engine, ExactEngine)
     drives = np.concatenate([np.abs(drive[:, axis]) for drive in solver.engine.drives(point)])
     every = np.unique(np.round(drives[drives >= lowest], 12)).astype(float)
     return every[: np.searchsorted(every, 2.0 * HIGHEST * lowest, side="right") + 1]

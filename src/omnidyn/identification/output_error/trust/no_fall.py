@@ -13,12 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.problem.falling import APART, speed_of
+from omnidyn.identification.output_error.problem.friction_laws import APART, speed_of
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.output_error.solve.ordered import Order
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
+from omnidyn.identification.output_error.solve.steps import Order
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, LIMIT
-from omnidyn.identification.output_error.trust.ends import at_the_end
+from omnidyn.identification.output_error.trust.support import at_the_end
 from omnidyn.identification.output_error.trust.uncertainty import RISE, Trust
 from omnidyn.statement import WARNING, Statement
 
@@ -53,7 +53,7 @@ def without_a_fall(solution: Solution, known: Trust) -> tuple[Trust, Intervals, 
 def _not_seen(solution: Solution, known: Trust) -> list[tuple[int, int, int]]:
     """Indices of (breakaway, Coulomb friction, Stribeck speed), all free, between which no fall is seen."""
     problem, values = solution.solver.problem, solution.state.point.values
-    if not isinstance(solution.solver.engine, ImplicitEngine):
+    if solution.solver.engine.exact:
         return []
     ended, found = {p.name for p in at_the_end(problem, values)}, []
     for s, c in Order(problem).pairs:

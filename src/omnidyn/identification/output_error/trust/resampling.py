@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.output_error.problem.problem import Point
+from omnidyn.identification.output_error.engines.engine import Engine, Weighting
+from omnidyn.identification.output_error.problem.parameters import AT
+from omnidyn.identification.output_error.problem.problem import PieceSums, Point, Problem
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
-from omnidyn.identification.output_error.solve.tied import TiedEngine
 from omnidyn.identification.output_error.trust.uncertainty import Trust
+from omnidyn.identification.steady.study_table import Difference
 from omnidyn.statistics import central_interval, t_quantile
 
 OUTWARD, HALVINGS = 12, 12  # steps of 1.5 standard errors out, then halvings
@@ -246,3 +249,90 @@ def runs_by_group(solver: Solver, strata: Strata | None) -> dict[str, list[int]]
     for run in dict.fromkeys(id(piece.record) for piece in solver.problem.pieces):
         found.setdefault(strata[run] if strata else "", []).append(run)
     return found
+
+
+# A problem in which one number is another one plus a given change: for the profile of a difference
+
+
+class TiedEngine(Engine[Problem]):
+    """An engine whose parameter `second` is `first` plus `change`, and so no longer free. Neither has a prior."""
+
+    def __init__(self, engine: Engine, first: int, second: int, change: float):
+        self._engine, self._first, self._second, self._change = engine, first, second, change
+        whole, own = engine.problem, list(engine.problem.parameters)
+        one, other = own[first], own[second]
+        own[first] = replace(one, low=max(one.low, other.low - change), high=min(one.high, other.high - change))
+        del own[second]
+        count = whole.robot_count - (second < whole.robot_count)
+        self.problem: Problem = replace(whole, parameters=tuple(own), robot_count=count)
+
+    def on(self, problem: Problem) -> TiedEngine:
+        """The same engine on other pieces of the same logs."""
+        whole = replace(self._engine.problem, pieces=problem.pieces)
+        return TiedEngine(self._engine.on(whole), self._first, self._second, self._change)
+
+    def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
+        """The sums of the whole problem; what slopes by `second` is added to what slopes by `first`."""
+        left = np.delete(np.arange(len(point.values) + 1), self._second)
+        values = np.empty(len(point.values) + 1)
+        values[left] = point.values
+        values[self._second] = values[self._first] + self._change
+        return [self._folded(sums) for sums in self._engine.sums(Point(values, point.states), weighting)]
+
+    def _folded(self, sums: PieceSums) -> PieceSums:
+        grad, score = self._along(sums.grad, 1), self._along(sums.score, 1)
+        return replace(sums, grad=grad, score=score, info=self._along(self._along(sums.info, 1), 2), waves=None)
+
+    def _along(self, values: FloatArray, axis: int) -> FloatArray:
+        moved = np.moveaxis(values, axis, 0).copy()
+        moved[self._first] += moved[self._second]
+        return np.moveaxis(np.delete(moved, self._second, axis=0), 0, axis)
+
+
+# What differs between groups that were fitted together: second minus first, with an interval of its own
+
+
+def differences(
+    solution: Solution, known: Trust, again: Resampled, own: Iterable[str], groups: Sequence[str],
+    profile: Sequence[str], strata: Strata,
+) -> tuple[Difference, ...]:  # fmt: skip
+    """Every number of `own` between every two groups that have it and determine it.
+
+    Its interval is by profile where that is asked for, from draws of a bootstrap where there are any, else to first
+    order in the covariance.
+    """
+    names = solution.solver.problem.names
+    found = []
+    for key in own:
+        there = [group for group in groups if f"{key}{AT}{group}" in names]
+        for first, second in combinations(there, 2):
+            a, b = names.index(f"{key}{AT}{first}"), names.index(f"{key}{AT}{second}")
+            if known.blind[a] or known.blind[b]:
+                continue
+            pair = float(solution.state.point.values[a]), float(solution.state.point.values[b])
+            std, low, high = _interval(solution, known, again, a, b, strata, key in profile)
+            found.append(Difference(key, first, second, pair, pair[1] - pair[0], std, low, high))
+    return tuple(found)
+
+
+def _interval(
+    solution: Solution, known: Trust, again: Resampled, a: int, b: int, strata: Strata, profiled: bool
+) -> tuple[float, float, float]:  # fmt: skip
+    """(std, low, high) of number b minus number a."""
+    solver, values = solution.solver, solution.state.point.values
+    change = float(values[b] - values[a])
+    along = np.zeros(len(values))  # the change of the numbers that the solver sees, to first order
+    along[a], along[b] = (
+        side * solver.problem.parameters[k].slope(float(values[k])) for side, k in ((-1.0, a), (1.0, b))
+    )
+    if again.draws is not None:
+        drawn = again.draws[:, b] - again.draws[:, a]
+        std = widening_of_std(least_runs(solver, strata)) * float(drawn.std(ddof=1))
+        low, high = draw_interval(change, drawn, again.widening)
+    else:
+        covariance = np.where(np.isfinite(known.covariance), known.covariance, 0.0)
+        std = float(np.sqrt(max(along @ covariance @ along, 0.0)))
+        low, high = change - known.quantile * std, change + known.quantile * std
+    if profiled and std > 0.0:
+        low, high = difference_interval(solver, solution, a, b, std, known.rise(along)) or (low, high)
+    return std, low, high

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, earliest
+from omnidyn.identification.output_error.problem.parameters import EFFICIENCY, Parameter
+from omnidyn.identification.output_error.problem.problem import Fitted
 from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver
 from omnidyn.model.actuation import DEAD_BAND, GAIN
 
@@ -37,3 +42,21 @@ def too_early(solver: Solver, solution: Solution) -> dict[str, float]:
     late = {p.name: value for p, value in pairs if p.part == LATENCY}
     limit = earliest([piece.record for piece in solver.problem.pieces]) if late else 0.0
     return {name: value for name, value in late.items() if value <= limit}
+
+
+# Numbers that ended where their search ends: they are no estimates
+
+NEAR = 0.01  # of the range: a descent that is on its way out is stopped by the last rows that it would lose
+
+
+def at_the_end(problem: Fitted, values: FloatArray) -> Iterator[Parameter]:
+    """Those near a bound that is no limit of nature; a friction, or a dead band, of 0 is at one, a gear without loss
+    at another."""
+    for p, value in zip(problem.parameters, values.tolist(), strict=True):
+        if value <= 0.0 and p.log:
+            continue
+        low, high = (p.inner(p.low), p.inner(p.high)) if p.log else (p.low, p.high)
+        share = (p.inner(value) - low) / (high - low) if high > low else 0.5
+        lossless = p.name.startswith(EFFICIENCY)
+        if (share >= 1.0 - NEAR and not lossless) or (share <= NEAR and (p.log or p.low < 0.0)):
+            yield p

@@ -9,12 +9,13 @@ blocks that carry the information. Which of the two is used is decided by the re
 each is one block: a floor or a battery that differs from run to run is then in the intervals too (Liang, Zeger,
 Biometrika 73 (1986); n/(n - 1) for n runs).
 
-Counts without noise are neither: their covariance is what rounding.py finds, and more only where the sandwich says so
+Counts without noise are neither: their covariance is that of rounding, and more only where the sandwich says so
 beyond chance. No variance is below the plain one, of a number or of what several do together.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,12 +24,12 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.identification.output_error.engines.exact import Weighting
-from omnidyn.identification.output_error.kernel.march import FINAL
-from omnidyn.identification.output_error.problem.problem import PieceSums, per_column
-from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State
-from omnidyn.identification.output_error.trust.blind import Way, blind_ways
-from omnidyn.identification.output_error.trust.rounding import rounding_scatter, silent
+from omnidyn.identification.output_error.engines.engine import Weighting
+from omnidyn.identification.output_error.kernel.counts import HARMONICS, LEAST_SHARE, information, rounding
+from omnidyn.identification.output_error.kernel.march import FINAL, WAVES
+from omnidyn.identification.output_error.problem.problem import PieceSums, Problem, per_column
+from omnidyn.identification.output_error.solve.solver import Normal, Solution, Solver, State, of_states
+from omnidyn.identification.output_error.trust.cures import Way, blind_ways
 from omnidyn.statistics import t_quantile
 
 BLOCKS, LEAST_BLOCK = 100, 8  # blocks in all; rows of one, at least
@@ -63,7 +64,7 @@ class Trust:
     behind it. neighbours (columns,): correlation of successive residuals. directions: blind or weak ones no prior
     holds: (eigenvalue, relative change of each parameter). runs: that were the blocks, 0 where these were shorter than
     a run. plain (P, P): inverse of the information, which is what the likelihood itself curves by; the covariance where
-    the noise is white. ways: what the rows do not tell, priors or none (blind.py).
+    the noise is white. ways: what the rows do not tell, priors or none (cures.py).
     """
 
     covariance: FloatArray
@@ -314,3 +315,106 @@ def _at_least(wide: FloatArray, least: FloatArray, beyond: float) -> FloatArray:
 def _free_step(plain: FloatArray, normal: Normal) -> FloatArray:
     """From where a bound holds a parameter to where the fit would be without the bound, to first order."""
     return np.where(normal.held, plain @ normal.gradient, 0.0)
+
+
+# What the log alone leaves open, and what numbers of the file that are only known so far add to it
+#
+# A number that the file gives with a std is free in a fit, and its std a prior: the intervals of all others have in
+# them
+# what it may be off by. Were it exact, the covariance of the others would be
+#
+#     C_alone = C_aa - C_ab C_bb^-1 C_ba        b: what the file knows, a: the others
+
+
+def given(problem: Problem) -> BoolArray:
+    """Which parameters have a prior. Shape (P,)."""
+    return np.array([p.prior is not None for p in problem.parameters], dtype=bool)
+
+
+def from_the_log_alone(problem: Problem, known: Trust) -> Trust | None:
+    """The trust in the others were all that the file knows exact; None where it knows nothing with a std."""
+    finite = np.isfinite(np.diag(known.covariance))
+    of_file = given(problem) & finite
+    if not of_file.any():
+        return None
+    own = finite & ~of_file
+    covariance = known.covariance.copy()
+    across = covariance[np.ix_(own, of_file)]
+    told = np.linalg.pinv(covariance[np.ix_(of_file, of_file)], hermitian=True)
+    left = covariance[np.ix_(own, own)] - across @ told @ across.T
+    covariance[np.ix_(own, own)] = 0.5 * (left + left.T)
+    np.fill_diagonal(covariance, np.maximum(np.diag(covariance), 0.0))
+    return replace(known, covariance=covariance)
+
+
+# The spread of a fit to counts that show no noise: what an encoder rounds off is a function of the angle
+#
+# Between its ticks the angle of a wheel begins anywhere; nothing else is left to chance. A row pulls at the fit by
+# E x/s (kernel/counts.py), odd in r = y - f and of period q, E x = sum b_m sin(2 pi m r/q), where r = -(f + phase)
+# up to whole ticks. Over all phases
+#
+#     var of the score = sum over m of b_m^2/(2 s^2) |sum over rows of exp(2 pi i m f/q) J|^2
+#
+# so that rows at rest, which repeat one another, and the saw teeth of a slow wheel count as what they are. The phases
+# of
+# wheels and pieces are independent; the harmonics beyond HARMONICS are taken as if rows were. With H the curvature that
+# rows have in the mean over all phases, the covariance is H^-1 (var of the score) H^-1. Source: White, Econometrica 50
+# (1982), for a likelihood that is not that of the data: the solver takes the noise to be LEAST_SHARE of a tick at
+# least.
+
+STEPS = 4096  # of the integrals over a tick
+CLOSE = 1e-6  # relative, to the least variance: the noise does not show
+
+
+def silent(solver: Solver, solution: Solution) -> BoolArray:
+    """Columns of counts whose noise does not show. Shape (columns,)."""
+    return (solver.tick > 0.0) & (solution.state.variance <= (1.0 + CLOSE) * (LEAST_SHARE * solver.tick) ** 2)
+
+
+def rounding_scatter(solver: Solver, solution: Solution) -> tuple[FloatArray, FloatArray]:
+    """(H, variance of the score), priors and other columns included, in the numbers that the solver sees: (P, P) each.
+
+    States of the pieces are eliminated. Needs an engine that knows counts.
+    """
+    state, quiet = solution.state, silent(solver, solution)
+    one = np.ones(len(state.variance))
+    sums = solver.engine.sums(state.point, Weighting(one))  # sum of J J'
+    waves = solver.engine.sums(state.point, Weighting(state.variance, mode=WAVES, counted=True))
+    usual = information(state.variance, solver.tick)[0]
+    if solver.nu:
+        usual = np.where(solver.tick > 0.0, usual, (solver.nu + 1.0) / (solver.nu + 3.0))
+    curved, scatters = [], []
+    for piece, own, more in zip(solver.problem.pieces, sums, waves, strict=True):
+        ticks = np.where(quiet[own.columns], piece.record.ticks, 0.0)
+        curvature, scatter = _of_piece(own, more.waves, ticks, state.variance[own.columns], usual[own.columns])
+        curved.append(curvature)
+        scatters.append(scatter)
+    normal = Normal(solver, State(state.point, curved, state.objective, one))
+    count, total = len(normal.scale), np.diag(normal.prior_information)
+    for scatter, (_, info) in zip(scatters, normal.pieces, strict=True):
+        full = np.concatenate([normal.scale, np.ones(len(scatter) - count)])[: len(info)]
+        score = scatter[: len(info), : len(info)] * np.outer(full, full)
+        lift = np.eye(count, len(info))
+        if len(info) > count:
+            lift[:, count:] = -of_states(info[count:, count:], info[count:, :count]).T
+        total = total + lift @ score @ lift.T
+    return normal.information, total
+
+
+def _of_piece(
+    sums: PieceSums, waves: FloatArray | None, ticks: FloatArray, variance: FloatArray, usual: FloatArray
+) -> tuple[PieceSums, FloatArray]:
+    """The sums of a piece with the mean curvature for its information, and the variance of its score."""
+    assert waves is not None
+    info, scatter = np.zeros_like(sums.info), np.zeros(sums.info.shape[1:])
+    for c, square in enumerate(sums.info):
+        if ticks[c] == 0.0:
+            info[c] = usual[c] / variance[c] * square
+            scatter += info[c]
+            continue
+        series, whole, curvature = rounding(0.5 * ticks[c] / math.sqrt(variance[c]), HARMONICS, STEPS)
+        power = 0.5 * series**2
+        told = np.einsum("m,mkp,mkq->pq", power, waves[c], waves[c])
+        scatter += (told + (whole - power.sum()) * square) / variance[c]
+        info[c] = curvature / variance[c] * square
+    return replace(sums, info=info), scatter

@@ -12,13 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification.output_error.joint import JointEngine
 from omnidyn.identification.output_error.linear.blocks import Blocks
 from omnidyn.identification.output_error.linear.rows import Linear, Rows
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
-from omnidyn.identification.output_error.problem.bounded import bounded
-from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
-from omnidyn.identification.output_error.solve.solver import RowEngine, Solution
+from omnidyn.identification.output_error.problem.problem import Parts, Point, bounded
+from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.structure.tails import as_counted
 
 Shows = Callable[[Point], list[Parts]]
@@ -62,7 +60,7 @@ def errors(solution: Solution, memory: Memories, margins: Sequence[FloatArray], 
     Of groups a tenth of each is held out at a time: no number that a group has for itself is without a log.
     """
     engine = solution.solver.engine
-    if not isinstance(memory, Mapping) or not isinstance(engine, JointEngine):
+    if not isinstance(memory, Mapping) or not engine.members:
         memory = next(iter(memory.values())) if isinstance(memory, Mapping) else memory
         blocks, seen = _blocks(solution, memory, margins)
     else:
@@ -70,7 +68,7 @@ def errors(solution: Solution, memory: Memories, margins: Sequence[FloatArray], 
         for member in engine.members:
             own = [margins[k] for k in member.places]
             found, rows = _blocks(
-                engine.alone(member, solution),
+                member.alone(solution),
                 memory[member.name],
                 own,
                 [k for k, at in enumerate(member.at.tolist()) if at in told],
@@ -86,9 +84,10 @@ def _blocks(
     solution: Solution, memory: Sequence[AutoRegression], margins: Sequence[FloatArray], told: Container[int] = ()
 ) -> tuple[Blocks, int]:
     """(blocks of one group, how many rows they have). told: parameters whose priors another group has already."""
-    problem = bounded(_from(solution.solver.problem, margins))
-    point = solution.state.point
-    engine: RowEngine = solution.solver.engine.on(problem)  # pyright: ignore[reportAssignmentType]
+    whole, point = solution.solver.problem, solution.state.point
+    pieces = [replace(piece, margin=own) for piece, own in zip(whole.pieces, margins, strict=True)]
+    problem = bounded(replace(whole, pieces=tuple(pieces)))
+    engine = solution.solver.engine.on(problem)
     shows: Shows = lambda at: as_counted(solution, problem, engine.residuals(at))  # noqa: E731
     bare = [replace(p, prior=None) if k in told else p for k, p in enumerate(problem.parameters)]
     rows = Rows.of(replace(problem, parameters=tuple(bare)), point, shows(point))
@@ -161,8 +160,3 @@ def margins_of(solutions: Sequence[Solution]) -> list[FloatArray]:
     """Of each piece (C,), the margin that leaves the same rows to all these fits: a latency needs one."""
     every = [[piece.margin for piece in solution.solver.problem.pieces] for solution in solutions]
     return [np.max(own, axis=0) for own in zip(*every, strict=True)]
-
-
-def _from(problem: Problem, margins: Sequence[FloatArray]) -> Problem:
-    pieces = [replace(piece, margin=own) for piece, own in zip(problem.pieces, margins, strict=True)]
-    return replace(problem, pieces=tuple(pieces))

@@ -18,12 +18,11 @@ from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.ladder import STANDS
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.identification.output_error.joint import JointEngine
 from omnidyn.identification.output_error.prepare import expand_keys
 from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution
-from omnidyn.identification.structure.missing.laws import may_break_away, other_laws
+from omnidyn.identification.structure.missing.laws import TRACTION, may_break_away, other_laws
 from omnidyn.identification.structure.missing.switches import (
     BREAKS,
     EACH_WHEEL,
@@ -113,10 +112,8 @@ class Model:
         return self._alone(self.fit.weighed(self.solution).plain)
 
     def _alone(self, solution: Solution) -> dict[str, Solution]:
-        engine = solution.solver.engine
-        if not isinstance(engine, JointEngine):
-            return {self.fit.groups[0].name: solution}
-        return {member.name: engine.alone(member, solution) for member in engine.members}
+        members = solution.solver.engine.members
+        return {one.name: one.alone(solution) for one in members} or {self.fit.groups[0].name: solution}
 
     def robot(self, group: str) -> Robot:
         """The fitted robot of a group."""
@@ -263,3 +260,65 @@ def _own(stands: Model, begins: Mapping[str, tuple[Robot, OutputError]]) -> tupl
     of_friction: Callable[[str], bool] = lambda key: (place := find_key(key)) is not None and place.part == FRICTION  # noqa: E731
     own = [key for key in keys if of_friction(key) and key not in shared]
     return tuple(dict.fromkeys([*(key for key in asked if not of_friction(key)), *own]))
+
+
+# What the ladder spends on fits of wheels that slip, which take a hundred times as long as others
+#
+# Their engine simulates the log twice for every number of the fit. So what needs it is tried last of a step, not where
+# the others leave nothing but noise and it promised less than they, and FITS times in all: counted, so that the
+# answer is
+# the same on every machine. What is not tried for that is in the answer, by name.
+
+FITS = 4  # of wheels that slip, in all steps together
+CLEARLY = 6.0  # of chi squared, by which one remedy explains more than another
+NOT_NEEDED = Statement("slow_and_not_needed", NOTE)
+BEYOND = Statement("slow_fits_spent", NOTE, numbers={"fits": FITS})
+
+
+class Purse:
+    """How many slow fits are left, and what was not tried for want of them."""
+
+    def __init__(self) -> None:
+        self.left, self._untried = FITS, list[Untried]()
+
+    def pays(self, moves: Sequence[Move], stands: Model) -> list[Move]:
+        """Those of some moves that are made; the others are noted."""
+        made = list[Move]()
+        for move in moves:
+            slow = is_slow(move, stands)
+            if slow and not self.left:
+                self._leave(move, BEYOND)
+                continue
+            self.left -= slow
+            made.append(move)
+        return made
+
+    def rivals(self, moves: Sequence[Move], best: Model) -> list[Move]:
+        """Those of some slow moves that promised about as much as one that leaves nothing but noise; the others are
+        noted. Both by the diagnosis of what stood before."""
+        assert best.move is not None
+        least = best.move.promise - CLEARLY
+        for move in moves:
+            if move.promise < least:
+                self._leave(move, NOT_NEEDED)
+        return [move for move in moves if move.promise >= least]
+
+    def told(self) -> list[Untried]:
+        """What was not tried since it was told last."""
+        found, self._untried = self._untried, []
+        return found
+
+    def _leave(self, move: Move, why: Statement) -> None:
+        self._untried.append(Untried(move, move.cause, why))
+
+
+def is_slow(move: Move, stands: Model) -> bool:
+    """Whether a move is a fit with wheels that slip."""
+    slips = any(robot.wheels.traction_mu is not None for robot, _ in stands.begins.values())
+    return slips or move.key == TRACTION
+
+
+def quick_first(moves: Sequence[Move], stands: Model) -> tuple[list[Move], list[Move]]:
+    """(those of other engines, those with wheels that slip), each best first."""
+    slow = [move for move in moves if is_slow(move, stands)]
+    return [move for move in moves if move not in slow], slow

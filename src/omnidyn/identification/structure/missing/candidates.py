@@ -18,7 +18,6 @@ from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import CHANGE
 from omnidyn.identification.output_error.linear.motion import Motion, in_the_room
 from omnidyn.identification.output_error.linear.workbench import Workbench, scaled
-from omnidyn.identification.output_error.prepare import LOOP
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT
 from omnidyn.model.actuation import DEAD_BAND, FADE, GAIN, Driver
 from omnidyn.model.dynamics import drive_wrench
@@ -114,7 +113,7 @@ def _number(robot: Robot, key: str, beside: str = "") -> Iterator[Candidate]:
 
 def of_the_log(bench: Workbench) -> Iterator[Candidate]:
     """What a log does to a right model: nuisances that are not fitted, and a change on the way."""
-    if bench.kind != LOOP:
+    if not bench.kind.looped:
         gain, fade, band = Driver(gain=1.0 + STEP), Driver(fade=STEP), Driver(dead_band=0.1)
         yield Candidate(GAIN, _driver(GAIN, gain, STEP), sized("gain", "", gain=lambda by, _: 1.0 + by))
         yield Candidate(FADE, _driver(FADE, fade, STEP), sized("fading_voltage", "", percent=lambda by, _: 100.0 * by))
@@ -187,13 +186,81 @@ def _friction(motion: Motion) -> FloatArray:
 
 def _inertia(motion: Motion) -> FloatArray:
     """Of a mass that is added to the body, and of its inertia."""
-    pace = np.zeros_like(motion.twist)
-    pace[:-1] = np.diff(motion.twist, axis=0) / np.diff(motion.t)[:, None]
-    flat, turn = pace * [1.0, 1.0, 0.0], pace * [0.0, 0.0, 1.0]
-    return -np.stack([flat, turn], axis=1)
+    return -np.stack([motion.pace * [1.0, 1.0, 0.0], motion.pace * [0.0, 0.0, 1.0]], axis=1)
 
 
 def _drive(motion: Motion) -> FloatArray:
     """Of voltages that are all larger by a share: what the motors push with, without the back-EMF."""
     at_rest = drive_wrench(motion.robot, np.zeros_like(motion.twist), motion.voltage)
     return at_rest[:, None, :]
+
+
+# What robots do that no law of a robot file holds yet: rivals of the candidates, so that none stands in for them
+#
+# Where one of these explains more than all that is offered, the answer says what it looks like, and offers no remedy.
+
+Force = Callable[[Motion, float], FloatArray]
+WAVES = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 9.0, 12.0, 24.0)  # a turn of a wheel
+
+
+def unoffered(bench: Workbench) -> Iterator[Candidate]:
+    """All of them."""
+    for key, force, sizes in (
+        ("friction one way", _one_way, (0.0,)),
+        ("drag", _drag, (0.0,)),
+        ("turns of the wheels", _waves, WAVES),
+        ("sag", _sag, (0.0,)),
+        ("heat", _heat, (0.0,)),
+    ):
+        yield Candidate(key, _tried(force, sizes), as_it_is("cause", key), offered=False)
+    yield Candidate("filter", _filtered, as_it_is("cause", "filter"), offered=False)
+
+
+def _tried(force: Force, sizes: tuple[float, ...]) -> Callable[[Workbench], list[Trial]]:
+    def trials(bench: Workbench) -> list[Trial]:
+        shown = bench.by_forces([lambda m, size=size: force(m, size) for size in sizes])
+        return [Trial(own, size) for own, size in zip(shown, sizes, strict=True)]
+
+    return trials
+
+
+def _along_axes(values: FloatArray) -> FloatArray:
+    """A force of its own on each axis, from sizes (n, 3)."""
+    return np.eye(N_AXES) * values[:, None, :]
+
+
+def _one_way(motion: Motion, _: float) -> FloatArray:
+    return _along_axes((motion.twist != 0.0).astype(float))
+
+
+def _drag(motion: Motion, _: float) -> FloatArray:
+    return _along_axes(-motion.twist * np.abs(motion.twist))
+
+
+def _waves(motion: Motion, count: float) -> FloatArray:
+    g, turned = motion.robot.wheels.wrench_matrix, motion.turned
+    moving = (motion.twist @ g != 0.0).astype(float)
+    waves = np.concatenate([np.cos(count * turned) * moving, np.sin(count * turned) * moving], axis=1)
+    return waves[:, :, None] * np.concatenate([g, g], axis=1).T
+
+
+def _sag(motion: Motion, _: float) -> FloatArray:
+    draw = np.abs(motion.current).sum(axis=1, keepdims=True)
+    return -((motion.voltage * draw) @ motion.robot.wheels.wrench_matrix.T)[:, None, :]
+
+
+def _heat(motion: Motion, _: float) -> FloatArray:
+    step = np.append(np.diff(motion.t), 0.0)[:, None]
+    heat = np.cumsum(motion.current**2 * step, axis=0)
+    return -((motion.current * heat) @ motion.robot.wheels.wrench_matrix.T)[:, None, :]
+
+
+def _filtered(bench: Workbench) -> list[Trial]:
+    """What a filter takes out beside the delay: the bend of every speed."""
+    shown = []
+    for motion in bench.motions:
+        level = motion.shown(motion.twist[:, None, :])
+        bend = np.gradient(np.gradient(level, motion.t, axis=1), motion.t, axis=1)
+        speed = np.array([name in ("twist", "wheel_speed") for name, _ in motion.piece.record.columns])
+        shown.append(np.where(speed[:, None, None], bend, 0.0))
+    return [Trial(shown)]

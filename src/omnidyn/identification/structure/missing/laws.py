@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ from numpy.typing import ArrayLike
 from omnidyn.arrays import FloatArray
 from omnidyn.identification.output_error.linear.motion import Motion
 from omnidyn.identification.output_error.linear.workbench import Workbench
-from omnidyn.identification.output_error.prepare import LOOP
 from omnidyn.identification.structure.missing.candidates import (
     CHANGE,
     STEP,
@@ -51,7 +51,7 @@ def candidates(bench: Workbench) -> Iterator[Candidate]:
     """All that may be asked of a fit: numbers, laws, and what the log does; what is free already is left out."""
     taken = set(bench.problem.names)
     taken |= {key.name for name in bench.problem.names if (key := find_key(name))}
-    of_laws = (*_of_the_body(bench), *_of_motors(bench), *_of_the_floor(bench), *_of_friction(bench))
+    of_laws = (*_of_the_body(bench), *_of_motors(bench), *_of_friction(bench))
     for one in (*numbers(bench), *of_laws, *of_the_log(bench)):
         key = find_key(one.key)
         if one.key == CHANGE or not (one.key in taken or (key and key.name in taken)):
@@ -70,8 +70,6 @@ def _of_the_body(bench: Workbench) -> Iterator[Candidate]:
 def _off_centre(motion: Motion) -> FloatArray:
     """What a centre of mass a metre ahead, and one a metre aside, does to the body as it moves. Shape (n, 2, 3)."""
     body, found = motion.robot.body, []
-    pace = np.zeros_like(motion.twist)
-    pace[:-1] = np.diff(motion.twist, axis=0) / np.diff(motion.t)[:, None]
     for way in np.eye(2) * NEARBY:
         up, down = (
             motion.robot.model_copy(
@@ -80,7 +78,7 @@ def _off_centre(motion: Motion) -> FloatArray:
             for side in (1.0, -1.0)
         )
         turned = frame_wrench(up, motion.twist) - frame_wrench(down, motion.twist)
-        found.append((turned - pace @ (mass_matrix(up) - mass_matrix(down))) / (2.0 * NEARBY))
+        found.append((turned - motion.pace @ (mass_matrix(up) - mass_matrix(down))) / (2.0 * NEARBY))
     return np.stack(found, axis=1)
 
 
@@ -101,6 +99,8 @@ def _of_motors(bench: Workbench) -> Iterator[Candidate]:
             "motor.gear_efficiency", lambda b: [Trial([own / LOSS for own in b.change(lossy)])],
             sized("gear_efficiency", "", efficiency=lambda by, _: 1.0 - by), 0.0,
         )  # fmt: skip
+    if bench.robot.wheels.traction_mu is None and not bench.kind.looped:
+        yield Candidate(TRACTION, _grips, sized("slipping_wheels", "", share=lambda _, at: at), late=True)
 
 
 def _switched_on(robot: Robot, key: str, field: str, size: float) -> Candidate:
@@ -120,11 +120,6 @@ def _limits(bench: Workbench) -> list[Trial]:
     most = np.concatenate([np.abs(m.current).max(axis=1) for m in bench.motions])
     levels = np.unique(np.quantile(most[most > 0.0], LIMITS)).tolist()
     return [Trial(bench.change(_with(bench.robot, current_limit=level)), level) for level in levels]
-
-
-def _of_the_floor(bench: Workbench) -> Iterator[Candidate]:
-    if bench.robot.wheels.traction_mu is None and bench.kind != LOOP:
-        yield Candidate(TRACTION, _grips, sized("slipping_wheels", "", share=lambda _, at: at), late=True)
 
 
 def _grips(bench: Workbench) -> list[Trial]:
@@ -157,20 +152,20 @@ def _of_friction(bench: Workbench) -> Iterator[Candidate]:
     axes, direction = friction.axes, friction.direction
     boxed, round_ = any(axes.coulomb), any(direction.coulomb)
     for table in may_break_away(friction):
-        yield Candidate(f"{table}.{BREAKAWAY}", _breaking(table), as_it_is("breakaway"))
+        yield Candidate(f"{table}.{BREAKAWAY}", partial(_breaking, table), as_it_is("breakaway"))
     if boxed and not round_:
-        yield Candidate(DIRECTION, _in_place(along_travel), as_it_is("friction_of_travel"))
+        yield Candidate(DIRECTION, partial(_in_place, along_travel), as_it_is("friction_of_travel"))
     if round_ and not boxed:
-        yield Candidate(BODY_AXES, _in_place(along_axes), as_it_is("friction_of_axes"))
+        yield Candidate(BODY_AXES, partial(_in_place, along_axes), as_it_is("friction_of_axes"))
     if friction.wheels == WheelFriction():
-        yield Candidate(WHEELS, _at_wheels, as_it_is("friction_at_wheels"))
+        yield Candidate(WHEELS, lambda b: [Trial(b.by_force(_at_rims))], as_it_is("friction_at_wheels"))
     for key in other_laws(friction):
         table, _, name = key.rpartition(".")
         if name == FALL:
-            yield Candidate(key, _falling(FORCES[table]), as_it_is("stribeck"), 0.0)
+            yield Candidate(key, partial(_falling, FORCES[table]), as_it_is("stribeck"), 0.0)
         else:
             law, code = BRISTLES[name]
-            yield Candidate(key, _bending(law, table), as_it_is(code))
+            yield Candidate(key, partial(_bending, law, table), as_it_is(code))
 
 
 def other_laws(friction: Friction) -> list[str]:
@@ -211,17 +206,13 @@ def _with_table(friction: Friction, table: str, law: Any) -> Friction:
     return friction.model_copy(update={table.rpartition(".")[2]: law})
 
 
-def _falling(force: Callable[[Motion, float], FloatArray]) -> Callable[[Workbench], list[Trial]]:
+def _falling(force: Callable[[Motion, float], FloatArray], bench: Workbench) -> list[Trial]:
     """A level that is larger at rest by a share of Coulomb friction, a number for each part of `force`: to first order,
     where the robot moves. Tried with several speeds over which it falls [m/s at the rims]."""
-
-    def trials(bench: Workbench) -> list[Trial]:
-        top = max(float(np.abs(m.twist @ bench.robot.wheels.wrench_matrix).max()) for m in bench.motions)
-        speeds = [share * top for share in SPEEDS if top > 0.0]
-        shown = bench.by_forces([lambda m, v=v: force(m, v) for v in speeds])
-        return [Trial(own, v) for own, v in zip(shown, speeds, strict=True)]
-
-    return trials
+    top = max(float(np.abs(m.twist @ bench.robot.wheels.wrench_matrix).max()) for m in bench.motions)
+    speeds = [share * top for share in SPEEDS if top > 0.0]
+    shown = bench.by_forces([lambda m, v=v: force(m, v) for v in speeds])
+    return [Trial(own, v) for own, v in zip(shown, speeds, strict=True)]
 
 
 def falling(robot: Robot, table: str, above: FloatArray, over: float) -> Friction:
@@ -245,8 +236,7 @@ def held_above(robot: Robot, table: str, above: FloatArray) -> dict[str, Any]:
     if table == DIRECTION:
         yaw = {f"yaw_{BREAKAWAY}": float(above[1] * own.yaw_coulomb)} if own.yaw_coulomb > 0.0 else {}
         return {BREAKAWAY: tuple((above[0] * np.array(own.coulomb)).tolist())} | yaw
-    levels = above[0] * np.array(own.coulomb)
-    return {BREAKAWAY: tuple(levels.tolist()) if levels.ndim else float(levels)}
+    return {BREAKAWAY: _plain(above[0] * np.array(own.coulomb))}
 
 
 def arm(robot: Robot) -> float:
@@ -279,14 +269,10 @@ def _of_rims(motion: Motion, over: float) -> FloatArray:
 FORCES = {BODY_AXES: _of_axes, DIRECTION: _of_travel, WHEELS: _of_rims}  # of a fall, of each table
 
 
-def _bending(law: Callable[[Robot, str, float], Friction], table: str) -> Callable[[Workbench], list[Trial]]:
+def _bending(law: Callable[[Robot, str, float], Friction], table: str, bench: Workbench) -> list[Trial]:
     """Bristles in the place of friction that holds exactly, at several lengths by which they bend."""
-
-    def trials(bench: Workbench) -> list[Trial]:
-        robot = lowered(bench.robot, table)
-        return [Trial(bench.change(robot.model_copy(update={"friction": law(robot, table, z)})), z) for z in BENDS]
-
-    return trials
+    robot = lowered(bench.robot, table)
+    return [Trial(bench.change(robot.model_copy(update={"friction": law(robot, table, z)})), z) for z in BENDS]
 
 
 def lowered(robot: Robot, table: str) -> Robot:
@@ -329,10 +315,7 @@ def bristled(robot: Robot, table: str, bend: float) -> Friction:
     return bent(robot, table, bend, LUGRE)
 
 
-BRISTLES = {
-    BEND: (bent, "dahl"),
-    DAMPING: (bristled, "lugre"),
-}
+BRISTLES = {BEND: (bent, "dahl"), DAMPING: (bristled, "lugre")}
 
 
 def along_travel(friction: Friction) -> Friction:
@@ -353,44 +336,33 @@ def along_axes(friction: Friction) -> Friction:
     return Friction(axes=own, wheels=friction.wheels)
 
 
-def _in_place(other: Callable[[Friction], Friction]) -> Callable[[Workbench], list[Trial]]:
+def _in_place(other: Callable[[Friction], Friction], bench: Workbench) -> list[Trial]:
     """The same robot with friction of another shape; a change by 1 is the whole of it."""
-    return lambda b: [Trial(b.change(b.robot.model_copy(update={"friction": other(b.robot.friction)})))]
+    return [Trial(bench.change(bench.robot.model_copy(update={"friction": other(bench.robot.friction)})))]
 
 
 def breaking(robot: Robot, table: str, above: FloatArray) -> Friction:
     """The friction with levels of breakaway that are `above` times Coulomb friction, see `falling`."""
     law = table_of(robot.friction, table).model_copy(update=held_above(robot, table, above))
-    return robot.friction.model_copy(update={table.rpartition(".")[2]: law})
+    return _with_table(robot.friction, table, law)
 
 
-def _breaking(table: str) -> Callable[[Workbench], list[Trial]]:
+def _breaking(table: str, bench: Workbench) -> list[Trial]:
     """Breakaway above Coulomb friction by several shares, a number for each part of the table."""
-
-    def trials(bench: Workbench) -> list[Trial]:
-        """One for each share."""
-        found, robot = [], bench.robot
-        for share in ABOVE:
-            every = 1.0 + share * np.eye(_parts(robot, table))
-            columns = [
-                bench.change(robot.model_copy(update={"friction": breaking(robot, table, above)})) for above in every
-            ]
-            found.append(Trial([np.concatenate(each, axis=2) for each in zip(*columns, strict=True)], share))
-        return found
-
+    trials, robot = [], bench.robot
+    # Levels that hold for themselves: each axis; travel, and turning where friction resists it; all wheels.
+    parts = {BODY_AXES: N_AXES, DIRECTION: 1 + (robot.friction.direction.yaw_coulomb > 0.0), WHEELS: 1}[table]
+    for share in ABOVE:
+        columns = [
+            bench.change(robot.model_copy(update={"friction": breaking(robot, table, above)}))
+            for above in 1.0 + share * np.eye(parts)
+        ]
+        trials.append(Trial([np.concatenate(pieces, axis=2) for pieces in zip(*columns, strict=True)], share))
     return trials
 
 
-def _parts(robot: Robot, table: str) -> int:
-    """How many levels hold for themselves: each axis; travel, and turning where friction resists it; all wheels."""
-    return {BODY_AXES: N_AXES, DIRECTION: 1 + (robot.friction.direction.yaw_coulomb > 0.0), WHEELS: 1}[table]
-
-
-def _at_wheels(bench: Workbench) -> list[Trial]:
-    g = bench.robot.wheels.wrench_matrix
-
-    def force(motion: Motion) -> FloatArray:
-        rim = motion.twist @ g
-        return -np.stack([np.sign(rim) @ g.T, rim @ g.T], axis=1)
-
-    return [Trial(bench.by_force(force))]
+def _at_rims(motion: Motion) -> FloatArray:
+    """Coulomb and viscous friction of 1 at every rim. Shape (n, 2, 3)."""
+    g = motion.robot.wheels.wrench_matrix
+    rim = motion.twist @ g
+    return -np.stack([np.sign(rim) @ g.T, rim @ g.T], axis=1)

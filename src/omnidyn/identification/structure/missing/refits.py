@@ -17,15 +17,13 @@ from omnidyn.errors import OmnidynError
 from omnidyn.findings.needs import is_exact
 from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.methods import OutputError
+from omnidyn.identification.output_error.engines.engine import Engine
+from omnidyn.identification.output_error.engines.exact import ExactEngine
+from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.linear.workbench import on_time
-from omnidyn.identification.output_error.memory.whitened import OfRows
 from omnidyn.identification.output_error.prepare import (
-    EXACT,
-    IMPLICIT,
-    LOOP,
-    engine_kind,
+    Kind,
     expand_keys,
-    make_engine,
     make_problem,
     stays_exact,
 )
@@ -66,7 +64,7 @@ def refits(
     if problem.robot.wheels.traction_mu is not None:
         return {}
     point, begun = solution.state.point, []
-    coarse = LOOP if engine_kind(solution.solver.engine) == LOOP else IMPLICIT
+    coarse = type(solution.solver.engine) if solution.solver.engine.looped else ImplicitEngine
     try:
         off = _by_coarse_steps(problem, parts, point, coarse)
     except OmnidynError:  # a nuisance that the implicit engine does not know
@@ -100,15 +98,15 @@ def _question(problem: Problem) -> OutputError:
     return OutputError(free=problem.names[: problem.robot_count], nuisances=problem.names[problem.robot_count :])
 
 
-class _Coarse(OfRows):
+class _Coarse(Engine[Problem]):
     """An engine by a step a row, or a tick, three times as fast, and what that was off by in the fit before."""
 
-    def __init__(self, problem: Problem, kind: str, off: Sequence[FloatArray]):
+    def __init__(self, problem: Problem, kind: Kind, off: Sequence[FloatArray]):
         self.problem, self._kind, self._off = problem, kind, off
-        self._engine = make_engine(kind, problem, None)
+        self._engine = kind.of(problem)
 
     def residuals(self, point: Point) -> list[Parts]:
-        """Residuals and slopes of every piece, see engines/sums.py."""
+        """Residuals and slopes of every piece, see engines/engine.py."""
         both = zip(self._engine.residuals(point), self._off, strict=True)
         return [(residual + off, slopes, at) for (residual, slopes, at), off in both]
 
@@ -117,27 +115,27 @@ class _Coarse(OfRows):
         return _Coarse(problem, self._kind, [np.zeros(1)] * len(problem.pieces))
 
 
-def _by_coarse_steps(problem: Problem, parts: Sequence[Parts], point: Point, kind: str) -> list[FloatArray]:
+def _by_coarse_steps(problem: Problem, parts: Sequence[Parts], point: Point, kind: Kind) -> list[FloatArray]:
     """What a step a row, or a tick, of an engine is off by in the rows of a fit. Of each piece (C, rows)."""
     known = problem.robot_count  # a robot as it stands needs no slopes: what was driven to 0 has none
     bare = replace(problem, robot=problem.robot_at(point.values), parameters=problem.parameters[known:], robot_count=0)
-    coarse = make_engine(kind, bare, None).residuals(Point(point.values[known:], point.states))
+    coarse = kind.of(bare).residuals(Point(point.values[known:], point.states))
     return [np.nan_to_num(fine[0] - rough[0]) for fine, rough in zip(parts, coarse, strict=True)]
 
 
 def _begun(
-    candidate: Candidate, way: Switch, problem: Problem, solution: Solution, off: Sequence[FloatArray], coarse: str
+    candidate: Candidate, way: Switch, problem: Problem, solution: Solution, off: Sequence[FloatArray], coarse: Kind
 ) -> _Refit:  # fmt: skip
     """Where a fit with a candidate begins. coarse: the engine of `off`. Raises OmnidynError where none can."""
     records = list({id(piece.record): piece.record for piece in problem.pieces}.values())
     keys = expand_keys(way.question.free or (), way.robot)
-    kind = EXACT if coarse != LOOP and is_exact(way.robot) and stays_exact(way.robot, keys) else coarse
+    kind = ExactEngine if not coarse.looped and is_exact(way.robot) and stays_exact(way.robot, keys) else coarse
     made = make_problem(records, way.robot, replace(way.question, free=keys), kind)
     made = replace(made, pieces=problem.pieces)
     before, values = _values(problem, solution), np.array([p.value for p in made.parameters])
     for k, name in enumerate(made.names[made.robot_count :], made.robot_count):
         values[k] = before.get(name, values[k])  # numbers of the robot stand in it where they were found
-    engine = make_engine(kind, made) if kind == EXACT else _Coarse(made, kind, off)
+    engine = kind.of(made) if kind.exact else _Coarse(made, kind, off)
     solver = Solver(made, engine, solution.solver.nu, CLOSE, counted=False)
     begins = [values]
     if made.robot.wheels.traction_mu is not None:  # whose leaps lead the latency of wheels that roll astray
@@ -149,7 +147,7 @@ def _begun(
 def _trial(refit: _Refit, problem: Problem, parts: Sequence[Parts], solution: Solution) -> Trial:
     """What a fit shows less of the log than the fit before."""
     made, point = refit.solver.problem, refit.state.point
-    after = refit.solver.engine.residuals(point)  # pyright: ignore[reportAttributeAccessIssue]  # see RowEngine
+    after = refit.solver.engine.residuals(point)
     shown = [np.nan_to_num(a[0] - b[0])[:, :, None] for a, b in zip(parts, after, strict=True)]
     before, value = _values(problem, solution), dict(zip(made.names, point.values.tolist(), strict=True))
     changes = {name: (before[name], value[name]) for name in problem.names[: problem.robot_count] if name in value}

@@ -7,8 +7,8 @@ log where each leaves as much as the other and both together hardly less.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,9 @@ from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.output_error.linear.blocks import Blocks
 from omnidyn.identification.output_error.linear.rows import Linear, Rows
 from omnidyn.identification.structure.missing.candidates import Candidate, Trial
+from omnidyn.model.actuation import GAIN
 from omnidyn.model.keys import BODY_AXES, DIRECTION
+from omnidyn.statement import NOTE, Statement
 
 CLEAR = 2.0  # standard errors by which a remedy may seem worse on blocks it was not fitted to
 NOTHING = 1e-4  # of where a number began, below which there is none of it
@@ -123,3 +125,33 @@ def _same(blocks: Blocks, known: IntArray, base: float, noise: float, one: Tried
     both = (base - blocks.left(np.concatenate([known, one.at, other.at]))) / noise
     least = max(TOLD_APART, ROUGHLY * max(one.chi2, other.chi2))  # to first order, for either is a larger change
     return abs(one.chi2 - other.chi2) < least and both - max(one.chi2, other.chi2) < least
+
+
+# What a log of nothing but a twist hides, if the robot computed that from its wheels, with a radius that is wrong
+#
+# Wheels s times as large as said show v/s: exactly what motors of s^2 the resistance, or of 1/s^2 the voltage, and
+# Coulomb friction over s do (M v' = G K (u - E G'v/(s r))/(R s r) - F sgn v); wheels s times as far out as said turn
+# like
+# a body of I/s^2. No fit to such a log can tell.
+
+HIDDEN = {
+    "motor.resistance_ohm": "wheels.wheel_radius_m", GAIN: "wheels.wheel_radius_m",
+    "body.inertia_kg_m2": "wheels.robot_radius_m",
+}  # fmt: skip
+
+
+def hidden_by(key: str, columns: Iterable[tuple[str, int]]) -> list[str]:
+    """The radius that looks like a change of a number, to logs of these columns: none, or one."""
+    return [HIDDEN[key]] if key in HIDDEN and {name for name, _ in columns} == {"twist"} else []
+
+
+def with_odometry(remedies: Sequence[Remedy], columns: Sequence[tuple[str, int]]) -> tuple[Remedy, ...]:
+    """The same; those that may be a radius name it, and the radius them."""
+    behind = {each.key: hidden_by(each.key, columns) for each in remedies}
+    found = []
+    for each in remedies:
+        looks = [key for key, radii in behind.items() if each.key in radii]
+        cause = Statement("if_odometry", NOTE, numbers={"cause": each.cause}) if looks else each.cause
+        same = tuple(dict.fromkeys((*each.same_as, *behind[each.key], *looks)))
+        found.append(replace(each, same_as=same, cause=cause))
+    return tuple(found)

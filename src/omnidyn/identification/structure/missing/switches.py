@@ -16,8 +16,8 @@ from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import LOSS, Remedy
 from omnidyn.identification.ladder import STANDS
 from omnidyn.identification.methods import STUDENT, OutputError
-from omnidyn.identification.output_error.prepare import LOOP, engine_kind, expand_keys, guesses
-from omnidyn.identification.output_error.problem.bending import with_damping
+from omnidyn.identification.output_error.prepare import expand_keys, guesses
+from omnidyn.identification.output_error.problem.friction_laws import with_damping
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
 from omnidyn.identification.output_error.problem.parameters import EFFICIENCY, WITHIN
 from omnidyn.identification.output_error.solve.solver import Solution
@@ -118,7 +118,9 @@ def _ways(remedy: Remedy, robot: Robot, asked: OutputError) -> Iterator[Switch]:
         body = robot.body.replace(rotating_frame=not robot.body.rotating_frame)
         yield Switch(robot.replace(body=body), asked, cause)
     elif key == CENTRE:
-        yield Switch(_balanced(robot, remedy.size), _free(asked, key), cause)
+        most = 0.7 * WITHIN * float(np.min(robot.wheels.robot_radius))  # well within the wheels
+        centre = np.clip(np.add(robot.body.centre, remedy.size), -most, most)
+        yield Switch(robot.replace(body=robot.body.replace(centre=centre)), _free(asked, key), cause)
     elif key in BREAKS:
         yield _breaking_away(remedy, robot, asked)
     elif key == DIRECTION:
@@ -172,7 +174,7 @@ def _free(asked: OutputError, *keys: str) -> OutputError:
 
 def _as_far_as_profiled(way: Switch, found: Solution) -> Switch:
     """The same; where no engine looks for levels of breakaway, of a speed loop or wheels that slip, they stay."""
-    if way.robot.wheels.traction_mu is None and engine_kind(found.solver.engine) != LOOP:
+    if way.robot.wheels.traction_mu is None and not found.solver.engine.looped:
         return way
     return with_levels_as_they_are(way)
 
@@ -182,12 +184,6 @@ def with_levels_as_they_are(way: Switch) -> Switch:
     keys = expand_keys(way.question.free or (), way.robot)
     kept = tuple(key for key in keys if not is_profiled(key, way.robot))
     return way if kept == keys else replace(way, question=replace(way.question, free=kept))
-
-
-def _balanced(robot: Robot, by: Sequence[float]) -> Robot:
-    """The robot with its centre of mass moved by so much [m], well within its wheels."""
-    most = 0.7 * WITHIN * float(np.min(robot.wheels.robot_radius))
-    return robot.replace(body=robot.body.replace(centre=np.clip(np.add(robot.body.centre, by), -most, most)))
 
 
 def _of_another_shape(asked: OutputError) -> OutputError:

@@ -13,14 +13,14 @@ from omnidyn.errors import InputError, MissingExtraError
 from omnidyn.files import default_max_bytes, growth, open_regular, pieces, too_large
 from omnidyn.logs.readers.matlab.mat5 import MAX_EXPANSION, MIN_EXPANDED_BYTES, damaged, read_mat5
 from omnidyn.logs.readers.matlab.variables import Variables, tables_of
-from omnidyn.logs.readers.reader import Options, Reader
+from omnidyn.logs.readers.reader import Reader, ReadOptions
 from omnidyn.logs.table.table import Table
 from omnidyn.logs.table.text_file import TOO_LARGE_REMEDY
 
 MAT5 = b"MATLAB 5.0 MAT-file"
 
 
-def read_variables(path: str | os.PathLike, options: Options) -> Variables:
+def read_variables(path: str | os.PathLike, options: ReadOptions) -> Variables:
     """What a file holds. Raises InputError where it cannot be read, MissingExtraError without h5py."""
     limit = options.max_bytes if options.max_bytes is not None else default_max_bytes()
     digest, variables = hashlib.sha256(), Variables(str(path))
@@ -38,7 +38,7 @@ def read_variables(path: str | os.PathLike, options: Options) -> Variables:
     return variables.chosen(options.variables)
 
 
-def _tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
+def _tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
     yield from tables_of(read_variables(path, options), rows)
 
 
@@ -68,7 +68,7 @@ def read_hdf5(path: str | os.PathLike, size: int, variables: Variables, max_byte
     h5py = import_h5py(str(path))
     try:
         with h5py.File(path, "r", locking=False) as file:
-            walk = _Walk(h5py, variables, size, max_bytes)
+            walk = _Hdf5Walk(h5py, variables, size, max_bytes)
             walk.group(file, "", 0)
     except InputError:
         raise
@@ -76,7 +76,7 @@ def read_hdf5(path: str | os.PathLike, size: int, variables: Variables, max_byte
         raise damaged(variables.source, " ".join(str(error).split()) or type(error).__name__) from None
 
 
-class _Walk:
+class _Hdf5Walk:
     def __init__(self, h5py: Any, variables: Variables, size: int, max_bytes: int):
         self.h5py, self.variables, self.size, self.max_bytes = h5py, variables, size, max_bytes
         self.items = self.expanded = 0

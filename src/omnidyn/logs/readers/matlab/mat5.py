@@ -132,7 +132,7 @@ class _Matrix:
         if kind > LAST_NUMERIC:
             self.variables.passed[name or "a variable"] = "an object"
             return None
-        shape = tuple(int(each) for each in self._numbers())
+        shape = tuple(int(number) for number in self._numbers())
         own = bytes(self._next().data).rstrip(b"\0").decode("latin-1")
         name = name or own or "a variable"
         if not shape or min(shape) < 0:

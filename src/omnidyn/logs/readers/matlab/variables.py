@@ -52,10 +52,10 @@ class Variables:
         """Those of the names, and what is in them; all for no names. Raises InputError for a name that is none."""
         if not names:
             return self
-        heads = [tuple(_below(each)) for each in self.arrays]
+        heads = [tuple(_below(array)) for array in self.arrays]
         for name in names:
-            if not any(name in each for each in heads):
-                known = list(dict.fromkeys(part for each in heads for part in each))
+            if not any(name in head for head in heads):
+                known = list(dict.fromkeys(part for head in heads for part in head))
                 close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
                 raise InputError(
                     "no such variable", got=name, expected=shortened(", ".join(known), 300) or "a file with variables",
@@ -69,8 +69,8 @@ class Variables:
     @property
     def columns(self) -> dict[str, FloatArray]:
         """Vectors, and the columns of matrices, whose rows are as many as the times of their file or struct."""
-        times = [each for name, each in self.arrays.items() if _is_time(name)]
-        lengths = {each.size for each in times if each.ndim == 1 or 1 in each.shape}
+        times = [array for name, array in self.arrays.items() if _is_time(name)]
+        lengths = {time_values.size for time_values in times if time_values.ndim == 1 or 1 in time_values.shape}
         found: dict[str, FloatArray] = {}
         for name, values in self.arrays.items():
             if values.ndim == 1 or 1 in values.shape:
@@ -170,7 +170,7 @@ def recording_of(variables: Variables) -> Recording:
 def _clock(name: str, length: int, times: Mapping[str, FloatArray]) -> str | None:
     """The time of a column: in its own struct, else the only one of its length."""
     fits = [each for each, values in times.items() if len(values) == length]
-    own = [each for each in fits if each.rpartition("/")[0] == name.rpartition("/")[0]]
+    own = [fit for fit in fits if fit.rpartition("/")[0] == name.rpartition("/")[0]]
     chosen = own or fits
     return chosen[0] if len(chosen) == 1 else None
 

@@ -12,8 +12,7 @@ from typing import Any, BinaryIO
 
 from omnidyn.errors import InputError
 from omnidyn.files import default_max_bytes, growth, open_regular, pieces
-from omnidyn.logs.readers.folders import files_of
-from omnidyn.logs.readers.reader import Options, Reader
+from omnidyn.logs.readers.reader import Reader, ReadOptions, files_of
 from omnidyn.logs.readers.recording import Recording
 from omnidyn.logs.readers.ros.bag1_file import Bag1File
 from omnidyn.logs.readers.ros.db3_file import Db3File
@@ -26,12 +25,12 @@ from omnidyn.progress import Report
 SQLITE, ROSBAG, ZSTD = b"SQLite format 3\x00", b"#ROSBAG V", b"\x28\xb5\x2f\xfd"
 
 
-def read_bag(path: str | os.PathLike, options: Options) -> Recording:
+def read_bag(path: str | os.PathLike, options: ReadOptions) -> Recording:
     """A bag: a file, or the folder of one. Raises InputError where no message can be read, or it grows too much."""
     return read_files(files_of(path), str(path), options)
 
 
-def read_files(paths: Sequence[Path], source: str, options: Options) -> Recording:
+def read_files(paths: Sequence[Path], source: str, options: ReadOptions) -> Recording:
     """Files of one recording, in their order."""
     limit = options.max_bytes if options.max_bytes is not None else default_max_bytes()
     bag, digest, damage, grown = Bag(source, limit), hashlib.sha256(), [], []
@@ -84,10 +83,10 @@ def _opened(stream: BinaryIO, path: Path, limit: int, told: Callable[[int], None
         yield (Bag1File if start.startswith(ROSBAG) else McapFile)(stream, size, unpacker, told)
 
 
-def tables_of(read: Callable[[str | os.PathLike, Options], Recording]) -> Callable[..., Iterator[Table]]:
+def tables_of(read: Callable[[str | os.PathLike, ReadOptions], Recording]) -> Callable[..., Iterator[Table]]:
     """The `tables` of a Reader from what reads a Recording."""
 
-    def tables(path: str | os.PathLike, rows: int, options: Options) -> Iterator[Table]:
+    def tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator[Table]:
         yield from read(path, options).tables(rows)
 
     return tables

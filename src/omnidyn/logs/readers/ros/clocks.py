@@ -17,7 +17,7 @@ from omnidyn.errors import shortened
 
 SECOND = 10**9
 SET_BACK, SET_FORWARD = SECOND // 20, 86_400 * SECOND  # a step of the recorder's clock beyond is no recording
-MANY = 20  # times: so often no clock is set back
+MOST_RESETS = 20  # times: so often no clock is set back
 SEAM = SECOND  # what is put where the true time is not known: enough for a gap
 OTHER_CLOCK = SECOND  # two times of one message differ by less, where they are of one clock
 JUMP = SECOND // 2  # of a header against the time of reception
@@ -50,36 +50,36 @@ def trusted(topics: Sequence[Clocked]) -> tuple[dict[str, IntArray], list[str]]:
     notes: list[str] = []
     if not topics:
         return {}, notes
-    topics = [_smoothed(each, notes) for each in _sewn(topics, notes)]
-    stamped = [each for each in topics if each.stamped.any()]
-    bare = [each.topic for each in topics if not each.stamped.any() and OWN not in each.topic]
+    topics = [_smoothed(topic, notes) for topic in _sewn(topics, notes)]
+    stamped = [topic for topic in topics if topic.stamped.any()]
+    bare = [topic.topic for topic in topics if not topic.stamped.any() and OWN not in topic.topic]
     if bare and stamped:
         told = shortened(", ".join(bare), 200)
         notes.append(f"{told}: no stamps, so the times of reception are taken, which lag behind by the way to it")
     if not stamped and bare:
         notes.append("no message has a stamp of its own: the times of reception are taken")
     if not stamped:
-        return {each.topic: _from_1970(each.receive, notes) for each in topics}, list(dict.fromkeys(notes))
+        return {topic.topic: _from_1970(topic.receive, notes) for topic in topics}, list(dict.fromkeys(notes))
     reference = _reference(stamped)
     found = {}
-    for each in topics:
-        if not each.stamped.any():
-            found[each.topic] = _as_reference(each.receive, reference)
+    for topic in topics:
+        if not topic.stamped.any():
+            found[topic.topic] = _as_reference(topic.receive, reference)
             continue
-        apart = each.offset - reference.offset
+        apart = topic.offset - reference.offset
         shift = 0
         if abs(apart) > OTHER_CLOCK:
-            behind = (each.header - each.receive)[each.stamped]
+            behind = (topic.header - topic.receive)[topic.stamped]
             shift = int(behind.max()) - (reference.offset if abs(reference.offset) > OTHER_CLOCK else 0)
             notes.append(
-                f"{each.topic} is stamped by another clock, {apart / 1e9:.6g} s from that of {reference.topic}: moved "
+                f"{topic.topic} is stamped by another clock, {apart / 1e9:.6g} s from that of {reference.topic}: moved "
                 "by as much as its fastest message shows; what all of them take is not known"
             )
-        late = each.receive + (each.offset if each.stamped.any() else 0)
-        found[each.topic] = np.where(each.stamped, each.header, late) - shift
-        bare = ~each.stamped & (each.receive != 0)
+        late = topic.receive + (topic.offset if topic.stamped.any() else 0)
+        found[topic.topic] = np.where(topic.stamped, topic.header, late) - shift
+        bare = ~topic.stamped & (topic.receive != 0)
         if bare.any():
-            notes.append(f"{each.topic}: {int(bare.sum())} messages have no stamp: when received is taken")
+            notes.append(f"{topic.topic}: {int(bare.sum())} messages have no stamp: when received is taken")
     if abs(reference.offset) > OTHER_CLOCK:
         notes.append(
             f"stamps lie {reference.offset / 1e9:.6g} s from the times of reception: another clock, or a recording "
@@ -91,7 +91,7 @@ def trusted(topics: Sequence[Clocked]) -> tuple[dict[str, IntArray], list[str]]:
 
 def _reference(stamped: Sequence[Clocked]) -> Clocked:
     """The topic whose clock counts: one that agrees with the recorder's, else the busiest."""
-    near = [each for each in stamped if abs(each.offset) <= OTHER_CLOCK]
+    near = [topic for topic in stamped if abs(topic.offset) <= OTHER_CLOCK]
     return max(near or stamped, key=lambda each: len(each.receive))
 
 
@@ -108,13 +108,13 @@ def _as_reference(receive: IntArray, reference: Clocked) -> IntArray:
 
 def _sewn(topics: Sequence[Clocked], notes: list[str]) -> list[Clocked]:
     """The topics with a second in place of each step by which the recorder's clock was set."""
-    if not any(_has_step(each.receive) for each in topics):
+    if not any(_has_step(topic.receive) for topic in topics):
         return list(topics)
     if _are_shuffled(topics):
         notes.append("the messages stand out of the order of time in the file: they were sorted")
         return list(topics)
-    order = np.concatenate([each.order for each in topics])
-    receive = np.concatenate([each.receive for each in topics])[np.argsort(order)]
+    order = np.concatenate([topic.order for topic in topics])
+    receive = np.concatenate([topic.receive for topic in topics])[np.argsort(order)]
     order = np.sort(order)
     steps = np.diff(receive)
     cuts = [k for k in np.flatnonzero((steps < -SET_BACK) | (steps > SET_FORWARD)).tolist() if _is_set(receive, k)]
@@ -125,7 +125,7 @@ def _sewn(topics: Sequence[Clocked], notes: list[str]) -> list[Clocked]:
             f"the clock of the recorder was set {way} by {abs(step) / 1e9:.6g} s: what follows is taken to begin "
             f"{SEAM / 1e9:g} s later, behind a gap"
         )
-        topics = [_moved(each, int(order[k]), int(receive[k]), step) for each in topics]
+        topics = [_moved(topic, int(order[k]), int(receive[k]), step) for topic in topics]
     return list(topics)
 
 
@@ -138,9 +138,9 @@ def _are_shuffled(topics: Sequence[Clocked]) -> bool:
     """Whether times go back because messages were written out of order, not because a clock was set: what stands
     between jumps of the busiest topic does not overlap, or they are too many."""
     busiest = max(topics, key=lambda each: len(each.receive)).receive
-    if any((np.diff(each.receive) > SET_FORWARD).any() for each in topics):
+    if any((np.diff(topic.receive) > SET_FORWARD).any() for topic in topics):
         return False
-    return int((np.diff(busiest) < -SET_BACK).sum()) > MANY or not _overlap(busiest)
+    return int((np.diff(busiest) < -SET_BACK).sum()) > MOST_RESETS or not _overlap(busiest)
 
 
 def _overlap(receive: IntArray) -> bool:
@@ -148,7 +148,7 @@ def _overlap(receive: IntArray) -> bool:
     steps = np.abs(np.diff(receive))
     jump = max(SET_BACK, 5.0 * float(np.median(steps)) if len(steps) else 0.0)
     stretches = np.split(receive, np.flatnonzero(steps > jump) + 1)
-    spans = sorted((int(each.min()), int(each.max())) for each in stretches if len(each))
+    spans = sorted((int(stretch.min()), int(stretch.max())) for stretch in stretches if len(stretch))
     return any(before[1] > after[0] + SET_BACK for before, after in itertools.pairwise(spans))
 
 

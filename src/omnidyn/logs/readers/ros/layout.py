@@ -32,7 +32,7 @@ class BadMessageError(ValueError):
 
 
 @dataclass
-class Layout:
+class MessageLayout:
     """Of all messages of `size` bytes that agree in the `fixed` stretches, which hold their lengths and words.
 
     numbers: path ("pose.position.x", "velocity[2]") -> Leaf. words: path -> text.
@@ -55,9 +55,9 @@ class Layout:
         return True
 
 
-def layout_of(types: Types, name: str, data: bytes, ros1: bool = False) -> Layout:
+def layout_of(types: Types, name: str, data: bytes, ros1: bool = False) -> MessageLayout:
     """The layout of one message. Raises BadMessageError."""
-    walk = _Walk(types, bytes(data), ros1)
+    walk = _FieldWalk(types, bytes(data), ros1)
     walk.message(name, "", 0)
     if len(data) - walk.at >= 8 and not ros1:  # a writer may pad; more is another type
         raise BadMessageError(f"{len(data) - walk.at} bytes too many")
@@ -73,12 +73,12 @@ def column(block: np.ndarray, leaf: Leaf) -> np.ndarray:
     return np.ascontiguousarray(block[:, leaf.offset : leaf.offset + size]).view(leaf.code)[:, 0]
 
 
-class _Walk:
+class _FieldWalk:
     def __init__(self, types: Types, data: bytes, ros1: bool):
         self.types, self.data, self.ros1 = types, data, ros1
         self.base = self.at = 0 if ros1 else CDR_HEAD
         self.order = "<"
-        self.layout = Layout(len(data), sample=data)
+        self.layout = MessageLayout(len(data), sample=data)
         if not ros1:
             if len(data) < CDR_HEAD or data[0] != 0 or data[1] > 1:
                 raise BadMessageError("no plain CDR")

@@ -11,14 +11,14 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, printable
 from omnidyn.files import too_large
-from omnidyn.logs.readers.claims import Claim, Out, tracks_of
+from omnidyn.logs.readers.claims import TopicClaim, TopicColumn, tracks_of
 from omnidyn.logs.readers.recording import Topic, Track, topic_of
 from omnidyn.logs.readers.ros.clocks import Clocked, trusted
 from omnidyn.logs.readers.ros.layout import (
     USUAL,
     BadDefinitionError,
     BadMessageError,
-    Layout,
+    MessageLayout,
     Types,
     column,
     layout_of,
@@ -64,8 +64,8 @@ class TopicReader:
         self.bad, self.last_fault = 0, ""
         self.rule: Rule | None = rule_of(connection.type)
         self.types: Types = {}
-        self.layouts: list[tuple[Layout, dict[str, str]]] = []
-        self.waiting: dict[int, tuple[Layout, dict[str, str], list[int], list[bytes]]] = {}
+        self.layouts: list[tuple[MessageLayout, dict[str, str]]] = []
+        self.waiting: dict[int, tuple[MessageLayout, dict[str, str], list[int], list[bytes]]] = {}
         self.bytes_waiting = 0
         self.numbers: dict[str, array] = {}  # of all messages kept; arrays that grow in place: a long bag is held once
         self.stamps = array("q")
@@ -114,7 +114,7 @@ class TopicReader:
         if self.bytes_waiting > BATCH_BYTES:
             self.flush()
 
-    def _layout(self, data: bytes) -> tuple[Layout, dict[str, str]] | None:
+    def _layout(self, data: bytes) -> tuple[MessageLayout, dict[str, str]] | None:
         for known in reversed(self.layouts):
             if known[0].fits(data):
                 return known
@@ -176,10 +176,10 @@ class TopicReader:
         self.order, self.stamps = array("q"), array("q")
         return Clocked(self.connection.topic, receive, order, stamps)
 
-    def columns(self, source: str) -> tuple[list[Out], list[str]]:
+    def columns(self, source: str) -> tuple[list[TopicColumn], list[str]]:
         """Its columns, over the messages that were understood, and notes. Raises InputError for an infinite number."""
         assert self.rule is not None
-        numbers = {key: np.frombuffer(each, dtype=float) for key, each in self.numbers.items()}
+        numbers = {key: np.frombuffer(number, dtype=float) for key, number in self.numbers.items()}
         self.numbers = {}
         found, notes = [], []
         for out in self.rule.columns(self.connection.topic, numbers):
@@ -243,21 +243,21 @@ class Bag:
         self._refuse_more()
 
     def _refuse_more(self) -> None:
-        if sum(each.held for each in self.readers.values()) > self.max_bytes:
+        if sum(reader.held for reader in self.readers.values()) > self.max_bytes:
             raise too_large(self.source, self.max_bytes, TOO_LARGE_REMEDY)
 
     def result(self) -> tuple[list[Track], list[Topic], list[str]]:
         """Tracks, topics, and notes."""
         readers, clocked = list(self.readers.values()), []
         read: dict[str, TopicReader] = {}
-        for each in readers:
-            clock = each.clocked()
-            if each.kept and each.reads and each.connection.topic not in read:
-                read[each.connection.topic] = each
+        for reader in readers:
+            clock = reader.clocked()
+            if reader.kept and reader.reads and reader.connection.topic not in read:
+                read[reader.connection.topic] = reader
                 clocked.append(clock)
         stamps, notes = trusted(clocked)
         del clocked
-        claims: dict[str, Claim] = {}
+        claims: dict[str, TopicClaim] = {}
         topics = []
         for each in readers:
             topic = each.connection.topic
@@ -266,7 +266,7 @@ class Bag:
                 found, more = each.columns(self.source)
                 notes += more
                 if found and each.rule is not None:
-                    claims[topic] = Claim(topic, stamps[topic], found, rank_of(topic, each.rule))
+                    claims[topic] = TopicClaim(topic, stamps[topic], found, rank_of(topic, each.rule))
             used = mine and topic in claims
             seen = stamps[topic] if used else np.array(each.receive, dtype=np.int64)
             topics.append(topic_of(topic, each.connection.type, seen, used, "" if used else _why(each, mine)))

@@ -15,8 +15,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.logs.columns import names as words
 from omnidyn.logs.columns.names import read_name
-from omnidyn.logs.readers.claims import Out
-from omnidyn.logs.readers.ros.layout import Layout, plain
+from omnidyn.logs.readers.claims import TopicColumn
+from omnidyn.logs.readers.ros.layout import MessageLayout, plain
 
 Picks = Mapping[str, str]  # key -> path of a number in the layout
 Numbers = Mapping[str, FloatArray]  # key -> one number a message
@@ -37,8 +37,8 @@ class Rule(NamedTuple):
     """picks(layout): the numbers to read. columns(topic, numbers): what becomes of them. rank: of what gives the same
     component, the least is taken."""
 
-    picks: Callable[[Layout], Picks]
-    columns: Callable[[str, Numbers], list[Out]]
+    picks: Callable[[MessageLayout], Picks]
+    columns: Callable[[str, Numbers], list[TopicColumn]]
     rank: int = 0
 
 
@@ -58,15 +58,15 @@ def is_command(topic: str) -> bool:
 # ---- picking --------------------------------------------------------------------------------------------
 
 
-def _stamp(layout: Layout, prefix: str = "header.stamp") -> dict[str, str]:
+def _stamp(layout: MessageLayout, prefix: str = "header.stamp") -> dict[str, str]:
     found = {SECONDS: f"{prefix}.sec", NANOSECONDS: f"{prefix}.nanosec"}
     return found if all(path in layout.numbers for path in found.values()) else {}
 
 
-def _paths(**keys: str) -> Callable[[Layout], Picks]:
+def _paths(**keys: str) -> Callable[[MessageLayout], Picks]:
     """Some numbers, by their paths, and the stamp in the header."""
 
-    def picks(layout: Layout) -> Picks:
+    def picks(layout: MessageLayout) -> Picks:
         return {**_stamp(layout), **{key: path for key, path in keys.items() if path in layout.numbers}}
 
     return picks
@@ -83,13 +83,13 @@ def _twist_paths(of: str) -> dict[str, str]:
     return {"vx": f"{of}linear.x", "vy": f"{of}linear.y", "omega": f"{of}angular.z"}
 
 
-def _all(layout: Layout) -> Picks:
+def _all(layout: MessageLayout) -> Picks:
     """Every plain number but stamps and covariances."""
     paths = [p for p in layout.numbers if "stamp." not in p and "covariance" not in p and not p.startswith("layout.")]
     return {**_stamp(layout), **{path: path for path in paths[:MOST_GENERIC]}}
 
 
-def _joints(layout: Layout) -> Picks:
+def _joints(layout: MessageLayout) -> Picks:
     """The numbers of each joint by its name, whatever the order, and however many arrays are empty."""
     found = dict(_stamp(layout))
     names = {path: text for path, text in layout.words.items() if path.startswith("name[")}
@@ -101,7 +101,7 @@ def _joints(layout: Layout) -> Picks:
     return found
 
 
-def _transforms(layout: Layout) -> Picks:
+def _transforms(layout: MessageLayout) -> Picks:
     """The first transform from a frame of the world to one of the body."""
     best: tuple[int, str] | None = None
     for path, child in layout.words.items():
@@ -146,46 +146,46 @@ def _continued(yaw: FloatArray) -> FloatArray:
     return yaw + 2.0 * np.pi * turns
 
 
-def _pose(topic: str, numbers: Numbers) -> list[Out]:
-    found = [Out(f"{topic}/{key}", numbers[key], "m", key) for key in ("x", "y") if key in numbers]
+def _pose(topic: str, numbers: Numbers) -> list[TopicColumn]:
+    found = [TopicColumn(f"{topic}/{key}", numbers[key], "m", key) for key in ("x", "y") if key in numbers]
     if all(f"q{axis}" in numbers for axis in "xyzw"):
         heading = heading_of(*(numbers[f"q{axis}"] for axis in "xyzw"))
-        found.append(Out(f"{topic}/heading", heading, "rad", "heading"))
+        found.append(TopicColumn(f"{topic}/heading", heading, "rad", "heading"))
     elif "theta" in numbers:
-        found.append(Out(f"{topic}/heading", _continued(numbers["theta"]), "rad", "heading"))
+        found.append(TopicColumn(f"{topic}/heading", _continued(numbers["theta"]), "rad", "heading"))
     return found
 
 
 _TWIST_UNITS = {"vx": "m/s", "vy": "m/s", "omega": "rad/s"}
 
 
-def _twist(topic: str, numbers: Numbers, command: bool = False) -> list[Out]:
+def _twist(topic: str, numbers: Numbers, command: bool = False) -> list[TopicColumn]:
     ending = "_cmd" if command else ""
     return [
-        Out(f"{topic}/{key}", numbers[key], unit, f"{key}{ending}")
+        TopicColumn(f"{topic}/{key}", numbers[key], unit, f"{key}{ending}")
         for key, unit in _TWIST_UNITS.items()
         if key in numbers
     ]
 
 
-def _either_twist(topic: str, numbers: Numbers) -> list[Out]:
+def _either_twist(topic: str, numbers: Numbers) -> list[TopicColumn]:
     return _twist(topic, numbers, is_command(topic))
 
 
-def _odometry(topic: str, numbers: Numbers) -> list[Out]:
+def _odometry(topic: str, numbers: Numbers) -> list[TopicColumn]:
     return [*_pose(topic, numbers), *_twist(topic, numbers)]
 
 
-def _imu(topic: str, numbers: Numbers) -> list[Out]:
-    return [Out(f"{topic}/omega", numbers["omega"], "rad/s", "omega")] if "omega" in numbers else []
+def _imu(topic: str, numbers: Numbers) -> list[TopicColumn]:
+    return [TopicColumn(f"{topic}/omega", numbers["omega"], "rad/s", "omega")] if "omega" in numbers else []
 
 
-def _battery(topic: str, numbers: Numbers) -> list[Out]:
+def _battery(topic: str, numbers: Numbers) -> list[TopicColumn]:
     volts = numbers.get("voltage")
-    return [] if volts is None else [Out(f"{topic}/voltage", volts, "V", "supply")]
+    return [] if volts is None else [TopicColumn(f"{topic}/voltage", volts, "V", "supply")]
 
 
-def _joint_columns(topic: str, numbers: Numbers) -> list[Out]:
+def _joint_columns(topic: str, numbers: Numbers) -> list[TopicColumn]:
     """Each joint's angle and speed, wheel by number where the names of the joints have one for each wheel."""
     joints = list(dict.fromkeys(key.rpartition("/")[0] for key in numbers))
     wheels, command = wheel_numbers(joints), is_command(topic)
@@ -198,7 +198,7 @@ def _joint_columns(topic: str, numbers: Numbers) -> list[Out]:
         component = f"w{of}{'_cmd' * command}" if speed else "" if command else f"a{of}"
         if of is None:
             component = "" if wheels else None
-        found.append(Out(f"{topic}/{joint}/{array}", values, unit, component))
+        found.append(TopicColumn(f"{topic}/{joint}/{array}", values, unit, component))
     return found
 
 
@@ -208,7 +208,7 @@ def wheel_numbers(joints: list[str]) -> dict[str, int]:
     Where some are called wheels or motors, the others are none.
     """
     parts = {joint: read_name(joint) for joint in joints}
-    wheels = [j for j, each in parts.items() if each.roles & {words.WHEEL, words.MOTOR}]
+    wheels = [j for j, part in parts.items() if part.roles & {words.WHEEL, words.MOTOR}]
     numbers = {joint: parts[joint].number for joint in wheels or joints}
     known = [number for number in numbers.values() if number is not None]
     first = min(known, default=1)
@@ -217,16 +217,16 @@ def wheel_numbers(joints: list[str]) -> dict[str, int]:
     return {joint: number - first + 1 for joint, number in numbers.items() if number is not None}
 
 
-def _as_they_are(topic: str, numbers: Numbers) -> list[Out]:
+def _as_they_are(topic: str, numbers: Numbers) -> list[TopicColumn]:
     """Each number under its own name, in the unit that its name ends in: current_A[0]."""
     units = {key: read_name(_INDEX.sub("", key.rpartition(".")[2])).unit for key in numbers}
     return [
-        Out(f"{topic}/{key}", values, unit.text if (unit := units[key]) is not None else "")
+        TopicColumn(f"{topic}/{key}", values, unit.text if (unit := units[key]) is not None else "")
         for key, values in numbers.items()
     ]
 
 
-def _volts(topic: str, numbers: Numbers) -> list[Out]:
+def _volts(topic: str, numbers: Numbers) -> list[TopicColumn]:
     """An array of numbers; on .../omnidyn/voltage and its kin, which `omnidyn convert` writes, the wheels'."""
     name = topic.rstrip("/")
     kind = next((kind for kind in OWN_TOPICS if name.endswith(kind)), None)
@@ -252,7 +252,7 @@ def rank_of(topic: str, rule: Rule) -> int:
     return -1 if topic.rstrip("/").endswith(HEADING) else rule.rank
 
 
-def _array(layout: Layout) -> Picks:
+def _array(layout: MessageLayout) -> Picks:
     return {**_stamp(layout), **{path: path for path in layout.numbers if path.startswith("data")}}
 
 

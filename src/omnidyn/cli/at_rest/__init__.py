@@ -1,1 +1,0 @@
-"""Commands about what holds a robot at rest: deadzone (in volts), friction (in newtons)."""

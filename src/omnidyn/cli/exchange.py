@@ -1,0 +1,142 @@
+"""omnidyn import KIND FILE: a robot file from a file of another tool."""
+
+from __future__ import annotations
+
+import inspect
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+import omnidyn
+from omnidyn.cli.log_options import MAX_BYTES
+from omnidyn.cli.terminal.session import input_file, provenance, robot_input
+from omnidyn.cli.terminal.sizes import refuse_sizes
+from omnidyn.cli.terminal.streams import say, show
+from omnidyn.cli.terminal.telling import tell
+from omnidyn.files import check_output, keep_apart, write_atomic
+from omnidyn.model.presets import robot_path
+
+if TYPE_CHECKING:
+    from omnidyn.export.contract import Export
+
+
+def bring(
+    kind: str = typer.Argument(metavar="KIND", help="What FILE is: json, urdf or mjcf."),
+    file: str = typer.Argument(metavar="FILE", help="The file to read."),
+    out: str = typer.Option("", "-o", "--out", metavar="OUT", help="Robot file to write; - is stdout."),
+    like: str = typer.Option(
+        "", metavar="ROBOT", help="Take what FILE does not say, such as motors, from this preset or robot file."
+    ),
+    wheel_radius: float | None = typer.Option(
+        None, metavar="M", help="Radius of the wheels [m], where they are meshes in a URDF file."
+    ),
+    force: bool = typer.Option(False, "--force", help="Replace the file if it exists."),
+    json: bool = typer.Option(False, "--json", help="What was read and guessed, for machines."),
+) -> None:
+    """Read a robot from a file of another tool.
+
+    What was read is marked as imported; what FILE does not say is guessed, with a wide spread, and marked as a guess.
+    """
+    from omnidyn.interop.kinds import import_robot
+    from omnidyn.model.first_guess import guessed
+    from omnidyn.model.robot_file import robot_to_toml
+
+    if out == "-" and json:
+        raise typer.BadParameter("-o - and --json both want stdout.")
+    if out not in ("", "-"):
+        keep_apart([out], [file, *([robot_path(like)] if like else [])])
+        check_output(out, force)
+    refuse_sizes({"wheel_radius": wheel_radius})
+    robot = import_robot(kind, file, omnidyn.load_robot(like) if like else None, wheel_radius)
+    text = robot_to_toml(robot)
+    if out == "-":
+        show(text.rstrip("\n"))
+    else:
+        if out:
+            write_atomic(out, text, force)
+        inputs = [input_file(kind, file), *([robot_input(like)] if like else [])]
+        tell(robot.document(), json, provenance(inputs), output=out or None, guessed=guessed(robot))
+    if guessed(robot):
+        say(f"omnidyn: guessed: {', '.join(guessed(robot))}")
+    if not out:
+        say("omnidyn: nothing written; -o FILE writes the robot file")
+
+
+# omnidyn export KIND ROBOT -o OUT: a robot in the files of other tools
+
+
+def export(
+    kind: str = typer.Argument(metavar="KIND", help="What to write."),
+    robot: str = typer.Argument(metavar="ROBOT", help="A preset (see: omnidyn robots) or a robot file."),
+    out: str = typer.Option("", "-o", "--out", metavar="OUT", help="File or folder to write; - is stdout."),
+    precision: str = typer.Option("", metavar="double|single", help="Of the numbers of c-model; double by default."),
+    height: float | None = typer.Option(
+        None, metavar="M", help="Of the body [m], for its inertia about the other axes (mjcf, urdf, sdf)."
+    ),
+    log: list[str] = typer.Option(
+        [], "--log", metavar="LOG", help="With wheel speeds and a measured twist, for covariances (ros2-control)."
+    ),
+    horizon: float | None = typer.Option(
+        None, metavar="S", help="For which the covariance of the pose is given [s] (ros2-control)."
+    ),
+    max_bytes: int = MAX_BYTES,
+    controller: str = typer.Option(
+        "",
+        metavar="NAME|FILE",
+        help="Controller by name or file (c-controller, pid by default; ros2-node, to follow a path).",
+    ),
+    dt: float | None = typer.Option(
+        None, metavar="S", help="Between two of its steps [s]; 0.02 by default (c-controller, ros2-node)."
+    ),
+    force: bool = typer.Option(False, "--force", help="Replace files that exist."),
+    json: bool = typer.Option(False, "--json", help="What was written and left out, for machines."),
+) -> None:
+    """Write a robot in the files of another tool.
+
+    KIND is json, c-model, c-controller, fmu, wpilib, road-runner, gains, mjcf, urdf, sdf, ros2-control or ros2-node.
+    What the format cannot say stands in the file as comments, and is shown.
+    """
+    from omnidyn.export.kinds import maker
+
+    make = maker(kind)
+    if out == "-" and json:
+        raise typer.BadParameter("-o - and --json both want stdout.")
+    given = {"precision": precision or None, "height": height, "horizon": horizon, "dt": dt}
+    options = _options(kind, make, {**given, "controller": controller or None})
+    loaded = omnidyn.load_robot(robot)
+    if log:
+        options |= _options(
+            kind, make, {"runs": [omnidyn.read_log(path, robot=loaded, max_bytes=max_bytes or None) for path in log]}
+        )
+    inputs = [robot_path(robot), *log, *([controller] if controller.endswith(".toml") else [])]
+    if out not in ("", "-"):
+        keep_apart([out], inputs)
+    made = make(loaded, **options)
+    if made.folder and out not in ("", "-"):
+        keep_apart([Path(out, name) for name in made.files], inputs)
+    record = provenance([robot_input(robot), *(input_file("log", path) for path in log)])
+    if out == "-":
+        show(made.text.rstrip("\n"))
+        _say_missing(made)
+        return
+    written = [str(path) for path in made.write(out, force)] if out else []
+    tell(made.document(), json, record, output=written or None)
+    if not json:
+        say(f"omnidyn: wrote {', '.join(written)}" if written else "omnidyn: nothing written; -o OUT writes it")
+
+
+def _options(kind: str, make: Any, given: dict[str, Any]) -> dict[str, Any]:
+    """The options that were given. Ends as wrong usage where the kind has none of that name."""
+    known = inspect.signature(make).parameters
+    options = {name: value for name, value in given.items() if value is not None}
+    for name in options:
+        if name not in known:
+            flag = {"runs": "log"}.get(name, name)
+            raise typer.BadParameter(f"--{flag} is not for {kind}.")
+    return options
+
+
+def _say_missing(made: Export) -> None:
+    for words in made.missing:
+        say(f"omnidyn: not in it: {words}")

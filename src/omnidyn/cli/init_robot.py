@@ -1,0 +1,322 @@
+"""The robot of `omnidyn init`: from its options, at a terminal from its user, from logs, from a preset."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import typer
+
+from omnidyn.cli import log_options
+from omnidyn.cli.terminal.numbers import number_list, number_words
+from omnidyn.cli.terminal.sizes import LEAST_WHEELS, MOST_WHEELS, refuse_sizes
+from omnidyn.cli.terminal.streams import say
+from omnidyn.errors import InputError
+from omnidyn.logs.geometry import Geometry, as_mecanum, wheel_geometry
+from omnidyn.logs.read_log import LogOptions
+from omnidyn.model.first_guess import (
+    DIRECTION,
+    GEAR,
+    default_prior,
+    even_azimuths,
+    first_guess,
+    guessed,
+    like,
+    mecanum_wheels,
+    reasons,
+    with_gear,
+    with_rotor,
+)
+from omnidyn.model.robot import GIVEN, GUESS, MEASURED, Body, Prior, Robot
+from omnidyn.model.robot_file import robot_to_toml
+from omnidyn.model.wheels import Wheels
+
+DEFAULTS = {"wheel_radius": 0.05, "robot_radius": 0.15, "mass": 3.0}  # [m], [m], [kg], shown at a terminal
+QUESTIONS = {
+    "azimuth": "where the wheels stand, counter-clockwise from forward [degree]",
+    "wheel_radius": "radius of a wheel [m]",
+    "robot_radius": "from the centre of the robot to a wheel [m]",
+    "mass": "mass of the robot [kg]",
+}
+
+
+KEYS = {
+    "azimuth": "wheels.azimuth_deg", "wheel_radius": "wheels.wheel_radius_m", "robot_radius": "wheels.robot_radius_m",
+    "mass": "body.mass_kg", "voltage_limit": "motor.voltage_limit_V", "roller": "wheels.roller_angle_deg",
+    "gear_ratio": "motor.gear_ratio", "rotor_inertia": "motor.rotor_inertia_kg_m2",
+}  # fmt: skip
+LEAST_RADIUS, LARGEST_RADIUS = 0.012, 0.3  # [m] of a wheel; what is outside is no radius, the speeds are of a motor
+GEARED = 1.5  # logged speeds so many times those of the wheels are speeds before a gear
+
+
+@dataclass
+class Answers:
+    """What is known of the robot: name of an option -> its value. accepted: answered with Enter at a terminal."""
+
+    value: dict[str, Any]
+    accepted: set[str] = field(default_factory=set)
+
+
+def robot_of(
+    name: str,
+    given: dict[str, Any],
+    told: Collection[str],
+    preset: Robot | None,
+    mecanum: bool,
+    friction: str,
+    seen: Geometry | None,
+) -> Robot:
+    """The robot of all that is known. Raises InputError.
+
+    Args:
+        name: of the robot.
+        given: name of an option -> its value, from the command line or from logs; None where not known.
+        told: names of the options of the command line.
+        preset: whose numbers are taken for what is not given.
+        mecanum: four mecanum wheels.
+        friction: where guessed friction acts, "" for the default.
+        seen: what logs show of its wheels.
+    """
+    known = {key: value for key, value in given.items() if value is not None}
+    refuse_sizes(_sizes(known, preset))
+    answers = complete(dict(known), preset, mecanum)
+    refuse_sizes(_sizes(answers.value, preset))
+    from_logs = {KEYS[key] for key in KEYS.keys() & (known.keys() - set(told))}
+    robot = _as_seen(_guessed_robot(name, answers, preset, mecanum, friction), seen, from_logs)
+    return _with_motor(robot, given, preset is not None)
+
+
+def complete(value: dict[str, Any], preset: Robot | None, mecanum: bool) -> Answers:
+    """Answers to all that is needed: from options, at a terminal from its user, from the preset."""
+    if mecanum:
+        value["wheels"] = 4
+    answers = Answers(value)
+    needed = [key for key in QUESTIONS if key not in value and not (mecanum and key == "azimuth")]
+    if _at_terminal() and needed:
+        _ask_for(needed, answers, preset)
+    elif preset is not None:
+        answers.accepted = {
+            key
+            for key in needed
+            if key != "azimuth" or (value.get("wheels", preset.wheels.count) == preset.wheels.count)
+        }
+        needed = [key for key in needed if key not in answers.accepted]
+    if not _at_terminal() and needed:
+        flags = ", ".join(f"--{key.replace('_', '-')}" for key in needed)
+        raise typer.BadParameter(f"{flags} missing; without them it asks, but only at a terminal.")
+    return answers
+
+
+def _at_terminal() -> bool:
+    return sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
+
+
+def _ask_for(needed: list[str], answers: Answers, preset: Robot | None) -> None:
+    """Ask one by one; Enter takes what stands in brackets."""
+    say("Enter takes what stands in brackets.")
+    for key in needed:
+        if key == "azimuth":
+            _ask_for_wheels(answers, preset)
+            continue
+        default = getattr(preset.body if key == "mass" else preset.wheels, key) if preset else DEFAULTS[key]
+        typed = _ask(
+            f"{QUESTIONS[key]} [{number_words(default)}]: ",
+            lambda text, key=key: _checked(key, _several(text, 1, "one number, such as 0.05")[0], answers.value),
+        )
+        if typed is None:
+            answers.accepted.add(key)
+            if preset is None:
+                answers.value[key] = default
+        else:
+            answers.value[key] = typed
+
+
+def _ask_for_wheels(answers: Answers, preset: Robot | None) -> None:
+    count = answers.value.get("wheels")
+    if count is None:
+        usual = preset.wheels.count if preset else 3
+        count = _ask(f"how many wheels [{usual}]: ", _count) or usual
+        answers.value["wheels"] = count
+    taken = preset is not None and preset.wheels.count == count
+    default = preset.wheels.azimuth_deg if preset is not None and taken else even_azimuths(count)
+    typed = _ask(
+        f"{QUESTIONS['azimuth']} [{number_words(default)}]: ",
+        lambda text: _checked("azimuth", _several(text, count), {}),
+    )
+    if typed is not None or not taken:
+        answers.value["azimuth"] = list(default) if typed is None else typed
+    if typed is None:
+        answers.accepted.add("azimuth")
+
+
+def _ask(question: str, understood: Callable[[str], Any]) -> Any:
+    """An answer, asked for on stderr until it can be used; None for Enter."""
+    while True:
+        with contextlib.suppress(BrokenPipeError):
+            print(question, end="", file=sys.stderr, flush=True)
+        line = sys.stdin.readline()
+        if not line:
+            say("")
+            raise InputError("the input ended before all was answered", remedy="or give the numbers as options")
+        if not line.strip():
+            return None
+        try:
+            return understood(line.strip())
+        except InputError as error:
+            say(f"omnidyn: {error}")
+
+
+def _several(text: str, count: int, expected: str = "") -> list[float]:
+    try:
+        values = number_list("", text)
+    except InputError:
+        values = []
+    if len(values) != count:
+        raise InputError(
+            "cannot use this answer", got=text, expected=expected or f"{count} numbers, such as 60,180,300"
+        )
+    return values
+
+
+def _count(text: str) -> int:
+    if text not in map(str, range(LEAST_WHEELS, MOST_WHEELS + 1)):
+        raise InputError("cannot use this answer", got=text, expected=f"{LEAST_WHEELS} to {MOST_WHEELS} wheels")
+    return int(text)
+
+
+def _checked(key: str, value: Any, known: Mapping[str, Any]) -> Any:
+    """The value, if a robot may have it beside what is known. Raises InputError."""
+    refuse_sizes({**known, key: value})
+    if key == "mass":
+        Body(mass=value, inertia=1.0)
+    else:
+        usual = {"azimuth_deg": even_azimuths(3), "wheel_radius": 0.1, "robot_radius": 0.1}
+        Wheels(**{**usual, "azimuth_deg" if key == "azimuth" else key: value})
+    return value
+
+
+def _sizes(given: dict[str, Any], preset: Robot | None) -> dict[str, Any]:
+    """What is given of lengths, angles and the mass, the rest from the preset."""
+    of_preset = {} if preset is None else {
+        "wheel_radius": preset.wheels.wheel_radius, "robot_radius": preset.wheels.robot_radius,
+        "mass": preset.body.mass,
+    }  # fmt: skip
+    return of_preset | {key: value for key, value in given.items() if value is not None}
+
+
+def _guessed_robot(name: str, answers: Answers, preset: Robot | None, mecanum: bool, friction: str) -> Robot:
+    """The robot of these answers. Raises InputError, also where no guess makes sense."""
+    value = answers.value
+    wheels, mass = _wheels(value, preset, mecanum), value.get("mass", preset.body.mass if preset else None)
+    Body(mass=mass, inertia=1.0)
+    told = {KEYS[key] for key in value if key in KEYS and key not in answers.accepted}
+    told |= {KEYS["azimuth"], KEYS["roller"]} if mecanum else set()
+    try:
+        if preset is not None:
+            robot = like(preset, name, wheels, mass, value.get("voltage_limit"), told)
+        else:
+            robot = first_guess(
+                name, wheels, mass, value.get("voltage_limit"), friction or DIRECTION, value.get("speed_loop", ())
+            )
+    except InputError as error:
+        raise InputError(
+            "cannot make such a robot", got=str(error), remedy="check the units: m, kg, V, degree", where=name
+        ) from None
+    accepted = {KEYS[key]: value[key] for key in answers.accepted if key in value}
+    return robot.replace(priors=robot.priors | {key: default_prior(key, one) for key, one in accepted.items()})
+
+
+def _with_motor(robot: Robot, given: dict[str, Any], copied: bool) -> Robot:
+    """The robot with the gear and the rotor that were given. copied: from a preset, whose motors stay as they are.
+
+    Raises InputError for a rotor behind a gear that is only guessed: at the wheel it counts with its square.
+    """
+    gear, rotor = given["gear_ratio"], given["rotor_inertia"]
+    if gear is not None and copied:
+        known = {key: prior for key, prior in robot.priors.items() if not key.startswith(GEAR)}
+        motor = robot.motor.replace(gear_ratio=gear)
+        robot = robot.replace(motor=motor, priors=known | {GEAR: Prior(origin=GIVEN)})
+    elif gear is not None:
+        robot = with_gear(robot, gear, "", GIVEN)
+    if rotor is None:
+        return robot
+    if GEAR in robot.priors and robot.priors[GEAR].origin == GUESS:
+        raise InputError(
+            "a rotor needs its gear: at the wheel its inertia is J l^2", got=f"{rotor:g} kg m2 and no gear ratio",
+            expected="both", remedy="give --gear-ratio too", where="--rotor-inertia",
+        )  # fmt: skip
+    return with_rotor(robot, rotor)
+
+
+def _wheels(value: dict[str, Any], preset: Robot | None, mecanum: bool) -> Wheels:
+    known: dict[str, Any] = {key: value[key] for key in ("wheel_radius", "robot_radius") if key in value}
+    if preset is not None and not mecanum:
+        changed = {"azimuth_deg": value["azimuth"]} if "azimuth" in value else {}
+        return preset.wheels.replace(**known, **changed)
+    if preset is not None:
+        known = {"wheel_radius": preset.wheels.wheel_radius, "robot_radius": preset.wheels.robot_radius} | known
+    return mecanum_wheels(**known) if mecanum else Wheels(azimuth_deg=value["azimuth"], **known)
+
+
+def file_of(robot: Robot) -> tuple[str, list[str]]:
+    """The robot file, with comments for whoever opens it, and the keys of the numbers that were guessed."""
+    lines = [
+        "Written by omnidyn init. SI units; azimuths count counter-clockwise from forward (x forward, y left).",
+        'The origin of a number stands beside it: "given" by you, a "guess", "imported" from another robot. std is the',
+        'standard deviation. Put in what you know, such as { value = 1.7, std = 0.1, origin = "datasheet" }.',
+    ]
+    guesses = reasons(robot)
+    if guesses:
+        lines += ["", "How it was guessed (M mass, b centre to wheel):"]
+        lines += [f"  {key}: {why}" for key, why in guesses]
+    head = "".join(f"# {line}".rstrip() + "\n" for line in lines)
+    return f"{head}\n{robot_to_toml(robot)}", guessed(robot)
+
+
+def from_logs(given: dict[str, Any], log: list[str], options: LogOptions, mecanum: bool, copied: bool) -> Geometry:
+    """Azimuths and radii, of the robot where it turned, from logs; what is given on the command line stays.
+
+    copied: the wheels are those of a preset, whose radius then tells the gear.
+    """
+    runs, maps = [], log_options.Maps()
+    for path, each in log_options.load_logs(log_options.log_files(log), None, options):
+        maps.show(path, each.columns)
+        runs.append(each.to_run())
+    seen = wheel_geometry(runs, "--robot-radius" if mecanum else "`azimuth`")
+    azimuth = [round(angle, 2) for angle in seen.azimuth_deg]
+    where = "pushing towards" if mecanum else "at"
+    told = f"from {seen.source} ({seen.residual:.1%} unexplained)"
+    say(f"omnidyn: wheels {where} {number_words(tuple(azimuth))} degrees, {told}")
+    if mecanum:
+        seen = as_mecanum(seen)
+    elif given["azimuth"] is None and given["wheels"] in (None, len(azimuth)):
+        given["azimuth"], given["wheels"] = azimuth, len(azimuth)
+    if given["robot_radius"] is None and seen.robot_radius is not None and seen.robot_radius > 0.0:
+        given["robot_radius"] = round(seen.robot_radius, 4)
+        say(f"omnidyn: centre to wheel {given['robot_radius']:g} m")
+    elif given["robot_radius"] is None:
+        say("omnidyn: the logs do not turn, or hold no turn rate: the distance from centre to wheel is not in them")
+    radius = 1.0 / seen.per_metre
+    if given["wheel_radius"] is None and seen.measured and not copied and LEAST_RADIUS < radius < LARGEST_RADIUS:
+        given["wheel_radius"] = round(radius, 4)
+        say(f"omnidyn: wheel radius {radius:.4g} m, if the logged speeds are those of the wheels, behind the gear")
+    return seen
+
+
+def _as_seen(robot: Robot, seen: Geometry | None, from_logs: set[str]) -> Robot:
+    """The robot with the gear that the logged speeds show: those of the motor shaft are faster by it.
+
+    from_logs: keys of the robot file whose numbers the logs gave; their source says so.
+    """
+    if seen is None:
+        return robot
+    told = Prior(source=f"logs: {seen.source}", origin=MEASURED)
+    robot = robot.replace(priors=robot.priors | dict.fromkeys(from_logs, told))
+    ratio = seen.per_metre * float(robot.wheels.radii.mean())
+    if ratio < GEARED:
+        return robot
+    say(f"omnidyn: logged speeds are {ratio:.4g} times those of such wheels: taken as those of the motor, gear ratio")
+    return with_gear(robot, round(ratio, 3), "logs: speed of the motor shaft over that of the wheel")

@@ -1,0 +1,185 @@
+"""The numbers of a predictive controller as C, and the files of this folder around them."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from omnidyn.control.controller import FARTHEST, WHEEL_SPEED
+from omnidyn.control.mpc import interior_point, loop, observer, program
+from omnidyn.control.mpc.controller import Mpc
+from omnidyn.control.mpc.model import (
+    ACROSS,
+    BY_MASS,
+    DECAY,
+    ELLIPSE,
+    FEED,
+    GX,
+    PHI,
+    PSI,
+    SOFT,
+    TURNING,
+    volts,
+)
+from omnidyn.control.mpc.settings import Settings
+from omnidyn.errors import UnsupportedError
+from omnidyn.export.spelling import c_number, filled
+from omnidyn.model.wheels import wheel_speed
+
+FOLDER = files("omnidyn.export.code") / "mpc"
+PARTS = ("model.c", "solver.c", "step.c")
+# What float32 asks for in place of the constants of Python, whose rounding is 1e9 times as small.
+BEYOND, NARROWEST = 1e-3, 1e-3  # [V]
+# Of the interior point method: where its mean product stops, how fast it falls, passes, [V] from a bound. It need find
+# the bounds that are met alone: the active set finds the inputs.
+TIGHT, CENTRE, MOST, LEAST = 1e-4, 0.1, 30, 2e-6
+
+_INPUT = """/* An input of the horizon: its volts, and room to find them. */
+typedef struct {
+    float volts, wanted, next,@OWN@ hold[2], push[2];
+    int active;
+} omnidyn_input;"""
+
+
+def mpc_code(controller: Mpc) -> str:
+    """The body of its C file. Raises UnsupportedError for what float32 cannot hold."""
+    if controller.settings.speed is not None:
+        raise UnsupportedError(
+            "the model predictive controller in C has no limit of the speed: float32 cannot hold its weight beside the "
+            "others", got=controller.settings.speed, expected="none", where="speed",
+            remedy="leave `speed` out of the controller file, and ask for slower paths",
+        )  # fmt: skip
+    text = "\n".join(FOLDER.joinpath(name).read_text("utf-8") for name in PARTS)
+    return f"#include <string.h>\n\n{_constants(controller)}\n\n{text}"
+
+
+def mpc_input(controller: Mpc) -> str:
+    """The type of what is known of one input of the horizon."""
+    own = " bound[2]," if _bounded(controller) else ""
+    return filled(_INPUT, OWN=own)
+
+
+def mpc_memory(controller: Mpc) -> str:
+    """The fields of `omnidyn_control`: what it remembers, and room to work in."""
+    n, wheels, settings = "OMNIDYN_HORIZON", "OMNIDYN_WHEELS", controller.settings
+    lines = ["float believed[4][3], base[3]; /* pose, twist, push, share of friction */"]
+    lines += ["float unsure[3], spread[3][3][3]; /* of these */"] if controller.observer else []
+    lines += [f"float sent[{controller.steps_late + 1}][3], last[{wheels}];", "int begun, known;"]
+    lines += [f"float slewed[{wheels}];"] if settings.slew is not None else []
+    lines += [
+        f"omnidyn_input input[{n} * {wheels}];",
+        f"float x[{n} + 1][6], goal[{n} + 1][6], before[{n}][6], way[{n}][3];",
+        f"float columns[{n}][8][6], gain[{n}][3][7];",
+    ]
+    return "\n".join(f"    {line}" for line in lines)
+
+
+def _bounded(controller: Mpc) -> bool:
+    """Whether the bounds of the volts are others in each step."""
+    limit = volts(controller.robot)
+    return controller.settings.slew is not None or _current(controller) or bool(np.any(limit != limit[0]))
+
+
+def _current(controller: Mpc) -> bool:
+    return controller.settings.current is not None or controller.robot.motor.current_limit is not None
+
+
+def _constants(controller: Mpc) -> str:
+    """Numbers and tables, those alone that this controller needs."""
+    settings, linear, robot = controller.settings, controller._numbers.linear[0], controller.robot
+    turning, ellipse = bool(linear[TURNING] != 0.0), bool(linear[ELLIPSE] > 0.0)
+    whether = {
+        "LEVELS": len(controller._numbers.levels), "ELLIPSE": ellipse, "TURNING": turning,
+        "OFF_CENTRE": any(robot.body.centre),
+        "LEARN": controller.observer, "BOUNDED": _bounded(controller), "CURRENT": _current(controller),
+        "SLEW": settings.slew is not None,
+        "WHEEL_SPEED": controller.output == WHEEL_SPEED, "LATE_STEPS": controller.steps_late,
+        "PASSES": observer.PASSES, "SOON": program.SOON, "AGAIN": settings.again,
+        "FIRST_PASSES": interior_point.FIRST, "LAST_PASSES": interior_point.LAST, "MOST": MOST,
+    }  # fmt: skip
+    numbers = {
+        "FARTHEST": FARTHEST, "EXACT": observer.EXACT, "LAST_WEIGHT": settings.last, "VOLTS_WEIGHT": settings.volts,
+        "BEYOND": BEYOND, "BACK_OFF": interior_point.BACK_OFF, "CENTRE": CENTRE,
+        "TIGHT": TIGHT, "LEAST": LEAST, "NARROWEST": NARROWEST, "TURNED": program.TURNED, "MOVED": program.MOVED,
+        "PULLED": program.PULLED, "FARTHEST_OFF": observer.BEYOND, "MOST_SCALE": observer.MOST,
+        "START_PUSH": loop.START_PUSH, "START_SCALE": loop.START_SCALE, "SHARP": settings.volts,
+    }  # fmt: skip
+    if ellipse:
+        numbers |= dict(
+            zip(("ELLIPSE_X", "ELLIPSE_Y", "ELLIPSE_WIDTH"), linear[ELLIPSE : ELLIPSE + 3] ** (2, 2, 1), strict=True)
+        )
+    if settings.slew is not None:
+        numbers["SLEW_STEP"] = settings.slew * controller.dt
+    lines = [f"#define {name} {int(value)}" for name, value in whether.items()]
+    lines += [f"#define {name} {c_number(float(value), True)}" for name, value in numbers.items()]
+    matrices = _matrices(controller, linear) | ({"FRAME": _square(linear, TURNING)} if turning else {})
+    matrices |= {"BY_MASS": _square(linear, BY_MASS)} if ellipse else {}
+    matrices |= _outputs(controller, robot)
+    made = [_table(name, np.asarray(each, float)) for name, each in matrices.items()]
+    made += [_by_wheel(name, each) for name, each in _wheels(controller).items()]
+    return "\n".join([*lines, "", *made])
+
+
+def _matrices(controller: Mpc, linear: np.ndarray) -> dict[str, Any]:
+    """Tables of the model, the cost and the observer."""
+    settings, own = controller.settings, controller._numbers
+    found: dict[str, Any] = {"GAINS": np.concatenate([_square(linear, at) for at in (DECAY, PHI, PSI)])}
+    found |= {"FEED": _square(linear, FEED), "PUSH": own.push.T, "PULL": own.pull}
+    found |= {"WEIGHT": (*settings.pose, *settings.twist)}
+    found |= {"NEAR": program.NEAR, "HOME": program.HOME, "ARRIVED": program.ARRIVED}
+    if len(own.levels):
+        assert (GX, ACROSS, SOFT) == (0, 3, 9)  # columns that model.c counts by hand
+        found["LEVEL"] = own.levels[:, : SOFT + 1]  # what falls with the speed has no C
+    if controller.observer:
+        found |= _noise(settings)
+    return found
+
+
+def _noise(settings: Settings) -> dict[str, Any]:
+    return {
+        "NOISE": np.square(settings.noise), "POSE_NOISE": np.square(settings.pose_noise),
+        "WALK": np.square((settings.walk, settings.push_walk, (settings.scale_walk,) * 3, settings.pose_walk)),
+    }  # fmt: skip
+
+
+def _outputs(controller: Mpc, robot: Any) -> dict[str, Any]:
+    """Tables of optional limits, and of how twists become speeds of wheels."""
+    settings, found = controller.settings, dict[str, Any]()
+    if controller.output == WHEEL_SPEED:
+        found["SPEED_OF"] = np.array([wheel_speed(robot.wheels, each) for each in np.eye(3)]).T
+    if _current(controller):
+        limit, emf = settings.tables(robot, controller.dt, True)[2:4]
+        found |= {"CURRENT_VOLTS": limit[1], "EMF": emf}
+    return found
+
+
+def _wheels(controller: Mpc) -> dict[str, np.ndarray]:
+    """What each wheel has one of: limits, and how volts become what the drive takes."""
+    robot, per_volt = controller.robot, np.full(controller.robot.wheels.count, controller._per_volt)
+    if controller.output == WHEEL_SPEED:
+        per_volt = 0.0 * per_volt if np.any(robot.drive.ki) else 0.0 * per_volt + 1.0 / np.asarray(robot.drive.kp)
+    return {"VOLTAGE_LIMIT": volts(robot), "OUTPUT_LIMIT": controller.limit, "PER_VOLT": per_volt}
+
+
+def _by_wheel(name: str, values: np.ndarray) -> str:
+    """A macro of a wheel, or of an input: one number where all wheels are alike."""
+    if np.all(values == values[0]):
+        return f"#define {name}(i) {c_number(float(values[0]), True)}"
+    return f"{_table(f'{name}S', values)}\n#define {name}(i) {name}S[(i) % OMNIDYN_WHEELS]"
+
+
+def _square(linear: np.ndarray, at: int) -> np.ndarray:
+    return linear[at : at + 9].reshape(3, 3)
+
+
+def _table(name: str, values: np.ndarray) -> str:
+    """A constant table."""
+    shape = "".join(f"[{n}]" for n in values.shape)
+    return f"static const float {name}{shape} = {_braces(values)};"
+
+
+def _braces(values: np.ndarray) -> str:
+    inner = (_braces(each) if values.ndim > 1 else c_number(float(each), True) for each in values)
+    return f"{{{', '.join(inner)}}}"

@@ -1,0 +1,200 @@
+"""The contract of the engines of fits, which simulate whole logs with derivatives; and what a kernel adds up over a
+piece, from arrays of the length of the log: for the engines that simulate first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, Generic, Self, TypeVar
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.compiled.kernel import kernel
+from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
+from omnidyn.identification.output_error.kernel.march import FINAL, WAVES, add_waves, terms_of
+from omnidyn.identification.output_error.problem.problem import Column, Fitted, Parts, Piece, PieceSums, Point, Problem
+from omnidyn.model.actuation import Driver
+from omnidyn.model.layout import N_AXES
+
+P = TypeVar("P", bound=Fitted)
+
+
+@dataclass(frozen=True)
+class Weighting:
+    """variance (columns,) by Problem.columns; nu of Student's t, 0 for Gauss; mode and block as in kernel/march.py.
+
+    counted: whether counts are taken as such, or like any other output.
+    """
+
+    variance: FloatArray
+    nu: float = 0.0
+    mode: int = 0
+    block: int = 1
+    counted: bool = False
+
+
+class Engine(Generic[P]):
+    """What simulates a problem with its derivatives. A new one:
+
+    1. gives `residuals`, or `sums` where rows need not be held, and `on`;
+    2. says in attributes what it is: a fit asks these, and never for its name;
+    3. gives what only some have (`with_levels`, `drives`, `meets_limit`, `of`) where its attributes promise it.
+
+    exact: takes each row in one step without error, and has `drives`. looped: a speed loop makes its voltages.
+    tol [m/s]: tolerance of its steps, None for one a row. levels: key -> level of breakaway that it holds. members: its
+    groups.
+    """
+
+    problem: P
+    exact: bool = False
+    looped: bool = False
+    tol: float | None = None
+    levels: Mapping[str, float] = MappingProxyType({})
+    members: Sequence[Any] = ()
+
+    @classmethod
+    def of(cls, problem: P, tol: float | None = None) -> Engine[P]:
+        """The engine of this kind that serves a problem. tol [m/s]: of the steps of one that is not exact."""
+        raise NotImplementedError
+
+    def on(self, problem: P) -> Self:
+        """The same engine on other pieces of the same logs, with the same parameters."""
+        raise NotImplementedError
+
+    def residuals(self, point: Point) -> list[Parts]:
+        """(residuals (C, rows), slopes (C, rows, U), (U,) the index of each slope among the parameters and states) of
+        every piece."""
+        raise NotImplementedError
+
+    def parts(self, point: Point) -> Iterable[Parts]:
+        """The same, one piece after the other."""
+        return self.residuals(point)
+
+    def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
+        """What the residuals of every piece add up to; see kernel/march.py."""
+        columns, count = self.problem.columns, len(self.problem.parameters)
+        return [
+            added(piece, columns, parts, weighting, count)
+            for piece, parts in zip(self.problem.pieces, self.parts(point), strict=True)
+        ]
+
+    @property
+    def unfiltered(self) -> Engine[P]:
+        """The engine that simulates, whose rows are as they are."""
+        return self
+
+    def with_levels(self, levels: Mapping[str, float]) -> Self:
+        """The same engine with these levels of breakaway, key -> [N], about yaw [N m]; 0 follows coulomb. All others
+        stay as the robot has them."""
+        raise NotImplementedError
+
+    def drives(self, point: Point) -> list[FloatArray]:
+        """Drive of the axes [N, N, N m] in every row of every piece but the last, shape (rows, 3)."""
+        raise NotImplementedError
+
+    def meets_limit(self, point: Point) -> bool:
+        """Whether a run may come near the voltage limit, where the integral of a loop stands still, at any row."""
+        return True
+
+
+def added(piece: Piece, every: tuple[Column, ...], parts: Parts, weighting: Weighting, count: int) -> PieceSums:
+    """The sums of kernel/march.py for a piece of a problem with the columns `every` and `count` parameters.
+
+    parts: residuals (C, rows), slopes (C, rows, U) and (U,) the index of each slope among the parameters and states.
+    """
+    residual, slopes, at = parts
+    columns, width = piece.record.columns, count + N_AXES + len(piece.record.columns)
+    known = np.array([every.index(column) for column in columns])
+    there = np.isfinite(residual) & np.isfinite(slopes).all(axis=2)  # at a kink a slope may not be a number
+    r, j = residual, slopes
+    if not there.all():
+        r, j = np.where(there, residual, np.nan), np.where(there[:, :, None], slopes, 0.0)
+    variance, final = weighting.variance[known], bool(weighting.mode & FINAL)
+    tick = np.array(piece.record.ticks) if weighting.counted and any(piece.record.ticks) else None
+    share = np.ones(len(known)) if tick is None else information(variance, tick)[0]
+    pull, square, curvature, rho = row_terms(r, variance, weighting.nu, tick, share, final)
+    grad, info = np.zeros((len(r), width)), np.zeros((len(r), width, width))
+    grad[:, at] = np.einsum("ck,cku->cu", pull, j)
+    info[:, at[:, None], at] = row_squares(j, curvature)
+    score, drift = np.zeros((0, width)), np.zeros((0, len(r)))
+    if final:
+        starts = np.arange(0, r.shape[1], weighting.block)
+        score = np.zeros((len(starts), width))
+        score[:, at] = np.add.reduceat(np.einsum("ck,cku->ku", pull / variance[:, None], j), starts, axis=0)
+        drift = np.add.reduceat(pull.T, starts, axis=0)
+    waves = None
+    if weighting.mode & WAVES:
+        waves = np.zeros((len(r), HARMONICS, 2, width))
+        if tick is not None:
+            shown = piece.record.outputs[piece.first : piece.last + 1].T - r
+            waves[..., at] = row_waves(j, shown / np.where(tick > 0.0, tick, np.nan)[:, None], HARMONICS)
+    lag = (pull[:, 1:] * pull[:, :-1]).sum(axis=1)
+    return PieceSums(
+        known, there.sum(axis=1).astype(float), square.sum(axis=1), rho.sum(axis=1), lag, grad, info, score, drift,
+        waves,
+    )  # fmt: skip
+
+
+# The driver of a problem: what is free of it and what is not
+
+LATE = "latency."
+
+
+def driver_of(problem: Problem, values: FloatArray) -> tuple[Driver, list[int]]:
+    """(the driver at these values, index of each of its numbers among the parameters or -1)."""
+    where = [problem.where(name) for name in Driver._fields]
+    plain = Driver(dead_band=problem.robot.drive.dead_band)
+    return Driver(*(float(values[k]) if k >= 0 else own for k, own in zip(where, plain, strict=True))), where
+
+
+def late_by(problem: Problem, values: FloatArray, columns: Sequence[Column]) -> tuple[list[float], list[int]]:
+    """(by how much each column is late [s], index of that among the parameters or -1: as late as the robot's drive)."""
+    where = [problem.where(LATE + name) for name, _ in columns]
+    return [float(values[k]) if k >= 0 else problem.robot.drive.latency for k in where], where
+
+
+# What rows that were simulated before add up to; apart from the engines, so that few edits compile it anew
+
+
+@kernel
+def row_terms(residual, variance, nu, tick, share, final):
+    """(w r, w r^2, curvature, rho) of every residual (C, rows), see kernel/march.py; 0 where it is NaN."""
+    columns, rows = residual.shape
+    out = np.zeros((4, columns, rows))
+    for c in range(columns):
+        for k in range(rows):
+            if residual[c, k] == residual[c, k]:
+                pull, square, curvature, rho = terms_of(residual[c, k], variance, nu, c, tick, share, final)
+                out[0, c, k], out[1, c, k], out[2, c, k], out[3, c, k] = pull, square, curvature, rho
+    return out
+
+
+@kernel
+def row_waves(slopes, turns, count):
+    """Sum over the rows of (cos, sin)(2 pi m turns) J, m = 1 to `count`; turns (C, rows), NaN where there is none."""
+    columns, rows, width = slopes.shape
+    out = np.zeros((columns, count, 2, width))
+    for c in range(columns):
+        for k in range(rows):
+            if turns[c, k] == turns[c, k]:
+                add_waves(out[c], slopes[c, k], turns[c, k])
+    return out
+
+
+@kernel
+def row_squares(slopes, weight):
+    """Sum over the rows of weight J J'. Shapes (C, rows, U), (C, rows) -> (C, U, U)."""
+    columns, rows, count = slopes.shape
+    out = np.zeros((columns, count, count))
+    for c in range(columns):
+        for k in range(rows):
+            for a in range(count):
+                pulled = weight[c, k] * slopes[c, k, a]
+                for b in range(a + 1):
+                    out[c, a, b] += pulled * slopes[c, k, b]
+        for a in range(count):
+            for b in range(a):
+                out[c, b, a] = out[c, a, b]
+    return out

@@ -1,0 +1,153 @@
+"""Numbers of which one is never below another, both free: breakaway and Coulomb friction.
+
+Where S is pushed against C it stands there, and goes with C: a step of C is one of both.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.identification.output_error.engines.engine import LATE
+from omnidyn.identification.output_error.problem.friction_laws import APART, coulomb_below
+from omnidyn.identification.output_error.problem.parameters import AT
+from omnidyn.identification.output_error.problem.problem import Fitted
+from omnidyn.model.keys import BREAKAWAY, find_key
+
+MEET = 1e-12  # relative: nearer than this, S stands at its bound
+
+
+class Order:
+    """Pairs (S, C) of the parameters of a problem: S >= APART C."""
+
+    def __init__(self, problem: Fitted):
+        names = [p.name for p in problem.parameters]
+        self.pairs: list[tuple[int, int]] = []
+        for k, name in enumerate(names):
+            key = find_key(name.partition(AT)[0])
+            if key is not None and key.level == BREAKAWAY:
+                below = coulomb_below(name), coulomb_below(name).replace("_backward", "")
+                self.pairs += [(k, names.index(own)) for own in below if own in names][:1]
+
+    def kept(self, inner: FloatArray) -> FloatArray:
+        """The same numbers (P,), S raised where it is below C; in place."""
+        for s, c in self.pairs:
+            inner[s] = max(inner[s], APART * inner[c])
+        return inner
+
+    def at_bound(self, inner: FloatArray, gradient: FloatArray) -> BoolArray:
+        """Which S stand at C and are pushed against it."""
+        held = np.zeros(len(inner), bool)
+        for s, c in self.pairs:
+            held[s] = inner[s] <= APART * inner[c] * (1.0 + MEET) and gradient[s] < 0.0
+        return held
+
+    def together(self, inner: FloatArray, still: BoolArray) -> FloatArray:
+        """T (P, P): the step is T times that of what is not still, so that S goes with C; else the identity."""
+        fold = np.eye(len(inner))
+        for s, c in self.pairs:
+            if still[s] and inner[s] <= APART * inner[c] * (1.0 + MEET):
+                fold[s, c] = APART
+        return fold
+
+
+# Latencies at which a likelihood has an edge, which no descent by slopes gets across
+#
+# A current follows the voltage at once, so that its latency meets a jump at every row. What follows the current meets a
+# kink there: where the log has no latency, the floor of a valley.
+
+CURRENT = f"{LATE}current"
+ENOUGH_ROWS = 500  # for their median
+
+
+class Edges:
+    """Which parameters of a problem meet edges, and where."""
+
+    def __init__(self, problem: Fitted):
+        names = [p.name.partition("@")[0] for p in problem.parameters]
+        jumps, late = (np.array([name.startswith(own) for name in names], bool) for own in (CURRENT, LATE))
+        self._kinds, self._kinks = (jumps, late), late & ~jumps
+        self._row = _row(problem) if late.any() else 0.0
+
+    def not_yet(self, still: BoolArray) -> BoolArray | None:
+        """Parameters of the gravest kind that are not all `still`; None where there are none."""
+        return next((kind for kind in self._kinds if (kind & ~still).any()), None)
+
+    def onto(self, inner: FloatArray, then: FloatArray, still: BoolArray) -> FloatArray:
+        """The step (P,) of what is to stand still from now on: 0, or onto the first kink on the way to `then`."""
+        step = np.zeros_like(inner)
+        for j in np.flatnonzero(self._kinks & ~still) if self._row else ():
+            up = then[j] > inner[j]
+            kink = self._row * (np.floor(inner[j] / self._row) + 1.0 if up else np.ceil(inner[j] / self._row) - 1.0)
+            if inner[j] < kink < then[j] or then[j] < kink < inner[j]:
+                step[j] = kink - inner[j]
+        return step
+
+
+def _row(problem: Fitted) -> float:
+    """The usual time from row to row [s]; 0 where there is none."""
+    piece = next(iter(problem.pieces), None)
+    return piece.record.step_of(slice(piece.first, min(piece.last, piece.first + ENOUGH_ROWS) + 1)) if piece else 0.0
+
+
+# What Gauss-Newton does not see of a likelihood: residuals that are no noise bend it, and its steps come out short
+#
+# The information of least squares leaves out the second derivatives of the model, each times a residual. Where a model
+# misses something these are large, and all of one sign: steps then cover the same share of the way each time, which
+# takes
+# a dozen of them. The gradients at both ends of a step tell what was left out along it. It is learnt by symmetric
+# updates
+# of rank one (J. E. Dennis, D. M. Gay, R. E. Welsch, ACM Trans. Math. Softw. 7, 348 (1981), keep such a matrix beside
+# that of Gauss-Newton; the update is that of A. R. Conn, N. I. M. Gould, P. L. Toint, Math. Program. 50, 177 (1991)).
+
+FLAT, STEEP = -0.8, 3.0  # times the information along any way: what a step is told of a bend lies between
+ALONG = 1e-6  # a change of the gradient that has less than this share along the step says nothing
+UNSEEN = 1e-13  # of the largest information: ways with less are none
+
+
+class Bend:
+    """Learns from step to step. matrix (P, P): the Hessian less the information; 0 for what is not known."""
+
+    def __init__(self, count: int):
+        self._matrix = np.zeros((count, count))
+        self._last: tuple[FloatArray, FloatArray] | None = None
+        self.known = False
+
+    def learn(self, inner: FloatArray, gradient: FloatArray, information: FloatArray) -> None:
+        """From the way to the numbers `inner` (P,) from where it was last; gradient (P,): downhill there."""
+        last, self._last = self._last, (inner, gradient)
+        if last is None:
+            return
+        step = inner - last[0]
+        missing = np.where(step != 0.0, last[1] - gradient - (information + self._matrix) @ step, 0.0)
+        along, size = float(missing @ step), _size(information)
+        if abs(along) > ALONG * float(np.linalg.norm(missing / size) * np.linalg.norm(step * size)):
+            self._matrix += np.outer(missing, missing) / along
+            self.known = True
+
+    def forget(self) -> None:
+        """What was learnt led astray: there was a kink on the way."""
+        self._matrix[:] = 0.0
+        self.known = False
+
+    def beside(self, information: FloatArray, still: BoolArray) -> FloatArray:
+        """What to add to an information (P, P), `still` ones left out: the whole stays positive, and no step wild."""
+        found = np.zeros_like(self._matrix)
+        free = np.flatnonzero(~still)
+        if not self.known or not free.size:
+            return found
+        own = np.ix_(free, free)
+        size = _size(information)[free]
+        values, ways = np.linalg.eigh(information[own] / np.outer(size, size))
+        seen = values > UNSEEN * max(float(values.max()), 0.0)
+        root, back = ways[:, seen] * np.sqrt(values[seen]), ways[:, seen] / np.sqrt(values[seen])
+        shares, axes = np.linalg.eigh(back.T @ (self._matrix[own] / np.outer(size, size)) @ back)
+        turned = (root @ axes) * size[:, None]
+        found[own] = (turned * np.clip(shares, FLAT, STEEP)) @ turned.T
+        return found
+
+
+def _size(information: FloatArray) -> FloatArray:
+    """The units in which an information has 1 on its diagonal, 1 for what is not seen."""
+    size = np.sqrt(np.maximum(information.diagonal(), 0.0))
+    return np.where(size > 0.0, size, 1.0)

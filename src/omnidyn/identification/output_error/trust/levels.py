@@ -1,0 +1,155 @@
+"""Levels of which a log tells only what they are together: how far one may rise while others fall for it.
+
+Starts along one slant tell one number of the two sides of an ellipse. F is then a narrow ridge, tenths of a percent
+wide, along which one side rises and the other falls: none finds it who moves one side at a time. So one level is q s
+times what it was and the others are s / q times that, and q is walked outwards. Of an ellipse the ridge is
+s^2 = A / q^2 + B q^2: its next point is known from the last ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+FIRST = (0.94, 0.97, 0.99, 0.997, 1.0, 1.003, 1.01, 1.03, 1.06)  # s to begin with, at q = 1
+LEAST, MOST = 0.005, 0.08  # steps of the logarithm of q
+ROW = 9  # values of s at each q
+NARROW, WIDER = 0.003, 1.5  # how far they reach at least, and in shares of how far the last likely ones did
+ANEW = 0.02  # steps of q that are so small try twice as many, twice as far, before the ridge ends there
+
+
+class Place(NamedTuple):
+    """One level q s times what it was, the others s / q times."""
+
+    q: float
+    s: float
+
+
+class Walk(NamedTuple):
+    """Where likely levels lie between, and the last ones of a direction in which they went out of bounds."""
+
+    edges: list[Place]
+    gone: list[Place]
+
+
+def trade(cost: Callable[[Place], float], limit: float, inside: Callable[[Place], bool]) -> Walk:
+    """Walk the ridge both ways, as long as what is within `limit` of the least cost is `inside`."""
+    row = dict[float, float]()
+
+    def of(s: float) -> float:
+        row[s] = cost(Place(1.0, s))
+        return row[s]
+
+    likely_levels(of, FIRST, limit)
+    start, walk = _Row(1.0, row), Walk([], [])
+    for way in (1.0, -1.0):
+        _outwards(cost, limit, inside, start, way, walk)
+    return walk
+
+
+class _Row:
+    """What each s costs at one q."""
+
+    def __init__(self, q: float, cost: dict[float, float]):
+        self.q, self.s = q, sorted(cost)
+        self.cost = [cost[s] for s in self.s]
+
+    def likely(self, most: float) -> tuple[int, int] | None:
+        """Index of the first and of the last s that costs no more; None where none does."""
+        found = [k for k, each in enumerate(self.cost) if each <= most]
+        return (found[0], found[-1]) if found else None
+
+    def middle(self, most: float) -> tuple[float, float]:
+        """(the middle of the likely s, how far they reach from it as a share); the best s and 0 where none is."""
+        low, high = self.likely(most) or (int(np.argmin(self.cost)),) * 2
+        return float(np.sqrt(self.s[low] * self.s[high])), float(np.sqrt(self.s[high] / self.s[low]) - 1.0)
+
+
+def _outwards(
+    cost: Callable[[Place], float], limit: float, inside: Callable[[Place], bool], start: _Row, way: float, walk: Walk,
+) -> None:  # fmt: skip
+    rows, step, most = [start], LEAST, min(start.cost) + limit
+    beyond: list[Place] = []
+    while step >= LEAST:
+        q = float(rows[-1].q * np.exp(way * step))
+        s, reach = _next(rows, q, most)
+        row = _row(cost, q, s, reach, ROW)
+        most = min(most, min(row.cost) + limit)
+        if row.likely(most) is None and step <= ANEW:
+            row = _row(cost, q, s, 2.0 * reach, 2 * ROW)
+            most = min(most, min(row.cost) + limit)
+        if row.likely(most) is None:
+            beyond, step = [Place(q, row.s[0]), Place(q, row.s[-1])], 0.5 * step
+            continue
+        beyond, step = [], min(2.0 * step, MOST)
+        rows.append(row)
+        if not inside(here := Place(q, row.middle(most)[0])):
+            walk.gone.append(here)
+            break
+    walk.edges.extend(beyond)
+    for row in rows:
+        for k in row.likely(most) or ():
+            walk.edges.extend(Place(row.q, row.s[j]) for j in (max(k - 1, 0), min(k + 1, len(row.s) - 1)))
+
+
+def _row(cost: Callable[[Place], float], q: float, s: float, reach: float, count: int) -> _Row:
+    grid = (s * (1.0 + reach * np.linspace(-1.0, 1.0, count))).tolist()
+    return _Row(q, {each: cost(Place(q, each)) for each in grid})
+
+
+def _next(rows: list[_Row], q: float, most: float) -> tuple[float, float]:
+    """(s at the next q, as the ellipse through the first and the last row has it; how far to look from it)."""
+    likely = [row for row in rows if row.likely(most)] or rows[:1]
+    (first, _), (last, wide) = likely[0].middle(most), likely[-1].middle(most)
+    reach = max(NARROW, WIDER * wide)
+    if len(likely) == 1:
+        return first, reach + abs(float(np.log(q / likely[0].q)))
+    sides = np.array([[row.q**-2.0, row.q**2.0] for row in (likely[0], likely[-1])])
+    a, b = np.linalg.solve(sides, [first**2, last**2])
+    square = a / q**2 + b * q**2
+    return (float(np.sqrt(square)) if square > 0.0 else last), reach
+
+
+# Which levels are likely, of a number at which a fit jumps: a search that counts its fits
+#
+# Each level costs a fit, so none is tried twice: first a grid, until it gets hopeless; then between the best and its
+# neighbours; then where likely ends, either way. What is returned as an end is a level that was found unlikely.
+
+HOPELESS, IN_A_ROW = 50.0, 4  # beyond the least cost, times the limit, that so many levels of a grid in a row are
+ROUNDS = 3  # in which the gaps beside the best level are halved
+FINEST = 0.005  # relative width of the gap in which likely ends, at which it is found
+HALVINGS = 12  # times that gaps are halved, of up to four levels each
+
+
+def likely_levels(cost: Callable[[float], float], grid: Sequence[float], limit: float) -> tuple[float, float, float]:
+    """(best, low, high): the level of the least cost, and the ends of those within `limit` of it.
+
+    grid: levels > 0 to begin with, increasing. low: its first level where that is likely; high: infinite where its
+    last one is.
+    """
+    known: dict[float, float] = {}
+    for level in grid:
+        known[level] = cost(level)
+        beyond = list(known.values())[-IN_A_ROW:]
+        if len(beyond) == IN_A_ROW and min(beyond) > min(known.values()) + HOPELESS * limit:
+            break
+    for k in range(HALVINGS):
+        best, likely = _likely(known, limit)
+        gaps = [(a, b) for a, b in pairwise(sorted(known)) if b / a > 1.0 + FINEST]
+        wide = [(a, b) for a, b in gaps if a == likely[-1] or b == likely[0] or (best in (a, b) and k < ROUNDS)]
+        if not wide:
+            break
+        for a, b in wide:
+            known[middle] = cost(middle := float(np.sqrt(a * b)))
+    best, likely = _likely(known, limit)
+    below, above = ([x for x in known if x < likely[0]], [x for x in known if x > likely[-1]])
+    return best, max(below, default=likely[0]), min(above, default=np.inf)
+
+
+def _likely(known: dict[float, float], limit: float) -> tuple[float, list[float]]:
+    """(the level of the least cost, those within `limit` of it)."""
+    best = min(known, key=lambda level: known[level])
+    return best, sorted(level for level in known if known[level] <= known[best] + limit)

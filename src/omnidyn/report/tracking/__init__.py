@@ -1,1 +1,0 @@
-"""What closed loops look like: pictures (path, errors, voltages), animation (a GIF), page (all of it)."""
