@@ -24,7 +24,7 @@ ALLOWED = {
     "identification/output_error/problem/differences.py": (4, "a run in the rows of its wheels"),
     "identification/output_error/problem/heading.py": (1, "an integral over all rows, each filled"),
     "identification/output_error/memory/whitened.py": (2, "rows of one output"),
-    "identification/motors/static.py": (1, "a log in the rows of its motors"),
+    "identification/motors/start.py": (1, "a log in the rows of its motors"),
     "identification/output_error/linear/sensitivity.py": (1, "not asked of clocks of their own"),
     "identification/structure/windows.py": (1, "the rows between which a command holds"),
     "identification/output_error/linear/motion.py": (4, "steps of the simulation, which stops at every row"),

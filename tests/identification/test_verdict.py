@@ -12,7 +12,7 @@ from omnidyn.findings.finding import Finding, Verdict
 from omnidyn.identification.estimate import Correlation, Estimate
 from omnidyn.identification.identify import Identification, identify
 from omnidyn.identification.methods import OutputError
-from omnidyn.identification.motors.verdict import motors_verdict
+from omnidyn.identification.motors.study import motors_verdict
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.verdict import fit_verdict, fits_verdict, steady_verdict
 from omnidyn.model.keys import BOX

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks import real_fit, udea
-from omnidyn.identification.motors.choice import choose_motor
+from omnidyn.identification.motors.choice import choose_motor, fit_rmse
 from omnidyn.identification.motors.fit import fit_motor
-from omnidyn.identification.motors.free_run import fit_rmse
 from tests.support import real_logs as logs
 
 TURN = 2.0 * np.pi

@@ -9,8 +9,7 @@ from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import MotorLine, SteadyState
 from omnidyn.identification.steady.line import fit_line
 from omnidyn.identification.steady.operating_points import force_points
-from omnidyn.identification.steady.shape_fit import fit_shape, rms_and_error
-from omnidyn.identification.steady.shapes import SHAPES
+from omnidyn.identification.steady.shapes import SHAPES, fit_shape, rms_and_error
 from omnidyn.model.robot_file import load_robot
 from tests.support import real_logs as logs
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from omnidyn.findings.needs import why_no_inputs
 from omnidyn.identification.methods import OUTPUT_ERROR, STEADY_STATE, Method, OutputError, SteadyState
-from omnidyn.identification.steady.settling import why_no_transient
+from omnidyn.identification.steady.operating_points import why_no_transient
 from omnidyn.model.motor import DUTY, SPEED, VOLTAGE
 from omnidyn.model.robot import MEASURED, Prior, Robot
 from omnidyn.progress import Progress, Report

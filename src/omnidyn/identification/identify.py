@@ -36,11 +36,9 @@ from omnidyn.identification.methods import QUICK as QUICKLY
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import WHOLE, Fit
 from omnidyn.identification.output_error.solve.progress import FitProgress
-from omnidyn.identification.steady.axis_lines import identify_lines
-from omnidyn.identification.steady.steady_state import fit_steady_state
+from omnidyn.identification.steady.steady_state import fit_steady_state, identify_lines
 from omnidyn.identification.steady.study import diagnosed, fit_steady, undiagnosed
-from omnidyn.identification.steady.study_parts import Difference
-from omnidyn.identification.steady.study_table import SteadyStudy
+from omnidyn.identification.steady.study_table import Difference, SteadyStudy
 from omnidyn.identification.validation import Validation, validate
 from omnidyn.identification.verdict import (
     fit_failure,

@@ -104,7 +104,7 @@ def steady_verdict(study: SteadyStudy) -> list[Statement]:
         "levels": tuple(each.mean for each in study.travel.values()), "groups": tuple(study.travel),
         "shapes": Statement("shapes", NOTE, numbers=shapes), "share": share,
         "ties": tuple(each.name for each in study.choice.scores if not each.told_apart and each.name != score.name),
-        "misfit": bool(lacks), "cause": next((str(r.words) for each in lacks for r in each.remedies), ""),
+        "misfit": bool(lacks), "cause": next((str(r.cause) for each in lacks for r in each.remedies), ""),
         "known": lines_verdict(study.estimates)[0],
     })  # fmt: skip
     changes = tuple(each.short() for each in study.moments)

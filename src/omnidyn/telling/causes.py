@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from omnidyn.document import all_of, short
+from omnidyn.identification.steady.lack_of_fit import TURNED_DEG
 from omnidyn.model.keys import BODY_AXES, DIRECTION, find_key, in_words, unit
 from omnidyn.statement import Statement
 from omnidyn.telling.sentence import Sentence
@@ -14,6 +15,15 @@ UNOFFERED = {
     "sag": "a supply that sags under load",
     "heat": "motors that weaken as they warm up",
     "filter": "speeds that went through a filter",
+    **{
+        f"box turned by {angle:.0f} deg": f"a box turned by {angle:.0f} degrees against the body"
+        for angle in TURNED_DEG
+    },
+    "rollers": "friction along the axles of the wheels, where the rollers turn",
+    "forward and backward": "another level forward than backward",
+    "left and right": "another level to the left than to the right",
+    "pull": "a constant pull, by a floor that is not level or an offset of sensors",
+    "turning left and right": "another level turning left than right",
 }
 NO_REST = 1e-3  # of what a number was, below which nothing is left of it
 SHAPES = {DIRECTION: "an ellipse", BODY_AXES: "a box"}

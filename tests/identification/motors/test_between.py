@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from omnidyn.identification.motors.between import SUB, refined
+from omnidyn.identification.motors.choice import fit_rmse, run_motor
 from omnidyn.identification.motors.fit import fit_motor
-from omnidyn.identification.motors.free_run import fit_rmse, run_motor
+from omnidyn.identification.motors.log import SUB, refined
 from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run
 from tests.support.codes import codes

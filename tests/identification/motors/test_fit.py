@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.motors.between import HOLD
-from omnidyn.identification.motors.choice import WAYS, choose_motor
-from omnidyn.identification.motors.engine import step_numbers
+from omnidyn.identification.motors.choice import WAYS, choose_motor, fit_rmse, run_motor
 from omnidyn.identification.motors.fit import fit_motor
-from omnidyn.identification.motors.free_run import fit_rmse, run_motor
+from omnidyn.identification.motors.log import HOLD
+from omnidyn.identification.motors.problem import step_numbers
 from omnidyn.run import Run
 
 SLOPE, BAND, LAG = 0.5, 0.4, 0.05

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InsufficientDataError
-from omnidyn.identification.steady.axis_lines import identify_lines
+from omnidyn.identification.steady.steady_state import identify_lines
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 from tests.support.steady_logs import spoiled, steady_voltage

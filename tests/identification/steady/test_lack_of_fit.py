@@ -16,16 +16,16 @@ def test_a_shape_that_is_not_offered_is_noticed_and_named(world):
     assert lack.found
     best = lack.remedies[0]
     assert world in (best.key, *best.same_as)
-    assert best.error < 0.5 * best.error_before
-    assert lack.share > 0.5
-    assert any(best.words == warning.numbers["with"] for warning in found.warnings if warning.code == "no_shape_fits")
+    assert best.force.after < 0.5 * best.force.before
+    assert lack.channels["force"] > 0.5
+    assert any(best.cause == warning.numbers["with"] for warning in found.warnings if warning.code == "no_shape_fits")
 
 
 @pytest.mark.parametrize("world", [*OFFERED])
 def test_nothing_is_invented_where_a_shape_fits(world):
     found = study(world, 0)
     assert not found.lack_of_fit["all"].found
-    assert found.lack_of_fit["all"].tested
+    assert found.lack_of_fit["all"].tried
     assert "no_lack_of_fit" in codes(found.statements)
 
 
@@ -33,12 +33,12 @@ def test_errors_that_repeat_tell_by_themselves():
     """Three speeds in each direction; what is wrong needs no name then."""
     lack = study("rollers", 1, speeds=(0.2, 0.3, 0.4)).lack_of_fit["all"]
     assert lack.found
-    assert REPEATS in lack.tested
+    assert REPEATS in lack.tried
 
 
 def test_too_few_directions_are_not_tested_and_it_says_so():
     found = study("disc", 0, step=60)
-    assert found.lack_of_fit["all"].tested == ()
+    assert found.lack_of_fit["all"].tried == ()
     assert "fit_not_tested" in codes(found.statements)
 
 
@@ -50,8 +50,8 @@ def test_an_estimate_tells_it_as_that_of_whole_logs_does():
     assert 0.0 < lack.channels["force"] <= 1.0
     assert lack.remedies[0].key == "rollers"
     assert not lack.remedies[0].offered
-    best = one.lack_of_fit["all"].remedies[0]
-    assert lack.remedies[0].gain == pytest.approx(1.0 - (best.error / best.error_before) ** 2)
+    force = lack.remedies[0].force
+    assert lack.remedies[0].gain == pytest.approx(1.0 - (force.after / force.before) ** 2)
     assert not study("box", 0).estimate.lack_of_fit.found
 
 

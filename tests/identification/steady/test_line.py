@@ -26,7 +26,7 @@ def test_weights_are_those_of_a_scaled_least_squares():
     design = np.stack([SPEED, np.sign(SPEED)], axis=1) / std[:, None]
     solution, square, *_ = np.linalg.lstsq(design, force / std)
     covariance = np.linalg.inv(design.T @ design)
-    assert line.estimate == pytest.approx(solution, rel=1e-10)
+    assert line.level == pytest.approx(solution, rel=1e-10)
     assert line.covariance == pytest.approx(covariance * square[0] / 5, rel=1e-9)
     assert line.reduced_chi2 == pytest.approx(square[0] / 5, rel=1e-9)
     assert line.quantile == stats.t.ppf(0.975, 5)
@@ -38,7 +38,7 @@ def test_weights_are_those_of_a_scaled_least_squares():
 def test_weights_that_are_all_equal_change_nothing():
     force = truth(SPEED) + 0.1 * np.random.default_rng(4).standard_normal(7)
     plain, weighted = fit_line(SPEED, force), fit_line(SPEED, force, None, np.full(7, 0.03))
-    assert weighted.estimate == pytest.approx(plain.estimate, rel=1e-10)
+    assert weighted.level == pytest.approx(plain.level, rel=1e-10)
     assert weighted.ci95 == pytest.approx(plain.ci95, rel=1e-9)
 
 
@@ -55,7 +55,7 @@ def test_speed_std_minimises_the_effective_variance():
 
     best = optimize.minimize(cost, [1.0, 2.0], method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-14})
     assert line.converged
-    assert line.estimate == pytest.approx(best.x, rel=1e-6)
+    assert line.level == pytest.approx(best.x, rel=1e-6)
 
     def misfit(p):
         true_speed = p[2:]
@@ -65,7 +65,7 @@ def test_speed_std_minimises_the_effective_variance():
         return p[0] * true_speed + p[1] * np.sign(speed)
 
     result = optimize.least_squares(misfit, [1.0, 2.0, *speed], xtol=1e-15, ftol=1e-15, gtol=1e-15)
-    assert line.estimate == pytest.approx(result.x[:2], rel=1e-6)
+    assert line.level == pytest.approx(result.x[:2], rel=1e-6)
 
 
 def coverage(make, absolute=False, draws=DRAWS):
@@ -134,8 +134,8 @@ def test_noisy_speeds_do_not_flatten_the_slope():
     measured, force = speed + 0.1 * random.standard_normal(20000), truth(speed) + 0.05 * random.standard_normal(20000)
     plain = fit_line(measured, force)
     right = fit_line(measured, force, np.full(20000, 0.1), np.full(20000, 0.05))
-    assert plain.estimate[0] == pytest.approx(B / (1 + 0.01 * 12), rel=0.01)  # variance of the speeds: 1/12
-    assert right.estimate[0] == pytest.approx(B, rel=0.01)
+    assert plain.level[0] == pytest.approx(B / (1 + 0.01 * 12), rel=0.01)  # variance of the speeds: 1/12
+    assert right.level[0] == pytest.approx(B, rel=0.01)
 
 
 # ---- bounds ---------------------------------------------------------------------------------------------
@@ -144,9 +144,9 @@ def test_noisy_speeds_do_not_flatten_the_slope():
 def test_a_falling_line_has_no_negative_viscous_friction():
     speed, force = np.array([0.2, 0.5, 0.8, 1.1]), np.array([2.4, 2.3, 2.3, 2.1])
     line = fit_line(speed, force)
-    assert line.at_bound == (True, False)
+    assert line.at_bound.tolist() == [True, False]
     assert line.free[0] == pytest.approx(stats.linregress(speed, force).slope, rel=1e-10)
-    assert line.estimate == pytest.approx([0.0, force.mean()], rel=1e-12)
+    assert line.level == pytest.approx([0.0, force.mean()], rel=1e-12)
     half = line.quantile * line.std
     assert line.ci95[0].tolist() == [0.0, half[0]]
     assert line.ci95[1] == pytest.approx([min(line.free[1] - half[1], 2.275), line.free[1] + half[1]])
@@ -155,14 +155,14 @@ def test_a_falling_line_has_no_negative_viscous_friction():
 def test_a_steep_line_has_no_negative_coulomb_friction():
     speed, force = np.array([0.2, 0.5, 0.8, 1.1]), np.array([0.1, 0.52, 0.9, 1.35])
     line = fit_line(speed, force)
-    assert line.at_bound == (False, True)
-    assert line.estimate == pytest.approx([speed @ force / (speed @ speed), 0.0], rel=1e-12)
+    assert line.at_bound.tolist() == [False, True]
+    assert line.level == pytest.approx([speed @ force / (speed @ speed), 0.0], rel=1e-12)
 
 
 def test_forces_of_the_wrong_sign_leave_no_friction():
     line = fit_line(np.array([0.2, 0.5, 0.8]), np.array([-0.1, -0.3, -0.3]))
-    assert line.estimate.tolist() == [0.0, 0.0]
-    assert line.at_bound == (True, True)
+    assert line.level.tolist() == [0.0, 0.0]
+    assert line.at_bound.tolist() == [True, True]
 
 
 def test_at_a_bound_the_intervals_still_cover():
@@ -188,9 +188,9 @@ def test_the_bounded_line_is_the_best_within_the_bounds(points):
     design = np.stack([speed, np.sign(speed)], axis=1) / std[:, None]
     expected, _ = optimize.nnls(design, force / std)
     size = np.linalg.norm(force / std)
-    assert np.linalg.norm(design @ (line.estimate - expected)) <= 1e-6 * size + 1e-12
-    assert (line.ci95[:, 0] <= line.estimate).all()
-    assert (line.estimate <= line.ci95[:, 1]).all()
+    assert np.linalg.norm(design @ (line.level - expected)) <= 1e-6 * size + 1e-12
+    assert (line.ci95[:, 0] <= line.level).all()
+    assert (line.level <= line.ci95[:, 1]).all()
 
 
 @given(rows, st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))

@@ -113,7 +113,7 @@ def test_a_change_is_told_first_and_the_shape_fits_on_both_sides_of_it(shape):
     assert study is not None
     assert [moment.shape for moment in study.moments] == [study.choice.chosen]
     assert not study.lack_of_fit["all"].found
-    assert study.lack_of_fit["all"].tested
+    assert study.lack_of_fit["all"].tried
     assert any(one.numbers["changes"] for one in study.statements if one.code == "no_lack_of_fit")
     assert found.verdict.startswith("The force of friction changes within a run (+2")
     assert "no offered shape fits" not in found.verdict

@@ -8,8 +8,7 @@ from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import SteadyState
 from omnidyn.identification.steady.choice import choose_shape
 from omnidyn.identification.steady.operating_points import force_points
-from omnidyn.identification.steady.shape_fit import fit_shape
-from omnidyn.identification.steady.shapes import SHAPES
+from omnidyn.identification.steady.shapes import SHAPES, fit_shape
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
 from omnidyn.run import Run

@@ -3,18 +3,63 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
 
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InsufficientDataError, OmnidynError
-from omnidyn.identification.motors.between import CURVE, HOLD, MEAN
-from omnidyn.identification.motors.estimate import MotorEstimate
-from omnidyn.identification.motors.fit import fit_motor
-from omnidyn.identification.motors.free_run import fit_rmse
+from omnidyn.identification.motors.estimate import BAND, MotorEstimate
+from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
+from omnidyn.identification.motors.log import CURVE, HOLD, MEAN, SUB
+from omnidyn.identification.motors.problem import SPEED, MotorEngine, motor_problem, motor_record
+from omnidyn.identification.output_error.problem.record import SHORTEST
+from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.run import Run, as_list
+
+
+def run_motor(fit: MotorEstimate, runs: Run | Sequence[Run]) -> list[FloatArray]:
+    """Free runs of a fitted motor under the inputs of other logs: its speed [rad/s], shape (rows,) each.
+
+    Each piece starts at the measured speed, or by the slope of the angle where no speed is logged; NaN outside of the
+    pieces. Latencies are included.
+    """
+    assert fit.motor is not None
+    logs = [
+        replace(log, speed=log.motion if log.speed is None and len(log.t) >= SHORTEST else log.speed)
+        for log in logs_of_free_runs(runs, fit.kind)
+    ]  # fmt: skip
+    records = [motor_record(log, fit.motor, fit.between, angle=False) for log in logs]
+    problem = motor_problem(records, BAND in fit.value, bool(fit.late))
+    late = fit.value.get(f"latency.{SPEED[0]}", next(iter(fit.late.values()), 0.0))
+    values = [fit.value.get(name, late) for name in problem.names]
+    point = replace(problem.start(), values=np.array(values))
+    found = {id(r): np.full(len(r.t), np.nan) for r in records}
+    for piece, (predicted, _) in zip(problem.pieces, MotorEngine(problem).outputs(point), strict=True):
+        rows = slice(piece.first, piece.last + 1)
+        found[id(piece.record)][rows] = predicted[rows, 0]
+    return [speed[:: SUB if fit.between == CURVE else 1] for speed in found.values()]
+
+
+def fit_rmse(fit: MotorEstimate, runs: Run | Sequence[Run]) -> float:
+    """Root mean square error of the speed [rad/s] of free runs beside logs; NaN where none has a speed.
+
+    Rows whose input the log does not resolve do not count.
+    """
+    every = as_list(runs)
+    errors = [
+        (ours - run.wheel_speed[:, fit.motor])[~unresolved_rows(getattr(run, fit.kind)[:, fit.motor])]
+        for ours, run in zip(run_motor(fit, every), every, strict=True)
+        if run.wheel_speed is not None
+    ]  # fmt: skip
+    known = np.concatenate(errors) if errors else np.zeros(0)
+    known = known[np.isfinite(known)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
+
+
+# ---- the way that best predicts logs left out
 
 TIE = 0.01  # relative difference of errors that does not pay for one more number
 SHARES = 4  # parts in time of a single log
@@ -86,10 +131,9 @@ def _folds(runs: Sequence[Run]) -> Iterator[tuple[list[Run], Run]]:
     parts = list(runs)
     if len(runs) == 1:
         edges = np.linspace(0, len(runs[0]), SHARES + 1).astype(int)
-        parts = [_rows(runs[0], slice(int(a), int(b))) for a, b in pairwise(edges)]
+        parts = [
+            runs[0].replace(t=runs[0].t[a:b], **{name: values[a:b] for name, values in runs[0].channels.items()})
+            for a, b in pairwise(edges.tolist())
+        ]
     for k, out in enumerate(parts):
         yield [*parts[:k], *parts[k + 1 :]], out
-
-
-def _rows(run: Run, rows: slice) -> Run:
-    return run.replace(t=run.t[rows], **{name: values[rows] for name, values in run.channels.items()})

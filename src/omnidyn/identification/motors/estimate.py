@@ -121,22 +121,18 @@ class MotorEstimate:
 
     def row(self) -> tuple[str, ...]:
         """Cells under HEAD."""
-        band = BAND in self.value
+        band, (low, high) = BAND in self.value, self.ci95.get(BAND, (math.nan, math.nan))
         return (
             self.name.removeprefix("motor "), f"{self.count} windows" if self.way == WINDOWS else self.way,
             "yes" if band else "no", f"{self.value[SLOPE]:.5g}", f"{self.std[SLOPE]:.2g}",
             *((f"{self.value[BAND]:.3g}", f"{self.std[BAND]:.2g}", "[{:.3g}, {:.3g}]".format(*self.ci95[BAND]))
-              if band and math.isfinite(self.std[BAND]) else ("-", "-", self._interval_alone())),
+              if band and math.isfinite(self.std[BAND])
+              else ("-", "-", f"[{low:.3g}, {high:.3g}]" if math.isfinite(high) else "-")),
             *(f"{1e3 * each:{form}}" if math.isfinite(each) and LAG not in self.unidentifiable else "-"
               for each, form in ((self.value[LAG], ".3g"), (self.std[LAG], ".2g"))),
             f"{self.unit}, s/rad", f"{self.rmse:.4g}",
             f"{self.held_out:.4g}" if math.isfinite(self.held_out) else "-",
         )  # fmt: skip
-
-    def _interval_alone(self) -> str:
-        """Of a dead band without a value."""
-        low, high = self.ci95.get(BAND, (math.nan, math.nan))
-        return f"[{low:.3g}, {high:.3g}]" if math.isfinite(high) else "-"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""

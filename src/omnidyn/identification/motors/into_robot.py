@@ -73,8 +73,8 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
 
     Raises InputError where the logs have more motors than the robot has wheels.
     """
-    motors = [each for each in study.motors if each.motor is not None]
-    most = max((each.motor or 0) + 1 for each in motors)
+    motors = [motor for motor in study.motors if motor.motor is not None]
+    most = max((motor.motor or 0) + 1 for motor in motors)
     if most > robot.wheels.count:
         raise InputError("the logs have more motors than the robot has wheels", got=most,
                          expected=f"{robot.wheels.count} or fewer, as {robot.name} has")  # fmt: skip
@@ -86,13 +86,14 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
     priors: dict[str, Prior] = {}
     for each in motors if supply else ():
         wheel = _Wheel(robot, each.motor or 0, study.kind)
-        found, own = wheel.numbers(each, supply, 0.0 if study.windows is None else study.windows.smear)
-        remarks += [remark.of(each.name) for remark in own]
+        found, notes = wheel.numbers(each, supply, 0.0 if study.windows is None else study.windows.smear)
+        remarks += [remark.of(each.name) for remark in notes]
         for key, (number, spread) in found.items():
             robot = wheel.put(robot, key, number)
             value[key], std[key] = number, spread
             priors[key] = identified(spread, f"motors by {each.way}, {each.source}")
-    if any(key.startswith(COULOMB) for key in value) and not _only_wheels(robot):
+    floor = [robot.friction.axes, robot.friction.direction]
+    if any(key.startswith(COULOMB) for key in value) and any(np.any(f.coulomb) or np.any(f.viscous) for f in floor):
         remarks.append(Statement("floor_friction_kept", NOTE))
     # Motors that were measured anew, each by itself, are no longer off together with what an earlier fit found.
     told = with_correlation(with_priors(robot, priors), [*priors], np.eye(len(priors)))
@@ -110,28 +111,22 @@ def _supply(study: MotorStudy, robot: Robot) -> tuple[float, list[Statement]]:
     return 0.0, [Statement("supply_unknown")]
 
 
-def _only_wheels(robot: Robot) -> bool:
-    """Whether all friction of a robot acts at its wheels."""
-    floor = [robot.friction.axes, robot.friction.direction]
-    return all(not np.any(each.coulomb) and not np.any(each.viscous) for each in floor)
-
-
 class _Wheel:
     """The numbers of the file at one wheel, and what is to be said of them."""
 
     def __init__(self, robot: Robot, wheel: int, kind: str):
         motor, count = robot.motor, robot.wheels.count
 
-        def own(value: Any) -> float:
+        def at_wheel(value: Any) -> float:
             return float(per_wheel(value, count)[wheel])
 
         self.wheel, self.kind = wheel, kind
-        self.gear, self.radius = own(motor.gear_ratio), own(robot.wheels.wheel_radius)
-        self.resistance = own(motor.resistance)
-        self.torque, self.efficiency = own(motor.torque_constant), own(motor.gear_efficiency)
-        self.tied = self.torque == own(motor.emf_constant)
-        self.wheel_inertia = own(robot.wheels.wheel_inertia)
-        self.drop, self.viscous = own(motor.voltage_drop), own(robot.friction.wheels.viscous)
+        self.gear, self.radius = at_wheel(motor.gear_ratio), at_wheel(robot.wheels.wheel_radius)
+        self.resistance = at_wheel(motor.resistance)
+        self.torque, self.efficiency = at_wheel(motor.torque_constant), at_wheel(motor.gear_efficiency)
+        self.tied = self.torque == at_wheel(motor.emf_constant)
+        self.wheel_inertia = at_wheel(robot.wheels.wheel_inertia)
+        self.drop, self.viscous = at_wheel(motor.voltage_drop), at_wheel(robot.friction.wheels.viscous)
 
     def key(self, name: str) -> str:
         return f"{name}[{self.wheel}]"

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,7 +14,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.clocks import usual_step
 from omnidyn.errors import InputError
 from omnidyn.findings.needs import MOTOR_INPUTS, motor_input
-from omnidyn.logs.plateaus import live_angle
+from omnidyn.logs.plateaus import STEPWISE, live_angle
 from omnidyn.logs.resolved import rows_of_mean
 from omnidyn.logs.segments import on_clock_of, segments
 from omnidyn.model.robot import Robot
@@ -20,6 +22,9 @@ from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import SENSORS, Run
 from omnidyn.statement import Statement
 from omnidyn.statistics import stretches
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 # Unit of each input, and how many of it in one SI unit.
 INPUTS: dict[str, tuple[str, float]] = dict(zip(MOTOR_INPUTS, (("V", 1.0), ("%", 100.0), ("A", 1.0)), strict=True))
@@ -67,7 +72,7 @@ class MotorLog:
 
     def piece(self, row: int) -> slice:
         """The rows between the two gaps around a row."""
-        return self.pieces[bisect_right([each.start for each in self.pieces], row) - 1]
+        return self.pieces[bisect_right([piece.start for piece in self.pieces], row) - 1]
 
 
 def motor_logs(
@@ -121,8 +126,8 @@ def averaged_statements(logs: Sequence[MotorLog], allowed: bool = True) -> list[
     found: dict[int, list[str]] = {}
     for motor in range(max((log.motors for log in logs), default=0)):
         rows = {log.averaged[motor] for log in logs if motor < log.motors} - {1}
-        for each in rows:
-            found.setdefault(each, []).append(str(motor + 1))
+        for row in rows:
+            found.setdefault(row, []).append(str(motor + 1))
     return [
         Statement("speed_is_mean", numbers={"motors": names, "rows": rows, "allowed": allowed})
         for rows, names in found.items()
@@ -142,3 +147,105 @@ def orientation_of(logs: Sequence[MotorLog], motor: int) -> float:
 def rows_with(known: BoolArray, pieces: Sequence[slice]) -> list[tuple[int, int]]:
     """(first, last) rows between gaps throughout which `known` (rows,) holds."""
     return [(p.start + a, p.start + b - 1) for p in pieces for a, b in stretches(known[p]).tolist()]
+
+
+# The input of a motor between the rows of its log: held, the mean of both rows, or a curve through the rows
+
+Rows = Sequence[tuple[int, int]]  # first and last row of what has no gap and no row without an input
+
+HOLD, MEAN, CURVE = "hold", "mean", "curve"
+WORDS = {HOLD: "held from row to row", MEAN: "the mean of two rows", CURVE: "a curve through the rows"}
+SUB = 4  # held inputs from one row to the next: what a sine of 6 rows a swing loses is 0.5 %
+JUMP = 3.0  # times the larger change before and after: the input jumped. A smooth curve changes at most three times as
+# much from one row to the next, and only on one side of a crest
+CUBIC_ROWS = 4
+
+
+def _curves(t: FloatArray, u: FloatArray, pieces: Rows) -> Iterator[tuple[int, int, CubicSpline]]:
+    """(first row, row after the last, curve) of the stretches on which the input does not jump."""
+    from scipy.interpolate import CubicSpline  # takes a second to import
+
+    for first, last in pieces:
+        step = np.abs(np.diff(u[first : last + 1]))
+        near = np.maximum(np.append(step[1:], 0.0), np.append(0.0, step[:-1]))
+        edges = [first, *(first + 1 + np.flatnonzero(step > JUMP * near)), last + 1]
+        for begin, end in pairwise(edges):
+            if end - begin >= CUBIC_ROWS:
+                yield begin, end, CubicSpline(t[begin:end], u[begin:end])
+
+
+def refined(
+    t: FloatArray, u: FloatArray, outputs: FloatArray, pieces: Rows
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """(t, u, outputs) with SUB rows in place of each, u in the middle of each; outputs NaN where nothing was measured.
+
+    t, u: shape (rows,); outputs (rows, C). The result has SUB (rows - 1) + 1 rows. A jump between two rows came nobody
+    knows when: on a line, which is what the motor got on the average over all times when it may have come.
+    """
+    share = np.arange(SUB) / SUB
+    fine = np.append((t[:-1, None] + share * np.diff(t)[:, None]).ravel(), t[-1])
+    middle = np.append(0.5 * (fine[1:] + fine[:-1]), t[-1])
+    known = np.isfinite(u)
+    put_in = np.interp(middle, t[known], u[known])
+    for begin, end, curve in _curves(t, u, pieces):
+        rows = slice(SUB * begin, SUB * (end - 1))
+        put_in[rows] = curve(middle[rows])
+    wide = np.full((len(fine), outputs.shape[1]), np.nan)
+    wide[::SUB] = outputs
+    return fine, put_in, wide
+
+
+def _integrals(t: FloatArray, u: FloatArray, pieces: Rows) -> tuple[FloatArray, FloatArray]:
+    """The integral of an input up to each row, of held values and of the curve. Shapes (rows,)."""
+    steps = np.diff(t)
+    held, curved = u[:-1] * steps, 0.5 * (u[1:] + u[:-1]) * steps
+    for begin, end, curve in _curves(t, u, pieces):
+        curved[begin : end - 1] = np.diff(curve.antiderivative()(t[begin:end]))
+    one, other = (np.append(0.0, np.cumsum(np.nan_to_num(each))) for each in (held, curved))
+    return one, other
+
+
+def _integrals_at(t: FloatArray, own: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """As `_integrals`, up to each of the times t, of an input with stamps of its own."""
+    new = np.append(True, (values[1:] != values[:-1]) & np.isfinite(values[:-1]))
+    held, _ = _integrals(own, values, ())
+    whole = [(int(a), int(b) - 1) for a, b in stretches(np.isfinite(values[new]))]
+    _, curved = _integrals(own[new], values[new], whole)
+    return np.interp(t, own, held), np.interp(t, own[new], curved)
+
+
+class InputIntegral:
+    """The integral of an input over any rows of a piece: of held values where it comes in steps, else of the curve.
+
+    Straight lines from row to row would cut the crests of a sine of 20 rows by almost a percent.
+    """
+
+    def __init__(
+        self, t: FloatArray, u: FloatArray, pieces: Rows, averaged: int = 1,
+        given: tuple[FloatArray, FloatArray] | None = None,
+    ):  # fmt: skip
+        """averaged: of the integrals over the same rows and those up to so many rows before, their mean: what holds of
+        a speed that is a mean over as many rows. NaN where there are not so many rows before.
+        given: times and values of the input where it has stamps of its own; u is then what held in each row.
+        """
+        self._u = u
+        found = _integrals(t, u, pieces) if given is None else _integrals_at(t, *given)
+        self._held, self._curved = (_trailing_mean(each, pieces, averaged) for each in found)
+
+    def over(self, window: slice) -> float:
+        """From the first row of a window to its last, in units of the input times seconds."""
+        own = self._u[window]
+        in_steps = np.mean(np.diff(own) != 0.0) <= max(STEPWISE, 2.0 / len(own))
+        total = self._held if in_steps else self._curved
+        return float(total[window.stop - 1] - total[window.start])
+
+
+def _trailing_mean(values: FloatArray, pieces: Rows, rows: int) -> FloatArray:
+    """The mean of each row and the `rows` - 1 before it in its piece; NaN where there are fewer."""
+    if rows == 1:
+        return values
+    mean = np.full(len(values), np.nan)
+    for first, last in pieces:
+        if last - first >= rows - 1:
+            mean[first + rows - 1 : last + 1] = np.convolve(values[first : last + 1], np.ones(rows) / rows, "valid")
+    return mean

@@ -19,11 +19,10 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.clocks import usual_step
-from omnidyn.identification.motors.edge import edge_interval
 from omnidyn.identification.motors.log import MotorLog
 from omnidyn.logs.plateaus import find_plateaus
 from omnidyn.logs.resolved import unresolved_rows
-from omnidyn.statistics import MAD_TO_STD, robust_mean, sensor_step, stretches
+from omnidyn.statistics import MAD_TO_STD, robust_mean, sensor_step, stretches, t_quantile
 
 RISK = 0.05
 AROUND = 40  # rows on either side of a start or stop that tell of it
@@ -47,7 +46,7 @@ class Span(NamedTuple):
     high: float
 
 
-class _Column(NamedTuple):
+class _MotorRows(NamedTuple):
     """One motor between two gaps, signed so that the direction looked at is forward."""
 
     t: FloatArray
@@ -61,7 +60,7 @@ class _Column(NamedTuple):
 class _Edge(NamedTuple):
     """A change from rest to motion, or back. row: where it shows; first, last: of the rows that tell of it."""
 
-    column: _Column
+    column: _MotorRows
     row: int
     first: int
     last: int
@@ -81,17 +80,17 @@ def starts_and_stops(
     found = [edge for column in columns for edge in _edges_of(column) if _is_slow_enough(edge, lag)]
     spans: tuple[list[Span], list[Span]] = [], []
     for stop in (False, True):
-        own = [edge for edge in found if edge.stop is stop]
-        own = own[:: max(1, -(-len(own) // MOST))]
-        every = [_span(edge, lag, RISK / len(own)) for edge in own]
-        spans[stop].extend(span for span in every if stop or span.high > 0.0)
+        edges = [edge for edge in found if edge.stop is stop]
+        edges = edges[:: max(1, -(-len(edges) // MOST))]
+        ends = [_span(edge, lag, RISK / len(edges)) for edge in edges]
+        spans[stop].extend(span for span in ends if stop or span.high > 0.0)
     bounds = [bound for column in columns for bound in _rested(column)]
     if bounds:
         spans[0].append(Span(max(bounds), math.inf))
     return spans
 
 
-def _columns(logs: Sequence[MotorLog], motor: int) -> Iterator[_Column]:
+def _columns(logs: Sequence[MotorLog], motor: int) -> Iterator[_MotorRows]:
     """The pieces of all logs in which input and speed of a motor are known, and which way it turns in each row."""
     largest = max((_largest(log, motor) for log in logs), default=0.0)
     for log in logs:
@@ -115,7 +114,7 @@ def _largest(log: MotorLog, motor: int) -> float:
     return float(np.abs(medians).max(initial=0.0))
 
 
-def _column(log: MotorLog, motor: int, rows: slice, largest: float, rough: BoolArray) -> _Column | None:
+def _column(log: MotorLog, motor: int, rows: slice, largest: float, rough: BoolArray) -> _MotorRows | None:
     """None where the speed is lost in noise."""
     t, speed = log.t[rows], log.motion[rows, motor]
     if log.angle is not None:  # of the row before, not of both sides: else a start would show a row early
@@ -130,7 +129,7 @@ def _column(log: MotorLog, motor: int, rows: slice, largest: float, rough: BoolA
     if level > LOST * largest:
         return None
     moving = _without_flicker(np.where(np.abs(smooth) > level, np.sign(smooth), 0.0))
-    return _Column(t, log.put_in[rows, motor], speed, moving, tick, rough)
+    return _MotorRows(t, log.put_in[rows, motor], speed, moving, tick, rough)
 
 
 def _without_flicker(moving: FloatArray) -> FloatArray:
@@ -159,7 +158,7 @@ def _averaged(noise: float, tick: float, largest: float, rows: int) -> int:
     return min(count, max(1, rows // 20)) | 1
 
 
-def _edges_of(column: _Column) -> Iterator[_Edge]:
+def _edges_of(column: _MotorRows) -> Iterator[_Edge]:
     """Starts and stops of the forward direction."""
     runs = _runs(column.moving)
     for (a, b, one), (c, d, other) in pairwise(runs):
@@ -184,16 +183,16 @@ def _runs(moving: FloatArray) -> list[tuple[int, int, float]]:
     return [(a, b, float(moving[a])) for a, b in pairwise(cuts)]
 
 
-def _rests(column: _Column, first: int, last: int) -> bool:
+def _rests(column: _MotorRows, first: int, last: int) -> bool:
     """Whether rows without visible motion are rest: a motor that passes zero goes from one side to the other there."""
-    own = column.speed[first:last]
-    if len(own) < LEAST_REST:
+    speed = column.speed[first:last]
+    if len(speed) < LEAST_REST:
         return False
-    third = max(len(own) // 3, 1)
-    early, late = own[:third], own[-third:]
-    middle = own[third:-third] if len(own) > 2 * third else own
+    third = max(len(speed) // 3, 1)
+    early, late = speed[:third], speed[-third:]
+    middle = speed[third:-third] if len(speed) > 2 * third else speed
     reach = max(float(np.abs(middle).max()), column.tick)
-    error = (noise_of_rows(own) if len(own) > LEAST_REST else reach) * math.sqrt(2.0 / third)
+    error = (noise_of_rows(speed) if len(speed) > LEAST_REST else reach) * math.sqrt(2.0 / third)
     return abs(float(np.median(late) - np.median(early))) <= max(SIGNS * error, column.tick, 1e-9 * reach)
 
 
@@ -209,15 +208,10 @@ def _span(edge: _Edge, lag: float, risk: float) -> Span:
     # a row on either side: loggers write an input in the row in which it is set, or in which it is answered
     begin = edge.first + max(int(np.searchsorted(t, first, "right")) - 2, 0)
     end = min(edge.first + int(np.searchsorted(t, last, "right")), len(column.t) - 1)
-    changed = begin - _since_change(column.put_in[: begin + 1])
-    own = column.put_in[max(changed - 1, 0) : end + 1]
-    return Span(float(own.min()) + 0.0, float(own.max()) + 0.0)  # no -0
-
-
-def _since_change(put_in: FloatArray) -> int:
-    """Rows since the last change of the input, up to the last row."""
-    same = put_in[:-1] != put_in[-1]
-    return len(put_in) - 2 - int(np.flatnonzero(same)[-1]) if same.any() else len(put_in) - 1
+    other = np.flatnonzero(column.put_in[:begin] != column.put_in[begin])
+    changed = int(other[-1]) + 1 if other.size else 0  # the last change of the input
+    put_in = column.put_in[max(changed - 1, 0) : end + 1]
+    return Span(float(put_in.min()) + 0.0, float(put_in.max()) + 0.0)  # no -0
 
 
 def _lags(lag: float, row: float) -> list[float]:
@@ -226,7 +220,7 @@ def _lags(lag: float, row: float) -> list[float]:
     return [0.3 * row, *around] if around else [row * factor for factor in (0.3, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)]
 
 
-def _rested(column: _Column) -> Iterator[float]:
+def _rested(column: _MotorRows) -> Iterator[float]:
     """Inputs under which the motor rested for LEAST_REST rows, and did not set off forward afterwards."""
     runs = _runs(column.moving)
     for k, (a, b, side) in enumerate(runs):
@@ -237,9 +231,9 @@ def _rested(column: _Column) -> Iterator[float]:
             a += int(np.argmin(column.put_in[a:b]))
         if b - a < LEAST_REST:
             continue
-        own, speed = column.put_in[a:b], column.speed[a:b]
-        held = float(np.min([own[n : len(own) - LEAST_REST + 1 + n] for n in range(LEAST_REST)], axis=0).max())
-        under = speed[own >= held]
+        put_in, speed = column.put_in[a:b], column.speed[a:b]
+        held = float(np.min([put_in[n : len(put_in) - LEAST_REST + 1 + n] for n in range(LEAST_REST)], axis=0).max())
+        under = speed[put_in >= held]
         if held > 0.0 and float(under.mean()) <= 3.0 * noise_of_rows(speed) / math.sqrt(len(under)):
             yield held
 
@@ -284,8 +278,8 @@ def _steady(logs: Sequence[MotorLog], motor: int) -> list[_Window]:
 
 
 def _windows_of(log: MotorLog, motor: int) -> Iterator[_Window]:
-    for each in find_plateaus(log.run):
-        put_in, speed = log.put_in[each.rows, motor], log.motion[each.rows, motor]
+    for plateau in find_plateaus(log.run):
+        put_in, speed = log.put_in[plateau.rows, motor], log.motion[plateau.rows, motor]
         if not np.isfinite(put_in).all() or np.isfinite(speed).sum() < 2:
             continue
         half = len(speed) // 2
@@ -294,3 +288,91 @@ def _windows_of(log: MotorLog, motor: int) -> Iterator[_Window]:
         slower = np.sign(mean) * (early - late) > FALLING * np.hypot(early_std, late_std)
         middle, error = (float(part) for part in robust_mean(put_in))
         yield _Window(middle, mean, NOISE * error, abs(mean) > SURE * std and not slower, abs(mean) <= SURE * std)
+
+
+# When a motor leaves rest, or comes to rest: the instants t0 that its speed, noise and lag allow
+#
+# A start, at rest until t0, driven by what the input u is above the friction c from there on, u0 = u(t0) >= c:
+#
+#     lag w' + w = g (u - c),   w(t0) = 0:   w = g F(u - u0) + q F(1),   g >= 0, q = g (u0 - c) >= 0
+#
+# with F the first-order lag from t0 on, of an input that is held from row to row. A stop is the same law before t0,
+# from any speed w1 at the first row, with w(t0) = 0, at rest from there on:
+#
+#     w = g F(u) + h F(1) + w1 exp(-(t - t_first)/lag)
+#
+# For every t0 the numbers g, q or g, h, w1 and the lag are those of least squares. The interval holds all t0 whose
+# sum of squares is not above the least by more than t^2 s^2 (the profile of the likelihood). No threshold on the
+# speed comes in, so a motor that creeps off out of the noise is not said to start late.
+
+NUMBERS = 3  # fitted beside t0, the lag among them
+
+
+def edge_interval(
+    t: FloatArray, put_in: FloatArray, speed: FloatArray, tries: FloatArray, *, lags: Sequence[float], stop: bool,
+    least_std: float, risk: float,
+) -> tuple[float, float]:  # fmt: skip
+    """(first, last) instant [s] at which the motor may have started, or stopped, but for a share `risk`.
+
+    t [s], put_in, speed [rad/s]: the rows around it, signed so that the motion is forward. Shape (rows,).
+    tries [s]: instants that are tried, shape (n,). lags [s]: tried. least_std [rad/s]: of the speed, as a sensor that
+    reads in steps has it at least.
+    """
+    left = np.array([min(_left(t, put_in, speed, at, lag, stop) for lag in lags) for at in tries])
+    freedom = max(len(t) - NUMBERS - 1, 1)
+    variance = max(float(left.min()) / freedom, least_std**2)
+    allowed = tries[left <= left.min() + t_quantile(freedom, 1.0 - 0.5 * risk) ** 2 * variance]
+    return float(allowed[0]), float(allowed[-1])
+
+
+def _left(t: FloatArray, put_in: FloatArray, speed: FloatArray, at: float, lag: float, stop: bool) -> float:
+    """Least sum of squares with the edge at one instant."""
+    moving = t < at if stop else t > at
+    resting = float(speed[~moving] @ speed[~moving])
+    if not moving.any():
+        return resting
+    return resting + (_stop_left if stop else _start_left)(t, put_in, speed, at, lag, moving)
+
+
+def _start_left(
+    t: FloatArray, put_in: FloatArray, speed: FloatArray, at: float, lag: float, moving: BoolArray
+) -> float:
+    """Least sum of squares of the rows after a start."""
+    above = put_in - put_in[max(int(np.searchsorted(t, at, "right")) - 1, 0)]
+    weight = _lagged(t[moving], t, at, lag)
+    return _not_negative(np.stack([weight @ above[:-1], weight.sum(axis=1)], axis=1), speed[moving])
+
+
+def _stop_left(t: FloatArray, put_in: FloatArray, speed: FloatArray, at: float, lag: float, moving: BoolArray) -> float:
+    """Least sum of squares of the rows before a stop."""
+    weight = _lagged(np.append(t[moving], at), t, float(t[0]), lag)
+    decay = np.exp(-(np.append(t[moving], at) - t[0]) / lag)
+    table = np.stack([weight @ put_in[:-1], weight.sum(axis=1), decay], axis=1)
+    size = np.sqrt((table**2).sum(axis=0)) + 1e-300
+    table = table / size
+    # two directions in which the speed at the stop stays 0
+    free = np.linalg.svd(table[-1:])[2][1:].T
+    design, measured = table[:-1] @ free, speed[moving]
+    rest = measured - design @ np.linalg.lstsq(design, measured, rcond=1e-9)[0]
+    return float(rest @ rest)
+
+
+def _lagged(at: FloatArray, t: FloatArray, begin: float, lag: float) -> FloatArray:
+    """What each row of a held input adds to a first-order lag from `begin` on. Shape (len(at), len(t) - 1)."""
+    first = np.minimum(np.maximum(t[:-1], begin), at[:, None])
+    last = np.minimum(np.maximum(t[1:], begin), at[:, None])
+    return np.exp(-(at[:, None] - last) / lag) - np.exp(-(at[:, None] - first) / lag)
+
+
+def _not_negative(design: FloatArray, speed: FloatArray) -> float:
+    """Least sum of squares with two numbers, neither below 0."""
+    inner, right = design.T @ design, design.T @ speed
+    total = float(speed @ speed)
+    best = min(total - max(right[k], 0.0) ** 2 / inner[k, k] if inner[k, k] > 0.0 else total for k in (0, 1))
+    determinant = inner[0, 0] * inner[1, 1] - inner[0, 1] ** 2
+    if determinant > 1e-12 * inner[0, 0] * inner[1, 1]:
+        one = (inner[1, 1] * right[0] - inner[0, 1] * right[1]) / determinant
+        other = (inner[0, 0] * right[1] - inner[0, 1] * right[0]) / determinant
+        if one >= 0.0 and other >= 0.0:
+            best = total - one * right[0] - other * right[1]
+    return max(float(best), 0.0)

@@ -17,17 +17,21 @@ from omnidyn.findings.fitness import MOTORS as MOTORS_USE
 from omnidyn.identification.grouping import held_out
 from omnidyn.identification.log_verdicts import checked, log_verdicts, of_motors, told_why, unfit, verdict_advice
 from omnidyn.identification.methods import OUTPUT_ERROR, STEADY_STATE, MotorFit, MotorLine
-from omnidyn.identification.motors.choice import is_late
+from omnidyn.identification.motors.choice import fit_rmse, is_late
 from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, named
 from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
-from omnidyn.identification.motors.free_run import fit_rmse
-from omnidyn.identification.motors.line import fit_line
 from omnidyn.identification.motors.log import GROUND, MotorLog, averaged_statements, motor_logs, orientation_of
 from omnidyn.identification.motors.rest import turned_under
-from omnidyn.identification.motors.start import STARTS_HEAD, MotorStart, motor_starts
-from omnidyn.identification.motors.static import is_slow, points_of_logs, starts_of_points, windows_of_points
-from omnidyn.identification.motors.verdict import motors_verdict, none_answers
-from omnidyn.identification.motors.windows import MotorWindows, motor_windows
+from omnidyn.identification.motors.start import (
+    STARTS_HEAD,
+    MotorStart,
+    is_slow,
+    motor_starts,
+    points_of_logs,
+    starts_of_points,
+    windows_of_points,
+)
+from omnidyn.identification.motors.windows import MotorWindows, fit_line, motor_windows
 from omnidyn.logs.log import Log
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.model.robot import Robot
@@ -38,6 +42,9 @@ from omnidyn.statement import ERROR, NOTE, WARNING, Statement, as_verdict, by_se
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+from omnidyn.identification.motors.estimate import BAND, SLOPE
+from omnidyn.identification.motors.start import START
 
 SAME_SPEED = 1e-9  # spread of speeds over the largest, below which they are one
 
@@ -79,13 +86,13 @@ class MotorStudy(Shown):
     @property
     def statements(self) -> tuple[Statement, ...]:
         """What the logs say of each motor, and whether its dead band is any use on held-out logs."""
-        known = {each.motor for each in self.starts if each.sharp}
-        found = [each.statement(started=each.motor in known) for each in self.motors]
+        known = {start.motor for start in self.starts if start.sharp}
+        found = [motor.statement(started=motor.motor in known) for motor in self.motors]
         for band, plain in zip(self.motors, self.plain, strict=False):
             if band.dead_band_seen and band.held_out > (1.0 - PAYS) * plain.held_out:
                 errors = {"with_band": band.held_out, "without": plain.held_out}
                 found.append(Statement("held_out_no_better", WARNING, band.name, errors))
-        return (*found, *(each.statement() for each in self.starts))
+        return (*found, *(start.statement() for start in self.starts))
 
     @property
     def verdict(self) -> Statement:
@@ -97,7 +104,7 @@ class MotorStudy(Shown):
     @property
     def failed(self) -> bool:
         """Whether the numbers mean nothing: no motor is seen to answer to its input, or `check` finds a log unfit."""
-        return bool(unfit(self.verdicts)) or none_answers(self.motors, self.starts)
+        return self.verdict.severity == ERROR
 
     @property
     def advice(self) -> tuple[Statement, ...]:
@@ -122,11 +129,11 @@ class MotorStudy(Shown):
             how = f"windows of {self.windows.length:g} s in integral form"
             if self.windows.settled:
                 how = "steady windows" if math.isfinite(self.windows.length) else "a point per row"
-        pairs = zip(self.motors, self.plain, strict=True) if self.plain else ((each,) for each in self.motors)
+        pairs = zip(self.motors, self.plain, strict=True) if self.plain else ((motor,) for motor in self.motors)
         parts = [
             f"motors: {self.kind} [{self.unit}] against speed from {self.speed_from}, {how}", "",
             Table(HEAD, [each.row() for several in pairs for each in several], name="motors"), "",
-            *([Table(STARTS_HEAD, [each.row() for each in self.starts], name="starts"), ""] if self.starts else []),
+            *([Table(STARTS_HEAD, [start.row() for start in self.starts], name="starts"), ""] if self.starts else []),
             Points(self.statements, name="statements"), by_severity(self.warnings, "warnings"),
             Points(self.advice, "next:", "next"),
         ]  # fmt: skip
@@ -134,14 +141,14 @@ class MotorStudy(Shown):
 
     def to_dict(self) -> dict[str, Any]:
         """The study as JSON can hold it."""
-        motors = [each.to_dict() for each in self.motors]
-        for own, plain in zip(motors, self.plain, strict=False):
-            own["without_dead_band"] = plain.to_dict()
+        motors = [motor.to_dict() for motor in self.motors]
+        for record, plain in zip(motors, self.plain, strict=False):
+            record["without_dead_band"] = plain.to_dict()
         return {
             **as_verdict(self.verdict), "ok": not self.failed, "method": self.method, "input": self.kind,
             "unit": self.unit, "speed_from": self.speed_from,
             "window_s": self.windows.length if self.windows is not None else None, "motors": motors,
-            "starts": [each.to_dict() for each in self.starts], "statements": plain_values(self.statements),
+            "starts": [start.to_dict() for start in self.starts], "statements": plain_values(self.statements),
             "warnings": plain_values(self.warnings), "next": plain_values(self.advice), "check": checked(self.verdicts),
         }  # fmt: skip
 
@@ -221,32 +228,29 @@ def _free_runs(runs: Sequence[Run], asked: MotorFit, hold_out: Sequence[str], pr
     away = held_out([run.source for run in runs], hold_out)
     kept = [run for run, out in zip(runs, away, strict=True) if out]
     logs = logs_of_free_runs([run for run, out in zip(runs, away, strict=True) if not out], asked.input)
-    own: list[Run] = [log.run for log in logs]
+    fitted: list[Run] = [log.run for log in logs]
     how: dict[str, Any] = {"kind": logs[0].kind, "between": asked.between, "loss": asked.loss}
-    motors = [m for m in range(min(log.motors for log in logs)) if all(_driven(log, m) for log in logs)] or [0]
+    motors = [
+        m for m in range(min(log.motors for log in logs)) if all(np.isfinite(log.put_in[:, m]).any() for log in logs)
+    ] or [0]
     latency, pairs = _latency(asked.nuisances), []
     for motor in motors:
         progress(Report(f"fitting motor {motor + 1} of {len(motors)}"))
-        late = is_late(own, motor, **how) if latency is None else latency
-        fits = [fit_motor(own, motor, dead_band=band, latency=late, **how) for band in (True, False)]
+        late = is_late(fitted, motor, **how) if latency is None else latency
+        fits = [fit_motor(fitted, motor, dead_band=band, latency=late, **how) for band in (True, False)]
         pairs.append([replace(fit, held_out=fit_rmse(fit, kept)) if kept else fit for fit in fits])
     bands, plain = zip(*pairs, strict=True)
     origin = logs[0].motion_from if logs[0].speed is None else "wheel_speed"
     slow = is_slow(logs)
-    seen = None if slow else _windows_of(logs)
+    try:
+        seen = None if slow else motor_windows(logs)
+    except InsufficientDataError:  # no window for the line of a direction
+        seen = None
     starts = starts_of_points(points_of_logs(logs)) if slow else motor_starts(logs, seen, motors)
     return MotorStudy(
         OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain, starts=starts, supply=_supply(logs),
         drawn=seen, log_warnings=tuple(averaged_statements(logs, False)),
     )  # fmt: skip
-
-
-def _windows_of(logs: Sequence[MotorLog]) -> MotorWindows | None:
-    """The windows through which the line of a direction goes; None where there are none."""
-    try:
-        return motor_windows(logs)
-    except InsufficientDataError:
-        return None
 
 
 def _latency(nuisances: Sequence[str] | None) -> bool | None:
@@ -263,11 +267,6 @@ def _supply(logs: Sequence[MotorLog]) -> float:
     return float(np.mean(means))
 
 
-def _driven(log: MotorLog, motor: int) -> bool:
-    """Whether the log has an input of this motor: a robot may have more wheels than the log has motors."""
-    return bool(np.isfinite(log.put_in[:, motor]).any())
-
-
 def _of_windows(windows: MotorWindows, lines: Sequence[MotorEstimate]) -> Iterator[Statement]:
     """What was left out, and what cannot be told apart."""
     if windows.unresolved:
@@ -278,3 +277,48 @@ def _of_windows(windows: MotorWindows, lines: Sequence[MotorEstimate]) -> Iterat
         yield Statement("windows_thinned", NOTE, numbers={"every": windows.every})
     if any(line.one_way for line in lines):
         yield Statement("turned_one_way")
+
+
+# What a study of motors came to
+
+
+def motors_verdict(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart] = ()) -> Statement:
+    """Which motors answer to their input, and at which input they start: from rest where that was seen, else by the
+    dead band of the line.
+    """
+    lines = [motor for motor in motors if motor.motor is not None] or list(motors)  # else that of all together
+    levels = {line.name: _levels(line, starts) for line in lines}
+    blind = [
+        line.name for line in lines if not line.ci95[SLOPE][0] > 0.0 and not levels[line.name]
+    ]  # may have no slope
+    if len(blind) == len(lines):
+        return Statement("no_motor_answers", ERROR, numbers={"motors": blind})
+    seen = [line for line in lines if levels[line.name]]
+    without = [line.name for line in lines if not levels[line.name] and line.name not in blind]
+    parts = [_starts(seen, levels, starts, len(lines))] if seen else []
+    if without:
+        numbers = {"motors": without, "too": bool(seen), "total": len(lines)}
+        parts.append(Statement("motors_without_dead_band", NOTE, numbers=numbers))
+    if blind:
+        parts.append(Statement("motors_not_answering", WARNING, numbers={"motors": blind}))
+    return Statement("motors_answer", WARNING if blind else NOTE, numbers={"parts": parts})
+
+
+def _levels(motor: MotorEstimate, starts: Sequence[MotorStart]) -> list[float]:
+    """The inputs at which a motor starts; none where that is not known."""
+    sharp = [start.value[START] for start in starts if start.motor == motor.motor and start.sharp]
+    return sharp or ([motor.value[BAND]] if motor.dead_band_seen else [])
+
+
+def _starts(
+    seen: Sequence[MotorEstimate], levels: dict[str, list[float]], starts: Sequence[MotorStart], total: int
+) -> Statement:  # fmt: skip
+    """At which inputs motors start; of a motor alone, in each direction."""
+    both = [start for start in starts if start.sharp]
+    unit = {"unit": seen[0].unit}
+    if total == 1 and len(both) == 2 and both[0].motor == seen[0].motor:
+        ways = {"levels": [start.value[START] for start in both], "directions": [start.direction for start in both]}
+        return Statement("starts_both_ways", NOTE, seen[0].name, ways | unit)
+    numbers = {"motors": [line.name for line in seen], "total": total,
+               "levels": [level for line in seen for level in levels[line.name]]}  # fmt: skip
+    return Statement("motors_start", NOTE, numbers=numbers | unit)

@@ -16,11 +16,21 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InsufficientDataError
-from omnidyn.identification.motors.between import InputIntegral
-from omnidyn.identification.motors.log import MotorLog, rows_with
+from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, SLOPE, WINDOWS, MotorEstimate
+from omnidyn.identification.motors.log import InputIntegral, MotorLog, rows_with
 from omnidyn.logs.plateaus import STEPWISE, find_plateaus
 from omnidyn.logs.resolved import unresolved_input
-from omnidyn.statistics import MAD_TO_STD, robust_mean, sensor_step
+from omnidyn.statistics import (
+    MAD_TO_STD,
+    autocorrelation_time,
+    central_interval,
+    drawn_times,
+    errors_in_variables,
+    huber_weight,
+    robust_mean,
+    sensor_step,
+    t_quantile,
+)
 
 LENGTHS = (0.05, 0.1, 0.2, 0.5)  # [s] the shortest whose mean speed is sharp enough is taken
 SHARP = 0.02  # of the spread of the speeds: a mean speed with this error needs no longer window
@@ -88,7 +98,9 @@ def motor_windows(
     """
     usual = _usual_speed(logs)
     length, sharp = _length(logs, usual, least)
-    if not sharp and not steady and share is None and all(map(_in_steps, logs)):
+    # the input stands still most of the time
+    in_steps = all(np.mean((np.diff(log.put_in, axis=0) != 0.0).any(axis=1)) <= STEPWISE for log in logs)
+    if in_steps and not (sharp or steady or share):
         share = SETTLED_SHARE if all(_windows(log, length, False, SETTLED_SHARE) for log in logs) else None
     windows = [_windows(log, length, steady, share) for log in logs]
     every = max(1, -(-sum(map(len, windows)) // MAX_WINDOWS))
@@ -98,10 +110,10 @@ def motor_windows(
         reader = _Reader(log, usual)
         readers.append(reader)
         for window in several[::every]:
-            rows += [(*each, block) for each in reader.rows_of(window)]
+            rows += [(*row, block) for row in reader.rows_of(window)]
             block += 1
         block += 1  # no block of the bootstrap reaches over the end of a run
-    unresolved, resting = (sum(getattr(each, name) for each in readers) for name in ("unresolved", "resting"))
+    unresolved, resting = (sum(getattr(reader, name) for reader in readers) for name in ("unresolved", "resting"))
     if not rows:
         raise InsufficientDataError(
             "no window tells how the motors answer",
@@ -112,7 +124,7 @@ def motor_windows(
     return MotorWindows(
         *table[:, :5].T, motor=table[:, 5].astype(np.int64), block=table[:, 6].astype(np.int64), unit=first.unit,
         kind=first.kind, speed_from=first.motion_from, length=length, unresolved=unresolved, resting=resting,
-        rest=np.fmax.reduce([each.rest for each in readers]), settled=steady or share is not None, every=every,
+        rest=np.fmax.reduce([reader.rest for reader in readers]), settled=steady or share is not None, every=every,
         smear=max(_smear(log, length) for log in logs),
     )  # fmt: skip
 
@@ -134,14 +146,9 @@ def _smear(log: MotorLog, length: float) -> float:
     return 2.0 * row * max(1, round(EDGE_SHARE * length / row / 2.0)) if row > 0.0 else 0.0
 
 
-def _in_steps(log: MotorLog) -> bool:
-    """Whether the input stands still most of the time."""
-    return bool(np.mean((np.diff(log.put_in, axis=0) != 0.0).any(axis=1)) <= STEPWISE)
-
-
 def _length(logs: Sequence[MotorLog], usual: float, least: float) -> tuple[float, bool]:
     """The shortest length of a window whose mean speed is sharp and that has rows enough; whether there is one."""
-    for length in (each for each in LENGTHS if each >= least):
+    for length in (length for length in LENGTHS if length >= least):
         errors, rows = [], []
         for log in logs:
             for window in _windows(log, length)[:: max(1, len(log.t) // 500)]:
@@ -160,7 +167,7 @@ def _windows(
     """Windows of about `length` between gaps; each ends on the row where the next begins."""
     if steady or share:
         plateaus = find_plateaus(log.run, start=share[0], end=share[1]) if share else find_plateaus(log.run)
-        return [each.rows for each in plateaus]
+        return [plateau.rows for plateau in plateaus]
     found = []
     for piece in log.pieces:
         t = log.t[piece]
@@ -285,3 +292,158 @@ class _Reader:
             return float(robust_mean(log.motion[near, motor])[0])
         angle, t = log.angle[near, motor], log.t[near]
         return float((angle[-1] - angle[0]) / (t[-1] - t[0]))
+
+
+# What a motor needs to turn: slope, dead band and inertia, from windows in integral form (windows.py)
+#
+# mean u = k (mean w) + c (mean sgn w) + m (change of w / length)
+#
+# A mean speed has an error too: the sum of r^2 / (s^2 + k^2 speed_std^2) is minimised over k, c, m, as
+# `steady/line.py` does, with s^2 such that the sum is the degrees of freedom (what the speeds cannot explain). Where
+# the speeds are sharp this is least squares of u; where they are noisy it is least squares of w, and the slope is not
+# flattened by the noise. Intervals are by moving-block bootstrap over the windows: H. R. Kuensch, Ann. Stat. 17, 1217
+# (1989).
+
+DRAWS, SEED, BLOCK = 1000, 20121, 3
+ITERATIONS, SETTLED = 200, 1e-8
+HUBER = 2.5
+MIDDLE = 0.6827  # of the draws: a few wild ones, of a line that is hardly determined, do not count in a std
+MIN_WINDOWS = 6
+ALIKE = 1e-3  # share of a column that the others leave over: below it they say the same
+
+
+def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEstimate:
+    """The line of one motor (its number from 0), or of all. Raises InsufficientDataError below six windows."""
+    put_in, speed, speed_std, side, change, block = windows.of(motor)
+    block = block.astype(np.int64)
+    count = len(np.unique(block))
+    if count < MIN_WINDOWS:
+        raise InsufficientDataError(
+            "too few windows for a line with intervals", got=f"{count} windows of {windows.length:g} s",
+            expected=f"{MIN_WINDOWS} or more in which the motor turns", remedy="record longer",
+        )  # fmt: skip
+    design = np.stack([speed, side, change], axis=1)
+    used = _columns(design, windows.settled)
+    fit = _fit(design[:, used], put_in, speed_std)
+    drawn = np.full((DRAWS + 1, 3), np.nan)  # the fit itself first
+    drawn[0, used] = fit.parameters
+    drawn[1:, used] = _bootstrap(design[:, used], put_in, speed_std, fit, block, windows.settled)
+    with np.errstate(invalid="ignore", divide="ignore"):  # a draw without a slope has no lag
+        numbers = dict(zip((SLOPE, BAND, INERTIA), drawn.T, strict=True)) | {LAG: drawn[:, 2] / drawn[:, 0]}
+    residual = put_in - design[:, used] @ fit.parameters
+    slope, error = float(fit.parameters[0]), float(np.sqrt(np.mean(residual**2)))
+    with np.errstate(invalid="ignore", divide="ignore"):  # of draws that are all alike there is none
+        correlation = float(np.corrcoef(drawn[1:, :2].T)[0, 1])
+    return MotorEstimate(
+        motor=motor, kind=windows.kind, unit=windows.unit, way=WINDOWS, source=source, count=count,
+        value={name: float(draws[0]) for name, draws in numbers.items()},
+        std={name: 0.5 * float(np.diff(central_interval(draws[1:], MIDDLE))[0]) for name, draws in numbers.items()},
+        ci95={name: central_interval(draws[1:]) for name, draws in numbers.items()},
+        correlation=correlation, rmse=error / abs(slope) if slope else math.inf,
+        unidentifiable=tuple(name for name, draws in numbers.items() if np.isnan(draws[0])),
+        one_way=bool(np.abs(side.sum()) > 0.98 * np.abs(side).sum()),
+        rest=float(np.fmax.reduce(windows.rest if motor is None else windows.rest[[motor]])),
+        draws={name: draws[1:] for name, draws in numbers.items()},
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    parameters: FloatArray
+    extra: float  # variance of the input that the errors of the speeds do not explain
+    weight: FloatArray
+
+
+def _columns(design: FloatArray, settled: bool) -> list[int]:
+    """The columns that can be told: no inertia where the speed never changes or start-ups were left out; no dead band
+    where the others say as much as it, at one speed or under one input (then k w + m w' is constant).
+    """
+    size = np.abs(design).max(axis=0)
+    others = [0] if settled or size[2] <= 1e-9 * size[0] else [0, 2]
+    side, rest = design[:, 1], design[:, others]
+    left = side - rest @ np.linalg.lstsq(rest, side, rcond=None)[0]
+    told = float(left @ left) > ALIKE * float(side @ side)
+    return sorted([*others, 1]) if told else others
+
+
+def _fit(design: FloatArray, put_in: FloatArray, speed_std: FloatArray) -> _Fit:
+    """The line, the extra variance (Mandel and Paule 1982), and Huber's weights, in turn until they settle."""
+    weight, extra = np.ones(len(put_in)), float(np.var(put_in)) + 1e-30
+    parameters = _york(design[None], put_in[None], speed_std[None], extra, weight[None])[0]
+    for _ in range(20):
+        residual = put_in - design @ parameters
+        error = (parameters[0] * speed_std) ** 2
+        extra = _extra_variance(residual, error, weight, design.shape[1])
+        size = np.abs(residual) / np.sqrt(extra + error + 1e-300)
+        weight = huber_weight(size, HUBER)
+        new = _york(design[None], put_in[None], speed_std[None], extra, weight[None])[0]
+        if np.abs(new - parameters).max() <= SETTLED * np.abs(new).max():
+            break
+        parameters = new
+    return _Fit(parameters, extra, weight)
+
+
+def _extra_variance(residual: FloatArray, error: FloatArray, weight: FloatArray, count: int) -> float:
+    """s^2 >= 0 with sum w r^2 / (s^2 + error) = degrees of freedom; bisected."""
+    freedom = max(float(weight.sum()) - count, 1.0)
+
+    def excess(variance: float) -> float:
+        return float(np.sum(weight * residual**2 / (variance + error + 1e-300))) - freedom
+
+    if excess(0.0) <= 0.0:
+        return 0.0
+    low, high = 0.0, float(np.sum(residual**2)) + 1e-30
+    for _ in range(100):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
+    return high
+
+
+def _york(
+    design: FloatArray, put_in: FloatArray, speed_std: FloatArray, extra: float, weight: FloatArray
+) -> FloatArray:
+    """Least sum of w r^2 / (s^2 + k^2 speed_std^2), for many draws at once. design: (draws, n, p). Returns (draws, p).
+
+    A ridge keeps draws apart that determine no line.
+    """
+    scale = np.sqrt(np.mean(design**2, axis=1))
+    scale[scale == 0.0] = 1.0
+
+    def solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
+        matrix = matrix / (scale[:, :, None] * scale[:, None, :])
+        ridge = np.maximum(1e-12 * np.trace(matrix, axis1=1, axis2=2), 1e-300)
+        matrix += ridge[:, None, None] * np.eye(matrix.shape[1])
+        return np.linalg.solve(matrix, (right / scale)[:, :, None])[:, :, 0] / scale
+
+    return errors_in_variables(
+        design, put_in, extra, speed_std**2, solve, weight=weight, tolerance=SETTLED, most=ITERATIONS
+    ).parameters
+
+
+def _bootstrap(
+    design: FloatArray, put_in: FloatArray, speed_std: FloatArray, fit: _Fit, block: IntArray, settled: bool
+) -> FloatArray:
+    """Parameters of fits to windows drawn anew, in blocks of neighbours. Shape (DRAWS, p).
+
+    A block is twice as long as the residuals remember, and three windows at least, one where each is a step of its own.
+    The draws are widened as Student's t is, for a bootstrap of few blocks is too narrow.
+    """
+    blocks, own = np.unique(block, return_inverse=True)
+    residual = np.bincount(own, put_in - design @ fit.parameters) / np.bincount(own)
+    memory = int(np.ceil(2.0 * autocorrelation_time(residual)))
+    length = min(max(1 if settled else BLOCK, memory), max(1, len(blocks) // 2))
+    times = drawn_times(len(blocks), length, DRAWS, np.random.default_rng(SEED))
+    found = []
+    for part in np.array_split(times, max(1, DRAWS * len(put_in) // 100_000)):
+        weight = fit.weight * part[:, own]
+        shape = (len(part), *design.shape)
+        found.append(
+            _york(
+                np.broadcast_to(design, shape), np.broadcast_to(put_in, shape[:2]),
+                np.broadcast_to(speed_std, shape[:2]), fit.extra, weight,
+            )
+        )  # fmt: skip
+    drawn = np.concatenate(found)
+    freedom = max(len(blocks) / length - design.shape[1], 1.0)
+    wider = np.sqrt(1.0 + design.shape[1] / freedom) * t_quantile(int(max(freedom, 1))) / t_quantile(10**6)
+    return fit.parameters + wider * (drawn - fit.parameters)

@@ -1,7 +1,7 @@
 """Friction from points at constant speed.
 
-The paper's way: points, line (with its band), steady_state, axis_lines. With all axes at once: operating_points,
-shapes, shape_fit, choice, lack_of_fit (does any offered shape fit?), moment and moment_by_shape
-(a change inside a run), study, and what it says: study_parts, study_statements,
-study_table; of steady_state, line_statements. settling: whether a log has a transient at all.
+points, operating_points: points of a table, or of the steady windows of logs. shapes: the shapes of friction and how
+one is fitted. choice: which shape predicts best. line, steady_state: the paper's line on each axis, with its band.
+lack_of_fit: does any offered shape fit? moment: a change inside a run. study, study_table: all of it for the groups of
+some logs, and what it says.
 """

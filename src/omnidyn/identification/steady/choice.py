@@ -22,16 +22,16 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.steady.operating_points import CURRENT, ForcePoints
-from omnidyn.identification.steady.shape_fit import (
+from omnidyn.identification.steady.shapes import (
     HUBER,
     RAYLEIGH,
+    SHAPES,
+    VISCOUS,
     ShapeFit,
     fit_shape,
-    is_turning,
     mean_error,
     rms_and_error,
 )
-from omnidyn.identification.steady.shapes import SHAPES, VISCOUS
 from omnidyn.model.robot import Robot
 from omnidyn.statistics import huber_loss
 
@@ -97,7 +97,7 @@ class ShapeChoice:
     def error(self) -> float:
         """Root mean square of the left-out error of the full force vector, each group with its shape [N]."""
         groups = next(iter(self.fits.values()))
-        return float(np.sqrt(np.mean(_joined([(self.fit(group).error ** 2).sum(axis=1) for group in groups]))))
+        return float(np.sqrt(np.mean(np.concatenate([(self.fit(group).error ** 2).sum(axis=1) for group in groups]))))
 
     @property
     def score(self) -> ShapeScore:
@@ -115,17 +115,14 @@ def choose_shape(robot: Robot, points: ForcePoints, *, shape: str = AUTO, robust
     if shape not in (AUTO, *SHAPES):
         raise InputError("no such shape", got=shape, expected=", ".join((AUTO, *SHAPES)), where="shape")
     _refuse_lost_signs(points)
-    parts = {group: points.chosen(np.array([name == group for name in points.group])) for group in points.groups}
+    parts = {group: points.of(group) for group in points.groups}
     fits: dict[str, dict[str, ShapeFit]] = {}
     missing: dict[str, str] = {}
     for name, candidate in SHAPES.items():
         if candidate.viscous and not all(map(speeds_differ, parts.values())):
             missing[name] = "one_speed"
             continue
-        fitted = {
-            group: fit_shape(candidate, robot, own, turning=is_turning(robot, own), robust=robust)
-            for group, own in parts.items()
-        }
+        fitted = {group: fit_shape(candidate, robot, part, robust=robust) for group, part in parts.items()}
         if all(fit is not None for fit in fitted.values()):
             fits[name] = {group: fit for group, fit in fitted.items() if fit is not None}
         else:
@@ -136,11 +133,11 @@ def choose_shape(robot: Robot, points: ForcePoints, *, shape: str = AUTO, robust
             got=f"{len(points)} points: {NOT_COMPARED.get(missing.get(shape, ''), 'too few')}",
             expected="steady runs in six directions or more", remedy="drive in more directions, each at a held speed",
         )  # fmt: skip
-    judge = _Judge(fits, robust)
-    scores = _scores(fits, judge)
+    errors = _LeftOutErrors(fits, robust)
+    scores = _scores(fits, errors)
     if shape != AUTO:
         return ShapeChoice(scores, shape, fits, missing)
-    chosen, own, scored = _of_groups(fits, _choice(scores, judge), robust)
+    chosen, own, scored = _of_groups(fits, _choice(scores, errors), robust)
     return ShapeChoice(scores, chosen, fits, missing, own, scored)
 
 
@@ -153,23 +150,23 @@ def _of_groups(
     """
     rest, own = [*next(iter(fits.values()))], dict[str, str]()
     scored: dict[str, tuple[ShapeScore, ...]] = {}
-    alone = {group: {name: {group: each[group]} for name, each in fits.items()} for group in rest}
+    alone = {group: {name: {group: fit[group]} for name, fit in fits.items()} for group in rest}
     while len(rest) + len(own) > 1 and rest:
         found = {}
         for group in rest:
-            judge = _Judge(alone[group], robust)
-            scored[group] = _scores(alone[group], judge)
+            errors = _LeftOutErrors(alone[group], robust)
+            scored[group] = _scores(alone[group], errors)
             able = [score.name for score in scored[group] if score.in_model and not score.at_bound]
-            if able and judge.apart(chosen, able[0]) > APART:
-                found[group] = _choice(scored[group], judge)
+            if able and errors.apart(chosen, able[0]) > APART:
+                found[group] = _choice(scored[group], errors)
         if not found:
             break
         own |= found
         rest = [group for group in rest if group not in own]
         if rest:
-            left = {name: {group: each[group] for group in rest} for name, each in fits.items()}
-            judge = _Judge(left, robust)
-            chosen = _choice(_scores(left, judge), judge)
+            left = {name: {group: fit[group] for group in rest} for name, fit in fits.items()}
+            errors = _LeftOutErrors(left, robust)
+            chosen = _choice(_scores(left, errors), errors)
     return chosen, own, {group: scored[group] for group in own}
 
 
@@ -191,15 +188,21 @@ def speeds_differ(points: ForcePoints) -> bool:
     return bool(speed.size > 1 and np.quantile(speed, 0.9) > SPEED_RATIO * np.quantile(speed, 0.1))
 
 
-class _Judge:
+class _LeftOutErrors:
     """What decides between shapes. squares: shape -> squared left-out errors; fold: of each point."""
 
     def __init__(self, fits: Mapping[str, Mapping[str, ShapeFit]], robust: bool):
         self.squares = {
-            name: _joined([(fit.error**2).sum(axis=1) for fit in own.values()]) for name, own in fits.items()
+            name: np.concatenate([(fit.error**2).sum(axis=1) for fit in groups.values()])
+            for name, groups in fits.items()
         }
-        self.fold = _folds(next(iter(fits.values())).values())
-        self._loss = _capped(self.squares) if robust else self.squares
+        folds = [fit.fold for fit in next(iter(fits.values())).values()]
+        before = np.cumsum([0, *(int(fold.max()) + 1 for fold in folds)])
+        self.fold = np.concatenate([fold + first for fold, first in zip(folds, before[:-1], strict=True)])
+        self._loss = self.squares
+        if robust:  # Huber's loss, its bound two scales of the shape that has the least
+            limit = HUBER / RAYLEIGH * float(np.sqrt(min(np.median(square) for square in self.squares.values())))
+            self._loss = {name: huber_loss(square, limit) for name, square in self.squares.items()}
 
     @property
     def order(self) -> list[str]:
@@ -215,27 +218,21 @@ class _Judge:
         return behind / error if error > 0.0 else math.copysign(math.inf, behind)
 
 
-def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], judge: _Judge) -> tuple[ShapeScore, ...]:
-    along = {name: _joined([fit.along_error**2 for fit in own.values()]) for name, own in fits.items()}
-    squares, fold, order = judge.squares, judge.fold, judge.order
+def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], errors: _LeftOutErrors) -> tuple[ShapeScore, ...]:
+    along = {name: np.concatenate([fit.along_error**2 for fit in groups.values()]) for name, groups in fits.items()}
+    squares, fold, order = errors.squares, errors.fold, errors.order
     found = []
     for name in order:
-        apart = judge.apart(name, order[0])
-        own = list(fits[name].values())
+        apart = errors.apart(name, order[0])
+        groups = list(fits[name].values())
         found.append(
             ShapeScore(
-                name, SHAPES[name].words, len(own[0].keys), *rms_and_error(squares[name], fold),
+                name, SHAPES[name].words, len(groups[0].keys), *rms_and_error(squares[name], fold),
                 *rms_and_error(along[name], fold), *_difference(squares[name], squares[order[0]], fold), apart,
-                apart > APART, SHAPES[name].in_model, any((fit.free <= 0.0).any() for fit in own),
+                apart > APART, SHAPES[name].in_model, any((fit.free <= 0.0).any() for fit in groups),
             )
         )  # fmt: skip
     return tuple(found)
-
-
-def _capped(squares: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Huber's loss of squared lengths, its bound two scales of the shape that has the least."""
-    limit = HUBER / RAYLEIGH * float(np.sqrt(min(np.median(each) for each in squares.values())))
-    return {name: huber_loss(each, limit) for name, each in squares.items()}
 
 
 def _difference(first: FloatArray, second: FloatArray, fold: IntArray) -> tuple[float, float]:
@@ -246,20 +243,7 @@ def _difference(first: FloatArray, second: FloatArray, fold: IntArray) -> tuple[
     return float(np.mean(first - second)) / sizes, mean_error(first - second, fold) / sizes
 
 
-def _joined(parts: Sequence[FloatArray]) -> FloatArray:
-    return np.concatenate(list(parts))
-
-
-def _folds(fits) -> IntArray:
-    """Numbers of the folds of all groups, one group after the other."""
-    found, first = [], 0
-    for fit in fits:
-        found.append(fit.fold + first)
-        first += int(fit.fold.max()) + 1
-    return np.concatenate(found)
-
-
-def _choice(scores: Sequence[ShapeScore], judge: _Judge) -> str:
+def _choice(scores: Sequence[ShapeScore], errors: _LeftOutErrors) -> str:
     """The simplest shape that a robot file can hold and that the data cannot tell from the best of those."""
     able = [score for score in scores if score.in_model and not score.at_bound]
     if not able:
@@ -268,7 +252,7 @@ def _choice(scores: Sequence[ShapeScore], judge: _Judge) -> str:
             got=", ".join(score.name for score in scores), expected="forces that point along the motion",
             remedy="check the sign of the currents, and which wheel is which",
         )  # fmt: skip
-    equal = [score for score in able if judge.apart(score.name, able[0].name) <= APART]
+    equal = [score for score in able if errors.apart(score.name, able[0].name) <= APART]
     return min(equal, key=lambda score: (score.levels, score.loo)).name
 
 

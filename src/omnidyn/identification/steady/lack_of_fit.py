@@ -10,29 +10,30 @@ needs no idea of what is wrong. Points at which a part of the chosen shape is at
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import fdtrc, stdtr
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification import lack_of_fit as common
+from omnidyn.identification.lack_of_fit import Force, LackOfFit, Remedy
 from omnidyn.identification.steady.choice import APART
 from omnidyn.identification.steady.operating_points import ForcePoints
-from omnidyn.identification.steady.shape_fit import (
+from omnidyn.identification.steady.shapes import (
     HUBER,
     RAYLEIGH,
     ShapeFit,
+    element_speeds,
     fold_numbers,
     is_turning,
     mean_error,
+    on_rollers,
     seen_components,
 )
-from omnidyn.identification.steady.shapes import element_speeds, on_rollers
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import sin_cos_deg
-from omnidyn.statement import quoted
+from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import huber_weight
 
 FALSE_ALARM = 0.002  # of all tests of a group together, by Student's t: few directions have longer tails
@@ -43,93 +44,59 @@ SPARE = 6  # folds beyond the levels that a test needs
 ROUNDS = 10  # of robust weights
 TURNED_DEG = (15.0, 30.0, 45.0, 60.0, 75.0)
 REPEATS = "repeats"
-ROOM = {"forward and backward", "left and right", "pull"}  # keys of remedies that a tilted floor looks like
-
-
-@dataclass(frozen=True)
-class Remedy:
-    """What would fit better. key: its name, words: what it is. size [N]: rms of the force that it adds.
-
-    error, error_before [N]: left-out error with it and without, rms; gain, gain_std [N]: their difference. probability:
-    of so much by chance, all tests counted. same_as: keys of others that the data cannot tell from it.
-    """
-
-    key: str
-    words: str
-    size: float
-    error_before: float
-    error: float
-    gain: float
-    gain_std: float
-    probability: float
-    same_as: tuple[str, ...] = ()
-
-    def as_of_whole_logs(self) -> common.Remedy:
-        """See `LackOfFit.as_of_whole_logs`."""
-        before, after = self.error_before**2, self.error**2
-        std = 2.0 * self.error * self.gain_std / before
-        return common.Remedy(self.key, quoted(self.words), 1.0 - after / before, std, self.same_as, offered=False)
-
-    def fits(self, force: float) -> bool:
-        """Whether it is no chance, tells more of what was left out, and is as large as matters. force [N]: rms."""
-        sure = self.probability < FALSE_ALARM and self.gain > APART * self.gain_std
-        return sure and self.size > MATTERS * force
-
-
-@dataclass(frozen=True)
-class LackOfFit:
-    """Whether friction is something else than the chosen shape. found: it is, and it matters. share: of the squared
-    left-out error that is no noise. remedies: what would fit, best first; none where only repeats tell. tested: names
-    of what was tried; empty where there are too few directions.
-    """
-
-    found: bool
-    share: float
-    remedies: tuple[Remedy, ...]
-    tested: tuple[str, ...]
-
-    def as_of_whole_logs(self) -> common.LackOfFit:
-        """The same in the words that every method has: the one channel is the force of friction, in directions that
-        were left out [N]; gains are shares of the squared error there. No robot file holds any of these remedies."""
-        told = tuple(each.as_of_whole_logs() for each in self.remedies)
-        size = {"force": max((each.size for each in self.remedies), default=0.0)}
-        return common.LackOfFit(self.found, {"force": self.share}, size, (), told, {})
-
-
-@dataclass(frozen=True)
-class _Rival:
-    key: str
-    words: str
-    columns: Callable[[Robot, ForcePoints], FloatArray]
-    yaw: bool = False
+ABOUT_YAW = "turning left and right"
 
 
 def lack_of_fit(robot: Robot, points: ForcePoints, fit: ShapeFit) -> LackOfFit:
-    """Test the fitted shape of one group of points."""
+    """Test the fitted shape of one group of points.
+
+    The one channel is the force of friction, in directions that were left out [N]; gains are shares of the squared
+    error there. No robot file holds any of these remedies. Nothing is tried where there are too few directions.
+    """
     moving = all_moving(robot, points, fit)
     turning = is_turning(robot, points) and bool(moving.turns.any())
+    untested = LackOfFit(False, {"force": 0.0}, {"force": 0.0}, (), (), {})
     if not len(moving) or int(fold_numbers(moving).max()) + 1 < len(fit.keys) + SPARE:
-        return LackOfFit(False, 0.0, (), ())
+        return untested
     problem = LinearShape(robot, moving, fit, turning)
     plain = problem.solve(np.zeros((*problem.target.shape, 0)))
     if plain is None:
-        return LackOfFit(False, 0.0, (), ())
-    tried: list[tuple[_Rival, FloatArray, _Solved]] = []
-    for rival in _rivals():
-        columns = problem.components(rival.columns(robot, moving))
-        solved = problem.solve(columns) if turning or not rival.yaw else None
+        return untested
+    tried: dict[str, _Solved] = {}
+    for key, columns in UNOFFERED_SHAPES.items():
+        solved = problem.solve(problem.components(columns(robot, moving))) if turning or key != ABOUT_YAW else None
         if solved is not None:
-            tried.append((rival, columns, solved))
-    force = float(np.sqrt(np.mean((problem.target**2).sum(axis=1))))
-    tests = sum(columns.shape[2] for _, columns, _ in tried) + 1
-    every = (_remedy(*one, plain, problem.fold, tests) for one in tried)
-    remedies = sorted((each for each in every if each.fits(force)), key=lambda each: each.error)
+            tried[key] = solved
+    size = float(np.sqrt(np.mean((problem.target**2).sum(axis=1))))
+    tests = sum(solved.new for solved in tried.values()) + 1
+    forces = {key: _gain(solved, plain, problem.fold, tests) for key, solved in tried.items()}
+    better = sorted((key for key in forces if _matters(forces[key], size)), key=lambda key: forces[key].after)
     repeated = _repeated(plain, problem, len(fit.keys))
-    found = bool(remedies) or (repeated.probability * tests < FALSE_ALARM and repeated.size > MATTERS * force)
-    share = max(repeated.share if found else 0.0, _share(remedies))
+    found = bool(better) or (repeated.probability * tests < FALSE_ALARM and repeated.size > MATTERS * size)
+    share = repeated.share if found else 0.0
+    if better:
+        share = max(share, 1.0 - (forces[better[0]].after / forces[better[0]].before) ** 2)
     return LackOfFit(
-        found, share, _tied(remedies), (*(rival.key for rival, *_ in tried), *([REPEATS] if repeated.tested else []))
-    )
+        found, {"force": share}, {"force": max((forces[key].size for key in better), default=0.0)}, (),
+        tuple(_remedy(key, forces, better) for key in better), {},
+        tried=(*tried, *([REPEATS] if repeated.tested else [])),
+    )  # fmt: skip
+
+
+def _matters(force: Force, size: float) -> bool:
+    """Whether a gain is no chance, tells more of what was left out, and is large. size [N]: rms of all forces."""
+    return force.p < FALSE_ALARM and force.gain > APART * force.gain_std and force.size > MATTERS * size
+
+
+def _remedy(key: str, forces: Mapping[str, Force], better: Sequence[str]) -> Remedy:
+    """The best names those which do as well: their left-out error is within a standard error of its gain."""
+    force, best = forces[key], forces[better[0]]
+    alike = [other for other in better[1:] if forces[other].after - best.after <= best.gain_std]
+    before, after = force.before**2, force.after**2
+    return Remedy(
+        key, Statement("cause", NOTE, key), 1.0 - after / before, 2.0 * force.after * force.gain_std / before,
+        tuple(alike) if force is best else (), offered=False, force=force,
+    )  # fmt: skip
 
 
 def all_moving(robot: Robot, points: ForcePoints, fit: ShapeFit) -> ForcePoints:
@@ -138,20 +105,6 @@ def all_moving(robot: Robot, points: ForcePoints, fit: ShapeFit) -> ForcePoints:
     fastest = np.linalg.norm(points.twist * [1.0, 1.0, float(np.mean(robot.wheels.robot_radius))], axis=1)
     bound = np.maximum(STILL_TIMES * points.still, SLOW_SHARE * fastest)
     return points.chosen(np.asarray((slow > bound[:, None]).all(axis=1)))
-
-
-def _share(remedies: Sequence[Remedy]) -> float:
-    best = remedies[0] if remedies else None
-    return 0.0 if best is None else 1.0 - (best.error / best.error_before) ** 2
-
-
-def _tied(remedies: Sequence[Remedy]) -> tuple[Remedy, ...]:
-    """The best, and which others do as well: their left-out error is within a standard error of its gain."""
-    if not remedies:
-        return ()
-    best = remedies[0]
-    same = tuple(each.key for each in remedies[1:] if each.error - best.error <= best.gain_std)
-    return (Remedy(**{**vars(best), "same_as": same}), *remedies[1:])
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,19 +177,17 @@ def is_turning_fit(fit: ShapeFit) -> bool:
     return fit.error.shape[1] == 3
 
 
-def _remedy(rival: _Rival, columns: FloatArray, solved: _Solved, plain: _Solved, fold: IntArray, tests: int) -> Remedy:
+def _gain(solved: _Solved, plain: _Solved, fold: IntArray, tests: int) -> Force:
+    """What the new columns add to the force, and take away of the left-out error."""
     new = slice(len(solved.level) - solved.new, None)
-    size = np.abs(solved.level[new]) / np.sqrt(len(columns))  # the columns are of length 1
+    size = np.abs(solved.level[new]) / np.sqrt(len(solved.error))  # the columns are of length 1
     with np.errstate(divide="ignore", invalid="ignore"):
         t = np.where(solved.std[new] > 0.0, np.abs(solved.level[new]) / solved.std[new], 0.0)
-    probability = float(np.min(2.0 * stdtr(solved.degrees, -t)))
+    p = float(np.min(2.0 * stdtr(solved.degrees, -t)))
     before, after = (plain.error**2).sum(axis=1), (solved.error**2).sum(axis=1)
     first, second = float(np.sqrt(before.mean())), float(np.sqrt(after.mean()))
     spread = mean_error(before - after, fold) / max(first + second, 1e-300)
-    return Remedy(
-        rival.key, rival.words, float(np.linalg.norm(size)), first, second, first - second, spread,
-        min(1.0, tests * probability),
-    )  # fmt: skip
+    return Force(float(np.linalg.norm(size)), first, second, first - second, spread, min(1.0, tests * p))
 
 
 @dataclass(frozen=True)
@@ -271,27 +222,6 @@ def _repeated(plain: _Solved, problem: LinearShape, levels: int) -> _Repeated:
 # ---- what is not offered ----------------------------------------------------------------------------------
 
 
-def _rivals() -> list[_Rival]:
-    turned = [
-        _Rival(f"box turned by {angle:.0f} deg", f"a box turned by {angle:.0f} degrees against the body",
-               lambda r, p, angle=angle: _turned_box(p, angle)) for angle in TURNED_DEG
-    ]  # fmt: skip
-    return [
-        *turned,
-        _Rival("rollers", "friction along the axles of the wheels, where the rollers turn", on_rollers),
-        _Rival("forward and backward", "another level forward than backward", lambda r, p: _one_sided(p, 0)),
-        _Rival("left and right", "another level to the left than to the right", lambda r, p: _one_sided(p, 1)),
-        _Rival("pull", "a constant pull, by a floor that is not level or an offset of sensors", lambda r, p: _pull(p)),
-        _Rival("turning left and right", "another level turning left than right",
-               lambda r, p: _on_axis(p, np.ones(len(p)), 2), yaw=True),
-    ]  # fmt: skip
-
-
-def rival_columns(robot: Robot, points: ForcePoints, problem: LinearShape, turning: bool) -> list[FloatArray]:
-    """What each part that is not offered would add, in components of a problem: (points, components, levels) each."""
-    return [problem.components(r.columns(robot, points)) for r in _rivals() if turning or not r.yaw]
-
-
 def _turned_box(points: ForcePoints, angle: float) -> FloatArray:
     """(C_1 sgn(e_1 . v) e_1, C_2 sgn(e_2 . v) e_2) of two axes at this angle. Shape (points, 3, 2)."""
     sin, cos = sin_cos_deg(angle)
@@ -307,11 +237,25 @@ def _one_sided(points: ForcePoints, axis: int) -> FloatArray:
     return _on_axis(points, np.abs(points.twist[:, axis]) / np.where(speed > 0.0, speed, 1.0), axis)
 
 
-def _pull(points: ForcePoints) -> FloatArray:
-    return np.concatenate([_on_axis(points, np.ones(len(points)), axis) for axis in (0, 1)], axis=2)
-
-
 def _on_axis(points: ForcePoints, value: FloatArray, axis: int) -> FloatArray:
     column = np.zeros((len(points), 3, 1))
     column[:, axis, 0] = value
     return column
+
+
+# Columns of what is not offered, by key, and those of it that a tilted floor looks like.
+UNOFFERED_SHAPES: dict[str, Callable[[Robot, ForcePoints], FloatArray]] = {
+    **{f"box turned by {angle:.0f} deg": lambda r, p, angle=angle: _turned_box(p, angle) for angle in TURNED_DEG},
+    "rollers": on_rollers,
+    "forward and backward": lambda r, p: _one_sided(p, 0),
+    "left and right": lambda r, p: _one_sided(p, 1),
+    "pull": lambda r, p: np.concatenate([_on_axis(p, np.ones(len(p)), axis) for axis in (0, 1)], axis=2),
+    ABOUT_YAW: lambda r, p: _on_axis(p, np.ones(len(p)), 2),
+}
+TILTED_FLOOR = {"forward and backward", "left and right", "pull"}
+
+
+def unoffered_columns(robot: Robot, points: ForcePoints, problem: LinearShape, turning: bool) -> list[FloatArray]:
+    """What each part that is not offered would add, in components of a problem: (points, components, levels) each."""
+    return [problem.components(columns(robot, points))
+            for key, columns in UNOFFERED_SHAPES.items() if turning or key != ABOUT_YAW]  # fmt: skip

@@ -10,12 +10,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtr
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Estimate
+from omnidyn.identification.steady.levels import FittedLevels
+from omnidyn.logs.steady_table import SteadyTable
+from omnidyn.model.dynamics import drive_wrench, frame_wrench, wrench_from_currents
+from omnidyn.model.frames import AXES
+from omnidyn.model.motor import back_emf
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import wheel_speed
+from omnidyn.statement import NOTE, Statement, statements
 from omnidyn.statistics import FittedLine, errors_in_variables, t_quantile
 
 PARAMETERS = 2
@@ -24,56 +35,32 @@ MAX_CONDITION = 1e13
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
-    """A fitted line. Order of all pairs: B (slope), C (level).
+class Line(FittedLevels):
+    """A fitted line: its levels are B (slope) and C (level).
 
-    estimate: within B >= 0 and C >= 0. free: without these bounds. covariance: of `free`, shape (2, 2).
-    at_bound: which of the two the bounds hold at 0. rows, degrees_of_freedom: rows, and rows - 2.
-    reduced_chi2: mean square of the residuals over their variances (over 1 where no std was given).
-    quantile: standard errors in half a 95 % interval. converged: whether the iteration for speed_std ended.
+    rows: that it goes through. reduced_chi2: mean square of the residuals over their variances (over 1 where no std was
+    given). absolute_std: whether the std given count as exact. converged: whether the iteration for speed_std ended.
     """
 
-    estimate: FloatArray
-    free: FloatArray
-    covariance: FloatArray
     rows: int
     reduced_chi2: float
-    quantile: float
+    absolute_std: bool = False
     converged: bool = True
 
     @property
-    def at_bound(self) -> tuple[bool, bool]:
-        slope, level = (self.estimate == 0.0) & (self.free != 0.0)
-        return bool(slope), bool(level)
-
-    @property
     def degrees_of_freedom(self) -> int:
+        """Rows minus levels."""
         return self.rows - PARAMETERS
 
     @property
-    def std(self) -> FloatArray:
-        """Standard errors of the fit without bounds: what the data alone say. Shape (2,)."""
-        return np.sqrt(np.diag(self.covariance))
+    def quantile(self) -> float:
+        """Of Student's t; of the normal where the std are exact."""
+        return t_quantile(math.inf if self.absolute_std else self.degrees_of_freedom)
 
     @property
-    def correlation(self) -> float:
-        """Between B and C; 0 where the points lie on the line and nothing is uncertain."""
-        product = float(np.prod(self.std))
-        return float(self.covariance[0, 1]) / product if product > 0.0 else 0.0
-
-    @property
-    def ci95(self) -> FloatArray:
-        """95 % intervals, shape (2, 2): (low, high) of B, then of C.
-
-        free +- quantile * std. At a bound: from 0 to what the free fit would reach from 0, which covers every true
-        value >= 0 that the interval of the free fit covers. The other parameter, moved by the bound, keeps the free
-        interval, widened to hold its estimate.
-        """
-        half = self.quantile * self.std
-        low, high = self.free - half, self.free + half
-        bound = np.array(self.at_bound)
-        low = np.where(bound, 0.0, np.minimum(low, self.estimate))
-        return np.stack([low, np.where(bound, np.maximum(high, half), np.maximum(high, self.estimate))], axis=1)
+    def at_bound(self) -> BoolArray:
+        """Also of a level that is held because the other one is."""
+        return (self.level == 0.0) & (self.free != 0.0)
 
 
 def fit_line(
@@ -83,10 +70,12 @@ def fit_line(
     force_std: FloatArray | None = None,
     *,
     absolute_std: bool = False,
+    keys: tuple[str, ...] = ("viscous", "coulomb"),
 ) -> Line:
-    """Fit B and C. All arrays have shape (rows,); a row at rest is a point of the line on the side its force pushes.
+    """Fit B and C, whose keys are given, to arrays of shape (rows,).
 
-    Two different |speed| are needed, and three rows (two with `absolute_std`): the caller checks.
+    A row at rest is a point of the line on the side its force pushes. Two different |speed| are needed, and three rows
+    (two with `absolute_std`): the caller checks.
     absolute_std: the given std are exact, intervals use the normal quantile; otherwise only their ratios count, the
     scatter itself sets their scale and Student's t the interval.
     """
@@ -101,13 +90,15 @@ def fit_line(
     mean_square = _cost(free, *problem) / max(rows - PARAMETERS, 1)
     normal = best.adjusted.T @ (best.weight[:, None] * best.adjusted)
     covariance = _solve(normal, np.eye(PARAMETERS)) * (1.0 if absolute_std else mean_square)
+    covariance[1, 0] = covariance[0, 1]  # symmetric to the last digit
     return Line(
-        estimate=_bounded(free, *problem) / scale,
+        keys=keys,
+        level=_bounded(free, *problem) / scale,
         free=free / scale,
         covariance=covariance / np.outer(scale, scale),
         rows=rows,
         reduced_chi2=mean_square,
-        quantile=t_quantile(math.inf if absolute_std else rows - PARAMETERS),
+        absolute_std=absolute_std,
         converged=best.converged,
     )
 
@@ -169,3 +160,111 @@ def confidence_band(estimate: Estimate, axis: int, speed: FloatArray) -> tuple[F
     spread = np.sqrt(of_slope**2 + joint + of_level**2)
     middle = estimate.value[slope] * speed + estimate.value[level]
     return middle, t_quantile(estimate.degrees_of_freedom[slope]) * spread
+
+
+# What is odd about steady points, and weak about the lines through them
+
+FEW_DEGREES = 2
+AGREEMENT = 0.05  # forces that differ by less than this share of their size agree
+UNLIKELY = 0.01  # probability below which the scatter contradicts the std given
+ORIGINS = ("table", "current", "voltage")  # of forces
+
+
+def line_statements(axis: int, line: Line, weighted: bool) -> list[Statement]:
+    """What is weak about one fitted line. weighted: by std that came with the data."""
+    found: list[Statement] = []
+    head = AXES[axis]
+    if line.degrees_of_freedom <= FEW_DEGREES and not line.absolute_std:
+        numbers = {"degrees": line.degrees_of_freedom, "rows": line.rows, "quantile": line.quantile}
+        found.append(Statement("few_degrees", subject=head, numbers=numbers))
+    for k, name in enumerate(line.keys):
+        low, high = line.ci95[k]
+        if line.at_bound[k]:
+            found.append(Statement("coefficient_at_bound", subject=name, numbers={"free": line.free[k], "high": high}))
+        elif low <= 0.0 <= high:
+            found.append(Statement("interval_contains_zero", subject=name, numbers={"ci95": (low, high)}))
+    if not line.converged:
+        found.append(Statement("speed_std_not_settled", subject=head))
+    degrees = line.degrees_of_freedom
+    if weighted and degrees >= 1:
+        share = chdtr(degrees, line.reduced_chi2 * degrees)
+        if not UNLIKELY / 2 <= share <= 1.0 - UNLIKELY / 2:
+            numbers = {"times": np.sqrt(line.reduced_chi2), "absolute_std": line.absolute_std}
+            found.append(Statement("scatter_contradicts_std", subject=head, numbers=numbers))
+    return found
+
+
+def point_statements(robot: Robot, points: SteadyTable) -> list[Statement]:
+    """What is odd about the points, whatever line is drawn through them."""
+    found = [*statements(points.notes)]
+    for axis in range(len(AXES)):
+        rows = np.flatnonzero(points.axis_index == axis)
+        if rows.size:
+            wrong = int((points.force[rows] * points.speed[rows] < 0.0).sum())
+            against = Statement("axis_against_motion", subject=AXES[axis], numbers={"wrong": wrong, "rows": rows.size})
+            found += [against] if wrong else []
+            found += _beyond_no_load(robot, axis, points, rows)
+            forces = {points.force_from: points.force[rows], **_recomputed(robot, axis, points, rows)}
+            for pair in combinations([name for name in ORIGINS if name in forces], 2):
+                found += _compare(axis, pair, forces[pair[0]], forces[pair[1]])
+    return found
+
+
+def _beyond_no_load(robot: Robot, axis: int, points: SteadyTable, rows: NDArray[np.intp]) -> list[Statement]:
+    """Rows in which the wheels outrun the voltage: at the no-load speed the back-EMF has eaten all of it."""
+    if points.voltage is None:
+        return []
+    ratio = no_load_ratio(robot, points.twists[rows], points.voltage[rows])
+    beyond = ratio[ratio > 1.0]
+    if not beyond.size:
+        return []
+    excess = 100.0 * (beyond[np.isfinite(beyond)] - 1.0)
+    numbers = {
+        "beyond": beyond.size, "moving": int((points.speed[rows] != 0.0).sum()),
+        "excess": (excess.min(), excess.max()) if excess.size else None,
+    }  # fmt: skip
+    return [Statement("beyond_no_load", subject=AXES[axis], numbers=numbers)]
+
+
+def no_load_ratio(robot: Robot, twist: FloatArray, voltage: FloatArray) -> FloatArray:
+    """Speed over no-load speed, |e|^2 / (e . u) with the back-EMF e of all wheels. Shape (rows,).
+
+    Above 1 the motors brake as a whole. Infinite where the voltage opposes the motion, NaN at rest or without voltage.
+    """
+    emf = back_emf(robot.motor, wheel_speed(robot.wheels, twist))
+    own, against = (emf * emf).sum(axis=1), (emf * voltage).sum(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        ratio = np.where(against > 0.0, own / against, np.inf)
+    return np.where((own > 0.0) & np.isfinite(against), ratio, np.nan)
+
+
+def _recomputed(robot: Robot, axis: int, points: SteadyTable, rows: NDArray[np.intp]) -> dict[str, FloatArray]:
+    """The same forces from other measurements."""
+    twist = points.twists[rows]
+    extra = frame_wrench(robot, twist)[:, axis]
+    forces: dict[str, FloatArray] = {}
+    if points.current is not None and points.force_from != "current":
+        forces["current"] = wrench_from_currents(robot, points.current[rows])[:, axis] + extra
+    if points.voltage is not None and points.force_from != "voltage":
+        forces["voltage"] = drive_wrench(robot, twist, points.voltage[rows])[:, axis] + extra
+    return forces
+
+
+def _compare(axis: int, origins: tuple[str, str], a: FloatArray, b: FloatArray) -> list[Statement]:
+    known = np.isfinite(a) & np.isfinite(b)
+    a, b = a[known], b[known]
+    size = float(np.sqrt(np.mean(a**2))) if a.size else 0.0
+    if size == 0.0:
+        return []
+    difference = float(np.sqrt(np.mean((a - b) ** 2)))
+    if difference <= AGREEMENT * size:
+        return []
+    numbers = {"origins": origins, "ratio": a @ b / (a @ a), "rows": a.size, "difference": difference}
+    return [Statement("forces_disagree", subject=AXES[axis], numbers=numbers)]
+
+
+def rest_statements(axis: int, resting: int, rest: str) -> list[Statement]:
+    """How rows at rest were used, where that matters."""
+    codes = {"line": ("rest_as_sliding", "warning"), "ignore": ("rest_not_used", NOTE)}
+    code, severity = codes.get(rest, ("", ""))
+    return [Statement(code, severity, AXES[axis], {"rows": resting})] if resting and code else []

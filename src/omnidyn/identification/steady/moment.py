@@ -8,18 +8,20 @@ explains most; Student's t of d counts all cuts of all runs (C. E. Bonferroni, 1
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from scipy.special import stdtr
 
 from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.identification.steady.lack_of_fit import LinearShape, all_moving, unoffered_columns
 from omnidyn.identification.steady.operating_points import ForcePoints, HeldForces, held_forces
+from omnidyn.identification.steady.shapes import HUBER, RAYLEIGH, ShapeFit, is_turning
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.statement import Statement
-from omnidyn.statistics import t_quantile
+from omnidyn.statistics import autocorrelation_time, huber_weight, t_quantile
 
 FALSE = 0.01  # of right logs for which a change is told
 SPARE = 4  # windows beyond the commands that a test needs
@@ -68,13 +70,13 @@ def levelled(points: ForcePoints, found: Sequence[Moment], sources: Mapping[int,
     and the side on which no force is left, go. sources: of the runs, by number."""
     wrench, kept = points.wrench.copy(), np.ones(len(points), bool)
     for each in found:
-        own = np.array([sources[number] == each.source for number in points.run.tolist()])
-        before, after = own & (points.span[:, 1] <= each.at), own & (points.span[:, 0] >= each.at)
+        of_run = np.array([sources[number] == each.source for number in points.run.tolist()])
+        before, after = of_run & (points.span[:, 1] <= each.at), of_run & (points.span[:, 0] >= each.at)
         if any(each.vanished):
-            kept &= ~own | (after if each.vanished[0] else before)
+            kept &= ~of_run | (after if each.vanished[0] else before)
             continue
         wrench[after] /= 1.0 + each.change
-        kept &= ~own | before | after
+        kept &= ~of_run | before | after
     return replace(points, wrench=wrench).chosen(kept)
 
 
@@ -114,8 +116,8 @@ def _moment(held: HeldForces, source: str, tests: int) -> Moment | None:
     spread = t_quantile(degrees)
     scatter = std * np.sqrt(len(y)) / 2.0  # of one window, over the force
 
-    def level(own: BoolArray) -> tuple[float, tuple[float, float]]:
-        middle, half = force * float(y[own].mean()), float(spread * force * scatter / np.sqrt(own.sum()))
+    def level(rows: BoolArray) -> tuple[float, tuple[float, float]]:
+        middle, half = force * float(y[rows].mean()), float(spread * force * scatter / np.sqrt(rows.sum()))
         return middle, (middle - half, middle + half)
 
     ends = (float(held.start[min(near) - 1]), float(held.end[max(near)]))
@@ -130,10 +132,10 @@ def _along(held: HeldForces) -> tuple[FloatArray, FloatArray]:
     """(force of each window along the mean of its command, over that mean (n,); the mean [N] (n,))."""
     y, size = np.zeros(len(held.start)), np.zeros(len(held.start))
     for c in np.unique(held.command):
-        own = held.command == c
-        mean = held.force[own].mean(axis=0)
-        size[own] = np.linalg.norm(mean)
-        y[own] = held.force[own] @ mean / max(float(mean @ mean), 1e-300)
+        rows = held.command == c
+        mean = held.force[rows].mean(axis=0)
+        size[rows] = np.linalg.norm(mean)
+        y[rows] = held.force[rows] @ mean / max(float(mean @ mean), 1e-300)
     return y, size
 
 
@@ -150,3 +152,180 @@ def _shift(y: FloatArray, held: HeldForces, cut: int) -> tuple[float, float, int
     degrees = len(y) - len(np.unique(held.command)) - 1
     rest = left - shift * x
     return shift, float(np.sqrt(max(float(rest @ rest), 1e-300) / degrees / square)), degrees
+
+
+# A change inside a run where no command comes again: the fitted shape of friction is the yardstick
+#
+# F_k = (1 + d [t_k > T]) f(nu_k) + noise,   f: the shape at the motion of window k, its levels free
+#
+# The levels are fitted anew beside every d, so that directions which were driven on one side only say nothing. T is
+# the cut that explains most; Student's t of d counts the free numbers of the shape, and all cuts of all runs. What a
+# wrong shape leaves over follows the direction; a robot that drives round slowly makes a step in time of that. So the
+# standard error is that of errors with the memory that is left beside the step, and a step that a part which is not
+# offered takes away (lack_of_fit.py) is none.
+
+LEAST = 3  # windows on either side of a cut
+SPARE_NUMBERS = 6  # numbers beyond those that are fitted
+ROUNDS = 10  # of robust weights
+WORST = 1e4  # condition of what determines levels
+SEEN = 0.05  # the chance of as much beside another part, above which that may be it
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """One run as a linear problem, in the order of time. span (n, 2) [s]."""
+
+    source: str
+    shape: str
+    span: FloatArray
+    problem: LinearShape
+    rivals: Sequence[FloatArray]
+
+    @property
+    def cuts(self) -> range:
+        return range(LEAST, len(self.span) - LEAST + 1)
+
+
+@dataclass(frozen=True)
+class _Step:
+    """d of a cut, its standard error and degrees of freedom."""
+
+    value: float
+    std: float
+    degrees: int
+
+    @property
+    def size(self) -> float:
+        return abs(self.value / self.std)
+
+    def chance(self, tests: int) -> float:
+        """Of as much by noise alone, in so many tests."""
+        return min(1.0, tests * 2.0 * float(stdtr(self.degrees, -self.size)))
+
+
+def moments_by_shape(
+    robot: Robot, points: ForcePoints, fit_of: Callable[[str], ShapeFit], sources: Mapping[int, str],
+    told: Sequence[Moment] = (),
+) -> tuple[Moment, ...]:  # fmt: skip
+    """The changes inside runs, one a run at the most. fit_of: group -> its fit; sources: of the runs, by number.
+
+    told: what commands that come again have told; of those runs nothing more is said.
+    """
+    known = {each.source for each in told}
+    runs = [_run(robot, points, fit_of, number, source) for number, source in sources.items() if source not in known]
+    found = [run for run in runs if run is not None]
+    tests = sum(len(run.cuts) for run in found)
+    return tuple(moment for run in found if (moment := _change_by_shape(run, tests)) is not None)
+
+
+def _run(
+    robot: Robot, points: ForcePoints, fit_of: Callable[[str], ShapeFit], number: int, source: str
+) -> _Run | None:  # fmt: skip
+    """None where there are too few windows."""
+    own = points.chosen(points.run == number)
+    if not len(own):
+        return None
+    fit = fit_of(own.group[0])
+    own = all_moving(robot, own, fit)
+    own = own.chosen(np.argsort(own.span[:, 0], kind="stable"))
+    if len(own) < 2 * LEAST:
+        return None
+    turning = is_turning(robot, own)
+    problem = LinearShape(robot, own, fit, turning)
+    if problem.seen.sum() < problem.sizes.sum() + 1 + SPARE_NUMBERS:
+        return None
+    base = problem.base[:, :, problem.sizes]
+    rivals = [
+        more for more in unoffered_columns(robot, own, problem, turning)
+        if _determined(np.concatenate([base, more], axis=2), int(problem.seen.sum()))
+    ]  # fmt: skip
+    return _Run(source, fit.shape.name, own.span, problem, rivals)
+
+
+def _determined(design: FloatArray, count: int) -> bool:
+    """Whether `count` numbers tell the levels of these columns, and what is left over."""
+    norm = np.linalg.norm(design, axis=(0, 1))
+    if (norm == 0.0).any() or count - len(norm) < SPARE_NUMBERS:
+        return False
+    return bool(np.linalg.cond((design / norm).reshape(-1, len(norm))) <= WORST)
+
+
+def _change_by_shape(run: _Run, tests: int) -> Moment | None:
+    tried = {cut: step for cut in run.cuts if (step := _step(run, cut)) is not None}
+    if not tried:
+        return None
+    best = max(tried, key=lambda cut: tried[cut].size)
+    step = tried[best]
+    p = step.chance(tests)
+    if p > FALSE or abs(step.value) < MATTERS:
+        return None
+    if any((other := _step(run, best, more)) is None or other.chance(1) > SEEN for more in run.rivals):
+        return None
+    near = [cut for cut in tried if tried[cut].size ** 2 > step.size**2 - AS_GOOD]
+    before, after = _levels(run, best)
+    # The shape was fitted to both sides: d is a share of what it has on average.
+    share = float(np.linalg.norm(run.problem.force[:, :, 0], axis=1).mean()) / before[0]
+    spread = t_quantile(step.degrees)
+    low = share * min(tried[cut].value - spread * tried[cut].std for cut in near)  # T is not known any better
+    high = share * max(tried[cut].value + spread * tried[cut].std for cut in near)
+    return Moment(
+        run.source, 0.5 * float(run.span[best - 1, 1] + run.span[best, 0]),
+        (float(run.span[min(near) - 1, 0]), float(run.span[max(near), 1] if max(near) < len(run.span) else np.inf)),
+        *before, *after, share * step.value, (low, high), p, run.shape,
+    )  # fmt: skip
+
+
+def _step(run: _Run, cut: int, more: FloatArray | None = None) -> _Step | None:
+    """The step at a cut, levels fitted anew beside it; more: columns of a part that is not offered."""
+    after = (np.arange(len(run.span)) >= cut).astype(float)
+    solved = _solved(run, run.problem.force * after[:, None, None], more)
+    if solved is None:
+        return None
+    level, covariance, degrees = solved
+    return _Step(float(level[-1]), float(np.sqrt(covariance[-1, -1])), degrees)
+
+
+def _levels(run: _Run, cut: int) -> list[tuple[float, tuple[float, float]]]:
+    """(mean force over the windows [N], its 95 % interval) with the levels before the cut, and after it."""
+    problem, found = run.problem, []
+    for side in (np.arange(len(run.span)) < cut, np.arange(len(run.span)) >= cut):
+        # The same model with the step on the other side: the levels are then those of this side.
+        solved = _solved(run, problem.force * (~side)[:, None, None], None)
+        assert solved is not None
+        level, covariance, degrees = solved
+        base = problem.base[:, :, problem.sizes]
+        way = problem.force[:, :, 0] / np.maximum(np.linalg.norm(problem.force[:, :, 0], axis=1), 1e-300)[:, None]
+        row = np.append(np.einsum("nc,nck->k", way, base) / len(base), 0.0)
+        middle = float(row @ level)
+        half = t_quantile(degrees) * float(np.sqrt(row @ covariance @ row))
+        found.append((middle, (middle - half, middle + half)))
+    return found
+
+
+def _solved(
+    run: _Run, step: FloatArray, more: FloatArray | None
+) -> tuple[FloatArray, FloatArray, int] | None:  # fmt: skip
+    """(levels, the step's the last, covariance, degrees of freedom) by robust least squares; None: not determined."""
+    problem = run.problem
+    parts = [problem.base[:, :, problem.sizes], *([] if more is None else [more]), step]
+    design = np.concatenate(parts, axis=2)
+    count = int(problem.seen.sum())
+    if not _determined(design, count):
+        return None
+    norm = np.linalg.norm(design, axis=(0, 1))
+    design, degrees = design / norm, count - len(norm)
+    weight = np.ones(len(design))
+    normal = level = np.zeros(0)
+    for _ in range(ROUNDS):
+        normal = np.einsum("n,nca,ncb->ab", weight, design, design)
+        level = np.linalg.solve(normal, np.einsum("n,nca,nc->a", weight, design, problem.target))
+        length = np.linalg.norm(problem.target - design @ level, axis=1)
+        scale = float(np.median(length)) / RAYLEIGH
+        if scale == 0.0:
+            break
+        weight = huber_weight(length, HUBER * scale)
+    rest = problem.target - design @ level
+    variance = float((weight[:, None] * rest**2).sum()) / degrees
+    memory = max(autocorrelation_time(rest[:, c]) for c in range(rest.shape[1]))
+    covariance = np.linalg.inv(normal) * max(variance, 1e-300) * memory
+    return level / norm, covariance / np.outer(norm, norm), degrees

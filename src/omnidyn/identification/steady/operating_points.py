@@ -21,11 +21,11 @@ from omnidyn.identification.steady.points import refuse_losses
 from omnidyn.logs.plateaus import ANGLE, COMMANDS, SAME_COMMAND, Plateau, find_plateaus, pool
 from omnidyn.logs.segments import on_clock_of_wheels
 from omnidyn.model.actuation import asked_voltage, reaching
-from omnidyn.model.dynamics import frame_wrench
+from omnidyn.model.dynamics import frame_wrench, state_space
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.motor import settled_current, traction
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import rim_speed, twist_from_wheel_speed, wrench_from_traction
+from omnidyn.model.wheels import rim_speed, twist_from_wheel_speed, wheel_speed, wrench_from_traction
 from omnidyn.run import Run
 from omnidyn.statement import NOTE, Statement, statements
 
@@ -80,6 +80,10 @@ class ForcePoints:
     def groups(self) -> tuple[str, ...]:
         """Names of the groups in order of appearance."""
         return tuple(dict.fromkeys(self.group))
+
+    def of(self, group: str) -> ForcePoints:
+        """The points of one group."""
+        return self.chosen(np.array([name == group for name in self.group]))
 
     @property
     def speed(self) -> FloatArray:
@@ -160,7 +164,11 @@ def steady_windows(
     origin = _origin(runs, force_from)
     found, empty = [], []
     for number, run in enumerate(runs):
-        _check_wheels(run, robot)
+        if run.wheels is not None and run.wheels != robot.wheels.count:
+            raise InputError(
+                "the run has another number of wheels than the robot", got=str(run.wheels),
+                expected=f"{robot.wheels.count} ({robot.name})", where=run.source,
+            )  # fmt: skip
         run = on_clock_of_wheels(_with_voltage(run, robot) if origin == VOLTAGE else run)
         windows = pool(find_plateaus(run, start=window[0], end=window[1]) if window else find_plateaus(run))
         empty += [] if windows else [run.source]
@@ -215,14 +223,6 @@ def _origin(runs: Sequence[Run], asked: str) -> str:
         "no force can be had from this run", got=", ".join(lacking.channels) or "no channels",
         expected="current, or voltage (or duty and supply) with a speed", where=lacking.source,
     )  # fmt: skip
-
-
-def _check_wheels(run: Run, robot: Robot) -> None:
-    if run.wheels is not None and run.wheels != robot.wheels.count:
-        raise InputError(
-            "the run has another number of wheels than the robot", got=str(run.wheels),
-            expected=f"{robot.wheels.count} ({robot.name})", where=run.source,
-        )  # fmt: skip
 
 
 def _with_voltage(run: Run, robot: Robot) -> Run:
@@ -337,7 +337,7 @@ def _direction(robot: Robot, each: Plateau, twist: FloatArray) -> FloatArray:
 def _refuse_unsigned(runs: Sequence[Run], windows: Sequence[Plateau]) -> None:
     """A sensor without sign: no current is ever below 0 although wheels turn both ways."""
     lowest = min((float(np.nanmin(run.current, initial=0.0)) for run in runs if run.current is not None), default=0.0)
-    speeds = [each.mean.get("wheel_speed", each.mean.get("wheel_speed_command")) for each in windows]
+    speeds = [window.mean.get("wheel_speed", window.mean.get("wheel_speed_command")) for window in windows]
     back = sum(bool((speed < 0.0).any()) for speed in speeds if speed is not None)
     if lowest >= 0.0 and back > UNSIGNED_SHARE * len(windows):
         raise InputError(
@@ -398,3 +398,44 @@ def _moving(points: ForcePoints, robot: Robot) -> ForcePoints:
     kept = points.chosen(moves)
     left_out = Statement("windows_at_rest", NOTE, numbers={"windows": resting})
     return replace(kept, notes=(*kept.notes, left_out)) if resting else kept
+
+
+# How fast a robot follows its firmware's speed loop, beside how often its log has a row
+#
+# A loop that settles within a row shows no transient: whole logs then say no more than their steady stretches do.
+
+SETTLED = 2.0  # time constants: what is left of a transient then is a seventh
+
+
+def settling_time(robot: Robot) -> float:
+    """Slowest time constant [s] of the robot within its speed loop, linear; inf where it does not settle.
+
+        v' = A v - B (kp S v + ki S z),   z' = v,   S twist = speeds of the wheels
+
+    A, B of `state_space`: sliding, below the voltage limit. At least a period of the loop.
+    """
+    system, turned = state_space(robot), wheel_speed(robot.wheels, np.eye(3)).T
+    kp, ki = (np.reshape(gain, (-1, 1)) * turned for gain in (robot.drive.kp, robot.drive.ki))
+    matrix = system.A - system.B @ kp
+    if np.any(robot.drive.ki):
+        matrix = np.block([[matrix, -system.B @ ki], [np.eye(3), np.zeros((3, 3))]])
+    slowest = float(-np.linalg.eigvals(matrix).real.max())
+    return max(1.0 / slowest, 1.0 / (robot.drive.rate or np.inf)) if slowest > 0.0 else np.inf
+
+
+def why_no_transient(runs: Sequence[Run], robot: Robot) -> str:
+    """Why logs of set speeds are not worth fitting whole, in words; "" where they are.
+
+    They are where the loop is seen settling, and where a current or a speed is missing: then the steady state does not
+    tell either.
+    """
+    if any(run.current is None or (run.wheel_speed is None and run.wheel_angle is None) for run in runs):
+        return ""
+    settled = SETTLED * settling_time(robot)
+    row = min(run.step for run in runs)
+    if settled > row:
+        return ""
+    return (
+        f"the speed loop of {robot.name} settles in {1e3 * settled:.0f} ms, a row comes every {1e3 * row:.0f} ms: "
+        "no transient is seen, so that whole logs say no more than their steady stretches, and take longer to fit"
+    )

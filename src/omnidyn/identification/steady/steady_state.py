@@ -9,7 +9,7 @@ currents or from voltages (points.py); B and C of each axis from weighted least 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -17,16 +17,26 @@ import numpy as np
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, InsufficientDataError, UnsupportedError
-from omnidyn.identification.estimate import Correlation, Estimate, identified
+from omnidyn.identification.estimate import Estimate, identified
 from omnidyn.identification.force_scale import scale_of_traction
-from omnidyn.identification.steady.line import PARAMETERS, Line, fit_line
-from omnidyn.identification.steady.line_statements import line_statements, point_statements, rest_statements
+from omnidyn.identification.methods import SteadyState
+from omnidyn.identification.steady.levels import estimate_of
+from omnidyn.identification.steady.line import (
+    PARAMETERS,
+    Line,
+    fit_line,
+    line_statements,
+    point_statements,
+    rest_statements,
+)
+from omnidyn.identification.steady.operating_points import ForcePoints, force_points
+from omnidyn.identification.steady.points import driven_axes
 from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.frames import AXES
-from omnidyn.model.friction import AxesFriction
-from omnidyn.model.keys import with_priors
-from omnidyn.model.known.told import with_correlation
+from omnidyn.model.friction import AxesFriction, Friction
+from omnidyn.model.keys import DIRECTION, WHEELS
 from omnidyn.model.robot import Robot
+from omnidyn.run import Run
 from omnidyn.statement import NOTE, Statement
 
 REST = ("bound", "line", "ignore")
@@ -70,13 +80,23 @@ def fit_steady_state(
     """
     check_order("fit_steady_state(robot, data)", (robot, Robot), (data, SteadyTable))
     limits = _options(rest, rest_speed, absolute_std, data)
-    _refuse_other_friction(robot)
+    if not robot.friction.only_axes:
+        raise UnsupportedError(
+            "this fit knows friction on the body axes only",
+            got=f"{robot.name} with friction elsewhere too",
+            expected="[friction.axes] alone",
+            remedy="remove [friction.direction] and [friction.wheels]",
+        )
     found = _Findings(warnings=point_statements(robot, data))
     for axis in range(len(AXES)):
         _study(axis, data, rest, limits[axis], absolute_std, found)
     if not found.lines:
+        held = [
+            Statement("holds_at_least", NOTE, AXES[axis], {"bound": bound, "key": _breakaway(axis)})
+            for axis, bound in found.bounds.items()
+        ]
         raise InsufficientDataError(
-            "; ".join(map(str, ["no axis can be fitted", *found.unfitted, *_held(found.bounds)])),
+            "; ".join(map(str, ["no axis can be fitted", *found.unfitted, *held])),
             expected="three rows in motion or more, at two speeds or more, per axis",
             where=data.source,
         )
@@ -84,10 +104,18 @@ def fit_steady_state(
     if data.force_from == "voltage":
         found.warnings.append(Statement("forces_from_voltage", NOTE))
     friction = _friction(robot.friction.axes, found)
-    estimate = _estimate(robot, friction, found, _method(data, rest, absolute_std), _data(data))
-    if data.force_from == "table":
-        return estimate
-    return replace(estimate, scale=scale_of_traction(robot, data.force_from == "current"))
+    name = f"{(Path(data.source).name if data.sha256 else data.source) or 'unnamed'}, {len(data)} points"
+    name = f"{name}, sha256 {data.sha256}" if data.sha256 else name
+    method = {"weighted": data.force_std is not None, "absolute_std": absolute_std, "force_from": data.force_from,
+              "rest": rest}  # fmt: skip
+    return estimate_of(
+        list(found.lines.values()), robot.replace(friction=robot.friction.replace(axes=friction)), name,
+        {_breakaway(axis): identified(None, f"lower bound from rest, {name}") for axis, bound in found.bounds.items()
+         if friction.breakaway is not None and friction.breakaway[axis] == bound},
+        lower_bound={_breakaway(axis): bound for axis, bound in found.bounds.items()}, warnings=tuple(found.warnings),
+        method=str(Statement("line_method", NOTE, numbers=method)),
+        scale="" if data.force_from == "table" else scale_of_traction(robot, data.force_from == "current"),
+    )  # fmt: skip
 
 
 def _options(rest: str, rest_speed: Sequence[float], absolute_std: bool, data: SteadyTable) -> FloatArray:
@@ -103,16 +131,6 @@ def _options(rest: str, rest_speed: Sequence[float], absolute_std: bool, data: S
             "absolute_std needs the std of the forces", got="none", expected="a column force_std", where=data.source
         )
     return limits
-
-
-def _refuse_other_friction(robot: Robot) -> None:
-    if not robot.friction.only_axes:
-        raise UnsupportedError(
-            "this fit knows friction on the body axes only",
-            got=f"{robot.name} with friction elsewhere too",
-            expected="[friction.axes] alone",
-            remedy="remove [friction.direction] and [friction.wheels]",
-        )
 
 
 def _study(axis: int, data: SteadyTable, rest: str, limit: float, absolute_std: bool, found: _Findings) -> None:
@@ -131,13 +149,14 @@ def _study(axis: int, data: SteadyTable, rest: str, limit: float, absolute_std: 
     if not _identifiable(axis, speed, data.force[used], absolute_std, found, data.source):
         return
     spreads = [None if std is None else std[used] for std in (data.speed_std, data.force_std)]
-    line = fit_line(speed, data.force[used], *spreads, absolute_std=absolute_std)
-    if (line.estimate > MAX_FRICTION).any():
-        beyond = {"level": line.estimate.max()}
+    keys = f"friction.axes.viscous[{axis}]", f"friction.axes.coulomb[{axis}]"
+    line = fit_line(speed, data.force[used], *spreads, absolute_std=absolute_std, keys=keys)
+    if (line.level > MAX_FRICTION).any():
+        beyond = {"level": line.level.max()}
         found.unfitted.append(Statement("axis_beyond_any_robot", subject=AXES[axis], numbers=beyond))
         return
     found.lines[axis] = line
-    found.warnings += line_statements(axis, line, _names(axis), data.force_std is not None, absolute_std)
+    found.warnings += line_statements(axis, line, data.force_std is not None)
 
 
 def _identifiable(
@@ -168,10 +187,6 @@ def _identifiable(
     return False
 
 
-def _names(axis: int) -> tuple[str, str]:
-    return f"friction.axes.viscous[{axis}]", f"friction.axes.coulomb[{axis}]"
-
-
 def _breakaway(axis: int) -> str:
     return f"friction.axes.breakaway[{axis}]"
 
@@ -180,7 +195,7 @@ def _friction(before: AxesFriction, found: _Findings) -> AxesFriction:
     """The friction with the fitted B and C; breakaway raised only as far as C or a row at rest demands."""
     viscous, coulomb, breakaway = (level.copy() for level in before.levels)
     for axis, line in found.lines.items():
-        viscous[axis], coulomb[axis] = line.estimate
+        viscous[axis], coulomb[axis] = line.level
         if before.breakaway is None:
             breakaway[axis] = coulomb[axis]
         elif breakaway[axis] < coulomb[axis]:
@@ -200,65 +215,33 @@ def _friction(before: AxesFriction, found: _Findings) -> AxesFriction:
     )
 
 
-def _estimate(robot: Robot, friction: AxesFriction, found: _Findings, method: str, data: str) -> Estimate:
-    value, std, ci95, degrees = {}, {}, {}, {}
-    at_bound: list[str] = []
-    for axis, line in sorted(found.lines.items()):
-        for k, name in enumerate(_names(axis)):
-            value[name], std[name] = float(line.estimate[k]), float(line.std[k])
-            ci95[name] = (float(line.ci95[k, 0]), float(line.ci95[k, 1]))
-            degrees[name] = line.degrees_of_freedom
-            at_bound += [name] if line.at_bound[k] else []
-    return Estimate(
-        robot=_robot(robot, friction, std, found, data),
-        value=value,
-        std=std,
-        ci95=ci95,
-        correlation=_correlation(found.lines),
-        degrees_of_freedom=degrees,
-        at_bound=tuple(at_bound),
-        lower_bound={_breakaway(axis): bound for axis, bound in found.bounds.items()},
-        warnings=tuple(found.warnings),
-        method=method,
-        data=data,
+# The paper's line on each body axis, eqs (15)-(17), from the steady windows of logs
+
+
+def identify_lines(
+    runs: Sequence[Run], robot: Robot, asked: SteadyState, groups: Sequence[str] | None = None
+) -> dict[str, Estimate]:  # fmt: skip
+    """B and C of each axis and group: group -> Estimate. groups: name of each run's group.
+
+    Every point counts for the axes that it drives. Friction elsewhere than on the axes is taken off the robot.
+    Raises InsufficientDataError when no axis of a group has three points at two speeds or more.
+    """
+    points = force_points(
+        runs, robot, groups=groups, speed=asked.speed, force_from=asked.force_from, window=asked.window
     )
+    priors = {key: prior for key, prior in robot.priors.items() if key.rpartition(".")[0] not in (DIRECTION, WHEELS)}
+    plain = robot.replace(friction=Friction(axes=robot.friction.axes), priors=priors)
+    found = {}
+    for group in points.groups:
+        own = points.of(group)
+        found[group] = fit_steady_state(plain, steady_table(robot, own, group))
+    return found
 
 
-def _robot(robot: Robot, friction: AxesFriction, std: dict[str, float], found: _Findings, data: str) -> Robot:
-    """The robot with this friction, and where its numbers come from."""
-    known = {name: identified(deviation, f"steady state, {data}") for name, deviation in std.items()}
-    for axis, bound in found.bounds.items():
-        if friction.breakaway is not None and friction.breakaway[axis] == bound:
-            known[_breakaway(axis)] = identified(None, f"lower bound from rest, {data}")
-    fitted = with_priors(robot.replace(friction=robot.friction.replace(axes=friction)), known)
-    together = _correlation(found.lines)
-    return with_correlation(fitted, together.names, together.matrix)
-
-
-def _correlation(lines: dict[int, Line]) -> Correlation:
-    """B and C of one axis are correlated; the axes are fitted apart."""
-    names = [name for axis in sorted(lines) for name in _names(axis)]
-    matrix = np.eye(len(names))
-    for k, axis in enumerate(sorted(lines)):
-        matrix[2 * k, 2 * k + 1] = matrix[2 * k + 1, 2 * k] = lines[axis].correlation
-    return Correlation(tuple(names), matrix)
-
-
-def _method(data: SteadyTable, rest: str, absolute_std: bool) -> str:
-    numbers = {"weighted": data.force_std is not None, "absolute_std": absolute_std, "force_from": data.force_from,
-               "rest": rest}  # fmt: skip
-    return str(Statement("line_method", NOTE, numbers=numbers))
-
-
-def _data(data: SteadyTable) -> str:
-    name = Path(data.source).name if data.sha256 else data.source
-    words = f"{name or 'unnamed'}, {len(data)} points"
-    return f"{words}, sha256 {data.sha256}" if data.sha256 else words
-
-
-def _held(bounds: dict[int, float]) -> list[Statement]:
-    """What axes held at rest."""
-    return [
-        Statement("holds_at_least", NOTE, AXES[axis], {"bound": bound, "key": _breakaway(axis)})
-        for axis, bound in bounds.items()
-    ]
+def steady_table(robot: Robot, points: ForcePoints, source: str = "") -> SteadyTable:
+    """The points as rows of a steady table, one for each axis that a point drives."""
+    row, axis = np.nonzero(driven_axes(robot, points.twist, points.wrench) & (points.twist != 0.0))
+    return SteadyTable(
+        axis=[AXES[k] for k in axis], speed=points.twist[row, axis], force=points.wrench[row, axis],
+        twist=points.twist[row], force_from=points.force_from, source=source, notes=points.notes,
+    )  # fmt: skip

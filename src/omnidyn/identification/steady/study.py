@@ -15,36 +15,36 @@ from itertools import combinations
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.errors import InsufficientDataError
-from omnidyn.identification.estimate import Correlation, Estimate, identified
+from omnidyn.errors import InsufficientDataError, OmnidynError
+from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.force_scale import scale_of_traction
-from omnidyn.identification.lack_of_fit import Diagnosis
+from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
 from omnidyn.identification.methods import SteadyState
 from omnidyn.identification.stability import Stability
 from omnidyn.identification.steady.choice import ShapeChoice, base_name, choose_shape, speeds_differ
-from omnidyn.identification.steady.lack_of_fit import LackOfFit, lack_of_fit
-from omnidyn.identification.steady.moment import Moment, levelled, moments
-from omnidyn.identification.steady.moment_by_shape import moments_by_shape
+from omnidyn.identification.steady.lack_of_fit import lack_of_fit
+from omnidyn.identification.steady.levels import estimate_of
+from omnidyn.identification.steady.moment import Moment, levelled, moments, moments_by_shape
 from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE, ForcePoints, SteadyWindows, steady_windows
-from omnidyn.identification.steady.rests_on import moved_by_the_file, rests_on
-from omnidyn.identification.steady.shape_fit import ShapeFit, fit_shape, is_turning
-from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, friction_of
-from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
-from omnidyn.identification.steady.study_statements import (
+from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, ShapeFit, fit_shape, friction_of, is_turning
+from omnidyn.identification.steady.study_table import (
+    Difference,
+    SteadyStudy,
+    Travel,
+    Viscous,
     advice,
     fit_statements,
     lack_statements,
     point_statements,
     result_statements,
 )
-from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.model.dynamics import drive_wrench, linear_part
 from omnidyn.model.friction import Friction
-from omnidyn.model.keys import BODY_AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, find_key
+from omnidyn.model.keys import BODY_AXES, DIRECTION, EMF, TORQUE, WHEELS, Key, expand, find_key
 from omnidyn.model.keys import VISCOUS as VISCOUS_LEVEL
-from omnidyn.model.known.told import with_correlation
+from omnidyn.model.known.told import known_priors
 from omnidyn.model.layout import YAW
-from omnidyn.model.robot import GUESSES, Prior, Robot
+from omnidyn.model.robot import GUESSES, Robot
 from omnidyn.run import Run
 from omnidyn.statement import NOTE, Statement, statements
 from omnidyn.statistics import t_quantile
@@ -89,9 +89,11 @@ def fit_steady(
             "a robot file cannot hold this shape: it is for comparison only", got=choice.chosen,
             expected=", ".join(name for name, each in SHAPES.items() if each.in_model), where="shape",
         )  # fmt: skip
-    parts = {group: points.chosen(np.array([name == group for name in points.group])) for group in points.groups}
+    parts = {group: points.of(group) for group in points.groups}
     anew = {group: partial(_levels, windows, choice.of(group), group, asked.robust) for group in parts}
-    estimates = {group: _estimate(robot, own, choice, group, asked.robust, anew[group]) for group, own in parts.items()}
+    estimates = {
+        group: _estimate(robot, part, choice, group, asked.robust, anew[group]) for group, part in parts.items()
+    }
     return SteadyFit(runs, robot, asked, windows, points, choice, parts, anew, estimates)
 
 
@@ -107,14 +109,17 @@ def diagnosed(fit: SteadyFit) -> SteadyStudy:
     sources = {number: run.source for number, run, _ in fit.windows.found}
     changed += moments_by_shape(robot, points, choice.fit, sources, changed)
     lack = {
-        group: _lack(robot, own, choice, group, changed, sources, fit.asked.robust) for group, own in fit.parts.items()
+        group: _lack(robot, part, choice, group, changed, sources, fit.asked.robust)
+        for group, part in fit.parts.items()
     }
-    within = {group for group, own in fit.parts.items() if _changed(own, changed, sources)}
+    within = {group for group, part in fit.parts.items() if _changed(part, changed, sources)}
     known = {
-        group: Diagnosis(lack[group].as_of_whole_logs(), rests_on(robot, each.value, fit.anew[group]), LASTING)
-        for group, each in fit.estimates.items()
+        group: Diagnosis(lack[group], rests_on(robot, estimate.value, fit.anew[group]), LASTING)
+        for group, estimate in fit.estimates.items()
     }  # whether the levels last, `moments` says
-    estimates = {group: replace(each, study=partial(known.__getitem__, group)) for group, each in fit.estimates.items()}
+    estimates = {
+        group: replace(estimate, study=partial(known.__getitem__, group)) for group, estimate in fit.estimates.items()
+    }
     return _study(replace(fit, estimates=estimates), changed, lack, within)
 
 
@@ -123,14 +128,19 @@ def _study(
 ) -> SteadyStudy:  # fmt: skip
     """The study. changed: inside a run; lack: group -> what its shape leaves out; within: groups with such a change."""
     robot, points, choice, robust = fit.robot, fit.points, fit.choice, fit.asked.robust
-    travel = {group: _travel(own) for group, own in fit.parts.items()}
+    travel = {group: _travel(part) for group, part in fit.parts.items()}
     viscous = {
-        group: _viscous(robot, fit.windows, choice, group, own, travel[group], robust)
-        for group, own in fit.parts.items()
+        group: _viscous(robot, fit.windows, choice, group, part, travel[group], robust)
+        for group, part in fit.parts.items()
     }
     differences = _differences(choice)
-    internal = {group: _internal(robot, own) for group, own in fit.parts.items()} if robot.wheels.count > 3 else {}
-    turning = any(is_turning(robot, own) for own in fit.parts.values())
+    internal = {}
+    if robot.wheels.count > 3:  # the part of the traction that pushes nowhere: G f = 0
+        from scipy.linalg import null_space  # slow to import, and most robots have three wheels
+
+        against = {group: part.traction @ null_space(robot.wheels.wrench_matrix) for group, part in fit.parts.items()}
+        internal = {group: float(np.sqrt(np.mean((f**2).sum(axis=1)))) for group, f in against.items()}
+    turning = any(is_turning(robot, part) for part in fit.parts.values())
     return SteadyStudy(
         robot=robot, points=points, choice=choice, estimates=fit.estimates, travel=travel, viscous=viscous,
         differences=differences, internal=internal,
@@ -140,7 +150,7 @@ def _study(
             scale_of_traction(robot, points.force_from == CURRENT),
         )),
         warnings=(
-            *points.notes, *point_statements(points, choice, turning), *(each.statement() for each in changed),
+            *points.notes, *point_statements(points, choice, turning), *(moment.statement() for moment in changed),
             *lack_statements(lack, choice, within),
         ),
         moments=tuple(changed),
@@ -150,8 +160,8 @@ def _study(
 
 def _changed(points: ForcePoints, found: Sequence[Moment], sources: Mapping[int, str]) -> list[Moment]:
     """The changes inside the runs of these points; without those of runs that have one name."""
-    own, names = {sources[number] for number in points.run.tolist()}, [*sources.values()]
-    return [each for each in found if each.source in own and names.count(each.source) == 1]
+    sources_here, names = {sources[number] for number in points.run.tolist()}, [*sources.values()]
+    return [moment for moment in found if moment.source in sources_here and names.count(moment.source) == 1]
 
 
 def _lack(
@@ -160,25 +170,17 @@ def _lack(
 ) -> LackOfFit:  # fmt: skip
     """Whether the shape of a group fits: on both sides of a change inside a run, which would look like another shape
     wherever directions were driven on one side of it only."""
-    fit, own = choice.fit(group), _changed(points, found, sources)
-    if own:
-        points = levelled(points, own, sources)
-        fit = fit_shape(fit.shape, robot, points, turning=is_turning(robot, points), robust=robust) or fit
+    fit, inside = choice.fit(group), _changed(points, found, sources)
+    if inside:
+        points = levelled(points, inside, sources)
+        fit = fit_shape(fit.shape, robot, points, robust=robust) or fit
     return lack_of_fit(robot, points, fit)
 
 
 def _levels(windows: SteadyWindows, shape: str, group: str, robust: bool, robot: Robot) -> dict[str, float]:
     """The levels of a group were the robot another one; empty where the shape has none then."""
-    points = windows.points(robot)
-    own = points.chosen(np.array([name == group for name in points.group]))
-    turning = is_turning(robot, own)
-    fit = fit_shape(SHAPES[shape], robot, own, turning=turning, robust=robust)
-    return {} if fit is None else _free(fit)
-
-
-def _free(fit: ShapeFit) -> dict[str, float]:
-    """The levels of a fit without their bound at 0."""
-    return dict(zip(fit.keys, fit.free.tolist(), strict=True))
+    fit = fit_shape(SHAPES[shape], robot, windows.points(robot).of(group), robust=robust)
+    return {} if fit is None else fit.by_key(fit.free)
 
 
 def _travel(points: ForcePoints) -> Travel:
@@ -201,11 +203,12 @@ def _viscous(
     name, found = base_name(choice.of(group)) + VISCOUS, []
     fit = choice.fits[name][group] if name in choice.fits else None
     if fit is None and speeds_differ(points):  # the other groups may have one speed only
-        fit = fit_shape(SHAPES[name], robot, points, turning=is_turning(robot, points), robust=robust)
+        fit = fit_shape(SHAPES[name], robot, points, robust=robust)
     if fit is None:
         return ()
-    emf, fitted = _back_emf(robot, points), _free(fit)
-    moved = moved_by_the_file(robot, fitted, partial(_levels, windows, name, group, robust))
+    brake, guesses = _back_emf(robot, points)
+    at_rim = float(np.trace(brake) / np.sum(robot.wheels.wrench_matrix**2))
+    moved = moved_by_the_file(robot, fit.by_key(fit.free), partial(_levels, windows, name, group, robust))
     for k, key in enumerate(fit.keys):
         name = Key.parse(key)
         if name.level != VISCOUS_LEVEL:
@@ -214,109 +217,54 @@ def _viscous(
         if name.axis == YAW:
             turned = np.abs(points.twist[points.turns, 2])
             level, slow, fast = float(np.abs(points.wrench[points.turns, 2]).mean()), turned.min(), turned.max()
-        brake = emf.of(name)
+        on_body = float(brake[name.axis, name.axis] if name.axis is not None else np.mean(np.diag(brake)[:2]))
         value, std = float(fit.free[k]), float(np.linalg.norm([fit.std[k], *moved[k]]))
         half = t_quantile(fit.degrees_of_freedom) * std
         low, high = value - half, value + half
         found.append(
             Viscous(key, value, std, low, high, seen=not low <= 0.0 <= high,
                     effect=max(abs(low), abs(high)) * float(fast - slow), level=level, slow=float(slow),
-                    fast=float(fast), back_emf=brake, guesses=emf.guesses, sum_std=float(fit.std[k]))
+                    fast=float(fast), back_emf=at_rim if name.table == WHEELS else on_body, guesses=guesses,
+                    sum_std=float(fit.std[k]))
         )  # fmt: skip
     return tuple(found)
 
 
-@dataclass(frozen=True, eq=False)
-class _BackEmf:
-    """How the back-EMF brakes: forces from a voltage show its sum with viscous friction, and never one alone.
+def _back_emf(robot: Robot, points: ForcePoints) -> tuple[FloatArray, tuple[str, ...]]:
+    """(-d(wrench)/d(twist) by which the back-EMF brakes, shape (3, 3), the motor constants that are guesses).
 
-    brake: -d(wrench)/d(twist), shape (3, 3). at_rim: the same of one wheel [N s/m]. guesses: the motor constants that
-    are guesses of the robot file.
+    Forces from a voltage show its sum with viscous friction, and never one alone; those from currents show none of it.
     """
-
-    brake: FloatArray
-    at_rim: float
-    guesses: tuple[str, ...] = ()
-
-    def of(self, key: Key) -> float:
-        """The part of a viscous level that is back-EMF, in its unit."""
-        if key.table == WHEELS:
-            return self.at_rim
-        return float(self.brake[key.axis, key.axis] if key.axis is not None else np.mean(np.diag(self.brake)[:2]))
-
-
-def _back_emf(robot: Robot, points: ForcePoints) -> _BackEmf:
-    """None where forces are from currents."""
     if points.force_from != VOLTAGE:
-        return _BackEmf(np.zeros((3, 3)), 0.0)
-    brake = -drive_wrench(linear_part(robot), np.eye(3), np.zeros(robot.wheels.count))
-    matrix = robot.wheels.wrench_matrix
+        return np.zeros((3, 3)), ()
     guesses = [key for key, prior in robot.priors.items()
                if prior.origin in GUESSES and Key.parse(key).name in (TORQUE, EMF)]  # fmt: skip
-    return _BackEmf(brake, float(np.trace(brake) / np.sum(matrix**2)), tuple(guesses))
+    return -drive_wrench(linear_part(robot), np.eye(3), np.zeros(robot.wheels.count)), tuple(guesses)
 
 
 def _estimate(
     robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str, robust: bool,
     again: Callable[[Robot], Mapping[str, float]],
 ) -> Estimate:  # fmt: skip
-    alone, emf = choice.fit(group), _back_emf(robot, points)
-    moved = moved_by_the_file(robot, _free(alone), again)
+    alone = choice.fit(group)
+    moved = moved_by_the_file(robot, alone.by_key(alone.free), again)
     fit = replace(alone, covariance=alone.covariance + moved @ moved.T)
-    value = dict(zip(fit.keys, fit.level.tolist(), strict=True))
-    std = dict(zip(fit.keys, fit.std.tolist(), strict=True))
-    turning = is_turning(robot, points)
-    data = _data(points, group)
-    friction, kept = _friction(robot, fit, value, turning)
-    together = Correlation(fit.keys, _correlation(fit.covariance))
-    fitted = robot.replace(friction=friction, priors=_priors(robot, std, kept, data))
-    return Estimate(
-        robot=with_correlation(fitted, together.names, together.matrix),
-        value=value,
-        std=std,
-        ci95=_intervals(fit),
-        correlation=together,
-        degrees_of_freedom=dict.fromkeys(fit.keys, fit.degrees_of_freedom),
-        at_bound=tuple(key for key, free in zip(fit.keys, fit.free, strict=True) if free < 0.0),
-        warnings=tuple(fit_statements(fit, robust, kept, emf.guesses)),
-        method=_method(points, fit, robust),
-        data=data,
-        scale=scale_of_traction(robot, points.force_from == CURRENT),
-        log_alone=_intervals(alone) if moved.size else {},
-    )
-
-
-def _method(points: ForcePoints, fit: ShapeFit, robust: bool) -> str:
-    """How the numbers were made."""
-    numbers = {
+    name, runs = "" if group == "all" else f"{group}: ", len(set(points.run.tolist()))
+    friction, kept = _friction(robot, fit, fit.by_key(fit.level), is_turning(robot, points))
+    priors = {key: prior for key, prior in robot.priors.items()
+              if key in kept or not ((place := find_key(key)) and place.level)}  # fmt: skip
+    method = {
         "shape": fit.shape.name, "robust": robust, "force_from": points.force_from, "speed_from": points.speed_from,
         "folds": int(fit.fold.max()) + 1,
     }  # fmt: skip
-    return str(Statement("steady_method", NOTE, numbers=numbers))
-
-
-def _data(points: ForcePoints, group: str) -> str:
-    """What the numbers were made from: the source of the numbers in a robot file."""
-    name = "" if group == "all" else f"{group}: "
-    return f"{name}{len(set(points.run.tolist()))} runs, {len(points)} steady points, {int(points.rows.sum())} rows"
-
-
-def _intervals(fit: ShapeFit) -> dict[str, tuple[float, float]]:
-    """95 % intervals; at a bound from 0 to what the free fit would reach from 0, as with a line."""
-    half = t_quantile(fit.degrees_of_freedom) * fit.std
-    low, high = fit.free - half, fit.free + half
-    bound = fit.free < 0.0
-    low = np.where(bound, 0.0, np.minimum(low, fit.level))
-    high = np.where(bound, np.maximum(high, half), np.maximum(high, fit.level))
-    return {key: (float(a), float(b)) for key, a, b in zip(fit.keys, low, high, strict=True)}
-
-
-def _correlation(covariance: FloatArray) -> FloatArray:
-    std = np.sqrt(np.diag(covariance))
-    std = np.where(std > 0.0, std, 1.0)
-    matrix = covariance / np.outer(std, std)
-    np.fill_diagonal(matrix, 1.0)
-    return matrix
+    return estimate_of(
+        [fit], robot.replace(friction=friction, priors=priors),
+        f"{name}{runs} runs, {len(points)} steady points, {int(points.rows.sum())} rows",
+        warnings=tuple(fit_statements(fit, robust, kept, _back_emf(robot, points)[1])),
+        method=str(Statement("steady_method", NOTE, numbers=method)),
+        scale=scale_of_traction(robot, points.force_from == CURRENT),
+        log_alone=alone.intervals() if moved.size else {},
+    )  # fmt: skip
 
 
 def _friction(robot: Robot, fit: ShapeFit, value: dict[str, float], turning: bool) -> tuple[Friction, dict[str, float]]:
@@ -332,15 +280,6 @@ def _friction(robot: Robot, fit: ShapeFit, value: dict[str, float], turning: boo
     )  # fmt: skip
     kept = {key: level for key, level in zip(names, (coulomb, viscous), strict=True) if level > 0.0}
     return friction_of(fit.shape, robot, value | kept), kept
-
-
-def _priors(robot: Robot, std: dict[str, float], kept: dict[str, float], data: str) -> dict[str, Prior]:
-    priors = {
-        key: prior
-        for key, prior in robot.priors.items()
-        if key in kept or not ((place := find_key(key)) and place.level)
-    }
-    return priors | {key: identified(deviation, f"steady state, {data}") for key, deviation in std.items()}
 
 
 def _differences(choice: ShapeChoice) -> tuple[Difference, ...]:
@@ -360,9 +299,55 @@ def _differences(choice: ShapeChoice) -> tuple[Difference, ...]:
     return tuple(found)
 
 
-def _internal(robot: Robot, points: ForcePoints) -> float:
-    """rms [N] of the part of the traction that pushes nowhere: G f = 0."""
-    from scipy.linalg import null_space  # takes a while to import, and most fits never come here
+# What the levels of a steady state rest on: the logs asked anew with each fixed number 1 % larger
 
-    against = points.traction @ null_space(robot.wheels.wrench_matrix)
-    return float(np.sqrt(np.mean((against**2).sum(axis=1))))
+STEP = 0.01
+# Keys, with what follows them: those that forces and speeds are made with.
+FIXED = {
+    TORQUE: (EMF,), "motor.resistance_ohm": (), "motor.gear_ratio": (), "wheels.wheel_radius_m": (),
+    "wheels.robot_radius_m": (), EMF: (),
+}  # fmt: skip
+
+
+def rests_on(
+    robot: Robot, value: Mapping[str, float], again: Callable[[Robot], Mapping[str, float]]
+) -> dict[str, dict[str, float]]:
+    """Number -> fixed key -> relative change of the number per percent of the key. again: the numbers of a robot."""
+    found: dict[str, dict[str, float]] = {name: {} for name in value}
+    for key, beside in FIXED.items():
+        try:
+            other = again(_larger(robot, key, *beside))
+        except OmnidynError:  # no number of this robot, or none that these logs can be read with
+            continue
+        for name, now in value.items():
+            if now > 0.0 and name in other:
+                found[name][key] = other[name] / now - 1.0
+    return found
+
+
+def moved_by_the_file(
+    robot: Robot, value: Mapping[str, float], again: Callable[[Robot], Mapping[str, float]]
+) -> FloatArray:
+    """What one std of each number that the file of the robot knows only so far moves the numbers by, to first order.
+    Shape (numbers, K). A torque constant brings the EMF constant with it: both are one number of the magnet."""
+    known = {key: std for key, (_, std) in known_priors(robot).items() if Key.parse(key).name in FIXED}
+    magnet = any(Key.parse(key).name == TORQUE for key in known)
+    found = []
+    for key, std in known.items():
+        place = Key.parse(key)
+        if magnet and place.name == EMF:
+            continue
+        try:
+            other = again(_larger(robot, key, *(str(Key(name, place.index)) for name in FIXED[place.name])))
+        except OmnidynError:  # no number that these logs are read with
+            continue
+        size = STEP * float(place.get(robot))
+        found.append([std / size * (other.get(name, now) - now) for name, now in value.items()])
+    return np.array(found).reshape(-1, len(value)).T
+
+
+def _larger(robot: Robot, *names: str) -> Robot:
+    for name in names:
+        for key in map(Key.parse, expand(name, robot)):
+            robot = key.set(robot, (1.0 + STEP) * float(key.get(robot)))
+    return robot

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from omnidyn.document import Document, Points, Table, all_of, interval_cell, plain
 from omnidyn.identification.estimate import Estimate
+from omnidyn.identification.lack_of_fit import LackOfFit
 from omnidyn.identification.steady.choice import ShapeChoice
-from omnidyn.identification.steady.lack_of_fit import LackOfFit
+from omnidyn.identification.steady.lack_of_fit import TILTED_FLOOR
 from omnidyn.identification.steady.moment import Moment
 from omnidyn.identification.steady.operating_points import FORCES, SPEEDS, ForcePoints
-from omnidyn.identification.steady.study_parts import Difference, Travel, Viscous
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.shown import FIGURE, Shown, make
@@ -20,6 +20,14 @@ from omnidyn.statement import Statement, by_severity
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE
+from omnidyn.identification.steady.shapes import ShapeFit
+from omnidyn.model.keys import VISCOUS
+from omnidyn.statement import NOTE
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -57,7 +65,46 @@ class SteadyStudy(Shown):
 
     def document(self) -> Document:
         """What was used, the shapes, the levels, what it says and what it warns of."""
-        return _document(self)
+        fits = [_of(group, warning) for group, fit in self.estimates.items() for warning in fit.warnings]
+        parts = [
+            f"{self.robot.name}: steady state from logs; forces from {FORCES[self.points.force_from]}; friction over "
+            f"the {SPEEDS[self.points.speed_from]}",
+            "", _travel_table(self), "", _shape_table(self), "", _level_table(self),
+            *(table for fit in self.estimates.values() if (table := fit.alone_table())), "",
+            Points(self.statements, name="statements"),
+            by_severity(self.warnings, "warnings"),
+            Points(self.advice, "next:", "next"),
+            by_severity(fits, "warnings of fits"),
+        ]  # fmt: skip
+        return Document(parts, self.to_dict(), self.warnings)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The study as JSON can hold it."""
+        return {
+            "force_from": self.points.force_from,
+            "speed_from": self.points.speed_from,
+            "shape": self.choice.chosen,
+            "shapes": [asdict(score) for score in self.choice.scores],
+            "not_compared": dict(self.choice.missing),
+            "groups": {
+                group: {
+                    **fit.to_dict(),
+                    "shape": self.choice.of(group),
+                    "along_travel": asdict(self.travel[group]),
+                    "viscous": [asdict(level) for level in self.viscous[group]],
+                    "lack_of_fit": _lack(self.lack_of_fit.get(group)),
+                    "rests_on": fit.rests_on,
+                    "internal_force_N": self.internal.get(group),
+                }
+                for group, fit in self.estimates.items()
+            },
+            "lack_of_fit": _lack(next(iter(self.lack_of_fit.values()), None)),
+            "moments": [asdict(moment) for moment in self.moments],
+            "differences": [{**asdict(pair), "differs": pair.differs} for pair in self.differences],
+            "statements": plain(self.statements),
+            "warnings": plain(self.warnings),
+            "advice": plain(self.advice),
+        }
 
     def plot(self) -> Figure:
         """The force of friction over the direction of travel. Needs matplotlib."""
@@ -68,32 +115,13 @@ def _lack(lack: LackOfFit | None) -> dict[str, Any] | None:
     """As every method tells it, each remedy with its forces beside."""
     if lack is None:
         return None
-    told = lack.as_of_whole_logs().to_dict()
-    own = [
-        {"size_N": each.size, "error_N": each.error, "error_before_N": each.error_before, "chance": each.probability}
-        for each in lack.remedies
+    forces = [
+        {"size_N": force.size, "error_N": force.after, "error_before_N": force.before, "chance": force.p}
+        for remedy in lack.remedies if (force := remedy.force)
     ]  # fmt: skip
-    remedies = [one | more for one, more in zip(told["remedies"], own, strict=True)]
-    return told | {"remedies": remedies, "tested": list(lack.tested)}
-
-
-def _document(study: SteadyStudy) -> Document:
-    """The study: what was used, the shapes, the levels, what it says and what it warns of."""
-    points = study.points
-    of_fits = [
-        warning if group == "all" else warning.of(group)
-        for group, estimate in study.estimates.items() for warning in estimate.warnings
-    ]  # fmt: skip
-    parts = [
-        f"{study.robot.name}: steady state from logs; forces from {FORCES[points.force_from]}; friction over the "
-        f"{SPEEDS[points.speed_from]}",
-        "", _travel_table(study), "", _shape_table(study), "", _level_table(study), *_alone_tables(study), "",
-        Points(study.statements, name="statements"),
-        by_severity(study.warnings, "warnings"),
-        Points(study.advice, "next:", "next"),
-        by_severity(of_fits, "warnings of fits"),
-    ]  # fmt: skip
-    return Document(parts, _data(study), study.warnings)
+    record = lack.to_dict()
+    remedies = [remedy | force for remedy, force in zip(record["remedies"], forces, strict=True)]
+    return record | {"remedies": remedies, "tested": list(lack.tried)}
 
 
 def _travel_table(study: SteadyStudy) -> Table:
@@ -142,35 +170,212 @@ def _level_table(study: SteadyStudy) -> Table:
     )
 
 
-def _alone_tables(study: SteadyStudy) -> list[Table]:
-    """What the intervals of each group owe to what the robot file knows with a std, where that is worth a word."""
-    return [table for each in study.estimates.values() if (table := each.alone_table())]
+# Which statements a steady-state study makes, from its numbers
+
+LOW_WEIGHT = 0.5
+WRONG_WAY = 0.05  # share of points whose force points against the motion from which a sign is doubted
+MATTERS = 0.02  # of the force: a viscous part below this does not matter in the speeds driven
 
 
-def _data(study: SteadyStudy) -> dict[str, Any]:
-    """The study as JSON can hold it."""
-    return {
-        "force_from": study.points.force_from,
-        "speed_from": study.points.speed_from,
-        "shape": study.choice.chosen,
-        "shapes": [asdict(score) for score in study.choice.scores],
-        "not_compared": dict(study.choice.missing),
-        "groups": {
-            group: {
-                **study.estimates[group].to_dict(),
-                "shape": study.choice.of(group),
-                "along_travel": asdict(study.travel[group]),
-                "viscous": [asdict(each) for each in study.viscous[group]],
-                "lack_of_fit": _lack(study.lack_of_fit.get(group)),
-                "rests_on": study.estimates[group].rests_on,
-                "internal_force_N": study.internal.get(group),
-            }
-            for group in study.estimates
-        },
-        "lack_of_fit": _lack(next(iter(study.lack_of_fit.values()), None)),
-        "moments": [asdict(each) for each in study.moments],
-        "differences": [{**asdict(each), "differs": each.differs} for each in study.differences],
-        "statements": plain(study.statements),
-        "warnings": plain(study.warnings),
-        "advice": plain(study.advice),
-    }
+def result_statements(
+    choice: ShapeChoice, viscous: Mapping[str, Sequence[Viscous]], differences: Sequence[Difference],
+    internal: Mapping[str, float], lack: Mapping[str, LackOfFit], within: Collection[str],
+) -> list[Statement]:  # fmt: skip
+    """What the data say. within: groups in which the force changes within a run."""
+    found = _shape_statements(choice)
+    found += [
+        _of(group, Statement("no_lack_of_fit", NOTE, numbers={"changes": group in within}) if one.tried
+            else Statement("fit_not_tested", NOTE))
+        for group, one in lack.items() if not one.found
+    ]  # fmt: skip
+    found += [_of(group, _viscous(level, choice.of(group))) for group, levels in viscous.items() for level in levels]
+    found += [
+        Statement("group_difference", NOTE, pair.key, {
+            "values": pair.values, "difference": pair.difference, "low": pair.low, "high": pair.high,
+            "differs": pair.differs, "groups": [pair.first, pair.second],
+        })
+        for pair in differences
+    ]  # fmt: skip
+    found += [
+        _of(group, Statement("internal_force", NOTE, numbers={"force": force})) for group, force in internal.items()
+    ]
+    return found
+
+
+def _of(group: str, statement: Statement) -> Statement:
+    return statement if group == "all" else statement.of(group)
+
+
+def _shape_statements(choice: ShapeChoice) -> list[Statement]:
+    """The shape that was chosen, groups with another one, shapes that the data cannot tell from the best, and the best
+    where it is not the chosen one and the data do tell the two apart.
+    """
+    score, best = choice.score, choice.scores[0]
+    box = next((other for other in choice.scores if other.name == "box" and other is not score), None)
+    numbers = {"error": (score.loo, score.loo_std), "box": (box.loo, box.loo_std) if box else None}
+    found = [Statement("shape_chosen", NOTE, score.name, numbers)]
+    for group, name in choice.own.items():
+        scores = {score.name: score for score in choice.scored[group]}
+        score, other = scores[name], scores[choice.chosen]
+        numbers = {"shape": name, "error": (score.loo, score.loo_std), "other": None}
+        if name != choice.chosen:
+            numbers |= {"other": other.name, "other_error": (other.loo, other.loo_std)}
+        found.append(Statement("group_shape", NOTE, group, numbers))
+    first, *ties = [score for score in choice.scores if not score.told_apart] or [choice.score]
+    if ties:
+        numbers = {"shapes": [tie.name for tie in ties], "behind": [(tie.behind, tie.behind_std) for tie in ties]}
+        found.append(Statement("shapes_tied", NOTE, first.name, numbers))
+    if best.name != choice.chosen and score.told_apart:
+        why = "not_in_model" if not best.in_model else "below_zero" if best.at_bound else "not_asked"
+        numbers = {"behind": (score.behind, score.behind_std), "why": why}
+        found.append(Statement("better_shape_not_used", NOTE, best.name, numbers))
+    return found
+
+
+def lack_statements(
+    lack: Mapping[str, LackOfFit], choice: ShapeChoice, within: Collection[str] = ()
+) -> list[Statement]:
+    """That no offered shape fits, and what would. within: groups in which the force changes within a run."""
+    found = []
+    for group, one in lack.items():
+        numbers = {"changes": group in within, "share": one.channels["force"], "with": ""}
+        if one.remedies and (best := one.remedies[0]).force:
+            numbers |= {"with": best.cause, "shape": choice.of(group), "error": best.force.after,
+                        "error_before": best.force.before, "same": best.same_as}  # fmt: skip
+        found += [_of(group, Statement("no_shape_fits", numbers=numbers))] if one.found else []
+    return found
+
+
+def _viscous(level: Viscous, chosen: str) -> Statement:
+    numbers = {name: value for name, value in asdict(level).items() if name not in ("key", "seen")}
+    if level.guesses:
+        return Statement("viscous_with_back_emf", NOTE, level.key, numbers)
+    if not level.seen:
+        matters = level.effect > MATTERS * level.level
+        return Statement("viscous_not_identifiable", NOTE, level.key, numbers | {"matters": matters})
+    if level.value < 0.0:
+        return Statement("force_falls_with_speed", NOTE, level.key, numbers)
+    return Statement("viscous_seen", NOTE, level.key, numbers | {"in_shape": "viscous" in chosen})
+
+
+def point_statements(points: ForcePoints, choice: ShapeChoice, turning: bool) -> list[Statement]:
+    """What is weak about the points or the comparison of shapes."""
+    found = []
+    along = points.along[np.isfinite(points.along)]
+    wrong = int((along < 0.0).sum())
+    if wrong > WRONG_WAY * max(len(along), 1):
+        found.append(Statement("against_motion", "warning", points.force_from, {"wrong": wrong, "points": len(along)}))
+    if points.force_from == VOLTAGE:
+        found.append(Statement("forces_from_voltage", NOTE))
+    if not turning:
+        found.append(Statement("not_turned"))
+    for why in dict.fromkeys(choice.missing.values()):
+        shapes = [name for name, reason in choice.missing.items() if reason == why]
+        found.append(Statement("shapes_not_compared", NOTE, numbers={"why": why, "shapes": shapes}))
+    return found
+
+
+def fit_statements(fit: ShapeFit, robust: bool, kept: Mapping[str, float], guesses: Sequence[str]) -> list[Statement]:
+    """What is weak about the levels of one group. kept: levels of the robot file; guesses: of the back-EMF."""
+    found = [
+        Statement("level_at_bound", subject=key, numbers={"free": free})
+        for key, free in zip(fit.keys, fit.free.tolist(), strict=True) if free < 0.0
+    ]  # fmt: skip
+    far = int((fit.weight < LOW_WEIGHT).sum())
+    if robust and far:
+        found.append(Statement("points_far_from_shape", NOTE, numbers={"far": far, "points": len(fit.weight)}))
+    found += [Statement("level_kept", NOTE, key, {"level": level}) for key, level in kept.items()]
+    levels = [key for key in fit.keys if Key.parse(key).level == VISCOUS]
+    if levels and guesses:
+        found.append(Statement("rests_on_back_emf", numbers={"levels": levels, "guesses": guesses}))
+    return found
+
+
+def advice(
+    choice: ShapeChoice, viscous: Mapping[str, Sequence[Viscous]], lack: Mapping[str, LackOfFit], turning: bool,
+    force_from: str,
+) -> list[Statement]:  # fmt: skip
+    """What to measure next."""
+    found = []
+    if any(one.found for one in lack.values()):
+        keys = {remedy.key for one in lack.values() for remedy in one.remedies}
+        found.append(Statement("drive_turned_around" if keys & TILTED_FLOOR else "look_beyond_shapes", NOTE))
+    if not turning:
+        found.append(Statement("turn_on_the_spot", NOTE))
+    if not any(viscous.values()):
+        found.append(Statement("drive_at_two_speeds", NOTE))
+    elif not all(level.seen for levels in viscous.values() for level in levels):
+        found.append(Statement("drive_faster", NOTE))
+    tie = next((score for score in choice.scores[1:] if not score.told_apart and score.apart > 0.0), None)
+    if tie is not None:
+        numbers = {"best": choice.scores[0].name, "apart": tie.apart}
+        found.append(Statement("more_directions", NOTE, tie.name, numbers))
+    if force_from == CURRENT:
+        found.append(Statement("pull_once", NOTE))
+    return found
+
+
+# What a steady-state study says of one group, or of two: plain numbers with their uncertainty
+
+
+@dataclass(frozen=True)
+class Travel:
+    """Force along travel of one group [N]: mean over the points, its standard error, their standard deviation.
+
+    slow, fast: range of the speeds [m/s]. points, runs, rows: what it was made from.
+    """
+
+    mean: float
+    std: float
+    deviation: float
+    slow: float
+    fast: float
+    points: int
+    runs: int
+    rows: int
+
+
+@dataclass(frozen=True)
+class Viscous:
+    """What the data say about a viscous level of one group: its key, value, standard error and 95 % interval.
+
+    seen: the interval does not contain 0. effect [N]: the most that a viscous force inside the interval changes
+    between the slowest and the fastest point. level [N]: the force along travel, to compare. slow, fast [m/s]: range of
+    the speeds. About yaw [N m] and [rad/s].
+    back_emf: the part of the slope of the drive that the robot file says is back-EMF, where forces are from voltages; 0
+    from currents. guesses: motor constants that are guesses; where there are any, only the sum of `value` and
+    `back_emf` is known, with standard error `sum_std`: `std` and the interval count the std of the guess.
+    """
+
+    key: str
+    value: float
+    std: float
+    low: float
+    high: float
+    seen: bool
+    effect: float
+    level: float
+    slow: float
+    fast: float
+    back_emf: float = 0.0
+    guesses: tuple[str, ...] = ()
+    sum_std: float = 0.0
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A level in two groups: second minus first, with standard error and 95 % interval. differs: 0 lies outside."""
+
+    key: str
+    first: str
+    second: str
+    values: tuple[float, float]
+    difference: float
+    std: float
+    low: float
+    high: float
+
+    @property
+    def differs(self) -> bool:
+        """Whether the interval leaves 0 out."""
+        return not self.low <= 0.0 <= self.high

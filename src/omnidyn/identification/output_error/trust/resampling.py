@@ -16,7 +16,7 @@ from omnidyn.identification.output_error.problem.problem import PieceSums, Point
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.trust.uncertainty import Trust
-from omnidyn.identification.steady.study_parts import Difference
+from omnidyn.identification.steady.study_table import Difference
 from omnidyn.statistics import central_interval, t_quantile
 
 OUTWARD, HALVINGS = 12, 12  # steps of 1.5 standard errors out, then halvings
