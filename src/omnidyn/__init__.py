@@ -21,7 +21,7 @@ __version__ = "0.1.0"
 _HOME = {
     "Comparison": "omnidyn.comparison.result",
     "Estimate": "omnidyn.identification.estimate",
-    "Identification": "omnidyn.identification.identify",
+    "Identification": "omnidyn.identification.identification",
     "MotorFit": "omnidyn.identification.methods",
     "MotorLine": "omnidyn.identification.methods",
     "OmnidynError": "omnidyn.errors",
@@ -79,7 +79,8 @@ if TYPE_CHECKING:
     from omnidyn.errors import OmnidynError
     from omnidyn.findings.check import check
     from omnidyn.identification.estimate import Estimate
-    from omnidyn.identification.identify import Identification, identify
+    from omnidyn.identification.identification import Identification
+    from omnidyn.identification.identify import identify
     from omnidyn.identification.methods import MotorFit, MotorLine, OutputError, SteadyState
     from omnidyn.logs.command_file import read_commands, read_voltages
     from omnidyn.logs.read_log import load_log, read_log

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 import omnidyn
-from omnidyn.cli.identify_options import asked as asked_of
-from omnidyn.cli.identify_options import default_of, options
 from omnidyn.cli.terminal.flags import of_place, with_flags
+from omnidyn.cli.terminal.identify_options import asked as asked_of
+from omnidyn.cli.terminal.identify_options import default_of, options
 from omnidyn.errors import InputError
 from omnidyn.identification.methods import METHODS, MotorFit, MotorLine, OutputError, SteadyState, choices
 

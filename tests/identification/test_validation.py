@@ -144,9 +144,9 @@ def test_what_decides_the_method():
 
 def test_arguments_that_a_method_does_not_take_are_refused():
     run = noisy_draw(simulate(AXEBOT, excitation(2.0), 0.01), 1)
-    with pytest.raises(InputError, match=r"steady-state has no such option; got `hold_out`"):
+    with pytest.raises(InputError, match=r"SteadyState has no use for it; got `hold_out`"):
         omnidyn.identify(run, AXEBOT, omnidyn.SteadyState(), hold_out="*")
-    with pytest.raises(InputError, match=r"got `groups`"):
+    with pytest.raises(InputError, match=r"MotorLine has no use for it; got `groups`"):
         omnidyn.identify(run, AXEBOT, omnidyn.MotorLine(), groups=["a"])
 
 

@@ -10,7 +10,8 @@ import pytest
 from omnidyn.document import sentence
 from omnidyn.findings.finding import Finding, Verdict
 from omnidyn.identification.estimate import Correlation, Estimate
-from omnidyn.identification.identify import Identification, identify
+from omnidyn.identification.identification import Identification
+from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.motors.study import motors_verdict
 from omnidyn.identification.output_error.answer import OutputErrorEstimate

@@ -13,14 +13,14 @@ import typer
 
 import omnidyn
 from omnidyn.attempts import Attempts, not_made
-from omnidyn.cli import identify_options
 from omnidyn.cli import log_options as options
 from omnidyn.cli.identify_logs import Loaded
-from omnidyn.cli.identify_options import MOTORS, Asked
 from omnidyn.cli.identify_show import Out, say_written
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
+from omnidyn.cli.terminal import identify_options
 from omnidyn.cli.terminal.flags import flags
 from omnidyn.cli.terminal.help import MORE
+from omnidyn.cli.terminal.identify_options import MOTORS, Asked
 from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say

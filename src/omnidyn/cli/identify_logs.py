@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from omnidyn.cli.identify_options import Asked
 from omnidyn.cli.log_options import Maps, load_logs, log_files
+from omnidyn.cli.terminal.identify_options import Asked
 from omnidyn.cli.terminal.streams import say
 from omnidyn.files import open_regular
 from omnidyn.progress import Progress

@@ -13,8 +13,8 @@ import typer
 
 import omnidyn
 from omnidyn.attempts import Attempts
-from omnidyn.cli.identify_options import Asked
 from omnidyn.cli.terminal.flags import with_flags
+from omnidyn.cli.terminal.identify_options import Asked
 from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say
@@ -22,14 +22,13 @@ from omnidyn.cli.terminal.telling import brief_document
 from omnidyn.cli.terminal.telling import tell as tell_document
 from omnidyn.document import Document, Table, interval_cell
 from omnidyn.files import check_output, keep_apart, write_atomic
-from omnidyn.identification.methods import OutputError
-from omnidyn.identification.steady.study_table import SteadyStudy
+from omnidyn.identification.methods import OutputError, SteadyState
 from omnidyn.progress import Progress, Report
 
 if TYPE_CHECKING:
     from omnidyn.attempts import Attempts
     from omnidyn.identification.estimate import Estimate
-    from omnidyn.identification.identify import Identification
+    from omnidyn.identification.identification import Identification
     from omnidyn.model.robot import Robot
 
 PAGE = "page"
@@ -114,7 +113,7 @@ def _has_page(found: Identification) -> bool:
 
 def _page(found: Identification, record: dict[str, Any]) -> str:
     """The report."""
-    if isinstance(found.study, SteadyStudy):
+    if isinstance(found.method, SteadyState) and found.study is not None:
         from omnidyn.report.steady_page import render_study
 
         return render_study(found.study, record, verdict=found.verdict, verdicts=found.verdicts)

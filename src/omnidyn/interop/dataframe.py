@@ -16,7 +16,7 @@ from omnidyn.comparison.result import Comparison
 from omnidyn.comparison.traces import unit as component_unit
 from omnidyn.errors import InputError, MissingExtraError
 from omnidyn.identification.estimate import Estimate
-from omnidyn.identification.identify import Identification
+from omnidyn.identification.identification import Identification
 from omnidyn.logs.run_file import run_columns, unit_of_column
 from omnidyn.model.keys import unit
 from omnidyn.run import Run

@@ -14,7 +14,7 @@ from omnidyn.comparison.compare import with_fitted_band
 from omnidyn.comparison.result import Comparison
 from omnidyn.document import Points, sentence
 from omnidyn.identification.fit_document import difference_table, number_table, short_table, verdict_table
-from omnidyn.identification.identify import Identification
+from omnidyn.identification.identification import Identification
 from omnidyn.identification.lack_of_fit import Binned
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.validation import FITTED, HELD_OUT, Score, Validation, output_name

@@ -14,7 +14,7 @@ from omnidyn.errors import InputError
 from omnidyn.findings.finding import Verdict
 from omnidyn.identification.estimate import Estimate
 from omnidyn.identification.friction_curve import FrictionCurve, sliding_force
-from omnidyn.identification.identify import Identification
+from omnidyn.identification.identification import Identification
 from omnidyn.identification.motors.study import MotorStudy
 from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.logs.path import path_of

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from omnidyn.errors import InsufficientDataError
+from omnidyn.identification.methods import SteadyState
 from omnidyn.identification.steady.steady_state import identify_lines
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
@@ -26,7 +27,7 @@ def runs():
 
 @pytest.mark.parametrize("force_from", ["current", "voltage"])
 def test_table_3_comes_back_from_its_own_logs(force_from):
-    estimate = identify_lines(runs(), AXEBOT, force_from=force_from)["all"]
+    estimate = identify_lines(runs(), AXEBOT, SteadyState(force_from=force_from))["all"]
     for axis in range(3):
         assert estimate.value[f"friction.axes.viscous[{axis}]"] == pytest.approx(
             AXEBOT.friction.axes.viscous[axis], rel=0.02
@@ -38,7 +39,7 @@ def test_table_3_comes_back_from_its_own_logs(force_from):
 
 def test_noise_widens_the_intervals_around_the_truth():
     rng = np.random.default_rng(0)
-    estimate = identify_lines([spoiled(run, rng, between=0.01) for run in runs()], AXEBOT)["all"]
+    estimate = identify_lines([spoiled(run, rng, between=0.01) for run in runs()], AXEBOT, SteadyState())["all"]
     low, high = estimate.ci95["friction.axes.coulomb[0]"]
     assert low <= 2.2 <= high
     assert high - low > 0.01
@@ -46,4 +47,4 @@ def test_noise_widens_the_intervals_around_the_truth():
 
 def test_one_run_is_no_line():
     with pytest.raises(InsufficientDataError, match="too few rows for a line"):
-        identify_lines(runs()[:1], AXEBOT)
+        identify_lines(runs()[:1], AXEBOT, SteadyState())

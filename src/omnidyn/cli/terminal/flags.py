@@ -17,7 +17,7 @@ _NAMED = re.compile(r"`([a-z_]+)`")
 @cache
 def flags() -> dict[str, str]:
     """Option -> flag."""
-    from omnidyn.cli.identify_options import options
+    from omnidyn.cli.terminal.identify_options import options
 
     asked = {name: spec.metadata["flag"] or name for name, spec in options().items()}
     asked["groups"] = "per"
