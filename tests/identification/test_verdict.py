@@ -7,12 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from omnidyn.attempts import Attempts
 from omnidyn.document import sentence
 from omnidyn.findings.finding import Finding, Verdict
 from omnidyn.identification.estimate import Correlation, Estimate
-from omnidyn.identification.identification import Identification
+from omnidyn.identification.identification import After, Identification
 from omnidyn.identification.identify import identify
-from omnidyn.identification.methods import OutputError
+from omnidyn.identification.methods import OutputError, SteadyState
 from omnidyn.identification.motors.study import motors_verdict
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.verdict import fit_verdict, fits_verdict, steady_verdict
@@ -23,6 +24,11 @@ from omnidyn.statement import ERROR, Statement
 from tests.support.axebot_logs import excitation, noisy_draw
 
 AXEBOT = load_robot("axebot")
+
+
+def followed_by(fits, validations=None):
+    """What makes that which follows a fit."""
+    return lambda: After(fits, validations or {}, (), (), Attempts())
 
 
 class Score(NamedTuple):
@@ -170,7 +176,7 @@ def test_no_shape_fits():
     assert said(*steady_verdict(study(7.0))) == (
         "No shape of friction explains the forces: the best, disc, misses 7 N of 10 N in a direction that was left out."
     )
-    found = Identification(OutputError(), "steady-state", {"all": estimate([0.02] * 6, Estimate)}, study=study(7.0))
+    found = Identification(SteadyState(), {"all": estimate([0.02] * 6, Estimate)}, followed_by({}), study=study(7.0))
     assert found.verdict.startswith("Failed: no shape of friction explains the forces: the best, disc, misses 7 N")
     assert found.verdict.endswith("the numbers are not usable until that is corrected.")
     assert replace(found, study=study(0.5)).failures == ()
@@ -179,10 +185,11 @@ def test_no_shape_fits():
 def test_what_the_verdict_calls_meaningless_is_a_failure():
     """The sentence said that the numbers mean nothing, and `failures` was empty: exit 0."""
     lost = estimate([0.02] * 6, not_followed=("wheel_speed[0]",))
-    found = Identification(OutputError(), "output-error", {"all": lost})
+    found = Identification(OutputError(), {"all": lost}, followed_by({"all": lost}))
     assert [*map(str, found.failures)] == ["the model does not follow wheel_speed[0]"]
     scores = SimpleNamespace(scores={"fitted": BAD}, not_followed=lambda noise: {})
-    hardly = replace(found, estimates={"all": estimate([0.02] * 6)}, validations={"all": scores})
+    well = {"all": estimate([0.02] * 6)}
+    hardly = replace(found, groups=well, follow=followed_by(well, {"all": scores}))
     assert [*map(str, hardly.failures)] == ["the model does not follow: wheel speeds not at all (rms error 9 rad/s)"]
 
 

@@ -116,7 +116,8 @@ def _page(found: Identification, record: dict[str, Any]) -> str:
     if isinstance(found.method, SteadyState) and found.study is not None:
         from omnidyn.report.steady_page import render_study
 
-        return render_study(found.study, record, verdict=found.verdict, verdicts=found.verdicts)
+        study: Any = found.study  # a SteadyStudy: this method makes no other
+        return render_study(study, record, verdict=found.verdict, verdicts=found.verdicts)
     from omnidyn.report.fit_page import render_fit
 
     return render_fit(found, record)

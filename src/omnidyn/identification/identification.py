@@ -91,6 +91,11 @@ class Identification(Shown):
         """The study of motors."""
         return None if self.groups else self.study  # type: ignore[return-value]
 
+    @property
+    def _steady(self) -> SteadyStudy | None:
+        """The study of steady states."""
+        return self.study if self.groups else None  # type: ignore[return-value]
+
     def _first(self) -> Any:
         """The estimate of the first group; the study of motors."""
         return next(iter(self.groups.values()), self.study)
@@ -155,7 +160,7 @@ class Identification(Shown):
         errors that `check` found; empty for a fit that stands."""
         if self._motors is not None:
             return (self._motors.verdict,) if self._motors.failed else ()
-        found = [steady_failure(self.study)] if isinstance(self.study, SteadyStudy) else []
+        found = [steady_failure(self._steady)] if self._steady else []
         for group, fit in self.fits.items():
             missed = fit_failure(fit, self.validations.get(group))
             found.append(of_group(group, missed) if missed and len(self.groups) > 1 else missed)
@@ -180,8 +185,8 @@ class Identification(Shown):
             return [self._motors.verdict]
         if self.failures and not self.interrupted:
             return [Statement("failed", ERROR, numbers={"failures": self.failures})]
-        if isinstance(self.study, SteadyStudy):
-            return steady_verdict(self.study)
+        if self._steady:
+            return steady_verdict(self._steady)
         if isinstance(self.method, OutputError):
             return fits_verdict(self.fits, self.validations, self.verdicts, self.interrupted)
         return lines_verdict(self.groups)
