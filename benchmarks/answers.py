@@ -85,9 +85,10 @@ def _array(value: np.ndarray) -> Any:
     flat = np.ascontiguousarray(value)
     every = max(1, value.size // SAMPLES)
     return {
-        "shape": list(value.shape), "sha256": hashlib.sha256(flat.tobytes()).hexdigest(),
+        "shape": list(value.shape),
+        "sha256": hashlib.sha256(flat.tobytes()).hexdigest(),
         "samples": [plain(item) for item in flat.ravel()[::every].tolist()],
-    }  # fmt: skip
+    }
 
 
 # ---- what a command left -----------------------------------------------------------------------------------
@@ -102,8 +103,11 @@ def told(text: str, here: Path) -> Any:
     lines = text.splitlines()
     if len(lines) <= LONG_TEXT:
         return lines
-    return {"lines": len(lines), "sha256": hashlib.sha256(text.encode()).hexdigest(),
-            "samples": lines[:: max(1, len(lines) // SAMPLES)]}  # fmt: skip
+    return {
+        "lines": len(lines),
+        "sha256": hashlib.sha256(text.encode()).hexdigest(),
+        "samples": lines[:: max(1, len(lines) // SAMPLES)],
+    }
 
 
 def _cleaned(text: str, here: Path) -> str:

@@ -53,55 +53,94 @@ DUTY = "[drive]\nkind = 'duty'\nsupply_V = 6.0\noff = '{}'"
 LOOP = "[drive]\nkind = 'speed'\nkp_V_s_rad = 0.3\nki_V_rad = 2.0\nrate_Hz = 200.0"
 TURNING = "rotating_frame = true"
 ROBOTS: dict[str, tuple[str, str, str, str]] = {  # body, motor, drive, friction
-    "box": ("", PLAIN, "", BOX), "rough": ("", PLAIN, "", ROUGH), "guess": ("", PLAIN, "", GUESS),
-    "sticky": ("", PLAIN, "", STICKY), "prior": ("", PLAIN, "", PRIOR), "disc": ("", PLAIN, "", DISC),
-    "ellipse": (TURNING, PLAIN, "", ELLIPSE), "wheels": ("", PLAIN, "", WHEELS),
-    "mixed": (TURNING, LIMITS, "", f"{DISC}\n{WHEELS}"), "unequal": ("", UNEQUAL, "", BOX),
-    "limits": ("", LIMITS, "", BOX), "duty": ("", PLAIN, DUTY.format("brake"), BOX),
-    "coast": ("", PLAIN, DUTY.format("coast"), BOX), "loop": ("", PLAIN, LOOP, BOX),
-    "loopdisc": ("", PLAIN, LOOP, DISC), "looprough": ("", PLAIN, LOOP, DISC.replace("2.0", "2.6")),
-    "dynamic": ("", COIL, "", BOX), "dynamicmixed": ("", f"{COIL}\n{DRIVER}", "", DISC),
-    "free": ("", PLAIN, "", ""), "weak": ("", f"{PLAIN}\nvoltage_drop_V = 5.5", "", BOX),
-    "bad_key": ("weight = 1.0", PLAIN, "", BOX), "bad_range": ("", "resistance_ohm = -1.0", "", BOX),
-    "bad_text": ("", "resistance_ohm = 'much'", "", BOX), "bad_toml": ("= 3", PLAIN, "", BOX),
-    "bad_law": ("", PLAIN, "", f"{BOX}\nlaw = 'stribeck'"), "bad_level": ("", PLAIN, "", f"{BOX}\nbreakaway = [1,1,1]"),
+    "box": ("", PLAIN, "", BOX),
+    "rough": ("", PLAIN, "", ROUGH),
+    "guess": ("", PLAIN, "", GUESS),
+    "sticky": ("", PLAIN, "", STICKY),
+    "prior": ("", PLAIN, "", PRIOR),
+    "disc": ("", PLAIN, "", DISC),
+    "ellipse": (TURNING, PLAIN, "", ELLIPSE),
+    "wheels": ("", PLAIN, "", WHEELS),
+    "mixed": (TURNING, LIMITS, "", f"{DISC}\n{WHEELS}"),
+    "unequal": ("", UNEQUAL, "", BOX),
+    "limits": ("", LIMITS, "", BOX),
+    "duty": ("", PLAIN, DUTY.format("brake"), BOX),
+    "coast": ("", PLAIN, DUTY.format("coast"), BOX),
+    "loop": ("", PLAIN, LOOP, BOX),
+    "loopdisc": ("", PLAIN, LOOP, DISC),
+    "looprough": ("", PLAIN, LOOP, DISC.replace("2.0", "2.6")),
+    "dynamic": ("", COIL, "", BOX),
+    "dynamicmixed": ("", f"{COIL}\n{DRIVER}", "", DISC),
+    "free": ("", PLAIN, "", ""),
+    "weak": ("", f"{PLAIN}\nvoltage_drop_V = 5.5", "", BOX),
+    "bad_key": ("weight = 1.0", PLAIN, "", BOX),
+    "bad_range": ("", "resistance_ohm = -1.0", "", BOX),
+    "bad_text": ("", "resistance_ohm = 'much'", "", BOX),
+    "bad_toml": ("= 3", PLAIN, "", BOX),
+    "bad_law": ("", PLAIN, "", f"{BOX}\nlaw = 'stribeck'"),
+    "bad_level": ("", PLAIN, "", f"{BOX}\nbreakaway = [1,1,1]"),
     "bad_loop": ("", PLAIN, "[drive]\nkind = 'speed'", BOX),
     "bad_coil": ("", COIL.replace("inductance_H = 0.02", ""), "", BOX),
-}  # fmt: skip
+}
 
 TEXTS = {
     "u.csv": "t_s,u1_V,u2_V,u3_V\n0,0,3,-3\n0.5,0,0,0\n1,1,1,1\n1.5,-4,2,2.5\n",
-    "low.csv": "t_s,u1_V,u2_V,u3_V\n0,0,0.6,-0.6\n1,0,0,0\n", "high.csv": "t_s,u1_V,u2_V,u3_V\n0,0,30,-30\n1,0,0,0\n",
+    "low.csv": "t_s,u1_V,u2_V,u3_V\n0,0,0.6,-0.6\n1,0,0,0\n",
+    "high.csv": "t_s,u1_V,u2_V,u3_V\n0,0,30,-30\n1,0,0,0\n",
     "u4.csv": "t_s,u1_V,u2_V,u3_V,u4_V\n0,3,3,-3,-3\n0.5,0,0,0,0\n1,1,1,1,1\n",
     "d.csv": "t_s,d1_duty,d2_duty,d3_duty\n0,0,0.5,-0.5\n0.5,0,0,0\n1,0.3,0.3,0.3\n",
     "ds.csv": "t_s,d1_duty,d2_duty,d3_duty,supply_V\n0,0,0.5,-0.5,6\n0.5,0,0,0,5.8\n1,0.3,0.3,0.3,5.5\n",
     "w.csv": "t_s,w1_cmd_rad_s,w2_cmd_rad_s,w3_cmd_rad_s\n0,0,5,-5\n1,3,3,3\n2,0,0,0\n",
     "c.csv": "t_s,vx_cmd_m_s,vy_cmd_m_s,omega_cmd_rad_s\n0,0.3,0,0\n1,0,0.2,0.5\n2,0,0,0\n",
-    "one.csv": "t_s,u1_V,u2_V,u3_V\n0,1,1,1\n", "empty.csv": "",
-    "nan.csv": "t_s,u1_V,u2_V,u3_V\n0,nan,3,-3\n1,0,0,0\n", "inf.csv": "t_s,u1_V,u2_V,u3_V\n0,1e400,3,-3\n1,0,0,0\n",
-    "cells.csv": "t_s,u1_V,u2_V,u3_V\n0,1,2\n1,0,0,0\n", "back.csv": "t_s,u1_V,u2_V,u3_V\n1,0,3,-3\n0,0,0,0\n",
-    "twice.csv": "t_s,u1_V,u2_V,u3_V\n1,0,3,-3\n1,0,0,0\n", "names.csv": "t_s,u1_V,u2_V,wind\n1,0,3,-3\n2,0,0,0\n",
-    "few.csv": "axis,speed,force\nx,0.4,2.5\nx,0.7,2.8\n", "badtable.csv": "axis,speed,force\nz,0.4,2.5\nx,0.7,2.8\n",
+    "one.csv": "t_s,u1_V,u2_V,u3_V\n0,1,1,1\n",
+    "empty.csv": "",
+    "nan.csv": "t_s,u1_V,u2_V,u3_V\n0,nan,3,-3\n1,0,0,0\n",
+    "inf.csv": "t_s,u1_V,u2_V,u3_V\n0,1e400,3,-3\n1,0,0,0\n",
+    "cells.csv": "t_s,u1_V,u2_V,u3_V\n0,1,2\n1,0,0,0\n",
+    "back.csv": "t_s,u1_V,u2_V,u3_V\n1,0,3,-3\n0,0,0,0\n",
+    "twice.csv": "t_s,u1_V,u2_V,u3_V\n1,0,3,-3\n1,0,0,0\n",
+    "names.csv": "t_s,u1_V,u2_V,wind\n1,0,3,-3\n2,0,0,0\n",
+    "few.csv": "axis,speed,force\nx,0.4,2.5\nx,0.7,2.8\n",
+    "badtable.csv": "axis,speed,force\nz,0.4,2.5\nx,0.7,2.8\n",
     "stds.csv": "axis,speed,force,speed_std,force_std\nx,0.4,2.5,0.01,0.1\nx,0.7,2.9,0.01,0.1\nx,1,3.1,0.02,0.1\n"
-                "v_n,0.4,1.9,0.01,0.05\nv_n,-0.7,-2.1,0.01,0.05\nv_n,1,2.5,0.01,0.05\n",
+    "v_n,0.4,1.9,0.01,0.05\nv_n,-0.7,-2.1,0.01,0.05\nv_n,1,2.5,0.01,0.05\n",
     "noequal.csv": "axis,speed,force\nx,0.4,-2.5\nx,0.7,-2.8\nx,0.9,-3.5\n",
-    "places.toml": "schema = 1\n" + "".join(
-        f"[{n}]\ncolumn = '{column}'\nunit = '{unit}'\n" for n, column, unit in (
-            ("t", "count", "ms"), ("w1", "front", "rad/s"), ("w2", "left", "rad/s"), ("w3", "right", "rad/s"),
-            ("vx", "vx_m_s", "m/s"), ("vy", "vy_m_s", "m/s"), ("omega", "omega_rad_s", "rad/s"))),
-    "log.json": '{"t": [1, 2]}', "words.txt": "these are words\nand no numbers\n",
-}  # fmt: skip
+    "places.toml": "schema = 1\n"
+    + "".join(
+        f"[{n}]\ncolumn = '{column}'\nunit = '{unit}'\n"
+        for n, column, unit in (
+            ("t", "count", "ms"),
+            ("w1", "front", "rad/s"),
+            ("w2", "left", "rad/s"),
+            ("w3", "right", "rad/s"),
+            ("vx", "vx_m_s", "m/s"),
+            ("vy", "vy_m_s", "m/s"),
+            ("omega", "omega_rad_s", "rad/s"),
+        )
+    ),
+    "log.json": '{"t": [1, 2]}',
+    "words.txt": "these are words\nand no numbers\n",
+}
 
 COLUMNS = {
-    "voltage": "u{}_V", "duty": "d{}_duty", "current": "i{}_A", "wheel_angle": "a{}_rad", "wheel_speed": "w{}_rad_s",
-    "wheel_speed_command": "w{}_cmd_rad_s", "twist": ("vx_m_s", "vy_m_s", "omega_rad_s"),
-    "twist_command": ("vx_cmd_m_s", "vy_cmd_m_s", "omega_cmd_rad_s"), "pose": ("x_m", "y_m", "heading_rad"),
+    "voltage": "u{}_V",
+    "duty": "d{}_duty",
+    "current": "i{}_A",
+    "wheel_angle": "a{}_rad",
+    "wheel_speed": "w{}_rad_s",
+    "wheel_speed_command": "w{}_cmd_rad_s",
+    "twist": ("vx_m_s", "vy_m_s", "omega_rad_s"),
+    "twist_command": ("vx_cmd_m_s", "vy_cmd_m_s", "omega_cmd_rad_s"),
+    "pose": ("x_m", "y_m", "heading_rad"),
     "supply": ("supply_V",),
-}  # fmt: skip
+}
 NOISE: dict[str, Any] = {
-    "twist": np.array([0.02, 0.02, 0.1]), "wheel_speed": 0.3, "current": 0.03, "pose": np.array([2e-3, 2e-3, 5e-3]),
+    "twist": np.array([0.02, 0.02, 0.1]),
+    "wheel_speed": 0.3,
+    "current": 0.03,
+    "pose": np.array([2e-3, 2e-3, 5e-3]),
     "wheel_angle": 0.002,
-}  # fmt: skip
+}
 Table = dict[str, Any]  # name of a column -> its cells
 
 
@@ -162,8 +201,13 @@ def write_logs() -> None:
         write(f"{channels}.csv", table_of(run, ("voltage", channels), 2))
     write("inputless.csv", table_of(run, ("wheel_speed",), 2))
     counts = table_of(run, ("voltage", "wheel_angle", "twist"), 2)
-    write("counts.csv", {f"m{n[1]}pos" if n[0] == "a" else n: np.floor(x * 19 * 25 / 2 / np.pi) if n[0] == "a" else x
-                         for n, x in counts.items()})  # fmt: skip
+    write(
+        "counts.csv",
+        {
+            f"m{n[1]}pos" if n[0] == "a" else n: np.floor(x * 19 * 25 / 2 / np.pi) if n[0] == "a" else x
+            for n, x in counts.items()
+        },
+    )
     rest = omnidyn.simulate(omnidyn.load_robot("axebot"), np.full((200, 3), 0.05), STEP)
     write("rest.csv", table_of(rest, ("voltage", "twist"), 3))
     share = (levels(5.0, 4) / 6.0).round(3)
@@ -221,12 +265,15 @@ def write_faults() -> None:
     spike = np.where(rows % 97 == 5, 900.0, full["w2_rad_s"])
     slip = np.where((rows > 300) & (rows < 520), 0.5, 1.0)
     faults: dict[str, Table] = {
-        "swapped": full | swap, "inverted": full | {"w1_rad_s": -full["w1_rad_s"]},
+        "swapped": full | swap,
+        "inverted": full | {"w1_rad_s": -full["w1_rad_s"]},
         "inverted_u": full | {"u2_V": -full["u2_V"]},
         "rpm": full | {f"w{k}_rad_s": full[f"w{k}_rad_s"] * 30 / np.pi for k in (1, 2, 3)},
         "gear": full | {f"w{k}_rad_s": full[f"w{k}_rad_s"] * 1.2 for k in (1, 2, 3)},
         "late": full | {f"w{k}_rad_s": np.roll(full[f"w{k}_rad_s"], 6) for k in (1, 2, 3)},
-        "stuck": full | {"w1_rad_s": hold}, "dead": full | {"i2_A": 0.0 * t}, "spikes": full | {"w2_rad_s": spike},
+        "stuck": full | {"w1_rad_s": hold},
+        "dead": full | {"i2_A": 0.0 * t},
+        "spikes": full | {"w2_rad_s": spike},
         "placeholder": full | {"i1_A": np.where(rows % 50 == 7, -999.0, full["i1_A"])},
         "wrapped": full | {"i1_A": np.where(full["i1_A"] < 0, full["i1_A"] + 65536.0, full["i1_A"])},
         "slip": full | {name: full[name] * slip for name in ("vx_m_s", "vy_m_s", "omega_rad_s")},
@@ -239,12 +286,15 @@ def write_faults() -> None:
         "unsigned": full | {f"i{k}_A": np.abs(full[f"i{k}_A"]) for k in (1, 2, 3)},
         "saturated": full | {f"u{k}_V": np.clip(full[f"u{k}_V"], -2.0, 2.0) for k in (1, 2, 3)},
         "wild": full | {"vx_m_s": full["vx_m_s"] + np.where(rows % 37 == 4, 1.0, 0.0)},
-        "short": {name: x[:3] for name, x in full.items()}, "odd": {"t_s": t, "foo": t * 3, "bar": rows * 1.0},
+        "short": {name: x[:3] for name, x in full.items()},
+        "odd": {"t_s": t, "foo": t * 3, "bar": rows * 1.0},
         "text": full | {"i1_A": [f"{x:.9g}" if k != 70 else "#N/A" for k, x in enumerate(full["i1_A"])]},
         "infinite": full | {"i1_A": [f"{x:.9g}" if k != 70 else "inf" for k, x in enumerate(full["i1_A"])]},
-        "fullduty": {n.replace("u", "d").replace("V", "duty") if n[0] == "u" else n: x / 6.0 if n[0] == "u" else x
-                     for n, x in full.items()},
-    }  # fmt: skip
+        "fullduty": {
+            n.replace("u", "d").replace("V", "duty") if n[0] == "u" else n: x / 6.0 if n[0] == "u" else x
+            for n, x in full.items()
+        },
+    }
     for name, table in faults.items():
         write(f"bad/{name}.csv", table)
     write_dialects({name: x[:200] for name, x in full.items() if name[0] in "tuwvo"}, n)
@@ -258,21 +308,51 @@ def write_dialects(table: Table, rows: int) -> None:
     write("dialect/blanks.txt", table, "  ")
     write("dialect/comments.csv", table, head=f"# made by a robot\n# {rows} rows\n")
     write("dialect/headless.csv", table, head="!")
-    write("dialect/units.csv", {"t": ["ms", *map(str, range(0, 2000, 10))]} | {
-        n.split("_")[0]: ["rpm" if n[0] == "w" else "V" if n[0] == "u" else n.split("_", 1)[1].replace("_", "/"),
-                          *(f"{x * (30 / np.pi if n[0] == 'w' else 1):.9g}" for x in col)]
-        for n, col in table.items() if n != "t_s"})  # fmt: skip
-    write("dialect/dates.csv", {"time": [f"2026-01-01T10:00:{x:09.6f}Z" for x in t]} | {
-        n: x for n, x in table.items() if n != "t_s"})  # fmt: skip
-    write("dialect/stamp.csv", {"stamp.sec": np.floor(t) + 100, "stamp.nanosec": (t % 1) * 1e9} | {
-        n: x for n, x in table.items() if n != "t_s"})  # fmt: skip
-    write("dialect/motor.csv", {"millis": t * 1e3, **{f"motor_{k}_volts": table[f"u{k}_V"] for k in (1, 2, 3)},
-                                **{f"m{k}vel": table[f"w{k}_rad_s"] * 19 * 30 / np.pi for k in (1, 2, 3)}})  # fmt: skip
+    write(
+        "dialect/units.csv",
+        {"t": ["ms", *map(str, range(0, 2000, 10))]}
+        | {
+            n.split("_")[0]: [
+                "rpm" if n[0] == "w" else "V" if n[0] == "u" else n.split("_", 1)[1].replace("_", "/"),
+                *(f"{x * (30 / np.pi if n[0] == 'w' else 1):.9g}" for x in col),
+            ]
+            for n, col in table.items()
+            if n != "t_s"
+        },
+    )
+    write(
+        "dialect/dates.csv",
+        {"time": [f"2026-01-01T10:00:{x:09.6f}Z" for x in t]} | {n: x for n, x in table.items() if n != "t_s"},
+    )
+    write(
+        "dialect/stamp.csv",
+        {"stamp.sec": np.floor(t) + 100, "stamp.nanosec": (t % 1) * 1e9}
+        | {n: x for n, x in table.items() if n != "t_s"},
+    )
+    write(
+        "dialect/motor.csv",
+        {
+            "millis": t * 1e3,
+            **{f"motor_{k}_volts": table[f"u{k}_V"] for k in (1, 2, 3)},
+            **{f"m{k}vel": table[f"w{k}_rad_s"] * 19 * 30 / np.pi for k in (1, 2, 3)},
+        },
+    )
     turned = {f"m{k}pos": np.cumsum(table[f"w{k}_rad_s"]) * STEP * 19 * 2000 / 2 / np.pi for k in (1, 2, 3)}
-    write("dialect/ticks.csv", {"t": t, **{f"u{k}": table[f"u{k}_V"] for k in (1, 2, 3)},
-                                **{n: np.floor(x) % 65536 for n, x in turned.items()}})  # fmt: skip
-    write("dialect/change.csv", {n: x if n[0] == "t" or n[0] == "v" else np.where(np.arange(200) % 4 == 0, x, np.nan)
-                                 for n, x in table.items()})  # fmt: skip
+    write(
+        "dialect/ticks.csv",
+        {
+            "t": t,
+            **{f"u{k}": table[f"u{k}_V"] for k in (1, 2, 3)},
+            **{n: np.floor(x) % 65536 for n, x in turned.items()},
+        },
+    )
+    write(
+        "dialect/change.csv",
+        {
+            n: x if n[0] == "t" or n[0] == "v" else np.where(np.arange(200) % 4 == 0, x, np.nan)
+            for n, x in table.items()
+        },
+    )
     body = {n: x for n, x in table.items() if n in COLUMNS["twist"]}
     wheels = {"front": "w1_rad_s", "left": "w2_rad_s", "right": "w3_rad_s"}
     write("dialect/places.csv", {"count": t * 1e3, **body, **{n: table[old] for n, old in wheels.items()}})
@@ -288,8 +368,10 @@ def write_init_logs() -> None:
     table = {"t_s": np.arange(50) * STEP, **dict(zip(COLUMNS["twist_command"], twist.T, strict=True))}
     for gear, name in ((1.0, "init1.csv"), (16.0, "init16.csv")):
         write(name, table | {f"w{k + 1}_cmd_rad_s": gear * rim[:, k] / 0.04 for k in range(3)})
-    write("noturn.csv", table | {"omega_cmd_rad_s": np.full(50, np.nan)} | {
-        f"w{k + 1}_cmd_rad_s": rim[:, k] / 0.04 for k in range(3)})  # fmt: skip
+    write(
+        "noturn.csv",
+        table | {"omega_cmd_rad_s": np.full(50, np.nan)} | {f"w{k + 1}_cmd_rad_s": rim[:, k] / 0.04 for k in range(3)},
+    )
 
 
 def copy_real() -> list[str]:
@@ -298,12 +380,19 @@ def copy_real() -> list[str]:
     shutil.copytree(ROOT / "examples", "examples")
     wanted = {
         "odrive": ("odrive_umn/demo_data/", ("step1.csv", "step2.csv", "chirp1.csv")),
-        "udea": ("udea_three_omni/", ("motor_tests/stage1_1.txt", "motor_tests/stage1_2.txt",
-                                      "rotation_tests/stage2_1.txt", "sensor_data/exp1.txt")),
+        "udea": (
+            "udea_three_omni/",
+            (
+                "motor_tests/stage1_1.txt",
+                "motor_tests/stage1_2.txt",
+                "rotation_tests/stage2_1.txt",
+                "sensor_data/exp1.txt",
+            ),
+        ),
         "gray": ("robotino/one_surface_type/gray_surface/", tuple(f"exp{n:02d}.csv" for n in range(0, 72, 6))),
         "green": ("robotino/one_surface_type/green_surface/", tuple(f"exp{n:02d}.csv" for n in range(0, 72, 6))),
         "motors": ("robotino/dc_motor_model_identification/", ("validation_data.csv",)),
-    }  # fmt: skip
+    }
     for folder, (place, names) in wanted.items():
         for name in names if (data / place).is_dir() else ():
             Path("real", folder).mkdir(parents=True, exist_ok=True)

@@ -59,9 +59,12 @@ def measure() -> Table:
 
 def _add(table: Table, name: str, path: Path) -> None:
     run = subprocess.run(
-        [sys.executable, "-m", "benchmarks.big_log", str(path)], capture_output=True, text=True, check=True,
+        [sys.executable, "-m", "benchmarks.big_log", str(path)],
+        capture_output=True,
+        text=True,
+        check=True,
         cwd=Path(__file__).resolve().parents[1],
-    )  # fmt: skip
+    )
     told = json.loads(run.stdout)
     met = told["cpu s"] <= CPU_GOAL_S and told["peak MB"] <= MEMORY_GOAL_MB
     size = path.stat().st_size / 1e6
@@ -132,8 +135,11 @@ def read(path: str) -> dict[str, float]:
     peak = usage.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
     cpu = usage.ru_utime + usage.ru_stime
     return {
-        "rows": rows, "cpu s": round(cpu, 1), "wall s": round(time.perf_counter() - wall, 1), "peak MB": round(peak),
-    }  # fmt: skip
+        "rows": rows,
+        "cpu s": round(cpu, 1),
+        "wall s": round(time.perf_counter() - wall, 1),
+        "peak MB": round(peak),
+    }
 
 
 if __name__ == "__main__":

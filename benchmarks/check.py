@@ -57,11 +57,19 @@ def run_fault(name: str, logs: int = LOGS) -> Outcome:
 
 # What a verdict may say about each fault; anything else above a note is counted as untrue.
 CODES = {
-    "swapped motor": ("swapped",), "inverted sign": ("inverted",), "rpm as rad/s": ("unit",),
-    "one-sample lag": ("lag",), "gap": ("gap",), "repeated stamps": ("time_repeats",), "saturation": ("saturation",),
-    "sag": ("sag",), "slip": ("slip",), "stuck encoder": ("stuck",), "dead channel": ("dead",),
+    "swapped motor": ("swapped",),
+    "inverted sign": ("inverted",),
+    "rpm as rad/s": ("unit",),
+    "one-sample lag": ("lag",),
+    "gap": ("gap",),
+    "repeated stamps": ("time_repeats",),
+    "saturation": ("saturation",),
+    "sag": ("sag",),
+    "slip": ("slip",),
+    "stuck encoder": ("stuck",),
+    "dead channel": ("dead",),
     "wrong gear": ("gear", "path_ratio"),
-}  # fmt: skip
+}
 
 
 def run_clean(logs: int = CLEAN) -> tuple[int, list[str]]:
@@ -106,14 +114,26 @@ def table_of(outcomes: dict[str, Outcome], false: tuple[int, list[str]], clean_l
     for name, outcome in outcomes.items():
         fault, share = FAULTS[name], float(outcome.found.mean())
         sizes = f"{fault.low:g} to {fault.high:g} {fault.unit}" if fault.high > fault.low else f"{fault.unit}"
-        table.add(f">= {100 * RECALL:g} %", share >= RECALL, fault=name, sizes=sizes, logs=len(outcome.found),
-                  found=int(outcome.found.sum()), untrue=outcome.untrue, **{"recall %": 100.0 * share})  # fmt: skip
+        table.add(
+            f">= {100 * RECALL:g} %",
+            share >= RECALL,
+            fault=name,
+            sizes=sizes,
+            logs=len(outcome.found),
+            found=int(outcome.found.sum()),
+            untrue=outcome.untrue,
+            **{"recall %": 100.0 * share},
+        )
     wrong, words = false
     goal = f"<= {100 * FALSE:g} % untrue"
     table.add(goal, wrong <= FALSE * clean_logs, fault="none (clean)", sizes="", logs=clean_logs, untrue=wrong)
     seconds = speed()
-    table.add(f"<= {SECONDS:g} s of CPU", seconds <= SECONDS, fault=f"{ROWS} rows x {COLUMNS} columns",
-              sizes=f"{seconds:.2f} s")  # fmt: skip
+    table.add(
+        f"<= {SECONDS:g} s of CPU",
+        seconds <= SECONDS,
+        fault=f"{ROWS} rows x {COLUMNS} columns",
+        sizes=f"{seconds:.2f} s",
+    )
     table.notes += [machine(), "untrue: logs in which a warning or a fatal finding says what is not the case"]
     table.notes += [f"untrue in {each}" for each in words[:20]]
     return table

@@ -156,8 +156,10 @@ def put_saturation(rng: Rng, scene: Scene, size: float):
 
 
 def found_saturation(verdict: Verdict, broken: dict) -> bool:
-    return any(f.code == "saturation" and abs(f.numbers["share"] - broken["share"]) < 0.01 + 0.3 * broken["share"]
-               for f in verdict.findings)  # fmt: skip
+    return any(
+        f.code == "saturation" and abs(f.numbers["share"] - broken["share"]) < 0.01 + 0.3 * broken["share"]
+        for f in verdict.findings
+    )
 
 
 def put_sag(rng: Rng, scene: Scene, size: float):
@@ -166,8 +168,10 @@ def put_sag(rng: Rng, scene: Scene, size: float):
 
 
 def found_sag(verdict: Verdict, broken: dict) -> bool:
-    return any(f.code == "sag" and abs(f.numbers["drop"] - broken["drop"]) < 0.02 + 0.4 * broken["drop"]
-               for f in verdict.findings)  # fmt: skip
+    return any(
+        f.code == "sag" and abs(f.numbers["drop"] - broken["drop"]) < 0.02 + 0.4 * broken["drop"]
+        for f in verdict.findings
+    )
 
 
 def put_slip(rng: Rng, scene: Scene, size: float):
@@ -245,24 +249,34 @@ def found_gear(verdict: Verdict, broken: dict) -> bool:
 
 
 FAULTS: dict[str, Fault] = {
-    "swapped motor": Fault(1, 1, "two columns", _any_check, put_swapped,
-                           lambda v, b: _named(v, ("swapped",), b["where"])),
-    "inverted sign": Fault(1, 1, "one column", _any_check, put_inverted,
-                           lambda v, b: _named(v, ("inverted",), b["where"])),
-    "rpm as rad/s": Fault(1, 1, "9.55 times", lambda s: s.has_speed, put_rpm,
-                          lambda v, b: any(f.code == "unit" and "rpm" in str(f) for f in v.findings)),
+    "swapped motor": Fault(
+        1, 1, "two columns", _any_check, put_swapped, lambda v, b: _named(v, ("swapped",), b["where"])
+    ),
+    "inverted sign": Fault(
+        1, 1, "one column", _any_check, put_inverted, lambda v, b: _named(v, ("inverted",), b["where"])
+    ),
+    "rpm as rad/s": Fault(
+        1,
+        1,
+        "9.55 times",
+        lambda s: s.has_speed,
+        put_rpm,
+        lambda v, b: any(f.code == "unit" and "rpm" in str(f) for f in v.findings),
+    ),
     "one-sample lag": Fault(1, 1, "row", _any_check, put_lag, found_lag),
     "gap": Fault(3, 200, "rows", lambda s: True, put_gap, found_gap),
     "repeated stamps": Fault(1, 20, "rows", lambda s: True, put_repeats, found_repeats),
     "saturation": Fault(2, 40, "% of rows", lambda s: True, put_saturation, found_saturation),
     "sag": Fault(5, 30, "%", lambda s: True, put_sag, found_sag),
     "slip": Fault(5, 50, "% of the path", _full_floor, put_slip, found_slip, ("path_ratio", "robot_radius")),
-    "stuck encoder": Fault(0.4, 5, "s", lambda s: s.has_speed, put_stuck,
-                           lambda v, b: _named(v, ("stuck",), b["where"])),
-    "dead channel": Fault(1, 1, "a flat line", lambda s: s.has_speed, put_dead,
-                          lambda v, b: _named(v, ("dead",), b["where"])),
+    "stuck encoder": Fault(
+        0.4, 5, "s", lambda s: s.has_speed, put_stuck, lambda v, b: _named(v, ("stuck",), b["where"])
+    ),
+    "dead channel": Fault(
+        1, 1, "a flat line", lambda s: s.has_speed, put_dead, lambda v, b: _named(v, ("dead",), b["where"])
+    ),
     "wrong gear": Fault(5, 40, "%", _any_check, put_gear, found_gear),
-}  # fmt: skip
+}
 
 
 def draw(name: str, seed: int) -> tuple[Log, Robot, dict, float]:

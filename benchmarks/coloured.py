@@ -103,9 +103,15 @@ def bound(robot: Robot, clean: Run, output: str, lags: np.ndarray) -> np.ndarray
 
 
 def measure_case(
-    table: Table, robot: Robot, name: str, output: str, log: Callable[[int], Run], least: np.ndarray, goals: bool,
+    table: Table,
+    robot: Robot,
+    name: str,
+    output: str,
+    log: Callable[[int], Run],
+    least: np.ndarray,
+    goals: bool,
     nuisances: tuple[str, ...] = (),
-) -> None:  # fmt: skip
+) -> None:
     """One kind of noise: by default, and by the sandwich."""
     for kind in ("sandwich", "auto"):
         draws, chosen = Draws(truth(robot)), 0
@@ -120,12 +126,20 @@ def measure_case(
         asked = goals and kind == "auto"
         table.add(
             f">= {LEAST}, <= {NEAR}" if asked else "",
-            bool(held >= LEAST - slack and std <= NEAR + spare) if asked else None, noise=name, output=output,
-            intervals=kind, logs=LOGS, coverage=held, least=float(draws.coverage.min()), **{
-                "std/bound": std, "greatest": float(spread.max()),
-                "stated/bound": float(np.median(np.array(draws.std) / least)), "autoregressive": chosen / LOGS,
+            bool(held >= LEAST - slack and std <= NEAR + spare) if asked else None,
+            noise=name,
+            output=output,
+            intervals=kind,
+            logs=LOGS,
+            coverage=held,
+            least=float(draws.coverage.min()),
+            **{
+                "std/bound": std,
+                "greatest": float(spread.max()),
+                "stated/bound": float(np.median(np.array(draws.std) / least)),
+                "autoregressive": chosen / LOGS,
             },
-        )  # fmt: skip
+        )
 
 
 def measure_peak(
@@ -152,9 +166,14 @@ def measure_peak(
         errors.append((found.x * true - true) / least)
     size = np.sqrt(np.mean(np.array(errors) ** 2, axis=0))
     table.add(
-        "", None, noise=name, output=output, intervals="peak of the true likelihood", logs=LOGS,
+        "",
+        None,
+        noise=name,
+        output=output,
+        intervals="peak of the true likelihood",
+        logs=LOGS,
         **{"std/bound": float(np.sqrt(np.mean(size**2))), "greatest": float(size.max())},
-    )  # fmt: skip
+    )
 
 
 def counted(robot: Robot, voltage: np.ndarray) -> Callable[[int], Run]:
@@ -177,9 +196,17 @@ def counted(robot: Robot, voltage: np.ndarray) -> Callable[[int], Run]:
 
 def measure() -> Table:
     columns = [
-        "noise", "output", "intervals", "logs", "coverage", "least", "std/bound", "greatest", "stated/bound",
+        "noise",
+        "output",
+        "intervals",
+        "logs",
+        "coverage",
+        "least",
+        "std/bound",
+        "greatest",
+        "stated/bound",
         "autoregressive",
-    ]  # fmt: skip
+    ]
     table, robot = Table("Errors with a memory: 30 s at 100 Hz", columns), load_robot("axebot")
     clean = simulate(robot, voltages(np.random.default_rng(11), SECONDS, RATE), 1.0 / RATE)
     assert clean.voltage is not None
@@ -188,9 +215,12 @@ def measure() -> Table:
             values = getattr(clean, output)
 
             def log(
-                seed: int, colour: Colour = colour, output: str = output, values: np.ndarray = values,
+                seed: int,
+                colour: Colour = colour,
+                output: str = output,
+                values: np.ndarray = values,
                 share: float = 1.0,
-            ) -> Run:  # fmt: skip
+            ) -> Run:
                 noise = share * colour.draw(np.random.default_rng(seed), len(clean)) * STD[output]
                 return Run(t=clean.t, voltage=clean.voltage, source="simulated", **{output: values + noise})
 
@@ -204,9 +234,15 @@ def measure() -> Table:
         np.concatenate([[1.0, -0.5], np.zeros(len(clean) - 2)]) * TICK**2 / 6.0 * RATE**2 / STD["wheel_speed"][0] ** 2
     )
     measure_case(
-        table, robot, "differenced counts", "wheel_speed", counted(robot, clean.voltage[:-1]),
-        bound(robot, clean, "wheel_speed", rounding), False, nuisances=("latency.wheel_speed",),
-    )  # fmt: skip
+        table,
+        robot,
+        "differenced counts",
+        "wheel_speed",
+        counted(robot, clean.voltage[:-1]),
+        bound(robot, clean, "wheel_speed", rounding),
+        False,
+        nuisances=("latency.wheel_speed",),
+    )
     table.notes += [
         "coverage: of all six 95 % intervals together; least: of the worst of them. std: root mean square error, over "
         "the Cramer-Rao bound of noise of that covariance; stated: what the fit says, in the median",

@@ -39,23 +39,40 @@ def measure() -> Table:
     size = dict(zip(SPEEDS, [*SPEED_NOISE, *[WHEEL_NOISE] * 3], strict=True))
     ratio = np.array([each.overall["axebot"][name].rmse / size[name] for each in found for name in SPEEDS])
     table.add(
-        "1 within 0.02", bool(abs(ratio.mean() - 1.0) < 0.02), model="true", what="rmse / noise, mean",
-        channels="speeds", **{"rate or value": float(ratio.mean()), "min cpu ms": min(times.cpu)},
-    )  # fmt: skip
+        "1 within 0.02",
+        bool(abs(ratio.mean() - 1.0) < 0.02),
+        model="true",
+        what="rmse / noise, mean",
+        channels="speeds",
+        **{"rate or value": float(ratio.mean()), "min cpu ms": min(times.cpu)},
+    )
     fit = [each.fit_percent for each in speeds if each.fit_percent is not None]
     table.add(model="true", what="fit %, median", channels="speeds", **{"rate or value": float(np.median(fit))})
     alarms = _alarms(found, SPEEDS)
-    table.add("3 to 8 %", 0.03 <= alarms <= 0.08, model="true", what="called not white", channels="speeds",
-              **{"rate or value": alarms})  # fmt: skip
+    table.add(
+        "3 to 8 %",
+        0.03 <= alarms <= 0.08,
+        model="true",
+        what="called not white",
+        channels="speeds",
+        **{"rate or value": alarms},
+    )
     turned = _alarms(found, ("x", "y", "heading"))
-    table.add("3 to 8 %", 0.03 <= turned <= 0.08, model="true", what="called not white", channels="x y heading",
-              **{"rate or value": turned})  # fmt: skip
+    table.add(
+        "3 to 8 %",
+        0.03 <= turned <= 0.08,
+        model="true",
+        what="called not white",
+        channels="x y heading",
+        **{"rate or value": turned},
+    )
     for percent in (5, 10, 20, 50):
         wrong = coulomb_times(true, 1.0 + percent / 100.0)
         rate = _alarms([compare(wrong, log) for log in logs[:100]], ("vx", "vy"))
         goal = ("> 90 %", rate > 0.9) if percent >= 20 else ("", None)
-        table.add(*goal, model=f"Coulomb +{percent} %", what="called not white", channels="vx vy",
-                  **{"rate or value": rate})  # fmt: skip
+        table.add(
+            *goal, model=f"Coulomb +{percent} %", what="called not white", channels="vx vy", **{"rate or value": rate}
+        )
     _two(table, true, logs)
     return table
 
@@ -114,8 +131,14 @@ def _two(table: Table, true: Robot, logs: list[Run]) -> None:
         # what a rate of 5 % stays below in 99 of 100 such benchmarks
         bound = float(binom.ppf(0.99, len(tried), LEVEL)) / len(tried)
         what = f"{words} with either called better"
-        table.add(f"<= {100 * bound:.0f} %", share <= bound, model="+-0.01 %", what=what, channels="all",
-                  **{"rate or value": share})  # fmt: skip
+        table.add(
+            f"<= {100 * bound:.0f} %",
+            share <= bound,
+            model="+-0.01 %",
+            what=what,
+            channels="all",
+            **{"rate or value": share},
+        )
 
 
 def _chosen(found: Comparison, which: int) -> float:

@@ -20,10 +20,15 @@ from omnidyn.control.paths.path import path
 from omnidyn.model.robot import Robot
 
 REFERENCES = {
-    "eight": "eight", "slow8": "eight:size_m=0.25,period_s=12", "square": "square", "spin": "circle:turn_rad_s=2",
-    "zigzag": "zigzag", "fast8": "eight:period_s=3.2", "fsquare": "square:speed_m_s=1.2",
+    "eight": "eight",
+    "slow8": "eight:size_m=0.25,period_s=12",
+    "square": "square",
+    "spin": "circle:turn_rad_s=2",
+    "zigzag": "zigzag",
+    "fast8": "eight:period_s=3.2",
+    "fsquare": "square:speed_m_s=1.2",
     "fspin": "circle:speed_m_s=1.1,turn_rad_s=4",
-}  # fmt: skip
+}
 LONGEST = 8.0  # [s]
 PUSH = (0.45, -0.3, 0.0125)  # [N, N, N m]: 0.3, -0.2 m/s^2 and 0.5 rad/s^2 of the peers' robot
 CONDITIONS: dict[str, dict[str, Any]] = {
@@ -56,9 +61,11 @@ def rivals() -> dict[str, list[ControllerFile]]:
         return found
     without = {"friction": False, "observer": False}
     return {
-        "mpc": [ControllerFile("mpc")], "mpc_no_observer": [ControllerFile("mpc", {"observer": False})],
-        "mpc_no_friction": [ControllerFile("mpc", without)], **found,
-    }  # fmt: skip
+        "mpc": [ControllerFile("mpc")],
+        "mpc_no_observer": [ControllerFile("mpc", {"observer": False})],
+        "mpc_no_friction": [ControllerFile("mpc", without)],
+        **found,
+    }
 
 
 def errors(spec: ControllerFile, robot: Robot, scale: float = 1.0, **condition: Any) -> list[float]:
@@ -97,7 +104,11 @@ def measure() -> Table:
             goal = GOALS.get(condition) if name == "mpc" else None
             cells = {key: f"{value:.3g}" for key, value in zip(REFERENCES, found, strict=True)}
             table.add(
-                "" if goal is None else f"<= {goal:g} mm", None if goal is None else mean(found) <= goal,
-                condition=condition, controller=name, **{"mean mm": f"{mean(found):.3g}"}, **cells,
-            )  # fmt: skip
+                "" if goal is None else f"<= {goal:g} mm",
+                None if goal is None else mean(found) <= goal,
+                condition=condition,
+                controller=name,
+                **{"mean mm": f"{mean(found):.3g}"},
+                **cells,
+            )
     return table

@@ -21,9 +21,11 @@ from omnidyn.model.friction import DirectionFriction, Friction, WheelFriction
 from omnidyn.model.robot import Robot
 
 PATHS = (
-    "eight:size_m=0.4,period_s=6", "circle:radius_m=0.4,speed_m_s=0.45,turn_rad_s=1", "square:side_m=0.6,speed_m_s=0.3",
+    "eight:size_m=0.4,period_s=6",
+    "circle:radius_m=0.4,speed_m_s=0.45,turn_rad_s=1",
+    "square:side_m=0.6,speed_m_s=0.3",
     "zigzag:speed_m_s=0.12,turn_rad_s=0.8,period_s=3",
-)  # fmt: skip
+)
 LONGEST, SECONDS, DT, HOLD, NOISE = 6.0, 60, 0.02, 25, 0.2  # [s], [s], [s], rows a level, [rad/s] of a wheel
 DATA_SHEET = 0.1  # R, K_t and K_e are drawn within this share
 CONTROLLERS: dict[str, dict[str, Any]] = {
@@ -31,7 +33,7 @@ CONTROLLERS: dict[str, dict[str, Any]] = {
     "mpc_no_observer": {"observer": False},
     "pid": {},
     "feedforward": {},
-}  # fmt: skip
+}
 GOALS = {"mpc": 0.5, "mpc_no_observer": 0.2}
 
 

@@ -64,9 +64,14 @@ def _rows(folder: Path) -> Iterator[dict[str, Any]]:
 def _counted(name: str, program: Program, count: int) -> dict[str, Any]:
     found, valid = program.run(count, ANY), program.run(VALID_CALLS, VALID)
     return {
-        "export": name, "calls": count, "made": found.returned[0], "refused": sum(found.returned[1:]),
-        "slowest ms": max(found.slowest, valid.slowest), "valid refused": sum(valid.returned[1:]), "kept": found.kept,
-    }  # fmt: skip
+        "export": name,
+        "calls": count,
+        "made": found.returned[0],
+        "refused": sum(found.returned[1:]),
+        "slowest ms": max(found.slowest, valid.slowest),
+        "valid refused": sum(valid.returned[1:]),
+        "kept": found.kept,
+    }
 
 
 def _by_fmpy(robot: Robot, path: Path) -> dict[str, Any]:
@@ -77,9 +82,11 @@ def _by_fmpy(robot: Robot, path: Path) -> dict[str, Any]:
     refused = importlib.import_module("fmpy.fmi1").FMICallException
     about = fmpy.read_model_description(str(path))
     unit = fmi2.FMU2Slave(
-        guid=about.guid, unzipDirectory=fmpy.extract(str(path), str(path.with_suffix(""))), instanceName="unit",
+        guid=about.guid,
+        unzipDirectory=fmpy.extract(str(path), str(path.with_suffix(""))),
+        instanceName="unit",
         modelIdentifier=about.coSimulation.modelIdentifier,
-    )  # fmt: skip
+    )
     unit.instantiate()
     unit.setupExperiment(startTime=0.0)
     unit.enterInitializationMode()
@@ -103,9 +110,14 @@ def _by_fmpy(robot: Robot, path: Path) -> dict[str, Any]:
     unit.terminate()
     unit.freeInstance()
     return {
-        "export": "fmu, axebot, by fmpy", "calls": FEWER, "made": made, "refused": FEWER - made,
-        "slowest ms": slowest, "valid refused": "", "kept": True,
-    }  # fmt: skip
+        "export": "fmu, axebot, by fmpy",
+        "calls": FEWER,
+        "made": made,
+        "refused": FEWER - made,
+        "slowest ms": slowest,
+        "valid refused": "",
+        "kept": True,
+    }
 
 
 if __name__ == "__main__":

@@ -46,9 +46,9 @@ void many(const omnidyn_real *u, int rows, int steps, omnidyn_real h, omnidyn_re
 def volts() -> FloatArray:
     """The rows of Table 1, one after the other: each forward, rest, back, rest. Shape (rows, 3)."""
     rows = [np.array(row.voltage, dtype=float) for axis in TABLE_1.values() for row in axis]
-    return np.concatenate([
-        np.repeat([row, np.zeros(3), -row, np.zeros(3)], [HELD, REST, HELD, REST], axis=0) for row in rows
-    ])  # fmt: skip
+    return np.concatenate(
+        [np.repeat([row, np.zeros(3), -row, np.zeros(3)], [HELD, REST, HELD, REST], axis=0) for row in rows]
+    )
 
 
 def resting(robot: Robot, rows: int) -> FloatArray:
@@ -84,9 +84,14 @@ def _rows(robot: Robot, folder: Path) -> Iterator[dict[str, Any]]:
     assert run.pose is not None
     rest = omnidyn.simulate(robot, resting(robot, 6000), 0.01)
     assert rest.pose is not None
-    yield {"tool": "omnidyn, exact engine", "v m/s": 0.0, "omega rad/s": 0.0, "x, y m": 0.0,
-           "drift mm/min": float(np.abs(rest.pose).max() * 1e3),
-           "ns/step": _least(lambda: omnidyn.simulate(robot, program, DT)) / len(program)}  # fmt: skip
+    yield {
+        "tool": "omnidyn, exact engine",
+        "v m/s": 0.0,
+        "omega rad/s": 0.0,
+        "x, y m": 0.0,
+        "drift mm/min": float(np.abs(rest.pose).max() * 1e3),
+        "ns/step": _least(lambda: omnidyn.simulate(robot, program, DT)) / len(program),
+    }
     for precision in ("double", "single"):
         yield _c(robot, folder / precision, precision, program, run)
     for name, make in {"fmpy": _fmu, "mujoco": _mujoco, "control": _control, "wpimath": _wpilib}.items():
@@ -104,9 +109,11 @@ def _least(call: Callable[[], Any]) -> float:
 
 
 def _errors(twist: FloatArray, pose: FloatArray, run: Any) -> dict[str, Any]:
-    return {"v m/s": float(np.abs(twist - run.twist)[:, :2].max()),
-            "omega rad/s": float(np.abs(twist - run.twist)[:, 2].max()),
-            "x, y m": float(np.abs(pose - run.pose)[:, :2].max())}  # fmt: skip
+    return {
+        "v m/s": float(np.abs(twist - run.twist)[:, :2].max()),
+        "omega rad/s": float(np.abs(twist - run.twist)[:, 2].max()),
+        "x, y m": float(np.abs(pose - run.pose)[:, :2].max()),
+    }
 
 
 def _c(robot: Robot, folder: Path, precision: str, program: FloatArray, run: Any) -> dict[str, Any]:
@@ -157,8 +164,14 @@ def _fmu(robot: Robot, folder: Path, program: FloatArray, run: Any) -> Iterator[
     found = _errors(out[:, :3], out[:, 3:], omnidyn.simulate(robot, program, 2.0**-10))
     creep = float(np.abs(simulated(resting(robot, 3840), 2.0**-6)[:, 3:]).max() * 1e3)
     met = max(found.values()) <= NEAR and creep == 0.0
-    yield {"tool": "fmu, by fmpy", **found, "drift mm/min": creep, "ns/step": cost, "kB": path.stat().st_size / 1e3,
-           "goal": (f"<= {NEAR:g}, drift 0", met)}  # fmt: skip
+    yield {
+        "tool": "fmu, by fmpy",
+        **found,
+        "drift mm/min": creep,
+        "ns/step": cost,
+        "kB": path.stat().st_size / 1e3,
+        "goal": (f"<= {NEAR:g}, drift 0", met),
+    }
 
 
 def _mujoco(robot: Robot, folder: Path, program: FloatArray, run: Any) -> Iterator[dict[str, Any]]:
@@ -182,8 +195,14 @@ def _mujoco(robot: Robot, folder: Path, program: FloatArray, run: Any) -> Iterat
         cost = (time.perf_counter() - begun) * 1e9 / len(program)
         creep = 10.0 * float(np.abs(simulated(resting(robot, 6000))[-1, 3:5]).max() * 1e3)
         goal = (f"drift <= {CREEP:g} mm", creep <= CREEP) if model_text is text else ("", None)
-        yield {"tool": name, **_errors(out[:, :3], out[:, 3:], run), "drift mm/min": creep, "ns/step": cost,
-               "kB": len(model_text) / 1e3, "goal": goal}  # fmt: skip
+        yield {
+            "tool": name,
+            **_errors(out[:, :3], out[:, 3:], run),
+            "drift mm/min": creep,
+            "ns/step": cost,
+            "kB": len(model_text) / 1e3,
+            "goal": goal,
+        }
     yield _turning(robot, mujoco)
 
 
@@ -211,9 +230,11 @@ def _control(robot: Robot, folder: Path, program: FloatArray, run: Any) -> Itera
     t = np.arange(rows + 1) * 0.01
     begun = time.perf_counter()
     out = control.input_output_response(
-        omnidyn.interop.nonlinear_system(robot), t, np.vstack([push, push[-1:]]).T,
+        omnidyn.interop.nonlinear_system(robot),
+        t,
+        np.vstack([push, push[-1:]]).T,
         solve_ivp_kwargs={"rtol": 1e-9, "atol": 1e-10},
-    ).outputs.T  # fmt: skip
+    ).outputs.T
     cost = (time.perf_counter() - begun) * 1e9 / rows
     yield {"tool": "python-control, one push of 1 s", **_errors(out[:, :3], out[:, 3:], own), "ns/step": cost}
 
@@ -232,8 +253,12 @@ def _wpilib(robot: Robot, folder: Path, program: FloatArray, run: Any) -> Iterat
         assert twist is not None
         off[axis] = np.abs(twist[-1] - end).max()
     met = bool(off.max() <= NEAR)
-    yield {"tool": "WPILib feed-forward, 20 ms to the next speed", "v m/s": float(off[:2].max()),
-           "omega rad/s": float(off[2]), "goal": (f"<= {NEAR:g}", met)}  # fmt: skip
+    yield {
+        "tool": "WPILib feed-forward, 20 ms to the next speed",
+        "v m/s": float(off[:2].max()),
+        "omega rad/s": float(off[2]),
+        "goal": (f"<= {NEAR:g}", met),
+    }
 
 
 if __name__ == "__main__":

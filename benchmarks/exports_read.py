@@ -25,9 +25,11 @@ NEAR = 1e-12
 LOGS, FITTED = 200, 20  # of which as many give a covariance
 LOW, HIGH, SIGMAS = 0.93, 0.97, 1.96  # of normalised errors within so many standard deviations: 95 %
 ROBOTS = (
-    *(random_robot(seed) for seed in range(14)), *(with_spin(random_robot(seed), seed) for seed in range(14, 20)),
-    *(exact_robot(seed) for seed in range(9)), with_centre(exact_robot(9), 9),
-)  # fmt: skip
+    *(random_robot(seed) for seed in range(14)),
+    *(with_spin(random_robot(seed), seed) for seed in range(14, 20)),
+    *(exact_robot(seed) for seed in range(9)),
+    with_centre(exact_robot(9), 9),
+)
 COLUMN = "off"
 Parts = tuple[FloatArray, FloatArray, FloatArray]  # masses, inertias about z, places (parts, 2): the base first
 
@@ -119,8 +121,11 @@ def _controller(robot: Robot) -> Iterator[dict[str, Any]]:
     # The joints of its URDF turn about axes that point outwards, ours inwards.
     again = np.linalg.solve(matrix, -wheel_speed(robot.wheels, twist)[order] * found["wheel_radius"])
     off = float(np.abs(again - twist).max())
-    yield {"tool": "ros2-control, by PyYAML and the controller's equations: twist", COLUMN: off,
-           "goal": ("<= 1e-09", off <= 1e-9)}  # fmt: skip
+    yield {
+        "tool": "ros2-control, by PyYAML and the controller's equations: twist",
+        COLUMN: off,
+        "goal": ("<= 1e-09", off <= 1e-9),
+    }
     inside, count = np.zeros(3), 0
     for first in range(0, LOGS, LOGS // FITTED):
         variance = given(ros2_control(robot, _log(robot, 5000 + first)))["diagonal_covariance"]["twist"]
@@ -130,8 +135,10 @@ def _controller(robot: Robot) -> Iterator[dict[str, Any]]:
             inside, count = inside + (np.abs(error) < SIGMAS * std).sum(axis=0), count + len(error)
     share = inside / count
     told = " ".join(f"{each:.1%}" for each in share)
-    yield {"tool": f"ros2-control, covariance on {LOGS} logs: within 95 % are {told}",
-           "goal": ("93 to 97 %", bool(((share > LOW) & (share < HIGH)).all()))}  # fmt: skip
+    yield {
+        "tool": f"ros2-control, covariance on {LOGS} logs: within 95 % are {told}",
+        "goal": ("93 to 97 %", bool(((share > LOW) & (share < HIGH)).all())),
+    }
 
 
 def _frame(kind: str, run: Run) -> dict[str, Any]:
@@ -151,5 +158,7 @@ def _many() -> dict[str, Any]:
             except UnsupportedError:
                 refused += 1
     total = len(ROBOTS) * len(KINDS)
-    return {"tool": f"{len(KINDS)} kinds x {len(ROBOTS)} robots: {written} written, {refused} refused by name",
-            "goal": (f"{total} in all", written + refused == total)}  # fmt: skip
+    return {
+        "tool": f"{len(KINDS)} kinds x {len(ROBOTS)} robots: {written} written, {refused} refused by name",
+        "goal": (f"{total} in all", written + refused == total),
+    }

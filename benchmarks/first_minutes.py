@@ -77,9 +77,13 @@ def _omnidyn(place: Path, kernels: str, *arguments: str) -> Took:
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"} | own
     before, start = os.times(), time.perf_counter()
     done = subprocess.run(
-        [sys.executable, "-m", "omnidyn", *arguments], cwd=place, env=environment, capture_output=True, text=True,
+        [sys.executable, "-m", "omnidyn", *arguments],
+        cwd=place,
+        env=environment,
+        capture_output=True,
+        text=True,
         check=True,
-    )  # fmt: skip
+    )
     wall, after = time.perf_counter() - start, os.times()
     processor = after.children_user + after.children_system - before.children_user - before.children_system
     return Took(wall, processor, done.stderr)

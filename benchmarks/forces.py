@@ -46,18 +46,28 @@ def pushed(world: World, volts: np.ndarray, rate: float, share: float, seed: int
     """Speeds of the body under random forces. Shape (rows, 3)."""
     dt, coulomb = 1.0 / rate / INNER, np.array(world.coulomb)
     return _march(
-        np.ascontiguousarray(world.G), world.ke, np.array(world.resistance),
-        np.array([world.mass, world.mass, world.inertia]), coulomb, np.array(world.viscous),
-        np.ascontiguousarray(volts), dt, share * coulomb, np.exp(-dt / MEMORY), np.random.default_rng([seed, 7]),
-    )  # fmt: skip
+        np.ascontiguousarray(world.G),
+        world.ke,
+        np.array(world.resistance),
+        np.array([world.mass, world.mass, world.inertia]),
+        coulomb,
+        np.array(world.viscous),
+        np.ascontiguousarray(volts),
+        dt,
+        share * coulomb,
+        np.exp(-dt / MEMORY),
+        np.random.default_rng([seed, 7]),
+    )
 
 
 def measure() -> Table:
     """A row for each share."""
     names = list(truths(right_case(FIRST_SEED).told, "axes"))
     short = [f"{name.split('.')[-1]}" for name in names]
-    table = Table("forces: a right robot under random forces, by its wheel speeds",
-                  ["force / Coulomb", "logs", "found", "held", "rms z", *short])  # fmt: skip
+    table = Table(
+        "forces: a right robot under random forces, by its wheel speeds",
+        ["force / Coulomb", "logs", "found", "held", "rms z", *short],
+    )
     table.notes += [machine(), "rms z: error over its standard error, root mean square: of all numbers, then of each"]
     for share in SHARES:
         found, z = [], []
@@ -77,8 +87,13 @@ def measure() -> Table:
         held = float(np.nanmean(np.abs(error) < 1.96))
         rms = np.sqrt(np.nanmean(error**2, axis=0)).tolist()
         table.add(
-            f"found <= {FALSE}, held >= {HELD}", says <= FALSE and held >= HELD, **{"force / Coulomb": share},
-            logs=LOGS, found=says, held=held, **{"rms z": float(np.sqrt(np.nanmean(error**2)))},
+            f"found <= {FALSE}, held >= {HELD}",
+            says <= FALSE and held >= HELD,
+            **{"force / Coulomb": share},
+            logs=LOGS,
+            found=says,
+            held=held,
+            **{"rms z": float(np.sqrt(np.nanmean(error**2)))},
             **dict(zip(short, rms, strict=True)),
-        )  # fmt: skip
+        )
     return table

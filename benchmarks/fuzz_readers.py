@@ -50,11 +50,44 @@ HANG_S = float(
 MAX_SEED_BYTES = 6000
 
 PIECES = [
-    b",", b";", b"\t", b"\n", b"\r", b'"', b"#", b"%", b"nan", b"inf", b"1e400", b"-", b"0", b"1e308", b"1e-320",
-    b"1,5", b"1,500", b"\xef\xbb\xbf", b"\xff\xfe", b"\xfe\xff", b"\x00", b"\xb5", b"x", b"_", b" ", b"\x85", b"\x0b",
-    b"\xe2\x80\xa8", b"[rad/s]", b"sep=;\n", b"9" * 400, b"PAR1", b"\x80\x04", b"PK\x03\x04", b"\xff\xff\xff\xff",
-    b"\x7f\xff\xff\xff", b"\x00\x00\x00\x80",
-]  # fmt: skip
+    b",",
+    b";",
+    b"\t",
+    b"\n",
+    b"\r",
+    b'"',
+    b"#",
+    b"%",
+    b"nan",
+    b"inf",
+    b"1e400",
+    b"-",
+    b"0",
+    b"1e308",
+    b"1e-320",
+    b"1,5",
+    b"1,500",
+    b"\xef\xbb\xbf",
+    b"\xff\xfe",
+    b"\xfe\xff",
+    b"\x00",
+    b"\xb5",
+    b"x",
+    b"_",
+    b" ",
+    b"\x85",
+    b"\x0b",
+    b"\xe2\x80\xa8",
+    b"[rad/s]",
+    b"sep=;\n",
+    b"9" * 400,
+    b"PAR1",
+    b"\x80\x04",
+    b"PK\x03\x04",
+    b"\xff\xff\xff\xff",
+    b"\x7f\xff\xff\xff",
+    b"\x00\x00\x00\x80",
+]
 
 
 def _run() -> Run:
@@ -97,8 +130,13 @@ def _parquet_seeds() -> list[bytes]:
         }
     )
     seeds = [run_to_parquet(_run())]
-    for options in ({}, {"compression": "zstd"}, {"use_dictionary": False, "compression": "none"},
-                    {"data_page_version": "2.0", "compression": "gzip"}, {"row_group_size": 7}):  # fmt: skip
+    for options in (
+        {},
+        {"compression": "zstd"},
+        {"use_dictionary": False, "compression": "none"},
+        {"data_page_version": "2.0", "compression": "gzip"},
+        {"row_group_size": 7},
+    ):
         sink = io.BytesIO()
         parquet.write_table(table, sink, **options)
         seeds.append(sink.getvalue())
@@ -148,11 +186,16 @@ def _wpilog_seeds() -> list[bytes]:
         return len(words).to_bytes(4, "little") + words.encode()
 
     entries = [
-        ("w1_rad_s", "double", struct.pack("<d", 1.5)), ("u1_V", "float", struct.pack("<f", 2.0)),
-        ("n", "int64", struct.pack("<q", 3)), ("on", "boolean", b"\x01"), ("mode", "string", b"auto"),
-        ("i", "double[]", struct.pack("<3d", 1.0, 2.0, 3.0)), ("pose", "struct:Pose2d", struct.pack("<3d", 1, 2, 3)),
-        ("/.schema/struct:Two", "structschema", b"double a;int8 b[2]"), ("two", "struct:Two[]", bytes(20)),
-    ]  # fmt: skip
+        ("w1_rad_s", "double", struct.pack("<d", 1.5)),
+        ("u1_V", "float", struct.pack("<f", 2.0)),
+        ("n", "int64", struct.pack("<q", 3)),
+        ("on", "boolean", b"\x01"),
+        ("mode", "string", b"auto"),
+        ("i", "double[]", struct.pack("<3d", 1.0, 2.0, 3.0)),
+        ("pose", "struct:Pose2d", struct.pack("<3d", 1, 2, 3)),
+        ("/.schema/struct:Two", "structschema", b"double a;int8 b[2]"),
+        ("two", "struct:Two[]", bytes(20)),
+    ]
     content = b"WPILOG\x00\x01\x00\x00\x00\x00"
     for number, (name, kind, _) in enumerate(entries, 1):
         content += record(0, 0, b"\x00" + number.to_bytes(4, "little") + text(name) + text(kind) + text(""))
@@ -208,8 +251,9 @@ READERS: dict[str, tuple[Callable[[], list[bytes]], Callable[[str], Any]]] = {
 HANGS = "hangs"
 _SLOW_WORD = "a" * 60 + "b"
 _ALL: dict[str, tuple[Callable[[], list[bytes]], Callable[[str], Any]]] = {
-    **READERS, HANGS: (lambda: [b"x"], lambda _: re.match(r"(a+)+$", _SLOW_WORD))
-}  # fmt: skip
+    **READERS,
+    HANGS: (lambda: [b"x"], lambda _: re.match(r"(a+)+$", _SLOW_WORD)),
+}
 
 # What reads each format: a minute of a format is shared by these.
 FORMATS = {

@@ -160,9 +160,12 @@ def _steps(kind: Kind) -> set[str]:
 
 def _cells(logs: Sequence[Seen]) -> dict[str, Any]:
     return {
-        "logs": len(logs), "named": _share(log.named for log in logs), "other": _share(log.other for log in logs),
-        "held": _share(each for log in logs for each in log.held), "s a log": _share(log.seconds for log in logs),
-    }  # fmt: skip
+        "logs": len(logs),
+        "named": _share(log.named for log in logs),
+        "other": _share(log.other for log in logs),
+        "held": _share(each for log in logs for each in log.held),
+        "s a log": _share(log.seconds for log in logs),
+    }
 
 
 def _share(values: Iterable[Any]) -> float:

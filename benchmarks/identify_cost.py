@@ -110,8 +110,13 @@ def command(table: Table, robot: Robot, clean: Run) -> None:
         np.savetxt(place / "log.csv", rows, delimiter=",", header=heads, comments="", fmt="%.6f")
         first = [_command(place, f"cache{k}") for k in range(3)]
         again = [_command(place, "cache0") for _ in range(3)]
-    table.add(f"<= {FIRST:g}", max(first) <= FIRST, what="CSV to report, one command, nothing compiled: worst of 3",
-              value=max(first), unit="s")  # fmt: skip
+    table.add(
+        f"<= {FIRST:g}",
+        max(first) <= FIRST,
+        what="CSV to report, one command, nothing compiled: worst of 3",
+        value=max(first),
+        unit="s",
+    )
     table.add(f"<= {FIRST:g}", max(again) <= FIRST, what="... compiled before: worst of 3", value=max(again), unit="s")
 
 
@@ -121,12 +126,24 @@ def _command(place: Path, cache: str) -> float:
     source = str(Path(omnidyn.__file__).resolve().parents[1])  # PYTHONPATH may be relative, and the child is elsewhere
     subprocess.run(
         [
-            sys.executable, "-m", "omnidyn", "identify", "log.csv", "--robot", "axebot", "-o", "fit.toml",
-            "--report", "fit.html", "--force",
+            sys.executable,
+            "-m",
+            "omnidyn",
+            "identify",
+            "log.csv",
+            "--robot",
+            "axebot",
+            "-o",
+            "fit.toml",
+            "--report",
+            "fit.html",
+            "--force",
         ],
-        cwd=place, env=os.environ | {"NUMBA_CACHE_DIR": str(place / cache), "PYTHONPATH": source},
-        capture_output=True, check=True,
-    )  # fmt: skip
+        cwd=place,
+        env=os.environ | {"NUMBA_CACHE_DIR": str(place / cache), "PYTHONPATH": source},
+        capture_output=True,
+        check=True,
+    )
     return sum(os.times()[2:4]) - before
 
 
@@ -149,8 +166,14 @@ def diagnosis(table: Table, _robot: Robot, _clean: Run) -> None:
                 slowest = max(implicit, slow[-1])
             by_slowest.append(asked / slowest)
     worst = max(by_slowest)
-    table.add("<= 2", worst <= 2.0, what="diagnosis of wrong logs, in fits by the slowest engine it needs: worst",
-              draws=len(by_slowest), value=worst, unit="fits")  # fmt: skip
+    table.add(
+        "<= 2",
+        worst <= 2.0,
+        what="diagnosis of wrong logs, in fits by the slowest engine it needs: worst",
+        draws=len(by_slowest),
+        value=worst,
+        unit="fits",
+    )
     table.add(
         what="... such a fit, of wheels that slip: median", draws=len(slow), value=float(np.median(slow)), unit="s"
     )

@@ -76,8 +76,9 @@ def impaired(table: Table, robot: Robot, clean: Run) -> None:
         draws.add(identify(log, robot, OutputError(nuisances=NUISANCES, start="rest", loss="student-t")).estimate)
     spent = (time.process_time() - started) / IMPAIRED * 1e3
     least = draws.coverage.min()
-    table.add(">= 0.92", least >= 0.92, what="coverage of nine intervals, least: impaired logs",
-              draws=IMPAIRED, value=least)  # fmt: skip
+    table.add(
+        ">= 0.92", least >= 0.92, what="coverage of nine intervals, least: impaired logs", draws=IMPAIRED, value=least
+    )
     table.add(what="... bias, greatest", draws=IMPAIRED, value=np.abs(draws.bias).max(), unit="std")
     table.add(what="... one fit", draws=IMPAIRED, value=spent, unit="ms")
 

@@ -36,8 +36,9 @@ from tests.support.axebot_logs import NOISE, RATE, excitation, noisy_draw
 LOGS = scaled(300, 10)
 LATE, FINE_ROWS = 0.013, 10  # [s]; rows of the truth in a row of the log
 WRONG = 1.5
-KEYS = tuple(f"friction.direction.{name}" for name in ("coulomb[0]", "coulomb[1]", "viscous", "yaw_coulomb",
-                                                       "yaw_viscous"))  # fmt: skip
+KEYS = tuple(
+    f"friction.direction.{name}" for name in ("coulomb[0]", "coulomb[1]", "viscous", "yaw_coulomb", "yaw_viscous")
+)
 LATENCY = "latency.twist"
 TIGHT, SLOW = 1e-9, 1e-6  # [m/s] tolerances of the truth, and of the fit that the fast one is compared with
 

@@ -32,15 +32,21 @@ CURRENT_NOISE = 0.05  # [A]
 def measure() -> Table:
     """All of it, a few minutes."""
     table = Table("identify_loop: output error through a speed loop", ["robot", "what", "draws", "value", "unit"])
-    table.notes += [machine(), "times: processor time of this process", f"goals of coverage: 0.92 less {COUNTING:g} "
-                    "standard errors of a counted share, as few draws as these allow no more"]  # fmt: skip
+    table.notes += [
+        machine(),
+        "times: processor time of this process",
+        f"goals of coverage: 0.92 less {COUNTING:g} "
+        "standard errors of a counted share, as few draws as these allow no more",
+    ]
     axebot = load_robot("axebot")
     pi = axebot.replace(name="PI, axes", drive=axebot.drive.replace(kind="speed", kp=0.25, ki=1.0, rate=100.0))
     direction = DirectionFriction(coulomb=(2.2, 1.5), viscous=0.95, yaw_coulomb=0.099, yaw_viscous=0.01)
     p = axebot.replace(
-        name="P, ellipse", friction=Friction(direction=direction), body=axebot.body.replace(rotating_frame=True),
+        name="P, ellipse",
+        friction=Friction(direction=direction),
+        body=axebot.body.replace(rotating_frame=True),
         drive=axebot.drive.replace(kind="speed", kp=0.4, rate=100.0),
-    )  # fmt: skip
+    )
     for robot in (pi, p):
         _coverage(table, robot)
     return table
@@ -64,10 +70,12 @@ def log(robot: Robot, seed: int) -> Run:
     assert fine.current is not None
     rng, seen = np.random.default_rng(1000 + seed), np.maximum(np.arange(len(command)) * 10 - round(LATE / FINE), 0)
     return Run(
-        t=np.arange(len(command)) * 0.01, twist_command=command, source="simulated",
+        t=np.arange(len(command)) * 0.01,
+        twist_command=command,
+        source="simulated",
         twist=fine.twist[seen] + rng.normal(size=(len(seen), 3)) * NOISE,
         current=fine.current[seen] + rng.normal(size=(len(seen), 3)) * CURRENT_NOISE,
-    )  # fmt: skip
+    )
 
 
 def _coverage(table: Table, robot: Robot) -> None:
@@ -86,9 +94,13 @@ def _coverage(table: Table, robot: Robot) -> None:
     for name, share in zip(true, draws.coverage, strict=True):
         table.add(">= 0.92", bool(share >= 0.92 - slack), what=f"coverage of {name}", value=float(share), **shared)
     table.add(
-        "< 0.1 and counting", bool(np.abs(draws.bias).max() < 0.1 + 3.0 / np.sqrt(LOGS)), what="bias, greatest",
-        value=float(np.abs(draws.bias).max()), unit="std", **shared,
-    )  # fmt: skip
+        "< 0.1 and counting",
+        bool(np.abs(draws.bias).max() < 0.1 + 3.0 / np.sqrt(LOGS)),
+        what="bias, greatest",
+        value=float(np.abs(draws.bias).max()),
+        unit="std",
+        **shared,
+    )
     for key in gain_keys(robot):
         j = list(true).index(key)
         table.add(what=f"scatter of {key}", value=float(100.0 * draws.spread[j] / true[key]), unit="%", **shared)

@@ -202,17 +202,25 @@ def by_sysid(robot: Robot, log: Run, fair: bool) -> np.ndarray:
     system, mass = state_space(robot), axis_masses(robot)
     braking = -np.diag(system.A) * mass - start[:3]  # back-EMF
     friction = JOINT.format(2.0 * STEP)
-    spec = mujoco.MjSpec.from_string(XML.format(
-        step=STEP,
-        bodies="".join(BODY.format(k=k, mass=mass[k], friction=friction) for k in range(3)),
-        motors="".join(f'<motor name="m{k}" joint="j{k}"/>' for k in range(3)),
-        sensors="".join(f'<jointvel name="s{k}" joint="j{k}"/>' for k in range(3)),
-    ))  # fmt: skip
+    spec = mujoco.MjSpec.from_string(
+        XML.format(
+            step=STEP,
+            bodies="".join(BODY.format(k=k, mass=mass[k], friction=friction) for k in range(3)),
+            motors="".join(f'<motor name="m{k}" joint="j{k}"/>' for k in range(3)),
+            sensors="".join(f'<jointvel name="s{k}" joint="j{k}"/>' for k in range(3)),
+        )
+    )
     parameters = sysid.ParameterDict()
     for k, key in enumerate(BOX):
-        parameters.add(sysid.Parameter(
-            key, nominal=start[k], min_value=0.0, max_value=5.0 * start[k], modifier=put_friction(k, braking),
-        ))  # fmt: skip
+        parameters.add(
+            sysid.Parameter(
+                key,
+                nominal=start[k],
+                min_value=0.0,
+                max_value=5.0 * start[k],
+                modifier=put_friction(k, braking),
+            )
+        )
     for k in range(6):
         parameters[BOX[k]].modifier(spec, parameters[BOX[k]])
     model = spec.compile()

@@ -69,8 +69,9 @@ def measure() -> Table:
     stepped = [log for log in able if log.steps]
     held = _share(each for log in stepped for each in log.after)
     table.add(world="all that can be switched on", **_cells(able))
-    table.add(f"held after >= {HELD}", held is not None and held >= HELD, world="those of them with a step",
-              **_cells(stepped))  # fmt: skip
+    table.add(
+        f"held after >= {HELD}", held is not None and held >= HELD, world="those of them with a step", **_cells(stepped)
+    )
     table.add(world="all others", **_cells([log for kind, log in every if not is_able(kind)]))
     richer = _share(bool(log.steps) for log in calm)
     table.add(f"step <= {RICHER}", richer is not None and richer <= RICHER, world="all right worlds", **_cells(calm))
@@ -127,8 +128,11 @@ def on(case: Case, run: Run, key: str) -> Climbed:
 def _true(case: Case, robot: Robot) -> dict[str, float]:
     """The truth in the shape of a robot; none where it has two."""
     friction = robot.friction
-    on_it = {"friction.axes": any(friction.axes.coulomb), "friction.direction": any(friction.direction.coulomb),
-             "friction.wheels": np.any(friction.wheels.coulomb)}  # fmt: skip
+    on_it = {
+        "friction.axes": any(friction.axes.coulomb),
+        "friction.direction": any(friction.direction.coulomb),
+        "friction.wheels": np.any(friction.wheels.coulomb),
+    }
     shapes = [SHAPES[name] for name, has in on_it.items() if has]
     if len(shapes) != 1:
         return {}
@@ -155,12 +159,15 @@ def _right(workers: Workers, table: Table, noise: str) -> list[Climbed]:
 
 def _cells(logs: Sequence[Climbed]) -> dict[str, Any]:
     return {
-        "logs": len(logs), "found": _share(log.found for log in logs), "step": _share(log.steps > 0 for log in logs),
-        "the cause": _share(log.cause for log in logs if log.steps), "silent": _share(log.silent for log in logs),
+        "logs": len(logs),
+        "found": _share(log.found for log in logs),
+        "step": _share(log.steps > 0 for log in logs),
+        "the cause": _share(log.cause for log in logs if log.steps),
+        "silent": _share(log.silent for log in logs),
         "held before": _share(each for log in logs for each in log.before),
         "held after": _share(each for log in logs for each in log.after),
         "s a log": _share(log.seconds for log in logs),
-    }  # fmt: skip
+    }
 
 
 def _share(values: Iterable[Any]) -> float | None:

@@ -31,10 +31,21 @@ CPU_GOAL_S, MEMORY_GOAL_MB, RATIO_GOAL = 60.0, 1000.0, 0.05
 AZIMUTH, LEVEL, STEP, STILL = (45.0, 135.0, -135.0, -45.0), 6.0, 0.1, 0.15  # [degree], [V], [V], share of the time
 NOISE = {"current": 0.05, "wheel": 0.05, "gyroscope": 0.01, "place": 0.001, "heading": 0.002}
 WORLD = World(
-    azimuth=AZIMUTH, wheel_radius=(0.05,) * 4, robot_radius=(0.2,) * 4, mass=10.0, inertia=0.25, resistance=1.0,
-    torque_constant=0.022, gear_ratio=19.0, voltage_limit=12.0, coulomb=(18.0, 14.0, 1.6), viscous=(3.0, 3.0, 0.05),
-    shape=ELLIPSE, rotor_inertia=1e-6, current_limit=8.0,
-)  # fmt: skip
+    azimuth=AZIMUTH,
+    wheel_radius=(0.05,) * 4,
+    robot_radius=(0.2,) * 4,
+    mass=10.0,
+    inertia=0.25,
+    resistance=1.0,
+    torque_constant=0.022,
+    gear_ratio=19.0,
+    voltage_limit=12.0,
+    coulomb=(18.0, 14.0, 1.6),
+    viscous=(3.0, 3.0, 0.05),
+    shape=ELLIPSE,
+    rotor_inertia=1e-6,
+    current_limit=8.0,
+)
 LIMIT = "current_limit_A = 8.0\nrotor_inertia_kg_m2 = 1e-6\n"
 RIGHT = f"""schema = 1
 name = "xdrive"
@@ -87,9 +98,11 @@ def measure() -> Table:
             met = took["cpu s"] <= CPU_GOAL_S and took["peak MB"] <= MEMORY_GOAL_MB and named
             table.add(
                 f"<= {CPU_GOAL_S:g} s, {MEMORY_GOAL_MB:g} MB{'' if model != 'no frame' else ', named'}",
-                met, model=model, **{"cpu s": took["cpu s"], "peak MB": took["peak MB"], "left out": took["found"]},
+                met,
+                model=model,
+                **{"cpu s": took["cpu s"], "peak MB": took["peak MB"], "left out": took["found"]},
                 **{"first remedy": took["remedy"], "std error over that of all rows": ratio or ""},
-            )  # fmt: skip
+            )
             if ratio is not None:
                 within = abs(np.log(ratio)) <= np.log1p(RATIO_GOAL)
                 table.add(f"within {RATIO_GOAL:.0%}", within, model="... of all rows, the furthest of its numbers")
@@ -113,11 +126,13 @@ def write_log(seed: int, path: Path, seconds: float = SECONDS) -> None:
     wheel = twist @ WORLD.G / WORLD.wheel_radius
     place = pose + rng.normal(size=pose.shape) * [NOISE["place"], NOISE["place"], NOISE["heading"]]
     columns = [
-        motion.t[:rows], volts,
+        motion.t[:rows],
+        volts,
         currents(WORLD, twist, volts) + NOISE["current"] * rng.normal(size=wheel.shape),
         wheel + NOISE["wheel"] * rng.normal(size=wheel.shape),
-        twist[:, 2] + NOISE["gyroscope"] * rng.normal(size=rows), place,
-    ]  # fmt: skip
+        twist[:, 2] + NOISE["gyroscope"] * rng.normal(size=rows),
+        place,
+    ]
     names = [f"{letter}{k}_{unit}" for letter, unit in (("u", "V"), ("i", "A"), ("w", "rad_s")) for k in (1, 2, 3, 4)]
     header = ",".join(["t_s", *names, "omega_rad_s", "x_m", "y_m", "heading_rad"])
     np.savetxt(path, np.column_stack(columns), delimiter=",", fmt="%.6g", comments="", header=header)
@@ -126,9 +141,11 @@ def write_log(seed: int, path: Path, seconds: float = SECONDS) -> None:
 def _child(model: str, rows: str, folder: Path) -> dict[str, Any]:
     """What a process of its own says."""
     run = subprocess.run(
-        [sys.executable, "-m", "benchmarks.large", model, str(folder), rows], capture_output=True, text=True,
+        [sys.executable, "-m", "benchmarks.large", model, str(folder), rows],
+        capture_output=True,
+        text=True,
         cwd=Path(__file__).resolve().parents[1],
-    )  # fmt: skip
+    )
     if run.returncode:
         raise RuntimeError(f"omnidyn identify of {model} ended with {run.returncode}: {run.stderr[-800:]}")
     return json.loads(run.stdout)
@@ -156,9 +173,11 @@ def identified(model: str, folder: Path) -> dict[str, Any]:
     return {
         "cpu s": round(usage.ru_utime + usage.ru_stime, 1),
         "peak MB": round(usage.ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)),
-        "found": bool(next(_every(told, "found"), False)), "remedy": first["key"], "same": first["same_as"],
+        "found": bool(next(_every(told, "found"), False)),
+        "remedy": first["key"],
+        "same": first["same_as"],
         "std": {key: own["std"] for key, own in told["parameters"].items()},
-    }  # fmt: skip
+    }
 
 
 def errors(model: str, folder: Path) -> dict[str, Any]:

@@ -28,15 +28,29 @@ from tests.reference import bristles, modes
 LOGS = scaled(200, 10)
 PROGRAMS, ROWS, DT = 5, 240, 0.02
 TRUE = {
-    "viscous": 0.94, "coulomb": 2.2, "breakaway": 2.8, "stribeck_speed": 0.05, "stiffness": 2e3, "damping": 80.0,
-}  # fmt: skip
+    "viscous": 0.94,
+    "coulomb": 2.2,
+    "breakaway": 2.8,
+    "stribeck_speed": 0.05,
+    "stiffness": 2e3,
+    "damping": 80.0,
+}
 GUESS = {
-    "viscous": 1.2, "coulomb": 2.0, "breakaway": 2.5, "stribeck_speed": 0.03, "stiffness": 1e3, "damping": 60.0,
-}  # fmt: skip
+    "viscous": 1.2,
+    "coulomb": 2.0,
+    "breakaway": 2.5,
+    "stribeck_speed": 0.03,
+    "stiffness": 1e3,
+    "damping": 60.0,
+}
 OTHERS = {
-    "viscous": (0.96, 0.01), "coulomb": (1.5, 0.099), "breakaway": (1.9, 0.13), "stribeck_speed": (0.05, 0.4),
-    "stiffness": (1e3, 50.0), "damping": (60.0, 1.0),
-}  # fmt: skip
+    "viscous": (0.96, 0.01),
+    "coulomb": (1.5, 0.099),
+    "breakaway": (1.9, 0.13),
+    "stribeck_speed": (0.05, 0.4),
+    "stiffness": (1e3, 50.0),
+    "damping": (60.0, 1.0),
+}
 WIDEST = 1.3  # std over the bound
 
 

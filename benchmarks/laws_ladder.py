@@ -57,10 +57,11 @@ def measure() -> Table:
     """All worlds."""
     table = Table("laws_ladder: a law of friction that the robot file lacks", COLUMNS)
     table.notes += [
-        machine(), "held: 95 % intervals of viscous and Coulomb friction that hold the truth, with the file's law, and "
+        machine(),
+        "held: 95 % intervals of viscous and Coulomb friction that hold the truth, with the file's law, and "
         "with what the ladder took; law taken: of all logs, a step is the law, or says it is the same: "
         "of LuGre its damped bristles, not the fall of the level alone",
-    ]  # fmt: skip
+    ]
     for name, law in LAW_OF.items():
         for clear in CLEAR if name == "Stribeck" else CLEAR[-1:]:
             logs = [of_law(name, clear, seed) for seed in range(LOGS)]
@@ -145,10 +146,13 @@ def _held(estimate: Any) -> list[bool]:
 
 def _cells(logs: Sequence[tuple[Climbed, bool | None]]) -> dict[str, Any]:
     shares: dict[str, Callable[[Climbed], Iterable[Any]]] = {
-        "found": lambda log: [log.found], "step": lambda log: [log.steps > 0], "law taken": lambda log: [log.cause],
-        "held before": lambda log: log.before, "held after": lambda log: log.after,
+        "found": lambda log: [log.found],
+        "step": lambda log: [log.steps > 0],
+        "law taken": lambda log: [log.cause],
+        "held before": lambda log: log.before,
+        "held after": lambda log: log.after,
         "s a log": lambda log: [log.seconds],
-    }  # fmt: skip
+    }
     found = {name: _share(each for log, _ in logs for each in own(log)) for name, own in shares.items()}
     named = [early for _, early in logs if early is not None]
     return {"logs": len(logs), **({"1st or 2nd": _share(named)} if named else {}), **found}

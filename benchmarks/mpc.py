@@ -61,9 +61,20 @@ def plant_of(share: float, hold: float | None = None) -> Any:
 
 
 def closed_loop(
-    controller: Any, name: str, seconds: float, *, share: float = 1.0, noise: float = 0.0, push: Any = (0.0, 0.0, 0.0),
-    delay: int = 0, seed: int = 0, pose: Any = None, dt: float = DT, hold: float | None = None, early: int = 0,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    controller: Any,
+    name: str,
+    seconds: float,
+    *,
+    share: float = 1.0,
+    noise: float = 0.0,
+    push: Any = (0.0, 0.0, 0.0),
+    delay: int = 0,
+    seed: int = 0,
+    pose: Any = None,
+    dt: float = DT,
+    hold: float | None = None,
+    early: int = 0,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """States (n + 1, 6), errors of the pose (n + 1, 3) and times of the steps [us], from rest on the path.
 
     early: steps for which the loop runs before the path begins.
@@ -72,7 +83,7 @@ def closed_loop(
     wrench = tuple(np.array(push) * [ROBOT.body.mass, ROBOT.body.mass, ROBOT.body.inertia])
     live = LiveRobot(
         plant_of(share, hold), dt, pose=along.at(0.0).pose if pose is None else pose, delay=delay, push=wrench
-    )  # fmt: skip
+    )
     count, rng = round(seconds / dt), np.random.default_rng(seed)
     for k in range(-early, 0):
         live.step(controller.step(k * dt, live.pose.copy(), live.twist.copy(), along))
@@ -116,9 +127,10 @@ def time_rows(table: Table) -> None:
     base = step_times(lambda: Mpc(ROBOT, dt=0.01), "eight")[0]
     peer_rows(table, base)
     for name, settings in (
-        ("current 3 A", Settings(current=3.0)), ("slew 200 V/s", Settings(slew=200.0)),
+        ("current 3 A", Settings(current=3.0)),
+        ("slew 200 V/s", Settings(slew=200.0)),
         ("speed 0.5 m/s", Settings(speed=(0.5, 0.5, 5.0))),
-    ):  # fmt: skip
+    ):
         median, p99 = step_times(lambda settings=settings: Mpc(ROBOT, dt=0.01, settings=settings), "eight")
         table.add(what=f"limit of {name} more", value=median - base, unit="us", more=f"p99 {p99:.0f}")
 
@@ -143,9 +155,15 @@ def peers() -> dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]]:
             n = len(slope)
             solver = osqp.OSQP()
             solver.setup(
-                sparse.csc_matrix(np.triu(hessian)), slope, sparse.eye(n, format="csc"), np.full(n, -6.0),
-                np.full(n, 6.0), verbose=False, eps_abs=1e-4, eps_rel=1e-4,
-            )  # fmt: skip
+                sparse.csc_matrix(np.triu(hessian)),
+                slope,
+                sparse.eye(n, format="csc"),
+                np.full(n, -6.0),
+                np.full(n, 6.0),
+                verbose=False,
+                eps_abs=1e-4,
+                eps_rel=1e-4,
+            )
             return solver.solve().x
 
         found["OSQP, set-up included"] = by_osqp
@@ -196,9 +214,13 @@ def cold_rows(table: Table, count: int = COLD) -> None:
         else:
             wrong += 1
     table.add(
-        "0", wrong == 0, what=f"wrong of {count}, up to 5 m off", value=wrong, unit="",
+        "0",
+        wrong == 0,
+        what=f"wrong of {count}, up to 5 m off",
+        value=wrong,
+        unit="",
         more=f"{other_worse:.0f} times DAQP is off; else within {worst:.0e} V",
-    )  # fmt: skip
+    )
     p99, most = float(np.percentile(times, 99)), float(times.max())
     table.add(
         "<= 200", p99 <= 200.0, what="cold solve, p99", value=p99, unit="us", more=f"median {np.median(times):.0f}"
@@ -209,16 +231,15 @@ def cold_rows(table: Table, count: int = COLD) -> None:
 def tracking_rows(table: Table) -> None:
     """Errors over the eight references, and of those that saturate beside IPOPT's."""
     for words, (share, noise, push, goal) in CONDITIONS.items():
-        found = [
-            rmse(closed_loop(Mpc(ROBOT), name, 8.0, share=share, noise=noise, push=push)[1]) for name in PATHS
-        ]  # fmt: skip
+        found = [rmse(closed_loop(Mpc(ROBOT), name, 8.0, share=share, noise=noise, push=push)[1]) for name in PATHS]
         value = mean(found)
         each = " ".join(f"{one:.2f}" for one in found)
         table.add(f"<= {goal:g}", value <= goal, what=f"tracking, {words}", value=value, unit="mm", more=each)
     others: dict[str, Callable[[], Any]] = {
-        "mpc_no_friction": lambda: Mpc(ROBOT, friction=False), "mpc_no_observer": lambda: Mpc(ROBOT, observer=False),
+        "mpc_no_friction": lambda: Mpc(ROBOT, friction=False),
+        "mpc_no_observer": lambda: Mpc(ROBOT, observer=False),
         "pid": lambda: Pid(ROBOT, dt=DT),
-    }  # fmt: skip
+    }
     for name, make in others.items():
         value = mean([rmse(closed_loop(make(), way, 8.0)[1]) for way in PATHS])
         table.add(what=f"tracking, exact plant, {name}", value=value, unit="mm")
@@ -228,9 +249,13 @@ def tracking_rows(table: Table) -> None:
         own = step_times(lambda: Mpc(ROBOT), name, 3.2, DT)[0]
         ipopt, theirs = here.get(name, (quoted, float("nan")))
         table.add(
-            f"<= {1.05 * ipopt:.2f}", value <= 1.05 * ipopt, what=f"saturating: {name}, 3.2 s", value=value, unit="mm",
+            f"<= {1.05 * ipopt:.2f}",
+            value <= 1.05 * ipopt,
+            what=f"saturating: {name}, 3.2 s",
+            value=value,
+            unit="mm",
             more=f"IPOPT {ipopt:.2f}{'' if name in here else ', quoted'}, {value / ipopt - 1.0:+.1%}",
-        )  # fmt: skip
+        )
         table.add("<= 33", own <= 33.0, what=f"a step there: {name}", value=own, unit="us")
         if name in here:
             table.add(">= 100", theirs >= 100.0 * own, what=f"IPOPT over it: {name}", value=theirs / own, unit="times")
@@ -246,9 +271,7 @@ def rest_rows(table: Table) -> None:
     table.add(
         "0", still, what="greatest speed in its last second", value=float(np.abs(states[-50:, 3:]).max()), unit=""
     )
-    states = closed_loop(
-        Mpc(ROBOT), "goal:x_m=0,y_m=0,heading_rad=0", 6.0, pose=(0.03, -0.02, 0.1), hold=1.4
-    )[0]  # fmt: skip
+    states = closed_loop(Mpc(ROBOT), "goal:x_m=0,y_m=0,heading_rad=0", 6.0, pose=(0.03, -0.02, 0.1), hold=1.4)[0]
     swing = 1e3 * float(np.hypot(*np.ptp(states[-100:, :2], axis=0)))
     table.add(what="rest, breakaway 1.4 x Coulomb: peak to peak, last 2 s", value=swing, unit="mm")
 
@@ -277,9 +300,13 @@ def araujo_rows(table: Table) -> None:
     worst = max(own[name] / theirs[name] for name in PATHS)
     each = " ".join(f"{one:.1f}" for one in theirs.values())
     table.add(
-        "< 1", worst < 1.0, what="our error over Araujo's, the worst of eight", value=worst, unit="",
+        "< 1",
+        worst < 1.0,
+        what="our error over Araujo's, the worst of eight",
+        value=worst,
+        unit="",
         more=f"theirs {each} mm, {mean(list(theirs.values())):.1f} in the mean; {np.median(took):.0f} us a step",
-    )  # fmt: skip
+    )
 
 
 def measure() -> Table:

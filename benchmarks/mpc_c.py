@@ -43,9 +43,13 @@ def c_rows(table: Table, robot: Robot) -> None:
         stack = [int(line.split("\t")[1]) for line in (folder / "omnidyn_control.su").read_text().splitlines()]
         table.add("<= 8 kB", code <= MOST_CODE, what="mpc in C, code, gcc -Os", value=float(code), unit="bytes")
         table.add(
-            "<= 11 kB", sum(memory) <= MOST_MEMORY, what="mpc in C, memory, 20 ahead", value=float(sum(memory)),
-            unit="bytes", more=f"and a stack of at most {sum(stack)}",
-        )  # fmt: skip
+            "<= 11 kB",
+            sum(memory) <= MOST_MEMORY,
+            what="mpc in C, memory, 20 ahead",
+            value=float(sum(memory)),
+            unit="bytes",
+            more=f"and a stack of at most {sum(stack)}",
+        )
         with CController(robot, Path(name) / "run", "mpc") as control:
             ratios = {
                 key: _error(robot, reference, control) / _error(robot, reference, "mpc")
@@ -53,9 +57,13 @@ def c_rows(table: Table, robot: Robot) -> None:
             }
     worse = mean(list(ratios.values()))
     table.add(
-        "<= 1.01", worse <= MOST_WORSE, what="mpc in C, float32, error over Python's", value=worse, unit="",
+        "<= 1.01",
+        worse <= MOST_WORSE,
+        what="mpc in C, float32, error over Python's",
+        value=worse,
+        unit="",
         more=" ".join(f"{each:.3f}" for each in ratios.values()),
-    )  # fmt: skip
+    )
 
 
 def _error(robot: Robot, reference: str, control: Any) -> float:

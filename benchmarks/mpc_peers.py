@@ -63,9 +63,13 @@ def peer_rows(table: Table, own: float) -> None:
         runs = [run_of(made[name](), "eight", DT, seconds) for _ in range(repeats)]
         step, solve = (1e6 * float(np.median(np.min([run[key] for run in runs], axis=0))) for key in ("t", "solve"))
         table.add(
-            f">= {goal:g} times", step >= goal * own, what=f"{name}, a whole step", value=step, unit="us",
+            f">= {goal:g} times",
+            step >= goal * own,
+            what=f"{name}, a whole step",
+            value=step,
+            unit="us",
             more=f"{step / own:.1f} times; its solver alone {solve:.0f} us, {solve / own:.1f} times our whole step",
-        )  # fmt: skip
+        )
 
 
 def run_of(controller: Any, name: str, dt: float, seconds: float) -> Any:

@@ -62,8 +62,13 @@ def _implicit(table: Table, robot: Robot) -> None:
         name = f"turning frame, {what}"
         _cover(table, name, draws, IMPLICIT)
         spread = float(np.sqrt(np.mean(z**2)))
-        table.add("0.9 to 1.1", 0.9 <= spread <= 1.1 if WHOLE else None, what="... rms of all z-scores",
-                  draws=IMPLICIT, value=spread)  # fmt: skip
+        table.add(
+            "0.9 to 1.1",
+            0.9 <= spread <= 1.1 if WHOLE else None,
+            what="... rms of all z-scores",
+            draws=IMPLICIT,
+            value=spread,
+        )
 
 
 def rolled(robot: Robot, voltage: np.ndarray, dt: float) -> tuple[Run, np.ndarray]:
@@ -113,8 +118,13 @@ def _ticks(table: Table, robot: Robot, counts: int, jitter: float) -> None:
     for way in ways:
         least = draws[way].coverage.min()
         met = bool(least >= 0.92 - (0.0 if WHOLE else 0.2)) if way == "counts" else None
-        table.add(">= 0.92" if way == "counts" else "", met, what=f"{name}: coverage by {way}, least", draws=TICKED,
-                  value=least)  # fmt: skip
+        table.add(
+            ">= 0.92" if way == "counts" else "",
+            met,
+            what=f"{name}: coverage by {way}, least",
+            draws=TICKED,
+            value=least,
+        )
     gain = draws["Gauss"].spread / draws["counts"].spread
     table.add(what="... std by Gauss / std by counts, median", draws=TICKED, value=float(np.median(gain)))
     if jitter:

@@ -159,9 +159,14 @@ def path_of_a_cell() -> Trail:
 def as_row(table: Table, name: str, path: Trail, stays: int, climbs: int) -> None:
     """One row of the table, and the functions as notes."""
     table.add(
-        what=name, stays=len(path.stays), rooms=len(path.rooms), climbs=len(path.climbs), returns=len(path.returns),
-        goal=f"at most {stays} stays, {climbs} climbs", met=len(path.stays) <= stays and len(path.climbs) <= climbs,
-    )  # fmt: skip
+        what=name,
+        stays=len(path.stays),
+        rooms=len(path.rooms),
+        climbs=len(path.climbs),
+        returns=len(path.returns),
+        goal=f"at most {stays} stays, {climbs} climbs",
+        met=len(path.stays) <= stays and len(path.climbs) <= climbs,
+    )
     table.notes += [f"{name}: {place.file}: {place.function}" for place in path.stays]
 
 

@@ -39,11 +39,14 @@ QUOTED = [  # us/step, m/s, rad/s; EVIDENCE.md section 3
 FALLING: dict[str, Any] = {"breakaway": (2.8, 1.9, 0.13), "stribeck_speed": (0.02, 0.02, 0.2)}
 BENT = {"stiffness": (1e4, 1e4, 1e2)}
 LAWS: dict[str, dict[str, Any]] = {  # on the axes; breakaway above Coulomb friction where a law has it
-    "Coulomb": {}, "breakaway": {"breakaway": FALLING["breakaway"]}, "Stribeck": FALLING,
+    "Coulomb": {},
+    "breakaway": {"breakaway": FALLING["breakaway"]},
+    "Stribeck": FALLING,
     "Karnopp": {"law": "karnopp", "karnopp_speed": (2e-3, 2e-3, 2e-2), "breakaway": FALLING["breakaway"]},
-    "Dahl": {"law": "dahl", **BENT}, "LuGre": {"law": "lugre", **BENT, **FALLING},
+    "Dahl": {"law": "dahl", **BENT},
+    "LuGre": {"law": "lugre", **BENT, **FALLING},
     "elasto-plastic": {"law": "elastoplastic", **BENT, **FALLING},
-}  # fmt: skip
+}
 LEVELS_ALONG: dict[str, Any] = {"coulomb": (2.2, 1.5), "viscous": 0.95, "yaw_coulomb": 0.099, "yaw_viscous": 0.01}
 HELD_ALONG: dict[str, Any] = {"breakaway": (2.8, 1.9), "yaw_breakaway": 0.13}
 FALLING_ALONG: dict[str, Any] = {**HELD_ALONG, "stribeck_speed": 0.02, "yaw_stribeck_speed": 0.2}
@@ -51,9 +54,10 @@ BENT_ALONG: dict[str, Any] = {"stiffness": 1e4, "yaw_stiffness": 1e2}
 ALONG: dict[str, dict[str, Any]] = {  # the same along the direction of travel
     "Coulomb": {},
     "Karnopp": {"law": "karnopp", "karnopp_speed": 2e-3, "yaw_karnopp_speed": 2e-2, **HELD_ALONG},
-    "Dahl": {"law": "dahl", **BENT_ALONG}, "LuGre": {"law": "lugre", **BENT_ALONG, **FALLING_ALONG},
+    "Dahl": {"law": "dahl", **BENT_ALONG},
+    "LuGre": {"law": "lugre", **BENT_ALONG, **FALLING_ALONG},
     "elasto-plastic": {"law": "elastoplastic", **BENT_ALONG, **FALLING_ALONG},
-}  # fmt: skip
+}
 SLIPPERY = {"traction_mu": 0.2, "wheel_inertia": 2e-5}
 COLUMNS = ["engine", "us/step", "cpu us/step", "kernel us/step", "error m/s", "error rad/s", "p50", "p99", "max"]
 NO_MUJOCO = "MuJoCo skipped: not installed here (python -m pip install -r benchmarks/peers.txt)"

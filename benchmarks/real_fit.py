@@ -56,8 +56,18 @@ def command(table: Table) -> None:
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log.csv"
         write_run(noisy_draw(simulate(load_robot("axebot"), excitation(), 0.01), 0), log)
-        words = [sys.executable, "-m", "omnidyn", "identify", str(log), "--robot", "axebot", "--force", "--report",
-                 str(Path(folder) / "report.html")]  # fmt: skip
+        words = [
+            sys.executable,
+            "-m",
+            "omnidyn",
+            "identify",
+            str(log),
+            "--robot",
+            "axebot",
+            "--force",
+            "--report",
+            str(Path(folder) / "report.html"),
+        ]
         times = []
         for _ in range(2):
             start = time.perf_counter()
@@ -104,8 +114,15 @@ def bench(table: Table) -> None:
                 )
             slope, error = TURN * fit.value["slope"], TURN * fit.std["slope"]
             met = abs(slope - VISCOUS[0]) <= 3.0 * np.hypot(error, VISCOUS[1])
-            table.add(f"README {VISCOUS[0]} +- {VISCOUS[1]}", met, data="bench", what="... viscous", value=slope,
-                      unit="V/(turn/s)", **{"+-": error})  # fmt: skip
+            table.add(
+                f"README {VISCOUS[0]} +- {VISCOUS[1]}",
+                met,
+                data="bench",
+                what="... viscous",
+                value=slope,
+                unit="V/(turn/s)",
+                **{"+-": error},
+            )
             _band(table, fit)
 
 
@@ -117,12 +134,24 @@ def exam(table: Table) -> None:
     runs = bench_runs()
     choice = choose_motor([each[0] for each in runs.values()])
     for way, error in choice.errors:
-        table.add("", None, data="bench, choice", what=f"left out of training: {_words(way)}", value=error / TURN,
-                  unit="turns/s")  # fmt: skip
+        table.add(
+            "",
+            None,
+            data="bench, choice",
+            what=f"left out of training: {_words(way)}",
+            value=error / TURN,
+            unit="turns/s",
+        )
     for kind, each in runs.items():
         value = fit_rmse(choice.fit, each[1]) / TURN
-        table.add(f"<= 1.1 x {RMSE[kind]}, both {kind}s", value <= 1.1 * RMSE[kind], data="bench, choice",
-                  what=f"chosen: {_words(choice.way)}; rmse {kind}2", value=value, unit="turns/s")  # fmt: skip
+        table.add(
+            f"<= 1.1 x {RMSE[kind]}, both {kind}s",
+            value <= 1.1 * RMSE[kind],
+            data="bench, choice",
+            what=f"chosen: {_words(choice.way)}; rmse {kind}2",
+            value=value,
+            unit="turns/s",
+        )
 
 
 def chirp_alone(table: Table) -> None:
@@ -131,15 +160,27 @@ def chirp_alone(table: Table) -> None:
     fits = [fit_motor(run) for run in runs]
     for k, fit in enumerate(fits):
         low = 1e3 * fit.ci95["dead_band"][0]
-        table.add("0: none seen", low <= 0.0, data="bench, chirp alone", value=low, unit="mV",
-                  what=f"Coulomb of chirp{k + 1} alone, lower end of its 95 % interval")  # fmt: skip
+        table.add(
+            "0: none seen",
+            low <= 0.0,
+            data="bench, chirp alone",
+            value=low,
+            unit="mV",
+            what=f"Coulomb of chirp{k + 1} alone, lower end of its 95 % interval",
+        )
     errors = [(run_motor(fits[0], run)[0] - run.wheel_speed[:, 0], run.t - run.t[0]) for run in runs]  # type: ignore[index]
     (first, t), (second, other) = errors
     known = np.isfinite(second)
     again = np.interp(t, other[known], second[known])
     both = np.isfinite(first) & (t > 0.1)
-    table.add("0 for noise", None, data="bench, chirp alone", what="correlation of the errors of chirp1 and chirp2",
-              value=float(np.corrcoef(first[both], again[both])[0, 1]), unit="")  # fmt: skip
+    table.add(
+        "0 for noise",
+        None,
+        data="bench, chirp alone",
+        what="correlation of the errors of chirp1 and chirp2",
+        value=float(np.corrcoef(first[both], again[both])[0, 1]),
+        unit="",
+    )
 
 
 def _words(way: Mapping[str, Any]) -> str:

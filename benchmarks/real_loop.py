@@ -73,8 +73,15 @@ def robotino(table: Table) -> None:
         force, levels = README[floor]
         own = np.array([estimate.value[key] for key in LEVELS])
         along, told = _along(own), _along(np.array(levels))
-        _row(table, f"<= {FORCE_BOUND} N of {force} (README)", abs(along - force) <= FORCE_BOUND, floor,
-             "mean force along travel", along, "N")  # fmt: skip
+        _row(
+            table,
+            f"<= {FORCE_BOUND} N of {force} (README)",
+            abs(along - force) <= FORCE_BOUND,
+            floor,
+            "mean force along travel",
+            along,
+            "N",
+        )
         _row(table, "", None, floor, "... of the README's ellipse, the same mean", told, "N")
         same = _along(np.array([steady[floor].value[key] for key in LEVELS]))
         _row(table, "", None, floor, "... of a steady-state ellipse of the same rows", same, "N")
@@ -89,11 +96,27 @@ def robotino(table: Table) -> None:
             _row(table, "", None, floor, f"rmse of {name}, {len(mine)} held-out free runs", error, unit)
             _row(table, "", None, floor, "... of the mean of each run", mean, unit)
     one = next(iter(fit.groups.values()))
-    _row(table, "15 +- 5 (robot file)", None, "both", f"{GAIN}, from {WRONG:g} times 15", one.value[GAIN], "V s/rad",
-         one.std[GAIN])  # fmt: skip
+    _row(
+        table,
+        "15 +- 5 (robot file)",
+        None,
+        "both",
+        f"{GAIN}, from {WRONG:g} times 15",
+        one.value[GAIN],
+        "V s/rad",
+        one.std[GAIN],
+    )
     for change in fit.differences:
-        _row(table, "", None, "both", f"{change.key}, {change.second} - {change.first}", change.difference, "N",
-             change.std)  # fmt: skip
+        _row(
+            table,
+            "",
+            None,
+            "both",
+            f"{change.key}, {change.second} - {change.first}",
+            change.difference,
+            "N",
+            change.std,
+        )
     _row(table, "<= 60", spent <= 60.0, "both", f"the fit of {len(runs)} runs", spent, "s")
     table.notes += [
         "robotino: friction is collinear with the velocity and the speed loop at rest in every row used, so that what "
@@ -122,8 +145,16 @@ def _transient(table: Table, robot: Robot) -> None:
     ).estimate
     for name, nuisance in fit.nuisances.items():
         _row(table, "", None, "gray 0.2", f"{name}, {len(runs)} runs", nuisance.value, nuisance.unit, nuisance.std)
-    _row(table, "", None, "gray 0.2", "body.mass_kg from the start", fit.value["body.mass_kg"], "kg",
-         fit.std["body.mass_kg"])  # fmt: skip
+    _row(
+        table,
+        "",
+        None,
+        "gray 0.2",
+        "body.mass_kg from the start",
+        fit.value["body.mass_kg"],
+        "kg",
+        fit.std["body.mass_kg"],
+    )
 
 
 def _along(levels: np.ndarray) -> float:

@@ -60,8 +60,14 @@ def _beside(
     automatic, names = _errors(robot, runs, asked)
     ratio = float(np.sqrt(np.mean([(automatic[name] / without[name]) ** 2 for name in without])))
     assert not alone
-    table.add(f"<= {WORSE}", ratio <= WORSE, data=data, value=ratio, unit="",
-              what=f"held-out error with {', '.join(names) or 'no'} nuisances over that without: {what}")  # fmt: skip
+    table.add(
+        f"<= {WORSE}",
+        ratio <= WORSE,
+        data=data,
+        value=ratio,
+        unit="",
+        what=f"held-out error with {', '.join(names) or 'no'} nuisances over that without: {what}",
+    )
 
 
 def _errors(

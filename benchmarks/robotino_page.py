@@ -23,10 +23,20 @@ def answer(data: Path) -> str:
     """What the command of the page prints."""
     with tempfile.TemporaryDirectory() as folder:
         arguments = [
-            "identify", str(data / "robotino" / "one_surface_type"), "--robot", "robotino", "--current-unsigned",
-            "--assume", "a=ticks/2000", "--group", "gray=gray_surface", "--group", "green=green_surface",
-            "-o", str(Path(folder) / "robotino.toml"),
-        ]  # fmt: skip
+            "identify",
+            str(data / "robotino" / "one_surface_type"),
+            "--robot",
+            "robotino",
+            "--current-unsigned",
+            "--assume",
+            "a=ticks/2000",
+            "--group",
+            "gray=gray_surface",
+            "--group",
+            "green=green_surface",
+            "-o",
+            str(Path(folder) / "robotino.toml"),
+        ]
         printed = io.StringIO()
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
             code = omnidyn(arguments)

@@ -99,6 +99,7 @@ def _sweep(table: Table, folder: Path, robot: Robot, number: int, rates: bool) -
     met = azimuth <= OFF_AZIMUTH and rms <= OFF_RMS and not false
     words = f"{len(found)} logs of {number} topics, {'three rates' if rates else 'one rate'}"
     table.add(
-        f"{OFF_AZIMUTH:g} deg, {OFF_RMS:.0%}, none", met,
+        f"{OFF_AZIMUTH:g} deg, {OFF_RMS:.0%}, none",
+        met,
         **{"logs": words, "azimuth deg": azimuth, "rms %": 100.0 * rms, "false findings": ", ".join(false) or "none"},
-    )  # fmt: skip
+    )

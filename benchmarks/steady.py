@@ -24,13 +24,21 @@ from tests.support.steady_logs import FRICTIONS, TRUTH, clean_runs, robot_with, 
 
 DRAWS, DIRECTIONS = 200, range(0, 360, 15)
 SHARE = (0.4, 0.95)
-TRAVEL = {"gray 0.1": (39.27, 0.30, 2.51), "gray 0.2": (39.15, 0.28, 2.38), "gray 0.3": (39.37, 0.28, 2.35),
-          "green 0.1": (35.55, 0.25, 1.49)}  # fmt: skip
+TRAVEL = {
+    "gray 0.1": (39.27, 0.30, 2.51),
+    "gray 0.2": (39.15, 0.28, 2.38),
+    "gray 0.3": (39.37, 0.28, 2.35),
+    "green 0.1": (35.55, 0.25, 1.49),
+}
 LOO = {
-    "box": (16.33, 16.34, 16.28, 15.58), "wheel": (12.33, 11.83, 11.93, 10.25), "wheels": (12.51, 12.01, 11.86, 10.61),
-    "wheel+roller": (6.13, 6.28, 6.27, 5.88), "disc": (4.14, 3.82, 3.85, 1.98), "disc+wheel": (4.18, 3.85, 3.88, 1.96),
+    "box": (16.33, 16.34, 16.28, 15.58),
+    "wheel": (12.33, 11.83, 11.93, 10.25),
+    "wheels": (12.51, 12.01, 11.86, 10.61),
+    "wheel+roller": (6.13, 6.28, 6.27, 5.88),
+    "disc": (4.14, 3.82, 3.85, 1.98),
+    "disc+wheel": (4.18, 3.85, 3.88, 1.96),
     "ellipse-plain": (2.53, 2.06, 2.30, 1.92),
-}  # fmt: skip
+}
 
 
 def measure() -> Table:
@@ -62,16 +70,26 @@ def _robotino(table: Table, data: Path) -> None:
         level = fit_shape(SHAPES["ellipse-plain"], robot, fixed[group], turning=False, robust=False)
         assert level is not None
         table.add(
-            "0.15 N", bool(np.abs(level.level - told).max() < 0.15), what="ellipse Cx, Cy [N]", where=group,
-            ours=_list(level.level), how="plain form, rows 40..95 %", **{"README or truth": _list(told)},
-        )  # fmt: skip
+            "0.15 N",
+            bool(np.abs(level.level - told).max() < 0.15),
+            what="ellipse Cx, Cy [N]",
+            where=group,
+            ours=_list(level.level),
+            how="plain form, rows 40..95 %",
+            **{"README or truth": _list(told)},
+        )
     gray = [group for group in runs if group.startswith("gray")]
     speed = np.concatenate([force_points(runs[group], robot, window=SHARE).speed for group in gray])
     line = fit_line(speed, np.concatenate([fixed[group].along for group in gray]))
     table.add(
-        "covers 0", bool(line.ci95[0, 0] <= 0.0 <= line.ci95[0, 1]), what="B [N s/m]", where="gray",
-        ours=_pm(line.free[0], line.std[0]), how="line along travel", **{"README or truth": "-0.02 +- 2.02"},
-    )  # fmt: skip
+        "covers 0",
+        bool(line.ci95[0, 0] <= 0.0 <= line.ci95[0, 1]),
+        what="B [N s/m]",
+        where="gray",
+        ours=_pm(line.free[0], line.std[0]),
+        how="line along travel",
+        **{"README or truth": "-0.02 +- 2.02"},
+    )
     _study(table, robot, runs, read)
 
 
@@ -79,10 +97,14 @@ def _travel(table: Table, group: str, own: ForcePoints, how: str, bound: float) 
     along, (mean, error, spread) = own.along, TRAVEL[group]
     deviation = float(np.std(along, ddof=1))
     table.add(
-        f"within {bound:.2g} N", abs(float(np.mean(along)) - mean) < bound, what="force along travel [N]", where=group,
-        ours=f"{_pm(np.mean(along), deviation / np.sqrt(len(along)))}, sd {deviation:.2f}", how=how,
+        f"within {bound:.2g} N",
+        abs(float(np.mean(along)) - mean) < bound,
+        what="force along travel [N]",
+        where=group,
+        ours=f"{_pm(np.mean(along), deviation / np.sqrt(len(along)))}, sd {deviation:.2f}",
+        how=how,
         **{"README or truth": f"{_pm(mean, error)}, sd {spread:.2f}"},
-    )  # fmt: skip
+    )
 
 
 def _left_out(table: Table, robot: Robot, points: dict[str, ForcePoints], shape: str, told: tuple[float, ...]) -> None:
@@ -96,9 +118,14 @@ def _left_out(table: Table, robot: Robot, points: dict[str, ForcePoints], shape:
         gap = np.array(ours) - told
         goal, met = ("0.06 N", np.abs(gap).max() < 0.06) if still == 0.0 else ("no worse", gap.max() < 0.06)
         table.add(
-            goal, bool(met), what="left-out error [N]", where=shape, ours=_list(ours), how=how,
+            goal,
+            bool(met),
+            what="left-out error [N]",
+            where=shape,
+            ours=_list(ours),
+            how=how,
             **{"README or truth": _list(told)},
-        )  # fmt: skip
+        )
 
 
 def _study(table: Table, robot: Robot, runs: dict[str, list[Run]], read: float) -> None:
@@ -111,15 +138,23 @@ def _study(table: Table, robot: Robot, runs: dict[str, list[Run]], read: float) 
         seconds = time.process_time() - began
         ranking = ", ".join(f"{score.name} {score.loo:.2f}+-{score.loo_std:.2f}" for score in study.choice.scores)
         table.add(
-            what="chosen shape", where=f"both floors, {speed} speed", ours=study.choice.chosen,
-            how="robust, found windows", **{"README or truth": "ellipse"},
-        )  # fmt: skip
+            what="chosen shape",
+            where=f"both floors, {speed} speed",
+            ours=study.choice.chosen,
+            how="robust, found windows",
+            **{"README or truth": "ellipse"},
+        )
         table.notes.append(f"{speed} speed: {ranking}")
         table.notes.extend(f"{speed} speed: {words}" for words in study.statements)
         table.add(
-            "5 s", read + seconds < 5.0, what="cpu [s]", where="252 files", ours=f"{read:.2f} + {seconds:.2f}",
-            how="reading + identifying", **{"README or truth": ""},
-        )  # fmt: skip
+            "5 s",
+            read + seconds < 5.0,
+            what="cpu [s]",
+            where="252 files",
+            ours=f"{read:.2f} + {seconds:.2f}",
+            how="reading + identifying",
+            **{"README or truth": ""},
+        )
 
 
 def _motors(table: Table, data: Path) -> None:
@@ -128,47 +163,72 @@ def _motors(table: Table, data: Path) -> None:
         _band(table, "free motors: Coulomb [A]", line, told, abs(line.value["dead_band"] - float(told[:5])) < 0.005)
     slope = free.motors[-1]
     table.add(
-        "0.3e-4", abs(slope.value["slope"] / 16.0 - 3.9e-4) < 0.3e-4, what="free motors: slope [A s/rad, motor]",
-        where="all", ours=_pm(slope.value["slope"] / 16.0, slope.std["slope"] / 16.0), how="steady windows",
+        "0.3e-4",
+        abs(slope.value["slope"] / 16.0 - 3.9e-4) < 0.3e-4,
+        what="free motors: slope [A s/rad, motor]",
+        where="all",
+        ours=_pm(slope.value["slope"] / 16.0, slope.std["slope"] / 16.0),
+        how="steady windows",
         **{"README or truth": "(3.9 +- 0.3)e-4"},
-    )  # fmt: skip
+    )
     stairs = identify(logs.udea_stairs(data), None, MotorLine()).motors[-1]
     low, high = np.quantile(stairs.draws["dead_band"], [0.05, 0.95])
     gains = np.quantile(1.0 / stairs.draws["slope"], [0.15865, 0.84135])
     table.add(
-        "covers 0", not stairs.dead_band_seen, what="stairs: dead zone [%]", where="all",
-        ours=f"{stairs.value['dead_band']:.2f}, 90 % {low:.1f}..{high:.1f}", how="last two thirds of each step",
+        "covers 0",
+        not stairs.dead_band_seen,
+        what="stairs: dead zone [%]",
+        where="all",
+        ours=f"{stairs.value['dead_band']:.2f}, 90 % {low:.1f}..{high:.1f}",
+        how="last two thirds of each step",
         **{"README or truth": "-1.75, 90 % -14..+4.8"},
-    )  # fmt: skip
+    )
     table.add(
-        "0.073", abs(1.0 / stairs.value["slope"] - 0.429) < 0.073, what="stairs: slope [(rad/s)/%]", where="all",
-        ours=_pm(1.0 / stairs.value["slope"], 0.5 * np.ptp(gains)), how="", **{"README or truth": "0.429 +- 0.073"},
-    )  # fmt: skip
+        "0.073",
+        abs(1.0 / stairs.value["slope"] - 0.429) < 0.073,
+        what="stairs: slope [(rad/s)/%]",
+        where="all",
+        ours=_pm(1.0 / stairs.value["slope"], 0.5 * np.ptp(gains)),
+        how="",
+        **{"README or truth": "0.429 +- 0.073"},
+    )
     robot, run = logs.udea_turning(data)
     turning = identify([run], robot, MotorLine(speed="ground")).motors[-1]
     _band(table, "turning: dead zone [%]", turning, "0.85 +- 0.54", abs(turning.value["dead_band"] - 0.85) < 0.54)
     table.add(
-        "0.09", abs(turning.value["slope"] - 1.96) < 0.09, what="turning: slope [% s/rad]", where="all",
-        ours=_pm(turning.value["slope"], turning.std["slope"]), how="speed from heading",
+        "0.09",
+        abs(turning.value["slope"] - 1.96) < 0.09,
+        what="turning: slope [% s/rad]",
+        where="all",
+        ours=_pm(turning.value["slope"], turning.std["slope"]),
+        how="speed from heading",
         **{"README or truth": "1.96 +- 0.09"},
-    )  # fmt: skip
+    )
     bench = identify(logs.odrive(data, ("step", "chirp")), None, MotorLine()).motors[0]
     _band(table, "bench: Coulomb [V]", bench, "0.00035 +- 0.00024, none", not bench.dead_band_seen)
     turn = 2.0 * np.pi
     table.add(
-        "1 %", abs(bench.value["slope"] * turn / 0.05509 - 1.0) < 0.01, what="bench: viscous [V/(turn/s)]", where="all",
-        ours=_pm(bench.value["slope"] * turn, bench.std["slope"] * turn), how="step and chirp",
+        "1 %",
+        abs(bench.value["slope"] * turn / 0.05509 - 1.0) < 0.01,
+        what="bench: viscous [V/(turn/s)]",
+        where="all",
+        ours=_pm(bench.value["slope"] * turn, bench.std["slope"] * turn),
+        how="step and chirp",
         **{"README or truth": "0.05509 +- 0.00006"},
-    )  # fmt: skip
+    )
 
 
 def _band(table: Table, what: str, line: MotorEstimate, told: str, met: bool) -> None:
     low, high = line.ci95["dead_band"]
     table.add(
-        "", met, what=what, where=f"motor {_of(line)}", how=f"{line.count} windows",
+        "",
+        met,
+        what=what,
+        where=f"motor {_of(line)}",
+        how=f"{line.count} windows",
         ours=f"{_pm(line.value['dead_band'], line.std['dead_band'])}, 95 % {low:.3g}..{high:.3g}",
         **{"README or truth": told},
-    )  # fmt: skip
+    )
 
 
 def _of(line: MotorEstimate) -> str:
@@ -191,16 +251,25 @@ def _simulated(table: Table) -> None:
                 held[key].append(low <= truth <= high)
         wrong = sum(number for name, number in chosen.items() if name.split("+")[0].split("-")[0] != shape)
         table.add(
-            "1 %", wrong <= 0.01 * DRAWS, what="true shape chosen", where=shape, ours=f"{chosen[shape]} of {DRAWS}",
+            "1 %",
+            wrong <= 0.01 * DRAWS,
+            what="true shape chosen",
+            where=shape,
+            ours=f"{chosen[shape]} of {DRAWS}",
             how=", ".join(f"{name} {number}" for name, number in chosen.most_common()),
             **{"README or truth": "another kind never"},
-        )  # fmt: skip
+        )
         for key, cover in held.items():
             share = float(np.mean(cover))
             table.add(
-                "90..99 %", 0.90 <= share <= 0.995, what="95 % interval holds the truth", where=key,
-                ours=f"{100 * share:.1f} %", how=f"{DRAWS} draws", **{"README or truth": "95 %"},
-            )  # fmt: skip
+                "90..99 %",
+                0.90 <= share <= 0.995,
+                what="95 % interval holds the truth",
+                where=key,
+                ours=f"{100 * share:.1f} %",
+                how=f"{DRAWS} draws",
+                **{"README or truth": "95 %"},
+            )
 
 
 def _pm(value: float, std: float) -> str:

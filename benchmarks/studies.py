@@ -55,9 +55,10 @@ def measure() -> Table:
     """All studies."""
     table = Table("studies: intervals that hold the truth, right worlds that stay calm", COLUMNS)
     table.notes += [
-        machine(), "27 November 2026, as tests of the same draws: all goals held but one, the start of an equal motor "
+        machine(),
+        "27 November 2026, as tests of the same draws: all goals held but one, the start of an equal motor "
         "under noise of 0.3 rad/s (0.895): without stiction it sets off where noise hides it",
-    ]  # fmt: skip
+    ]
     for study in studies():
         began, draws = time.process_time(), scaled(study.draws)
         found = [study.draw(number) for number in range(draws)]

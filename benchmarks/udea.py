@@ -36,19 +36,43 @@ def turning(table: Table) -> None:
         words = "with Coulomb" if dead_band else "without Coulomb"
         whole = fit_motor(run, dead_band=dead_band, **HOW)
         own = window_rmse(whole, [run])
-        table.add(f"<= {baseline}", own <= baseline, data="udea turning",
-                  what=f"free run, rmse of w, {words}, fitted to all",
-                  value=own, unit="rad/s")  # fmt: skip
+        table.add(
+            f"<= {baseline}",
+            own <= baseline,
+            data="udea turning",
+            what=f"free run, rmse of w, {words}, fitted to all",
+            value=own,
+            unit="rad/s",
+        )
         crossed = [window_rmse(fit_motor(a, dead_band=dead_band, **HOW), [b]) for a, b in (parts, parts[::-1])]
         other = float(np.sqrt(np.mean(np.square(crossed))))
-        table.add(f"<= {baseline}", other <= baseline, data="udea turning",
-                  what=f"... halves, each by the other, {words}", value=other, unit="rad/s")  # fmt: skip
-        table.add("README 0.51", None, data="udea turning", what="... 1/slope", value=1.0 / whole.value["slope"],
-                  unit="(rad/s)/%", **{"+-": whole.std["slope"] / whole.value["slope"] ** 2})  # fmt: skip
+        table.add(
+            f"<= {baseline}",
+            other <= baseline,
+            data="udea turning",
+            what=f"... halves, each by the other, {words}",
+            value=other,
+            unit="rad/s",
+        )
+        table.add(
+            "README 0.51",
+            None,
+            data="udea turning",
+            what="... 1/slope",
+            value=1.0 / whole.value["slope"],
+            unit="(rad/s)/%",
+            **{"+-": whole.std["slope"] / whole.value["slope"] ** 2},
+        )
         if dead_band:
-            table.add("README 0.85 +- 0.54", None, data="udea turning", what="... dead zone",
-                      value=whole.value["dead_band"], unit="%",
-                      **{"+-": whole.std["dead_band"]})  # fmt: skip
+            table.add(
+                "README 0.85 +- 0.54",
+                None,
+                data="udea turning",
+                what="... dead zone",
+                value=whole.value["dead_band"],
+                unit="%",
+                **{"+-": whole.std["dead_band"]},
+            )
         _turning_as_in_readme(table, run, whole, dead_band)
     chosen(table, parts)
 
@@ -60,9 +84,14 @@ def chosen(table: Table, parts: Sequence[Run]) -> None:
     words = ", ".join(f"{name}: {'yes' if value else 'no'}" for name, value in choice.way.items())
     value = window_rmse(choice.fit, [parts[1]])
     baseline = TURNING if choice.way["dead_band"] else TURNING_PROPORTIONAL
-    table.add(f"<= {baseline}", value <= baseline, data="udea turning",
-              what=f"chosen on the first half ({words}), second half",
-              value=value, unit="rad/s")  # fmt: skip
+    table.add(
+        f"<= {baseline}",
+        value <= baseline,
+        data="udea turning",
+        what=f"chosen on the first half ({words}), second half",
+        value=value,
+        unit="rad/s",
+    )
 
 
 def _turning_as_in_readme(table: Table, run: Run, fit: MotorEstimate, dead_band: bool) -> None:
@@ -84,8 +113,14 @@ def _turning_as_in_readme(table: Table, run: Run, fit: MotorEstimate, dead_band:
             table.add(
                 f"README {TURNING_DUTY}", None, data="udea turning", what=f"{way}: rmse of u", value=rms, unit="%"
             )
-        table.add(f"README {TURNING if dead_band else TURNING_PROPORTIONAL}", None, data="udea turning",
-                  what=f"{way}: rmse of w", value=rms / float(numbers[0]), unit="rad/s")  # fmt: skip
+        table.add(
+            f"README {TURNING if dead_band else TURNING_PROPORTIONAL}",
+            None,
+            data="udea turning",
+            what=f"{way}: rmse of w",
+            value=rms / float(numbers[0]),
+            unit="rad/s",
+        )
 
 
 def windows_of_turning(run: Run) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -117,8 +152,9 @@ def window_rmse(fit: MotorEstimate, runs: Sequence[Run], most_span: float = np.i
     """
     errors = [
         float(np.mean(speed[rows])) - _measured(run, rows, fit.motor)
-        for run, speed in zip(runs, run_motor(fit, runs), strict=True) for rows in windows(run, fit.motor, most_span)
-    ]  # fmt: skip
+        for run, speed in zip(runs, run_motor(fit, runs), strict=True)
+        for rows in windows(run, fit.motor, most_span)
+    ]
     return float(np.sqrt(np.nanmean(np.square(errors))))
 
 
@@ -150,15 +186,32 @@ def drives(table: Table) -> None:
             own.append(window_rmse(fit, runs[:3], SPAN))
             other.append(window_rmse(fit, runs[3:], SPAN))
             if dead_band:
-                table.add("README 1.0, none visible", None, data="udea drives", what=f"dead zone, motor {motor + 1}",
-                          value=fit.value["dead_band"], unit="%",
-                          **{"+-": fit.std["dead_band"]})  # fmt: skip
-            table.add("README 0.32 to 0.33", None, data="udea drives", what=f"1/slope, motor {motor + 1}, {words}",
-                      value=1.0 / fit.value["slope"], unit="(rad/s)/%")  # fmt: skip
+                table.add(
+                    "README 1.0, none visible",
+                    None,
+                    data="udea drives",
+                    what=f"dead zone, motor {motor + 1}",
+                    value=fit.value["dead_band"],
+                    unit="%",
+                    **{"+-": fit.std["dead_band"]},
+                )
+            table.add(
+                "README 0.32 to 0.33",
+                None,
+                data="udea drives",
+                what=f"1/slope, motor {motor + 1}, {words}",
+                value=1.0 / fit.value["slope"],
+                unit="(rad/s)/%",
+            )
         for logs_, each in (("exp1..3", own), ("exp4, exp5", other)):
-            table.add(f"README {DRIVES}, fitted to all", None, data="udea drives",
-                      what=f"free run, rmse of w, {words}, {logs_}",
-                      value=_together(each), unit="rad/s")  # fmt: skip
+            table.add(
+                f"README {DRIVES}, fitted to all",
+                None,
+                data="udea drives",
+                what=f"free run, rmse of w, {words}, {logs_}",
+                value=_together(each),
+                unit="rad/s",
+            )
         _drives_as_in_readme(table, runs, dead_band)
     _drives_chosen(table, runs)
 
@@ -180,8 +233,14 @@ def _drives_as_in_readme(table: Table, runs: Sequence[Run], dead_band: bool) -> 
                 u = 100.0 * float(run.duty[rows, motor].mean())
                 errors.append(np.sign(u) * max(abs(u) - band, 0.0) / fit.value["slope"] - _measured(run, rows, motor))
     words = f"README's way {'with' if dead_band else 'without'} Coulomb, our numbers, exp1..5"
-    table.add(f"README {DRIVES}", None, data="udea drives", what=f"{words}: rmse of w",
-              value=float(np.sqrt(np.mean(np.square(errors)))), unit="rad/s")  # fmt: skip
+    table.add(
+        f"README {DRIVES}",
+        None,
+        data="udea drives",
+        what=f"{words}: rmse of w",
+        value=float(np.sqrt(np.mean(np.square(errors)))),
+        unit="rad/s",
+    )
 
 
 def _drives_chosen(table: Table, runs: Sequence[Run]) -> None:
@@ -196,8 +255,14 @@ def _drives_chosen(table: Table, runs: Sequence[Run]) -> None:
     ]
     words = "; ".join(f"{c.way['between']}, {'with' if c.way['dead_band'] else 'without'} Coulomb" for c in choices)
     value = _together([score(choice.fit, runs[3:]) for choice in choices])
-    table.add(f"<= {DRIVES}, README, fitted to all", value <= DRIVES, data="udea drives",
-              what=f"chosen on exp1..3 ({words}): exp4, exp5", value=value, unit="rad/s")  # fmt: skip
+    table.add(
+        f"<= {DRIVES}, README, fitted to all",
+        value <= DRIVES,
+        data="udea drives",
+        what=f"chosen on exp1..3 ({words}): exp4, exp5",
+        value=value,
+        unit="rad/s",
+    )
 
 
 def _together(errors: Sequence[float]) -> float:

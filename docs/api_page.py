@@ -32,19 +32,31 @@ NO_SIGNATURE = (
 
 # What an argument is where its docstring need not say it.
 COMMON = {
-    "robot": "as `load_robot` gives it", "run": "of `read_log` or `simulate`", "runs": "of `read_log` or `simulate`",
-    "path": "of the file", "force": "replace a file that is there", "draws": "how many plausible robots",
-    "count": "how many", "seed": "of the draws",
+    "robot": "as `load_robot` gives it",
+    "run": "of `read_log` or `simulate`",
+    "runs": "of `read_log` or `simulate`",
+    "path": "of the file",
+    "force": "replace a file that is there",
+    "draws": "how many plausible robots",
+    "count": "how many",
+    "seed": "of the draws",
     "log": "as `load_log` reads it",
-    "duration": "of the whole [s]", "max_steps": "most rows", "wheels": "how many the robot has",
-    "progress": "is told what is being done", "watch": "is told what is being done",
-}  # fmt: skip
+    "duration": "of the whole [s]",
+    "max_steps": "most rows",
+    "wheels": "how many the robot has",
+    "progress": "is told what is being done",
+    "watch": "is told what is being done",
+}
 
 FIELDS = {
-    "name": "of the robot", "source": "where it comes from, in words", "body": "mass, inertia, turning frame",
-    "wheels": "where they stand, their radii and rollers", "motor": "its constants, gear and limits",
-    "drive": "what a command is", "friction": "on the axes, along the direction of travel, at the wheels",
-}  # fmt: skip
+    "name": "of the robot",
+    "source": "where it comes from, in words",
+    "body": "mass, inertia, turning frame",
+    "wheels": "where they stand, their radii and rollers",
+    "motor": "its constants, gear and limits",
+    "drive": "what a command is",
+    "friction": "on the axes, along the direction of travel, at the wheels",
+}
 
 
 class Shown:
@@ -207,9 +219,14 @@ def _table(takes: Iterable[Argument], words: dict[str, str], fields_of_a_value: 
     head = ("holds" if fields_of_a_value else "argument", "type", "default", "what it is")
     common = FIELDS if fields_of_a_value else COMMON
     rows = [
-        (f"``{a.name}``", a.type and f"``{a.type}``", a.default and f"``{a.default}``",
-         *_escaped(words.get(a.name.lstrip("*"), common.get(a.name, "")))) for a in takes
-    ]  # fmt: skip
+        (
+            f"``{a.name}``",
+            a.type and f"``{a.type}``",
+            a.default and f"``{a.default}``",
+            *_escaped(words.get(a.name.lstrip("*"), common.get(a.name, ""))),
+        )
+        for a in takes
+    ]
     return _list_table(_without_empty([head, *rows]))
 
 

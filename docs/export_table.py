@@ -11,11 +11,15 @@ PAGE = Path(__file__).with_name("exports.md")
 BEGIN, END = "<!-- begin: docs/export_table.py -->", "<!-- end: docs/export_table.py -->"
 # Kinds that do the same with every feature share a column.
 GROUPS = {
-    "json": ("json",), "c-model, fmu": ("c-model", "fmu"), "c-controller": ("c-controller",),
+    "json": ("json",),
+    "c-model, fmu": ("c-model", "fmu"),
+    "c-controller": ("c-controller",),
     "wpilib, road-runner, gains": ("wpilib", "road-runner", "gains"),
-    "mjcf": ("mjcf",), "urdf, sdf": ("urdf", "sdf"), "ros2-control": ("ros2-control",),
+    "mjcf": ("mjcf",),
+    "urdf, sdf": ("urdf", "sdf"),
+    "ros2-control": ("ros2-control",),
     "ros2-node": ("ros2-node",),
-}  # fmt: skip
+}
 
 
 def export_table() -> str:

@@ -21,13 +21,16 @@ LEVELS = {"viscous": (0.94, 0.96, 0.01), "coulomb": (2.2, 1.5, 0.099)}
 HOLDS, FALLS = {"breakaway": (2.8, 1.9, 0.13)}, {"stribeck_speed": (0.02, 0.02, 0.2)}
 STIFF = {"stiffness": (2e4, 2e4, 2e2)}
 LAWS = {
-    "Coulomb": {}, "breakaway": HOLDS, "Stribeck": HOLDS | FALLS, "LuGre": HOLDS | FALLS | STIFF | {"law": "lugre"},
+    "Coulomb": {},
+    "breakaway": HOLDS,
+    "Stribeck": HOLDS | FALLS,
+    "LuGre": HOLDS | FALLS | STIFF | {"law": "lugre"},
     "Dahl": STIFF | {"law": "dahl"},
-}  # fmt: skip
+}
 MORE = {
     "elasto-plastic": HOLDS | FALLS | STIFF | {"law": "elastoplastic"},
     "Karnopp": HOLDS | {"law": "karnopp", "karnopp_speed": (2e-3, 2e-3, 2e-2)},
-}  # fmt: skip
+}
 COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, GREY, ORANGE, SKY)
 LINES = ("-", "--", "-.", (0, (1, 1)), (0, (4, 1, 1, 1)), (0, (5, 2)), (0, (2, 2)))
 DT, RAMP, SWING = 1e-3, 4.0, 2.0  # [s]

@@ -71,13 +71,18 @@ def test_right_ones_pass_and_what_an_iterator_holds_is_not_asked():
 @pytest.mark.parametrize(
     "call",
     [
-        omnidyn.dead_zone, omnidyn.axis_patterns, omnidyn.state_space, omnidyn.plausible,
-        lambda name: omnidyn.dead_zone_map(name, [0.0]), lambda name: omnidyn.breakaway_voltage(name, VOLTS),
-        lambda name: omnidyn.moving_axes(name, VOLTS), lambda name: omnidyn.confidence_band(name, VOLTS, 0.1),
+        omnidyn.dead_zone,
+        omnidyn.axis_patterns,
+        omnidyn.state_space,
+        omnidyn.plausible,
+        lambda name: omnidyn.dead_zone_map(name, [0.0]),
+        lambda name: omnidyn.breakaway_voltage(name, VOLTS),
+        lambda name: omnidyn.moving_axes(name, VOLTS),
+        lambda name: omnidyn.confidence_band(name, VOLTS, 0.1),
         lambda name: omnidyn.acceleration(name, np.zeros(3), np.zeros(3)),
         lambda name: omnidyn.identify(TABLE, name),
     ],
-)  # fmt: skip
+)
 def test_the_name_of_a_robot_is_no_robot_anywhere(call):
     """It was AttributeError: 'str' object has no attribute 'motor'."""
     with pytest.raises(InputError, match=r"no Robot; got the text 'axebot'.*load_robot"):

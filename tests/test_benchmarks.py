@@ -16,9 +16,20 @@ from benchmarks.answers import differences
 
 ROOT = Path(__file__).resolve().parents[1]
 QUICK = (
-    "house", "path_of_a_value", "accuracy", "simulate", "inductance", "rest", "compare", "check", "exports", "stagger",
-    "identify_loop", "ten_robots", "studies",
-)  # fmt: skip
+    "house",
+    "path_of_a_value",
+    "accuracy",
+    "simulate",
+    "inductance",
+    "rest",
+    "compare",
+    "check",
+    "exports",
+    "stagger",
+    "identify_loop",
+    "ten_robots",
+    "studies",
+)
 
 
 @pytest.mark.long

@@ -133,9 +133,14 @@ def test_a_plot_starts_no_pyplot_and_leaves_the_backend_alone(tmp_path):
     )
     sources = str(Path(__file__).resolve().parents[1] / "src")
     result = subprocess.run(
-        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=True,
+        [sys.executable, "-c", script],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
         env={"PYTHONPATH": sources, "HOME": str(tmp_path)},
-    )  # fmt: skip
+    )
     assert result.stdout == "False True\n"
 
 

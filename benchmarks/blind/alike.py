@@ -58,24 +58,39 @@ class Alike:
     def world(self, world: World) -> World:
         """The truth of a file that says `world`."""
         f = self.factor
-        return replace(world, **{
-            GAIN: {"gain": f}, OHM: {"resistance": (world.resistance[0] * f,) * 3},
-            TORQUE: {"torque_constant": (world.torque_constant[0] * f,) * 3},
-            RADIUS: {"wheel_radius": (world.wheel_radius[0] * f,) * 3}, MASS: {"mass": world.mass * f},
-            INERTIA: {"inertia": world.inertia * f}, ARM: {"robot_radius": world.robot_radius * f},
-        }[self.cause])  # type: ignore[arg-type]  # fmt: skip
+        return replace(
+            world,
+            **{
+                GAIN: {"gain": f},
+                OHM: {"resistance": (world.resistance[0] * f,) * 3},
+                TORQUE: {"torque_constant": (world.torque_constant[0] * f,) * 3},
+                RADIUS: {"wheel_radius": (world.wheel_radius[0] * f,) * 3},
+                MASS: {"mass": world.mass * f},
+                INERTIA: {"inertia": world.inertia * f},
+                ARM: {"robot_radius": world.robot_radius * f},
+            }[self.cause],
+        )  # type: ignore[arg-type]
 
 
 ALIKE = (
-    *(Alike(cause, factor, RICH, logged, OF_MOTORS)
-      for logged in (TWIST, WHEELS) for cause, factor in ((GAIN, 0.9), (OHM, 1.15), (TORQUE, 0.9), (RADIUS, 1.06))),
-    *(Alike(cause, factor, FORWARD, TWIST, (*OF_MOTORS, MASS))
-      for cause, factor in ((GAIN, 0.9), (OHM, 1.15), (TORQUE, 1.1), (RADIUS, 0.94), (MASS, 1.2))),
-    *(Alike(cause, factor, SIDEWAYS, WHEELS, (*OF_MOTORS, MASS))
-      for cause, factor in ((GAIN, 1.1), (OHM, 0.87), (MASS, 0.8))),
-    *(Alike(cause, factor, TURNS, TWIST, (*OF_MOTORS, INERTIA, ARM))
-      for cause, factor in ((GAIN, 0.9), (OHM, 1.15), (INERTIA, 1.2), (ARM, 1.06))),
-)  # fmt: skip
+    *(
+        Alike(cause, factor, RICH, logged, OF_MOTORS)
+        for logged in (TWIST, WHEELS)
+        for cause, factor in ((GAIN, 0.9), (OHM, 1.15), (TORQUE, 0.9), (RADIUS, 1.06))
+    ),
+    *(
+        Alike(cause, factor, FORWARD, TWIST, (*OF_MOTORS, MASS))
+        for cause, factor in ((GAIN, 0.9), (OHM, 1.15), (TORQUE, 1.1), (RADIUS, 0.94), (MASS, 1.2))
+    ),
+    *(
+        Alike(cause, factor, SIDEWAYS, WHEELS, (*OF_MOTORS, MASS))
+        for cause, factor in ((GAIN, 1.1), (OHM, 0.87), (MASS, 0.8))
+    ),
+    *(
+        Alike(cause, factor, TURNS, TWIST, (*OF_MOTORS, INERTIA, ARM))
+        for cause, factor in ((GAIN, 0.9), (OHM, 1.15), (INERTIA, 1.2), (ARM, 1.06))
+    ),
+)
 
 
 def world_told(case: Alike, seed: int) -> World:

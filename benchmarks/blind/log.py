@@ -15,8 +15,13 @@ from omnidyn.run import Run
 
 RATE, SECONDS = 100.0, 20.0
 STARTS = 1.15  # of the truth, where what is free begins
-NOISE = {TWIST: np.array([0.01, 0.01, 0.08]), WHEELS: 0.3, CURRENT: 0.05, POSE: np.array([0.004, 0.004, 0.01]),
-         HEADING: np.array([0.004, 0.004, 0.01])}  # fmt: skip
+NOISE = {
+    TWIST: np.array([0.01, 0.01, 0.08]),
+    WHEELS: 0.3,
+    CURRENT: 0.05,
+    POSE: np.array([0.004, 0.004, 0.01]),
+    HEADING: np.array([0.004, 0.004, 0.01]),
+}
 SETTLED = 3.0  # [s] before a log of one constant speed begins
 
 
@@ -27,9 +32,15 @@ def world_of(setup: Setup, seed: int) -> World:
     base = World()
     rotor = near(2e-6) if ROTOR in setup.free else 0.0
     return replace(
-        base, mass=near(2.4), inertia=near(0.016), resistance=(near(2.2),) * 3, torque_constant=(near(0.0105),) * 3,
-        coulomb=(near(3.0), near(3.4), near(0.2)), viscous=(near(3.0), near(3.4), near(0.03)), rotor_inertia=rotor,
-    )  # fmt: skip
+        base,
+        mass=near(2.4),
+        inertia=near(0.016),
+        resistance=(near(2.2),) * 3,
+        torque_constant=(near(0.0105),) * 3,
+        coulomb=(near(3.0), near(3.4), near(0.2)),
+        viscous=(near(3.0), near(3.4), near(0.03)),
+        rotor_inertia=rotor,
+    )
 
 
 def robot_of(world: World) -> Robot:
@@ -83,9 +94,13 @@ def driven(world: World, setup: Setup, seed: int) -> Run:
     place = np.cumsum(np.vstack([np.zeros((1, 2)), 0.5 * (ground[1:] + ground[:-1]) / RATE]), axis=0)
     back = motion.wheel_speed * np.array(world.torque_constant) * world.gear_ratio
     return Run(
-        t, voltage=voltage, twist=motion.twist, wheel_speed=motion.wheel_speed,
-        current=(voltage - back) / np.array(world.resistance), pose=np.column_stack([place, heading]),
-    )  # fmt: skip
+        t,
+        voltage=voltage,
+        twist=motion.twist,
+        wheel_speed=motion.wheel_speed,
+        current=(voltage - back) / np.array(world.resistance),
+        pose=np.column_stack([place, heading]),
+    )
 
 
 def noisy(setup: Setup, run: Run, seed: int) -> Run:

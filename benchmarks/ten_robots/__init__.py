@@ -33,13 +33,21 @@ def measure() -> Table:
         name, least = found.worst
         met = found.pooled >= POOLED - slack and found.reported >= REPORTED and (LOGS < ALL or least >= SINGLE)
         table.add(
-            f"coverage >= {POOLED}, least >= {SINGLE}, reported >= {REPORTED}", bool(met and not found.words),
-            robot=case.name, what=case.words, logs=len(found.exits), numbers=intervals, coverage=found.pooled,
-            least=least, of=name, reported=found.reported, **{
+            f"coverage >= {POOLED}, least >= {SINGLE}, reported >= {REPORTED}",
+            bool(met and not found.words),
+            robot=case.name,
+            what=case.words,
+            logs=len(found.exits),
+            numbers=intervals,
+            coverage=found.pooled,
+            least=least,
+            of=name,
+            reported=found.reported,
+            **{
                 "exit 4": sum(code == 4 for code in found.exits),
                 "s a log": float(np.median(found.seconds)) if found.seconds else None,
             },
-        )  # fmt: skip
+        )
         table.notes += [f"{case.name}: {words}" for words in found.words[:3]]
         missed = sorted(key for key, asked in found.asked.items() if found.told[key] < asked)
         table.notes += [f"{case.name}: determined, but not always reported: {', '.join(missed)}"] if missed else []

@@ -58,9 +58,11 @@ class Number:
 def numbers(world: World) -> list[Number]:
     """What `init` guesses of a world, by the keys of its file."""
     found = [
-        Number("motor.resistance_ohm", "resistance"), Number("motor.torque_constant_Nm_A", "torque_constant"),
-        Number("motor.gear_ratio", "gear_ratio"), Number("body.inertia_kg_m2", "inertia"),
-    ]  # fmt: skip
+        Number("motor.resistance_ohm", "resistance"),
+        Number("motor.torque_constant_Nm_A", "torque_constant"),
+        Number("motor.gear_ratio", "gear_ratio"),
+        Number("body.inertia_kg_m2", "inertia"),
+    ]
     if world.rotor_inertia > 0.0:
         found.append(Number("motor.rotor_inertia_kg_m2", "rotor_inertia"))
     if world.loop[2] > 0.0:
@@ -68,10 +70,13 @@ def numbers(world: World) -> list[Number]:
     if world.shape == ELLIPSE:
         table = "friction.direction"
         return [
-            *found, Number(f"{table}.coulomb[0]", "coulomb", (0,)), Number(f"{table}.coulomb[1]", "coulomb", (1,)),
-            Number(f"{table}.viscous", "viscous", (0, 1)), Number(f"{table}.yaw_coulomb", "coulomb", (2,)),
+            *found,
+            Number(f"{table}.coulomb[0]", "coulomb", (0,)),
+            Number(f"{table}.coulomb[1]", "coulomb", (1,)),
+            Number(f"{table}.viscous", "viscous", (0, 1)),
+            Number(f"{table}.yaw_coulomb", "coulomb", (2,)),
             Number(f"{table}.yaw_viscous", "viscous", (2,)),
-        ]  # fmt: skip
+        ]
     return [
         *found,
         *(Number(f"friction.axes.{level}[{axis}]", level, (axis,)) for level in LEVELS for axis in range(3)),

@@ -49,9 +49,17 @@ def init_options(world: World, *more: str) -> tuple[str, ...]:
     """What a ruler and a scale tell."""
     where = ("--mecanum",) if world.roller else ("--azimuth", ",".join(f"{a:g}" for a in world.azimuth))
     return (
-        *where, "--wheel-radius", _numbers(world.wheel_radius), "--robot-radius", _numbers(world.robot_radius),
-        "--mass", f"{world.mass:g}", "--voltage-limit", f"{world.voltage_limit:g}", *more,
-    )  # fmt: skip
+        *where,
+        "--wheel-radius",
+        _numbers(world.wheel_radius),
+        "--robot-radius",
+        _numbers(world.robot_radius),
+        "--mass",
+        f"{world.mass:g}",
+        "--voltage-limit",
+        f"{world.voltage_limit:g}",
+        *more,
+    )
 
 
 def _rotors(share: float, mass: float, radius: float, gear: float, wheels: int) -> float:
@@ -72,67 +80,216 @@ MECANUM = {"azimuth": (90.0, -90.0, 90.0, -90.0), "roller": (-45.0, 45.0, 45.0, 
 def cases() -> tuple[Case, ...]:
     """The ten."""
     kiwi = World(
-        THREE, (0.03,) * 3, (0.11,) * 3, 2.4, 0.016, 2.2, 0.0105, 24.0, 12.0, (3.9, 3.9, 0.2), (1.2, 1.2, 0.012),
-    )  # fmt: skip
+        THREE,
+        (0.03,) * 3,
+        (0.11,) * 3,
+        2.4,
+        0.016,
+        2.2,
+        0.0105,
+        24.0,
+        12.0,
+        (3.9, 3.9, 0.2),
+        (1.2, 1.2, 0.012),
+    )
     duty = World(
-        THREE, (0.029,) * 3, (0.12,) * 3, 3.1, 0.022, 2.9, 0.014, 30.0, 12.0, (5.2, 4.4, 0.24), (0.9, 0.9, 0.01),
+        THREE,
+        (0.029,) * 3,
+        (0.12,) * 3,
+        3.1,
+        0.022,
+        2.9,
+        0.014,
+        30.0,
+        12.0,
+        (5.2, 4.4, 0.24),
+        (0.9, 0.9, 0.01),
         rotor_inertia=_rotors(0.2, 3.1, 0.029, 30.0, 3),
-    )  # fmt: skip
+    )
     square = World(
-        FOUR, (0.05,) * 4, (0.2,) * 4, 6.2, 0.13, 1.6, 0.021, 30.0, 12.0, (14.0, 14.0, 1.2), (3.0, 3.0, 0.12),
+        FOUR,
+        (0.05,) * 4,
+        (0.2,) * 4,
+        6.2,
+        0.13,
+        1.6,
+        0.021,
+        30.0,
+        12.0,
+        (14.0, 14.0, 1.2),
+        (3.0, 3.0, 0.12),
         rotor_inertia=1.5e-6,
-    )  # fmt: skip
+    )
     captured = World(
-        FOUR, (0.04,) * 4, (0.15,) * 4, 4.0, 0.05, 2.1, 0.016, 25.0, 11.1, (7.0, 8.5, 0.5), (1.5, 1.5, 0.03),
-    )  # fmt: skip
+        FOUR,
+        (0.04,) * 4,
+        (0.15,) * 4,
+        4.0,
+        0.05,
+        2.1,
+        0.016,
+        25.0,
+        11.1,
+        (7.0, 8.5, 0.5),
+        (1.5, 1.5, 0.03),
+    )
     mecanum = World(
-        **MECANUM, wheel_radius=(0.05,) * 4, robot_radius=(0.3,) * 4, mass=7.5, inertia=0.3, resistance=1.1,
-        torque_constant=0.02, gear_ratio=26.0, voltage_limit=12.0, coulomb=(8.0, 14.0, 1.8), viscous=(2.5, 2.5, 0.2),
+        **MECANUM,
+        wheel_radius=(0.05,) * 4,
+        robot_radius=(0.3,) * 4,
+        mass=7.5,
+        inertia=0.3,
+        resistance=1.1,
+        torque_constant=0.02,
+        gear_ratio=26.0,
+        voltage_limit=12.0,
+        coulomb=(8.0, 14.0, 1.8),
+        viscous=(2.5, 2.5, 0.2),
         rotor_inertia=_rotors(0.2, 7.5, 0.05, 26.0, 8),
-    )  # fmt: skip
+    )
     current = World(
-        **MECANUM, wheel_radius=(0.038,) * 4, robot_radius=(0.24,) * 4, mass=5.0, inertia=0.11, resistance=1.7,
-        torque_constant=0.017, gear_ratio=20.0, voltage_limit=12.0, coulomb=(7.5, 11.0, 1.1), viscous=(2.0, 2.0, 0.1),
+        **MECANUM,
+        wheel_radius=(0.038,) * 4,
+        robot_radius=(0.24,) * 4,
+        mass=5.0,
+        inertia=0.11,
+        resistance=1.7,
+        torque_constant=0.017,
+        gear_ratio=20.0,
+        voltage_limit=12.0,
+        coulomb=(7.5, 11.0, 1.1),
+        viscous=(2.0, 2.0, 0.1),
         rotor_inertia=_rotors(0.2, 5.0, 0.038, 20.0, 8),
-    )  # fmt: skip
+    )
     six = World(
-        SIX, (0.06,) * 6, (0.25,) * 6, 15.0, 0.5, 1.4, 0.03, 28.0, 24.0, (26.0, 26.0, 3.4), (6.0, 6.0, 0.4),
-    )  # fmt: skip
+        SIX,
+        (0.06,) * 6,
+        (0.25,) * 6,
+        15.0,
+        0.5,
+        1.4,
+        0.03,
+        28.0,
+        24.0,
+        (26.0, 26.0, 3.4),
+        (6.0, 6.0, 0.4),
+    )
     uneven = World(
-        THREE, (0.03, 0.03, 0.034), (0.11, 0.11, 0.14), 2.8, 0.02, 2.4, 0.011, 24.0, 12.0, (4.2, 4.2, 0.24),
+        THREE,
+        (0.03, 0.03, 0.034),
+        (0.11, 0.11, 0.14),
+        2.8,
+        0.02,
+        2.4,
+        0.011,
+        24.0,
+        12.0,
+        (4.2, 4.2, 0.24),
         (1.0, 1.0, 0.012),
-    )  # fmt: skip
+    )
     looped = World(
-        FOUR, (0.05,) * 4, (0.18,) * 4, 5.5, 0.09, 1.5, 0.02, 30.0, 12.0, (12.0, 10.0, 0.9), (2.5, 2.5, 0.08),
+        FOUR,
+        (0.05,) * 4,
+        (0.18,) * 4,
+        5.5,
+        0.09,
+        1.5,
+        0.02,
+        30.0,
+        12.0,
+        (12.0, 10.0, 0.9),
+        (2.5, 2.5, 0.08),
         loop=(0.6, 4.0, 100.0),
-    )  # fmt: skip
+    )
     box = World(
-        (180.0, -60.0, 60.0), (0.035,) * 3, (0.1,) * 3, 1.5, 0.0095, 1.69, 0.0085, 19.0, 8.0, (2.2, 1.5, 0.099),
-        (0.94, 0.96, 0.01), shape=BOX, rotor_inertia=_rotors(0.2, 1.5, 0.035, 19.0, 3),
-    )  # fmt: skip
+        (180.0, -60.0, 60.0),
+        (0.035,) * 3,
+        (0.1,) * 3,
+        1.5,
+        0.0095,
+        1.69,
+        0.0085,
+        19.0,
+        8.0,
+        (2.2, 1.5, 0.099),
+        (0.94, 0.96, 0.01),
+        shape=BOX,
+        rotor_inertia=_rotors(0.2, 1.5, 0.035, 19.0, 3),
+    )
     loop = ",".join(f"{value:g}" for value in looped.loop)
     return (
         Case("kiwi", kiwi, Sensors(speeds=0.15), init_options(kiwi), words="3 omni; volts; wheel speeds"),
-        Case("arduino", duty, Sensors(counts=1440, gyro=0.02, duty=True), init_options(duty), (*_counts(1440), *PWM),
-             words="3 omni, rotors 20 %; PWM, counts, gyro"),
-        Case("square", square, Sensors(counts=2048), init_options(square), _counts(2048), 100.0,
-             "4 omni at 45 deg, rotors 18 %; volts, counts"),
-        Case("studio", captured, Sensors(capture=(0.001, 0.003), duty=True), init_options(captured), PWM, 100.0,
-             "4 omni at 45 deg; PWM, motion capture"),
-        Case("mecanum", mecanum, Sensors(counts=1024, capture=(0.002, 0.004), duty=True), init_options(mecanum),
-             (*_counts(1024), *PWM), words="mecanum, rotors 20 %; PWM, counts, motion capture"),
-        Case("currents", current, Sensors(speeds=0.1, amps=0.05), init_options(current), (), 100.0,
-             "mecanum, rotors 20 %; volts, wheel speeds, currents"),
-        Case("six", six, Sensors(speeds=0.08, gyro=0.01), init_options(six),
-             words="6 wheels; volts, wheel speeds, gyro"),
-        Case("uneven", uneven, Sensors(speeds=0.12, gyro=0.02), init_options(uneven),
-             words="3 omni, unequal radii; volts, wheel speeds, gyro"),
-        Case("firmware", looped, Sensors(speeds=0.1, amps=0.05, loop=True),
-             init_options(looped, "--speed-loop", loop), (), 100.0 / 3.0,
-             "4 omni behind a loop of 100 Hz, logged at 33 Hz; set speeds, speeds, currents"),
-        Case("paper", box, Sensors(speeds=0.15, gyro=0.02, duty=True), init_options(box, "--friction", "axes"),
-             PWM, words="3 omni, the paper's box, rotors 20 %; PWM, wheel speeds, gyro"),
-    )  # fmt: skip
+        Case(
+            "arduino",
+            duty,
+            Sensors(counts=1440, gyro=0.02, duty=True),
+            init_options(duty),
+            (*_counts(1440), *PWM),
+            words="3 omni, rotors 20 %; PWM, counts, gyro",
+        ),
+        Case(
+            "square",
+            square,
+            Sensors(counts=2048),
+            init_options(square),
+            _counts(2048),
+            100.0,
+            "4 omni at 45 deg, rotors 18 %; volts, counts",
+        ),
+        Case(
+            "studio",
+            captured,
+            Sensors(capture=(0.001, 0.003), duty=True),
+            init_options(captured),
+            PWM,
+            100.0,
+            "4 omni at 45 deg; PWM, motion capture",
+        ),
+        Case(
+            "mecanum",
+            mecanum,
+            Sensors(counts=1024, capture=(0.002, 0.004), duty=True),
+            init_options(mecanum),
+            (*_counts(1024), *PWM),
+            words="mecanum, rotors 20 %; PWM, counts, motion capture",
+        ),
+        Case(
+            "currents",
+            current,
+            Sensors(speeds=0.1, amps=0.05),
+            init_options(current),
+            (),
+            100.0,
+            "mecanum, rotors 20 %; volts, wheel speeds, currents",
+        ),
+        Case(
+            "six", six, Sensors(speeds=0.08, gyro=0.01), init_options(six), words="6 wheels; volts, wheel speeds, gyro"
+        ),
+        Case(
+            "uneven",
+            uneven,
+            Sensors(speeds=0.12, gyro=0.02),
+            init_options(uneven),
+            words="3 omni, unequal radii; volts, wheel speeds, gyro",
+        ),
+        Case(
+            "firmware",
+            looped,
+            Sensors(speeds=0.1, amps=0.05, loop=True),
+            init_options(looped, "--speed-loop", loop),
+            (),
+            100.0 / 3.0,
+            "4 omni behind a loop of 100 Hz, logged at 33 Hz; set speeds, speeds, currents",
+        ),
+        Case(
+            "paper",
+            box,
+            Sensors(speeds=0.15, gyro=0.02, duty=True),
+            init_options(box, "--friction", "axes"),
+            PWM,
+            words="3 omni, the paper's box, rotors 20 %; PWM, wheel speeds, gyro",
+        ),
+    )
 
 
 def commands(case: Case, rng: np.random.Generator) -> np.ndarray:
@@ -181,8 +338,11 @@ def write_log(case: Case, seed: int, path: Path) -> None:
     each: Callable[[str], list[str]] = lambda words: [words.format(i + 1) for i in range(wheels)]  # noqa: E731
     columns: list[tuple[list[str], np.ndarray, str]] = []
     if sensors.duty:
-        columns = [(["time_ms"], np.round(motion.t[:-1, None] * 1e3, 3), "%.10g"), (each("pwm{}"), asked, "%d"),
-                   (["vbat_V"], battery[:, None], "%.2f")]  # fmt: skip
+        columns = [
+            (["time_ms"], np.round(motion.t[:-1, None] * 1e3, 3), "%.10g"),
+            (each("pwm{}"), asked, "%d"),
+            (["vbat_V"], battery[:, None], "%.2f"),
+        ]
     elif sensors.loop:
         columns = [(["t_s"], motion.t[:-1, None], "%.6f"), (each("w{}_cmd_rad_s"), asked, "%.4f")]
     else:

@@ -84,10 +84,29 @@ def drive(world: World, command: np.ndarray, dt: float, looped: bool = False) ->
     kp, ki, rate = world.loop
     inverse = np.linalg.inv(world.M)
     _run(
-        np.ascontiguousarray(command, dtype=float), dt, STEP, world.G, world.M, inverse, world.mass, world.push,
-        world.emf, world.resistance, world.current_limit, np.array(world.coulomb), np.array(world.viscous), world.shape,
-        looped, kp, ki, rate or 1.0, world.voltage_limit, np.array(world.wheel_radius), states, volts,
-    )  # fmt: skip
+        np.ascontiguousarray(command, dtype=float),
+        dt,
+        STEP,
+        world.G,
+        world.M,
+        inverse,
+        world.mass,
+        world.push,
+        world.emf,
+        world.resistance,
+        world.current_limit,
+        np.array(world.coulomb),
+        np.array(world.viscous),
+        world.shape,
+        looped,
+        kp,
+        ki,
+        rate or 1.0,
+        world.voltage_limit,
+        np.array(world.wheel_radius),
+        states,
+        volts,
+    )
     return Motion(np.arange(n + 1) * dt, states[:, :3], states[:, 3:6], states[:, 6:], volts)
 
 
@@ -270,9 +289,29 @@ def _advance(y, span, step, stuck, sign, args, force):
 
 @numba.njit(cache=True)
 def _run(
-    command, dt, step, G, M, Minv, mass, push, emf, resistance, limit, coulomb, viscous, shape, looped, kp, ki, rate,
-    voltage_limit, radius, states, volts,
-):  # fmt: skip
+    command,
+    dt,
+    step,
+    G,
+    M,
+    Minv,
+    mass,
+    push,
+    emf,
+    resistance,
+    limit,
+    coulomb,
+    viscous,
+    shape,
+    looped,
+    kp,
+    ki,
+    rate,
+    voltage_limit,
+    radius,
+    states,
+    volts,
+):
     count = G.shape[1]
     y, force, u = np.zeros(9), np.zeros(3), np.zeros(count)
     stuck, sign, total = np.array([True, True, True]), np.zeros(3), np.zeros(count)

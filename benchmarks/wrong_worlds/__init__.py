@@ -24,9 +24,20 @@ if TYPE_CHECKING:
 LOGS, TWO, RIGHT_LOGS = (scaled(n) for n in (25, 200, 112))  # of each kind, of two, of each noise
 SILENT, NAMED, CALM, HELD, FALSE, RICHER = 0.02, 0.9, 0.9, 0.9, 0.03, 0.05
 COLUMNS = [
-    "world", "cause", "logs", "off", "silent", "found", "visible", "found of visible", "1st or 2nd", "sure", "held",
-    "s a log", "first",
-]  # fmt: skip
+    "world",
+    "cause",
+    "logs",
+    "off",
+    "silent",
+    "found",
+    "visible",
+    "found of visible",
+    "1st or 2nd",
+    "sure",
+    "held",
+    "s a log",
+    "first",
+]
 
 
 def measure() -> Table:
@@ -67,13 +78,18 @@ def _cells(key: str, logs: Sequence[Seen]) -> dict[str, Any]:
     visible = [log.found for log in logs if log.visible]
     firsts = [log.first for log in logs if log.first]
     return {
-        "logs": len(logs), "off": _share(log.off for log in logs), "silent": _share(log.silent for log in logs),
-        "found": _share(log.found for log in logs), "visible": _share(log.visible for log in logs),
-        "found of visible": _share(visible), "1st or 2nd": _share(log.early for log in logs) if key else None,
-        "sure": None if key else _share(log.sure for log in logs), "s a log": _share(log.seconds for log in logs),
+        "logs": len(logs),
+        "off": _share(log.off for log in logs),
+        "silent": _share(log.silent for log in logs),
+        "found": _share(log.found for log in logs),
+        "visible": _share(log.visible for log in logs),
+        "found of visible": _share(visible),
+        "1st or 2nd": _share(log.early for log in logs) if key else None,
+        "sure": None if key else _share(log.sure for log in logs),
+        "s a log": _share(log.seconds for log in logs),
         "held": _share(each for log in logs for each in log.held) if key else None,
         "first": max(set(firsts), key=firsts.count) if firsts else "",
-    }  # fmt: skip
+    }
 
 
 def _add_totals(table: Table, every: Sequence[tuple[Kind, Seen]]) -> None:
@@ -85,10 +101,21 @@ def _add_totals(table: Table, every: Sequence[tuple[Kind, Seen]]) -> None:
         table.add(world=f"all {size}", **_cells("all", some))
     silent, early = _share(log.silent for log in logs), _share(log.early for log in told)
     sure, held = _share(log.sure for log in other), _share(each for log in told for each in log.held)
-    table.add(f"silent <= {SILENT}", _at_most(silent, SILENT), world="all", logs=len(logs), silent=silent,
-              **{"found of visible": _share(log.found for log in logs if log.visible)})  # fmt: skip
-    table.add(f"1st or 2nd >= {NAMED}", _at_least(early, NAMED), world="all that a candidate describes",
-              logs=len(told), **{"1st or 2nd": early})  # fmt: skip
+    table.add(
+        f"silent <= {SILENT}",
+        _at_most(silent, SILENT),
+        world="all",
+        logs=len(logs),
+        silent=silent,
+        **{"found of visible": _share(log.found for log in logs if log.visible)},
+    )
+    table.add(
+        f"1st or 2nd >= {NAMED}",
+        _at_least(early, NAMED),
+        world="all that a candidate describes",
+        logs=len(told),
+        **{"1st or 2nd": early},
+    )
     seen = [log for log in told if log.visible]
     early_seen: dict[str, Any] = {"1st or 2nd": _share(log.early for log in seen)}
     table.add(world="those of them that are visible", logs=len(seen), **early_seen)
@@ -110,9 +137,11 @@ def _add_two(table: Table, asked: Sequence[Seen | None]) -> None:
 def _calm_cells(seen: Sequence[Calm]) -> dict[str, Any]:
     told = [log for log in seen if not log.words]
     return {
-        "logs": len(told), "found": _share(log.found for log in told), "sure": _share(log.sure for log in told),
+        "logs": len(told),
+        "found": _share(log.found for log in told),
+        "sure": _share(log.sure for log in told),
         "held": _share(each for log in told for each in log.held),
-    }  # fmt: skip
+    }
 
 
 def _add_calm(table: Table, calm: dict[str, list[Calm]]) -> None:

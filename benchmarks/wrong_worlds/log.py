@@ -80,9 +80,14 @@ def right_case(seed: int) -> Case:
     near: Callable[[float], float] = lambda value: float(value * np.exp(rng.uniform(-0.15, 0.15)))  # noqa: E731
     base, ohm, torque = World(), near(2.2), near(0.0105)
     world = World(
-        mass=near(base.mass), inertia=near(base.inertia), resistance=(ohm,) * 3, torque_constant=(torque,) * 3,
-        coulomb=(near(3.9), near(3.9), near(0.2)), viscous=(near(1.2), near(1.2), near(0.012)), frame=seed % 3 == 2,
-    )  # fmt: skip
+        mass=near(base.mass),
+        inertia=near(base.inertia),
+        resistance=(ohm,) * 3,
+        torque_constant=(torque,) * 3,
+        coulomb=(near(3.9), near(3.9), near(0.2)),
+        viscous=(near(1.2), near(1.2), near(0.012)),
+        frame=seed % 3 == 2,
+    )
     sensor = (SPEEDS, SPEEDS, TWIST, AR, COUNTS)[seed % 5]
     return Case(world, world, Setup(100.0 if seed // 2 % 2 else 50.0, SECONDS, sensor, 0.8 if sensor == AR else 0.0))
 
@@ -128,9 +133,12 @@ def truths(world: World, shape: str) -> dict[str, float]:
     if shape == ELLIPSE:
         table = "friction.direction"
         return {
-            f"{table}.coulomb[0]": c[0], f"{table}.coulomb[1]": c[1], f"{table}.viscous": b[0],
-            f"{table}.yaw_coulomb": c[2], f"{table}.yaw_viscous": b[2],
-        }  # fmt: skip
+            f"{table}.coulomb[0]": c[0],
+            f"{table}.coulomb[1]": c[1],
+            f"{table}.viscous": b[0],
+            f"{table}.yaw_coulomb": c[2],
+            f"{table}.yaw_viscous": b[2],
+        }
     return {
         f"friction.axes.{name}[{a}]": level[a] for name, level in (("viscous", b), ("coulomb", c)) for a in range(3)
     }

@@ -83,12 +83,17 @@ def true_value(key: str, world: World) -> Any:
     """What a number of the robot file is in a world; None where that is not known here."""
     name, _, index = key.partition("[")
     field = {
-        LIMIT: world.limit, "motor.voltage_drop_V": world.drop, "body.mass_kg": world.mass,
-        "motor.gear_efficiency": world.efficiency, "motor.rotor_inertia_kg_m2": world.rotor_inertia,
-        "motor.torque_constant_Nm_A": world.torque_constant, "motor.resistance_ohm": world.resistance,
-        "wheels.wheel_radius_m": world.wheel_radius, "wheels.robot_radius_m": world.robot_radius,
+        LIMIT: world.limit,
+        "motor.voltage_drop_V": world.drop,
+        "body.mass_kg": world.mass,
+        "motor.gear_efficiency": world.efficiency,
+        "motor.rotor_inertia_kg_m2": world.rotor_inertia,
+        "motor.torque_constant_Nm_A": world.torque_constant,
+        "motor.resistance_ohm": world.resistance,
+        "wheels.wheel_radius_m": world.wheel_radius,
+        "wheels.robot_radius_m": world.robot_radius,
         "body.inertia_kg_m2": world.inertia,
-    }.get(name)  # fmt: skip
+    }.get(name)
     if isinstance(field, tuple):
         return field[int(index[:-1]) if index else 0]
     return field

@@ -16,10 +16,16 @@ from omnidyn.identification.methods import OutputError
 FIRST_SEED, SEEDS_EACH = 60_000, 1000
 # Name of a noise -> the sensor, and the correlation of its noise from row to row.
 NOISES = {
-    "white speeds": (SPEEDS, 0.0), "white twist": (TWIST, 0.0), "AR .5": (AR, 0.5), "AR .9": (AR, 0.9),
-    "AR .95": (AR, 0.95), "AR .98": (AR, 0.98), "mean of 5": (FILTERED, 0.0), "differenced counts": (COUNTS, 0.0),
+    "white speeds": (SPEEDS, 0.0),
+    "white twist": (TWIST, 0.0),
+    "AR .5": (AR, 0.5),
+    "AR .9": (AR, 0.9),
+    "AR .95": (AR, 0.95),
+    "AR .98": (AR, 0.98),
+    "mean of 5": (FILTERED, 0.0),
+    "differenced counts": (COUNTS, 0.0),
     "counts": (TICKS, 0.0),
-}  # fmt: skip
+}
 
 
 @dataclass

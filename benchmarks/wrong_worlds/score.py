@@ -29,9 +29,14 @@ VISIBLE = 12.5  # of the log likelihood, between the truth and what was fitted: 
 SURE = 2.0  # standard errors of its gain from which on a remedy is a confident one
 # What an owner knows of the numbers in the file, std in percent: with `rests_on` part of what an interval owes.
 KNOWN = {
-    "body.mass_kg": 0.5, "body.inertia_kg_m2": 5.0, "wheels.wheel_radius_m": 0.5, "wheels.robot_radius_m": 0.5,
-    "motor.resistance_ohm": 1.0, "motor.torque_constant_Nm_A": 1.0, "motor.emf_constant_Vs_rad": 1.0,
-}  # fmt: skip
+    "body.mass_kg": 0.5,
+    "body.inertia_kg_m2": 5.0,
+    "wheels.wheel_radius_m": 0.5,
+    "wheels.robot_radius_m": 0.5,
+    "motor.resistance_ohm": 1.0,
+    "motor.torque_constant_Nm_A": 1.0,
+    "motor.emf_constant_Vs_rad": 1.0,
+}
 
 
 @dataclass

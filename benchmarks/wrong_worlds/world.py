@@ -90,15 +90,47 @@ class World:
         ellipse = np.array(self.coulomb[:2]) if self.shape == ELLIPSE else np.zeros(2)
         after = np.array([1.0, self.after_friction])
         return Physics(
-            self.G, np.stack([self._inertia(m) for m in masses]), np.array(masses) * self.frame, self.centre, self.ke,
-            self.ke, np.array(self.resistance), d, np.outer(after, level), np.outer(after, viscous),
-            self.drag * viscous / size, self.breakaway, self.aside, self.stribeck, 0.03 * size,
-            np.outer(after, ellipse), after * (self.viscous[0] if self.shape == ELLIPSE else 0.0), self.cooling, 10.0,
-            np.array(self.pull), self.gain * np.array([1.0, self.after_gain]), self.fade, self.battery,
-            self.voltage_limit, self.drop, self.dead, self.limit, self.efficiency, self.heating, self.load,
-            np.full(n, self.eccentric), self.bumps, np.array(self.wheel_radius), self.cogging, self.ripple, self.teeth,
-            self.traction, self.gap, self.change, duration,
-        )  # fmt: skip
+            self.G,
+            np.stack([self._inertia(m) for m in masses]),
+            np.array(masses) * self.frame,
+            self.centre,
+            self.ke,
+            self.ke,
+            np.array(self.resistance),
+            d,
+            np.outer(after, level),
+            np.outer(after, viscous),
+            self.drag * viscous / size,
+            self.breakaway,
+            self.aside,
+            self.stribeck,
+            0.03 * size,
+            np.outer(after, ellipse),
+            after * (self.viscous[0] if self.shape == ELLIPSE else 0.0),
+            self.cooling,
+            10.0,
+            np.array(self.pull),
+            self.gain * np.array([1.0, self.after_gain]),
+            self.fade,
+            self.battery,
+            self.voltage_limit,
+            self.drop,
+            self.dead,
+            self.limit,
+            self.efficiency,
+            self.heating,
+            self.load,
+            np.full(n, self.eccentric),
+            self.bumps,
+            np.array(self.wheel_radius),
+            self.cogging,
+            self.ripple,
+            self.teeth,
+            self.traction,
+            self.gap,
+            self.change,
+            duration,
+        )
 
     def sum(self) -> Sum:
         """The numbers that march_sum reads."""
@@ -106,10 +138,16 @@ class World:
         round_ = self.shape == ELLIPSE
         damping = (d.T * viscous) @ d + np.diag([1.0, 1.0, 0.0]) * (self.viscous[0] if round_ else 0.0)
         return Sum(
-            self.G, self._inertia(self.mass), self.mass * self.frame, self.ke, np.array(self.resistance),
-            np.ascontiguousarray(np.vstack([d, self.G.T])), np.concatenate([level, self.each_wheel]), damping,
+            self.G,
+            self._inertia(self.mass),
+            self.mass * self.frame,
+            self.ke,
+            np.array(self.resistance),
+            np.ascontiguousarray(np.vstack([d, self.G.T])),
+            np.concatenate([level, self.each_wheel]),
+            damping,
             np.array(self.coulomb[:2]) if round_ else np.zeros(2),
-        )  # fmt: skip
+        )
 
     def _elements(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(directions (k, 3), levels, viscous) of the line elements."""

@@ -29,8 +29,13 @@ def write_logs(kind: Kind, logs: int, folder: Path, small: bool = False) -> list
 def main() -> None:
     """As the command line says."""
     asked = argparse.ArgumentParser(description=__doc__)
-    asked.add_argument("names", nargs="+", choices=[kind.name for kind in KINDS], metavar="KIND",
-                       help=", ".join(kind.name for kind in KINDS))  # fmt: skip
+    asked.add_argument(
+        "names",
+        nargs="+",
+        choices=[kind.name for kind in KINDS],
+        metavar="KIND",
+        help=", ".join(kind.name for kind in KINDS),
+    )
     asked.add_argument("--logs", type=int, default=3)
     asked.add_argument("--small", action="store_true", help="as much as biases a number by 5, not 20 standard errors")
     asked.add_argument("--out", type=Path, default=Path("logs"))

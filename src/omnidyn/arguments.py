@@ -46,24 +46,30 @@ def check_order(call: str, *places: tuple[object, Kinds]) -> None:
                 first, second = sorted((one, other))
                 raise InputError(
                     "two arguments stand in each other's place",
-                    got=f"{_kind(places[first][0])} before {_kind(places[second][0])}", expected=call,
-                )  # fmt: skip
+                    got=f"{_kind(places[first][0])} before {_kind(places[second][0])}",
+                    expected=call,
+                )
     given, wanted = places[wrong[0]]
     kinds = wanted if isinstance(wanted, tuple) else (wanted,)
     names = [kind.__name__ for kind in kinds if kind is not type(None)]
     raise InputError(
-        f"an argument is no {' or '.join(names)}", got=_kind(given), expected=call,
+        f"an argument is no {' or '.join(names)}",
+        got=_kind(given),
+        expected=call,
         remedy=next((MADE_BY[name] for name in names if name in MADE_BY), ""),
-    )  # fmt: skip
+    )
 
 
 def unknown_option(owner: str, option: str, known: Iterable[str], where: str) -> InputError:
     """The error of an option that something does not have, with the nearest that it has."""
     near = difflib.get_close_matches(option, list(known), 1, 0.4)
     return InputError(
-        f"{owner} has no such option", got=option, expected=", ".join(known),
-        remedy=f"did you mean {near[0]}?" if near else "", where=where,
-    )  # fmt: skip
+        f"{owner} has no such option",
+        got=option,
+        expected=", ".join(known),
+        remedy=f"did you mean {near[0]}?" if near else "",
+        where=where,
+    )
 
 
 def _is(value: object, wanted: Kinds) -> bool:

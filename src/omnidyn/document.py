@@ -208,7 +208,7 @@ GLOSSARY = {
     "no noise": "follows speeds, voltages, the time or the like by more than chance; a memory alone is not counted.",
     "held-out error": "squared error on blocks of the log that were not fitted to.",
     "free run": "the model gets the inputs only, never what was measured after the start.",
-}  # fmt: skip
+}
 
 _TERMS = {term: re.compile(rf"(?<![\w-]){re.escape(term)}(?:s|(?![\w-]))") for term in GLOSSARY}
 

@@ -173,9 +173,12 @@ def read_bytes(path: str | os.PathLike, max_bytes: int = MAX_TEXT_BYTES) -> byte
 def empty(path: object) -> InputError:
     """For a file that holds nothing."""
     return InputError(
-        "the file is empty", got="0 bytes", expected="a file with content", remedy="copy or make it once more",
-        where=str(path)
-    )  # fmt: skip
+        "the file is empty",
+        got="0 bytes",
+        expected="a file with content",
+        remedy="copy or make it once more",
+        where=str(path),
+    )
 
 
 def too_large(path: str | os.PathLike, max_bytes: int, remedy: str = "") -> InputError:
@@ -240,8 +243,12 @@ def check_output(path: str | os.PathLike, force: bool = False) -> Path:
     if place.is_dir():
         raise InputError("cannot write the result there", got="a folder", expected="a file name", where=str(path))
     if place.exists() and not place.is_file():
-        raise InputError("cannot write the result there", got="no regular file (a pipe, a socket or a device)",
-                         expected="a file name", where=str(path))  # fmt: skip
+        raise InputError(
+            "cannot write the result there",
+            got="no regular file (a pipe, a socket or a device)",
+            expected="a file name",
+            where=str(path),
+        )
     if place.exists() and not force:
         raise InputError("the file exists already", remedy="use `force` to replace it", where=str(path))
     folder = place.parent

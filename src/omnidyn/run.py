@@ -38,10 +38,17 @@ CHANNELS = {
 }
 SENSORS = ("wheel_speed", "wheel_angle", "twist", "pose", "current")  # what was measured; all else are inputs
 UNITS = {
-    "voltage": "V", "duty": "1", "current": "A", "wheel_angle": "rad", "wheel_speed": "rad/s",
-    "wheel_speed_command": "rad/s", "twist": "m/s, m/s, rad/s", "twist_command": "m/s, m/s, rad/s",
-    "pose": "m, m, rad", "supply": "V",
-}  # fmt: skip
+    "voltage": "V",
+    "duty": "1",
+    "current": "A",
+    "wheel_angle": "rad",
+    "wheel_speed": "rad/s",
+    "wheel_speed_command": "rad/s",
+    "twist": "m/s, m/s, rad/s",
+    "twist_command": "m/s, m/s, rad/s",
+    "pose": "m, m, rad",
+    "supply": "V",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,9 +146,12 @@ class Run(Shown):
         rate = f" at {1.0 / self.step:.4g} Hz" if len(self.t) > 1 else ""
         head = f"{self.source or 'a run'}: {len(self.t)} samples, {span:.6g} s{rate}"
         data = {
-            "source": self.source, "samples": len(self.t), "duration_s": span, "channels": list(self.channels),
+            "source": self.source,
+            "samples": len(self.t),
+            "duration_s": span,
+            "channels": list(self.channels),
             "warnings": [warning.to_dict() for warning in self.warnings],
-        }  # fmt: skip
+        }
         table = Table(("channel", "", "unit", "least", "mean", "largest", "missing"), rows, "<<<>", name="channels")
         warnings = Points(self.warnings, "warning:", "warnings")
         return Document([head, "", table, warnings], data, self.warnings, ascii=True)

@@ -65,10 +65,13 @@ class Statement:
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON; a number that is not finite is None."""
         return {
-            "code": self.code, "severity": self.severity, "subject": self.subject, "text": str(self),
+            "code": self.code,
+            "severity": self.severity,
+            "subject": self.subject,
+            "text": str(self),
             "remedy": self.remedy_text,
             "numbers": plain({name: _as_plain(value) for name, value in self.numbers.items()}),
-        }  # fmt: skip
+        }
 
 
 def quoted(text: str, severity: str = WARNING) -> Statement:

@@ -39,12 +39,31 @@ _TABLE: dict[str, dict[str, float]] = {
     LENGTH: {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "in": 0.0254, "inch": 0.0254, "ft": 0.3048},
     SPEED: {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1.0 / 3.6},
     ANGLE: {
-        "rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "°": DEGREE, "rev": TURN, "turn": TURN, "turns": TURN, "rot": TURN,
+        "rad": 1.0,
+        "mrad": 1e-3,
+        "deg": DEGREE,
+        "°": DEGREE,
+        "rev": TURN,
+        "turn": TURN,
+        "turns": TURN,
+        "rot": TURN,
     },
     TURN_RATE: {
-        "rad/s": 1.0, "mrad/s": 1e-3, "deg/s": DEGREE, "°/s": DEGREE, "dps": DEGREE, "rpm": TURN / 60.0,
-        "1/min": TURN / 60.0, "rev/min": TURN / 60.0, "rot/min": TURN / 60.0, "rev/s": TURN, "rot/s": TURN,
-        "turn/s": TURN, "turns/s": TURN, "rps": TURN, "Hz": TURN,
+        "rad/s": 1.0,
+        "mrad/s": 1e-3,
+        "deg/s": DEGREE,
+        "°/s": DEGREE,
+        "dps": DEGREE,
+        "rpm": TURN / 60.0,
+        "1/min": TURN / 60.0,
+        "rev/min": TURN / 60.0,
+        "rot/min": TURN / 60.0,
+        "rev/s": TURN,
+        "rot/s": TURN,
+        "turn/s": TURN,
+        "turns/s": TURN,
+        "rps": TURN,
+        "Hz": TURN,
     },
     COUNT: {"ticks": 1.0, "tick": 1.0, "counts": 1.0, "count": 1.0, "pulses": 1.0, "pulse": 1.0, "cts": 1.0},
     # Of no channel of a log: what has one of these is nothing that a fit takes.
@@ -56,7 +75,7 @@ _TABLE: dict[str, dict[str, float]] = {
     "charge": {"Ah": 3600.0, "mAh": 3.6},
     "acceleration": {"m/s2": 1.0, "m/s^2": 1.0, "m/s²": 1.0},
     "turn acceleration": {"rad/s2": 1.0, "rad/s^2": 1.0, "rad/s²": 1.0},
-}  # fmt: skip
+}
 _NAMES = {name: (quantity, size) for quantity, names in _TABLE.items() for name, size in names.items()}
 _NUMBER = r"\d+(?:\.\d*)?(?:[eE][+-]?\d+)?"
 _UNIT = re.compile(rf"(?:({_NUMBER})\s*\*?\s*)?([^\d\s].*?)(?:\s*/\s*({_NUMBER}))?", re.ASCII)
@@ -68,15 +87,58 @@ MAX_TEXT = 64  # characters; no unit is that long
 
 # How people write them otherwise, in any mixture of capitals where they have three letters or more.
 _SPELLINGS = {
-    "rad s^-1": "rad/s", "radians": "rad", "radian": "rad", "degrees": "deg", "degree": "deg", "m s^-1": "m/s",
-    "U/min": "rpm", "r/min": "rpm", "tr/min": "rpm", "U/s": "rev/s", "tr/s": "rev/s", "seconds": "s", "second": "s",
-    "sec": "s", "secs": "s", "S": "s", "milliseconds": "ms", "millisecond": "ms", "msec": "ms", "MS": "ms",
-    "usec": "us", "microseconds": "us", "nanoseconds": "ns", "nsec": "ns", "minute": "min", "meter": "m", "meters": "m",
-    "metre": "m", "metres": "m", "inches": "in", "feet": "ft", "v": "V", "ampere": "A", "amperes": "A", "a": "A",
-    "milliamps": "mA", "millivolts": "mV", "rad_s": "rad/s", "m_s": "m/s", "deg_s": "deg/s", "rot_s": "rot/s",
-    "mm_s": "mm/s", "rev_s": "rev/s", "Grad": "deg", "rotations": "rev", "revolutions": "rev", "radps": "rad/s",
-    "millis": "ms", "micros": "us", "prozent": "%", "percentage": "%",
-}  # fmt: skip
+    "rad s^-1": "rad/s",
+    "radians": "rad",
+    "radian": "rad",
+    "degrees": "deg",
+    "degree": "deg",
+    "m s^-1": "m/s",
+    "U/min": "rpm",
+    "r/min": "rpm",
+    "tr/min": "rpm",
+    "U/s": "rev/s",
+    "tr/s": "rev/s",
+    "seconds": "s",
+    "second": "s",
+    "sec": "s",
+    "secs": "s",
+    "S": "s",
+    "milliseconds": "ms",
+    "millisecond": "ms",
+    "msec": "ms",
+    "MS": "ms",
+    "usec": "us",
+    "microseconds": "us",
+    "nanoseconds": "ns",
+    "nsec": "ns",
+    "minute": "min",
+    "meter": "m",
+    "meters": "m",
+    "metre": "m",
+    "metres": "m",
+    "inches": "in",
+    "feet": "ft",
+    "v": "V",
+    "ampere": "A",
+    "amperes": "A",
+    "a": "A",
+    "milliamps": "mA",
+    "millivolts": "mV",
+    "rad_s": "rad/s",
+    "m_s": "m/s",
+    "deg_s": "deg/s",
+    "rot_s": "rot/s",
+    "mm_s": "mm/s",
+    "rev_s": "rev/s",
+    "Grad": "deg",
+    "rotations": "rev",
+    "revolutions": "rev",
+    "radps": "rad/s",
+    "millis": "ms",
+    "micros": "us",
+    "prozent": "%",
+    "percentage": "%",
+}
 _FOLDED = {name.lower(): name for name in [*_SPELLINGS, *_NAMES] if len(name) > 2}
 
 
@@ -98,9 +160,11 @@ def parse_unit(text: str) -> Unit:
     if match is None or found is None:
         close = difflib.get_close_matches(name, [*_NAMES, *_SPELLINGS], n=1, cutoff=0.5)
         raise InputError(
-            "unknown unit", got=text, expected="a unit such as rad/s, rpm, mA or ticks/2000",
+            "unknown unit",
+            got=text,
+            expected="a unit such as rad/s, rpm, mA or ticks/2000",
             remedy=f"did you mean {close[0]}?" if close else "",
-        )  # fmt: skip
+        )
     quantity, size = found
     if match[3]:
         divisor = float(match[3])

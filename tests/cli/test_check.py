@@ -130,12 +130,15 @@ def test_a_picture_of_the_log(call, ending, magic):
     assert "exists already" in err
 
 
-@pytest.mark.parametrize("arguments, words", [
-    (["clean.csv", "--picture", "log.pdf"], "cannot tell the kind of picture"),
-    (["clean.csv", "gap.csv", "--picture", "log.png"], "a picture shows one log"),
-    ([".", "--picture", "log.png"], "a picture shows one log"),
-    (["clean.csv", "--robot", "nobody"], "nobody"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (["clean.csv", "--picture", "log.pdf"], "cannot tell the kind of picture"),
+        (["clean.csv", "gap.csv", "--picture", "log.png"], "a picture shows one log"),
+        ([".", "--picture", "log.png"], "a picture shows one log"),
+        (["clean.csv", "--robot", "nobody"], "nobody"),
+    ],
+)
 def test_what_is_refused_before_any_work(call, arguments, words):
     code, out, err = call(*arguments)
     assert (code, out) == (3, "")

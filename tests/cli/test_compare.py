@@ -82,8 +82,11 @@ def test_for_machines(call):
     assert [segment["log"] for segment in result["segments"]] == [0, 1, 1]
     inputs = result["provenance"]["inputs"]
     assert [(each["role"], each["name"]) for each in inputs] == [
-        ("robot", "axebot"), ("robot", "wrong.toml"), ("log", "run.csv"), ("log", "gap.csv")
-    ]  # fmt: skip
+        ("robot", "axebot"),
+        ("robot", "wrong.toml"),
+        ("log", "run.csv"),
+        ("log", "gap.csv"),
+    ]
     assert all(len(each["sha256"]) == 64 for each in inputs)
     assert "restarts_at_gaps" in [warning["code"] for warning in result["warnings"]]
 

@@ -46,10 +46,11 @@ def test_nothing_is_replaced_without_force(call, here):
 @pytest.mark.parametrize(
     "kind, name, options",
     [
-        ("wpilib", "robot_gains.py", []), ("c-model", "omnidyn_step.c", ["--precision", "single"]),
+        ("wpilib", "robot_gains.py", []),
+        ("c-model", "omnidyn_step.c", ["--precision", "single"]),
         ("ros2-node", "drive_loop.py", []),
     ],
-)  # fmt: skip
+)
 def test_a_folder_never_takes_the_place_of_what_the_export_reads(call, here, kind, name, options):
     """A robot file that is called as a file of the export, in the folder that the export writes."""
     (here / "out").mkdir()

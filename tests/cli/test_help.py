@@ -10,9 +10,20 @@ from omnidyn.cli.terminal.help import FIRST, MORE
 
 COMMANDS = sorted(get_command(app).commands)  # type: ignore[attr-defined]
 NEEDED_FIRST = (
-    "--robot", "--out", "--report", "--method", "--what", "--hold-out", "--per", "--free", "--fix", "--json", "--full",
-    "--column", "--assume",
-)  # fmt: skip
+    "--robot",
+    "--out",
+    "--report",
+    "--method",
+    "--what",
+    "--hold-out",
+    "--per",
+    "--free",
+    "--fix",
+    "--json",
+    "--full",
+    "--column",
+    "--assume",
+)
 
 
 def flags(text):

@@ -119,9 +119,21 @@ def test_a_log_of_another_floor_is_not_predicted(call):
 
 def test_groups_share_the_motor_and_have_their_own_friction(call, tmp_path):
     code, out, _ = call(
-        ".", "--robot", "axebot", "--per", "smooth=smooth*", "--per", "rough=rough*", "--free", "friction",
-        "--free", "motor.torque_constant_Nm_A", "--json", "-o", str(tmp_path / "f.toml"),
-    )  # fmt: skip
+        ".",
+        "--robot",
+        "axebot",
+        "--per",
+        "smooth=smooth*",
+        "--per",
+        "rough=rough*",
+        "--free",
+        "friction",
+        "--free",
+        "motor.torque_constant_Nm_A",
+        "--json",
+        "-o",
+        str(tmp_path / "f.toml"),
+    )
     assert code == 0
     result = strict(out)
     motors = {g["parameters"]["motor.torque_constant_Nm_A"]["value"] for g in result["groups"].values()}
@@ -144,8 +156,25 @@ def test_without_inputs_it_is_steady_state_and_says_why(call):
 def test_a_new_robot_is_fitted_to_its_logs_by_default(tmp_path, monkeypatch, capsys):
     """As omnidyn init writes it: friction along the direction of travel, a turning frame. The truth: 1.3 times it."""
     monkeypatch.chdir(tmp_path)
-    assert main(["init", "newbie", "--azimuth", "60,180,300", "--wheel-radius", "0.05", "--robot-radius", "0.15",
-                 "--mass", "6", "--voltage-limit", "12"]) == 0  # fmt: skip
+    assert (
+        main(
+            [
+                "init",
+                "newbie",
+                "--azimuth",
+                "60,180,300",
+                "--wheel-radius",
+                "0.05",
+                "--robot-radius",
+                "0.15",
+                "--mass",
+                "6",
+                "--voltage-limit",
+                "12",
+            ]
+        )
+        == 0
+    )
     guess = load_robot("newbie.toml")
     levels = tuple(1.3 * level for level in guess.friction.direction.coulomb)
     direction = guess.friction.direction.replace(coulomb=levels)
@@ -180,7 +209,7 @@ def test_a_new_robot_is_fitted_to_its_logs_by_default(tmp_path, monkeypatch, cap
         (["--method", "magic"], "no such method; got magic"),
         (["--per-free", "body.mass_kg"], "--per-free: there are no groups"),
     ],
-)  # fmt: skip
+)
 def test_what_does_not_belong_is_refused_by_name(call, arguments, words):
     code, out, err = call("smooth0.csv", "--robot", "axebot", *arguments)
     assert (code, out) == (3, "")
@@ -221,8 +250,18 @@ def test_an_interrupt_while_groups_are_fitted_alone_leaves_the_best_so_far(call,
                 raise KeyboardInterrupt
 
     monkeypatch.setattr(FitProgress, "enter", listening)
-    code, out, err = call(".", "--robot", "axebot", "--per", "smooth=smooth*", "--per", "rough=rough*", "--json",
-                          "-o", str(tmp_path / "{group}.toml"))  # fmt: skip
+    code, out, err = call(
+        ".",
+        "--robot",
+        "axebot",
+        "--per",
+        "smooth=smooth*",
+        "--per",
+        "rough=rough*",
+        "--json",
+        "-o",
+        str(tmp_path / "{group}.toml"),
+    )
     assert code == 130
     assert "interrupted: the numbers are the best so far" in err
     groups = strict(out)["groups"]
@@ -232,8 +271,20 @@ def test_an_interrupt_while_groups_are_fitted_alone_leaves_the_best_so_far(call,
 
 
 def test_an_interrupt_of_groups_leaves_the_best_so_far_and_the_same_again(call, tmp_path, monkeypatch):
-    arguments = (".", "--robot", "axebot", "--per", "smooth=smooth*", "--per", "rough=rough*", "--free", "friction",
-                 "--free", "motor.torque_constant_Nm_A", "--json")  # fmt: skip
+    arguments = (
+        ".",
+        "--robot",
+        "axebot",
+        "--per",
+        "smooth=smooth*",
+        "--per",
+        "rough=rough*",
+        "--free",
+        "friction",
+        "--free",
+        "motor.torque_constant_Nm_A",
+        "--json",
+    )
     found = []
     for name in ("a.toml", "b.toml"):
         monkeypatch.setattr(FitProgress, "__call__", cut_at_the_second_state())
@@ -313,9 +364,18 @@ def test_motors_by_output_error(call, tmp_path):
         put_in = np.append(level, level[-1])[:, None]
         write_run(Run(t=t, voltage=put_in, wheel_speed=measured[:, None]), tmp_path / f"{log}.csv")
     code, out, _ = call(
-        str(tmp_path / "1.csv"), str(tmp_path / "2.csv"), "--what", "motors", "--method", "output-error",
-        "--hold-out", "2.csv", "--json", "--report", str(tmp_path / "m.html"),
-    )  # fmt: skip
+        str(tmp_path / "1.csv"),
+        str(tmp_path / "2.csv"),
+        "--what",
+        "motors",
+        "--method",
+        "output-error",
+        "--hold-out",
+        "2.csv",
+        "--json",
+        "--report",
+        str(tmp_path / "m.html"),
+    )
     assert code == 0
     (motor,) = strict(out)["motors"]
     for name, true in (("slope", 0.5), ("dead_band", 0.4), ("lag", 0.05)):

@@ -141,7 +141,7 @@ def test_existing_files_are_refused_before_any_work(call, tmp_path, monkeypatch)
         ([".", "--robot", "axebot", "--group", "a=smooth", "--group", "b=s*"], "belongs to two groups; got a and b"),
         (["nothing.csv", "--robot", "axebot"], "nothing.csv: no such file"),
     ],
-)  # fmt: skip
+)
 def test_bad_input_is_exit_3(call, arguments, words):
     code, out, err = call(*arguments)
     assert (code, out) == (3, "")

@@ -259,11 +259,13 @@ def test_a_log_that_does_not_tell_of_turning_says_so(call, here):
         (["--wheel-radius", "40"], "--wheel-radius: no wheel radius is so large; got 40 m", "--wheel-radius 0.04"),
         (["--wheel-radius", "40,40,34"], "got 40,40,34 m; expected metres", "--wheel-radius 0.04,0.04,0.034"),
         (
-            ["--wheel-radius", "0.4", "--robot-radius", "0.3"], "a wheel is larger than the robot",
+            ["--wheel-radius", "0.4", "--robot-radius", "0.3"],
+            "a wheel is larger than the robot",
             "--wheel-radius 0.01016",
         ),
         (
-            ["--wheel-radius", "0.125", "--robot-radius", "0.04"], "a wheel is larger than the robot",
+            ["--wheel-radius", "0.125", "--robot-radius", "0.04"],
+            "a wheel is larger than the robot",
             "--wheel-radius 0.04 --robot-radius 0.125",
         ),
         (["--robot-radius", "125"], "--robot-radius: no robot radius is so large; got 125 m", "--robot-radius 0.125"),
@@ -273,7 +275,7 @@ def test_a_log_that_does_not_tell_of_turning_says_so(call, here):
         (["--azimuth", "0.785,2.356,-2.356,-0.785"], "look like radians", "--azimuth 45,135,-135,-45"),
         (["--azimuth", "0,2.0944,-2.0944"], "look like radians", "--azimuth 0,120,-120"),
     ],
-)  # fmt: skip
+)
 def test_sizes_that_cannot_be_are_asked_about_and_the_call_in_the_message_works(call, here, wrong, words, call_meant):
     code, out, err = call("init", "mini", *MINI, *wrong)
     assert (code, out, os.listdir(here)) == (3, "", [])
@@ -285,11 +287,15 @@ def test_sizes_that_cannot_be_are_asked_about_and_the_call_in_the_message_works(
 @pytest.mark.parametrize(
     "right",
     [
-        ["--mass", "40"], ["--mass", "0.3"], ["--robot-radius", "1.2", "--wheel-radius", "0.2", "--mass", "1450"],
-        ["--robot-radius", "0.02", "--wheel-radius", "0.008", "--mass", "0.1"], ["--azimuth", "0,10,180,270"],
-        ["--wheel-radius", "0.12"], ["--azimuth", "-5,120,240"],
+        ["--mass", "40"],
+        ["--mass", "0.3"],
+        ["--robot-radius", "1.2", "--wheel-radius", "0.2", "--mass", "1450"],
+        ["--robot-radius", "0.02", "--wheel-radius", "0.008", "--mass", "0.1"],
+        ["--azimuth", "0,10,180,270"],
+        ["--wheel-radius", "0.12"],
+        ["--azimuth", "-5,120,240"],
     ],
-)  # fmt: skip
+)
 def test_sizes_of_small_and_large_robots_are_taken(call, here, right):
     assert call("init", "mini", *MINI, *right)[0] == 0
 
@@ -355,11 +361,16 @@ def test_it_asks_again_after_a_bad_answer(typed, here):
     code, _, err = typed(answers, "init", "asked")
     assert code == 0
     for words in (
-        "got 2; expected 3 to 16 wheels", "got many; expected 3 to 16 wheels", "got 0,1; expected 3 numbers",
-        "cannot move the robot in every direction", "got 0,04; expected one number, such as 0.05",
-        "got -1.0; expected greater than", "got nan; expected one number", "mass: cannot use this value; got 0.0",
+        "got 2; expected 3 to 16 wheels",
+        "got many; expected 3 to 16 wheels",
+        "got 0,1; expected 3 numbers",
+        "cannot move the robot in every direction",
+        "got 0,04; expected one number, such as 0.05",
+        "got -1.0; expected greater than",
+        "got nan; expected one number",
+        "mass: cannot use this value; got 0.0",
         "got 1e400; expected one number",
-    ):  # fmt: skip
+    ):
         assert words in err
     assert load_robot(here / "asked.toml").body.mass == 5.0
 
@@ -552,14 +563,25 @@ def test_a_current_limit_that_holds_the_robot_is_not_blamed_on_the_pattern(call,
 
 
 def test_radii_may_differ_from_wheel_to_wheel(call, here):
-    code, *_ = call("init", "odd", "--azimuth", "60,180,300", "--wheel-radius", "0.03,0.03,0.034", "--robot-radius",
-                    "0.11,0.11,0.14", "--mass", "2.8")  # fmt: skip
+    code, *_ = call(
+        "init",
+        "odd",
+        "--azimuth",
+        "60,180,300",
+        "--wheel-radius",
+        "0.03,0.03,0.034",
+        "--robot-radius",
+        "0.11,0.11,0.14",
+        "--mass",
+        "2.8",
+    )
     assert code == 0
     robot = load_robot("odd.toml")
     assert robot.wheels.wheel_radius == (0.03, 0.03, 0.034)
     assert robot.wheels.robot_radius == (0.11, 0.11, 0.14)
-    code, _, err = call("init", "bad", "--azimuth", "60,180,300", "--wheel-radius", "3cm", "--robot-radius", "0.1",
-                        "--mass", "2.8")  # fmt: skip
+    code, _, err = call(
+        "init", "bad", "--azimuth", "60,180,300", "--wheel-radius", "3cm", "--robot-radius", "0.1", "--mass", "2.8"
+    )
     assert code == 3
     assert "--wheel-radius: not a list of numbers; got 3cm" in err
 

@@ -22,15 +22,28 @@ SENSORS = {"speeds": {"speeds": 0.1}, "counts": {"counts": COUNTS}, "pose": {"ca
 def omni(azimuth, **numbers):
     wheels = len(azimuth)
     return World(
-        azimuth, (0.04,) * wheels, (0.15,) * wheels, 4.0, 0.05, 2.1, 0.016, 25.0, 12.0, (9.0, 5.0, 0.5),
-        (1.5, 1.5, 0.03), shape=BOX, **numbers,
-    )  # fmt: skip
+        azimuth,
+        (0.04,) * wheels,
+        (0.15,) * wheels,
+        4.0,
+        0.05,
+        2.1,
+        0.016,
+        25.0,
+        12.0,
+        (9.0, 5.0, 0.5),
+        (1.5, 1.5, 0.03),
+        shape=BOX,
+        **numbers,
+    )
 
 
 ROBOTS = {
-    "three omni": omni(THREE), "four omni": omni(FOUR), "six omni": omni(SIX),
+    "three omni": omni(THREE),
+    "four omni": omni(FOUR),
+    "six omni": omni(SIX),
     "four mecanum": omni(MECANUM["azimuth"], roller=MECANUM["roller"]),
-}  # fmt: skip
+}
 
 
 @pytest.mark.long

@@ -24,9 +24,10 @@ def here(here):
 @pytest.fixture
 def driven(here, call):
     """The folder, with a log of that robot in it too."""
-    (here / "turn.csv").write_text("t_s,u1_V,u2_V,u3_V\n" + "".join(
-        f"{k / 100},{4 * (k // 50 % 2)},{3 - 6 * (k // 70 % 2)},{-4 * (k // 90 % 2)}\n" for k in range(600)
-    ))  # fmt: skip
+    (here / "turn.csv").write_text(
+        "t_s,u1_V,u2_V,u3_V\n"
+        + "".join(f"{k / 100},{4 * (k // 50 % 2)},{3 - 6 * (k // 70 % 2)},{-4 * (k // 90 % 2)}\n" for k in range(600))
+    )
     assert call("simulate", "r.toml", "turn.csv", "-o", "log.csv")[0] == 0
     return here
 
@@ -92,9 +93,14 @@ def test_a_page_that_cannot_be_drawn_costs_no_fit(call, driven, monkeypatch):
 def test_a_full_stream_costs_no_result(here, redirect):
     command = [sys.executable, "-m", "omnidyn", "simulate", "r.toml", "u.csv", "-o", "run.csv"]
     result = subprocess.run(
-        ["sh", "-c", f'exec "$@" {redirect}', "sh", *command], cwd=here, env=environment(), capture_output=True,
-        text=True, timeout=120, check=False,
-    )  # fmt: skip
+        ["sh", "-c", f'exec "$@" {redirect}', "sh", *command],
+        cwd=here,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
     assert (here / "run.csv").stat().st_size > 1000
     assert result.returncode == (3 if ">/dev/full" in redirect.replace("2>/dev/full", "") else 0)
     assert "Traceback" not in result.stderr
@@ -105,8 +111,9 @@ def test_a_full_stream_costs_no_result(here, redirect):
 def test_talk_to_a_full_stream_keeps_the_exit_code(here, redirect):
     """What could not be said waits in a buffer, and Python ends with 120 where that cannot be written."""
     command = [sys.executable, "-m", "omnidyn", "simulate", "r.toml", "no.csv"]
-    result = subprocess.run(["sh", "-c", f'exec "$@" {redirect}', "sh", *command], cwd=here, env=environment(),
-                            timeout=120, check=False)  # fmt: skip
+    result = subprocess.run(
+        ["sh", "-c", f'exec "$@" {redirect}', "sh", *command], cwd=here, env=environment(), timeout=120, check=False
+    )
     assert result.returncode == 3
 
 
@@ -131,9 +138,14 @@ def test_a_missing_file_is_told_before_anything_slow_is_loaded(here, arguments):
         "print(code, sorted(heavy & set(sys.modules)))"
     )
     result = subprocess.run(
-        [sys.executable, "-c", script], cwd=here, env=environment(), capture_output=True, text=True, timeout=60,
+        [sys.executable, "-c", script],
+        cwd=here,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=60,
         check=True,
-    )  # fmt: skip
+    )
     assert result.stdout == "3 []\n"
     assert result.stderr.count("\n") == 1
     assert "no such file" in result.stderr

@@ -112,8 +112,14 @@ def test_a_closed_pipe_is_no_error(tmp_path, arguments):
     os.close(reading)
     command = [sys.executable, "-m", "omnidyn", *arguments]
     result = subprocess.run(
-        command, cwd=tmp_path, env=environment(), stdout=writing, stderr=subprocess.PIPE, text=True, timeout=120,
-    )  # fmt: skip
+        command,
+        cwd=tmp_path,
+        env=environment(),
+        stdout=writing,
+        stderr=subprocess.PIPE,
+        text=True,
+        timeout=120,
+    )
     os.close(writing)
     assert result.returncode == 0
     assert "Traceback" not in result.stderr
@@ -143,9 +149,15 @@ def test_streams_that_are_not_there_change_nothing(tmp_path, arguments, code):
 def test_a_full_disk_behind_stdout_is_said(tmp_path):
     with open("/dev/full", "w") as full:
         result = subprocess.run(
-            [sys.executable, "-m", "omnidyn", "robots"], cwd=tmp_path, env=environment(), stdout=full,
-            stderr=subprocess.PIPE, text=True, timeout=120, check=False,
-        )  # fmt: skip
+            [sys.executable, "-m", "omnidyn", "robots"],
+            cwd=tmp_path,
+            env=environment(),
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=120,
+            check=False,
+        )
     assert result.returncode == 3
     assert "No space left on device" in result.stderr
     assert "Traceback" not in result.stderr
@@ -201,9 +213,14 @@ def test_help_is_quick(tmp_path):
         "print(sorted(heavy & set(sys.modules)), len(sys.modules) < 300, file=sys.stderr)"
     )
     result = subprocess.run(
-        [sys.executable, "-c", script], cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=60,
+        [sys.executable, "-c", script],
+        cwd=tmp_path,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        timeout=60,
         check=True,
-    )  # fmt: skip
+    )
     assert result.stderr == "[] True\n"
 
 

@@ -44,8 +44,13 @@ def test_the_values_for_machines(call):
     assert [each["name"] for each in told["controllers"]] == ["pid_no_friction", "speed_no_friction"]
     for each in told["controllers"]:
         assert set(each) >= {
-            "name", "rmse_position_m", "rmse_heading_rad", "worst_position_m", "saturated_share", "step_us"
-        }  # fmt: skip
+            "name",
+            "rmse_position_m",
+            "rmse_heading_rad",
+            "worst_position_m",
+            "saturated_share",
+            "step_us",
+        }
         assert set(each["step_us"]) == {"median", "p99"}
     assert told["provenance"]["inputs"][0]["role"] == "robot"
 

@@ -130,8 +130,13 @@ with open("asked.json", "w") as file:
 
 
 def asked(folder, *commands):
-    subprocess.run([sys.executable, "-c", ASKED, *commands], cwd=folder, check=True, stdout=subprocess.DEVNULL,
-                   env=os.environ | {"PYTHONPATH": SOURCE})  # fmt: skip
+    subprocess.run(
+        [sys.executable, "-c", ASKED, *commands],
+        cwd=folder,
+        check=True,
+        stdout=subprocess.DEVNULL,
+        env=os.environ | {"PYTHONPATH": SOURCE},
+    )
     return json.loads((folder / "asked.json").read_text())
 
 
@@ -144,10 +149,14 @@ def test_the_first_runs_need_what_commands_need(tmp_path):
     np.savetxt(tmp_path / "u.csv", rows, delimiter=",", header="t_s,u1_V,u2_V,u3_V", comments="", fmt="%.4f")
     enough = asked(tmp_path)
     needed = asked(
-        tmp_path, "simulate axebot u.csv -o run.csv", "simulate robotino u.csv", "check run.csv --robot axebot",
-        "compare run.csv --robot axebot", "identify run.csv --robot axebot --report fit.html -o fit.toml",
+        tmp_path,
+        "simulate axebot u.csv -o run.csv",
+        "simulate robotino u.csv",
+        "check run.csv --robot axebot",
+        "compare run.csv --robot axebot",
+        "identify run.csv --robot axebot --report fit.html -o fit.toml",
         "track axebot --path eight --controller mpc --duration 1",
-    )  # fmt: skip
+    )
     assert len(enough) >= 15
     assert len(needed) >= 5
     for name, signatures in needed.items():
@@ -163,6 +172,11 @@ def test_every_kernel_of_the_package_is_kept_once():
 def test_nothing_slow_is_imported_for_what_most_logs_do_not_need():
     """scipy.signal takes as long as all the rest together; only repeats in a column of wheel speeds need it."""
     told = "import sys; import omnidyn.identification.first_runs; print('scipy.signal' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", told], check=True, capture_output=True, text=True,
-                          env=os.environ | {"PYTHONPATH": SOURCE})  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-c", told],
+        check=True,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": SOURCE},
+    )
     assert done.stdout.strip() == "False"

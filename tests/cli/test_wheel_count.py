@@ -20,9 +20,11 @@ def write(path, wheels, channels=("u{}_V", "w{}_rad_s"), rows=60):
 @pytest.mark.parametrize("command", ["check", "identify", "compare"])
 @pytest.mark.parametrize(
     "wheels, robot, words",
-    [(3, "four-wheel", "fewer wheels .*; got 3 wheels; expected 4, as four-wheel has; name the robot of this log"),
-     (4, "axebot", "more wheels .*; got 4 wheels; expected 3, as axebot has; name the robot of this log")],
-)  # fmt: skip
+    [
+        (3, "four-wheel", "fewer wheels .*; got 3 wheels; expected 4, as four-wheel has; name the robot of this log"),
+        (4, "axebot", "more wheels .*; got 4 wheels; expected 3, as axebot has; name the robot of this log"),
+    ],
+)
 def test_another_number_of_wheels_is_refused(call, here, command, wheels, robot, words):
     write(here / "log.csv", wheels)
     code, _, err = call(command, "log.csv", "--robot", robot)

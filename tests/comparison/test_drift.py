@@ -33,7 +33,7 @@ def fitted(values, name="fit", source="log", keys=KEYS, std=STD):
     priors = {
         key: Prior(std=float(s), source=f"output error, {source}", origin="identified")
         for key, s in zip(keys, std, strict=True)
-    }  # fmt: skip
+    }
     robot = robot.replace(priors=priors)
     return with_correlation(robot, keys, CORRELATION, std.tolist()) if len(keys) == 6 else robot
 

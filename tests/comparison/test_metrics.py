@@ -133,8 +133,14 @@ def test_which_components_are_compared():
     assert compared_components(run, "voltage") == ("vx", "vy", "omega", "w1", "w3")
     assert compared_components(run, "wheel_speed_command")[-3:] == ("u1", "u2", "u3")
     assert [unit(name) for name in ("vx", "omega", "w2", "i1", "x", "heading", "u1")] == [
-        "m/s", "rad/s", "rad/s", "A", "m", "rad", "V"
-    ]  # fmt: skip
+        "m/s",
+        "rad/s",
+        "rad/s",
+        "A",
+        "m",
+        "rad",
+        "V",
+    ]
 
 
 def test_what_the_start_is_off_by_is_not_tested_for_whiteness():

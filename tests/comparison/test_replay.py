@@ -55,8 +55,12 @@ def test_a_free_run_is_never_set_back():
     assert (np.diff(off[20:]) > 0.0).all()
     settled = simulate(wrong, [[0.0, 3.0, -3.0]] * 600, 0.01).twist[-1, 0] - run.twist[-1, 0]
     assert off[-1] - off[300] == pytest.approx(3.0 * abs(settled), rel=1e-3)
-    blind = run.replace(**{name: np.where(np.arange(601)[:, None] < 10, getattr(run, name), 77.0)
-                           for name in ("twist", "wheel_speed", "pose", "current")})  # fmt: skip
+    blind = run.replace(
+        **{
+            name: np.where(np.arange(601)[:, None] < 10, getattr(run, name), 77.0)
+            for name in ("twist", "wheel_speed", "pose", "current")
+        }
+    )
     for name in SIMULATED:
         np.testing.assert_array_equal(getattr(replay(wrong, blind).run, name), getattr(found.run, name))
 

@@ -157,8 +157,13 @@ json.dump(found, sys.stdout)
 
 def test_all_that_python_loads_for_a_kernel_is_in_its_stamp():
     names = sorted({kernel.py_func.__module__ for kernel in kernels().values()})
-    done = subprocess.run([sys.executable, "-c", LOADED, *names], capture_output=True, text=True, check=True,
-                          env=os.environ | {"PYTHONPATH": str(PACKAGE.parent)})  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED, *names],
+        capture_output=True,
+        text=True,
+        check=True,
+        env=os.environ | {"PYTHONPATH": str(PACKAGE.parent)},
+    )
     for name, files in json.loads(done.stdout).items():
         reach = stamp.reach(str(PACKAGE.parent.joinpath(*name.split(".")).with_suffix(".py")))
         assert set(files) <= reach, name
@@ -207,8 +212,15 @@ def test_the_stamp_covers_names_and_contents(tmp_path, fresh):
         return stamp.stamp(kernel_in(home, name, line))
 
     seen = [now(), now("g"), now(line=2)]
-    for edit in ("a/__init__.py:", "a/__init__.py:b = 1", "a/b.py:b = 1", "a/c.py:b = 1", "a/c.py:b = 2",
-                 "__init__.py:x", "k.py:from omnidyn.a import b, c\nx"):  # fmt: skip
+    for edit in (
+        "a/__init__.py:",
+        "a/__init__.py:b = 1",
+        "a/b.py:b = 1",
+        "a/c.py:b = 1",
+        "a/c.py:b = 2",
+        "__init__.py:x",
+        "k.py:from omnidyn.a import b, c\nx",
+    ):
         name, _, content = edit.partition(":")
         (tmp_path / name).write_text(content)
         seen.append(now())

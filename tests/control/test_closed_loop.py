@@ -105,8 +105,13 @@ def test_it_says_what_it_found():
     assert found.statuses == {"path ended: holding its last pose": 49}
     assert "warning" not in words
     assert set(found.to_dict()) >= {
-        "name", "rmse_position_m", "rmse_heading_rad", "worst_position_m", "saturated_share", "step_us"
-    }  # fmt: skip
+        "name",
+        "rmse_position_m",
+        "rmse_heading_rad",
+        "worst_position_m",
+        "saturated_share",
+        "step_us",
+    }
 
 
 def test_a_demand_by_hand():

@@ -30,9 +30,12 @@ REST = np.zeros(3)
 DUTY = AXEBOT.replace(drive=AXEBOT.drive.replace(kind="duty", supply=7.2))
 SPEED = AXEBOT.replace(drive=AXEBOT.drive.replace(kind="speed", kp=0.3, ki=2.0, rate=100.0))
 ROBOTS = {
-    "axebot": AXEBOT, "duty": DUTY, "speed": SPEED, "all friction": shaped("all", current_limit=1.0),
+    "axebot": AXEBOT,
+    "duty": DUTY,
+    "speed": SPEED,
+    "all friction": shaped("all", current_limit=1.0),
     **{f"mixed {seed}": random_robot(seed) for seed in (2, 5, 8)},
-}  # fmt: skip
+}
 
 
 @pytest.fixture(params=list(NAMES))

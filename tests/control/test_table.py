@@ -62,8 +62,11 @@ def test_its_code_compiles_and_says_the_same(name, tmp_path):
         "(void)d; (void)fx; (void)fy; (void)ft;\n"
         f"{signs}{body}\n{out}\n}}\n"
     )
-    subprocess.run(["cc", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-O1", "-o", "t.so", "table.c", "-lm"],
-                   cwd=tmp_path, check=True)  # fmt: skip
+    subprocess.run(
+        ["cc", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-O1", "-o", "t.so", "table.c", "-lm"],
+        cwd=tmp_path,
+        check=True,
+    )
     code, random = ctypes.CDLL(str(tmp_path / "t.so")), np.random.default_rng(1)
     for _ in range(20):
         twist, change = random.normal(size=3) * [0.5, 0.5, 2.0], random.normal(size=3) * [2.0, 2.0, 8.0]

@@ -22,10 +22,14 @@ from tests.support.exported import STRICT, exact_robot, sloping
 from tests.support.mixed_robots import random_robot, with_centre, with_spin
 
 ROBOTS = [
-    *(random_robot(seed) for seed in range(14)), *(with_spin(random_robot(seed), seed) for seed in range(14, 20)),
-    *(exact_robot(seed) for seed in range(10)), sloping(exact_robot(0)), sloping(random_robot(0)),
-    with_centre(exact_robot(1), 1), with_centre(random_robot(3), 3),
-]  # fmt: skip
+    *(random_robot(seed) for seed in range(14)),
+    *(with_spin(random_robot(seed), seed) for seed in range(14, 20)),
+    *(exact_robot(seed) for seed in range(10)),
+    sloping(exact_robot(0)),
+    sloping(random_robot(0)),
+    with_centre(exact_robot(1), 1),
+    with_centre(random_robot(3), 3),
+]
 
 
 def read_back(made, folder):
@@ -98,7 +102,7 @@ def test_written_or_refused_as_the_table_says(robot, tmp_path):
 )
 def test_huge_and_tiny_numbers_are_written_or_refused_in_words(kind, change, tmp_path):
     plain = omnidyn.load_robot("axebot")
-    (part, values), = change.items()  # fmt: skip
+    ((part, values),) = change.items()
     robot = plain.replace(
         **{
             part: type(getattr(plain, part)).model_validate(

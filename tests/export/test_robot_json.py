@@ -21,8 +21,9 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 def known_robot():
     robot = omnidyn.load_robot("axebot")
     stds = {"friction.axes.coulomb[0]": 0.1, "friction.axes.viscous[0]": 0.05, "motor.resistance_ohm": 0.02}
-    robot = robot.replace(priors={key: Prior(std=std, source="a \"bench\" \\ test", origin="measured")
-                                  for key, std in stds.items()})  # fmt: skip
+    robot = robot.replace(
+        priors={key: Prior(std=std, source='a "bench" \\ test', origin="measured") for key, std in stds.items()}
+    )
     return with_correlation(robot, ["friction.axes.coulomb[0]", "friction.axes.viscous[0]"], [[1.0, -0.7], [-0.7, 1.0]])
 
 

@@ -9,12 +9,21 @@ from omnidyn.model.robot_file import robot_from_dict
 
 AZIMUTHS, RADIUS, WHEEL = np.radians([60.0, 180.0, 300.0]), 0.2, 0.05
 
-ROBOT = robot_from_dict({
-    "schema": 1, "name": "omni", "body": {"mass_kg": 5.0, "inertia_kg_m2": 0.1},
-    "wheels": {"azimuth_deg": [60.0, 180.0, 300.0], "robot_radius_m": RADIUS, "wheel_radius_m": WHEEL},
-    "motor": {"resistance_ohm": 1.0, "torque_constant_Nm_A": 0.02, "emf_constant_Vs_rad": 0.02, "gear_ratio": 20.0,
-              "voltage_limit_V": 12.0},
-})  # fmt: skip
+ROBOT = robot_from_dict(
+    {
+        "schema": 1,
+        "name": "omni",
+        "body": {"mass_kg": 5.0, "inertia_kg_m2": 0.1},
+        "wheels": {"azimuth_deg": [60.0, 180.0, 300.0], "robot_radius_m": RADIUS, "wheel_radius_m": WHEEL},
+        "motor": {
+            "resistance_ohm": 1.0,
+            "torque_constant_Nm_A": 0.02,
+            "emf_constant_Vs_rad": 0.02,
+            "gear_ratio": 20.0,
+            "voltage_limit_V": 12.0,
+        },
+    }
+)
 
 
 def driven(seconds: float = 40.0, dt: float = 0.02, seed: int = 0, slip_y: float = 1.0):

@@ -28,8 +28,16 @@ def bag(tmp_path_factory):
         turn = maker.vector(0.0, 0.0, float(np.degrees(twist[k, 2])))
         still = maker.make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 0.0)
         unknown = np.full(9, -1.0)
-        imu = maker.make("sensor_msgs/msg/Imu", maker.header(now), still, unknown, turn, unknown,
-                         maker.vector(0.0, 0.0, 9.8), unknown)  # fmt: skip
+        imu = maker.make(
+            "sensor_msgs/msg/Imu",
+            maker.header(now),
+            still,
+            unknown,
+            turn,
+            unknown,
+            maker.vector(0.0, 0.0, 9.8),
+            unknown,
+        )
         maker.add("/imu/data", "sensor_msgs/msg/Imu", now, imu)
         point = maker.make("geometry_msgs/msg/Point", place[k].real, place[k].imag, 0.0)
         pose = maker.make(
@@ -39,8 +47,12 @@ def bag(tmp_path_factory):
         speed = maker.make(
             "geometry_msgs/msg/TwistWithCovariance", maker.make("geometry_msgs/msg/Twist", lost, lost), none
         )
-        maker.add("/odom", "nav_msgs/msg/Odometry", now,
-                  maker.make("nav_msgs/msg/Odometry", maker.header(now), "base_link", pose, speed))  # fmt: skip
+        maker.add(
+            "/odom",
+            "nav_msgs/msg/Odometry",
+            now,
+            maker.make("nav_msgs/msg/Odometry", maker.header(now), "base_link", pose, speed),
+        )
     return write_mcap(maker, folder / "log.mcap")
 
 
@@ -69,11 +81,17 @@ def test_messages_without_a_number_are_named(bag):
 
 # Bag of the case -> what is said above a note, with a robot; each has one cause.
 CAUSES = {
-    "ok": [], "stagger": [], "world_twist": [("twist_frame", "vx vy")],
+    "ok": [],
+    "stagger": [],
+    "world_twist": [("twist_frame", "vx vy")],
     "world_twist_nowheels": [("twist_frame", "vx vy")],
-    "zero_quaternion": [], "nan_odom": [], "gyro_deg": [], "rpm": [("unit", "w1 w2 w3")],
-    "left_handed": [("inverted", "vy omega y heading")], "roller_slip": [("axis_ratio", "y")],
-}  # fmt: skip
+    "zero_quaternion": [],
+    "nan_odom": [],
+    "gyro_deg": [],
+    "rpm": [("unit", "w1 w2 w3")],
+    "left_handed": [("inverted", "vy omega y heading")],
+    "roller_slip": [("axis_ratio", "y")],
+}
 
 
 @pytest.mark.long

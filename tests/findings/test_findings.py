@@ -57,10 +57,18 @@ def mutilated(log, rng):
     channels, t = {}, log.t.copy()
     for name, values in log.channels.items():
         spoil = [
-            lambda v: v, lambda v: v * 0.0, lambda v: v * np.nan, lambda v: v * rng.choice([1e-6, 1e3, -1.0, 1e150]),
-            np.abs, np.round, lambda v: v[:, ::-1], lambda v: np.where(rng.random(v.shape) < 0.5, np.nan, v),
-            lambda v: np.repeat(v[:1], len(v), axis=0), lambda v: v, lambda v: v,
-        ][rng.integers(11)]  # fmt: skip
+            lambda v: v,
+            lambda v: v * 0.0,
+            lambda v: v * np.nan,
+            lambda v: v * rng.choice([1e-6, 1e3, -1.0, 1e150]),
+            np.abs,
+            np.round,
+            lambda v: v[:, ::-1],
+            lambda v: np.where(rng.random(v.shape) < 0.5, np.nan, v),
+            lambda v: np.repeat(v[:1], len(v), axis=0),
+            lambda v: v,
+            lambda v: v,
+        ][rng.integers(11)]
         channels[name] = spoil(values)
     k = rng.integers(8)
     t = [t * 1e3, t * 0.0, rng.permutation(t), np.where(rng.random(len(t)) < 0.3, np.nan, t), np.round(t, 1), t, t, t][

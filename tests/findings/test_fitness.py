@@ -61,8 +61,11 @@ def test_a_full_log_is_usable_for_all(run, robot):
     assert "omni wheels at 180, 300 and 60 degrees" in words(verdict, "geometry")
     use = verdict.to_dict()["uses"][0]
     assert (use["name"], use["good"], use["code"], use["text"]) == (
-        "whole logs", True, "serves_whole", words(verdict, "whole logs"),
-    )  # fmt: skip
+        "whole logs",
+        True,
+        "serves_whole",
+        words(verdict, "whole logs"),
+    )
 
 
 def test_a_run_is_checked_without_a_robot_too(run):
@@ -145,9 +148,12 @@ def test_too_short(run, robot):
 def test_at_rest_all_the_time(run, robot):
     rng = np.random.default_rng(2)
     still = run.replace(
-        wheel_speed=1e-3 * rng.normal(size=run.wheel_speed.shape), twist=1e-3 * rng.normal(size=run.twist.shape),
-        voltage=0.01 * run.voltage, pose=None, current=None,
-    )  # fmt: skip
+        wheel_speed=1e-3 * rng.normal(size=run.wheel_speed.shape),
+        twist=1e-3 * rng.normal(size=run.twist.shape),
+        voltage=0.01 * run.voltage,
+        pose=None,
+        current=None,
+    )
     verdict = check(still, robot)
     assert verdict.useless
     assert verdict.verdict.startswith("Not usable: the robot never moves")

@@ -31,7 +31,7 @@ def test_a_battery_that_sags(log, robot, with_channels):
     supply[900:1000] *= 0.94
     (finding,) = check(with_channels(supply=supply), robot).of("sag")
     assert finding.numbers["drop"] == pytest.approx(0.06, abs=0.01)
-    (first, last), = finding.rows  # fmt: skip
+    ((first, last),) = finding.rows
     assert abs(first - 902) < 12
     assert abs(last - 1001) < 12
 
@@ -84,7 +84,7 @@ def test_a_blocked_robot(log, robot, with_channels):
     current[held] = voltage[held] / 1.69
     verdict = check(with_channels(voltage=voltage, wheel_speed=speed, twist=twist, current=current, pose=None), robot)
     (finding,) = verdict.of("blocked")
-    (first, last), = finding.rows  # fmt: skip
+    ((first, last),) = finding.rows
     assert abs(first - 802) < 12
     assert abs(last - 951) < 12
 

@@ -19,9 +19,12 @@ def logged(number, offset, jitter=0.0, rates=False):
 
 long = pytest.mark.long
 CASES = [
-    (2, 1e-6, 0.0, False), (8, 3e-3, 0.0, False), pytest.param(4, 0.01, 0.0, False, marks=long),
-    pytest.param(8, 20e-6, 1e-3, False, marks=long), pytest.param(4, 3e-3, 0.0, True, marks=long),
-]  # fmt: skip
+    (2, 1e-6, 0.0, False),
+    (8, 3e-3, 0.0, False),
+    pytest.param(4, 0.01, 0.0, False, marks=long),
+    pytest.param(8, 20e-6, 1e-3, False, marks=long),
+    pytest.param(4, 3e-3, 0.0, True, marks=long),
+]
 
 
 @pytest.mark.parametrize(("number", "offset", "jitter", "rates"), CASES)

@@ -74,9 +74,7 @@ def test_the_usual_step_comes_from_the_clock_of_a_channel():
 
 
 def test_steps_between_rows_stand_only_where_all_rows_are_meant():
-    found = Counter(
-        name for name, tree in files() for call in steps(tree) if times(call.args[0]) in MERGED
-    )  # fmt: skip
+    found = Counter(name for name, tree in files() for call in steps(tree) if times(call.args[0]) in MERGED)
     more = [name for name, count in found.items() if count > ALLOWED.get(name, (0, ""))[0]]
     assert not more, (
         f"take the samples of the channel (omnidyn.clocks), or say in ALLOWED why all rows are meant: {more}"

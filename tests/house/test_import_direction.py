@@ -17,11 +17,38 @@ PACKAGE = Path(__file__).resolve().parents[2] / "src" / "omnidyn"
 
 # From what knows nothing to what knows all. A name is a file or a folder, and may be listed before it exists.
 FLOORS = (
-    "errors", "progress", "arguments", "arrays", "files", "units", "statistics", "clocks", "document",
-    "shown", "statement", "attempts", "compiled", "run", "model",
-    "simulation", "logs", "findings", "comparison", "identification", "control", "campaigns", "telling", "paper",
-    "report", "export", "interop", "__init__", "cli", "studio", "__main__",
-)  # fmt: skip
+    "errors",
+    "progress",
+    "arguments",
+    "arrays",
+    "files",
+    "units",
+    "statistics",
+    "clocks",
+    "document",
+    "shown",
+    "statement",
+    "attempts",
+    "compiled",
+    "run",
+    "model",
+    "simulation",
+    "logs",
+    "findings",
+    "comparison",
+    "identification",
+    "control",
+    "campaigns",
+    "telling",
+    "paper",
+    "report",
+    "export",
+    "interop",
+    "__init__",
+    "cli",
+    "studio",
+    "__main__",
+)
 
 # The skins: whatever stands below them, nobody but `python -m omnidyn` imports them.
 SKINS = ("cli", "studio")

@@ -21,9 +21,14 @@ def missing(*remedies):
     """What is advised where these would mend the model."""
     lack = LackOfFit(True, {"vx": 0.5}, {"vx": 0.1}, (), remedies, {})
     fit = OutputErrorEstimate(
-        robot=load_robot("axebot"), value={}, std={}, ci95={}, correlation=Correlation((), np.eye(0)),
-        degrees_of_freedom={}, study=lambda: Diagnosis(lack, {}, Stability({}, ())),
-    )  # fmt: skip
+        robot=load_robot("axebot"),
+        value={},
+        std={},
+        ci95={},
+        correlation=Correlation((), np.eye(0)),
+        degrees_of_freedom={},
+        study=lambda: Diagnosis(lack, {}, Stability({}, ())),
+    )
     return [each for each in advice(fit, None) if each.code == "missing_cause"]
 
 
@@ -51,10 +56,13 @@ def together(std):
     """What is advised where two numbers of value 2, with this standard error, have a correlation of 0.97."""
     names = ("friction.axes.coulomb[0]", "friction.axes.coulomb[1]")
     fit = OutputErrorEstimate(
-        robot=load_robot("axebot"), value=dict.fromkeys(names, 2.0), std=dict.fromkeys(names, std),
+        robot=load_robot("axebot"),
+        value=dict.fromkeys(names, 2.0),
+        std=dict.fromkeys(names, std),
         ci95=dict.fromkeys(names, (2.0 - 2.0 * std, 2.0 + 2.0 * std)),
-        correlation=Correlation(names, np.array([[1.0, 0.97], [0.97, 1.0]])), degrees_of_freedom={},
-    )  # fmt: skip
+        correlation=Correlation(names, np.array([[1.0, 0.97], [0.97, 1.0]])),
+        degrees_of_freedom={},
+    )
     return [each for each in advice(fit, None) if each.code == "correlated_numbers"]
 
 

@@ -17,8 +17,11 @@ from tests.support.axebot_logs import excitation
 
 AXEBOT = load_robot("axebot")
 MASS, INERTIA, RESISTANCE, RADIUS = (
-    "body.mass_kg", "body.inertia_kg_m2", "motor.resistance_ohm", "wheels.wheel_radius_m"
-)  # fmt: skip
+    "body.mass_kg",
+    "body.inertia_kg_m2",
+    "motor.resistance_ohm",
+    "wheels.wheel_radius_m",
+)
 
 
 def scaled(robot, **factors):
@@ -35,10 +38,13 @@ def log():
     run = simulate(AXEBOT, excitation(20.0, 50.0), 0.02)
     noise = np.random.default_rng(1)
     return Run(
-        t=run.t, voltage=run.voltage, twist=run.twist + 0.01 * noise.normal(size=run.twist.shape),
+        t=run.t,
+        voltage=run.voltage,
+        twist=run.twist + 0.01 * noise.normal(size=run.twist.shape),
         wheel_speed=run.wheel_speed + 0.1 * noise.normal(size=run.wheel_speed.shape),
-        current=run.current + 0.01 * noise.normal(size=run.current.shape), source="log",
-    )  # fmt: skip
+        current=run.current + 0.01 * noise.normal(size=run.current.shape),
+        source="log",
+    )
 
 
 def part(log, *names):

@@ -20,9 +20,15 @@ def duties():
     run = simulate(load_robot("axebot"), voltage, 0.02)
     noisy = run.wheel_speed + 0.05 * rng.normal(size=run.wheel_speed.shape)
     return run.replace(
-        voltage=None, duty=run.voltage / 6.0, supply=np.full(len(run), 6.0), wheel_speed=noisy, current=None,
-        twist=None, pose=None, source="duty.csv",
-    )  # fmt: skip
+        voltage=None,
+        duty=run.voltage / 6.0,
+        supply=np.full(len(run), 6.0),
+        wheel_speed=noisy,
+        current=None,
+        twist=None,
+        pose=None,
+        source="duty.csv",
+    )
 
 
 def test_a_robot_fitted_to_duties_has_a_drive_of_duties(duties):
@@ -48,10 +54,14 @@ def test_a_drive_that_the_file_states_stays(duties):
 @pytest.mark.parametrize("right", [True, False])
 def test_a_longer_log_is_asked_for_against_noise_only(right):
     fit = SimpleNamespace(
-        value={"body.mass_kg": 2.0}, std={"body.mass_kg": 0.6}, at_bound=(), unidentifiable=(),
-        half_width=lambda _: 0.6 * 1.96 / 2.0, is_known=lambda _: True,
+        value={"body.mass_kg": 2.0},
+        std={"body.mass_kg": 0.6},
+        at_bound=(),
+        unidentifiable=(),
+        half_width=lambda _: 0.6 * 1.96 / 2.0,
+        is_known=lambda _: True,
         lack_of_fit=SimpleNamespace(found=not right),
-    )  # fmt: skip
+    )
     words = str(*advice._wide(fit))
     assert ("times as long" in words) is right
     assert ("a longer log does not help" in words) is not right

@@ -54,9 +54,13 @@ def test_a_method_that_is_none_is_refused_with_the_four(method):
 
 @pytest.mark.parametrize(
     "method, given",
-    [(SteadyState(), {"hold_out": "a*"}), (MotorLine(), {"hold_out": "a*"}), (MotorLine(), {"quick": True}),
-     (MotorFit(), {"groups": "a=*"})],
-)  # fmt: skip
+    [
+        (SteadyState(), {"hold_out": "a*"}),
+        (MotorLine(), {"hold_out": "a*"}),
+        (MotorLine(), {"quick": True}),
+        (MotorFit(), {"groups": "a=*"}),
+    ],
+)
 def test_what_a_method_has_no_use_for_is_refused(method, given):
     words = f"{type(method).__name__} has no use for it; got `{next(iter(given))}`"
     with pytest.raises(InputError, match=words):
@@ -72,13 +76,21 @@ def test_friction_needs_a_robot_and_a_ladder_the_diagnosis():
 
 @pytest.mark.parametrize(
     "given, method",
-    [({}, None), ({"free": ["friction"]}, OutputError(free="friction")), ({"shape": "disc"}, SteadyState(shape="disc")),
-     ({"loss": "gaussian"}, None), ({"hold_out": ["a"]}, OutputError()), ({"group": ["a=*"]}, SteadyState()),
-     ({"quick": True}, None), ({"method": "steady-state"}, SteadyState()), ({"what": "motors"}, MotorLine()),
-     ({"what": "motors", "input": "duty"}, MotorLine(input="duty")),
-     ({"what": "motors", "method": "output-error", "input": "duty"}, MotorFit(input="duty")),
-     ({"what": "motors", "between": "mean"}, MotorFit(between="mean"))],
-)  # fmt: skip
+    [
+        ({}, None),
+        ({"free": ["friction"]}, OutputError(free="friction")),
+        ({"shape": "disc"}, SteadyState(shape="disc")),
+        ({"loss": "gaussian"}, None),
+        ({"hold_out": ["a"]}, OutputError()),
+        ({"group": ["a=*"]}, SteadyState()),
+        ({"quick": True}, None),
+        ({"method": "steady-state"}, SteadyState()),
+        ({"what": "motors"}, MotorLine()),
+        ({"what": "motors", "input": "duty"}, MotorLine(input="duty")),
+        ({"what": "motors", "method": "output-error", "input": "duty"}, MotorFit(input="duty")),
+        ({"what": "motors", "between": "mean"}, MotorFit(between="mean")),
+    ],
+)
 def test_options_of_one_method_choose_it(given, method):
     assert asked(**given).method == method
 
@@ -90,15 +102,17 @@ def test_options_of_one_method_choose_it(given, method):
         ({"what": "magic"}, "what: nothing of that name; got magic; expected friction or motors"),
         ({"method": "output-error", "shape": "disc"}, "output-error has no such option; got `shape`"),
         ({"method": "output-error", "group": ["a=*"]}, "for groups use `per`"),
-        ({"method": "steady-state", "free": ["friction"]}, "got `free`; expected with output-error; leave it out, or "
-         "leave out `method`"),
+        (
+            {"method": "steady-state", "free": ["friction"]},
+            "got `free`; expected with output-error; leave it out, or leave out `method`",
+        ),
         ({"shape": "disc", "loss": "student-t"}, "steady-state has no such option; got `loss`"),
         ({"between": "mean"}, "`between`: an option of the motors"),
         ({"input": "duty"}, "`input`: an option of the motors"),
         ({"what": "motors", "free": ["friction"]}, "`what` motors: not an option of the motors; got `free`"),
         ({"what": "motors", "method": "output-error", "speed": "set"}, "output-error has no such option; got `speed`"),
     ],
-)  # fmt: skip
+)
 def test_what_does_not_go_together_is_refused(given, words):
     with pytest.raises(InputError, match=re.escape(words)):
         asked(**given)

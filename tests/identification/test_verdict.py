@@ -41,10 +41,14 @@ def estimate(std, kind: Any = OutputErrorEstimate, **more) -> Any:
     """An estimate of the paper's six numbers, each 2, with these standard errors."""
     names = BOX[: len(std)]
     return kind(
-        robot=AXEBOT, value=dict.fromkeys(names, 2.0), std=dict(zip(names, std, strict=True)),
+        robot=AXEBOT,
+        value=dict.fromkeys(names, 2.0),
+        std=dict(zip(names, std, strict=True)),
         ci95={name: (2.0 - 2.0 * s, 2.0 + 2.0 * s) for name, s in zip(names, std, strict=True)},
-        correlation=Correlation(names, np.eye(len(names))), degrees_of_freedom=dict.fromkeys(names, 100), **more,
-    )  # fmt: skip
+        correlation=Correlation(names, np.eye(len(names))),
+        degrees_of_freedom=dict.fromkeys(names, 100),
+        **more,
+    )
 
 
 def beside(scores, which="fitted") -> Any:
@@ -154,10 +158,13 @@ def study(loo, ties=(), std=0.02) -> Any:
     scores = [one, *(SimpleNamespace(name=name, told_apart=False) for name in ties)]
     choice = SimpleNamespace(score=one, scores=scores, chosen="disc", own={}, error=loo)
     return SimpleNamespace(
-        choice=choice, travel={"all": SimpleNamespace(mean=10.0)},
+        choice=choice,
+        travel={"all": SimpleNamespace(mean=10.0)},
         points=SimpleNamespace(wrench=np.array([[10.0, 0.0, 0.0], [0.0, -10.0, 0.0]])),
-        estimates={"all": estimate([std] * 6, Estimate)}, lack_of_fit={}, moments=(),
-    )  # fmt: skip
+        estimates={"all": estimate([std] * 6, Estimate)},
+        lack_of_fit={},
+        moments=(),
+    )
 
 
 def test_a_good_shape():
@@ -198,23 +205,33 @@ def test_what_the_verdict_calls_meaningless_is_a_failure():
 
 def motor(number, band=0.5, seen=True, slope=(0.1, 0.2)) -> Any:
     return SimpleNamespace(
-        motor=number, name="all motors" if number is None else f"motor {number + 1}", unit="V", dead_band_seen=seen,
-        value={"dead_band": band}, ci95={"slope": slope},
-    )  # fmt: skip
+        motor=number,
+        name="all motors" if number is None else f"motor {number + 1}",
+        unit="V",
+        dead_band_seen=seen,
+        value={"dead_band": band},
+        ci95={"slope": slope},
+    )
 
 
 @pytest.mark.parametrize(
     "motors, words",
     [
         ([motor(0, 0.52), motor(1, 0.61), motor(None)], "All 2 motors start at 0.52 to 0.61 V."),
-        ([motor(0, 0.5), motor(1, seen=False)],
-         "Motor 1 starts at 0.5 V; motor 2 answers too, and shows no dead band."),
+        (
+            [motor(0, 0.5), motor(1, seen=False)],
+            "Motor 1 starts at 0.5 V; motor 2 answers too, and shows no dead band.",
+        ),
         ([motor(0, seen=False), motor(1, seen=False)], "All 2 motors answer, and show no dead band."),
-        ([motor(0), motor(1, seen=False, slope=(-0.1, 0.2))],
-         "Motor 1 starts at 0.5 V; motor 2 is not seen to answer to the input."),
-        ([motor(0, seen=False, slope=(-0.1, 0.2))],
-         "No motor is seen to answer to its input: the slope of motor 1 may as well be 0."),
+        (
+            [motor(0), motor(1, seen=False, slope=(-0.1, 0.2))],
+            "Motor 1 starts at 0.5 V; motor 2 is not seen to answer to the input.",
+        ),
+        (
+            [motor(0, seen=False, slope=(-0.1, 0.2))],
+            "No motor is seen to answer to its input: the slope of motor 1 may as well be 0.",
+        ),
     ],
-)  # fmt: skip
+)
 def test_motors(motors, words):
     assert said(motors_verdict(motors)) == words

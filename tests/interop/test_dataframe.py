@@ -10,9 +10,12 @@ import omnidyn
 from omnidyn.errors import MissingExtraError
 
 RUN = omnidyn.Run(
-    t=np.array([0.0, 0.1, 0.2]), voltage=np.arange(9.0).reshape(3, 3), supply=np.array([12.0, np.nan, 11.0]),
-    source="log.csv", warnings=("a doubt",),
-)  # fmt: skip
+    t=np.array([0.0, 0.1, 0.2]),
+    voltage=np.arange(9.0).reshape(3, 3),
+    supply=np.array([12.0, np.nan, 11.0]),
+    source="log.csv",
+    warnings=("a doubt",),
+)
 COLUMNS = ["u1_V", "u2_V", "u3_V", "supply_V"]
 
 

@@ -43,8 +43,10 @@ def test_frames_are_taken_wherever_a_run_is(kind, tmp_path):
     assert str(omnidyn.check(frame, ROBOT)) == str(omnidyn.check(omnidyn.interop.run_of(frame), ROBOT))
     omnidyn.write_run(frame, tmp_path / "run.csv")
     assert np.array_equal(omnidyn.read_log(str(tmp_path / "run.csv")).twist, one.twist)
-    fits = [omnidyn.identify(each, ROBOT, omnidyn.OutputError(free=["friction.axes.coulomb"])).estimate
-            for each in (frame, one)]  # fmt: skip
+    fits = [
+        omnidyn.identify(each, ROBOT, omnidyn.OutputError(free=["friction.axes.coulomb"])).estimate
+        for each in (frame, one)
+    ]
     assert fits[0].value == fits[1].value
 
 

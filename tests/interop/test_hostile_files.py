@@ -35,14 +35,15 @@ def with_part(part):
     [
         with_asset('<asset><texture name="t" type="2d" builtin="flat" width="17000" height="17000"/></asset>'),
         with_asset('<asset><hfield name="h" nrow="20000" ncol="20000" size="1 1 1 1"/></asset>'),
-        with_asset('<size memory="1G"/>'), with_asset('<size njmax="2000000000" nconmax="2000000000"/>'),
+        with_asset('<size memory="1G"/>'),
+        with_asset('<size njmax="2000000000" nconmax="2000000000"/>'),
         with_asset('<asset><model name="x" content_type="text/xml"/></asset>'),
         with_asset('<visual><global offwidth="60000" offheight="60000"/></visual>'),
         with_part('<site name="s"/><camera name="c" resolution="60000 60000"/><light name="l"/>'),
         GOOD.replace("</worldbody>", "</worldbody><sensor><user name='a' dim='2000000000' needstage='acc'/></sensor>"),
         with_asset('<option timestep="1e-300" noslip_iterations="2000000000"/>'),
     ],
-)  # fmt: skip
+)
 def test_what_says_nothing_of_masses_is_not_made(text, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -117,10 +118,14 @@ def test_a_pipe_is_no_file(kind, tmp_path):
 @pytest.mark.parametrize(
     "old, new",
     [
-        ('ixx="0.1"', 'ixx="-0.1"'), ('izz="0.06"', 'izz="-0.06"'), ('iyy="0.1"', 'iyy="0.1" ixy="0.3"'),
-        ('ixx="1e-4"', 'ixx="-1e-4"'), ('mass value="0.2"', 'mass value="-0.2"'), ('mass value="1"', 'mass value="-1"'),
+        ('ixx="0.1"', 'ixx="-0.1"'),
+        ('izz="0.06"', 'izz="-0.06"'),
+        ('iyy="0.1"', 'iyy="0.1" ixy="0.3"'),
+        ('ixx="1e-4"', 'ixx="-1e-4"'),
+        ('mass value="0.2"', 'mass value="-0.2"'),
+        ('mass value="1"', 'mass value="-1"'),
     ],
-)  # fmt: skip
+)
 def test_a_negative_inertia_is_refused(old, new):
     assert old in kiwi()
     with pytest.raises(InputError, match=r"no body has a negative mass or inertia; got .*; expected 0 or more"):
@@ -141,9 +146,11 @@ def test_many_links_and_deep_trees_end_soon():
     begun = resource.getrusage(resource.RUSAGE_SELF).ru_utime
     links, joints = '<link name="a"/>', '<joint name="j"><child link="base"/><parent link="base"/></joint>'
     for text in (
-        f"<robot>{links * 20_000}</robot>", f"<robot>{joints * 20_000}</robot>",
-        f"<robot>{'<a>' * 100_000}{'</a>' * 100_000}</robot>", f"<robot {'a' * 200_000}='1'/>",
-    ):  # fmt: skip
+        f"<robot>{links * 20_000}</robot>",
+        f"<robot>{joints * 20_000}</robot>",
+        f"<robot>{'<a>' * 100_000}{'</a>' * 100_000}</robot>",
+        f"<robot {'a' * 200_000}='1'/>",
+    ):
         with pytest.raises(InputError):
             robot_of_urdf(text)
     with pytest.raises(InputError):

@@ -65,9 +65,12 @@ WHEEL = """<link name="{name}"><inertial><mass value="0.2"/><inertia ixx="1e-4" 
 
 def kiwi(name="wheel{}"):
     angles = np.radians([90.0, 210.0, 330.0])
-    return OTHER.format(wheels="".join(
-        WHEEL.format(name=name.format(k), x=0.15 * np.cos(a), y=0.15 * np.sin(a), yaw=a) for k, a in enumerate(angles)
-    ))  # fmt: skip
+    return OTHER.format(
+        wheels="".join(
+            WHEEL.format(name=name.format(k), x=0.15 * np.cos(a), y=0.15 * np.sin(a), yaw=a)
+            for k, a in enumerate(angles)
+        )
+    )
 
 
 @pytest.mark.parametrize("name", ["wheel{}", "rad_{}"])
@@ -132,8 +135,10 @@ def model_wheels(names="wheel"):
     text = ""
     for k, angle in enumerate(np.radians([60.0, 180.0, 300.0])):
         x, y = np.cos(angle), np.sin(angle)
-        text += (f'<body name="{names}{k}" pos="{0.1 * x} {0.1 * y} 0"><joint type="hinge" axis="{x} {y} 0"/>'
-                 f'<geom type="cylinder" size="0.03 0.01" zaxis="{x} {y} 0" mass="0.1"/></body>')  # fmt: skip
+        text += (
+            f'<body name="{names}{k}" pos="{0.1 * x} {0.1 * y} 0"><joint type="hinge" axis="{x} {y} 0"/>'
+            f'<geom type="cylinder" size="0.03 0.01" zaxis="{x} {y} 0" mass="0.1"/></body>'
+        )
     return MODEL.format(text)
 
 

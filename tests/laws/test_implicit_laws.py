@@ -175,9 +175,12 @@ def test_the_mirror_image(shape):
     hold_forward, hold_backward = (np.broadcast_to(np.asarray(v, float), 3) for v in (w.hold_forward, w.hold_backward))
     swap = [0, 2, 1]
     mirrored = WheelFriction(
-        coulomb=tuple(backward[swap]), coulomb_backward=tuple(forward[swap]), breakaway=tuple(hold_backward[swap]),
-        breakaway_backward=tuple(hold_forward[swap]), viscous=w.viscous,
-    )  # fmt: skip
+        coulomb=tuple(backward[swap]),
+        coulomb_backward=tuple(forward[swap]),
+        breakaway=tuple(hold_backward[swap]),
+        breakaway_backward=tuple(hold_forward[swap]),
+        viscous=w.viscous,
+    )
     robot = shaped(shape)
     image = robot.replace(friction=friction.replace(wheels=mirrored))
     voltage = program(6)

@@ -170,9 +170,13 @@ def test_rows_of_one_time_that_contradict_each_other_are_not_joined(tmp_path):
 
 @pytest.mark.parametrize(
     ("names", "size"),
-    [(("header.stamp.sec", "header.stamp.nanosec"), 1e9), (("secs", "nsecs"), 1e9), (("tv_sec", "tv_usec"), 1e6),
-     (("Stamp_Seconds", "Stamp_Nanoseconds"), 1e9)],
-)  # fmt: skip
+    [
+        (("header.stamp.sec", "header.stamp.nanosec"), 1e9),
+        (("secs", "nsecs"), 1e9),
+        (("tv_sec", "tv_usec"), 1e6),
+        (("Stamp_Seconds", "Stamp_Nanoseconds"), 1e9),
+    ],
+)
 def test_seconds_and_the_rest_of_a_second_are_one_time(tmp_path, names, size):
     times = 1_764_000_000 + np.array([0, 0.25, 0.5, 0.75, 1.0, 1.25])
     cells = [f"{int(t)},{round((t - int(t)) * size)},{k}" for k, t in enumerate(times)]

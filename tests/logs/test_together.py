@@ -57,8 +57,11 @@ def test_files_of_two_runs_or_clocks_are_refused(tmp_path):
     t = np.arange(20) / 50
     one = table(tmp_path / "a.csv", "w1_rad_s", t, [1.0] * 20)
     other = table(tmp_path / "b.csv", "heading_rad", t, [2.0] * 20, start=0.0)
-    with pytest.raises(InputError, match=r"b\.csv: the files were not recorded at the same time; got 0 to 0.38 s, .*"
-                                         r"within 2023-11-14 22:13:20 to .*stamps of one clock"):  # fmt: skip
+    with pytest.raises(
+        InputError,
+        match=r"b\.csv: the files were not recorded at the same time; got 0 to 0.38 s, .*"
+        r"within 2023-11-14 22:13:20 to .*stamps of one clock",
+    ):
         read_log(one, beside=[other])
 
 

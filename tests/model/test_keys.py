@@ -132,13 +132,19 @@ def test_a_value_out_of_its_range_is_refused_by_its_key(axebot):
         ("friction.direction.yaw_coulomb", "coulomb", 2, None, "C yaw", "Coulomb friction turning"),
         ("friction.wheels.coulomb[0]", "coulomb", None, 0, "C of wheel 1", "Coulomb friction of wheel 1"),
         ("friction.wheels.viscous", "viscous", None, None, "B at the wheels", "viscous friction at the wheels"),
-        ("friction.wheels.coulomb_backward", "coulomb", None, None, "coulomb_backward at the wheels",
-         "Coulomb friction backward at the wheels"),
+        (
+            "friction.wheels.coulomb_backward",
+            "coulomb",
+            None,
+            None,
+            "coulomb_backward at the wheels",
+            "Coulomb friction backward at the wheels",
+        ),
         ("motor.torque_constant_Nm_A", "", None, None, TORQUE, "torque constant"),
         ("motor.gear_ratio[2]", "", None, 2, "motor.gear_ratio[2]", "gear ratio of motor 3"),
         ("body.mass_kg", "", None, None, "body.mass_kg", "mass"),
     ],
-)  # fmt: skip
+)
 def test_what_a_key_says(text, level, axis, wheel, symbol, words):
     key = Key.parse(text)
     assert (key.level, key.axis, key.wheel, key.symbol, key.words) == (level, axis, wheel, symbol, words)
@@ -147,10 +153,17 @@ def test_what_a_key_says(text, level, axis, wheel, symbol, words):
 def test_names_that_stand_for_several(axebot, four_wheel):
     disc = first_guess("disc", axebot.wheels, 1.5)
     assert expand("friction", axebot) == friction_keys(axebot) == BOX
-    assert expand("friction", disc) == friction_keys(disc) == (
-        "friction.direction.coulomb[0]", "friction.direction.coulomb[1]", "friction.direction.viscous",
-        "friction.direction.yaw_coulomb", "friction.direction.yaw_viscous",
-    )  # fmt: skip
+    assert (
+        expand("friction", disc)
+        == friction_keys(disc)
+        == (
+            "friction.direction.coulomb[0]",
+            "friction.direction.coulomb[1]",
+            "friction.direction.viscous",
+            "friction.direction.yaw_coulomb",
+            "friction.direction.yaw_viscous",
+        )
+    )
     assert expand("friction.axes.coulomb", axebot) == BOX[3:]
     assert expand("friction.axes.breakaway", axebot) == tuple(f"friction.axes.breakaway[{axis}]" for axis in range(3))
     assert expand(RESISTANCE, axebot) == (RESISTANCE,)

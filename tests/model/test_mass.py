@@ -94,10 +94,14 @@ def test_the_state_space_has_the_new_mass():
     np.testing.assert_allclose(heavy.K, light.K * share[:, None], rtol=1e-13, atol=0.0)
 
 
-@pytest.mark.parametrize("part, change", [
-    ("motor", {"rotor_inertia": (1e-6, 2e-6, 3e-6)}), ("wheels", {"wheel_inertia": 1e-4}),
-    ("body", {"centre": (0.01, 0.0)}),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "part, change",
+    [
+        ("motor", {"rotor_inertia": (1e-6, 2e-6, 3e-6)}),
+        ("wheels", {"wheel_inertia": 1e-4}),
+        ("body", {"centre": (0.01, 0.0)}),
+    ],
+)
 def test_the_body_alone_is_without_what_spins_and_in_the_middle(part, change):
     robot = AXEBOT.replace(**{part: getattr(AXEBOT, part).replace(**change)})
     assert not np.array_equal(mass_matrix(robot), mass_matrix(AXEBOT))

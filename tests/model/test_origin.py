@@ -66,8 +66,10 @@ def test_what_was_identified_in_an_old_file():
 def test_words_by_hand():
     robot = old("by_hand")
     assert {key: prior.origin for key, prior in robot.priors.items() if prior.origin != "given"} == {
-        "body.inertia_kg_m2": "guess", EMF: "guess", "friction.axes.viscous[2]": "identified",
-    }  # fmt: skip
+        "body.inertia_kg_m2": "guess",
+        EMF: "guess",
+        "friction.axes.viscous[2]": "identified",
+    }
     assert robot.priors["body.inertia_kg_m2"].source == "guess: a disc"
     assert robot.priors["motor.resistance_ohm"] == Prior(std=0.1, source="datasheet")
     assert robot.priors["wheels.robot_radius_m"] == Prior(std=0.002)
@@ -88,10 +90,16 @@ def test_an_origin_that_is_given_counts_whatever_the_words(origin, source):
 GUESSED_OF = {
     "robotino": ["inertia", "voltage limit", "kp of the speed loop", "rate", "friction"],
     "lekiwi": [
-        "mass", "inertia", "voltage limit", "rotor inertia", "kp of the speed loop", "ki of the speed loop", "rate",
+        "mass",
+        "inertia",
+        "voltage limit",
+        "rotor inertia",
+        "kp of the speed loop",
+        "ki of the speed loop",
+        "rate",
         "friction",
     ],
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", preset_names())

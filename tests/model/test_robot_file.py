@@ -338,9 +338,12 @@ def test_bytes_flipped_at_random(tmp_path):
 
 @pytest.mark.parametrize(
     "right, wrong, where",
-    [("mass_kg", "mas_kg", "[body] mas_kg"), ("resistance_ohm", "resistance_Ohm", "[motor] resistance_Ohm"),
-     ("robot_radius_m", "robot_radius", "[wheels] robot_radius")],
-)  # fmt: skip
+    [
+        ("mass_kg", "mas_kg", "[body] mas_kg"),
+        ("resistance_ohm", "resistance_Ohm", "[motor] resistance_Ohm"),
+        ("robot_radius_m", "robot_radius", "[wheels] robot_radius"),
+    ],
+)
 def test_a_typo_is_named_before_the_key_that_is_missing_for_it(right, wrong, where):
     with pytest.raises(InputError) as caught:
         parse_robot(AXEBOT.replace(f"{right} =", f"{wrong} ="), "my.toml")

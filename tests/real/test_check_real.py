@@ -139,14 +139,23 @@ def test_a_recording_that_is_given_twice(data, gray, capsys):
 
 # ---- udea ----
 
-UDEA = robot_from_dict({
-    "schema": 1, "name": "udea", "body": {"mass_kg": 3.178, "inertia_kg_m2": 0.0156},
-    "wheels": {"azimuth_deg": [150.0, 270.0, 30.0], "robot_radius_m": 0.099, "wheel_radius_m": 0.0325},
-    # Motor and limit are not known; a duty without a supply makes no voltage, so nothing is computed from them.
-    "motor": {"resistance_ohm": 3.0, "torque_constant_Nm_A": 0.02, "emf_constant_Vs_rad": 0.02, "gear_ratio": 20.0,
-              "voltage_limit_V": 22.2},
-    "drive": {"kind": "duty"},
-})  # fmt: skip
+UDEA = robot_from_dict(
+    {
+        "schema": 1,
+        "name": "udea",
+        "body": {"mass_kg": 3.178, "inertia_kg_m2": 0.0156},
+        "wheels": {"azimuth_deg": [150.0, 270.0, 30.0], "robot_radius_m": 0.099, "wheel_radius_m": 0.0325},
+        # Motor and limit are not known; a duty without a supply makes no voltage, so nothing is computed from them.
+        "motor": {
+            "resistance_ohm": 3.0,
+            "torque_constant_Nm_A": 0.02,
+            "emf_constant_Vs_rad": 0.02,
+            "gear_ratio": 20.0,
+            "voltage_limit_V": 22.2,
+        },
+        "drive": {"kind": "duty"},
+    }
+)
 
 
 @cache

@@ -14,8 +14,12 @@ FLOORS = {
     "gray_surface": {0.1: range(0, 72, 12), 0.2: range(72, 144, 12), 0.3: range(144, 216, 12)},
     "green_surface": {0.1: range(0, 72, 12)},
 }
-TURNING = {("gray_surface", 0.1): 0.72, ("gray_surface", 0.2): 0.86, ("gray_surface", 0.3): 0.90,
-           ("green_surface", 0.1): 0.75}  # fmt: skip
+TURNING = {
+    ("gray_surface", 0.1): 0.72,
+    ("gray_surface", 0.2): 0.86,
+    ("gray_surface", 0.3): 0.90,
+    ("green_surface", 0.1): 0.75,
+}
 
 
 def read(data, floor, numbers, **options):

@@ -17,20 +17,32 @@ ROBOTINO = load_robot("robotino")
 SHARE = (0.4, 0.95)  # rows that the README's numbers are from
 
 # README: force along travel [N], its standard error, run-to-run standard deviation.
-TRAVEL = {"gray 0.1": (39.27, 0.30, 2.51), "gray 0.2": (39.15, 0.28, 2.38), "gray 0.3": (39.37, 0.28, 2.35),
-          "green 0.1": (35.55, 0.25, 1.49)}  # fmt: skip
+TRAVEL = {
+    "gray 0.1": (39.27, 0.30, 2.51),
+    "gray 0.2": (39.15, 0.28, 2.38),
+    "gray 0.3": (39.37, 0.28, 2.35),
+    "green 0.1": (35.55, 0.25, 1.49),
+}
 # README: left-out error of the full vector [N], for the same four groups.
 LOO = {
-    "box": (16.33, 16.34, 16.28, 15.58), "wheel": (12.33, 11.83, 11.93, 10.25), "wheels": (12.51, 12.01, 11.86, 10.61),
-    "wheel+roller": (6.13, 6.28, 6.27, 5.88), "disc": (4.14, 3.82, 3.85, 1.98), "disc+wheel": (4.18, 3.85, 3.88, 1.96),
+    "box": (16.33, 16.34, 16.28, 15.58),
+    "wheel": (12.33, 11.83, 11.93, 10.25),
+    "wheels": (12.51, 12.01, 11.86, 10.61),
+    "wheel+roller": (6.13, 6.28, 6.27, 5.88),
+    "disc": (4.14, 3.82, 3.85, 1.98),
+    "disc+wheel": (4.18, 3.85, 3.88, 1.96),
     "ellipse-plain": (2.53, 2.06, 2.30, 1.92),
-}  # fmt: skip
+}
 # README: left-out error along travel [N], of shapes fitted along travel.
 ALONG = {
-    "box": (3.42, 3.60, 3.39, 3.86), "wheel": (3.08, 3.11, 2.97, 2.03), "wheels": (2.39, 2.40, 2.35, 1.73),
-    "wheel+roller": (2.52, 2.44, 2.37, 1.58), "disc": (2.53, 2.40, 2.37, 1.51), "disc+wheel": (2.56, 2.42, 2.40, 1.52),
+    "box": (3.42, 3.60, 3.39, 3.86),
+    "wheel": (3.08, 3.11, 2.97, 2.03),
+    "wheels": (2.39, 2.40, 2.35, 1.73),
+    "wheel+roller": (2.52, 2.44, 2.37, 1.58),
+    "disc": (2.53, 2.40, 2.37, 1.51),
+    "disc+wheel": (2.56, 2.42, 2.40, 1.52),
     "ellipse-plain": (1.29, 0.96, 1.12, 0.81),
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="session")

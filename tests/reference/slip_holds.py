@@ -77,9 +77,13 @@ def room(rows, load, both, levels=None):
         for row, angle in zip(cuts, tangents, strict=True):
             row[count:] = np.cos(angle) / levels[0], np.sin(angle) / levels[1], 1.0 / min(levels)
         out = linprog(
-            -np.eye(j + 1)[-1], np.vstack([above, cuts]), np.append(most, np.ones(len(cuts))), same, basis @ load,
+            -np.eye(j + 1)[-1],
+            np.vstack([above, cuts]),
+            np.append(most, np.ones(len(cuts))),
+            same,
+            basis @ load,
             [(None, None)] * (j + 1),
-        )  # fmt: skip
+        )
         if levels is None:
             break
         q = out.x[count:-1] / levels

@@ -118,9 +118,14 @@ def test_no_pyplot_and_no_window(tmp_path):
     )
     sources = str(Path(__file__).resolve().parents[2] / "src")
     result = subprocess.run(
-        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=True,
+        [sys.executable, "-c", script],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
         env={"PYTHONPATH": sources, "MPLBACKEND": "TkAgg", "HOME": str(tmp_path)},
-    )  # fmt: skip
+    )
     assert result.stdout == "False\n"
 
 

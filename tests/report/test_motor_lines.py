@@ -19,11 +19,13 @@ def study(count, width=0.01) -> Any:
     """So many motors, u = 0.5 w + 0.4 sgn w, whose dead bands are known within `width`."""
     lines = [
         SimpleNamespace(
-            motor=k, name=f"motor {k + 1}", value={"slope": 0.5, "dead_band": 0.4, "inertia": 0.0},
+            motor=k,
+            name=f"motor {k + 1}",
+            value={"slope": 0.5, "dead_band": 0.4, "inertia": 0.0},
             ci95={"dead_band": (0.4 - width, 0.4 + width)},
         )
         for k in range(count)
-    ]  # fmt: skip
+    ]
     side = np.sign(SPEED)
     parts = (0.5 * SPEED + 0.4 * side, SPEED, 0.01 + 0.0 * SPEED, side, 0.0 * SPEED, side)
     windows = SimpleNamespace(kind="voltage", unit="V", speed_from="wheel_angle", of=lambda motor: parts)

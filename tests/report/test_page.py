@@ -41,10 +41,13 @@ def test_it_is_whole_and_every_id_is_there_once(demo_page):
 
 def test_every_picture_stands_in_front_of_its_claims(demo_page):
     for name, first, last in (
-        ("fig1_robot", "frames", "noise"), ("fig3_friction", "table-2-viscous-x", "table-2-coulomb-yaw"),
-        ("fig2_traces", "steady-speed-x", "force-yaw"), ("fig5_dead_zone", "dead-zone-x", "dead-zone-yaw"),
-        ("fig4_steps", "fig-4", "fig-4"), ("fig6_reconcile", "one-robot", "axes-disagree"),
-    ):  # fmt: skip
+        ("fig1_robot", "frames", "noise"),
+        ("fig3_friction", "table-2-viscous-x", "table-2-coulomb-yaw"),
+        ("fig2_traces", "steady-speed-x", "force-yaw"),
+        ("fig5_dead_zone", "dead-zone-x", "dead-zone-yaw"),
+        ("fig4_steps", "fig-4", "fig-4"),
+        ("fig6_reconcile", "one-robot", "axes-disagree"),
+    ):
         place = demo_page.index(f'id="{name}"')
         begin, end = demo_page.rindex("<section", 0, place), demo_page.index("</section>", place)
         assert begin < place < demo_page.index(f'id="{first}"') < end, name

@@ -16,9 +16,10 @@ from tests.support.outputs import Reader
 from tests.support.steady_logs import clean_runs, robot_with, spoiled
 
 RECORD = {
-    "omnidyn": "0.1.0", "command": "omnidyn identify <b>",
+    "omnidyn": "0.1.0",
+    "command": "omnidyn identify <b>",
     "inputs": [{"role": "log", "name": f"run{k}.csv", "sha256": "ab" * 32} for k in range(24)],
-}  # fmt: skip
+}
 
 
 @pytest.fixture(scope="module")

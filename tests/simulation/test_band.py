@@ -33,8 +33,9 @@ def test_the_width_is_that_of_the_slope(robot, key):
     up, down = (simulate(Key.parse(key).set(robot, 2.2 + sign * step), FORWARD, 2e-3) for sign in (1.0, -1.0))
     slope = (up.twist[:, 0] - down.twist[:, 0]) / (2.0 * step)
     np.testing.assert_allclose(high.twist[:, 0] - low.twist[:, 0], -2.0 * Z * 0.022 * slope, rtol=0.02, atol=1e-9)
-    np.testing.assert_allclose(high.pose[-1, 0] - low.pose[-1, 0],
-                               Z * 0.022 * abs(up.pose[-1, 0] - down.pose[-1, 0]) / step, rtol=0.02)  # fmt: skip
+    np.testing.assert_allclose(
+        high.pose[-1, 0] - low.pose[-1, 0], Z * 0.022 * abs(up.pose[-1, 0] - down.pose[-1, 0]) / step, rtol=0.02
+    )
     assert draws == 100
 
 

@@ -26,12 +26,14 @@ ROBOTS = {
     "LuGre": on_axes(law="lugre", **FALL, **BRISTLES),
     "elasto-plastic": on_axes(law="elastoplastic", **BRISTLES),
     "Karnopp": on_axes(law="karnopp"),
-    "ellipse": AXEBOT.replace(friction=Friction(
-        axes=AxesFriction(viscous=(0.0, 0.0, 0.01), coulomb=(0.0, 0.0, 0.1)),
-        direction=DirectionFriction(coulomb=(2.0, 1.5), breakaway=(3.0, 2.0), stribeck_speed=0.02),
-    )),
+    "ellipse": AXEBOT.replace(
+        friction=Friction(
+            axes=AxesFriction(viscous=(0.0, 0.0, 0.01), coulomb=(0.0, 0.0, 0.1)),
+            direction=DirectionFriction(coulomb=(2.0, 1.5), breakaway=(3.0, 2.0), stribeck_speed=0.02),
+        )
+    ),
     "slip": AXEBOT.replace(wheels=AXEBOT.wheels.replace(traction_mu=0.3, wheel_inertia=1e-5)),
-}  # fmt: skip
+}
 
 
 @pytest.fixture

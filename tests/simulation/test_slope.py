@@ -64,9 +64,16 @@ def modes(robot, voltage, dt, steps):
                 return meets
 
             out = solve_ivp(
-                rate, (0.0, left), state, args=(u, sign), method="DOP853", rtol=1e-11, atol=1e-13, max_step=0.02,
+                rate,
+                (0.0, left),
+                state,
+                args=(u, sign),
+                method="DOP853",
+                rtol=1e-11,
+                atol=1e-13,
+                max_step=0.02,
                 events=[event(axis) for axis in range(3)],
-            )  # fmt: skip
+            )
             state, left = out.y[:, -1].copy(), left - out.t[-1]
             if out.status == 1:
                 (axis,) = [a for a in range(3) if len(out.t_events[a])][:1]
@@ -180,8 +187,9 @@ def test_a_fixed_step_is_of_second_order():
 
 
 @pytest.mark.parametrize(
-    "kind", ["voltage", "speed", "windings"],
-)  # fmt: skip
+    "kind",
+    ["voltage", "speed", "windings"],
+)
 def test_a_live_robot_feels_it_as_well(kind):
     robot = on_slope(AXEBOT, 7.0, -60.0)
     if kind == "speed":

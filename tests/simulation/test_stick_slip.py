@@ -28,9 +28,7 @@ DT, ROWS = 5e-3, 620
 
 
 def dragged(**law):
-    axes = AxesFriction(
-        viscous=(VISCOUS, 0.96, 0.01), coulomb=(SLIDE, 1.5, 0.099), breakaway=(HOLD, 1.9, 0.13), **law
-    )  # fmt: skip
+    axes = AxesFriction(viscous=(VISCOUS, 0.96, 0.01), coulomb=(SLIDE, 1.5, 0.099), breakaway=(HOLD, 1.9, 0.13), **law)
     motor = AXEBOT.motor.replace(resistance=RESISTANCE, inductance=INDUCTANCE, electrical="dynamic")
     return AXEBOT.replace(motor=motor, friction=Friction(axes=axes))
 

@@ -75,10 +75,12 @@ class BagMaker:
         moves = self.make("geometry_msgs/msg/Twist", self.vector(vx, vy, 0.0), self.vector(0.0, 0.0, omega))
         zeros = np.zeros(36)
         message = self.make(
-            "nav_msgs/msg/Odometry", self.header(t if stamp == "t" else stamp, "odom"), "base_link",
+            "nav_msgs/msg/Odometry",
+            self.header(t if stamp == "t" else stamp, "odom"),
+            "base_link",
             self.make("geometry_msgs/msg/PoseWithCovariance", where, zeros),
             self.make("geometry_msgs/msg/TwistWithCovariance", moves, zeros),
-        )  # fmt: skip
+        )
         self.add(topic, "nav_msgs/msg/Odometry", t, message, late)
 
     def twist(self, t: float, twist: Any, topic: str = "/cmd_vel", stamped: bool = False) -> None:
@@ -93,8 +95,19 @@ class BagMaker:
     def battery(self, t: float, volts: float, topic: str = "/battery_state") -> None:
         nan, none = float("nan"), np.zeros(0, dtype=np.float32)
         message = self.make(
-            "sensor_msgs/msg/BatteryState", self.header(t), volts, *[nan] * 6, 2, 1, 2, True, none, none, "", "",
-        )  # fmt: skip
+            "sensor_msgs/msg/BatteryState",
+            self.header(t),
+            volts,
+            *[nan] * 6,
+            2,
+            1,
+            2,
+            True,
+            none,
+            none,
+            "",
+            "",
+        )
         self.add(topic, "sensor_msgs/msg/BatteryState", t, message)
 
     def numbers(self, t: float, values: Any, topic: str, late: float = 0.002) -> None:

@@ -19,9 +19,12 @@ def logged(world, commands, rng, source):
     back = moved.wheel_speed * world.gear_ratio * np.array(world.torque_constant)
     current = (volts - back) / np.array(world.resistance)
     return Run(
-        t, voltage=volts, wheel_speed=moved.wheel_speed + 0.1 * rng.normal(size=volts.shape),
-        current=current + 0.03 * rng.normal(size=volts.shape), source=source,
-    )  # fmt: skip
+        t,
+        voltage=volts,
+        wheel_speed=moved.wheel_speed + 0.1 * rng.normal(size=volts.shape),
+        current=current + 0.03 * rng.normal(size=volts.shape),
+        source=source,
+    )
 
 
 def once(seed, world, count, swept=False, change=1e9, factor=1.0):

@@ -30,20 +30,26 @@ def exact_robot(seed: int) -> Robot:
     count, first = 3 + seed % 4, random.uniform(-180.0, 180.0)
     azimuth = [(first + 360.0 * k / count + 180.0) % 360.0 - 180.0 for k in range(count)]
     wheels = Wheels(
-        azimuth_deg=tuple(azimuth), robot_radius=around(0.1), wheel_radius=around(0.035),
+        azimuth_deg=tuple(azimuth),
+        robot_radius=around(0.1),
+        wheel_radius=around(0.035),
         wheel_inertia=around(1e-5) if seed % 3 == 0 else 0.0,
-    )  # fmt: skip
+    )
     coulomb = tuple(map(around, (2.2, 1.5, 0.099)))
     friction = Friction(
         axes=AxesFriction(
-            viscous=tuple(map(around, (0.94, 0.96, 0.01))), coulomb=coulomb,
+            viscous=tuple(map(around, (0.94, 0.96, 0.01))),
+            coulomb=coulomb,
             breakaway=tuple(c * random.uniform(1.0, 1.5) for c in coulomb) if seed % 2 else None,
         )
-    )  # fmt: skip
+    )
     motor = plain.motor.replace(
-        resistance=around(1.69), gear_ratio=around(19.0), rotor_inertia=around(1e-7) if seed % 3 == 1 else 0.0,
-        inductance=around(10.0 ** random.uniform(-4.0, -2.0)), electrical=DYNAMIC if seed % 4 == 3 else "quasi-static",
-    )  # fmt: skip
+        resistance=around(1.69),
+        gear_ratio=around(19.0),
+        rotor_inertia=around(1e-7) if seed % 3 == 1 else 0.0,
+        inductance=around(10.0 ** random.uniform(-4.0, -2.0)),
+        electrical=DYNAMIC if seed % 4 == 3 else "quasi-static",
+    )
     drive = plain.drive.replace(dead_band=around(0.2)) if seed % 5 == 2 else plain.drive
     body = plain.body.replace(mass=around(1.5), inertia=around(0.025))
     return Robot(name=f"exact {seed}", body=body, wheels=wheels, motor=motor, drive=drive, friction=friction)

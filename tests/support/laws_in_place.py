@@ -37,9 +37,12 @@ NUMBERS = {
 WORD = {"none": "coulomb", "Stribeck": "coulomb", "Dahl": "dahl", "LuGre": "lugre"}
 NAMED = {"Stribeck": "stribeck_speed", "Dahl": "stiffness", "LuGre": "damping"}
 NOISE = {  # [m/s]
-    (DIRECTION, "Dahl"): 0.014, (DIRECTION, "LuGre"): 0.002, (WHEELS, "Dahl"): 0.02, (WHEELS, "LuGre"): 0.004,
+    (DIRECTION, "Dahl"): 0.014,
+    (DIRECTION, "LuGre"): 0.002,
+    (WHEELS, "Dahl"): 0.02,
+    (WHEELS, "LuGre"): 0.004,
     (WHEELS, "Stribeck"): 0.005,
-}  # fmt: skip
+}
 
 
 def robot_of(place, law, factor=1.0):

@@ -8,9 +8,15 @@ from tests.support.robots import random_program, random_robot, robot_of
 
 ROBOT_KEYS = (
     *(f"friction.axes.{name}[{axis}]" for name in ("viscous", "coulomb") for axis in range(3)),
-    "body.mass_kg", "body.inertia_kg_m2", "motor.resistance_ohm", "motor.torque_constant_Nm_A",
-    "motor.emf_constant_Vs_rad", "motor.gear_ratio", "wheels.wheel_radius_m", "wheels.robot_radius_m",
-)  # fmt: skip
+    "body.mass_kg",
+    "body.inertia_kg_m2",
+    "motor.resistance_ohm",
+    "motor.torque_constant_Nm_A",
+    "motor.emf_constant_Vs_rad",
+    "motor.gear_ratio",
+    "wheels.wheel_radius_m",
+    "wheels.robot_radius_m",
+)
 FACING = 0.7  # heading at the start [rad]
 
 

@@ -78,9 +78,19 @@ class Solver:
     def program(self, problem: Problem, x: np.ndarray) -> Program:
         """The program, with the arrays that it is solved in."""
         return Program(
-            problem.push, problem.weight, problem.stage, problem.wanted, problem.bounds, self.answer, self.inverse,
-            self.target, x, self.u, self.active, self.room,
-        )  # fmt: skip
+            problem.push,
+            problem.weight,
+            problem.stage,
+            problem.wanted,
+            problem.bounds,
+            self.answer,
+            self.inverse,
+            self.target,
+            x,
+            self.u,
+            self.active,
+            self.room,
+        )
 
     def solve(self, problem: Problem, warm: bool = False) -> tuple[np.ndarray, int]:
         if not warm:

@@ -65,9 +65,16 @@ class World:
         g, steps = self.push, round(seconds / STEP)
         table = np.array([[*d, back, front] for d, back, front in self.elements], dtype=float).reshape(-1, 5)
         twist = _march(
-            np.array([self.mass, self.mass, self.inertia]), g, np.asarray(voltage, dtype=float),
-            self.per_ampere / self.ohm, self.emf, table, np.array(self.cone), np.array(self.viscous), steps,
-        )[:: round(row / STEP)]  # fmt: skip
+            np.array([self.mass, self.mass, self.inertia]),
+            g,
+            np.asarray(voltage, dtype=float),
+            self.per_ampere / self.ohm,
+            self.emf,
+            table,
+            np.array(self.cone),
+            np.array(self.viscous),
+            steps,
+        )[:: round(row / STEP)]
         rim = twist @ g
         return np.arange(len(twist)) * row, twist, (voltage - self.emf * rim) / self.ohm, rim / self.radius
 

@@ -57,28 +57,51 @@ def random_robot(rng: Rng) -> Robot:
     viscous = coulomb / top * rng.uniform(0.0, 0.4)
     friction = {
         "box": {"axes": {"viscous": [viscous, viscous, viscous * b**2], "coulomb": [coulomb, coulomb * ratio, yaw]}},
-        "disc": {"direction": {"coulomb": [coulomb, coulomb * ratio], "viscous": viscous, "yaw_coulomb": yaw,
-                               "yaw_viscous": viscous * b**2}},
-    }[kind]  # fmt: skip
-    return robot_from_dict({
-        "schema": 1, "name": f"random-{kind}-{n}",
-        "body": {"mass_kg": mass, "inertia_kg_m2": 0.5 * mass * b**2, "rotating_frame": bool(rng.random() < 0.3)},
-        "wheels": {"azimuth_deg": [start + 360.0 * k / n - 360.0 * (start + 360.0 * k / n > 180.0) for k in range(n)],
-                   "robot_radius_m": b, "wheel_radius_m": r},
-        "motor": {"resistance_ohm": resistance, "torque_constant_Nm_A": constant, "emf_constant_Vs_rad": constant,
-                  "gear_ratio": gear, "voltage_limit_V": LIMIT},
-        "drive": {"kind": "voltage"}, "friction": friction,
-    })  # fmt: skip
+        "disc": {
+            "direction": {
+                "coulomb": [coulomb, coulomb * ratio],
+                "viscous": viscous,
+                "yaw_coulomb": yaw,
+                "yaw_viscous": viscous * b**2,
+            }
+        },
+    }[kind]
+    return robot_from_dict(
+        {
+            "schema": 1,
+            "name": f"random-{kind}-{n}",
+            "body": {"mass_kg": mass, "inertia_kg_m2": 0.5 * mass * b**2, "rotating_frame": bool(rng.random() < 0.3)},
+            "wheels": {
+                "azimuth_deg": [start + 360.0 * k / n - 360.0 * (start + 360.0 * k / n > 180.0) for k in range(n)],
+                "robot_radius_m": b,
+                "wheel_radius_m": r,
+            },
+            "motor": {
+                "resistance_ohm": resistance,
+                "torque_constant_Nm_A": constant,
+                "emf_constant_Vs_rad": constant,
+                "gear_ratio": gear,
+                "voltage_limit_V": LIMIT,
+            },
+            "drive": {"kind": "voltage"},
+            "friction": friction,
+        }
+    )
 
 
 def random_scene(rng: Rng) -> Scene:
     """A robot and a way to log it: 10 to 60 s at 50 to 200 Hz; some sensors are missing."""
     return Scene(
-        random_robot(rng), float(rng.choice([50.0, 100.0, 125.0, 200.0])), rng.uniform(10.0, 60.0),
-        float(rng.choice([0.0, 0.02, 0.1])), str(rng.choice(["voltage", "duty"])),
-        str(rng.choice(["twist", "pose", "gyro", "none"], p=[0.45, 0.25, 0.2, 0.1])), bool(rng.random() < 0.8),
-        bool(rng.random() < 0.95), rng.uniform(0.5, 0.85),
-    )  # fmt: skip
+        random_robot(rng),
+        float(rng.choice([50.0, 100.0, 125.0, 200.0])),
+        rng.uniform(10.0, 60.0),
+        float(rng.choice([0.0, 0.02, 0.1])),
+        str(rng.choice(["voltage", "duty"])),
+        str(rng.choice(["twist", "pose", "gyro", "none"], p=[0.45, 0.25, 0.2, 0.1])),
+        bool(rng.random() < 0.8),
+        bool(rng.random() < 0.95),
+        rng.uniform(0.5, 0.85),
+    )
 
 
 def program(rng: Rng, scene: Scene, n: int, dt: float) -> FloatArray:

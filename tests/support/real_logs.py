@@ -24,8 +24,10 @@ def folder() -> Path:
 def robotino_groups(data: Path) -> dict[str, list[Run]]:
     """Runs over two floors: "gray 0.1", "gray 0.2", "gray 0.3", "green 0.1"."""
     gray, green = (data / "robotino" / "one_surface_type" / name for name in ("gray_surface", "green_surface"))
-    groups = {f"gray {speed}": [gray / f"exp{n:02d}.csv" for n in range(first, first + 72)]
-              for speed, first in (("0.1", 0), ("0.2", 72), ("0.3", 144))}  # fmt: skip
+    groups = {
+        f"gray {speed}": [gray / f"exp{n:02d}.csv" for n in range(first, first + 72)]
+        for speed, first in (("0.1", 0), ("0.2", 72), ("0.3", 144))
+    }
     groups["green 0.1"] = [green / f"exp{n:02d}.csv" for n in range(0, 72, 2)]
     return {name: [_robotino(path) for path in paths] for name, paths in groups.items()}
 

@@ -84,8 +84,14 @@ def plant(seconds: float = 40.0, seed: int = 1) -> dict[str, Values]:
     place = np.concatenate([[0.0], np.cumsum(steps[:-1])])
     wheels = twist @ sides.T / RADIUS
     grid = np.arange(count) * STEP
-    line = {"vx": twist[:, 0], "vy": twist[:, 1], "omega": twist[:, 2], "x": np.real(place), "y": np.imag(place),
-            "heading": heading}  # fmt: skip
+    line = {
+        "vx": twist[:, 0],
+        "vy": twist[:, 1],
+        "omega": twist[:, 2],
+        "x": np.real(place),
+        "y": np.imag(place),
+        "heading": heading,
+    }
     line |= {f"w{k + 1}": wheels[:, k] for k in range(3)}
     line |= {f"a{k + 1}": np.cumsum(wheels[:, k]) * STEP for k in range(3)}
     known: dict[str, Values] = {name: _on_line(grid, values) for name, values in line.items()}
@@ -187,8 +193,19 @@ class Logged:
         return write_mcap(maker, path)
 
 
-UNITS = {"u": "V", "w": "rad_s", "a": "rad", "i": "A", "vx": "m_s", "vy": "m_s", "omega": "rad_s", "x": "m", "y": "m",
-         "heading": "rad", "supply": "V"}  # fmt: skip
+UNITS = {
+    "u": "V",
+    "w": "rad_s",
+    "a": "rad",
+    "i": "A",
+    "vx": "m_s",
+    "vy": "m_s",
+    "omega": "rad_s",
+    "x": "m",
+    "y": "m",
+    "heading": "rad",
+    "supply": "V",
+}
 
 
 def _noise(name: str) -> float:

@@ -22,7 +22,7 @@ FRICTIONS = {
     "disc": Friction(direction=DirectionFriction(coulomb=(2.0, 2.0), yaw_coulomb=0.099)),
     "ellipse": Friction(direction=DirectionFriction(coulomb=(2.4, 1.6), yaw_coulomb=0.099)),
     "wheel": Friction(wheels=WheelFriction(coulomb=0.9)),
-}  # fmt: skip
+}
 TRUTH = {
     "box": {"friction.axes.coulomb[0]": 2.4, "friction.axes.coulomb[1]": 1.6},
     "disc": {"friction.direction.coulomb": 2.0},

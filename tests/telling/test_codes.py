@@ -34,9 +34,13 @@ def test_a_sentence_is_made_of_a_statement_above_it():
     (warning,) = clipped_run().warnings
     assert str(warning) == "voltage above the limit was clipped in 1 of 2 rows, first in row 0"
     assert warning.to_dict() == {
-        "code": "clipped", "severity": "warning", "subject": "voltage", "text": str(warning), "remedy": "",
+        "code": "clipped",
+        "severity": "warning",
+        "subject": "voltage",
+        "text": str(warning),
+        "remedy": "",
         "numbers": {"clipped": 1, "rows": 2, "first": 0},
-    }  # fmt: skip
+    }
 
 
 def test_no_number_depends_on_a_sentence(monkeypatch):

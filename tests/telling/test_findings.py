@@ -65,9 +65,12 @@ def test_no_number_of_check_depends_on_a_sentence(before, faulty, capsys, reques
     assert code == 4
     (log,) = document["logs"]
     assert [(f["code"], f["severity"], f["subject"]) for f in log["findings"]] == [
-        ("swapped", "error", "w1 w2"), ("gap", "warning", "t"), ("spike", "warning", "w3"), ("not_taken", "note", ""),
+        ("swapped", "error", "w1 w2"),
+        ("gap", "warning", "t"),
+        ("spike", "warning", "w3"),
+        ("not_taken", "note", ""),
         ("not_used", "note", ""),
-    ]  # fmt: skip
+    ]
     assert log["findings"][1]["rows"] == [[202, 203]]
     assert log["findings"][2]["numbers"]["farthest"] == 999.0
 

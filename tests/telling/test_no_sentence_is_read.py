@@ -21,10 +21,16 @@ def identified():
     lack = fit.lack_of_fit
     assert lack is not None
     values = {
-        "value": fit.value, "std": fit.std, "ci95": fit.ci95, "rests_on": fit.rests_on,
-        "robot": robot_to_toml(fit.robot), "noise": lack.noise, "gain": [each.gain for each in lack.remedies],
-        "changes": [each.changes for each in lack.remedies], "failed": bool(found.failures),
-    }  # fmt: skip
+        "value": fit.value,
+        "std": fit.std,
+        "ci95": fit.ci95,
+        "rests_on": fit.rests_on,
+        "robot": robot_to_toml(fit.robot),
+        "noise": lack.noise,
+        "gain": [each.gain for each in lack.remedies],
+        "changes": [each.changes for each in lack.remedies],
+        "failed": bool(found.failures),
+    }
     values["scores"] = {group: each.scores for group, each in (found.validations or {}).items()}
     told = [*fit.warnings, *lack.statements(), *found.advice, *found.outcome(), *found.failures]
     keys = [(each.key, each.cause.code, each.same_as) for each in lack.remedies]

@@ -13,9 +13,12 @@ from omnidyn.cli.terminal.telling import tell
 from omnidyn.document import Document, Table
 
 app = typer.Typer(
-    name="omnidyn", add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False,
+    name="omnidyn",
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
-)  # fmt: skip
+)
 
 
 def _version(wanted: bool) -> None:
@@ -49,9 +52,22 @@ def _omnidyn(
 
 
 for _command in (
-    demo.demo, init.init, check.check, simulate.simulate, identify.identify, compare.compare, compare.drift,
-    at_rest.deadzone, at_rest.friction, loops.track, loops.tune, logs.info, logs.convert, robots,
-    exchange.export, warm.warm,
-):  # fmt: skip
+    demo.demo,
+    init.init,
+    check.check,
+    simulate.simulate,
+    identify.identify,
+    compare.compare,
+    compare.drift,
+    at_rest.deadzone,
+    at_rest.friction,
+    loops.track,
+    loops.tune,
+    logs.info,
+    logs.convert,
+    robots,
+    exchange.export,
+    warm.warm,
+):
     app.command(cls=Grouped)(_command)
 app.command("import", cls=Grouped)(exchange.bring)

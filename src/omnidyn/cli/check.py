@@ -84,9 +84,13 @@ def check(
 
 
 def _checked(
-    path: str, robot: Robot | None, options: LogOptions, maps: log_options.Maps, progress: Progress,
+    path: str,
+    robot: Robot | None,
+    options: LogOptions,
+    maps: log_options.Maps,
+    progress: Progress,
     picture: bool,
-) -> Checked:  # fmt: skip
+) -> Checked:
     """One log, block by block; an error in reading it does not stop the others."""
     done, digest = Checked(path), _Digest()
     progress(Report(f"reading {path}"))

@@ -114,9 +114,11 @@ def _checked(folder: Path, force: bool) -> Path:
     if folder.is_dir():
         if any(folder.iterdir()) and not (folder / MARKER).is_file() and not force:
             raise InputError(
-                "the folder has other things in it", expected="a new folder, or one that the demo made",
-                remedy="use --out with another name, or --force to write into it", where=str(folder),
-            )  # fmt: skip
+                "the folder has other things in it",
+                expected="a new folder, or one that the demo made",
+                remedy="use --out with another name, or --force to write into it",
+                where=str(folder),
+            )
         target = folder
     else:
         target = folder.absolute().parent

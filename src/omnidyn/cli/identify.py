@@ -126,10 +126,17 @@ def _identify(arguments: list[str], robot: str, asked: Asked, reading: Any, to: 
         load_meanwhile(to, asked.quick)
         with shared_out(start) if isinstance(method, OutputError) else nullcontext():
             found = omnidyn.identify(
-                loaded.runs, start, method, hold_out=asked.hold_out, groups=groups, quick=asked.quick,
-                progress=progress, check=loaded.logs, keep_best=True,
+                loaded.runs,
+                start,
+                method,
+                hold_out=asked.hold_out,
+                groups=groups,
+                quick=asked.quick,
+                progress=progress,
+                check=loaded.logs,
+                keep_best=True,
                 save=lambda fits: to.save({name: fit.robot for name, fit in fits.items()}, record["inputs"]),
-            )  # fmt: skip
+            )
             attempts = found.after.attempts
         if found.interrupted:
             progress(Report("interrupted: the numbers are the best so far, not the best there are", urgent=True))
@@ -167,9 +174,7 @@ def tell_motor_table(table: str, robot: str, asked: Asked, to: Out) -> None:
     )
 
 
-def _tell(
-    study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress
-) -> None:  # fmt: skip
+def _tell(study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress) -> None:
     attempts, report, numbers = Attempts(), "", _into_file(study, robot, record, to)
     told = study.document()
     if numbers is not None:

@@ -55,10 +55,16 @@ def init(
     The rest is guessed, with a wide spread, and marked as a guess.
     """
     given = {
-        "wheels": wheels, "azimuth": _listed("azimuth", azimuth), "wheel_radius": _radii("wheel_radius", wheel_radius),
-        "robot_radius": _radii("robot_radius", robot_radius), "mass": mass, "voltage_limit": voltage_limit,
-        "speed_loop": _listed("speed_loop", speed_loop), "gear_ratio": gear_ratio, "rotor_inertia": rotor_inertia,
-    }  # fmt: skip
+        "wheels": wheels,
+        "azimuth": _listed("azimuth", azimuth),
+        "wheel_radius": _radii("wheel_radius", wheel_radius),
+        "robot_radius": _radii("robot_radius", robot_radius),
+        "mass": mass,
+        "voltage_limit": voltage_limit,
+        "speed_loop": _listed("speed_loop", speed_loop),
+        "gear_ratio": gear_ratio,
+        "rotor_inertia": rotor_inertia,
+    }
     _refuse_words(given, mecanum, friction, like, out, json)
     _refuse_numbers(given)
     path = _checked_path(name := name.removesuffix(".toml"), out, force)
@@ -98,24 +104,33 @@ def _refuse_numbers(given: dict[str, Any]) -> None:
     for key in ("wheel_radius", "robot_radius"):
         if count and isinstance(given[key], tuple) and len(given[key]) != count:
             raise InputError(
-                "wrong number of values", got=number_words(given[key]), expected=f"1, or one per wheel ({count})",
+                "wrong number of values",
+                got=number_words(given[key]),
+                expected=f"1, or one per wheel ({count})",
                 where=f"--{key.replace('_', '-')}",
-            )  # fmt: skip
+            )
     if loop is not None and len(loop) not in (1, 3):
         raise InputError(
-            "not a speed loop", got=f"{len(loop)} numbers", where="--speed-loop",
+            "not a speed loop",
+            got=f"{len(loop)} numbers",
+            where="--speed-loop",
             expected="its rate, such as 100 [Hz], or both gains and its rate: 0.5,3,100 [V s/rad, V/rad, Hz]",
-        )  # fmt: skip
+        )
     if azimuth is not None and not LEAST_WHEELS <= len(azimuth) <= MOST_WHEELS:
         raise InputError(
-            "a robot that can move in every direction has three wheels or more", got=f"{len(azimuth)} angles",
-            expected=f"{LEAST_WHEELS} to {MOST_WHEELS}, one per wheel, such as 60,180,300", where="--azimuth",
-        )  # fmt: skip
+            "a robot that can move in every direction has three wheels or more",
+            got=f"{len(azimuth)} angles",
+            expected=f"{LEAST_WHEELS} to {MOST_WHEELS}, one per wheel, such as 60,180,300",
+            where="--azimuth",
+        )
     if limit is not None and not 0.0 < limit < float("inf"):
         raise InputError(
-            "no motor turns at this voltage", got=f"{limit:g} V", expected="more than 0 V, such as 12",
-            remedy="leave it out for a guess", where="--voltage-limit",
-        )  # fmt: skip
+            "no motor turns at this voltage",
+            got=f"{limit:g} V",
+            expected="more than 0 V, such as 12",
+            remedy="leave it out for a guess",
+            where="--voltage-limit",
+        )
     gear = given["gear_ratio"]
     if gear is not None and not 0.0 < gear < float("inf"):
         raise InputError(
@@ -139,9 +154,12 @@ def _checked_path(name: str, out: str, force: bool) -> str:
         raise InputError("a preset has this name", got=name, remedy="choose another one, or use --like", where="NAME")
     if not 0 < len(name) <= MAX_NAME or not name.isprintable() or set(name) & set("/\\:") or name[0] in ".- ":
         raise InputError(
-            "cannot name a robot and its file like this", got=name, expected=f"a plain name of 1 to {MAX_NAME} letters",
-            remedy="use --out for a file in another folder", where="NAME",
-        )  # fmt: skip
+            "cannot name a robot and its file like this",
+            got=name,
+            expected=f"a plain name of 1 to {MAX_NAME} letters",
+            remedy="use --out for a file in another folder",
+            where="NAME",
+        )
     path = out or f"{name}.toml"
     if "\0" in path:
         raise InputError("not a file name", got=path, where="--out")

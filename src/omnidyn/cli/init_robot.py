@@ -44,10 +44,15 @@ QUESTIONS = {
 
 
 KEYS = {
-    "azimuth": "wheels.azimuth_deg", "wheel_radius": "wheels.wheel_radius_m", "robot_radius": "wheels.robot_radius_m",
-    "mass": "body.mass_kg", "voltage_limit": "motor.voltage_limit_V", "roller": "wheels.roller_angle_deg",
-    "gear_ratio": "motor.gear_ratio", "rotor_inertia": "motor.rotor_inertia_kg_m2",
-}  # fmt: skip
+    "azimuth": "wheels.azimuth_deg",
+    "wheel_radius": "wheels.wheel_radius_m",
+    "robot_radius": "wheels.robot_radius_m",
+    "mass": "body.mass_kg",
+    "voltage_limit": "motor.voltage_limit_V",
+    "roller": "wheels.roller_angle_deg",
+    "gear_ratio": "motor.gear_ratio",
+    "rotor_inertia": "motor.rotor_inertia_kg_m2",
+}
 LEAST_RADIUS, LARGEST_RADIUS = 0.012, 0.3  # [m] of a wheel; what is outside is no radius, the speeds are of a motor
 GEARED = 1.5  # logged speeds so many times those of the wheels are speeds before a gear
 
@@ -200,10 +205,15 @@ def _checked(key: str, value: Any, known: Mapping[str, Any]) -> Any:
 
 def _sizes(given: dict[str, Any], preset: Robot | None) -> dict[str, Any]:
     """What is given of lengths, angles and the mass, the rest from the preset."""
-    of_preset = {} if preset is None else {
-        "wheel_radius": preset.wheels.wheel_radius, "robot_radius": preset.wheels.robot_radius,
-        "mass": preset.body.mass,
-    }  # fmt: skip
+    of_preset = (
+        {}
+        if preset is None
+        else {
+            "wheel_radius": preset.wheels.wheel_radius,
+            "robot_radius": preset.wheels.robot_radius,
+            "mass": preset.body.mass,
+        }
+    )
     return of_preset | {key: value for key, value in given.items() if value is not None}
 
 
@@ -245,9 +255,12 @@ def _with_motor(robot: Robot, given: dict[str, Any], copied: bool) -> Robot:
         return robot
     if GEAR in robot.priors and robot.priors[GEAR].origin == GUESS:
         raise InputError(
-            "a rotor needs its gear: at the wheel its inertia is J l^2", got=f"{rotor:g} kg m2 and no gear ratio",
-            expected="both", remedy="give --gear-ratio too", where="--rotor-inertia",
-        )  # fmt: skip
+            "a rotor needs its gear: at the wheel its inertia is J l^2",
+            got=f"{rotor:g} kg m2 and no gear ratio",
+            expected="both",
+            remedy="give --gear-ratio too",
+            where="--rotor-inertia",
+        )
     return with_rotor(robot, rotor)
 
 

@@ -28,8 +28,19 @@ if TYPE_CHECKING:
     from omnidyn.model.robot import Robot
 
 ENDINGS = (
-    ".csv", ".txt", ".tsv", ".dat", ".parquet", ".pq", ".log", ".mcap", ".db3", ".bag", ".wpilog", ".mat",
-)  # fmt: skip  # what is taken from a folder
+    ".csv",
+    ".txt",
+    ".tsv",
+    ".dat",
+    ".parquet",
+    ".pq",
+    ".log",
+    ".mcap",
+    ".db3",
+    ".bag",
+    ".wpilog",
+    ".mat",
+)  # what is taken from a folder
 MAX_FILES = 100_000
 
 LOGS = typer.Argument(metavar="LOG...", help="Logs (CSV, Parquet, bags of ROS, ..), or folders of them.")
@@ -54,10 +65,11 @@ class LogFlags:
         [], metavar="CH=COL:UNIT", help="One column: u1=motor_1_volts:V, w2=-m2vel:rpm@motor. Repeatable."
     )
     assume: Sequence[str] = typer.Option(
-        [], metavar="NAME=UNIT",
+        [],
+        metavar="NAME=UNIT",
         help="Unit of a column, or of all u, w, vx, ...: d=%, a=ticks/48@motor. Frames: twist=room, marker=9deg. "
         "Repeatable.",
-    )  # fmt: skip
+    )
     latency: Sequence[str] = typer.Option(
         [], metavar="CH=SECONDS", help="How late a channel was recorded. Repeatable.", rich_help_panel=MORE
     )
@@ -76,13 +88,17 @@ class LogFlags:
     )
     max_bytes: int = MAX_BYTES
     var: Sequence[str] = typer.Option(
-        [], metavar="NAME", help="Read this variable of a MATLAB file alone, with all in it. Repeatable.",
+        [],
+        metavar="NAME",
+        help="Read this variable of a MATLAB file alone, with all in it. Repeatable.",
         rich_help_panel=MORE,
-    )  # fmt: skip
+    )
     current_unsigned: bool = typer.Option(
-        False, "--current-unsigned", help="Currents are |i|: they get the sign of the commanded speed.",
+        False,
+        "--current-unsigned",
+        help="Currents are |i|: they get the sign of the commanded speed.",
         rich_help_panel=MORE,
-    )  # fmt: skip
+    )
 
     def options(self) -> LogOptions:
         """The options as the readers take them. Raises InputError for what cannot be read."""
@@ -116,10 +132,11 @@ def reads_logs(*without: str) -> Callable[[Callable[..., None]], Callable[..., N
     """A command with an option for every field of LogFlags but those `without`, in the place of its `flags`."""
     used = [option for option in fields(LogFlags) if option.name not in without]
     options = [
-        inspect.Parameter(option.name, inspect.Parameter.KEYWORD_ONLY, default=option.default,
-                          annotation=_KINDS[str(option.type)])
+        inspect.Parameter(
+            option.name, inspect.Parameter.KEYWORD_ONLY, default=option.default, annotation=_KINDS[str(option.type)]
+        )
         for option in used
-    ]  # fmt: skip
+    ]
 
     def with_options(command: Callable[..., None]) -> Callable[..., None]:
         """The command, which gets its `flags` from these options."""

@@ -161,9 +161,18 @@ def tune(
     loaded = omnidyn.load_robot(robot)
     with shown_progress("tuning") as progress:
         found = tune_controller(
-            loaded, path, controller, draws=draws, evaluations=evaluations, noise=noise, delay=delay, dt=dt,
-            duration=duration, seed=seed, progress=progress,
-        )  # fmt: skip
+            loaded,
+            path,
+            controller,
+            draws=draws,
+            evaluations=evaluations,
+            noise=noise,
+            delay=delay,
+            dt=dt,
+            duration=duration,
+            seed=seed,
+            progress=progress,
+        )
     if out:
         save_controller(found.controller, out, force)
     tell(found.document(), json, record, output=out or None)

@@ -29,10 +29,19 @@ ABSENT = Trace(np.zeros(0), np.zeros(0), np.zeros(0))
 
 
 def compare(
-    robot: Robot, run: Run | Sequence[Run], other: Robot | None = None, *, apply: str | None = None,
-    hold: float = HOLD, current_unsigned: bool = False, tol: float | None = TOLERANCE, seed: int = 0,
-    progress: Progress = silent, band: bool = False, log: LogEffects | None = None,
-) -> Comparison:  # fmt: skip
+    robot: Robot,
+    run: Run | Sequence[Run],
+    other: Robot | None = None,
+    *,
+    apply: str | None = None,
+    hold: float = HOLD,
+    current_unsigned: bool = False,
+    tol: float | None = TOLERANCE,
+    seed: int = 0,
+    progress: Progress = silent,
+    band: bool = False,
+    log: LogEffects | None = None,
+) -> Comparison:
     """Replay logs against one robot, or two, and measure how near each comes.
 
     The logged input drives the model: voltage, else duty times supply, else the speed loop of the robot file. Each
@@ -98,10 +107,11 @@ def what_is_compared(robots: Sequence[Robot], runs: Sequence[Run], apply: str | 
             raise error.at(run.source) if run.source else error from None
     if not found:
         raise InsufficientDataError(
-            "the logs hold nothing that a model predicts", got=", ".join(runs[0].channels),
+            "the logs hold nothing that a model predicts",
+            got=", ".join(runs[0].channels),
             expected="twist, wheel_speed, wheel_angle, current or pose",
             remedy="map the columns of speeds, angles, currents or the pose",
-        )  # fmt: skip
+        )
     return in_order(found, robots[0].wheels.count)
 
 
@@ -207,9 +217,17 @@ COARSE = 1e-4  # [m/s] of the implicit engine: a band is a hundred times as wide
 
 
 def with_bands(
-    found: Comparison, robots: Sequence[Robot], *, logs: Sequence[int] | None = None, apply: str | None = None,
-    hold: float = HOLD, tol: float | None = COARSE, draws: int = DRAWS, seed: int = 0, log: LogEffects | None = None,
-) -> Comparison:  # fmt: skip
+    found: Comparison,
+    robots: Sequence[Robot],
+    *,
+    logs: Sequence[int] | None = None,
+    apply: str | None = None,
+    hold: float = HOLD,
+    tol: float | None = COARSE,
+    draws: int = DRAWS,
+    seed: int = 0,
+    log: LogEffects | None = None,
+) -> Comparison:
     """The comparison with the band of each model: the same free runs by plausible robots.
 
     robots: those compared, in order. logs: which logs, all by default. apply, hold, tol, log: as they were compared. A
@@ -229,7 +247,7 @@ def with_bands(
                 drawn, lambda each, k=k: replay(each, found.measured[k], apply=apply, hold=hold, tol=tol, log=log).run
             )
             for k in which
-        }  # fmt: skip
+        }
         guessed[name] = known.guessed
         if known.guessed:
             warnings.append(Statement("band_rests_on_guesses", subject=name, numbers={"guesses": known.guessed}))

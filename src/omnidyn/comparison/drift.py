@@ -34,9 +34,17 @@ if TYPE_CHECKING:
 LEVEL = 0.05  # chance of any change in fits of one and the same robot
 UPPER = float(ndtri(0.975))
 SAME_EIGENVALUE = 1e-9  # of the largest eigenvalue of a matrix whose diagonal is 1: below it two numbers are one
-TAKEN = ("body.mass_kg", "body.inertia_kg_m2", CENTRE, "wheels.wheel_radius_m", "wheels.robot_radius_m",
-         "motor.resistance_ohm", "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad",
-         "motor.gear_ratio")  # fmt: skip
+TAKEN = (
+    "body.mass_kg",
+    "body.inertia_kg_m2",
+    CENTRE,
+    "wheels.wheel_radius_m",
+    "wheels.robot_radius_m",
+    "motor.resistance_ohm",
+    "motor.torque_constant_Nm_A",
+    "motor.emf_constant_Vs_rad",
+    "motor.gear_ratio",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,11 +134,18 @@ class Drift(Shown):
         for number in self.numbers:
             for k, name in enumerate(number.fits):
                 first = k == 0
-                rows.append((
-                    in_words(number.key) if first else "", number.key if first else "", name, f"{number.value[k]:.4g}",
-                    interval_cell(number.ci95[k]), unit(number.key), chance_cell(min(number.p, 1.0)) if first else "",
-                    ("changed" if number.changed else "no change seen") if first else "",
-                ))  # fmt: skip
+                rows.append(
+                    (
+                        in_words(number.key) if first else "",
+                        number.key if first else "",
+                        name,
+                        f"{number.value[k]:.4g}",
+                        interval_cell(number.ci95[k]),
+                        unit(number.key),
+                        chance_cell(min(number.p, 1.0)) if first else "",
+                        ("changed" if number.changed else "no change seen") if first else "",
+                    )
+                )
         head = ("number", "key", "fit", "value", "95 % interval", "unit", "chance", "")
         return Table(head, rows, "<<<>><><")
 
@@ -139,19 +154,29 @@ class Drift(Shown):
         chi2, degrees, p = self.together
         numbers = {
             number.key: {
-                "words": in_words(number.key), "unit": unit(number.key), "chi2": number.chi2, "degrees": number.degrees,
-                "p": number.p, "changed": number.changed,
+                "words": in_words(number.key),
+                "unit": unit(number.key),
+                "chi2": number.chi2,
+                "degrees": number.degrees,
+                "p": number.p,
+                "changed": number.changed,
                 "fits": {
                     name: {"value": number.value[k], "std": number.std[k], "ci95": number.ci95[k]}
                     for k, name in enumerate(number.fits)
                 },
             }
             for number in self.numbers
-        }  # fmt: skip
-        return plain({
-            **as_verdict(self.verdict), "fits": self.fits, "changed": self.changed, "numbers": numbers,
-            "together": {"chi2": chi2, "degrees": degrees, "p": p}, "warnings": self.warnings,
-        })  # fmt: skip
+        }
+        return plain(
+            {
+                **as_verdict(self.verdict),
+                "fits": self.fits,
+                "changed": self.changed,
+                "numbers": numbers,
+                "together": {"chi2": chi2, "degrees": degrees, "p": p},
+                "warnings": self.warnings,
+            }
+        )
 
 
 def drift(fits: Sequence[Robot | str | os.PathLike], names: Sequence[str] = ()) -> Drift:
@@ -173,9 +198,11 @@ def drift(fits: Sequence[Robot | str | os.PathLike], names: Sequence[str] = ()) 
     shared = [key for key in keys if sum(key in numbers for numbers in known) > 1]
     if not shared:
         raise InsufficientDataError(
-            "no number is in two of the fits", got="; ".join(f"{n}: {', '.join(k)}" for n, k in zip(called, known,
-            strict=True)), expected="fits of the same numbers", where="fits",
-        )  # fmt: skip
+            "no number is in two of the fits",
+            got="; ".join(f"{n}: {', '.join(k)}" for n, k in zip(called, known, strict=True)),
+            expected="fits of the same numbers",
+            where="fits",
+        )
     numbers = [_number(key, called, known, len(shared)) for key in shared]
     everywhere = [key for key in shared if all(key in numbers for numbers in known)]
     return Drift(
@@ -201,9 +228,11 @@ def _fitted(robot: Robot, name: str) -> Fitted:
             found[key] = (float(own.value[k]), float(own.std[k]), bool(own.log[k]))
     if not found:
         raise InputError(
-            "no number of this file was fitted", got=", ".join(robot.priors) or "no std of any number",
-            expected="a robot file that identify wrote, with the std of its numbers", where=name,
-        )  # fmt: skip
+            "no number of this file was fitted",
+            got=", ".join(robot.priors) or "no std of any number",
+            expected="a robot file that identify wrote, with the std of its numbers",
+            where=name,
+        )
     return found
 
 

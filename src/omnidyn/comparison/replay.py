@@ -58,9 +58,14 @@ class Replay:
 
 
 def replay(
-    robot: Robot, run: Run, *, apply: str | None = None, hold: float = HOLD, tol: float | None = TOLERANCE,
+    robot: Robot,
+    run: Run,
+    *,
+    apply: str | None = None,
+    hold: float = HOLD,
+    tol: float | None = TOLERANCE,
     log: LogEffects | None = None,
-) -> Replay:  # fmt: skip
+) -> Replay:
     """Simulate `robot` under what was applied in `run`, at the same times.
 
     apply: the channel to apply (voltage, duty, wheel_speed_command, twist_command); by default the first of these that
@@ -99,16 +104,18 @@ def refuse_other_robot(robot: Robot, run: Run) -> None:
         count = values.shape[1] if CHANNELS[name] == WHEEL else robot.wheels.count
         if count == 1:
             raise InputError(
-                "a log of one motor cannot be compared with a robot", got=f"{name} of 1 motor",
+                "a log of one motor cannot be compared with a robot",
+                got=f"{name} of 1 motor",
                 expected=f"{robot.wheels.count} wheels, as {robot.name} has",
                 remedy="this is a motor bench: compare the log of the whole robot",
-            )  # fmt: skip
+            )
         if count != robot.wheels.count:
             raise InputError(
-                "the log is of another robot", got=f"{name} of {count} wheels",
+                "the log is of another robot",
+                got=f"{name} of {count} wheels",
                 expected=f"{robot.wheels.count} wheels, as {robot.name} has",
                 remedy="choose the robot of this log, or map the columns of its wheels",
-            )  # fmt: skip
+            )
 
 
 def choose_input(robot: Robot, run: Run, apply: str | None = None) -> str:
@@ -118,26 +125,29 @@ def choose_input(robot: Robot, run: Run, apply: str | None = None) -> str:
         _refuse_apply(apply, there)
     if not there:
         raise InputError(
-            "the log has no input to replay", got=", ".join(run.channels) or "no channels",
-            expected=" or ".join(INPUTS), remedy="map the columns of the motor voltages, duties or set speeds",
-        )  # fmt: skip
+            "the log has no input to replay",
+            got=", ".join(run.channels) or "no channels",
+            expected=" or ".join(INPUTS),
+            remedy="map the columns of the motor voltages, duties or set speeds",
+        )
     whole = [name for name in there if not _blank_components(run, name)]
     # A duty of 0 that coasts is an open circuit, which its voltage of 0 does not tell.
     chosen = apply or (DUTY if robot.drive.coasts and DUTY in whole else [*whole, *there][0])
     blank = _blank_components(run, chosen)
     if blank:
         raise InputError(
-            f"{', '.join(blank)} was not recorded", got=f"{chosen} without it",
+            f"{', '.join(blank)} was not recorded",
+            got=f"{chosen} without it",
             expected=f"an input for all {robot.wheels.count} wheels and axes of {robot.name}",
             remedy="choose the robot of this log, or map the columns that are missing",
-        )  # fmt: skip
+        )
     if chosen in SET_SPEEDS and robot.drive.kind != SPEED:
         raise InputError(
             "the log has set speeds only, and the robot no speed loop to follow them",
             got=f'[drive] kind = "{robot.drive.kind}" of {robot.name}',
             expected="a logged voltage or duty, or the speed loop of the firmware",
             remedy='map the voltages, or add [drive] kind = "speed", kp_V_s_rad, ki_V_rad, rate_Hz to the robot file',
-        )  # fmt: skip
+        )
     return chosen
 
 
@@ -172,9 +182,11 @@ def _prepared(
     kept = [piece for piece in pieces if piece.stop - piece.start >= FEWEST_ROWS]
     if not kept:
         raise InsufficientDataError(
-            "nothing can be replayed", got=f"{len(pieces)} stretches with inputs, the longest too short",
-            expected=f"{FEWEST_ROWS} rows in a row without a gap", remedy="look at the log with omnidyn check",
-        )  # fmt: skip
+            "nothing can be replayed",
+            got=f"{len(pieces)} stretches with inputs, the longest too short",
+            expected=f"{FEWEST_ROWS} rows in a row without a gap",
+            remedy="look at the log with omnidyn check",
+        )
     left = len(run) - sum(piece.stop - piece.start for piece in kept)
     warnings = []
     if len(stretches) > 1:
@@ -208,9 +220,15 @@ def _usable_pieces(rows: slice, usable: BoolArray) -> Iterator[slice]:
 
 
 def _free_run(
-    robot: Robot, run: Run, rows: slice, applied: str, inputs: FloatArray, supply: FloatArray | None, tol: float | None,
+    robot: Robot,
+    run: Run,
+    rows: slice,
+    applied: str,
+    inputs: FloatArray,
+    supply: FloatArray | None,
+    tol: float | None,
     log: LogEffects | None,
-) -> tuple[Run, str]:  # fmt: skip
+) -> tuple[Run, str]:
     """One piece: simulated from its measured start to its end. Also returns where the start came from."""
     start = start_of(run, robot, rows)
     held = slice(rows.start, rows.stop - 1)
@@ -236,15 +254,25 @@ def _commands(robot: Robot, dt: FloatArray, applied: str, inputs: FloatArray, ex
     """The logged inputs as commands."""
     named = dict.fromkeys((*INPUTS, "supply")) | {applied: inputs} | extra
     return commands(
-        robot, named["voltage"], dt, named["duty"], named["wheel_speed_command"], named["twist_command"],
+        robot,
+        named["voltage"],
+        dt,
+        named["duty"],
+        named["wheel_speed_command"],
+        named["twist_command"],
         named["supply"],
-    )  # fmt: skip
+    )
 
 
 def _view(
-    robot: Robot, run: Run, held: slice, given: Commands, log: LogEffects | None, parts: int = 1,
+    robot: Robot,
+    run: Run,
+    held: slice,
+    given: Commands,
+    log: LogEffects | None,
+    parts: int = 1,
     of_angles: bool = False,
-) -> View:  # fmt: skip
+) -> View:
     """What a log shows of a piece, whose rows are `held`. parts: steps of the simulation in a row.
 
     The start was measured by the first channel of LATE: the run begins by so much earlier as that is late.
@@ -300,8 +328,9 @@ def _from_simulation(parts: list[tuple[Run, str]]) -> list[Statement]:
     """What the simulations warned of, by piece, and starts that were assumed."""
     warnings = [
         warning.of(f"piece {k + 1}") if len(parts) > 1 else warning
-        for k, (part, _) in enumerate(parts) for warning in part.warnings
-    ]  # fmt: skip
+        for k, (part, _) in enumerate(parts)
+        for warning in part.warnings
+    ]
     more = len(warnings) - SHOWN
     cut = [Statement("more_warnings", numbers={"more": more})] if more > 0 else []
     assumed = sum(source == REST for _, source in parts)

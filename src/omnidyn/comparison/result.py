@@ -164,9 +164,11 @@ class Comparison(Shown):
         if self.difference:
             first, second = self.robots
             parts += [
-                f"rmse of {first} minus rmse of {second}, with its standard error (block bootstrap)", "",
-                difference_table(self.robots, self.difference), "",
-            ]  # fmt: skip
+                f"rmse of {first} minus rmse of {second}, with its standard error (block bootstrap)",
+                "",
+                difference_table(self.robots, self.difference),
+                "",
+            ]
         parts += legend([metrics for found in self.overall.values() for metrics in found.values()])
         parts += ["currents are compared by size, without sign."] if self.current_unsigned else []
         parts.append(by_severity(self.warnings))
@@ -180,11 +182,14 @@ class Comparison(Shown):
             second = others[0]
             rows = [
                 (
-                    name, unit(name), f"{found[name].rmse:.4g}", f"{self.overall[second][name].rmse:.4g}",
+                    name,
+                    unit(name),
+                    f"{found[name].rmse:.4g}",
+                    f"{self.overall[second][name].rmse:.4g}",
                     self.better(name) or ("the same" if gap.std_error == 0.0 else "cannot tell"),
                 )
                 for name, gap in self.difference.items()
-            ]  # fmt: skip
+            ]
             return Table(("", "unit", f"rmse of {first}", f"rmse of {second}", "nearer"), rows, "<<>><", (8, 6))
         widths = self.half_widths(first) if self.bands else {}
         bands = [(f"{widths[name]:.4g}" if name in widths else "",) * bool(self.bands) for name in self.channels]
@@ -264,9 +269,17 @@ def _row(name: str, each: Metrics | None) -> tuple[str, ...]:
     if each is None:
         return name, unit(name), "0"
     return (
-        name, unit(name), f"{each.samples}", f"{each.rmse:.4g}", f"{each.max:.4g}", f"{each.bias:+.3g}",
-        cell(each.fit_percent, ".1f"), cell(each.vaf, ".1f"), chance_cell(each.whiteness), cell(each.lag, "+.3f"),
-    )  # fmt: skip
+        name,
+        unit(name),
+        f"{each.samples}",
+        f"{each.rmse:.4g}",
+        f"{each.max:.4g}",
+        f"{each.bias:+.3g}",
+        cell(each.fit_percent, ".1f"),
+        cell(each.vaf, ".1f"),
+        chance_cell(each.whiteness),
+        cell(each.lag, "+.3f"),
+    )
 
 
 def band_table(half_widths: Mapping[str, float], found: Mapping[str, Metrics]) -> Table:

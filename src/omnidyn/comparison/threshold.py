@@ -35,9 +35,11 @@ def parse_threshold(text: str) -> Threshold:
     match = _FORM.fullmatch(text)
     if match is None:
         raise InputError(
-            "cannot read this threshold", got=text, expected='such as "vx.rmse>0.05", with > >= < or <=',
+            "cannot read this threshold",
+            got=text,
+            expected='such as "vx.rmse>0.05", with > >= < or <=',
             where="`fail_if`",
-        )  # fmt: skip
+        )
     component, metric, sign, number = match.groups()
     if metric not in METRICS:
         raise _unknown("no such metric", metric, METRICS)
@@ -66,9 +68,11 @@ def exceeded(comparison: Comparison, thresholds: Sequence[Threshold], robot: str
         value = getattr(found[threshold.component], threshold.metric) if threshold.component in found else None
         if value is None:
             raise InsufficientDataError(
-                f"the data do not tell {threshold.component}.{threshold.metric}", got=str(threshold),
-                expected="a signal that changes, and enough samples", where="`fail_if`",
-            )  # fmt: skip
+                f"the data do not tell {threshold.component}.{threshold.metric}",
+                got=str(threshold),
+                expected="a signal that changes, and enough samples",
+                where="`fail_if`",
+            )
         if _OPERATORS[threshold.sign](value, threshold.number):
             name = f"{threshold.component}.{threshold.metric}"
             words.append(f"{name} = {value:.6g} ({threshold.sign} {threshold.number:g})")

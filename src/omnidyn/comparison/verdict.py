@@ -25,12 +25,19 @@ WELL, NOISE, ROUGHLY, HARDLY, NOT = range(5)  # how a component is followed, bes
 LEVELS = ("well", "noise", "roughly", "hardly", "not")  # the same for machines
 THE_MODEL = "the model"
 PLAIN = {
-    ("twist", 0): "speed over the ground", ("twist", 1): "speed over the ground", ("twist", 2): "turn rate",
-    ("pose", 0): "position", ("pose", 1): "position", ("pose", 2): "heading",
-}  # fmt: skip
+    ("twist", 0): "speed over the ground",
+    ("twist", 1): "speed over the ground",
+    ("twist", 2): "turn rate",
+    ("pose", 0): "position",
+    ("pose", 1): "position",
+    ("pose", 2): "heading",
+}
 OF_WHEELS = {
-    "wheel_speed": "wheel speeds", "wheel_angle": "wheel angles", "current": "currents", "voltage": "voltages",
-}  # fmt: skip
+    "wheel_speed": "wheel speeds",
+    "wheel_angle": "wheel angles",
+    "current": "currents",
+    "voltage": "voltages",
+}
 
 
 class Scored(Protocol):
@@ -138,7 +145,8 @@ def compared(
         return follows(THE_MODEL, followed(scores[0]))
     models = [follows(robot, followed(score)) for robot, score in zip(robots, scores, strict=True)]
     nearer = [
-        Statement("nearer", NOTE, robot, {"components": components}) for robot in robots
+        Statement("nearer", NOTE, robot, {"components": components})
+        for robot in robots
         if (components := [name for name, best in better.items() if best == robot])
-    ]  # fmt: skip
+    ]
     return Statement("models_compared", NOTE, numbers={"nearer": nearer, "models": models})

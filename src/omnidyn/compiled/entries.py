@@ -208,11 +208,19 @@ def loaded(context: Any, saved: Any) -> Any:
         begin()
     library = FromDisk.of(context.codegen(), code, (fndesc.llvm_func_name, fndesc.llvm_cpython_wrapper_name))
     result = compile_result(
-        target_context=context, typing_context=context.typing_context, library=library, environment=environment,
-        entry_point=context.get_executable(library, fndesc, environment), fndesc=fndesc, type_annotation=annotation,
-        signature=signature, objectmode=objectmode, lifted=lifted, reload_init=reload_init,
+        target_context=context,
+        typing_context=context.typing_context,
+        library=library,
+        environment=environment,
+        entry_point=context.get_executable(library, fndesc, environment),
+        fndesc=fndesc,
+        type_annotation=annotation,
+        signature=signature,
+        objectmode=objectmode,
+        lifted=lifted,
+        reload_init=reload_init,
         referenced_envs=environments,
-    )  # fmt: skip
+    )
     for each in environments:
         context.codegen().set_env(each.env_name, each)
     return result

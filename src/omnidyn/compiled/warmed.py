@@ -48,8 +48,10 @@ def remember(caches: Sequence[Entries], made_with: str) -> None:
     if not made_with or any(each.content(file) is None for each in caches for file in each.asked):
         return
     with contextlib.suppress(OSError, RuntimeError, OmnidynError):
-        known = [Remembered(each.stamp, each.cache_path, {str(file): sha256(file.read_bytes()) for file in each.asked})
-                 for each in caches]  # fmt: skip
+        known = [
+            Remembered(each.stamp, each.cache_path, {str(file): sha256(file.read_bytes()) for file in each.asked})
+            for each in caches
+        ]
         file = place()
         file.parent.mkdir(parents=True, exist_ok=True)
         content = {"made_with": made_with, "kernels": [asdict(each) for each in known]}

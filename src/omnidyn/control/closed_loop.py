@@ -55,9 +55,11 @@ class Circumstances:
                 raise InputError("out of range", got=value, expected=f"{low:g} to {high:g}", where=name)
         if self.duration is not None and not self.dt <= self.duration <= MOST_STEPS * self.dt:
             raise InputError(
-                "cannot track for that long", got=self.duration,
-                expected=f"one step, {self.dt:g} s, to a million of them", where="duration",
-            )  # fmt: skip
+                "cannot track for that long",
+                got=self.duration,
+                expected=f"one step, {self.dt:g} s, to a million of them",
+                where="duration",
+            )
 
     def steps(self, path: Path) -> int:
         """How many steps it takes. Raises InputError for a path of too many."""
@@ -69,10 +71,20 @@ class Circumstances:
 
 
 def track(
-    robot: Robot, path: Path | Run | str, controller: Controller | ControllerFile | str = "pid", *,
-    plant: Robot | None = None, dt: float = DT, duration: float | None = None, skip: float = SKIP, noise: float = 0.0,
-    delay: int = 0, seed: int = 0, push: tuple[float, float, float] = (0.0, 0.0, 0.0), supply: float | None = None,
-) -> Tracking:  # fmt: skip
+    robot: Robot,
+    path: Path | Run | str,
+    controller: Controller | ControllerFile | str = "pid",
+    *,
+    plant: Robot | None = None,
+    dt: float = DT,
+    duration: float | None = None,
+    skip: float = SKIP,
+    noise: float = 0.0,
+    delay: int = 0,
+    seed: int = 0,
+    push: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    supply: float | None = None,
+) -> Tracking:
     """Drive a simulated robot along a path with a controller, and see how near it comes.
 
     robot: that the controller believes to drive. path: a Path, or what `path` takes. controller: a Controller, or the
@@ -98,9 +110,12 @@ def track(
         controller = controller.make(robot, supply=supply, **told_of_loop(robot, around))
     elif not hasattr(controller, "step"):
         raise InputError(
-            "no controller", got=type(controller).__name__, expected="a Controller, or the name of one",
-            remedy='controller="pid", or one made for the robot, such as Mpc(robot)', where="controller",
-        )  # fmt: skip
+            "no controller",
+            got=type(controller).__name__,
+            expected="a Controller, or the name of one",
+            remedy='controller="pid", or one made for the robot, such as Mpc(robot)',
+            where="controller",
+        )
     return tracked(plant or robot, follow, controller, around)
 
 
@@ -115,9 +130,7 @@ def tracked(plant: Robot, path: Path, controller: Controller, around: Circumstan
     _check_match(plant, controller, around.supply)
     count, dt, n = around.steps(path), around.dt, plant.wheels.count
     t: FloatArray = np.arange(count + 1, dtype=np.float64) * dt
-    live = LiveRobot(
-        plant, dt, pose=path.at(0.0).pose, delay=around.delay, supply=around.supply, push=around.push
-    )  # fmt: skip
+    live = LiveRobot(plant, dt, pose=path.at(0.0).pose, delay=around.delay, supply=around.supply, push=around.push)
     controller.reset()
     early = round(plant.drive.latency / dt) + around.delay
     draws = np.random.default_rng(around.seed).standard_normal((count + early, 6)) * (around.noise * NOISE)
@@ -142,8 +155,17 @@ def tracked(plant: Robot, path: Path, controller: Controller, around: Circumstan
     run = _run(plant, controller, t, sent, volts, state, around).replace(warnings=live.warnings)
     full = float(np.mean((np.abs(sent) >= limit * (1.0 - 1e-9)).any(axis=1)))
     return Tracking(
-        controller.name, plant.name, path.name, run, path.at(t).pose, around.skip, dt, full, took, words,
-    )  # fmt: skip
+        controller.name,
+        plant.name,
+        path.name,
+        run,
+        path.at(t).pose,
+        around.skip,
+        dt,
+        full,
+        took,
+        words,
+    )
 
 
 def _check_match(plant: Robot, controller: Controller, supply: float | None) -> None:
@@ -154,14 +176,20 @@ def _check_match(plant: Robot, controller: Controller, supply: float | None) -> 
         raise InputError(
             "the controller is made for another drive",
             got=f"{believed.wheels.count} wheels, {believed.drive.kind}",
-            expected=f"{plant.wheels.count} wheels, {plant.drive.kind}", where="plant",
-        )  # fmt: skip
+            expected=f"{plant.wheels.count} wheels, {plant.drive.kind}",
+            where="plant",
+        )
 
 
 def _run(
-    plant: Robot, controller: Controller, t: FloatArray, sent: FloatArray, volts: FloatArray, state: FloatArray,
+    plant: Robot,
+    controller: Controller,
+    t: FloatArray,
+    sent: FloatArray,
+    volts: FloatArray,
+    state: FloatArray,
     around: Circumstances,
-) -> Run:  # fmt: skip
+) -> Run:
     """What the instruments of the robot would have recorded, without noise."""
 
     def last(rows: FloatArray) -> FloatArray:
@@ -170,10 +198,13 @@ def _run(
     kind = plant.drive.kind
     battery = around.supply if around.supply is not None else plant.drive.supply
     return Run(
-        t=t, voltage=last(volts), duty=last(sent) if kind == DUTY else None,
+        t=t,
+        voltage=last(volts),
+        duty=last(sent) if kind == DUTY else None,
         wheel_speed=state[:, 6:],
         wheel_speed_command=last(sent) if kind == SPEED else None,
-        twist=state[:, 3:6], pose=state[:, :3],
+        twist=state[:, 3:6],
+        pose=state[:, :3],
         supply=np.full(len(t), battery) if kind == DUTY and battery is not None else None,
         source=f"simulated: {plant.name} driven by {controller.name}",
-    )  # fmt: skip
+    )

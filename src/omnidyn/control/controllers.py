@@ -79,9 +79,12 @@ def controller_class(name: str) -> type[Any]:
     if name not in every:
         near = difflib.get_close_matches(name, every, 1)
         raise InputError(
-            "unknown controller", got=name, expected=f"{', '.join(every)}, or a controller file (.toml)",
-            remedy=f"did you mean {near[0]}?" if near else "", where="controller",
-        )  # fmt: skip
+            "unknown controller",
+            got=name,
+            expected=f"{', '.join(every)}, or a controller file (.toml)",
+            remedy=f"did you mean {near[0]}?" if near else "",
+            where="controller",
+        )
     module, _, own = every[name].partition(":")
     return getattr(importlib.import_module(module), own)
 
@@ -116,9 +119,11 @@ def check_options(name: str, options: Mapping[str, Any]) -> None:
             raise unknown_option(name, key, known, f"options.{key}")
         if not _plain(value):
             raise InputError(
-                "not a value of an option", got=value, expected="a finite number, a word, true or false, or a list",
+                "not a value of an option",
+                got=value,
+                expected="a finite number, a word, true or false, or a list",
                 where=f"options.{key}",
-            )  # fmt: skip
+            )
 
 
 def _plain(value: Any) -> bool:
@@ -155,9 +160,11 @@ def several(
     for key in wanted:
         if not any(key in options_of(spec.controller) for spec in specs):
             raise InputError(
-                "none of these controllers has that", got=", ".join(names), expected=f"one with the option {key}",
+                "none of these controllers has that",
+                got=", ".join(names),
+                expected=f"one with the option {key}",
                 where=f"no_{key}" if key == "observer" else key,
-            )  # fmt: skip
+            )
     made = [spec.make(robot, **options) for spec in specs]
     for k, each in enumerate(made):
         before = sum(other.name.partition(" ")[0] == each.name for other in made[:k])
@@ -190,9 +197,12 @@ def load_controller(path: str | os.PathLike) -> ControllerFile:
         if key not in known:
             near = difflib.get_close_matches(key, known, 1, 0.4)
             raise InputError(
-                "unknown key", got=key, expected=", ".join(known), remedy=f"did you mean {near[0]}?" if near else "",
+                "unknown key",
+                got=key,
+                expected=", ".join(known),
+                remedy=f"did you mean {near[0]}?" if near else "",
                 where=where,
-            )  # fmt: skip
+            )
     if table.get("schema") != SCHEMA:
         raise InputError(
             "not a controller file", got=f"schema = {table.get('schema')}", expected=f"schema = {SCHEMA}", where=where
@@ -200,9 +210,11 @@ def load_controller(path: str | os.PathLike) -> ControllerFile:
     name, options, source = table.get("controller"), table.get("options", {}), table.get("source", "")
     if not isinstance(name, str) or not isinstance(options, dict) or not isinstance(source, str):
         raise InputError(
-            "not a controller file", got="controller, options or source of another kind",
-            expected='controller = "name", source = "words", and a table [options]', where=where,
-        )  # fmt: skip
+            "not a controller file",
+            got="controller, options or source of another kind",
+            expected='controller = "name", source = "words", and a table [options]',
+            where=where,
+        )
     try:
         return ControllerFile(name, options, source)
     except InputError as error:

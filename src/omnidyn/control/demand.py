@@ -109,11 +109,22 @@ def path_demand(robot: Robot, path: Path | Run | str) -> Demand:
     hottest = int(np.argmax(amperes.max(axis=0) / (most if np.isfinite(most).all() else 1.0)))
     corners, jump, turn_jump = _corners(t, follow.at(t).velocity, follow.at(t).acceleration)
     return Demand(
-        robot.name, follow.name, _largest(twist[:, :2]), _largest(twist[:, 2:]), _largest(change[:, :2]),
-        _largest(change[:, 2:]), float(volts[:, worst].max()), float(limit[worst]), float(amperes[:, hottest].max()),
-        None if motor.current_limit is None else float(most[hottest]), bool(most[hottest] < own[hottest]),
-        float(beyond.mean()), corners, jump, turn_jump,
-    )  # fmt: skip
+        robot.name,
+        follow.name,
+        _largest(twist[:, :2]),
+        _largest(twist[:, 2:]),
+        _largest(change[:, :2]),
+        _largest(change[:, 2:]),
+        float(volts[:, worst].max()),
+        float(limit[worst]),
+        float(amperes[:, hottest].max()),
+        None if motor.current_limit is None else float(most[hottest]),
+        bool(most[hottest] < own[hottest]),
+        float(beyond.mean()),
+        corners,
+        jump,
+        turn_jump,
+    )
 
 
 def _largest(vectors: FloatArray) -> float:

@@ -190,9 +190,14 @@ class Feedforward(Guarded):
     name = "feedforward"
 
     def __init__(
-        self, robot: Robot, *, dt: float = DT, friction: bool = True, delay: int | None = None,
+        self,
+        robot: Robot,
+        *,
+        dt: float = DT,
+        friction: bool = True,
+        delay: int | None = None,
         supply: float | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.dt, self.friction, self.delay = check_dt(dt), friction, check_delay(delay)
         self.name = type(self).name if friction else f"{type(self).name}_no_friction"
         super().__init__(robot, supply)

@@ -53,9 +53,17 @@ class Pid(Guarded):
     name = "pid"
 
     def __init__(
-        self, robot: Robot, *, dt: float = DT, faster: float = FASTER, integral: float = INTEGRAL,
-        friction: bool = True, feedforward: bool = True, delay: int | None = None, supply: float | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        robot: Robot,
+        *,
+        dt: float = DT,
+        faster: float = FASTER,
+        integral: float = INTEGRAL,
+        friction: bool = True,
+        feedforward: bool = True,
+        delay: int | None = None,
+        supply: float | None = None,
+    ) -> None:
         self.dt, self.faster, self.integral = check_dt(dt), check_faster(faster), check_integral(integral)
         self.friction, self.feedforward, self.delay = friction, feedforward, check_delay(delay)
         without = "" if friction else "_no_friction"

@@ -32,9 +32,15 @@ class _Loop(Safe):
     name = "speed"
 
     def __init__(
-        self, robot: Robot, *, dt: float = DT, faster: float = FASTER, friction: bool = True,
-        delay: int | None = None, supply: float | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        robot: Robot,
+        *,
+        dt: float = DT,
+        faster: float = FASTER,
+        friction: bool = True,
+        delay: int | None = None,
+        supply: float | None = None,
+    ) -> None:
         self.dt, self.faster, self.friction = check_dt(dt), check_faster(faster), friction
         self.delay = check_delay(delay)
         self.name = type(self).name if friction else f"{type(self).name}_no_friction"
@@ -192,9 +198,11 @@ def check_faster(faster: float) -> float:
     """How many times as fast as the robot. Raises InputError outside 0.05..1000."""
     if not isinstance(faster, int | float) or not 0.05 <= faster <= MOST_FASTER:
         raise InputError(
-            "no speed for a loop", got=faster, expected=f"0.05 to {MOST_FASTER:g} times that of the robot",
+            "no speed for a loop",
+            got=faster,
+            expected=f"0.05 to {MOST_FASTER:g} times that of the robot",
             where="faster",
-        )  # fmt: skip
+        )
     return float(faster)
 
 

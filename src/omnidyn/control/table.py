@@ -77,16 +77,22 @@ class FeedforwardTable(Shown):
             for k in range(len(self.speed))
         ]
         parts: list[Part] = [
-            f"{self.robot}: volts of each wheel, of speeds [V s/m, V s/m, V s/rad] and of their changes", "",
-            Table(head, rows, ">", name="speed and change"), "",
-        ]  # fmt: skip
+            f"{self.robot}: volts of each wheel, of speeds [V s/m, V s/m, V s/rad] and of their changes",
+            "",
+            Table(head, rows, ">", name="speed and change"),
+            "",
+        ]
         if len(self.directions):
             shown = [("along", *(f"kS {k + 1}" for k in range(len(self.speed))))]
             shown += [
                 (_way(way), *(f"{value:.5g}" for value in self.sign[0, :, e])) for e, way in enumerate(self.directions)
             ]
-            parts += ["volts against dry friction, times the sign of the speed along", "",
-                      Table(shown[0], shown[1:], "<>", name="sign"), ""]  # fmt: skip
+            parts += [
+                "volts against dry friction, times the sign of the speed along",
+                "",
+                Table(shown[0], shown[1:], "<>", name="sign"),
+                "",
+            ]
         parts += [*self.code(), ""]
         return Document(parts, plain({key: value for key, value in vars(self).items()}))
 
@@ -138,27 +144,39 @@ def feedforward_table(robot: Robot) -> FeedforwardTable:
     check_order("feedforward_table(robot)", (robot, Robot))
     if np.any(np.asarray(robot.motor.gear_efficiency) != 1.0):
         raise UnsupportedError(
-            "no formula of signs and sums for gears that lose", got="[motor] gear_efficiency below 1",
-            expected="1", remedy="take voltage_for, which finds out which motors drive",
-        )  # fmt: skip
+            "no formula of signs and sums for gears that lose",
+            got="[motor] gear_efficiency below 1",
+            expected="1",
+            remedy="take voltage_for, which finds out which motors drive",
+        )
     model, count = inverse(robot), robot.wheels.count
     own = model.levels
     if own.falls.any():
         raise UnsupportedError(
-            "no formula of signs and sums for friction that falls with the speed", got="stribeck_speed",
-            expected="none", remedy="take voltage_for, or leave stribeck_speed out: then it pushes with coulomb",
-        )  # fmt: skip
+            "no formula of signs and sums for friction that falls with the speed",
+            got="stribeck_speed",
+            expected="none",
+            remedy="take voltage_for, or leave stribeck_speed out: then it pushes with coulomb",
+        )
     push = per_wheel(robot.motor.resistance, count)[:, None] * model.share
     viscous = (own.directions.T * own.viscous) @ own.directions
     emf = back_emf(robot.motor, wheel_speed(robot.wheels, np.eye(3))).T
     rubs = own.slide.any(axis=0)
     sign = np.einsum("wi,ei,se->swe", push, own.directions[rubs], own.slide[:, rubs])
     return FeedforwardTable(
-        robot.name, _clean(emf + push @ viscous), _clean(push @ model.mass), _clean(own.directions[rubs]), _clean(sign),
-        _clean(push), own.ellipse_slide,
-        robot.body.mass if robot.body.rotating_frame else 0.0, np.array(robot.body.centre),
-        per_wheel(robot.motor.voltage_drop, count), robot.drive.dead_band, _clean(emf),
-    )  # fmt: skip
+        robot.name,
+        _clean(emf + push @ viscous),
+        _clean(push @ model.mass),
+        _clean(own.directions[rubs]),
+        _clean(sign),
+        _clean(push),
+        own.ellipse_slide,
+        robot.body.mass if robot.body.rotating_frame else 0.0,
+        np.array(robot.body.centre),
+        per_wheel(robot.motor.voltage_drop, count),
+        robot.drive.dead_band,
+        _clean(emf),
+    )
 
 
 def _sum(values: FloatArray, names: tuple[str, ...]) -> str:

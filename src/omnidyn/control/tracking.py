@@ -97,9 +97,13 @@ class Tracking(Shown):
         """How near it came."""
         assert self.run.pose is not None
         numbers = {
-            "plant": self.plant, "path": self.path, "worst": self.worst_position, "rmse": self.rmse_position,
-            "size": np.hypot(*np.ptp(self.wanted[:, :2], axis=0)), "saturated": self.saturated_share,
-        }  # fmt: skip
+            "plant": self.plant,
+            "path": self.path,
+            "worst": self.worst_position,
+            "rmse": self.rmse_position,
+            "size": np.hypot(*np.ptp(self.wanted[:, :2], axis=0)),
+            "saturated": self.saturated_share,
+        }
         return Statement("tracked", NOTE, self.controller, numbers)
 
     def summary(self) -> str:
@@ -113,11 +117,16 @@ class Tracking(Shown):
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
         return {
-            "name": self.controller, "rmse_position_m": self.rmse_position, "rmse_heading_rad": self.rmse_heading,
-            "worst_position_m": self.worst_position, "saturated_share": self.saturated_share,
-            "step_us": self.step_us, "effort_V": self.effort, "restlessness_V": self.restlessness,
+            "name": self.controller,
+            "rmse_position_m": self.rmse_position,
+            "rmse_heading_rad": self.rmse_heading,
+            "worst_position_m": self.worst_position,
+            "saturated_share": self.saturated_share,
+            "step_us": self.step_us,
+            "effort_V": self.effort,
+            "restlessness_V": self.restlessness,
             "statuses": dict(self.statuses),
-        }  # fmt: skip
+        }
 
     def plot(self) -> Figure:
         """Path and robot from above, error over time, voltages, as a matplotlib Figure."""
@@ -138,28 +147,52 @@ def trackings_document(found: Sequence[Tracking], notes: Sequence[Statement] = (
     )
     head += f"{first.skip:g} s on"
     rows = [
-        (each.controller, f"{1e3 * each.rmse_position:.3f}", f"{1e3 * each.rmse_heading:.2f}",
-         f"{1e3 * each.worst_position:.2f}", f"{100.0 * each.saturated_share:.1f}", f"{each.effort:.2f}",
-         f"{each.restlessness:.3f}", f"{each.step_us['median']:.0f}", f"{each.step_us['p99']:.0f}")
+        (
+            each.controller,
+            f"{1e3 * each.rmse_position:.3f}",
+            f"{1e3 * each.rmse_heading:.2f}",
+            f"{1e3 * each.worst_position:.2f}",
+            f"{100.0 * each.saturated_share:.1f}",
+            f"{each.effort:.2f}",
+            f"{each.restlessness:.3f}",
+            f"{each.step_us['median']:.0f}",
+            f"{each.step_us['p99']:.0f}",
+        )
         for each in found
-    ]  # fmt: skip
+    ]
     columns = (
-        "controller", "position mm", "heading mrad", "worst mm", "at limit %", "effort V", "change V", "step us",
+        "controller",
+        "position mm",
+        "heading mrad",
+        "worst mm",
+        "at limit %",
+        "effort V",
+        "change V",
+        "step us",
         "p99 us",
-    )  # fmt: skip
+    )
     warnings = [warning for each in found for warning in (*_odd(each), *_of_run(each, len(found) > 1))]
     verdict = _verdict(found)
     parts: list[Part] = [
-        head, "", Table(columns, rows, "<>", name="controllers"), "",
+        head,
+        "",
+        Table(columns, rows, "<>", name="controllers"),
+        "",
         "position, heading: rmse; effort: rms of a voltage; change: its mean change from step to step.",
-    ]  # fmt: skip
+    ]
     parts += [Points(notes, "-", "path")] if notes else []
     parts.append(by_severity(warnings, "warnings"))
     data = {
-        **as_verdict(verdict), "robot": first.plant, "path": first.path, "dt_s": first.dt, "duration_s": span,
-        "skip_s": first.skip, "controllers": [each.to_dict() for each in found], "notes": plain(list(notes)),
+        **as_verdict(verdict),
+        "robot": first.plant,
+        "path": first.path,
+        "dt_s": first.dt,
+        "duration_s": span,
+        "skip_s": first.skip,
+        "controllers": [each.to_dict() for each in found],
+        "notes": plain(list(notes)),
         "warnings": plain(warnings),
-    }  # fmt: skip
+    }
     return Document(parts, data, warnings, verdict=verdict)
 
 
@@ -179,5 +212,6 @@ def _odd(tracking: Tracking) -> list[Statement]:
     steps = len(tracking.step_times)
     return [
         Statement("steps_with_status", WARNING, status, {"count": count, "steps": steps}).of(tracking.controller)
-        for status, count in tracking.statuses.items() if status != ENDED
-    ]  # fmt: skip
+        for status, count in tracking.statuses.items()
+        if status != ENDED
+    ]

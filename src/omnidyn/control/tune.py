@@ -56,9 +56,11 @@ class Range(NamedTuple):
     def of(self, value: float) -> float:
         """The place of a value."""
         inside = min(self.high, max(self.low, value))
-        return math.log(inside / self.low) / math.log(self.high / self.low) if self.log else (
-            (inside - self.low) / (self.high - self.low)
-        )  # fmt: skip
+        return (
+            math.log(inside / self.low) / math.log(self.high / self.low)
+            if self.log
+            else ((inside - self.low) / (self.high - self.low))
+        )
 
 
 # Controller -> option -> where its best value is looked for.
@@ -137,8 +139,9 @@ class Tuned(Shown):
         }
         lost = [
             Statement(code, NOTE, numbers={"before": before, "after": after})
-            for code, (before, after) in errors.items() if after > 1.02 * before
-        ]  # fmt: skip
+            for code, (before, after) in errors.items()
+            if after > 1.02 * before
+        ]
         return [*found, *(lost or [Statement("given_up_nothing", NOTE)])]
 
     def document(self) -> Document:
@@ -146,7 +149,7 @@ class Tuned(Shown):
         rows = [
             (name, f"{1e3 * own.mean:.3f}", f"{1e3 * each.mean:.3f}", f"{1e3 * each.worst:.3f}", f"{each.restless:.3f}")
             for name, own, each in (("before", self.own_before, self.before), ("tuned", self.own_after, self.after))
-        ]  # fmt: skip
+        ]
         head = ("", "this robot mm", "robots mm", "worst mm", "change V")
         scores, words = Table(head, rows, "<>", name="scores"), Points(self.statements(), "-", "statements")
         parts: list[Part] = [scores, "", words, "", self.controller.to_toml()]
@@ -155,19 +158,37 @@ class Tuned(Shown):
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
         scores = {name: getattr(self, name)._asdict() for name in ("before", "after", "own_before", "own_after")}
-        return plain({
-            "robot": self.robot, "paths": self.paths, "controller": self.controller.controller,
-            "options": dict(self.controller.options), "start": dict(self.start), **scores, "draws": self.draws,
-            "evaluations": self.evaluations, "better": self.better, "statements": self.statements(),
-            **as_verdict(self.verdict),
-        })  # fmt: skip
+        return plain(
+            {
+                "robot": self.robot,
+                "paths": self.paths,
+                "controller": self.controller.controller,
+                "options": dict(self.controller.options),
+                "start": dict(self.start),
+                **scores,
+                "draws": self.draws,
+                "evaluations": self.evaluations,
+                "better": self.better,
+                "statements": self.statements(),
+                **as_verdict(self.verdict),
+            }
+        )
 
 
 def tune(
-    robot: Robot, path: Path | str | Sequence[Path | str], controller: str = "pid", *, draws: int = DRAWS,
-    evaluations: int = EVALUATIONS, noise: float = NOISE, delay: int = 0, dt: float = DT, duration: float | None = None,
-    seed: int = 0, progress: Progress = silent,
-) -> Tuned:  # fmt: skip
+    robot: Robot,
+    path: Path | str | Sequence[Path | str],
+    controller: str = "pid",
+    *,
+    draws: int = DRAWS,
+    evaluations: int = EVALUATIONS,
+    noise: float = NOISE,
+    delay: int = 0,
+    dt: float = DT,
+    duration: float | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Tuned:
     """Find the gains of a controller by simulation, over the robots that the file says may be meant.
 
     path: a Path or what `path` takes; or several. controller: a name or a controller file: its options are where the
@@ -212,9 +233,20 @@ def tune(
     names = tuple(each.name for each in follow)
     source = f"tuned for {robot.name} on {all_of(names)}, {draws if known else 0} draws, seed {seed}"
     return Tuned(
-        robot.name, names, replace(new, source=source), start, before, after, own_before, own_after,
-        draws if known else 0, len(tried), noise, delay, dt,
-    )  # fmt: skip
+        robot.name,
+        names,
+        replace(new, source=source),
+        start,
+        before,
+        after,
+        own_before,
+        own_after,
+        draws if known else 0,
+        len(tried),
+        noise,
+        delay,
+        dt,
+    )
 
 
 def _check_counts(draws: int, evaluations: int, paths: Sequence[Any]) -> None:
@@ -229,9 +261,12 @@ def _ranges(spec: ControllerFile) -> dict[str, Range]:
     """The gains of a controller that are looked for. Raises InputError where it has none."""
     if spec.controller not in TUNED:
         raise InputError(
-            "this controller has no gains", got=spec.controller, expected=" or ".join(TUNED),
-            remedy="it follows from the robot alone", where="controller",
-        )  # fmt: skip
+            "this controller has no gains",
+            got=spec.controller,
+            expected=" or ".join(TUNED),
+            remedy="it follows from the robot alone",
+            where="controller",
+        )
     return TUNED[spec.controller]
 
 
@@ -257,9 +292,11 @@ def _score(
     logs = [math.log(max(math.sqrt(float(np.mean([_square(each, rim) for each in row]))), 1e-9)) for row in found]
     errors = [each.rmse_position for each in every]
     return Score(
-        math.exp(float(np.mean(logs))), float(np.mean(errors)), max(errors),
+        math.exp(float(np.mean(logs))),
+        float(np.mean(errors)),
+        max(errors),
         float(np.mean([each.restlessness for each in every])),
-    )  # fmt: skip
+    )
 
 
 def _square(each: Tracking, rim: float) -> float:

@@ -51,9 +51,11 @@ class Export(Shown):
         (content,) = self.files.values() if len(self.files) == 1 else (b"",)
         if isinstance(content, bytes):
             raise InputError(
-                f"{self.kind} is no single text", got=", ".join(self.files), expected="a file or a folder to write to",
+                f"{self.kind} is no single text",
+                got=", ".join(self.files),
+                expected="a file or a folder to write to",
                 remedy="use write(path)",
-            )  # fmt: skip
+            )
         return content
 
     def write(self, path: str | os.PathLike, force: bool = False) -> list[Path]:
@@ -78,9 +80,12 @@ class Export(Shown):
         if self.notes:
             parts += ["", Points(self.notes, name="notes")]
         data = {
-            "kind": self.kind, "robot": self.robot, "files": list(self.files), "missing": list(self.missing),
+            "kind": self.kind,
+            "robot": self.robot,
+            "files": list(self.files),
+            "missing": list(self.missing),
             "notes": list(self.notes),
-        }  # fmt: skip
+        }
         return Document(parts, data)
 
 

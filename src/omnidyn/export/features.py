@@ -50,9 +50,13 @@ def _any(value: object, plain: float = 0.0) -> bool:
 def _unequal(robot: Robot) -> bool:
     motor = robot.motor
     values = (
-        motor.resistance, motor.torque_constant, motor.emf_constant, motor.gear_ratio, motor.inductance,
+        motor.resistance,
+        motor.torque_constant,
+        motor.emf_constant,
+        motor.gear_ratio,
+        motor.inductance,
         robot.wheels.wheel_radius,
-    )  # fmt: skip
+    )
     return any(isinstance(value, tuple) and len(set(value)) > 1 for value in values)
 
 
@@ -63,9 +67,12 @@ def _couples(robot: Robot) -> bool:
 def _holds_more(robot: Robot) -> bool:
     axes, along, wheels = robot.friction.axes, robot.friction.direction, robot.friction.wheels
     pairs = (
-        (axes.breakaway, axes.coulomb), (along.breakaway, along.coulomb), (along.yaw_breakaway, along.yaw_coulomb),
-        (wheels.hold_forward, wheels.coulomb), (wheels.hold_backward, wheels.backward),
-    )  # fmt: skip
+        (axes.breakaway, axes.coulomb),
+        (along.breakaway, along.coulomb),
+        (along.yaw_breakaway, along.yaw_coulomb),
+        (wheels.hold_forward, wheels.coulomb),
+        (wheels.hold_backward, wheels.backward),
+    )
     return any(hold is not None and _any(np.subtract(hold, slide)) for hold, slide in pairs)
 
 
@@ -148,11 +155,23 @@ _DUTY = Cell(
 _DRIVE = {"latency": _DELAY, "loop": _LOOP, "duty": _DUTY}
 _NOT_EXACT = dict.fromkeys(
     (
-        "direction", "wheels", "falls", "bends", "sides", "frame", "current", "drop", "gear", "unequal", "couples",
-        "slope", "slip", "centre",
+        "direction",
+        "wheels",
+        "falls",
+        "bends",
+        "sides",
+        "frame",
+        "current",
+        "drop",
+        "gear",
+        "unequal",
+        "couples",
+        "slope",
+        "slip",
+        "centre",
     ),
     Cell(REFUSES, "it holds the exact step, and this robot has none"),
-)  # fmt: skip
+)
 
 _LEVEL = Cell(LEAVES_OUT, "the floor is level")
 _ROLL = Cell(LEAVES_OUT, "its wheels roll, whatever they push with")
@@ -301,10 +320,11 @@ def refuse_controller(kind: str, controller: str) -> None:
     own = CONTROLLERS[controller]
     if own.does == REFUSES:
         raise UnsupportedError(
-            f"{kind} cannot be exported for the controller {controller}: {own.words}", got=controller,
+            f"{kind} cannot be exported for the controller {controller}: {own.words}",
+            got=controller,
             expected=" or ".join(name for name, each in CONTROLLERS.items() if each.does != REFUSES),
             where="controller",
-        )  # fmt: skip
+        )
 
 
 def left_out(kind: str, robot: Robot) -> tuple[str, ...]:

@@ -47,42 +47,61 @@ def robot_json(robot: Robot) -> Export:
 def json_schema() -> dict[str, Any]:
     """The schema of the file (JSON Schema 2020-12), from the fields of the model."""
     known = {
-        "type": "object", "required": ["value"], "additionalProperties": False,
+        "type": "object",
+        "required": ["value"],
+        "additionalProperties": False,
         "properties": {
             "value": {"type": ["number", "array", "string", "boolean"]},
             "std": {"type": "number", "exclusiveMinimum": 0},
             "source": {"type": "string"},
             "origin": {"enum": ["guess", "joint", "given", "datasheet", "measured", "identified", "imported"]},
         },
-    }  # fmt: skip
+    }
     entry = {"anyOf": [{"type": ["number", "string", "boolean"]}, {"$ref": "#/$defs/known"}]}
     value = {"anyOf": [entry, {"type": "array", "items": entry}]}
     tables = {name: _table_schema(Robot, name) for name in TABLES}
     matrix = {"type": "array", "items": {"type": "array", "items": {"type": "number"}}}
     texts = {"type": "array", "items": {"type": "string"}}
     together = {
-        "type": "object", "required": ["keys", "matrix"], "additionalProperties": False,
+        "type": "object",
+        "required": ["keys", "matrix"],
+        "additionalProperties": False,
         "properties": {"keys": texts, "matrix": matrix, "std": {"type": "array", "items": {"type": "number"}}},
-    }  # fmt: skip
+    }
     robot = {
-        "type": "object", "required": ["schema", "name", "body", "wheels", "motor"], "additionalProperties": False,
+        "type": "object",
+        "required": ["schema", "name", "body", "wheels", "motor"],
+        "additionalProperties": False,
         "properties": {
-            "schema": {"const": 1}, "name": {"type": "string", "minLength": 1}, "source": {"type": "string"}, **tables,
-            "correlation": together, "log": {"type": "object"}, "variations": {"type": "object"},
+            "schema": {"const": 1},
+            "name": {"type": "string", "minLength": 1},
+            "source": {"type": "string"},
+            **tables,
+            "correlation": together,
+            "log": {"type": "object"},
+            "variations": {"type": "object"},
         },
-    }  # fmt: skip
+    }
     covariance = {
-        "type": "object", "required": ["keys", "units", "matrix"], "additionalProperties": False,
+        "type": "object",
+        "required": ["keys", "units", "matrix"],
+        "additionalProperties": False,
         "properties": {"keys": texts, "units": texts, "matrix": matrix},
-    }  # fmt: skip
+    }
     return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema", "title": "A robot, as omnidyn exports it",
-        "type": "object", "required": ["format", "version", "robot", "covariance"], "additionalProperties": False,
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "A robot, as omnidyn exports it",
+        "type": "object",
+        "required": ["format", "version", "robot", "covariance"],
+        "additionalProperties": False,
         "properties": {
-            "format": {"const": FORMAT}, "version": {"const": VERSION}, "robot": robot, "covariance": covariance,
+            "format": {"const": FORMAT},
+            "version": {"const": VERSION},
+            "robot": robot,
+            "covariance": covariance,
         },
         "$defs": {"known": known, "value": value},
-    }  # fmt: skip
+    }
 
 
 def _table_schema(model: type[BaseModel], name: str) -> dict[str, Any]:

@@ -59,9 +59,12 @@ def c_number(value: float, single: bool = False) -> str:
     """A literal of C, double or float. Raises InputError for what a float cannot hold."""
     if single and value != 0.0 and not SINGLE_MIN <= abs(value) <= SINGLE_MAX:
         raise InputError(
-            "a number does not fit single precision", got=value, expected=f"{SINGLE_MIN:.3g} to {SINGLE_MAX:.3g}",
-            remedy="export double precision, or check the robot file", where="precision",
-        )  # fmt: skip
+            "a number does not fit single precision",
+            got=value,
+            expected=f"{SINGLE_MIN:.3g} to {SINGLE_MAX:.3g}",
+            remedy="export double precision, or check the robot file",
+            where="precision",
+        )
     text = number(value)
     if single:
         text = f"{value + 0.0:.9g}"

@@ -39,10 +39,25 @@ __all__ = ["check", "check_blocks", "check_log"]
 
 Family = Callable[[LogUnderCheck], tuple[list[Finding], LogUnderCheck]]
 FAMILIES: tuple[Family, ...] = (
-    check_echo, check_values, check_limits, check_twist_frame, check_derivatives, check_turn_rate, check_wiring,
-    check_dead_wheels, check_slip, check_axes, check_scale, check_averaged, check_lag, check_filters, check_energy,
-    check_motion, check_oddities, check_excitation,
-)  # fmt: skip
+    check_echo,
+    check_values,
+    check_limits,
+    check_twist_frame,
+    check_derivatives,
+    check_turn_rate,
+    check_wiring,
+    check_dead_wheels,
+    check_slip,
+    check_axes,
+    check_scale,
+    check_averaged,
+    check_lag,
+    check_filters,
+    check_energy,
+    check_motion,
+    check_oddities,
+    check_excitation,
+)
 
 # What only a whole log can show: dropped unless every block shows it.
 WHOLE = ("never_moved", "few_rows")
@@ -81,10 +96,15 @@ def check_log(log: Log, robot: Robot | None = None) -> Verdict:
         good = uses(log, robot, {finding.code for finding in found})
     length = float(work.t[-1] - work.t[0]) if len(work) > 1 else 0.0
     return Verdict(
-        in_order(found), work.known.get("excitation", {}), len(log), length,
-        1.0 / work.step if work.step > 0.0 else 0.0, tuple(name for name in log.channels if work_has(log, name)),
-        log.source, good,
-    )  # fmt: skip
+        in_order(found),
+        work.known.get("excitation", {}),
+        len(log),
+        length,
+        1.0 / work.step if work.step > 0.0 else 0.0,
+        tuple(name for name in log.channels if work_has(log, name)),
+        log.source,
+        good,
+    )
 
 
 def work_has(log: Log, channel: str) -> bool:

@@ -38,10 +38,17 @@ def check_energy(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     if not bad.any() or bad.mean() < (0.0 if points else LEAST_SHARE):
         return [], work
     excess = _excess(robot, voltage[bad], speed[bad])
-    return [Finding(
-        "energy", ERROR, "", {"worst_W": worst, "emf_over_voltage": excess}, rows=work.lines(bad), count=int(bad.sum()),
-        rests_on=OF_BACK_EMF,
-    )], work  # fmt: skip
+    return [
+        Finding(
+            "energy",
+            ERROR,
+            "",
+            {"worst_W": worst, "emf_over_voltage": excess},
+            rows=work.lines(bad),
+            count=int(bad.sum()),
+            rests_on=OF_BACK_EMF,
+        )
+    ], work
 
 
 def _speed(work: LogUnderCheck) -> FloatArray | None:
@@ -88,8 +95,10 @@ def _windows(work: LogUnderCheck, robot: Robot, voltage: FloatArray, speed: Floa
     mean = 0.5 * (speed[1:] + speed[:-1])
     power, scale = _power(robot, voltage[:-1], mean)
     good = np.isfinite(power)
-    done, size, whole = (np.concatenate([[0.0], np.cumsum(np.nan_to_num(each))]) for each in
-                         (power * length, scale * length, np.where(good, 0.0, 1.0)))  # fmt: skip
+    done, size, whole = (
+        np.concatenate([[0.0], np.cumsum(np.nan_to_num(each))])
+        for each in (power * length, scale * length, np.where(good, 0.0, 1.0))
+    )
     twist = twist_from_wheel_speed(robot.wheels, speed)
     mass = mass_matrix(robot)
     momentum = twist @ mass
@@ -100,7 +109,8 @@ def _windows(work: LogUnderCheck, robot: Robot, voltage: FloatArray, speed: Floa
     unsure += (np.diag(mass) * noise**2).sum() * 6.0
     spent = done[high] - done[low]
     wrong = (spent - change < -MARGIN * (size[high] - size[low]) - unsure - MARGIN * np.abs(change)) & (
-        whole[high] - whole[low] == 0.0)  # fmt: skip
+        whole[high] - whole[low] == 0.0
+    )
     # Only where the back-EMF is the larger of the two, and the robot moves.
     counter = np.sqrt((back_emf(robot.motor, mean) ** 2).sum(axis=1))
     applied = np.sqrt((voltage[:-1] ** 2).sum(axis=1))

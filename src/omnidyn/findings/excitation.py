@@ -75,9 +75,12 @@ def _of_axis(values: FloatArray, axis: str, top: float, length: float) -> dict[s
         return {}
     values = values[np.isfinite(values)]
     far = float(np.quantile(np.abs(values), 0.98))
-    known = {axis: float(np.sqrt(np.mean(values**2))) / length, f"{axis}_max": far / length,
-             f"forward_{axis}": float((values > 0.2 * top).mean()),
-             f"backward_{axis}": float((values < -0.2 * top).mean())}  # fmt: skip
+    known = {
+        axis: float(np.sqrt(np.mean(values**2))) / length,
+        f"{axis}_max": far / length,
+        f"forward_{axis}": float((values > 0.2 * top).mean()),
+        f"backward_{axis}": float((values < -0.2 * top).mean()),
+    }
     if axis == "yaw":
         known["turning"] = float((np.abs(values) > 0.2 * top).mean())
     return known

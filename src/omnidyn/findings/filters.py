@@ -68,11 +68,18 @@ def check_filters(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
 
 def _finding(filtered: Filter, speeds: list[Speed], step: float) -> Finding:
     return Finding(
-        "filtered", NOTE, " ".join(speed.component for speed in speeds),
-        {"rows_late": filtered.late, "seconds_late": filtered.late * step, "filter": filtered.kind,
-         "positions": list(dict.fromkeys(speed.origin for speed in speeds)), "time_constant_s": filtered.constant},
+        "filtered",
+        NOTE,
+        " ".join(speed.component for speed in speeds),
+        {
+            "rows_late": filtered.late,
+            "seconds_late": filtered.late * step,
+            "filter": filtered.kind,
+            "positions": list(dict.fromkeys(speed.origin for speed in speeds)),
+            "time_constant_s": filtered.constant,
+        },
         filtered.kind,
-    )  # fmt: skip
+    )
 
 
 def _filter_of(speed: Speed, step: float) -> Filter | None:
@@ -80,7 +87,7 @@ def _filter_of(speed: Speed, step: float) -> Filter | None:
     if not speed.noise > 0.0:
         return None
     if _off(speed.values - speed.centred, speed.back) < NOISE_SHARE * 0.5 * speed.noise:
-        return Filter("centred", 0.0)  # fmt: skip
+        return Filter("centred", 0.0)
     for rows, rate in enumerate(speed.over, 1):
         if _off(speed.values - rate, speed.back) < NOISE_SHARE * speed.noise / rows:
             return Filter("backward", 0.5 * rows)
@@ -96,7 +103,7 @@ def _low_pass(speed: Speed, step: float) -> Filter | None:
     if not STRONGEST < share < PLAIN or not _off(change - share * ahead, ahead) < NOISE_SHARE * share * speed.noise:
         return None
     constant = (1.0 - share) / share
-    return Filter("low_pass", 0.5 + round(constant, 1), float(f"{constant * step * 1e3:.2g}") * 1e-3)  # fmt: skip
+    return Filter("low_pass", 0.5 + round(constant, 1), float(f"{constant * step * 1e3:.2g}") * 1e-3)
 
 
 def _off(errors: FloatArray, rate: FloatArray) -> float:
@@ -132,9 +139,14 @@ def _speeds(work: LogUnderCheck) -> Iterator[Speed]:
 
 
 def _made(
-    component: str, origin: str, values: FloatArray, place: FloatArray, t: FloatArray, step: float,
+    component: str,
+    origin: str,
+    values: FloatArray,
+    place: FloatArray,
+    t: FloatArray,
+    step: float,
     row: FloatArray | None,
-) -> Iterator[Speed]:  # fmt: skip
+) -> Iterator[Speed]:
     """The speed beside the rates of its positions, shape (rows, n); row (rows, n): which part of them it is."""
     part = np.ones_like(place) if row is None else row
     near = np.concatenate([[False], np.diff(t) < LATE_STEP * step])
@@ -190,11 +202,13 @@ def _at_its_clock(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
                 alike.setdefault((channel, rows), []).append(component)
     return [
         Finding(
-            "averaged", WARNING, " ".join(names),
+            "averaged",
+            WARNING,
+            " ".join(names),
             {"rows": rows, "seconds": rows * work.step, "late_s": 0.5 * (rows - 1) * work.step},
         )
         for (_, rows), names in alike.items()
-    ], work  # fmt: skip
+    ], work
 
 
 def late_by(work: LogUnderCheck, channel: str) -> float:

@@ -126,13 +126,23 @@ class Verdict(Shown):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON, without NaN."""
-        return plain({
-            "source": self.source, "rows": self.rows, "duration_s": float(self.duration), "rate_Hz": float(self.rate),
-            "channels": self.channels, "verdict": self.verdict, "code": self.conclusion.code,
-            "has_errors": self.has_errors, "useless": self.useless, "counts": self.counts,
-            "uses": [use.to_dict() for use in self.uses], "findings": [finding.to_dict() for finding in self.findings],
-            "excitation": {name: float(value) for name, value in self.excitation.items()},
-        })  # fmt: skip
+        return plain(
+            {
+                "source": self.source,
+                "rows": self.rows,
+                "duration_s": float(self.duration),
+                "rate_Hz": float(self.rate),
+                "channels": self.channels,
+                "verdict": self.verdict,
+                "code": self.conclusion.code,
+                "has_errors": self.has_errors,
+                "useless": self.useless,
+                "counts": self.counts,
+                "uses": [use.to_dict() for use in self.uses],
+                "findings": [finding.to_dict() for finding in self.findings],
+                "excitation": {name: float(value) for name, value in self.excitation.items()},
+            }
+        )
 
 
 def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:

@@ -141,8 +141,14 @@ def _steady(run: Run, robot: Robot | None, columns: ColumnMap) -> Use:
         return _not(STEADY, "no_steady_stretch", columns, hold_s=MIN_DURATION, at_rest=len(windows))
     drives = "duty" if origin == needs.VOLTAGE and run.voltage is None else origin
     more = len(windows) == MOST_WINDOWS
-    return _yes(STEADY, "serves_steady", stretches=count, more=more, force_from=drives,
-                needs=_needs_of_robot(run, robot, drives))  # fmt: skip
+    return _yes(
+        STEADY,
+        "serves_steady",
+        stretches=count,
+        more=more,
+        force_from=drives,
+        needs=_needs_of_robot(run, robot, drives),
+    )
 
 
 def _moves(window: Plateau) -> bool:

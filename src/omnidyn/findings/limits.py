@@ -78,8 +78,9 @@ def _saturated(work: LogUnderCheck, channel: str) -> list[Finding]:
     limit, whose = _limit(work, channel)
     if values is None or limit is None:
         return []
-    tolerance = np.array([max(AT_LIMIT * float(np.max(limit)), 0.5 * quantum(column), 2.5 * white_noise(column))
-                          for column in values.T])  # fmt: skip
+    tolerance = np.array(
+        [max(AT_LIMIT * float(np.max(limit)), 0.5 * quantum(column), 2.5 * white_noise(column)) for column in values.T]
+    )
     tolerance = np.minimum(tolerance, 0.03 * np.max(limit))
     with np.errstate(invalid="ignore"):
         at = np.abs(values) >= limit - tolerance
@@ -87,13 +88,22 @@ def _saturated(work: LogUnderCheck, channel: str) -> list[Finding]:
     share = float(bad.mean())
     if share < LEAST_SHARE:
         return []
-    names = [name for name, column in zip(components(channel, values.shape[1]), at.T, strict=True)
-             if column.mean() > 0.2 * LEAST_SHARE]  # fmt: skip
+    names = [
+        name
+        for name, column in zip(components(channel, values.shape[1]), at.T, strict=True)
+        if column.mean() > 0.2 * LEAST_SHARE
+    ]
     level = float(np.mean(limit))
-    return [Finding(
-        "saturation", WARNING, " ".join(names), {"share": share, "limit": level, "limited_by": whose},
-        rows=work.lines(bad), count=int(bad.sum()),
-    )]  # fmt: skip
+    return [
+        Finding(
+            "saturation",
+            WARNING,
+            " ".join(names),
+            {"share": share, "limit": level, "limited_by": whose},
+            rows=work.lines(bad),
+            count=int(bad.sum()),
+        )
+    ]
 
 
 def _too_fast(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -107,9 +117,11 @@ def _too_fast(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     if bad.mean() < TOO_FAST:
         return [], work
     names = [each for (each, _), column in zip(columns, fast.T, strict=True) if column.any()]
-    return [Finding(
-        "too_fast", NOTE, " ".join(names), {"share": float(bad.mean())}, rows=work.lines(bad), count=int(bad.sum())
-    )], work  # fmt: skip
+    return [
+        Finding(
+            "too_fast", NOTE, " ".join(names), {"share": float(bad.mean())}, rows=work.lines(bad), count=int(bad.sum())
+        )
+    ], work
 
 
 def _sag(work: LogUnderCheck) -> list[Finding]:
@@ -127,11 +139,17 @@ def _sag(work: LogUnderCheck) -> list[Finding]:
     if drop < SAG or high - low < 4.0 * noise:
         return []
     bad = level < high - 0.5 * (high - low)
-    return [Finding(
-        "sag", WARNING, "supply",
-        {"drop": drop, "high_V": high, "low_V": low, "lowest_at_s": float(work.t[int(np.nanargmin(level))])},
-        "of_duty" if work.get("duty") is not None else "", rows=work.lines(bad), count=int(bad.sum()),
-    )]  # fmt: skip
+    return [
+        Finding(
+            "sag",
+            WARNING,
+            "supply",
+            {"drop": drop, "high_V": high, "low_V": low, "lowest_at_s": float(work.t[int(np.nanargmin(level))])},
+            "of_duty" if work.get("duty") is not None else "",
+            rows=work.lines(bad),
+            count=int(bad.sum()),
+        )
+    ]
 
 
 def _no_supply(work: LogUnderCheck) -> list[Finding]:
@@ -149,8 +167,14 @@ def _unsigned(work: LogUnderCheck) -> list[Finding]:
     names = " ".join(components("current", current.shape[1]))
     if work.log.current_unsigned:
         return [Finding("unsigned", NOTE, names)]
-    turning = next((values for name in ("wheel_speed", "wheel_speed_command", "voltage", "duty")
-                    if (values := work.get(name)) is not None and values.shape == current.shape), None)  # fmt: skip
+    turning = next(
+        (
+            values
+            for name in ("wheel_speed", "wheel_speed_command", "voltage", "duty")
+            if (values := work.get(name)) is not None and values.shape == current.shape
+        ),
+        None,
+    )
     noise = np.array([max(white_noise(column), quantum(column)) for column in current.T])
     with np.errstate(invalid="ignore"):
         if turning is None or (current < -2.0 * noise).mean() > 1e-3:

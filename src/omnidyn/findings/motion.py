@@ -44,10 +44,16 @@ def _start_up(work: LogUnderCheck, still: BoolArray) -> list[Finding]:
         command = work.get(channel)
         if command is not None and np.nanmax(np.abs(command[0])) > 0.0 and not np.diff(command[:rows], axis=0).any():
             first = np.arange(len(work)) < rows
-            return [Finding(
-                "start_up", NOTE, channel, {"rows": rows, "seconds": float(work.t[rows] - work.t[0])},
-                rows=work.lines(first), count=rows,
-            )]  # fmt: skip
+            return [
+                Finding(
+                    "start_up",
+                    NOTE,
+                    channel,
+                    {"rows": rows, "seconds": float(work.t[rows] - work.t[0])},
+                    rows=work.lines(first),
+                    count=rows,
+                )
+            ]
     return []
 
 
@@ -83,8 +89,10 @@ def _level(work: LogUnderCheck) -> float:
 
 
 def _never_moved(work: LogUnderCheck) -> Finding:
-    driven = any(work.get(name) is not None and np.nanmax(np.abs(work.channels[name])) > 0.0
-                 for name in ("voltage", "duty", "wheel_speed_command", "twist_command"))  # fmt: skip
+    driven = any(
+        work.get(name) is not None and np.nanmax(np.abs(work.channels[name])) > 0.0
+        for name in ("voltage", "duty", "wheel_speed_command", "twist_command")
+    )
     return Finding("never_moved", ERROR, "", {"driven": driven}, rows=work.lines(work.everywhere), count=len(work))
 
 
@@ -112,9 +120,16 @@ def _blocked(work: LogUnderCheck, still: BoolArray) -> list[Finding]:
     bad = _long(bad, round(SETTLE / work.step))
     if not bad.any():
         return []
-    return [Finding(
-        "blocked", WARNING, "", {"seconds": float(bad.sum() * work.step)}, rows=work.lines(bad), count=int(bad.sum())
-    )]  # fmt: skip
+    return [
+        Finding(
+            "blocked",
+            WARNING,
+            "",
+            {"seconds": float(bad.sum() * work.step)},
+            rows=work.lines(bad),
+            count=int(bad.sum()),
+        )
+    ]
 
 
 def _long(bad: BoolArray, least: int) -> BoolArray:
@@ -149,10 +164,16 @@ def _droop(work: LogUnderCheck) -> list[Finding]:
     line = slope(w, command, ids, count)
     if not line.differs(1.0, DROOP, 5.0) or line.windows < 4 or line.value <= 0.0:
         return []
-    return [Finding(
-        "droop", WARNING, " ".join(components("wheel_speed", speed.shape[1])),
-        {"ratio": line.value, "error": line.error, "command": name}, rows=work.lines(settled), count=int(settled.sum()),
-    )]  # fmt: skip
+    return [
+        Finding(
+            "droop",
+            WARNING,
+            " ".join(components("wheel_speed", speed.shape[1])),
+            {"ratio": line.value, "error": line.error, "command": name},
+            rows=work.lines(settled),
+            count=int(settled.sum()),
+        )
+    ]
 
 
 # Small things that a reader of the log should know: bursts of a tracker, a last row that is not like the others
@@ -181,11 +202,16 @@ def _bursts(work: LogUnderCheck) -> list[Finding]:
         if usual <= 0.0 or not bad.any():
             continue
         top = int(np.flatnonzero(bad)[np.argmax(size[bad])])
-        findings.append(Finding(
-            "burst", NOTE, component,
-            {"farthest": float(values[top]), "usual": usual, "at_s": float(work.t[top]), "longest_s": SHORT},
-            rows=work.lines(bad), count=int(bad.sum()),
-        ))  # fmt: skip
+        findings.append(
+            Finding(
+                "burst",
+                NOTE,
+                component,
+                {"farthest": float(values[top]), "usual": usual, "at_s": float(work.t[top]), "longest_s": SHORT},
+                rows=work.lines(bad),
+                count=int(bad.sum()),
+            )
+        )
     return findings
 
 

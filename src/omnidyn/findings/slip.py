@@ -41,12 +41,24 @@ def check_slip(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         assert seen is not None
         names = " ".join(components("wheel_speed", work.wheels))
         rows = np.flatnonzero(bad)
-        findings.append(Finding(
-            "slip", WARNING, names,
-            {"ratio": inside / outside, "error": error, "from_s": float(work.t[rows[0]]),
-             "to_s": float(work.t[rows[-1]]), "inside": inside, "outside": outside, **_against_the_limit(work, bad)},
-            rows=work.lines(bad), count=int(bad.sum()),
-        ))  # fmt: skip
+        findings.append(
+            Finding(
+                "slip",
+                WARNING,
+                names,
+                {
+                    "ratio": inside / outside,
+                    "error": error,
+                    "from_s": float(work.t[rows[0]]),
+                    "to_s": float(work.t[rows[-1]]),
+                    "inside": inside,
+                    "outside": outside,
+                    **_against_the_limit(work, bad),
+                },
+                rows=work.lines(bad),
+                count=int(bad.sum()),
+            )
+        )
         values = work.channels[seen.name].copy()
         values[bad] = np.nan
         work = work.replace(**{seen.name: values})

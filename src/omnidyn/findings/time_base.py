@@ -51,10 +51,14 @@ def _empty_rows(log: Log, empty: BoolArray) -> list[Finding]:
     share = count / len(log)
     return [
         Finding(
-        "empty_rows", ERROR if share > MAX_MISSING else WARNING, "", {"share": share, "of_rows": len(log)},
-        rows=spans_of(empty, log.lines), count=count,
-    )
-    ]  # fmt: skip
+            "empty_rows",
+            ERROR if share > MAX_MISSING else WARNING,
+            "",
+            {"share": share, "of_rows": len(log)},
+            rows=spans_of(empty, log.lines),
+            count=count,
+        )
+    ]
 
 
 def _padded(log: Log, rows: IntArray) -> list[Finding]:
@@ -62,9 +66,7 @@ def _padded(log: Log, rows: IntArray) -> list[Finding]:
         return []
     bad = np.zeros(len(log), dtype=bool)
     bad[rows] = True
-    return [
-        Finding("padding", WARNING, "t", rows=spans_of(bad, log.lines), count=int(rows.size))
-    ]  # fmt: skip
+    return [Finding("padding", WARNING, "t", rows=spans_of(bad, log.lines), count=int(rows.size))]
 
 
 def _backward(log: Log, rows: IntArray) -> list[Finding]:
@@ -76,10 +78,15 @@ def _backward(log: Log, rows: IntArray) -> list[Finding]:
     farthest = float(-np.diff(log.t[rows]).min())
     return [
         Finding(
-        "time_back", ERROR, "t", {"farthest_s": farthest}, "often" if goes_back_often(count, len(rows)) else "",
-        rows=spans_of(bad, log.lines[rows]), count=count,
-    )
-    ]  # fmt: skip
+            "time_back",
+            ERROR,
+            "t",
+            {"farthest_s": farthest},
+            "often" if goes_back_often(count, len(rows)) else "",
+            rows=spans_of(bad, log.lines[rows]),
+            count=count,
+        )
+    ]
 
 
 def _repeated(log: Log, rows: IntArray, again: BoolArray) -> list[Finding]:
@@ -92,10 +99,15 @@ def _repeated(log: Log, rows: IntArray, again: BoolArray) -> list[Finding]:
     bad[rows[again][where]] = True
     return [
         Finding(
-        "time_repeats", ERROR if share > MAX_MISSING else WARNING, "t", {"share": share},
-        "often" if share > 0.01 else "", rows=spans_of(bad, log.lines), count=count,
-    )
-    ]  # fmt: skip
+            "time_repeats",
+            ERROR if share > MAX_MISSING else WARNING,
+            "t",
+            {"share": share},
+            "often" if share > 0.01 else "",
+            rows=spans_of(bad, log.lines),
+            count=count,
+        )
+    ]
 
 
 def _gaps(work: LogUnderCheck) -> list[Finding]:
@@ -109,12 +121,18 @@ def _gaps(work: LogUnderCheck) -> list[Finding]:
     lost = int(min(np.round(lengths / work.step - 1.0).sum(), 1e15))
     return [
         Finding(
-        "gap", WARNING, "t",
-        {"longest_s": float(lengths.max()), "lost_rows": float(lost),
-         "at_s": float(work.t[cuts[int(lengths.argmax())] - 1])},
-        rows=tuple((int(lines[k - 1]), int(lines[k])) for k in cuts[:20]), count=len(cuts),
-    )
-    ]  # fmt: skip
+            "gap",
+            WARNING,
+            "t",
+            {
+                "longest_s": float(lengths.max()),
+                "lost_rows": float(lost),
+                "at_s": float(work.t[cuts[int(lengths.argmax())] - 1]),
+            },
+            rows=tuple((int(lines[k - 1]), int(lines[k])) for k in cuts[:20]),
+            count=len(cuts),
+        )
+    ]
 
 
 def _jitter(work: LogUnderCheck) -> list[Finding]:
@@ -127,26 +145,24 @@ def _jitter(work: LogUnderCheck) -> list[Finding]:
         return []
     return [
         Finding(
-        "jitter", WARNING if relative > JITTER_WARN else NOTE, "t",
-        {"relative": relative, "step_s": work.step, "low_s": float(low), "high_s": float(high)},
-    )
-    ]  # fmt: skip
+            "jitter",
+            WARNING if relative > JITTER_WARN else NOTE,
+            "t",
+            {"relative": relative, "step_s": work.step, "low_s": float(low), "high_s": float(high)},
+        )
+    ]
 
 
 def _unit(work: LogUnderCheck) -> list[Finding]:
     if len(work) < MIN_ROWS or SHORTEST_STEP <= work.step <= LONGEST_STEP:
         return []
-    return [
-        Finding("time_unit", ERROR, "t", {"step_s": work.step})
-    ]  # fmt: skip
+    return [Finding("time_unit", ERROR, "t", {"step_s": work.step})]
 
 
 def _few(work: LogUnderCheck) -> list[Finding]:
     if len(work) >= MIN_ROWS:
         return []
-    return [
-        Finding("few_rows", ERROR if len(work) < 2 else NOTE, "", {"rows": float(len(work))})
-    ]  # fmt: skip
+    return [Finding("few_rows", ERROR if len(work) < 2 else NOTE, "", {"rows": float(len(work))})]
 
 
 def between(last: tuple[float, int] | None, block: Log, rate: float) -> tuple[list[Finding], tuple[float, int] | None]:
@@ -196,10 +212,17 @@ def check_counters(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             continue
         bad = np.zeros(len(work), dtype=bool)
         bad[list(rows)] = True
-        findings.append(Finding(
-            COUNTER if rows else FULL, ERROR, component, {} if period is None else {"period_rad": period},
-            "of_run", rows=work.lines(bad), count=len(rows),
-        ))  # fmt: skip
+        findings.append(
+            Finding(
+                COUNTER if rows else FULL,
+                ERROR,
+                component,
+                {} if period is None else {"period_rad": period},
+                "of_run",
+                rows=work.lines(bad),
+                count=len(rows),
+            )
+        )
         angle = work.channels["wheel_angle"].copy()
         angle[:, place(component)[1]] = going_on  # type: ignore[index]
         work = work.replace(wheel_angle=angle)

@@ -85,9 +85,10 @@ def way(remedy: Remedy) -> str:
 def _guesses(fit: OutputErrorEstimate) -> Iterator[Statement]:
     """What the robot file only guesses, where the model misses something: no friction makes up for a wrong motor."""
     guessed = [
-        key for key, prior in fit.robot.priors.items()
+        key
+        for key, prior in fit.robot.priors.items()
         if prior.origin in GUESSES and key not in fit.value and Key.parse(key).part in ("motor", "body")
-    ]  # fmt: skip
+    ]
     if FREEABLE[0] in fit.value:
         guessed = [key for key in guessed if key not in GOES_WITH_TORQUE]
     freeable = tuple(key for key in FREEABLE if key in guessed)
@@ -99,10 +100,13 @@ def _together(fit: OutputErrorEstimate) -> Iterator[Statement]:
     """Numbers that move together, and are wide for it: where both are known well, it does no harm."""
     names, matrix = fit.correlation.names, fit.correlation.matrix
     pairs = [
-        (first, names[j], matrix[i, j]) for i, first in enumerate(names) for j in range(i + 1, len(names))
-        if abs(matrix[i, j]) > CORRELATED and not {first, names[j]} & set(fit.unidentifiable)
+        (first, names[j], matrix[i, j])
+        for i, first in enumerate(names)
+        for j in range(i + 1, len(names))
+        if abs(matrix[i, j]) > CORRELATED
+        and not {first, names[j]} & set(fit.unidentifiable)
         and max(fit.half_width(name) if name in fit.value else 0.0 for name in (first, names[j])) > GOAL
-    ]  # fmt: skip
+    ]
     if pairs:
         first, second, between = zip(*pairs, strict=True)
         numbers = {"first": first, "second": second, "correlation": between}
@@ -112,15 +116,17 @@ def _together(fit: OutputErrorEstimate) -> Iterator[Statement]:
 def _wide(fit: OutputErrorEstimate) -> Iterator[Statement]:
     """What is known too roughly. A longer log helps against noise only: not where the model itself misses something."""
     shares = {
-        name: fit.half_width(name) for name in fit.value
-        if name not in fit.unidentifiable and name not in fit.at_bound
-    }  # fmt: skip
+        name: fit.half_width(name) for name in fit.value if name not in fit.unidentifiable and name not in fit.at_bound
+    }
     wide = {name: share for name, share in shares.items() if share > WIDE}
     if wide:
         numbers = {
-            "keys": tuple(wide), "shares": tuple(wide.values()), "known": tuple(fit.is_known(name) for name in wide),
-            "longer": (max(wide.values()) / GOAL) ** 2, "goal": GOAL,
-        }  # fmt: skip
+            "keys": tuple(wide),
+            "shares": tuple(wide.values()),
+            "known": tuple(fit.is_known(name) for name in wide),
+            "longer": (max(wide.values()) / GOAL) ** 2,
+            "goal": GOAL,
+        }
         yield Statement("wide_by_misfit" if _misses(fit) else "wide_intervals", NOTE, numbers=numbers)
 
 

@@ -180,25 +180,31 @@ class Estimate(Shown):
         """The estimate as JSON can hold it: no NaN, no infinity (null instead); the robot as the text of its file."""
         parameters = {
             name: {
-                "value": value, "std": self.std[name], "ci95": self.ci95[name],
-                "degrees_of_freedom": int(self.degrees_of_freedom[name]), "at_bound": name in self.at_bound,
-                "unit": unit(name), "words": in_words(name),
+                "value": value,
+                "std": self.std[name],
+                "ci95": self.ci95[name],
+                "degrees_of_freedom": int(self.degrees_of_freedom[name]),
+                "at_bound": name in self.at_bound,
+                "unit": unit(name),
+                "words": in_words(name),
             }
             | (UNKNOWN if name in self.unidentifiable else {})
             for name, value in self.value.items()
-        }  # fmt: skip
-        return plain({
-            "parameters": parameters,
-            "lower_bound": self.lower_bound,
-            "correlation": {"names": self.correlation.names, "matrix": self.correlation.matrix},
-            "from_the_log_alone": self.log_alone,
-            "rests_on_guesses": guesses_under(self.robot),
-            "warnings": self.warnings,
-            "method": self.method,
-            "data": self.data,
-            "scale": self.scale,
-            "robot": robot_to_toml(self.robot),
-        })  # fmt: skip
+        }
+        return plain(
+            {
+                "parameters": parameters,
+                "lower_bound": self.lower_bound,
+                "correlation": {"names": self.correlation.names, "matrix": self.correlation.matrix},
+                "from_the_log_alone": self.log_alone,
+                "rests_on_guesses": guesses_under(self.robot),
+                "warnings": self.warnings,
+                "method": self.method,
+                "data": self.data,
+                "scale": self.scale,
+                "robot": robot_to_toml(self.robot),
+            }
+        )
 
 
 def identified(std: float | None, source: str) -> Prior:

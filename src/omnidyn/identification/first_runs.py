@@ -97,8 +97,11 @@ def _run(robot: Robot) -> Run:
 def _fit(robot: Robot, *sensors: str, memory: FloatArray = MEMORY[:1], **options: Any) -> Estimate:
     """A fit to what these sensors show of that run, with errors of that memory."""
     random, run = np.random.default_rng(1), _run(robot)
-    seen = {name: value + NOISE[name] * _remembered(random.standard_normal(value.shape), memory)
-            for name, value in run.channels.items() if name in NOISE}  # fmt: skip
+    seen = {
+        name: value + NOISE[name] * _remembered(random.standard_normal(value.shape), memory)
+        for name, value in run.channels.items()
+        if name in NOISE
+    }
     seen["wheel_angle"] = np.round(np.cumsum(run.channels["wheel_speed"], axis=0) * DT / TICK) * TICK
     given = Run(t=run.t, voltage=None if robot.drive.kind == SPEED else run.voltage, twist_command=run.twist_command)
     log = given.replace(**{name: seen[name] for name in sensors})

@@ -22,9 +22,12 @@ MOST_LOGS = 20  # that are shown, one by one
 
 
 def fit_document(
-    fits: Mapping[str, OutputErrorEstimate], validations: Mapping[str, Validation], differences: Sequence[Difference],
-    verdicts: Sequence[Verdict], advice: Sequence[Statement],
-) -> Document:  # fmt: skip
+    fits: Mapping[str, OutputErrorEstimate],
+    validations: Mapping[str, Validation],
+    differences: Sequence[Difference],
+    verdicts: Sequence[Verdict],
+    advice: Sequence[Statement],
+) -> Document:
     """The fit of each group beside its logs, the differences between groups, and what to do next."""
     blocks: list[Sequence[Part]] = []
     groups, last = {}, [*fits][-1:]  # all have the same ladder
@@ -36,17 +39,21 @@ def fit_document(
         blocks += [fit.ladder.parts()] if fit.ladder and group in last else []
         blocks += _found(found) if found and not fit.not_followed else []
         groups[group] = {
-            **fit.to_dict(), "validation": beside[0].data if beside else None,
-            "lack_of_fit": found.lack_of_fit.to_dict() if found else None, "rests_on": fit.rests_on,
+            **fit.to_dict(),
+            "validation": beside[0].data if beside else None,
+            "lack_of_fit": found.lack_of_fit.to_dict() if found else None,
+            "rests_on": fit.rests_on,
             "stability": found.stability.to_dict() if found else None,
-        }  # fmt: skip
+        }
     blocks.append([difference_table(differences)] if differences else [])
     blocks.append(["next:", Points(advice, name="next")] if advice else [])
     data = {
-        "method": OUTPUT_ERROR, **(next(iter(groups.values())) if len(groups) == 1 else {"groups": groups}),
-        "differences": [{**vars(each), "differs": each.differs} for each in differences], "next": advice,
+        "method": OUTPUT_ERROR,
+        **(next(iter(groups.values())) if len(groups) == 1 else {"groups": groups}),
+        "differences": [{**vars(each), "differs": each.differs} for each in differences],
+        "next": advice,
         "check": checked(verdicts),
-    }  # fmt: skip
+    }
     return Document(apart(*blocks), data, [words for fit in fits.values() for words in fit.warnings], ascii=True)
 
 
@@ -106,10 +113,19 @@ def _whose(name: str) -> str:
 def difference_table(differences: Sequence[Difference]) -> Table:
     """What differs between groups, and what may."""
     rows = [
-        (d.key, f"{d.first} {d.values[0]:.4g}", f"{d.second} {d.values[1]:.4g}", f"{d.difference:+.4g}", f"{d.std:.2g}",
-         interval_cell((d.low, d.high)), unit(d.key), "differs" if d.differs else "no difference seen", in_words(d.key))
+        (
+            d.key,
+            f"{d.first} {d.values[0]:.4g}",
+            f"{d.second} {d.values[1]:.4g}",
+            f"{d.difference:+.4g}",
+            f"{d.std:.2g}",
+            interval_cell((d.low, d.high)),
+            unit(d.key),
+            "differs" if d.differs else "no difference seen",
+            in_words(d.key),
+        )
         for d in differences
-    ]  # fmt: skip
+    ]
     return Table(
         ("number", "first", "second", "difference", "std error", "95 % interval", "unit", "", "in words"), rows
     )
@@ -124,8 +140,17 @@ def verdict_table(verdicts: Sequence[Verdict]) -> Table:
         heard = [f for f in each.findings if f.severity in (ERROR, WARNING) or f.code == "judged_again"]
         what = [f"{f.code} {f.subject}".rstrip() for f in heard]
         words = ", ".join(what[:SHOWN]) + (", ..." if len(what) > SHOWN else "")
-        rows.append((each.source, str(each.rows), f"{each.duration:.4g}", f"{each.rate:.4g}", str(each.counts[ERROR]),
-                     str(each.counts[WARNING]), words or "fit for use"))  # fmt: skip
+        rows.append(
+            (
+                each.source,
+                str(each.rows),
+                f"{each.duration:.4g}",
+                f"{each.rate:.4g}",
+                str(each.counts[ERROR]),
+                str(each.counts[WARNING]),
+                words or "fit for use",
+            )
+        )
     rest = len(verdicts) - len(shown)
     if rest:
         fit = len(verdicts) - sum(each.counts[ERROR] + each.counts[WARNING] > 0 for each in verdicts)

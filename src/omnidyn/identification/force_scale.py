@@ -36,8 +36,11 @@ def scale_of_motion(robot: Robot, free: Collection[str], current: bool, metres: 
     masses = [key for key in (MASS, INERTIA) if key not in names][:1]
     # K_t alone, the EMF constant with it, is told by back-EMF; so is R where the current is measured.
     open_motors = {TORQUE, EMF} <= names or (RESISTANCE in names and not current) or bool(names & set(GAINS))
-    motors = [] if open_motors else [key for key in (TORQUE, RESISTANCE) if key not in names and not (
-        key == RESISTANCE and current)]  # fmt: skip
+    motors = (
+        []
+        if open_motors
+        else [key for key in (TORQUE, RESISTANCE) if key not in names and not (key == RESISTANCE and current)]
+    )
     if not open_motors and TORQUE in names:
         motors.append(RATIO)
     held = [*masses, *motors]
@@ -77,9 +80,10 @@ def _listed(words: Collection[str]) -> str:
 def _spin(robot: Robot, free: Collection[str]) -> str:
     """What rotors and wheels add to the mass, where they are taken as they stand."""
     keys = [
-        key for key, value in ((ROTOR, robot.motor.rotor_inertia), (WHEEL, robot.wheels.wheel_inertia))
+        key
+        for key, value in ((ROTOR, robot.motor.rotor_inertia), (WHEEL, robot.wheels.wheel_inertia))
         if np.any(value) and key not in free
-    ]  # fmt: skip
+    ]
     if keys:
         added = float(np.diag(added_mass(robot))[:2].mean())
         return f"; {_listed([f'{key}, {_known(robot, key)},' for key in keys])} adds {added:.3g} kg"

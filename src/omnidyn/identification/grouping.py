@@ -34,8 +34,9 @@ def held_out(sources: Sequence[str], patterns: Sequence[str]) -> list[bool]:
             )
     held = [any(matches(source, pattern) for pattern in patterns) for source in sources]
     if patterns and all(held):
-        raise InputError("every log is held out", got=", ".join(patterns), expected="one or more to fit",
-                         where="hold_out")  # fmt: skip
+        raise InputError(
+            "every log is held out", got=", ".join(patterns), expected="one or more to fit", where="hold_out"
+        )
     return held
 
 
@@ -49,13 +50,21 @@ def group_names(sources: Sequence[str], patterns: Sequence[str], option: str) ->
     for source in sources:
         mine = list(dict.fromkeys(name for name, pattern in pairs if matches(source, pattern)))
         if len(mine) > 1:
-            raise InputError("a log belongs to two groups", got=" and ".join(mine), where=source,
-                             remedy=f"make the patterns of `{option}` narrower")  # fmt: skip
+            raise InputError(
+                "a log belongs to two groups",
+                got=" and ".join(mine),
+                where=source,
+                remedy=f"make the patterns of `{option}` narrower",
+            )
         found.append(mine[0] if mine else "")
     for name, pattern in pairs:
         if name not in found:
-            raise InputError("no log belongs to this group", got=pattern, expected="a glob or a folder of LOG...",
-                             where=f"`{option}` {name}")  # fmt: skip
+            raise InputError(
+                "no log belongs to this group",
+                got=pattern,
+                expected="a glob or a folder of LOG...",
+                where=f"`{option}` {name}",
+            )
     return found
 
 
@@ -79,8 +88,9 @@ def names_of_groups(groups: str | Sequence[str] | None, sources: Sequence[str]) 
 def _pair(text: str, option: str) -> tuple[str, str]:
     name, equals, pattern = text.partition("=")
     if not equals or not name.strip() or not pattern.strip():
-        raise InputError("cannot read the group", got=text, expected="NAME=GLOB, such as gray=gray_surface",
-                         where=option)  # fmt: skip
+        raise InputError(
+            "cannot read the group", got=text, expected="NAME=GLOB, such as gray=gray_surface", where=option
+        )
     return printable(name.strip()), pattern.strip()
 
 

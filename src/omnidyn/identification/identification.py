@@ -207,9 +207,11 @@ class Identification(Shown):
             return replace(told, data={"ok": not self.failures, **told.data})
         lines = {group: estimate.document() for group, estimate in self.groups.items()}
         data = {
-            "ok": not self.failures, "shape": LINE,
-            "groups": {group: each.data for group, each in lines.items()}, "check": checked(self.verdicts),
-        }  # fmt: skip
+            "ok": not self.failures,
+            "shape": LINE,
+            "groups": {group: each.data for group, each in lines.items()},
+            "check": checked(self.verdicts),
+        }
         mend = [Points(self.advice, "next:", "next")] if self.advice else []
         return Document(apart(*(each.parts for each in lines.values()), mend), data, ascii=True)
 

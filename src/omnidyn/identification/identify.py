@@ -59,10 +59,18 @@ Save = Callable[[Mapping[str, Estimate]], object]
 
 
 def identify(
-    logs: Logs, robot: Robot | None = None, method: Method | None = None, *, hold_out: str | Sequence[str] = (),
-    groups: str | Sequence[str] | None = None, quick: bool = False, progress: Progress = silent,
-    check: Sequence[Log] = (), keep_best: bool = False, save: Save | None = None,
-) -> Identification:  # fmt: skip
+    logs: Logs,
+    robot: Robot | None = None,
+    method: Method | None = None,
+    *,
+    hold_out: str | Sequence[str] = (),
+    groups: str | Sequence[str] | None = None,
+    quick: bool = False,
+    progress: Progress = silent,
+    check: Sequence[Log] = (),
+    keep_best: bool = False,
+    save: Save | None = None,
+) -> Identification:
     """Identify a robot from logs: its numbers with intervals, what the model misses, and what to do next.
 
     The result has what an Estimate has: robot, value, std, ci95, correlation, warnings, lack_of_fit, ...
@@ -88,9 +96,14 @@ def identify(
     check_order("identify(logs, robot)", (logs, (Run, Log, SteadyTable, MotorTable)), (robot, (Robot, type(None))))
     refuse_unless_method(method)
     asked = _Asked(
-        robot, groups, (hold_out,) if isinstance(hold_out, str) else tuple(hold_out), quick, progress,
-        save or _discard, Attempts(keep=keep_best),
-    )  # fmt: skip
+        robot,
+        groups,
+        (hold_out,) if isinstance(hold_out, str) else tuple(hold_out),
+        quick,
+        progress,
+        save or _discard,
+        Attempts(keep=keep_best),
+    )
     if isinstance(logs, SteadyTable):
         return _of_steady_table(logs, method or SteadyState(), asked)
     if isinstance(logs, MotorTable):
@@ -113,9 +126,12 @@ def identify(
     if not why:
         return found
     chosen = Statement("method_chosen", NOTE, numbers={"method": method.name, "why": why})
-    return replace(found, groups={
-        name: replace(estimate, warnings=(chosen, *estimate.warnings)) for name, estimate in found.groups.items()
-    })  # fmt: skip
+    return replace(
+        found,
+        groups={
+            name: replace(estimate, warnings=(chosen, *estimate.warnings)) for name, estimate in found.groups.items()
+        },
+    )
 
 
 @dataclass(frozen=True)
@@ -133,8 +149,13 @@ class _Asked:
     def of_friction(self) -> Robot:
         """The robot. Raises InputError where there is none."""
         if self.robot is None:
-            raise InputError("friction is identified of a robot", got="none", expected="identify(logs, robot)",
-                             remedy=MADE_BY["Robot"], where="robot")  # fmt: skip
+            raise InputError(
+                "friction is identified of a robot",
+                got="none",
+                expected="identify(logs, robot)",
+                remedy=MADE_BY["Robot"],
+                where="robot",
+            )
         return self.robot
 
     def refuse(self, method: Method) -> None:
@@ -142,13 +163,15 @@ class _Asked:
         given = {HOLD_OUT: self.hold_out, GROUPS: self.groups, QUICKLY: self.quick}
         for name, value in given.items():
             if value and name not in method.takes:
-                raise InputError(f"{type(method).__name__} has no use for it", got=f"`{name}`", where=name,
-                                 remedy="leave it out")  # fmt: skip
+                raise InputError(
+                    f"{type(method).__name__} has no use for it", got=f"`{name}`", where=name, remedy="leave it out"
+                )
         if self.quick and isinstance(method, OutputError) and method.ladder:
             raise InputError(
-                "the ladder climbs by the diagnosis, which `quick` leaves out", got="`quick` and `ladder`",
+                "the ladder climbs by the diagnosis, which `quick` leaves out",
+                got="`quick` and `ladder`",
                 remedy="leave out one of them",
-            )  # fmt: skip
+            )
 
     def without_more(self, verdicts: tuple[Verdict, ...] = (), mend: tuple[Statement, ...] = ()) -> Callable[[], After]:
         """Makes what follows a method that is not validated: nothing more."""
@@ -162,8 +185,12 @@ def _discard(told: object) -> None:
 def _of_steady_table(table: SteadyTable, method: Method, asked: _Asked) -> Identification:
     """The paper's line on each axis."""
     if not isinstance(method, SteadyState):
-        raise InputError("a table of steady points has no time in it", got="a table axis,speed,force",
-                         expected="logs, or `method` steady-state", where="method")  # fmt: skip
+        raise InputError(
+            "a table of steady points has no time in it",
+            got="a table axis,speed,force",
+            expected="logs, or `method` steady-state",
+            where="method",
+        )
     asked.refuse(method)
     how = {"rest": method.rest, "rest_speed": method.rest_speed, "absolute_std": method.absolute_std}
     estimate = fit_steady_state(asked.of_friction(), table, **how)
@@ -183,8 +210,12 @@ def _of_motors(runs: Sequence[Run] | MotorTable, method: Method, check: Sequence
     elif isinstance(method, MotorLine):
         study = study_points(runs)
     else:
-        raise InputError("a table of steady speeds has no time in it", got="a table input,speed",
-                         expected="logs, or `method` steady-state", where="method")  # fmt: skip
+        raise InputError(
+            "a table of steady speeds has no time in it",
+            got="a table input,speed",
+            expected="logs, or `method` steady-state",
+            where="method",
+        )
     return Identification(method, {}, asked.without_more(study.verdicts, study.advice), study=study)
 
 
@@ -246,9 +277,14 @@ def _fitted(runs: Sequence[Run], method: OutputError, check: Sequence[Log], aske
 
 
 def _after(
-    fits: Mapping[str, OutputErrorEstimate], own: Mapping[str, list[Run]], aside: Mapping[str, list[Run]],
-    verdicts: tuple[Verdict, ...], check: Sequence[Log], repeated: Sequence[Statement], asked: _Asked,
-) -> After:  # fmt: skip
+    fits: Mapping[str, OutputErrorEstimate],
+    own: Mapping[str, list[Run]],
+    aside: Mapping[str, list[Run]],
+    verdicts: tuple[Verdict, ...],
+    check: Sequence[Log],
+    repeated: Sequence[Statement],
+    asked: _Asked,
+) -> After:
     """What follows fits to whole logs. own, aside: group -> the runs it was fitted to, and those held out of it.
     repeated: what is said of logs that are both."""
     attempts, progress = asked.attempts, asked.progress
@@ -295,8 +331,9 @@ def _not_independent(runs: Sequence[Run], held: Sequence[bool]) -> list[Statemen
     fitted = {mark: run.source for mark, run, out in zip(marks, runs, held, strict=False) if not out}
     return [
         Statement("held_out_is_fitted", WARNING, run.source, {"fitted": fitted[mark]})
-        for mark, run, out in zip(marks, runs, held, strict=False) if out and mark in fitted
-    ]  # fmt: skip
+        for mark, run, out in zip(marks, runs, held, strict=False)
+        if out and mark in fitted
+    ]
 
 
 def _answered(

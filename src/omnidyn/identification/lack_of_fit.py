@@ -207,9 +207,14 @@ class LackOfFit:
             return Statement("misfit_unexplained", WARNING, worst, numbers)
         best = self.causes[0]
         code = (
-            "misfit_likely_cause" if best.confident else "misfit_without_law" if not best.offered
-            else "misfit_with_rivals" if best.rivals else "misfit_nearest_cause"
-        )  # fmt: skip
+            "misfit_likely_cause"
+            if best.confident
+            else "misfit_without_law"
+            if not best.offered
+            else "misfit_with_rivals"
+            if best.rivals
+            else "misfit_nearest_cause"
+        )
         numbers |= {"cause": best.cause, "explains": best.share, "rivals": best.rivals, "alike": self.alike(best)}
         return Statement(code, WARNING, worst, numbers)
 
@@ -229,11 +234,15 @@ class LackOfFit:
     def table(self) -> Table:
         """The remedies, a row each."""
         rows = [
-            (str(r.cause), r.key, f"{short(100.0 * r.gain)} +- {short(100.0 * r.gain_std)} %",
-             str(Statement("changes", NOTE, numbers=r.largest_changes(1))),
-             all_of([str(Statement("cause", NOTE, key)) for key in r.same_as]))
+            (
+                str(r.cause),
+                r.key,
+                f"{short(100.0 * r.gain)} +- {short(100.0 * r.gain_std)} %",
+                str(Statement("changes", NOTE, numbers=r.largest_changes(1))),
+                all_of([str(Statement("cause", NOTE, key)) for key in r.same_as]),
+            )
             for r in self.remedies
-        ]  # fmt: skip
+        ]
         head = ("what may be missing", "key", "held-out error less by", "would change", "the same to this log")
         return Table(head, rows, "<<><<")
 
@@ -245,8 +254,9 @@ class LackOfFit:
             return [whole or calm, *self._levels(), *self._tails()]
         shares = [
             Statement("misfit_of_output", WARNING, name, {"size": self.sizes[name], "percent": 100.0 * share})
-            for name, share in self.channels.items() if share >= WORTH
-        ]  # fmt: skip
+            for name, share in self.channels.items()
+            if share >= WORTH
+        ]
         return [*([whole] if whole else []), *shares, *self._levels(), *self._tails()]
 
     def _levels(self) -> list[Statement]:
@@ -260,10 +270,12 @@ class LackOfFit:
             if own:
                 noises = [*own.values()]
                 numbers = {
-                    "outputs": tuple(own), "levels": tuple(each.level for each in noises),
-                    "units": tuple(each.unit for each in noises), "of_moves": max(each.of_moves for each in noises),
+                    "outputs": tuple(own),
+                    "levels": tuple(each.level for each in noises),
+                    "units": tuple(each.unit for each in noises),
+                    "of_moves": max(each.of_moves for each in noises),
                     "chi2": tuple(pick(each.chi2 for each in noises) for pick in (min, max)),
-                }  # fmt: skip
+                }
                 levels.append(Statement("noise_level", NOTE, source, numbers))
         return [*self._rounded(), *levels, *self._beyond_rest()]
 
@@ -276,9 +288,10 @@ class LackOfFit:
     def _beyond_rest(self) -> list[Statement]:
         """Of the output that most surely leaves more in motion than at rest; nothing where none does."""
         beyond = {
-            name: each for name, each in self.at_rest.items()
+            name: each
+            for name, each in self.at_rest.items()
             if each.p * len(self.at_rest) < FAR[0] and each.share > FAR[1]
-        }  # fmt: skip
+        }
         worst = min(beyond, key=lambda name: beyond[name].p, default="")
         return [beyond[worst].beyond(worst)] if worst else []
 
@@ -296,16 +309,23 @@ class LackOfFit:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
-        return plain({
-            "found": self.found, "channels": self.channels, "sizes": self.sizes,
-            "follows": [asdict(each) for each in self.follows],
-            "remedies": self.remedies, "statements": self.statements(), "tested": self.tested,
-            "wild": {name: asdict(each) for name, each in self.wild.items()},
-            "noise": {name: asdict(each) for name, each in (self.noise or {}).items()},
-            "beyond_noise": self.beyond,
-            "at_rest": {name: asdict(each) for name, each in self.at_rest.items()}, "rounded_inputs": self.rounded,
-            "drifts": self.drifts,
-        })  # fmt: skip
+        return plain(
+            {
+                "found": self.found,
+                "channels": self.channels,
+                "sizes": self.sizes,
+                "follows": [asdict(each) for each in self.follows],
+                "remedies": self.remedies,
+                "statements": self.statements(),
+                "tested": self.tested,
+                "wild": {name: asdict(each) for name, each in self.wild.items()},
+                "noise": {name: asdict(each) for name, each in (self.noise or {}).items()},
+                "beyond_noise": self.beyond,
+                "at_rest": {name: asdict(each) for name, each in self.at_rest.items()},
+                "rounded_inputs": self.rounded,
+                "drifts": self.drifts,
+            }
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -84,11 +84,18 @@ class Ladder:
     def table(self) -> Table:
         """Every model that was fitted, a row each."""
         rows = [
-            (str(r.step), str(r.cause), r.key, str(r.numbers or ""), _cell(r.held_out, ".4g"),
-             f"{short(100.0 * r.gain)} +- {short(100.0 * r.gain_std)} %" if r.step and math.isfinite(r.gain) else "",
-             _cell(r.bic, "+.3g") if r.step else "", "taken" if r.taken else str(r.why or ""))
+            (
+                str(r.step),
+                str(r.cause),
+                r.key,
+                str(r.numbers or ""),
+                _cell(r.held_out, ".4g"),
+                f"{short(100.0 * r.gain)} +- {short(100.0 * r.gain_std)} %" if r.step and math.isfinite(r.gain) else "",
+                _cell(r.bic, "+.3g") if r.step else "",
+                "taken" if r.taken else str(r.why or ""),
+            )
             for r in self.rungs
-        ]  # fmt: skip
+        ]
         head = ("step", "with", "key", "numbers", "held-out error", "less by", "BIC", "")
         return Table(head, rows, "<<<>>>><")
 

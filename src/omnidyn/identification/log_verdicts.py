@@ -80,11 +80,13 @@ def verdict_advice(verdicts: Sequence[Verdict]) -> list[Statement]:
             alike.setdefault((finding.code, finding.remedy_text), []).append((each.source, finding))
     return [
         Statement(
-            "mend_log", ERROR, _first(source for source, _ in found),
+            "mend_log",
+            ERROR,
+            _first(source for source, _ in found),
             {"finding": found[0][1], "what": remedy or "see omnidyn check"},
         )
         for (_, remedy), found in alike.items()
-    ]  # fmt: skip
+    ]
 
 
 def unfit(verdicts: Sequence[Verdict]) -> list[Statement]:
@@ -95,11 +97,13 @@ def unfit(verdicts: Sequence[Verdict]) -> list[Statement]:
             alike.setdefault(tuple(finding.code for finding in _errors(each)), []).append(each)
     return [
         Statement(
-            "log_not_usable", ERROR, _first(each.source for each in found),
+            "log_not_usable",
+            ERROR,
+            _first(each.source for each in found),
             {"logs": len(found), "findings": tuple(_errors(found[0]))},
         )
         for found in alike.values()
-    ]  # fmt: skip
+    ]
 
 
 def checked(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:

@@ -22,9 +22,12 @@ HOLD_OUT, GROUPS, QUICK = "hold_out", "groups", "quick"  # what `identify` takes
 
 # What is wrong with a word that is none of the choices of an option, where "unknown NAME" does not say it.
 WRONG = {
-    "method": "no such method", "what": "nothing of that name", "speed": "no such speed",
-    "force_from": "no such origin of the force", "rest": "unknown use of rows at rest",
-}  # fmt: skip
+    "method": "no such method",
+    "what": "nothing of that name",
+    "speed": "no such speed",
+    "force_from": "no such origin of the force",
+    "rest": "unknown use of rows at rest",
+}
 
 
 def option(
@@ -36,9 +39,9 @@ def option(
         metavar, flag: on the command line; "" for the name of the field, None for an option that it does not have.
         first: whether a user needs it first, in the help of the command line.
     """
-    return field(default=default, metadata={
-        "words": words, "more": more, "metavar": metavar, "flag": flag, "first": first
-    })  # fmt: skip
+    return field(
+        default=default, metadata={"words": words, "more": more, "metavar": metavar, "flag": flag, "first": first}
+    )
 
 
 @cache
@@ -133,62 +136,69 @@ class OutputError(Method):
     takes: ClassVar[tuple[str, ...]] = (HOLD_OUT, GROUPS, QUICK)
 
     free: tuple[str, ...] | None = option(
-        None, "Fit this instead of the friction and all guesses; friction is all of it.",
+        None,
+        "Fit this instead of the friction and all guesses; friction is all of it.",
         'Keys of the robot file, such as "body.mass_kg"; that of a list stands for its items. None: the friction that '
         "the robot has, and every number that has a std which no earlier fit wrote. Such a std is a prior, listed or "
         "not. The EMF constant follows the torque constant, wheel by wheel, unless both are listed. Breakaway "
         'follows coulomb, or stays as the robot has it; "friction.axes.breakaway[0]" asks for its interval, without '
         '"[0]" for all; so do those of friction.direction and friction.wheels.',
-        metavar="KEY", first=True,
-    )  # fmt: skip
-    fixed: tuple[str, ...] = option(
-        (), "Leave this as the robot file has it.", metavar="KEY", flag="fix", first=True
-    )  # fmt: skip
+        metavar="KEY",
+        first=True,
+    )
+    fixed: tuple[str, ...] = option((), "Leave this as the robot file has it.", metavar="KEY", flag="fix", first=True)
     nuisances: tuple[str, ...] | None = option(None, *NUISANCES, metavar="NAME", flag="nuisance")
     loss: Literal["gaussian", "student-t"] = option(GAUSS, LOSS)
     per_free: tuple[str, ...] = option(
-        (), "What each group has for itself instead.",
+        (),
+        "What each group has for itself instead.",
         "Of the free numbers, or of the nuisances; the others are shared. By default all friction that is free.",
         metavar="KEY",
-    )  # fmt: skip
+    )
     profile: tuple[str, ...] = option(
-        (), "Interval by profile of the likelihood.",
+        (),
+        "Interval by profile of the likelihood.",
         "It is scaled by the sandwich where that is used. A number that each group has for itself is profiled in each, "
         "and so are its differences.",
         metavar="KEY",
-    )  # fmt: skip
+    )
     bootstrap: int = option(
-        0, "Intervals from N draws of whole runs instead.",
+        0,
+        "Intervals from N draws of whole runs instead.",
         "Std and intervals of all come from them; runs of a group are drawn among themselves. Deterministic.",
         metavar="N",
-    )  # fmt: skip
+    )
     ladder: bool = option(
-        False, "Switch on what the model leaves out, step by step, while it pays.",
+        False,
+        "Switch on what the model leaves out, step by step, while it pays.",
         "Each step fits the logs with each of the best remedies of `lack_of_fit`, and takes the one that best predicts "
         "blocks of the logs that it was not fitted to, where BIC says so too; the simpler one within a standard error. "
         "`Estimate.ladder` has all that was tried.",
-    )  # fmt: skip
+    )
     start: Literal["auto", "rest", "free"] = option(
         AUTO, "How logs begin: rest, free, or auto: at rest where that shows."
     )
     outputs: tuple[str, ...] | None = option(
-        None, "What is fitted to.",
+        None,
+        "What is fitted to.",
         'Of "twist", "wheel_speed", "current", "pose" (or of "heading", "position"), "wheel_angle". None: all that '
         "the log has, but for what is computed from another one: that would count the same data twice.",
         flag=None,
-    )  # fmt: skip
+    )
     covariance: Literal["auto", "white", "autoregressive", "sandwich"] = option(
-        AUTO, "white, autoregressive, sandwich, or auto: autoregressive where residuals are not white.",
+        AUTO,
+        "white, autoregressive, sandwich, or auto: autoregressive where residuals are not white.",
         "An autoregression of the errors sets estimate and intervals. The sandwich stays where there is none: for "
         "Student's t, for counts, from 20 runs on, and where none makes the residuals white.",
         flag=None,
-    )  # fmt: skip
+    )
     tick_rad: float | None = option(
-        None, "Of the encoders behind wheel angles [rad].",
+        None,
+        "Of the encoders behind wheel angles [rad].",
         "None: found in the log. Their likelihood is that of counts; 0 takes them like any other output, and wheel "
         "speeds that are differences of counts as they are.",
         flag=None,
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True)
@@ -213,9 +223,7 @@ class SteadyState(Method):
     rest_speed: tuple[float, float, float] = option(
         (0.0, 0.0, 0.0), "Of a table: speeds up to this count as rest, per axis [m/s, m/s, rad/s].", flag=None
     )
-    absolute_std: bool = option(
-        False, "Of a table: its stds are exact; else only their ratios count.", flag=None
-    )  # fmt: skip
+    absolute_std: bool = option(False, "Of a table: its stds are exact; else only their ratios count.", flag=None)
 
 
 @dataclass(frozen=True)
@@ -255,6 +263,9 @@ def refuse_unless_method(method: object) -> None:
         spellings = ", ".join(f"omnidyn.{kind.__name__}()" for kind in METHODS)
         got = method if isinstance(method, str) else getattr(method, "__name__", type(method).__name__)
         raise InputError(
-            "a method is a value with its options, not a name", got=got, expected="one of the four methods",
-            where="method", remedy=f"say one of {spellings}",
-        )  # fmt: skip
+            "a method is a value with its options, not a name",
+            got=got,
+            expected="one of the four methods",
+            where="method",
+            remedy=f"say one of {spellings}",
+        )

@@ -81,10 +81,19 @@ class Stability:
     def table(self) -> Table:
         """What each number that differs is in each part."""
         rows = [
-            (in_words(shift.key), shift.key, level.part, f"{level.value:.4g}", interval_cell(level.ci95),
-             unit(shift.key), chance_cell(shift.p))
-            for split in self.splits for shift in split.shifts for level in shift.levels
-        ]  # fmt: skip
+            (
+                in_words(shift.key),
+                shift.key,
+                level.part,
+                f"{level.value:.4g}",
+                interval_cell(level.ci95),
+                unit(shift.key),
+                chance_cell(shift.p),
+            )
+            for split in self.splits
+            for shift in split.shifts
+            for level in shift.levels
+        ]
         return Table(("number", "key", "in", "value", "95 % interval", "unit", "chance"), rows, "<<<>><>")
 
     def parts(self) -> list[Part]:
@@ -99,5 +108,11 @@ class Stability:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
-        return plain({"found": self.found, "tested": self.tested, "splits": [asdict(each) for each in self.splits],
-                      "statements": self.statements()})  # fmt: skip
+        return plain(
+            {
+                "found": self.found,
+                "tested": self.tested,
+                "splits": [asdict(each) for each in self.splits],
+                "statements": self.statements(),
+            }
+        )

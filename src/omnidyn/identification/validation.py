@@ -74,10 +74,20 @@ class Validation:
     def table(self) -> Table:
         """The scores, a row per component."""
         rows = [
-            (which, name, unit(name), str(s.samples), f"{s.rmse:.4g}", cell(s.fit_percent, ".1f"),
-             cell(s.chi2, ".3g"), chance_cell(s.whiteness), cell(s.lag, "+.3f"))
-            for which, found in self.scores.items() for name, s in found.items()
-        ]  # fmt: skip
+            (
+                which,
+                name,
+                unit(name),
+                str(s.samples),
+                f"{s.rmse:.4g}",
+                cell(s.fit_percent, ".1f"),
+                cell(s.chi2, ".3g"),
+                chance_cell(s.whiteness),
+                cell(s.lag, "+.3f"),
+            )
+            for which, found in self.scores.items()
+            for name, s in found.items()
+        ]
         head = ("logs", "component", "unit", "samples", "rmse", "fit %", "chi2", "white p", "lag s")
         return Table(head, rows, "<<<>")
 
@@ -127,8 +137,9 @@ class Validation:
                 "logs": [run.source for run in comparison.measured],
                 "components": {name: asdict(s) | {"unit": unit(name)} for name, s in self.scores[which].items()},
             }
-            for which, comparison in ((FITTED, self.fitted), (HELD_OUT, self.held_out)) if comparison is not None
-        }  # fmt: skip
+            for which, comparison in ((FITTED, self.fitted), (HELD_OUT, self.held_out))
+            if comparison is not None
+        }
 
 
 def _scatter(found: Comparison, name: str) -> float:
@@ -137,9 +148,11 @@ def _scatter(found: Comparison, name: str) -> float:
 
 
 def validate(
-    fit: OutputErrorEstimate, runs: Sequence[Run], held_out: Sequence[Run] = (),
+    fit: OutputErrorEstimate,
+    runs: Sequence[Run],
+    held_out: Sequence[Run] = (),
     progress: Progress = silent,
-) -> Validation:  # fmt: skip
+) -> Validation:
     """Run the fitted robot freely beside the logs it was fitted to and beside those held out, nuisances included.
 
     What the diagnosis says of the noise counts in chi2; it is made first, unless the fit has none.
@@ -172,7 +185,7 @@ def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Progress)
 
 def _scores(
     fit: OutputErrorEstimate, lack: LackOfFit | None, found: Comparison, logged: Sequence[Run]
-) -> dict[str, Score]:  # fmt: skip
+) -> dict[str, Score]:
     """The score of each component. What was not fitted has no noise, and no chi2.
 
     An encoder at rest repeats what it rounds off: of a counted angle nothing tells whether errors are white.
@@ -190,8 +203,9 @@ def _errors(found: Comparison, name: str) -> list[FloatArray]:
     near = PATH if name in PATH else (name,)
     traces = {
         key: [found.trace(found.robots[0], key, segment) for segment in found.segments]
-        for key in near if key in found.channels
-    }  # fmt: skip
+        for key in near
+        if key in found.channels
+    }
     if counts_from_start(name):
         return errors_for_whiteness(name, traces)
     return [trace.error for trace in traces[name]]
@@ -209,9 +223,7 @@ def _tick(logged: Sequence[Run], name: str) -> float:
     return max((find_tick(angle[:, column]) for angle in angles), default=0.0)
 
 
-def _chi2(
-    fit: OutputErrorEstimate, lack: LackOfFit | None, found: Comparison, name: str, tick: float
-) -> float | None:  # fmt: skip
+def _chi2(fit: OutputErrorEstimate, lack: LackOfFit | None, found: Comparison, name: str, tick: float) -> float | None:
     output = output_name(name)
     noise = fit.noise.get(output)
     if not noise:

@@ -34,9 +34,11 @@ def fit_verdict(fit: OutputErrorEstimate, validation: Validation | None = None) 
 
 
 def fits_verdict(
-    fits: Mapping[str, OutputErrorEstimate], validations: Mapping[str, Validation], verdicts: Sequence[Verdict] = (),
+    fits: Mapping[str, OutputErrorEstimate],
+    validations: Mapping[str, Validation],
+    verdicts: Sequence[Verdict] = (),
     cut: bool = False,
-) -> list[Statement]:  # fmt: skip
+) -> list[Statement]:
     """Fits of all groups. verdicts: of `check` on the logs. cut: whether an interrupt cut the fit off."""
     found = [Statement("cut_short", WARNING)] if cut else []
     faults = [finding for each in verdicts for finding in each.findings if finding.severity == ERROR]
@@ -100,13 +102,20 @@ def steady_verdict(study: SteadyStudy) -> list[Statement]:
         "names": tuple(study.choice.of(group) for group in own) or (study.choice.chosen,),
         "groups": tuple(own) or ("",),
     }
-    friction = Statement("steady_friction", WARNING if lacks else NOTE, numbers={
-        "levels": tuple(each.mean for each in study.travel.values()), "groups": tuple(study.travel),
-        "shapes": Statement("shapes", NOTE, numbers=shapes), "share": share,
-        "ties": tuple(each.name for each in study.choice.scores if not each.told_apart and each.name != score.name),
-        "misfit": bool(lacks), "cause": next((str(r.cause) for each in lacks for r in each.remedies), ""),
-        "known": lines_verdict(study.estimates)[0],
-    })  # fmt: skip
+    friction = Statement(
+        "steady_friction",
+        WARNING if lacks else NOTE,
+        numbers={
+            "levels": tuple(each.mean for each in study.travel.values()),
+            "groups": tuple(study.travel),
+            "shapes": Statement("shapes", NOTE, numbers=shapes),
+            "share": share,
+            "ties": tuple(each.name for each in study.choice.scores if not each.told_apart and each.name != score.name),
+            "misfit": bool(lacks),
+            "cause": next((str(r.cause) for each in lacks for r in each.remedies), ""),
+            "known": lines_verdict(study.estimates)[0],
+        },
+    )
     changes = tuple(each.short() for each in study.moments)
     moved = [Statement("force_changes_in_run", WARNING, numbers={"changes": changes})] if changes else []
     return [*moved, friction]

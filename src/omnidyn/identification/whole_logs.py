@@ -15,9 +15,13 @@ from omnidyn.run import Run
 
 
 def solved(
-    fit: Fit, runs: Sequence[Run], progress: FitProgress, groups: Sequence[str] | None = None,
-    without_ladder: Callable[[Answer], object] | None = None, quick: bool = False,
-) -> Answer:  # fmt: skip
+    fit: Fit,
+    runs: Sequence[Run],
+    progress: FitProgress,
+    groups: Sequence[str] | None = None,
+    without_ladder: Callable[[Answer], object] | None = None,
+    quick: bool = False,
+) -> Answer:
     """The answer of a fit of some runs, with the ladder where that is asked for. groups: name of each run's group.
 
     without_ladder: is called with the answer of the fit from which a ladder begins, before it does. quick: leaves

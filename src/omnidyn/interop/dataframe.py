@@ -97,18 +97,22 @@ def _of_estimate(estimate: Estimate) -> tuple[Mapping[str, list[Any]], dict[str,
         "unit": [unit(name) for name in names],
     }
     attributes = {
-        "robot": estimate.robot.name, "method": estimate.method, "data": estimate.data,
-        "warnings": [*map(str, estimate.warnings)], "units": dict(zip(names, columns["unit"], strict=True)),
-    }  # fmt: skip
+        "robot": estimate.robot.name,
+        "method": estimate.method,
+        "data": estimate.data,
+        "warnings": [*map(str, estimate.warnings)],
+        "units": dict(zip(names, columns["unit"], strict=True)),
+    }
     return columns, attributes
 
 
 def _of_comparison(found: Comparison) -> tuple[Mapping[str, list[Any]], dict[str, Any]]:
     rows = [(robot, name, each) for robot in found.robots for name, each in found.overall[robot].items()]
     columns: dict[str, list[Any]] = {
-        "robot": [robot for robot, _, _ in rows], "component": [name for _, name, _ in rows],
+        "robot": [robot for robot, _, _ in rows],
+        "component": [name for _, name, _ in rows],
         "unit": [component_unit(name) for _, name, _ in rows],
-    }  # fmt: skip
+    }
     for metric in METRICS:
         values = [getattr(each, metric) for _, _, each in rows]
         columns[metric] = values if metric == "samples" else [np.nan if v is None else float(v) for v in values]

@@ -98,8 +98,15 @@ _TURNS = {"quat", "axisangle", "xyaxes", "zaxis", "euler"}
 KEPT = {
     "mujoco": {"model"},
     "compiler": {
-        "angle", "eulerseq", "coordinate", "inertiafromgeom", "inertiagrouprange", "boundmass", "boundinertia",
-        "settotalmass", "balanceinertia",
+        "angle",
+        "eulerseq",
+        "coordinate",
+        "inertiafromgeom",
+        "inertiagrouprange",
+        "boundmass",
+        "boundinertia",
+        "settotalmass",
+        "balanceinertia",
     },
     "default": {"class"},
     "worldbody": set[str](),
@@ -109,9 +116,19 @@ KEPT = {
     "freejoint": {"name"},
     "joint": {"name", "class", "type", "pos", "axis"},
     "geom": {
-        "name", "class", "type", "size", "pos", "fromto", "mass", "density", "group", "shellinertia", *_TURNS,
+        "name",
+        "class",
+        "type",
+        "size",
+        "pos",
+        "fromto",
+        "mass",
+        "density",
+        "group",
+        "shellinertia",
+        *_TURNS,
     },
-}  # fmt: skip
+}
 # They say nothing of masses and wheels.
 _OTHERS = """
     option size visual statistic asset contact equality tendon actuator sensor keyframe custom site camera light
@@ -128,9 +145,12 @@ def read_parts(root: ET.Element, where: str) -> str:
         other = next((value for name, value in node.items() if name.startswith("file")), None)
         if node.tag == "include" or other is not None:
             raise InputError(
-                "the model takes from other files", got=other or f"<{node.tag}>", expected="one file",
-                remedy="save the compiled model: mj_saveLastXML", where=where,
-            )  # fmt: skip
+                "the model takes from other files",
+                got=other or f"<{node.tag}>",
+                expected="one file",
+                remedy="save the compiled model: mj_saveLastXML",
+                where=where,
+            )
     kept = ET.Element("mujoco", _attributes(root))
     waiting, parts = [(root, kept, 1)], 0
     while waiting:
@@ -152,23 +172,33 @@ def _refuse(node: ET.Element, depth: int, parts: int, where: str) -> None:
     """Raises InputError for an element that cannot be read, and where there are too many."""
     if node.tag not in KEPT:
         raise InputError(
-            "this element is not read", got=f"<{node.tag}>", expected="bodies, joints, geoms and inertias",
-            remedy="save the compiled model, mj_saveLastXML, or begin with omnidyn init", where=where,
-        )  # fmt: skip
+            "this element is not read",
+            got=f"<{node.tag}>",
+            expected="bodies, joints, geoms and inertias",
+            remedy="save the compiled model, mj_saveLastXML, or begin with omnidyn init",
+            where=where,
+        )
     if node.get("type") in _FROM_ELSEWHERE or any(node.get(name) is not None for name in _FROM_ELSEWHERE):
         raise InputError(
-            "the shape of this geom is not in the model", got=node.get("name") or node.get("mesh") or node.get("type"),
+            "the shape of this geom is not in the model",
+            got=node.get("name") or node.get("mesh") or node.get("type"),
             expected="boxes, spheres, cylinders, capsules and ellipsoids",
-            remedy="give the body an <inertial>, and a simple shape in place of the geom", where=where,
-        )  # fmt: skip
+            remedy="give the body an <inertial>, and a simple shape in place of the geom",
+            where=where,
+        )
     for name in _NEVER_NEGATIVE:
         if any(text.startswith("-") and text.strip("-0.eE+") for text in node.get(name, "").split()):
             raise InputError(
-                "no body has a negative mass or inertia", got=f'{name}="{node.get(name)}"', expected="0 or more",
-                remedy="correct the sign", where=where,
-            )  # fmt: skip
+                "no body has a negative mass or inertia",
+                got=f'{name}="{node.get(name)}"',
+                expected="0 or more",
+                remedy="correct the sign",
+                where=where,
+            )
     if parts > MOST_PARTS or depth > DEEPEST:
         raise InputError(
-            "the model is too large", got=f"{parts} elements, {depth} deep",
-            expected=f"at most {MOST_PARTS}, and {DEEPEST} deep", where=where,
-        )  # fmt: skip
+            "the model is too large",
+            got=f"{parts} elements, {depth} deep",
+            expected=f"at most {MOST_PARTS}, and {DEEPEST} deep",
+            where=where,
+        )

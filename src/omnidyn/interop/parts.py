@@ -82,9 +82,11 @@ def _refuse_impossible(lumps: Sequence[Lump], axles: Sequence[Axle]) -> None:
         least = float(np.linalg.eigvalsh(lump.inertia)[0])
         if lump.mass < 0.0 or least < -NEAR * float(np.abs(lump.inertia).max()):
             raise InputError(
-                "no body has a negative mass or inertia", got=f"{lump.mass:g} kg, {least:g} kg m^2 about one axis",
-                expected="0 or more", remedy="correct the signs of its inertial part",
-            )  # fmt: skip
+                "no body has a negative mass or inertia",
+                got=f"{lump.mass:g} kg, {least:g} kg m^2 about one axis",
+                expected="0 or more",
+                remedy="correct the signs of its inertial part",
+            )
     for axle in axles:
         if not np.all(np.abs([*axle.centre, *axle.axis, axle.radius or 0.0, axle.inertia]) <= LARGEST):
             raise InputError("a part beyond all robots", got=axle.name, expected=f"numbers below {LARGEST:g}")
@@ -100,10 +102,14 @@ def _robot(name: str, lumps: Sequence[Lump], axles: Sequence[Axle], where: str, 
     if off.any():
         made = made.replace(body=made.body.replace(centre=off))
     told = {
-        "body.mass_kg", "wheels.azimuth_deg", "wheels.robot_radius_m", "wheels.wheel_radius_m",
+        "body.mass_kg",
+        "wheels.azimuth_deg",
+        "wheels.robot_radius_m",
+        "wheels.wheel_radius_m",
         *(["body.centre_m"] if off.any() else []),
-        *(["body.inertia_kg_m2"] if turning > 0.0 else []), *(["wheels.inertia_kg_m2"] if wheels.wheel_inertia else []),
-    }  # fmt: skip
+        *(["body.inertia_kg_m2"] if turning > 0.0 else []),
+        *(["wheels.inertia_kg_m2"] if wheels.wheel_inertia else []),
+    }
     kept = {key: prior for key, prior in made.priors.items() if key.partition("[")[0] not in told}
     origin = Prior(source=f"imported from {where}"[:300], origin=IMPORTED)
     joints = ", ".join(axle.name for axle in axles)[:LONGEST_NAMES]
@@ -129,17 +135,21 @@ def _wheels(axles: Sequence[Axle], centre: FloatArray) -> Wheels:
     """Where the wheels stand, seen from their centre."""
     if not MIN_WHEELS <= len(axles) <= MAX_WHEELS:
         raise InputError(
-            "cannot tell the wheels", got=f"{len(axles)} found: {', '.join(axle.name for axle in axles) or 'none'}",
+            "cannot tell the wheels",
+            got=f"{len(axles)} found: {', '.join(axle.name for axle in axles) or 'none'}",
             expected=f"{MIN_WHEELS} to {MAX_WHEELS} parts whose name has wheel or rim in it, on joints that turn "
-            "without end about a horizontal axis", remedy="name them so in the file, or begin with omnidyn init",
-        )  # fmt: skip
+            "without end about a horizontal axis",
+            remedy="name them so in the file, or begin with omnidyn init",
+        )
     radii = [axle.radius for axle in axles if axle.radius is not None]
     if len(radii) < len(axles):
         raise InputError(
-            "the file holds no radius of these wheels: they are meshes", where="wheels",
+            "the file holds no radius of these wheels: they are meshes",
+            where="wheels",
             got=", ".join(axle.name for axle in axles if axle.radius is None)[:LONGEST_NAMES],
-            expected="a cylinder or a sphere, or the radius [m]", remedy="give it, such as `wheel_radius` 0.05",
-        )  # fmt: skip
+            expected="a cylinder or a sphere, or the radius [m]",
+            remedy="give it, such as `wheel_radius` 0.05",
+        )
     azimuth, far = [], []
     for axle in axles:
         away = axle.centre - centre
@@ -147,17 +157,19 @@ def _wheels(axles: Sequence[Axle], centre: FloatArray) -> Wheels:
         off = abs(math.remainder(turned - angle, math.pi))
         if off > RADIAL:
             raise InputError(
-                "an axle does not point to the centre", got=f"{axle.name} is off by {math.degrees(off):.3g} degrees",
+                "an axle does not point to the centre",
+                got=f"{axle.name} is off by {math.degrees(off):.3g} degrees",
                 expected="omni wheels",
                 remedy="for mecanum wheels begin with `omnidyn init`, with `mecanum`",
-            )  # fmt: skip
+            )
         azimuth.append(math.degrees(angle))
         far.append(math.hypot(away[0], away[1]))
     return Wheels(
-        azimuth_deg=tuple(float(f"{each:.12g}") for each in azimuth), robot_radius=_one_or_all(far),
+        azimuth_deg=tuple(float(f"{each:.12g}") for each in azimuth),
+        robot_radius=_one_or_all(far),
         wheel_radius=_one_or_all(radii),
         wheel_inertia=_one_or_all([axle.inertia for axle in axles]),
-    )  # fmt: skip
+    )
 
 
 def _one_or_all(values: Sequence[float]) -> float | tuple[float, ...]:

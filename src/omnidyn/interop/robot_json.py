@@ -22,21 +22,29 @@ def robot_of_json(text: str, where: str = "robot.json") -> Robot:
     document = _parsed(text, where)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise InputError(
-            "not a robot exported by omnidyn", got="another JSON document", expected=f'"format": "{FORMAT}"',
-            remedy="write it with: omnidyn export json ROBOT", where=where,
-        )  # fmt: skip
+            "not a robot exported by omnidyn",
+            got="another JSON document",
+            expected=f'"format": "{FORMAT}"',
+            remedy="write it with: omnidyn export json ROBOT",
+            where=where,
+        )
     version = document.get("version")
     if type(version) is not int or version != VERSION:
         raise InputError(
-            "unknown version of the format", got=version, expected=str(VERSION),
-            remedy="read it with the omnidyn that wrote it, or a later one", where=where,
-        )  # fmt: skip
+            "unknown version of the format",
+            got=version,
+            expected=str(VERSION),
+            remedy="read it with the omnidyn that wrote it, or a later one",
+            where=where,
+        )
     unknown = sorted(set(document) - KEYS)
     if unknown or not isinstance(document.get("robot"), dict):
         raise InputError(
-            "not the schema of an exported robot", got=", ".join(unknown) or "no robot",
-            expected="format, version, robot, covariance", where=where,
-        )  # fmt: skip
+            "not the schema of an exported robot",
+            got=", ".join(unknown) or "no robot",
+            expected="format, version, robot, covariance",
+            where=where,
+        )
     try:
         return robot_from_dict(document["robot"])
     except InputError as error:

@@ -36,17 +36,21 @@ def _of_dataset(dataset: Any) -> Run:
     unknown = sorted(str(name) for name in dataset.data_vars if name not in CHANNELS)
     if unknown or TIME not in dataset.coords:
         raise InputError(
-            "not the variables of a run", got=", ".join(unknown) or f"no coordinate {TIME}",
-            expected=f"{TIME}, and some of {', '.join(CHANNELS)}", remedy="name them like Run.to_xarray() does",
-        )  # fmt: skip
+            "not the variables of a run",
+            got=", ".join(unknown) or f"no coordinate {TIME}",
+            expected=f"{TIME}, and some of {', '.join(CHANNELS)}",
+            remedy="name them like Run.to_xarray() does",
+        )
     channels = {}
     for name, variable in dataset.data_vars.items():
         others = [each for each in variable.dims if each != TIME]
         channels[str(name)] = _numbers(str(name), variable.transpose(TIME, *others))
     return Run(
-        t=_numbers(TIME, dataset.coords[TIME]), source=str(dataset.attrs.get("source", "an xarray Dataset")),
-        warnings=_statements(dataset.attrs.get("warnings")), **channels,
-    )  # fmt: skip
+        t=_numbers(TIME, dataset.coords[TIME]),
+        source=str(dataset.attrs.get("source", "an xarray Dataset")),
+        warnings=_statements(dataset.attrs.get("warnings")),
+        **channels,
+    )
 
 
 def _statements(value: Any) -> tuple[Statement, ...]:

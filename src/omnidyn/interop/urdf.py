@@ -47,15 +47,23 @@ def robot_of_urdf(
 def parsed(text: str, where: str) -> ET.Element:
     """The tree of an XML text. Raises InputError for none, and for one that declares entities."""
     if re.search(r"<!(?:DOCTYPE|ENTITY)", text, re.IGNORECASE):
-        raise InputError("a file that declares entities is not read", got="<!DOCTYPE>", expected="plain XML",
-                         remedy="remove it", where=where)  # fmt: skip
+        raise InputError(
+            "a file that declares entities is not read",
+            got="<!DOCTYPE>",
+            expected="plain XML",
+            remedy="remove it",
+            where=where,
+        )
     try:
         return ET.fromstring(text)
     except (ET.ParseError, ValueError, LookupError) as error:
         raise InputError(
-            "not valid XML", got=str(error), expected="a whole file, each tag closed",
-            remedy="copy it again, or write it out of xacro first", where=where,
-        ) from None  # fmt: skip
+            "not valid XML",
+            got=str(error),
+            expected="a whole file, each tag closed",
+            remedy="copy it again, or write it out of xacro first",
+            where=where,
+        ) from None
 
 
 Frame = tuple[FloatArray, FloatArray]  # where a link stands, and how it is turned, in the frame of the robot
@@ -149,8 +157,12 @@ def _numbers(node: ET.Element, name: str, count: int, default: str = "") -> Floa
     except ValueError:
         values = np.full(1, np.nan)
     if len(values) != count or not np.isfinite(values).all():
-        raise InputError("cannot use this value", got=text, expected=f"{count} finite number{'s' * (count > 1)}",
-                         where=f"<{node.tag} {name}>")  # fmt: skip
+        raise InputError(
+            "cannot use this value",
+            got=text,
+            expected=f"{count} finite number{'s' * (count > 1)}",
+            where=f"<{node.tag} {name}>",
+        )
     return values
 
 

@@ -14,9 +14,13 @@ TIME = "t"
 
 # Components of a channel of wheels, "{}" being the number of the wheel, or of any other channel.
 _OF_WHEELS = {
-    "voltage": "u{}", "duty": "d{}", "current": "i{}", "wheel_angle": "a{}", "wheel_speed": "w{}",
+    "voltage": "u{}",
+    "duty": "d{}",
+    "current": "i{}",
+    "wheel_angle": "a{}",
+    "wheel_speed": "w{}",
     "wheel_speed_command": "w{}_cmd",
-}  # fmt: skip
+}
 _OTHERS = {
     "twist": ("vx", "vy", "omega"),
     "twist_command": ("vx_cmd", "vy_cmd", "omega_cmd"),
@@ -27,10 +31,17 @@ _WHEEL_COMPONENT = re.compile(r"([a-z])([1-9]\d?)(_cmd)?", re.ASCII)
 
 # SI unit of each component, as it ends the names of the columns of a run file; per axis where the axes differ.
 _UNITS = {
-    "voltage": "V", "duty": "duty", "current": "A", "wheel_angle": "rad", "wheel_speed": "rad_s",
-    "wheel_speed_command": "rad_s", "supply": "V", "pose": ("m", "m", "rad"), "twist": ("m_s", "m_s", "rad_s"),
+    "voltage": "V",
+    "duty": "duty",
+    "current": "A",
+    "wheel_angle": "rad",
+    "wheel_speed": "rad_s",
+    "wheel_speed_command": "rad_s",
+    "supply": "V",
+    "pose": ("m", "m", "rad"),
+    "twist": ("m_s", "m_s", "rad_s"),
     "twist_command": ("m_s", "m_s", "rad_s"),
-}  # fmt: skip
+}
 
 
 def components(channel: str, wheels: int) -> tuple[str, ...]:

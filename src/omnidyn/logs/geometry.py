@@ -28,8 +28,12 @@ AS_OMNI = (45.0, 315.0, 135.0, 225.0)  # where mecanum wheels FL, FR, RL, RR wou
 MAX_TURNED = 15.0  # [degree] that they may seem to stand elsewhere
 COMMANDS = ("twist_command", "wheel_speed_command")
 SOURCES = (
-    COMMANDS, ("twist", "wheel_speed"), ("twist", "wheel_angle"), ("pose", "wheel_speed"), ("pose", "wheel_angle")
-)  # fmt: skip
+    COMMANDS,
+    ("twist", "wheel_speed"),
+    ("twist", "wheel_angle"),
+    ("pose", "wheel_speed"),
+    ("pose", "wheel_angle"),
+)
 TOGETHER = 0.5  # of the samples of the wheels that stand in a row with one of the body: then rows are compared
 
 
@@ -72,11 +76,12 @@ def wheel_geometry(runs: Sequence[Run], instead: str = "`azimuth`") -> Geometry:
         except (InputError, InsufficientDataError) as error:
             first = first or error
     raise first or InputError(
-        "cannot tell where the wheels stand", got=", ".join(runs[0].channels) if runs else "no log",
+        "cannot tell where the wheels stand",
+        got=", ".join(runs[0].channels) if runs else "no log",
         expected="twist_command and wheel_speed_command, or twist or pose with wheel_speed or wheel_angle, all "
         "components of them",
         remedy=f"say which columns they are (`column` w1=NAME), or leave the logs out and give {instead}",
-    )  # fmt: skip
+    )
 
 
 def shows_both(run: Run) -> bool:
@@ -111,10 +116,11 @@ def as_mecanum(seen: Geometry) -> Geometry:
     off = [(each - there + 180.0) % 360.0 - 180.0 for each, there in zip(angle, AS_OMNI, strict=False)]
     if len(angle) != len(AS_OMNI) or max(map(abs, off)) > MAX_TURNED:
         raise InputError(
-            "the wheels do not push as mecanum wheels in an X do", got=f"directions {angle} degree",
+            "the wheels do not push as mecanum wheels in an X do",
+            got=f"directions {angle} degree",
             expected=f"{list(AS_OMNI)}: front left, front right, rear left, rear right, counter-clockwise positive",
             remedy="name the columns in this order, a left wheel that counts forward with a minus: `column` w1=-LEFT",
-        )  # fmt: skip
+        )
     radius = None if seen.robot_radius is None else float(np.sqrt(2.0)) * seen.robot_radius
     return replace(seen, azimuth_deg=AS_OMNI, per_metre=seen.per_metre / float(np.sqrt(2.0)), robot_radius=radius)
 
@@ -131,21 +137,24 @@ def _fit(twist: FloatArray, speed: FloatArray, source: str, instead: str) -> Geo
     size = np.sqrt(np.mean(design**2, axis=0))
     if (size == 0.0).any() or np.linalg.cond(design / size) > MAX_CONDITION:
         raise InsufficientDataError(
-            "the logs do not show where the wheels stand", got=f"{len(twist)} rows in motion, all alike",
+            "the logs do not show where the wheels stand",
+            got=f"{len(twist)} rows in motion, all alike",
             expected="motion along x and along y",
             remedy=f"add logs in other directions, or leave the logs out and give {instead}",
-        )  # fmt: skip
+        )
     rows, *_ = np.linalg.lstsq(design, speed, rcond=None)
     rest = speed - design @ rows
     residual = float(np.sqrt(np.mean(rest**2) / np.mean(speed**2)))
     if residual > MAX_RESIDUAL:
         raise InputError(
             "the wheels do not follow the body as omni wheels do",
-            got=f"{residual:.0%} of the wheel speeds unexplained", expected=f"at most {MAX_RESIDUAL:.0%}",
+            got=f"{residual:.0%} of the wheel speeds unexplained",
+            expected=f"at most {MAX_RESIDUAL:.0%}",
             remedy=f"check the columns with omnidyn check, or leave the logs out and give {instead}"
-            if turned else "a turn rate is not in the "
+            if turned
+            else "a turn rate is not in the "
             "logs, or 0: where the robot turned say which column it is (`column` omega=NAME:UNIT)",
-        )  # fmt: skip
+        )
     scale = np.hypot(rows[0], rows[1])
     if (scale == 0.0).any():
         raise InputError(

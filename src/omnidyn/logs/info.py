@@ -53,41 +53,69 @@ class LogInfo:
         if self.salvaged is not None:
             head += f"; cut short, {self.salvaged} messages salvaged"
         rows = [
-            (topic.name, topic.type, str(topic.count), f"{topic.rate:.4g}" if topic.rate else "",
-             f"{topic.longest_gap:.4g}" if topic.longest_gap else "", topic.why)
+            (
+                topic.name,
+                topic.type,
+                str(topic.count),
+                f"{topic.rate:.4g}" if topic.rate else "",
+                f"{topic.longest_gap:.4g}" if topic.longest_gap else "",
+                topic.why,
+            )
             for topic in self.topics
-        ]  # fmt: skip
+        ]
         table = Cells(("topic", "type", "count", "rate [Hz]", "longest gap [s]", ""), rows, "<<>>><", name="topics")
         lines = self.mapping.lines() if self.mapping is not None else [f"nothing: {self.why}"]
         doubts = self.mapping.doubts if self.mapping is not None else ()
         taken = Points(lines, "taken:", "mapping")
         open_questions = [doubt.with_remedy for doubt in doubts]
         return Document(
-            [head, "", table, "", taken, Points(open_questions, "doubt:", "doubts"),
-             Points(self.notes, "note:", "notes")],
-            self.to_dict(), doubts, ascii=True,
-        )  # fmt: skip
+            [
+                head,
+                "",
+                table,
+                "",
+                taken,
+                Points(open_questions, "doubt:", "doubts"),
+                Points(self.notes, "note:", "notes"),
+            ],
+            self.to_dict(),
+            doubts,
+            ascii=True,
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """For machines."""
         columns = self.mapping.columns if self.mapping is not None else {}
         return {
-            "source": self.source, "format": self.format, "span_s": self.span, "salvaged": self.salvaged,
+            "source": self.source,
+            "format": self.format,
+            "span_s": self.span,
+            "salvaged": self.salvaged,
             "topics": [
-                {"name": topic.name, "type": topic.type, "count": topic.count, "rate_hz": topic.rate,
-                 "longest_gap_s": topic.longest_gap, "read": topic.read, "why": topic.why}
+                {
+                    "name": topic.name,
+                    "type": topic.type,
+                    "count": topic.count,
+                    "rate_hz": topic.rate,
+                    "longest_gap_s": topic.longest_gap,
+                    "read": topic.read,
+                    "why": topic.why,
+                }
                 for topic in self.topics
             ],
             "mapping": {key: {"column": column.name, "unit": column.unit} for key, column in columns.items()},
             "doubts": [doubt.to_dict() for doubt in self.mapping.doubts] if self.mapping is not None else [self.why],
             "notes": [note.to_dict() for note in self.notes],
-        }  # fmt: skip
+        }
 
 
 def read_info(
-    path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None, *,
+    path: str | os.PathLike,
+    robot: Robot | None = None,
+    options: LogOptions | None = None,
+    *,
     progress: Progress = silent,
-) -> LogInfo:  # fmt: skip
+) -> LogInfo:
     """What a file holds. robot, options: as for a log. Raises InputError where nothing can be read.
 
     progress: hears now and then how many bytes are done, of how many.

@@ -26,7 +26,7 @@ REFUSED = {
     "rows_empty": "hold no time or no number",
     "rows_of_padding": "at the end repeat one row with an earlier time (padding)",
     "rows_repeated": "repeat the time of the row before",
-}  # fmt: skip
+}
 OFTEN_BACK = 0.005  # of the rows: no recorder writes so many out of order
 MAX_MISSING = 0.2  # share of rows without a time or without any number
 ON_CHANGE = 0.2  # a component with more blank cells than this share, gaps left out, is recorded on change
@@ -110,9 +110,11 @@ class Log:
         repeated = np.concatenate([[False], np.diff(log.t) == 0.0])
         if len(log) > 1 and repeated.sum() == len(log) - 1:
             raise InputError(
-                "time stands still", got=f"t = {log.t[0]:.9g} s in all {len(log)} rows", expected="times that increase",
+                "time stands still",
+                got=f"t = {log.t[0]:.9g} s in all {len(log)} rows",
+                expected="times that increase",
                 where=self.source,
-            )  # fmt: skip
+            )
         log = log._without(repeated, "rows_repeated", warnings, bound=1.0)._moved(warnings)
         channels = {name: log.aligned(name, values, warnings) for name, values in log.channels.items()}
         channels = {name: np.where(log.between(name), np.nan, values) for name, values in channels.items()}
@@ -145,9 +147,13 @@ class Log:
         settled = {key: replace(column, latency=0.0) for key, column in self.columns.columns.items()}
         lines = self.lines[np.searchsorted(self.t, t, side="right") - 1]
         log = replace(
-            self, t=t, channels=channels, lines=lines, columns=replace(self.columns, columns=settled),
+            self,
+            t=t,
+            channels=channels,
+            lines=lines,
+            columns=replace(self.columns, columns=settled),
             own_clocks=self.own_clocks or len(t) > len(self),
-        )  # fmt: skip
+        )
         empty = log.empty_rows()
         empty[own] = False
         return log.rows(~empty)
@@ -252,10 +258,12 @@ class Log:
         said = Statement(code, WARNING, "", {"left_out": count, "rows": len(self), "first": first})
         if count > bound * len(self) or count == len(self):
             raise InputError(
-                f"{count} of {len(self)} rows {REFUSED[code]}", got=f"first in line {first}",
+                f"{count} of {len(self)} rows {REFUSED[code]}",
+                got=f"first in line {first}",
                 expected=f"at most {bound:.0%}",
-                remedy="mend the recording, or map another column to t", where=self.source,
-            )  # fmt: skip
+                remedy="mend the recording, or map another column to t",
+                where=self.source,
+            )
         warnings.append(said)
         return self.rows(~bad)
 
@@ -264,10 +272,12 @@ class Log:
         if back.size:
             row = int(back[0]) + 1
             raise InputError(
-                "time goes back", got=f"{self.t[row]:.9g} s after {self.t[row - 1]:.9g} s ({back.size} times)",
-                expected="times that increase", remedy=back_remedy(back.size, len(self.t), "sort them, or use `sort`"),
+                "time goes back",
+                got=f"{self.t[row]:.9g} s after {self.t[row - 1]:.9g} s ({back.size} times)",
+                expected="times that increase",
+                remedy=back_remedy(back.size, len(self.t), "sort them, or use `sort`"),
                 where=f"{self.source}:{self.lines[row]}",
-            )  # fmt: skip
+            )
 
 
 def goes_back_often(times: int, rows: int) -> bool:

@@ -90,9 +90,12 @@ def stamps_of(run: Run) -> IntArray:
     """Times as whole ns. Raises InputError where they are none: before 0, too late, or less than 1 ns apart."""
     if not 0.0 <= run.t[0] <= run.t[-1] < LARGEST_NS / 1e9:
         raise InputError(
-            "these times are no stamps", got=f"{run.t[0]:.9g} to {run.t[-1]:.9g} s", expected="seconds from 0 on",
-            remedy="shift them: run.replace(t=run.t - run.t[0])", where=run.source,
-        )  # fmt: skip
+            "these times are no stamps",
+            got=f"{run.t[0]:.9g} to {run.t[-1]:.9g} s",
+            expected="seconds from 0 on",
+            remedy="shift them: run.replace(t=run.t - run.t[0])",
+            where=run.source,
+        )
     stamps = np.rint(run.t * 1e9).astype(np.int64)
     if (np.diff(stamps) <= 0).any():
         raise InputError("times less than a nanosecond apart", expected="stamps that increase", where=run.source)

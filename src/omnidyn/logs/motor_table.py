@@ -23,12 +23,21 @@ from omnidyn.logs.table.table import Table
 # column -> (kind, unit, size of one in that unit)
 _INPUTS: dict[str, tuple[str, str, float]] = {
     "input": ("input", "units", 1.0),
-    "voltage": ("voltage", "V", 1.0), "voltage_v": ("voltage", "V", 1.0), "input_v": ("voltage", "V", 1.0),
-    "u_v": ("voltage", "V", 1.0), "u1_v": ("voltage", "V", 1.0),
-    "duty": ("duty", "%", 100.0), "duty_%": ("duty", "%", 1.0), "pwm_%": ("duty", "%", 1.0),
-    "input_%": ("duty", "%", 1.0), "d1_duty": ("duty", "%", 100.0), "input_duty": ("duty", "%", 100.0),
-    "current": ("current", "A", 1.0), "current_a": ("current", "A", 1.0), "input_a": ("current", "A", 1.0),
-}  # fmt: skip
+    "voltage": ("voltage", "V", 1.0),
+    "voltage_v": ("voltage", "V", 1.0),
+    "input_v": ("voltage", "V", 1.0),
+    "u_v": ("voltage", "V", 1.0),
+    "u1_v": ("voltage", "V", 1.0),
+    "duty": ("duty", "%", 100.0),
+    "duty_%": ("duty", "%", 1.0),
+    "pwm_%": ("duty", "%", 1.0),
+    "input_%": ("duty", "%", 1.0),
+    "d1_duty": ("duty", "%", 100.0),
+    "input_duty": ("duty", "%", 100.0),
+    "current": ("current", "A", 1.0),
+    "current_a": ("current", "A", 1.0),
+    "input_a": ("current", "A", 1.0),
+}
 _RPM = 2.0 * math.pi / 60.0
 _SPEEDS = {"speed": 1.0, "speed_rad_s": 1.0, "w_rad_s": 1.0, "w1_rad_s": 1.0, "rpm": _RPM, "speed_rpm": _RPM}
 # Of a column `input`, by a row of units
@@ -61,8 +70,9 @@ class MotorTable:
     def __post_init__(self) -> None:
         wrong = {len(self.put_in), len(self.speed), len(self.motor)}
         if len(wrong) > 1:
-            raise InputError("columns of different lengths", got=sorted(wrong), expected="one point a row",
-                             where=self.source)  # fmt: skip
+            raise InputError(
+                "columns of different lengths", got=sorted(wrong), expected="one point a row", where=self.source
+            )
 
     def __len__(self) -> int:
         return len(self.speed)
@@ -86,8 +96,13 @@ def read_motor_table(path: str | os.PathLike) -> MotorTable:
     table = read_table(path)
     found = {_bare(name): name for name in table.names}
     if not is_motor_table(table.names):
-        raise InputError("no table of motors", got=", ".join(table.names), expected="input,speed[,motor]",
-                         remedy="name the columns so, or voltage_V, duty_%, speed_rpm", where=table.source)  # fmt: skip
+        raise InputError(
+            "no table of motors",
+            got=", ".join(table.names),
+            expected="input,speed[,motor]",
+            remedy="name the columns so, or voltage_V, duty_%, speed_rpm",
+            where=table.source,
+        )
     own = next(name for name in found if name in _INPUTS)
     kind, unit, size = _INPUTS[_UNITS.get(table.units.get(found[own], ""), own) if own == "input" else own]
     put_in, notes = table.measured(found[own]) * size, table.notes
@@ -110,9 +125,12 @@ def _refuse_log(put_in: FloatArray, speed: FloatArray, motor: IntArray, source: 
     close = len(speed) >= LOG_ROWS and float(np.median(steps)) < LOG_STEP * spread
     if close and (swings > SWEEPS or len(speed) >= SURELY_LOG) and not motor.any():
         raise InputError(
-            "a log without a time, and no table of steady points", got=f"{len(speed)} rows that follow each other",
-            expected="a row for each steady point", remedy="say how many rows a second: `rate` HZ", where=source,
-        )  # fmt: skip
+            "a log without a time, and no table of steady points",
+            got=f"{len(speed)} rows that follow each other",
+            expected="a row for each steady point",
+            remedy="say how many rows a second: `rate` HZ",
+            where=source,
+        )
 
 
 def _speed_size(table: Table, name: str, bare: str) -> float:
@@ -121,8 +139,13 @@ def _speed_size(table: Table, name: str, bare: str) -> float:
     if bare != "speed" or not unit:
         return _SPEEDS[bare]
     if unit not in _SPEED_UNITS:
-        raise InputError("the row of units names another unit", got=unit, expected="rad/s or rpm",
-                         remedy="convert the column", where=f"{table.source}, column {name}")  # fmt: skip
+        raise InputError(
+            "the row of units names another unit",
+            got=unit,
+            expected="rad/s or rpm",
+            remedy="convert the column",
+            where=f"{table.source}, column {name}",
+        )
     return _SPEED_UNITS[unit]
 
 

@@ -101,9 +101,7 @@ def _pooled(windows: Sequence[Plateau]) -> Plateau:
     mean, rate = (_averaged([getattr(window, part) for window in windows], weight) for part in ("mean", "rate"))
     std, rate_std = (_error([getattr(window, part) for window in windows], weight) for part in ("std", "rate_std"))
     rows, count = slice(first.rows.start, last.rows.stop), sum(window.count for window in windows)
-    return replace(
-        first, rows=rows, end=last.end, mean=mean, std=std, count=count, rate=rate, rate_std=rate_std
-    )  # fmt: skip
+    return replace(first, rows=rows, end=last.end, mean=mean, std=std, count=count, rate=rate, rate_std=rate_std)
 
 
 def _averaged(parts: Sequence[Mapping[str, FloatArray]], weight: FloatArray) -> dict[str, FloatArray]:
@@ -136,9 +134,16 @@ def _plateau(run: Run, rows: slice, angle: FloatArray | None) -> Plateau:
         speeds["twist"] = _middle(at), _body_steps(pose) / np.diff(at)[:, None]
     rates = {name: _rate_of_change(*speed) for name, speed in speeds.items()}
     return Plateau(
-        rows, float(t[0]), float(t[-1]), mean, std, speed_from, count=rows.stop - rows.start,
-        rate={name: rate[0] for name, rate in rates.items()}, rate_std={name: rate[1] for name, rate in rates.items()},
-    )  # fmt: skip
+        rows,
+        float(t[0]),
+        float(t[-1]),
+        mean,
+        std,
+        speed_from,
+        count=rows.stop - rows.start,
+        rate={name: rate[0] for name, rate in rates.items()},
+        rate_std={name: rate[1] for name, rate in rates.items()},
+    )
 
 
 def live_angle(run: Run) -> FloatArray | None:

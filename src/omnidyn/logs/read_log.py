@@ -72,9 +72,11 @@ class LogOptions:
     def of_tables(self) -> dict[str, Any]:
         """What the readers of tables are told."""
         return {
-            "header": self.header, "skip_bad_rows": self.skip_bad_rows, "max_bytes": self.max_bytes,
+            "header": self.header,
+            "skip_bad_rows": self.skip_bad_rows,
+            "max_bytes": self.max_bytes,
             "variables": self.variables,
-        }  # fmt: skip
+        }
 
 
 def read_log(
@@ -115,9 +117,18 @@ def read_log(
     elif columns is not None and given is None:
         given = load_map(columns)  # type: ignore[arg-type]
     options = LogOptions(
-        given, overrides, assume or {}, latency or {}, header, skip_bad_rows, current_unsigned, max_bytes,
-        tuple(variables), tuple(str(file) for file in beside), rate,
-    )  # fmt: skip
+        given,
+        overrides,
+        assume or {},
+        latency or {},
+        header,
+        skip_bad_rows,
+        current_unsigned,
+        max_bytes,
+        tuple(variables),
+        tuple(str(file) for file in beside),
+        rate,
+    )
     log = load_log(path, robot, options)
     run = log.to_run(sort=sort)
     return run.replace(warnings=(*run.warnings, *log.columns.doubts))
@@ -159,9 +170,12 @@ def map_columns(table: Table, robot: Robot | None, options: LogOptions) -> Colum
             close = difflib.get_close_matches(column.name, table.names, n=1, cutoff=0.5)
             remedy = f'did you mean "{close[0]}"?' if close else ""
             raise InputError(
-                f"the log has no column {column.name} for {component}", got=", ".join(table.names),
-                expected="one of its columns", remedy=remedy, where=table.source,
-            )  # fmt: skip
+                f"the log has no column {column.name} for {component}",
+                got=", ".join(table.names),
+                expected="one of its columns",
+                remedy=remedy,
+                where=table.source,
+            )
     refuse_doubtful(columns, table.source)
     return columns
 
@@ -227,9 +241,17 @@ def log_from_table(
     restarts = counters.restarts()
     notes += [restart.statement for restart in restarts if restart.where != TIME]
     log = Log(
-        t, channels, table.lines, columns, table.source, table.sha256, False, statements(notes), table.own_clocks,
+        t,
+        channels,
+        table.lines,
+        columns,
+        table.source,
+        table.sha256,
+        False,
+        statements(notes),
+        table.own_clocks,
         tuple(restarts),
-    )  # fmt: skip
+    )
     beside = counters.beside_restarts()
     log = log.rows(~beside) if beside.any() else log
     log = _without_other_topics(log).joined()
@@ -265,12 +287,16 @@ def _wheel_count(columns: ColumnMap, robot: Robot | None, where: str) -> int:
     if count > robot.wheels.count or fewer:
         raise InputError(
             f"the log has {'more' if count > robot.wheels.count else 'fewer'} wheels than the robot",
-            got=f"{count} wheels", expected=f"{robot.wheels.count}, as {robot.name} has", where=where,
-            remedy="name the robot of this log, or make its file with `omnidyn init`" + (
+            got=f"{count} wheels",
+            expected=f"{robot.wheels.count}, as {robot.name} has",
+            where=where,
+            remedy="name the robot of this log, or make its file with `omnidyn init`"
+            + (
                 "; where columns of a wheel were not found, say which they are: `column` "
                 f"{found[-1][1][0]}{robot.wheels.count}=NAME:UNIT"
-            ) * fewer,
-        )  # fmt: skip
+            )
+            * fewer,
+        )
     return count
 
 
@@ -280,9 +306,12 @@ def _divisor(column: Column, component: str, robot: Robot | None, wheel: int, wh
         return column.divisor(robot, wheel)
     if column.of_rim:
         raise InputError(
-            f"{component} is that of a rim: without its radius it is no angle", got=f"{column}, and no robot",
-            expected="rad/s or rad, or a robot", remedy="name the robot, whose file has the radius", where=where,
-        )  # fmt: skip
+            f"{component} is that of a rim: without its radius it is no angle",
+            got=f"{column}, and no robot",
+            expected="rad/s or rad, or a robot",
+            remedy="name the robot, whose file has the radius",
+            where=where,
+        )
     return 1.0
 
 
@@ -293,9 +322,11 @@ def _signed(log: Log, robot: Robot | None) -> Log:
     sign, origin = driven_way(log, robot)
     if sign is None or sign.shape != log.channels["current"].shape:
         raise InputError(
-            "cannot give unsigned currents a sign", got=", ".join(log.channels),
-            expected="a commanded speed of the wheels or of the body, a voltage or a duty", where=log.source,
-        )  # fmt: skip
+            "cannot give unsigned currents a sign",
+            got=", ".join(log.channels),
+            expected="a commanded speed of the wheels or of the body, a voltage or a duty",
+            where=log.source,
+        )
     current = np.abs(log.channels["current"]) * sign
     note = Statement("current_sign_taken", NOTE, "current", {"origin": origin})
     channels = {**log.channels, "current": current}
@@ -318,9 +349,13 @@ def driven_way(log: Log, robot: Robot | None) -> tuple[FloatArray | None, str]:
 
 
 def iter_logs(
-    path: str | os.PathLike, robot: Robot | None = None, options: LogOptions | None = None, *,
-    rows: int = ROWS, progress: Progress = silent,
-) -> Iterator[Log]:  # fmt: skip
+    path: str | os.PathLike,
+    robot: Robot | None = None,
+    options: LogOptions | None = None,
+    *,
+    rows: int = ROWS,
+    progress: Progress = silent,
+) -> Iterator[Log]:
     """The blocks of a log too long for memory, at most `rows` rows each, all under the map of the first.
 
     progress: hears how many bytes are done. Time counts from the first block. Raises InputError.
@@ -350,11 +385,12 @@ def joined_table(paths: Sequence[str | os.PathLike], options: ReadOptions, mappe
     for recording, (first, last) in zip(found[1:], spans[1:], strict=True):
         if first > spans[0][1] or last < spans[0][0]:
             raise InputError(
-                "the files were not recorded at the same time", got=f"{_moments(first, last)}, {recording.source}",
+                "the files were not recorded at the same time",
+                got=f"{_moments(first, last)}, {recording.source}",
                 expected=f"times within {_moments(*spans[0])}, as in {found[0].source}",
                 remedy="give stamps of one clock, such as seconds since 1970; logs of several runs need no joining",
                 where=recording.source,
-            )  # fmt: skip
+            )
     taken: set[str] = set()
     tracks = [_renamed(track, Path(recording.source).stem, taken) for recording in found for track in recording.tracks]
     notes = [f"{len(found)} files are one experiment: {', '.join(recording.source for recording in found)}"]
@@ -372,10 +408,13 @@ def _recording(path: str | os.PathLike, options: ReadOptions, mapped: Mapped) ->
         return replace(found, tracks=[track for track in found.tracks if len(track.stamps) and track.columns])
     table = with_joined_stamp(
         read_table(
-            path, header=options.header, skip_bad_rows=options.skip_bad_rows, max_bytes=options.max_bytes,
+            path,
+            header=options.header,
+            skip_bad_rows=options.skip_bad_rows,
+            max_bytes=options.max_bytes,
             variables=options.variables,
         )
-    )  # fmt: skip
+    )
     column, clock = mapped(table).columns[TIME], Clock()
     t = clock.times(table, column, [])
     known = np.isfinite(t)
@@ -410,7 +449,9 @@ def _renamed(track: Track, stem: str, taken: set[str]) -> Track:
     names = {name: name if name not in taken else f"{stem}/{name}" for name in track.columns}
     taken |= set(names.values())
     return Track(
-        track.topic, track.stamps, {names[name]: values for name, values in track.columns.items()},
+        track.topic,
+        track.stamps,
+        {names[name]: values for name, values in track.columns.items()},
         {names[name]: unit for name, unit in track.units.items()},
         {names[name]: said for name, said in track.says.items() if name in names},
-    )  # fmt: skip
+    )

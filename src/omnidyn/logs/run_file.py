@@ -36,9 +36,33 @@ from omnidyn.units import DUTY, known_unit, parse_unit
 _SUFFIXES = ("rad_s", "m_s", "duty", "rad", "V", "A", "m", "s")  # as channels.si_suffix gives them, long before short
 _SHEETS = frozenset((".xlsx", ".xls", ".xlsm", ".ods"))
 _OTHERS = _SHEETS | frozenset(
-    (".npz", ".npy", ".h5", ".hdf5", ".hdf", ".bag", ".db3", ".wpilog", ".ulg", ".json", ".toml",
-     ".html", ".pdf", ".png", ".svg", ".pkl", ".pickle", ".feather", ".arrow", ".zip", ".gz", ".bz2", ".xz", ".zst")
-)  # fmt: skip
+    (
+        ".npz",
+        ".npy",
+        ".h5",
+        ".hdf5",
+        ".hdf",
+        ".bag",
+        ".db3",
+        ".wpilog",
+        ".ulg",
+        ".json",
+        ".toml",
+        ".html",
+        ".pdf",
+        ".png",
+        ".svg",
+        ".pkl",
+        ".pickle",
+        ".feather",
+        ".arrow",
+        ".zip",
+        ".gz",
+        ".bz2",
+        ".xz",
+        ".zst",
+    )
+)
 MCAP, MAT = ".mcap", ".mat"
 _UNIT_OF_DUTY = ("duty", "-", "1")
 
@@ -85,9 +109,12 @@ def check_format(path: str | os.PathLike) -> None:
         import_mcap(str(path))
     if suffix in _OTHERS:
         raise InputError(
-            "a run is not written in this format", got=suffix, expected=".csv, .parquet, .mcap or .mat",
-            remedy="spreadsheets open CSV" if suffix in _SHEETS else "", where=str(path),
-        )  # fmt: skip
+            "a run is not written in this format",
+            got=suffix,
+            expected=".csv, .parquet, .mcap or .mat",
+            remedy="spreadsheets open CSV" if suffix in _SHEETS else "",
+            where=str(path),
+        )
 
 
 def run_to_parquet(run: Run) -> bytes:
@@ -178,9 +205,12 @@ def run_of_columns(
     strange = [name for name in columns if name not in every]
     if strange or "t_s" not in columns:
         raise InputError(
-            "not the columns of a run", got=", ".join(strange[:5]) or "no column t_s",
-            expected="t_s, u1_V, w1_rad_s, vx_m_s, ...", remedy=remedy, where=source,
-        )  # fmt: skip
+            "not the columns of a run",
+            got=", ".join(strange[:5]) or "no column t_s",
+            expected="t_s, u1_V, w1_rad_s, vx_m_s, ...",
+            remedy=remedy,
+            where=source,
+        )
     channels: dict[str, Any] = {channel: _complete(columns, channel, names, source) for channel, names in known.items()}
     return Run(t=columns["t_s"], source=source, warnings=warnings, **channels)
 
@@ -193,9 +223,12 @@ def _complete(columns: Mapping[str, FloatArray], channel: str, names: list[str],
     if len(there) < len(names):
         absent = [name for name in names if name not in there]
         raise InputError(
-            f"the channel {channel} is not complete", got=", ".join(there), expected=", ".join(names),
-            remedy=f"add {', '.join(absent)}", where=source,
-        )  # fmt: skip
+            f"the channel {channel} is not complete",
+            got=", ".join(there),
+            expected=", ".join(names),
+            remedy=f"add {', '.join(absent)}",
+            where=source,
+        )
     values = np.stack([columns[name] for name in names], axis=1)
     return values[:, 0] if CHANNELS[channel] == SCALAR else values
 

@@ -141,9 +141,12 @@ def _vectors(name: str, value: ArrayLike, size: int) -> FloatArray:
     array = np.asarray(value, dtype=float)
     if array.ndim == 0 or array.shape[-1] != size:
         raise InputError(
-            "wrong shape", got=array.shape, expected=f"(*batch, {size})", where=name,
+            "wrong shape",
+            got=array.shape,
+            expected=f"(*batch, {size})",
+            where=name,
             remedy="give one value per wheel of the robot" if name == "voltage" else "give vx, vy and omega",
-        )  # fmt: skip
+        )
     return array
 
 
@@ -153,9 +156,12 @@ def _batch(twist: FloatArray, voltage: FloatArray) -> tuple[int, ...]:
         return np.broadcast_shapes(twist.shape[:-1], voltage.shape[:-1])
     except ValueError:
         raise InputError(
-            "twist and voltage do not go together", got=f"{twist.shape} and {voltage.shape}",
-            expected="the same leading axes", remedy="give a voltage for each twist, or one for all", where="voltage",
-        ) from None  # fmt: skip
+            "twist and voltage do not go together",
+            got=f"{twist.shape} and {voltage.shape}",
+            expected="the same leading axes",
+            remedy="give a voltage for each twist, or one for all",
+            where="voltage",
+        ) from None
 
 
 def axes_hold_alone(robot: Robot) -> bool:

@@ -85,15 +85,21 @@ def mecanum_wheels(wheel_radius: PerWheel, robot_radius: PerWheel) -> Wheels:
     robot_radius: half track + half wheelbase [m].
     """
     return Wheels(
-        azimuth_deg=(90.0, -90.0, 90.0, -90.0), roller_angle_deg=(-45.0, 45.0, 45.0, -45.0),
-        wheel_radius=wheel_radius, robot_radius=robot_radius,
-    )  # fmt: skip
+        azimuth_deg=(90.0, -90.0, 90.0, -90.0),
+        roller_angle_deg=(-45.0, 45.0, 45.0, -45.0),
+        wheel_radius=wheel_radius,
+        robot_radius=robot_radius,
+    )
 
 
 def first_guess(
-    name: str, wheels: Wheels, mass: float, voltage_limit: float | None = None, shape: str = DIRECTION,
+    name: str,
+    wheels: Wheels,
+    mass: float,
+    voltage_limit: float | None = None,
+    shape: str = DIRECTION,
     speed_loop: Sequence[float] = (),
-) -> Robot:  # fmt: skip
+) -> Robot:
     """A robot from its wheels and its mass [kg]; voltage_limit [V] where it is known.
 
     shape: where friction acts, on the "direction" of travel (a disc) or on the body "axes" (the paper's box).
@@ -105,10 +111,15 @@ def first_guess(
     friction = _friction(mass, _mean(wheels.robot_radius))
     motor = _motor(wheels, mass, friction, VOLTAGE_LIMIT if voltage_limit is None else voltage_limit)
     robot = Robot(
-        name=name, source="omnidyn init: a first guess, to be identified", body=body, wheels=wheels, motor=motor,
-        friction=Friction(direction=friction) if shape == DIRECTION else Friction(axes=_as_box(friction)), priors={},
+        name=name,
+        source="omnidyn init: a first guess, to be identified",
+        body=body,
+        wheels=wheels,
+        motor=motor,
+        friction=Friction(direction=friction) if shape == DIRECTION else Friction(axes=_as_box(friction)),
+        priors={},
         drive=_speed_loop(motor, speed_loop),
-    )  # fmt: skip
+    )
     given = {"body.mass_kg"} | ({"motor.voltage_limit_V"} if voltage_limit is not None else set())
     given |= {RATE} if len(speed_loop) == 1 else {RATE, *GAINS}
     priors = {}
@@ -177,9 +188,11 @@ def _friction(mass: float, robot_radius: float) -> DirectionFriction:
     coulomb = FRICTION_SHARE * mass * GRAVITY
     viscous = VISCOUS_SHARE * coulomb
     return DirectionFriction(
-        coulomb=(_round(coulomb), _round(coulomb)), viscous=_round(viscous),
-        yaw_coulomb=_round(YAW_SHARE * coulomb * robot_radius), yaw_viscous=_round(viscous * robot_radius**2),
-    )  # fmt: skip
+        coulomb=(_round(coulomb), _round(coulomb)),
+        viscous=_round(viscous),
+        yaw_coulomb=_round(YAW_SHARE * coulomb * robot_radius),
+        yaw_viscous=_round(viscous * robot_radius**2),
+    )
 
 
 def _as_box(friction: DirectionFriction) -> AxesFriction:
@@ -211,16 +224,23 @@ def _motor(wheels: Wheels, mass: float, friction: DirectionFriction, voltage_lim
     one, constant = stall / weakest, _round(voltage_limit / MOTOR_SPEED)
     gear = _round(MOTOR_SPEED * radius / no_load)
     return Motor(
-        resistance=_round(voltage_limit**2 / (no_load * one)), torque_constant=constant, emf_constant=constant,
-        gear_ratio=gear, voltage_limit=voltage_limit,
+        resistance=_round(voltage_limit**2 / (no_load * one)),
+        torque_constant=constant,
+        emf_constant=constant,
+        gear_ratio=gear,
+        voltage_limit=voltage_limit,
         rotor_inertia=_round(ROTOR_SHARE * mass * (radius / gear) ** 2 / weakest),
-    )  # fmt: skip
+    )
 
 
 def like(
-    preset: Robot, name: str, wheels: Wheels, mass: float, voltage_limit: float | None = None,
+    preset: Robot,
+    name: str,
+    wheels: Wheels,
+    mass: float,
+    voltage_limit: float | None = None,
     given: Collection[str] = (),
-) -> Robot:  # fmt: skip
+) -> Robot:
     """A robot built like another one: its motors and drive, its inertia and friction scaled to the new size.
 
     Inertia goes with M b^2, friction with M (the weight on the floor), about yaw with M b, viscous M b^2.
@@ -232,10 +252,15 @@ def like(
     inertia = _times(preset.body.inertia, heavier * wider**2)
     motor = preset.motor if voltage_limit is None else preset.motor.replace(voltage_limit=voltage_limit)
     robot = Robot(
-        name=name, source=f"omnidyn init: like {preset.name}, to be identified", wheels=wheels, motor=motor,
-        body=Body(mass=mass, inertia=inertia, rotating_frame=True), drive=preset.drive, friction=friction,
+        name=name,
+        source=f"omnidyn init: like {preset.name}, to be identified",
+        wheels=wheels,
+        motor=motor,
+        body=Body(mass=mass, inertia=inertia, rotating_frame=True),
+        drive=preset.drive,
+        friction=friction,
         priors={},
-    )  # fmt: skip
+    )
     return robot.replace(priors=_priors_like(robot, preset, given))
 
 
@@ -277,10 +302,13 @@ SCALED = ("coulomb", "coulomb_backward", "breakaway", "breakaway_backward", *PER
 
 def _changed(law: Any, factors: Mapping[str, Any]) -> Any:
     """A law with some of its numbers times factors."""
-    return law.replace(**{
-        field: _times(getattr(law, field), factor)
-        for field, factor in factors.items() if field in type(law).model_fields
-    })  # fmt: skip
+    return law.replace(
+        **{
+            field: _times(getattr(law, field), factor)
+            for field, factor in factors.items()
+            if field in type(law).model_fields
+        }
+    )
 
 
 def _times(value: Any, factor: float | tuple[float, ...]) -> Any:

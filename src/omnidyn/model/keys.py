@@ -35,14 +35,27 @@ GAINS = ("drive.kp_V_s_rad", "drive.ki_V_rad")
 DEAD_BAND, LATENCY = "drive.dead_band_V", "drive.latency_s"
 
 _UNITS = {
-    "_kg": "kg", "_kg_m2": "kg m^2", "_m": "m", "_deg": "deg", "_ohm": "ohm", "_H": "H", "_Nm_A": "N m/A",
-    "_Vs_rad": "V s/rad", "_V": "V", "_A": "A", "_V_s_rad": "V s/rad", "_V_rad": "V/rad", "_Hz": "Hz",
+    "_kg": "kg",
+    "_kg_m2": "kg m^2",
+    "_m": "m",
+    "_deg": "deg",
+    "_ohm": "ohm",
+    "_H": "H",
+    "_Nm_A": "N m/A",
+    "_Vs_rad": "V s/rad",
+    "_V": "V",
+    "_A": "A",
+    "_V_s_rad": "V s/rad",
+    "_V_rad": "V/rad",
+    "_Hz": "Hz",
     "_s": "s",
-}  # fmt: skip
+}
 _FORM = re.compile(r"(\w+(?:\.\w+)*)(?:\[(\d{1,9})\])?", re.ASCII)
 _FRICTIONS = {
-    COULOMB: "Coulomb friction", VISCOUS: "viscous friction", BREAKAWAY: "breakaway friction",
-}  # fmt: skip
+    COULOMB: "Coulomb friction",
+    VISCOUS: "viscous friction",
+    BREAKAWAY: "breakaway friction",
+}
 _LETTERS = {COULOMB: "C", VISCOUS: "B", BREAKAWAY: "S", "yaw_coulomb": "C yaw", "yaw_viscous": "B yaw"}
 
 
@@ -190,9 +203,11 @@ class Key:
         content: Any = reduce(getattr, place.path, robot)
         if content is None:
             raise InputError(
-                "not a number of this robot", expected="a number that it has",
-                remedy="enter a first value in the robot file", where=str(self),
-            )  # fmt: skip
+                "not a number of this robot",
+                expected="a number that it has",
+                remedy="enter a first value in the robot file",
+                where=str(self),
+            )
         if self.index is None and isinstance(content, tuple):
             raise InputError(
                 "needs an index", got=str(self), expected=f"an entry, such as {self.name}[{len(content) - 1}]"

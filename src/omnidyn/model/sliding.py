@@ -57,10 +57,16 @@ def levels_of(robot: Robot) -> Levels:
     body, element = own
     directions = np.concatenate([np.eye(N_AXES), robot.wheels.wrench_matrix.T])
     return Levels(
-        directions, element["viscous"], element["coulomb"].T, element["breakaway"].T, body.coulomb, body.breakaway,
-        np.append(element["fall"], body.fall), np.append(element["exponent"], body.exponent),
+        directions,
+        element["viscous"],
+        element["coulomb"].T,
+        element["breakaway"].T,
+        body.coulomb,
+        body.breakaway,
+        np.append(element["fall"], body.fall),
+        np.append(element["exponent"], body.exponent),
         np.append(element["form"], body.form),
-    )  # fmt: skip
+    )
 
 
 def sliding_wrench(robot: Robot, twist: ArrayLike) -> FloatArray:
@@ -83,9 +89,15 @@ def speeds(own: Levels, twist: FloatArray, rounding: float = ROUNDING) -> FloatA
 
 
 def resisting(
-    own: Levels, twist: FloatArray, speed: FloatArray, side: FloatArray, slide: FloatArray, way: FloatArray,
-    ellipse: FloatArray, least: float = 0.0,
-) -> FloatArray:  # fmt: skip
+    own: Levels,
+    twist: FloatArray,
+    speed: FloatArray,
+    side: FloatArray,
+    slide: FloatArray,
+    way: FloatArray,
+    ellipse: FloatArray,
+    least: float = 0.0,
+) -> FloatArray:
     """The formula of `sliding_wrench`, of elements that move, or are about to, to a side. Shape (*batch, 3).
 
     side: sgn s_e of each element, or a part of it, shape (*batch, 3 + wheels); slide: levels against either side,

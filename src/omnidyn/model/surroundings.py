@@ -43,9 +43,12 @@ def refuse_slope(floor: Floor, who: str) -> None:
     """Raises UnsupportedError where the floor is not level, for `who` knows level floors only."""
     if floor.tilt:
         raise UnsupportedError(
-            f"{who} no floor that is not level", got=f"{floor.tilt:g} degrees", expected="0",
-            remedy="take the robot without it", where="[floor] tilt_deg",
-        )  # fmt: skip
+            f"{who} no floor that is not level",
+            got=f"{floor.tilt:g} degrees",
+            expected="0",
+            remedy="take the robot without it",
+            where="[floor] tilt_deg",
+        )
 
 
 # Variations of a robot: loads, floors, slopes and batteries that its file knows by name, and how they change it

@@ -22,9 +22,13 @@ ON_FLOOR = ("axes", "direction")  # the parts of friction that a floor has; that
 
 
 def vary_robot(
-    robot: Robot, *, payload: str | Payload = "", floor: str | Surface = "", tilt: str | Floor = "",
+    robot: Robot,
+    *,
+    payload: str | Payload = "",
+    floor: str | Surface = "",
+    tilt: str | Floor = "",
     battery: str | Battery = "",
-) -> Robot:  # fmt: skip
+) -> Robot:
     """The robot with a load, on another floor, on a slope, with another battery: by the names of its file, or by value.
 
     payload: adds mass and inertia, and moves the centre of mass towards its own. floor: friction between robot and
@@ -49,9 +53,10 @@ def vary_robot(
     gone = [kind for kind, choice in chosen.items() if choice]
     heads = tuple(f"variations.{kind}." for kind in gone)
     return robot.replace(
-        name=f"{robot.name} with {', '.join(said)}"[:400], variations=own.variations.replace(**{k: {} for k in gone}),
+        name=f"{robot.name} with {', '.join(said)}"[:400],
+        variations=own.variations.replace(**{k: {} for k in gone}),
         priors={key: prior for key, prior in robot.priors.items() if not key.startswith(heads)},
-    )  # fmt: skip
+    )
 
 
 def vary_as(robot: Robot, text: str) -> Robot:
@@ -76,9 +81,12 @@ def _named(robot: Robot, kind: str, name: str) -> Any:
         return known[name]
     if not known:
         raise InputError(
-            f"{robot.name} knows no {kind} by name", got=name, expected=f"[variations.{kind}.{name}]",
-            remedy="add the table to the robot file", where=kind,
-        )  # fmt: skip
+            f"{robot.name} knows no {kind} by name",
+            got=name,
+            expected=f"[variations.{kind}.{name}]",
+            remedy="add the table to the robot file",
+            where=kind,
+        )
     raise InputError(f"no {kind} of this name", got=name, remedy=_nearest(name, list(known)), where=kind)
 
 
@@ -167,5 +175,8 @@ def _fed(robot: Robot, battery: Battery, told: Mapping[str, Prior]) -> Robot:
 
 
 _CHANGES: dict[str, Callable[[Robot, Any, Mapping[str, Prior]], Robot]] = {
-    "payload": _loaded, "floor": _on_surface, "tilt": _on_slope, "battery": _fed,
-}  # fmt: skip
+    "payload": _loaded,
+    "floor": _on_surface,
+    "tilt": _on_slope,
+    "battery": _fed,
+}

@@ -212,6 +212,9 @@ def refuse_slip(wheels: Wheels, who: str) -> None:
     """Raises UnsupportedError where wheels may slip, for `who` knows only wheels that roll."""
     if wheels.traction_mu is not None:
         raise UnsupportedError(
-            f"{who} no wheels that slip", got=f"traction_mu = {wheels.traction_mu}", expected="wheels that roll",
-            remedy="take the robot without it", where="[wheels] traction_mu",
-        )  # fmt: skip
+            f"{who} no wheels that slip",
+            got=f"traction_mu = {wheels.traction_mu}",
+            expected="wheels that roll",
+            remedy="take the robot without it",
+            where="[wheels] traction_mu",
+        )

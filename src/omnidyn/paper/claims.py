@@ -77,9 +77,11 @@ def claims_document(claims: Sequence[Claim]) -> Document:
     total = [_judged(verdict, f"{number} {verdict.value}") for verdict, number in counts.items()]
     lines = headlines(claims)
     data = {
-        "headlines": lines, "rule": RULE, "verdicts": {verdict.value: number for verdict, number in counts.items()},
+        "headlines": lines,
+        "rule": RULE,
+        "verdicts": {verdict.value: number for verdict, number in counts.items()},
         "claims": [*map(asdict, claims)],
-    }  # fmt: skip
+    }
     return Document([*parts, "", *total, "", Words(RULE), "", Points(lines, name="headlines")], data)
 
 

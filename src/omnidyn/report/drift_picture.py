@@ -21,16 +21,19 @@ def draw_drift(found: Drift) -> Picture:
     rows = math.ceil(len(shown) / ACROSS)
     with look():
         figure = new_figure(WIDTH, 2.5 * rows + 0.2)
-        figure.subplots_adjust(left=0.09, right=0.98, top=1.0 - 0.35 / (2.5 * rows), bottom=0.75 / (2.5 * rows),
-                               wspace=0.35, hspace=0.75)  # fmt: skip
+        figure.subplots_adjust(
+            left=0.09, right=0.98, top=1.0 - 0.35 / (2.5 * rows), bottom=0.75 / (2.5 * rows), wspace=0.35, hspace=0.75
+        )
         for k, each in enumerate(shown):
             _panel(figure.add_subplot(rows, ACROSS, k + 1), each, found.fits)
         more = "" if len(shown) == len(found.numbers) else f" The first {MOST} of {len(found.numbers)}."
         return picture(
-            "drift", "Which numbers changed",
+            "drift",
+            "Which numbers changed",
             "Fitted numbers with their 95 % intervals, fit by fit. In red: they differ by more than their errors "
-            f"allow, all numbers counted. The line is the mean that fits them best.{more}", figure,
-        )  # fmt: skip
+            f"allow, all numbers counted. The line is the mean that fits them best.{more}",
+            figure,
+        )
 
 
 def _panel(axes: Axes, each: Drifting, fits: tuple[str, ...]) -> None:

@@ -42,9 +42,12 @@ def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
 
 
 def _page(
-    found: Identification, fits: Fits, validations: Mapping[str, Validation], banded: Mapping[str, Future[Bands]],
+    found: Identification,
+    fits: Fits,
+    validations: Mapping[str, Validation],
+    banded: Mapping[str, Future[Bands]],
     provenance: Mapping[str, Any],
-) -> str:  # fmt: skip
+) -> str:
     """All of it. banded: group -> its comparisons with the band of the model, which are on their way."""
     first = next(iter(fits.values()))
     robot = first.robot.name
@@ -169,9 +172,10 @@ def _measured(validations: Mapping[str, Validation]) -> list[tuple[str, Run]]:
     return [
         (group, run)
         for group, each in validations.items()
-        for comparison in (each.fitted, each.held_out) if comparison is not None
+        for comparison in (each.fitted, each.held_out)
+        if comparison is not None
         for run in comparison.measured
-    ]  # fmt: skip
+    ]
 
 
 def _driven(fits: Fits, validations: Mapping[str, Validation]) -> list[tuple[float, float] | None]:

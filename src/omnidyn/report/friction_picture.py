@@ -46,9 +46,11 @@ def draw_friction(studies: Mapping[str, FrictionStudy], axis: int = 0) -> Pictur
         unit = next(iter(studies.values())).axes[axis].unit
         speed, way = ("rad/s", "mrad") if unit == "N m" else ("m/s", "mm")
         for panel, title, below in zip(
-            panels, (f"force: {unit}", f"slow loop: {unit}", f"breakaway: {unit}"),
-            (f"speed, {speed}", f"way, {way}", f"rate of the force, {unit}/s"), strict=True,
-        ):  # fmt: skip
+            panels,
+            (f"force: {unit}", f"slow loop: {unit}", f"breakaway: {unit}"),
+            (f"speed, {speed}", f"way, {way}", f"rate of the force, {unit}/s"),
+            strict=True,
+        ):
             panel.set_title(title)
             panel.set_xlabel(below)
         log_scale(panels[2], "x")

@@ -40,17 +40,25 @@ def section(key: str, title: str, *parts: Table | Points | Picture, none: str = 
 def content(*parts: Table | Points | Picture) -> str:
     """Tables, lists and pictures, one after the other."""
     return "".join(
-        figure(part) if isinstance(part, Picture)
-        else table(part.head, part.rows) if isinstance(part, Table)
+        figure(part)
+        if isinstance(part, Picture)
+        else table(part.head, part.rows)
+        if isinstance(part, Table)
         else bullets([*map(str, part.words)])
         for part in parts
-    )  # fmt: skip
+    )
 
 
 def page(
-    title: str, introduction: str, sections: Sequence[Section], provenance: Mapping[str, Any], *, lead: str = "",
-    verdict: str = "", screen: str = "",
-) -> str:  # fmt: skip
+    title: str,
+    introduction: str,
+    sections: Sequence[Section],
+    provenance: Mapping[str, Any],
+    *,
+    lead: str = "",
+    verdict: str = "",
+    screen: str = "",
+) -> str:
     """The page as HTML. verdict: the result in a sentence, before all else. lead: HTML between introduction and links.
     screen: HTML right behind the verdict, for the first screen.
 

@@ -15,9 +15,12 @@ __all__ = ["SIGNS", "STYLE", "render_page"]
 
 # Beside the colour, which is that of the short word: a reader who cannot see one has the other, and the words.
 SIGNS = {
-    "yes": "\N{CHECK MARK}", "mended": "\N{ALMOST EQUAL TO}", "no": "\N{MULTIPLICATION X}",
-    "absent": "\N{EN DASH}", "other": "\N{RIGHTWARDS ARROW}",
-}  # fmt: skip
+    "yes": "\N{CHECK MARK}",
+    "mended": "\N{ALMOST EQUAL TO}",
+    "no": "\N{MULTIPLICATION X}",
+    "absent": "\N{EN DASH}",
+    "other": "\N{RIGHTWARDS ARROW}",
+}
 
 # Which pictures stand beside the claims of which subject.
 BESIDE = {

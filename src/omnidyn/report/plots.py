@@ -60,9 +60,11 @@ def _run(run: Run, channels: Sequence[str] = (), path: bool = False, robot: Robo
     went = path_of(run, robot)
     if went is None:
         raise InputError(
-            "where it went is not in the run", got=", ".join(run.channels), expected="twist or pose",
+            "where it went is not in the run",
+            got=", ".join(run.channels),
+            expected="twist or pose",
             remedy="or wheel speeds and the robot: plot_path(robot)",
-        )  # fmt: skip
+        )
     return draw_path([went])
 
 

@@ -26,8 +26,15 @@ from omnidyn.paper.tables import PAPER_AXES
 
 # Okabe & Ito 2008.
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE = (
-    "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7",
-)  # fmt: skip
+    "#000000",
+    "#E69F00",
+    "#56B4E9",
+    "#009E73",
+    "#F0E442",
+    "#0072B2",
+    "#D55E00",
+    "#CC79A7",
+)
 INK, GREY, PALE = "#222222", "#767676", "#E4E4E4"
 
 AXIS_COLOUR = {"x": BLUE, "y": VERMILLION, "yaw": GREEN}

@@ -41,9 +41,14 @@ def animation(found: Sequence[Tracking], robot: Robot) -> bytes:
     frames = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in frames]
     stream = io.BytesIO()
     frames[0].save(
-        stream, "GIF", save_all=True, append_images=frames[1:], duration=round(1e3 * min(step, FRAME)), loop=0,
+        stream,
+        "GIF",
+        save_all=True,
+        append_images=frames[1:],
+        duration=round(1e3 * min(step, FRAME)),
+        loop=0,
         optimize=False,
-    )  # fmt: skip
+    )
     return stream.getvalue()
 
 

@@ -34,9 +34,14 @@ class Band(NamedTuple):
 
 
 def confidence_band(
-    robot: Robot, voltage: ArrayLike | None = None, dt: ArrayLike | None = None, *, draws: int = DRAWS, seed: int = 0,
+    robot: Robot,
+    voltage: ArrayLike | None = None,
+    dt: ArrayLike | None = None,
+    *,
+    draws: int = DRAWS,
+    seed: int = 0,
     **options: Any,
-) -> Band:  # fmt: skip
+) -> Band:
     """The band of `simulate(robot, voltage, dt, **options)`: the same run by so many plausible robots.
 
     Raises InsufficientDataError where no number of the robot has a std, and what `simulate` raises.

@@ -38,22 +38,31 @@ class Commands(NamedTuple):
 
 
 def commands(
-    robot: Robot, voltage: ArrayLike | None, dt: ArrayLike | None, duty: ArrayLike | None,
-    wheel_speed_command: ArrayLike | None, twist_command: ArrayLike | None, supply: ArrayLike | None,
-) -> Commands:  # fmt: skip
+    robot: Robot,
+    voltage: ArrayLike | None,
+    dt: ArrayLike | None,
+    duty: ArrayLike | None,
+    wheel_speed_command: ArrayLike | None,
+    twist_command: ArrayLike | None,
+    supply: ArrayLike | None,
+) -> Commands:
     """Check what was asked for and bring it into one form. Exactly one kind of command must be given.
 
     Raises InputError for wrong shapes, values that are not finite, dt out of range, or a kind the drive cannot take.
     """
     given = {
-        "voltage": voltage, "duty": duty, "wheel_speed_command": wheel_speed_command, "twist_command": twist_command
-    }  # fmt: skip
+        "voltage": voltage,
+        "duty": duty,
+        "wheel_speed_command": wheel_speed_command,
+        "twist_command": twist_command,
+    }
     named = [name for name, value in given.items() if value is not None]
     if len(named) != 1 or dt is None:
         raise InputError(
-            "cannot tell what to apply", got=" and ".join(named) or "no command",
+            "cannot tell what to apply",
+            got=" and ".join(named) or "no command",
             expected=f"one of {', '.join(given)}, and dt",
-        )  # fmt: skip
+        )
     name, width = named[0], 3 if named[0] == "twist_command" else robot.wheels.count
     rows = as_floats(name, given[name])
     if rows.ndim != 2 or rows.shape[1] != width or not len(rows):
@@ -71,9 +80,11 @@ def commands(
         return _from_duty(robot, rows, steps, supply)
     if robot.drive.kind != SPEED:
         raise InputError(
-            f"the drive of {robot.name} takes no {name}", got=f'[drive] kind = "{robot.drive.kind}"',
-            expected='kind = "speed"', remedy="add the gains and the rate of its speed loop to the robot file",
-        )  # fmt: skip
+            f"the drive of {robot.name} takes no {name}",
+            got=f'[drive] kind = "{robot.drive.kind}"',
+            expected='kind = "speed"',
+            remedy="add the gains and the rate of its speed loop to the robot file",
+        )
     if name == "twist_command":
         return Commands(steps, None, set_point=wheel_speed(robot.wheels, rows), twist=rows)
     return Commands(steps, None, set_point=rows)
@@ -85,9 +96,11 @@ def _from_duty(robot: Robot, rows: FloatArray, steps: FloatArray, supply: ArrayL
         supply = robot.drive.supply
     if supply is None:
         raise InputError(
-            "a duty needs a supply", got="no supply", expected="supply= or [drive] supply_V",
+            "a duty needs a supply",
+            got="no supply",
+            expected="supply= or [drive] supply_V",
             remedy='add [drive] kind = "duty" and supply_V to the robot file',
-        )  # fmt: skip
+        )
     battery = as_floats("supply", supply)
     if battery.shape not in ((), (len(rows),)) or not np.all(np.isfinite(battery) & (battery > 0.0)):
         raise InputError("cannot use this supply", got=supply, expected=f"positive volts, one or {len(rows)}")
@@ -156,9 +169,11 @@ def _steps(dt: ArrayLike, count: int) -> FloatArray:
     bad = np.flatnonzero(~((steps >= MIN_DT) & (steps <= MAX_DT)))
     if bad.size:
         raise InputError(
-            "step out of range", got=float(steps[bad[0]]), expected=f"{MIN_DT:g} to {MAX_DT:g} s",
+            "step out of range",
+            got=float(steps[bad[0]]),
+            expected=f"{MIN_DT:g} to {MAX_DT:g} s",
             where=f"dt row {bad[0]}",
-        )  # fmt: skip
+        )
     return steps
 
 

@@ -277,9 +277,13 @@ def cap_warnings(stopped: int, rows: int) -> tuple[Statement, ...]:
 
 
 def implicit_motion(
-    robot: Robot, units: FloatArray, outcome: Outcome, voltage: FloatArray, asked: FloatArray | None = None,
+    robot: Robot,
+    units: FloatArray,
+    outcome: Outcome,
+    voltage: FloatArray,
+    asked: FloatArray | None = None,
     state: Any = None,
-) -> Motion:  # fmt: skip
+) -> Motion:
     """The Motion of an outcome of the implicit engine.
 
     Args:
@@ -304,9 +308,11 @@ class Slipping(_Stepping):
         if conditions.push and conditions.speed_loop:
             raise UnsupportedError(
                 "a push on a robot whose wheels may slip is simulated as volts, and a speed loop makes its own",
-                got=f'drive = "{robot.drive.kind}"', expected="voltages or duties", where=robot.name,
+                got=f'drive = "{robot.drive.kind}"',
+                expected="voltages or duties",
+                where=robot.name,
                 remedy="leave the push out, or [wheels] traction_mu",
-            )  # fmt: skip
+            )
         self._plant, self._push = slip_plant(robot), push_voltage(robot, conditions)
         if conditions.tilt:
             self._plant.room[:] += conditions.tilt
@@ -355,9 +361,12 @@ def as_tolerance(tol: float | None) -> float:
         return 0.0
     if not 1e-10 <= tol <= 1.0:
         raise InputError(
-            "tolerance out of range", got=tol, expected="1e-10 to 1 m/s, or None for a fixed step",
-            remedy="leave `tol` out", where="tol",
-        )  # fmt: skip
+            "tolerance out of range",
+            got=tol,
+            expected="1e-10 to 1 m/s, or None for a fixed step",
+            remedy="leave `tol` out",
+            where="tol",
+        )
     return float(tol)
 
 
@@ -411,8 +420,9 @@ class Grip(NamedTuple):
         slip = Statement("wheels_slip", WARNING, numbers={"wheels": wheels + 1, "shares": shares[wheels]})
         lifted = [
             Statement("wheel_lifts", WARNING, numbers={"wheel": w + 1, "share": count / rows})
-            for w, count in enumerate(self.lifted.tolist()) if count
-        ]  # fmt: skip
+            for w, count in enumerate(self.lifted.tolist())
+            if count
+        ]
         air = [Statement("wheel_in_air", WARNING, numbers={"wheel": w + 1}) for w in wheel_loads(robot).lifted]
         capped = [not_converged(self.capped, rows)] if self.capped else []
         return (*air, *([slip] if wheels.size else []), *capped, *lifted)

@@ -234,15 +234,28 @@ def _row(each: AxisFriction) -> tuple[str, ...]:
     holds = f"{each.holds[0]:.4g}" + ("" if each.holds[0] == each.holds[1] else f", back {each.holds[1]:.4g}")
     ramps = ", ".join(f"{value:.4g}" for value in each.breakaway) if np.isfinite(each.breakaway).all() else "-"
     return (
-        each.axis, each.law, f"{holds} {unit}", f"{each.force[middle]:.4g}", f"{each.force[-1]:.4g}", way, ramps,
-    )  # fmt: skip
+        each.axis,
+        each.law,
+        f"{holds} {unit}",
+        f"{each.force[middle]:.4g}",
+        f"{each.force[-1]:.4g}",
+        way,
+        ramps,
+    )
 
 
 def _told(each: AxisFriction) -> dict[str, Any]:
     finite = np.isfinite(each.rate).all()
     return {
-        "axis": each.axis, "unit": each.unit, "law": each.law, "speed": each.speed.tolist(),
-        "force": each.force.tolist(), "holds": list(each.holds), "bends": each.bends, "way": each.way.tolist(),
-        "loop": each.loop.tolist(), "rate": each.rate.tolist() if finite else None,
+        "axis": each.axis,
+        "unit": each.unit,
+        "law": each.law,
+        "speed": each.speed.tolist(),
+        "force": each.force.tolist(),
+        "holds": list(each.holds),
+        "bends": each.bends,
+        "way": each.way.tolist(),
+        "loop": each.loop.tolist(),
+        "rate": each.rate.tolist() if finite else None,
         "breakaway": each.breakaway.tolist() if finite else None,
-    }  # fmt: skip
+    }

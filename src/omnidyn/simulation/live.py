@@ -35,10 +35,17 @@ class LiveRobot:
     """
 
     def __init__(
-        self, robot: Robot, dt: float, *, pose: ArrayLike = (0.0, 0.0, 0.0), twist: ArrayLike = (0.0, 0.0, 0.0),
-        delay: int = 0, supply: float | None = None, push: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        self,
+        robot: Robot,
+        dt: float,
+        *,
+        pose: ArrayLike = (0.0, 0.0, 0.0),
+        twist: ArrayLike = (0.0, 0.0, 0.0),
+        delay: int = 0,
+        supply: float | None = None,
+        push: tuple[float, float, float] = (0.0, 0.0, 0.0),
         tol: float | None = TOLERANCE,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.robot, self.dt, self.supply = robot, dt, supply
         self.pose, self.twist = as_start("pose", pose, 3), as_start("twist", twist, 3)
         self._kind, n = robot.drive.kind, robot.wheels.count
@@ -105,6 +112,8 @@ def check_supply(robot: Robot, supply: float | None) -> None:
     """Raises InputError for a duty without a supply."""
     if robot.drive.kind == DUTY and supply is None and robot.drive.supply is None:
         raise InputError(
-            "a duty needs a supply", got="no supply", expected="`supply`, or [drive] supply_V",
+            "a duty needs a supply",
+            got="no supply",
+            expected="`supply`, or [drive] supply_V",
             remedy="add supply_V to the [drive] of the robot file",
-        )  # fmt: skip
+        )

@@ -60,9 +60,15 @@ def simulate(
 
 
 def simulate_seen(
-    robot: Robot, given: Commands, view: View, *, twist: ArrayLike, pose: ArrayLike, current: ArrayLike | None,
+    robot: Robot,
+    given: Commands,
+    view: View,
+    *,
+    twist: ArrayLike,
+    pose: ArrayLike,
+    current: ArrayLike | None,
     tol: float | None,
-) -> Run:  # fmt: skip
+) -> Run:
     """`simulate` of commands that were checked, as the log of a view shows them."""
     n, acting = robot.wheels.count, view.acting(robot, given)
     start = (
@@ -77,9 +83,14 @@ def simulate_seen(
 
 
 def as_run(
-    robot: Robot, given: Commands, acting: Commands, motion: Motion, engine: str, warnings: tuple[Statement, ...],
+    robot: Robot,
+    given: Commands,
+    acting: Commands,
+    motion: Motion,
+    engine: str,
+    warnings: tuple[Statement, ...],
     view: View = PLAIN,
-) -> Run:  # fmt: skip
+) -> Run:
     """The Run of a simulation: what the instruments of the robot would have recorded, as a view shows it.
 
     Args:

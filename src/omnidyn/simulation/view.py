@@ -87,9 +87,13 @@ def seen_at_once(robot: Robot, given: Commands, held: bool = False) -> View:
 
 
 def seen_through(
-    robot: Robot, given: Commands, log: LogEffects, late: Mapping[str, float] | None = None,
-    share: FloatArray | None = None, start: float | None = None,
-) -> View:  # fmt: skip
+    robot: Robot,
+    given: Commands,
+    log: LogEffects,
+    late: Mapping[str, float] | None = None,
+    share: FloatArray | None = None,
+    start: float | None = None,
+) -> View:
     """What a log shows. late: channel -> by how much it is late [s]; None: as the log says. share (rows,): of the log
     that had gone by at each row; None: it is all of the log.
 

@@ -30,9 +30,10 @@ def _not_told(statement: Statement) -> str:
     """A number is not identifiable, and the robot file knows nothing of it."""
     axis = statement.numbers["axis"]
     how = (
-        f"drive {axis} both ways, at several speeds" if axis
+        f"drive {axis} both ways, at several speeds"
+        if axis
         else "fix it (`fixed`), or record what depends on it: currents, or another load"
-    )  # fmt: skip
+    )
     return f"{statement.subject} is not identifiable from these logs: {how}"
 
 

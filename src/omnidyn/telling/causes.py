@@ -37,10 +37,12 @@ def named(key: str) -> str:
 def changes(statement: Statement) -> str:
     """ "viscous friction forward 0.5 -> 0.3 N s/m": the numbers that a cause would change, as many as are given."""
     names, before, after = (statement.numbers[name] for name in ("changed", "before", "after"))
-    return all_of([
-        f"{in_words(name)} {now:.3g} -> {then if abs(then) > NO_REST * abs(now) else 0.0:.3g} {unit(name)}".rstrip()
-        for name, now, then in zip(names, before, after, strict=True)
-    ])  # fmt: skip
+    return all_of(
+        [
+            f"{in_words(name)} {now:.3g} -> {then if abs(then) > NO_REST * abs(now) else 0.0:.3g} {unit(name)}".rstrip()
+            for name, now, then in zip(names, before, after, strict=True)
+        ]
+    )
 
 
 def _named(statement: Statement) -> str:

@@ -18,10 +18,24 @@ if TYPE_CHECKING:
 
 # From what loads at once to what loads slowly; docs/statements.md has a section for each.
 ROOMS = (
-    "model", "control", "comparison", "fit", "lack_of_fit", "causes", "advice", "verdicts",
-    "logs", "findings.rows", "findings.signal", "findings.wiring", "findings.scale", "findings.uses", "motors",
-    "steady", "lines",
-)  # fmt: skip
+    "model",
+    "control",
+    "comparison",
+    "fit",
+    "lack_of_fit",
+    "causes",
+    "advice",
+    "verdicts",
+    "logs",
+    "findings.rows",
+    "findings.signal",
+    "findings.wiring",
+    "findings.scale",
+    "findings.uses",
+    "motors",
+    "steady",
+    "lines",
+)
 
 
 @cache

@@ -43,17 +43,22 @@ def _signal_followed(statement: Statement) -> str:
     numbers = statement.numbers
     percent = f"{max(1.0, round(100.0 * numbers['share'])):.0f} %"
     how = {
-        "well": f"within {percent}", "noise": f"as far as noise lets it ({percent})", "roughly": f"roughly ({percent})",
-        "hardly": f"hardly ({percent})", "not": f"not at all (rms error {numbers['error']:.2g} {numbers['unit']})",
-    }  # fmt: skip
+        "well": f"within {percent}",
+        "noise": f"as far as noise lets it ({percent})",
+        "roughly": f"roughly ({percent})",
+        "hardly": f"hardly ({percent})",
+        "not": f"not at all (rms error {numbers['error']:.2g} {numbers['unit']})",
+    }
     return f"{statement.subject} {how[numbers['level']]}"
 
 
 def _follows(statement: Statement) -> str:
     """A model follows some of what was measured; what it hardly follows, or not at all, is named too."""
     signals = statement.numbers["signals"]
-    good, bad = ([str(signal) for signal in signals if (signal.numbers["level"] in ("hardly", "not")) is poor]
-                 for poor in (False, True))  # fmt: skip
+    good, bad = (
+        [str(signal) for signal in signals if (signal.numbers["level"] in ("hardly", "not")) is poor]
+        for poor in (False, True)
+    )
     return f"{statement.subject} follows {all_of(good)}{f', but {all_of(bad)}' if bad else ''}"
 
 

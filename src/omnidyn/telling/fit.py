@@ -22,19 +22,29 @@ DRIVERS = {
 }
 MOVE = {"x": "drive it forward and back", "y": "drive it sideways", "yaw": "turn it"}
 MEASURED = {
-    "body.mass_kg": "weigh the robot", "wheels.wheel_radius_m": "measure the wheel radius",
-    "wheels.robot_radius_m": "measure the robot radius", "motor.gear_ratio": "read the gear ratio off its data sheet",
-    "motor.resistance_ohm": "measure the resistance of a motor", TORQUE: "take the torque constant from the data sheet",
+    "body.mass_kg": "weigh the robot",
+    "wheels.wheel_radius_m": "measure the wheel radius",
+    "wheels.robot_radius_m": "measure the robot radius",
+    "motor.gear_ratio": "read the gear ratio off its data sheet",
+    "motor.resistance_ohm": "measure the resistance of a motor",
+    TORQUE: "take the torque constant from the data sheet",
     EMF: "take the emf constant from the data sheet (in SI it is the torque constant)",
-    ROTOR: "take the rotor inertia from the data sheet", WHEEL: "weigh a wheel",
+    ROTOR: "take the rotor inertia from the data sheet",
+    WHEEL: "weigh a wheel",
     CENTRE: "balance the robot on an edge",
-    "body.inertia_kg_m2": "measure the inertia (swing the robot)", "gain": "measure the voltage at the motors",
-}  # fmt: skip
-CURES = MEASURED | MOVE | {
-    "current": "log currents", "wheel_speed": "log wheel speeds",
-    "twist": "log the speed over the ground, or where the robot is",
-    "drive": "drive at several speeds, both ways, with starts and stops",
-}  # fmt: skip
+    "body.inertia_kg_m2": "measure the inertia (swing the robot)",
+    "gain": "measure the voltage at the motors",
+}
+CURES = (
+    MEASURED
+    | MOVE
+    | {
+        "current": "log currents",
+        "wheel_speed": "log wheel speeds",
+        "twist": "log the speed over the ground, or where the robot is",
+        "drive": "drive at several speeds, both ways, with starts and stops",
+    }
+)
 
 
 def _gaps(statement: Statement) -> str:
@@ -159,10 +169,13 @@ def _alike(keys: Sequence[str], shares: Sequence[float]) -> Iterator[tuple[str, 
         name, share = next(iter(left.items()))
         key = find_key(name)
         alike = [
-            other for other, percent in left.items()
-            if key is not None and (place := find_key(other)) is not None and place.name == key.name
+            other
+            for other, percent in left.items()
+            if key is not None
+            and (place := find_key(other)) is not None
+            and place.name == key.name
             and abs(percent - share) < 0.02 * abs(share)
-        ]  # fmt: skip
+        ]
         several = key is not None and len(alike) > 1
         yield (in_words(key.name) if key is not None and several else in_words(name)), share
         for other in alike if several else [name]:

@@ -14,11 +14,12 @@ LARGE_CHI2 = 100.0  # chi2 of which nobody needs decimals
 MAJORITY_SHARE = 0.5  # of the variance of errors that is not noise, from which on most of it is
 WORTHWHILE_SHARE = 0.01  # and from which on any is
 WHERE = {  # how a log shows its noise, and what more than that is
-    REPEATS: ("repeats within", "not noise"), HOLDS: ("scatters, while commands are held, by", "not noise"),
+    REPEATS: ("repeats within", "not noise"),
+    HOLDS: ("scatters, while commands are held, by", "not noise"),
     NEIGHBOURS: ("scatters from row to row by", "misfit, or slower noise"),
     ROUNDING: ("is rounded within", "misfit, or noise beside what the encoder rounds"),
     REST: ("scatters at rest by", "misfit, or noise that comes with motion"),
-}  # fmt: skip
+}
 
 
 def names_of(names: tuple[str, ...], most: int = NAMED) -> str:
@@ -165,9 +166,7 @@ SENTENCES = {
     "misfit_with_rivals": Sentence(_rivals),
     "misfit_nearest_cause": Sentence(_weak),
     "misfit_likely_cause": Sentence(_likely),
-    "misfit_of_output": Sentence(
-        "{subject}: {size:.2g} of its residual is not noise, {percent:.0f} % of the variance"
-    ),
+    "misfit_of_output": Sentence("{subject}: {size:.2g} of its residual is not noise, {percent:.0f} % of the variance"),
     "noise_level": Sentence(_noise_level),
     "noise_unknown": Sentence(
         "this log cannot tell its noise from misfit: repeat a command, or let the robot rest for a second"
@@ -186,4 +185,4 @@ SENTENCES = {
     "held_out_misfit": Sentence(_held_out_misfit),
     "held_out_colour": Sentence(_held_out_colour),
     "held_out_noise": Sentence("held-out logs are predicted as well as the noise allows"),
-}  # fmt: skip
+}

@@ -13,9 +13,10 @@ NOT_IDENTIFIABLE = "dead band not identifiable here"
 NOT_WRITTEN = {
     "viscous_explains_slope": "friction.wheels.viscous of the file explains all of the slope",
     "drop_explains_dead_band": "motor.voltage_drop_V of the file explains all of the dead band",
-    "negative": "", "no_dead_band": "no dead band is seen",
+    "negative": "",
+    "no_dead_band": "no dead band is seen",
     "no_inertia": "the logs do not determine an inertia",
-}  # fmt: skip
+}
 
 
 def _motor_line(statement: Statement) -> str:

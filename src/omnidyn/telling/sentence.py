@@ -83,10 +83,15 @@ _FORMATTER = _Formatter()
 
 # What tells how a wheel turns or a channel moves, by the source or channel that findings name.
 SOURCES = {
-    "circuit": "voltage and current", "drive": "its voltage", "floor": "the motion over the floor",
-    "wheels": "the motion of the wheels", "wheel_speed_command": "the commanded speed",
-    "twist_command": "the commanded twist", "twist": "the twist", "pose": "the pose",
-}  # fmt: skip
+    "circuit": "voltage and current",
+    "drive": "its voltage",
+    "floor": "the motion over the floor",
+    "wheels": "the motion of the wheels",
+    "wheel_speed_command": "the commanded speed",
+    "twist_command": "the commanded twist",
+    "twist": "the twist",
+    "pose": "the pose",
+}
 
 
 def names(statement: Statement) -> str:

@@ -19,9 +19,10 @@ LOST = {
     "voltage": "the sign of the voltages or speeds is wrong, or K_t, K_v, the gear or a radius of the robot file is",
 }
 NOT_USED = {
-    "not_in_model": "no robot file can hold it", "below_zero": "a level of it came out below 0",
+    "not_in_model": "no robot file can hold it",
+    "below_zero": "a level of it came out below 0",
     "not_asked": "another was asked for",
-}  # fmt: skip
+}
 BOTH_SIDES = " on both sides of the change within the run"
 
 
@@ -166,9 +167,16 @@ def _changes_within_run(statement: Statement) -> str:
         "{}: the force {} changes within the run, most likely at {:.4g} s (between {:.4g} and {:.4g} s): from {} to "
         "{}, {:+.3g} % [{:.3g}, {:.3g}]; the levels of the fit lie between both{}"
     ).format(
-        statement.subject or "the run", what, numbers["at"], *numbers["between"], *force, 100.0 * numbers["change"],
-        low, high, rests,
-    )  # fmt: skip
+        statement.subject or "the run",
+        what,
+        numbers["at"],
+        *numbers["between"],
+        *force,
+        100.0 * numbers["change"],
+        low,
+        high,
+        rests,
+    )
 
 
 def _change_in_run(statement: Statement) -> str:
@@ -229,10 +237,14 @@ SENTENCES = {
     "shapes_tied": Sentence(_shapes_tied),
     "better_shape_not_used": Sentence(_better_shape_not_used),
     "fit_not_tested": Sentence("whether the shape fits was not tested: too few directions in which all of it moves"),
-    "no_lack_of_fit": Sentence(either("changes",
-        "no lack of fit is seen on both sides of the change within the run: nothing that was tried beside the "
-        "shape does better"
-, "no lack of fit is seen: nothing that was tried beside the shape does better")),
+    "no_lack_of_fit": Sentence(
+        either(
+            "changes",
+            "no lack of fit is seen on both sides of the change within the run: nothing that was tried beside the "
+            "shape does better",
+            "no lack of fit is seen: nothing that was tried beside the shape does better",
+        )
+    ),
     "no_shape_fits": Sentence(_no_shape_fits),
     "viscous_with_back_emf": Sentence(_viscous_with_back_emf),
     "viscous_not_identifiable": Sentence(_viscous_not_identifiable),
@@ -266,12 +278,10 @@ SENTENCES = {
     "turn_on_the_spot": Sentence(
         "turn on the spot, both ways, at two speeds or more: that gives the friction about yaw"
     ),
-    "drive_at_two_speeds": Sentence(
-        "drive at speeds a factor of three apart: that shows, or bounds, viscous friction"
-    ),
+    "drive_at_two_speeds": Sentence("drive at speeds a factor of three apart: that shows, or bounds, viscous friction"),
     "drive_faster": Sentence("drive much faster than now: the viscous part grows with speed, the rest does not"),
     "more_directions": Sentence(_more_directions),
     "pull_once": Sentence(
         "pull the robot with a spring scale once: all forces here are only as accurate as the torque constant"
     ),
-}  # fmt: skip
+}

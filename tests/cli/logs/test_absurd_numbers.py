@@ -11,14 +11,21 @@ from tests.support.cases import case
 
 ROWS = 150
 CHANNELS = {
-    "voltage": "u1_V u2_V u3_V", "duty": "d1_duty d2_duty d3_duty", "speed": "w1_rad_s w2_rad_s w3_rad_s",
-    "counts": "a1_rad a2_rad a3_rad", "pose": "x_m y_m heading_rad", "twist": "vx_m_s vy_m_s omega_rad_s",
-    "current": "i1_A i2_A i3_A", "supply": "supply_V", "time": "t_s",
-}  # fmt: skip
+    "voltage": "u1_V u2_V u3_V",
+    "duty": "d1_duty d2_duty d3_duty",
+    "speed": "w1_rad_s w2_rad_s w3_rad_s",
+    "counts": "a1_rad a2_rad a3_rad",
+    "pose": "x_m y_m heading_rad",
+    "twist": "vx_m_s vy_m_s omega_rad_s",
+    "current": "i1_A i2_A i3_A",
+    "supply": "supply_V",
+    "time": "t_s",
+}
 LOGS = {
-    "volts": ("voltage", "speed", "pose", "current", "supply"), "duties": ("duty", "supply", "counts", "pose"),
+    "volts": ("voltage", "speed", "pose", "current", "supply"),
+    "duties": ("duty", "supply", "counts", "pose"),
     "twists": ("voltage", "twist"),
-}  # fmt: skip
+}
 COMMANDS = {
     "check": ("check", "log.csv", "--robot", "axebot"),
     "identify": ("identify", "log.csv", "--robot", "axebot", "--quick"),
@@ -26,9 +33,21 @@ COMMANDS = {
     "motors": ("identify", "log.csv", "--what", "motors"),
     "free runs": ("identify", "log.csv", "--what", "motors", "--method", "output-error"),
     "compare": ("compare", "log.csv", "--robot", "axebot"),
-    "init": ("init", "r", "--log", "log.csv", "--mass", "2", "--wheel-radius", "0.03", "--robot-radius", "0.1",
-             "-o", "-"),
-}  # fmt: skip
+    "init": (
+        "init",
+        "r",
+        "--log",
+        "log.csv",
+        "--mass",
+        "2",
+        "--wheel-radius",
+        "0.03",
+        "--robot-radius",
+        "0.1",
+        "-o",
+        "-",
+    ),
+}
 COLUMNS = {  # what becomes of a column
     "constant": lambda column: np.full(ROWS, 3.0),
     "zero": lambda column: np.zeros(ROWS),
@@ -37,8 +56,13 @@ COLUMNS = {  # what becomes of a column
     "a huge cell": lambda column: np.where(np.arange(ROWS) == 70, -1e300, column),
     "a tiny cell": lambda column: np.where(np.arange(ROWS) == 70, 1e-300, column),
 }
-SHORT = [("volts", "speed", "zero"), ("volts", "voltage", "constant"), ("twists", "twist", "a huge cell"),
-         ("duties", "counts", "tiny"), ("duties", "time", "constant")]  # fmt: skip
+SHORT = [
+    ("volts", "speed", "zero"),
+    ("volts", "voltage", "constant"),
+    ("twists", "twist", "a huge cell"),
+    ("duties", "counts", "tiny"),
+    ("duties", "time", "constant"),
+]
 
 
 def columns():
@@ -51,11 +75,16 @@ def columns():
     random = np.random.default_rng(2)
     twist = 0.035 * speed @ np.array([[0.0, -0.6, 0.6], [-0.7, 0.3, 0.3], [3.3, 3.3, 3.3]]).T
     every = {
-        "voltage": volts, "duty": volts / 6.0, "speed": speed + 0.05 * random.normal(size=speed.shape),
-        "counts": np.round(0.02 * np.cumsum(speed, axis=0) / 0.01) * 0.01, "twist": twist,
-        "pose": 0.02 * np.cumsum(twist, axis=0), "current": (volts - 0.11 * speed) / 1.7,
-        "supply": np.full((ROWS, 1), 6.0) + 0.01 * random.normal(size=(ROWS, 1)), "time": 0.02 * row[:, None],
-    }  # fmt: skip
+        "voltage": volts,
+        "duty": volts / 6.0,
+        "speed": speed + 0.05 * random.normal(size=speed.shape),
+        "counts": np.round(0.02 * np.cumsum(speed, axis=0) / 0.01) * 0.01,
+        "twist": twist,
+        "pose": 0.02 * np.cumsum(twist, axis=0),
+        "current": (volts - 0.11 * speed) / 1.7,
+        "supply": np.full((ROWS, 1), 6.0) + 0.01 * random.normal(size=(ROWS, 1)),
+        "time": 0.02 * row[:, None],
+    }
     return {name: dict(zip(names.split(), every[name].T, strict=True)) for name, names in CHANNELS.items()}
 
 

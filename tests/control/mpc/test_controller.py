@@ -58,8 +58,9 @@ def predicted_off(robot, believed, along):
     poses, twists, _ = drive(controller, along, 60, plant=robot)
     controller.step(60 * DT, poses[-1], twists[-1], along)
     run, predicted = (
-        simulate(robot, controller._memory.u.copy(), DT, twist=twists[-1], pose=poses[-1]), controller.info.predicted,
-    )  # fmt: skip
+        simulate(robot, controller._memory.u.copy(), DT, twist=twists[-1], pose=poses[-1]),
+        controller.info.predicted,
+    )
     assert predicted is not None
     assert run.pose is not None
     return np.abs(predicted - run.pose[1:])
@@ -131,8 +132,10 @@ def test_robots_of_every_shape(robot):
 def test_limits_are_kept():
     along = path("square:speed_m_s=0.5")
     for settings, met in (
-        (Settings(current=1.0), "current"), (Settings(slew=60.0), "slew"), (Settings(speed=(0.4, 0.4, 4.0)), "speed"),
-    ):  # fmt: skip
+        (Settings(current=1.0), "current"),
+        (Settings(slew=60.0), "slew"),
+        (Settings(speed=(0.4, 0.4, 4.0)), "speed"),
+    ):
         controller, words = Mpc(ROBOT, settings=settings), set()
         live = LiveRobot(ROBOT, DT, pose=along.at(0.0).pose)
         last, most = np.zeros(3), 0.0

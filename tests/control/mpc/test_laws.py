@@ -37,7 +37,7 @@ SLIDING = {
     "LuGre along": along(law="lugre", **BENDS_ALONG, **FALLS_ALONG),
     "elasto-plastic along": along(law="elastoplastic", **BENDS_ALONG, **FALLS_ALONG),
     "Karnopp along": along(law="karnopp", **HOLDS_ALONG),
-}  # fmt: skip
+}
 
 
 def settled(robot, volts):

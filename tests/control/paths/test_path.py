@@ -11,9 +11,14 @@ from omnidyn.errors import InputError
 from omnidyn.run import Run
 
 SMOOTH = [
-    "eight", "eight:heading=along", "eight:size_m=0.25,period_s=12", "circle", "circle:heading=along",
-    "circle:turn_rad_s=2", "goal:x_m=0.4,y_m=-0.3,heading_rad=1.0,travel_s=1.5",
-]  # fmt: skip
+    "eight",
+    "eight:heading=along",
+    "eight:size_m=0.25,period_s=12",
+    "circle",
+    "circle:heading=along",
+    "circle:turn_rad_s=2",
+    "goal:x_m=0.4,y_m=-0.3,heading_rad=1.0,travel_s=1.5",
+]
 EVERY = [*SMOOTH, "square", "square:turn_rad_s=1", "zigzag"]
 
 

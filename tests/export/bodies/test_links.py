@@ -28,10 +28,15 @@ def from_urdf(text):
         )
     for joint in root.findall("joint"):
         origin, limit, eased = joint.find("origin"), joint.find("limit").attrib, joint.find("dynamics").attrib
-        joints.append((
-            numbers(origin.get("xyz")), numbers(origin.get("rpy"))[2], numbers(joint.find("axis").get("xyz")),
-            (float(limit["effort"]), float(limit["velocity"])), (float(eased["damping"]), float(eased["friction"])),
-        ))  # fmt: skip
+        joints.append(
+            (
+                numbers(origin.get("xyz")),
+                numbers(origin.get("rpy"))[2],
+                numbers(joint.find("axis").get("xyz")),
+                (float(limit["effort"]), float(limit["velocity"])),
+                (float(eased["damping"]), float(eased["friction"])),
+            )
+        )
     return links, joints
 
 
@@ -47,11 +52,15 @@ def from_sdf(text):
         where[link.get("name")] = numbers(link.findtext("pose"))
     for joint in model.findall("joint"):
         pose, axis = where[joint.findtext("child")], joint.find("axis")
-        joints.append((
-            pose[:3], pose[5], numbers(axis.findtext("xyz")),
-            (float(axis.findtext("limit/effort")), float(axis.findtext("limit/velocity"))),
-            (float(axis.findtext("dynamics/damping")), float(axis.findtext("dynamics/friction"))),
-        ))  # fmt: skip
+        joints.append(
+            (
+                pose[:3],
+                pose[5],
+                numbers(axis.findtext("xyz")),
+                (float(axis.findtext("limit/effort")), float(axis.findtext("limit/velocity"))),
+                (float(axis.findtext("dynamics/damping")), float(axis.findtext("dynamics/friction"))),
+            )
+        )
     return links, joints
 
 
@@ -144,10 +153,15 @@ def from_python_sdformat(text):
         where[link.name] = numbers(link.pose.text)
     for joint in model.joints:
         pose, axis = where[joint.child], joint.axis
-        joints.append((
-            pose[:3], pose[5], numbers(axis.xyz.text), (float(axis.limit.effort), float(axis.limit.velocity)),
-            (float(axis.dynamics.damping), float(axis.dynamics.friction)),
-        ))  # fmt: skip
+        joints.append(
+            (
+                pose[:3],
+                pose[5],
+                numbers(axis.xyz.text),
+                (float(axis.limit.effort), float(axis.limit.velocity)),
+                (float(axis.dynamics.damping), float(axis.dynamics.friction)),
+            )
+        )
     return links, joints, _unknown(model)
 
 

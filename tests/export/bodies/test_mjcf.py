@@ -47,7 +47,7 @@ def test_motors_push_as_ours_do(seed):
     mujoco.mj_forward(model, data)
     plain = robot.replace(
         motor=robot.motor.replace(voltage_drop=0.0, gear_efficiency=1.0, electrical="quasi-static"),
-    )  # fmt: skip
+    )
     rims = robot.wheels.wrench_matrix.T @ twist
     viscous = np.array(robot.friction.axes.viscous) * twist
     along = robot.friction.direction

@@ -35,10 +35,14 @@ def driven(kind):
 
 
 ROBOTS = [
-    ROBOT, *(without_losses(random_robot(seed)) for seed in range(4)),
-    *(without_losses(with_spin(random_robot(seed), seed)) for seed in (6,)), exact_robot(2), driven("duty"),
-    driven("speed"), without_losses(with_centre(random_robot(7), 7)),
-]  # fmt: skip
+    ROBOT,
+    *(without_losses(random_robot(seed)) for seed in range(4)),
+    *(without_losses(with_spin(random_robot(seed), seed)) for seed in (6,)),
+    exact_robot(2),
+    driven("duty"),
+    driven("speed"),
+    without_losses(with_centre(random_robot(7), 7)),
+]
 
 
 class Given(Path):
@@ -126,8 +130,13 @@ def test_its_size_is_small_and_it_asks_for_no_memory(tmp_path, capsys):
     subprocess.run(["gcc", *STRICT, "-Os", "-c", "omnidyn_control.c"], cwd=tmp_path / "c", check=True)
     needs = subprocess.run(["nm", "-u", "omnidyn_control.o"], cwd=tmp_path / "c", capture_output=True, text=True)
     assert {line.split()[-1] for line in needs.stdout.splitlines()} <= {
-        "cosf", "sinf", "sincosf", "remainderf", "__stack_chk_fail", "_GLOBAL_OFFSET_TABLE_",
-    }  # fmt: skip
+        "cosf",
+        "sinf",
+        "sincosf",
+        "remainderf",
+        "__stack_chk_fail",
+        "_GLOBAL_OFFSET_TABLE_",
+    }
     size = subprocess.run(["size", "omnidyn_control.o"], cwd=tmp_path / "c", capture_output=True, text=True)
     text, data, bss = map(int, size.stdout.splitlines()[1].split()[:3])
     with capsys.disabled():

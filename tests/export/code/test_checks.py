@@ -56,11 +56,13 @@ LONG = pytest.mark.long
 @pytest.mark.parametrize(
     "robot, precision, count",
     [
-        (ROBOT, "double", 20_000), (WOUND, "double", 2_000), pytest.param(ROBOT, "single", 20_000, marks=LONG),
+        (ROBOT, "double", 20_000),
+        (WOUND, "double", 2_000),
+        pytest.param(ROBOT, "single", 20_000, marks=LONG),
         pytest.param(exact_robot(7), "single", 20_000, marks=LONG),
         pytest.param(exact_robot(2), "double", 20_000, marks=LONG),
     ],
-)  # fmt: skip
+)
 def test_random_calls_under_sanitizers(robot, precision, count, tmp_path):
     program = of_step(robot, tmp_path / "c", precision)
     found, valid = program.run(count, ANY), program.run(1000, VALID)
@@ -75,9 +77,10 @@ def test_random_calls_under_sanitizers(robot, precision, count, tmp_path):
 def test_a_robot_of_20_grams_is_not_too_fast(electrical, precision, tmp_path):
     """Its rates are 20000 per second: a second at full volts, forward and back, is one call."""
     small = ROBOT.replace(
-        body=ROBOT.body.replace(mass=0.02, inertia=2e-6), motor=ROBOT.motor.replace(electrical=electrical),
+        body=ROBOT.body.replace(mass=0.02, inertia=2e-6),
+        motor=ROBOT.motor.replace(electrical=electrical),
         wheels=ROBOT.wheels.replace(robot_radius=0.015, wheel_radius=0.005),
-    )  # fmt: skip
+    )
     volts = np.random.default_rng(1).uniform(-100.0, 100.0, (200, 3))
     volts[::2] = np.sign(volts[::2, :1])
     twist, pose = Stepper(small, tmp_path / "c", precision).run(100.0 * volts, 1.0)

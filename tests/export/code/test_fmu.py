@@ -29,7 +29,7 @@ def simulated(robot, folder, volts, dt, start=None):
     values = {f"start_{name}": value for name, value in (start or {}).items()}
     found = fmpy.simulate_fmu(
         str(path), stop_time=len(volts) * dt, step_size=dt, output_interval=dt, input=given, start_values=values
-    )  # fmt: skip
+    )
     return np.stack([found[name] for name in OUTPUTS], axis=1)
 
 

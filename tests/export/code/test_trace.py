@@ -29,9 +29,10 @@ def test_choices_views_and_writing_into_a_part():
     chosen = np.where(x > 0.0, x, 1.0)
     chosen[1:] += 1.0
     assert lines(chosen) == [
-        "y[0] = ((x[0] > 0.0) ? x[0] : 1.0);", "y[1] = (((x[1] > 0.0) ? x[1] : 1.0) + 1.0);",
+        "y[0] = ((x[0] > 0.0) ? x[0] : 1.0);",
+        "y[1] = (((x[1] > 0.0) ? x[1] : 1.0) + 1.0);",
         "y[2] = (((x[2] > 0.0) ? x[2] : 1.0) + 1.0);",
-    ]  # fmt: skip
+    ]
     assert np.asanyarray(x, dtype=float) is x
     assert lines(np.max(np.abs(x[:2]), axis=-1, keepdims=True)) == ["y[0] = max_of(fabs(x[0]), fabs(x[1]));"]
 

@@ -62,9 +62,12 @@ def test_the_translated_formula_computes_the_same(tmp_path):
     program.function(found, (REAL,) * 7)
     cases = [
         (v, g, c, c * s, 6.7, phi, 0.0)
-        for v in (0.0, 1e-9, 0.3, -0.3, -2.0) for g in (0.0, 0.5, -0.5, 3.0, -9.0) for c in (0.0, 1.5)
-        for s in (1.0, 1.4) for phi in (1e-4, 0.01, 0.14)
-    ]  # fmt: skip
+        for v in (0.0, 1e-9, 0.3, -0.3, -2.0)
+        for g in (0.0, 0.5, -0.5, 3.0, -9.0)
+        for c in (0.0, 1.5)
+        for s in (1.0, 1.4)
+        for phi in (1e-4, 0.01, 0.14)
+    ]
     calls = "\n".join(f'printf("%a\\n", exact_step({", ".join(map(repr, case))}));' for case in cases)
     text = f"#include <math.h>\n#include <stdio.h>\n{program.text()}\nint main(void) {{\n{calls}\nreturn 0; }}\n"
     (tmp_path / "t.c").write_text(text)

@@ -138,7 +138,7 @@ def test_the_node_on_a_bus(bus, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "nav_msgs", ModuleType("nav_msgs"))
     monkeypatch.setitem(sys.modules, "nav_msgs.msg", messages)
     node = loaded(tmp_path / "n" / "omnidyn_node.py", "omnidyn_node").OmnidynNode()
-    (period, tick), = bus.timers  # fmt: skip
+    ((period, tick),) = bus.timers
     assert period == DT
 
     def posed(x, y, heading, seconds=0.0):

@@ -102,9 +102,16 @@ def test_what_is_no_command_is_none(drive, bad):
 
 
 NO_NUMBERS = [
-    (np.nan, 0.0, 0.0), (1e308, -1e308, 1e308), (10**400, 0, 0), (None, 0.0, 0.0), ("x", 1.0, 2.0, 3.0), None, 1.0,
-    "abc", ([], [], []),
-]  # fmt: skip
+    (np.nan, 0.0, 0.0),
+    (1e308, -1e308, 1e308),
+    (10**400, 0, 0),
+    (None, 0.0, 0.0),
+    ("x", 1.0, 2.0, 3.0),
+    None,
+    1.0,
+    "abc",
+    ([], [], []),
+]
 NO_SUPPLY = [np.nan, np.inf, 0.0, -6.0, 1e-300, None, "6", b"6", 10**400, [], object()]
 NO_TIME = [np.nan, np.inf, None, "0.01", b"1", [], 10**400, 1j, object()]
 
@@ -219,8 +226,11 @@ def bus(monkeypatch):
         "rclpy.node": {"Node": Node},
         "geometry_msgs.msg": {"Twist": type("Twist", (), {}), "TwistStamped": type("TwistStamped", (), {})},
         "sensor_msgs.msg": {"JointState": type("JointState", (), {})},
-        "std_msgs.msg": {"Float64MultiArray": Message}, "geometry_msgs": {}, "sensor_msgs": {}, "std_msgs": {},
-    }  # fmt: skip
+        "std_msgs.msg": {"Float64MultiArray": Message},
+        "geometry_msgs": {},
+        "sensor_msgs": {},
+        "std_msgs": {},
+    }
     for name, content in stubs.items():
         module = ModuleType(name)
         module.__dict__.update(content)
@@ -235,7 +245,7 @@ def test_the_node_on_a_bus(bus, tmp_path, monkeypatch, stamped):
     module = loaded(tmp_path / "n" / "omnidyn_node.py", "omnidyn_node")
     bus.parameters = {"stamped": stamped, "supply_V": 7.2}
     node = module.OmnidynNode()
-    (period, tick), = bus.timers  # fmt: skip
+    ((period, tick),) = bus.timers
     assert period == DT
     kind, command = bus.heard["cmd_vel"]
     assert kind.__name__ == ("TwistStamped" if stamped else "Twist")

@@ -37,8 +37,12 @@ def test_a_gyroscope_in_degrees_beside_wheels_alone():
     assert above_notes(check(log, ROBOT)) == [("unit", "omega")]
     # Where the wheels were read in deg/s, and the gyroscope was right, these are blamed.
     columns = {"omega": Column("gz", "rad/s"), **{f"w{k}": Column(f"w{k}", "deg/s") for k in (1, 2, 3)}}
-    wrong = recorded(twist=lambda twist: twist * [np.nan, np.nan, 1.0], pose=None, twist_command=None,
-                     wheel_speed=lambda speed: speed * DEGREES)  # fmt: skip
+    wrong = recorded(
+        twist=lambda twist: twist * [np.nan, np.nan, 1.0],
+        pose=None,
+        twist_command=None,
+        wheel_speed=lambda speed: speed * DEGREES,
+    )
     wrong = replace(wrong, columns=ColumnMap({**columns, "w1": Column("w1", "rad/s")}))
     assert above_notes(check(wrong, ROBOT)) == [("unit", "w1 w2 w3")]
 

@@ -22,8 +22,9 @@ def test_noise_in_both_channels_does_not_pull_a_slope_down():
     assert line.error < 0.1
 
 
-@pytest.mark.parametrize("factor, unit", [(60.0 / (2.0 * np.pi), "rpm"), (180.0 / np.pi, "deg/s"),
-                                          (19.0, "rad/s@motor")])  # fmt: skip
+@pytest.mark.parametrize(
+    "factor, unit", [(60.0 / (2.0 * np.pi), "rpm"), (180.0 / np.pi, "deg/s"), (19.0, "rad/s@motor")]
+)
 @pytest.mark.parametrize("without", [(), ("twist", "pose"), ("current", "voltage"), ("twist", "pose", "current")])
 def test_a_wrong_unit_of_speed(log, robot, with_channels, grave, factor, unit, without):
     broken = with_channels(wheel_speed=factor * log.channels["wheel_speed"], **dict.fromkeys(without))

@@ -49,8 +49,10 @@ def test_the_residue_of_a_filter_is_not_stuck():
 def test_an_encoder_that_reads_a_residue_reads_zero(log, robot, with_channels):
     step = 0.5 * float(np.quantile(np.abs(log.channels["wheel_speed"]), 0.5))
     speed = step * np.trunc(log.channels["wheel_speed"] / step)
-    found = [check(replace(log, channels={**log.channels, "wheel_speed": each}), robot).of("reads_zero")
-             for each in (speed, np.where(speed == 0.0, 1e-12, speed))]  # fmt: skip
+    found = [
+        check(replace(log, channels={**log.channels, "wheel_speed": each}), robot).of("reads_zero")
+        for each in (speed, np.where(speed == 0.0, 1e-12, speed))
+    ]
     assert [each.numbers for each in found[0]] == [each.numbers for each in found[1]]
 
 

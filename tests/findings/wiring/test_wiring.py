@@ -13,8 +13,14 @@ from tests.findings.redundant import ROBOT, recorded
 from tests.support.pushed_logs import clean_log
 from tests.support.random_logs import clean
 
-SOME = [((1, 0, 2), (1, 1, 1)), ((0, 2, 1), (1, 1, 1)), ((2, 0, 1), (1, 1, 1)), ((0, 1, 2), (1, -1, 1)),
-        ((0, 1, 2), (-1, -1, 1)), ((2, 1, 0), (1, 1, -1))]  # fmt: skip
+SOME = [
+    ((1, 0, 2), (1, 1, 1)),
+    ((0, 2, 1), (1, 1, 1)),
+    ((2, 0, 1), (1, 1, 1)),
+    ((0, 1, 2), (1, -1, 1)),
+    ((0, 1, 2), (-1, -1, 1)),
+    ((2, 1, 0), (1, 1, -1)),
+]
 
 
 def names_of(order, sign, letter="w"):
@@ -128,8 +134,9 @@ def test_two_wheels_exchanged_or_one_turned_about_in_rpm_are_both_said(seed, ord
 
 def test_a_gyroscope_beside_a_pose_hides_no_exchanged_wheels():
     """The pose tells all three axes; a gyroscope alone cannot tell wheels apart that turn the robot alike."""
-    log = recorded(twist=lambda twist: np.column_stack([np.full((len(twist), 2), np.nan), twist[:, 2]]),
-                   twist_command=None)  # fmt: skip
+    log = recorded(
+        twist=lambda twist: np.column_stack([np.full((len(twist), 2), np.nan), twist[:, 2]]), twist_command=None
+    )
     verdict = check(log, ROBOT)
     assert not verdict.has_errors
     assert verdict.excitation["x"] == pytest.approx(0.3, abs=0.1)

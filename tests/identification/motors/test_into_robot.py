@@ -47,10 +47,12 @@ def log(kind="voltage", seed=0, motors=TRUE, noise=0.02, hold=40, **how):
     speed, current = np.stack([wheel(u, *own, **how) for u, own in zip(voltage.T, motors, strict=True)], axis=-1)
     put_in = {"duty": {"duty": voltage / 12.0}, "current": {"current": current, "voltage": voltage}}
     return Run(
-        t=DT * np.arange(ROWS), **put_in.get(kind, {kind: voltage}),
+        t=DT * np.arange(ROWS),
+        **put_in.get(kind, {kind: voltage}),
         wheel_speed=speed + noise * rng.standard_normal(speed.shape),
-        supply=np.full(ROWS, 12.0) if kind == "duty" else None, source="bench.csv",
-    )  # fmt: skip
+        supply=np.full(ROWS, 12.0) if kind == "duty" else None,
+        source="bench.csv",
+    )
 
 
 def tied():

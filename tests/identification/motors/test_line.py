@@ -136,9 +136,10 @@ def test_duty_is_in_percent():
 def test_several_motors_have_a_line_each_and_one_together():
     one, other = bench(0.2, 0), bench(0.6, 1)
     both = Run(
-        t=one.t, voltage=np.hstack([one.voltage, other.voltage]),
+        t=one.t,
+        voltage=np.hstack([one.voltage, other.voltage]),
         wheel_angle=np.hstack([one.wheel_angle, other.wheel_angle]),
-    )  # fmt: skip
+    )
     lines = {line.motor: line for line in identify([both], None, MotorLine()).motors}
     assert lines[0].value["dead_band"] == pytest.approx(0.2, abs=0.05)
     assert lines[1].value["dead_band"] == pytest.approx(0.6, abs=0.05)

@@ -63,9 +63,7 @@ def test_a_sweep_of_a_row_a_second_tells_all(how):
 
 def test_whole_logs_of_a_row_a_second_have_the_same_starts():
     study = identify([slow_log()], None, MotorFit(between="hold", nuisances="none")).study
-    assert [each.ci95["start"] for each in study.starts] == [
-        pytest.approx((hold, hold + 2.0)) for hold in HOLD
-    ]  # fmt: skip
+    assert [each.ci95["start"] for each in study.starts] == [pytest.approx((hold, hold + 2.0)) for hold in HOLD]
 
 
 def test_a_table_has_the_largest_input_at_rest_and_the_smallest_that_moves():

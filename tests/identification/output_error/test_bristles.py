@@ -23,31 +23,43 @@ def dahl(viscous=0.94, coulomb=2.2, stiffness=2e3, exponent=1.0):
     return AXEBOT.replace(
         friction=Friction(
             axes=AxesFriction(
-                law="dahl", viscous=(viscous, 0.96, 0.01), coulomb=(coulomb, 1.5, 0.099),
-                stiffness=(stiffness, 1e3, 50.0), dahl_exponent=exponent,
+                law="dahl",
+                viscous=(viscous, 0.96, 0.01),
+                coulomb=(coulomb, 1.5, 0.099),
+                stiffness=(stiffness, 1e3, 50.0),
+                dahl_exponent=exponent,
             )
         )
-    )  # fmt: skip
+    )
 
 
 def lugre(viscous=0.94, coulomb=2.2, breakaway=2.8, speed=0.05, stiffness=2e3, damping: float | None = 80.0):
     return AXEBOT.replace(
         friction=Friction(
             axes=AxesFriction(
-                law="lugre", viscous=(viscous, 0.96, 0.01), coulomb=(coulomb, 1.5, 0.099),
-                breakaway=(breakaway, 1.9, 0.13), stribeck_speed=(speed, 0.05, 0.4),
-                stiffness=(stiffness, 1e3, 50.0), damping=None if damping is None else (damping, 60.0, 1.0),
+                law="lugre",
+                viscous=(viscous, 0.96, 0.01),
+                coulomb=(coulomb, 1.5, 0.099),
+                breakaway=(breakaway, 1.9, 0.13),
+                stribeck_speed=(speed, 0.05, 0.4),
+                stiffness=(stiffness, 1e3, 50.0),
+                damping=None if damping is None else (damping, 60.0, 1.0),
             )
         )
-    )  # fmt: skip
+    )
 
 
 DIRECTED = Friction(
     direction=DirectionFriction(
-        law="lugre", coulomb=(2.0, 1.6), breakaway=(2.6, 2.1), stribeck_speed=0.05, stiffness=2e3, damping=60.0,
+        law="lugre",
+        coulomb=(2.0, 1.6),
+        breakaway=(2.6, 2.1),
+        stribeck_speed=0.05,
+        stiffness=2e3,
+        damping=60.0,
         viscous=0.9,
     )
-)  # fmt: skip
+)
 ROLLING = Friction(
     wheels=WheelFriction(
         law="lugre", coulomb=0.7, breakaway=1.0, stribeck_speed=0.05, stiffness=1e3, damping=30.0, viscous=0.3
@@ -62,12 +74,19 @@ OF_TABLE = ("breakaway", "stribeck_speed", "stiffness", "damping")
         (lugre(), (*OF_LUGRE, "body.mass_kg")),
         (lugre(damping=None, stiffness=1e5), (OF_LUGRE[1], OF_LUGRE[2])),
         (dahl(exponent=1.5), (*OF_DAHL, f"{AXES}stiffness[2]")),
-        (AXEBOT.replace(friction=DIRECTED), ("friction.direction.coulomb[0]", "friction.direction.breakaway[1]",
-                                             "friction.direction.stiffness", "friction.direction.damping")),
+        (
+            AXEBOT.replace(friction=DIRECTED),
+            (
+                "friction.direction.coulomb[0]",
+                "friction.direction.breakaway[1]",
+                "friction.direction.stiffness",
+                "friction.direction.damping",
+            ),
+        ),
         (AXEBOT.replace(friction=ROLLING), tuple(f"friction.wheels.{name}" for name in OF_TABLE)),
     ],
     ids=["lugre", "critical", "dahl", "direction", "wheels"],
-)  # fmt: skip
+)
 def test_derivatives_are_differences_of_the_differential_equation(robot, keys):
     """How far things are bent goes along: within what `derivatives` promises."""
     levels = np.random.default_rng(0).uniform(-3.0, 3.0, (6, 3)) * [[1.0], [0.3], [1.0], [0.5], [1.0], [0.2]]

@@ -74,7 +74,9 @@ def test_a_paper_robot_whose_centre_is_free_leaves_the_exact_engine(log):
     random = np.random.default_rng(0)
     noisy = run.replace(
         wheel_speed=run.wheel_speed + random.normal(0.0, 0.1, run.wheel_speed.shape),
-        twist=None, pose=None, current=None,
-    )  # fmt: skip
+        twist=None,
+        pose=None,
+        current=None,
+    )
     fit = omnidyn.identify([noisy], AXEBOT, omnidyn.OutputError(free=["friction", "body.centre_m"])).estimate
     check(fit, CENTRE, BESIDE)

@@ -37,11 +37,15 @@ def test_a_number_of_one_wheel_is_found_from_equal_motors(axebot, log, share):
 @pytest.mark.parametrize(
     "keys, exact",
     [
-        (BOX, True), (("body.mass_kg", "motor.torque_constant_Nm_A"), True), (("wheels.robot_radius_m",), True),
-        ((RESISTANCE,), False), (("motor.gear_ratio[1]",), False), (("wheels.wheel_radius_m[2]",), False),
+        (BOX, True),
+        (("body.mass_kg", "motor.torque_constant_Nm_A"), True),
+        (("wheels.robot_radius_m",), True),
+        ((RESISTANCE,), False),
+        (("motor.gear_ratio[1]",), False),
+        (("wheels.wheel_radius_m[2]",), False),
         (("friction.direction.coulomb[0]",), False),
     ],
-)  # fmt: skip
+)
 def test_which_keys_the_exact_engine_can_follow(axebot, keys, exact):
     assert is_exact(axebot)
     assert stays_exact(axebot, keys) == exact

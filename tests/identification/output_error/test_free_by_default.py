@@ -20,9 +20,12 @@ from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation
 
 DIRECTION = (
-    "friction.direction.coulomb[0]", "friction.direction.coulomb[1]", "friction.direction.viscous",
-    "friction.direction.yaw_coulomb", "friction.direction.yaw_viscous",
-)  # fmt: skip
+    "friction.direction.coulomb[0]",
+    "friction.direction.coulomb[1]",
+    "friction.direction.viscous",
+    "friction.direction.yaw_coulomb",
+    "friction.direction.yaw_viscous",
+)
 RESISTANCE = "motor.resistance_ohm"
 GUESSES = ("body.inertia_kg_m2", RESISTANCE, "motor.torque_constant_Nm_A", "motor.gear_ratio")
 VISCOUS = (DIRECTION[2], DIRECTION[4])

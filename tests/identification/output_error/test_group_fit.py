@@ -17,8 +17,11 @@ from tests.support.axebot_logs import excitation, noisy_draw
 
 AXEBOT = load_robot("axebot")
 TORQUE, EMF, COULOMB, MASS = (
-    "motor.torque_constant_Nm_A", "motor.emf_constant_Vs_rad", "friction.axes.coulomb[0]", "body.mass_kg",
-)  # fmt: skip
+    "motor.torque_constant_Nm_A",
+    "motor.emf_constant_Vs_rad",
+    "friction.axes.coulomb[0]",
+    "body.mass_kg",
+)
 MAGNET, ROUGH = 0.0062, 2.6
 FREE = ["friction", TORQUE]
 

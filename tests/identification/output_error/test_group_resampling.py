@@ -134,8 +134,9 @@ def test_logs_with_other_channels_in_another_order():
     engine = join(groups, [group.problem() for group in groups], BOX)
     problem = engine.problem
     order = [3, 0, 2, 1]
-    other = engine.on(type(problem)(problem.robot, problem.parameters, problem.robot_count,
-                                    tuple(problem.pieces[k] for k in order)))  # fmt: skip
+    other = engine.on(
+        type(problem)(problem.robot, problem.parameters, problem.robot_count, tuple(problem.pieces[k] for k in order))
+    )
     point = problem.start()
     moved = type(point)(point.values, tuple(point.states[k] for k in order))
     first = engine.sums(point, Weighting(np.ones(len(problem.columns))))

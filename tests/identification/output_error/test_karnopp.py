@@ -57,9 +57,16 @@ def test_so_it_is_elsewhere(place):
         keys = (f"{table}.coulomb", f"{table}.viscous")
     else:
         law = DirectionFriction(
-            coulomb=(2.2, 1.5), breakaway=(2.8, 1.9), viscous=0.95, yaw_coulomb=0.099, yaw_breakaway=0.13,
-            yaw_viscous=0.01, law="karnopp", karnopp_speed=1e-3, yaw_karnopp_speed=1e-2,
-        )  # fmt: skip
+            coulomb=(2.2, 1.5),
+            breakaway=(2.8, 1.9),
+            viscous=0.95,
+            yaw_coulomb=0.099,
+            yaw_breakaway=0.13,
+            yaw_viscous=0.01,
+            law="karnopp",
+            karnopp_speed=1e-3,
+            yaw_karnopp_speed=1e-2,
+        )
         keys = (f"{table}.coulomb[0]", f"{table}.viscous")
     robot = AXEBOT.replace(friction=Friction(**{place: law}))
     pushes = np.repeat([1.5, -2.5, 3.5, 0.0, -4.0, 3.0], 10)

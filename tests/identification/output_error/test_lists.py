@@ -57,8 +57,9 @@ def test_the_emf_constant_follows_wheel_by_wheel(axebot):
     assert also_of(axebot, TORQUE) == {TORQUE: {EMF: 1.0}}
     assert also_of(axebot, f"{TORQUE}[1]") == {f"{TORQUE}[1]": {f"{EMF}[1]": 1.0}}
     assert also_of(each, f"{TORQUE}[1]", f"{TORQUE}[2]") == {
-        f"{TORQUE}[1]": {f"{EMF}[1]": 2.0}, f"{TORQUE}[2]": {f"{EMF}[2]": 0.5},
-    }  # fmt: skip
+        f"{TORQUE}[1]": {f"{EMF}[1]": 2.0},
+        f"{TORQUE}[2]": {f"{EMF}[2]": 0.5},
+    }
     one = with_motor(axebot, emf_constant=(k, 2.0 * k, k))
     assert also_of(one, TORQUE) == {TORQUE: {f"{EMF}[0]": 1.0, f"{EMF}[1]": 2.0, f"{EMF}[2]": 1.0}}
 

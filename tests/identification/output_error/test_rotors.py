@@ -30,11 +30,15 @@ def heavy(friction, rotor=J):
         body=Body(mass=6.2, inertia=0.14, rotating_frame=friction is DISC),
         wheels=Wheels(azimuth_deg=(45.0, 135.0, 225.0, 315.0), robot_radius=0.18, wheel_radius=0.05),
         motor=Motor(
-            resistance=2.0, torque_constant=0.012, emf_constant=0.012, gear_ratio=30.0, voltage_limit=12.0,
+            resistance=2.0,
+            torque_constant=0.012,
+            emf_constant=0.012,
+            gear_ratio=30.0,
+            voltage_limit=12.0,
             rotor_inertia=rotor,
         ),
         friction=friction,
-    )  # fmt: skip
+    )
 
 
 def log_of(robot, seed=1):
@@ -46,9 +50,11 @@ def log_of(robot, seed=1):
     voltage = np.array(rows[: round(SECONDS / DT)])
     twist = np.vstack([np.zeros(3), stepped(plant_of(robot), voltage, DT, 1e-4)[0]])
     return Run(
-        t=np.arange(len(voltage) + 1) * DT, voltage=np.vstack([voltage, voltage[-1:]]),
-        twist=twist + rng.normal(size=twist.shape) * NOISE, source="stepper",
-    )  # fmt: skip
+        t=np.arange(len(voltage) + 1) * DT,
+        voltage=np.vstack([voltage, voltage[-1:]]),
+        twist=twist + rng.normal(size=twist.shape) * NOISE,
+        source="stepper",
+    )
 
 
 LOGS = {}

@@ -41,17 +41,16 @@ def log(seed, seconds, noisy=True, robot=ROBOT):
     noise = {name: noisy * NOISE[name] * rng.normal(size=each.shape) for name, each in seen.items()}
     rows = min(len(each) for each in seen.values())
     return Run(
-        t=np.arange(rows) * DT, voltage=np.concatenate([voltage, voltage[-1:]])[:rows],
+        t=np.arange(rows) * DT,
+        voltage=np.concatenate([voltage, voltage[-1:]])[:rows],
         **{name: (each + noise[name])[:rows] for name, each in seen.items()},
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="module")
 def fit():
     axes = ROBOT.friction.axes.replace(coulomb=(3.0, 2.0, 0.13), viscous=(1.3, 0.7, 0.014))
-    guess = ROBOT.replace(
-        wheels=ROBOT.wheels.replace(traction_mu=0.45), friction=ROBOT.friction.replace(axes=axes)
-    )  # fmt: skip
+    guess = ROBOT.replace(wheels=ROBOT.wheels.replace(traction_mu=0.45), friction=ROBOT.friction.replace(axes=axes))
     return identify(
         log(1, 6.0),
         guess,

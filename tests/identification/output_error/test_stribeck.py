@@ -26,9 +26,11 @@ HELD = KEYS[2]
 
 def robot_with(viscous=0.94, coulomb=2.2, breakaway=2.8, speed=0.05):
     axes = AxesFriction(
-        viscous=(viscous, 0.96, 0.01), coulomb=(coulomb, 1.5, 0.099), breakaway=(breakaway, 1.9, 0.13),
+        viscous=(viscous, 0.96, 0.01),
+        coulomb=(coulomb, 1.5, 0.099),
+        breakaway=(breakaway, 1.9, 0.13),
         stribeck_speed=(speed, 0.05, 0.4),
-    )  # fmt: skip
+    )
     return AXEBOT.replace(friction=Friction(axes=axes))
 
 
@@ -64,7 +66,7 @@ ROLLING = Friction(wheels=WheelFriction(coulomb=0.7, breakaway=1.0, stribeck_spe
         (AXEBOT.replace(friction=ROLLING), ("friction.wheels.breakaway", "friction.wheels.stribeck_speed")),
     ],
     ids=["axes", "direction", "wheels"],
-)  # fmt: skip
+)
 def test_derivatives_are_differences_of_an_integrator_that_shares_nothing(robot, keys):
     """Within what `derivatives` promises after a release."""
     found = derivatives(robot, ramps()[:60], 0.02, keys, tol=1e-7)
@@ -148,8 +150,11 @@ def test_without_a_fall_there_is_no_stribeck_speed(seed):
 
 def test_a_breakaway_that_only_holds_is_within_what_held():
     """It falls within less than the log shows: the speed is no estimate, the level is between the drives of the log."""
-    holds = AXEBOT.replace(friction=Friction(axes=AxesFriction(
-        viscous=(0.94, 0.96, 0.01), coulomb=(2.2, 1.5, 0.099), breakaway=(2.8, 1.5, 0.099))))  # fmt: skip
+    holds = AXEBOT.replace(
+        friction=Friction(
+            axes=AxesFriction(viscous=(0.94, 0.96, 0.01), coulomb=(2.2, 1.5, 0.099), breakaway=(2.8, 1.5, 0.099))
+        )
+    )
     fit = omnidyn.identify(
         [log_of(reference(holds, ramps(), 0.02), 2)], robot_with(1.2, 2.0, 2.5, 0.03), omnidyn.OutputError(free=KEYS)
     ).estimate

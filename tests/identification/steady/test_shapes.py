@@ -15,11 +15,21 @@ def points_at(robot, twists):
     twists, n = np.asarray(twists, dtype=float), len(twists)
     zero = np.zeros((n, 3))
     return ForcePoints(
-        twist=twists, traction=np.zeros((n, robot.wheels.count)), wrench=zero, wrench_std=zero, still=np.full(n, 1e-9),
-            travels=np.hypot(twists[:, 0], twists[:, 1]) > 1e-9, turns=np.abs(twists[:, 2]) > 1e-9,
-        direction=np.degrees(np.arctan2(twists[:, 1], twists[:, 0])), group=("all",) * n, run=np.arange(n),
-        rows=np.ones(n, dtype=np.int64), span=np.zeros((n, 2)), speed_from="set", force_from="current",
-    )  # fmt: skip
+        twist=twists,
+        traction=np.zeros((n, robot.wheels.count)),
+        wrench=zero,
+        wrench_std=zero,
+        still=np.full(n, 1e-9),
+        travels=np.hypot(twists[:, 0], twists[:, 1]) > 1e-9,
+        turns=np.abs(twists[:, 2]) > 1e-9,
+        direction=np.degrees(np.arctan2(twists[:, 1], twists[:, 0])),
+        group=("all",) * n,
+        run=np.arange(n),
+        rows=np.ones(n, dtype=np.int64),
+        span=np.zeros((n, 2)),
+        speed_from="set",
+        force_from="current",
+    )
 
 
 def some_twists():

@@ -23,10 +23,17 @@ def mecanum(**friction):
     motor, wheels = MECANUM.motor, MECANUM.wheels
     per_meter = motor.gear_ratio / wheels.wheel_radius
     world = World(
-        azimuth=wheels.azimuth_deg, roller=wheels.roller_angle_deg, arm=wheels.robot_radius, radius=wheels.wheel_radius,
-        mass=MECANUM.body.mass, inertia=MECANUM.body.inertia, per_ampere=motor.torque_constant * per_meter,
-        ohm=motor.resistance, emf=motor.emf_constant * per_meter, **friction,
-    )  # fmt: skip
+        azimuth=wheels.azimuth_deg,
+        roller=wheels.roller_angle_deg,
+        arm=wheels.robot_radius,
+        radius=wheels.wheel_radius,
+        mass=MECANUM.body.mass,
+        inertia=MECANUM.body.inertia,
+        per_ampere=motor.torque_constant * per_meter,
+        ohm=motor.resistance,
+        emf=motor.emf_constant * per_meter,
+        **friction,
+    )
     np.testing.assert_allclose(world.push, wheels.wrench_matrix, atol=1e-12)
     return world
 
@@ -94,8 +101,13 @@ def heavy_runs(random, noise=0.3):
     runs = []
     for _, (t, _, current, speed) in steady_logs(world, fan((0.15, 0.5)), 3.0):
         rows = (len(t), 3)
-        runs.append(Run(t=t, current=current + 0.05 * random.standard_normal(rows),
-                        wheel_speed=speed + noise * random.standard_normal(rows)))  # fmt: skip
+        runs.append(
+            Run(
+                t=t,
+                current=current + 0.05 * random.standard_normal(rows),
+                wheel_speed=speed + noise * random.standard_normal(rows),
+            )
+        )
     return runs
 
 
@@ -136,9 +148,13 @@ def viscous_runs():
     for twist, (t, _, current, speed) in steady_logs(world, fan((0.15, 0.5))):
         rows = (len(t), 3)
         runs.append(
-            Run(t=t, current=current + 0.05 * random.standard_normal(rows), wheel_speed=speed
-                + 0.1 * random.standard_normal(rows), voltage=np.tile(world.voltage(twist), (len(t), 1)))
-        )  # fmt: skip
+            Run(
+                t=t,
+                current=current + 0.05 * random.standard_normal(rows),
+                wheel_speed=speed + 0.1 * random.standard_normal(rows),
+                voltage=np.tile(world.voltage(twist), (len(t), 1)),
+            )
+        )
     return runs
 
 

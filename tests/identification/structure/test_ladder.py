@@ -204,14 +204,21 @@ def test_remedies_that_are_worth_a_fit():
 
     class Lack:
         remedies = (
-            remedy("sag", offered=False), remedy("gain", "motor.resistance_ohm"), remedy("fade", "heat"),
-            remedy("change"), remedy("body.mass_kg"), remedy("body.inertia_kg_m2"),
+            remedy("sag", offered=False),
+            remedy("gain", "motor.resistance_ohm"),
+            remedy("fade", "heat"),
+            remedy("change"),
+            remedy("body.mass_kg"),
+            remedy("body.inertia_kg_m2"),
             remedy("motor.resistance_ohm", "gain"),
-        )  # fmt: skip
+        )
 
     assert [each.key for each in offered(Lack)] == [
-        "gain", "body.mass_kg", "body.inertia_kg_m2", "motor.resistance_ohm"
-    ]  # fmt: skip
+        "gain",
+        "body.mass_kg",
+        "body.inertia_kg_m2",
+        "motor.resistance_ohm",
+    ]
 
 
 def test_the_page_and_the_values_for_machines_have_every_model_that_was_fitted(turning):

@@ -96,7 +96,7 @@ def test_breakaway_is_offered_where_friction_holds_no_more_than_it_slides_with()
         (Friction(wheels=ROLLING.replace(coulomb_backward=0.3)), {WHEELS: ("stribeck_speed",)}),
         (Friction(wheels=ROLLING.replace(law="elastoplastic", stiffness=1e3)), {WHEELS: ("stribeck_speed",)}),
     ],
-)  # fmt: skip
+)
 def test_a_table_may_take_the_laws_that_it_has_not_where_it_has_coulomb_friction(friction, expected):
     assert other_laws(friction) == [f"{table}.{name}" for table, names in expected.items() for name in names]
 

@@ -12,10 +12,13 @@ from tests.support.laws_in_place import DIRECTION, NAMED, NOISE, WHEELS, climbed
 @pytest.mark.parametrize(
     ("place", "law", "seed"),
     [
-        (DIRECTION, "Dahl", 1), (DIRECTION, "LuGre", 0),
-        (WHEELS, "Dahl", 0), (WHEELS, "LuGre", 1), (WHEELS, "Stribeck", 0),
+        (DIRECTION, "Dahl", 1),
+        (DIRECTION, "LuGre", 0),
+        (WHEELS, "Dahl", 0),
+        (WHEELS, "LuGre", 1),
+        (WHEELS, "Stribeck", 0),
     ],
-)  # fmt: skip
+)
 def test_a_law_is_taken_in_its_place(place, law, seed):
     """In one step, with every number of its own, behind which there is nothing but noise."""
     found = climbed(place, law, seed, NOISE[place, law])

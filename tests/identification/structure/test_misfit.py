@@ -178,12 +178,16 @@ def test_a_force_in_the_room_is_called_one():
 
 
 @pytest.mark.parametrize(
-    ("kind", "key"), [
-        ("mass", "body.mass_kg"), ("gear loss", "motor.gear_efficiency"), ("turning frame", "body.rotating_frame"),
-        ("wheel radius", "wheels.wheel_radius_m"), ("payload", "change"),
+    ("kind", "key"),
+    [
+        ("mass", "body.mass_kg"),
+        ("gear loss", "motor.gear_efficiency"),
+        ("turning frame", "body.rotating_frame"),
+        ("wheel radius", "wheels.wheel_radius_m"),
+        ("payload", "change"),
         ("off centre", "body.centre_m"),
     ],
-)  # fmt: skip
+)
 def test_the_cause_is_named_first(kind, key):
     found = lack(kind)
     best = found.remedies[0]

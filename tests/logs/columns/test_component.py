@@ -18,9 +18,22 @@ def taken(columns):
 
 
 SENSORS = [
-    "encoder_V", "ntc_V", "pot_V", "hall_V", "hall_A", "encoder_A", "adc_V", "potentiometer_voltage_V", "Hall_Voltage",
-    "thermistor_volts", "ENCODER_V", "encoderVoltage", "ntc1_V", "hall_1_mV", "sync_V",
-]  # fmt: skip
+    "encoder_V",
+    "ntc_V",
+    "pot_V",
+    "hall_V",
+    "hall_A",
+    "encoder_A",
+    "adc_V",
+    "potentiometer_voltage_V",
+    "Hall_Voltage",
+    "thermistor_volts",
+    "ENCODER_V",
+    "encoderVoltage",
+    "ntc1_V",
+    "hall_1_mV",
+    "sync_V",
+]
 
 
 @pytest.mark.parametrize("name", SENSORS)
@@ -110,9 +123,13 @@ def test_inches_are_a_place_and_what_goes_in_is_none(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "units"),
-    [("u1_V", "`assume` u=duty/255"), ("d1_duty", "`assume` d=duty/255"), ("pwm1", "`assume` d=duty/255"),
-     ("duty_1_%", "`assume` d=duty/255")],
-)  # fmt: skip
+    [
+        ("u1_V", "`assume` u=duty/255"),
+        ("d1_duty", "`assume` d=duty/255"),
+        ("pwm1", "`assume` d=duty/255"),
+        ("duty_1_%", "`assume` d=duty/255"),
+    ],
+)
 def test_numbers_that_cannot_be_what_they_are_called_are_asked_about(tmp_path, name, units):
     values = np.round(np.linspace(-230.0, 230.0, ROWS))
     columns = guessed(tmp_path, {name: values})

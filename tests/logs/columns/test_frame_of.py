@@ -37,10 +37,14 @@ def test_a_sensor_and_a_marker_at_an_angle(spinning):
 
 
 def test_a_map_keeps_the_frame(spinning, tmp_path):
-    columns = ColumnMap({
-        "t": Column("t_s", "s"), "heading": Column("heading_rad", "rad", frame="12 deg"),
-        "vx": Column("vx_m_s", "m/s", frame="room"), "vy": Column("vy_m_s", "m/s", frame="room"),
-    })  # fmt: skip
+    columns = ColumnMap(
+        {
+            "t": Column("t_s", "s"),
+            "heading": Column("heading_rad", "rad", frame="12 deg"),
+            "vx": Column("vx_m_s", "m/s", frame="room"),
+            "vy": Column("vy_m_s", "m/s", frame="room"),
+        }
+    )
     again = load_map(save_map(columns, tmp_path / "map.toml"))
     assert again == columns
     # The marker is 12 deg ahead of the robot: so much less it is turned.
@@ -48,8 +52,14 @@ def test_a_map_keeps_the_frame(spinning, tmp_path):
     assert np.degrees(np.arctan2(run.twist[0, 1], run.twist[0, 0])) == pytest.approx(12.0)
 
 
-@pytest.mark.parametrize("assume, words", [({"twist": "moon"}, "not a frame"), ({"twist": "3 m"}, "not a frame"),
-                                           ({"twist_command": "room"}, "no column has this frame")])  # fmt: skip
+@pytest.mark.parametrize(
+    "assume, words",
+    [
+        ({"twist": "moon"}, "not a frame"),
+        ({"twist": "3 m"}, "not a frame"),
+        ({"twist_command": "room"}, "no column has this frame"),
+    ],
+)
 def test_what_is_no_frame_is_refused(spinning, assume, words):
     with pytest.raises(InputError, match=words):
         read_log(spinning, assume=assume)

@@ -39,16 +39,38 @@ def found(columns):
 @pytest.mark.parametrize(
     ("name", "component"),
     [
-        ("u1_V", "u1"), ("w2_cmd_rad_s", "w2_cmd"), ("vx_cmd_m_s", "vx_cmd"), ("heading_rad", "heading"),
-        ("supply_V", "supply"), ("a3_rad", "a3"), ("d1_duty", "d1"), ("motor_1_volts", "u1"), ("motor1_rpm", "w1"),
-        ("Motor2Current_mA", "i2"), ("wheelSpeed3_rad_s", "w3"), ("vbx_sp_m_s", "vx_cmd"), ("wb_sp_rad_s", "omega_cmd"),
-        ("cmd_vel_x_m_s", "vx_cmd"), ("yaw_rate_deg_s", "omega"), ("gyro_z_deg_s", "omega"),
+        ("u1_V", "u1"),
+        ("w2_cmd_rad_s", "w2_cmd"),
+        ("vx_cmd_m_s", "vx_cmd"),
+        ("heading_rad", "heading"),
+        ("supply_V", "supply"),
+        ("a3_rad", "a3"),
+        ("d1_duty", "d1"),
+        ("motor_1_volts", "u1"),
+        ("motor1_rpm", "w1"),
+        ("Motor2Current_mA", "i2"),
+        ("wheelSpeed3_rad_s", "w3"),
+        ("vbx_sp_m_s", "vx_cmd"),
+        ("wb_sp_rad_s", "omega_cmd"),
+        ("cmd_vel_x_m_s", "vx_cmd"),
+        ("yaw_rate_deg_s", "omega"),
+        ("gyro_z_deg_s", "omega"),
         ("battery_voltage_V", "supply"),
-        ("rpm1", "w1"), ("RPM_1", "w1"), ("motor2Rpm", "w2"), ("wheelrpm3", "w3"), ("rpm_1_filtered", "w1"),
-        ("current_mA_1", "i1"), ("gyro_dps_z", "omega"), ("V1_V", "u1"), ("field.motor1.voltage_V", "u1"),
-        ("phi_deg", "heading"), ("v_n_m_s", "vy"), ("x_mm", "x"), ("pwm1_duty", "d1"),
+        ("rpm1", "w1"),
+        ("RPM_1", "w1"),
+        ("motor2Rpm", "w2"),
+        ("wheelrpm3", "w3"),
+        ("rpm_1_filtered", "w1"),
+        ("current_mA_1", "i1"),
+        ("gyro_dps_z", "omega"),
+        ("V1_V", "u1"),
+        ("field.motor1.voltage_V", "u1"),
+        ("phi_deg", "heading"),
+        ("v_n_m_s", "vy"),
+        ("x_mm", "x"),
+        ("pwm1_duty", "d1"),
     ],
-)  # fmt: skip
+)
 def test_a_column_is_known_by_its_name_and_unit(tmp_path, name, component):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), name: 0.5}))
     assert list(columns.columns) == ["t", component]
@@ -117,8 +139,10 @@ def test_what_no_run_holds_is_left_alone(tmp_path, name):
 def test_a_units_row_gives_the_units(tmp_path):
     table = table_of(tmp_path, {"t": clock(10.0), "w1": 1, "i1": 2}, ["ms", "rpm", "mA"])
     assert found(guess_columns(table)) == {
-        "t": ("t", "ms", "wheel"), "w1": ("w1", "rpm", "wheel"), "i1": ("i1", "mA", "wheel")
-    }  # fmt: skip
+        "t": ("t", "ms", "wheel"),
+        "w1": ("w1", "rpm", "wheel"),
+        "i1": ("i1", "mA", "wheel"),
+    }
 
 
 def test_the_columns_of_the_robotino(tmp_path):
@@ -141,9 +165,15 @@ def test_the_columns_of_the_robotino(tmp_path):
     units = ["ms", "m/s", "m/s", "rad/s", "rad/s", "ticks", "rad/s", "A", "A", "A", "pix", "deg", "mm", "deg"]
     columns = guess_columns(table_of(tmp_path, {name: clock(31.0) if name == "t" else 1.0 for name in names}, units))
     assert {key: column.name for key, column in columns.columns.items()} == {
-        "t": "t", "i1": "m1cur", "heading": "ang", "vx_cmd": "xsetspeed", "vy_cmd": "ysetspeed", "omega_cmd": "setvel",
-        "w1": "m1vel", "w1_cmd": "m1setvel",
-    }  # fmt: skip
+        "t": "t",
+        "i1": "m1cur",
+        "heading": "ang",
+        "vx_cmd": "xsetspeed",
+        "vy_cmd": "ysetspeed",
+        "omega_cmd": "setvel",
+        "w1": "m1vel",
+        "w1_cmd": "m1setvel",
+    }
     assert columns.columns["w1"].side == columns.columns["w1_cmd"].side == "motor"
     doubts = " ".join(said(columns.doubts))
     assert "m1pos looks like a1, but counts per turn are not known" in doubts
@@ -153,10 +183,17 @@ def test_the_columns_of_the_robotino(tmp_path):
 @pytest.mark.parametrize(
     ("name", "unit"),
     [
-        ("rpm1", "rpm"), ("RPM_1", "rpm"), ("motor2Rpm", "rpm"), ("wheelrpm3", "rpm"), ("w1_rpm_filt", "rpm"),
-        ("current_mA_2", "mA"), ("gyro_dps_z", "dps"), ("speed_rad_s_3", "rad/s"), ("yaw_deg_est", "deg"),
+        ("rpm1", "rpm"),
+        ("RPM_1", "rpm"),
+        ("motor2Rpm", "rpm"),
+        ("wheelrpm3", "rpm"),
+        ("w1_rpm_filt", "rpm"),
+        ("current_mA_2", "mA"),
+        ("gyro_dps_z", "dps"),
+        ("speed_rad_s_3", "rad/s"),
+        ("yaw_deg_est", "deg"),
     ],
-)  # fmt: skip
+)
 def test_a_unit_may_stand_anywhere_in_a_name(tmp_path, name, unit):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), name: 0.5})).columns
     assert [column.unit for key, column in columns.items() if key != "t"] == [unit]
@@ -302,9 +339,15 @@ def test_names_of_a_run_file_may_be_counted_from_zero_too(tmp_path):
     names = ["u0_V", "u1_V", "u2_V", "w0_cmd_rad_s", "w1_cmd_rad_s", "w2_cmd_rad_s", "i1_A", "i2_A"]
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), **dict.fromkeys(names, 1)}))
     assert {key: column.name for key, column in columns.columns.items() if key != "t"} == {
-        "u1": "u0_V", "u2": "u1_V", "u3": "u2_V", "i2": "i1_A", "i3": "i2_A",
-        "w1_cmd": "w0_cmd_rad_s", "w2_cmd": "w1_cmd_rad_s", "w3_cmd": "w2_cmd_rad_s",
-    }  # fmt: skip
+        "u1": "u0_V",
+        "u2": "u1_V",
+        "u3": "u2_V",
+        "i2": "i1_A",
+        "i3": "i2_A",
+        "w1_cmd": "w0_cmd_rad_s",
+        "w2_cmd": "w1_cmd_rad_s",
+        "w3_cmd": "w2_cmd_rad_s",
+    }
     assert said(columns.doubts) == ()
 
 
@@ -328,15 +371,21 @@ def test_a_units_row_that_contradicts_a_name_is_still_refused(tmp_path):
 def test_units_in_capitals_are_units(tmp_path):
     columns = guess_columns(table_of(tmp_path, {"T_S": clock(0.01), "W1_RAD_S": 1, "I1_A": 2, "VX_M_S": 1}))
     assert {key: (column.name, column.unit) for key, column in columns.columns.items() if key != "t"} == {
-        "w1": ("W1_RAD_S", "rad/s"), "i1": ("I1_A", "A"), "vx": ("VX_M_S", "m/s")
-    }  # fmt: skip
+        "w1": ("W1_RAD_S", "rad/s"),
+        "i1": ("I1_A", "A"),
+        "vx": ("VX_M_S", "m/s"),
+    }
 
 
 @pytest.mark.parametrize(
     ("yaw", "taken"),
-    [(np.arange(ROWS) * 30.0 % 360.0, ""), ((np.arange(ROWS) * 30.0 + 180.0) % 360.0 - 180.0, ""),
-     (np.arange(ROWS) * 0.5 % 6.28, "rad"), (np.arange(ROWS) * 30.0, "rad")],
-)  # fmt: skip
+    [
+        (np.arange(ROWS) * 30.0 % 360.0, ""),
+        ((np.arange(ROWS) * 30.0 + 180.0) % 360.0 - 180.0, ""),
+        (np.arange(ROWS) * 0.5 % 6.28, "rad"),
+        (np.arange(ROWS) * 30.0, "rad"),
+    ],
+)
 def test_a_heading_that_jumps_by_360_is_not_taken_as_radians(tmp_path, yaw, taken):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), "x_m": 1, "yaw": yaw}))
     assert (columns.columns["heading"].unit if "heading" in columns.columns else "") == taken
@@ -353,8 +402,11 @@ def test_a_log_of_one_motor_needs_no_numbers(tmp_path):
     )
     columns = guess_columns(table)
     assert {key: column.name for key, column in columns.columns.items()} == {
-        "t": "time", "u1": "voltage", "a1": "position", "w1": "velocity"
-    }  # fmt: skip
+        "t": "time",
+        "u1": "voltage",
+        "a1": "position",
+        "w1": "velocity",
+    }
 
 
 def test_two_columns_for_one_component_take_the_first_and_say_so(tmp_path):
@@ -438,8 +490,12 @@ def test_a_bad_map_is_refused_with_its_table(tmp_path, text, words):
 
 def test_the_text_of_a_map_is_stable():
     assert map_to_toml(ColumnMap({"t": Column("a", "s")})).splitlines()[1:] == [
-        "schema = 1", "", "[t]", 'column = "a"', 'unit = "s"'
-    ]  # fmt: skip
+        "schema = 1",
+        "",
+        "[t]",
+        'column = "a"',
+        'unit = "s"',
+    ]
 
 
 @pytest.mark.parametrize("name", ["", " ", "\x00", "ü" * 300, "1" * 50, "_" * 80, "a_b_c_d_e_f_g_h"])

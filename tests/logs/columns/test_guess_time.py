@@ -12,14 +12,30 @@ from tests.support.codes import said
 @pytest.mark.parametrize(
     ("name", "step", "unit"),
     [
-        ("t_now", 0.02, "s"), ("log_t", 0.02, "s"), ("motor_time_ms", 20.0, "ms"), ("Elapsed", 0.02, "s"),
-        ("timestamp_us", 2e4, "us"), ("ros_time", 0.02, "s"), ("uptime", 20.0, "ms"), ("TIME_NOW", 0.02, "s"),
-        ("motorTime", 0.02, "s"), ("log time", 0.02, "s"), ("wheel1_t", 0.02, "s"), ("time since start", 0.02, "s"),
-        ("Zeit", 0.02, "s"), ("elapsed_time_seconds", 0.02, "s"), ("/log/t_now", 0.02, "s"),
-        ("ms", 20.0, "ms"), ("us", 2e4, "us"), ("s", 0.02, "s"), ("seconds", 0.02, "s"), ("loop_ms", 20.0, "ms"),
-        ("aika_ms", 20.0, "ms"), ("runtime", 0.02, "s"),
+        ("t_now", 0.02, "s"),
+        ("log_t", 0.02, "s"),
+        ("motor_time_ms", 20.0, "ms"),
+        ("Elapsed", 0.02, "s"),
+        ("timestamp_us", 2e4, "us"),
+        ("ros_time", 0.02, "s"),
+        ("uptime", 20.0, "ms"),
+        ("TIME_NOW", 0.02, "s"),
+        ("motorTime", 0.02, "s"),
+        ("log time", 0.02, "s"),
+        ("wheel1_t", 0.02, "s"),
+        ("time since start", 0.02, "s"),
+        ("Zeit", 0.02, "s"),
+        ("elapsed_time_seconds", 0.02, "s"),
+        ("/log/t_now", 0.02, "s"),
+        ("ms", 20.0, "ms"),
+        ("us", 2e4, "us"),
+        ("s", 0.02, "s"),
+        ("seconds", 0.02, "s"),
+        ("loop_ms", 20.0, "ms"),
+        ("aika_ms", 20.0, "ms"),
+        ("runtime", 0.02, "s"),
     ],
-)  # fmt: skip
+)
 def test_a_time_may_have_words_about_it(tmp_path, name, step, unit):
     columns = guess_columns(table_of(tmp_path, {name: clock(step), "w1_rad_s": 1.0}))
     assert (columns.columns["t"].name, columns.columns["t"].unit) == (name, unit)
@@ -49,9 +65,15 @@ def test_nanoseconds_since_1970_keep_their_steps(tmp_path):
 
 @pytest.mark.parametrize(
     "head",
-    ["x-axis,1,2\nsecond,Volt,Ampere", "x-axis,1,2\ns,V,A", "TIME,CH1,CH2\ns,V,A",
-     "Time,Channel A,Channel B\n(s),(V),(A)\n", "Time (s),CH1 (V),CH2 (A)", "Zeit,Kanal 1,Kanal 2\n[s],[V],[A]"],
-)  # fmt: skip
+    [
+        "x-axis,1,2\nsecond,Volt,Ampere",
+        "x-axis,1,2\ns,V,A",
+        "TIME,CH1,CH2\ns,V,A",
+        "Time,Channel A,Channel B\n(s),(V),(A)\n",
+        "Time (s),CH1 (V),CH2 (A)",
+        "Zeit,Kanal 1,Kanal 2\n[s],[V],[A]",
+    ],
+)
 def test_the_channels_of_an_oscilloscope_are_no_numbers_of_wheels(tmp_path, head):
     path = tmp_path / "scope.csv"
     rows = [f"{-0.1 + 0.01 * k:+.3E},{6 - k / 10:+.3E},{k / 10:+.3E}" for k in range(60)]

@@ -27,13 +27,28 @@ def mapped(*names, robot=None):
 @pytest.mark.parametrize(
     "name, place",
     [
-        ("front_left_wheel", FL), ("left_front_wheel_velocity", FL), ("fl_vel_rad_s", FL), ("wheelFL_rad_s", FL),
-        ("leftFrontPower", FL), ("FLPower", FL), ("/joint_states/front_left_wheel_joint/velocity", FL),
-        ("frontRight", FR), ("w_rf", FR), ("frspeed", FR), ("rl_rpm", RL), ("back_left_current_A", RL),
-        ("lr_wheel", RL), ("rear_right_wheel_joint", RR), ("back_right_wheel_joint/velocity", RR), ("rr", RR),
-        ("left_wheel", 90.0), ("rear_wheel", 180.0), ("middle_right_speed", -90.0), ("vorne_links_rad_s", FL),
+        ("front_left_wheel", FL),
+        ("left_front_wheel_velocity", FL),
+        ("fl_vel_rad_s", FL),
+        ("wheelFL_rad_s", FL),
+        ("leftFrontPower", FL),
+        ("FLPower", FL),
+        ("/joint_states/front_left_wheel_joint/velocity", FL),
+        ("frontRight", FR),
+        ("w_rf", FR),
+        ("frspeed", FR),
+        ("rl_rpm", RL),
+        ("back_left_current_A", RL),
+        ("lr_wheel", RL),
+        ("rear_right_wheel_joint", RR),
+        ("back_right_wheel_joint/velocity", RR),
+        ("rr", RR),
+        ("left_wheel", 90.0),
+        ("rear_wheel", 180.0),
+        ("middle_right_speed", -90.0),
+        ("vorne_links_rad_s", FL),
     ],
-)  # fmt: skip
+)
 def test_a_place_is_the_angle_at_which_it_stands(name, place):
     assert read_name(name).place == place
     assert read_name(name).number is None
@@ -68,8 +83,11 @@ def test_a_robot_says_which_wheel_stands_at_a_place():
 
 def test_mecanum_wheels_are_told_by_their_rollers():
     assert mapped(*(f"{place}_rad_s" for place in SIX), robot=load_robot("mecanum")) == {
-        "w1": "fl_rad_s", "w2": "fr_rad_s", "w3": "rl_rad_s", "w4": "rr_rad_s",
-    }  # fmt: skip
+        "w1": "fl_rad_s",
+        "w2": "fr_rad_s",
+        "w3": "rl_rad_s",
+        "w4": "rr_rad_s",
+    }
     wheels = load_robot("mecanum").wheels
     turned = wheels.replace(azimuth_deg=wheels.azimuth_deg[::-1], roller_angle_deg=wheels.roller_angle_deg[::-1])
     other = load_robot("mecanum").replace(wheels=turned)

@@ -36,9 +36,7 @@ def test_an_array_of_as_many_places_as_motors_counts_from_0_alone(tmp_path):
 def test_a_sensor_that_is_missing_does_not_move_the_others_of_its_style(tmp_path):
     names = [*(f"motor{k}_voltage_V" for k in range(3)), "motor1_current_A", "motor2_current_A"]
     found, _ = taken(tmp_path, names)
-    assert found == {
-        "u1": names[0], "u2": names[1], "u3": names[2], "i2": "motor1_current_A", "i3": "motor2_current_A"
-    }  # fmt: skip
+    assert found == {"u1": names[0], "u2": names[1], "u3": names[2], "i2": "motor1_current_A", "i3": "motor2_current_A"}
 
 
 def test_commands_and_measurements_are_families_of_their_own(tmp_path):
@@ -50,12 +48,15 @@ def test_commands_and_measurements_are_families_of_their_own(tmp_path):
 @pytest.mark.parametrize(
     ("name", "component", "unit"),
     [
-        ("/motor1/velocity_rad_s/data", "w1", "rad/s"), ("/motor2/current_mA/data[0]", "i2", "mA"),
-        ("/drive/velocity_rpm/wheel_1", "w1", "rpm"), ("/Drive/Motor3/DriveVelocityRadPerSec", "w3", "rad/s"),
-        ("/drive/motor1/appliedVolts", "u1", "volts"), ("/motor1/velocity_rad_s.value", "w1", "rad/s"),
+        ("/motor1/velocity_rad_s/data", "w1", "rad/s"),
+        ("/motor2/current_mA/data[0]", "i2", "mA"),
+        ("/drive/velocity_rpm/wheel_1", "w1", "rpm"),
+        ("/Drive/Motor3/DriveVelocityRadPerSec", "w3", "rad/s"),
+        ("/drive/motor1/appliedVolts", "u1", "volts"),
+        ("/motor1/velocity_rad_s.value", "w1", "rad/s"),
         ("/robot_A/wheel1/speed_rpm", "w1", "rpm"),
     ],
-)  # fmt: skip
+)
 def test_a_unit_in_the_name_of_a_topic_counts(tmp_path, name, component, unit):
     columns = guess_columns(table_of(tmp_path, {"t_s": clock(0.01), name: 1})).columns
     assert [(key, column.name, column.unit) for key, column in columns.items() if key != "t"] == [

@@ -76,14 +76,16 @@ FORMATS = {
     "db3": (db3, 16, {"the bag is damaged or cut short"}, set()),
     "ROS 1": (ros1, 13, CUT, {0, 1, 2, 3}),
     "wpilog": (
-        lambda f: written(f, "a.wpilog", READERS["read_log, wpilog"][0]()[0][:700]), 6,
-        {"the data log is damaged or cut short", *NOTHING}, {None, *range(60)},
+        lambda f: written(f, "a.wpilog", READERS["read_log, wpilog"][0]()[0][:700]),
+        6,
+        {"the data log is damaged or cut short", *NOTHING},
+        {None, *range(60)},
     ),
     "MAT 5": (lambda f: mat(f, "5"), 19, MAT, {None}),
     "MAT 5, packed": (lambda f: mat(f, "packed"), 19, MAT, {None}),
     "MAT 7.3": (lambda f: mat(f, "7.3"), 19, MAT, set()),
     "Parquet": (parquet, 4, {"the Parquet file is damaged or cut short"}, set()),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", list(FORMATS))

@@ -27,12 +27,16 @@ STRIBECK = {
     "axes": of(axes=AxesFriction(**LEVELS, **FALLS)),
     "direction": of(
         direction=DirectionFriction(
-            coulomb=(2.2, 1.8), breakaway=(2.8, 2.0), stribeck_speed=0.03, yaw_coulomb=0.1, yaw_breakaway=0.13,
+            coulomb=(2.2, 1.8),
+            breakaway=(2.8, 2.0),
+            stribeck_speed=0.03,
+            yaw_coulomb=0.1,
+            yaw_breakaway=0.13,
             yaw_stribeck_speed=0.3,
         )
     ),
     "wheels": of(wheels=WheelFriction(coulomb=0.7, breakaway=0.9, stribeck_speed=0.02, stribeck_exponent=1.0)),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("place", STRIBECK)

@@ -24,10 +24,12 @@ from omnidyn.model.stick_slip.plant import plant
 STIFFNESS, DAMPING = 1e4, 80.0
 AXEBOT = load_robot("axebot")
 NEW = {
-    "dahl 0.6": {"law": "dahl", "dahl_exponent": 0.6}, "dahl": {"law": "dahl"},
-    "dahl 1.7": {"law": "dahl", "dahl_exponent": 1.7}, "dahl 3": {"law": "dahl", "dahl_exponent": 3.0},
+    "dahl 0.6": {"law": "dahl", "dahl_exponent": 0.6},
+    "dahl": {"law": "dahl"},
+    "dahl 1.7": {"law": "dahl", "dahl_exponent": 1.7},
+    "dahl 3": {"law": "dahl", "dahl_exponent": 3.0},
     **{f"elastic {b}": {"law": "elastoplastic", "elastic_share": b} for b in (0.0, 0.3, 0.7, 0.95)},
-}  # fmt: skip
+}
 FALLS = {"breakaway": (2.8, 2.8, 0.2), "stribeck_speed": (0.02, 0.02, 0.2)}
 
 

@@ -79,10 +79,12 @@ def test_a_supply_counts_in_the_duty_alone():
 def test_what_it_rests_on_is_named_and_what_it_does_not_is_not():
     robot = AXEBOT.replace(
         priors={
-            R: Prior(std=0.3, origin="guess"), K_T: Prior(origin="guess"),
-            "body.mass_kg": Prior(std=0.5, origin="guess"), C[0]: Prior(std=0.1, origin="identified"),
+            R: Prior(std=0.3, origin="guess"),
+            K_T: Prior(origin="guess"),
+            "body.mass_kg": Prior(std=0.5, origin="guess"),
+            C[0]: Prior(std=0.1, origin="identified"),
         }
-    )  # fmt: skip
+    )
     found = dead_zone(robot)
     assert [each.key for each in found.rests_on] == [R, C[0], K_T]
     assert found.guesses == (R, K_T)

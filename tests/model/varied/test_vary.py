@@ -43,8 +43,11 @@ ROBOT = parse_robot(PLAIN + TABLES)
 def test_the_file_comes_back_to_the_last_bit():
     assert parse_robot(robot_to_toml(ROBOT)) == ROBOT
     assert ROBOT.variations.names == {
-        "payload": ("2kg", "basket"), "floor": ("carpet", "ice"), "tilt": ("ramp", "none"), "battery": ("low",)
-    }  # fmt: skip
+        "payload": ("2kg", "basket"),
+        "floor": ("carpet", "ice"),
+        "tilt": ("ramp", "none"),
+        "battery": ("low",),
+    }
     assert "can be varied by floor: carpet, ice" in ROBOT.document().to_text()
 
 
@@ -150,8 +153,10 @@ def test_a_load_beside_the_middle_is_a_body_of_two_points():
 
 
 def test_loads_that_balance_each_other_are_one_in_the_middle():
-    one = omnidyn.vary_robot(omnidyn.vary_robot(ROBOT, payload=Payload(mass=1.0, offset=(0.05, 0.0))),
-                       payload=Payload(mass=1.0, offset=(-0.05, 0.0)))  # fmt: skip
+    one = omnidyn.vary_robot(
+        omnidyn.vary_robot(ROBOT, payload=Payload(mass=1.0, offset=(0.05, 0.0))),
+        payload=Payload(mass=1.0, offset=(-0.05, 0.0)),
+    )
     both = omnidyn.vary_robot(ROBOT, payload=Payload(mass=2.0, inertia=2.0 * 0.05**2))
     np.testing.assert_allclose(one.body.centre, (0.0, 0.0), atol=1e-17)
     assert one.body.inertia == pytest.approx(both.body.inertia, rel=1e-14)

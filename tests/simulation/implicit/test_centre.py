@@ -26,7 +26,7 @@ from tests.support.mixed_robots import (
     with_centre,
     with_spin,
     with_stribeck,
-)  # fmt: skip
+)
 
 ROWS = 15
 SCALAR = [seed for seed in range(40) if seed % 7 in (0, 2, 3)]  # axes, wheels, both: no ellipse
@@ -219,8 +219,9 @@ def test_on_a_slope_the_centre_of_mass_falls_as_a_stone_and_nothing_turns_it():
     place, velocity = in_the_room(robot, run.twist, run.pose)
     down = 9.81 * np.sin(np.radians(3.0)) * np.array([np.cos(np.radians(40.0)), np.sin(np.radians(40.0))])
     np.testing.assert_allclose(velocity, velocity[0] + run.t[:, None] * down, rtol=0, atol=2e-8)
-    np.testing.assert_allclose(place, place[0] + run.t[:, None] * velocity[0] + 0.5 * run.t[:, None] ** 2 * down,
-                               rtol=0, atol=3e-8)  # fmt: skip
+    np.testing.assert_allclose(
+        place, place[0] + run.t[:, None] * velocity[0] + 0.5 * run.t[:, None] ** 2 * down, rtol=0, atol=3e-8
+    )
     np.testing.assert_allclose(run.twist[:, 2], 3.0, rtol=0, atol=2e-8)
 
 
@@ -238,8 +239,15 @@ def test_a_slope_turns_a_robot_on_casters_like_a_pendulum():
     run = simulate(robot, np.zeros((200, 3)), 0.01, pose=(0.0, 0.0, 1.0), tol=1e-8)
     about = robot.body.inertia + robot.body.mass * 0.05**2
     pull = robot.body.mass * 9.81 * np.sin(np.radians(5.0)) * 0.05
-    swing = solve_ivp(lambda _, z: [z[1], -pull / about * np.sin(z[0])], (0.0, 2.0), [1.0, 0.0], method="DOP853",
-                      rtol=1e-11, atol=1e-12, t_eval=run.t)  # fmt: skip
+    swing = solve_ivp(
+        lambda _, z: [z[1], -pull / about * np.sin(z[0])],
+        (0.0, 2.0),
+        [1.0, 0.0],
+        method="DOP853",
+        rtol=1e-11,
+        atol=1e-12,
+        t_eval=run.t,
+    )
     np.testing.assert_allclose(run.pose[:, 2], swing.y[0], rtol=0, atol=1e-6)
     assert (run.twist[:, :2] == 0.0).all()
 
@@ -266,8 +274,10 @@ def test_turning_robot_and_frame_by_a_third_turns_the_motion():
     robot = beside(AXEBOT).replace(friction=smooth)
     turned = beside(AXEBOT, tuple((rotation @ CENTRE).tolist())).replace(friction=smooth)
     voltage = np.repeat([[1.0, 5.0, -4.0], [0.0, 0.0, 0.0], [3.0, 1.0, -2.0]], 10, axis=0)
-    order = [int(np.argmin(np.abs(np.angle(np.exp(1j * np.radians(np.array(AXEBOT.wheels.azimuth_deg) - a))))))
-             for a in np.array(AXEBOT.wheels.azimuth_deg) - 120.0]  # fmt: skip
+    order = [
+        int(np.argmin(np.abs(np.angle(np.exp(1j * np.radians(np.array(AXEBOT.wheels.azimuth_deg) - a))))))
+        for a in np.array(AXEBOT.wheels.azimuth_deg) - 120.0
+    ]
     one, other = simulate(robot, voltage, 0.02), simulate(turned, voltage[:, order], 0.02)
     np.testing.assert_allclose(other.twist[:, :2], one.twist[:, :2] @ rotation.T, rtol=0, atol=2e-6)
     np.testing.assert_allclose(other.twist[:, 2], one.twist[:, 2], rtol=0, atol=2e-5)

@@ -15,16 +15,21 @@ TOL = 1e-6
 MOTORS = {
     "plain": {},
     "drop, gear, limit": {
-        "voltage_drop": (0.3, 0.2, 0.25), "gear_efficiency": (0.8, 0.9, 0.75), "current_limit": 1.4,
+        "voltage_drop": (0.3, 0.2, 0.25),
+        "gear_efficiency": (0.8, 0.9, 0.75),
+        "current_limit": 1.4,
         "resistance": (1.69, 1.6, 1.8),
     },
     "unequal rotors": {"rotor_inertia": (4e-7, 9e-7, 2e-7)},
     "dynamic": {"electrical": "dynamic", "inductance": 4e-3},
     "dynamic, drop, gear, limit": {
-        "electrical": "dynamic", "inductance": (4e-3, 3e-3, 5e-3), "voltage_drop": 0.3, "gear_efficiency": 0.8,
+        "electrical": "dynamic",
+        "inductance": (4e-3, 3e-3, 5e-3),
+        "voltage_drop": 0.3,
+        "gear_efficiency": 0.8,
         "current_limit": (1.4, 1.2, 1.6),
     },
-}  # fmt: skip
+}
 
 
 def currents(robot, twist, voltage):

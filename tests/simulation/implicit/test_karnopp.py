@@ -24,10 +24,16 @@ def along(coulomb=(2.2, 1.5), breakaway=(2.8, 1.9), law="karnopp", speed=DV):
     own = {"karnopp_speed": speed, "yaw_karnopp_speed": 10.0 * speed} if law == "karnopp" else {}
     return Friction(
         direction=DirectionFriction(
-            coulomb=coulomb, breakaway=breakaway, viscous=0.95, yaw_coulomb=0.099, yaw_breakaway=0.13, yaw_viscous=0.01,
-            law=law, **own,
+            coulomb=coulomb,
+            breakaway=breakaway,
+            viscous=0.95,
+            yaw_coulomb=0.099,
+            yaw_breakaway=0.13,
+            yaw_viscous=0.01,
+            law=law,
+            **own,
         )
-    )  # fmt: skip
+    )
 
 
 def at_wheels(law="karnopp", speed=DV):
@@ -58,9 +64,12 @@ def test_against_events(seed):
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_along_an_axis_the_direction_of_travel_is_the_law_of_the_axis(axis):
     box = AxesFriction(
-        viscous=(0.95, 0.95, 0.01), coulomb=(2.2, 1.5, 0.099), breakaway=(2.8, 1.9, 0.13), law="karnopp",
+        viscous=(0.95, 0.95, 0.01),
+        coulomb=(2.2, 1.5, 0.099),
+        breakaway=(2.8, 1.9, 0.13),
+        law="karnopp",
         karnopp_speed=(DV, DV, 10.0 * DV),
-    )  # fmt: skip
+    )
     voltage = np.outer(np.repeat(pushes(20, 1)[:, 0], 10), axis_patterns(AXEBOT)[axis])
     robots = (AXEBOT.replace(friction=each) for each in (along(), Friction(axes=box)))
     runs = [simulate(robot, voltage, 4e-3, tol=1e-8) for robot in robots]

@@ -224,9 +224,14 @@ def test_dahl_runs_along_its_exact_hysteresis():
 def test_lugre_of_1995_breaks_away_at_less_the_faster_the_force_rises():
     """1e5 N/m, sqrt(1e5), 0.4, 1, 1.5, 1e-3 and 1 kg: the peak of sigma0 z falls from near 1.5 N as in fig. 4."""
     levels = AxesFriction(
-        viscous=(0.4, 0.4, 0.01), coulomb=(1.0, 1.0, 0.1), breakaway=(1.5, 1.5, 0.15), law="lugre",
-        stribeck_speed=(1e-3, 1e-3, 1e-2), stiffness=(1e5, 1e5, 1e3), damping=(math.sqrt(1e5), math.sqrt(1e5), 3.0),
-    )  # fmt: skip
+        viscous=(0.4, 0.4, 0.01),
+        coulomb=(1.0, 1.0, 0.1),
+        breakaway=(1.5, 1.5, 0.15),
+        law="lugre",
+        stribeck_speed=(1e-3, 1e-3, 1e-2),
+        stiffness=(1e5, 1e5, 1e3),
+        damping=(math.sqrt(1e5), math.sqrt(1e5), 3.0),
+    )
     robot = AXEBOT.replace(body=AXEBOT.body.replace(mass=1.0), friction=Friction(axes=levels))
     volt = 1.0 / (math.sqrt(3.0) * 0.0059 * 19.0 / 0.035 / 1.69)  # of each of two motors, for a force of 1 N
     p, peaks = plant_of(robot.rigid), []

@@ -19,10 +19,14 @@ from tests.reference.modes_plant import plant_of
 SIGMA_0, SIGMA_1, SIGMA_2, COULOMB, BREAKAWAY, STRIBECK = 1e5, math.sqrt(1e5), 0.4, 1.0, 1.5, 1e-3
 AXEBOT = load_robot("axebot")
 LEVELS = AxesFriction(
-    viscous=(SIGMA_2, SIGMA_2, 0.01), coulomb=(COULOMB, COULOMB, 0.1), breakaway=(BREAKAWAY, BREAKAWAY, 0.15),
-    law="lugre", stribeck_speed=(STRIBECK, STRIBECK, 1e-2), stiffness=(SIGMA_0, SIGMA_0, 1e3),
+    viscous=(SIGMA_2, SIGMA_2, 0.01),
+    coulomb=(COULOMB, COULOMB, 0.1),
+    breakaway=(BREAKAWAY, BREAKAWAY, 0.15),
+    law="lugre",
+    stribeck_speed=(STRIBECK, STRIBECK, 1e-2),
+    stiffness=(SIGMA_0, SIGMA_0, 1e3),
     damping=(SIGMA_1, SIGMA_1, 3.0),
-)  # fmt: skip
+)
 ROBOT = AXEBOT.replace(body=AXEBOT.body.replace(mass=1.0), friction=Friction(axes=LEVELS))
 VOLT = 1.0 / (math.sqrt(3.0) * 0.0059 * 19.0 / 0.035 / 1.69)  # of each of two motors, for a force of 1 N
 MOST, RATE, ROWS = (
@@ -41,9 +45,15 @@ def test_its_loop_before_it_slips():
     middle = force - 0.5 * np.diff(force, prepend=0.0)
     numbers = plant(ROBOT)
     out = run_implicit(
-        numbers, np.outer(middle * VOLT, [0.0, 1.0, -1.0]), np.full((len(force), 3), np.inf), np.full(len(force), step),
-        start_state(numbers, np.zeros(3), np.zeros(3)), np.zeros(3), no_loop(3), 1e-8,
-    )  # fmt: skip
+        numbers,
+        np.outer(middle * VOLT, [0.0, 1.0, -1.0]),
+        np.full((len(force), 3), np.inf),
+        np.full(len(force), step),
+        start_state(numbers, np.zeros(3), np.zeros(3)),
+        np.zeros(3),
+        no_loop(3),
+        1e-8,
+    )
     way = out.pose[1:, 0]
     p, t = plant_of(ROBOT.rigid), np.arange(1, len(force) + 1) * step
     braking = float(p.K[1] * p.E[1] / p.R[1] * (p.G[0] @ p.G[0])) + SIGMA_2

@@ -64,9 +64,7 @@ def test_along_an_axis_it_is_the_law_of_one_axis(law, axis):
         more |= {"damping": 60.0}
     one = along(**more)
     triple = {k: (v, v, 0.0) for k, v in more.items() if k == "damping"}
-    box = AxesFriction(
-        viscous=(0.95, 0.95, 0.01), coulomb=(2.2, 1.5, 0.0), stiffness=(1e4, 1e4, 1.0), **more | triple
-    )  # fmt: skip
+    box = AxesFriction(viscous=(0.95, 0.95, 0.01), coulomb=(2.2, 1.5, 0.0), stiffness=(1e4, 1e4, 1.0), **more | triple)
     pattern = ([0.0, 1.0, -1.0], [-1.0, 0.5, 0.5])[axis]
     voltage = np.outer(pushes(60)[:, 0], pattern)
     runs = [simulate(robot, voltage, 4e-3, tol=None) for robot in (one, AXEBOT.replace(friction=Friction(axes=box)))]
@@ -149,9 +147,11 @@ def test_a_file_keeps_it_and_it_is_drawn(law):
     robot = along(yaw_coulomb=0.1, **LAWS[law])
     assert parse_robot(robot_to_toml(robot)) == robot
     both = AxesFriction(
-        viscous=(0.95, 0.95, 0.01), coulomb=(2.2, 1.5, 0.1), stiffness=(1e4, 1e4, 1e2),
+        viscous=(0.95, 0.95, 0.01),
+        coulomb=(2.2, 1.5, 0.1),
+        stiffness=(1e4, 1e4, 1e2),
         **LAWS[law] | ({"damping": (0.0, 0.0, 0.0)} if "damping" in LAWS[law] else {}),
-    )  # fmt: skip
+    )
     one, box = friction_study(robot).axes, friction_study(AXEBOT.replace(friction=Friction(axes=both))).axes
     for k in range(3):
         np.testing.assert_allclose(one[k].loop, box[k].loop, rtol=1e-9, atol=1e-12)

@@ -58,9 +58,15 @@ def test_a_friction_far_below_the_forces_at_work_still_stops_what_it_stops(elect
     voltage = np.repeat([[3.0, 3.0, 3.0], [-1.0, -4.0, 5.0]], [10, 140], axis=0)
     numbers = plant(robot)
     outcome = implicit.run_implicit(
-        numbers, voltage, np.full((150, 3), np.inf), np.full(150, 0.02), new_state(numbers), np.zeros(3), no_loop(3),
+        numbers,
+        voltage,
+        np.full((150, 3), np.inf),
+        np.full(150, 0.02),
+        new_state(numbers),
+        np.zeros(3),
+        no_loop(3),
         1e-5,
-    )  # fmt: skip
+    )
     turns = outcome.state.x[1:, 2]
     assert outcome.steps.max() < 1000
     assert turns[9] > 0.1
@@ -80,9 +86,15 @@ def test_what_rests_does_not_keep_the_steps_short_where_friction_falls_with_the_
         robot = AXEBOT.replace(friction=AXEBOT.friction.replace(axes=axes))
         numbers = plant(robot)
         outcome = implicit.run_implicit(
-            numbers, voltage, np.full((150, 3), np.inf), np.full(150, 0.02), new_state(numbers), np.zeros(3),
-            no_loop(3), 1e-6,
-        )  # fmt: skip
+            numbers,
+            voltage,
+            np.full((150, 3), np.inf),
+            np.full(150, 0.02),
+            new_state(numbers),
+            np.zeros(3),
+            no_loop(3),
+            1e-6,
+        )
         assert (outcome.state.x[:, 1:] == 0.0).all()
         assert (outcome.state.x[:, 0] != 0.0).any()
         steps.append(int(outcome.steps.sum()))

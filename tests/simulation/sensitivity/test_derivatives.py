@@ -94,10 +94,15 @@ def closed_form(p, t):
 def test_closed_form_of_the_paper(axebot):
     """d v_x / d parameter, by a complex step in the closed form."""
     names = {
-        "mass": "body.mass_kg", "resistance": "motor.resistance_ohm", "torque_constant": "motor.torque_constant_Nm_A",
-        "emf_constant": "motor.emf_constant_Vs_rad", "radius": "wheels.wheel_radius_m", "gear": "motor.gear_ratio",
-        "viscous": "friction.axes.viscous[0]", "coulomb": "friction.axes.coulomb[0]",
-    }  # fmt: skip
+        "mass": "body.mass_kg",
+        "resistance": "motor.resistance_ohm",
+        "torque_constant": "motor.torque_constant_Nm_A",
+        "emf_constant": "motor.emf_constant_Vs_rad",
+        "radius": "wheels.wheel_radius_m",
+        "gear": "motor.gear_ratio",
+        "viscous": "friction.axes.viscous[0]",
+        "coulomb": "friction.axes.coulomb[0]",
+    }
     values = {name: Key.parse(key).get(axebot) for name, key in names.items()}
     found = derivatives(axebot, held((60, [0, 3, -3])), 0.01, list(names.values()), tol=1e-9)
     np.testing.assert_allclose(found.run.twist[:, 0], closed_form(values, found.run.t), atol=1e-8)

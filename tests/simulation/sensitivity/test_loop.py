@@ -54,9 +54,13 @@ def test_against_a_loop_in_plain_python(axebot):
     values = {"kp": 0.4, "ki": 2.0, "limit": 6.0, "viscous": 0.94, "coulomb": 2.2}
     values = {key: complex(value) for key, value in values.items()}
     found = derivatives(
-        robot, dt=0.01, keys=list(names.values()), wheel_speed_command=held((80, [0, 35, -35])),
-        twist=(0.1, 0.0, 0.0), tol=1e-9,
-    )  # fmt: skip
+        robot,
+        dt=0.01,
+        keys=list(names.values()),
+        wheel_speed_command=held((80, [0, 35, -35])),
+        twist=(0.1, 0.0, 0.0),
+        tol=1e-9,
+    )
     speeds, volts = by_hand(values, 80, 0.01, 0.1, 35.0)
     np.testing.assert_allclose(found.run.twist[:, 0], speeds.real, atol=1e-8)
     np.testing.assert_allclose(found.run.voltage[:-1, 1], volts.real, atol=1e-6)
@@ -85,11 +89,13 @@ def by_hand_with_inductance(p, ticks, period, speed, command):
         total += p["ki"] * error * period
         u = p["kp"] * error + total
         assert abs(u) < 6.0
-        rates = np.array([
-            [-p["viscous"] / 1.5, 2.0 * share * gain / 1.5, -p["coulomb"] / 1.5],
-            [-share * gain / p["inductance"], -1.69 / p["inductance"], u / p["inductance"]],
-            [0.0, 0.0, 0.0],
-        ])  # fmt: skip
+        rates = np.array(
+            [
+                [-p["viscous"] / 1.5, 2.0 * share * gain / 1.5, -p["coulomb"] / 1.5],
+                [-share * gain / p["inductance"], -1.69 / p["inductance"], u / p["inductance"]],
+                [0.0, 0.0, 0.0],
+            ]
+        )
         state = scipy.linalg.expm(rates * period) @ state
         assert state[0].real > 0.0
         speeds.append(state[0])

@@ -70,8 +70,10 @@ def test_a_centre_of_mass_beside_the_wheels(unequal):
     """By where it is, and by what else moves then: the reference knows the equations of the centre of mass alone."""
     wheels = Friction(wheels=WheelFriction(coulomb=(0.3, 0.2, 0.25), viscous=0.1))
     robot = unequal.replace(
-        name="beside", friction=wheels, body=unequal.body.replace(centre=(0.03, -0.05)),
-    )  # fmt: skip
+        name="beside",
+        friction=wheels,
+        body=unequal.body.replace(centre=(0.03, -0.05)),
+    )
     keys = ["body.centre_m[0]", "body.centre_m[1]", "body.mass_kg", "body.inertia_kg_m2", f"{ROTOR}[1]"]
     check(lambda r: reference(r, TURNING, 0.01), robot, keys, 1e-4)
 
@@ -99,9 +101,12 @@ def test_a_first_step_of_the_centre_from_the_middle(unequal):
         up, down = (
             simulate(
                 unequal.replace(body=unequal.body.replace(centre=tuple(np.eye(2)[k] * each))),
-                TURNING[:20], 0.01, tol=1e-9,
-            ).twist for each in (1e-4, -1e-4)
-        )  # fmt: skip
+                TURNING[:20],
+                0.01,
+                tol=1e-9,
+            ).twist
+            for each in (1e-4, -1e-4)
+        )
         assert worst(found.twist[..., k], (up - down) / 2e-4) <= 1e-4
 
 

@@ -35,8 +35,10 @@ def pieces(robot, rng):
 
 
 def falls(rng):
-    return {"stribeck_shape": str(rng.choice(["exponential", "lorentzian"])),
-            "stribeck_exponent": float(rng.choice([1.0, 1.5, 2.0]))}  # fmt: skip
+    return {
+        "stribeck_shape": str(rng.choice(["exponential", "lorentzian"])),
+        "stribeck_exponent": float(rng.choice([1.0, 1.5, 2.0])),
+    }
 
 
 def with_ellipse(robot, law, rng):
@@ -58,15 +60,24 @@ def with_plane(robot, law, rng):
     arm, beside, kind = float(np.mean(robot.wheels.robot_radius)), law.endswith("wheels"), law.split()[1]
     own = {"law": "dahl", "dahl_exponent": rng.uniform(1.3, 2.0)} if kind == "ductile" else {"law": kind}
     if kind in ("lugre", "elastoplastic"):
-        own |= {"breakaway": tuple(np.array(way.coulomb) * more[:2]), "yaw_breakaway": way.yaw_coulomb * more[2],
-                "stribeck_speed": speed, "yaw_stribeck_speed": speed / arm, "damping": rng.uniform(2.0, 10.0),
-                "yaw_damping": 10.0 * arm**2, **falls(rng)}  # fmt: skip
+        own |= {
+            "breakaway": tuple(np.array(way.coulomb) * more[:2]),
+            "yaw_breakaway": way.yaw_coulomb * more[2],
+            "stribeck_speed": speed,
+            "yaw_stribeck_speed": speed / arm,
+            "damping": rng.uniform(2.0, 10.0),
+            "yaw_damping": 10.0 * arm**2,
+            **falls(rng),
+        }
     if kind == "lugre" and not beside:
         own |= {"damping_speed": rng.uniform(0.5, 2.0), "yaw_damping_speed": rng.uniform(0.5, 2.0) / arm}
     if kind == "elastoplastic":
         own["elastic_share"] = rng.uniform(0.3, 0.9)
-    way = way.replace(stiffness=way.coulomb[0] / rng.uniform(0.5e-3, 2e-3),
-                      yaw_stiffness=max(way.yaw_coulomb, 1e-3) / (1e-3 / arm), **own)  # fmt: skip
+    way = way.replace(
+        stiffness=way.coulomb[0] / rng.uniform(0.5e-3, 2e-3),
+        yaw_stiffness=max(way.yaw_coulomb, 1e-3) / (1e-3 / arm),
+        **own,
+    )
     rim = 0.1 * way.coulomb[0] / robot.wheels.count if beside else 0.0
     rims = robot.friction.wheels.replace(coulomb=rim, breakaway=1.3 * rim if beside else None)
     grip = robot.wheels.replace(traction_mu=0.6 * robot.wheels.traction_mu)
@@ -83,11 +94,17 @@ def with_law(robot, law, rng):
     arm, more = float(np.mean(robot.wheels.robot_radius)), rng.uniform(1.1, 1.5, 3)
     speed, friction, motor = rng.uniform(0.02, 0.1), robot.friction, robot.motor
     axes, wheels, half = friction.axes, friction.wheels, friction.axes.replace(coulomb=tuple(0.5 * coulomb))
-    rims = {"coulomb": rim, "coulomb_backward": 0.9 * rim, "breakaway": 1.3 * rim, "breakaway_backward": 1.2 * rim,
-            "viscous": 0.2 * rim}  # fmt: skip
+    rims = {
+        "coulomb": rim,
+        "coulomb_backward": 0.9 * rim,
+        "breakaway": 1.3 * rim,
+        "breakaway_backward": 1.2 * rim,
+        "viscous": 0.2 * rim,
+    }
     if law == "breakaway":
-        axes = axes.replace(breakaway=tuple(coulomb * more), coulomb_backward=tuple(0.9 * coulomb),
-                            breakaway_backward=tuple(coulomb))  # fmt: skip
+        axes = axes.replace(
+            breakaway=tuple(coulomb * more), coulomb_backward=tuple(0.9 * coulomb), breakaway_backward=tuple(coulomb)
+        )
     elif law == "stribeck":
         axes = axes.replace(breakaway=tuple(coulomb * more), stribeck_speed=(speed, speed, speed / arm), **falls(rng))
     elif law == "wheels":
@@ -111,15 +128,22 @@ def with_law(robot, law, rng):
         if law == "elastoplastic":
             spin = robot.wheels.wheel_inertia / robot.wheels.radii[0] ** 2
             axes = axes.replace(
-                breakaway=tuple(0.5 * coulomb * more), stribeck_speed=(speed, speed, speed / arm),
-                damping=(10.0, 10.0, 10.0 * arm**2), **falls(rng),
-            )  # fmt: skip
+                breakaway=tuple(0.5 * coulomb * more),
+                stribeck_speed=(speed, speed, speed / arm),
+                damping=(10.0, 10.0, 10.0 * arm**2),
+                **falls(rng),
+            )
             wheels = wheels.replace(damping=2.0 * float(np.sqrt(spring * spin)))
     else:
         stiff = coulomb / 1e-3
-        axes = axes.replace(law="lugre", breakaway=tuple(coulomb * more), stribeck_speed=(speed, speed, speed / arm),
-                            stiffness=(stiff[0], stiff[1], stiff[2] * arm), damping=(10.0, 10.0, 10.0 * arm**2),
-                            coulomb=tuple(coulomb))  # fmt: skip
+        axes = axes.replace(
+            law="lugre",
+            breakaway=tuple(coulomb * more),
+            stribeck_speed=(speed, speed, speed / arm),
+            stiffness=(stiff[0], stiff[1], stiff[2] * arm),
+            damping=(10.0, 10.0, 10.0 * arm**2),
+            coulomb=tuple(coulomb),
+        )
         spring, spin = rim / 2e-3, robot.wheels.wheel_inertia / robot.wheels.radii[0] ** 2
         wheels = wheels.replace(law="lugre", coulomb=rim, stiffness=spring, damping=2.0 * float(np.sqrt(spring * spin)))
     grip = robot.wheels.replace(traction_mu=0.6 * robot.wheels.traction_mu)  # friction of its own holds a wheel back
@@ -190,8 +214,9 @@ ROBOTS_OF = {
     "breakaway": changed("axes", "axes", breakaway=HOLD),
     "backward": changed("axes", "axes", coulomb_backward=(1.9, 1.2, 0.08), breakaway_backward=(2.5, 1.9, 0.1)),
     "stribeck": changed("axes", "axes", breakaway=HOLD, stribeck_speed=SPEEDS),
-    "lorentzian": changed("axes", "axes", breakaway=HOLD, stribeck_speed=SPEEDS, stribeck_shape="lorentzian",
-                          stribeck_exponent=1.0),
+    "lorentzian": changed(
+        "axes", "axes", breakaway=HOLD, stribeck_speed=SPEEDS, stribeck_shape="lorentzian", stribeck_exponent=1.0
+    ),
     "wheels": changed("wheels", "wheels", breakaway=1.2),
     "wheels stribeck": changed("wheels", "wheels", breakaway=1.2, stribeck_speed=0.05),
     "direction": changed("ellipse", "direction", breakaway=(2.9, 1.7), yaw_breakaway=0.12),
@@ -199,20 +224,38 @@ ROBOTS_OF = {
     "gear": changed("axes", gear_efficiency=0.8),
     "gear and wheels": changed("wheels", gear_efficiency=0.8),
     "winding": changed("axes", electrical="dynamic", inductance=3e-3),
-    "winding, drop and limit": changed("axes", electrical="dynamic", inductance=3e-3, voltage_drop=0.3,
-                                       current_limit=1.5),
+    "winding, drop and limit": changed(
+        "axes", electrical="dynamic", inductance=3e-3, voltage_drop=0.3, current_limit=1.5
+    ),
     "lugre": changed("axes", "axes", law="lugre", stiffness=(1e4, 1e4, 300.0), breakaway=HOLD, stribeck_speed=SPEEDS),
     "dahl": changed("axes", "axes", law="dahl", stiffness=(1e4, 1e4, 300.0)),
     "dahl, exponent": changed("axes", "axes", law="dahl", stiffness=(1e4, 1e4, 300.0), dahl_exponent=1.5),
     "lugre at the wheels": changed("wheels", "wheels", law="lugre", stiffness=1e4),
     "dahl along": changed("ellipse", "direction", law="dahl", stiffness=1e4, yaw_stiffness=300.0),
-    "dahl along, exponent": changed("ellipse", "direction", law="dahl", stiffness=1e4, yaw_stiffness=300.0,
-                                    dahl_exponent=1.5),
-    "lugre along": changed("ellipse", "direction", law="lugre", stiffness=1e4, yaw_stiffness=300.0,
-                           breakaway=(2.9, 1.7), stribeck_speed=0.05, yaw_breakaway=0.12, yaw_stribeck_speed=0.4),
-    "elastoplastic along": changed("ellipse", "direction", law="elastoplastic", stiffness=1e4, yaw_stiffness=300.0,
-                                   breakaway=(2.9, 1.7), stribeck_speed=0.05),
-}  # fmt: skip
+    "dahl along, exponent": changed(
+        "ellipse", "direction", law="dahl", stiffness=1e4, yaw_stiffness=300.0, dahl_exponent=1.5
+    ),
+    "lugre along": changed(
+        "ellipse",
+        "direction",
+        law="lugre",
+        stiffness=1e4,
+        yaw_stiffness=300.0,
+        breakaway=(2.9, 1.7),
+        stribeck_speed=0.05,
+        yaw_breakaway=0.12,
+        yaw_stribeck_speed=0.4,
+    ),
+    "elastoplastic along": changed(
+        "ellipse",
+        "direction",
+        law="elastoplastic",
+        stiffness=1e4,
+        yaw_stiffness=300.0,
+        breakaway=(2.9, 1.7),
+        stribeck_speed=0.05,
+    ),
+}
 
 
 BENT = re.compile("dahl|lugre|elastoplastic")

@@ -72,9 +72,12 @@ def test_loads_that_shift_against_the_events(seed):
     """The same with a centre of mass at a height of up to 0.4 of where the wheels stand."""
     rng = np.random.default_rng(100 + seed)
     robot = slippery(
-        (AXEBOT, FOUR)[seed % 2], rng.uniform(0.2, 0.8), rng.uniform(1e-5, 5e-5), rotating_frame=bool(seed // 2 % 2),
+        (AXEBOT, FOUR)[seed % 2],
+        rng.uniform(0.2, 0.8),
+        rng.uniform(1e-5, 5e-5),
+        rotating_frame=bool(seed // 2 % 2),
         centre_height=rng.uniform(0.01, 0.04),
-    )  # fmt: skip
+    )
     run, other = meet_slip(robot, robot.body.replace(centre_height=0.0), 100 + seed)
     assert np.abs(run.twist - other.twist).max() > 1e-4
 
@@ -114,8 +117,11 @@ def test_friction_of_wheels_and_of_the_direction_rests_exactly_too(name):
 def test_wheels_that_spin_push_with_mu_times_the_load():
     """Forward at full volts on ice: M v' = 2 mu N cos 30 - C - B v, N = M g/3; rims run to the motors' speed."""
     mu = 0.4
-    robot = slippery(AXEBOT.replace(friction=AXEBOT.friction.replace(
-        axes=AXEBOT.friction.axes.replace(coulomb=(0.5, 0.5, 0.05)))), mu, 1e-6)  # fmt: skip
+    robot = slippery(
+        AXEBOT.replace(friction=AXEBOT.friction.replace(axes=AXEBOT.friction.axes.replace(coulomb=(0.5, 0.5, 0.05)))),
+        mu,
+        1e-6,
+    )
     mass, axes = robot.body.mass, robot.friction.axes
     load = mass * GRAVITY / 3.0
     np.testing.assert_allclose(wheel_loads(robot).newtons, load)
@@ -173,9 +179,13 @@ def test_a_centre_of_mass_beside_the_wheels_against_the_events(seed):
     rng = np.random.default_rng(200 + seed)
     far, way = rng.uniform(0.01, 0.04), rng.uniform(0.0, 6.28)
     robot = slippery(
-        (AXEBOT, FOUR)[seed % 2], rng.uniform(0.2, 0.8), rng.uniform(1e-5, 5e-5), rotating_frame=bool(seed // 2 % 2),
-        centre=(far * np.cos(way), far * np.sin(way)), centre_height=rng.choice([0.0, 0.015]),
-    )  # fmt: skip
+        (AXEBOT, FOUR)[seed % 2],
+        rng.uniform(0.2, 0.8),
+        rng.uniform(1e-5, 5e-5),
+        rotating_frame=bool(seed // 2 % 2),
+        centre=(far * np.cos(way), far * np.sin(way)),
+        centre_height=rng.choice([0.0, 0.015]),
+    )
     run, other = meet_slip(robot, robot.body.replace(centre=(0.0, 0.0)), 200 + seed)
     assert np.abs(run.twist - other.twist).max() > 1e-3
     assert "not_converged" not in codes(run.warnings)
@@ -384,11 +394,13 @@ def test_a_floor_of_the_file_can_be_slippery():
     "change, named",
     [
         (lambda r: r.replace(wheels=r.wheels.replace(wheel_inertia=0.0)), "wheels that weigh nothing"),
-        (lambda r: r.replace(friction=r.friction.replace(axes=r.friction.axes.replace(law="karnopp"))),
-         r'law = "karnopp" of \[friction.axes\].*take law = "coulomb", which sticks with the same levels'),
+        (
+            lambda r: r.replace(friction=r.friction.replace(axes=r.friction.axes.replace(law="karnopp"))),
+            r'law = "karnopp" of \[friction.axes\].*take law = "coulomb", which sticks with the same levels',
+        ),
     ],
     ids=["weightless", "karnopp"],
-)  # fmt: skip
+)
 def test_what_has_no_law_here_is_named(change, named):
     with pytest.raises(UnsupportedError, match=rf"\[wheels\] traction_mu: .*got .*{named}"):
         omnidyn.simulate(change(slippery(AXEBOT, 0.3)), np.ones((2, 3)), 0.01)

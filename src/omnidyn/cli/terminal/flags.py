@@ -7,10 +7,39 @@ from functools import cache
 
 # Options beside those of `omnidyn identify`, and those whose flag is not their name.
 OTHERS = (
-    "assume", "azimuth", "column", "controller", "current_unsigned", "delay", "draws", "dt", "duration", "evaluations",
-    "fail_if", "force", "full", "horizon", "map", "max_bytes", "max_steps", "no_header", "no_observer", "noise", "path",
-    "plant", "pose", "rate", "skip", "skip_bad_rows", "sort", "split", "tol", "twist", "wheel_radius", "with",
-)  # fmt: skip
+    "assume",
+    "azimuth",
+    "column",
+    "controller",
+    "current_unsigned",
+    "delay",
+    "draws",
+    "dt",
+    "duration",
+    "evaluations",
+    "fail_if",
+    "force",
+    "full",
+    "horizon",
+    "map",
+    "max_bytes",
+    "max_steps",
+    "no_header",
+    "no_observer",
+    "noise",
+    "path",
+    "plant",
+    "pose",
+    "rate",
+    "skip",
+    "skip_bad_rows",
+    "sort",
+    "split",
+    "tol",
+    "twist",
+    "wheel_radius",
+    "with",
+)
 _NAMED = re.compile(r"`([a-z_]+)`")
 
 

@@ -106,8 +106,9 @@ def _method(name: str, what: str, given: Sequence[str]) -> type[Method] | None:
         if not methods and what == MOTORS:
             raise InputError("not an option of the motors", got=f"`{asked}`", where=f"`what` {MOTORS}")
         if not methods:
-            raise InputError("an option of the motors", got=f"`{asked}`", expected=f"`what` {MOTORS}",
-                             where=f"`{asked}`")  # fmt: skip
+            raise InputError(
+                "an option of the motors", got=f"`{asked}`", expected=f"`what` {MOTORS}", where=f"`{asked}`"
+            )
     steady, fit = ([asked for asked, has in takers.items() if has == [only]] for only in (STEADY_STATE, OUTPUT_ERROR))
     if fit and (name == STEADY_STATE or (steady and name == AUTO)):
         others = ", ".join(f"`{asked}`" for asked in steady) or "`method`"

@@ -36,9 +36,10 @@ def refuse_sizes(value: Mapping[str, Any]) -> None:
         raise InputError(
             "a wheel is larger than the robot: are both radii in metres?",
             got=f"wheels of {number_words(wheel)} m, {number_words(robot)} m from the centre",
-            expected="a radius below the distance from the centre to the wheel", where="--wheel-radius",
+            expected="a radius below the distance from the centre to the wheel",
+            where="--wheel-radius",
             remedy=f"{_smaller(wheel, robot)}{SAYING}",
-        )  # fmt: skip
+        )
     if mass is not None:
         _refuse_mass(mass, 2.0 * (max(_numbers(robot)) + max(_numbers(wheel))))
 
@@ -67,9 +68,12 @@ def _refuse_radians(azimuth: list[float] | None) -> None:
     degrees = [math.degrees(each) for each in azimuth]
     whole = [round(each) if abs(each - round(each)) < ANGLES else round(each, 2) for each in degrees]
     raise InputError(
-        "these angles look like radians", got=number_words(tuple(azimuth)), expected="degrees, such as 60,180,300",
-        remedy=f"{_call('azimuth', tuple(map(float, whole)))}{SAYING}", where="--azimuth",
-    )  # fmt: skip
+        "these angles look like radians",
+        got=number_words(tuple(azimuth)),
+        expected="degrees, such as 60,180,300",
+        remedy=f"{_call('azimuth', tuple(map(float, whole)))}{SAYING}",
+        where="--azimuth",
+    )
 
 
 def _refuse_length(key: str, value: Any, possible: tuple[float, float], usual: tuple[float, float]) -> None:
@@ -79,9 +83,11 @@ def _refuse_length(key: str, value: Any, possible: tuple[float, float], usual: t
         return  # which no robot file takes
     raise InputError(
         f"no {key.replace('_', ' ')} is so {'small' if min(_numbers(value)) < possible[0] else 'large'}",
-        got=f"{number_words(value)} m", expected=f"metres, {possible[0]:g} to {possible[1]:g}",
-        remedy=f"{_call(key, _meant(value, usual))}{SAYING}", where=f"--{key.replace('_', '-')}",
-    )  # fmt: skip
+        got=f"{number_words(value)} m",
+        expected=f"metres, {possible[0]:g} to {possible[1]:g}",
+        remedy=f"{_call(key, _meant(value, usual))}{SAYING}",
+        where=f"--{key.replace('_', '-')}",
+    )
 
 
 def _meant(value: float | tuple[float, ...], usual: tuple[float, float]) -> Any:
@@ -103,9 +109,10 @@ def _refuse_mass(mass: float, side: float) -> None:
     raise InputError(
         f"no robot of this size is so {'heavy' if density > DENSITY[1] else 'light'}",
         got=f"{mass:g} kg in {side:.2g} m",
-        expected=f"kilograms, {_two(DENSITY[0] * side**3)} to {_two(DENSITY[1] * side**3)}", where="--mass",
+        expected=f"kilograms, {_two(DENSITY[0] * side**3)} to {_two(DENSITY[1] * side**3)}",
+        where="--mass",
         remedy=f"{_call('mass', meant if fits else None)}{SAYING}",
-    )  # fmt: skip
+    )
 
 
 def _two(value: float) -> str:

@@ -19,14 +19,36 @@ from omnidyn.errors import printable
 
 MIN_WIDTH, WIDTH_WITHOUT_TERMINAL = 20, 110
 COLOURS = {
-    "error": "red", "warning": "yellow", "note": "white", "yes": "green", "mended": "yellow", "no": "red",
-}  # fmt: skip
+    "error": "red",
+    "warning": "yellow",
+    "note": "white",
+    "yes": "green",
+    "mended": "yellow",
+    "no": "red",
+}
 
 # What a terminal that knows ASCII only gets to see.
 _PLAIN = {
-    "±": "+-", "≤": "<=", "≥": ">=", "≈": "~", "–": "-", "—": "-", "−": "-", "→": "->", "×": "x", "·": " ", "⋅": " ",
-    "°": " deg", "²": "^2", "√": "sqrt", "…": "...", "ω": "omega", "θ": "theta", "τ": "tau", "Ω": "ohm",
-}  # fmt: skip
+    "±": "+-",
+    "≤": "<=",
+    "≥": ">=",
+    "≈": "~",
+    "–": "-",
+    "—": "-",
+    "−": "-",
+    "→": "->",
+    "×": "x",
+    "·": " ",
+    "⋅": " ",
+    "°": " deg",
+    "²": "^2",
+    "√": "sqrt",
+    "…": "...",
+    "ω": "omega",
+    "θ": "theta",
+    "τ": "tau",
+    "Ω": "ohm",
+}
 
 _coloured: set[str] = set()  # words that we coloured: no other escape code is let through
 

@@ -75,9 +75,11 @@ def brief_document(
     worst = _that_fit(worst, room - 2 * bool(advice))
     steps = _that_fit([Words(f"next: {step}", rest="  ") for step in advice[:BRIEF_STEPS]], room - _height(worst))
     hidden = {
-        more: len(table.rows) - len(shown.rows), "warning": len(grave) - len(worst), "note": len(every) - len(grave),
+        more: len(table.rows) - len(shown.rows),
+        "warning": len(grave) - len(worst),
+        "note": len(every) - len(grave),
         "next step": len(advice) - len(steps),
-    }  # fmt: skip
+    }
     counts = ", ".join(f"{count} more {name}{'s' * (count > 1)}" for name, count in hidden.items() if count > 0)
     last = f"--full shows all{f': {counts}' if counts else ''}."
     return Brief([*head, shown, "", *worst, *steps, last], ascii=True, verdict=verdict)

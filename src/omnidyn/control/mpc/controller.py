@@ -61,9 +61,17 @@ class Mpc:
     name = "mpc"
 
     def __init__(
-        self, robot: Robot, *, dt: float = DT, horizon: int = HORIZON, delay: int | None = None,
-        friction: bool = True, observer: bool = True, settings: Settings | None = None, supply: float | None = None,
-    ) -> None:  # fmt: skip
+        self,
+        robot: Robot,
+        *,
+        dt: float = DT,
+        horizon: int = HORIZON,
+        delay: int | None = None,
+        friction: bool = True,
+        observer: bool = True,
+        settings: Settings | None = None,
+        supply: float | None = None,
+    ) -> None:
         self.dt, self.horizon = check_dt(dt), _whole("horizon", horizon, 1, MOST_HORIZON)
         self.delay = None if delay is None else _whole("delay", delay, 0, MOST_DELAY)
         self.friction, self.observer, self.supply = friction, observer and friction, supply
@@ -134,9 +142,11 @@ class Mpc:
         at_voltage = np.abs(volts) >= limit[0] - MET
         at_current = np.abs(volts - self._tables.emf @ memory.x[0, 3:]) >= limit[1] - MET
         met = {
-            "voltage": at_voltage.any(), "current": at_current.any(), "slew": (held & ~at_voltage & ~at_current).any(),
+            "voltage": at_voltage.any(),
+            "current": at_current.any(),
+            "slew": (held & ~at_voltage & ~at_current).any(),
             "speed": memory.fast[0].any(),
-        }  # fmt: skip
+        }
         return tuple(name for name, value in met.items() if value)
 
     def step(self, t: float, pose: Any, twist: Any, path: Any) -> FloatArray:

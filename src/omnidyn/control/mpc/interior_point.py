@@ -238,9 +238,10 @@ def guess(program):
     for k in range(u.shape[0]):
         for i in range(u.shape[1]):
             width = (bounds[1, k, i] - bounds[0, k, i]) / scale
-            low, high = room[LOW, k, i] * width > u[k, i] - bounds[0, k, i], (
-                room[HIGH, k, i] * width > bounds[1, k, i] - u[k, i]
-            )  # fmt: skip
+            low, high = (
+                room[LOW, k, i] * width > u[k, i] - bounds[0, k, i],
+                (room[HIGH, k, i] * width > bounds[1, k, i] - u[k, i]),
+            )
             active[k, i] = LOWER if low else (UPPER if high else FREE)
 
 

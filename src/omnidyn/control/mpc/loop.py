@@ -77,9 +77,13 @@ class Memory(NamedTuple):
         estimate = np.zeros((ESTIMATE_SIZE, 3))
         _unlearn(estimate, settings)
         return cls(
-            estimate, np.zeros((delay + 1, wheels)), np.zeros((n + 1, 6)), np.zeros((n, wheels)),
-            np.zeros((n, wheels), np.int64), np.zeros((n, 3), np.int64),
-        )  # fmt: skip
+            estimate,
+            np.zeros((delay + 1, wheels)),
+            np.zeros((n + 1, 6)),
+            np.zeros((n, wheels)),
+            np.zeros((n, wheels), np.int64),
+            np.zeros((n, 3), np.int64),
+        )
 
     def copied(self, relearn: Settings | None) -> Self:
         """A copy; for other friction, `relearn`, the push stays and the share of friction is learned anew."""
@@ -121,9 +125,15 @@ class Room(NamedTuple):
         wheels = len(limit)
         bounds = np.ascontiguousarray(np.broadcast_to(np.array([-limit, limit])[:, None], (2, n, wheels)))
         return cls(
-            np.zeros((n, STAGE_SIZE)), np.zeros((n, ANSWER_SIZE)), np.zeros((n, wheels)), np.zeros((n, wheels)),
-            np.zeros((n, wheels)), bounds, np.zeros((n + 1, 6)), np.zeros((ROOM_SIZE, n, wheels)),
-        )  # fmt: skip
+            np.zeros((n, STAGE_SIZE)),
+            np.zeros((n, ANSWER_SIZE)),
+            np.zeros((n, wheels)),
+            np.zeros((n, wheels)),
+            np.zeros((n, wheels)),
+            bounds,
+            np.zeros((n + 1, 6)),
+            np.zeros((ROOM_SIZE, n, wheels)),
+        )
 
 
 @part
@@ -169,9 +179,19 @@ def control(numbers, tables, preview, start, state, known, memory, room):
         stay(x)
     limited = settings[CURRENT] != 0.0
     program = Program(
-        numbers.push, tables.weight, stage, room.wanted, bounds, room.answer, room.inverse, room.target, x, u,
-        memory.active, room.interior,
-    )  # fmt: skip
+        numbers.push,
+        tables.weight,
+        stage,
+        room.wanted,
+        bounds,
+        room.answer,
+        room.inverse,
+        room.target,
+        x,
+        u,
+        memory.active,
+        room.interior,
+    )
     if limited | (settings[SLEW] > 0.0):
         make_bounds(tables, program, sent)
     make_costs(numbers, settings, estimate, program, preview, start, add)
@@ -216,9 +236,7 @@ def control_batch(numbers, tables, previews, start, states, known, memories, roo
         memory = Memory(
             memories.estimate[i], memories.sent[i], memories.x[i], memories.u[i], memories.active[i], memories.fast[i]
         )
-        passes[i] = control(
-            numbers, tables, previews[start[i, 0]], start[i, 1], states[i], known[i], memory, room
-        )  # fmt: skip
+        passes[i] = control(numbers, tables, previews[start[i, 0]], start[i, 1], states[i], known[i], memory, room)
     return passes
 
 

@@ -52,8 +52,14 @@ def numbers(robot: Robot, dt: float, friction: bool = True) -> Numbers:
     linear = np.zeros((1, LINEAR_SIZE))
     by_mass = per_mass(robot, np.eye(N_AXES)).T
     turning = by_mass @ frame_terms(robot)
-    for column, value in {DECAY: decay, PHI: phi, PSI: psi, FEED: np.linalg.inv(phi), TURNING: turning,
-                          BY_MASS: by_mass}.items():  # fmt: skip
+    for column, value in {
+        DECAY: decay,
+        PHI: phi,
+        PSI: psi,
+        FEED: np.linalg.inv(phi),
+        TURNING: turning,
+        BY_MASS: by_mass,
+    }.items():
         linear[0, column : column + 9] = value.ravel()
     linear[0, STEP] = dt
     push = np.ascontiguousarray(per_mass(robot, motors.driving).T)

@@ -68,9 +68,10 @@ def make_stages(numbers, estimate, program):
     for k in range(len(stage)):
         end, way = vector(x, k + 1, 3), vector(stage, k, WAY)
         sense = (
-            end[0] + min(max(way[0], -NEAR[0]), NEAR[0]), end[1] + min(max(way[1], -NEAR[1]), NEAR[1]),
+            end[0] + min(max(way[0], -NEAR[0]), NEAR[0]),
+            end[1] + min(max(way[1], -NEAR[1]), NEAR[1]),
             end[2] + min(max(way[2], -NEAR[2]), NEAR[2]),
-        )  # fmt: skip
+        )
         friction = friction_at(linear, levels, estimate[SCALE], sense, 1.0, True)
         linear_stage(linear, friction, push, stage, k, x[k, 2], vector(x, k, 3), end)
 

@@ -72,17 +72,33 @@ def drive_of(push, u, k):
 @part
 def turned_rows(m, gx, gy):
     """(I + turn)^T m."""
-    return m[0], m[1], m[2], m[3], m[4], m[5], m[6] + gx * m[0] + gy * m[3], m[7] + gx * m[1] + gy * m[4], (
-        m[8] + gx * m[2] + gy * m[5]
-    )  # fmt: skip
+    return (
+        m[0],
+        m[1],
+        m[2],
+        m[3],
+        m[4],
+        m[5],
+        m[6] + gx * m[0] + gy * m[3],
+        m[7] + gx * m[1] + gy * m[4],
+        (m[8] + gx * m[2] + gy * m[5]),
+    )
 
 
 @part
 def turned_columns(m, gx, gy):
     """m (I + turn)."""
-    return m[0], m[1], m[2] + gx * m[0] + gy * m[1], m[3], m[4], m[5] + gx * m[3] + gy * m[4], m[6], m[7], (
-        m[8] + gx * m[6] + gy * m[7]
-    )  # fmt: skip
+    return (
+        m[0],
+        m[1],
+        m[2] + gx * m[0] + gy * m[1],
+        m[3],
+        m[4],
+        m[5] + gx * m[3] + gy * m[4],
+        m[6],
+        m[7],
+        (m[8] + gx * m[6] + gy * m[7]),
+    )
 
 
 @part
@@ -120,9 +136,11 @@ def factor_stage(stage, answer, push, inverse, k, n):
     q11, f11 = turned_rows(turned_columns(full(s11), gx, gy), gx, gy), tms(z1, wz1)
     q12, f12 = turned_rows(m1, gx, gy), tm(z1, wz2)
     put6(
-        answer, k, P11,
+        answer,
+        k,
+        P11,
         (q11[0] - f11[0], q11[1] - f11[1], q11[2] - f11[2], q11[4] - f11[3], q11[5] - f11[4], q11[8] - f11[5]),
-    )  # fmt: skip
+    )
     put3(answer, k, P12, (q12[0] - f12[0], q12[1] - f12[1], q12[2] - f12[2]))
     put3(answer, k, P12 + 3, (q12[3] - f12[3], q12[4] - f12[4], q12[5] - f12[5]))
     put3(answer, k, P12 + 6, (q12[6] - f12[6], q12[7] - f12[7], q12[8] - f12[8]))

@@ -18,8 +18,16 @@ def vector(t, k, i):
 def matrix(t, k, i):
     """Nine entries of row k from column i."""
     return (
-        t[k, i], t[k, i + 1], t[k, i + 2], t[k, i + 3], t[k, i + 4], t[k, i + 5], t[k, i + 6], t[k, i + 7], t[k, i + 8]
-    )  # fmt: skip
+        t[k, i],
+        t[k, i + 1],
+        t[k, i + 2],
+        t[k, i + 3],
+        t[k, i + 4],
+        t[k, i + 5],
+        t[k, i + 6],
+        t[k, i + 7],
+        t[k, i + 8],
+    )
 
 
 @part
@@ -44,8 +52,16 @@ def put6(t, k, i, v):
 def put9(t, k, i, v):
     """Write a matrix into row k from column i."""
     (
-        t[k, i], t[k, i + 1], t[k, i + 2], t[k, i + 3], t[k, i + 4], t[k, i + 5], t[k, i + 6], t[k, i + 7], t[k, i + 8]
-    ) = v  # fmt: skip
+        t[k, i],
+        t[k, i + 1],
+        t[k, i + 2],
+        t[k, i + 3],
+        t[k, i + 4],
+        t[k, i + 5],
+        t[k, i + 6],
+        t[k, i + 7],
+        t[k, i + 8],
+    ) = v
 
 
 @part
@@ -76,9 +92,16 @@ def transposed(a):
 def added(a, b):
     """a + b of two matrices."""
     return (
-        a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5], a[6] + b[6], a[7] + b[7],
+        a[0] + b[0],
+        a[1] + b[1],
+        a[2] + b[2],
+        a[3] + b[3],
+        a[4] + b[4],
+        a[5] + b[5],
+        a[6] + b[6],
+        a[7] + b[7],
         a[8] + b[8],
-    )  # fmt: skip
+    )
 
 
 @part
@@ -233,7 +256,13 @@ def inverse(a):
     c0, c1, c2 = a[4] * a[8] - a[5] * a[7], a[5] * a[6] - a[3] * a[8], a[3] * a[7] - a[4] * a[6]
     r = 1.0 / (a[0] * c0 + a[1] * c1 + a[2] * c2)
     return (
-        c0 * r, (a[2] * a[7] - a[1] * a[8]) * r, (a[1] * a[5] - a[2] * a[4]) * r,
-        c1 * r, (a[0] * a[8] - a[2] * a[6]) * r, (a[2] * a[3] - a[0] * a[5]) * r,
-        c2 * r, (a[1] * a[6] - a[0] * a[7]) * r, (a[0] * a[4] - a[1] * a[3]) * r,
-    )  # fmt: skip
+        c0 * r,
+        (a[2] * a[7] - a[1] * a[8]) * r,
+        (a[1] * a[5] - a[2] * a[4]) * r,
+        c1 * r,
+        (a[0] * a[8] - a[2] * a[6]) * r,
+        (a[2] * a[3] - a[0] * a[5]) * r,
+        c2 * r,
+        (a[1] * a[6] - a[0] * a[7]) * r,
+        (a[0] * a[4] - a[1] * a[3]) * r,
+    )

@@ -104,18 +104,26 @@ def friction_at(linear, levels, scale, twist, narrow, soft):
             both = 0.0 if bend == 0.0 else (fx * twist[0] * bx + fy * twist[1] * by) * bend
             grows_x, grows_y = fx * (2.0 * bx - both) / speed, fy * (2.0 * by - both) / speed
         b = matrix(linear, 0, BY_MASS)
-        g = mm(b, (
-            qx * r - fx * fx * bend + grows_x * twist[0], -fx * fy * bend + grows_x * twist[1], 0.0,
-            -fx * fy * bend + grows_y * twist[0], qy * r - fy * fy * bend + grows_y * twist[1], 0.0, 0.0, 0.0, 0.0,
-        ))  # fmt: skip
+        g = mm(
+            b,
+            (
+                qx * r - fx * fx * bend + grows_x * twist[0],
+                -fx * fy * bend + grows_x * twist[1],
+                0.0,
+                -fx * fy * bend + grows_y * twist[0],
+                qy * r - fy * fy * bend + grows_y * twist[1],
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+            ),
+        )
         v = mv(b, (fx, fy, 0.0))
         f0, f1, f2 = f0 + v[0], f1 + v[1], f2 + v[2]
         s0, s1, s2, s3, s4, s5 = s0 + g[0], s1 + g[1], s2 + g[2], s3 + g[3], s4 + g[4], s5 + g[5]
         s6, s7, s8 = s6 + g[6], s7 + g[7], s8 + g[8]
     a, b, c = scale[0], scale[1], scale[2]
-    return (a * f0, b * f1, c * f2), (
-        a * s0, a * s1, a * s2, b * s3, b * s4, b * s5, c * s6, c * s7, c * s8
-    )  # fmt: skip
+    return (a * f0, b * f1, c * f2), (a * s0, a * s1, a * s2, b * s3, b * s4, b * s5, c * s6, c * s7, c * s8)
 
 
 @part
@@ -143,17 +151,25 @@ def linear_stage(linear, friction, push, stage, k, heading, twist, end):
     if turning:
         middle = 0.5 * (twist[0] + end[0]), 0.5 * (twist[1] + end[1]), 0.5 * (twist[2] + end[2])
         n, j = frame_at(linear, middle)
-        half = 0.5 * j[0], 0.5 * j[1], 0.5 * j[2], 0.5 * j[3], 0.5 * j[4], 0.5 * j[5], 0.5 * j[6], 0.5 * j[7], (
-            0.5 * j[8]
-        )  # fmt: skip
+        half = (
+            0.5 * j[0],
+            0.5 * j[1],
+            0.5 * j[2],
+            0.5 * j[3],
+            0.5 * j[4],
+            0.5 * j[5],
+            0.5 * j[6],
+            0.5 * j[7],
+            (0.5 * j[8]),
+        )
         const = plus(const, minus(n, mv(j, middle)))
-        slope = added(slope, (-half[0], -half[1], -half[2], -half[3], -half[4], -half[5], -half[6], -half[7],
-                              -half[8]))  # fmt: skip
+        slope = added(slope, (-half[0], -half[1], -half[2], -half[3], -half[4], -half[5], -half[6], -half[7], -half[8]))
         v, m = added(v, mm(phi, half)), added(m, mm(psi, half))
     if resists | turning:
         stiff = mm(phi, slope)
-        k_ = inverse((1.0 + stiff[0], stiff[1], stiff[2], stiff[3], 1.0 + stiff[4], stiff[5], stiff[6], stiff[7],
-                      1.0 + stiff[8]))  # fmt: skip
+        k_ = inverse(
+            (1.0 + stiff[0], stiff[1], stiff[2], stiff[3], 1.0 + stiff[4], stiff[5], stiff[6], stiff[7], 1.0 + stiff[8])
+        )
         v, hv = mm(k_, v), mm(k_, hv)
         back = mm(psi, slope)
         back = (-back[0], -back[1], -back[2], -back[3], -back[4], -back[5], -back[6], -back[7], -back[8])
@@ -177,13 +193,29 @@ def along_path(stage, k, m, h, c, heading, twist, end, dt):
     hx, hy = 0.5 * gx, 0.5 * gy
     for column, t in ((E, m), (HP, h)):
         x, y, z = (t[0], t[1], t[2]), (t[3], t[4], t[5]), (t[6], t[7], t[8])
-        put9(stage, k, column, (
-            cos * x[0] - sin * y[0] + hx * z[0], cos * x[1] - sin * y[1] + hx * z[1],
-            cos * x[2] - sin * y[2] + hx * z[2],
-            sin * x[0] + cos * y[0] + hy * z[0], sin * x[1] + cos * y[1] + hy * z[1],
-            sin * x[2] + cos * y[2] + hy * z[2],
-            z[0], z[1], z[2],
-        ))  # fmt: skip
-    put3(stage, k, CP, (
-        cos * c[0] - sin * c[1] + hx * c[2] - gx * middle, sin * c[0] + cos * c[1] + hy * c[2] - gy * middle, c[2],
-    ))  # fmt: skip
+        put9(
+            stage,
+            k,
+            column,
+            (
+                cos * x[0] - sin * y[0] + hx * z[0],
+                cos * x[1] - sin * y[1] + hx * z[1],
+                cos * x[2] - sin * y[2] + hx * z[2],
+                sin * x[0] + cos * y[0] + hy * z[0],
+                sin * x[1] + cos * y[1] + hy * z[1],
+                sin * x[2] + cos * y[2] + hy * z[2],
+                z[0],
+                z[1],
+                z[2],
+            ),
+        )
+    put3(
+        stage,
+        k,
+        CP,
+        (
+            cos * c[0] - sin * c[1] + hx * c[2] - gx * middle,
+            sin * c[0] + cos * c[1] + hy * c[2] - gy * middle,
+            c[2],
+        ),
+    )

@@ -204,9 +204,11 @@ def lines(t: ArrayLike, pose: ArrayLike, name: str) -> Lines:
     time, place = np.asarray(t, dtype=float), np.array(pose, dtype=float)
     if time.ndim != 1 or place.shape != (len(time), 3) or len(time) < 2:
         raise InputError(
-            "no path", got=f"{time.shape} times and {place.shape} poses", expected="(rows,) and (rows, 3), rows >= 2",
+            "no path",
+            got=f"{time.shape} times and {place.shape} poses",
+            expected="(rows,) and (rows, 3), rows >= 2",
             where=name,
-        )  # fmt: skip
+        )
     bad = np.flatnonzero(~np.isfinite(np.column_stack([time, place])).all(axis=1))
     if bad.size:
         raise InputError(
@@ -215,10 +217,12 @@ def lines(t: ArrayLike, pose: ArrayLike, name: str) -> Lines:
     back = np.flatnonzero(np.diff(time) <= 0.0)
     if back.size:
         raise InputError(
-            "time does not increase", got=f"{time[back[0] + 1]:.12g} after {time[back[0]]:.12g}",
-            expected="increasing times", remedy="sort the rows by time and keep one of each",
+            "time does not increase",
+            got=f"{time[back[0] + 1]:.12g} after {time[back[0]]:.12g}",
+            expected="increasing times",
+            remedy="sort the rows by time and keep one of each",
             where=f"{name}, row {back[0] + 1}",
-        )  # fmt: skip
+        )
     if np.abs(place[:, 2]).max() <= np.pi + 1e-6:
         place[:, 2] = unwrapped(place[:, 2])
     return Lines(name, time - time[0], place)
@@ -228,9 +232,12 @@ def path_of_run(run: Run) -> Lines:
     """The path that a Run went: its poses. Raises InputError for a Run without, or with gaps in them."""
     if run.pose is None:
         raise InputError(
-            "this run has no poses to follow", got=", ".join(run.channels) or "no channel", expected="x, y and heading",
-            remedy="take a run of a simulation, or a log with a pose", where=run.source,
-        )  # fmt: skip
+            "this run has no poses to follow",
+            got=", ".join(run.channels) or "no channel",
+            expected="x, y and heading",
+            remedy="take a run of a simulation, or a log with a pose",
+            where=run.source,
+        )
     known = np.isfinite(run.pose).all(axis=1)
     return lines(run.t[known], run.pose[known], run.source or "a run")
 
@@ -241,8 +248,11 @@ def path_of_file(path: str | os.PathLike) -> Lines:
     missing = [name for name in COLUMNS if name not in table.names]
     if missing:
         raise InputError(
-            "no path in this file", got=", ".join(table.names), expected=", ".join(COLUMNS),
-            remedy=f"add {', '.join(missing)}", where=table.source,
-        )  # fmt: skip
+            "no path in this file",
+            got=", ".join(table.names),
+            expected=", ".join(COLUMNS),
+            remedy=f"add {', '.join(missing)}",
+            where=table.source,
+        )
     t, *pose = (table.measured(name) for name in COLUMNS)
     return lines(t, np.column_stack(pose), str(table.source))

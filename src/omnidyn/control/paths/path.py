@@ -29,14 +29,25 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "circle": {"radius_m": 0.5, "speed_m_s": 0.5, "period_s": None, **TURNING},
     "square": {"side_m": 0.8, "speed_m_s": 0.5, "period_s": None, **TURNING},
     "zigzag": {
-        "speed_m_s": 0.15, "sideways_m_s": None, "turn_rad_s": 1.0, "period_s": 4.0, "lag_s": 0.3, "heading_rad": 0.0,
+        "speed_m_s": 0.15,
+        "sideways_m_s": None,
+        "turn_rad_s": 1.0,
+        "period_s": 4.0,
+        "lag_s": 0.3,
+        "heading_rad": 0.0,
         "rounds": 3.0,
     },
     "goal": {
-        "x_m": 1.0, "y_m": 0.0, "heading_rad": 0.0, "from_x_m": 0.0, "from_y_m": 0.0, "from_heading_rad": 0.0,
-        "travel_s": 2.0, "hold_s": 2.0,
+        "x_m": 1.0,
+        "y_m": 0.0,
+        "heading_rad": 0.0,
+        "from_x_m": 0.0,
+        "from_y_m": 0.0,
+        "from_heading_rad": 0.0,
+        "travel_s": 2.0,
+        "hold_s": 2.0,
     },
-}  # fmt: skip
+}
 POSITIVE = ("size_m", "period_s", "radius_m", "side_m", "speed_m_s", "rounds")
 
 
@@ -65,9 +76,12 @@ def path(what: str | os.PathLike | Run, **options: Any) -> Path:
         return path_of_file(text)
     near = difflib.get_close_matches(name, OPTIONS, 1)
     raise InputError(
-        "unknown path", got=text, expected=f"{', '.join(OPTIONS)}, or a file of t_s, x_m, y_m, heading_rad",
-        remedy=f"did you mean {near[0]}?" if near else "", where="path",
-    )  # fmt: skip
+        "unknown path",
+        got=text,
+        expected=f"{', '.join(OPTIONS)}, or a file of t_s, x_m, y_m, heading_rad",
+        remedy=f"did you mean {near[0]}?" if near else "",
+        where="path",
+    )
 
 
 def _refuse_options(options: Mapping[str, Any], what: str) -> None:
@@ -124,13 +138,20 @@ def _turning(name: str, values: Mapping[str, Any], given: Mapping[str, Any]) -> 
     """What the heading of a curve does."""
     how = values["heading"] if "heading" in given else ("turning" if values["turn_rad_s"] else "held")
     if how == "held" and values["turn_rad_s"]:
-        raise InputError("a heading that is held does not turn", got=f"turn_rad_s={values['turn_rad_s']:g}",
-                         expected="heading=turning", where=name)  # fmt: skip
+        raise InputError(
+            "a heading that is held does not turn",
+            got=f"turn_rad_s={values['turn_rad_s']:g}",
+            expected="heading=turning",
+            where=name,
+        )
     if how == "along" and name == "square":
         raise InputError(
-            "a heading along a square turns at once at its corners", got="heading=along", expected="held or turning",
-            remedy="take an eight or a circle", where=name,
-        )  # fmt: skip
+            "a heading along a square turns at once at its corners",
+            got="heading=along",
+            expected="held or turning",
+            remedy="take an eight or a circle",
+            where=name,
+        )
     turn = values["turn_rad_s"] if "turn_rad_s" in given or how != "turning" else 1.0
     return {"heading": values["heading_rad"], "turn": turn if how == "turning" else 0.0, "along": how == "along"}
 

@@ -84,9 +84,14 @@ def links(robot: Robot, tall: float) -> Links:
         for k in range(n)
     )
     return Links(
-        identifier(robot.name), base, (float(centre[0]), float(centre[1])), inertias(base, turning, tall), tall, wheels,
+        identifier(robot.name),
+        base,
+        (float(centre[0]), float(centre[1])),
+        inertias(base, turning, tall),
+        tall,
+        wheels,
         notes if np.any(spins < axle) else (),
-    )  # fmt: skip
+    )
 
 
 def _joint(robot: Robot, wheel: int) -> tuple[float, float, float, float]:
@@ -96,9 +101,11 @@ def _joint(robot: Robot, wheel: int) -> tuple[float, float, float, float]:
     stall = wheel_torque(robot.motor, settled_current(robot.motor, limit, np.zeros(n)))[wheel]
     free = no_load_speed(robot.motor, limit)[wheel]
     return (
-        float(stall), float(free), float(per_wheel(friction.viscous, n)[wheel] * radius**2),
+        float(stall),
+        float(free),
+        float(per_wheel(friction.viscous, n)[wheel] * radius**2),
         float(per_wheel(friction.coulomb, n)[wheel] * radius),
-    )  # fmt: skip
+    )
 
 
 # What simulators of bodies ask beyond the model: inertias about the other axes, wheels as parts, friction per axis
@@ -126,8 +133,9 @@ def height_of(robot: Robot, height: float | None) -> float:
     if height is None:
         return 2.0 * float(robot.wheels.radii.max())
     if not 0.0 < height <= HIGHEST:
-        raise InputError("no body has this height", got=height, expected=f"more than 0 and at most {HIGHEST:g} m",
-                         where="height")  # fmt: skip
+        raise InputError(
+            "no body has this height", got=height, expected=f"more than 0 and at most {HIGHEST:g} m", where="height"
+        )
     return float(height)
 
 

@@ -35,16 +35,27 @@ def mjcf(robot: Robot, height: float | None = None) -> Export:
     """A robot as a MuJoCo model. height [m]: of the body, for the inertia about the other axes."""
     refuse("mjcf", robot)
     missing, tall = left_out("mjcf", robot), height_of(robot, height)
-    text = "\n".join([
-        f"<mujoco model={attribute(robot.name)}>",
-        xml_comment([f"{robot.name}, by omnidyn. SI units.", *(f"Not as in omnidyn: {words}" for words in missing),
-                     f"Height of the body {tall:g} m, for its inertia about x and y: a guess, it does not tip."]),
-        f'  <option timestep="{STEP}" integrator="implicitfast" noslip_iterations="10"/>',
-        "  <worldbody>", *_body(robot, tall), "  </worldbody>",
-        "  <actuator>", *_actuators(robot), "  </actuator>",
-        '  <sensor>\n    <velocimeter name="twist" site="body"/>\n    <gyro name="gyro" site="body"/>\n  </sensor>',
-        "</mujoco>\n",
-    ])  # fmt: skip
+    text = "\n".join(
+        [
+            f"<mujoco model={attribute(robot.name)}>",
+            xml_comment(
+                [
+                    f"{robot.name}, by omnidyn. SI units.",
+                    *(f"Not as in omnidyn: {words}" for words in missing),
+                    f"Height of the body {tall:g} m, for its inertia about x and y: a guess, it does not tip.",
+                ]
+            ),
+            f'  <option timestep="{STEP}" integrator="implicitfast" noslip_iterations="10"/>',
+            "  <worldbody>",
+            *_body(robot, tall),
+            "  </worldbody>",
+            "  <actuator>",
+            *_actuators(robot),
+            "  </actuator>",
+            '  <sensor>\n    <velocimeter name="twist" site="body"/>\n    <gyro name="gyro" site="body"/>\n  </sensor>',
+            "</mujoco>\n",
+        ]
+    )
     return Export("mjcf", robot.name, {"robot.xml": text}, missing, NOTES)
 
 

@@ -22,28 +22,46 @@ def sdf(robot: Robot, height: float | None = None) -> Export:
     tall = height_of(robot, height)
     parts = links(robot, tall)
     missing = (*left_out("sdf", robot), *parts.notes)
-    text = "\n".join([
-        '<?xml version="1.0"?>', '<sdf version="1.9">', f'  <model name="{parts.name}">',
-        xml_comment([f"{robot.name}, by omnidyn. SI units.", *(f"Not as in omnidyn: {words}" for words in missing),
-                     f"Height of the base {tall:g} m, for its inertia about x and y: a guess."]),
-        f"    <pose>{several(0, 0, max(each.place.radius for each in parts.wheels), 0, 0, 0)}</pose>",
-        *_base(parts), *(line for each in parts.wheels for line in _wheel(each)), "  </model>", "</sdf>\n",
-    ])  # fmt: skip
+    text = "\n".join(
+        [
+            '<?xml version="1.0"?>',
+            '<sdf version="1.9">',
+            f'  <model name="{parts.name}">',
+            xml_comment(
+                [
+                    f"{robot.name}, by omnidyn. SI units.",
+                    *(f"Not as in omnidyn: {words}" for words in missing),
+                    f"Height of the base {tall:g} m, for its inertia about x and y: a guess.",
+                ]
+            ),
+            f"    <pose>{several(0, 0, max(each.place.radius for each in parts.wheels), 0, 0, 0)}</pose>",
+            *_base(parts),
+            *(line for each in parts.wheels for line in _wheel(each)),
+            "  </model>",
+            "</sdf>\n",
+        ]
+    )
     return Export("sdf", robot.name, {"robot.sdf": text}, missing, NOTES)
 
 
 def _inertial(mass: float, about: tuple[float, float, float], centre: tuple[float, float] = (0.0, 0.0)) -> list[str]:
     entries = "".join(f"<{n}>{number(v)}</{n}>" for n, v in zip(("ixx", "iyy", "izz"), about, strict=True))
     place = f"<pose>{several(*centre, 0.0, 0.0, 0.0, 0.0)}</pose>" if any(centre) else ""
-    return [f"      <inertial>{place}<mass>{number(mass)}</mass>",
-            f"        <inertia>{entries}<ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia></inertial>"]  # fmt: skip
+    return [
+        f"      <inertial>{place}<mass>{number(mass)}</mass>",
+        f"        <inertia>{entries}<ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia></inertial>",
+    ]
 
 
 def _base(parts: Links) -> list[str]:
     radius = max(math.hypot(each.place.x, each.place.y) for each in parts.wheels)
     shape = f"<cylinder><radius>{number(radius)}</radius><length>{number(parts.tall)}</length></cylinder>"
-    return ['    <link name="base_link">', *_inertial(parts.mass, parts.inertia, parts.centre),
-            f'      <visual name="looks"><geometry>{shape}</geometry></visual>', "    </link>"]  # fmt: skip
+    return [
+        '    <link name="base_link">',
+        *_inertial(parts.mass, parts.inertia, parts.centre),
+        f'      <visual name="looks"><geometry>{shape}</geometry></visual>',
+        "    </link>",
+    ]
 
 
 def _wheel(wheel: Wheel) -> list[str]:
@@ -56,12 +74,15 @@ def _wheel(wheel: Wheel) -> list[str]:
         f'    <link name="{wheel.name}">',
         f'      <pose relative_to="base_link">{several(place.x, place.y, 0.0, 0.0, 0.0, place.azimuth)}</pose>',
         *_inertial(wheel.mass, (axle, across, across)),
-        f'      <visual name="looks">{parts[0]}</visual>', f'      <collision name="touches">{parts[1]}</collision>',
+        f'      <visual name="looks">{parts[0]}</visual>',
+        f'      <collision name="touches">{parts[1]}</collision>',
         "    </link>",
-        f'    <joint name="{wheel.name}_joint" type="revolute">', "      <parent>base_link</parent>",
-        f"      <child>{wheel.name}</child>", "      <axis><xyz>-1 0 0</xyz>",
+        f'    <joint name="{wheel.name}_joint" type="revolute">',
+        "      <parent>base_link</parent>",
+        f"      <child>{wheel.name}</child>",
+        "      <axis><xyz>-1 0 0</xyz>",
         f"        <limit><effort>{number(wheel.effort)}</effort><velocity>{number(wheel.speed)}</velocity></limit>",
         f"        <dynamics><damping>{number(wheel.damping)}</damping>"
         f"<friction>{number(wheel.friction)}</friction></dynamics></axis>",
         "    </joint>",
-    ]  # fmt: skip
+    ]

@@ -28,15 +28,22 @@ def urdf(robot: Robot, height: float | None = None) -> Export:
 def description(name: str, parts: Links, missing: tuple[str, ...], outward: bool = False) -> str:
     """The parts of a robot as URDF. outward: axes of joints point outwards, as some controllers of ROS have it."""
     about = [
-        f"{name}, by omnidyn. SI units.", *(f"Not as in omnidyn: {words}" for words in missing),
+        f"{name}, by omnidyn. SI units.",
+        *(f"Not as in omnidyn: {words}" for words in missing),
         f"Height of the base {parts.tall:g} m, for its inertia about x and y: a guess.",
         *(["Joints turn the other way than the wheels of omnidyn: their axes point outwards."] if outward else []),
-    ]  # fmt: skip
-    return "\n".join([
-        '<?xml version="1.0"?>', f"<robot name={attribute(name)}>", xml_comment(about), *_base(parts),
-        *(line for each in parts.wheels for line in _wheel(each, "1 0 0" if outward else "-1 0 0")), *control(parts),
-        "</robot>\n",
-    ])  # fmt: skip
+    ]
+    return "\n".join(
+        [
+            '<?xml version="1.0"?>',
+            f"<robot name={attribute(name)}>",
+            xml_comment(about),
+            *_base(parts),
+            *(line for each in parts.wheels for line in _wheel(each, "1 0 0" if outward else "-1 0 0")),
+            *control(parts),
+            "</robot>\n",
+        ]
+    )
 
 
 def inertial(mass: float, about: tuple[float, float, float], centre: tuple[float, float] = (0.0, 0.0)) -> list[str]:
@@ -44,15 +51,21 @@ def inertial(mass: float, about: tuple[float, float, float], centre: tuple[float
     names = ("ixx", "iyy", "izz")
     entries = " ".join(f'{name}="{number(value)}"' for name, value in zip(names, about, strict=True))
     place = f'<origin xyz="{several(*centre, 0.0)}"/>' if any(centre) else ""
-    return [f'    <inertial>{place}<mass value="{number(mass)}"/>',
-            f'      <inertia {entries} ixy="0" ixz="0" iyz="0"/></inertial>']  # fmt: skip
+    return [
+        f'    <inertial>{place}<mass value="{number(mass)}"/>',
+        f'      <inertia {entries} ixy="0" ixz="0" iyz="0"/></inertial>',
+    ]
 
 
 def _base(parts: Links) -> list[str]:
     radius = max(math.hypot(each.place.x, each.place.y) for each in parts.wheels)
     shape = f'<geometry><cylinder radius="{number(radius)}" length="{number(parts.tall)}"/></geometry>'
-    return ['  <link name="base_link">', *inertial(parts.mass, parts.inertia, parts.centre),
-            f"    <visual>{shape}</visual>", "  </link>"]  # fmt: skip
+    return [
+        '  <link name="base_link">',
+        *inertial(parts.mass, parts.inertia, parts.centre),
+        f"    <visual>{shape}</visual>",
+        "  </link>",
+    ]
 
 
 def _wheel(wheel: Wheel, axis: str) -> list[str]:
@@ -61,26 +74,33 @@ def _wheel(wheel: Wheel, axis: str) -> list[str]:
     shape = f'<cylinder radius="{number(place.radius)}" length="{number(wheel.width)}"/>'
     turned = f'<origin rpy="{several(0.0, 0.5 * math.pi, 0.0)}"/>'
     return [
-        f'  <link name="{wheel.name}">', *inertial(wheel.mass, (axle, across, across)),
-        f"    <visual>{turned}<geometry>{shape}</geometry></visual>", "  </link>",
-        f'  <joint name="{wheel.name}_joint" type="continuous">', '    <parent link="base_link"/>',
+        f'  <link name="{wheel.name}">',
+        *inertial(wheel.mass, (axle, across, across)),
+        f"    <visual>{turned}<geometry>{shape}</geometry></visual>",
+        "  </link>",
+        f'  <joint name="{wheel.name}_joint" type="continuous">',
+        '    <parent link="base_link"/>',
         f'    <child link="{wheel.name}"/>',
         f'    <origin xyz="{several(place.x, place.y, 0.0)}" rpy="{several(0.0, 0.0, place.azimuth)}"/>',
         f'    <axis xyz="{axis}"/>',
         f'    <limit effort="{number(wheel.effort)}" velocity="{number(wheel.speed)}"/>',
-        f'    <dynamics damping="{number(wheel.damping)}" friction="{number(wheel.friction)}"/>', "  </joint>",
-    ]  # fmt: skip
+        f'    <dynamics damping="{number(wheel.damping)}" friction="{number(wheel.friction)}"/>',
+        "  </joint>",
+    ]
 
 
 def control(parts: Links) -> list[str]:
     """What ros2_control reads: a command and a state for each joint, with the speed that its motor can keep."""
-    lines = ['  <ros2_control name="omnidyn" type="system">',
-             "    <hardware><plugin>mock_components/GenericSystem</plugin></hardware>"]  # fmt: skip
+    lines = [
+        '  <ros2_control name="omnidyn" type="system">',
+        "    <hardware><plugin>mock_components/GenericSystem</plugin></hardware>",
+    ]
     for wheel in parts.wheels:
         lines += [
             f'    <joint name="{wheel.name}_joint">',
             f'      <command_interface name="velocity"><param name="min">-{number(wheel.speed)}</param>'
             f'<param name="max">{number(wheel.speed)}</param></command_interface>',
-            '      <state_interface name="position"/><state_interface name="velocity"/>', "    </joint>",
-        ]  # fmt: skip
+            '      <state_interface name="position"/><state_interface name="velocity"/>',
+            "    </joint>",
+        ]
     return [*lines, "  </ros2_control>"]

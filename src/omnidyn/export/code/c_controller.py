@@ -63,14 +63,21 @@ def _header(made: Any, about: str) -> str:
     predicts = isinstance(made, Mpc)
     late = made.steps_late * made.dt if predicts else made.late
     numbers = {
-        "WHEELS": str(made.robot.wheels.count), "DT": c_number(made.dt, True), "LATE": c_number(late, True),
-    } | ({"HORIZON": str(made.horizon)} if predicts else {})  # fmt: skip
+        "WHEELS": str(made.robot.wheels.count),
+        "DT": c_number(made.dt, True),
+        "LATE": c_number(late, True),
+    } | ({"HORIZON": str(made.horizon)} if predicts else {})
     defines = "\n".join(f"#define OMNIDYN_{name} {text}" for name, text in numbers.items())
     return filled(
-        _HEADER, ABOUT=about, DEFINES=defines, UNITS=_UNITS[made.output],
-        MEMORY=mpc_memory(made) if predicts else _MEMORY, INPUT=f"{mpc_input(made)}\n\n" if predicts else "",
-        AHEAD=_AHEAD if predicts else _NOW_AND_AHEAD, ROWS="OMNIDYN_HORIZON + 1" if predicts else "3",
-    ).lstrip()  # fmt: skip
+        _HEADER,
+        ABOUT=about,
+        DEFINES=defines,
+        UNITS=_UNITS[made.output],
+        MEMORY=mpc_memory(made) if predicts else _MEMORY,
+        INPUT=f"{mpc_input(made)}\n\n" if predicts else "",
+        AHEAD=_AHEAD if predicts else _NOW_AND_AHEAD,
+        ROWS="OMNIDYN_HORIZON + 1" if predicts else "3",
+    ).lstrip()
 
 
 _INCLUDES = '#include "omnidyn_control.h"\n\n#include <math.h>\n'
@@ -186,10 +193,13 @@ def _within(controller: AnyOf) -> list[str]:
     together = isinstance(controller, SpeedController)
     own = ("\n    float share = 1.0f;" if together else "") + ("" if current else "\n    (void)current;")
     text = filled(
-        _WITHIN, CURRENT=" || fabsf(current[k]) > CURRENT_LIMIT[k]" if current else "", OWN=own,
-        EACH=(_SHARE if together else _EACH).lstrip("\n"), TOGETHER=_TOGETHER if together else "",
+        _WITHIN,
+        CURRENT=" || fabsf(current[k]) > CURRENT_LIMIT[k]" if current else "",
+        OWN=own,
+        EACH=(_SHARE if together else _EACH).lstrip("\n"),
+        TOGETHER=_TOGETHER if together else "",
         PER_VOLT=_c(float(controller._sent(np.ones(1))[0])),
-    )  # fmt: skip
+    )
     return [text.strip()]
 
 

@@ -40,18 +40,24 @@ def c_model(robot: Robot, precision: Literal["double", "single"] = DOUBLE) -> Ex
 
 def _header(code: StepCode, about: str, precision: str) -> str:
     return filled(
-        _HEADER, ABOUT=about, REAL="float" if precision == SINGLE else "double", WHEELS=str(code.wheels),
-        STATUS=STATUS, FORCE=_FORCE if code.inductance else "",
+        _HEADER,
+        ABOUT=about,
+        REAL="float" if precision == SINGLE else "double",
+        WHEELS=str(code.wheels),
+        STATUS=STATUS,
+        FORCE=_FORCE if code.inductance else "",
         MORE=",\n                 omnidyn_real force[3]" if code.inductance else "",
-    ).lstrip()  # fmt: skip
+    ).lstrip()
 
 
 def _source(code: StepCode, about: str) -> str:
     return filled(
-        _SOURCE, ABOUT=about, TEXT=code.text,
+        _SOURCE,
+        ABOUT=about,
+        TEXT=code.text,
         MORE=",\n                 omnidyn_real force[3]" if code.inductance else "",
         FORCE="force, " if code.inductance else "",
-    ).lstrip()  # fmt: skip
+    ).lstrip()
 
 
 _FORCE = """

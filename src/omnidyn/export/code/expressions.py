@@ -224,8 +224,9 @@ class Expressions:
     def _own(self, called: sources.Source, nodes: list[ast.expr]) -> Typed:
         """A call of another function of the package, translated for arguments of these types."""
         given = [self.of(each) for each in nodes]
-        made = self.program.function(called, tuple(REAL if kind == INT and ("." in text) else kind
-                                                   for text, kind in given))  # fmt: skip
+        made = self.program.function(
+            called, tuple(REAL if kind == INT and ("." in text) else kind for text, kind in given)
+        )
         for position, node in enumerate(nodes):
             if position in made.writes:
                 self.body.writes_to(node)

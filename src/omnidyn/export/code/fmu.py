@@ -27,8 +27,12 @@ from omnidyn.simulation.engine import FARTHEST
 OUTPUTS = ("vx_m_s", "vy_m_s", "omega_rad_s", "x_m", "y_m", "heading_rad")
 _OUTPUT_UNITS = ("m/s", "m/s", "rad/s", "m", "m", "rad")
 _BASE = {
-    "V": 'kg="1" m="2" s="-3" A="-1"', "m/s": 'm="1" s="-1"', "rad/s": 'rad="1" s="-1"', "m": 'm="1"', "rad": 'rad="1"',
-}  # fmt: skip
+    "V": 'kg="1" m="2" s="-3" A="-1"',
+    "m/s": 'm="1" s="-1"',
+    "rad/s": 'rad="1" s="-1"',
+    "m": 'm="1"',
+    "rad": 'rad="1"',
+}
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the first moment that an archive can hold: the same robot gives the same bytes
 COMPILERS = ("gcc", "clang", "cc")
 SECONDS = 120  # for the compiler
@@ -103,9 +107,15 @@ def _library(source: bytes, name: str) -> tuple[bytes | None, str]:
 
 def _source(code: StepCode, guid: str) -> str:
     return filled(
-        FMI2_C, STATUS=STATUS, STEP=code.text, WHEELS=str(code.wheels), GUID=guid, TWIST=c_number(FARTHEST["twist"]),
-        POSE=c_number(FARTHEST["pose"]), FORCE="unit->force, " if code.inductance else "",
-    ).lstrip()  # fmt: skip
+        FMI2_C,
+        STATUS=STATUS,
+        STEP=code.text,
+        WHEELS=str(code.wheels),
+        GUID=guid,
+        TWIST=c_number(FARTHEST["twist"]),
+        POSE=c_number(FARTHEST["pose"]),
+        FORCE="unit->force, " if code.inductance else "",
+    ).lstrip()
 
 
 def _variables(wheels: int) -> list[str]:

@@ -48,9 +48,12 @@ def mpc_code(controller: Mpc) -> str:
     if controller.settings.speed is not None:
         raise UnsupportedError(
             "the model predictive controller in C has no limit of the speed: float32 cannot hold its weight beside the "
-            "others", got=controller.settings.speed, expected="none", where="speed",
+            "others",
+            got=controller.settings.speed,
+            expected="none",
+            where="speed",
             remedy="leave `speed` out of the controller file, and ask for slower paths",
-        )  # fmt: skip
+        )
     text = "\n".join(FOLDER.joinpath(name).read_text("utf-8") for name in PARTS)
     return f"#include <string.h>\n\n{_constants(controller)}\n\n{text}"
 
@@ -91,21 +94,43 @@ def _constants(controller: Mpc) -> str:
     settings, linear, robot = controller.settings, controller._numbers.linear[0], controller.robot
     turning, ellipse = bool(linear[TURNING] != 0.0), bool(linear[ELLIPSE] > 0.0)
     whether = {
-        "LEVELS": len(controller._numbers.levels), "ELLIPSE": ellipse, "TURNING": turning,
+        "LEVELS": len(controller._numbers.levels),
+        "ELLIPSE": ellipse,
+        "TURNING": turning,
         "OFF_CENTRE": any(robot.body.centre),
-        "LEARN": controller.observer, "BOUNDED": _bounded(controller), "CURRENT": _current(controller),
+        "LEARN": controller.observer,
+        "BOUNDED": _bounded(controller),
+        "CURRENT": _current(controller),
         "SLEW": settings.slew is not None,
-        "WHEEL_SPEED": controller.output == WHEEL_SPEED, "LATE_STEPS": controller.steps_late,
-        "PASSES": observer.PASSES, "SOON": program.SOON, "AGAIN": settings.again,
-        "FIRST_PASSES": interior_point.FIRST, "LAST_PASSES": interior_point.LAST, "MOST": MOST,
-    }  # fmt: skip
+        "WHEEL_SPEED": controller.output == WHEEL_SPEED,
+        "LATE_STEPS": controller.steps_late,
+        "PASSES": observer.PASSES,
+        "SOON": program.SOON,
+        "AGAIN": settings.again,
+        "FIRST_PASSES": interior_point.FIRST,
+        "LAST_PASSES": interior_point.LAST,
+        "MOST": MOST,
+    }
     numbers = {
-        "FARTHEST": FARTHEST, "EXACT": observer.EXACT, "LAST_WEIGHT": settings.last, "VOLTS_WEIGHT": settings.volts,
-        "BEYOND": BEYOND, "BACK_OFF": interior_point.BACK_OFF, "CENTRE": CENTRE,
-        "TIGHT": TIGHT, "LEAST": LEAST, "NARROWEST": NARROWEST, "TURNED": program.TURNED, "MOVED": program.MOVED,
-        "PULLED": program.PULLED, "FARTHEST_OFF": observer.BEYOND, "MOST_SCALE": observer.MOST,
-        "START_PUSH": loop.START_PUSH, "START_SCALE": loop.START_SCALE, "SHARP": settings.volts,
-    }  # fmt: skip
+        "FARTHEST": FARTHEST,
+        "EXACT": observer.EXACT,
+        "LAST_WEIGHT": settings.last,
+        "VOLTS_WEIGHT": settings.volts,
+        "BEYOND": BEYOND,
+        "BACK_OFF": interior_point.BACK_OFF,
+        "CENTRE": CENTRE,
+        "TIGHT": TIGHT,
+        "LEAST": LEAST,
+        "NARROWEST": NARROWEST,
+        "TURNED": program.TURNED,
+        "MOVED": program.MOVED,
+        "PULLED": program.PULLED,
+        "FARTHEST_OFF": observer.BEYOND,
+        "MOST_SCALE": observer.MOST,
+        "START_PUSH": loop.START_PUSH,
+        "START_SCALE": loop.START_SCALE,
+        "SHARP": settings.volts,
+    }
     if ellipse:
         numbers |= dict(
             zip(("ELLIPSE_X", "ELLIPSE_Y", "ELLIPSE_WIDTH"), linear[ELLIPSE : ELLIPSE + 3] ** (2, 2, 1), strict=True)
@@ -139,9 +164,10 @@ def _matrices(controller: Mpc, linear: np.ndarray) -> dict[str, Any]:
 
 def _noise(settings: Settings) -> dict[str, Any]:
     return {
-        "NOISE": np.square(settings.noise), "POSE_NOISE": np.square(settings.pose_noise),
+        "NOISE": np.square(settings.noise),
+        "POSE_NOISE": np.square(settings.pose_noise),
         "WALK": np.square((settings.walk, settings.push_walk, (settings.scale_walk,) * 3, settings.pose_walk)),
-    }  # fmt: skip
+    }
 
 
 def _outputs(controller: Mpc, robot: Any) -> dict[str, Any]:

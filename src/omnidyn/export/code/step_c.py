@@ -101,8 +101,12 @@ def _with_inductance(program: Program) -> dict[tuple[str, str], tuple[Type, ...]
     """The kernels of a robot with winding inductance, with the types of their arguments."""
     program.shapes[Axes] = dict.fromkeys(Axes._fields, (3,))
     program.shapes[Nodes] = {
-        "weight": (COUNT,), "time": (COUNT,), "kick": (3, COUNT), "phi": (3, COUNT), "total": (COUNT,),
-    }  # fmt: skip
+        "weight": (COUNT,),
+        "time": (COUNT,),
+        "kick": (3, COUNT),
+        "phi": (3, COUNT),
+        "total": (COUNT,),
+    }
     law = program.struct(AxisLaw)
     nodes, axes = program.struct(Nodes), program.struct(Axes)
     tables = Array((3, 5)), Array((3, 4)), Array(GAUSS.shape)
@@ -142,10 +146,12 @@ def _drive(program: Program, robot: Robot) -> str:
     reach = "volts = at_motor(volts, ZERO, driver).a0;" if band else ""
     driver = ", ".join(c_number(each, single) for each in (1.0, band, 0.0))
     return _DRIVE.format(
-        real=program.real, wheels=robot.wheels.count, zero=c_number(0.0, single),
+        real=program.real,
+        wheels=robot.wheels.count,
+        zero=c_number(0.0, single),
         band=f"        const Driver driver = {{{driver}}};\n" if band else "",
         reach=f"\n        {reach.replace('ZERO', c_number(0.0, single))}" if band else "",
-    ).strip()  # fmt: skip
+    ).strip()
 
 
 def _advance(program: Program, robot: Robot) -> str:
@@ -154,15 +160,20 @@ def _advance(program: Program, robot: Robot) -> str:
     largest = SINGLE_MAX if single else sys.float_info.max
     piece = inductance.PIECE if dynamic else march.PIECE  # [rad] at the most that a turn of the loop takes
     numbers = {
-        "LARGEST": largest, "LONGEST": MAX_DT, "TWIST": FARTHEST["twist"], "POSE": FARTHEST["pose"],
+        "LARGEST": largest,
+        "LONGEST": MAX_DT,
+        "TWIST": FARTHEST["twist"],
+        "POSE": FARTHEST["pose"],
         "FULL_TURN": piece * program.most_turns,
-    }  # fmt: skip
+    }
     words = {name: c_number(value, single) for name, value in numbers.items()}
     text = filled(_CHECKED, ABS="fabsf" if single else "fabs", REAL=program.real)
     text += filled(
-        _ADVANCE_WITH_INDUCTANCE if dynamic else _ADVANCE, REAL=program.real,
-        REFUSE=filled(_REFUSE, WHEELS=str(robot.wheels.count), **words).strip("\n"), LARGEST=words["LARGEST"],
-    )  # fmt: skip
+        _ADVANCE_WITH_INDUCTANCE if dynamic else _ADVANCE,
+        REAL=program.real,
+        REFUSE=filled(_REFUSE, WHEELS=str(robot.wheels.count), **words).strip("\n"),
+        LARGEST=words["LARGEST"],
+    )
     return text.strip()
 
 

@@ -22,12 +22,28 @@ from omnidyn.export.spelling import c_number
 LONGEST = 100  # of an expression on a line of its own
 # Operation -> C, of the texts of its operands; f is the suffix of functions of float.
 _C: dict[str, str] = {
-    "+": "({0} + {1})", "-": "({0} - {1})", "*": "({0} * {1})", "/": "({0} / {1})", "neg": "(-{0})",
-    ">": "({0} > {1})", ">=": "({0} >= {1})", "<": "({0} < {1})", "<=": "({0} <= {1})", "==": "({0} == {1})",
-    "and": "({0} && {1})", "or": "({0} || {1})", "not": "(!{0})", "?": "({0} ? {1} : {2})",
-    "sign": "sign_of({0})", "abs": "fabs{f}({0})", "sqrt": "sqrt{f}({0})", "cos": "cos{f}({0})", "sin": "sin{f}({0})",
-    "max": "max_of({0}, {1})", "min": "min_of({0}, {1})",
-}  # fmt: skip
+    "+": "({0} + {1})",
+    "-": "({0} - {1})",
+    "*": "({0} * {1})",
+    "/": "({0} / {1})",
+    "neg": "(-{0})",
+    ">": "({0} > {1})",
+    ">=": "({0} >= {1})",
+    "<": "({0} < {1})",
+    "<=": "({0} <= {1})",
+    "==": "({0} == {1})",
+    "and": "({0} && {1})",
+    "or": "({0} || {1})",
+    "not": "(!{0})",
+    "?": "({0} ? {1} : {2})",
+    "sign": "sign_of({0})",
+    "abs": "fabs{f}({0})",
+    "sqrt": "sqrt{f}({0})",
+    "cos": "cos{f}({0})",
+    "sin": "sin{f}({0})",
+    "max": "max_of({0}, {1})",
+    "min": "min_of({0}, {1})",
+}
 _TRUTHS = frozenset((">", ">=", "<", "<=", "==", "and", "or", "not"))
 
 
@@ -130,20 +146,30 @@ _OWN: dict[Any, np.ufunc] = {
     **{
         ufunc: _elementwise(sign, ufunc, 2)
         for ufunc, sign in (
-            (np.greater, ">"), (np.greater_equal, ">="), (np.less, "<"), (np.less_equal, "<="), (np.equal, "=="),
-            (np.maximum, "max"), (np.minimum, "min"),
+            (np.greater, ">"),
+            (np.greater_equal, ">="),
+            (np.less, "<"),
+            (np.less_equal, "<="),
+            (np.equal, "=="),
+            (np.maximum, "max"),
+            (np.minimum, "min"),
         )
     },
     **{
         ufunc: _elementwise(name, ufunc, 1)
         for ufunc, name in (
-            (np.sign, "sign"), (np.absolute, "abs"), (np.sqrt, "sqrt"), (np.cos, "cos"), (np.sin, "sin"),
+            (np.sign, "sign"),
+            (np.absolute, "abs"),
+            (np.sqrt, "sqrt"),
+            (np.cos, "cos"),
+            (np.sin, "sin"),
             (np.invert, "not"),
         )
     },
     np.square: np.frompyfunc(lambda each: each * each, 1, 1),
-    np.bitwise_and: np.frompyfunc(_both, 2, 1), np.logical_and: np.frompyfunc(_both, 2, 1),
-}  # fmt: skip
+    np.bitwise_and: np.frompyfunc(_both, 2, 1),
+    np.logical_and: np.frompyfunc(_both, 2, 1),
+}
 _REDUCED: dict[Any, Any] = {np.all: np.logical_and, np.max: np.maximum, np.min: np.minimum}
 _ARITHMETIC = frozenset(
     (np.add, np.subtract, np.multiply, np.true_divide, np.negative, np.matmul, np.power)

@@ -82,9 +82,12 @@ def gains(robot: Robot) -> Gains:
         slopes.append((axis_gains(ends[0]) - axis_gains(ends[1])) / (2.0 * step) * std)
         wheel_slopes.append((wheel_gains(ends[0]) - wheel_gains(ends[1])) / (2.0 * step) * std)
     return Gains(
-        value, _spread(np.array(slopes), known.correlation), axis_patterns(robot), wheel,
+        value,
+        _spread(np.array(slopes), known.correlation),
+        axis_patterns(robot),
+        wheel,
         _spread(np.array(wheel_slopes), known.correlation),
-    )  # fmt: skip
+    )
 
 
 def axis_gains(robot: Robot) -> FloatArray:
@@ -133,8 +136,9 @@ def gains_csv(robot: Robot) -> Export:
     missing = left_out("gains", robot)
     lines = ["place,gain,value,std,unit"]
     lines += [f"{row.place},{row.name},{number(row.value)},{_std(row)},{row.unit}" for row in rows(robot)]
-    head = hash_comment([f"{robot.name}: volts of the most loaded motor, by omnidyn",
-                         *(f"not in it: {words}" for words in missing)])  # fmt: skip
+    head = hash_comment(
+        [f"{robot.name}: volts of the most loaded motor, by omnidyn", *(f"not in it: {words}" for words in missing)]
+    )
     return Export("gains", robot.name, {"gains.csv": head + "\n".join(lines) + "\n"}, missing)
 
 

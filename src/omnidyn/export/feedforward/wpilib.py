@@ -35,9 +35,10 @@ def wpilib(robot: Robot) -> Export:
     every = [(_constant(row), row) for row in rows(robot)]
     pattern = gains(robot).pattern
     files = {
-        "RobotGains.java": _java(about, every, pattern), "robot_gains.h": _cpp(about, every, pattern),
+        "RobotGains.java": _java(about, every, pattern),
+        "robot_gains.h": _cpp(about, every, pattern),
         "robot_gains.py": _python(about, every, pattern),
-    }  # fmt: skip
+    }
     return Export("wpilib", robot.name, files, missing, NOTES, folder=True)
 
 
@@ -50,9 +51,11 @@ def _java(about: list[str], every: list[tuple[str, Row]], pattern: np.ndarray) -
     lines = [f"  public static final double {name} = {number(row.value)}; // {spread(row)}" for name, row in every]
     table = ",\n".join(f"    {{{', '.join(map(number, each))}}}" for each in pattern.tolist())
     return (
-        java_comment(about) + "public final class RobotGains {\n  private RobotGains() {}\n\n" + "\n".join(lines)
+        java_comment(about)
+        + "public final class RobotGains {\n  private RobotGains() {}\n\n"
+        + "\n".join(lines)
         + f"\n\n  public static final double[][] PATTERN = {{\n{table}\n  }};\n}}\n"
-    )  # fmt: skip
+    )
 
 
 def _cpp(about: list[str], every: list[tuple[str, Row]], pattern: np.ndarray) -> str:
@@ -60,9 +63,11 @@ def _cpp(about: list[str], every: list[tuple[str, Row]], pattern: np.ndarray) ->
     table = ",\n".join(f"    {{{', '.join(map(number, each))}}}" for each in pattern.tolist())
     count = pattern.shape[1]
     return (
-        c_comment(about) + "\n#pragma once\n\nnamespace robot_gains {\n" + "\n".join(lines)
+        c_comment(about)
+        + "\n#pragma once\n\nnamespace robot_gains {\n"
+        + "\n".join(lines)
         + f"\n\ninline constexpr double PATTERN[{len(AXES)}][{count}] = {{\n{table}}};\n}}  // namespace robot_gains\n"
-    )  # fmt: skip
+    )
 
 
 def _python(about: list[str], every: list[tuple[str, Row]], pattern: np.ndarray) -> str:

@@ -53,8 +53,13 @@ def ros2_node(
     own = "c-controller" if controller else KIND
     refuse(own, robot)
     missing = left_out(own, robot)
-    about = python_comment([f"{robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in missing),
-                          "Checked without ROS, see docs/exports.md: try it on blocks first."])  # fmt: skip
+    about = python_comment(
+        [
+            f"{robot.name}, by omnidyn. SI units.",
+            *(f"Not in it: {words}" for words in missing),
+            "Checked without ROS, see docs/exports.md: try it on blocks first.",
+        ]
+    )
     if controller:
         files = follower(robot, controller, dt, timeout, about)
         return Export(KIND, robot.name, files, missing, (*NOTES, BUILD), folder=True)
@@ -229,9 +234,12 @@ def follower(robot: Robot, controller: str | os.PathLike, dt: float, timeout: fl
     made: Any = controller_spec(controller).make(robot, dt=dt)
     if made.output == "wheel_speed":
         raise UnsupportedError(
-            "a node gives duties, and this drive takes speeds of wheels", got=robot.drive.kind,
-            expected="a drive of volts or duty", remedy="ros2-control drives such a robot", where="drive.kind",
-        )  # fmt: skip
+            "a node gives duties, and this drive takes speeds of wheels",
+            got=robot.drive.kind,
+            expected="a drive of volts or duty",
+            remedy="ros2-control drives such a robot",
+            where="drive.kind",
+        )
     if isinstance(made, Mpc):
         ahead = [made.steps_late * dt + k * dt for k in range(made.horizon + 1)]
     else:
@@ -257,8 +265,12 @@ IN_VOLTS = {made.output == "voltage"}  # what the controller gives; else duties
 # [s] from now: when it wants to know the path.
 AHEAD = ({", ".join(number(each) for each in ahead)})
 '''
-    return {**code.files, "control_shared.c": _SHARED, "path_loop.py": about + constants + NUMBERS + _STEP,
-            "omnidyn_node.py": about + _SETUP + NODE_END}  # fmt: skip
+    return {
+        **code.files,
+        "control_shared.c": _SHARED,
+        "path_loop.py": about + constants + NUMBERS + _STEP,
+        "omnidyn_node.py": about + _SETUP + NODE_END,
+    }
 
 
 # What both loops ask of numbers from outside.

@@ -195,9 +195,11 @@ def odometry_error(robot: Robot, run: Run) -> FloatArray:
     """Twist from the wheels minus the measured one, NaN where either is missing. Shape (samples, 3)."""
     if run.wheel_speed is None or run.twist is None:
         raise InputError(
-            "cannot compare odometry with this run", got=", ".join(run.channels) or "no channel",
-            expected="wheel_speed and twist", remedy="give logs that measured both, such as by motion capture",
-        )  # fmt: skip
+            "cannot compare odometry with this run",
+            got=", ".join(run.channels) or "no channel",
+            expected="wheel_speed and twist",
+            remedy="give logs that measured both, such as by motion capture",
+        )
     return twist_from_wheel_speed(robot.wheels, run.wheel_speed) - run.twist
 
 
@@ -206,9 +208,11 @@ def _from_runs(robot: Robot, runs: Sequence[Run], horizon: float) -> Covariance:
     known = np.concatenate([error[np.isfinite(error).all(axis=1)] for error in errors])
     if len(known) < LEAST_SAMPLES:
         raise InputError(
-            "too few samples for a covariance", got=f"{len(known)} samples with wheel speeds and twist",
-            expected=f"{LEAST_SAMPLES} or more", remedy="give longer logs",
-        )  # fmt: skip
+            "too few samples for a covariance",
+            got=f"{len(known)} samples with wheel speeds and twist",
+            expected=f"{LEAST_SAMPLES} or more",
+            remedy="give longer logs",
+        )
     twist = np.mean(known**2, axis=0)
     ways = [_windows(error, run.t, horizon) for error, run in zip(errors, runs, strict=True)]
     whole = np.concatenate(ways)

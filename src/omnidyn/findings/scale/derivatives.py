@@ -99,11 +99,14 @@ def _joined(lines: list[tuple[SpeedPair, Slope]]) -> list[tuple[SpeedPair, Slope
     first = wheels[0][0]
     witness = [pair.witness for pair, _ in wheels]
     joined = first._replace(
-        speed=" ".join(pair.speed for pair, _ in wheels), position=" ".join(pair.position for pair, _ in wheels),
-        value=np.hstack([pair.value for pair, _ in wheels]), rate=np.hstack([pair.rate for pair, _ in wheels]),
-        of=(first.of[0], columns), on=(first.on[0], columns),
+        speed=" ".join(pair.speed for pair, _ in wheels),
+        position=" ".join(pair.position for pair, _ in wheels),
+        value=np.hstack([pair.value for pair, _ in wheels]),
+        rate=np.hstack([pair.rate for pair, _ in wheels]),
+        of=(first.of[0], columns),
+        on=(first.on[0], columns),
         witness=None if None in witness else (witness[0][0], np.hstack([channel[1] for channel in witness])),  # type: ignore[index]
-    )  # fmt: skip
+    )
     line = Slope(float(ratios.mean()), max(each.error for _, each in wheels), wheels[0][1].windows)
     return [(joined, line)]
 
@@ -112,8 +115,10 @@ def _judged(work: LogUnderCheck, pair: SpeedPair, line: Slope) -> tuple[Finding,
     """What is wrong, and the work with it put right."""
     ratio = line.value  # the speed is 1/ratio times too large, or the position ratio times
     by, side = _blamed(work, pair, ratio)
-    units = {SPEED_SIDE: unit_of(1.0 / ratio, possible(pair.speed_units, work, _component(pair.of))),
-             POSITION_SIDE: unit_of(ratio, possible(pair.position_units, work, _component(pair.on)))}  # fmt: skip
+    units = {
+        SPEED_SIDE: unit_of(1.0 / ratio, possible(pair.speed_units, work, _component(pair.of))),
+        POSITION_SIDE: unit_of(ratio, possible(pair.position_units, work, _component(pair.on))),
+    }
     if not side:
         side = POSITION_SIDE if any(units[POSITION_SIDE]) and not any(units[SPEED_SIDE]) else SPEED_SIDE
     name, other = (pair.speed, pair.position) if side == SPEED_SIDE else (pair.position, pair.speed)
@@ -126,9 +131,11 @@ def _judged(work: LogUnderCheck, pair: SpeedPair, line: Slope) -> tuple[Finding,
         finding = _of_time((pair, line))
     elif ratio < 0.0:
         finding = Finding(
-            "inverted", ERROR, name if by else f"{pair.speed} {pair.position}",
+            "inverted",
+            ERROR,
+            name if by else f"{pair.speed} {pair.position}",
             {"ratio": ratio, "error": line.error, **compared, "blamed": name if by else ""},
-        )  # fmt: skip
+        )
     else:
         finding = Finding(
             "scale", WARNING, name, {"ratio": ratio, "error": line.error, **compared, "blamed": name if by else ""}
@@ -157,9 +164,11 @@ def _of_time(which: tuple[SpeedPair, Slope]) -> Finding:
     pair, line = which
     clock = unit_of(1.0 / line.value, TIME_UNITS)
     return Finding(
-        "time_unit", ERROR, "t", {"ratio": line.value, "position": pair.position, "speed": pair.speed,
-         "mistake": clock if any(clock) else ()},
-    )  # fmt: skip
+        "time_unit",
+        ERROR,
+        "t",
+        {"ratio": line.value, "position": pair.position, "speed": pair.speed, "mistake": clock if any(clock) else ()},
+    )
 
 
 def _component(of: tuple[str, tuple[int, ...]]) -> str:
@@ -188,8 +197,18 @@ def _turn(work: LogUnderCheck) -> Iterator[SpeedPair]:
     own = None if speed is None else wheels_twist(work, speed, 2 * half + 1)
     rate = central_rate(unwrapped(pose[:, 2]), work.t, half)
     witness = None if own is None else ("wheels", own[:, 2:])
-    yield SpeedPair("turn", "omega", "heading", smooth(twist[:, 2:], 2 * half + 1), rate[:, None], ("twist", (2,)),
-               ("pose", (2,)), witness, TURN_UNITS, ANGLE_UNITS)  # fmt: skip
+    yield SpeedPair(
+        "turn",
+        "omega",
+        "heading",
+        smooth(twist[:, 2:], 2 * half + 1),
+        rate[:, None],
+        ("twist", (2,)),
+        ("pose", (2,)),
+        witness,
+        TURN_UNITS,
+        ANGLE_UNITS,
+    )
 
 
 def _wheels(work: LogUnderCheck) -> Iterator[SpeedPair]:
@@ -202,8 +221,18 @@ def _wheels(work: LogUnderCheck) -> Iterator[SpeedPair]:
     for k, name in enumerate(components("wheel_speed", speed.shape[1])):
         witness = None if expected is None else (expected[0], smooth(expected[1][:, [k]], 2 * half + 1))
         rate = central_rate(angle[:, k], work.t, half)[:, None]
-        yield SpeedPair("wheels", name, name.replace("w", "a"), smooth(speed[:, [k]], 2 * half + 1), rate,
-                   ("wheel_speed", (k,)), ("wheel_angle", (k,)), witness, TURN_UNITS, ANGLE_UNITS)  # fmt: skip
+        yield SpeedPair(
+            "wheels",
+            name,
+            name.replace("w", "a"),
+            smooth(speed[:, [k]], 2 * half + 1),
+            rate,
+            ("wheel_speed", (k,)),
+            ("wheel_angle", (k,)),
+            witness,
+            TURN_UNITS,
+            ANGLE_UNITS,
+        )
 
 
 def _path(work: LogUnderCheck) -> Iterator[SpeedPair]:

@@ -55,9 +55,11 @@ def check_lag(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
 def _finding(work: LogUnderCheck, pair: LagPair, line: Slope) -> Finding:
     late, early = (pair.late, pair.against) if line.value > 0.0 else (pair.against, pair.late)
     return Finding(
-        "lag", NOTE if abs(line.value) < WARN_FROM else WARNING, pair.subject,
+        "lag",
+        NOTE if abs(line.value) < WARN_FROM else WARNING,
+        pair.subject,
         {"rows": line.value, "error": line.error, "seconds": line.value * work.step, "late": late, "early": early},
-    )  # fmt: skip
+    )
 
 
 def _pairs(work: LogUnderCheck) -> Iterator[tuple[LogUnderCheck, LagPair]]:
@@ -69,8 +71,13 @@ def _pairs(work: LogUnderCheck) -> Iterator[tuple[LogUnderCheck, LagPair]]:
         assert own is not None
         length = np.array([1.0, 1.0, float(np.mean(work.geometry.wheels.robot_radius))])
         axes = seen.axes
-        pair = LagPair("wheel_speed", seen.name, own[:, axes] * length[axes], seen.twist[:, axes] * length[axes],
-                    f"wheel_speed {seen.name}")  # fmt: skip
+        pair = LagPair(
+            "wheel_speed",
+            seen.name,
+            own[:, axes] * length[axes],
+            seen.twist[:, axes] * length[axes],
+            f"wheel_speed {seen.name}",
+        )
         yield work, pair
     # A current jumps with the voltage, a speed does not: between samples of the current nothing is on a line.
     here = sampled_with(work, "current", ("voltage", "duty", "supply", "wheel_speed"))

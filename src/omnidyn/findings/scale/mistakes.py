@@ -24,9 +24,12 @@ NO_MISTAKE: Mistake = ("", "")
 
 # How many times too large a value is, if it is read in the second unit.
 TURN_UNITS: Mistakes = {
-    ("rpm", "rad/s"): 60.0 / TURN, ("deg/s", "rad/s"): 1.0 / DEGREE, ("turns/s", "rad/s"): 1.0 / TURN,
-    ("rad/s", "rpm"): TURN / 60.0, ("rad/s", "deg/s"): DEGREE,
-}  # fmt: skip
+    ("rpm", "rad/s"): 60.0 / TURN,
+    ("deg/s", "rad/s"): 1.0 / DEGREE,
+    ("turns/s", "rad/s"): 1.0 / TURN,
+    ("rad/s", "rpm"): TURN / 60.0,
+    ("rad/s", "deg/s"): DEGREE,
+}
 ANGLE_UNITS: Mistakes = {("deg", "rad"): 1.0 / DEGREE, ("turns", "rad"): 1.0 / TURN, ("rad", "deg"): DEGREE}
 LENGTH_UNITS: Mistakes = {("mm", "m"): 1e3, ("cm", "m"): 1e2, ("m", "mm"): 1e-3, ("m", "cm"): 1e-2}
 SPEED_UNITS: Mistakes = {("mm/s", "m/s"): 1e3, ("cm/s", "m/s"): 1e2, ("m/s", "mm/s"): 1e-3, ("m/s", "cm/s"): 1e-2}
@@ -58,9 +61,12 @@ def unit_finding(
         numbers: what shows it: `shown_by` and what was measured.
     """
     return Finding(
-        "unit", ERROR, subject, {"factor": factor, **numbers, "mistake": mistake if any(mistake) else ()},
+        "unit",
+        ERROR,
+        subject,
+        {"factor": factor, **numbers, "mistake": mistake if any(mistake) else ()},
         rests_on=rests_on,
-    )  # fmt: skip
+    )
 
 
 def possible(units: Mistakes, work: LogUnderCheck, component: str) -> Mistakes:
@@ -136,8 +142,9 @@ def emf_alone(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     assert robot is not None
     gear = float(np.mean(robot.motor.gear_ratio))
     # At the voltages given a motor turns at most 1, usually 0.5 to 1 times as fast as without load.
-    fits = {mistake: factor for mistake, factor in {**TURN_UNITS, MOTOR_SPEED: gear}.items()
-            if 0.2 < excess / factor < 1.15}  # fmt: skip
+    fits = {
+        mistake: factor for mistake, factor in {**TURN_UNITS, MOTOR_SPEED: gear}.items() if 0.2 < excess / factor < 1.15
+    }
     likely = max(fits, key=lambda mistake: -abs(np.log(excess / fits[mistake] / 0.7))) if fits else NO_MISTAKE
     names = " ".join(components("wheel_speed", work.wheels))
     return [unit_finding(names, excess, likely, CIRCUIT[1:], shown_by="emf")], work.replace(wheel_speed=speed * np.nan)

@@ -255,10 +255,17 @@ def _dead_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         coarse = 4.0 * quantum(work.channels["wheel_speed"][:, k])
         sure = np.isfinite(a.error) and a.windows >= 4 and abs(a.value) < 0.1 and a.error < 0.05
         if sure and size > max(0.2 * max(sizes), coarse) and not _told_to_rest(work, k):
-            findings.append(Finding(
-                "dead", ERROR, name, {"slope": a.value, "error": a.error, "source": source},
-                rows=work.lines(work.everywhere), count=len(work), rests_on=keys_behind(source),
-            ))  # fmt: skip
+            findings.append(
+                Finding(
+                    "dead",
+                    ERROR,
+                    name,
+                    {"slope": a.value, "error": a.error, "source": source},
+                    rows=work.lines(work.everywhere),
+                    count=len(work),
+                    rests_on=keys_behind(source),
+                )
+            )
             work = work.masked("wheel_speed", k, work.everywhere)
     return findings, work
 
@@ -296,8 +303,11 @@ def _single_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     if ratio is not None and abs(ratio.value - 1.0) > 0.1:
         return [], work  # a robot that slips does so more in one direction than in another
     coarse = [10.0 * quantum(column) for column in work.channels["wheel_speed"].T]
-    good = [k for k, a in enumerate(slopes)
-            if np.isfinite(a.error) and a.windows >= 4 and sizes[k] > max(0.2 * max(sizes), coarse[k])]  # fmt: skip
+    good = [
+        k
+        for k, a in enumerate(slopes)
+        if np.isfinite(a.error) and a.windows >= 4 and sizes[k] > max(0.2 * max(sizes), coarse[k])
+    ]
     if len(good) < 3:
         return [], work
     findings = []
@@ -308,10 +318,15 @@ def _single_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         off = slopes[k].value / float(np.mean(others))
         name = components("wheel_speed", work.wheels)[k]
         if off < 0.0:
-            findings.append(Finding(
-                "inverted", ERROR, name, {"ratio": off, "error": slopes[k].error, "source": source},
-                rests_on=keys_behind(source),
-            ))  # fmt: skip
+            findings.append(
+                Finding(
+                    "inverted",
+                    ERROR,
+                    name,
+                    {"ratio": off, "error": slopes[k].error, "source": source},
+                    rests_on=keys_behind(source),
+                )
+            )
             continue
         findings.append(
             Finding("wheel_scale", WARNING, name, {"ratio": off, "error": slopes[k].error, "source": source})

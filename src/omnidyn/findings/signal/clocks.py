@@ -87,10 +87,14 @@ def _in_rows(work: LogUnderCheck, clock: SensorClock) -> LogUnderCheck:
     filled = log.channels.items() if len(t) else ()
     channels = {name: log.aligned(name, values, [])[clock.rows] for name, values in filled}
     return replace(
-        work, rows=rows[clock.rows], t=t, step=float(np.clip(usual_step(t), 1e-9, 1e9)) if len(t) > 1 else 0.0,
-        segments=tuple(segments(t)) if len(t) else (), channels=channels,
+        work,
+        rows=rows[clock.rows],
+        t=t,
+        step=float(np.clip(usual_step(t), 1e-9, 1e9)) if len(t) > 1 else 0.0,
+        segments=tuple(segments(t)) if len(t) else (),
+        channels=channels,
         sampled=clock.components if len(clocks) > 1 else None,
-    )  # fmt: skip
+    )
 
 
 def with_speed(work: LogUnderCheck) -> LogUnderCheck:

@@ -49,9 +49,13 @@ def _wrapped(work: LogUnderCheck, channel: str, component: str, values: FloatArr
         return [], work, values
     bits = round(np.log2(wrap))
     finding = Finding(
-        "wrapped", ERROR, component, {"share": float(high.mean()), "bits": bits}, rows=work.lines(high),
+        "wrapped",
+        ERROR,
+        component,
+        {"share": float(high.mean()), "bits": bits},
+        rows=work.lines(high),
         count=int(high.sum()),
-    )  # fmt: skip
+    )
     right = np.where(high, values - wrap * size, values)
     return [finding], _changed(work, channel, component, right), right
 
@@ -68,9 +72,13 @@ def _placeholder(work: LogUnderCheck, channel: str, component: str, values: Floa
         return [], work, values
     cell = float(cells[np.flatnonzero(bad)[0]])
     finding = Finding(
-        "placeholder", ERROR, component, {"cell": cell, "share": float(bad.mean()), "times": top / others},
-        rows=work.lines(bad), count=int(bad.sum()),
-    )  # fmt: skip
+        "placeholder",
+        ERROR,
+        component,
+        {"cell": cell, "share": float(bad.mean()), "times": top / others},
+        rows=work.lines(bad),
+        count=int(bad.sum()),
+    )
     kept = np.where(bad, np.nan, values)
     return [finding], _changed(work, channel, component, kept), kept
 
@@ -110,11 +118,16 @@ def check_spikes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             if not bad.any() or bad.mean() > 0.2:
                 continue
             worst = int(np.flatnonzero(bad)[np.argmax(np.abs(values[bad] - np.nanmedian(values)))])
-            findings.append(Finding(
-                "spike", WARNING, component,
-                {"farthest": float(values[worst]), "share": float(bad.mean()), "at_s": float(work.t[worst])},
-                rows=work.lines(bad), count=int(bad.sum()),
-            ))  # fmt: skip
+            findings.append(
+                Finding(
+                    "spike",
+                    WARNING,
+                    component,
+                    {"farthest": float(values[worst]), "share": float(bad.mean()), "at_s": float(work.t[worst])},
+                    rows=work.lines(bad),
+                    count=int(bad.sum()),
+                )
+            )
             work = work.masked(channel, k, bad)
     return findings, work
 

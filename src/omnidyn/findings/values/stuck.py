@@ -51,11 +51,16 @@ def check_stuck(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
                 continue
             each = stretches(bad)
             longest = max(work.t[b - 1] - work.t[a] for a, b in each)
-            findings.append(Finding(
-                "stuck", WARNING, component,
-                {"longest_s": float(longest), "share": float(bad.mean()), "times": len(each)},
-                rows=work.lines(bad), count=int(bad.sum()),
-            ))  # fmt: skip
+            findings.append(
+                Finding(
+                    "stuck",
+                    WARNING,
+                    component,
+                    {"longest_s": float(longest), "share": float(bad.mean()), "times": len(each)},
+                    rows=work.lines(bad),
+                    count=int(bad.sum()),
+                )
+            )
             work = work.masked(channel, k, bad)
             predictor = WheelPredictor(work)
     return findings, work

@@ -86,10 +86,16 @@ def _missing(work: LogUnderCheck) -> list[Finding]:
             share = float(bad.mean())
             if share > 0.0:
                 grave = share > MAX_MISSING and channel not in ("pose", "twist", "supply")
-                findings.append(Finding(
-                    "missing", WARNING if grave else NOTE, component, {"share": share}, rows=work.lines(bad),
-                    count=int(bad.sum()),
-                ))  # fmt: skip
+                findings.append(
+                    Finding(
+                        "missing",
+                        WARNING if grave else NOTE,
+                        component,
+                        {"share": share},
+                        rows=work.lines(bad),
+                        count=int(bad.sum()),
+                    )
+                )
     return findings
 
 
@@ -108,18 +114,24 @@ def _quantised(work: LogUnderCheck) -> list[Finding]:
             usual = float(np.median(busy)) if busy.size else 0.0
             if not step or step < max(0.02 * usual, TINY):
                 continue
-            key = next((known for known in groups if known[0] == channel and abs(known[1] / step - 1.0) < 0.01),
-                       (channel, step))  # fmt: skip
+            key = next(
+                (known for known in groups if known[0] == channel and abs(known[1] / step - 1.0) < 0.01),
+                (channel, step),
+            )
             groups.setdefault(key, []).append((component, step / usual, white_noise(own)))
             if channel == "wheel_speed" and expected is not None and expected[1].shape[1] > k:
                 findings += _reads_zero(work, component, values, step, expected[0], expected[1][:, k])
     for (_, step), members in groups.items():
         names = [name for name, _, _ in members]
         share, noise = max(each for _, each, _ in members), max(each for _, _, each in members)
-        findings.append(Finding(
-            "quantised", NOTE, " ".join(names),
-            {"step": step, "share": share, "noise": noise, **_in_column(work, names[0], step)},
-        ))  # fmt: skip
+        findings.append(
+            Finding(
+                "quantised",
+                NOTE,
+                " ".join(names),
+                {"step": step, "share": share, "noise": noise, **_in_column(work, names[0], step)},
+            )
+        )
     return findings
 
 
@@ -135,10 +147,16 @@ def _reads_zero(
     slow = ~moving(values) & np.isfinite(values) & (turning > max(0.3 * step, sure)) & (turning < 2.0 * step)
     if slow.mean() < 0.2:
         return []
-    return [Finding(
-        "reads_zero", WARNING, component, {"step": step, "share": float(slow.mean()), "source": source},
-        rows=work.lines(slow), count=int(slow.sum()),
-    )]  # fmt: skip
+    return [
+        Finding(
+            "reads_zero",
+            WARNING,
+            component,
+            {"step": step, "share": float(slow.mean()), "source": source},
+            rows=work.lines(slow),
+            count=int(slow.sum()),
+        )
+    ]
 
 
 def _in_column(work: LogUnderCheck, component: str, step: float) -> dict[str, object]:
@@ -166,11 +184,17 @@ def _constant(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             k = place(component)[1]  # type: ignore[index]
             reason = _should_move(work, channel, k, all(flat.values()))
             if reason:
-                findings.append(Finding(
-                    "dead", ERROR if channel not in ("pose", "twist_command", "wheel_speed_command") else WARNING,
-                    component, {"value": float(np.nanmax(values)), "reason": reason},
-                    rows=work.lines(work.everywhere), count=len(work), rests_on=_behind(work, channel),
-                ))  # fmt: skip
+                findings.append(
+                    Finding(
+                        "dead",
+                        ERROR if channel not in ("pose", "twist_command", "wheel_speed_command") else WARNING,
+                        component,
+                        {"value": float(np.nanmax(values)), "reason": reason},
+                        rows=work.lines(work.everywhere),
+                        count=len(work),
+                        rests_on=_behind(work, channel),
+                    )
+                )
                 work = work.masked(channel, k, work.everywhere)
     return findings, work
 
@@ -282,10 +306,16 @@ def check_echo(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         if rows is None:
             continue
         measured_rows = np.asarray(np.isfinite(values).any(axis=1))
-        findings.append(Finding(
-            "echo", ERROR, " ".join(components(measured, values.shape[1])),
-            {"rows": float(rows), "channel": measured}, rows=work.lines(measured_rows), count=len(work),
-        ))  # fmt: skip
+        findings.append(
+            Finding(
+                "echo",
+                ERROR,
+                " ".join(components(measured, values.shape[1])),
+                {"rows": float(rows), "channel": measured},
+                rows=work.lines(measured_rows),
+                count=len(work),
+            )
+        )
         work = work.replace(**{measured: None})
     return findings, work
 

@@ -60,9 +60,11 @@ def _within(work: LogUnderCheck, seconds: float) -> tuple[str, WiringChoice] | N
     null = _null_rows(robot)
     rows = np.vstack([columns[axes], null])
     w, *rest = means(
-        work, smooth(speed, width), *([floor[:, axes] * length[axes]] if floor is not None and axes else []),
+        work,
+        smooth(speed, width),
+        *([floor[:, axes] * length[axes]] if floor is not None and axes else []),
         seconds=seconds,
-    )  # fmt: skip
+    )
     if len(w) < 8:
         return None
     v = rest[0] if rest else np.zeros((len(w), 0))
@@ -151,10 +153,19 @@ def axes_finding(work: LogUnderCheck, answer: WiringChoice) -> Finding:
     also = [] if turn is None else turned_names(turn)
     wrong = answer.best.touched(names) + also
     return Finding(
-        code_of(answer.best), ERROR, " ".join(wrong),
-        {"explained_as_logged": 1.0 - answer.logged, "explained_put_right": 1.0 - answer.left,
-         "channel": channel, "wiring": answer.best.statement(names), "of_pose": also}, "axes", rests_on=GEOMETRY,
-    )  # fmt: skip
+        code_of(answer.best),
+        ERROR,
+        " ".join(wrong),
+        {
+            "explained_as_logged": 1.0 - answer.logged,
+            "explained_put_right": 1.0 - answer.left,
+            "channel": channel,
+            "wiring": answer.best.statement(names),
+            "of_pose": also,
+        },
+        "axes",
+        rests_on=GEOMETRY,
+    )
 
 
 def turned_names(turn: FloatArray) -> list[str]:
@@ -203,11 +214,22 @@ def wheels_finding(work: LogUnderCheck, answer: WiringChoice, blamed: str) -> Fi
     against = seen.name if seen is not None else ("twist_command" if work.get("twist_command") is not None else "")
     names = components("wheel_speed", work.wheels)
     return Finding(
-        code_of(answer.best), ERROR, " ".join(answer.best.touched(names)),
-        {"unexplained_as_logged": answer.logged, "unexplained_put_right": answer.left,
-         "as_good": float(answer.others), "channel": "wheel_speed", "against": against, "blamed": blamed,
-         "wiring": answer.best.statement(names), **rivals_of(answer, names)}, "wheels", rests_on=GEOMETRY,
-    )  # fmt: skip
+        code_of(answer.best),
+        ERROR,
+        " ".join(answer.best.touched(names)),
+        {
+            "unexplained_as_logged": answer.logged,
+            "unexplained_put_right": answer.left,
+            "as_good": float(answer.others),
+            "channel": "wheel_speed",
+            "against": against,
+            "blamed": blamed,
+            "wiring": answer.best.statement(names),
+            **rivals_of(answer, names),
+        },
+        "wheels",
+        rests_on=GEOMETRY,
+    )
 
 
 # The frame of a pose against its own heading: turned, or mirrored; and whether the pose follows the wheels at all
@@ -250,11 +272,15 @@ def check_frame(work: LogUnderCheck, left: float) -> tuple[list[Finding], LogUnd
     unit = np.exp(-1.0j * np.radians(angle))
     place = (mended[:, 0] + 1.0j * mended[:, 1]) * unit
     mended = np.column_stack([place.real, place.imag, mended[:, 2]])
-    return [Finding(
-        "pose_frame", WARNING, "x y",
-        {"angle_deg": angle, "mirrored": float(mirror < 0.0), "likeness": alike, "likeness_as_logged": plain},
-        "mirrored" if mirror < 0.0 else "turned",
-    )], work.replace(pose=mended)  # fmt: skip
+    return [
+        Finding(
+            "pose_frame",
+            WARNING,
+            "x y",
+            {"angle_deg": angle, "mirrored": float(mirror < 0.0), "likeness": alike, "likeness_as_logged": plain},
+            "mirrored" if mirror < 0.0 else "turned",
+        )
+    ], work.replace(pose=mended)
 
 
 def _marker(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:

@@ -179,10 +179,18 @@ def marker_finding(turn: Turned, source: str, agrees: str = "") -> Finding:
     """
     degrees = float(np.degrees(turn.angle))
     return Finding(
-        "marker_angle", WARNING, "heading",
-        {"angle_deg": degrees, "error_deg": float(np.degrees(turn.error)), "likeness": turn.alike,
-         "likeness_as_logged": turn.plain, "source": source, "agrees": agrees},
-    )  # fmt: skip
+        "marker_angle",
+        WARNING,
+        "heading",
+        {
+            "angle_deg": degrees,
+            "error_deg": float(np.degrees(turn.error)),
+            "likeness": turn.alike,
+            "likeness_as_logged": turn.plain,
+            "source": source,
+            "agrees": agrees,
+        },
+    )
 
 
 def with_marker(work: LogUnderCheck, pose: FloatArray, angle: float) -> LogUnderCheck:

@@ -93,9 +93,11 @@ def _as_in_body(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> Flo
 def _mirror_finding(plain: FrameCandidate, best: FrameCandidate) -> Finding:
     wrong = [name for name, sign in zip(NAMES, best.signs, strict=True) if sign < 0.0]
     return Finding(
-        "pose_frame", ERROR, " ".join(wrong),
+        "pose_frame",
+        ERROR,
+        " ".join(wrong),
         {"likeness": best.turn.alike, "likeness_as_logged": plain.turn.plain, "mirrored": 1.0},
-    )  # fmt: skip
+    )
 
 
 def _turned(
@@ -124,10 +126,18 @@ def _others(work: LogUnderCheck, width: int) -> list[tuple[str, FloatArray]]:
 def _sensor_finding(turn: Turned, name: str) -> Finding:
     degrees = float(np.degrees(turn.angle))
     return Finding(
-        "twist_frame", WARNING, "vx vy",
-        {"angle_deg": degrees, "error_deg": float(np.degrees(turn.error)), "likeness": turn.alike,
-         "likeness_as_logged": turn.plain, "agrees": name}, "turned",
-    )  # fmt: skip
+        "twist_frame",
+        WARNING,
+        "vx vy",
+        {
+            "angle_deg": degrees,
+            "error_deg": float(np.degrees(turn.error)),
+            "likeness": turn.alike,
+            "likeness_as_logged": turn.plain,
+            "agrees": name,
+        },
+        "turned",
+    )
 
 
 def _turned_back(twist: FloatArray, angle: float) -> FloatArray:

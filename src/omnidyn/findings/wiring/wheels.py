@@ -146,8 +146,15 @@ def by_likeness(work: LogUnderCheck, channel: str) -> WiringChoice | None:
     alike = (u.T @ w) / np.outer(su, sw)
     n = len(alike)
     tried = list(wirings(n))
-    costs = np.array([sum(1.0 - (s * alike[j, k]) * abs(alike[j, k]) for k, (j, s) in
-                          enumerate(zip(wiring.order, wiring.sign, strict=True))) for wiring in tried])  # fmt: skip
+    costs = np.array(
+        [
+            sum(
+                1.0 - (s * alike[j, k]) * abs(alike[j, k])
+                for k, (j, s) in enumerate(zip(wiring.order, wiring.sign, strict=True))
+            )
+            for wiring in tried
+        ]
+    )
     answer = choose(tried, costs, float(n))
     return answer if answer is not None and (answer.logged - answer.left) * n > 1.0 else None
 
@@ -157,8 +164,18 @@ def motor_finding(work: LogUnderCheck, channel: str, answer: WiringChoice, rests
     names = components(channel, work.wheels)
     against = "wheel_speed" if channel != "wheel_speed" else CURRENT_AND_VOLTAGE
     return Finding(
-        code_of(answer.best), ERROR, " ".join(answer.best.touched(names)),
-        {"unexplained_as_logged": answer.logged, "unexplained_put_right": answer.left,
-         "as_good": float(answer.others), "channel": channel, "against": against,
-         "wiring": answer.best.statement(names), **rivals_of(answer, names)}, "motors", rests_on=rests_on,
-    )  # fmt: skip
+        code_of(answer.best),
+        ERROR,
+        " ".join(answer.best.touched(names)),
+        {
+            "unexplained_as_logged": answer.logged,
+            "unexplained_put_right": answer.left,
+            "as_good": float(answer.others),
+            "channel": channel,
+            "against": against,
+            "wiring": answer.best.statement(names),
+            **rivals_of(answer, names),
+        },
+        "motors",
+        rests_on=rests_on,
+    )

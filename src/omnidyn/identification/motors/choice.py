@@ -30,7 +30,7 @@ def run_motor(fit: MotorEstimate, runs: Run | Sequence[Run]) -> list[FloatArray]
     logs = [
         replace(log, speed=log.motion if log.speed is None and len(log.t) >= SHORTEST else log.speed)
         for log in logs_of_free_runs(runs, fit.kind)
-    ]  # fmt: skip
+    ]
     records = [motor_record(log, fit.motor, fit.between, angle=False) for log in logs]
     problem = motor_problem(records, BAND in fit.value, bool(fit.late))
     late = fit.value.get(f"latency.{SPEED[0]}", next(iter(fit.late.values()), 0.0))
@@ -53,7 +53,7 @@ def fit_rmse(fit: MotorEstimate, runs: Run | Sequence[Run]) -> float:
         (ours - run.wheel_speed[:, fit.motor])[~unresolved_rows(getattr(run, fit.kind)[:, fit.motor])]
         for ours, run in zip(run_motor(fit, every), every, strict=True)
         if run.wheel_speed is not None
-    ]  # fmt: skip
+    ]
     known = np.concatenate(errors) if errors else np.zeros(0)
     known = known[np.isfinite(known)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")

@@ -17,8 +17,21 @@ from omnidyn.statement import NOTE, WARNING, Statement
 SLOPE, BAND, LAG, INERTIA, LATENCY = "slope", "dead_band", "lag", "inertia", "latency"
 WINDOWS, FREE_RUN = "windows", "free run"
 PAYS = 0.01  # share by which the error on held-out logs must fall for a dead band to pay
-HEAD = ("motor", "from", "dead band fitted", "slope", "+-", "dead band", "+-", "95 % interval", "lag ms", "+-", "unit",
-        "rmse rad/s", "held out rad/s")  # fmt: skip
+HEAD = (
+    "motor",
+    "from",
+    "dead band fitted",
+    "slope",
+    "+-",
+    "dead band",
+    "+-",
+    "95 % interval",
+    "lag ms",
+    "+-",
+    "unit",
+    "rmse rad/s",
+    "held out rad/s",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,10 +112,16 @@ class MotorEstimate:
             for name, value in self.late.items()
         ]
         numbers = {
-            "slope": self.value[SLOPE], "slope_std": self.std[SLOPE], "unit": self.unit, "lag": self.value[LAG],
-            "lag_known": LAG not in self.unidentifiable, "lag_seen": self.ci95[LAG][0] > 0.0, "late": late,
-            "left_out": self.left_out, "dead_band": self._of_dead_band(started),
-        }  # fmt: skip
+            "slope": self.value[SLOPE],
+            "slope_std": self.std[SLOPE],
+            "unit": self.unit,
+            "lag": self.value[LAG],
+            "lag_known": LAG not in self.unidentifiable,
+            "lag_seen": self.ci95[LAG][0] > 0.0,
+            "late": late,
+            "left_out": self.left_out,
+            "dead_band": self._of_dead_band(started),
+        }
         return Statement("motor_line", NOTE, self.name, numbers)
 
     def _of_dead_band(self, started: bool) -> Statement:
@@ -123,16 +142,24 @@ class MotorEstimate:
         """Cells under HEAD."""
         band, (low, high) = BAND in self.value, self.ci95.get(BAND, (math.nan, math.nan))
         return (
-            self.name.removeprefix("motor "), f"{self.count} windows" if self.way == WINDOWS else self.way,
-            "yes" if band else "no", f"{self.value[SLOPE]:.5g}", f"{self.std[SLOPE]:.2g}",
-            *((f"{self.value[BAND]:.3g}", f"{self.std[BAND]:.2g}", "[{:.3g}, {:.3g}]".format(*self.ci95[BAND]))
-              if band and math.isfinite(self.std[BAND])
-              else ("-", "-", f"[{low:.3g}, {high:.3g}]" if math.isfinite(high) else "-")),
-            *(f"{1e3 * each:{form}}" if math.isfinite(each) and LAG not in self.unidentifiable else "-"
-              for each, form in ((self.value[LAG], ".3g"), (self.std[LAG], ".2g"))),
-            f"{self.unit}, s/rad", f"{self.rmse:.4g}",
+            self.name.removeprefix("motor "),
+            f"{self.count} windows" if self.way == WINDOWS else self.way,
+            "yes" if band else "no",
+            f"{self.value[SLOPE]:.5g}",
+            f"{self.std[SLOPE]:.2g}",
+            *(
+                (f"{self.value[BAND]:.3g}", f"{self.std[BAND]:.2g}", "[{:.3g}, {:.3g}]".format(*self.ci95[BAND]))
+                if band and math.isfinite(self.std[BAND])
+                else ("-", "-", f"[{low:.3g}, {high:.3g}]" if math.isfinite(high) else "-")
+            ),
+            *(
+                f"{1e3 * each:{form}}" if math.isfinite(each) and LAG not in self.unidentifiable else "-"
+                for each, form in ((self.value[LAG], ".3g"), (self.std[LAG], ".2g"))
+            ),
+            f"{self.unit}, s/rad",
+            f"{self.rmse:.4g}",
             f"{self.held_out:.4g}" if math.isfinite(self.held_out) else "-",
-        )  # fmt: skip
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -140,16 +167,33 @@ class MotorEstimate:
             name: {"value": value, "std": self.std[name], "ci95": self.ci95[name]} for name, value in self.value.items()
         }
         of_way = (
-            {"rest": self.rest, "one_way": self.one_way} if self.way == WINDOWS
-            else {"between": self.between, "noise": self.noise, "covariance": self.covariance,
-                  "converged": self.converged, "left_out": self.left_out}
-        )  # fmt: skip
-        return plain({
-            "motor": "all" if self.motor is None else self.motor + 1, "unit": self.unit, "from": self.way,
-            "count": self.count, "parameters": parameters, "dead_band_seen": self.dead_band_seen,
-            "rmse_rad_s": self.rmse, "held_out_rmse_rad_s": self.held_out, "at_bound": self.at_bound,
-            "unidentifiable": self.unidentifiable, "warnings": self.warnings, "data": self.source, **of_way,
-        })  # fmt: skip
+            {"rest": self.rest, "one_way": self.one_way}
+            if self.way == WINDOWS
+            else {
+                "between": self.between,
+                "noise": self.noise,
+                "covariance": self.covariance,
+                "converged": self.converged,
+                "left_out": self.left_out,
+            }
+        )
+        return plain(
+            {
+                "motor": "all" if self.motor is None else self.motor + 1,
+                "unit": self.unit,
+                "from": self.way,
+                "count": self.count,
+                "parameters": parameters,
+                "dead_band_seen": self.dead_band_seen,
+                "rmse_rad_s": self.rmse,
+                "held_out_rmse_rad_s": self.held_out,
+                "at_bound": self.at_bound,
+                "unidentifiable": self.unidentifiable,
+                "warnings": self.warnings,
+                "data": self.source,
+                **of_way,
+            }
+        )
 
 
 def named(sources: Sequence[str]) -> str:

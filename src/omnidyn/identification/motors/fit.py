@@ -48,9 +48,16 @@ FREE_RUN_INPUTS = ("voltage", "duty")
 
 
 def fit_motor(
-    runs: Run | Sequence[Run], motor: int = 0, *, dead_band: bool = True, kind: str = "", between: str = AUTO,
-    latency: bool = False, angle: bool = False, loss: str = GAUSS,
-) -> MotorEstimate:  # fmt: skip
+    runs: Run | Sequence[Run],
+    motor: int = 0,
+    *,
+    dead_band: bool = True,
+    kind: str = "",
+    between: str = AUTO,
+    latency: bool = False,
+    angle: bool = False,
+    loss: str = GAUSS,
+) -> MotorEstimate:
     """Fit slope, dead band and lag of one motor to whole logs by output error.
 
     motor: its number from 0. dead_band: False leaves Coulomb friction out. kind: "voltage" or "duty"; "" takes the
@@ -136,10 +143,16 @@ def _with_rival(fit: MotorEstimate, rival: MotorEstimate) -> MotorEstimate:
     """
     own = [name for name in (SLOPE, BAND, LAG, INERTIA) if name in fit.value]
     std = {name: float(np.hypot(fit.std[name], fit.value[name] - rival.value[name])) for name in own}
-    warning = Statement("other_reading", numbers={
-        "better": rival.rmse < 0.99 * fit.rmse, "other": rival.between, "other_error": rival.rmse, "error": fit.rmse,
-        "between": fit.between,
-    })  # fmt: skip
+    warning = Statement(
+        "other_reading",
+        numbers={
+            "better": rival.rmse < 0.99 * fit.rmse,
+            "other": rival.between,
+            "other_error": rival.rmse,
+            "error": fit.rmse,
+            "between": fit.between,
+        },
+    )
     return _widened(fit, std, {name: rival.ci95[name] for name in std}, warning)
 
 
@@ -181,16 +194,25 @@ def _answer(
     size = known.std[0] * known.std[at]
     correlation = float(known.covariance[0, at] / size) if at >= 0 and np.isfinite(size) and size > 0.0 else 0.0
     return MotorEstimate(
-        motor=motor, kind=logs[0].kind, unit=logs[0].unit, way=FREE_RUN, between=between,
-        value={name: value[name] for name in names}, std={name: std[name] for name in names},
-        ci95={name: ci95[name] for name in names}, correlation=correlation, rmse=rmse, count=rows,
+        motor=motor,
+        kind=logs[0].kind,
+        unit=logs[0].unit,
+        way=FREE_RUN,
+        between=between,
+        value={name: value[name] for name in names},
+        std={name: std[name] for name in names},
+        ci95={name: ci95[name] for name in names},
+        correlation=correlation,
+        rmse=rmse,
+        count=rows,
         source=named([log.run.source for log in logs]),
         at_bound=tuple(name for name, held in zip(problem.names, known.held, strict=True) if held),
         unidentifiable=tuple(name for name in problem.names if name in blind),
         left_out=sum(int(unresolved_rows(log.put_in[:, motor]).sum()) for log in logs),
         noise={c[0]: float(np.sqrt(v)) for c, v in zip(problem.columns, solution.state.variance, strict=True)},
-        covariance=known.kind, converged=solution.converged,
-    )  # fmt: skip
+        covariance=known.kind,
+        converged=solution.converged,
+    )
 
 
 def _of_product(problem: MotorProblem, known: Trust, inertia: float) -> tuple[float, tuple[float, float]]:
@@ -280,9 +302,12 @@ def bend(solver: Solver[MotorProblem], state: State) -> BentLine | None:
     half = t_quantile(degrees) * std
     share = float(np.sqrt(np.mean(weight * left**2) / np.mean(weight * residual**2)))
     return BentLine(
-        max(value, 0.0), std, (max(value - half, 0.0), max(value + half, 0.0)),
-        bool(bends > fdtri(BENDS, degrees, SURE)), share,
-    )  # fmt: skip
+        max(value, 0.0),
+        std,
+        (max(value - half, 0.0), max(value + half, 0.0)),
+        bool(bends > fdtri(BENDS, degrees, SURE)),
+        share,
+    )
 
 
 def _regression(solver: Solver[MotorProblem], point: Point) -> tuple[FloatArray, FloatArray, IntArray]:
@@ -333,8 +358,9 @@ def _sandwich(scores: FloatArray, inverse: FloatArray, number: IntArray) -> tupl
     """(covariance, blocks): scores summed over blocks of rows, none of which reaches over the end of a piece."""
     length = max(LEAST_BLOCK, -(-len(scores) // BLOCKS))
     first = [
-        begin for n in np.unique(number)
+        begin
+        for n in np.unique(number)
         for begin in range(int(np.searchsorted(number, n)), int(np.searchsorted(number, n, "right")), length)
-    ]  # fmt: skip
+    ]
     influence = np.add.reduceat(scores, first, axis=0) @ inverse
     return influence.T @ influence, len(first)

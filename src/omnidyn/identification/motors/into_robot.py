@@ -76,8 +76,11 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
     motors = [motor for motor in study.motors if motor.motor is not None]
     most = max((motor.motor or 0) + 1 for motor in motors)
     if most > robot.wheels.count:
-        raise InputError("the logs have more motors than the robot has wheels", got=most,
-                         expected=f"{robot.wheels.count} or fewer, as {robot.name} has")  # fmt: skip
+        raise InputError(
+            "the logs have more motors than the robot has wheels",
+            got=most,
+            expected=f"{robot.wheels.count} or fewer, as {robot.name} has",
+        )
     if study.speed_from == HEADING:
         return MotorNumbers(robot, {}, {}, (Statement("motors_and_floor"),))
     supply, remarks = _supply(study, robot)
@@ -149,10 +152,12 @@ class _Wheel:
                 continue
             number = float(of(*at))
             if number > 0.0:
-                slopes = np.array([
-                    (of(*(at + step)) - of(*(at - step))) / (2.0 * step[k]) if step[k] > 0.0 else 0.0
-                    for k, step in enumerate(np.diag(STEP * spread))
-                ])  # fmt: skip
+                slopes = np.array(
+                    [
+                        (of(*(at + step)) - of(*(at - step))) / (2.0 * step[k]) if step[k] > 0.0 else 0.0
+                        for k, step in enumerate(np.diag(STEP * spread))
+                    ]
+                )
                 found[self.key(name)] = number, float(np.sqrt(slopes @ covariance @ slopes))
             else:
                 remarks.append(Statement("not_written", subject=name, numbers={"why": why}))

@@ -76,9 +76,12 @@ class MotorLog:
 
 
 def motor_logs(
-    runs: Sequence[Run], kind: str = "", speed: str = WHEEL, robot: Robot | None = None,
+    runs: Sequence[Run],
+    kind: str = "",
+    speed: str = WHEEL,
+    robot: Robot | None = None,
     kinds: Sequence[str] = tuple(INPUTS),
-) -> list[MotorLog]:  # fmt: skip
+) -> list[MotorLog]:
     """The runs with one input. kind: one of `kinds`; "" takes the first of them that all runs have.
 
     speed: "wheel", or "ground": of the heading of a robot that turns on the spot, which needs `robot`.
@@ -92,9 +95,11 @@ def motor_logs(
     lacking = next((run for run in runs if all(getattr(run, name) is None for name in wanted)), None)
     lacking = lacking or (runs[0] if runs else None)
     raise InputError(
-        "the motors' input is not in the log", got=", ".join(lacking.channels) if lacking else "no runs",
-        expected=", ".join(wanted), where=lacking.source if lacking else "",
-    )  # fmt: skip
+        "the motors' input is not in the log",
+        got=", ".join(lacking.channels) if lacking else "no runs",
+        expected=", ".join(wanted),
+        where=lacking.source if lacking else "",
+    )
 
 
 def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog:
@@ -104,8 +109,12 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
     put_in, pieces = getattr(run, kind) * INPUTS[kind][1], tuple(segments(run.t))
     if speed == GROUND:
         if run.pose is None or robot is None or not np.isfinite(run.pose[:, 2]).any():
-            raise InputError("the heading is not known", got=", ".join(run.channels), expected="heading, and a robot",
-                             where=run.source)  # fmt: skip
+            raise InputError(
+                "the heading is not known",
+                got=", ".join(run.channels),
+                expected="heading, and a robot",
+                where=run.source,
+            )
         angle, measured = run.pose[:, 2:] * wheel_speed(robot.wheels, [0.0, 0.0, 1.0]), None
         origin = HEADING
     elif speed == WHEEL:
@@ -115,8 +124,12 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
         raise InputError("no such speed", got=speed, expected=f"{WHEEL} or {GROUND}", where="speed")
     motion = measured if angle is None else np.gradient(angle, run.t, axis=0) if len(run) > 1 else np.zeros_like(angle)
     if motion is None:
-        raise InputError("the log has no speed and no angle of the motors", got=", ".join(run.channels),
-                         expected="wheel_angle or wheel_speed", where=run.source)  # fmt: skip
+        raise InputError(
+            "the log has no speed and no angle of the motors",
+            got=", ".join(run.channels),
+            expected="wheel_angle or wheel_speed",
+            where=run.source,
+        )
     averaged = [rows_of_mean(np.asarray(column)) or 1 if angle is None else 1 for column in motion.T]
     return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces, tuple(averaged), given)
 
@@ -221,9 +234,13 @@ class InputIntegral:
     """
 
     def __init__(
-        self, t: FloatArray, u: FloatArray, pieces: Rows, averaged: int = 1,
+        self,
+        t: FloatArray,
+        u: FloatArray,
+        pieces: Rows,
+        averaged: int = 1,
         given: tuple[FloatArray, FloatArray] | None = None,
-    ):  # fmt: skip
+    ):
         """averaged: of the integrals over the same rows and those up to so many rows before, their mean: what holds of
         a speed that is a mean over as many rows. NaN where there are not so many rows before.
         given: times and values of the input where it has stamps of its own; u is then what held in each row.

@@ -32,12 +32,17 @@ def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> Record
         raise InputError("no such motor", got=motor + 1, expected=f"1 to {log.put_in.shape[1]}", where=log.run.source)
     measured = {SPEED: log.speed, ANGLE: log.angle if angle or log.speed is None else None}
     outputs = {
-        name: column[:, motor] for name, column in measured.items()
+        name: column[:, motor]
+        for name, column in measured.items()
         if column is not None and np.isfinite(column[:, motor]).any()
-    }  # fmt: skip
+    }
     if not outputs:
-        raise InputError("the log has no speed and no angle of this motor", got=", ".join(log.run.channels),
-                         expected="wheel_speed or wheel_angle", where=log.run.source)  # fmt: skip
+        raise InputError(
+            "the log has no speed and no angle of this motor",
+            got=", ".join(log.run.channels),
+            expected="wheel_speed or wheel_angle",
+            where=log.run.source,
+        )
     t, u = log.t, log.put_in[:, motor]
     values = np.stack([*outputs.values()], axis=1)
     values[unresolved_rows(u)] = np.nan
@@ -46,16 +51,25 @@ def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> Record
     pieces = [rows for rows in rows_with(np.isfinite(u), log.pieces) if rows[1] - rows[0] + 1 >= SHORTEST]
     if not pieces:
         raise InsufficientDataError(
-            "no stretch of the log has inputs throughout", got=f"{int(np.isfinite(u).sum())} rows",
-            expected=f"{SHORTEST} rows in a row", where=log.run.source,
-        )  # fmt: skip
+            "no stretch of the log has inputs throughout",
+            got=f"{int(np.isfinite(u).sum())} rows",
+            expected=f"{SHORTEST} rows in a row",
+            where=log.run.source,
+        )
     if between == CURVE:
         t, u, values = refined(t, u, values, pieces)
         pieces = [(SUB * first, SUB * last) for first, last in pieces]
     return Record(
-        t, np.nan_to_num(u)[:, None], values, tuple(outputs), (0.0,) * len(outputs),
-        tuple(pieces), log.run.source, False, (),
-    )  # fmt: skip
+        t,
+        np.nan_to_num(u)[:, None],
+        values,
+        tuple(outputs),
+        (0.0,) * len(outputs),
+        tuple(pieces),
+        log.run.source,
+        False,
+        (),
+    )
 
 
 def motor_problem(records: Sequence[Record], dead_band: bool, latency: bool) -> MotorProblem:
@@ -158,14 +172,31 @@ class MotorEngine(Engine[MotorProblem]):
         late = [problem.where(f"{LATENCY}.{name}") for name, _ in columns]
         at = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)
         physics = Physics(
-            law, drive, np.zeros(N_AXES), speed_map, travel_map, np.zeros(width), np.full(width, -1),
-            np.array([values[k] if k >= 0 else 0.0 for k in late]), Driver(), bool(travel_map.any()),
-        )  # fmt: skip
+            law,
+            drive,
+            np.zeros(N_AXES),
+            speed_map,
+            travel_map,
+            np.zeros(width),
+            np.full(width, -1),
+            np.array([values[k] if k >= 0 else 0.0 for k in late]),
+            Driver(),
+            bool(travel_map.any()),
+        )
         slopes = PhysicsSlopes(
-            by_law, by_drive, np.zeros((N_AXES, room)), np.zeros((width, N_AXES, room)), np.zeros((width, PATH, room)),
-            np.zeros((width, room)), True, np.zeros(width, bool), np.array(late), np.full(3, -1),
-            at[:N_AXES], at[N_AXES:],
-        )  # fmt: skip
+            by_law,
+            by_drive,
+            np.zeros((N_AXES, room)),
+            np.zeros((width, N_AXES, room)),
+            np.zeros((width, PATH, room)),
+            np.zeros((width, room)),
+            True,
+            np.zeros(width, bool),
+            np.array(late),
+            np.full(3, -1),
+            at[:N_AXES],
+            at[N_AXES:],
+        )
         return physics, slopes, np.arange(width + 1)
 
 

@@ -76,7 +76,7 @@ def starts_and_stops(
     columns = [
         column._replace(put_in=way * side * column.put_in, speed=side * column.speed, moving=side * column.moving)
         for column in _columns(logs, motor)
-    ]  # fmt: skip
+    ]
     found = [edge for column in columns for edge in _edges_of(column) if _is_slow_enough(edge, lag)]
     spans: tuple[list[Span], list[Span]] = [], []
     for stop in (False, True):
@@ -202,9 +202,15 @@ def _span(edge: _Edge, lag: float, risk: float) -> Span:
     t, put_in = column.t[rows], column.put_in[rows]
     tries = np.sort(np.concatenate([t, 0.5 * (t[1:] + t[:-1])]))
     first, last = edge_interval(
-        t, put_in, column.speed[rows], tries, lags=_lags(lag, usual_step(t)), stop=edge.stop,
-        least_std=column.tick / math.sqrt(6.0), risk=risk,
-    )  # fmt: skip
+        t,
+        put_in,
+        column.speed[rows],
+        tries,
+        lags=_lags(lag, usual_step(t)),
+        stop=edge.stop,
+        least_std=column.tick / math.sqrt(6.0),
+        risk=risk,
+    )
     # a row on either side: loggers write an input in the row in which it is set, or in which it is answered
     begin = edge.first + max(int(np.searchsorted(t, first, "right")) - 2, 0)
     end = min(edge.first + int(np.searchsorted(t, last, "right")), len(column.t) - 1)
@@ -248,8 +254,9 @@ def turned_under(logs: Sequence[MotorLog], motor: int, side: float = 0.0, way: f
     """
     turned = (
         way * float(np.sign(each.speed)) * each.put_in + each.error
-        for each in _steady(logs, motor) if each.turns and side * each.speed >= 0.0
-    )  # fmt: skip
+        for each in _steady(logs, motor)
+        if each.turns and side * each.speed >= 0.0
+    )
     return min((each for each in turned if each > 0.0), default=math.inf)
 
 
@@ -274,7 +281,7 @@ def _steady(logs: Sequence[MotorLog], motor: int) -> list[_Window]:
     return [
         each._replace(turns=each.turns and abs(each.speed) > slow, rests=each.rests and abs(each.speed) <= slow)
         for each in found
-    ]  # fmt: skip
+    ]
 
 
 def _windows_of(log: MotorLog, motor: int) -> Iterator[_Window]:
@@ -309,9 +316,16 @@ NUMBERS = 3  # fitted beside t0, the lag among them
 
 
 def edge_interval(
-    t: FloatArray, put_in: FloatArray, speed: FloatArray, tries: FloatArray, *, lags: Sequence[float], stop: bool,
-    least_std: float, risk: float,
-) -> tuple[float, float]:  # fmt: skip
+    t: FloatArray,
+    put_in: FloatArray,
+    speed: FloatArray,
+    tries: FloatArray,
+    *,
+    lags: Sequence[float],
+    stop: bool,
+    least_std: float,
+    risk: float,
+) -> tuple[float, float]:
     """(first, last) instant [s] at which the motor may have started, or stopped, but for a share `risk`.
 
     t [s], put_in, speed [rad/s]: the rows around it, signed so that the motion is forward. Shape (rows,).

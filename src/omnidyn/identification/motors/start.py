@@ -32,8 +32,21 @@ from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import sensor_step, t_quantile
 
 START, STOP, OFFSET = "start", "stop", "offset"
-STARTS_HEAD = ("motor", "direction", "start", "95 % interval", "stop", "95 % interval", "slope", "95 % interval",
-               "offset", "95 % interval", "lag ms", "95 % interval", "unit")  # fmt: skip
+STARTS_HEAD = (
+    "motor",
+    "direction",
+    "start",
+    "95 % interval",
+    "stop",
+    "95 % interval",
+    "slope",
+    "95 % interval",
+    "offset",
+    "95 % interval",
+    "lag ms",
+    "95 % interval",
+    "unit",
+)
 # Numbers of a line that there is not.
 NO_LINE: dict[str, tuple[float, tuple[float, float]]] = {
     name: (math.nan, (math.nan, math.nan)) for name in (SLOPE, OFFSET, LAG)
@@ -88,9 +101,13 @@ class MotorStart:
         if low <= 0.0:
             return Statement("sets_off_below", NOTE, self.name, {"high": high, "unit": self.unit})
         numbers |= {
-            "start": self.value[START], "ci95": (low, high), "sharp": self.sharp, "stop": self.value[STOP],
-            "stop_ci95": self.ci95[STOP], "line_elsewhere": self.sharp and (left > high or right < low),
-        }  # fmt: skip
+            "start": self.value[START],
+            "ci95": (low, high),
+            "sharp": self.sharp,
+            "stop": self.value[STOP],
+            "stop_ci95": self.ci95[STOP],
+            "line_elsewhere": self.sharp and (left > high or right < low),
+        }
         return Statement("start_seen", NOTE, self.name, numbers)
 
     def row(self) -> tuple[str, ...]:
@@ -107,10 +124,17 @@ class MotorStart:
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
         numbers = {name: {"value": value, "ci95": self.ci95[name]} for name, value in self.value.items()}
-        return plain({
-            "motor": self.motor + 1, "direction": self.direction, "unit": self.unit, "parameters": numbers,
-            "starts": self.starts, "stops": self.stops, "warnings": self.warnings,
-        })  # fmt: skip
+        return plain(
+            {
+                "motor": self.motor + 1,
+                "direction": self.direction,
+                "unit": self.unit,
+                "parameters": numbers,
+                "starts": self.starts,
+                "stops": self.stops,
+                "warnings": self.warnings,
+            }
+        )
 
 
 def motor_starts(
@@ -132,9 +156,14 @@ def motor_starts(
 
 
 def direction_of(
-    motor: int, side: float, unit: str, up: Sequence[Span], down: Sequence[Span],
-    numbers: Mapping[str, tuple[float, tuple[float, float]]], turned: float = math.inf,
-) -> MotorStart:  # fmt: skip
+    motor: int,
+    side: float,
+    unit: str,
+    up: Sequence[Span],
+    down: Sequence[Span],
+    numbers: Mapping[str, tuple[float, tuple[float, float]]],
+    turned: float = math.inf,
+) -> MotorStart:
     """One direction from its starts, its stops and its line. numbers: name -> (value, interval). turned: the least
     input under which it turned steadily, which bounds a start that was not seen: it set off somewhere.
     """
@@ -149,10 +178,15 @@ def direction_of(
     }
     ci95 = {name: (span.low, span.high) for name, (span, _) in known.items()}
     return MotorStart(
-        motor, side, unit, value | {name: number for name, (number, _) in numbers.items()},
-        ci95 | {name: ends for name, (_, ends) in numbers.items()}, sum(math.isfinite(span.high) for span in up),
-        len(down), tuple(warnings),
-    )  # fmt: skip
+        motor,
+        side,
+        unit,
+        value | {name: number for name, (number, _) in numbers.items()},
+        ci95 | {name: ends for name, (_, ends) in numbers.items()},
+        sum(math.isfinite(span.high) for span in up),
+        len(down),
+        tuple(warnings),
+    )
 
 
 def common(spans: Sequence[Span]) -> tuple[Span, bool]:
@@ -220,9 +254,10 @@ def _numbers(line: MotorEstimate | None, way: float, row: float) -> dict[str, tu
         return dict(NO_LINE)
     early, late = line.ci95[LAG]
     return {
-        SLOPE: (line.value[SLOPE], line.ci95[SLOPE]), OFFSET: (way * line.value[BAND], _turned(line.ci95[BAND], way)),
+        SLOPE: (line.value[SLOPE], line.ci95[SLOPE]),
+        OFFSET: (way * line.value[BAND], _turned(line.ci95[BAND], way)),
         LAG: (line.value[LAG], (early - row, late + row)),
-    }  # fmt: skip
+    }
 
 
 # Inputs and steady speeds without what was in between: a table of points, or a log of a row a second
@@ -254,9 +289,14 @@ def points_of_logs(logs: Sequence[MotorLog]) -> MotorTable:
     parts = [part for log in logs for m in range(log.motors) for part in _points(log, m, later)]
     put_in, speed, motor, run = (np.concatenate(each) for each in zip(*parts, strict=True))
     return MotorTable(
-        put_in, speed, motor.astype(np.int64), logs[0].kind, logs[0].unit, run=run.astype(np.int64),
+        put_in,
+        speed,
+        motor.astype(np.int64),
+        logs[0].kind,
+        logs[0].unit,
+        run=run.astype(np.int64),
         source=logs[0].run.source,
-    )  # fmt: skip
+    )
 
 
 def _points(log: MotorLog, motor: int, later: bool) -> Iterator[tuple[FloatArray, ...]]:
@@ -300,18 +340,32 @@ def windows_of_points(points: MotorTable, speed_from: str) -> MotorWindows:
     turns = side != 0.0
     if not turns.any():
         raise InsufficientDataError(
-            "no row tells how the motors answer", got=f"{len(points)} rows at rest", expected="a motor that turns",
+            "no row tells how the motors answer",
+            got=f"{len(points)} rows at rest",
+            expected="a motor that turns",
             where=points.source,
-        )  # fmt: skip
+        )
     count, nothing = int(turns.sum()), np.zeros(int(turns.sum()))
     motors = int(points.motor.max()) + 1
     resting = [np.abs(points.put_in[(points.motor == m) & ~turns]) for m in range(motors)]
     return MotorWindows(
-        points.put_in[turns], points.speed[turns], nothing, side[turns], nothing, motor=points.motor[turns],
-        block=np.arange(count), unit=points.unit, kind=points.kind, speed_from=speed_from, length=math.nan,
-        rest=np.array([levels.max() if levels.size else np.nan for levels in resting]), unresolved=0,
-        resting=int((~turns).sum()), settled=True, every=1,
-    )  # fmt: skip
+        points.put_in[turns],
+        points.speed[turns],
+        nothing,
+        side[turns],
+        nothing,
+        motor=points.motor[turns],
+        block=np.arange(count),
+        unit=points.unit,
+        kind=points.kind,
+        speed_from=speed_from,
+        length=math.nan,
+        rest=np.array([levels.max() if levels.size else np.nan for levels in resting]),
+        unresolved=0,
+        resting=int((~turns).sum()),
+        settled=True,
+        every=1,
+    )
 
 
 def _sides(points: MotorTable) -> FloatArray:

@@ -131,12 +131,15 @@ class MotorStudy(Shown):
                 how = "steady windows" if math.isfinite(self.windows.length) else "a point per row"
         pairs = zip(self.motors, self.plain, strict=True) if self.plain else ((motor,) for motor in self.motors)
         parts = [
-            f"motors: {self.kind} [{self.unit}] against speed from {self.speed_from}, {how}", "",
-            Table(HEAD, [each.row() for several in pairs for each in several], name="motors"), "",
+            f"motors: {self.kind} [{self.unit}] against speed from {self.speed_from}, {how}",
+            "",
+            Table(HEAD, [each.row() for several in pairs for each in several], name="motors"),
+            "",
             *([Table(STARTS_HEAD, [start.row() for start in self.starts], name="starts"), ""] if self.starts else []),
-            Points(self.statements, name="statements"), by_severity(self.warnings, "warnings"),
+            Points(self.statements, name="statements"),
+            by_severity(self.warnings, "warnings"),
             Points(self.advice, "next:", "next"),
-        ]  # fmt: skip
+        ]
         return Document(parts, self.to_dict(), self.warnings, verdict=self.verdict)
 
     def to_dict(self) -> dict[str, Any]:
@@ -145,18 +148,30 @@ class MotorStudy(Shown):
         for record, plain in zip(motors, self.plain, strict=False):
             record["without_dead_band"] = plain.to_dict()
         return {
-            **as_verdict(self.verdict), "ok": not self.failed, "method": self.method, "input": self.kind,
-            "unit": self.unit, "speed_from": self.speed_from,
-            "window_s": self.windows.length if self.windows is not None else None, "motors": motors,
-            "starts": [start.to_dict() for start in self.starts], "statements": plain_values(self.statements),
-            "warnings": plain_values(self.warnings), "next": plain_values(self.advice), "check": checked(self.verdicts),
-        }  # fmt: skip
+            **as_verdict(self.verdict),
+            "ok": not self.failed,
+            "method": self.method,
+            "input": self.kind,
+            "unit": self.unit,
+            "speed_from": self.speed_from,
+            "window_s": self.windows.length if self.windows is not None else None,
+            "motors": motors,
+            "starts": [start.to_dict() for start in self.starts],
+            "statements": plain_values(self.statements),
+            "warnings": plain_values(self.warnings),
+            "next": plain_values(self.advice),
+            "check": checked(self.verdicts),
+        }
 
 
 def study_motors(
-    runs: Sequence[Run], robot: Robot | None, asked: MotorLine | MotorFit, hold_out: Sequence[str] = (),
-    logs: Sequence[Log] = (), progress: Progress = silent,
-) -> MotorStudy:  # fmt: skip
+    runs: Sequence[Run],
+    robot: Robot | None,
+    asked: MotorLine | MotorFit,
+    hold_out: Sequence[str] = (),
+    logs: Sequence[Log] = (),
+    progress: Progress = silent,
+) -> MotorStudy:
     """Slope, dead band, lag and inertia of every motor of some logs.
 
     Each direction of each motor has its own start, stop, line and lag in `MotorStudy.starts`. Rows of a log that are
@@ -188,13 +203,23 @@ def _lines(logs: Sequence[MotorLog], asked: MotorLine) -> MotorStudy:
     source = named([log.run.source for log in logs])
     motors, lines = _of_each(windows, source)
     lines = tuple(
-        line if line.motor is None else
-        line.bounded(turned_under(logs, line.motor, way=orientation_of(logs, line.motor)), line.rest) for line in lines
-    )  # fmt: skip
+        line
+        if line.motor is None
+        else line.bounded(turned_under(logs, line.motor, way=orientation_of(logs, line.motor)), line.rest)
+        for line in lines
+    )
     return MotorStudy(
-        STEADY_STATE, windows.kind, windows.unit, windows.speed_from, lines, (), windows,
-        motor_starts(logs, windows, motors), _supply(logs), (*averaged_statements(logs), *_of_windows(windows, lines)),
-    )  # fmt: skip
+        STEADY_STATE,
+        windows.kind,
+        windows.unit,
+        windows.speed_from,
+        lines,
+        (),
+        windows,
+        motor_starts(logs, windows, motors),
+        _supply(logs),
+        (*averaged_statements(logs), *_of_windows(windows, lines)),
+    )
 
 
 def _of_each(windows: MotorWindows, source: str) -> tuple[list[int], tuple[MotorEstimate, ...]]:
@@ -204,10 +229,12 @@ def _of_each(windows: MotorWindows, source: str) -> tuple[list[int], tuple[Motor
     speeds = [windows.of(motor)[1] for motor in motors]
     if all(np.ptp(speed) <= SAME_SPEED * np.abs(speed).max() for speed in speeds):
         raise InsufficientDataError(
-            "a line needs several speeds", got=f"{speeds[0][0]:.4g} rad/s in every window",
-            expected="speeds that change", remedy="drive the motors with several inputs, or look at their sensors",
+            "a line needs several speeds",
+            got=f"{speeds[0][0]:.4g} rad/s in every window",
+            expected="speeds that change",
+            remedy="drive the motors with several inputs, or look at their sensors",
             where=source,
-        )  # fmt: skip
+        )
     return motors, lines
 
 
@@ -219,9 +246,16 @@ def study_points(points: MotorTable, origin: str = "a table", remarks: Sequence[
         line if line.motor is None else line.bounded(windows.turned_under(line.motor), line.rest) for line in lines
     )
     return MotorStudy(
-        STEADY_STATE, points.kind, points.unit, origin, lines, (), windows, starts_of_points(points),
+        STEADY_STATE,
+        points.kind,
+        points.unit,
+        origin,
+        lines,
+        (),
+        windows,
+        starts_of_points(points),
         log_warnings=(*statements(points.notes), *remarks, *_of_windows(windows, lines)),
-    )  # fmt: skip
+    )
 
 
 def _free_runs(runs: Sequence[Run], asked: MotorFit, hold_out: Sequence[str], progress: Progress) -> MotorStudy:
@@ -248,9 +282,17 @@ def _free_runs(runs: Sequence[Run], asked: MotorFit, hold_out: Sequence[str], pr
         seen = None
     starts = starts_of_points(points_of_logs(logs)) if slow else motor_starts(logs, seen, motors)
     return MotorStudy(
-        OUTPUT_ERROR, logs[0].kind, logs[0].unit, origin, bands, plain, starts=starts, supply=_supply(logs),
-        drawn=seen, log_warnings=tuple(averaged_statements(logs, False)),
-    )  # fmt: skip
+        OUTPUT_ERROR,
+        logs[0].kind,
+        logs[0].unit,
+        origin,
+        bands,
+        plain,
+        starts=starts,
+        supply=_supply(logs),
+        drawn=seen,
+        log_warnings=tuple(averaged_statements(logs, False)),
+    )
 
 
 def _latency(nuisances: Sequence[str] | None) -> bool | None:
@@ -312,13 +354,16 @@ def _levels(motor: MotorEstimate, starts: Sequence[MotorStart]) -> list[float]:
 
 def _starts(
     seen: Sequence[MotorEstimate], levels: dict[str, list[float]], starts: Sequence[MotorStart], total: int
-) -> Statement:  # fmt: skip
+) -> Statement:
     """At which inputs motors start; of a motor alone, in each direction."""
     both = [start for start in starts if start.sharp]
     unit = {"unit": seen[0].unit}
     if total == 1 and len(both) == 2 and both[0].motor == seen[0].motor:
         ways = {"levels": [start.value[START] for start in both], "directions": [start.direction for start in both]}
         return Statement("starts_both_ways", NOTE, seen[0].name, ways | unit)
-    numbers = {"motors": [line.name for line in seen], "total": total,
-               "levels": [level for line in seen for level in levels[line.name]]}  # fmt: skip
+    numbers = {
+        "motors": [line.name for line in seen],
+        "total": total,
+        "levels": [level for line in seen for level in levels[line.name]],
+    }
     return Statement("motors_start", NOTE, numbers=numbers | unit)

@@ -122,19 +122,29 @@ def motor_windows(
         )
     table, first = np.array(rows), logs[0]
     return MotorWindows(
-        *table[:, :5].T, motor=table[:, 5].astype(np.int64), block=table[:, 6].astype(np.int64), unit=first.unit,
-        kind=first.kind, speed_from=first.motion_from, length=length, unresolved=unresolved, resting=resting,
-        rest=np.fmax.reduce([reader.rest for reader in readers]), settled=steady or share is not None, every=every,
+        *table[:, :5].T,
+        motor=table[:, 5].astype(np.int64),
+        block=table[:, 6].astype(np.int64),
+        unit=first.unit,
+        kind=first.kind,
+        speed_from=first.motion_from,
+        length=length,
+        unresolved=unresolved,
+        resting=resting,
+        rest=np.fmax.reduce([reader.rest for reader in readers]),
+        settled=steady or share is not None,
+        every=every,
         smear=max(_smear(log, length) for log in logs),
-    )  # fmt: skip
+    )
 
 
 def _usual_speed(logs: Sequence[MotorLog]) -> float:
     """The usual size of a speed that is one: the upper quartile of the means over half seconds."""
     means = [
         np.abs(_mean_speed(log, window)[0])
-        for log in logs for window in _windows(log, LENGTHS[-1])[:: max(1, len(log.t) // 20_000)]
-    ]  # fmt: skip
+        for log in logs
+        for window in _windows(log, LENGTHS[-1])[:: max(1, len(log.t) // 20_000)]
+    ]
     known = np.concatenate(means) if means else np.zeros(0)
     known = known[np.isfinite(known)]
     return float(np.quantile(known, 0.75)) if known.size else 0.0
@@ -319,9 +329,11 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
     count = len(np.unique(block))
     if count < MIN_WINDOWS:
         raise InsufficientDataError(
-            "too few windows for a line with intervals", got=f"{count} windows of {windows.length:g} s",
-            expected=f"{MIN_WINDOWS} or more in which the motor turns", remedy="record longer",
-        )  # fmt: skip
+            "too few windows for a line with intervals",
+            got=f"{count} windows of {windows.length:g} s",
+            expected=f"{MIN_WINDOWS} or more in which the motor turns",
+            remedy="record longer",
+        )
     design = np.stack([speed, side, change], axis=1)
     used = _columns(design, windows.settled)
     fit = _fit(design[:, used], put_in, speed_std)
@@ -335,16 +347,22 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
     with np.errstate(invalid="ignore", divide="ignore"):  # of draws that are all alike there is none
         correlation = float(np.corrcoef(drawn[1:, :2].T)[0, 1])
     return MotorEstimate(
-        motor=motor, kind=windows.kind, unit=windows.unit, way=WINDOWS, source=source, count=count,
+        motor=motor,
+        kind=windows.kind,
+        unit=windows.unit,
+        way=WINDOWS,
+        source=source,
+        count=count,
         value={name: float(draws[0]) for name, draws in numbers.items()},
         std={name: 0.5 * float(np.diff(central_interval(draws[1:], MIDDLE))[0]) for name, draws in numbers.items()},
         ci95={name: central_interval(draws[1:]) for name, draws in numbers.items()},
-        correlation=correlation, rmse=error / abs(slope) if slope else math.inf,
+        correlation=correlation,
+        rmse=error / abs(slope) if slope else math.inf,
         unidentifiable=tuple(name for name, draws in numbers.items() if np.isnan(draws[0])),
         one_way=bool(np.abs(side.sum()) > 0.98 * np.abs(side).sum()),
         rest=float(np.fmax.reduce(windows.rest if motor is None else windows.rest[[motor]])),
         draws={name: draws[1:] for name, draws in numbers.items()},
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -439,10 +457,13 @@ def _bootstrap(
         shape = (len(part), *design.shape)
         found.append(
             _york(
-                np.broadcast_to(design, shape), np.broadcast_to(put_in, shape[:2]),
-                np.broadcast_to(speed_std, shape[:2]), fit.extra, weight,
+                np.broadcast_to(design, shape),
+                np.broadcast_to(put_in, shape[:2]),
+                np.broadcast_to(speed_std, shape[:2]),
+                fit.extra,
+                weight,
             )
-        )  # fmt: skip
+        )
     drawn = np.concatenate(found)
     freedom = max(len(blocks) / length - design.shape[1], 1.0)
     wider = np.sqrt(1.0 + design.shape[1] / freedom) * t_quantile(int(max(freedom, 1))) / t_quantile(10**6)

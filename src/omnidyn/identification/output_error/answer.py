@@ -130,13 +130,20 @@ class OutputErrorEstimate(Estimate):
         nuisances = {
             name: asdict(own) | (UNKNOWN if name in self.unidentifiable else {}) for name, own in self.nuisances.items()
         }
-        return super().to_dict() | plain({
-            "nuisances": nuisances, "noise": self.noise, "unidentifiable": self.unidentifiable,
-            "combinations": self.combinations, "blind": self.blind,
-            "covariance": self.covariance, "unused": self.unused,
-            "converged": self.converged, **({"ladder": self.ladder.to_dict()} if self.ladder else {}),
-            "directions": [asdict(one) for one in self.directions],
-        })  # fmt: skip
+        return super().to_dict() | plain(
+            {
+                "nuisances": nuisances,
+                "noise": self.noise,
+                "unidentifiable": self.unidentifiable,
+                "combinations": self.combinations,
+                "blind": self.blind,
+                "covariance": self.covariance,
+                "unused": self.unused,
+                "converged": self.converged,
+                **({"ladder": self.ladder.to_dict()} if self.ladder else {}),
+                "directions": [asdict(one) for one in self.directions],
+            }
+        )
 
 
 @dataclass(frozen=True, eq=False)

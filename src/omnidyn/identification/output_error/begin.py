@@ -76,11 +76,13 @@ def _refuse_profile(group: Group, question: OutputError) -> None:
         why = "wheels that may slip"
     if why and levels:
         raise UnsupportedError(
-            "breakaway is profiled over voltages that are known, of wheels that roll", got=why,
-            expected="neither a speed loop nor a traction limit", where="free",
+            "breakaway is profiled over voltages that are known, of wheels that roll",
+            got=why,
+            expected="neither a speed loop nor a traction limit",
+            where="free",
             remedy=f"give {Key.parse(levels[0]).table} a stribeck_speed and free it too: what falls with the speed is "
             "fitted here; or hold breakaway, at the force with which slow ramps first move the robot",
-        )  # fmt: skip
+        )
 
 
 def _written_out(question: OutputError, robot: Robot, usual: Sequence[str]) -> OutputError:
@@ -91,18 +93,24 @@ def _written_out(question: OutputError, robot: Robot, usual: Sequence[str]) -> O
 
     free = question.free
     return replace(
-        question, free=None if free is None else every(free), fixed=every(question.fixed),
-        per_free=every(question.per_free), profile=every(question.profile),
-    )  # fmt: skip
+        question,
+        free=None if free is None else every(free),
+        fixed=every(question.fixed),
+        per_free=every(question.per_free),
+        profile=every(question.profile),
+    )
 
 
 def _refuse_joint(runs: Sequence[Run], robot: Robot, question: OutputError) -> None:
     levels = asked_levels(robot, question.free or ())
     if levels:
         raise UnsupportedError(
-            "breakaway is not profiled in groups", got=levels[0], expected="other keys", remedy="fit each group alone",
+            "breakaway is not profiled in groups",
+            got=levels[0],
+            expected="other keys",
+            remedy="fit each group alone",
             where="free",
-        )  # fmt: skip
+        )
     why = why_no_inputs(runs, robot)
     if why:
         raise UnsupportedError("groups are fitted by output error only", got=why, where="groups")

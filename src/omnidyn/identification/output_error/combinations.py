@@ -60,10 +60,14 @@ def combinations(problem: Problem, values: FloatArray, known: Trust, moved: Bool
                 value, half = float(now[axis]), known.quantile * std
                 found.append(
                     Combination(
-                        f"{kind.name}.{AXES[axis]}", value, std, (value - half, value + half), kind.units[axis],
+                        f"{kind.name}.{AXES[axis]}",
+                        value,
+                        std,
+                        (value - half, value + half),
+                        kind.units[axis],
                         AXES[axis],
                     )
-                )  # fmt: skip
+                )
     return tuple(found)
 
 

@@ -46,10 +46,18 @@ SCALE_OF_T = 0.8310  # scale of Student's t with four degrees of freedom, fitted
 
 
 def conclude(
-    solver: Solver, solution: Solution, known: Trust, records: Sequence[Record], loss: str, more: Sequence[Statement],
-    lower_bound: Mapping[str, float], moved: BoolArray, levels: Sequence[Breakaway] = (),
-    better: Mapping[str, tuple[float | None, tuple[float, float]]] | None = None, exact: Trust | None = None,
-) -> OutputErrorEstimate:  # fmt: skip
+    solver: Solver,
+    solution: Solution,
+    known: Trust,
+    records: Sequence[Record],
+    loss: str,
+    more: Sequence[Statement],
+    lower_bound: Mapping[str, float],
+    moved: BoolArray,
+    levels: Sequence[Breakaway] = (),
+    better: Mapping[str, tuple[float | None, tuple[float, float]]] | None = None,
+    exact: Trust | None = None,
+) -> OutputErrorEstimate:
     """The Estimate of a solution. loss: of the fit, in words; more: warnings to join; lower_bound: for the Estimate;
     moved (3,): which axes did; levels: of breakaway that were asked for; better: name -> (std, interval) that replace
     those of the covariance; exact: the trust were all that was taken as it stands exact, where `known` has more.
@@ -142,8 +150,10 @@ def unexplained(solver: Solver, solution: Solution) -> dict[str, float]:
     measured = [_measured(problem, column) for column in problem.columns]
     whole = [np.concatenate(parts) if parts else np.zeros(1) for parts in measured]
     own = [float(each.std()) if np.ptp(each) else 0.0 for each in whole]
-    largest = {name: max(s for s, other in zip(own, problem.columns, strict=True) if other[0] == name)
-               for name, _ in problem.columns}  # fmt: skip
+    largest = {
+        name: max(s for s, other in zip(own, problem.columns, strict=True) if other[0] == name)
+        for name, _ in problem.columns
+    }
     for c, (column, parts) in enumerate(zip(problem.columns, measured, strict=True)):
         left, spread = noise.get(_column(column), 0.0), own[c] or largest[column[0]]
         if solver.tick[c] or not spread or not parts:
@@ -180,21 +190,27 @@ def _refuse_blind(
         raise InsufficientDataError(
             "the robot moved, but with no value of what is free does the model move like it",
             got=f"{', '.join(missed)} that the voltages do not explain",
-            expected="a model that follows the log", where=where,
+            expected="a model that follows the log",
+            where=where,
             remedy="check signs, units and the order of the wheels, and the voltages (omnidyn check)",
-        )  # fmt: skip
+        )
     if not unseen.all():
         what = [str(replace(direction, cures=()).statement()) for direction in directions]
         ways = "; ".join(str(direction.how_to_show()) for direction in directions if direction.cures)
         raise InsufficientDataError(
             "; ".join(["of what is free each number can be made up for by others, so that none can be told", *what]),
-            got=", ".join(free), expected="fewer numbers", where=where,
+            got=", ".join(free),
+            expected="fewer numbers",
+            where=where,
             remedy=": ".join(["leave out one that is known", *([ways] if ways else [])]),
-        )  # fmt: skip
+        )
     raise InsufficientDataError(
-        "the logs say nothing about what is free", got=", ".join(free), expected="motion",
-        remedy="drive the robot faster than its dead zone", where=where,
-    )  # fmt: skip
+        "the logs say nothing about what is free",
+        got=", ".join(free),
+        expected="motion",
+        remedy="drive the robot faster than its dead zone",
+        where=where,
+    )
 
 
 def noise_of(solver: Solver, solution: Solution) -> dict[str, float]:
@@ -313,10 +329,12 @@ def _together(
     correlation (P, P): of `fitted`. Numbers without a std of this fit have no part in it, nor have those of the logs.
     """
     tied = [
-        (j, key, std[p.name] * factor) for j, p in enumerate(fitted)
+        (j, key, std[p.name] * factor)
+        for j, p in enumerate(fitted)
         if 0.0 < std[p.name] < LARGEST_STD and 0.0 < known.std[j] < math.inf
-        for key, factor in ((key_of(p.name, robot), 1.0), *p.also) if key
-    ]  # fmt: skip
+        for key, factor in ((key_of(p.name, robot), 1.0), *p.also)
+        if key
+    ]
     at = [j for j, _, _ in tied]
     matrix = correlation[np.ix_(at, at)]
     return with_correlation(robot, [key for _, key, _ in tied], matrix, [spread for *_, spread in tied])
@@ -356,12 +374,16 @@ def _unused(records: Sequence[Record]) -> tuple[Statement, ...]:
         for unused in record.unused:
             where.setdefault(unused, []).append(record.source or "a log")
     return tuple(
-        unused if len(logs) == len(records) else Statement(
-            "unused_in_some_logs", NOTE, unused.subject,
+        unused
+        if len(logs) == len(records)
+        else Statement(
+            "unused_in_some_logs",
+            NOTE,
+            unused.subject,
             {"unused": unused, "logs": len(logs), "of": len(records), "first": logs[0]},
         )
         for unused, logs in where.items()
-    )  # fmt: skip
+    )
 
 
 def _column(column: tuple[str, int]) -> str:
@@ -389,9 +411,14 @@ def _data(records: Sequence[Record]) -> str:
 
 
 def with_nuisances(
-    robot: Robot, problem: Problem, values: FloatArray, std: Mapping[str, float], open_: Sequence[str],
-    records: Sequence[Record], data: str,
-) -> Robot:  # fmt: skip
+    robot: Robot,
+    problem: Problem,
+    values: FloatArray,
+    std: Mapping[str, float],
+    open_: Sequence[str],
+    records: Sequence[Record],
+    data: str,
+) -> Robot:
     """The fitted robot with the dead band and the latency that were fitted beside it, and with what its logs did.
 
     std: of the parameters by name; open_: those that the data do not determine, which only go with the others.
@@ -444,9 +471,12 @@ def _effects(
     )
     tilt, push = ([found.get(f"{kind}.{axis}", 0.0) for axis in AXES] for kind in (TILT, PUSH))
     effects = LogEffects(
-        gain=found.get(GAIN, 1.0), fade=found.get(FADE, 0.0), latency=latency,
-        tilt=(tilt[0], tilt[1]), push=(push[0], push[1], push[2]),
-    )  # fmt: skip
+        gain=found.get(GAIN, 1.0),
+        fade=found.get(FADE, 0.0),
+        latency=latency,
+        tilt=(tilt[0], tilt[1]),
+        push=(push[0], push[1], push[2]),
+    )
     return None if effects == LogEffects() else effects.replace(of=tuple(log_mark(run) for run in runs))
 
 

@@ -68,9 +68,14 @@ class Fit:
 
     @classmethod
     def of(
-        cls, runs: Run | Sequence[Run], robot: Robot, question: OutputError, groups: Sequence[str] | None = None,
-        progress: FitProgress | None = None, begins: Mapping[str, tuple[Robot, OutputError]] | None = None,
-    ) -> Fit:  # fmt: skip
+        cls,
+        runs: Run | Sequence[Run],
+        robot: Robot,
+        question: OutputError,
+        groups: Sequence[str] | None = None,
+        progress: FitProgress | None = None,
+        begins: Mapping[str, tuple[Robot, OutputError]] | None = None,
+    ) -> Fit:
         """Make runs of any length and rate, split at gaps, a problem. groups: name of each run's group. begins: group
         -> the robot that it begins from and what is asked of it, where that is not the same in all; then every key of
         `question` is written out, and one of per_free that no group has is left out.
@@ -162,9 +167,18 @@ class Fit:
             known = self._beside_what_is_held(exact, sure) if done else exact
             words, better = [*warnings, *told, *group.warnings, *hints], beside(again, by, sure.known, known).intervals
             estimate = conclude(
-                solver, solution, known, group.records, loss, words, group.bounds, group.moved, levels,
-                held | dict(better), exact
-            )  # fmt: skip
+                solver,
+                solution,
+                known,
+                group.records,
+                loss,
+                words,
+                group.bounds,
+                group.moved,
+                levels,
+                held | dict(better),
+                exact,
+            )
             return Answer({group.name: estimate}, (), solver.problem.names, (), (solution,))
         exact, known = known, self._beside_what_is_held(known, sure) if done else known
         engine, estimates, alones, wider = solver.engine, {}, [], beside(again, by, sure.known, known).intervals
@@ -174,9 +188,18 @@ class Fit:
             seen, alone = member.alone(solution), member.trust_alone(solver.problem, known)
             as_exact = alone if exact is known else member.trust_alone(solver.problem, exact)
             estimate = conclude(
-                seen.solver, seen, alone, member.group.records, loss, words, {}, member.group.moved, (), better,
+                seen.solver,
+                seen,
+                alone,
+                member.group.records,
+                loss,
+                words,
+                {},
+                member.group.moved,
+                (),
+                better,
                 as_exact,
-            )  # fmt: skip
+            )
             others = ", ".join(each.name for each in engine.members if each is not member)
             alones.append(seen)
             estimates[member.name] = replace(estimate, method=f"{estimate.method}; fitted together with {others}")

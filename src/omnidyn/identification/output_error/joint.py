@@ -59,12 +59,18 @@ class Member:
         """What the trust in a solution of all groups is for this one."""
         at, columns = self.at, self.columns_of(joint)
         return replace(
-            known, covariance=known.covariance[np.ix_(at, at)], held=known.held[at], blind=known.blind[at],
-            unseen=known.unseen[at], free_step=known.free_step[at], neighbours=known.neighbours[columns],
-            plain=known.plain[np.ix_(at, at)], guessed=known.guessed[at],
+            known,
+            covariance=known.covariance[np.ix_(at, at)],
+            held=known.held[at],
+            blind=known.blind[at],
+            unseen=known.unseen[at],
+            free_step=known.free_step[at],
+            neighbours=known.neighbours[columns],
+            plain=known.plain[np.ix_(at, at)],
+            guessed=known.guessed[at],
             directions=tuple((v, way[at]) for v, way in known.directions if np.abs(way[at]).max() > SHARE),
             ways=tuple(replace(way, step=way.step[at], size=way.size[at]) for way in known.ways if way.step[at].any()),
-        )  # fmt: skip
+        )
 
     def named_alone(self, joint: Problem, found: Mapping[str, T]) -> dict[str, T]:
         """What was found by the names of all groups, by the names of this one."""

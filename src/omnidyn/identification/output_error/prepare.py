@@ -113,9 +113,14 @@ class Group:
 
 
 def make_group(
-    name: str, records: list[Record], robot: Robot, question: OutputError, exact: bool, usual: tuple[str, ...],
+    name: str,
+    records: list[Record],
+    robot: Robot,
+    question: OutputError,
+    exact: bool,
+    usual: tuple[str, ...],
     alone: bool,
-) -> Group:  # fmt: skip
+) -> Group:
     """The group of these records. exact: whether the exact engine fits them; usual: what is free by default.
 
     alone: there are no other groups, which may tell what is shared: raises InsufficientDataError where no axis moved.
@@ -153,8 +158,10 @@ def _never_moved(found: Motion, source: str) -> InsufficientDataError:
             f"{AXES[axis]} held {held:.3g}" if seen else f"{AXES[axis]} was not measured"
             for axis, (held, seen) in enumerate(zip(found.held, found.seen, strict=True))
         ),
-        expected="motion", remedy="drive it beyond its dead zone", where=source,
-    )  # fmt: skip
+        expected="motion",
+        remedy="drive it beyond its dead zone",
+        where=source,
+    )
 
 
 def _loop_question(question: OutputError, found: Motion, records: Sequence[Record], robot: Robot) -> OutputError:
@@ -175,9 +182,12 @@ def read_records(runs: Sequence[Run], robot: Robot, question: OutputError) -> li
     found = [record(run, robot, question.outputs, gains, question.tick_rad, counted) for run in runs]
     if len({each.set_point is None for each in found}) > 1:
         raise InputError(
-            "some logs have voltages, others set speeds only", got=", ".join(each.source for each in found[:2]),
-            expected="logs of one kind", remedy="free a gain of the loop, or fit them apart", where="runs",
-        )  # fmt: skip
+            "some logs have voltages, others set speeds only",
+            got=", ".join(each.source for each in found[:2]),
+            expected="logs of one kind",
+            remedy="free a gain of the loop, or fit them apart",
+            where="runs",
+        )
     return found
 
 
@@ -193,9 +203,11 @@ def make_problem(
     Raises InputError for unknown keys, or where nothing is left free.
     """
     priors = known_priors(robot)
-    keys = [*question.free] if question.free is not None else [
-        *dict.fromkeys((*(usual or free_by_default(robot)), *guesses(robot)))
-    ]  # fmt: skip
+    keys = (
+        [*question.free]
+        if question.free is not None
+        else [*dict.fromkeys((*(usual or free_by_default(robot)), *guesses(robot)))]
+    )
     unknown = [key for key in question.fixed if key not in keys]
     if unknown and question.free is not None:
         raise InputError("fixed, but not free", got=unknown[0], expected=", ".join(keys), where="fixed")
@@ -210,9 +222,10 @@ def make_problem(
         own = [kept_in_order(_within_reach(p, drive), robot, keys) for p in own]
     auto = automatic(records, engine.exact)
     more = (
-        nuisance_parameters(auto, records, robot, earliest(records)) if question.nuisances is None
+        nuisance_parameters(auto, records, robot, earliest(records))
+        if question.nuisances is None
         else nuisance_parameters(question.nuisances, records, robot)
-    )  # fmt: skip
+    )
     late = any(p.name.startswith(LATENCY) for p in more) or robot.drive.latency > 0.0
     start = question.start
     parts = (

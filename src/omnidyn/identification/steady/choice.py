@@ -131,8 +131,9 @@ def choose_shape(robot: Robot, points: ForcePoints, *, shape: str = AUTO, robust
         raise InsufficientDataError(
             f"the shape {shape} cannot be fitted" if shape != AUTO else "no shape can be fitted",
             got=f"{len(points)} points: {NOT_COMPARED.get(missing.get(shape, ''), 'too few')}",
-            expected="steady runs in six directions or more", remedy="drive in more directions, each at a held speed",
-        )  # fmt: skip
+            expected="steady runs in six directions or more",
+            remedy="drive in more directions, each at a held speed",
+        )
     errors = _LeftOutErrors(fits, robust)
     scores = _scores(fits, errors)
     if shape != AUTO:
@@ -175,11 +176,13 @@ def _refuse_lost_signs(points: ForcePoints) -> None:
     wrong = int((along < 0.0).sum())
     if wrong > len(along) / 2:
         raise InsufficientDataError(
-            "the force points against the motion, as if friction drove the robot", got=f"in {wrong} of {len(along)} "
-            "points", expected="forces along the motion",
+            "the force points against the motion, as if friction drove the robot",
+            got=f"in {wrong} of {len(along)} points",
+            expected="forces along the motion",
             remedy="check the sign of the currents (`current_unsigned`) and which wheel is which"
-            if points.force_from == CURRENT else "check K_t, K_v, the gear, the radii, and which wheel is which",
-        )  # fmt: skip
+            if points.force_from == CURRENT
+            else "check K_t, K_v, the gear, the radii, and which wheel is which",
+        )
 
 
 def speeds_differ(points: ForcePoints) -> bool:
@@ -227,11 +230,18 @@ def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], errors: _LeftOutErrors) 
         groups = list(fits[name].values())
         found.append(
             ShapeScore(
-                name, SHAPES[name].words, len(groups[0].keys), *rms_and_error(squares[name], fold),
-                *rms_and_error(along[name], fold), *_difference(squares[name], squares[order[0]], fold), apart,
-                apart > APART, SHAPES[name].in_model, any((fit.free <= 0.0).any() for fit in groups),
+                name,
+                SHAPES[name].words,
+                len(groups[0].keys),
+                *rms_and_error(squares[name], fold),
+                *rms_and_error(along[name], fold),
+                *_difference(squares[name], squares[order[0]], fold),
+                apart,
+                apart > APART,
+                SHAPES[name].in_model,
+                any((fit.free <= 0.0).any() for fit in groups),
             )
-        )  # fmt: skip
+        )
     return tuple(found)
 
 
@@ -249,9 +259,10 @@ def _choice(scores: Sequence[ShapeScore], errors: _LeftOutErrors) -> str:
     if not able:
         raise InsufficientDataError(
             "no shape of friction fits: every one has a level below 0",
-            got=", ".join(score.name for score in scores), expected="forces that point along the motion",
+            got=", ".join(score.name for score in scores),
+            expected="forces that point along the motion",
             remedy="check the sign of the currents, and which wheel is which",
-        )  # fmt: skip
+        )
     equal = [score for score in able if errors.apart(score.name, able[0].name) <= APART]
     return min(equal, key=lambda score: (score.levels, score.loo)).name
 

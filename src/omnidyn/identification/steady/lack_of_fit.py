@@ -77,10 +77,14 @@ def lack_of_fit(robot: Robot, points: ForcePoints, fit: ShapeFit) -> LackOfFit:
     if better:
         share = max(share, 1.0 - (forces[better[0]].after / forces[better[0]].before) ** 2)
     return LackOfFit(
-        found, {"force": share}, {"force": max((forces[key].size for key in better), default=0.0)}, (),
-        tuple(_remedy(key, forces, better) for key in better), {},
+        found,
+        {"force": share},
+        {"force": max((forces[key].size for key in better), default=0.0)},
+        (),
+        tuple(_remedy(key, forces, better) for key in better),
+        {},
         tried=(*tried, *([REPEATS] if repeated.tested else [])),
-    )  # fmt: skip
+    )
 
 
 def _matters(force: Force, size: float) -> bool:
@@ -94,9 +98,14 @@ def _remedy(key: str, forces: Mapping[str, Force], better: Sequence[str]) -> Rem
     alike = [other for other in better[1:] if forces[other].after - best.after <= best.gain_std]
     before, after = force.before**2, force.after**2
     return Remedy(
-        key, Statement("cause", NOTE, key), 1.0 - after / before, 2.0 * force.after * force.gain_std / before,
-        tuple(alike) if force is best else (), offered=False, force=force,
-    )  # fmt: skip
+        key,
+        Statement("cause", NOTE, key),
+        1.0 - after / before,
+        2.0 * force.after * force.gain_std / before,
+        tuple(alike) if force is best else (),
+        offered=False,
+        force=force,
+    )
 
 
 def all_moving(robot: Robot, points: ForcePoints, fit: ShapeFit) -> ForcePoints:
@@ -214,9 +223,11 @@ def _repeated(plain: _Solved, problem: LinearShape, levels: int) -> _Repeated:
     excess = max(0.0, between - between_degrees * within / within_degrees)
     ratio = (between / between_degrees) / (within / within_degrees) if within > 0.0 else np.inf
     return _Repeated(
-        float(fdtrc(between_degrees, within_degrees, ratio)), float(np.sqrt(excess / n)),
-        excess / max(between + within, 1e-300), True,
-    )  # fmt: skip
+        float(fdtrc(between_degrees, within_degrees, ratio)),
+        float(np.sqrt(excess / n)),
+        excess / max(between + within, 1e-300),
+        True,
+    )
 
 
 # ---- what is not offered ----------------------------------------------------------------------------------
@@ -257,5 +268,8 @@ TILTED_FLOOR = {"forward and backward", "left and right", "pull"}
 
 def unoffered_columns(robot: Robot, points: ForcePoints, problem: LinearShape, turning: bool) -> list[FloatArray]:
     """What each part that is not offered would add, in components of a problem: (points, components, levels) each."""
-    return [problem.components(columns(robot, points))
-            for key, columns in UNOFFERED_SHAPES.items() if turning or key != ABOUT_YAW]  # fmt: skip
+    return [
+        problem.components(columns(robot, points))
+        for key, columns in UNOFFERED_SHAPES.items()
+        if turning or key != ABOUT_YAW
+    ]

@@ -220,9 +220,10 @@ def _beyond_no_load(robot: Robot, axis: int, points: SteadyTable, rows: NDArray[
         return []
     excess = 100.0 * (beyond[np.isfinite(beyond)] - 1.0)
     numbers = {
-        "beyond": beyond.size, "moving": int((points.speed[rows] != 0.0).sum()),
+        "beyond": beyond.size,
+        "moving": int((points.speed[rows] != 0.0).sum()),
         "excess": (excess.min(), excess.max()) if excess.size else None,
-    }  # fmt: skip
+    }
     return [Statement("beyond_no_load", subject=AXES[axis], numbers=numbers)]
 
 

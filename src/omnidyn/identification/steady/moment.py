@@ -204,9 +204,12 @@ class _Step:
 
 
 def moments_by_shape(
-    robot: Robot, points: ForcePoints, fit_of: Callable[[str], ShapeFit], sources: Mapping[int, str],
+    robot: Robot,
+    points: ForcePoints,
+    fit_of: Callable[[str], ShapeFit],
+    sources: Mapping[int, str],
     told: Sequence[Moment] = (),
-) -> tuple[Moment, ...]:  # fmt: skip
+) -> tuple[Moment, ...]:
     """The changes inside runs, one a run at the most. fit_of: group -> its fit; sources: of the runs, by number.
 
     told: what commands that come again have told; of those runs nothing more is said.
@@ -218,9 +221,7 @@ def moments_by_shape(
     return tuple(moment for run in found if (moment := _change_by_shape(run, tests)) is not None)
 
 
-def _run(
-    robot: Robot, points: ForcePoints, fit_of: Callable[[str], ShapeFit], number: int, source: str
-) -> _Run | None:  # fmt: skip
+def _run(robot: Robot, points: ForcePoints, fit_of: Callable[[str], ShapeFit], number: int, source: str) -> _Run | None:
     """None where there are too few windows."""
     own = points.chosen(points.run == number)
     if not len(own):
@@ -236,9 +237,10 @@ def _run(
         return None
     base = problem.base[:, :, problem.sizes]
     rivals = [
-        more for more in unoffered_columns(robot, own, problem, turning)
+        more
+        for more in unoffered_columns(robot, own, problem, turning)
         if _determined(np.concatenate([base, more], axis=2), int(problem.seen.sum()))
-    ]  # fmt: skip
+    ]
     return _Run(source, fit.shape.name, own.span, problem, rivals)
 
 
@@ -269,10 +271,16 @@ def _change_by_shape(run: _Run, tests: int) -> Moment | None:
     low = share * min(tried[cut].value - spread * tried[cut].std for cut in near)  # T is not known any better
     high = share * max(tried[cut].value + spread * tried[cut].std for cut in near)
     return Moment(
-        run.source, 0.5 * float(run.span[best - 1, 1] + run.span[best, 0]),
+        run.source,
+        0.5 * float(run.span[best - 1, 1] + run.span[best, 0]),
         (float(run.span[min(near) - 1, 0]), float(run.span[max(near), 1] if max(near) < len(run.span) else np.inf)),
-        *before, *after, share * step.value, (low, high), p, run.shape,
-    )  # fmt: skip
+        *before,
+        *after,
+        share * step.value,
+        (low, high),
+        p,
+        run.shape,
+    )
 
 
 def _step(run: _Run, cut: int, more: FloatArray | None = None) -> _Step | None:
@@ -302,9 +310,7 @@ def _levels(run: _Run, cut: int) -> list[tuple[float, tuple[float, float]]]:
     return found
 
 
-def _solved(
-    run: _Run, step: FloatArray, more: FloatArray | None
-) -> tuple[FloatArray, FloatArray, int] | None:  # fmt: skip
+def _solved(run: _Run, step: FloatArray, more: FloatArray | None) -> tuple[FloatArray, FloatArray, int] | None:
     """(levels, the step's the last, covariance, degrees of freedom) by robust least squares; None: not determined."""
     problem = run.problem
     parts = [problem.base[:, :, problem.sizes], *([] if more is None else [more]), step]

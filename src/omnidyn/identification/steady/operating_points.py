@@ -101,8 +101,19 @@ class ForcePoints:
     def chosen(self, keep: NDArray) -> ForcePoints:
         """Some of the points: a mask or indices."""
         index = np.arange(len(self))[keep]
-        arrays = ("twist", "traction", "wrench", "wrench_std", "still", "travels", "turns", "direction", "run", "rows",
-                  "span")  # fmt: skip
+        arrays = (
+            "twist",
+            "traction",
+            "wrench",
+            "wrench_std",
+            "still",
+            "travels",
+            "turns",
+            "direction",
+            "run",
+            "rows",
+            "span",
+        )
         parts = {name: getattr(self, name)[index] for name in arrays}
         return replace(self, **parts, group=tuple(self.group[k] for k in index))
 
@@ -149,9 +160,14 @@ def force_points(
 
 
 def steady_windows(
-    runs: Sequence[Run], robot: Robot, *, groups: Sequence[str] | None = None, speed: str = WHEEL,
-    force_from: str = "", window: tuple[float, float] | None = None,
-) -> SteadyWindows:  # fmt: skip
+    runs: Sequence[Run],
+    robot: Robot,
+    *,
+    groups: Sequence[str] | None = None,
+    speed: str = WHEEL,
+    force_from: str = "",
+    window: tuple[float, float] | None = None,
+) -> SteadyWindows:
     """The windows that `force_points` makes its points of. Errors: as there."""
     if speed not in SPEEDS:
         raise InputError("no such speed", got=speed, expected=", ".join(SPEEDS), where="speed")
@@ -166,15 +182,20 @@ def steady_windows(
     for number, run in enumerate(runs):
         if run.wheels is not None and run.wheels != robot.wheels.count:
             raise InputError(
-                "the run has another number of wheels than the robot", got=str(run.wheels),
-                expected=f"{robot.wheels.count} ({robot.name})", where=run.source,
-            )  # fmt: skip
+                "the run has another number of wheels than the robot",
+                got=str(run.wheels),
+                expected=f"{robot.wheels.count} ({robot.name})",
+                where=run.source,
+            )
         run = on_clock_of_wheels(_with_voltage(run, robot) if origin == VOLTAGE else run)
         windows = pool(find_plateaus(run, start=window[0], end=window[1]) if window else find_plateaus(run))
         empty += [] if windows else [run.source]
         found += [(number, run, each) for each in windows]
-    lacking = [Statement("no_steady_window", subject=empty[0] or "run 0",
-                         numbers={"empty": len(empty), "runs": len(runs)})] if empty else []  # fmt: skip
+    lacking = (
+        [Statement("no_steady_window", subject=empty[0] or "run 0", numbers={"empty": len(empty), "runs": len(runs)})]
+        if empty
+        else []
+    )
     if origin == CURRENT:
         _refuse_unsigned(runs, [each for *_, each in found])
     return SteadyWindows(tuple(found), names, speed, origin, (*statements(twice), *lacking))
@@ -204,9 +225,11 @@ def held_forces(
     alike = SAME_COMMAND * max(float(np.abs(asked).max(initial=0.0)), 1e-12)
     command = np.unique(np.round(asked / alike / 2.0), axis=0, return_inverse=True)[1].ravel()
     return HeldForces(
-        np.array([each.start for each in found]), np.array([each.end for each in found]), command,
+        np.array([each.start for each in found]),
+        np.array([each.end for each in found]),
+        command,
         np.array(force).reshape(-1, 3),
-    )  # fmt: skip
+    )
 
 
 def _origin(runs: Sequence[Run], asked: str) -> str:
@@ -220,9 +243,11 @@ def _origin(runs: Sequence[Run], asked: str) -> str:
         return origin
     lacking = next(run for run in runs if run.current is None)
     raise InputError(
-        "no force can be had from this run", got=", ".join(lacking.channels) or "no channels",
-        expected="current, or voltage (or duty and supply) with a speed", where=lacking.source,
-    )  # fmt: skip
+        "no force can be had from this run",
+        got=", ".join(lacking.channels) or "no channels",
+        expected="current, or voltage (or duty and supply) with a speed",
+        where=lacking.source,
+    )
 
 
 def _with_voltage(run: Run, robot: Robot) -> Run:
@@ -232,9 +257,11 @@ def _with_voltage(run: Run, robot: Robot) -> Run:
     voltage = asked_voltage(None, run.duty, run.supply, robot.drive.supply)
     if voltage is None:
         raise InputError(
-            "a duty needs the voltage of the supply", got="neither logged nor in the robot file",
-            expected="a column supply, or [drive] supply_V", where=run.source,
-        )  # fmt: skip
+            "a duty needs the voltage of the supply",
+            got="neither logged nor in the robot file",
+            expected="a column supply, or [drive] supply_V",
+            where=run.source,
+        )
     return run.replace(voltage=voltage)
 
 
@@ -305,9 +332,12 @@ def _twist(run: Run, robot: Robot, each: Plateau, speed: str) -> tuple[FloatArra
         commanded = _commanded(robot, each)
         if commanded is None:
             raise InputError(
-                "the run lacks a set speed", got=", ".join(run.channels), expected="twist_command or "
-                "wheel_speed_command", remedy="use `speed` wheel", where=run.source,
-            )  # fmt: skip
+                "the run lacks a set speed",
+                got=", ".join(run.channels),
+                expected="twist_command or wheel_speed_command",
+                remedy="use `speed` wheel",
+                where=run.source,
+            )
         return commanded, _still(rim_speed(robot.wheels, commanded), 0.0)
     _need(run, each, "wheel_speed")
     twist = twist_from_wheel_speed(robot.wheels, each.mean["wheel_speed"])
@@ -341,21 +371,29 @@ def _refuse_unsigned(runs: Sequence[Run], windows: Sequence[Plateau]) -> None:
     back = sum(bool((speed < 0.0).any()) for speed in speeds if speed is not None)
     if lowest >= 0.0 and back > UNSIGNED_SHARE * len(windows):
         raise InputError(
-            "the currents have no sign: none is below 0", got=f"wheels that turn backward in {back} of {len(windows)} "
-            "windows", expected="currents signed as the torque", remedy="use `current_unsigned`",
+            "the currents have no sign: none is below 0",
+            got=f"wheels that turn backward in {back} of {len(windows)} windows",
+            expected="currents signed as the torque",
+            remedy="use `current_unsigned`",
             where=runs[0].source,
-        )  # fmt: skip
+        )
 
 
 def _stacked(
-    found: list[tuple[int, dict[str, FloatArray], Plateau]], robot: Robot, names: tuple[str, ...], speed: str,
-    origin: str, notes: list[Statement],
-) -> ForcePoints:  # fmt: skip
+    found: list[tuple[int, dict[str, FloatArray], Plateau]],
+    robot: Robot,
+    names: tuple[str, ...],
+    speed: str,
+    origin: str,
+    notes: list[Statement],
+) -> ForcePoints:
     if not found:
         raise InsufficientDataError(
-            "no steady window was found", got="; ".join(map(str, notes)) or "no rows",
-            expected="stretches of constant speed, half a second or longer", remedy="hold each command longer",
-        )  # fmt: skip
+            "no steady window was found",
+            got="; ".join(map(str, notes)) or "no rows",
+            expected="stretches of constant speed, half a second or longer",
+            remedy="hold each command longer",
+        )
     arrays = {name: np.array([point[name] for _, point, _ in found]) for name in found[0][1]}
     notes = [*notes, *_about_acceleration(arrays.pop("inertial"), arrays["wrench"], robot)]
     if any(each.speed_from == ANGLE for *_, each in found) and speed == WHEEL:
@@ -392,8 +430,9 @@ def _moving(points: ForcePoints, robot: Robot) -> ForcePoints:
         force = np.hypot(points.wrench[:, 0], points.wrench[:, 1]).max()
         raise InsufficientDataError(
             "the robot never moved: it stayed inside its dead zone, so friction is only known to hold what pushed",
-            got=f"at most {force:.3g} N of push", expected="windows in motion",
-        )  # fmt: skip
+            got=f"at most {force:.3g} N of push",
+            expected="windows in motion",
+        )
     resting = int((~moves).sum())
     kept = points.chosen(moves)
     left_out = Statement("windows_at_rest", NOTE, numbers={"windows": resting})

@@ -308,10 +308,16 @@ def fit_shape(
     deviation = levels - levels.mean(axis=0)
     way = points.twist[:, :2] / np.where(points.speed > 0.0, points.speed, 1.0)[:, None]
     return ShapeFit(
-        shape=shape, keys=keys, level=problem.bounded(weight, free), free=free,
-        covariance=(count - 1) / count * deviation.T @ deviation, weight=weight, fold=fold, error=error,
+        shape=shape,
+        keys=keys,
+        level=problem.bounded(weight, free),
+        free=free,
+        covariance=(count - 1) / count * deviation.T @ deviation,
+        weight=weight,
+        fold=fold,
+        error=error,
         along_error=(error[:, :2] * way).sum(axis=1),
-    )  # fmt: skip
+    )
 
 
 def fold_numbers(points: ForcePoints) -> IntArray:

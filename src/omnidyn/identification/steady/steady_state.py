@@ -106,16 +106,26 @@ def fit_steady_state(
     friction = _friction(robot.friction.axes, found)
     name = f"{(Path(data.source).name if data.sha256 else data.source) or 'unnamed'}, {len(data)} points"
     name = f"{name}, sha256 {data.sha256}" if data.sha256 else name
-    method = {"weighted": data.force_std is not None, "absolute_std": absolute_std, "force_from": data.force_from,
-              "rest": rest}  # fmt: skip
+    method = {
+        "weighted": data.force_std is not None,
+        "absolute_std": absolute_std,
+        "force_from": data.force_from,
+        "rest": rest,
+    }
     return estimate_of(
-        list(found.lines.values()), robot.replace(friction=robot.friction.replace(axes=friction)), name,
-        {_breakaway(axis): identified(None, f"lower bound from rest, {name}") for axis, bound in found.bounds.items()
-         if friction.breakaway is not None and friction.breakaway[axis] == bound},
-        lower_bound={_breakaway(axis): bound for axis, bound in found.bounds.items()}, warnings=tuple(found.warnings),
+        list(found.lines.values()),
+        robot.replace(friction=robot.friction.replace(axes=friction)),
+        name,
+        {
+            _breakaway(axis): identified(None, f"lower bound from rest, {name}")
+            for axis, bound in found.bounds.items()
+            if friction.breakaway is not None and friction.breakaway[axis] == bound
+        },
+        lower_bound={_breakaway(axis): bound for axis, bound in found.bounds.items()},
+        warnings=tuple(found.warnings),
         method=str(Statement("line_method", NOTE, numbers=method)),
         scale="" if data.force_from == "table" else scale_of_traction(robot, data.force_from == "current"),
-    )  # fmt: skip
+    )
 
 
 def _options(rest: str, rest_speed: Sequence[float], absolute_std: bool, data: SteadyTable) -> FloatArray:
@@ -220,7 +230,7 @@ def _friction(before: AxesFriction, found: _Findings) -> AxesFriction:
 
 def identify_lines(
     runs: Sequence[Run], robot: Robot, asked: SteadyState, groups: Sequence[str] | None = None
-) -> dict[str, Estimate]:  # fmt: skip
+) -> dict[str, Estimate]:
     """B and C of each axis and group: group -> Estimate. groups: name of each run's group.
 
     Every point counts for the axes that it drives. Friction elsewhere than on the axes is taken off the robot.
@@ -242,6 +252,11 @@ def steady_table(robot: Robot, points: ForcePoints, source: str = "") -> SteadyT
     """The points as rows of a steady table, one for each axis that a point drives."""
     row, axis = np.nonzero(driven_axes(robot, points.twist, points.wrench) & (points.twist != 0.0))
     return SteadyTable(
-        axis=[AXES[k] for k in axis], speed=points.twist[row, axis], force=points.wrench[row, axis],
-        twist=points.twist[row], force_from=points.force_from, source=source, notes=points.notes,
-    )  # fmt: skip
+        axis=[AXES[k] for k in axis],
+        speed=points.twist[row, axis],
+        force=points.wrench[row, axis],
+        twist=points.twist[row],
+        force_from=points.force_from,
+        source=source,
+        notes=points.notes,
+    )

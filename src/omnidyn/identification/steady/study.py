@@ -68,9 +68,7 @@ class SteadyFit:
     estimates: Mapping[str, Estimate]
 
 
-def fit_steady(
-    runs: Sequence[Run], robot: Robot, asked: SteadyState, groups: Sequence[str] | None = None
-) -> SteadyFit:  # fmt: skip
+def fit_steady(runs: Sequence[Run], robot: Robot, asked: SteadyState, groups: Sequence[str] | None = None) -> SteadyFit:
     """The levels of friction of each group, from the steady windows of runs.
 
     groups: name of each run's group (a floor, a load); every group has its own levels of one shape, and where its
@@ -86,9 +84,11 @@ def fit_steady(
     choice = choose_shape(robot, points, shape=asked.shape, robust=asked.robust)
     if not SHAPES[choice.chosen].in_model:
         raise InsufficientDataError(
-            "a robot file cannot hold this shape: it is for comparison only", got=choice.chosen,
-            expected=", ".join(name for name, each in SHAPES.items() if each.in_model), where="shape",
-        )  # fmt: skip
+            "a robot file cannot hold this shape: it is for comparison only",
+            got=choice.chosen,
+            expected=", ".join(name for name, each in SHAPES.items() if each.in_model),
+            where="shape",
+        )
     parts = {group: points.of(group) for group in points.groups}
     anew = {group: partial(_levels, windows, choice.of(group), group, asked.robust) for group in parts}
     estimates = {
@@ -125,7 +125,7 @@ def diagnosed(fit: SteadyFit) -> SteadyStudy:
 
 def _study(
     fit: SteadyFit, changed: Sequence[Moment], lack: Mapping[str, LackOfFit], within: Collection[str]
-) -> SteadyStudy:  # fmt: skip
+) -> SteadyStudy:
     """The study. changed: inside a run; lack: group -> what its shape leaves out; within: groups with such a change."""
     robot, points, choice, robust = fit.robot, fit.points, fit.choice, fit.asked.robust
     travel = {group: _travel(part) for group, part in fit.parts.items()}
@@ -142,20 +142,30 @@ def _study(
         internal = {group: float(np.sqrt(np.mean((f**2).sum(axis=1)))) for group, f in against.items()}
     turning = any(is_turning(robot, part) for part in fit.parts.values())
     return SteadyStudy(
-        robot=robot, points=points, choice=choice, estimates=fit.estimates, travel=travel, viscous=viscous,
-        differences=differences, internal=internal,
+        robot=robot,
+        points=points,
+        choice=choice,
+        estimates=fit.estimates,
+        travel=travel,
+        viscous=viscous,
+        differences=differences,
+        internal=internal,
         lack_of_fit=lack,
-        statements=statements((
-            *result_statements(choice, viscous, differences, internal, lack, within),
-            scale_of_traction(robot, points.force_from == CURRENT),
-        )),
+        statements=statements(
+            (
+                *result_statements(choice, viscous, differences, internal, lack, within),
+                scale_of_traction(robot, points.force_from == CURRENT),
+            )
+        ),
         warnings=(
-            *points.notes, *point_statements(points, choice, turning), *(moment.statement() for moment in changed),
+            *points.notes,
+            *point_statements(points, choice, turning),
+            *(moment.statement() for moment in changed),
             *lack_statements(lack, choice, within),
         ),
         moments=tuple(changed),
         advice=tuple(advice(choice, viscous, lack, turning, points.force_from)),
-    )  # fmt: skip
+    )
 
 
 def _changed(points: ForcePoints, found: Sequence[Moment], sources: Mapping[int, str]) -> list[Moment]:
@@ -165,9 +175,14 @@ def _changed(points: ForcePoints, found: Sequence[Moment], sources: Mapping[int,
 
 
 def _lack(
-    robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str, found: Sequence[Moment],
-    sources: Mapping[int, str], robust: bool,
-) -> LackOfFit:  # fmt: skip
+    robot: Robot,
+    points: ForcePoints,
+    choice: ShapeChoice,
+    group: str,
+    found: Sequence[Moment],
+    sources: Mapping[int, str],
+    robust: bool,
+) -> LackOfFit:
     """Whether the shape of a group fits: on both sides of a change inside a run, which would look like another shape
     wherever directions were driven on one side of it only."""
     fit, inside = choice.fit(group), _changed(points, found, sources)
@@ -190,15 +205,26 @@ def _travel(points: ForcePoints) -> Travel:
     mean, error = (float(np.mean(along)), spread / np.sqrt(n)) if n else (float("nan"), float("nan"))
     speed = points.speed[points.travels] if points.travels.any() else points.speed
     return Travel(
-        mean, error, spread, float(speed.min()), float(speed.max()), len(points), len(set(points.run.tolist())),
+        mean,
+        error,
+        spread,
+        float(speed.min()),
+        float(speed.max()),
+        len(points),
+        len(set(points.run.tolist())),
         int(points.rows.sum()),
-    )  # fmt: skip
+    )
 
 
 def _viscous(
-    robot: Robot, windows: SteadyWindows, choice: ShapeChoice, group: str, points: ForcePoints, travel: Travel,
+    robot: Robot,
+    windows: SteadyWindows,
+    choice: ShapeChoice,
+    group: str,
+    points: ForcePoints,
+    travel: Travel,
     robust: bool,
-) -> tuple[Viscous, ...]:  # fmt: skip
+) -> tuple[Viscous, ...]:
     """The viscous levels of the chosen shape, fitted beside its other levels."""
     name, found = base_name(choice.of(group)) + VISCOUS, []
     fit = choice.fits[name][group] if name in choice.fits else None
@@ -222,11 +248,22 @@ def _viscous(
         half = t_quantile(fit.degrees_of_freedom) * std
         low, high = value - half, value + half
         found.append(
-            Viscous(key, value, std, low, high, seen=not low <= 0.0 <= high,
-                    effect=max(abs(low), abs(high)) * float(fast - slow), level=level, slow=float(slow),
-                    fast=float(fast), back_emf=at_rim if name.table == WHEELS else on_body, guesses=guesses,
-                    sum_std=float(fit.std[k]))
-        )  # fmt: skip
+            Viscous(
+                key,
+                value,
+                std,
+                low,
+                high,
+                seen=not low <= 0.0 <= high,
+                effect=max(abs(low), abs(high)) * float(fast - slow),
+                level=level,
+                slow=float(slow),
+                fast=float(fast),
+                back_emf=at_rim if name.table == WHEELS else on_body,
+                guesses=guesses,
+                sum_std=float(fit.std[k]),
+            )
+        )
     return tuple(found)
 
 
@@ -237,34 +274,46 @@ def _back_emf(robot: Robot, points: ForcePoints) -> tuple[FloatArray, tuple[str,
     """
     if points.force_from != VOLTAGE:
         return np.zeros((3, 3)), ()
-    guesses = [key for key, prior in robot.priors.items()
-               if prior.origin in GUESSES and Key.parse(key).name in (TORQUE, EMF)]  # fmt: skip
+    guesses = [
+        key for key, prior in robot.priors.items() if prior.origin in GUESSES and Key.parse(key).name in (TORQUE, EMF)
+    ]
     return -drive_wrench(linear_part(robot), np.eye(3), np.zeros(robot.wheels.count)), tuple(guesses)
 
 
 def _estimate(
-    robot: Robot, points: ForcePoints, choice: ShapeChoice, group: str, robust: bool,
+    robot: Robot,
+    points: ForcePoints,
+    choice: ShapeChoice,
+    group: str,
+    robust: bool,
     again: Callable[[Robot], Mapping[str, float]],
-) -> Estimate:  # fmt: skip
+) -> Estimate:
     alone = choice.fit(group)
     moved = moved_by_the_file(robot, alone.by_key(alone.free), again)
     fit = replace(alone, covariance=alone.covariance + moved @ moved.T)
     name, runs = "" if group == "all" else f"{group}: ", len(set(points.run.tolist()))
     friction, kept = _friction(robot, fit, fit.by_key(fit.level), is_turning(robot, points))
-    priors = {key: prior for key, prior in robot.priors.items()
-              if key in kept or not ((place := find_key(key)) and place.level)}  # fmt: skip
+    priors = {
+        key: prior
+        for key, prior in robot.priors.items()
+        if key in kept or not ((place := find_key(key)) and place.level)
+    }
     method = {
-        "shape": fit.shape.name, "robust": robust, "force_from": points.force_from, "speed_from": points.speed_from,
+        "shape": fit.shape.name,
+        "robust": robust,
+        "force_from": points.force_from,
+        "speed_from": points.speed_from,
         "folds": int(fit.fold.max()) + 1,
-    }  # fmt: skip
+    }
     return estimate_of(
-        [fit], robot.replace(friction=friction, priors=priors),
+        [fit],
+        robot.replace(friction=friction, priors=priors),
         f"{name}{runs} runs, {len(points)} steady points, {int(points.rows.sum())} rows",
         warnings=tuple(fit_statements(fit, robust, kept, _back_emf(robot, points)[1])),
         method=str(Statement("steady_method", NOTE, numbers=method)),
         scale=scale_of_traction(robot, points.force_from == CURRENT),
         log_alone=alone.intervals() if moved.size else {},
-    )  # fmt: skip
+    )
 
 
 def _friction(robot: Robot, fit: ShapeFit, value: dict[str, float], turning: bool) -> tuple[Friction, dict[str, float]]:
@@ -275,9 +324,11 @@ def _friction(robot: Robot, fit: ShapeFit, value: dict[str, float], turning: boo
     coulomb = before.axes.coulomb[2] + before.direction.yaw_coulomb
     viscous = before.axes.viscous[2] + before.direction.yaw_viscous
     on_axes = fit.shape.name.startswith("box")
-    names = (f"{BODY_AXES}.coulomb[2]", f"{BODY_AXES}.viscous[2]") if on_axes else (
-        f"{DIRECTION}.yaw_coulomb", f"{DIRECTION}.yaw_viscous"
-    )  # fmt: skip
+    names = (
+        (f"{BODY_AXES}.coulomb[2]", f"{BODY_AXES}.viscous[2]")
+        if on_axes
+        else (f"{DIRECTION}.yaw_coulomb", f"{DIRECTION}.yaw_viscous")
+    )
     kept = {key: level for key, level in zip(names, (coulomb, viscous), strict=True) if level > 0.0}
     return friction_of(fit.shape, robot, value | kept), kept
 
@@ -304,9 +355,13 @@ def _differences(choice: ShapeChoice) -> tuple[Difference, ...]:
 STEP = 0.01
 # Keys, with what follows them: those that forces and speeds are made with.
 FIXED = {
-    TORQUE: (EMF,), "motor.resistance_ohm": (), "motor.gear_ratio": (), "wheels.wheel_radius_m": (),
-    "wheels.robot_radius_m": (), EMF: (),
-}  # fmt: skip
+    TORQUE: (EMF,),
+    "motor.resistance_ohm": (),
+    "motor.gear_ratio": (),
+    "wheels.wheel_radius_m": (),
+    "wheels.robot_radius_m": (),
+    EMF: (),
+}
 
 
 def rests_on(

@@ -69,13 +69,19 @@ class SteadyStudy(Shown):
         parts = [
             f"{self.robot.name}: steady state from logs; forces from {FORCES[self.points.force_from]}; friction over "
             f"the {SPEEDS[self.points.speed_from]}",
-            "", _travel_table(self), "", _shape_table(self), "", _level_table(self),
-            *(table for fit in self.estimates.values() if (table := fit.alone_table())), "",
+            "",
+            _travel_table(self),
+            "",
+            _shape_table(self),
+            "",
+            _level_table(self),
+            *(table for fit in self.estimates.values() if (table := fit.alone_table())),
+            "",
             Points(self.statements, name="statements"),
             by_severity(self.warnings, "warnings"),
             Points(self.advice, "next:", "next"),
             by_severity(fits, "warnings of fits"),
-        ]  # fmt: skip
+        ]
         return Document(parts, self.to_dict(), self.warnings)
 
     def to_dict(self) -> dict[str, Any]:
@@ -117,8 +123,9 @@ def _lack(lack: LackOfFit | None) -> dict[str, Any] | None:
         return None
     forces = [
         {"size_N": force.size, "error_N": force.after, "error_before_N": force.before, "chance": force.p}
-        for remedy in lack.remedies if (force := remedy.force)
-    ]  # fmt: skip
+        for remedy in lack.remedies
+        if (force := remedy.force)
+    ]
     record = lack.to_dict()
     remedies = [remedy | force for remedy, force in zip(record["remedies"], forces, strict=True)]
     return record | {"remedies": remedies, "tested": list(lack.tried)}
@@ -128,11 +135,17 @@ def _travel_table(study: SteadyStudy) -> Table:
     """What was used, and the force along travel, a row per group."""
     rows = [
         (
-            group, f"{each.runs}", f"{each.points}", f"{each.rows}", f"{each.slow:.3g} .. {each.fast:.3g}",
-            f"{each.mean:.2f}", f"{each.std:.2f}", f"{each.deviation:.2f}",
+            group,
+            f"{each.runs}",
+            f"{each.points}",
+            f"{each.rows}",
+            f"{each.slow:.3g} .. {each.fast:.3g}",
+            f"{each.mean:.2f}",
+            f"{each.std:.2f}",
+            f"{each.deviation:.2f}",
         )
         for group, each in study.travel.items()
-    ]  # fmt: skip
+    ]
     head = ("group", "runs", "points", "rows", "speed m/s", "along travel N", "+-", "scatter N")
     return Table(head, rows, name="travel")
 
@@ -148,10 +161,18 @@ def _shape_table(study: SteadyStudy) -> Table:
         marks += ["a level below 0"] if score.at_bound else []
         best = score.behind == 0.0 and score.behind_std == 0.0
         behind, error = ("", "") if best else (f"{score.behind:.2f}", f"{score.behind_std:.2f}")
-        rows.append((
-            score.name, f"{score.levels}", f"{score.loo:.2f}", f"{score.loo_std:.2f}", f"{score.along:.2f}", behind,
-            error, ", ".join(marks),
-        ))  # fmt: skip
+        rows.append(
+            (
+                score.name,
+                f"{score.levels}",
+                f"{score.loo:.2f}",
+                f"{score.loo_std:.2f}",
+                f"{score.along:.2f}",
+                behind,
+                error,
+                ", ".join(marks),
+            )
+        )
     head = ("shape", "levels", "left-out error N", "+-", "along N", "behind best N", "+-", "")
     return Table(head, rows, name="shapes")
 
@@ -178,24 +199,42 @@ MATTERS = 0.02  # of the force: a viscous part below this does not matter in the
 
 
 def result_statements(
-    choice: ShapeChoice, viscous: Mapping[str, Sequence[Viscous]], differences: Sequence[Difference],
-    internal: Mapping[str, float], lack: Mapping[str, LackOfFit], within: Collection[str],
-) -> list[Statement]:  # fmt: skip
+    choice: ShapeChoice,
+    viscous: Mapping[str, Sequence[Viscous]],
+    differences: Sequence[Difference],
+    internal: Mapping[str, float],
+    lack: Mapping[str, LackOfFit],
+    within: Collection[str],
+) -> list[Statement]:
     """What the data say. within: groups in which the force changes within a run."""
     found = _shape_statements(choice)
     found += [
-        _of(group, Statement("no_lack_of_fit", NOTE, numbers={"changes": group in within}) if one.tried
-            else Statement("fit_not_tested", NOTE))
-        for group, one in lack.items() if not one.found
-    ]  # fmt: skip
+        _of(
+            group,
+            Statement("no_lack_of_fit", NOTE, numbers={"changes": group in within})
+            if one.tried
+            else Statement("fit_not_tested", NOTE),
+        )
+        for group, one in lack.items()
+        if not one.found
+    ]
     found += [_of(group, _viscous(level, choice.of(group))) for group, levels in viscous.items() for level in levels]
     found += [
-        Statement("group_difference", NOTE, pair.key, {
-            "values": pair.values, "difference": pair.difference, "low": pair.low, "high": pair.high,
-            "differs": pair.differs, "groups": [pair.first, pair.second],
-        })
+        Statement(
+            "group_difference",
+            NOTE,
+            pair.key,
+            {
+                "values": pair.values,
+                "difference": pair.difference,
+                "low": pair.low,
+                "high": pair.high,
+                "differs": pair.differs,
+                "groups": [pair.first, pair.second],
+            },
+        )
         for pair in differences
-    ]  # fmt: skip
+    ]
     found += [
         _of(group, Statement("internal_force", NOTE, numbers={"force": force})) for group, force in internal.items()
     ]
@@ -240,8 +279,13 @@ def lack_statements(
     for group, one in lack.items():
         numbers = {"changes": group in within, "share": one.channels["force"], "with": ""}
         if one.remedies and (best := one.remedies[0]).force:
-            numbers |= {"with": best.cause, "shape": choice.of(group), "error": best.force.after,
-                        "error_before": best.force.before, "same": best.same_as}  # fmt: skip
+            numbers |= {
+                "with": best.cause,
+                "shape": choice.of(group),
+                "error": best.force.after,
+                "error_before": best.force.before,
+                "same": best.same_as,
+            }
         found += [_of(group, Statement("no_shape_fits", numbers=numbers))] if one.found else []
     return found
 
@@ -279,8 +323,9 @@ def fit_statements(fit: ShapeFit, robust: bool, kept: Mapping[str, float], guess
     """What is weak about the levels of one group. kept: levels of the robot file; guesses: of the back-EMF."""
     found = [
         Statement("level_at_bound", subject=key, numbers={"free": free})
-        for key, free in zip(fit.keys, fit.free.tolist(), strict=True) if free < 0.0
-    ]  # fmt: skip
+        for key, free in zip(fit.keys, fit.free.tolist(), strict=True)
+        if free < 0.0
+    ]
     far = int((fit.weight < LOW_WEIGHT).sum())
     if robust and far:
         found.append(Statement("points_far_from_shape", NOTE, numbers={"far": far, "points": len(fit.weight)}))
@@ -292,9 +337,12 @@ def fit_statements(fit: ShapeFit, robust: bool, kept: Mapping[str, float], guess
 
 
 def advice(
-    choice: ShapeChoice, viscous: Mapping[str, Sequence[Viscous]], lack: Mapping[str, LackOfFit], turning: bool,
+    choice: ShapeChoice,
+    viscous: Mapping[str, Sequence[Viscous]],
+    lack: Mapping[str, LackOfFit],
+    turning: bool,
     force_from: str,
-) -> list[Statement]:  # fmt: skip
+) -> list[Statement]:
     """What to measure next."""
     found = []
     if any(one.found for one in lack.values()):

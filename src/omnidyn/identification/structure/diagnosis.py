@@ -88,11 +88,20 @@ def examine(solution: Solution) -> Examined:
     wild = {} if solver.nu else wild_samples(seen, moved)
     pictures = binned(rows, moved, int(np.argmax([*channels.values()]))) if found else ()
     lack = LackOfFit(
-        found, channels, _sizes(rows, channels), seen.found, (*told, *calmer(seen, wild)), seen.tested,
-        pictures, wild, levels.noise, levels.beyond, levels.at_rest,
+        found,
+        channels,
+        _sizes(rows, channels),
+        seen.found,
+        (*told, *calmer(seen, wild)),
+        seen.tested,
+        pictures,
+        wild,
+        levels.noise,
+        levels.beyond,
+        levels.at_rest,
         dict(zip(names, seen.rounded.tolist(), strict=True)) if rows.rounding else {},
         seen.linear.degrees < SURE,
-    )  # fmt: skip
+    )
     diagnosis = Diagnosis(lack, rests_on(seen.linear.plain, bench), stable)
     return Examined(diagnosis, memory, len(tried), count)
 
@@ -110,9 +119,13 @@ def _chance(linear: Linear, tried: Sequence[tuple[Candidate, list[Trial]]], best
 
 
 def _fitted(
-    solution: Solution, problem: Problem, parts: Sequence[Parts], seen: Misfit,
-    tried: Sequence[tuple[Candidate, list[Trial]]], ranked: Sequence[Remedy],
-) -> tuple[tuple[Remedy, ...], list[FloatArray] | None]:  # fmt: skip
+    solution: Solution,
+    problem: Problem,
+    parts: Sequence[Parts],
+    seen: Misfit,
+    tried: Sequence[tuple[Candidate, list[Trial]]],
+    ranked: Sequence[Remedy],
+) -> tuple[tuple[Remedy, ...], list[FloatArray] | None]:
     """(the remedies, the best of them and other shapes as fits find them; what the first shows of each piece).
 
     A size stays that of the first step; so does all, where the numbers that a fit needs cost more than it explains.
@@ -122,9 +135,11 @@ def _fitted(
     tried = [anew.get(one.key, (one, trials)) for one, trials in tried]
     again = remedies(seen.linear, tried, seen.shown) or ranked
     shown = [
-        trial.shown for one, trials in tried for trial in trials
+        trial.shown
+        for one, trials in tried
+        for trial in trials
         if again and one.key == again[0].key and (trial.fitted or trial.at == again[0].at)
-    ]  # fmt: skip
+    ]
     told = tuple(_with_first_step(one, near[one.key], anew) if one.key in near else one for one in again)
     return with_odometry(told, problem.columns), shown[0] if shown else None
 
@@ -154,10 +169,22 @@ def _sizes(rows: Rows, channels: Mapping[str, float]) -> dict[str, float]:
 PERCENT = 0.01
 TRIED = 0.01  # relative change of a fixed number, either way is alike
 FIXED = (
-    "body.mass_kg", "body.inertia_kg_m2", "wheels.wheel_radius_m", "wheels.robot_radius_m", "motor.resistance_ohm",
-    TORQUE, EMF, "motor.gear_ratio", "motor.rotor_inertia_kg_m2", "wheels.inertia_kg_m2", "motor.voltage_drop_V",
-    "motor.current_limit_A", "wheels.traction_mu", f"{CENTRE}[0]", f"{CENTRE}[1]",
-)  # fmt: skip
+    "body.mass_kg",
+    "body.inertia_kg_m2",
+    "wheels.wheel_radius_m",
+    "wheels.robot_radius_m",
+    "motor.resistance_ohm",
+    TORQUE,
+    EMF,
+    "motor.gear_ratio",
+    "motor.rotor_inertia_kg_m2",
+    "wheels.inertia_kg_m2",
+    "motor.voltage_drop_V",
+    "motor.current_limit_A",
+    "wheels.traction_mu",
+    f"{CENTRE}[0]",
+    f"{CENTRE}[1]",
+)
 
 LEVELS = (f"{BODY_AXES}.breakaway", f"{DIRECTION}.breakaway", f"{DIRECTION}.yaw_breakaway", f"{WHEELS}.breakaway")
 TRIED_FALL = 1e-3  # the same of a level at which things break away: a larger change may move that to another row
@@ -189,9 +216,7 @@ def rests_on(linear: Linear, bench: Workbench) -> dict[str, dict[str, float]]:
             share = change if p.log else change / value if value else np.nan
             if np.isfinite(share):
                 found[p.name][name] = float(share)
-    return {
-        name: dict(sorted(by.items(), key=lambda item: -abs(item[1]))) for name, by in found.items()
-    }  # fmt: skip
+    return {name: dict(sorted(by.items(), key=lambda item: -abs(item[1]))) for name, by in found.items()}
 
 
 def _of_laws(bench: Workbench) -> list[str]:

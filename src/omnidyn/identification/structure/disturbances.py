@@ -62,11 +62,30 @@ def _travel(motion: Motion, top: FloatArray) -> FloatArray:
     c, s = motion.twist[:, 0] / moving, motion.twist[:, 1] / moving
     turns, turned = np.sign(w), np.abs(w)
     found = [
-        (0, c), (1, s), (0, c**3), (1, s**3), (0, np.sign(x) * turned), (1, np.sign(y) * turned),
-        (0, np.sign(x) * (turned > 0.0)), (1, np.sign(y) * (turned > 0.0)), (YAW, turns * (size > 0.0)),
-        (YAW, turns * np.hypot(x, y)), (YAW, turns * c**2), (0, y), (1, x), (0, np.sign(y)), (1, np.sign(x)),
-        (YAW, x), (YAW, y), (YAW, np.sign(x)), (YAW, np.sign(y)), (0, w), (1, w), (0, turns), (1, turns),
-    ]  # fmt: skip
+        (0, c),
+        (1, s),
+        (0, c**3),
+        (1, s**3),
+        (0, np.sign(x) * turned),
+        (1, np.sign(y) * turned),
+        (0, np.sign(x) * (turned > 0.0)),
+        (1, np.sign(y) * (turned > 0.0)),
+        (YAW, turns * (size > 0.0)),
+        (YAW, turns * np.hypot(x, y)),
+        (YAW, turns * c**2),
+        (0, y),
+        (1, x),
+        (0, np.sign(y)),
+        (1, np.sign(x)),
+        (YAW, x),
+        (YAW, y),
+        (YAW, np.sign(x)),
+        (YAW, np.sign(y)),
+        (0, w),
+        (1, w),
+        (0, turns),
+        (1, turns),
+    ]
     return _on_axes(found)
 
 
@@ -92,11 +111,18 @@ def _inputs(motion: Motion, top: FloatArray) -> FloatArray:
     draw = np.abs(i).sum(axis=1, keepdims=True) / peak
     share, load = u / most, i / peak
     each = np.concatenate([share, np.sign(u)], axis=1)[:, :, None] * np.concatenate([g, g], axis=1).T
-    along = np.stack([
-        (share * np.abs(share)) @ g.T, (share * draw) @ g.T, (load * np.abs(load)) @ g.T, np.sign(i) @ g.T,
-        (np.sign(i) * np.maximum(np.abs(load) - 0.5, 0.0)) @ g.T, load @ g.T,
-        (np.sign(u) * np.exp(-np.abs(share) / 0.15)) @ g.T,
-    ], axis=1)  # fmt: skip
+    along = np.stack(
+        [
+            (share * np.abs(share)) @ g.T,
+            (share * draw) @ g.T,
+            (load * np.abs(load)) @ g.T,
+            np.sign(i) @ g.T,
+            (np.sign(i) * np.maximum(np.abs(load) - 0.5, 0.0)) @ g.T,
+            load @ g.T,
+            (np.sign(u) * np.exp(-np.abs(share) / 0.15)) @ g.T,
+        ],
+        axis=1,
+    )
     dry = np.sign(motion.twist) * (np.abs(load) @ np.abs(g).T)  # friction that grows with what the gears carry
     return np.concatenate([each, along, _on_axes([(a, dry[:, a]) for a in range(N_AXES)])], axis=1)
 
@@ -117,7 +143,7 @@ def _angles(motion: Motion, top: FloatArray) -> FloatArray:
     g = motion.robot.wheels.wrench_matrix
     return np.concatenate(
         [wave(n * motion.turned)[:, :, None] * g.T for n in (1.0, 2.0) for wave in (np.cos, np.sin)], axis=1
-    )  # fmt: skip
+    )
 
 
 def _sensors(motion: Motion, top: FloatArray) -> FloatArray:
@@ -129,9 +155,7 @@ def _sensors(motion: Motion, top: FloatArray) -> FloatArray:
         pace = np.zeros_like(own)
         pace[1:-1] = (own[2:] - own[:-2]) / (dt[1:] + dt[:-1])
         most = max(float(np.abs(own).max()), 1e-12)
-        out[c, :, 4 * c : 4 * c + 4] = np.stack(
-            [own, pace, np.abs(own), own * np.abs(own) / most], axis=1
-        )  # fmt: skip
+        out[c, :, 4 * c : 4 * c + 4] = np.stack([own, pace, np.abs(own), own * np.abs(own) / most], axis=1)
     return out
 
 

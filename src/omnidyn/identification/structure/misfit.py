@@ -209,9 +209,7 @@ class _Asked:
         return f, float(fdtrc(k, min(together, rows), f)), k
 
 
-def _whitened(
-    rows: Rows, kept: Sequence[FloatArray]
-) -> tuple[Linear, tuple[list[FloatArray], list[FloatArray]]]:  # fmt: skip
+def _whitened(rows: Rows, kept: Sequence[FloatArray]) -> tuple[Linear, tuple[list[FloatArray], list[FloatArray]]]:
     """(the fit with the memory of what it and `kept` leave; what they leave (C, rows) of each piece, and what rounded
     inputs make of the rest).
 

@@ -149,9 +149,18 @@ class _Test:
         residual = self.residual * np.sqrt(more)
         slowest = self.removed / (2.0 * self.rows * step)
         return Noise(
-            source, self.level, float(residual), float((residual / max(self.level, TINY)) ** 2), self.p, self.degrees,
-            self.share, self.level / max(moves, TINY), slowest, unit, self.new,
-        )  # fmt: skip
+            source,
+            self.level,
+            float(residual),
+            float((residual / max(self.level, TINY)) ** 2),
+            self.p,
+            self.degrees,
+            self.share,
+            self.level / max(moves, TINY),
+            slowest,
+            unit,
+            self.new,
+        )
 
 
 def _test(noise: _Power, left: _Power, both: float, rows: int, removed: int) -> _Test | None:
@@ -226,9 +235,10 @@ def _neighbours(rows: Rows, c: int, memory: AutoRegression) -> _Test | None:
     if memory.remembers:
         return None
     series = [
-        own[a:b] for own, (k, j) in zip(_shown(rows, c), _where(rows, c), strict=True)
+        own[a:b]
+        for own, (k, j) in zip(_shown(rows, c), _where(rows, c), strict=True)
         for a, b in stretches(np.append(rows.steps[k][j][1:] == 1, False)).tolist()
-    ]  # fmt: skip
+    ]
     second, third, fourth = (
         np.concatenate([np.diff(each, n) for each in series if len(each) > n] or [np.zeros(0)]) for n in (2, 3, 4)
     )

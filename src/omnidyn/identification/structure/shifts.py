@@ -197,21 +197,29 @@ class _Look:
         return self._split(found[best], TIME, ["before", "after"], tests, where, when if alike else nowhere, share)
 
     def _split(
-        self, found: _Compared, by: str, names: Sequence[str], tests: int, where: str,
-        when: tuple[float, tuple[float, float]], share: float,
-    ) -> Split | None:  # fmt: skip
+        self,
+        found: _Compared,
+        by: str,
+        names: Sequence[str],
+        tests: int,
+        where: str,
+        when: tuple[float, tuple[float, float]],
+        share: float,
+    ) -> Split | None:
         if self._least([found], tests) > FALSE:
             return None
         shifts = [
             Shift(self.problem.parameters[self.told[j]].name, tuple(self._levels(found, j, names)), float(tests * p))
-            for j, p in enumerate(found.p.tolist()) if tests * p <= FALSE
-        ]  # fmt: skip
+            for j, p in enumerate(found.p.tolist())
+            if tests * p <= FALSE
+        ]
         # A level that no friction can have is another one than any friction: it is no change of that.
         bounds = dict(zip(self.problem.names, self.problem.parameters, strict=True))
         shifts = [
-            one for one in sorted(shifts, key=lambda shift: shift.p)
+            one
+            for one in sorted(shifts, key=lambda shift: shift.p)
             if all(at.ci95[1] > bounds[one.key].low and at.ci95[0] < bounds[one.key].high for at in one.levels)
-        ]  # fmt: skip
+        ]
         return Split(by, where, *when, share, min(1.0, tests * found.joint[0]), tuple(shifts))
 
     def _levels(self, found: _Compared, j: int, names: Sequence[str]) -> list[Level]:

@@ -100,9 +100,14 @@ class _Column:
         """The index of a row from which on so many are known, and in most of which it moves; None where not."""
         at = int(np.searchsorted(self.rows, row))
         own = self.rows[at : at + length]
-        return at if len(own) == length and own[0] == row and own[-1] == row + length - 1 and (
-            self.moves[at : at + length].mean() >= MOST
-        ) else None  # fmt: skip
+        return (
+            at
+            if len(own) == length
+            and own[0] == row
+            and own[-1] == row + length - 1
+            and (self.moves[at : at + length].mean() >= MOST)
+            else None
+        )
 
     def runs(self, mask: BoolArray, by_hold: bool = False) -> list[tuple[int, int]]:
         """Stretches of joined rows in which a mask holds, (first, behind the last); each within one hold."""
@@ -133,13 +138,18 @@ def shown(rows: Rows, motions: Sequence[Motion]) -> list[Shown]:
 
 
 def _of_column(
-    rows: Rows, motions: Sequence[Motion], c: int, settled: float, repeats: Sequence[_Set],
+    rows: Rows,
+    motions: Sequence[Motion],
+    c: int,
+    settled: float,
+    repeats: Sequence[_Set],
     holds: Sequence[tuple[FloatArray, IntArray]],
-) -> Shown:  # fmt: skip
+) -> Shown:
     parts = [
         _column(rows, motions[k], k, own.index(c), settled, *holds[k])
-        for k, own in enumerate(rows.column) if c in own and rows.there[k][own.index(c)].sum() >= LEAST
-    ]  # fmt: skip
+        for k, own in enumerate(rows.column)
+        if c in own and rows.there[k][own.index(c)].sum() >= LEAST
+    ]
     step = float(np.median([each.step for each in parts])) if parts else 1.0
     still = [each.runs((each.since >= settled) & each.moves, by_hold=True) for each in parts]
     lengths = [b - a for own in still for a, b in own]
@@ -158,9 +168,7 @@ def _of_column(
     return Shown(step, *(Windows.of(rows, found, length) for found in (held, busy, resting, again)), apart=apart)
 
 
-def _column(
-    rows: Rows, motion: Motion, k: int, j: int, settled: float, since: FloatArray, holds: IntArray
-) -> _Column:  # fmt: skip
+def _column(rows: Rows, motion: Motion, k: int, j: int, settled: float, since: FloatArray, holds: IntArray) -> _Column:
     known, at = np.flatnonzero(rows.there[k][j]), np.arange(len(motion.t))
     stands = (motion.twist == 0.0).all(axis=1)
     moved = np.maximum.accumulate(np.where(stands, 0, at))
@@ -175,9 +183,10 @@ def _again(parts: Sequence[_Column], repeats: Sequence[_Set], length: int) -> tu
     for number, one in enumerate(repeats):
         for first in range(0, one.length - length + 1, length):
             own = [
-                (k, of[k].j, at, (number, first)) for k, row in zip(one.pieces.tolist(), one.rows.tolist(), strict=True)
+                (k, of[k].j, at, (number, first))
+                for k, row in zip(one.pieces.tolist(), one.rows.tolist(), strict=True)
                 if k in of and (at := of[k].whole(row + first, length)) is not None
-            ]  # fmt: skip
+            ]
             if len(own) > 1:
                 found += own
                 apart = min(apart, one.apart)
@@ -256,5 +265,6 @@ def _joined(keys: NDArray[np.uint64], starts: IntArray) -> list[_Set]:
     pieces = [np.searchsorted(starts, group, side="right") - 1 for group, _ in found]
     return [
         _Set(piece, group - starts[piece], length, int(np.diff(group).min()))
-        for piece, (group, length) in zip(pieces, found, strict=True) if length >= LEAST
-    ]  # fmt: skip
+        for piece, (group, length) in zip(pieces, found, strict=True)
+        if length >= LEAST
+    ]

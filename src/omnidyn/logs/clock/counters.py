@@ -112,9 +112,11 @@ def _refuse_fast(steps: FloatArray, period: float | None, where: str) -> None:
     if period is not None and usual > FAST_SHARE * period and not _is_followed(steps, period):
         raise InputError(
             f"an angle starts over after {period:.6g} and moves too far between rows",
-            got=f"steps of {usual:.4g}", expected=f"steps below {FAST_SHARE * period:.4g}",
-            remedy="log faster, or log the speed", where=where,
-        )  # fmt: skip
+            got=f"steps of {usual:.4g}",
+            expected=f"steps below {FAST_SHARE * period:.4g}",
+            remedy="log faster, or log the speed",
+            where=where,
+        )
 
 
 def _is_followed(steps: FloatArray, period: float) -> bool:

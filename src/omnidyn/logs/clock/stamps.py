@@ -17,8 +17,16 @@ from omnidyn.logs.channels import TIME
 from omnidyn.logs.table.table import Said, Table
 
 _WHOLE = ("sec", "secs", "seconds")
-_REST = {"nanoseconds": 1e-9, "nanosecs": 1e-9, "nanosec": 1e-9, "nsecs": 1e-9, "nsec": 1e-9,
-         "microseconds": 1e-6, "usecs": 1e-6, "usec": 1e-6}  # fmt: skip
+_REST = {
+    "nanoseconds": 1e-9,
+    "nanosecs": 1e-9,
+    "nanosec": 1e-9,
+    "nsecs": 1e-9,
+    "nsec": 1e-9,
+    "microseconds": 1e-6,
+    "usecs": 1e-6,
+    "usec": 1e-6,
+}
 _NAME = re.compile(rf"(?P<stem>.*?)(?P<rest>{'|'.join(_REST)})", re.IGNORECASE | re.DOTALL)
 
 MANY_STAMPS, ASTRAY_SHARE = 10, 0.01  # stamps of which some may be astray; the share that may be
@@ -86,7 +94,10 @@ def timed(tables: Iterable[Table], rate: float | None, skipped: bool = False) ->
         done += len(table)
         name = TIME if TIME not in table.names else BY_RATE
         yield replace(
-            table, names=(name, *table.names), columns={name: rows / rate, **table.columns},
-            units={**table.units, name: "s"}, says={**table.says, name: Said(TIME)},
+            table,
+            names=(name, *table.names),
+            columns={name: rows / rate, **table.columns},
+            units={**table.units, name: "s"},
+            says={**table.says, name: Said(TIME)},
             notes=(*table.notes, f"time was made of the rate: {rate:g} rows a second"),
-        )  # fmt: skip
+        )

@@ -16,13 +16,17 @@ from omnidyn.units import (
     TURN_RATE,
     VOLTAGE,
     Unit,
-)  # fmt: skip
+)
 from omnidyn.units import TIME as TIME_UNIT
 
 # Kinds of columns that have a number: role -> letter of the component. The first that fits counts.
 _NUMBERED = (
-    (words.CURRENT, "i"), (words.DUTY, "d"), (words.VOLTAGE, "u"), (words.RATE, "w"), (words.ANGLE, "a"),
-)  # fmt: skip
+    (words.CURRENT, "i"),
+    (words.DUTY, "d"),
+    (words.VOLTAGE, "u"),
+    (words.RATE, "w"),
+    (words.ANGLE, "a"),
+)
 _OF_A_RIM = {words.LINEAR, words.RATE, words.WHEEL, words.MOTOR, words.COMMAND, words.MEASURED}
 BY_UNIT = {VOLTAGE: "u", CURRENT: "i", DUTY: "d", TURN_RATE: "w", COUNT_RATE: "w", ANGLE: "a", COUNT: "a"}
 _KIN = {"u": "ud", "d": "ud", "i": "i", "w": "wa", "a": "wa"}  # what a word may say beside a unit of the first

@@ -26,9 +26,11 @@ def with_frames(columns: ColumnMap, assume: Mapping[str, str]) -> ColumnMap:
         mine = [key for key in FRAMES[name] if key in columns.columns]
         if not mine:
             raise InputError(
-                f"no column has this frame: the log has no {' or '.join(FRAMES[name])}", got=f"{name}={assume[name]}",
-                expected="a frame of a column that is there", where="assume",
-            )  # fmt: skip
+                f"no column has this frame: the log has no {' or '.join(FRAMES[name])}",
+                got=f"{name}={assume[name]}",
+                expected="a frame of a column that is there",
+                where="assume",
+            )
         framed |= {key: replace(columns.columns[key], frame=assume[name].strip()) for key in mine}
     return replace(columns, columns={**columns.columns, **framed}) if framed else columns
 
@@ -50,9 +52,11 @@ def turn_to_body(t: FloatArray, channels: dict[str, FloatArray], columns: Column
             continue
         if len(frames) > 1 or any(key not in columns.columns for key in keys):
             raise InputError(
-                f"{' and '.join(keys)} are turned together", got=", ".join(sorted(frames)),
-                expected="one frame for both", where=where,
-            )  # fmt: skip
+                f"{' and '.join(keys)} are turned together",
+                got=", ".join(sorted(frames)),
+                expected="one frame for both",
+                where=where,
+            )
         frame = frames.pop()
         angle = _heading(t, channels, channel, where) if frame == ROOM else columns.columns[keys[0]].mounted_at
         plane = (channels[channel][:, 0] + 1j * channels[channel][:, 1]) * np.exp(-1j * np.asarray(angle))
@@ -68,8 +72,11 @@ def _heading(t: FloatArray, channels: Mapping[str, FloatArray], channel: str, wh
     known = np.isfinite(t) & np.isfinite(pose[:, 2]) if pose is not None else np.zeros(len(t), dtype=bool)
     if pose is None or not known.any():
         raise InputError(
-            f"a {channel} in the frame of the room needs a heading to be turned by", got="no heading",
-            expected="a column heading", remedy="say which column it is: `column` heading=NAME:deg", where=where,
-        )  # fmt: skip
+            f"a {channel} in the frame of the room needs a heading to be turned by",
+            got="no heading",
+            expected="a column heading",
+            remedy="say which column it is: `column` heading=NAME:deg",
+            where=where,
+        )
     order = np.flatnonzero(known)[np.argsort(t[known], kind="stable")]
     return np.where(known, pose[:, 2], np.interp(t, t[order], pose[order, 2]))

@@ -18,7 +18,7 @@ from omnidyn.logs.columns.component import (
     component_of,
     component_of_parts,
     numbered_kind,
-)  # fmt: skip
+)
 from omnidyn.logs.columns.frame_of import FRAMES
 from omnidyn.logs.columns.guess_time import take_time
 from omnidyn.logs.columns.guess_unit import doubt_of_rate, implausible, settle_side, take_sides, unit_of

@@ -134,6 +134,9 @@ def refuse_second_time(
         named = Column(own, "s") if own else found.columns.get(TIME)
     if named is not None and named.name != made:
         raise InputError(
-            "the log has a time already", got=f"the column {named.name}, and `rate`", expected="one of the two",
-            remedy="leave `rate` out", where=table.source,
-        )  # fmt: skip
+            "the log has a time already",
+            got=f"the column {named.name}, and `rate`",
+            expected="one of the two",
+            remedy="leave `rate` out",
+            where=table.source,
+        )

@@ -113,11 +113,12 @@ def joined_doubts(doubts: Iterable[Doubt]) -> tuple[Doubt, ...]:
         groups.setdefault((letter, single.code, repr(single.numbers), single.units), []).append(single)
     return tuple(
         replace(
-            alike[0], columns=tuple(single.columns[0] for single in alike),
+            alike[0],
+            columns=tuple(single.columns[0] for single in alike),
             components=tuple(dict.fromkeys(single.components[0] for single in alike)),
         )
         for alike in groups.values()
-    )  # fmt: skip
+    )
 
 
 def letter_of(component: str) -> str:

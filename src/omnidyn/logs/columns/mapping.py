@@ -24,9 +24,15 @@ FRAMED = ("vx", "vy", "vx_cmd", "vy_cmd", "heading")
 SCHEMA = 1
 
 _QUANTITIES = {
-    "s": TIME_QUANTITY, "V": VOLTAGE, "duty": DUTY, "A": CURRENT, "rad": ANGLE, "rad_s": TURN_RATE, "m": LENGTH,
+    "s": TIME_QUANTITY,
+    "V": VOLTAGE,
+    "duty": DUTY,
+    "A": CURRENT,
+    "rad": ANGLE,
+    "rad_s": TURN_RATE,
+    "m": LENGTH,
     "m_s": SPEED,
-}  # fmt: skip
+}
 _RIM = {TURN_RATE: SPEED, ANGLE: LENGTH}  # what a wheel does -> what its rim does
 _SPEC = re.compile(r"(?P<invert>-)?(?P<name>.+?)(?::(?P<unit>[^:@]*))?(?:@(?P<side>wheel|motor))?", re.DOTALL)
 
@@ -51,14 +57,16 @@ class ColumnMap:
             if column.side == MOTOR_SIDE and (component_channel(component) not in SIDED or column.of_rim):
                 what = "what is in metres is of the rim, behind the gear" if column.of_rim else ""
                 raise InputError(
-                    what or "only speeds and angles of wheels have a motor side", got=f"{component}: {column}",
+                    what or "only speeds and angles of wheels have a motor side",
+                    got=f"{component}: {column}",
                     expected="side wheel",
-                )  # fmt: skip
+                )
             if column.frame and component not in FRAMED:
                 raise InputError(
-                    "only a heading and velocities of the robot have a frame", got=f"{component}: {column}",
+                    "only a heading and velocities of the robot have a frame",
+                    got=f"{component}: {column}",
                     expected=f"no frame, or one of {', '.join(FRAMED)}",
-                )  # fmt: skip
+                )
 
     def with_columns(self, more: Mapping[str, Column]) -> ColumnMap:
         """The same with some columns set, and no longer unused."""
@@ -89,9 +97,10 @@ def component_channel(component: str) -> str:
     found = place(component)
     if found is None:
         raise InputError(
-            "unknown channel", got=component,
+            "unknown channel",
+            got=component,
             expected="t, u1.., d1.., i1.., a1.., w1.., w1_cmd.., vx, vy, omega, vx_cmd.., x, y, heading or supply",
-        )  # fmt: skip
+        )
     return found[0]
 
 
@@ -107,9 +116,11 @@ def check_quantity(component: str, unit: Unit) -> None:
     if unit.quantity != wanted and not is_of_rim(component, unit):
         remedy = "say how many make a turn: ticks/2000" if unit.quantity == "count" else ""
         raise InputError(
-            f"{component} cannot have this unit", got=f"{unit.text} ({unit.quantity})", expected=f"a {wanted}",
+            f"{component} cannot have this unit",
+            got=f"{unit.text} ({unit.quantity})",
+            expected=f"a {wanted}",
             remedy=remedy,
-        )  # fmt: skip
+        )
 
 
 def is_of_rim(component: str, unit: Unit) -> bool:

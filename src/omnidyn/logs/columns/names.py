@@ -17,12 +17,48 @@ from omnidyn.model.wheels import MAX_WHEELS, MIN_WHEELS, per_wheel
 from omnidyn.units import Unit, known_unit
 
 (
-    TIME, SUPPLY, VOLTAGE, CURRENT, DUTY, RATE, ANGLE, COMMAND, MOTOR, WHEEL, BODY, X, Y, YAW, LINEAR, ANGULAR, OTHER,
-    MEASURED, SENSOR, CHANNEL,
+    TIME,
+    SUPPLY,
+    VOLTAGE,
+    CURRENT,
+    DUTY,
+    RATE,
+    ANGLE,
+    COMMAND,
+    MOTOR,
+    WHEEL,
+    BODY,
+    X,
+    Y,
+    YAW,
+    LINEAR,
+    ANGULAR,
+    OTHER,
+    MEASURED,
+    SENSOR,
+    CHANNEL,
 ) = (
-    "time", "supply", "voltage", "current", "duty", "rate", "angle", "command", "motor", "wheel", "body", "x", "y",
-    "yaw", "linear", "angular", "other", "measured", "sensor", "channel",
-)  # fmt: skip
+    "time",
+    "supply",
+    "voltage",
+    "current",
+    "duty",
+    "rate",
+    "angle",
+    "command",
+    "motor",
+    "wheel",
+    "body",
+    "x",
+    "y",
+    "yaw",
+    "linear",
+    "angular",
+    "other",
+    "measured",
+    "sensor",
+    "channel",
+)
 
 _WORDS = {
     TIME: """t time stamp timestamp clock zeit uhrzeit laufzeit millis micros elapsed uptime runtime epoch temps tiempo
@@ -54,7 +90,7 @@ _WORDS = {
     # Quantities that a log may hold and a Run does not, and differences from row to row.
     OTHER: """ax ay az acc accel acceleration torque tau temp temperature force f d dx dy dz dang dt delta error
         err state mode id index row mag roll pitch integral index seq frame std var cov step timestep sample""",
-}  # fmt: skip
+}
 _ROLE = {word: role for role, words in _WORDS.items() if role != SENSOR for word in words.split()}
 _SENSORS = frozenset(_WORDS[SENSOR].split())
 _ROLE |= dict.fromkeys(_SENSORS - _ROLE.keys(), SENSOR)  # an encoder tells an angle too
@@ -221,16 +257,24 @@ def _compound(word: str) -> tuple[str, ...]:
 
 _FRONT, _REAR, _LEFT, _RIGHT = "front", "rear", "left", "right"
 _PLACES_WORDS = {
-    _FRONT: "front vorn vorne avant delantera", _REAR: "rear back hind hinten arriere trasera",
-    _LEFT: "left links gauche izquierda", _RIGHT: "right rechts droite derecha",
-}  # fmt: skip
+    _FRONT: "front vorn vorne avant delantera",
+    _REAR: "rear back hind hinten arriere trasera",
+    _LEFT: "left links gauche izquierda",
+    _RIGHT: "right rechts droite derecha",
+}
 _SIDES = {word: side for side, words in _PLACES_WORDS.items() for word in words.split()}
 _LETTERS = {"f": _FRONT, "b": _REAR, "l": _LEFT, "r": _RIGHT}
 _MIDDLE = {"mid", "middle", "center", "centre"}  # of a side: middle_left is left
 ANGLES = {
-    (_FRONT, ""): 0.0, (_FRONT, _LEFT): 45.0, ("", _LEFT): 90.0, (_REAR, _LEFT): 135.0, (_REAR, ""): 180.0,
-    (_REAR, _RIGHT): -135.0, ("", _RIGHT): -90.0, (_FRONT, _RIGHT): -45.0,
-}  # fmt: skip
+    (_FRONT, ""): 0.0,
+    (_FRONT, _LEFT): 45.0,
+    ("", _LEFT): 90.0,
+    (_REAR, _LEFT): 135.0,
+    (_REAR, ""): 180.0,
+    (_REAR, _RIGHT): -135.0,
+    ("", _RIGHT): -90.0,
+    (_FRONT, _RIGHT): -45.0,
+}
 FOUR = (45.0, -45.0, 135.0, -135.0)  # in the order of a file of four wheels: front left, front right, rear left, ..
 WIDEST_GAP = 180.0  # [degree] between neighbours of wheels that stand around a robot
 FARTHEST_ANGLE = 40.0  # [degree] from its place beyond which a wheel is another one

@@ -65,9 +65,10 @@ def wheel_numbers(table: Table, names: Iterable[str], found: Guess) -> dict[str,
         if 0 in mine.values():
             ends[family.style] = max(ends.get(family.style, 0), *mine.values())
     shifted = [
-        family for family, mine in families.items()
+        family
+        for family, mine in families.items()
         if 0 in mine.values() or max(mine.values()) <= ends.get(family.style, -1)
-    ]  # fmt: skip
+    ]
     if shifted:
         others = sorted({family.letter for family in families if family not in shifted})
         found.note("wheels_from_zero", from_one=others)

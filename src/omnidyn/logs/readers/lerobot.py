@@ -74,10 +74,12 @@ def tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterator
     source, info = str(path), _info(Path(path))
     if info is None:
         raise InputError(
-            "the numbers of a LeRobot dataset have their names in meta/info.json", got="no such file beside the data",
+            "the numbers of a LeRobot dataset have their names in meta/info.json",
+            got="no such file beside the data",
             expected="the folder as it was recorded: meta/info.json and data/chunk-000/file-000.parquet",
-            remedy="give the folder of the dataset, whole", where=source,
-        )  # fmt: skip
+            remedy="give the folder of the dataset, whole",
+            where=source,
+        )
     names = {key: _names_of(info, key) for key in (ACTION, STATE) if key in lists}
     yield from _dataset_tables(files, names, source, rows, options)
 
@@ -88,9 +90,10 @@ def _lists(file: Path) -> set[str]:
     with open_regular(file) as stream, damage(pyarrow, str(file)):
         kinds, schema = pyarrow.types, parquet.ParquetFile(stream, pre_buffer=False).schema_arrow
         return {
-            field.name for field in schema
+            field.name
+            for field in schema
             if kinds.is_list(field.type) or kinds.is_large_list(field.type) or kinds.is_fixed_size_list(field.type)
-        }  # fmt: skip
+        }
 
 
 def _info(path: Path) -> Mapping[str, Any] | None:
@@ -124,14 +127,18 @@ def _dataset_tables(
     """The tables of the files of a dataset, one after the other."""
     found = {
         f"{feature}.{name}": (feature, own.index(name), component, unit)
-        for feature, own in names.items() for name, (component, unit) in SPEEDS.items() if name in own
-    }  # fmt: skip
+        for feature, own in names.items()
+        for name, (component, unit) in SPEEDS.items()
+        if name in own
+    }
     if not found:
         every = [name for own in names.values() for name in own]
         raise InputError(
-            "no speeds of a base in the dataset", got=shortened(", ".join(dict.fromkeys(every)) or "no names", 200),
-            expected=f"{', '.join(SPEEDS)} in {ACTION} or {STATE}", where=source,
-        )  # fmt: skip
+            "no speeds of a base in the dataset",
+            got=shortened(", ".join(dict.fromkeys(every)) or "no names", 200),
+            expected=f"{', '.join(SPEEDS)} in {ACTION} or {STATE}",
+            where=source,
+        )
     units = {STAMP: "s"} | {column: unit for column, (*_, unit) in found.items()}
     says = {STAMP: Said("t")} | {
         column: Said(component + "_cmd" * (feature == ACTION)) for column, (feature, _, component, _) in found.items()
@@ -180,8 +187,12 @@ def _parts(
             pages, present = declared_bytes(stream), set(data.schema_arrow.names)
         lost = [name for name in (STAMP, *features) if name not in present]
         if lost:
-            raise InputError("a file of a dataset without its columns", got=f"no {', '.join(lost)}", where=source,
-                             expected=", ".join((STAMP, EPISODE, *features)))  # fmt: skip
+            raise InputError(
+                "a file of a dataset without its columns",
+                got=f"no {', '.join(lost)}",
+                where=source,
+                expected=", ".join((STAMP, EPISODE, *features)),
+            )
         check_size(data.metadata, pages, count, size, options.max_bytes, source)
         chosen = [name for name in (STAMP, EPISODE, *features) if name in present]
         for done, batch in batches_of(pyarrow, data, max(1, min(rows, MAX_CELLS // count)), source, chosen):
@@ -205,9 +216,11 @@ def _place(values: FloatArray, place: int, count: int, source: str, done: int) -
     """One of `count` numbers of each row. Raises InputError for rows that hold more or fewer."""
     if count == 0 or len(values) % count:
         raise InputError(
-            "rows without all numbers of a feature", got=f"{len(values)} numbers from row {done + 1} on",
-            expected=f"{count} in each row, as meta/info.json names them", where=source,
-        )  # fmt: skip
+            "rows without all numbers of a feature",
+            got=f"{len(values)} numbers from row {done + 1} on",
+            expected=f"{count} in each row, as meta/info.json names them",
+            where=source,
+        )
     return values.reshape(-1, count)[:, place].copy()
 
 

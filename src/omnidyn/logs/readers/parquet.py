@@ -101,9 +101,12 @@ def parquet_tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> 
 def _opened(pyarrow: Any, parquet: Any, stream: BinaryIO, source: str) -> tuple[Any, _Columns]:
     """The file and its columns. Words stay a dictionary and indices: a long word repeated often takes no memory."""
     options = {
-        "page_checksum_verification": True, "pre_buffer": False, "buffer_size": BLOCK_BYTES,
-        "thrift_string_size_limit": MAX_THRIFT_STRING, "thrift_container_size_limit": MAX_THRIFT_ITEMS,
-    }  # fmt: skip
+        "page_checksum_verification": True,
+        "pre_buffer": False,
+        "buffer_size": BLOCK_BYTES,
+        "thrift_string_size_limit": MAX_THRIFT_STRING,
+        "thrift_container_size_limit": MAX_THRIFT_ITEMS,
+    }
     file = parquet.ParquetFile(stream, **options)
     columns = _Columns(pyarrow, file.schema_arrow, source)
     words = [name for name, kind in zip(columns.raw, columns.kinds, strict=True) if kind == WORDS]
@@ -177,9 +180,11 @@ class _Columns:
         self.raw = list(schema.names)
         if not 0 < len(self.raw) <= MAX_COLUMNS:
             raise InputError(
-                "too many columns" if self.raw else "no columns", got=len(self.raw),
-                expected=f"1 to {MAX_COLUMNS}", where=source,
-            )  # fmt: skip
+                "too many columns" if self.raw else "no columns",
+                got=len(self.raw),
+                expected=f"1 to {MAX_COLUMNS}",
+                where=source,
+            )
         for k in range(len(self.raw)):
             check_name(k, [name if name.strip() else "" for name in self.raw], source)
         self.kinds = [_kind(pyarrow.types, field.type) for field in schema]

@@ -90,9 +90,12 @@ def _tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterato
     reader, suffix = reader_of(path), Path(path).suffix
     if options.variables and not reader.variables:
         raise InputError(
-            "there are no variables to choose from", got=reader.word, expected="a MATLAB or HDF5 file", where=str(path),
+            "there are no variables to choose from",
+            got=reader.word,
+            expected="a MATLAB or HDF5 file",
+            where=str(path),
             remedy="leave `variables` out; `column` chooses columns and topics",
-        )  # fmt: skip
+        )
     if is_log_folder(path):
         suffix = ""
     promised = next((reader for reader in READERS if suffix.lower() in reader.suffixes), TEXT)

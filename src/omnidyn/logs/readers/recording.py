@@ -86,9 +86,12 @@ class Recording:
             raise self._nothing()
         if len(names) > MAX_COLUMNS:
             raise InputError(
-                "too many columns", got=len(names), expected=f"at most {MAX_COLUMNS}", where=self.source,
+                "too many columns",
+                got=len(names),
+                expected=f"at most {MAX_COLUMNS}",
+                where=self.source,
                 remedy="record fewer topics, or cut it with `ros2 bag convert`",
-            )  # fmt: skip
+            )
         units = {TIME_COLUMN: "s"} | {name: unit for track in tracks for name, unit in track.units.items()}
         says = {TIME_COLUMN: Said("t")} | {name: said for track in tracks for name, said in track.says.items()}
         first, start = min(int(track.stamps[0]) for track in tracks), 0
@@ -131,10 +134,12 @@ class Recording:
     def _nothing(self) -> InputError:
         told = [f"{topic.name} ({topic.type}, {topic.count})" for topic in self.topics if topic.count]
         return InputError(
-            "no topic holds numbers that can be read", got=shortened(", ".join(told), 400) or "no messages",
+            "no topic holds numbers that can be read",
+            got=shortened(", ".join(told), 400) or "no messages",
             expected="JointState, Odometry, Twist, BatteryState, Imu or messages with plain numbers",
-            remedy="record the topics of wheels and commands too", where=self.source,
-        )  # fmt: skip
+            remedy="record the topics of wheels and commands too",
+            where=self.source,
+        )
 
 
 def _repeats(stamps: IntArray) -> IntArray:
@@ -232,5 +237,8 @@ class LeftOut:
         """What is to be said, in words; nothing where all were used."""
         if not self.count:
             return []
-        return [f"1 record was left out: {self.first}" if self.count == 1 else
-                f"{self.count} records were left out, the first: {self.first}"]  # fmt: skip
+        return [
+            f"1 record was left out: {self.first}"
+            if self.count == 1
+            else f"{self.count} records were left out, the first: {self.first}"
+        ]

@@ -176,15 +176,16 @@ def recording_of(tables: Iterable[Table], max_bytes: int) -> Recording:
                 continue
             if key not in stamps and len(stamps) >= MAX_COLUMNS:
                 raise InputError(
-                    "too many keys", got=f"more than {MAX_COLUMNS}", expected=f"at most {MAX_COLUMNS}",
-                    remedy="export the fields of wheels and commands alone", where=table.source,
-                )  # fmt: skip
+                    "too many keys",
+                    got=f"more than {MAX_COLUMNS}",
+                    expected=f"at most {MAX_COLUMNS}",
+                    remedy="export the fields of wheels and commands alone",
+                    where=table.source,
+                )
             stamps.setdefault(str(key), array("q")).append(stamp)
             values.setdefault(str(key), array("d")).append(number)
     assert table is not None
-    tracks = [
-        Track(key, np.array(stamps[key], dtype=np.int64), {key: np.array(mine)}) for key, mine in values.items()
-    ]  # fmt: skip
+    tracks = [Track(key, np.array(stamps[key], dtype=np.int64), {key: np.array(mine)}) for key, mine in values.items()]
     topics = [topic_of(track.topic, "numbers", track.stamps, True) for track in tracks]
     lost = sorted(words - set(stamps))
     notes = [*table.notes, "a row for every value: each key is a topic with times of its own"]

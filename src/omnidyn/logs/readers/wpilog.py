@@ -173,9 +173,12 @@ class WpilogFile:
 
     def _nothing(self, why: str) -> InputError:
         return InputError(
-            "the data log is damaged or cut short", got=why, expected="at least one whole record",
-            remedy="copy it again from the robot; nothing in it can be saved", where=self.source,
-        )  # fmt: skip
+            "the data log is damaged or cut short",
+            got=why,
+            expected="at least one whole record",
+            remedy="copy it again from the robot; nothing in it can be saved",
+            where=self.source,
+        )
 
 
 def _text(value: bytes, at: int) -> tuple[str, int]:
@@ -282,7 +285,7 @@ def _numbers(there: np.ndarray, starts: IntArray, content: np.ndarray, size: int
 
 def _struct(
     entry: Entry, schemas: dict[str, str], sizes: IntArray, starts: IntArray, content: np.ndarray
-) -> list[TopicColumn]:  # fmt: skip
+) -> list[TopicColumn]:
     """The numbers of a struct, or of each in an array of them."""
     kind = entry.kind.removeprefix(STRUCT)
     leaves, size = leaves_of(kind.removesuffix("[]"), schemas)
@@ -330,17 +333,31 @@ WPILOG = Reader("wpilog", "a WPILib data log", (".wpilog",), _tables, "one value
 
 MAX_DEPTH, MAX_LEAVES, MAX_SCHEMA, MAX_DIGITS = 8, 500, 65536, 4
 CODES = {
-    "bool": "u1", "char": "u1", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4",
-    "uint32": "u4", "int64": "i8", "uint64": "u8", "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
-}  # fmt: skip
+    "bool": "u1",
+    "char": "u1",
+    "int8": "i1",
+    "uint8": "u1",
+    "int16": "i2",
+    "uint16": "u2",
+    "int32": "i4",
+    "uint32": "u4",
+    "int64": "i8",
+    "uint64": "u8",
+    "float": "f4",
+    "float32": "f4",
+    "double": "f8",
+    "float64": "f8",
+}
 _FIELD = re.compile(r"(?:enum\s*)?(?:\{[^}]*\}\s*)?([\w:]+)\s+(\w+)\s*(?:\[(\d+)\])?", re.ASCII)
 
 # The usual ones, for logs that lost their schemas. Facts of WPILib.
 KNOWN = {
-    "Translation2d": "double x;double y", "Rotation2d": "double value",
+    "Translation2d": "double x;double y",
+    "Rotation2d": "double value",
     "Pose2d": "Translation2d translation;Rotation2d rotation",
-    "Twist2d": "double dx;double dy;double dtheta", "ChassisSpeeds": "double vx;double vy;double omega",
-}  # fmt: skip
+    "Twist2d": "double dx;double dy;double dtheta",
+    "ChassisSpeeds": "double vx;double vy;double omega",
+}
 
 
 class BadSchemaError(ValueError):

@@ -265,9 +265,12 @@ def check_name(k: int, names: Sequence[str], where: str, got: str | None = None,
         )
     if name in names[:k]:
         raise InputError(
-            "two columns have the same name", got=name, expected="different names",
-            remedy="give the second one another name in this line", where=where,
-        )  # fmt: skip
+            "two columns have the same name",
+            got=name,
+            expected="different names",
+            remedy="give the second one another name in this line",
+            where=where,
+        )
 
 
 def _refuse_width(columns: int, where: str) -> None:
@@ -290,9 +293,12 @@ def _units(names: list[str], head: _Head, where: str) -> tuple[list[str], dict[s
         unit = dialect.strip_brackets(cell)
         if unit and units.get(name, unit) != unit:
             raise InputError(
-                "name and row of units give two units", got=f"{units[name]} and {unit}", expected="one unit",
-                remedy="correct one of them", where=f"{where}, column {name}",
-            )  # fmt: skip
+                "name and row of units give two units",
+                got=f"{units[name]} and {unit}",
+                expected="one unit",
+                remedy="correct one of them",
+                where=f"{where}, column {name}",
+            )
         if unit:
             units[name] = unit
     return plain, units

@@ -121,9 +121,13 @@ class Table:
             remedy = "leave the cell blank, or use `skip_bad_rows`" if missing else "correct it, or remove the row"
             many = f" ({large.sum()} of {len(self)} are as large)" if large.sum() > 1 else ""
             raise self.fault(
-                row, name, "no sensor gives such a number", float(column[row]), f"at most {LARGEST:g} in size{many}",
+                row,
+                name,
+                "no sensor gives such a number",
+                float(column[row]),
+                f"at most {LARGEST:g} in size{many}",
                 remedy,
-            )  # fmt: skip
+            )
         if large.any() or small.any():
             column = np.where(large, np.nan, np.where(small, 0.0, column))
         return column

@@ -80,9 +80,11 @@ class TextFile:
                 rest = rest[end + 1 :]
             if len(rest) > MAX_LINE_BYTES:
                 raise InputError(
-                    "this is not a table", got=f"a line of more than {MAX_LINE_BYTES} bytes",
-                    expected="lines of cells", where=self.source,
-                )  # fmt: skip
+                    "this is not a table",
+                    got=f"a line of more than {MAX_LINE_BYTES} bytes",
+                    expected="lines of cells",
+                    where=self.source,
+                )
         if rest.endswith(b"\r"):
             yield rest[:-1]
         elif rest:
@@ -102,9 +104,12 @@ class TextFile:
                     kind = kind or text_format(block)
                     if kind is not None:
                         raise InputError(
-                            what, got=kind.words, expected="text with a row for each moment", remedy=kind.remedy,
+                            what,
+                            got=kind.words,
+                            expected="text with a row for each moment",
+                            remedy=kind.remedy,
                             where=self.source,
-                        )  # fmt: skip
+                        )
                     self._start = block[:SHOWN_BYTES]
                 self._hash.update(block)
                 done += len(block)
@@ -132,16 +137,20 @@ class TextFile:
             if (b"\0" in text and _is_binary(text)) or (k == 0 and decoder is None and _is_noise(text)):
                 begins = f" (it begins with {self._start.hex(' ')})"
                 raise InputError(
-                    "this is not a text file", got=f"bytes that are no text{begins}",
+                    "this is not a text file",
+                    got=f"bytes that are no text{begins}",
                     expected="text with a row for each moment, such as CSV, or Parquet",
-                    remedy="give the file that the logger wrote, or export it as CSV", where=self.source,
-                )  # fmt: skip
+                    remedy="give the file that the logger wrote, or export it as CSV",
+                    where=self.source,
+                )
             if b"\0" in text or (zeros and text):
                 raise InputError(
-                    "this is not a text file", got="zero bytes in it", expected="text",
+                    "this is not a text file",
+                    got="zero bytes in it",
+                    expected="text",
                     remedy="a recorder that lost its power leaves them: tr -d '\\000' < LOG > NEW takes them out",
                     where=self.source,
-                )  # fmt: skip
+                )
             if len(text) < len(block) and not zeros:
                 zeros = True
                 self.notes.append("zero bytes at the end, as a recorder leaves that lost its power, were left out")
@@ -155,9 +164,12 @@ class TextFile:
             return decoder.decode(block, final).encode()
         except UnicodeError:
             raise InputError(
-                "this is not a text file", got="no valid UTF-16 after its byte order mark", expected="text",
-                remedy="save it as UTF-8", where=self.source,
-            ) from None  # fmt: skip
+                "this is not a text file",
+                got="no valid UTF-16 after its byte order mark",
+                expected="text",
+                remedy="save it as UTF-8",
+                where=self.source,
+            ) from None
 
     def _decoded(self, block: bytes, first: int) -> str:
         try:

@@ -91,9 +91,11 @@ def plane_force(body, x, y, aimed, tau):
     x_bent, y_bent = aimed[0] + tau * x_rate, aimed[1] + tau * y_rate
     force = (-body.stiffness * x_bent - damping * x_rate, -body.stiffness * y_bent - damping * y_rate)
     slopes = (
-        -gain * x_x - fades_x * x_rate, -gain * x_y - fades_y * x_rate,
-        -gain * y_x - fades_x * y_rate, -gain * y_y - fades_y * y_rate,
-    )  # fmt: skip
+        -gain * x_x - fades_x * x_rate,
+        -gain * x_y - fades_y * x_rate,
+        -gain * y_x - fades_x * y_rate,
+        -gain * y_y - fades_y * y_rate,
+    )
     return force, slopes, (x_bent, y_bent)
 
 

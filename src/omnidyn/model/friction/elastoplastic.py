@@ -57,10 +57,14 @@ def _slip(own, zx, zy, speed, levels):
     each, most = share / below, along / below
     x, y = steep * most * zx / size, steep * most * zy / size
     return (
-        share * most, x + each * (speed[0] / cx - 2.0 * most * zx / cx**2),
-        y + each * (speed[1] / cy - 2.0 * most * zy / cy**2), each * zx / cx, each * zy / cy,
-        each * zx / cx**2 * (2.0 * most * zx / cx - speed[0]), each * zy / cy**2 * (2.0 * most * zy / cy - speed[1]),
-    )  # fmt: skip
+        share * most,
+        x + each * (speed[0] / cx - 2.0 * most * zx / cx**2),
+        y + each * (speed[1] / cy - 2.0 * most * zy / cy**2),
+        each * zx / cx,
+        each * zy / cy,
+        each * zx / cx**2 * (2.0 * most * zx / cx - speed[0]),
+        each * zy / cy**2 * (2.0 * most * zy / cy - speed[1]),
+    )
 
 
 @part
@@ -98,14 +102,18 @@ def plane(own, aimed, speed, tau, levels):
     fall_x, fall_y = fall * zx / cx - 2.0 * slip * zx * dx / cx**2, fall * zy / cy - 2.0 * slip * zy * dy / cy**2
     by = lugre.within(
         (
-            1.0 + stiff * (by_zx * zx + slip) / cx**2, stiff * by_zy * zx / (cx * cy),
-            stiff * by_zx * zy / (cx * cy), 1.0 + stiff * (by_zy * zy + slip) / cy**2,
+            1.0 + stiff * (by_zx * zx + slip) / cx**2,
+            stiff * by_zy * zx / (cx * cy),
+            stiff * by_zx * zy / (cx * cy),
+            1.0 + stiff * (by_zy * zy + slip) / cy**2,
         ),
         (
-            1.0 - zx / cx * by_x - fall_x * nx, -zx / cx * by_y - fall_x * ny,
-            -zy / cy * by_x - fall_y * nx, 1.0 - zy / cy * by_y - fall_y * ny,
+            1.0 - zx / cx * by_x - fall_x * nx,
+            -zx / cx * by_y - fall_x * ny,
+            -zy / cy * by_x - fall_y * nx,
+            1.0 - zy / cy * by_y - fall_y * ny,
         ),
-    )  # fmt: skip
+    )
     return x - slip * zx / cx, y - slip * zy / cy, by[0], by[1], by[2], by[3]
 
 

@@ -29,8 +29,11 @@ _STICKING = (
 KINDS = {each.word: each for each in (*_STICKING, *(law.KIND for law in bristle.LAWS))}
 
 
-FALL = {"stribeck_speed": Number("fall", -1, True, SPEED), "stribeck_exponent": Number("exponent"),
-        "stribeck_shape": Number("form")}  # fmt: skip
+FALL = {
+    "stribeck_speed": Number("fall", -1, True, SPEED),
+    "stribeck_exponent": Number("exponent"),
+    "stribeck_shape": Number("form"),
+}
 OF_LAWS = {key: number for each in KINDS.values() for key, number in each.takes.items()}
 NUMBERS = FALL | OF_LAWS
 """Every number that a law takes, by its key without "yaw_"."""
@@ -42,9 +45,15 @@ def words_of(place: str) -> tuple[str, ...]:
 
 
 def spread_on(
-    table: Any, rows: Any, slide: FloatArray, hold: FloatArray, mass: FloatArray | float, viscous: Any,
-    units: FloatArray | float = 1.0, yaw: str = "",
-) -> None:  # fmt: skip
+    table: Any,
+    rows: Any,
+    slide: FloatArray,
+    hold: FloatArray,
+    mass: FloatArray | float,
+    viscous: Any,
+    units: FloatArray | float = 1.0,
+    yaw: str = "",
+) -> None:
     """Add the law of a table to records of a plant, in place: to elements, or to the ellipse.
 
     slide, hold: levels of each pair, shape (rows, 2), of the ellipse (2,). mass [kg]: what each moves; viscous [N s/m]:

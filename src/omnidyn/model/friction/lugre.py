@@ -39,9 +39,11 @@ def within(own, given):
     a, b, c, d = own
     below = a * d - b * c
     return (
-        (d * given[0] - b * given[2]) / below, (d * given[1] - b * given[3]) / below,
-        (a * given[2] - c * given[0]) / below, (a * given[3] - c * given[1]) / below,
-    )  # fmt: skip
+        (d * given[0] - b * given[2]) / below,
+        (d * given[1] - b * given[3]) / below,
+        (a * given[2] - c * given[0]) / below,
+        (a * given[3] - c * given[1]) / below,
+    )
 
 
 @part

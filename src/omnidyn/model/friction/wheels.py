@@ -68,8 +68,11 @@ class WheelFriction(Value):
         wheels["viscous"] += self.viscous
         slide, hold = np.empty((len(wheels), 2)), np.empty((len(wheels), 2))
         slide[:, 0], slide[:, 1], hold[:, 0], hold[:, 1] = (
-            self.coulomb, self.backward, self.hold_forward, self.hold_backward,
-        )  # fmt: skip
+            self.coulomb,
+            self.backward,
+            self.hold_forward,
+            self.hold_backward,
+        )
         seen = plant.body.mass / np.maximum((wheels["g"] ** 2).sum(axis=1), 1e-300)
         spread_on(self, wheels, slide, hold, seen, wheels["viscous"])
 

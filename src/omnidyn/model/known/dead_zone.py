@@ -120,10 +120,16 @@ class DeadZone:
     def table(self) -> Table:
         """A row per pattern: volts and duty with their intervals."""
         rows = [
-            (row.axis or "never", f"{row.scale:.3f}", _ends(row.scale_interval), f"{row.duty:.3f}",
-             _ends(row.duty_interval), "" if row.reachable else "beyond the limit of the motors")
+            (
+                row.axis or "never",
+                f"{row.scale:.3f}",
+                _ends(row.scale_interval),
+                f"{row.duty:.3f}",
+                _ends(row.duty_interval),
+                "" if row.reachable else "beyond the limit of the motors",
+            )
             for row in self.rows
-        ]  # fmt: skip
+        ]
         return Table(("axis", "voltage V", "95 %", "duty", "95 %", ""), rows, "<>>>><")
 
     def statements(self) -> list[Statement]:
@@ -139,9 +145,10 @@ class DeadZone:
         ends = [int(np.argmax(self.voltage <= least)), int(np.argmax(self.voltage >= most))]
         band = self.band
         numbers = {
-            "volts": self.voltage[ends], "degrees": np.degrees(self.directions[ends]),
+            "volts": self.voltage[ends],
+            "degrees": np.degrees(self.directions[ends]),
             "ci95": [None if band is None else (band.low[k], band.high[k]) for k in ends],
-        }  # fmt: skip
+        }
         return [Statement("travel_range", NOTE, numbers=numbers), duty]
 
     def _warnings(self) -> list[Statement]:
@@ -161,23 +168,37 @@ class DeadZone:
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
         rows = [
-            {"axis": row.axis or None, "pattern": row.pattern,
-             "breakaway_scale_V": row.scale, "interval_V": row.scale_interval,
-             "voltage_V": row.voltage if np.isfinite(row.scale) else None,
-             "duty": row.duty, "duty_interval": row.duty_interval, "reachable": row.reachable}
+            {
+                "axis": row.axis or None,
+                "pattern": row.pattern,
+                "breakaway_scale_V": row.scale,
+                "interval_V": row.scale_interval,
+                "voltage_V": row.voltage if np.isfinite(row.scale) else None,
+                "duty": row.duty,
+                "duty_interval": row.duty_interval,
+                "reachable": row.reachable,
+            }
             for row in self.rows
-        ]  # fmt: skip
+        ]
         around = {
-            "direction_deg": np.degrees(self.directions).round(9), "voltage_V": self.voltage,
+            "direction_deg": np.degrees(self.directions).round(9),
+            "voltage_V": self.voltage,
             "low_V": None if self.band is None else self.band.low,
             "high_V": None if self.band is None else self.band.high,
-        }  # fmt: skip
-        return plain({
-            **as_verdict(self.verdict), "robot": self.robot.name, "dead_zone": rows, "directions": around,
-            "duty_of": {"volts": self.full, "of": self.full_of}, "warnings": self._warnings(),
-            "rests_on": [vars(each) for each in self.rests_on], "guesses": self.guesses,
-            "draws": self.draws if self.band is not None else 0,
-        })  # fmt: skip
+        }
+        return plain(
+            {
+                **as_verdict(self.verdict),
+                "robot": self.robot.name,
+                "dead_zone": rows,
+                "directions": around,
+                "duty_of": {"volts": self.full, "of": self.full_of},
+                "warnings": self._warnings(),
+                "rests_on": [vars(each) for each in self.rests_on],
+                "guesses": self.guesses,
+                "draws": self.draws if self.band is not None else 0,
+            }
+        )
 
 
 def dead_zone(robot: Robot, patterns: ArrayLike | None = None, *, draws: int = DRAWS, seed: int = 0) -> DeadZone:
@@ -244,8 +265,9 @@ def _rests_on(robot: Robot, patterns: FloatArray) -> tuple[RestsOn, ...]:
     volts = effects(robot, partial(breakaway_voltage, pattern=moving, halvings=HALVINGS), [*own])
     found = [
         RestsOn(key, own[key].origin, own[key].guessed, own[key].std, size, volts[key] <= FELT)
-        for key, size in effects(robot, both, [*own]).items() if size > FELT
-    ]  # fmt: skip
+        for key, size in effects(robot, both, [*own]).items()
+        if size > FELT
+    ]
     return tuple(sorted(found, key=lambda each: (each.duty, -each.effect)))
 
 

@@ -132,9 +132,12 @@ def refuse_strange_keys(robot: Robot) -> None:
             Key.parse(key).get(robot)
         except InputError as error:
             raise InputError(
-                error.what, got=error.got or key, expected=error.expected, remedy=error.remedy,
+                error.what,
+                got=error.got or key,
+                expected=error.expected,
+                remedy=error.remedy,
                 where=f"[correlation] keys[{k}]",
-            ) from None  # fmt: skip
+            ) from None
 
 
 def with_correlation(robot: Robot, keys: Sequence[str], matrix: ArrayLike, std: Sequence[float] = ()) -> Robot:
@@ -226,6 +229,8 @@ def _with(own: Any, below: Any, index: int | None, level: float, count: int) -> 
 def _at_least(level: Any, least: Any) -> Any:
     """Level by level; one for all wheels stays one where each slides with less."""
     higher = np.maximum(level, least)
-    return level if np.array_equal(higher, np.broadcast_to(level, higher.shape)) else (
-        tuple(higher.tolist()) if higher.ndim else float(higher)
-    )  # fmt: skip
+    return (
+        level
+        if np.array_equal(higher, np.broadcast_to(level, higher.shape))
+        else (tuple(higher.tolist()) if higher.ndim else float(higher))
+    )

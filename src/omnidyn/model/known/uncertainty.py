@@ -67,9 +67,11 @@ def _known(robot: Robot) -> tuple[list[Key], Told]:
     known = told(robot)
     if not known.keys:
         raise InsufficientDataError(
-            "nothing says how far the numbers of this robot may be off", got=f"{robot.name} without any std",
-            expected="{ value = .., std = .. } at the numbers of its file", remedy="let identify write it, or add std",
-        )  # fmt: skip
+            "nothing says how far the numbers of this robot may be off",
+            got=f"{robot.name} without any std",
+            expected="{ value = .., std = .. } at the numbers of its file",
+            remedy="let identify write it, or add std",
+        )
     return [Key.parse(key) for key in known.keys], known
 
 

@@ -30,8 +30,10 @@ def robot_path(name: str) -> str:
     if looks_like_a_name and not os.path.exists(name):
         beside = f"{name}.toml" if os.path.exists(f"{name}.toml") else ""
         raise InputError(
-            "no such robot", got=name, expected=f"a TOML file or a preset: {', '.join(preset_names())}",
+            "no such robot",
+            got=name,
+            expected=f"a TOML file or a preset: {', '.join(preset_names())}",
             remedy=f"did you mean {beside}?" if beside else "",
-        )  # fmt: skip
+        )
     with open_regular(name):
         return name

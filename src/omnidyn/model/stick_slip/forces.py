@@ -53,9 +53,16 @@ def motor_branch(plant, stage, e, speed, tau):
     """`winding_branch` of the motor of element e."""
     own, at = plant.element[e], stage.each[e]
     return winding_branch(
-        speed, at.voltage, at.aimed_current, tau, own.emf, own.resistance,
-        own.inductance, own.drop, at.bound,
-    )  # fmt: skip
+        speed,
+        at.voltage,
+        at.aimed_current,
+        tau,
+        own.emf,
+        own.resistance,
+        own.inductance,
+        own.drop,
+        at.bound,
+    )
 
 
 @part
@@ -63,9 +70,17 @@ def motor_current(plant, stage, e, branch, speed, tau):
     """`winding_answer` of the motor of element e."""
     own, at = plant.element[e], stage.each[e]
     return winding_answer(
-        branch, speed, at.voltage, at.aimed_current, tau, own.emf, own.resistance,
-        own.inductance, own.drop, at.bound,
-    )  # fmt: skip
+        branch,
+        speed,
+        at.voltage,
+        at.aimed_current,
+        tau,
+        own.emf,
+        own.resistance,
+        own.inductance,
+        own.drop,
+        at.bound,
+    )
 
 
 @part

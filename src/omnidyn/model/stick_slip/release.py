@@ -95,9 +95,16 @@ def settle_currents(plant, stage, state):
             now = state.each[e]
             speed = g0 * state.x[0] + g1 * state.x[1] + g2 * state.x[2] if now.sign != 0.0 else 0.0
             now.current = winding(
-                speed, stage.each[e].voltage, 0.0, 1.0, own.emf, own.resistance, 0.0, own.drop,
+                speed,
+                stage.each[e].voltage,
+                0.0,
+                1.0,
+                own.emf,
+                own.resistance,
+                0.0,
+                own.drop,
                 stage.each[e].bound,
-            )[0]  # fmt: skip
+            )[0]
 
 
 @part

@@ -43,9 +43,11 @@ def draw_run(run: Run, channels: Sequence[str] = ()) -> Picture:
     unknown = [name for name in names if name not in run.channels]
     if unknown or not names:
         raise InputError(
-            "the run does not hold this", got=", ".join(unknown) or "no channel",
-            expected=", ".join(run.channels) or "a run with a channel", where="channels",
-        )  # fmt: skip
+            "the run does not hold this",
+            got=", ".join(unknown) or "no channel",
+            expected=", ".join(run.channels) or "a run with a channel",
+            where="channels",
+        )
     total = PANEL * len(names) + BETWEEN * len(names) + EDGES
     with look():
         figure = new_figure(WIDTH, total)
@@ -71,8 +73,15 @@ def draw_channel(axes: Axes, t: FloatArray, values: FloatArray, name: str) -> No
             axes.plot(at, shown, LINES[k % len(LINES)], color=COLOURS[k % len(COLOURS)], linewidth=1.1, label=names[k])
     unit = ", ".join(dict.fromkeys(UNITS[name].split(", ")))
     axes.set_title(f"{name.replace('_', ' ')}, {'-1 to 1' if unit == '1' else unit}")
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.94), ncols=len(names), fontsize=9.5, handlelength=1.6,
-                borderaxespad=0.0, columnspacing=1.0)  # fmt: skip
+    axes.legend(
+        loc="lower right",
+        bbox_to_anchor=(1.0, 0.94),
+        ncols=len(names),
+        fontsize=9.5,
+        handlelength=1.6,
+        borderaxespad=0.0,
+        columnspacing=1.0,
+    )
     thin_out(axes, y=4)
 
 
@@ -104,5 +113,12 @@ def hatch_gaps(axes: Axes, times: FloatArray) -> None:
     """Stretches in which nothing was recorded."""
     t = np.sort(times[np.isfinite(times)])
     for piece in segments(t)[1:]:
-        axes.axvspan(float(t[piece.start - 1]), float(t[piece.start]), facecolor=PALE, edgecolor=INK, linewidth=0.0,
-                     hatch="//", zorder=0)  # fmt: skip
+        axes.axvspan(
+            float(t[piece.start - 1]),
+            float(t[piece.start]),
+            facecolor=PALE,
+            edgecolor=INK,
+            linewidth=0.0,
+            hatch="//",
+            zorder=0,
+        )

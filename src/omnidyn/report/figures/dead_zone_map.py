@@ -32,8 +32,16 @@ from omnidyn.report.style import (
 STEP_DEG = 1.0
 NOTHING: Mapping[str, DeadZone] = MappingProxyType({})
 COLOURS, LINES = (BLUE, VERMILLION, GREEN, PURPLE), ("-", "--", "-.", (0, (1, 1)))
-AROUND = {0.0: "x\nforward", 45.0: "45°", 90.0: "y\nleft", 135.0: "135°", 180.0: "180°", 225.0: "-135°",
-          270.0: "-90°", 315.0: "-45°"}  # fmt: skip
+AROUND = {
+    0.0: "x\nforward",
+    45.0: "45°",
+    90.0: "y\nleft",
+    135.0: "135°",
+    180.0: "180°",
+    225.0: "-135°",
+    270.0: "-90°",
+    315.0: "-45°",
+}
 
 
 def draw_dead_zone_map(robots: Mapping[str, Robot], found: Mapping[str, DeadZone] = NOTHING) -> Picture:
@@ -101,8 +109,10 @@ def _caption(robots: Mapping[str, Robot], found: Mapping[str, DeadZone]) -> str:
 
 def dead_zone_section(robots: Mapping[str, Robot]) -> Section:
     """Volts and duty of each group's robot, with their intervals, and the map of all directions."""
-    parts = [paragraph(f"{group}:") + _one(group, robot) if len(robots) > 1 else _one("", robot)
-             for group, robot in robots.items()]  # fmt: skip
+    parts = [
+        paragraph(f"{group}:") + _one(group, robot) if len(robots) > 1 else _one("", robot)
+        for group, robot in robots.items()
+    ]
     return Section("dead-zone", "Dead zone", "".join(parts))
 
 

@@ -41,9 +41,12 @@ def speeds_up_to(top: float) -> FloatArray:
 
 
 def draw_friction_speed(
-    curves: Mapping[str, Sequence[FrictionCurve]], driven: Sequence[tuple[float, float] | None] = (),
-    name: str = "friction_speed", *, banded: bool = True,
-) -> Picture:  # fmt: skip
+    curves: Mapping[str, Sequence[FrictionCurve]],
+    driven: Sequence[tuple[float, float] | None] = (),
+    name: str = "friction_speed",
+    *,
+    banded: bool = True,
+) -> Picture:
     """One panel per axis: a line and its band for each name in `curves` (x, y, yaw each).
 
     driven: the speeds that the logs hold, shaded, of each axis. banded: whether the curves have bands to speak of.
@@ -60,17 +63,22 @@ def draw_friction_speed(
         return picture(name, "Friction against speed", words, figure)
 
 
-def _panel(
-    axes: Axes, axis: int, curves: Mapping[str, FrictionCurve], driven: tuple[float, float] | None
-) -> None:  # fmt: skip
+def _panel(axes: Axes, axis: int, curves: Mapping[str, FrictionCurve], driven: tuple[float, float] | None) -> None:
     if driven is not None:
         axes.axvspan(*driven, color=PALE, alpha=0.6, linewidth=0.0, zorder=0, label="speeds in the logs (middle 90 %)")
     for (name, curve), colour, line in zip(curves.items(), COLOURS, LINES, strict=False):
         for k, way in enumerate((curve.speed < 0.0, curve.speed > 0.0)):
             speed, force, half = curve.speed[way], curve.force[way], curve.half[way]
             if half.any():
-                axes.fill_between(speed, force - half, force + half, color=colour, alpha=0.22, linewidth=0.0,
-                                  label="95 % band" if k == 0 and colour == COLOURS[0] else None)  # fmt: skip
+                axes.fill_between(
+                    speed,
+                    force - half,
+                    force + half,
+                    color=colour,
+                    alpha=0.22,
+                    linewidth=0.0,
+                    label="95 % band" if k == 0 and colour == COLOURS[0] else None,
+                )
             style: dict[str, Any] = (
                 {"linestyle": line, "color": colour} if curve.fitted else {"linestyle": ":", "color": GREY}
             )
@@ -89,8 +97,10 @@ def _caption(curves: Mapping[str, Sequence[FrictionCurve]], driven: bool, banded
     unknown = list(dict.fromkeys(name for parts in curves.values() for each in parts for name in each.unknown))
     band = (
         " The band is the 95 % interval that the errors of the fitted levels and their correlations leave, at each "
-        "speed by itself." if banded else ""
-    )  # fmt: skip
+        "speed by itself."
+        if banded
+        else ""
+    )
     lost = f" Not determined by the data, and not in the band: {', '.join(unknown)}." if unknown else ""
     guessed = [each.axis for parts in list(curves.values())[:1] for each in parts if not each.fitted]
     if guessed:

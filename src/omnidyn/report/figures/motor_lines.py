@@ -52,8 +52,18 @@ def draw_motor_lines(
 def _panel(axes: Axes, windows: MotorWindows, line: MotorEstimate, starts: dict[float, MotorStart]) -> None:
     put_in, speed, error, side, change, _ = windows.of(line.motor)
     inertia = np.nan_to_num(line.value["inertia"]) * change
-    axes.errorbar(speed, put_in - inertia, xerr=error, fmt="o", color=GREY, markersize=3.5, elinewidth=0.6, alpha=0.4,
-                  zorder=1, label=WINDOWS)  # fmt: skip
+    axes.errorbar(
+        speed,
+        put_in - inertia,
+        xerr=error,
+        fmt="o",
+        color=GREY,
+        markersize=3.5,
+        elinewidth=0.6,
+        alpha=0.4,
+        zorder=1,
+        label=WINDOWS,
+    )
     reach = np.abs(speed).max()
     for way in (-1.0, 1.0):
         if (side * way > 0.0).any():
@@ -77,8 +87,19 @@ def _direction(axes: Axes, way: float, reach: float, line: MotorEstimate, start:
     axes.plot(span, slope * span + at_rest * way, color=BLUE, label=LINE)
     if math.isfinite(low) and math.isfinite(high):
         # A mark of its own size: the interval of a start that is well known is thinner than any line.
-        axes.plot([0.0, 0.0], [way * low, way * high], color=VERMILLION, linewidth=4, alpha=0.8, marker="_",
-                  markersize=13, markeredgewidth=1.5, zorder=4, solid_capstyle="butt", label=name)  # fmt: skip
+        axes.plot(
+            [0.0, 0.0],
+            [way * low, way * high],
+            color=VERMILLION,
+            linewidth=4,
+            alpha=0.8,
+            marker="_",
+            markersize=13,
+            markeredgewidth=1.5,
+            zorder=4,
+            solid_capstyle="butt",
+            label=name,
+        )
 
 
 def _words(windows: MotorWindows, names: Sequence[str]) -> str:

@@ -31,17 +31,25 @@ def draw_overlay(comparison: Comparison, log: int = 0, channels: Sequence[str] =
     unknown = [name for name in shown if name not in comparison.channels]
     if unknown or not 1 <= len(shown) <= MOST_PANELS:
         raise InputError(
-            "cannot draw these components", got=", ".join(unknown or shown) or "none",
-            expected=f"up to {MOST_PANELS} of {', '.join(comparison.channels)}", where="channels",
-        )  # fmt: skip
+            "cannot draw these components",
+            got=", ".join(unknown or shown) or "none",
+            expected=f"up to {MOST_PANELS} of {', '.join(comparison.channels)}",
+            where="channels",
+        )
     segments = [segment for segment in comparison.segments if segment.log == log]
     height = HEIGHT * len(shown) + EXTRA
     with look():
         figure = new_figure(WIDTH, height)
         grid = figure.add_gridspec(
-            3 * len(shown) - 1, 1, height_ratios=([2.0, 1.0, 0.14] * len(shown))[:-1], hspace=0.12,
-            left=0.13, right=0.965, top=1.0 - 0.45 / height, bottom=0.55 / height,
-        )  # fmt: skip
+            3 * len(shown) - 1,
+            1,
+            height_ratios=([2.0, 1.0, 0.14] * len(shown))[:-1],
+            hspace=0.12,
+            left=0.13,
+            right=0.965,
+            top=1.0 - 0.45 / height,
+            bottom=0.55 / height,
+        )
         first = None
         for k, name in enumerate(shown):
             above = figure.add_subplot(grid[3 * k], sharex=first)

@@ -129,8 +129,18 @@ def _friction_panel(axes: Axes, axis: int, estimates: Mapping[str, Estimate]) ->
     axes.plot(span, printed, ":", color=INK, linewidth=2.2, label="printed in Table 2")
     moving = speed != 0.0
     axes.plot(speed[moving], force[moving], "o", color=INK, markersize=7, zorder=5, label="Table 1, moving")
-    axes.plot(speed[~moving], force[~moving], "o", color="white", markeredgecolor=INK, markeredgewidth=1.6,
-              markersize=8, zorder=5, clip_on=False, label="Table 1, at rest")  # fmt: skip
+    axes.plot(
+        speed[~moving],
+        force[~moving],
+        "o",
+        color="white",
+        markeredgecolor=INK,
+        markeredgewidth=1.6,
+        markersize=8,
+        zorder=5,
+        clip_on=False,
+        label="Table 1, at rest",
+    )
     axes.set_ylim(0.0, 1.35 * force.max())
     title = f"{axis_title(AXES[axis])}: force, {FORCE_UNIT[AXES[axis]]}"
     dress_panel(axes, title, f"speed, {SPEED_UNIT[AXES[axis]]}", span[-1])
@@ -177,10 +187,23 @@ def _steps_panel(axes: Axes, axis: str, responses: Sequence[StepResponse]) -> No
         axes.plot(response.run.t[kept], speed, LEVEL_LINES[k], color=colour)
         note(axes, 0.62 * SHOWN_S, response.settled_speed, f"{response.level:g} V", ha="center", va="center")
         if response.measured_speed is not None:
-            axes.plot([SHOWN_S] * 2, [response.settled_speed, response.measured_speed], color=colour, linewidth=1.2,
-                      clip_on=False)  # fmt: skip
-            axes.plot([SHOWN_S], [response.measured_speed], "o", color=colour, markeredgecolor=MEASURED,
-                      markersize=8, clip_on=False, zorder=5)  # fmt: skip
+            axes.plot(
+                [SHOWN_S] * 2,
+                [response.settled_speed, response.measured_speed],
+                color=colour,
+                linewidth=1.2,
+                clip_on=False,
+            )
+            axes.plot(
+                [SHOWN_S],
+                [response.measured_speed],
+                "o",
+                color=colour,
+                markeredgecolor=MEASURED,
+                markersize=8,
+                clip_on=False,
+                zorder=5,
+            )
     axes.set_ylim(bottom=0.0)
     dress_panel(axes, f"{axis_title(axis)}: speed, {SPEED_UNIT[axis]}", "time, s", SHOWN_S)
 
@@ -267,8 +290,16 @@ def _speeds(axes: Axes, axis: str, runs: Sequence[Run]) -> None:
         speed = run.twist[kept, AXES.index(axis)]
         axes.plot(run.t[kept], speed, LEVEL_LINES[k], color=LEVEL_COLOURS[k])
         axes.plot([TRACE_S] * 2, [speed[-1], row.speed], color=LEVEL_COLOURS[k], linewidth=1.2, clip_on=False)
-        axes.plot([TRACE_S], [row.speed], "o", color=LEVEL_COLOURS[k], markeredgecolor=INK, markersize=7.5,
-                  clip_on=False, zorder=5)  # fmt: skip
+        axes.plot(
+            [TRACE_S],
+            [row.speed],
+            "o",
+            color=LEVEL_COLOURS[k],
+            markeredgecolor=INK,
+            markersize=7.5,
+            clip_on=False,
+            zorder=5,
+        )
         words = f"{max(map(abs, row.voltage)):g} V"
         note(axes, 0.62 * TRACE_S, speed[-1], words, ha="center", va="bottom", fontsize=9.5, bbox=None)
     axes.set_title(f"{axis_title(axis)}: speed, {SPEED_UNIT[axis]}")

@@ -63,8 +63,13 @@ def _lanes(axes: Axes, log: Log, findings: Sequence[Finding]) -> None:
         if finding.rows:
             axes.broken_barh(bars, (lane - 0.36, 0.72), facecolors=colour, edgecolors=colour)
         elif len(log):  # of the log as a whole
-            axes.broken_barh([(float(np.nanmin(log.t)), float(np.ptp(log.t[np.isfinite(log.t)])))], (lane - 0.36, 0.72),
-                             facecolors="none", edgecolors=colour, hatch="....")  # fmt: skip
+            axes.broken_barh(
+                [(float(np.nanmin(log.t)), float(np.ptp(log.t[np.isfinite(log.t)])))],
+                (lane - 0.36, 0.72),
+                facecolors="none",
+                edgecolors=colour,
+                hatch="....",
+            )
     axes.set_yticks(range(len(findings)), [_label(finding) for finding in findings], fontsize=9.0)
     axes.set_ylim(len(findings) - 0.4, -0.6)
     axes.grid(visible=False)

@@ -129,8 +129,15 @@ def draw_correlation(correlation: Correlation) -> Picture:
         for i in range(count):
             for j in range(i + 1):
                 colour = "white" if abs(matrix[i, j]) > CLEAR else INK
-                axes.text(j, i, f"{matrix[i, j]:.2f}".replace("0.", "."), ha="center", va="center", color=colour,
-                          fontsize=10.0 if count <= 10 else 8.0)  # fmt: skip
+                axes.text(
+                    j,
+                    i,
+                    f"{matrix[i, j]:.2f}".replace("0.", "."),
+                    ha="center",
+                    va="center",
+                    color=colour,
+                    fontsize=10.0 if count <= 10 else 8.0,
+                )
         axes.set_yticks(range(count), short)
         axes.set_xticks(range(count), short, rotation=40, ha="right", rotation_mode="anchor")
         axes.grid(visible=False)
@@ -142,10 +149,12 @@ def draw_correlation(correlation: Correlation) -> Picture:
         bar.outline.set_visible(False)  # type: ignore[operator]
         more = "" if len(correlation.names) <= MOST_NAMES else f" The first {MOST_NAMES} of {len(correlation.names)}."
         return picture(
-            "correlation", "Which numbers move together",
+            "correlation",
+            "Which numbers move together",
             "Correlation of the estimates. Near 1 or -1 the logs cannot tell two numbers apart, however narrow the "
-            f"interval of their sum.{more}", figure,
-        )  # fmt: skip
+            f"interval of their sum.{more}",
+            figure,
+        )
 
 
 def _short(name: str) -> str:

@@ -91,16 +91,29 @@ def _wheel(axes: Axes, robot: Robot, wheel: int, place: FloatArray) -> None:
     radius = robot.wheels.radii[wheel]
     left, bottom = -radius, -0.5 * WHEEL_WIDTH * radius
     box = FancyBboxPatch(
-        (left, bottom), 2.0 * radius, WHEEL_WIDTH * radius, boxstyle=f"round,pad=0,rounding_size={0.2 * radius}",
-        facecolor="#BDBDBD", edgecolor=INK, linewidth=1.2, zorder=2,
-    )  # fmt: skip
+        (left, bottom),
+        2.0 * radius,
+        WHEEL_WIDTH * radius,
+        boxstyle=f"round,pad=0,rounding_size={0.2 * radius}",
+        facecolor="#BDBDBD",
+        edgecolor=INK,
+        linewidth=1.2,
+        zorder=2,
+    )
     turn = Affine2D().rotate_deg(robot.wheels.azimuth_deg[wheel] + 180.0).translate(*_seen(place))
     box.set_transform(turn + axes.transData)
     axes.add_patch(box)
     sin, cos = sin_cos_deg(robot.wheels.azimuth_deg)
     outward = np.array([cos[wheel], sin[wheel]])
-    axes.text(*_seen(place - 0.75 * radius * outward), str(wheel + 1), ha="center", va="center", fontsize=14,
-              fontweight="bold", zorder=3)  # fmt: skip
+    axes.text(
+        *_seen(place - 0.75 * radius * outward),
+        str(wheel + 1),
+        ha="center",
+        va="center",
+        fontsize=14,
+        fontweight="bold",
+        zorder=3,
+    )
     push = robot.wheels.wrench_matrix[:2, wheel]
     start = place + 0.75 * radius * outward - 0.9 * radius * push
     _arrow(axes, start, start + 1.8 * radius * push, INK)

@@ -56,16 +56,27 @@ def draw_scores(study: SteadyStudy) -> Picture:
         for row, score in enumerate(scores):
             chosen = score.name == study.choice.chosen
             colour = BLUE if chosen else INK if score.in_model else GREY
-            axes.errorbar(score.loo, row, xerr=2.0 * score.loo_std, fmt="o" if score.in_model else "D", color=colour,
-                          markersize=8 if chosen else 6, capsize=3,
-                          markerfacecolor=colour if score.in_model else "white")  # fmt: skip
+            axes.errorbar(
+                score.loo,
+                row,
+                xerr=2.0 * score.loo_std,
+                fmt="o" if score.in_model else "D",
+                color=colour,
+                markersize=8 if chosen else 6,
+                capsize=3,
+                markerfacecolor=colour if score.in_model else "white",
+            )
         axes.set_yticks(range(len(scores)), [_score_label(study, score.name) for score in scores])
         axes.set_xlim(left=0.0)
         axes.set_ylim(-0.6, len(scores) - 0.4)
         axes.set_xlabel("force error in a direction left out, N (bars: two standard errors)")
         axes.grid(axis="y", visible=False)
-        return picture("shape_errors", "Which shape predicts the force in a direction it has not seen", _scores_words(
-            study), figure)  # fmt: skip
+        return picture(
+            "shape_errors",
+            "Which shape predicts the force in a direction it has not seen",
+            _scores_words(study),
+            figure,
+        )
 
 
 def _score_label(study: SteadyStudy, name: str) -> str:
@@ -90,11 +101,25 @@ def draw_polar(study: SteadyStudy) -> Picture:
         for group, colour, mark, line in zip(groups, GROUP_COLOURS, GROUP_MARKS, LINES, strict=False):
             own = _of(study.points, group)
             name = "measured" if group == "all" else group
-            axes.plot(np.arctan2(own.twist[:, 1], own.twist[:, 0]), own.along, mark, color=colour, markersize=3.5,
-                      alpha=0.55, markeredgewidth=0, label=name)  # fmt: skip
+            axes.plot(
+                np.arctan2(own.twist[:, 1], own.twist[:, 0]),
+                own.along,
+                mark,
+                color=colour,
+                markersize=3.5,
+                alpha=0.55,
+                markeredgewidth=0,
+                label=name,
+            )
             way, curve = _curve(study, group, study.choice.of(group), own)
-            axes.plot(np.radians(way), _along(way, curve), color=colour, linestyle=line, linewidth=2.2,  # type: ignore[arg-type]
-                      label=study.choice.of(group) + ("" if group == "all" else f", {group}"))  # fmt: skip
+            axes.plot(
+                np.radians(way),
+                _along(way, curve),
+                color=colour,
+                linestyle=line,
+                linewidth=2.2,  # type: ignore[arg-type]
+                label=study.choice.of(group) + ("" if group == "all" else f", {group}"),
+            )
             top = max(top, float(np.nanmax(own.along, initial=0.0)))
         _compared(study, axes, groups[0])
         around_robot(axes, top)
@@ -136,10 +161,13 @@ def draw_components(study: SteadyStudy) -> Picture:
         handles, names = panels[0].get_legend_handles_labels()
         figure.legend(handles, names, loc="lower left", bbox_to_anchor=(0.065, 0.0), ncols=3, columnspacing=1.5)
         return picture(
-            "force_components", "Both components of the force", "The same points, as components along the body axes "
+            "force_components",
+            "Both components of the force",
+            "The same points, as components along the body axes "
             "(x forward, y left), over the direction of travel (90 degrees is left). The line is the chosen shape; the "
-            "dotted one is the box of the paper, which jumps where an axis changes its sign.", figure,
-        )  # fmt: skip
+            "dotted one is the box of the paper, which jumps where an axis changes its sign.",
+            figure,
+        )
 
 
 def _component(study: SteadyStudy, panel: Axes, component: int, group: str, number: int) -> None:
@@ -147,8 +175,16 @@ def _component(study: SteadyStudy, panel: Axes, component: int, group: str, numb
     colour = GROUP_COLOURS[number]
     way = np.degrees(np.arctan2(own.twist[:, 1], own.twist[:, 0]))
     name = "measured" if group == "all" else group
-    panel.plot(way, own.wrench[:, component], GROUP_MARKS[number], color=colour, markersize=3.5, alpha=0.55,
-               markeredgewidth=0, label=name)  # fmt: skip
+    panel.plot(
+        way,
+        own.wrench[:, component],
+        GROUP_MARKS[number],
+        color=colour,
+        markersize=3.5,
+        alpha=0.55,
+        markeredgewidth=0,
+        label=name,
+    )
     angles, curve = _curve(study, group, study.choice.of(group), own)
     label = study.choice.of(group) + ("" if group == "all" else f", {group}")
     panel.plot(angles, curve[:, component], color=colour, linestyle=LINES[number], label=label)  # type: ignore[arg-type]
@@ -166,11 +202,19 @@ def _curve(study: SteadyStudy, group: str, name: str, own: ForcePoints) -> tuple
     twist = speed * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
     empty = np.zeros(len(way))
     points = replace(
-        own, twist=twist, still=empty, wrench=np.zeros((len(way), 3)), wrench_std=np.zeros((len(way), 3)),
-        traction=np.zeros((len(way), own.traction.shape[1])), direction=way, travels=empty == 0.0, turns=empty > 0.0,
+        own,
+        twist=twist,
+        still=empty,
+        wrench=np.zeros((len(way), 3)),
+        wrench_std=np.zeros((len(way), 3)),
+        traction=np.zeros((len(way), own.traction.shape[1])),
+        direction=way,
+        travels=empty == 0.0,
+        turns=empty > 0.0,
         group=(group,) * len(way),
-        run=empty.astype(np.int64), rows=empty.astype(np.int64),
-    )  # fmt: skip
+        run=empty.astype(np.int64),
+        rows=empty.astype(np.int64),
+    )
     turning = any(Key.parse(key).axis == YAW for key in fit.keys)
     return way, SHAPES[name].force(study.robot, points, turning, fit.level)
 

@@ -86,9 +86,11 @@ def change_of(place, row, dv, dg, d_coulomb, d_rate, i):
     total = 0.0
     for axis in range(3):
         total += (
-            place[row, BY_SPEED + axis] * dv[axis, i] + place[row, BY_DRIVE + axis] * dg[axis, i]
-            + place[row, BY_COULOMB + axis] * d_coulomb[axis, i] + place[row, BY_RATE + axis] * d_rate[axis, i]
-        )  # fmt: skip
+            place[row, BY_SPEED + axis] * dv[axis, i]
+            + place[row, BY_DRIVE + axis] * dg[axis, i]
+            + place[row, BY_COULOMB + axis] * d_coulomb[axis, i]
+            + place[row, BY_RATE + axis] * d_rate[axis, i]
+        )
     return total
 
 

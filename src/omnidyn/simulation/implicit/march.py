@@ -96,9 +96,16 @@ def room(plant: Plant) -> Room:
 
 
 def run_implicit(
-    plant: Plant, voltage: FloatArray, bound: FloatArray, dt: FloatArray, state: State, pose: FloatArray,
-    loop: Loop, tol: float, work: Room | None = None,
-) -> Outcome:  # fmt: skip
+    plant: Plant,
+    voltage: FloatArray,
+    bound: FloatArray,
+    dt: FloatArray,
+    state: State,
+    pose: FloatArray,
+    loop: Loop,
+    tol: float,
+    work: Room | None = None,
+) -> Outcome:
     """Simulate rows of held voltage (filled in place by a speed loop). tol 0: one fixed step per row.
 
     voltage [V] and bound, the current limit in force [A]: shape (rows, n); dt [s]: (rows,); pose: (3,). work: `room` of
@@ -110,11 +117,12 @@ def run_implicit(
     row = _march(work or room(plant), voltage, bound, dt, loop, tol, most, out)
     if row < len(dt):
         raise InputError(
-            "this robot moves too fast to be followed", got=f"more than {most:.2g} steps up to row {row}",
+            "this robot moves too fast to be followed",
+            got=f"more than {most:.2g} steps up to row {row}",
             expected=f"motion that tol = {tol:g} m/s can follow in steps of 20 ns",
             remedy="check mass, inertia, gear ratio, torque and EMF constant of the robot file; or take one step per "
             "row (tol=None)",
-        )  # fmt: skip
+        )
     return out
 
 

@@ -70,9 +70,7 @@ def prepared(robot: Robot, keys: Sequence[str]) -> Prepared:
     return Prepared(robot, tuple(keys), scale, robots, numbers, plants)
 
 
-def directions_of(
-    numbers: Plant, plants: list[Plant], rates: FloatArray, push: FloatArray | None = None
-) -> Directions:  # fmt: skip
+def directions_of(numbers: Plant, plants: list[Plant], rates: FloatArray, push: FloatArray | None = None) -> Directions:
     """Tables of the plants up and down each key, the robot's own as the last one, and room to work in.
 
     rates: derivatives of the applied voltages, shape (K, rows, n). push: on each plant, (2 K + 1, rows, 3) [N].
@@ -83,12 +81,24 @@ def directions_of(
     arm = np.ascontiguousarray(np.swapaxes(difference(own.element["g"][:-1]), 0, 1))
     work = np.zeros((4, count, width(numbers)))
     return Directions(
-        plants=own, stages=new_stage(own), arm=arm, voltage=rates, push=push,
-        lift=np.zeros((3, 6)), held=np.zeros((2, 3), np.int64), point=np.zeros((5, 3)), aim=work[0], middle=work[1],
-        half=work[2], rate=np.zeros(width(numbers)), first=new_state(numbers),
-        last=new_state(numbers), gained=np.zeros(3), carry=np.zeros((3, n)),
+        plants=own,
+        stages=new_stage(own),
+        arm=arm,
+        voltage=rates,
+        push=push,
+        lift=np.zeros((3, 6)),
+        held=np.zeros((2, 3), np.int64),
+        point=np.zeros((5, 3)),
+        aim=work[0],
+        middle=work[1],
+        half=work[2],
+        rate=np.zeros(width(numbers)),
+        first=new_state(numbers),
+        last=new_state(numbers),
+        gained=np.zeros(3),
+        carry=np.zeros((3, n)),
         kept=work[3],
-    )  # fmt: skip
+    )
 
 
 def width(numbers: Plant) -> int:
@@ -118,10 +128,12 @@ def refuse_band(robot: Robot) -> None:
         if getattr(robot.friction, table).law != KARNOPP:
             continue
         raise UnsupportedError(
-            f'no derivatives of a run with law = "{KARNOPP}"', got=KARNOPP, expected='law = "coulomb"',
+            f'no derivatives of a run with law = "{KARNOPP}"',
+            got=KARNOPP,
+            expected='law = "coulomb"',
             remedy='take law = "coulomb" with the same levels: it sticks exactly, which the band stands in for',
             where=f"friction.{table}.law",
-        )  # fmt: skip
+        )
 
 
 def refuse_switched_off(key: str, numbers: Plant, up: Plant) -> None:
@@ -132,9 +144,12 @@ def refuse_switched_off(key: str, numbers: Plant, up: Plant) -> None:
     ellipse = numbers.body.breakaway[0] == 0.0 and up.body.coulomb.sum() > 0.0
     if off.any() or ellipse or (numbers.body.stiffness == 0.0 and up.body.stiffness > 0.0):
         raise InputError(
-            "cannot differentiate with respect to what is off", got=key, expected="a level that is not 0, a loss",
-            remedy="give it a value first", where="keys",
-        )  # fmt: skip
+            "cannot differentiate with respect to what is off",
+            got=key,
+            expected="a level that is not 0, a loss",
+            remedy="give it a value first",
+            where="keys",
+        )
 
 
 def _differ(before: Any, after: Any, *names: str) -> BoolArray:

@@ -297,7 +297,7 @@ def _soon(plant, stage, e, speed, now, tau):
     own = plant.element[e]
     return winding(
         speed, stage.each[e].voltage, now, tau, own.emf, own.resistance, own.inductance, own.drop, stage.each[e].bound
-    )[0]  # fmt: skip
+    )[0]
 
 
 @part

@@ -159,9 +159,13 @@ class LateSample:
 
 
 def late_samples(
-    robot: Robot, program: Program, directions: Sequence[Direction], late: Sequence[float], tol: float | None,
+    robot: Robot,
+    program: Program,
+    directions: Sequence[Direction],
+    late: Sequence[float],
+    tol: float | None,
     travel: int = TURN,
-) -> tuple[list[LateSample], int]:  # fmt: skip
+) -> tuple[list[LateSample], int]:
     """Simulate under held voltages and sample the run at t - late, one LateSample for every latency.
 
     tol as for `simulate`, but ROUGH instead of None where friction falls so fast that a row took more than
@@ -179,10 +183,15 @@ def late_samples(
     given = Commands(held(t, len(voltage), late), np.ascontiguousarray(voltage))
     seen = _room(robot, t, late, len(directions), travel)
     outcome, _, _ = run_with_derivatives(
-        numbers, directions_of(numbers, plants, rates, _pushes(program.push, directions, [*plants, numbers])), given,
-        current_bounds(robot, given, len(given.dt)), (np.asarray(start, dtype=float), np.zeros(3)), first,
-        _within(tol, numbers, given.dt), seen,
-    )  # fmt: skip
+        numbers,
+        directions_of(numbers, plants, rates, _pushes(program.push, directions, [*plants, numbers])),
+        given,
+        current_bounds(robot, given, len(given.dt)),
+        (np.asarray(start, dtype=float), np.zeros(3)),
+        first,
+        _within(tol, numbers, given.dt),
+        seen,
+    )
     return _looks(robot, directions, seen, (length, stretch), (seen.t, voltage, rates)), capped(outcome)
 
 
@@ -192,9 +201,15 @@ def _within(tol: float | None, numbers: Plant, dt: FloatArray) -> float:
 
 
 def looped_samples(
-    robot: Robot, t: FloatArray, set_point: FloatArray, directions: Sequence[Direction], late: Sequence[float],
-    tol: float | None, travel: int = TURN, settled: float = 0.0,
-) -> list[LateSample]:  # fmt: skip
+    robot: Robot,
+    t: FloatArray,
+    set_point: FloatArray,
+    directions: Sequence[Direction],
+    late: Sequence[float],
+    tol: float | None,
+    travel: int = TURN,
+    settled: float = 0.0,
+) -> list[LateSample]:
     """The same through the speed loop of the robot, under set points [rad/s], (rows - 1, n) or (rows, n), from rest.
 
     Before the run it has rested. Directions change the robot only. settled: see `run_loop_with_derivatives`.
@@ -205,9 +220,17 @@ def looped_samples(
     given = Commands(held(t, len(set_point), late), None, set_point=np.ascontiguousarray(set_point))
     seen, count = _room(robot, t, late, len(directions), travel), len(directions)
     found = run_loop_with_derivatives(
-        robot, robots, numbers, directions_of(numbers, plants, np.zeros((count, *set_point.shape))), given,
-        (np.zeros(3), np.zeros(3)), np.zeros((count, width(numbers))), as_tolerance(tol), settled, seen,
-    )  # fmt: skip
+        robot,
+        robots,
+        numbers,
+        directions_of(numbers, plants, np.zeros((count, *set_point.shape))),
+        given,
+        (np.zeros(3), np.zeros(3)),
+        np.zeros((count, width(numbers))),
+        as_tolerance(tol),
+        settled,
+        seen,
+    )
     for c, own in enumerate(seen.late):
         rests = seen.t - own < -MEET
         for part in (seen.state, seen.pace, seen.way, seen.dstate, seen.dway):
@@ -270,9 +293,12 @@ def _room(robot: Robot, t: FloatArray, late: Sequence[float], keys: int, travel:
 
 
 def _looks(
-    robot: Robot, directions: Sequence[Direction], seen: Samples, lengths: tuple[float, FloatArray],
+    robot: Robot,
+    directions: Sequence[Direction],
+    seen: Samples,
+    lengths: tuple[float, FloatArray],
     applied: tuple[FloatArray, FloatArray, FloatArray],
-) -> list[LateSample]:  # fmt: skip
+) -> list[LateSample]:
     """A LateSample for every latency. lengths: what omega is scaled by, and its derivatives.
 
     applied: [s] when each voltage comes into force, and more; voltages (J, n); their derivatives (K, J, n).
@@ -287,10 +313,19 @@ def _looks(
         dtwist[..., 2] = (dtwist[..., 2] - twist[:, 2, None] * stretch) / length
         found.append(
             LateSample(
-                robot, tuple(directions), float(own), twist, pace, seen.way[c], voltage[at], dtwist, seen.dway[c],
-                np.moveaxis(rates[:, at], 0, 1), *_currents(seen, c),
+                robot,
+                tuple(directions),
+                float(own),
+                twist,
+                pace,
+                seen.way[c],
+                voltage[at],
+                dtwist,
+                seen.dway[c],
+                np.moveaxis(rates[:, at], 0, 1),
+                *_currents(seen, c),
             )
-        )  # fmt: skip
+        )
     return found
 
 
@@ -324,11 +359,19 @@ class Derivatives:
 
 
 def derivatives(
-    robot: Robot, voltage: ArrayLike | None = None, dt: ArrayLike | None = None, keys: Sequence[str] = (), *,
-    duty: ArrayLike | None = None, wheel_speed_command: ArrayLike | None = None,
-    twist_command: ArrayLike | None = None, supply: ArrayLike | None = None,
-    twist: ArrayLike = (0.0, 0.0, 0.0), pose: ArrayLike = (0.0, 0.0, 0.0), tol: float | None = TOLERANCE,
-) -> Derivatives:  # fmt: skip
+    robot: Robot,
+    voltage: ArrayLike | None = None,
+    dt: ArrayLike | None = None,
+    keys: Sequence[str] = (),
+    *,
+    duty: ArrayLike | None = None,
+    wheel_speed_command: ArrayLike | None = None,
+    twist_command: ArrayLike | None = None,
+    supply: ArrayLike | None = None,
+    twist: ArrayLike = (0.0, 0.0, 0.0),
+    pose: ArrayLike = (0.0, 0.0, 0.0),
+    tol: float | None = TOLERANCE,
+) -> Derivatives:
     """Simulate and differentiate with respect to numbers of the robot file, such as "friction.axes.coulomb[1]".
 
     robot, voltage or duty or set points of a speed loop, dt, supply, twist, pose, tol: as for `simulate`; the implicit
@@ -346,9 +389,12 @@ def derivatives(
 
     if robot.drive.latency or LATENCY in keys:
         raise UnsupportedError(
-            "derivatives of a run know no latency", got=f"{robot.drive.latency:g} s", expected="0",
-            remedy="set latency_s = 0: it moves the run in time, and nothing else", where=LATENCY,
-        )  # fmt: skip
+            "derivatives of a run know no latency",
+            got=f"{robot.drive.latency:g} s",
+            expected="0",
+            remedy="set latency_s = 0: it moves the run in time, and nothing else",
+            where=LATENCY,
+        )
 
     def asked(robot: Robot) -> Commands:
         return commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
@@ -373,9 +419,13 @@ def derivatives(
 
 
 def differentiate(
-    ready: Prepared, given: Commands, rates: FloatArray, start: tuple[FloatArray, FloatArray], tol: float,
+    ready: Prepared,
+    given: Commands,
+    rates: FloatArray,
+    start: tuple[FloatArray, FloatArray],
+    tol: float,
     settled: float = 0.0,
-) -> Derivatives:  # fmt: skip
+) -> Derivatives:
     """`derivatives` of one run.
 
     rates: derivatives of the voltages or set points, shape (K, rows, n), by key / scale, as are all derivatives up to
@@ -417,20 +467,32 @@ def refuse_rate(keys: Sequence[str]) -> None:
     """Raises UnsupportedError where the rate of a speed loop, or the dead band behind it, is among the keys."""
     if DEAD_BAND in keys:
         raise UnsupportedError(
-            "no derivative by the dead band behind a speed loop", got=DEAD_BAND, expected="other keys", where="keys",
+            "no derivative by the dead band behind a speed loop",
+            got=DEAD_BAND,
+            expected="other keys",
+            where="keys",
             remedy="try a few dead bands instead",
-        )  # fmt: skip
+        )
     if RATE in keys:
         raise UnsupportedError(
-            "no derivative by the rate of the speed loop", got=RATE, expected="other keys",
-            remedy="its ticks would move; try a few rates instead", where="keys",
-        )  # fmt: skip
+            "no derivative by the rate of the speed loop",
+            got=RATE,
+            expected="other keys",
+            remedy="its ticks would move; try a few rates instead",
+            where="keys",
+        )
 
 
 def run_with_derivatives(
-    numbers: Plant, directions: Directions, given: Commands, bound: FloatArray, start: tuple[FloatArray, FloatArray],
-    first: FloatArray, tol: float, seen: Samples | None = None,
-) -> tuple[Outcome, FloatArray, FloatArray]:  # fmt: skip
+    numbers: Plant,
+    directions: Directions,
+    given: Commands,
+    bound: FloatArray,
+    start: tuple[FloatArray, FloatArray],
+    first: FloatArray,
+    tol: float,
+    seen: Samples | None = None,
+) -> tuple[Outcome, FloatArray, FloatArray]:
     """The run of `run_implicit`, with derivatives of state (rows + 1, K, D) and pose (rows + 1, K, 3).
 
     With `seen`, the run is sampled there instead: the derivatives by row are left out, both arrays are empty.
@@ -441,9 +503,18 @@ def run_with_derivatives(
     ds, dposes = np.zeros((kept, *first.shape)), np.zeros((kept, len(first), 3))
     ds[:1] = first
     march_with_derivatives(
-        room(numbers), directions, given.voltage, bound, given.dt, tol, out, first, ds,
-        dposes, seen or NO_SAMPLES,
-    )  # fmt: skip
+        room(numbers),
+        directions,
+        given.voltage,
+        bound,
+        given.dt,
+        tol,
+        out,
+        first,
+        ds,
+        dposes,
+        seen or NO_SAMPLES,
+    )
     return out, ds, dposes
 
 

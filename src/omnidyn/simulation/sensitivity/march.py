@@ -69,9 +69,24 @@ def _is_smooth(plant, stage, start, one, middle, two, settled):
 
 @part
 def row_with_derivatives(
-    plant, stage, bare, spare, along, state, dt, tol, h, pose, d, dnext, dpose, counts, kept,
-    seen, begin,
-):  # fmt: skip
+    plant,
+    stage,
+    bare,
+    spare,
+    along,
+    state,
+    dt,
+    tol,
+    h,
+    pose,
+    d,
+    dnext,
+    dpose,
+    counts,
+    kept,
+    seen,
+    begin,
+):
     """One row with derivatives, in place: adaptive steps, or for a tol of 0 one fixed step. Returns the next h.
 
     kept: whether the derivatives are kept by row, those of the pose included; else they are sampled, and the pose
@@ -81,9 +96,24 @@ def row_with_derivatives(
     counts[0] = counts[1] = 0
     if tol > 0.0:
         return _adaptive(
-            plant, stage, bare, spare, along, state, dt, tol, h, pose, d, dnext, dpose, counts,
-            kept, seen, begin + dt,
-        )  # fmt: skip
+            plant,
+            stage,
+            bare,
+            spare,
+            along,
+            state,
+            dt,
+            tol,
+            h,
+            pose,
+            d,
+            dnext,
+            dpose,
+            counts,
+            kept,
+            seen,
+            begin + dt,
+        )
     pieces = in_one_row(plant, dt)
     for j in range(pieces):
         h, at = dt / pieces, begin + j * dt / pieces
@@ -94,9 +124,24 @@ def row_with_derivatives(
 
 @part
 def _adaptive(
-    plant, stage, bare, spare, along, state, dt, tol, h, pose, d, dnext, dpose, counts, kept,
-    seen, end,
-):  # fmt: skip
+    plant,
+    stage,
+    bare,
+    spare,
+    along,
+    state,
+    dt,
+    tol,
+    h,
+    pose,
+    d,
+    dnext,
+    dpose,
+    counts,
+    kept,
+    seen,
+    end,
+):
     """`implicit._row` with derivatives: the half steps that count are done again with theirs. end: of the row [s]."""
     one, middle, two, inner, settled = spare.whole, spare.middle, spare.two, spare.inner.x, spare.settled
     left = dt
@@ -164,9 +209,7 @@ def push_row(plant, stage, along, row):
 
 
 @branching_kernel
-def march_with_derivatives(
-    room, along, voltage, bound, dt, tol, out, first, ds, dposes, seen
-):  # fmt: skip
+def march_with_derivatives(room, along, voltage, bound, dt, tol, out, first, ds, dposes, seen):
     """All rows; see run_with_derivatives. ds and dposes may be empty: the derivatives then are in `seen`."""
     own, stages, bare, spare = room.own.plant, room.own.stage, room.bare, room.spare
     plant, stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
@@ -178,9 +221,24 @@ def march_with_derivatives(
         apply_row(stage, along, voltage[r], bound[r], along.voltage[:, r])
         push_row(plant, stage, along, r)
         h = row_with_derivatives(
-            plant, stage, bare, spare, along, state, dt[r], tol, h, pose, d, dnext, dpose,
-            counts, kept, seen, begin,
-        )  # fmt: skip
+            plant,
+            stage,
+            bare,
+            spare,
+            along,
+            state,
+            dt[r],
+            tol,
+            h,
+            pose,
+            d,
+            dnext,
+            dpose,
+            counts,
+            kept,
+            seen,
+            begin,
+        )
         begin += dt[r]
         out.iterations[r], out.steps[r] = counts[0], counts[1]
         row_of_state(out.state, r + 1, state)
@@ -227,10 +285,17 @@ class LoopRun(NamedTuple):
 
 
 def run_loop_with_derivatives(
-    robot: Robot, robots: Sequence[Robot], numbers: Plant, along: Directions, given: Commands,
-    start: tuple[FloatArray, FloatArray], first: FloatArray, tol: float, settled: float = 0.0,
+    robot: Robot,
+    robots: Sequence[Robot],
+    numbers: Plant,
+    along: Directions,
+    given: Commands,
+    start: tuple[FloatArray, FloatArray],
+    first: FloatArray,
+    tol: float,
+    settled: float = 0.0,
     seen: Samples | None = None,
-) -> LoopRun:  # fmt: skip
+) -> LoopRun:
     """The run of set points, with derivatives; see `derivatives`.
 
     robots: up (2k) and down (2k + 1) each of K parameters. along.voltage: derivatives of the set points; start: twist
@@ -245,19 +310,37 @@ def run_loop_with_derivatives(
     loop = loop_of(robot, np.ascontiguousarray(given.set_point), tick)
     gain = np.array([loop_gains(r) for r in robots]).reshape(-1, 4, n)
     extra = LoopDirections(
-        gain, along.voltage, np.zeros((count, n)), np.zeros((count, n)), new_state(numbers),
-        np.zeros_like(first), np.zeros((2, n)),
-    )  # fmt: skip
+        gain,
+        along.voltage,
+        np.zeros((count, n)),
+        np.zeros((count, n)),
+        new_state(numbers),
+        np.zeros_like(first),
+        np.zeros((2, n)),
+    )
     found = LoopRun(
-        begun(len(given.dt), state, start[1]), np.zeros((kept, *first.shape)), np.zeros((kept, count, 3)),
-        np.zeros((len(dt), n)), np.zeros((count, len(dt), n)), np.concatenate([[0.0], np.cumsum(dt)]),
-        keep.astype(np.int64), seen or NO_SAMPLES,
-    )  # fmt: skip
+        begun(len(given.dt), state, start[1]),
+        np.zeros((kept, *first.shape)),
+        np.zeros((kept, count, 3)),
+        np.zeros((len(dt), n)),
+        np.zeros((count, len(dt), n)),
+        np.concatenate([[0.0], np.cumsum(dt)]),
+        keep.astype(np.int64),
+        seen or NO_SAMPLES,
+    )
     found.dstate[:1] = first
     march_loop(
-        room(numbers), along, loop, extra, bound, dt,
-        first, tol, settled, found,
-    )  # fmt: skip
+        room(numbers),
+        along,
+        loop,
+        extra,
+        bound,
+        dt,
+        first,
+        tol,
+        settled,
+        found,
+    )
     return found
 
 
@@ -349,9 +432,24 @@ def march_loop(room, along, loop, extra, bound, dt, first, tol, settled, found):
         if not still:
             apply_row(stage, along, motors, bound, dmotors)
             h = row_with_derivatives(
-                plant, stage, bare, spare, along, state, dt[j], tol, h, pose, d, dnext, dpose,
-                counts, kept, seen, edges[j],
-            )  # fmt: skip
+                plant,
+                stage,
+                bare,
+                spare,
+                along,
+                state,
+                dt[j],
+                tol,
+                h,
+                pose,
+                d,
+                dnext,
+                dpose,
+                counts,
+                kept,
+                seen,
+                edges[j],
+            )
             out.iterations[row] = max(out.iterations[row], counts[0])
             out.steps[row] += counts[1]
         elif kept:

@@ -57,11 +57,17 @@ def empty_samples(t: FloatArray, late: FloatArray, size: int, keys: int, travel:
     """Samples that have not been taken yet. size: S; keys: K; travel: W."""
     shape = (len(late), len(t))
     return Samples(
-        np.ascontiguousarray(t - t[0]), np.array(late, dtype=float), np.zeros(len(late), np.int64),
-        np.full((*shape, size), np.nan), np.full((*shape, size), np.nan), np.full((*shape, travel), np.nan),
-        np.full((*shape, keys, size), np.nan), np.full((*shape, keys, travel), np.nan), np.zeros(travel),
+        np.ascontiguousarray(t - t[0]),
+        np.array(late, dtype=float),
+        np.zeros(len(late), np.int64),
+        np.full((*shape, size), np.nan),
+        np.full((*shape, size), np.nan),
+        np.full((*shape, travel), np.nan),
+        np.full((*shape, keys, size), np.nan),
+        np.full((*shape, keys, travel), np.nan),
+        np.zeros(travel),
         np.zeros((keys, travel)),
-    )  # fmt: skip
+    )
 
 
 NO_SAMPLES = empty_samples(np.zeros(1), np.zeros(0), 3, 0)

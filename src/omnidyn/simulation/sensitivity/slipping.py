@@ -105,7 +105,7 @@ class SlipSample:
 
 def slipping_samples(
     robot: Robot, program: Program, directions: Sequence[Direction], late: Sequence[float], steps: int, tol: float
-) -> list[SlipSample]:  # fmt: skip
+) -> list[SlipSample]:
     """Simulate under held voltages, and sample at t - late: one SlipSample for every latency.
 
     steps: of a row, for derivatives, and for all where tol is 0; else tol [m/s] is of the run. Others as of
@@ -127,9 +127,14 @@ def slipping_samples(
 
 
 def _looks(
-    robot: Robot, voltage: FloatArray, start: FloatArray, t: FloatArray, late: Sequence[float], steps: int,
+    robot: Robot,
+    voltage: FloatArray,
+    start: FloatArray,
+    t: FloatArray,
+    late: Sequence[float],
+    steps: int,
     tol: float,
-) -> list[Look]:  # fmt: skip
+) -> list[Look]:
     """One run, seen with each latency."""
     plant, n = slip_plant(robot), robot.wheels.count
     ends = np.append(t[0], t[0] + np.cumsum(held(t, len(voltage), late)))
@@ -141,9 +146,15 @@ def _looks(
     given = Commands(np.diff(grid), np.ascontiguousarray(voltage[at]))
     assert given.voltage is not None
     out = run_slipping(
-        plant, given.voltage, current_bounds(robot, given, len(given.dt)), given.dt, rolling(plant, start), np.zeros(3),
-        no_loop(n), tol,
-    )  # fmt: skip
+        plant,
+        given.voltage,
+        current_bounds(robot, given, len(given.dt)),
+        given.dt,
+        rolling(plant, start),
+        np.zeros(3),
+        no_loop(n),
+        tol,
+    )
     turning = out.rims / robot.wheels.radii
     with np.errstate(invalid="ignore"):  # a robot far from any that fits may run away: its residuals say so
         middle = 0.5 * (turning[1:] + turning[:-1]) * given.dt[:, None]

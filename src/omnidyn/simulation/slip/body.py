@@ -153,7 +153,7 @@ def set_line(line, own, at, tau):
     """The current over a stage as a line, clip(soft(flow - falls s, lost), +-most): `winding` of stick_slip."""
     line.flow, slope = winding_answer(
         1.0, 0.0, at.voltage, at.aimed_current, tau, own.emf, own.resistance, own.inductance, 0.0, at.bound
-    )  # fmt: skip
+    )
     line.falls, line.lost, line.most = -slope, tau * own.drop / (own.inductance + tau * own.resistance), at.bound
     line.plain = 1.0 if own.efficiency == 1.0 and own.stiffness == 0.0 else 0.0
 

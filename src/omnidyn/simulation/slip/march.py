@@ -28,7 +28,7 @@ from omnidyn.simulation.slip.bounds import (
     memory_error,
     reverses,
     unresolved,
-)  # fmt: skip
+)
 from omnidyn.simulation.slip.plant import SlipPlant
 from omnidyn.simulation.slip.stage import SWEEPS, slip_step
 from omnidyn.simulation.speed_loop import Loop, passed, tick_answer, tick_branch
@@ -103,9 +103,15 @@ class SlipOutcome(NamedTuple):
 
 
 def run_slipping(
-    plant: SlipPlant, voltage: FloatArray, bound: FloatArray, dt: FloatArray, state: FloatArray, pose: FloatArray,
-    loop: Loop, tol: float,
-) -> SlipOutcome:  # fmt: skip
+    plant: SlipPlant,
+    voltage: FloatArray,
+    bound: FloatArray,
+    dt: FloatArray,
+    state: FloatArray,
+    pose: FloatArray,
+    loop: Loop,
+    tol: float,
+) -> SlipOutcome:
     """Simulate rows of held voltage (filled in place by a speed loop). tol 0: a step a row.
 
     voltage [V], bound [A]: (rows, n); state (8 + 3 n,), see `rolling`. Raises InputError where motion is so fast that
@@ -119,11 +125,12 @@ def run_slipping(
     row, capped = _march(plant, voltage, bound, dt, loop, tol, most, out, _room(plant))
     if row < rows:
         raise InputError(
-            "this robot moves too fast to be followed", got=f"more than {most:.2g} steps up to row {row}",
+            "this robot moves too fast to be followed",
+            got=f"more than {most:.2g} steps up to row {row}",
             expected=f"motion that tol = {tol:g} m/s can follow",
             remedy="check masses and inertias of the robot file, those of its wheels too; or take one step per row "
             "(tol=None)",
-        )  # fmt: skip
+        )
     return out._replace(capped=int(capped))
 
 

@@ -22,9 +22,16 @@ from omnidyn.model.wheels import per_wheel, sin_cos_deg
 
 FORGETS = (0.15, 30.0)  # [s] in which a robot is taken to forget an error, at least and at most
 POWERS = {
-    "coulomb": 1, "breakaway": 1, "bristle_coulomb": 1, "bristle_breakaway": 1, "fall": 1, "fade": 1,
-    "viscous": 2, "stiffness": 2, "damping": 2,
-}  # fmt: skip
+    "coulomb": 1,
+    "breakaway": 1,
+    "bristle_coulomb": 1,
+    "bristle_breakaway": 1,
+    "fall": 1,
+    "fade": 1,
+    "viscous": 2,
+    "stiffness": 2,
+    "damping": 2,
+}
 """Of the length by which yaw is measured, in each field of ELEMENT."""
 
 
@@ -77,11 +84,23 @@ def slip_plant(robot: Robot) -> SlipPlant:
     remembers = bends or (element["inductance"] > 0.0).any()
     slowest = float(np.max(mass / np.maximum(element["viscous"][:N_AXES], 1e-9 * mass)))
     return SlipPlant(
-        mass, np.array(robot.body.centre), alone, robot.body.mass if robot.body.rotating_frame else 0.0,
-        robot.floor.pull(robot.body.mass), np.array([body], BODY), element, steep, float(gaps), float(remembers),
-        np.ascontiguousarray(robot.wheels.wrench_matrix.T), spin, grips(robot), _shift(robot), robot.wheels.radii,
+        mass,
+        np.array(robot.body.centre),
+        alone,
+        robot.body.mass if robot.body.rotating_frame else 0.0,
+        robot.floor.pull(robot.body.mass),
+        np.array([body], BODY),
+        element,
+        steep,
+        float(gaps),
+        float(remembers),
+        np.ascontiguousarray(robot.wheels.wrench_matrix.T),
+        spin,
+        grips(robot),
+        _shift(robot),
+        robot.wheels.radii,
         min(max(slowest, FORGETS[0]), FORGETS[1]),
-    )  # fmt: skip
+    )
 
 
 def _in_radians(own: Plant) -> Plant:
@@ -132,12 +151,15 @@ def _refuse(robot: Robot) -> None:
         found.append("the height of the centre of mass on mecanum wheels without wheelbase_m")
     if found:
         raise UnsupportedError(
-            "wheels that slip are simulated without some of what this robot has", got="; ".join(found),
+            "wheels that slip are simulated without some of what this robot has",
+            got="; ".join(found),
             expected="wheels with an inertia; laws that stick, or bend",
             where="[wheels] traction_mu",
             remedy=f'take law = "{COULOMB}", which sticks with the same levels: "{KARNOPP}" stands in for it where a '
-            "solver cannot stick" if bands else "change that, or leave traction_mu out",
-        )  # fmt: skip
+            "solver cannot stick"
+            if bands
+            else "change that, or leave traction_mu out",
+        )
 
 
 # What each wheel carries: the weight, by where the wheels stand under the centre of mass c
@@ -171,11 +193,12 @@ def wheel_loads(robot: Robot) -> WheelLoads:
     count, centre = robot.wheels.count, robot.body.centre
     if any(centre) and robot.wheels.places is None:
         raise UnsupportedError(
-            "what mecanum wheels carry depends on where they stand, and no key says so", got=f"centre_m = {[*centre]}",
+            "what mecanum wheels carry depends on where they stand, and no key says so",
+            got=f"centre_m = {[*centre]}",
             expected="[0, 0] for mecanum wheels that slip, or [wheels] wheelbase_m",
             remedy="add wheelbase_m, from the axles in front to those behind",
             where="[body] centre_m",
-        )  # fmt: skip
+        )
     weight = robot.body.mass * GRAVITY * float(np.cos(np.radians(robot.floor.tilt)))
     places = _places(robot)
     down = np.ones(count, dtype=bool)

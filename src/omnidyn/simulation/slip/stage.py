@@ -79,7 +79,7 @@ def solve_stage(plant, stage, start, room, x, each):
                 limit = max(limit + plant.shift[w, 0] * f0 + plant.shift[w, 1] * f1, 0.0)
             f, s, sign, contact = wheel_answer(
                 plant.element[3 + w], stage.each[3 + w], lines[w], tau, plant.spin[w], goal[3 + w], (free, give), limit
-            )  # fmt: skip
+            )
             for a in range(3):
                 total[a] += plant.g[w, a] * (f - own.force)
             own.force, x[3 + w], loads = f, s, loads + abs(f)

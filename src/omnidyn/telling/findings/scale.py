@@ -7,11 +7,14 @@ from omnidyn.telling.findings.wiring import compared
 from omnidyn.telling.sentence import SOURCES, Sentence, by_number, either, names, read_as
 
 REASONS = {
-    "motor": "current and speed of its motor change", "voltage": "its motor gets a changing voltage",
-    "duty": "its motor gets a changing duty", "other_motors": "the other motors draw current",
-    "wheels": "the wheels say that it changes", "omega": "omega says that it turns",
+    "motor": "current and speed of its motor change",
+    "voltage": "its motor gets a changing voltage",
+    "duty": "its motor gets a changing duty",
+    "other_motors": "the other motors draw current",
+    "wheels": "the wheels say that it changes",
+    "omega": "omega says that it turns",
     "turning_wheels": "the wheels say that the robot turns: the heading was not recorded, or the wheels ran in the air",
-}  # fmt: skip
+}
 BY_HAND = "roll the robot over a measured distance by hand"
 
 

@@ -7,9 +7,11 @@ from omnidyn.statement import NOTE, Statement
 from omnidyn.telling.sentence import Sentence, by_number, either, names
 
 LIMITS = {
-    "duty": "full duty", "supply": "the supply", "motor.current_limit_A": "current_limit_A of the robot file",
+    "duty": "full duty",
+    "supply": "the supply",
+    "motor.current_limit_A": "current_limit_A of the robot file",
     "motor.voltage_limit_V": "voltage_limit_V of the robot file",
-}  # fmt: skip
+}
 
 
 def _quantised(statement: Statement) -> str:

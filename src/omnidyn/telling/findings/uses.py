@@ -12,9 +12,11 @@ from omnidyn.telling.logs import in_brief
 from omnidyn.telling.sentence import Sentence, by_number, counted, either
 
 OF_ROBOT = {
-    "": "", "robot": "; with a robot file", "supply": "; with a robot file that has supply_V",
+    "": "",
+    "robot": "; with a robot file",
+    "supply": "; with a robot file that has supply_V",
     "speed_loop": '; with a robot file that has the speed loop of the firmware, [drive] kind = "speed"',
-}  # fmt: skip
+}
 
 
 def usable_for(uses: tuple[str, ...], others: tuple[str, ...] = ()) -> str:

@@ -121,12 +121,11 @@ def _turned_frame(statement: Statement) -> str:
 
 
 OF_WHEELS = {
-    "axes":
-        "set `invert` for {subject:that column|these columns} in the mapping, or turn the wheels' signs in the "
-        "same way"
-, "motors": SLOTS,
+    "axes": "set `invert` for {subject:that column|these columns} in the mapping, or turn the wheels' signs in the "
+    "same way",
+    "motors": SLOTS,
     "wheels": f"{SLOTS}, or the order and signs of the wheels in the robot file",
-}  # fmt: skip
+}
 SENTENCES = {
     "wiring": Sentence(_wiring),
     "swapped": Sentence(_wired, "", OF_WHEELS),

@@ -34,13 +34,16 @@ VARIANTS = {
     "ellipse in a turning frame": (ROBOT.replace(friction=ELLIPSE, body=TURNING), {}),
     "a centre of mass beside the wheels": (ROBOT.replace(body=BESIDE), {}),
     "four wheels, current, slew": (
-        ROBOT.replace(wheels=FOUR, friction=Friction(wheels=WheelFriction(coulomb=0.7, viscous=0.3)),
-                      motor=ROBOT.motor.replace(current_limit=2.2, voltage_limit=(6.0, 5.5, 6.0, 5.0))),
+        ROBOT.replace(
+            wheels=FOUR,
+            friction=Friction(wheels=WheelFriction(coulomb=0.7, viscous=0.3)),
+            motor=ROBOT.motor.replace(current_limit=2.2, voltage_limit=(6.0, 5.5, 6.0, 5.0)),
+        ),
         {"slew": 300.0},
     ),
     "no observer, five ahead": (ROBOT, {"observer": False, "horizon": 5}),
     "no friction, a loop in the firmware": (ROBOT.replace(drive=LOOP), {"friction": False}),
-}  # fmt: skip
+}
 OK, LIMITED, STILL, BACKWARDS, BAD_TIME, BAD_POSE, BAD_TWIST, BAD_PATH = range(8)
 
 
@@ -164,9 +167,16 @@ def test_it_is_small_and_asks_for_no_memory(tmp_path, capsys):
         subprocess.run(command, cwd=tmp_path / "c", check=True)
     needs = subprocess.run(["nm", "-u", "omnidyn_control.o"], cwd=tmp_path / "c", capture_output=True, text=True)
     assert {line.split()[-1] for line in needs.stdout.splitlines()} <= {
-        "cosf", "sinf", "sincosf", "remainderf", "memcpy", "memmove", "memset", "__stack_chk_fail",
+        "cosf",
+        "sinf",
+        "sincosf",
+        "remainderf",
+        "memcpy",
+        "memmove",
+        "memset",
+        "__stack_chk_fail",
         "_GLOBAL_OFFSET_TABLE_",
-    }  # fmt: skip
+    }
     size = subprocess.run(["size", "omnidyn_control.o", "size.o"], cwd=tmp_path / "c", capture_output=True, text=True)
     (code, *own), (_, *one) = (list(map(int, line.split()[:3])) for line in size.stdout.splitlines()[1:])
     stack = [int(line.split("\t")[1]) for line in (tmp_path / "c" / "omnidyn_control.su").read_text().splitlines()]

@@ -119,9 +119,15 @@ def test_no_row_comes_or_goes_where_a_latency_passes_0(ellipse, log):
 
 
 NUISANCES = {
-    "gain": 1.04, "dead_band": 0.1, "fade": 0.03, "latency.twist": 0.004, "latency.current": 0.0025,
-    "latency.heading": 0.006, "latency.position": 0.0035, "latency.wheel_angle": 0.0045,
-}  # fmt: skip
+    "gain": 1.04,
+    "dead_band": 0.1,
+    "fade": 0.03,
+    "latency.twist": 0.004,
+    "latency.current": 0.0025,
+    "latency.heading": 0.006,
+    "latency.position": 0.0035,
+    "latency.wheel_angle": 0.0045,
+}
 START = (0.4, -0.3, 1.0)
 
 
@@ -145,10 +151,11 @@ def shown(robot, voltage, values, start=START, tol=1e-9, place=PLACE, channels=C
     u = np.repeat(applied(voltage, values), FINE, axis=0)
     run = simulate(robot, u, 0.01 / FINE, twist=start, pose=place, tol=tol)
     every = {
-        "heading": run.pose[:, 2:], "position": run.pose[:, :2],
+        "heading": run.pose[:, 2:],
+        "position": run.pose[:, :2],
         "wheel_angle": cumulative_simpson(run.wheel_speed, dx=0.01 / FINE, axis=0, initial=0.0),
         **{name: getattr(run, name) for name in ("twist", "wheel_speed", "current")},
-    }  # fmt: skip
+    }
     found = []
     for channel in channels:
         late = round(values.get(f"latency.{channel}", 0.0) * 100.0 * FINE)
@@ -169,9 +176,14 @@ def test_every_slope_against_differences_of_simulated_logs(ellipse, geometry):
     values |= {key: float(Key.parse(key).get(ellipse)) for key in geometry}
     clean = shown(ellipse, voltage, values)
     run = Run(
-        t=t, voltage=np.vstack([voltage, voltage[-1:]]), twist=clean[:, :3], wheel_speed=clean[:, 3:6],
-        current=clean[:, 6:9], pose=clean[:, [10, 11, 9]], wheel_angle=clean[:, 12:],
-    )  # fmt: skip
+        t=t,
+        voltage=np.vstack([voltage, voltage[-1:]]),
+        twist=clean[:, :3],
+        wheel_speed=clean[:, 3:6],
+        current=clean[:, 6:9],
+        pose=clean[:, [10, 11, 9]],
+        wheel_angle=clean[:, 12:],
+    )
     keys = [*TRUTH, "body.mass_kg", "motor.resistance_ohm", *geometry]
     given = OutputError(
         free=tuple(keys), nuisances=("gain", "dead_band", "fade", "latency"), start="free", tick_rad=0.0

@@ -26,9 +26,10 @@ def robot(axebot):
     """An ellipse and a current limit in a turning frame, the centre of mass beside that of the wheels."""
     direction = DirectionFriction(coulomb=(2.2, 1.5), viscous=0.95, yaw_coulomb=0.099, yaw_viscous=0.01)
     return axebot.replace(
-        body=axebot.body.replace(rotating_frame=True, centre=(0.01, -0.02)), friction=Friction(direction=direction),
+        body=axebot.body.replace(rotating_frame=True, centre=(0.01, -0.02)),
+        friction=Friction(direction=direction),
         motor=axebot.motor.replace(current_limit=2.0),
-    )  # fmt: skip
+    )
 
 
 def test_at_its_current_limit_a_push_adds_to_the_force_of_the_motors(axebot):
@@ -90,8 +91,10 @@ def test_logs_of_another_simulator_on_a_slope(seed):
     fit = identify(run, robot, OutputError(nuisances=("tilt",))).estimate
     truth = truths(case.told, case.told.shape)
     z = [abs(fit.value[key] - true) / fit.std[key] for key, true in truth.items()]
-    z += [abs(fit.nuisances[f"tilt.{axis}"].value - own) / fit.nuisances[f"tilt.{axis}"].std
-          for axis, own in zip("xy", pull, strict=True)]  # fmt: skip
+    z += [
+        abs(fit.nuisances[f"tilt.{axis}"].value - own) / fit.nuisances[f"tilt.{axis}"].std
+        for axis, own in zip("xy", pull, strict=True)
+    ]
     print(np.round(z, 2))
     assert max(z) < 4.0
     assert all(abs(own.value) > 10.0 * own.std for own in fit.nuisances.values())

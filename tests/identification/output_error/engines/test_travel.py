@@ -92,8 +92,9 @@ def test_each_channel_has_its_latency(seed):
         rows, at, expected = seen(name, late)
         np.testing.assert_allclose(outputs[np.ix_(rows, at)], expected, atol=1e-10 * np.abs(expected).max())
         sides = [seen(name, late + sign * 1e-6)[2] for sign in (1.0, -1.0)]
-        well, many = share_within(slopes[np.ix_(rows, at, [problem.where(name)])][..., 0],
-                                  (sides[0] - sides[1]) / 2e-6, 1e-7)  # fmt: skip
+        well, many = share_within(
+            slopes[np.ix_(rows, at, [problem.where(name)])][..., 0], (sides[0] - sides[1]) / 2e-6, 1e-7
+        )
         assert well >= 0.99 * many, name
 
 

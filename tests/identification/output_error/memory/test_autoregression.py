@@ -40,8 +40,10 @@ def test_stretches_know_nothing_of_each_other():
     steps = np.ones(40, int)
     steps[[0, 17]] = 0
     both = innovations(values, steps, THREE.coefficients, THREE.covariance)
-    alone = [innovations(part, np.minimum(np.arange(len(part)), 1), THREE.coefficients, THREE.covariance)
-             for part in (values[:17], values[17:])]  # fmt: skip
+    alone = [
+        innovations(part, np.minimum(np.arange(len(part)), 1), THREE.coefficients, THREE.covariance)
+        for part in (values[:17], values[17:])
+    ]
     np.testing.assert_allclose(both, np.concatenate(alone))
 
 

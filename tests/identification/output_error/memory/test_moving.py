@@ -71,8 +71,9 @@ def test_the_likelihood_is_the_dense_one(phi, share):
     assert square == pytest.approx(sum(np.sum(v * np.linalg.solve(c, v)) for v, c in parts), rel=1e-10)
     assert logs == pytest.approx(sum(np.linalg.slogdet(c)[1] for _, c in parts), rel=1e-10)
     for k, step in enumerate(1e-5 * np.eye(2)):
-        above, below = (_likelihood(values, moves, np.array(ends), phi + s * step[0], share + s * step[1])[:2]
-                        for s in (1.0, -1.0))  # fmt: skip
+        above, below = (
+            _likelihood(values, moves, np.array(ends), phi + s * step[0], share + s * step[1])[:2] for s in (1.0, -1.0)
+        )
         assert g[k] == pytest.approx((above[0] - below[0]) / 2e-5, rel=1e-5)
         assert by_logs[k] == pytest.approx((above[1] - below[1]) / 2e-5, rel=1e-5)
 

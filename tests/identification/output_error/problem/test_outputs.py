@@ -103,8 +103,9 @@ def test_a_push_is_found_and_friction_with_it(axebot, clean):
         assert abs(own.value - true) <= 4.5 * own.std
         assert own.unit == ("N m" if axis == "yaw" else "N")
     assert fit.nuisances["push.x"].value > 10.0 * fit.nuisances["push.x"].std
-    again = simulate(fit.robot.replace(motor=fit.robot.motor.replace(voltage_limit=100.0)),
-                     log.voltage[:-1], 0.01, log=fit.robot.log)  # fmt: skip
+    again = simulate(
+        fit.robot.replace(motor=fit.robot.motor.replace(voltage_limit=100.0)), log.voltage[:-1], 0.01, log=fit.robot.log
+    )
     assert np.sqrt(np.mean((again.twist - run.twist) ** 2, axis=0)) == pytest.approx(np.zeros(3), abs=0.005)
 
 

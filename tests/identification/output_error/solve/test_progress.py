@@ -67,10 +67,18 @@ def test_an_interrupted_fit_of_set_speeds_leaves_the_best_so_far(looped, log, cu
 def test_every_phase_is_told_before_it_begins(looped, log):
     seen = Cut()
     identify(log, looped, OutputError(), progress=seen)
-    first = [next(k for k, words in enumerate(seen.heard) if words.startswith(phase)) for phase in (
-        "looking for what moved", "looking for a start, latencies 1 of 5", "looking for a start, friction and gains 1",
-        "trying latency.current, 1 of", "the same as exactly", "looking for a better branch", "finding how sure",
-    )]  # fmt: skip
+    first = [
+        next(k for k, words in enumerate(seen.heard) if words.startswith(phase))
+        for phase in (
+            "looking for what moved",
+            "looking for a start, latencies 1 of 5",
+            "looking for a start, friction and gains 1",
+            "trying latency.current, 1 of",
+            "the same as exactly",
+            "looking for a better branch",
+            "finding how sure",
+        )
+    ]
     assert first == sorted(first)
 
 
@@ -114,5 +122,10 @@ def test_a_search_says_how_long_it_will_take(monkeypatch):
         progress.counted("trying", k, 4)
     for k in range(2):
         progress.counted("trying", k, 4)
-    assert heard == ["trying 1 of 4", "trying 2 of 4, about 9 s left", "trying 3 of 4, about 9 s left", "trying 1 of 4",
-                     "trying 2 of 4"]  # fmt: skip
+    assert heard == [
+        "trying 1 of 4",
+        "trying 2 of 4, about 9 s left",
+        "trying 3 of 4, about 9 s left",
+        "trying 1 of 4",
+        "trying 2 of 4",
+    ]

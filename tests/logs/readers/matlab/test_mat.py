@@ -94,9 +94,13 @@ def test_an_array_of_structs_of_single_numbers_is_a_table(tmp_path):
 
 def test_text_cells_and_pictures_are_passed_over_and_said(tmp_path):
     path = mat5(
-        tmp_path / "a.mat", t_s=T, w1_rad_s=T, name="robot", parts=np.array(["a", 1.0], dtype=object),
+        tmp_path / "a.mat",
+        t_s=T,
+        w1_rad_s=T,
+        name="robot",
+        parts=np.array(["a", 1.0], dtype=object),
         picture=np.zeros((4, 4, 3)),
-    )  # fmt: skip
+    )
     table = read_table(path)
     assert set(table.names) == {"t_s", "w1_rad_s"}
     assert table.notes == ("not read: parts (cells), picture (float64, 4 x 4 x 3)",)

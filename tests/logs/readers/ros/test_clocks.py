@@ -11,8 +11,10 @@ START = 1_700_000_000 * S
 
 def topics(seconds=10.0, **rates):
     """Topics received 2 ms after their stamps, in the order of reception."""
-    stamps = {name: START + np.rint(np.arange(int(seconds * rate)) / rate * 1e9).astype(np.int64)
-              for name, rate in rates.items()}  # fmt: skip
+    stamps = {
+        name: START + np.rint(np.arange(int(seconds * rate)) / rate * 1e9).astype(np.int64)
+        for name, rate in rates.items()
+    }
     receive = {name: each + 2_000_000 for name, each in stamps.items()}
     every = np.sort(np.concatenate(list(receive.values())), kind="stable")
     return {
@@ -22,9 +24,11 @@ def topics(seconds=10.0, **rates):
 
 def changed(topic, receive=None, header=None):
     return Clocked(
-        topic.topic, topic.receive if receive is None else receive, topic.order,
+        topic.topic,
+        topic.receive if receive is None else receive,
+        topic.order,
         topic.header if header is None else header,
-    )  # fmt: skip
+    )
 
 
 def test_stamps_of_one_clock_are_taken_as_they_are():
@@ -137,10 +141,12 @@ def test_messages_out_of_order_are_no_clock_that_was_set(way, stamped):
     count = sum(len(each.receive) for each in given)
     quarter, part = (np.array_split(np.arange(count), parts) for parts in (4, 30))
     files = {
-        "shuffled": np.random.default_rng(0).permutation(count), "backward": np.arange(count)[::-1],
-        "chunks": np.concatenate([quarter[k] for k in (2, 0, 3, 1)]), "halves": np.roll(np.arange(count), count // 2),
+        "shuffled": np.random.default_rng(0).permutation(count),
+        "backward": np.arange(count)[::-1],
+        "chunks": np.concatenate([quarter[k] for k in (2, 0, 3, 1)]),
+        "halves": np.roll(np.arange(count), count // 2),
         "every other chunk": np.concatenate(part[::2] + part[1::2]),
-    }  # fmt: skip
+    }
     order = np.empty(count, dtype=np.int64)
     order[files[way]] = np.arange(count)
     found, notes = trusted(written(given, order))

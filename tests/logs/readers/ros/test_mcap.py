@@ -93,8 +93,10 @@ def test_wheels_whose_names_do_not_count_are_asked_for(tmp_path):
         maker.joints(0.1 * k, ["red_wheel", "green_wheel", "blue_wheel"], [0, 0, 0], [1.0 * k, 2, 3])
     log = load_log(write_mcap(maker, tmp_path / "a.mcap"))
     assert "wheel_speed" not in log.channels
-    assert any("/joint_states/red_wheel/velocity" in words and "which wheel each is" in words
-               for words in said(log.columns.doubts))  # fmt: skip
+    assert any(
+        "/joint_states/red_wheel/velocity" in words and "which wheel each is" in words
+        for words in said(log.columns.doubts)
+    )
 
 
 def test_wheels_whose_names_say_where_they_stand_are_numbered_by_place(tmp_path):
@@ -148,9 +150,13 @@ def test_a_custom_message_is_read_by_the_definition_in_the_bag(tmp_path):
     maker = BagMaker(custom={kind: text})
     for k in range(6):
         message = maker.make(
-            kind, maker.header(0.1 * k), "go" if k % 2 else "stop", np.array([k, 2, 3], dtype=np.float32),
-            np.array([k, -k], dtype=np.int16), True,
-        )  # fmt: skip
+            kind,
+            maker.header(0.1 * k),
+            "go" if k % 2 else "stop",
+            np.array([k, 2, 3], dtype=np.float32),
+            np.array([k, -k], dtype=np.int16),
+            True,
+        )
         maker.add("/motors", kind, 0.1 * k, message)
     path = write_mcap(maker, tmp_path / "a.mcap")
     assert np.array_equal(seen(path, "/motors/current_A[0]")[1], np.arange(6.0))

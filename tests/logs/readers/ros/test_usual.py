@@ -26,20 +26,28 @@ class Maker(BagMaker):
     def imu(self, t, omega, topic="/imu/data"):
         none = np.zeros(9)
         message = self.make(
-            "sensor_msgs/msg/Imu", self.header(t), self.turn(0.0), none, self.vector(0.1, 0.2, omega), none,
-            self.vector(0.0, 0.0, 9.81), none,
-        )  # fmt: skip
+            "sensor_msgs/msg/Imu",
+            self.header(t),
+            self.turn(0.0),
+            none,
+            self.vector(0.1, 0.2, omega),
+            none,
+            self.vector(0.0, 0.0, 9.81),
+            none,
+        )
         self.add(topic, "sensor_msgs/msg/Imu", t, message)
 
     def tf(self, t, *frames, topic="/tf"):
         """frames: (parent, child, x, y, heading) each."""
         transforms = [
             self.make(
-                "geometry_msgs/msg/TransformStamped", self.header(t, parent), child,
+                "geometry_msgs/msg/TransformStamped",
+                self.header(t, parent),
+                child,
                 self.make("geometry_msgs/msg/Transform", self.vector(x, y, 0.0), self.turn(heading)),
             )
             for parent, child, x, y, heading in frames
-        ]  # fmt: skip
+        ]
         self.add(topic, "tf2_msgs/msg/TFMessage", t, self.make("tf2_msgs/msg/TFMessage", transforms))
 
     def pose_stamped(self, t, x, y, heading, topic="/mocap/pose"):

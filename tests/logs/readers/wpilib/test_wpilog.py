@@ -63,9 +63,13 @@ def oracle(path):
         elif not record.isControl():
             start = entries[record.getEntry()]
             get = {
-                "double": record.getDouble, "float": record.getFloat, "int64": record.getInteger,
-                "boolean": record.getBoolean, "double[]": record.getDoubleArray, "string": record.getString,
-            }[start.type]  # fmt: skip
+                "double": record.getDouble,
+                "float": record.getFloat,
+                "int64": record.getInteger,
+                "boolean": record.getBoolean,
+                "double[]": record.getDoubleArray,
+                "string": record.getString,
+            }[start.type]
             found.setdefault(start.name, []).append((record.getTimestamp(), get()))
     return found
 
@@ -101,11 +105,14 @@ def test_topics_are_listed(path):
 
 
 SCHEMAS = {
-    "Pose2d": "Translation2d translation;Rotation2d rotation", "Translation2d": "double x;double y",
-    "Rotation2d": "double value", "ChassisSpeeds": "double vx;double vy;double omega",
-    "SwerveModuleState": "double speed;Rotation2d angle", "Odd": "enum {a=1, b=2} int8 mode;float32 volts[2];bool on",
+    "Pose2d": "Translation2d translation;Rotation2d rotation",
+    "Translation2d": "double x;double y",
+    "Rotation2d": "double value",
+    "ChassisSpeeds": "double vx;double vy;double omega",
+    "SwerveModuleState": "double speed;Rotation2d angle",
+    "Odd": "enum {a=1, b=2} int8 mode;float32 volts[2];bool on",
     "Bits": "int8 a : 4; int8 b : 4",
-}  # fmt: skip
+}
 
 
 def test_structs_are_read_by_the_schemas_in_the_log(tmp_path):

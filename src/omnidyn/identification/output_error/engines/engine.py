@@ -132,9 +132,17 @@ def added(piece: Piece, every: tuple[Column, ...], parts: Parts, weighting: Weig
             waves[..., at] = row_waves(j, shown / np.where(tick > 0.0, tick, np.nan)[:, None], HARMONICS)
     lag = (pull[:, 1:] * pull[:, :-1]).sum(axis=1)
     return PieceSums(
-        known, there.sum(axis=1).astype(float), square.sum(axis=1), rho.sum(axis=1), lag, grad, info, score, drift,
+        known,
+        there.sum(axis=1).astype(float),
+        square.sum(axis=1),
+        rho.sum(axis=1),
+        lag,
+        grad,
+        info,
+        score,
+        drift,
         waves,
-    )  # fmt: skip
+    )
 
 
 # The driver of a problem: what is free of it and what is not

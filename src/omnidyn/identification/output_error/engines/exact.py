@@ -143,10 +143,24 @@ class ExactEngine(Engine[Problem]):
         scores = np.zeros((N_AXES, blocks, BY + 1))
         for axis in range(N_AXES):
             march_axis(
-                record.t, record.voltage, record.outputs, axis, piece.first, piece.last, now.drive[axis],
-                now.rate[axis], now.coulomb[axis], now.hold[axis], state[axis], weighting.variance[axis], weighting.nu,
-                weighting.block, weighting.mode, rows[axis], scores[axis],
-            )  # fmt: skip
+                record.t,
+                record.voltage,
+                record.outputs,
+                axis,
+                piece.first,
+                piece.last,
+                now.drive[axis],
+                now.rate[axis],
+                now.coulomb[axis],
+                now.hold[axis],
+                state[axis],
+                weighting.variance[axis],
+                weighting.nu,
+                weighting.block,
+                weighting.mode,
+                rows[axis],
+                scores[axis],
+            )
             slopes = np.zeros((BY, width))
             slopes[0, :count], slopes[1, :count] = by.rate[axis], by.coulomb[axis]
             slopes[2, count + axis] = piece.free[axis]
@@ -200,10 +214,17 @@ class ExactEngine(Engine[Problem]):
         (driver, at_driver), force = driver_of(problem, values), self._forces(PUSH, values)
         turned = any(problem.where(name) >= 0 for name in TILT)
         physics = Physics(
-            np.stack([now.rate, now.coulomb, now.hold]), now.drive, now.per_force * force, maps[0], maps[1], maps[2],
-            _wheel_of(columns), np.array(seconds),
-            driver, bool(maps[1].any()) or turned,
-        )  # fmt: skip
+            np.stack([now.rate, now.coulomb, now.hold]),
+            now.drive,
+            now.per_force * force,
+            maps[0],
+            maps[1],
+            maps[2],
+            _wheel_of(columns),
+            np.array(seconds),
+            driver,
+            bool(maps[1].any()) or turned,
+        )
         at = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)
         push, travel = wide(by.per_force * force[:, None]), wide(slopes[1])
         for axis, name in enumerate(PUSH):
@@ -214,9 +235,19 @@ class ExactEngine(Engine[Problem]):
                 travel[c, N_AXES:, at[N_AXES + columns.index(HEADING)]] = turned_by(facing)[i]
         varies = np.array([bool(travel[c].any()) for c in range(width)])
         derivatives = PhysicsSlopes(
-            wide(np.stack([by.rate, by.coulomb])), wide(by.drive), push, wide(slopes[0]), travel, wide(slopes[2]),
-            not self.mapping.linear, varies, np.array(late), np.array(at_driver), at[:N_AXES], at[N_AXES:],
-        )  # fmt: skip
+            wide(np.stack([by.rate, by.coulomb])),
+            wide(by.drive),
+            push,
+            wide(slopes[0]),
+            travel,
+            wide(slopes[2]),
+            not self.mapping.linear,
+            varies,
+            np.array(late),
+            np.array(at_driver),
+            at[:N_AXES],
+            at[N_AXES:],
+        )
         starts = [c for c in range(width) if c == 0 or columns[c][0] != columns[c - 1][0]]
         return physics, derivatives, np.array([*starts, width])
 
@@ -232,9 +263,14 @@ def padded(used: IntArray) -> int:
 
 
 def march_piece(
-    piece: Piece, state: FloatArray, every: Sequence[Column], count: int,
-    numbers: tuple[Physics, PhysicsSlopes, IntArray], weighting: Weighting, room: Room | None = None,
-) -> tuple[PieceSums, tuple[FloatArray, FloatArray]]:  # fmt: skip
+    piece: Piece,
+    state: FloatArray,
+    every: Sequence[Column],
+    count: int,
+    numbers: tuple[Physics, PhysicsSlopes, IntArray],
+    weighting: Weighting,
+    room: Room | None = None,
+) -> tuple[PieceSums, tuple[FloatArray, FloatArray]]:
     """The sums of a piece, and its (outputs, slopes) where the weighting keeps them. every: the columns of the problem.
 
     count: of parameters. numbers: physics, their slopes (rows of `padded`), and the first column of each group, and C.
@@ -250,11 +286,26 @@ def march_piece(
         len(columns), slopes.law.shape[2], len(used), len(piece.record.t), weighting.mode, _blocks(piece, weighting)
     )
     march(
-        piece.record.t, piece.record.voltage, piece.record.outputs, piece.first, piece.last,
-        float(piece.record.t[0]), piece.record.span, piece.margin, state[:N_AXES], state[N_AXES:], groups,
-        physics, slopes, loss, sums, tick, np.zeros((2, PLACE_SIZE)) if moves else None,
-        np.zeros((3, 3)) if moves else None, room,
-    )  # fmt: skip
+        piece.record.t,
+        piece.record.voltage,
+        piece.record.outputs,
+        piece.first,
+        piece.last,
+        float(piece.record.t[0]),
+        piece.record.span,
+        piece.margin,
+        state[:N_AXES],
+        state[N_AXES:],
+        groups,
+        physics,
+        slopes,
+        loss,
+        sums,
+        tick,
+        np.zeros((2, PLACE_SIZE)) if moves else None,
+        np.zeros((3, 3)) if moves else None,
+        room,
+    )
     grad, score = _at(used, sums.grad, total), _at(used, sums.score, total)
     info = np.zeros((len(columns), total, total))
     info[:, used[:, None], used] = sums.info[:, : len(used), : len(used)]
@@ -310,8 +361,15 @@ def _blocks(piece: Piece, weighting: Weighting) -> int:
 def _empty(columns: int, padded: int, total: int, rows: int, mode: int, blocks: int) -> Sums:
     kept = (rows, columns) if mode & KEEP else (0, columns)
     return Sums(
-        np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros((columns, padded)),
-        np.zeros((columns, padded, padded)), np.zeros((blocks, padded)), np.zeros((blocks, columns)),
-        np.full(kept, np.nan), np.full((*kept, total), np.nan),
+        np.zeros(columns),
+        np.zeros(columns),
+        np.zeros(columns),
+        np.zeros(columns),
+        np.zeros((columns, padded)),
+        np.zeros((columns, padded, padded)),
+        np.zeros((blocks, padded)),
+        np.zeros((blocks, columns)),
+        np.full(kept, np.nan),
+        np.full((*kept, total), np.nan),
         np.zeros((columns, HARMONICS if mode & WAVES else 0, 2, padded)),
-    )  # fmt: skip
+    )

@@ -83,9 +83,11 @@ class ImplicitEngine(Engine[Problem]):
         if other:
             raise UnsupportedError(
                 "this robot is fitted by an engine which does not know all that is asked for",
-                got=", ".join(other), expected=f"nuisances: latency, {', '.join(known)}",
-                remedy="leave it out of the nuisances", where=problem.robot.name,
-            )  # fmt: skip
+                got=", ".join(other),
+                expected=f"nuisances: latency, {', '.join(known)}",
+                remedy="leave it out of the nuisances",
+                where=problem.robot.name,
+            )
         self.last = LastPoints()
 
     def with_levels(self, levels: Mapping[str, float]) -> Self:
@@ -118,9 +120,14 @@ class ImplicitEngine(Engine[Problem]):
         )
 
     def _piece(
-        self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, state: FloatArray,
+        self,
+        robot: Robot,
+        moved: list[tuple[Robot, ...]],
+        scales: list[float],
+        piece: Piece,
+        state: FloatArray,
         values: FloatArray,
-    ) -> Parts:  # fmt: skip
+    ) -> Parts:
         """(residuals (C, rows), slopes (C, rows, U), index of each of the U among the P parameters and the states)."""
         record, count = piece.record, len(self.problem.parameters)
         t, measured = record.t[piece.first : piece.last + 1], record.outputs[piece.first : piece.last + 1].T
@@ -152,9 +159,15 @@ class ImplicitEngine(Engine[Problem]):
         return residual, slopes, np.array(at)
 
     def _run(
-        self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, state: FloatArray,
-        values: FloatArray, late: list[float],
-    ) -> tuple[list[LateSample], list[int], FloatArray]:  # fmt: skip
+        self,
+        robot: Robot,
+        moved: list[tuple[Robot, ...]],
+        scales: list[float],
+        piece: Piece,
+        state: FloatArray,
+        values: FloatArray,
+        late: list[float],
+    ) -> tuple[list[LateSample], list[int], FloatArray]:
         """(a look at the run for every latency, index of each direction among the slopes, their factors)."""
         t = piece.record.t[piece.first : piece.last + 1]
         voltage, directions, at, factors = self._directions(robot, moved, scales, piece, values)
@@ -164,9 +177,13 @@ class ImplicitEngine(Engine[Problem]):
         return self._sampled(robot, program, more, late, travel), [*at, *where], factors
 
     def _forces(
-        self, robot: Robot, moved: list[tuple[Robot, ...]], piece: Piece, values: FloatArray,
+        self,
+        robot: Robot,
+        moved: list[tuple[Robot, ...]],
+        piece: Piece,
+        values: FloatArray,
         directions: Sequence[Direction],
-    ) -> tuple[FloatArray | None, list[Direction], list[int]]:  # fmt: skip
+    ) -> tuple[FloatArray | None, list[Direction], list[int]]:
         """(the wrench from outside over the rows, None without one; the directions, those along its numbers behind; the
         place of these among the parameters)."""
         every = (*TILT, *PUSH)
@@ -200,9 +217,11 @@ class ImplicitEngine(Engine[Problem]):
         if name == "twist":
             return own.twist, own.pace, own.dtwist
         every = {
-            "heading": own.heading, "wheel_speed": own.wheel_speeds, "wheel_angle": own.wheel_angles,
+            "heading": own.heading,
+            "wheel_speed": own.wheel_speeds,
+            "wheel_angle": own.wheel_angles,
             "current": own.currents,
-        }  # fmt: skip
+        }
         return every[name]()
 
     def _directions(

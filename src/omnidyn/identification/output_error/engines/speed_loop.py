@@ -42,9 +42,11 @@ class LoopEngine(ImplicitEngine):
         other = [p.name for p in problem.parameters[problem.robot_count :] if not p.name.startswith(LATE)]
         if other:
             raise UnsupportedError(
-                "a log of set speeds has no voltage that could be changed on its way", got=", ".join(other),
-                expected="latency", where="nuisances",
-            )  # fmt: skip
+                "a log of set speeds has no voltage that could be changed on its way",
+                got=", ".join(other),
+                expected="latency",
+                where="nuisances",
+            )
         super().__init__(problem, tol)
 
     def meets_limit(self, point: Point) -> bool:
@@ -59,16 +61,27 @@ class LoopEngine(ImplicitEngine):
         return False
 
     def _piece(
-        self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, state: FloatArray,
+        self,
+        robot: Robot,
+        moved: list[tuple[Robot, ...]],
+        scales: list[float],
+        piece: Piece,
+        state: FloatArray,
         values: FloatArray,
-    ) -> Parts:  # fmt: skip
+    ) -> Parts:
         residual, slopes, at = super()._piece(robot, moved, scales, piece, state, values)
         return residual, np.clip(np.nan_to_num(slopes), -STEEPEST, STEEPEST), at
 
     def _run(
-        self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, state: FloatArray,
-        values: FloatArray, late: list[float],
-    ) -> tuple[list[LateSample], list[int], FloatArray]:  # fmt: skip
+        self,
+        robot: Robot,
+        moved: list[tuple[Robot, ...]],
+        scales: list[float],
+        piece: Piece,
+        state: FloatArray,
+        values: FloatArray,
+        late: list[float],
+    ) -> tuple[list[LateSample], list[int], FloatArray]:
         """As of any run; where currents jump from tick to tick, a look a period after theirs is the last one."""
         count, (t, set_point) = self.problem.robot_count, _driven(piece)
         directions = [

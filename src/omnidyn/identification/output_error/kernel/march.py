@@ -299,9 +299,26 @@ def add_input(row, volts, wheel, e, d_input, c, at_driver):
 
 @kernel
 def march(
-    t, u, y, first, last, origin, span, margin, start, offset, groups, physics, slopes, loss, sums, tick, place, pieces,
+    t,
+    u,
+    y,
+    first,
+    last,
+    origin,
+    span,
+    margin,
+    start,
+    offset,
+    groups,
+    physics,
+    slopes,
+    loss,
+    sums,
+    tick,
+    place,
+    pieces,
     room,
-):  # fmt: skip
+):
     """March from row `first` to row `last`, both of one piece without a gap, and add to `sums`.
 
     t (rows,), u (rows, W) voltages before the driver, y (rows, C) outputs, NaN where not measured. origin, span: of
@@ -316,8 +333,12 @@ def march(
     final, keep, travels = (loss.mode & FINAL) != 0, (loss.mode & KEEP) != 0, physics.travels
     v, s, g, v_now, s_now = start.copy(), np.zeros(PATH), np.zeros(3), np.zeros(3), np.zeros(PATH)
     dv, ds, dg, dv_now, ds_now = (
-        np.zeros((3, size)), np.zeros((PATH, size)), np.zeros((3, size)), np.zeros((3, size)), np.zeros((PATH, size)),
-    )  # fmt: skip
+        np.zeros((3, size)),
+        np.zeros((PATH, size)),
+        np.zeros((3, size)),
+        np.zeros((3, size)),
+        np.zeros((PATH, size)),
+    )
     for axis in range(3):
         if slopes.at_start[axis] >= 0:
             dv[axis, slopes.at_start[axis]] = 1.0
@@ -346,13 +367,36 @@ def march(
                 copy_motion(v, s, dv, ds, v_now, s_now, dv_now, ds_now, travels, place)
                 if into > 0.0:
                     advance(
-                        v_now, s_now, g, dv_now, ds_now, dg, law, dlaw, into, parts[group], travels, place, pieces,
-                    )  # fmt: skip
+                        v_now,
+                        s_now,
+                        g,
+                        dv_now,
+                        ds_now,
+                        dg,
+                        law,
+                        dlaw,
+                        into,
+                        parts[group],
+                        travels,
+                        place,
+                        pieces,
+                    )
                 for c in range(groups[group], groups[group + 1]):
                     value = offset[c] + put_row(
-                        row, c, v_now, s_now, dv_now, ds_now, speed_map, travel_map, d_speed, d_travel, vary,
-                        travels, travel_varies,
-                    )  # fmt: skip
+                        row,
+                        c,
+                        v_now,
+                        s_now,
+                        dv_now,
+                        ds_now,
+                        speed_map,
+                        travel_map,
+                        d_speed,
+                        d_travel,
+                        vary,
+                        travels,
+                        travel_varies,
+                    )
                     if wheels[c] >= 0:
                         value += add_input(row, volts, wheels[c], input_map[c], d_input, c, at_driver)
                     if at_late[c] >= 0:

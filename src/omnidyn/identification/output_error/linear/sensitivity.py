@@ -74,9 +74,7 @@ def as_weighed(weighed: Weighed) -> tuple[Linear, Engine, Point]:
     return Linear(rows, memory), engine, point
 
 
-def members_of(
-    engine: Engine, problem: Problem, point: Point
-) -> list[tuple[Problem, Point, Engine, IntArray]]:  # fmt: skip
+def members_of(engine: Engine, problem: Problem, point: Point) -> list[tuple[Problem, Point, Engine, IntArray]]:
     """(problem, point, engine, which pieces of all are its own) of each group; of one where there are none."""
     if not engine.members:
         return [(problem, point, engine, np.arange(len(problem.pieces)))]
@@ -168,9 +166,10 @@ def _stretches(piece: Piece) -> list[tuple[int, int, int, float]]:
     for w in np.flatnonzero(steps).tolist():
         edges = [*np.flatnonzero(_changed(inputs, w)).tolist(), len(t)]
         found += [
-            (w, a, b, float(steps[w])) for a, b in pairwise(edges)
+            (w, a, b, float(steps[w]))
+            for a, b in pairwise(edges)
             if inputs[a].any() and t[b - 1] - t[a] >= HELD  # what is off is off
-        ]  # fmt: skip
+        ]
     return found
 
 

@@ -174,9 +174,11 @@ def _steps(partial: FloatArray) -> list[FloatArray]:
 
 
 def autoregression(
-    stretches: Sequence[FloatArray], most: int | None = None, may_add_up: bool = False,
+    stretches: Sequence[FloatArray],
+    most: int | None = None,
+    may_add_up: bool = False,
     moves: Sequence[BoolArray] | None = None,
-) -> AutoRegression:  # fmt: skip
+) -> AutoRegression:
     """That of series without gaps, each of shape (n, K): the series is what all K columns add up to in the square.
 
     The first column is the series itself; the others may be what a fit has taken out of it, see whitening.py.
@@ -217,9 +219,13 @@ def _of_motion(found: Moving, rows: int) -> AutoRegression:
     """Errors that remember in the rows that move, so many."""
     partial, slopes = told_by_many(found.mixed)
     return AutoRegression(
-        partial, found.variance * found.settled, rows, slopes=slopes @ found.slopes, moving=(found.phi, found.share),
+        partial,
+        found.variance * found.settled,
+        rows,
+        slopes=slopes @ found.slopes,
+        moving=(found.phi, found.share),
         information=found.information,
-    )  # fmt: skip
+    )
 
 
 def _fitted(stretches: Sequence[FloatArray], most: int | None) -> tuple[AutoRegression, float]:

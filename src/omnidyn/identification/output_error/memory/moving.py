@@ -197,9 +197,11 @@ def mixed(stretches: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray, floa
 
 
 def scored(
-    looked: Callable[[FloatArray], Look], starts: Sequence[tuple[float, float]], low: tuple[float, float],
+    looked: Callable[[FloatArray], Look],
+    starts: Sequence[tuple[float, float]],
+    low: tuple[float, float],
     high: tuple[float, float],
-) -> tuple[FloatArray, FloatArray, float, float]:  # fmt: skip
+) -> tuple[FloatArray, FloatArray, float, float]:
     """(the two numbers (2,), the matrix there, variance, cost) of the least cost, from the best of some starts.
 
     looked: (cost, gradient (2,), Gauss-Newton's or Fisher's matrix (2, 2), variance) of two numbers, in one scale.

@@ -31,9 +31,11 @@ class WhitenedEngine(Engine[Problem]):
     """
 
     def __init__(
-        self, engine: Engine[Problem], models: Mapping[Column, AutoRegression],
+        self,
+        engine: Engine[Problem],
+        models: Mapping[Column, AutoRegression],
         moves: Sequence[BoolArray] | None = None,
-    ):  # fmt: skip
+    ):
         self.engine, self.models, self.problem, self._moves = engine, dict(models), engine.problem, moves
 
     @property

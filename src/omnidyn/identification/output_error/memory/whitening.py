@@ -144,9 +144,12 @@ def _straight(
 
 
 def _filtered(
-    solver: Solver[Problem], engine: Engine[Problem], models: Mapping[Column, AutoRegression], close: float,
+    solver: Solver[Problem],
+    engine: Engine[Problem],
+    models: Mapping[Column, AutoRegression],
+    close: float,
     moves: Sequence[BoolArray] | None = None,
-) -> Solver[Problem]:  # fmt: skip
+) -> Solver[Problem]:
     """The solver for errors of these memories, which ends `close` to the best point."""
     return Solver(solver.problem, WhitenedEngine(engine, models, moves), 0.0, close, solver.counted)
 
@@ -247,9 +250,13 @@ def _trusted(found: Solution, before: Trust, models: Mapping[Column, AutoRegress
     plain = np.sqrt(np.diag(before.plain))
     ratio = known.std[told] / np.where(plain[told] > 0.0, plain[told], 1.0)
     return replace(
-        known, kind=AUTOREGRESSIVE, degrees=int(degrees), quantile=t_quantile(degrees), neighbours=before.neighbours,
+        known,
+        kind=AUTOREGRESSIVE,
+        degrees=int(degrees),
+        quantile=t_quantile(degrees),
+        neighbours=before.neighbours,
         widening=float(ratio.max(initial=0.0)) or 1.0,
-    )  # fmt: skip
+    )
 
 
 def _observed(found: Solution, known: Trust) -> FloatArray:
@@ -309,10 +316,12 @@ def _statements(found: Solution, models: Mapping[Column, AutoRegression], known:
     longest = max(models, key=lambda column: models[column].memory)
     model, lasts = models[longest], models[longest].memory * spacing(pieces, longest)[0]
     numbers = {
-        "neighbours": np.abs(known.neighbours).max(), "orders": (orders[0], orders[-1]) if orders else None,
-        "beside_white": ("moving" if beside == {True} else "all") if beside else "", "memory": lasts,
+        "neighbours": np.abs(known.neighbours).max(),
+        "orders": (orders[0], orders[-1]) if orders else None,
+        "beside_white": ("moving" if beside == {True} else "all") if beside else "",
+        "memory": lasts,
         "widening": known.widening,
-    }  # fmt: skip
+    }
     yield Statement("autocorrelated_noise", NOTE, numbers=numbers)
     if model.rows < FEW * model.memory:
         numbers = {"memory": lasts, "times": model.rows / model.memory, "enough": FEW * lasts}

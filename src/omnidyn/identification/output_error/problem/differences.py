@@ -140,10 +140,14 @@ def _adds_up(logs: Sequence[Run], found: Differences) -> bool:
     inputs = [_inputs(run) for run in logs]
     for which in range(3):
         one, *many = (
-            np.concatenate([np.zeros(0), *(d for run, own in zip(logs, inputs, strict=True)
-                                           for d in _high(run, found, own[which], rows))])
+            np.concatenate(
+                [
+                    np.zeros(0),
+                    *(d for run, own in zip(logs, inputs, strict=True) for d in _high(run, found, own[which], rows)),
+                ]
+            )
             for rows in (1, *MANY)
-        )  # fmt: skip
+        )
         if min(map(len, (one, *many))) >= ENOUGH:
             level = _level(one)
             steady = sum(_level(each) <= rows**0.5 * level for rows, each in zip(MANY, many, strict=True))

@@ -96,15 +96,18 @@ def without_band(robot: Robot, free: Sequence[str]) -> Robot:
     asked = [key for key in free if Key.parse(key).name in BANDS]
     if asked:
         raise InputError(
-            "cannot be free", got=asked[0], expected="coulomb, breakaway or viscous",
+            "cannot be free",
+            got=asked[0],
+            expected="coulomb, breakaway or viscous",
             remedy="leave it out: the speed below which Karnopp's law rests is chosen for a solver, not measured",
             where="free",
-        )  # fmt: skip
+        )
     usual = {name: type(getattr(robot.friction, name)) for name in tables_with_band(robot)}
     return _changed(
-        robot, {n: {s: f.model_fields[s].default for s in SPEEDS if s in f.model_fields} for n, f in usual.items()},
+        robot,
+        {n: {s: f.model_fields[s].default for s in SPEEDS if s in f.model_fields} for n, f in usual.items()},
         COULOMB,
-    )  # fmt: skip
+    )
 
 
 def with_band(robot: Robot, of: Robot) -> Robot:

@@ -117,10 +117,12 @@ def measured_channels(records: Sequence[Record]) -> list[str]:
     """Channels with any measurement, each once."""
     return list(
         dict.fromkeys(
-            name for record in records for c, (name, _) in enumerate(record.columns)
+            name
+            for record in records
+            for c, (name, _) in enumerate(record.columns)
             if np.isfinite(record.outputs[:, c]).any()
         )
-    )  # fmt: skip
+    )
 
 
 def _forces(name: str, robot: Robot) -> list[Parameter]:
@@ -178,9 +180,14 @@ def _piece(
     duration = float(record.t[last] - record.t[first])
     margin = min(LATEST, 0.1 * duration) if late else 0.0
     return Piece(
-        record, first, last, np.zeros(3) if rest else guess, offset,
-        np.concatenate([np.full(3, not rest), travels]), np.full(len(columns), margin),
-    )  # fmt: skip
+        record,
+        first,
+        last,
+        np.zeros(3) if rest else guess,
+        offset,
+        np.concatenate([np.full(3, not rest), travels]),
+        np.full(len(columns), margin),
+    )
 
 
 def _begins_at_rest(record: Record, twist: FloatArray | None, first: int, last: int) -> bool:

@@ -62,9 +62,11 @@ def outputs_of(
         found = {name: value for name, value in found.items() if name in wanted}
     if not found:
         raise InputError(
-            "the log has no output to fit", got=", ".join(run.channels) or "no channels",
-            expected=", ".join(wanted or OUTPUTS), where=run.source,
-        )  # fmt: skip
+            "the log has no output to fit",
+            got=", ".join(run.channels) or "no channels",
+            expected=", ".join(wanted or OUTPUTS),
+            where=run.source,
+        )
     found, notes = _without_doubles(run, robot, found, wanted is not None)
     found, given, lost = _counted(run, found, counted, notes)
     if "position" in found and "heading" not in found:  # where the robot faces at the start is fitted all the same
@@ -74,7 +76,7 @@ def outputs_of(
     ticks = tuple(
         0.0 if name != "wheel_angle" else float(given[i]) if given is not None else _tick(found[name][:, i], tick_rad)
         for name, i in columns
-    )  # fmt: skip
+    )
     values = next(iter(found.values())) if len(found) == 1 else np.hstack(list(found.values()))
     return Outputs(columns, np.ascontiguousarray(values), ticks, tuple(notes), tuple(unused), lost)
 
@@ -210,9 +212,7 @@ def is_wheel_odometry(run: Run, robot: Robot) -> bool:
     return _is_filtered(twist[rows], body, np.searchsorted(wheels, rows, side="right") - 1, TO_STD * third, second)
 
 
-def _is_filtered(
-    told: FloatArray, body: FloatArray, last: IntArray, noise: FloatArray, second: FloatArray
-) -> bool:  # fmt: skip
+def _is_filtered(told: FloatArray, body: FloatArray, last: IntArray, noise: FloatArray, second: FloatArray) -> bool:
     """Whether a twist is the wheels' through a recursive filter: y_k = sum a_i y_(k-i) + sum b_j x_(k-j).
 
     told: the twist, (rows, 3); body: that of the wheels, (wheel rows, 3), `last` of which came before each of `told`.

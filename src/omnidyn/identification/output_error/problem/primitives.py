@@ -54,12 +54,15 @@ def primitives(robot: Robot, motors: MotorWrench | None = None) -> Primitives:
     system, count = state_space(robot, motors), robot.wheels.count
     rate, coulomb, hold = axis_levels(robot, system)
     return Primitives(
-        rate, coulomb, hold, system.B,
+        rate,
+        coulomb,
+        hold,
+        system.B,
         wheel_speed(robot.wheels, np.eye(3)).T,
         settled_currents(robot, np.eye(3), np.zeros(count)).T,
         np.diag(settled_currents(robot, np.zeros(3), np.eye(count))).copy(),
         1.0 / axis_masses(robot),
-    )  # fmt: skip
+    )
 
 
 class PrimitiveMap:

@@ -85,9 +85,13 @@ def _read_only(values: FloatArray) -> FloatArray:
 
 
 def record(
-    run: Run, robot: Robot, outputs: Sequence[str] | None = None, loop: bool = False, tick_rad: float | None = None,
+    run: Run,
+    robot: Robot,
+    outputs: Sequence[str] | None = None,
+    loop: bool = False,
+    tick_rad: float | None = None,
     counted: Differences | None = None,
-) -> Record:  # fmt: skip
+) -> Record:
     """Raises InputError for a run without inputs or outputs, InsufficientDataError where no piece is long enough.
 
     loop: take the set speeds even where a voltage was logged, for its gains are asked for. outputs, tick_rad,
@@ -97,10 +101,12 @@ def record(
     refuse_slope(robot.floor, "a fit starts from")
     if run.wheels is not None and run.wheels != robot.wheels.count:
         raise InputError(
-            "the log has another number of wheels", got=run.wheels,
-            expected=f"{robot.wheels.count}, as {robot.name} has", where=run.source,
+            "the log has another number of wheels",
+            got=run.wheels,
+            expected=f"{robot.wheels.count}, as {robot.name} has",
+            where=run.source,
             remedy="give the robot that the log is of",
-        )  # fmt: skip
+        )
     set_point = _set_point(run, robot, loop)
     if set_point is not None:
         refuse_slip(robot.wheels, "a fit through a speed loop knows")
@@ -123,18 +129,30 @@ def record(
         notes.append(Statement("split_at_gaps", NOTE, source, {"gaps": len(lost), "longest": max(lost)}))
     if not pieces:
         raise InsufficientDataError(
-            "no stretch of the log has inputs throughout", got=f"{int(known.sum())} rows of {len(run)} with all inputs",
-            expected=f"{SHORTEST} rows in a row", where=run.source,
+            "no stretch of the log has inputs throughout",
+            got=f"{int(known.sum())} rows of {len(run)} with all inputs",
+            expected=f"{SHORTEST} rows in a row",
+            where=run.source,
             remedy="log the voltage or the duty of every wheel in every row",
-        )  # fmt: skip
+        )
     if not known.all():
         notes.append(Statement("split_at_missing_inputs", NOTE, source, {"rows": int((~known).sum())}))
     if found.lost is not None and (many := int(found.lost[1:].sum())):
         notes.append(Statement("split_at_missing_counts", NOTE, source, {"rows": many}))
     return Record(
-        run.t, voltage, found.values, found.columns, found.ticks, tuple(pieces), run.source,
-        supplied, (*notes, *found.notes), set_point, (*_unused_inputs(run, set_point is not None), *found.unused), run,
-    )  # fmt: skip
+        run.t,
+        voltage,
+        found.values,
+        found.columns,
+        found.ticks,
+        tuple(pieces),
+        run.source,
+        supplied,
+        (*notes, *found.notes),
+        set_point,
+        (*_unused_inputs(run, set_point is not None), *found.unused),
+        run,
+    )
 
 
 def _unused_inputs(run: Run, looped: bool) -> list[Statement]:
@@ -151,8 +169,9 @@ def _unused_inputs(run: Run, looped: bool) -> list[Statement]:
         why["twist_command"] = ""
     return [
         Statement("input_not_used", NOTE, name, {"driver": driver})
-        for name, driver in why.items() if driver and getattr(run, name) is not None
-    ]  # fmt: skip
+        for name, driver in why.items()
+        if driver and getattr(run, name) is not None
+    ]
 
 
 def _refuse_wheels_without_input(run: Run, robot: Robot, finite: BoolArray) -> None:
@@ -162,10 +181,12 @@ def _refuse_wheels_without_input(run: Run, robot: Robot, finite: BoolArray) -> N
     empty = np.flatnonzero(~finite.any(axis=0))
     if 0 < len(empty) < finite.shape[1]:
         raise InputError(
-            "wheels without any input", got=", ".join(f"none for wheel {w + 1}" for w in empty), where=run.source,
+            "wheels without any input",
+            got=", ".join(f"none for wheel {w + 1}" for w in empty),
+            where=run.source,
             expected=f"one for each of the {robot.wheels.count} wheels of {robot.name}",
             remedy="take the robot of this log, or map its column to the wheel",
-        )  # fmt: skip
+        )
 
 
 def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[Statement]]:
@@ -178,14 +199,19 @@ def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[Statement]]
         return voltage, supplied, [taken] if supplied else []
     if run.duty is not None:
         raise InputError(
-            "a duty needs a supply", got="neither a supply column nor [drive] supply_V", where=run.source,
+            "a duty needs a supply",
+            got="neither a supply column nor [drive] supply_V",
+            where=run.source,
             remedy="add supply_V to the robot file",
-        )  # fmt: skip
+        )
     if has_set_speeds(run):
         raise UnsupportedError(
-            "only set speeds are logged, and the robot has no speed loop to follow them", got=", ".join(run.channels),
-            expected="voltage or duty, or the speed loop of the firmware", where=run.source, remedy=LOOP_REMEDY,
-        )  # fmt: skip
+            "only set speeds are logged, and the robot has no speed loop to follow them",
+            got=", ".join(run.channels),
+            expected="voltage or duty, or the speed loop of the firmware",
+            where=run.source,
+            remedy=LOOP_REMEDY,
+        )
     raise InputError("the log has no input", got=", ".join(run.channels), expected="voltage or duty", where=run.source)
 
 

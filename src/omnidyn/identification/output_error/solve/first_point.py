@@ -129,9 +129,14 @@ class RateEngine(ImplicitEngine):
     """
 
     def _piece(
-        self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, state: FloatArray,
+        self,
+        robot: Robot,
+        moved: list[tuple[Robot, ...]],
+        scales: list[float],
+        piece: Piece,
+        state: FloatArray,
         values: FloatArray,
-    ) -> Parts:  # fmt: skip
+    ) -> Parts:
         residual, slopes, at = super()._piece(robot, moved, scales, piece, state, values)
         for c, (name, _) in enumerate(piece.record.columns):
             if name in TRAVELS:

@@ -56,9 +56,12 @@ def loop_keys(robot: Robot, moved: BoolArray, source: str = "") -> list[str]:
     """
     if not moved.any():
         raise InsufficientDataError(
-            "the robot never visibly moved: a speed loop shows its friction in motion only", got="rest",
-            expected="motion", remedy="ask for speeds at which it sets off", where=source,
-        )  # fmt: skip
+            "the robot never visibly moved: a speed loop shows its friction in motion only",
+            got="rest",
+            expected="motion",
+            remedy="ask for speeds at which it sets off",
+            where=source,
+        )
     still = np.flatnonzero(~moved).tolist()
     kept = [key for key in friction_keys(robot) if Key.parse(key).axis not in still]
     return [*kept, *(key for key in gain_keys(robot) if not _given(robot, key))]
@@ -77,9 +80,11 @@ def loop_pieces(records: Sequence[Record], robot: Robot, start: str) -> list[Pie
     """
     if start == FREE:
         raise UnsupportedError(
-            "a log of set speeds begins at rest: the integral of the loop is not known elsewhere", got="a free start",
-            expected=f"{REST} or auto", where="start",
-        )  # fmt: skip
+            "a log of set speeds begins at rest: the integral of the loop is not known elsewhere",
+            got="a free start",
+            expected=f"{REST} or auto",
+            where="start",
+        )
     found = [
         _piece(record, *record.pieces[0])
         for record in records
@@ -88,9 +93,11 @@ def loop_pieces(records: Sequence[Record], robot: Robot, start: str) -> list[Pie
     if not found:
         raise InsufficientDataError(
             "no log begins at rest, so what the speed loop remembers is not known",
-            got=f"{len(records)} logs in motion", where=records[0].source, expected="one that begins at rest",
+            got=f"{len(records)} logs in motion",
+            where=records[0].source,
+            expected="one that begins at rest",
             remedy="cut the logs so that they begin before the robot sets off",
-        )  # fmt: skip
+        )
     return found
 
 
@@ -126,9 +133,14 @@ def _piece(record: Record, first: int, last: int) -> Piece:
     travels = np.array([name in TRAVELS for name, _ in columns])
     offset = np.where(travels, record.outputs[first], 0.0)
     return Piece(
-        record, first, last, np.zeros(3), np.where(np.isfinite(offset), offset, 0.0),
-        np.concatenate([np.zeros(3, bool), travels]), np.zeros(len(columns)),
-    )  # fmt: skip
+        record,
+        first,
+        last,
+        np.zeros(3),
+        np.where(np.isfinite(offset), offset, 0.0),
+        np.concatenate([np.zeros(3, bool), travels]),
+        np.zeros(len(columns)),
+    )
 
 
 def solve_loop(problem: Problem, nu: float, progress: FitProgress) -> Solution:

@@ -100,9 +100,13 @@ class Solver(Generic[P]):
         return np.full(len(self.tick), True) if self.nu else self.tick > 0.0
 
     def minimise(
-        self, start: Point | State, limit: int = MAX_ITERATIONS, progress: Progress | None = None,
-        blocked: BoolArray | None = None, scales: FloatArray | None = None,
-    ) -> Solution:  # fmt: skip
+        self,
+        start: Point | State,
+        limit: int = MAX_ITERATIONS,
+        progress: Progress | None = None,
+        blocked: BoolArray | None = None,
+        scales: FloatArray | None = None,
+    ) -> Solution:
         """The best point from `start`; `progress` sees every better one on the way.
 
         Where the start is a state that this engine found, the logs are not marched through for it again. blocked (P,):
@@ -318,7 +322,7 @@ def of_states(information: FloatArray, right: FloatArray) -> FloatArray:
 
 def _weighted(
     sums: PieceSums, weight: FloatArray, scale: FloatArray, states: FloatArray, known: tuple[FloatArray, FloatArray]
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+) -> tuple[FloatArray, FloatArray]:
     """Gradient and information of a piece over its columns, in inner numbers. known: of its start, see `start_prior`.
 
     States that are not free do not move. Nor does a speed that the rows only know to be below the fastest (a robot may

@@ -78,15 +78,20 @@ def refuse_level(name: str, robot: Robot, free: Sequence[str]) -> None:
     law = getattr(robot.friction, key.table.rpartition(".")[2]).law
     if KINDS[law].bends:
         raise InputError(
-            "bristles bend before anything breaks away", got=f'{name} of law = "{law}"', expected="a law that sticks",
-            remedy="give the table a stribeck_speed, where its law takes one: then breakaway is fitted", where="free",
-        )  # fmt: skip
+            "bristles bend before anything breaks away",
+            got=f'{name} of law = "{law}"',
+            expected="a law that sticks",
+            remedy="give the table a stribeck_speed, where its law takes one: then breakaway is fitted",
+            where="free",
+        )
     if not np.any(slides(robot, key)) and not any(Key.parse(each).name == below for each in free):
         raise InputError(
-            "no Coulomb friction that it could be above", got=f"{name}, {below} is 0", expected="a level in that table",
+            "no Coulomb friction that it could be above",
+            got=f"{name}, {below} is 0",
+            expected="a level in that table",
             remedy=f"give {below} a first value in the robot file, or free the breakaway of the table that has one",
             where="free",
-        )  # fmt: skip
+        )
 
 
 class _Profile:
@@ -97,9 +102,14 @@ class _Profile:
     """
 
     def __init__(
-        self, solver: Solver, ways: Callable[[Any], list[dict[str, float]]], point: Point, limit: int = REFIT,
-        nearest: bool = False, progress: Progress = silent,
-    ):  # fmt: skip
+        self,
+        solver: Solver,
+        ways: Callable[[Any], list[dict[str, float]]],
+        point: Point,
+        limit: int = REFIT,
+        nearest: bool = False,
+        progress: Progress = silent,
+    ):
         self.solver, self.ways, self.point, self.limit = solver, ways, point, limit
         self.nearest, self.progress = nearest, progress
         self.known: dict[float | Place, Solution] = {}
@@ -182,7 +192,7 @@ def find_breakaway(
 
 def _in_common(
     solution: Solution, names: Sequence[str], known: Trust, progress: FitProgress | None
-) -> dict[str, float]:  # fmt: skip
+) -> dict[str, float]:
     """Levels that are the same times Coulomb friction in each list that holds together, the likeliest one."""
     levels: dict[str, float] = {}
     for name in names:
@@ -207,9 +217,12 @@ def _together(name: str, names: Sequence[str]) -> list[str]:
 
 
 def _beside_the_others(
-    solution: Solution, levels: dict[str, float], found: Sequence[Breakaway], known: Trust,
+    solution: Solution,
+    levels: dict[str, float],
+    found: Sequence[Breakaway],
+    known: Trust,
     progress: FitProgress | None,
-) -> list[Breakaway]:  # fmt: skip
+) -> list[Breakaway]:
     """The levels with the intervals that they have whatever the others are that hold together with them."""
     wider = {one.name: one for one in found}
     for one in found:
@@ -220,9 +233,13 @@ def _beside_the_others(
 
 
 def _traded(
-    solution: Solution, levels: dict[str, float], group: Sequence[str], wider: dict[str, Breakaway], known: Trust,
+    solution: Solution,
+    levels: dict[str, float],
+    group: Sequence[str],
+    wider: dict[str, Breakaway],
+    known: Trust,
     progress: FitProgress | None,
-) -> None:  # fmt: skip
+) -> None:
     """Widen the intervals of a group by how far its first level goes with the others against it, and they with it."""
     coulomb = {name: _coulomb(solution.solver, solution.state.point, name) for name in group}
     if min(coulomb.values()) <= 0.0:  # friction acts elsewhere
@@ -295,9 +312,13 @@ def _one_axis(solver: Solver, solution: Solution, levels: dict[str, float], name
 
 
 def _by_a_grid(
-    solution: Solution, levels: dict[str, float], name: str, limit: float, before: Breakaway | None,
+    solution: Solution,
+    levels: dict[str, float],
+    name: str,
+    limit: float,
+    before: Breakaway | None,
     progress: FitProgress | None,
-) -> Breakaway:  # fmt: skip
+) -> Breakaway:
     """The likely levels by the implicit engine. before: what was found with other levels of the others."""
     own, point = solution.solver, solution.state.point
     profile = _by_the_engine(solution, lambda level: [levels | {name: level}], name, progress)

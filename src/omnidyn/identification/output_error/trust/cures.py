@@ -34,12 +34,24 @@ TRIED, SEEN = 1e-3, 0.01  # size of the change that is tried; share of it in a c
 ROWS, STEP, HOLD = 1000, 0.01, 50  # of an experiment: rows, their length [s], rows of one level
 MOST = 5  # cures that are named
 MEASURABLE = (
-    "body.mass_kg", "wheels.wheel_radius_m", "wheels.robot_radius_m", "motor.gear_ratio", "motor.resistance_ohm",
-    TORQUE, EMF, ROTOR, WHEEL, CENTRE, "body.inertia_kg_m2", "gain",
-)  # fmt: skip
+    "body.mass_kg",
+    "wheels.wheel_radius_m",
+    "wheels.robot_radius_m",
+    "motor.gear_ratio",
+    "motor.resistance_ohm",
+    TORQUE,
+    EMF,
+    ROTOR,
+    WHEEL,
+    CENTRE,
+    "body.inertia_kg_m2",
+    "gain",
+)
 CHANNELS = {  # that would show it -> outputs that show the same
-    "current": ("current",), "wheel_speed": ("wheel_speed", "wheel_angle"), "twist": ("twist", "position"),
-}  # fmt: skip
+    "current": ("current",),
+    "wheel_speed": ("wheel_speed", "wheel_angle"),
+    "twist": ("twist", "position"),
+}
 
 
 @dataclass(frozen=True)
@@ -62,17 +74,13 @@ class Blind:
         return Statement("cures", NOTE, numbers={"cures": self.cures})
 
 
-def blind_directions(
-    problem: Problem, values: FloatArray, ways: Sequence[Way], moved: BoolArray
-) -> tuple[Blind, ...]:  # fmt: skip
+def blind_directions(problem: Problem, values: FloatArray, ways: Sequence[Way], moved: BoolArray) -> tuple[Blind, ...]:
     """Each direction with what would show it. values (P,); moved (3,): which axes did."""
     drives = _drives(problem, values) if ways else ()
     return tuple(side_by_side(lambda way: _direction(problem, values, way, moved, drives), ways))
 
 
-def _direction(
-    problem: Problem, values: FloatArray, way: Way, moved: BoolArray, drives: Sequence[_Drive]
-) -> Blind:  # fmt: skip
+def _direction(problem: Problem, values: FloatArray, way: Way, moved: BoolArray, drives: Sequence[_Drive]) -> Blind:
     at = np.flatnonzero(way.step)
     names = [problem.names[j].partition("@")[0] for j in at]
     changes = {name: 0.01 * _relative(problem, values, way, int(j)) for name, j in zip(names, at, strict=True)}
@@ -126,9 +134,7 @@ class _Drive:
     before: Mapping[str, FloatArray]
 
     @classmethod
-    def of(
-        cls, problem: Problem, values: FloatArray, volts: FloatArray, dt: FloatArray, start: FloatArray
-    ) -> _Drive:  # fmt: skip
+    def of(cls, problem: Problem, values: FloatArray, volts: FloatArray, dt: FloatArray, start: FloatArray) -> _Drive:
         return cls(volts, dt, start, _channels(problem, values, volts, dt, start))
 
     def differs(self, problem: Problem, values: FloatArray, way: Way) -> dict[str, bool]:
@@ -177,10 +183,13 @@ def _channels(
     assert run.pose is not None
     speed = wheel_speed(robot.wheels, run.twist)
     return {
-        "twist": run.twist, "wheel_speed": speed, "wheel_angle": speed,
-        "current": settled_currents(robot, run.twist[:-1], at_the_motors), "position": run.pose[:, :YAW],
+        "twist": run.twist,
+        "wheel_speed": speed,
+        "wheel_angle": speed,
+        "current": settled_currents(robot, run.twist[:-1], at_the_motors),
+        "position": run.pose[:, :YAW],
         "heading": run.pose[:, YAW:],
-    }  # fmt: skip
+    }
 
 
 # What the logs do not tell: directions of the free numbers along which their outputs stay, by the SVD of the scaled

@@ -69,8 +69,13 @@ class _Row:
 
 
 def _outwards(
-    cost: Callable[[Place], float], limit: float, inside: Callable[[Place], bool], start: _Row, way: float, walk: Walk,
-) -> None:  # fmt: skip
+    cost: Callable[[Place], float],
+    limit: float,
+    inside: Callable[[Place], bool],
+    start: _Row,
+    way: float,
+    walk: Walk,
+) -> None:
     rows, step, most = [start], LEAST, min(start.cost) + limit
     beyond: list[Place] = []
     while step >= LEAST:

@@ -39,9 +39,14 @@ class Resampled:
 
 
 def resampled(
-    solver: Solver, solution: Solution, known: Trust, profile: Sequence[str] = (), draws: int = 0,
-    strata: Strata | None = None, progress: FitProgress | None = None,
-) -> Resampled:  # fmt: skip
+    solver: Solver,
+    solution: Solution,
+    known: Trust,
+    profile: Sequence[str] = (),
+    draws: int = 0,
+    strata: Strata | None = None,
+    progress: FitProgress | None = None,
+) -> Resampled:
     """Intervals by bootstrap of all numbers, and by profile of those named.
 
     A number that the logs do not determine has neither. strata: groups whose runs are drawn apart.
@@ -160,9 +165,13 @@ def _end(solver: Solver, solution: Solution, index: int, best: float, step: floa
 
 
 def _crossing(
-    rise: Callable[[float, Point], tuple[float, Point]], best: float, step: float, bound: float, point: Point,
+    rise: Callable[[float, Point], tuple[float, Point]],
+    best: float,
+    step: float,
+    bound: float,
+    point: Point,
     limit: float,
-) -> float:  # fmt: skip
+) -> float:
     """Where 2 (F - least F) passes `limit` on the way from `best` by steps of 1.5 `step`, or the bound before it."""
     inside, outside = best, best
     for _ in range(OUTWARD):
@@ -194,9 +203,13 @@ def _rise(solver: Solver, solution: Solution, index: int, inner: float, point: P
 
 
 def bootstrap(
-    solver: Solver, solution: Solution, draws: int, seed: int = SEED, strata: Strata | None = None,
+    solver: Solver,
+    solution: Solution,
+    draws: int,
+    seed: int = SEED,
+    strata: Strata | None = None,
     progress: FitProgress | None = None,
-) -> FloatArray:  # fmt: skip
+) -> FloatArray:
     """Fits to runs drawn with replacement, those of each group among themselves. Shape (draws, P).
 
     Runs are the blocks: whatever their residuals remember, from one run to the next they do not.
@@ -222,10 +235,12 @@ def refuse_few_runs(runs: Mapping[str, int]) -> None:
     for group, count in runs.items():
         if count < LEAST_RUNS:
             raise InsufficientDataError(
-                "too few runs for a bootstrap", got=f"{count}{f' in {group}' if group else ''}",
-                expected=f"{LEAST_RUNS} or more", remedy="cut a long log into runs, or take the sandwich",
+                "too few runs for a bootstrap",
+                got=f"{count}{f' in {group}' if group else ''}",
+                expected=f"{LEAST_RUNS} or more",
+                remedy="cut a long log into runs, or take the sandwich",
                 where="bootstrap",
-            )  # fmt: skip
+            )
 
 
 def refuse_bootstrap(draws: object, runs: Mapping[str, int]) -> None:
@@ -233,9 +248,11 @@ def refuse_bootstrap(draws: object, runs: Mapping[str, int]) -> None:
     refuse_few_runs(runs)
     if not isinstance(draws, (int, np.integer)) or draws < LEAST_DRAWS:
         raise InputError(
-            "too few draws for a 95 % interval", got=f"{draws}", expected=f"{LEAST_DRAWS} or more; better 200",
+            "too few draws for a 95 % interval",
+            got=f"{draws}",
+            expected=f"{LEAST_DRAWS} or more; better 200",
             where="bootstrap",
-        )  # fmt: skip
+        )
 
 
 def least_runs(solver: Solver, strata: Strata | None = None) -> int:
@@ -293,9 +310,14 @@ class TiedEngine(Engine[Problem]):
 
 
 def differences(
-    solution: Solution, known: Trust, again: Resampled, own: Iterable[str], groups: Sequence[str],
-    profile: Sequence[str], strata: Strata,
-) -> tuple[Difference, ...]:  # fmt: skip
+    solution: Solution,
+    known: Trust,
+    again: Resampled,
+    own: Iterable[str],
+    groups: Sequence[str],
+    profile: Sequence[str],
+    strata: Strata,
+) -> tuple[Difference, ...]:
     """Every number of `own` between every two groups that have it and determine it.
 
     Its interval is by profile where that is asked for, from draws of a bootstrap where there are any, else to first
@@ -317,7 +339,7 @@ def differences(
 
 def _interval(
     solution: Solution, known: Trust, again: Resampled, a: int, b: int, strata: Strata, profiled: bool
-) -> tuple[float, float, float]:  # fmt: skip
+) -> tuple[float, float, float]:
     """(std, low, high) of number b minus number a."""
     solver, values = solution.solver, solution.state.point.values
     change = float(values[b] - values[a])

@@ -143,12 +143,22 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     seen = seen & ~(logs & (np.sqrt(np.diag(covariance)) > UNTOLD))
     covariance[~seen, ~seen] = np.inf
     return Trust(
-        covariance, normal.held, ~seen, _unseen(normal), _free_step(plain, normal), kind, widening,
-        t_quantile(degrees if degrees > 0 else np.inf), max(int(degrees), 0), neighbours, directions,
-        count if kind == SANDWICH else 0, plain, guessed, blind_ways(
-            solver.problem, solution.state.point.values, normal.information - np.diag(normal.prior_information)
-        ),
-    )  # fmt: skip
+        covariance,
+        normal.held,
+        ~seen,
+        _unseen(normal),
+        _free_step(plain, normal),
+        kind,
+        widening,
+        t_quantile(degrees if degrees > 0 else np.inf),
+        max(int(degrees), 0),
+        neighbours,
+        directions,
+        count if kind == SANDWICH else 0,
+        plain,
+        guessed,
+        blind_ways(solver.problem, solution.state.point.values, normal.information - np.diag(normal.prior_information)),
+    )
 
 
 def _unseen(normal: Normal) -> BoolArray:

@@ -183,10 +183,7 @@ def judged(
     why = [_why_not(each, own, before, count, _beyond(each, seen)) for each, own in zip(models, by, strict=True)]
     paying = [k for k, reason in enumerate(why) if reason is None]
     best = max(paying, key=lambda k: by[k].gain(before)[0], default=None)
-    alike = [
-        k for k in paying
-        if best is not None and (_is_alike(by[best], by[k]) or _is_same(by[best], by[k]))
-    ]  # fmt: skip
+    alike = [k for k in paying if best is not None and (_is_alike(by[best], by[k]) or _is_same(by[best], by[k]))]
     taken = min(
         alike, key=lambda k: (by[k].numbers, models[k].shapes, not models[k].instead, by[k].bic(count)), default=None
     )
@@ -210,9 +207,11 @@ def _mark(rung: Rung) -> tuple[Any, ...]:
     def rounded(value: Any) -> Any:
         if isinstance(value, Statement):
             return value.code, value.subject, *map(rounded, value.numbers.values())
-        return tuple(map(rounded, value)) if isinstance(value, tuple) else (
-            f"{value:.3g}" if isinstance(value, float) else value
-        )  # fmt: skip
+        return (
+            tuple(map(rounded, value))
+            if isinstance(value, tuple)
+            else (f"{value:.3g}" if isinstance(value, float) else value)
+        )
 
     return rung.key, rounded(rung.cause)
 
@@ -268,25 +267,45 @@ def _not_fitted(
     fitted, noise = {each.key for each in models}, own.left / max(own.rows, 1)
     enough = (1.0 - ROUGHLY) * (before.left - own.left) / noise - TOLD_APART
     return [
-        r.key for group, remedy in model.move.remedies.items() for r in seen[group].diagnosis.lack_of_fit.remedies
+        r.key
+        for group, remedy in model.move.remedies.items()
+        for r in seen[group].diagnosis.lack_of_fit.remedies
         if r.key in remedy.same_as and r.key not in fitted and r.chi2 >= enough
-    ]  # fmt: skip
+    ]
 
 
 def _rung(
-    step: int, model: Model, own: Errors, before: Errors, count: int, taken: bool, why: Statement, same: Sequence[str],
+    step: int,
+    model: Model,
+    own: Errors,
+    before: Errors,
+    count: int,
+    taken: bool,
+    why: Statement,
+    same: Sequence[str],
     stands: Model,
-) -> Rung:  # fmt: skip
+) -> Rung:
     gain, std = own.gain(before)
     others = dict.fromkeys(key for key in same if taken and key != model.key)
     found = as_fitted(model.cause, stands.value, model.value)
     if model.instead is not None:
         found = Statement("instead_of", NOTE, numbers={"cause": found, "step": model.instead})
     return Rung(
-        step, model.key, found, own.numbers, own.size, gain, std,
-        own.bic(count) - before.bic(), taken, why, tuple(others), model.instead is not None,
-        model.value, model.move.groups if model.move else (),
-    )  # fmt: skip
+        step,
+        model.key,
+        found,
+        own.numbers,
+        own.size,
+        gain,
+        std,
+        own.bic(count) - before.bic(),
+        taken,
+        why,
+        tuple(others),
+        model.instead is not None,
+        model.value,
+        model.move.groups if model.move else (),
+    )
 
 
 def _beyond(model: Model, seen: Mapping[str, Examined]) -> tuple[float, Statement | None]:
@@ -326,9 +345,7 @@ def _looks_like(lack: LackOfFit) -> Statement | None:
     return None
 
 
-def _ended(
-    stands: Model, rungs: Sequence[Rung], why: str, **numbers: Any
-) -> tuple[Fit, Solution, Ladder]:  # fmt: skip
+def _ended(stands: Model, rungs: Sequence[Rung], why: str, **numbers: Any) -> tuple[Fit, Solution, Ladder]:
     return stands.fit, stands.solution, Ladder(tuple(rungs), Statement(why, NOTE, numbers=numbers))
 
 
@@ -336,16 +353,23 @@ def _ended(
 
 
 def calmed(
-    step: int, stands: Model, seen: Mapping[str, Examined], runs: Sequence[Run], names: Sequence[str] | None,
-    progress: FitProgress, gave_up: bool = False,
-) -> tuple[Model, list[Rung]]:  # fmt: skip
+    step: int,
+    stands: Model,
+    seen: Mapping[str, Examined],
+    runs: Sequence[Run],
+    names: Sequence[str] | None,
+    progress: FitProgress,
+    gave_up: bool = False,
+) -> tuple[Model, list[Rung]]:
     """(the model to go on from, the rungs of a step): of Student's t where that predicts better, by more than a
     standard error, what is not wild; as it stands, and no rungs, where no sample is wild, or a cause gains more.
     gave_up: no such cause paid. It counts as no number of the fit."""
     own = {
-        group: remedy for group, each in seen.items() for remedy in each.diagnosis.lack_of_fit.remedies
+        group: remedy
+        for group, each in seen.items()
+        for remedy in each.diagnosis.lack_of_fit.remedies
         if remedy.key == LOSS and (gave_up or remedy.gain > _best_cause(each.diagnosis.lack_of_fit))
-    }  # fmt: skip
+    }
     if not own:
         return stands, []
     best = max(own.values(), key=lambda remedy: remedy.gain - remedy.gain_std)

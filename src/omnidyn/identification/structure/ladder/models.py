@@ -154,9 +154,10 @@ def moves_apart(worth: Mapping[str, Sequence[Remedy]], stands: Model) -> list[Mo
     """The same in each group alone, where several ask for it."""
     return [
         Move({group: remedy}, all=False)
-        for key, own in _of_groups(worth) if len(own) > 1 and is_own(key, stands.fit.question)
+        for key, own in _of_groups(worth)
+        if len(own) > 1 and is_own(key, stands.fit.question)
         for group, remedy in own.items()
-    ]  # fmt: skip
+    ]
 
 
 def _of_groups(worth: Mapping[str, Sequence[Remedy]]) -> list[tuple[str, dict[str, Remedy]]]:
@@ -236,17 +237,23 @@ def _begins(stands: Model, ways: Mapping[str, Switch]) -> dict[str, tuple[Robot,
 
 
 def _fit(
-    stands: Model, begins: Mapping[str, tuple[Robot, OutputError]], runs: Sequence[Run], names: Sequence[str] | None,
+    stands: Model,
+    begins: Mapping[str, tuple[Robot, OutputError]],
+    runs: Sequence[Run],
+    names: Sequence[str] | None,
     progress: FitProgress,
-) -> Fit:  # fmt: skip
+) -> Fit:
     if names is None:
         return Fit.of(runs, *begins[stands.fit.groups[0].name], progress=progress)
     asked, first = stands.fit.question, next(iter(begins.values()))[1]
     profiles = [set(question.profile) for _, question in begins.values()]
     question = replace(
-        asked, per_free=_own(stands, begins), nuisances=first.nuisances, loss=first.loss,
+        asked,
+        per_free=_own(stands, begins),
+        nuisances=first.nuisances,
+        loss=first.loss,
         profile=tuple(name for name in asked.profile if all(name in own for own in profiles)),
-    )  # fmt: skip
+    )
     return Fit.of(runs, stands.fit.began, question, names, progress, begins)
 
 

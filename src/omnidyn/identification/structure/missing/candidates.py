@@ -117,9 +117,7 @@ def of_the_log(bench: Workbench) -> Iterator[Candidate]:
         gain, fade, band = Driver(gain=1.0 + STEP), Driver(fade=STEP), Driver(dead_band=0.1)
         yield Candidate(GAIN, _driver(GAIN, gain, STEP), sized("gain", "", gain=lambda by, _: 1.0 + by))
         yield Candidate(FADE, _driver(FADE, fade, STEP), sized("fading_voltage", "", percent=lambda by, _: 100.0 * by))
-        yield Candidate(
-            DEAD_BAND, _driver(DEAD_BAND, band, 0.1), sized("dead_band", "", value=lambda by, _: by), 0.0
-        )  # fmt: skip
+        yield Candidate(DEAD_BAND, _driver(DEAD_BAND, band, 0.1), sized("dead_band", "", value=lambda by, _: by), 0.0)
     yield Candidate(TILT, _by(in_the_room), as_it_is("force_in_the_room"))
     yield Candidate(PUSH, _by(_on_the_body), as_it_is("push_on_the_body"))
     for channel in dict.fromkeys(name for name, _ in bench.problem.columns):
@@ -128,9 +126,14 @@ def of_the_log(bench: Workbench) -> Iterator[Candidate]:
     mass, at = float(bench.robot.body.mass), partial(_seconds, bench)
     for what, force in (("friction", _friction), ("mass", _inertia), ("supply", _drive)):
         changed = sized(
-            "change_on_the_way", what, by=lambda by, _: by, before=lambda *_: mass,
-            after=lambda by, _: max(mass + by, 0.0), share=lambda _, share: share, at=lambda _, share: at(share),
-        )  # fmt: skip
+            "change_on_the_way",
+            what,
+            by=lambda by, _: by,
+            before=lambda *_: mass,
+            after=lambda by, _: max(mass + by, 0.0),
+            share=lambda _, share: share,
+            at=lambda _, share: at(share),
+        )
         yield Candidate(CHANGE, _later(force), changed)
 
 

@@ -96,9 +96,11 @@ def _of_motors(bench: Workbench) -> Iterator[Candidate]:
     if np.all(per_wheel(motor.gear_efficiency, n) == 1.0):
         lossy = _with(bench.robot, gear_efficiency=1.0 - LOSS)
         yield Candidate(
-            "motor.gear_efficiency", lambda b: [Trial([own / LOSS for own in b.change(lossy)])],
-            sized("gear_efficiency", "", efficiency=lambda by, _: 1.0 - by), 0.0,
-        )  # fmt: skip
+            "motor.gear_efficiency",
+            lambda b: [Trial([own / LOSS for own in b.change(lossy)])],
+            sized("gear_efficiency", "", efficiency=lambda by, _: 1.0 - by),
+            0.0,
+        )
     if bench.robot.wheels.traction_mu is None and not bench.kind.looped:
         yield Candidate(TRACTION, _grips, sized("slipping_wheels", "", share=lambda _, at: at), late=True)
 
@@ -107,9 +109,11 @@ def _switched_on(robot: Robot, key: str, field: str, size: float) -> Candidate:
     """A number of the motors that is 0, at a small size."""
     on = _with(robot, **{field: size})
     return Candidate(
-        key, lambda b: [Trial([own / size for own in b.change(on)])],
-        sized("switched_on", key, value=lambda by, _: by), 0.0,
-    )  # fmt: skip
+        key,
+        lambda b: [Trial([own / size for own in b.change(on)])],
+        sized("switched_on", key, value=lambda by, _: by),
+        0.0,
+    )
 
 
 def _with(robot: Robot, **changes: Any) -> Robot:
@@ -322,9 +326,11 @@ def along_travel(friction: Friction) -> Friction:
     """An ellipse in the place of a box, at the same levels."""
     axes = friction.axes
     other = DirectionFriction(
-        coulomb=axes.coulomb[:2], viscous=0.5 * (axes.viscous[0] + axes.viscous[1]), yaw_coulomb=axes.coulomb[YAW],
+        coulomb=axes.coulomb[:2],
+        viscous=0.5 * (axes.viscous[0] + axes.viscous[1]),
+        yaw_coulomb=axes.coulomb[YAW],
         yaw_viscous=axes.viscous[YAW],
-    )  # fmt: skip
+    )
     return Friction(direction=other, wheels=friction.wheels)
 
 

@@ -54,9 +54,12 @@ class _Refit:
 
 
 def refits(
-    solution: Solution, problem: Problem, parts: Sequence[Parts], ranked: Sequence[Remedy],
+    solution: Solution,
+    problem: Problem,
+    parts: Sequence[Parts],
+    ranked: Sequence[Remedy],
     candidates: Sequence[Candidate],
-) -> dict[str, tuple[Candidate, list[Trial]]]:  # fmt: skip
+) -> dict[str, tuple[Candidate, list[Trial]]]:
     """Key -> a candidate with what a fit with it shows. problem, parts: what was fitted, its rows at the best point.
 
     ranked: by columns near the fit. Nothing of wheels that slip, whose fits take as long as all else.
@@ -125,7 +128,7 @@ def _by_coarse_steps(problem: Problem, parts: Sequence[Parts], point: Point, kin
 
 def _begun(
     candidate: Candidate, way: Switch, problem: Problem, solution: Solution, off: Sequence[FloatArray], coarse: Kind
-) -> _Refit:  # fmt: skip
+) -> _Refit:
     """Where a fit with a candidate begins. coarse: the engine of `off`. Raises OmnidynError where none can."""
     records = list({id(piece.record): piece.record for piece in problem.pieces}.values())
     keys = expand_keys(way.question.free or (), way.robot)

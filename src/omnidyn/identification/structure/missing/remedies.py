@@ -87,10 +87,20 @@ def remedies(
         share = (t.chi2 - t.numbers) / max(every - t.numbers - len(themes), t.chi2 - t.numbers, 1e-300)
         ranking.append(
             Remedy(
-                t.candidate.key, cause, gain, std, same, share, t.candidate.offered, t.chi2, t.numbers,
-                tuple(t.size.tolist()), t.trial.at, fitted.changes if fitted else _changes(linear.rows, t),
+                t.candidate.key,
+                cause,
+                gain,
+                std,
+                same,
+                share,
+                t.candidate.offered,
+                t.chi2,
+                t.numbers,
+                tuple(t.size.tolist()),
+                t.trial.at,
+                fitted.changes if fitted else _changes(linear.rows, t),
             )
-        )  # fmt: skip
+        )
     kept = [r for r in ranking if r.gain > -CLEAR * r.gain_std and r.chi2 > RIVAL * worth[0].chi2]
     return tuple(_best_first(kept)[:most])
 
@@ -135,9 +145,10 @@ def _same(blocks: Blocks, known: IntArray, base: float, noise: float, one: Tried
 # a body of I/s^2. No fit to such a log can tell.
 
 HIDDEN = {
-    "motor.resistance_ohm": "wheels.wheel_radius_m", GAIN: "wheels.wheel_radius_m",
+    "motor.resistance_ohm": "wheels.wheel_radius_m",
+    GAIN: "wheels.wheel_radius_m",
     "body.inertia_kg_m2": "wheels.robot_radius_m",
-}  # fmt: skip
+}
 
 
 def hidden_by(key: str, columns: Iterable[tuple[str, int]]) -> list[str]:

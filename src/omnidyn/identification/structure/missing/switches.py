@@ -57,9 +57,10 @@ NUMBERS = {FALL: (BREAKAWAY, FALL), BEND: (BEND,), DAMPING: (BREAKAWAY, FALL, BE
 ABOVE = 1.1, HIGHEST  # breakaway over Coulomb friction, between which the fit of a fall begins
 # Numbers of each wheel that change together, and what stands for them in a robot.
 OF_ALL = {
-    "wheels.wheel_radius_m": ("wheels", ("wheel_radius",)), "motor.resistance_ohm": ("motor", ("resistance",)),
+    "wheels.wheel_radius_m": ("wheels", ("wheel_radius",)),
+    "motor.resistance_ohm": ("motor", ("resistance",)),
     "motor.torque_constant_Nm_A": ("motor", ("torque_constant", "emf_constant")),
-}  # fmt: skip
+}
 OFF = {"motor.voltage_drop_V": "voltage_drop", "motor.rotor_inertia_kg_m2": "rotor_inertia"}
 
 
@@ -223,8 +224,9 @@ def _rough(robot: Robot, asked: OutputError, names: Sequence[str], cause: Statem
     keys = [key for name in names for key in expand_keys(name, robot) if Key.parse(key).axis in own | {None}]
     rough = {
         key: Prior(std=UNSURE * float(Key.parse(key).get(robot)), source="where the search began", origin="guess")
-        for key in keys if not Key.parse(key).level
-    }  # fmt: skip
+        for key in keys
+        if not Key.parse(key).level
+    }
     return Switch(robot.replace(priors={**robot.priors, **rough}), _free(asked, *keys), cause)
 
 
@@ -235,9 +237,10 @@ def _at_wheels(robot: Robot, asked: OutputError) -> Iterator[Switch]:
     level = _at_rims(robot)
     rim = float(np.mean(viscous / (g**2).sum(axis=1)))
     yield Switch(
-        robot.replace(friction=Friction(wheels=WheelFriction(coulomb=level, viscous=rim))), _of_another_shape(asked),
+        robot.replace(friction=Friction(wheels=WheelFriction(coulomb=level, viscous=rim))),
+        _of_another_shape(asked),
         Statement("friction_at_wheels_instead", NOTE),
-    )  # fmt: skip
+    )
     if coulomb.any():
         yield _beside(robot, asked, False, 0.5 * level)
 
@@ -266,9 +269,11 @@ def _beside(robot: Robot, asked: OutputError, each: bool, level: float | tuple[f
         )
     else:
         half = DirectionFriction(
-            coulomb=(0.5 * float(coulomb[0]), 0.5 * float(coulomb[1])), yaw_coulomb=0.5 * direction.yaw_coulomb,
-            viscous=direction.viscous, yaw_viscous=direction.yaw_viscous,
-        )  # fmt: skip
+            coulomb=(0.5 * float(coulomb[0]), 0.5 * float(coulomb[1])),
+            yaw_coulomb=0.5 * direction.yaw_coulomb,
+            viscous=direction.viscous,
+            yaw_viscous=direction.yaw_viscous,
+        )
         body, where = Friction(direction=half), DIRECTION
     cause = Statement("friction_beside", NOTE, where, {"each": each})
     both = body.replace(wheels=WheelFriction(coulomb=level))

@@ -111,10 +111,12 @@ class _Hdf5Walk:
         self.expanded += 8 * item.size
         if self.expanded > max(MAX_EXPANSION * self.size, MIN_EXPANDED_BYTES):
             raise InputError(
-                "the file would grow too much", got=f"{self.expanded} bytes from {self.size}",
-                expected=f"at most {MAX_EXPANSION} times its size", where=self.variables.source,
+                "the file would grow too much",
+                got=f"{self.expanded} bytes from {self.size}",
+                expected=f"at most {MAX_EXPANSION} times its size",
+                where=self.variables.source,
                 remedy="a log does not shrink that much: save it again from its source",
-            )  # fmt: skip
+            )
         if self.expanded > max(self.max_bytes, MIN_EXPANDED_BYTES):
             raise too_large(self.variables.source, self.max_bytes, TOO_LARGE_REMEDY)
         values = np.asarray(item[()])

@@ -60,9 +60,12 @@ def read_mat5(stream: BinaryIO, size: int, variables: Variables, max_bytes: int)
 def damaged(source: str, got: str) -> InputError:
     """The error of a file that cannot be read."""
     return InputError(
-        "the MATLAB file is damaged or cut short", got=got[:80], expected="a whole file",
-        remedy="copy it again, or save it again in MATLAB", where=source,
-    )  # fmt: skip
+        "the MATLAB file is damaged or cut short",
+        got=got[:80],
+        expected="a whole file",
+        remedy="copy it again, or save it again in MATLAB",
+        where=source,
+    )
 
 
 class _Unpacker:
@@ -94,10 +97,12 @@ class _Unpacker:
         self.expanded += more
         if self.expanded > self.most:
             raise InputError(
-                "the file would grow too much", got=f"more than {self.most} bytes", where=self.source,
+                "the file would grow too much",
+                got=f"more than {self.most} bytes",
+                where=self.source,
                 expected=f"at most {MAX_EXPANSION} times its size",
                 remedy="a log does not shrink that much: save it again from its source",
-            )  # fmt: skip
+            )
         if self.expanded > max(self.max_bytes, MIN_EXPANDED_BYTES):
             raise too_large(self.source, self.max_bytes, TOO_LARGE_REMEDY)
 

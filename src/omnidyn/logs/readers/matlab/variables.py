@@ -58,9 +58,12 @@ class Variables:
                 known = list(dict.fromkeys(part for head in heads for part in head))
                 close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
                 raise InputError(
-                    "no such variable", got=name, expected=shortened(", ".join(known), 300) or "a file with variables",
-                    remedy=f"did you mean {close[0]}?" if close else "", where=self.source,
-                )  # fmt: skip
+                    "no such variable",
+                    got=name,
+                    expected=shortened(", ".join(known), 300) or "a file with variables",
+                    remedy=f"did you mean {close[0]}?" if close else "",
+                    where=self.source,
+                )
         mine = {each: values for each, values in self.arrays.items() if set(_below(each)) & set(names)}
         return replace(
             self, arrays=mine, passed={each: w for each, w in self.passed.items() if set(_below(each)) & set(names)}
@@ -185,17 +188,21 @@ def _second(name: str, values: FloatArray, source: str) -> float:
     if SHORTEST_STEP <= usual <= LONGEST_STEP:
         return 1.0
     raise InputError(
-        "a time without a unit", got=f"rows {usual:.4g} apart", expected="seconds", where=f"{source}, {name}",
+        "a time without a unit",
+        got=f"rows {usual:.4g} apart",
+        expected="seconds",
+        where=f"{source}, {name}",
         remedy=f"call it {name}_ms, or whatever it counts",
-    )  # fmt: skip
+    )
 
 
 def _nothing(variables: Variables) -> InputError:
     told = ", ".join([*(f"{name}: {why}" for name, why in variables.passed.items()), *variables.arrays])
     objects = any("object" in why for why in variables.passed.values())
     return InputError(
-        "the file holds no columns of numbers", got=shortened(told, 300) or "no variables",
+        "the file holds no columns of numbers",
+        got=shortened(told, 300) or "no variables",
         expected="vectors of one length, or structs of them, with a time among them",
         remedy=OBJECTS if objects else "save one vector per wheel, and the time: save('log.mat', 't_s', 'u1_V')",
         where=variables.source,
-    )  # fmt: skip
+    )

@@ -53,9 +53,12 @@ def read_files(paths: Sequence[Path], source: str, options: ReadOptions) -> Reco
             grown += growth(stream, size, path.name if len(paths) > 1 else "")
     if damage and not bag.count:
         raise InputError(
-            "the recording is damaged or cut short", got=damage[0], expected="at least one whole message",
-            remedy="copy it again, with all files that stand beside it", where=source,
-        )  # fmt: skip
+            "the recording is damaged or cut short",
+            got=damage[0],
+            expected="at least one whole message",
+            remedy="copy it again, with all files that stand beside it",
+            where=source,
+        )
     tracks, topics, notes = bag.result()
     notes = [*grown, *notes]
     if damage:

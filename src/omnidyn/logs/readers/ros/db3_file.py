@@ -47,9 +47,11 @@ class Db3File:
         tables = {str(name) for (name,) in db.execute("select name from sqlite_master where type = 'table'")}
         if not {"topics", "messages"} <= tables:
             raise InputError(
-                "an SQLite database that is no ROS 2 bag", got=", ".join(sorted(tables)[:8]) or "no tables",
-                expected="the tables topics and messages", where=str(self.path),
-            )  # fmt: skip
+                "an SQLite database that is no ROS 2 bag",
+                got=", ".join(sorted(tables)[:8]) or "no tables",
+                expected="the tables topics and messages",
+                where=str(self.path),
+            )
         texts = self._definitions(db) if "message_definitions" in tables else {}
         known = {
             number: Connection(str(name), str(kind), texts.get(str(kind), ""), str(form))
@@ -90,6 +92,9 @@ class Db3File:
         if self._beside():
             remedy += "; the file beside it that ends in -wal holds messages too: copy both"
         return InputError(
-            "the bag is damaged or cut short", got=got, expected="a whole SQLite database", remedy=remedy,
+            "the bag is damaged or cut short",
+            got=got,
+            expected="a whole SQLite database",
+            remedy=remedy,
             where=str(self.path),
-        )  # fmt: skip
+        )

@@ -179,9 +179,21 @@ SEQUENCE = -1  # as a length: of any
 
 # name -> the numpy code of what lies in the message. ROS 1 calls a signed byte `byte` and an unsigned one `char`.
 PRIMITIVES = {
-    "bool": "u1", "byte": "u1", "char": "u1", "octet": "u1", "int8": "i1", "uint8": "u1", "int16": "i2",
-    "uint16": "u2", "int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
-}  # fmt: skip
+    "bool": "u1",
+    "byte": "u1",
+    "char": "u1",
+    "octet": "u1",
+    "int8": "i1",
+    "uint8": "u1",
+    "int16": "i2",
+    "uint16": "u2",
+    "int32": "i4",
+    "uint32": "u4",
+    "int64": "i8",
+    "uint64": "u8",
+    "float32": "f4",
+    "float64": "f8",
+}
 WORDS = ("string", "wstring")
 STAMPS = ("time", "duration")  # of ROS 1: secs and nsecs
 

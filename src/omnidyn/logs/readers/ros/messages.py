@@ -187,9 +187,12 @@ class TopicReader:
             if infinite.any() and out.component:
                 where = f"{source}, {out.name}, message {self._place(int(np.argmax(infinite))) + 1}"
                 raise InputError(
-                    "not a finite number", got="inf", expected="a finite number, or NaN where missing",
-                    remedy="mend what records it", where=where,
-                )  # fmt: skip
+                    "not a finite number",
+                    got="inf",
+                    expected="a finite number, or NaN where missing",
+                    remedy="mend what records it",
+                    where=where,
+                )
             if infinite.any():
                 notes.append(f"{out.name}: {int(infinite.sum())} infinite numbers are taken as missing")
                 out = out._replace(values=np.where(infinite, np.nan, out.values))
@@ -222,9 +225,11 @@ class Bag:
         if key not in self.readers:
             if len(self.readers) >= MAX_TOPICS:
                 raise InputError(
-                    "too many topics", got=f"more than {MAX_TOPICS}", expected=f"at most {MAX_TOPICS}",
+                    "too many topics",
+                    got=f"more than {MAX_TOPICS}",
+                    expected=f"at most {MAX_TOPICS}",
                     where=self.source,
-                )  # fmt: skip
+                )
             self.readers[key] = TopicReader(connection)
         return self.readers[key]
 

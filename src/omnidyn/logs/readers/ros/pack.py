@@ -28,15 +28,20 @@ class Unpacker:
         limit = max(MAX_EXPANSION * self.size, MIN_EXPANDED_BYTES)
         if self.declared > limit:
             raise InputError(
-                "the file would grow too much", got=f"{self.declared} bytes from {self.size}",
-                expected=f"at most {MAX_EXPANSION} times its size", where=self.source,
+                "the file would grow too much",
+                got=f"{self.declared} bytes from {self.size}",
+                expected=f"at most {MAX_EXPANSION} times its size",
+                where=self.source,
                 remedy="a log does not shrink that much: record it again, or write it without compression",
-            )  # fmt: skip
+            )
         if size > self.max_bytes:
             raise InputError(
-                "a chunk of the file is too large", got=f"{size} bytes", expected=f"at most {self.max_bytes}",
-                remedy="write it in smaller chunks, or allow more with `max_bytes`", where=self.source,
-            )  # fmt: skip
+                "a chunk of the file is too large",
+                got=f"{size} bytes",
+                expected=f"at most {self.max_bytes}",
+                remedy="write it in smaller chunks, or allow more with `max_bytes`",
+                where=self.source,
+            )
 
     def unpack(self, kind: str, data: bytes, size: int) -> bytes:
         """The bytes of a chunk. Raises DamagedError where they are not `size`, InputError for an unknown packing."""
@@ -75,9 +80,11 @@ class Unpacker:
         size = size if size >= 0 else MIN_EXPANDED_BYTES
         if size > min(self.max_bytes, MIN_EXPANDED_BYTES):
             raise InputError(
-                "a message would grow too much", got=f"{size} bytes from {len(data)}",
-                expected=f"at most {MIN_EXPANDED_BYTES}", where=self.source,
-            )  # fmt: skip
+                "a message would grow too much",
+                got=f"{size} bytes from {len(data)}",
+                expected=f"at most {MIN_EXPANDED_BYTES}",
+                where=self.source,
+            )
         try:
             return zstandard.ZstdDecompressor().stream_reader(data).read(size)
         except zstandard.ZstdError:
@@ -93,10 +100,12 @@ def unpack_file(packed: BinaryIO, into: BinaryIO, source: str, limit: int) -> No
                 done += len(block)
                 if done > limit:
                     raise InputError(
-                        "the file would grow too much", got=f"more than {limit} bytes",
-                        expected=f"at most {MAX_EXPANSION} times its size", where=source,
+                        "the file would grow too much",
+                        got=f"more than {limit} bytes",
+                        expected=f"at most {MAX_EXPANSION} times its size",
+                        where=source,
                         remedy="a log does not shrink that much: record it again, or write it without compression",
-                    )  # fmt: skip
+                    )
                 into.write(block)
     except zstandard.ZstdError as error:
         raise InputError(

@@ -27,10 +27,26 @@ WORLD_FRAMES = ("odom", "map", "world")
 _INDEX = re.compile(r"\[\d+\]")
 MOST_GENERIC = 200  # columns of one topic that no rule knows
 HEAVY = (
-    "Image", "CompressedImage", "PointCloud", "PointCloud2", "LaserScan", "OccupancyGrid", "OccupancyGridUpdate",
-    "CameraInfo", "Marker", "MarkerArray", "Path", "PoseArray", "Log", "DiagnosticArray", "ParameterEvent", "Parameter",
-    "JointTrajectory", "PolygonStamped", "Costmap",
-)  # fmt: skip
+    "Image",
+    "CompressedImage",
+    "PointCloud",
+    "PointCloud2",
+    "LaserScan",
+    "OccupancyGrid",
+    "OccupancyGridUpdate",
+    "CameraInfo",
+    "Marker",
+    "MarkerArray",
+    "Path",
+    "PoseArray",
+    "Log",
+    "DiagnosticArray",
+    "ParameterEvent",
+    "Parameter",
+    "JointTrajectory",
+    "PolygonStamped",
+    "Costmap",
+)
 
 
 class Rule(NamedTuple):
@@ -74,9 +90,13 @@ def _paths(**keys: str) -> Callable[[MessageLayout], Picks]:
 
 def _pose_paths(of: str) -> dict[str, str]:
     return {
-        "x": f"{of}position.x", "y": f"{of}position.y", "qx": f"{of}orientation.x", "qy": f"{of}orientation.y",
-        "qz": f"{of}orientation.z", "qw": f"{of}orientation.w",
-    }  # fmt: skip
+        "x": f"{of}position.x",
+        "y": f"{of}position.y",
+        "qx": f"{of}orientation.x",
+        "qy": f"{of}orientation.y",
+        "qz": f"{of}orientation.z",
+        "qw": f"{of}orientation.w",
+    }
 
 
 def _twist_paths(of: str) -> dict[str, str]:
@@ -116,9 +136,10 @@ def _transforms(layout: MessageLayout) -> Picks:
         return {}
     of = best[1]
     paths = {
-        "x": f"{of}.transform.translation.x", "y": f"{of}.transform.translation.y",
+        "x": f"{of}.transform.translation.x",
+        "y": f"{of}.transform.translation.y",
         **{f"q{a}": f"{of}.transform.rotation.{a}" for a in "xyzw"},
-    }  # fmt: skip
+    }
     return {**_stamp(layout, f"{of}.header.stamp"), **paths}
 
 
@@ -241,10 +262,13 @@ def _volts(topic: str, numbers: Numbers) -> list[TopicColumn]:
 HEADING = "/omnidyn/heading"
 # What no standard message holds, under names of our own: topic -> letter of the component, unit, ending.
 OWN_TOPICS = {
-    "/omnidyn/voltage": ("u", "V", ""), "/omnidyn/duty": ("d", "duty", ""), "/omnidyn/current": ("i", "A", ""),
-    "/omnidyn/wheel_speed_command": ("w", "rad/s", "_cmd"), "/omnidyn/supply": ("supply", "V", ""),
+    "/omnidyn/voltage": ("u", "V", ""),
+    "/omnidyn/duty": ("d", "duty", ""),
+    "/omnidyn/current": ("i", "A", ""),
+    "/omnidyn/wheel_speed_command": ("w", "rad/s", "_cmd"),
+    "/omnidyn/supply": ("supply", "V", ""),
     HEADING: ("heading", "rad", ""),
-}  # fmt: skip
+}
 
 
 def rank_of(topic: str, rule: Rule) -> int:
