@@ -12,7 +12,7 @@ def result(headline, numbers, warnings):
     estimate = SimpleNamespace(
         value=dict.fromkeys(keys, 1.0), ci95=dict.fromkeys(keys, (0.9, 1.1)), unidentifiable=(), warnings=warnings
     )
-    return SimpleNamespace(estimates={"": estimate}, headline=headline, advice=(), study=None)
+    return SimpleNamespace(groups={"": estimate}, headline=headline, advice=(), study=None)
 
 
 def test_the_gravest_warning_is_shown_whatever_the_room():

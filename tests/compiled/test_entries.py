@@ -188,7 +188,8 @@ def test_a_cache_that_cannot_be_stamped_is_not_used(monkeypatch, problem):
 
 
 def test_two_kernels_of_one_name_are_told_apart(folder):
-    first, second = [kernel(lambda x: 2.0 * x), kernel(lambda x: 5.0 * x)]
+    first = kernel(lambda x: 2.0 * x)  # of another line: a cache tells them apart by that
+    second = kernel(lambda x: 5.0 * x)
     assert (first(1.0), second(1.0), first(2.0)) == (2.0, 5.0, 4.0)
 
 

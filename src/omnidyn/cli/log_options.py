@@ -17,7 +17,7 @@ from omnidyn.cli.terminal.help import MORE
 from omnidyn.cli.terminal.streams import say
 from omnidyn.errors import InputError
 from omnidyn.files import check_output, keep_apart, open_regular
-from omnidyn.logs.readers.reader import files_of, is_log_folder, log_folders, natural
+from omnidyn.logs.readers.folders import files_of, is_log_folder, log_folders, natural
 from omnidyn.model.presets import robot_path
 from omnidyn.progress import Progress, Report, silent
 

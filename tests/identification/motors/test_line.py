@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.identify import identify
-from omnidyn.identification.methods import MotorLine
+from omnidyn.identification.methods import MotorFit, MotorLine
 from omnidyn.identification.motors.log import motor_logs
 from omnidyn.identification.motors.windows import motor_windows
 from omnidyn.run import Run
@@ -157,15 +157,17 @@ def test_the_same_data_give_the_same_intervals():
         ({"input": "current"}, r"input is not in the log; got voltage, wheel_angle.*expected current"),
         ({"speed": "light"}, r"no such speed; got light; expected wheel, set or ground"),
         ({"speed": "set"}, r"no such speed; got set; expected wheel or ground"),
-        ({"shape": "disc"}, r"not an option of the motors; got `shape`"),
-        ({"between": "hold", "method": "steady-state"}, r"steady-state has no such option; got `between`"),
-        ({"nuisances": "gain", "between": "hold"}, r"of the motors only latency can be fitted; got gain"),
         ({"speed": "ground"}, r"the heading is not known"),
     ],
 )
 def test_wrong_options_are_refused(how, words):
     with pytest.raises(InputError, match=words):
         identify([bench(0.4)], None, MotorLine(**how))
+
+
+def test_a_free_run_takes_no_nuisance_but_a_latency():
+    with pytest.raises(InputError, match="of the motors only latency can be fitted; got gain"):
+        identify([bench(0.4)], None, MotorFit(nuisances="gain", between="hold"))
 
 
 def test_too_few_windows_are_refused():

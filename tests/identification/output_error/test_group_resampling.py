@@ -15,6 +15,7 @@ from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import coloured, excitation, noisy_draw
 from tests.support.codes import codes
+from tests.support.grouped import shared
 
 AXEBOT = load_robot("axebot")
 TORQUE, COULOMB, MASS = "motor.torque_constant_Nm_A", "friction.axes.coulomb[0]", "body.mass_kg"
@@ -163,6 +164,6 @@ def test_floors_of_a_robot_of_the_implicit_engine():
         runs.append(run.replace(twist=run.twist + noise, wheel_speed=None, current=None, pose=None))
     study = identify(runs, robot, OutputError(free=[*keys, MASS], per_free=keys[:1], **QUIET), groups=[*true])
     (difference,) = study.differences
-    assert study.shared == (keys[1], MASS)
+    assert shared(study) == {keys[1], MASS}
     assert difference.difference == pytest.approx(-5.0, abs=4.0 * difference.std)
     assert difference.std < 0.5

@@ -232,7 +232,7 @@ def test_what_is_written_can_be_read_and_says_where_it_comes_from(axebot, clean,
 )
 def test_options_that_cannot_be_used(axebot, clean, options, message):
     with pytest.raises(InputError, match=message.replace("[", r"\[")):
-        identify(noisy(clean, 1), axebot, OutputError(nuisances=(), **options))
+        identify(noisy(clean, 1), axebot, OutputError(**{"nuisances": (), **options}))
 
 
 def test_logs_that_cannot_be_used(axebot, four_wheel, clean):

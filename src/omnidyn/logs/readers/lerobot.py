@@ -19,6 +19,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, shortened
 from omnidyn.files import open_regular, read_text
+from omnidyn.logs.readers.folders import INFO, data_files, is_dataset_folder
 from omnidyn.logs.readers.parquet import (
     SUFFIXES,
     batches_of,
@@ -31,7 +32,7 @@ from omnidyn.logs.readers.parquet import (
     sha256_of,
 )
 from omnidyn.logs.readers.parquet_pages import declared_bytes
-from omnidyn.logs.readers.reader import INFO, Reader, ReadOptions, data_files, is_dataset_folder
+from omnidyn.logs.readers.reader import Reader, ReadOptions
 from omnidyn.logs.table.rows import refuse_infinite
 from omnidyn.logs.table.table import MAX_CELLS, Said, Table
 from omnidyn.progress import Report

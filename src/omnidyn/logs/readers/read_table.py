@@ -9,9 +9,10 @@ from pathlib import Path
 
 from omnidyn.errors import InputError
 from omnidyn.files import default_max_bytes, format_of
+from omnidyn.logs.readers.folders import files_of, is_bag_folder, is_log_folder
 from omnidyn.logs.readers.lerobot import PARQUET
 from omnidyn.logs.readers.matlab.mat import HDF5, MAT
-from omnidyn.logs.readers.reader import Reader, ReadOptions, completed, files_of, is_bag_folder, is_log_folder
+from omnidyn.logs.readers.reader import Reader, ReadOptions, completed
 from omnidyn.logs.readers.ros.bags import MCAP, ROS1, ROS2
 from omnidyn.logs.readers.text import TEXT
 from omnidyn.logs.readers.wpilog import WPILOG

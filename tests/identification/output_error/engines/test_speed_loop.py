@@ -19,6 +19,7 @@ from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, Wh
 from omnidyn.model.keys import EMF, TORQUE, Key, friction_keys, gain_keys
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
+from tests.support.grouped import shared
 
 KP, KI = "drive.kp_V_s_rad", "drive.ki_V_rad"
 RESISTANCE = "motor.resistance_ohm"
@@ -174,7 +175,7 @@ def test_two_floors_share_the_gains(looped):
         rough = Key.parse(key).set(rough, 1.3 * Key.parse(key).get(looped))
     runs = [log(looped, 5, 300), log(rough, 6, 300), log(looped, 7, 300), log(rough, 8, 300)]
     found = identify(runs, wrong(looped), OutputError(nuisances=()), groups=["smooth", "rough"] * 2)
-    assert set(found.shared) == {KP, KI}
+    assert shared(found) == {KP, KI}
     assert_near(found.groups["smooth"], looped)
     assert_near(found.groups["rough"], rough)
     change = {d.key: d for d in found.differences}["friction.axes.coulomb[0]"]

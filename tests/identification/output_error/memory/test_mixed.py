@@ -6,7 +6,7 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 from omnidyn.identification.output_error.memory.autoregression import autoregression
-from omnidyn.identification.output_error.memory.moving import _likelihood, mixed, partials
+from omnidyn.identification.output_error.memory.moving import _mixed_likelihood, mixed, partials
 
 
 def noise_and_memory(rows, z, share, seed):
@@ -26,7 +26,7 @@ def test_the_likelihood_is_the_dense_one(phi, theta):
     impulse = lfilter([1.0, -theta], [1.0, -phi], np.eye(1, 4000)[0])
     dense = toeplitz([impulse[: 4000 - k] @ impulse[k:] for k in range(30)])
     values = np.random.default_rng(1).normal(size=(50, 2))
-    square, logs, _, _ = _likelihood(values, np.array([0, 30, 50]), phi, theta)
+    square, logs, _, _ = _mixed_likelihood(values, np.array([0, 30, 50]), phi, theta)
     expected = [
         np.sum(part * np.linalg.solve(dense[:n, :n], part)) for n, part in ((30, values[:30]), (20, values[30:]))
     ]

@@ -12,7 +12,8 @@ from typing import Any, BinaryIO
 
 from omnidyn.errors import InputError
 from omnidyn.files import default_max_bytes, growth, open_regular, pieces
-from omnidyn.logs.readers.reader import Reader, ReadOptions, files_of
+from omnidyn.logs.readers.folders import files_of
+from omnidyn.logs.readers.reader import Reader, ReadOptions
 from omnidyn.logs.readers.recording import Recording
 from omnidyn.logs.readers.ros.bag1_file import Bag1File
 from omnidyn.logs.readers.ros.db3_file import Db3File
