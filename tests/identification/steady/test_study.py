@@ -264,12 +264,16 @@ def test_a_shape_for_comparison_cannot_be_asked_for():
         ({"speed": "light"}, r"no such speed; got light; expected wheel, set or ground"),
         ({"speed": "ground"}, r"lacks a channel; got .*; expected twist"),
         ({"force_from": "will"}, r"no such origin of the force; got will"),
-        ({"groups": ["a"]}, r"one group per run; got 1 groups; expected 24"),
     ],
 )
 def test_wrong_options_are_refused(how, words):
     with pytest.raises(InputError, match=words):
         identify(noisy("disc"), AXEBOT, SteadyState(**how))
+
+
+def test_groups_need_a_name_for_every_run():
+    with pytest.raises(InputError, match="groups"):
+        identify(noisy("disc"), AXEBOT, SteadyState(), groups=["a"])
 
 
 def test_a_run_without_forces_is_refused():
