@@ -109,6 +109,11 @@ def test_options_of_one_method_choose_it(given, method):
         ({"shape": "disc", "loss": "student-t"}, "steady-state has no such option; got `loss`"),
         ({"between": "mean"}, "`between`: an option of the motors"),
         ({"input": "duty"}, "`input`: an option of the motors"),
+        ({"what": "motors", "shape": "disc"}, "not an option of the motors; got `shape`"),
+        (
+            {"what": "motors", "method": "steady-state", "between": "hold"},
+            "steady-state has no such option; got `between`",
+        ),
         ({"what": "motors", "free": ["friction"]}, "`what` motors: not an option of the motors; got `free`"),
         ({"what": "motors", "method": "output-error", "speed": "set"}, "output-error has no such option; got `speed`"),
     ],

@@ -24,7 +24,7 @@ def in_a_turning_frame(seed, **options):
     speed = drive(world, t, asked, t).wheel_speed
     speed = speed + SENSOR * np.random.default_rng([seed, 3]).normal(size=speed.shape)
     log = Run(t, voltage=asked, wheel_speed=speed)
-    fit = identify(log, robot_of(world), OutputError(free=["friction", *LEVELS], **options)).estimate
+    fit = identify(log, robot_of(world), OutputError(free=["friction", *LEVELS]), **options).estimate
     levels = zip(LEVELS, (RATIO * level for level in world.coulomb), strict=True)
     return fit, truths(world, "axes") | dict(levels)
 

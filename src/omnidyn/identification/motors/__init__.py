@@ -3,6 +3,6 @@
 log: what a log says of the motors, and their input between its rows. estimate: what every fit returns. windows: windows
 in integral form and the line through them. rest: where a motor rests, and the instant at which it sets off. start: what
 each direction shows by itself, of rows or of points of steady speed. problem, fit: whole logs as free runs. choice:
-free runs of a fitted motor, and the options that best predict logs left out. study: identify_motors, all motors by one
+free runs of a fitted motor, and the options that best predict logs left out. study: study_motors, all motors by one
 of the two methods. into_robot: its numbers in a robot file.
 """

@@ -50,7 +50,7 @@ def test_it_is_found_above_the_last_drive_below_three_times_coulomb():
 def test_it_is_found_in_a_turning_frame_too():
     """The implicit engine runs it. Two axes are told well here, turning from below only: that is said."""
     words = []
-    fit, truth = in_a_turning_frame(8, progress=lambda report: words.append(str(report)))
+    fit, truth = in_a_turning_frame(8, progress=lambda report: words.append(str(report).removeprefix("fitting: ")))
     assert all(held(fit, truth).values())
     for key in LEVELS[:2]:
         low, high = fit.ci95[key]
