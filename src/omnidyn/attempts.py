@@ -13,7 +13,7 @@ Made = TypeVar("Made")
 
 LADDER, DIAGNOSIS, COMPARISON, PAGE = "ladder", "diagnosis", "comparison with the logs", "page"
 JUDGEMENT = "check of the logs by the fitted robot"
-QUICK = "left out by `quick`"
+BY_QUICK = "left out by `quick`"
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from omnidyn.cli.terminal.flags import of_place, with_flags
 from omnidyn.cli.terminal.identify_options import asked as asked_of
 from omnidyn.cli.terminal.identify_options import default_of, options
 from omnidyn.errors import InputError
+from omnidyn.identification.grouping import names_of_groups
 from omnidyn.identification.methods import METHODS, MotorFit, MotorLine, OutputError, SteadyState, choices
 
 SOURCE = Path(omnidyn.__file__).parent
@@ -39,6 +40,11 @@ def test_one_name_is_a_tuple_of_it_and_none_is_none():
         (SteadyState, {"rest": "sleep"}, "rest: unknown use of rows at rest; got sleep"),
         (MotorFit, {"nuisances": ("none", "gain")}, "nuisances: none and auto stand alone; got none, gain"),
         (MotorLine, {"window": (0.9, 0.4)}, "window: not two shares; got 0.9,0.4; expected such as 0.4,0.95"),
+        (SteadyState, {"window": 0.4}, "window: not two shares; got 0.4; expected such as 0.4,0.95"),
+        (OutputError, {"free": 3}, "free: not a name or several; got 3; expected text, or a list of texts"),
+        (MotorFit, {"nuisances": [1.0]}, "nuisances: not a name or several"),
+        (OutputError, {"bootstrap": -1}, "bootstrap: not a number of draws; got -1"),
+        (OutputError, {"tick_rad": float("nan")}, "tick_rad: not the step of an encoder; got nan"),
     ],
 )
 def test_words_that_mean_nothing_are_refused_at_once(method, wrong, words):
@@ -62,9 +68,15 @@ def test_a_method_that_is_none_is_refused_with_the_four(method):
     ],
 )
 def test_what_a_method_has_no_use_for_is_refused(method, given):
-    words = f"{type(method).__name__} has no use for it; got `{next(iter(given))}`"
+    words = f"{type(method).__name__} does not take it; got `{next(iter(given))}`"
     with pytest.raises(InputError, match=words):
         omnidyn.identify([], omnidyn.load_robot("axebot"), method, **given)
+
+
+def test_groups_in_a_table_are_refused():
+    """Its names would be taken for those of the logs, in that order."""
+    with pytest.raises(InputError, match=r"groups: groups are no table; got .*; expected .*NAME=GLOB"):
+        names_of_groups({"gray": "a*", "green": "b*"}, ["b.csv", "a.csv"])
 
 
 def test_friction_needs_a_robot_and_a_ladder_the_diagnosis():

@@ -144,9 +144,13 @@ def test_what_decides_the_method():
 
 def test_arguments_that_a_method_does_not_take_are_refused():
     run = noisy_draw(simulate(AXEBOT, excitation(2.0), 0.01), 1)
-    with pytest.raises(InputError, match=r"SteadyState has no use for it; got `hold_out`"):
+    with pytest.raises(
+        InputError, match="SteadyState does not take it; got `hold_out`; expected with OutputError or Mot"
+    ):
         omnidyn.identify(run, AXEBOT, omnidyn.SteadyState(), hold_out="*")
-    with pytest.raises(InputError, match=r"MotorLine has no use for it; got `groups`"):
+    with pytest.raises(
+        InputError, match="MotorLine does not take it; got `groups`; expected with OutputError or Steady"
+    ):
         omnidyn.identify(run, AXEBOT, omnidyn.MotorLine(), groups=["a"])
 
 

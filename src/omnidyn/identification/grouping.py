@@ -5,7 +5,7 @@ from __future__ import annotations
 import fnmatch
 import hashlib
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -74,14 +74,22 @@ def names_of_groups(groups: str | Sequence[str] | None, sources: Sequence[str]) 
     groups: NAME=GLOB each, of the sources of runs, or a name for every run. Raises InputError as `group_names` does,
     and for names that are not one for each run.
     """
+    if isinstance(groups, Mapping):
+        raise InputError(
+            "groups are no table", got=groups, expected='["NAME=GLOB", ...] or a name for every run', where="groups"
+        )
     words = [groups] if isinstance(groups, str) else list(groups or ())
     if not words:
         return None
     if isinstance(groups, str) or any("=" in word for word in words):
         return group_names(sources, words, "groups")
     if len(words) != len(sources):
-        got = f"{len(words)} names, {len(set(words))} of them different, for {len(sources)} runs"
-        raise InputError("groups need a name for every run", got=got, expected="two groups or more", where="groups")
+        raise InputError(
+            "groups need a name for every run",
+            got=f"{len(words)} names for {len(sources)} runs",
+            expected="as many names as runs, or NAME=GLOB each",
+            where="groups",
+        )
     return words
 
 

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from omnidyn.arguments import MADE_BY, check_order, is_frame
-from omnidyn.attempts import COMPARISON, DIAGNOSIS, JUDGEMENT, LADDER, QUICK, Attempts
+from omnidyn.attempts import BY_QUICK, COMPARISON, DIAGNOSIS, JUDGEMENT, LADDER, Attempts
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.findings.finding import Verdict, rest_on_guesses
 from omnidyn.findings.fitness import STEADY as STEADY_USE
@@ -22,7 +22,9 @@ from omnidyn.identification.methods import (
     GROUPS,
     HOLD_OUT,
     LINE,
+    METHODS,
     MOTOR_METHODS,
+    QUICK,
     STEADY_STATE,
     Method,
     MotorFit,
@@ -31,7 +33,6 @@ from omnidyn.identification.methods import (
     SteadyState,
     refuse_unless_method,
 )
-from omnidyn.identification.methods import QUICK as QUICKLY
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
 from omnidyn.identification.output_error.fit import WHOLE, Fit
 from omnidyn.identification.output_error.solve.progress import FitProgress
@@ -160,11 +161,16 @@ class _Asked:
 
     def refuse(self, method: Method) -> None:
         """Refuse what the method does not take. Raises InputError."""
-        given = {HOLD_OUT: self.hold_out, GROUPS: self.groups, QUICKLY: self.quick}
+        given = {HOLD_OUT: self.hold_out, GROUPS: self.groups, QUICK: self.quick}
         for name, value in given.items():
             if value and name not in method.takes:
+                takers = " or ".join(kind.__name__ for kind in METHODS if name in kind.takes)
                 raise InputError(
-                    f"{type(method).__name__} has no use for it", got=f"`{name}`", where=name, remedy="leave it out"
+                    f"{type(method).__name__} does not take it",
+                    got=f"`{name}`",
+                    expected=f"with {takers}",
+                    where=name,
+                    remedy="leave it out",
                 )
         if self.quick and isinstance(method, OutputError) and method.ladder:
             raise InputError(
@@ -203,18 +209,19 @@ def _of_motors(runs: Sequence[Run] | MotorTable, method: Method, check: Sequence
     """Every motor of some logs, or of a table."""
     from omnidyn.identification.motors.study import study_motors, study_points  # imported lazily: slow to load
 
+    asked.refuse(method)
     if not isinstance(runs, MotorTable):
         assert isinstance(method, MotorLine | MotorFit)
-        asked.refuse(method)
         study = study_motors(runs, asked.robot, method, asked.hold_out, check, asked.progress)
     elif isinstance(method, MotorLine):
         study = study_points(runs)
     else:
         raise InputError(
-            "a table of steady speeds has no time in it",
-            got="a table input,speed",
-            expected="logs, or `method` steady-state",
+            "a table input,speed holds the lines of motors, without time",
+            got=f"{type(method).__name__}()",
+            expected="omnidyn.MotorLine()",
             where="method",
+            remedy="leave out the method",
         )
     return Identification(method, {}, asked.without_more(study.verdicts, study.advice), study=study)
 
@@ -236,7 +243,7 @@ def _steady(runs: Sequence[Run], method: SteadyState, check: Sequence[Log], aske
     asked.save(fit.estimates)
     asked.progress(Report("diagnosing"))
     if asked.quick:
-        asked.attempts.leave_out(DIAGNOSIS, QUICK)
+        asked.attempts.leave_out(DIAGNOSIS, BY_QUICK)
     found = None if asked.quick else asked.attempts.make(DIAGNOSIS, partial(diagnosed, fit))
     study = found or undiagnosed(fit)
     study = replace(study, advice=(*map(str, mend), *study.advice))
@@ -309,7 +316,7 @@ def _after(
 def _diagnosed(fits: Mapping[str, OutputErrorEstimate], asked: _Asked) -> dict[str, OutputErrorEstimate]:
     """The fits with their diagnosis; without one where it fails, or is not asked for."""
     if asked.quick:
-        asked.attempts.leave_out(DIAGNOSIS, QUICK)
+        asked.attempts.leave_out(DIAGNOSIS, BY_QUICK)
         return dict(fits)
     found = {}
     for name, fit in fits.items():

@@ -6,8 +6,10 @@ of the API its tables.
 
 from __future__ import annotations
 
+import math
 import textwrap
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterable
+from dataclasses import Field, dataclass, field, fields
 from functools import cache
 from typing import Any, ClassVar, Literal, get_args, get_type_hints
 
@@ -77,8 +79,8 @@ class Method:
         known = choices(type(self))
         for spec in fields(self):
             value = getattr(self, spec.name)
-            if isinstance(spec.default, tuple) or spec.name in ("free", "nuisances", "outputs"):
-                value = value if value is None else (value,) if isinstance(value, str) else tuple(value)
+            if takes_names(spec):
+                value = _names(spec.name, value)
             elif spec.name in known:
                 refuse_word(spec.name, value, known[spec.name])
             value = ADAPTED[spec.name](value) if spec.name in ADAPTED else value
@@ -95,6 +97,19 @@ class Method:
         cls.__doc__ = f"{cls.__doc__}\n\n" + "\n".join(lines) + "\n    "
 
 
+def takes_names(spec: Field[Any]) -> bool:
+    """Whether an option is a name or several."""
+    return spec.default == () or spec.name in ("free", "nuisances", "outputs")
+
+
+def _names(option_name: str, value: Any) -> tuple[str, ...] | None:
+    """A name or several as a tuple; None as it is. Raises InputError for what is no name."""
+    names = (value,) if isinstance(value, str) else value
+    if names is not None and (not isinstance(names, Iterable) or not all(isinstance(name, str) for name in names)):
+        raise InputError("not a name or several", got=value, expected="text, or a list of texts", where=option_name)
+    return None if names is None else tuple(names)
+
+
 def _nuisances(names: tuple[str, ...] | None) -> tuple[str, ...] | None:
     """None for automatic ones, () for none."""
     if names is None or not {AUTO, NONE} & set(names):
@@ -108,14 +123,31 @@ def _shares(window: Any) -> tuple[float, float] | None:
     """Two shares, or None."""
     if window is None:
         return None
-    values = tuple(float(share) for share in window)
-    if len(values) != 2 or not 0.0 <= values[0] < values[1] <= 1.0:
-        got = ",".join(f"{share:g}" for share in values)
+    try:
+        low, high = (float(share) for share in window)
+    except (TypeError, ValueError):  # neither two, nor numbers
+        low, high = math.nan, math.nan
+    if not 0.0 <= low < high <= 1.0:
+        got = ",".join(map(str, window)) if isinstance(window, tuple | list) else window
         raise InputError("not two shares", got=got, expected="such as 0.4,0.95", where="window")
-    return values
+    return low, high
 
 
-ADAPTED = {"nuisances": _nuisances, "window": _shares}
+def _draws(count: Any) -> int:
+    """A number of draws. Raises InputError for what is none."""
+    if isinstance(count, bool) or not isinstance(count, int) or count < 0:
+        raise InputError("not a number of draws", got=count, expected="0 or a whole number above it", where="bootstrap")
+    return count
+
+
+def _tick(size: Any) -> float | None:
+    """The step of an encoder [rad], None where the log tells it. Raises InputError for what is no size."""
+    if size is not None and (not isinstance(size, int | float) or not 0.0 <= size < math.inf):
+        raise InputError("not the step of an encoder", got=size, expected="0 rad or more, or None", where="tick_rad")
+    return size
+
+
+ADAPTED = {"nuisances": _nuisances, "window": _shares, "bootstrap": _draws, "tick_rad": _tick}
 NUISANCES = (
     "Fit what the log does: latency, gain, dead_band, fade, tilt, push, none; default: auto.",
     '"latency.twist" is that of one channel, "push.x" of one axis; a tilt stays in the room. None or "auto": '

@@ -115,5 +115,5 @@ def test_a_line_without_a_slope_has_no_end():
 def test_a_table_at_rest_and_one_of_whole_logs_are_refused():
     with pytest.raises(InsufficientDataError, match=r"no row tells how the motors answer; got 3 rows at rest"):
         identify(table([0.0, 10.0, 12.0], [0.0, 0.0, 0.0]), None, MotorLine())
-    with pytest.raises(InputError, match=r"a table of steady speeds has no time in it"):
+    with pytest.raises(InputError, match=r"a table input,speed holds the lines of motors, without time"):
         identify(table([0.0, 10.0], [0.0, 1.0]), None, MotorFit())

@@ -16,6 +16,7 @@ from omnidyn.identification.methods import (
     METHODS,
     MOTOR_METHODS,
     OUTPUT_ERROR,
+    QUICK,
     STEADY_STATE,
     Method,
     MotorLine,
@@ -23,8 +24,8 @@ from omnidyn.identification.methods import (
     SteadyState,
     option,
     refuse_word,
+    takes_names,
 )
-from omnidyn.identification.methods import QUICK as QUICKLY
 
 FRICTION, MOTORS = "friction", "motors"
 NAMES = {OUTPUT_ERROR: STEADY_STATE, STEADY_STATE: OUTPUT_ERROR}  # method -> the other one
@@ -68,8 +69,7 @@ def options() -> dict[str, Field[Any]]:
 
 def default_of(spec: Field[Any]) -> Any:
     """What the command line shows as the default of an option; it has no None."""
-    many = isinstance(spec.default, tuple) or spec.name in ("free", "nuisances")
-    return [] if many else "" if spec.default is None else spec.default
+    return [] if takes_names(spec) else "" if spec.default is None else spec.default
 
 
 def asked(given: Mapping[str, Any]) -> Asked:
@@ -95,7 +95,7 @@ def _takes(kind: type[Method], name: str) -> bool:
     """Whether a method has an option, or a use for one that says which runs."""
     if name in ("per", "group"):
         return kind is (OutputError if name == "per" else SteadyState)
-    return name in kind.takes if name in (HOLD_OUT, QUICKLY) else name in {spec.name for spec in fields(kind)}
+    return name in kind.takes if name in (HOLD_OUT, QUICK) else name in {spec.name for spec in fields(kind)}
 
 
 def _method(name: str, what: str, given: Sequence[str]) -> type[Method] | None:

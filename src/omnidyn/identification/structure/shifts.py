@@ -222,6 +222,7 @@ class _Look:
         ]
         return Split(by, where, *when, share, min(1.0, tests * found.joint[0]), tuple(shifts))
 
+    @np.errstate(over="ignore")  # a part that hardly tells a number: it may be anything up to infinity
     def _levels(self, found: _Compared, j: int, names: Sequence[str]) -> list[Level]:
         """What a number is in each part that tells it."""
         p, at, t = self.problem.parameters[self.told[j]], self.told[j], len(self.told)
