@@ -205,6 +205,21 @@ def test_an_error_has_no_colour_codes(tmp_path):
     assert "\x1b" not in result.stdout
 
 
+@pytest.mark.parametrize("command", ["simulate axebot u.csv", "track axebot --path circle --controller pid"])
+def test_commands_that_fit_nothing_load_no_optimiser(tmp_path, command):
+    """It takes a tenth of a second to load."""
+    (tmp_path / "u.csv").write_text("t_s,u1_V,u2_V,u3_V\n0,0,3,-3\n0.1,0,3,-3\n0.2,0,3,-3\n")
+    script = (
+        f"import sys\nfrom omnidyn.cli import main\ncode = main({command.split()!r})\n"
+        "heavy = {'scipy.optimize', 'scipy.signal', 'matplotlib'}\n"
+        "print(code, sorted(heavy & set(sys.modules)), file=sys.stderr)"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", script], cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=60
+    )
+    assert result.stderr.splitlines()[-1] == "0 []"
+
+
 def test_help_is_quick(tmp_path):
     """It imports nothing heavy, and little at all: a count, for seconds depend on the machine."""
     script = (

@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike
 from omnidyn.arrays import FloatArray
 from omnidyn.control.paths.motion import Motion, Path
 from omnidyn.errors import InputError
-from omnidyn.logs.readers.read_table import read_table
 from omnidyn.model.frames import unwrapped
 from omnidyn.run import Run
 
@@ -244,6 +243,8 @@ def path_of_run(run: Run) -> Lines:
 
 def path_of_file(path: str | os.PathLike) -> Lines:
     """A path from a table with the columns t_s, x_m, y_m and heading_rad; others, of a run file, are not looked at."""
+    from omnidyn.logs.readers.read_table import read_table  # imported lazily: named paths need no reader
+
     table = read_table(path)
     missing = [name for name in COLUMNS if name not in table.names]
     if missing:

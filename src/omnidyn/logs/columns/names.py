@@ -9,7 +9,6 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from omnidyn.logs.table.dialect import MAX_NAME
 from omnidyn.model.robot import Robot
@@ -335,6 +334,8 @@ def wheels_at(places: Collection[float], robot: Robot | None = None) -> dict[flo
         return {}
     if robot is None or robot.wheels.count != len(asked):
         return {place: k for k, place in enumerate(FOUR if {*asked} == {*FOUR} else asked, 1)}
+    from scipy.optimize import linear_sum_assignment  # imported lazily: 0.1 s that most logs do not need
+
     stand = _angles(robot)
     apart = np.abs((np.subtract.outer(asked, stand) + 180.0) % 360.0 - 180.0)
     rows, wheels = linear_sum_assignment(apart)
