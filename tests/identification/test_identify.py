@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 
 from omnidyn import Run, load_robot, simulate
+from omnidyn.errors import InputError
 from omnidyn.identification import advice
 from omnidyn.identification.default_method import as_driven
 from omnidyn.identification.identify import identify
+from omnidyn.identification.methods import SteadyState
+from omnidyn.logs.log import Log
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
+from tests.support.steady_logs import clean_runs, robot_with
 
 
 @pytest.fixture(scope="module")
@@ -33,12 +37,40 @@ def duties():
 
 def test_a_robot_fitted_to_duties_has_a_drive_of_duties(duties):
     robot = load_robot("axebot")
-    for fitted in (identify(duties, robot).robot, identify(duties, robot).estimate.robot):
-        assert (fitted.drive.kind, fitted.drive.supply) == ("duty", 6.0)
-        again = parse_robot(robot_to_toml(fitted))
-        assert again.drive == fitted.drive
-        run = simulate(again, duty=duties.duty[:-1], dt=0.02)
-        np.testing.assert_allclose(run.wheel_speed, duties.wheel_speed, atol=1.0)
+    fitted = identify(duties, robot).robot
+    assert (fitted.drive.kind, fitted.drive.supply) == ("duty", 6.0)
+    again = parse_robot(robot_to_toml(fitted))
+    assert again.drive == fitted.drive
+    run = simulate(again, duty=duties.duty[:-1], dt=0.02)
+    np.testing.assert_allclose(run.wheel_speed, duties.wheel_speed, atol=1.0)
+
+
+def test_logs_are_checked_and_runs_are_not(duties):
+    """A log of which two wheels are exchanged is unfit: the result says so, not only `check`."""
+    speed = duties.wheel_speed[:, [1, 0, 2]]
+    swapped = duties.replace(wheel_speed=speed)
+    result = identify(Log.of_run(swapped), load_robot("axebot"), quick=True)
+    assert [finding.code for verdict in result.verdicts for finding in verdict.findings] == ["swapped"]
+    assert "log_not_usable" in [failure.code for failure in result.failures]
+    assert identify(duties, load_robot("axebot"), quick=True).verdicts == ()
+
+
+def test_a_result_of_several_groups_has_no_number_of_its_own(duties):
+    result = identify([duties, duties.replace(source="again.csv")], load_robot("axebot"), groups=["a", "b"], quick=True)
+    with pytest.raises(AttributeError, match=r"each group has its own value: say \.groups\['a'\]\.value; groups: a, b"):
+        _ = result.value
+    with pytest.raises(InputError, match=r"no single estimate; got a, b"):
+        _ = result.estimate
+    assert result.groups["a"].value.keys() == result.groups["b"].value.keys()
+
+
+def test_a_method_that_the_logs_chose_is_named_in_the_result():
+    """The logs have currents and no voltage: whole logs cannot be fitted."""
+    runs = [run.replace(voltage=None) for run in clean_runs(robot_with("disc"), range(0, 360, 30))]
+    result = identify(runs, load_robot("axebot"), quick=True)
+    assert result.method == SteadyState()
+    (note,) = [warning for warning in result.warnings if warning.code == "method_chosen"]
+    assert "holds set speeds only" in note.numbers["why"]
 
 
 def test_a_drive_that_the_file_states_stays(duties):
