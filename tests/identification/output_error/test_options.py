@@ -1,5 +1,7 @@
 """Options that can be misread: what is fixed, draws of a bootstrap, breakaway, one name as a string."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -41,13 +43,18 @@ def test_a_string_is_one_name(axebot, runs):
     assert changed == [BOX[4]]
 
 
-@pytest.mark.parametrize("draws", [1, 2, -5, 3.5, True])
-def test_a_bootstrap_needs_draws(axebot, runs, draws):
+FEW = "too few draws for a 95 % interval; got {}; expected 20 or more"
+NONE = "not a number of draws; got {}; expected 0 or a whole number above it"
+
+
+@pytest.mark.parametrize(("draws", "said"), [(1, FEW), (2, FEW), (-5, NONE), (3.5, NONE), (True, NONE)])
+def test_a_bootstrap_needs_draws(axebot, runs, draws, said):
     """Of two draws an interval need not even hold the value."""
-    with pytest.raises(InputError, match=r"bootstrap: too few draws for a 95 % interval; got .*; expected 20 or more"):
+    message = re.escape("bootstrap: " + said.format(draws))
+    with pytest.raises(InputError, match=message):
         identify(runs, axebot, OutputError(start="rest", nuisances=(), bootstrap=draws))
     names = [*"aaaaabbbbb"]
-    with pytest.raises(InputError, match=r"bootstrap: too few draws for a 95 % interval"):
+    with pytest.raises(InputError, match=message):
         identify([*runs, *runs], axebot, OutputError(bootstrap=draws, nuisances=()), groups=names)
 
 
