@@ -20,7 +20,7 @@ from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import brief_document
 from omnidyn.cli.terminal.telling import tell as tell_document
-from omnidyn.document import Document, Table, interval_cell
+from omnidyn.document import Document, Table, Words, interval_cell, sentence
 from omnidyn.files import check_output, keep_apart, write_atomic
 from omnidyn.identification.methods import OutputError, SteadyState
 from omnidyn.progress import Progress, Report
@@ -172,7 +172,9 @@ def brief(found: Identification) -> Document:
     of_study = found.study.warnings if found.study is not None else ()
     warnings = [*of_study, *(warning for estimate in found.groups.values() for warning in estimate.warnings)]
     table = Table(("number", "value", "95 % interval", "unit", "key"), rows, "<>><<")
-    return brief_document(found.headline, table, warnings, found.advice)
+    blocks = [fit.held_out.statement() for fit in found.fits.values() if fit.held_out is not None]
+    head = [Words(sentence(str(statement))) for statement in blocks]
+    return brief_document(found.headline, table, warnings, found.advice, head)
 
 
 def _rows(group: str, estimate: Estimate, groups: int) -> Iterator[tuple[str, ...]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -217,3 +217,21 @@ def printable(source: str) -> str:
     """The words of a source as a robot file takes them."""
     clean = source if source.isprintable() else "".join(c if c.isprintable() else " " for c in source)
     return shortened(clean, SOURCE_LENGTH)
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Errors of free runs on blocks of the logs that were not fitted: root mean square of each output over its own
+    spread, the geometric mean of all outputs.
+
+    written: of what is written. plain: of the plain fit: friction and what else was free, white noise, no nuisances.
+    given: of the robot as it was given; None where nothing was.
+    """
+
+    written: float
+    plain: float
+    given: float | None = None
+
+    def statement(self) -> Statement:
+        """What they are."""
+        return Statement("held_out_blocks", NOTE, numbers=asdict(self))

@@ -36,6 +36,7 @@ def fit_document(
         told = [fit.document(), *beside]
         found = fit.diagnosis
         blocks += [[f"group {group}"] if len(fits) > 1 else [], *(each.parts for each in told)]
+        blocks += [[Points([fit.held_out.statement()])]] if fit.held_out else []
         blocks += [fit.ladder.parts()] if fit.ladder and group in last else []
         blocks += _found(found) if found and not fit.not_followed else []
         groups[group] = {

@@ -6,12 +6,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 
+from omnidyn.errors import OmnidynError
 from omnidyn.identification.lack_of_fit import Diagnosis
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.linear.free_run import free_run, margins_of
+from omnidyn.identification.output_error.problem.nuisances import LATENCY
+from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.model.keys import in_words
 from omnidyn.run import Run
+from omnidyn.statement import WARNING, Statement
+
+LATE_ROWS = 2.0  # rows of a latency from which it is doubted: a drive answers sooner
+SIZE = ("wheels.wheel_radius_m", "body.inertia_kg_m2")  # what a robot that follows late may have other than its file
 
 
 def solved(
@@ -27,7 +36,7 @@ def solved(
     without_ladder: is called with the answer of the fit from which a ladder begins, before it does. quick: leaves
     out the diagnosis.
     """
-    first = fit.solve(progress)
+    fit, first = with_size(fit, fit.solve(progress), runs, progress)
     if not fit.question.ladder:
         return answered(fit, first, progress, quick)
     from omnidyn.identification.structure.ladder.climb import climb  # imported lazily: slow to load
@@ -41,6 +50,56 @@ def solved(
         for name, own in answer.estimates.items()
     }
     return replace(answer, estimates=estimates)
+
+
+def with_size(fit: Fit, found: Solution, runs: Sequence[Run], progress: FitProgress) -> tuple[Fit, Solution]:
+    """The fit and its solution, or those with wheel radius and inertia fitted too.
+
+    A robot that is heavier to move than its file says follows late, and a latency stands in for that. So a latency of
+    more than LATE_ROWS rows, by default, is tried beside these numbers too: the fit that predicts held-out blocks
+    better is taken, and a latency that stays is named.
+    """
+    problem = found.solver.problem
+    assert isinstance(problem, Problem)
+    late = _late(found)
+    if not late or fit.question.nuisances is not None:
+        return fit, found
+    found = replace(found, notes=(*found.notes, *late))
+    more = [key for key in SIZE if key not in problem.names and key not in fit.question.fixed]
+    group, *others = fit.groups
+    if fit.question.free is not None or others or group.engine.looped or fit.nu or not more:
+        return fit, found
+    names = [parameter.name for parameter in problem.robot_parameters]
+    aside = progress.aside(f"once more with {' and '.join(map(in_words, more))}")
+    try:
+        other = Fit.of(runs, fit.began, replace(fit.question, free=(*names, *more), fixed=()), progress=aside)
+        wider = other.solve(aside)
+    except OmnidynError:  # the logs do not tell these numbers
+        return fit, found
+    margins = margins_of([found, wider])
+    before, after = free_run(found, margins), free_run(wider, margins)
+    if not after.is_better(before):
+        return fit, found
+    numbers = {
+        "latency": late[0].numbers["latency"],
+        "keys": tuple(more),
+        "error": before.error,
+        "with": after.error,
+    }
+    told = Statement("size_fitted", WARNING, numbers=numbers)
+    return other, replace(wider, plain=found.plain, notes=(told, *wider.notes, *_late(wider)))
+
+
+def _late(found: Solution) -> list[Statement]:
+    """The latencies that are more than LATE_ROWS rows above that of the drive."""
+    problem = found.solver.problem
+    assert isinstance(problem, Problem)
+    step, count = max(piece.step for piece in problem.pieces), problem.robot_count
+    return [
+        Statement("late_by_rows", WARNING, parameter.name, {"latency": value, "rows": value / step})
+        for parameter, value in zip(problem.parameters[count:], found.state.point.values[count:].tolist(), strict=True)
+        if parameter.part == LATENCY and value - problem.robot.drive.latency > LATE_ROWS * step
+    ]
 
 
 def answered(fit: Fit, solution: Solution, progress: FitProgress, quick: bool = False) -> Answer:

@@ -47,6 +47,16 @@ CURES = (
 )
 
 
+def _size_fitted(statement: Statement) -> str:
+    """Wheel radius and inertia are fitted too, for a latency stood in for them."""
+    numbers = statement.numbers
+    return (
+        f"a latency of {1e3 * numbers['latency']:.3g} ms stood in for {all_of([*map(in_words, numbers['keys'])])}: "
+        f"with them fitted too a free run misses {100.0 * numbers['with']:.3g} % of the spread of the outputs on "
+        f"held-out blocks of the log, {100.0 * numbers['error']:.3g} % without; they are not those of the robot file"
+    )
+
+
 def _gaps(statement: Statement) -> str:
     """A log has gaps; each part between them is fitted from a start of its own."""
     count, longest = statement.numbers["gaps"], short(statement.numbers["longest"], ".3g")
@@ -246,6 +256,39 @@ SENTENCES = {
     ),
     "harmful_nuisance": Sentence(
         "{subject} improves the likelihood but worsens the prediction of held-out blocks of the log: it is not fitted"
+    ),
+    "late_by_rows": Sentence(
+        "{subject} of {latency:m.3g} ms is {rows:.2g} rows of the log: a camera, a network or a filter may be as late; "
+        "a drive is not, and then it stands in for what the model misses"
+    ),
+    "size_fitted": Sentence(_size_fitted, "measure {keys}, and write them into the robot file"),
+    "constant_force": Sentence(
+        "a constant force pushes the robot ({keys}): with it a free run misses {with:%.3g} % of the spread of the "
+        "outputs on held-out blocks of the log, {error:%.3g} % without",
+        "look for a floor that is not level, a cable, a brush, or voltages that are off by a constant",
+    ),
+    "plain_predicts_better": Sentence(
+        "the fit without {nuisances} predicts held-out blocks of the log better (a free run misses {plain:%.3g} % of "
+        "the spread of the outputs, {error:%.3g} % with them): they are not fitted"
+    ),
+    "white_predicts_better": Sentence(
+        "a fit that takes the errors to remember predicts held-out blocks of the log worse (a free run misses "
+        "{error:%.3g} % of the spread of the outputs, {white:%.3g} % by least squares): least squares are taken, and "
+        "the model misses something"
+    ),
+    "given_predicts_better": Sentence(
+        "the robot as it was given predicts held-out blocks of the log better than the fitted one (a free run misses "
+        "{given:%.3g} % of the spread of the outputs, {error:%.3g} % after the fit): it is what is written",
+        "record a longer log, or look for what the model misses",
+    ),
+    "held_out_blocks": Sentence(
+        either(
+            "given",
+            "on held-out blocks of the logs a free run misses {written:%.3g} % of the spread of the outputs; that of "
+            "the plain fit {plain:%.3g} %, that of the robot as it was given {given:%.3g} %",
+            "on held-out blocks of the logs a free run misses {written:%.3g} % of the spread of the outputs; that of "
+            "the plain fit {plain:%.3g} %",
+        )
     ),
     "unsettled_nuisances": Sentence(
         "together with {nuisances} these logs do not determine the numbers of the robot: {nuisances} are not fitted"

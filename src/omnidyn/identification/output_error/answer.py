@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from omnidyn.document import Part, Points, interval_cell, plain, sentence
-from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate
+from omnidyn.identification.estimate import NOT_DETERMINED, UNKNOWN, Estimate, HeldOut
 from omnidyn.identification.ladder import Ladder
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.cures import Blind
@@ -53,6 +53,10 @@ class Combination:
         return {**asdict(self), "words": str(self.statement())}
 
 
+def _nothing() -> None:
+    """None."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class OutputErrorEstimate(Estimate):
     """An Estimate from whole logs. `correlation` covers the nuisances too.
@@ -65,7 +69,7 @@ class OutputErrorEstimate(Estimate):
     together. directions: of these numbers, that the data do not show, with what would show them. covariance: "white",
     "autoregressive" or "sandwich". unused: what the logs hold and the fit does not use, and why. iterations,
     converged: of the minimisation. not_followed: outputs that the model does not follow. robust: whether the loss is
-    Student's t. ladder: what was switched on step by step, where that was asked for.
+    Student's t. ladder: what was switched on step by step, where that was asked for. reference: makes `held_out`.
     """
 
     nuisances: Mapping[str, Nuisance] = field(default_factory=dict)
@@ -79,6 +83,13 @@ class OutputErrorEstimate(Estimate):
     not_followed: tuple[str, ...] = ()
     robust: bool = False
     ladder: Ladder | None = None
+    reference: Callable[[], HeldOut | None] = _nothing
+
+    @property
+    def held_out(self) -> HeldOut | None:
+        """How well free runs predict blocks of the logs: of this robot, of a plain fit and of the robot as it was
+        given. None of a speed loop, of a fit by Student's t, of several groups, and after an interrupt."""
+        return self.reference()
 
     @property
     def blind(self) -> tuple[Statement, ...]:
@@ -139,6 +150,7 @@ class OutputErrorEstimate(Estimate):
                 "blind": self.blind,
                 "covariance": self.covariance,
                 "unused": self.unused,
+                "held_out_blocks": asdict(self.held_out) if self.held_out else None,
                 "converged": self.converged,
                 **({"ladder": self.ladder.to_dict()} if self.ladder else {}),
                 "directions": [asdict(one) for one in self.directions],

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from omnidyn.identification.grouping import count_once
 from omnidyn.identification.methods import AUTO, GAUSS, STUDENT, OutputError
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import WHOLE, begun, group_names
+from omnidyn.identification.output_error.choice import beside_given, best_with_force, better_of, why_white
 from omnidyn.identification.output_error.conclusion import conclude, unexplained
 from omnidyn.identification.output_error.joint import join, joint_start, own_names
 from omnidyn.identification.output_error.linear.blocks import rejected_nuisances
@@ -29,7 +31,7 @@ from omnidyn.identification.output_error.prepare import (
     guesses,
 )
 from omnidyn.identification.output_error.problem.friction_laws import band_note, with_band
-from omnidyn.identification.output_error.problem.nuisances import LATENCY, automatic, implausible
+from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT, automatic, implausible
 from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point
@@ -42,6 +44,7 @@ from omnidyn.identification.output_error.trust.no_fall import without_a_fall
 from omnidyn.identification.output_error.trust.resampling import beside, differences, refuse_bootstrap, resampled
 from omnidyn.identification.output_error.trust.support import supported, too_early
 from omnidyn.identification.output_error.trust.uncertainty import AUTOREGRESSIVE, SANDWICH, Trust, trust
+from omnidyn.model.actuation import GAIN
 from omnidyn.model.known.told import known_priors
 from omnidyn.model.robot import Robot
 from omnidyn.progress import silent
@@ -179,6 +182,9 @@ class Fit:
                 held | dict(better),
                 exact,
             )
+            if done and self._chooses:
+                plain = partial(self._plain, found, FitProgress())
+                estimate = beside_given(estimate, sure, plain, self.began, self.question.nuisances is None)
             return Answer({group.name: estimate}, (), solver.problem.names, (), (solution,))
         exact, known = known, self._beside_what_is_held(known, sure) if done else known
         engine, estimates, alones, wider = solver.engine, {}, [], beside(again, by, sure.known, known).intervals
@@ -239,7 +245,8 @@ class Fit:
         missed = unexplained(solution.solver, solution)
         if found is None or unexplained(found.plain.solver, found.plain).keys() - missed.keys():
             return as_it_is  # a memory that explains a whole output leaves nothing to the model
-        return found
+        told = None if asked or not self._chooses else why_white(solution, found)
+        return found if told is None else replace(as_it_is, warnings=(told,))
 
     def _settled(self, group: Group, progress: FitProgress) -> Solution:
         """The fit of one group; automatic nuisances that the logs do not support are taken out again."""
@@ -256,12 +263,43 @@ class Fit:
         kept = tuple(name for name in kept if name not in harmful)
         lost = [name for name in _nuisances(found.solver.problem) if name not in kept]
         if not lost:
-            return found
+            return self._chosen(found, progress)
         notes = tuple(implausible(name, value, fitted=False) for name, value in early.items())
         notes += tuple(Statement("harmful_nuisance", WARNING, name) for name in harmful if name not in early)
         if group.engine.looped:  # from its start on: until it is done, the fit with all of them is the best so far
             progress = progress.aside(f"once more without {', '.join(lost)}")
-        return replace(self._solve(group, group.problem(kept), progress), notes=notes)
+        return self._chosen(replace(self._solve(group, group.problem(kept), progress), notes=notes), progress)
+
+    @property
+    def _chooses(self) -> bool:
+        """Whether free runs on held-out blocks are compared: of one group, without a speed loop, by least squares."""
+        return len(self.groups) == 1 and not self.groups[0].engine.looped and not self.nu
+
+    def _chosen(self, found: Solution, progress: FitProgress) -> Solution:
+        """The fit of the only group, or the plain one; with a constant force where errors are not white and it pays."""
+        if not self._chooses:
+            return found
+        taken = better_of(found, self._plain(found, progress))
+        if trust(taken.solver, taken, AUTO).kind != SANDWICH:
+            return taken
+        names, aside = _nuisances(taken.solver.problem), progress.aside("once more with a constant force")
+        forced = [self._beside(taken, [*names, force], aside) for force in (PUSH, TILT)]
+        return best_with_force(taken, forced)
+
+    def _plain(self, found: Solution, progress: FitProgress) -> Solution:
+        """The fit of the only group without nuisances, but for the gain of a nominal supply; the fit itself where it
+        has none."""
+        names = _nuisances(found.solver.problem)
+        lost = [name for name in names if name != GAIN]
+        if not lost or found.plain is not None:
+            return found.plain or found
+        kept = [name for name in names if name == GAIN]
+        return self._beside(found, kept, progress.aside(f"once more without {', '.join(lost)}"))
+
+    def _beside(self, found: Solution, nuisances: Sequence[str], progress: FitProgress) -> Solution:
+        """The fit of the only group with other nuisances, in the same rows."""
+        problem = replace(self.groups[0].problem(nuisances), pieces=found.solver.problem.pieces)
+        return self._solve(self.groups[0], problem, progress, found)
 
     def _with_latencies_only(self, found: Solution, progress: FitProgress) -> Solution | None:
         """The fit of one group without other automatic nuisances; None where there are none, or they were asked for.
@@ -277,8 +315,9 @@ class Fit:
         note = Statement("unsettled_nuisances", WARNING, numbers={"nuisances": tuple(lost)})
         return replace(plainer, notes=(*found.notes, note))
 
-    def _solve(self, group: Group, problem: Problem, progress: FitProgress) -> Solution:
-        """The best point of one group alone."""
+    def _solve(self, group: Group, problem: Problem, progress: FitProgress, other: Solution | None = None) -> Solution:
+        """The best point of one group alone. other: a fit of it with other nuisances, near which an engine that marches
+        by steps begins."""
         if group.engine.looped:
             return solve_loop(problem, self.nu, progress)
         engine = group.engine.of(problem, FINE)
@@ -286,7 +325,7 @@ class Fit:
             progress.enter("looking for a start")
             solver = Solver(problem, engine, self.nu)
             return solver.minimise(first_point(solver, group.records), progress=progress)
-        near = coarse_point(problem, self.nu, progress)
+        near = coarse_point(problem, self.nu, progress, other)
         halfway = Solver(problem, group.engine.of(problem, HALFWAY), self.nu, ENOUGH)
         scales = near.variance if self.nu else None  # counts find theirs anew: a step a row is too coarse for them
         nearer = halfway.minimise(near.point, progress=progress, scales=scales)

@@ -80,7 +80,6 @@ def test_the_fast_fit_ends_where_an_independent_optimiser_does(ellipse, log):
     """scipy's least_squares on runs of simulate() at tol 1e-7, with a row at every t - latency."""
     fit = identify(log, ellipse, OutputError(free=list(TRUTH), start="rest", nuisances=["latency"])).estimate
     noise, t = np.array(list(fit.noise.values())), log.t
-    rows = t - t[0] >= 0.3  # of which a fit with a latency makes use
 
     def residual(scaled):
         robot, late = ellipse, float(scaled[-1]) * 0.007
@@ -90,7 +89,7 @@ def test_the_fast_fit_ends_where_an_independent_optimiser_does(ellipse, log):
         dt = np.tile([share * 0.01, (1.0 - share) * 0.01], len(t) - 1)
         twist = simulate(robot, np.repeat(log.voltage[:-1], 2, axis=0), dt, tol=1e-7).twist
         seen = np.concatenate([[0], 2 * np.arange(1, len(t)) - 1])
-        return ((twist[seen] - log.twist) / noise)[rows].ravel()
+        return ((twist[seen] - log.twist) / noise).ravel()  # all rows: it begins at rest
 
     own = np.array(
         [*(fit.value[key] / true for key, true in TRUTH.items()), fit.nuisances["latency.twist"].value / 0.007]
@@ -298,7 +297,7 @@ def test_many_logs_take_as_many_runs_as_one(turning, monkeypatch):
         return plain(self, robot, moved, scales, piece, *rest)
 
     monkeypatch.setattr(ImplicitEngine, "_piece", counting)
-    fit = identify(logs, start, OutputError()).estimate
+    fit = identify(logs, start, OutputError(nuisances=("latency",))).estimate
     assert rows < 15 * sum(len(log) for log in logs)
     for key, value in fit.value.items():
         assert abs(value - float(Key.parse(key).get(turning))) < 4.5 * fit.std[key]

@@ -152,6 +152,9 @@ class ImplicitEngine(Engine[Problem]):
             np.multiply(by[:, :, i], factors, out=slopes[c, :, :keys])
             if where[c] >= 0:
                 slopes[c, :, at.index(where[c])] = -pace[:, i]
+            if piece.at_rest and name != "current":  # before its first row it was at rest, too
+                before = t - t[0] < late[c]
+                residual[c][before], slopes[c, before] = measured[c][before] - state[N_AXES + c], 0.0
             if piece.free[N_AXES + c]:
                 slopes[c, :, at.index(count + N_AXES + c)] = 1.0
             if name == POSITION and piece.free[faces]:  # a quarter of a turn further is d/d facing

@@ -350,6 +350,7 @@ def march(
     d_travel, travel_varies, share = slopes.travel_map, slopes.travel_varies, loss.share
     number, square, total, lag, grad, info = sums.number, sums.square, sums.loss, sums.lag, sums.grad, sums.info
     score, drift, predicted, kept, waves = sums.score, sums.drift, sums.predicted, sums.slopes, sums.waves
+    at_rest = not start.any() and slopes.at_start[0] < 0 and slopes.at_start[1] < 0 and slopes.at_start[2] < 0
     for k in range(first, last + 1):
         put_volts(volts, u, k, (t[k] - origin) / span, driver)
         put_drive(g, dg, volts, drive, physics.push, d_drive, slopes.push, at_driver, vary)
@@ -362,8 +363,10 @@ def march(
                 sample = pointer[group]
                 pointer[group] += 1
                 into = t[sample] - late - t[k]
-                if into < 0.0 or t[sample] - t[first] < margin[groups[group]]:
+                early = into < 0.0  # what was before the first row is known of a robot at rest only: it has no margin
+                if t[sample] - t[first] < margin[groups[group]] or (early and not at_rest):
                     continue
+                into = max(into, 0.0)
                 copy_motion(v, s, dv, ds, v_now, s_now, dv_now, ds_now, travels, place)
                 if into > 0.0:
                     advance(
@@ -398,8 +401,10 @@ def march(
                         travel_varies,
                     )
                     if wheels[c] >= 0:
+                        if early:
+                            continue
                         value += add_input(row, volts, wheels[c], input_map[c], d_input, c, at_driver)
-                    if at_late[c] >= 0:
+                    if at_late[c] >= 0 and not early:
                         add_latency(row, c, at_late[c], v_now, s_now, g, law, speed_map, travel_map, place)
                     if at_offset[c] >= 0:
                         row[at_offset[c]] += 1.0

@@ -34,7 +34,7 @@ class Blocks:
     """Scalar products of [e, J, Z] in blocks of rows. matrix (B, n, n); shows (n,): which columns are not all 0."""
 
     def __init__(self, linear: Linear, *shown: Sequence[FloatArray]):
-        number = self._numbers(linear)
+        number = self.numbers(linear)
         self.count, self.rows = len(linear.rows.problem.parameters), len(number)
         self.block = [np.flatnonzero(number == b) for b in range(BLOCKS)]
         # Priors are held out of no block.
@@ -58,7 +58,8 @@ class Blocks:
         other.matrix, other.total = matrix, total
         return other
 
-    def _numbers(self, linear: Linear) -> IntArray:
+    @staticmethod
+    def numbers(linear: Linear) -> IntArray:
         """The block of each row, by its time: blocks are whole stretches of time. -1 of priors, which are in all."""
         when, pieces = [], linear.rows
         whole = sum(r.shape[1] for r in pieces.residual)

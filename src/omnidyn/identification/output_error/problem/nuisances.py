@@ -154,7 +154,8 @@ def pieces(
 
     start_std: of a start that was measured, None where it may be anywhere.
 
-    "auto": at rest where the log begins with a voltage that is held and without visible motion; else free.
+    "auto": at rest where the log begins with a voltage that is held and without visible motion; else free. From rest
+    no row is left out for a latency: what was before is known.
     """
     found = []
     for record in records:
@@ -178,7 +179,7 @@ def _piece(
         rest = _begins_at_rest(record, twist, first, last)
     offset = np.array([_mean(record.outputs[rows, c]) if travels[c] else 0.0 for c in range(len(columns))])
     duration = float(record.t[last] - record.t[first])
-    margin = min(LATEST, 0.1 * duration) if late else 0.0
+    margin = min(LATEST, 0.1 * duration) if late and not rest else 0.0
     return Piece(
         record,
         first,

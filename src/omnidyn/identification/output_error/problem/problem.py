@@ -37,6 +37,11 @@ class Piece:
     start_std: FloatArray | None = None
 
     @property
+    def at_rest(self) -> bool:
+        """Whether it is known to begin at rest: what came before its first row is known, too."""
+        return not (self.start.any() or self.free[: len(self.start)].any())
+
+    @property
     def step(self) -> float:
         """Usual time between two samples [s]."""
         return self.record.step_of(slice(self.first, self.last + 1))

@@ -18,7 +18,7 @@ from omnidyn.identification.output_error.problem.problem import Parts, Piece, Po
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.output_error.problem.starts import friction_values, integral_start
 from omnidyn.identification.output_error.solve.progress import FitProgress
-from omnidyn.identification.output_error.solve.solver import Solver, State
+from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
 from omnidyn.model.keys import FRICTION, find_key
 from omnidyn.model.robot import Robot
 
@@ -79,15 +79,17 @@ def _with_latencies(solver: Solver, begun: State) -> State:
     return solver.state(Point(values, point.states))
 
 
-def coarse_point(problem: Problem, nu: float, progress: FitProgress) -> State:
-    """A state near the best point, by a step a row; a long log is first fitted in part."""
+def coarse_point(problem: Problem, nu: float, progress: FitProgress, other: Solution | None = None) -> State:
+    """A state near the best point, by a step a row; a long log is first fitted in part. other: a fit of the same pieces
+    with other nuisances, near which it begins."""
     progress.enter("looking for a start")
     rows = sum(piece.last - piece.first for piece in problem.pieces)
-    solver, short, own = (
-        Solver(problem, ImplicitEngine.of(problem), nu, max(NEAR, BIAS * rows)),
-        problem.shortened(FEW),
-        moving_start(problem, nu, progress),
-    )
+    solver = Solver(problem, ImplicitEngine.of(problem), nu, max(NEAR, BIAS * rows))
+    if other is not None:
+        values = dict(zip(other.solver.problem.names, other.state.point.values.tolist(), strict=True))
+        near = Point(np.array([values.get(p.name, p.value) for p in problem.parameters]), other.state.point.states)
+        return solver.minimise(near, progress=progress).state
+    short, own = problem.shortened(FEW), moving_start(problem, nu, progress)
     if short is problem:
         return solver.minimise(own, progress=progress).state
     found = (

@@ -52,6 +52,7 @@ class Solution:
     """Where the minimisation ended. held: parameters at a bound that they push against. converged: or cut short.
 
     solver: which found it. blocked: latencies that stand at an edge. notes: what is to be said of the way there.
+    plain: the fit without nuisances that it was chosen beside.
     """
 
     state: State
@@ -61,6 +62,7 @@ class Solution:
     solver: Solver[Any]
     blocked: BoolArray | None = None
     notes: tuple[Statement, ...] = ()
+    plain: Solution | None = None
 
 
 class Solver(Generic[P]):

@@ -23,11 +23,12 @@ from omnidyn.identification.ladder import STANDS, Ladder, Rung
 from omnidyn.identification.output_error.begin import WHOLE
 from omnidyn.identification.output_error.conclusion import unexplained
 from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.linear.free_run import margins_of
 from omnidyn.identification.output_error.linear.motion import motions
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.structure.diagnosis import Examined, examine
-from omnidyn.identification.structure.ladder.held_out import CLEAR, Errors, errors, margins_of
+from omnidyn.identification.structure.ladder.held_out import CLEAR, Errors, errors
 from omnidyn.identification.structure.ladder.models import (
     Model,
     Move,

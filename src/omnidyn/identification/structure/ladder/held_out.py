@@ -154,9 +154,3 @@ class _Together(Blocks):
         self.size[self.size == 0.0] = 1.0
         self.matrix /= np.outer(self.size, self.size)
         self.total /= np.outer(self.size, self.size)
-
-
-def margins_of(solutions: Sequence[Solution]) -> list[FloatArray]:
-    """Of each piece (C,), the margin that leaves the same rows to all these fits: a latency needs one."""
-    every = [[piece.margin for piece in solution.solver.problem.pieces] for solution in solutions]
-    return [np.max(own, axis=0) for own in zip(*every, strict=True)]

@@ -27,6 +27,7 @@ from omnidyn.identification.output_error.prepare import (
     make_problem,
     stays_exact,
 )
+from omnidyn.identification.output_error.problem.nuisances import PUSH
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
 from omnidyn.identification.structure.missing.candidates import CHANGE, Candidate, Fitted, Trial
@@ -36,7 +37,7 @@ from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 BEST = 3  # candidates that are fitted beside the shapes
 CLOSE = 0.1  # squared standard errors to the best point that are enough to compare
 STEPS, MORE, GO_ON = 5, 10, 2  # of every fit; of the best of them; how many those are
-SHAPES = (DIRECTION, BODY_AXES, WHEELS)  # of friction, in the place of what is fitted
+ALWAYS = (PUSH, DIRECTION, BODY_AXES, WHEELS)  # a constant force; friction of another shape in the place of what is
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,11 +88,12 @@ def refits(
 
 
 def _asked(ranked: Sequence[Remedy], candidates: Sequence[Candidate]) -> Iterator[tuple[Candidate, Remedy]]:
-    """What to fit: the best that a robot file or a fit can hold, and every shape."""
+    """What to fit: the best that a robot file or a fit can hold, a constant push and every shape: far from the best fit
+    with them, columns near the one without tell little."""
     known = {one.key: one for one in candidates}
     best = simpler_first([each for each in ranked if each.offered and each.key != CHANGE])[:BEST]
     yield from ((known[each.key], each) for each in best)
-    for key in SHAPES:
+    for key in ALWAYS:
         if key in known and key not in {each.key for each in best}:
             yield known[key], Remedy(key, known[key].cause(0.0, 0.0), 0.0, 0.0)
 

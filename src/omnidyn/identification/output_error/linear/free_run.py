@@ -1,0 +1,121 @@
+"""How well free runs predict blocks of the logs that were not fitted: what an identified robot is used for.
+
+A likelihood asks which numbers make the next row likely, and a fit whose errors remember may follow it to numbers whose
+free run is far from the log (L. Ljung, System Identification, 16.6: simulate, and compare). So fits that a user
+did not ask for by name are compared by their free runs: each begins where the log begins, and of each block the error
+is that of a fit to all other blocks, one linear step from the fit to all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.identification.output_error.linear.blocks import BLOCKS, Blocks
+from omnidyn.identification.output_error.linear.rows import Linear, Rows, noise_models
+from omnidyn.identification.output_error.memory.autoregression import AutoRegression
+from omnidyn.identification.output_error.problem.problem import Column, Point, Problem, bounded
+from omnidyn.identification.output_error.solve.solver import Solution
+
+CLEAR = 1.0  # standard errors of the difference by which one fit must predict better to be taken for another
+LEAST_GAIN = 0.1  # of the squared error, the same: 5 % of the error
+TINY = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class FreeRun:
+    """The error of a free run on held-out blocks. square (B, C): sums of squares of each block and output; rows (C,):
+    how many there are; spread (C,): standard deviation of each output."""
+
+    square: FloatArray
+    rows: FloatArray
+    spread: FloatArray
+
+    @property
+    def error(self) -> float:
+        """Root mean square of the error of each output over its own spread, the geometric mean of all outputs."""
+        seen = (self.rows > 0.0) & (self.spread > 0.0)
+        share = np.sqrt(self.square.sum(axis=0)[seen] / self.rows[seen]) / self.spread[seen]
+        return float(np.exp(np.log(np.maximum(share, TINY)).mean())) if seen.any() else np.nan
+
+    def is_better(self, other: FreeRun) -> bool:
+        """Whether it predicts blocks clearly better than another: by the share of the squared error that it takes away,
+        the mean of all outputs, beyond CLEAR standard errors of it."""
+        whole = np.maximum(other.square.sum(axis=0), TINY)
+        gain = ((other.square - self.square) / whole)[:, self.rows > 0.0].mean(axis=1)
+        spread = float(gain.std(ddof=1)) * np.sqrt(len(gain))
+        return bool(gain.sum() > max(CLEAR * spread, LEAST_GAIN))
+
+
+def free_run(
+    solution: Solution,
+    margins: Sequence[FloatArray],
+    memory: Mapping[Column, AutoRegression] | None = None,
+    values: FloatArray | None = None,
+) -> FreeRun:
+    """The error of the free run of a fit on blocks that it was not fitted to.
+
+    Args:
+        solution: the fit; its engine shows residuals as they are.
+        margins: of each piece (C,) [s], before which no row counts, so that several fits are seen in the same rows.
+        memory: of each column, where the fit filtered its errors; none: they are white.
+        values: (P,) a point that no log was fitted by, such as the robot as it was given; nothing is held out of it.
+    """
+    whole = solution.solver.problem
+    assert isinstance(whole, Problem)
+    pieces = [replace(piece, margin=margin) for piece, margin in zip(whole.pieces, margins, strict=True)]
+    problem = bounded(replace(whole, pieces=tuple(pieces)))
+    point = solution.state.point if values is None else Point(values, solution.state.point.states)
+    rows = Rows.of(problem, point, solution.solver.engine.unfiltered.on(problem).residuals(point))
+    held = solution.held if values is None else np.ones(len(solution.held), bool)
+    rows = replace(rows, slopes=[np.where(held, 0.0, slopes) for slopes in rows.slopes])
+    white = noise_models(rows, rows.residual, most=0)
+    models = white
+    if memory:
+        models = [memory.get(column, plain) for column, plain in zip(problem.columns, white, strict=True)]
+    seen = Linear(rows, white)
+    residual, slopes = seen.whole()
+    number, column = _places(seen)
+    steps = np.zeros((BLOCKS, slopes.shape[1]))
+    at = 1 + np.flatnonzero(np.any(slopes != 0.0, axis=0))
+    if at.size:
+        blocks = Blocks(Linear(rows, models), [np.zeros((*own.shape, 0)) for own in rows.residual])
+        for b in range(BLOCKS):
+            steps[b, at - 1] = blocks.fitted(blocks.total - blocks.matrix[b], at) / blocks.size[at]
+    variance, square = np.array([model.variance for model in white]), np.zeros((BLOCKS, len(white)))
+    for b in range(BLOCKS):
+        block = number == b
+        left = residual[block] - slopes[block] @ steps[b]
+        square[b] = np.bincount(column[block], left**2, len(white)) * variance
+    count = rows.added(lambda k, j: rows.there[k][j])
+    return FreeRun(square, count, _spread(rows))
+
+
+def margins_of(solutions: Sequence[Solution]) -> list[FloatArray]:
+    """Of each piece (C,), the margin that leaves the same rows to all these fits: a latency needs one."""
+    margins = [[piece.margin for piece in solution.solver.problem.pieces] for solution in solutions]
+    return [np.max(margin, axis=0) for margin in zip(*margins, strict=True)]
+
+
+def _places(linear: Linear) -> tuple[IntArray, IntArray]:
+    """(block of each white row, its column), (N,) each; -1 where it is none of a log."""
+    rows, column = linear.rows, list[IntArray]()
+    for k, there in enumerate(rows.there):
+        of_rows = np.repeat(rows.column[k], there.sum(axis=1))
+        column.append(np.concatenate([of_rows, np.full(linear.length(k) - len(of_rows), -1)]))
+    column.append(np.full(len(rows.problem.parameters), -1))
+    found = np.concatenate(column)
+    return np.where(found >= 0, Blocks.numbers(linear), -1), found
+
+
+def _spread(rows: Rows) -> FloatArray:
+    """Standard deviation of what was measured of each column in the rows that count. Shape (C,)."""
+    values: list[list[FloatArray]] = [[] for _ in rows.problem.columns]
+    for piece, there, columns in zip(rows.pieces, rows.there, rows.column, strict=True):
+        measured = piece.record.outputs[piece.first : piece.last + 1].T
+        for j, c in enumerate(columns):
+            values[c].append(measured[j, there[j]])
+    return np.array([np.concatenate(own).std() if own and np.concatenate(own).size else 0.0 for own in values])

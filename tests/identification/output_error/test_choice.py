@@ -1,0 +1,124 @@
+"""Which fit is written: by free runs on held-out blocks, of logs that plain NumPy made."""
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn import OutputError
+from omnidyn.identification.output_error.linear.free_run import FreeRun
+from omnidyn.model.keys import Key
+from tests.support import plain_robot
+
+PUSH = (0.8, -0.5, 0.03)
+
+
+def share_of_noise(log):
+    """What noise alone is of the spread of the wheel speeds: nothing predicts better."""
+    return np.exp(np.log(plain_robot.NOISE / log.wheel_speed.std(axis=0)).mean())
+
+
+def codes(result):
+    return [warning.code for warning in result.warnings]
+
+
+@pytest.fixture(scope="module")
+def late(tmp_path_factory):
+    """A log of a robot 20 ms late, whose file has another wheel radius and inertia."""
+    folder = tmp_path_factory.mktemp("late")
+    given = plain_robot.robot(folder, radius=0.0505, inertia=0.6 * plain_robot.INERTIA)
+    return given, plain_robot.log(3, late_rows=1)
+
+
+def test_a_latency_does_not_stand_in_for_wheel_radius_and_inertia(late):
+    given, log = late
+    result = omnidyn.identify(log, given, quick=True)
+    assert result.value["wheels.wheel_radius_m"] == pytest.approx(plain_robot.RADIUS, rel=0.005)
+    assert result.value["body.inertia_kg_m2"] == pytest.approx(plain_robot.INERTIA, rel=0.01)
+    assert result.nuisances["latency.wheel_speed"].value == pytest.approx(0.02, abs=0.002)
+    truths = (*plain_robot.VISCOUS, *plain_robot.COULOMB)
+    for key, truth in zip(list(result.value)[:6], truths, strict=True):
+        assert result.value[key] == pytest.approx(truth, rel=0.05)
+    blocks = result.held_out
+    assert blocks.written < 1.1 * share_of_noise(log)
+    assert blocks.plain > 5.0 * blocks.written
+    assert blocks.given > 5.0 * blocks.written
+    assert "size_fitted" in codes(result)
+    assert "late_by_rows" not in codes(result)
+
+
+def test_what_was_asked_for_by_name_is_kept_and_doubted(late):
+    given, log = late
+    result = omnidyn.identify(log, given, OutputError(free="friction"), quick=True)
+    assert set(result.value) == {key for key in result.value if key.startswith("friction.")}
+    assert "late_by_rows" in codes(result)
+
+
+def test_errors_that_remember_give_way_to_least_squares_that_predict_better(late):
+    given, log = late
+    by_default = omnidyn.identify(log, given, OutputError(nuisances=()), quick=True)
+    coloured = omnidyn.identify(log, given, OutputError(nuisances=(), covariance="autoregressive"), quick=True)
+    assert "white_predicts_better" in codes(by_default)
+    assert by_default.held_out.written < 0.96 * coloured.held_out.written
+    assert by_default.held_out.written == by_default.held_out.plain
+
+
+def test_a_constant_push_is_fitted_where_it_is_there(tmp_path):
+    log = plain_robot.log(5, push=PUSH)
+    result = omnidyn.identify(log, plain_robot.robot(tmp_path), quick=True)
+    for axis, truth in zip(("x", "y", "yaw"), PUSH, strict=True):
+        found = result.nuisances[f"push.{axis}"]
+        assert abs(found.value - truth) < max(4.0 * found.std, 0.02 * abs(truth))
+    assert "constant_force" in codes(result)
+    assert result.held_out.written < 1.1 * share_of_noise(log)
+    assert result.held_out.plain > 3.0 * result.held_out.written
+
+
+def test_a_right_model_has_no_push_and_is_as_good_as_the_plain_fit(tmp_path):
+    log = plain_robot.log(6)
+    result = omnidyn.identify(log, plain_robot.robot(tmp_path), quick=True)
+    assert not any(name.startswith(("push", "tilt")) for name in result.nuisances)
+    assert result.held_out.written == pytest.approx(result.held_out.plain, rel=0.02)
+    assert result.held_out.written < 1.05 * share_of_noise(log)
+    assert result.held_out.given > 2.0 * result.held_out.written
+    assert set(result.value) == set(
+        omnidyn.identify(log, plain_robot.robot(tmp_path), OutputError(free="friction")).value
+    )
+
+
+def test_no_row_after_a_start_from_rest_is_left_out(tmp_path):
+    """Voltage from the first row on, 20 ms late: what was before is known, and the first rows tell the latency."""
+    log, given = plain_robot.log(7, late_rows=1, still=0, levels=3, held=15), plain_robot.robot(tmp_path)
+    result = omnidyn.identify(log, given, OutputError(start="rest", nuisances=("latency",)), quick=True)
+    assert result.nuisances["latency.wheel_speed"].value == pytest.approx(0.02, abs=0.001)
+    first = np.arange(len(log))[:, None] < 6
+    early = log.replace(wheel_speed=np.where(first, log.wheel_speed + 1.0, log.wheel_speed))
+    moved = omnidyn.identify(early, given, OutputError(start="rest", nuisances=("latency",)), quick=True)
+    assert max(moved.noise.values()) > 3.0 * max(result.noise.values())  # rows before 0.3 s count
+
+
+def test_the_robot_as_it_was_given_is_written_where_it_predicts_better(tmp_path):
+    """A log of a second with much noise, of a robot whose file is right."""
+    given = plain_robot.robot(tmp_path)
+    for axis, (viscous, coulomb) in enumerate(zip(plain_robot.VISCOUS, plain_robot.COULOMB, strict=True)):
+        given = Key.parse(f"friction.axes.viscous[{axis}]").set(given, viscous)
+        given = Key.parse(f"friction.axes.coulomb[{axis}]").set(given, coulomb)
+    log = plain_robot.log(0, levels=2, held=14)
+    noisy = log.replace(wheel_speed=log.wheel_speed + 3.0 * np.random.default_rng(0).normal(size=log.wheel_speed.shape))
+    result = omnidyn.identify(noisy, given, quick=True)
+    assert "given_predicts_better" in codes(result)
+    assert result.robot == given
+    assert result.held_out.written == result.held_out.given
+
+
+def test_one_run_is_better_by_more_than_its_blocks_scatter():
+    rows, spread = np.array([100.0, 100.0]), np.array([1.0, 2.0])
+    even = FreeRun(np.full((10, 2), 4.0), rows, spread)
+    assert even.error == pytest.approx(np.sqrt(np.sqrt(0.4) * np.sqrt(0.4) / 2.0))
+    better = FreeRun(np.full((10, 2), 3.0), rows, spread)
+    assert better.is_better(even)
+    assert not even.is_better(better)
+    hardly = FreeRun(np.full((10, 2), 3.8), rows, spread)
+    assert not hardly.is_better(even)  # 5 % of the squares
+    before, after = np.full((10, 2), 4.0), np.full((10, 2), 4.6)
+    before[3], after[3] = 40.0, 20.0
+    assert not FreeRun(after, rows, spread).is_better(FreeRun(before, rows, spread))  # in one block of ten
