@@ -14,14 +14,17 @@ from functools import cache
 import numpy as np
 
 from omnidyn.identification.estimate import HeldOut
+from omnidyn.identification.methods import AUTO
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.linear.free_run import FreeRun, free_run, margins_of
 from omnidyn.identification.output_error.memory.whitening import Weighed
-from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.solve.solver import Solution
+from omnidyn.identification.output_error.trust.uncertainty import trust
 from omnidyn.model.robot import Robot
 from omnidyn.statement import NOTE, WARNING, Statement
+
+SURE = 3.0  # standard errors by which a constant force is one
 
 
 def better_of(found: Solution, plain: Solution) -> Solution:
@@ -45,26 +48,22 @@ def best_with_force(found: Solution, forced: Sequence[Solution]) -> Solution:
     margins = margins_of([found, *forced])
     before, runs = free_run(found, margins), [free_run(one, margins) for one in forced]
     k = int(np.argmin([run.error for run in runs]))
-    if not runs[k].is_better(before):
+    problem, values = forced[k].solver.problem, forced[k].state.point.values
+    std = trust(forced[k].solver, forced[k], AUTO).std
+    at = [problem.where(name) for name in problem.names if name not in found.solver.problem.names]
+    if before.adds_up or not runs[k].is_better(before) or not (np.abs(values[at]) > SURE * std[at]).any():
         return found
-    problem = forced[k].solver.problem
-    names = tuple(name for name in problem.names if name not in found.solver.problem.names)
-    values = tuple(float(forced[k].state.point.values[problem.where(name)]) for name in names)
-    numbers = {"keys": names, "values": values, "error": before.error, "with": runs[k].error}
+    names = tuple(problem.names[j] for j in at)
+    numbers = {"keys": names, "values": tuple(values[at].tolist()), "error": before.error, "with": runs[k].error}
     notes = (*found.notes, Statement("constant_force", WARNING, numbers=numbers))
     return replace(forced[k], plain=found.plain, notes=notes)
 
 
 def why_white(white: Solution, found: Weighed) -> Statement | None:
-    """Why least squares are taken in the place of a fit whose errors remember; None where they are not.
-
-    Not where that is in what adds up, such as an angle: there no block of a log is untouched by those before.
-    """
-    if any(name in TRAVELS and model.order for (name, _), model in found.models.items()):
-        return None
+    """Why least squares are taken in the place of a fit whose errors remember; None where they are not."""
     margins = margins_of([white])
     plains, ours = free_run(white, margins), free_run(found.solution, margins, found.models)
-    if not plains.is_better(ours):
+    if plains.adds_up or not plains.is_better(ours):
         return None
     return Statement("white_predicts_better", NOTE, numbers={"error": ours.error, "white": plains.error})
 

@@ -17,6 +17,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.linear.blocks import BLOCKS, Blocks
 from omnidyn.identification.output_error.linear.rows import Linear, Rows, noise_models
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
+from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import Column, Point, Problem, bounded
 from omnidyn.identification.output_error.solve.solver import Solution
 
@@ -28,11 +29,16 @@ TINY = 1e-300
 @dataclass(frozen=True, eq=False)
 class FreeRun:
     """The error of a free run on held-out blocks. square (B, C): sums of squares of each block and output; rows (C,):
-    how many there are; spread (C,): standard deviation of each output."""
+    how many there are; spread (C,): standard deviation of each output.
+
+    Of what adds up, such as an angle, a block begins with the errors of all blocks before: it counts where nothing else
+    was measured, and there adds_up is True.
+    """
 
     square: FloatArray
     rows: FloatArray
     spread: FloatArray
+    adds_up: bool = False
 
     @property
     def error(self) -> float:
@@ -90,8 +96,9 @@ def free_run(
         block = number == b
         left = residual[block] - slopes[block] @ steps[b]
         square[b] = np.bincount(column[block], left**2, len(white)) * variance
-    count = rows.added(lambda k, j: rows.there[k][j])
-    return FreeRun(square, count, _spread(rows))
+    travels = np.array([name in TRAVELS for name, _ in problem.columns])
+    count = np.where(travels & ~travels.all(), 0.0, rows.added(lambda k, j: rows.there[k][j]))
+    return FreeRun(square, count, _spread(rows), bool(travels.all()))
 
 
 def margins_of(solutions: Sequence[Solution]) -> list[FloatArray]:
