@@ -18,6 +18,7 @@ from scipy.special import chdtrc
 
 from omnidyn.arrays import FloatArray
 from omnidyn.comparison.traces import Trace
+from omnidyn.compiled.parallel import small_matrices
 from omnidyn.statistics import block_length, bootstrap_error, t_quantile
 
 CONSTANT = 1e-9  # a measured signal that changes by less than this share of its size is constant
@@ -117,6 +118,7 @@ GRID, ROUNDS = 21, 4  # lags tried at a time; each round looks closer
 WORTHWHILE_SHARE = 0.9  # a lag counts where it takes what the model leaves unexplained below this share
 
 
+@small_matrices()
 def lag_of(traces: Sequence[Trace]) -> float | None:
     """The delay d [s] at which measured(t) and model(t - d) correlate best, over all traces together.
 

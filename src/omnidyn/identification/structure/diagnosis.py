@@ -17,6 +17,7 @@ from omnidyn.identification.output_error.linear.rows import Linear, Rows, solved
 from omnidyn.identification.output_error.linear.sensitivity import effects, with_rounding
 from omnidyn.identification.output_error.linear.workbench import Workbench, scaled
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
+from omnidyn.identification.output_error.problem.decimated import Decimated
 from omnidyn.identification.output_error.problem.friction_laws import bending_keys, falls
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem, bounded
 from omnidyn.identification.output_error.solve.solver import Solution
@@ -62,9 +63,10 @@ def examine(solution: Solution) -> Examined:
     """
     solver, point = solution.solver, solution.state.point
     whole = with_levels(solver.problem, point, levels_of(solution))
-    problem = bounded(whole, SHOWN, effects(whole))
-    engine = solver.engine.on(problem)
-    parts = engine.residuals(point)
+    few = Decimated.of(whole)
+    problem = bounded(few.problem, SHOWN, effects(few.problem))
+    engine = solver.engine.on(few.all_rows(problem))
+    parts = few.kept(engine.residuals(point))
     moved = motions(problem, point)
     rows = with_rounding(Rows.of(problem, point, as_counted(solution, problem, parts)), moved)
     seen = misfit(rows, moved)

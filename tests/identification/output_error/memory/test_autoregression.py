@@ -6,7 +6,7 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
-from omnidyn.identification.output_error.memory.innovations import innovations
+from omnidyn.identification.output_error.memory.innovations import gains, innovations
 
 THREE = AutoRegression(np.array([0.8, -0.4, 0.3]), 1.0, 1000)
 
@@ -14,6 +14,11 @@ THREE = AutoRegression(np.array([0.8, -0.4, 0.3]), 1.0, 1000)
 def series(model, rows, seed, columns=1):
     fresh = np.random.default_rng(seed).normal(size=(rows + 5000, columns))
     return lfilter([1.0], np.concatenate([[1.0], -model.coefficients]), fresh, axis=0)[5000:]
+
+
+def innovated(values, steps, phi, covariance):
+    """What is new in each row of a memory."""
+    return innovations(values, steps, phi, *gains(steps, phi, covariance))
 
 
 def test_the_autocovariance_is_that_of_its_response_to_an_impulse():
@@ -30,7 +35,7 @@ def test_what_is_new_makes_the_exact_likelihood_rows_missing_or_not(missing):
     values = np.random.default_rng(1).normal(size=(60, 3))
     left = np.setdiff1d(np.arange(60), missing)
     steps = np.concatenate([[0], np.diff(left)])
-    new = innovations(values[left], steps, THREE.coefficients, THREE.covariance)
+    new = innovated(values[left], steps, THREE.coefficients, THREE.covariance)
     dense = toeplitz(THREE.autocovariance(60))[np.ix_(left, left)]
     np.testing.assert_allclose(new.T @ new, values[left].T @ np.linalg.solve(dense, values[left]), rtol=1e-10)
 
@@ -39,9 +44,9 @@ def test_stretches_know_nothing_of_each_other():
     values = np.random.default_rng(2).normal(size=(40, 2))
     steps = np.ones(40, int)
     steps[[0, 17]] = 0
-    both = innovations(values, steps, THREE.coefficients, THREE.covariance)
+    both = innovated(values, steps, THREE.coefficients, THREE.covariance)
     alone = [
-        innovations(part, np.minimum(np.arange(len(part)), 1), THREE.coefficients, THREE.covariance)
+        innovated(part, np.minimum(np.arange(len(part)), 1), THREE.coefficients, THREE.covariance)
         for part in (values[:17], values[17:])
     ]
     np.testing.assert_allclose(both, np.concatenate(alone))
@@ -83,7 +88,7 @@ def test_what_is_new_of_errors_that_add_up_is_what_is_new_of_their_changes(missi
     values = np.random.default_rng(5).normal(size=(60, 3)).cumsum(axis=0) + 1000.0
     left = np.setdiff1d(np.arange(60), missing)
     steps = np.concatenate([[0], np.diff(left)])
-    new = innovations(values[left], steps, *model.filter)
+    new = innovated(values[left], steps, *model.filter)
     summed = np.tri(59)  # rows 1 to 59 from the changes before them
     dense = (summed @ toeplitz(THREE.autocovariance(59)) @ summed.T)[np.ix_(left[1:] - 1, left[1:] - 1)]
     apart = values[left[1:]] - values[left[0]]

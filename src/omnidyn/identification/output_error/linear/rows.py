@@ -18,7 +18,7 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.output_error.linear.random_effects import RandomEffects, drawn_together, scaled
-from omnidyn.identification.output_error.memory.autoregression import AutoRegression, autoregression
+from omnidyn.identification.output_error.memory.autoregression import AutoRegression, Gains, autoregression
 from omnidyn.identification.output_error.memory.innovations import without_gaps
 from omnidyn.identification.output_error.memory.whitened import known_rows, moving_rows
 from omnidyn.identification.output_error.problem.outputs import TRAVEL
@@ -106,7 +106,7 @@ class Linear:
     rows: Rows
     memory: Sequence[AutoRegression]
 
-    @property
+    @cached_property
     def degrees(self) -> float:
         """Degrees of freedom with which the noise is known where it is known least, at slow changes."""
         return min((memory.degrees for memory in self.memory), default=np.inf)
@@ -219,8 +219,20 @@ class Linear:
         """Values (rows, K) of column j of piece k made white, in the rows that count."""
         rows, memory = self.rows, self.memory[self.rows.column[k][j]]
         there = rows.there[k][j]
-        new = memory.new(np.ascontiguousarray(values[there]), rows.steps[k][j], rows.moves[k][j, there])
-        return new / np.sqrt(max(memory.variance, TINY))
+        return self._new(k, j, np.ascontiguousarray(values[there])) / np.sqrt(max(memory.variance, TINY))
+
+    def _new(self, k: int, j: int, known: FloatArray) -> FloatArray:
+        """What is new in the rows (n, K) of column j of piece k that count."""
+        rows, memory = self.rows, self.memory[self.rows.column[k][j]]
+        steps = rows.steps[k][j]
+        if memory.remembers and memory.moving is None and (k, j) not in self._gains:
+            self._gains[k, j] = memory.gains(steps)
+        return memory.new(known, steps, rows.moves[k][j, rows.there[k][j]], self._gains.get((k, j)))
+
+    @cached_property
+    def _gains(self) -> dict[tuple[int, int], Gains]:
+        """Those of columns that were asked before: column j of piece k."""
+        return {}
 
     def squares(self, values: Sequence[FloatArray]) -> FloatArray:
         """The same as of `Rows`, of values made white."""
@@ -264,7 +276,7 @@ class Linear:
                 for j in (j for j, column in enumerate(columns) if column == c):
                     there, steps = self.rows.there[k][j], self.rows.steps[k][j]
                     own = np.ascontiguousarray(shown[k][j][there])
-                    leaning += memory.leaning(own, memory.new(own, steps, self.rows.moves[k][j, there]), steps)
+                    leaning += memory.leaning(own, self._new(k, j, own), steps)
             scatter += memory.scatter(leaning / max(memory.variance, TINY))
         return 2.0 / np.maximum(scatter, TINY)
 

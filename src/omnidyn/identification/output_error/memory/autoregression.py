@@ -22,7 +22,7 @@ import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel
-from omnidyn.identification.output_error.memory.innovations import innovations
+from omnidyn.identification.output_error.memory.innovations import gains, innovations
 from omnidyn.identification.output_error.memory.moving import (
     Moving,
     coefficients,
@@ -41,6 +41,9 @@ BLOCK, MORE = 50, 1.5  # rows; standard errors above the power of white noise fr
 MANY = 300_000  # numbers of series, from which it pays to look for columns that say nothing new
 EMPTY = 1e-9  # of the squares of the errors themselves
 ANYWHERE = 1e8  # times the variance of what is new: where errors that add up may begin
+
+
+Gains = tuple[FloatArray, FloatArray]  # of innovations.py
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +67,7 @@ class AutoRegression:
         """p."""
         return len(self.partial)
 
-    @property
+    @cached_property
     def coefficients(self) -> FloatArray:
         """phi, shape (p,), by Levinson's recursion."""
         return coefficients(self.partial)
@@ -83,13 +86,24 @@ class AutoRegression:
         start = back @ self.covariance @ back.T + ANYWHERE
         return np.append(self.coefficients, 0.0) + np.append(1.0, -self.coefficients), start
 
-    def new(self, series: FloatArray, steps: IntArray, moves: BoolArray) -> FloatArray:
-        """What is new in each row of series (n, K), see innovations.py. moves (n,): in which rows the robot does."""
+    def gains(self, steps: IntArray) -> Gains:
+        """What `new` needs of its rows alone, for those who ask it of many series. steps (n,): see innovations.py."""
+        return gains(steps, *self.filter)
+
+    def new(self, series: FloatArray, steps: IntArray, moves: BoolArray, known: Gains | None = None) -> FloatArray:
+        """What is new in each row of series (n, K), see innovations.py.
+
+        Args:
+            series: columns of one memory.
+            steps: rows since the one before, (n,).
+            moves: in which rows the robot does, (n,).
+            known: the `gains` of these steps, where they are known.
+        """
         if self.moving is not None:
             return new_while_moving(series, steps, moves, *self.moving)
-        return innovations(series, steps, *self.filter) if self.remembers else series
+        return innovations(series, steps, self.filter[0], *known or self.gains(steps)) if self.remembers else series
 
-    @property
+    @cached_property
     def covariance(self) -> FloatArray:
         """Covariance of p rows in a row, (p, p), where what is new has variance 1."""
         lags = self.autocovariance(self.order)
@@ -108,7 +122,7 @@ class AutoRegression:
             known.append(float(phi @ known[: -len(phi) - 1 : -1]) if len(phi) else 0.0)
         return np.array(known[:count])
 
-    @property
+    @cached_property
     def degrees(self) -> float:
         """Degrees of freedom behind the power of the slowest errors, s^2/(1 - sum phi)^2; inf for white ones.
 

@@ -22,16 +22,47 @@ T = TypeVar("T", bound=np.generic)
 
 
 @kernel
-def innovations(series, steps, phi, covariance):
-    """What is new in each row, with the same variance throughout. series (n, K): columns of one memory; steps (n,):
-    rows since the one before, 1 where none is missing, 0 at the start of a stretch of its own; phi (p,) and
-    covariance (p, p) of AutoRegression. Returns (n, K)."""
+def gains(steps, phi, covariance):
+    """(gain (m, p), variance (m,)) of the m rows that do not follow p known ones: how far what is new in a row moves
+    what is expected of the last p, and what it varies by. They depend on no series, and serve all of them.
+
+    steps (n,): rows since the one before, 1 where none is missing, 0 at the start of a stretch of its own; phi (p,) and
+    covariance (p, p) of AutoRegression.
+    """
+    p = len(phi)
+    gain, variance = np.zeros((len(steps), p)), np.zeros(len(steps))
+    spread, pulled = np.zeros((p, p)), np.zeros(p)
+    known, m = 0, 0  # rows in a row up to the last one; rows so far
+    for t in range(len(steps)):
+        if steps[t] == 1 and known >= p:
+            known += 1
+            continue
+        if steps[t] == 0:
+            spread[:, :] = covariance
+        elif known >= p:
+            spread[:, :] = 0.0
+        for _ in range(steps[t]):
+            open_one_row_on(phi, spread, pulled)
+        variance[m] = spread[0, 0]
+        for i in range(p):
+            gain[m, i] = spread[i, 0] / variance[m]
+        for a in range(p):
+            for b in range(p):
+                spread[a, b] -= gain[m, a] * gain[m, b] * variance[m]
+        known = known + 1 if steps[t] == 1 else 1
+        m += 1
+    return gain[:m].copy(), variance[:m].copy()
+
+
+@kernel
+def innovations(series, steps, phi, gain, variance):
+    """What is new in each row, with the same variance throughout. series (n, K): columns of one memory; steps (n,) and
+    phi (p,) as for `gains`; gain, variance: theirs. Returns (n, K)."""
     n, count = series.shape
     p = len(phi)
     out = series.copy()
-    state, spread = np.zeros((p, count)), np.zeros((p, p))
-    pulled, fresh = np.zeros(p), np.zeros(count)
-    known = 0  # rows in a row up to the last one
+    state, fresh = np.zeros((p, count)), np.zeros(count)
+    known, m = 0, 0
     for t in range(n):
         if steps[t] == 1 and known >= p:
             for i in range(p):
@@ -41,33 +72,43 @@ def innovations(series, steps, phi, covariance):
             continue
         if steps[t] == 0:
             state[:, :] = 0.0
-            spread[:, :] = covariance
         elif known >= p:
             for i in range(p):
                 state[i] = series[t - 1 - i]
-            spread[:, :] = 0.0
         for _ in range(steps[t]):
-            one_row_on(phi, state, spread, pulled, fresh)
+            expect_one_row_on(phi, state, fresh)
         if p > 0:
-            learn(series[t], state, spread, pulled, out[t])
+            root = math.sqrt(variance[m])
+            for j in range(count):
+                fresh[j] = series[t, j] - state[0, j]
+                out[t, j] = fresh[j] / root
+            for i in range(p):
+                for j in range(count):
+                    state[i, j] += gain[m, i] * fresh[j]
         known = known + 1 if steps[t] == 1 else 1
+        m += 1
     return out
 
 
 @part
-def one_row_on(phi, state, spread, pulled, fresh):
-    """What is expected of the next row, and how far it is open: spread becomes T spread T' + e e', e the new row."""
+def expect_one_row_on(phi, state, fresh):
+    """What is expected of the next row, and of the p - 1 before it. state (p, K)."""
     p, count = state.shape
-    for j in range(count):
-        fresh[j] = 0.0
-        for i in range(p):
+    fresh[:] = 0.0
+    for i in range(p):
+        for j in range(count):
             fresh[j] += phi[i] * state[i, j]
     for i in range(p - 1, 0, -1):
         for j in range(count):
             state[i, j] = state[i - 1, j]
     for j in range(count):
         state[0, j] = fresh[j]
-    ahead = 1.0
+
+
+@part
+def open_one_row_on(phi, spread, pulled):
+    """How far the next row is open: spread becomes T spread T' + e e', e the new row."""
+    p, ahead = len(phi), 1.0
     for a in range(p):
         pulled[a] = 0.0
         for i in range(p):
@@ -81,23 +122,6 @@ def one_row_on(phi, state, spread, pulled, fresh):
         spread[0, a] = pulled[a - 1]
         spread[a, 0] = pulled[a - 1]
     spread[0, 0] = ahead
-
-
-@part
-def learn(row, state, spread, pulled, out):
-    """A row (K,) becomes known; `out` is what was new in it, over its standard deviation."""
-    p, count = state.shape
-    ahead = spread[0, 0]
-    for i in range(p):
-        pulled[i] = spread[i, 0] / ahead
-    for j in range(count):
-        new = row[j] - state[0, j]
-        out[j] = new / math.sqrt(ahead)
-        for i in range(p):
-            state[i, j] += pulled[i] * new
-    for a in range(p):
-        for b in range(p):
-            spread[a, b] -= pulled[a] * pulled[b] * ahead
 
 
 def without_gaps(series: NDArray[T], steps: IntArray) -> list[NDArray[T]]:

@@ -243,19 +243,20 @@ def partials(at: FloatArray, count: int) -> FloatArray:
     phi, theta = at
     first = (1.0 - phi * theta) * (phi - theta) / (1.0 + theta * theta - 2.0 * phi * theta)
     lags = np.append(1.0, first * phi ** np.arange(count))
-    found, known, left = np.zeros(count), np.zeros(0), 1.0
+    found, known, left = np.zeros(count), np.zeros(count), 1.0
     for m in range(count):
-        found[m] = (lags[m + 1] - known @ lags[m:0:-1]) / left
-        known = np.append(known - found[m] * known[::-1], found[m])
+        found[m] = (lags[m + 1] - known[:m] @ lags[m:0:-1]) / left
+        known[:m] -= found[m] * known[:m][::-1]
+        known[m] = found[m]
         left *= 1.0 - found[m] ** 2
     return found
 
 
 def coefficients(partial: FloatArray) -> FloatArray:
     """phi of an autoregression by its partial correlations, by Levinson's recursion. Shape (p,)."""
-    known = np.zeros(0)
-    for k in partial:
-        known = np.append(known - k * known[::-1], k)
+    known = np.array(partial)
+    for m, k in enumerate(partial):
+        known[:m] -= k * known[:m][::-1]
     return known
 
 

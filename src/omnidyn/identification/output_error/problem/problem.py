@@ -162,8 +162,8 @@ NUMBERS = 25_000_000  # rows x columns x what is shown in each, that are held at
 ROWS, EFFECTS = 30_000, 600  # that are looked at, of `growing` those of a piece
 
 
-def bounded(problem: Problem, beside: int = 0, growing: Sequence[int] = ()) -> Problem:
-    """The problem on the beginnings of its pieces, so that at most NUMBERS numbers are shown in at most ROWS rows.
+def bounded(problem: Problem, beside: int = 0, growing: Sequence[int] = (), most: int = ROWS) -> Problem:
+    """The problem on the beginnings of its pieces, so that at most NUMBERS numbers are shown in at most `most` rows.
 
     beside: columns that are shown beside residuals and their slopes. growing: of each piece, columns beside these, of
     which fewer rows have fewer.
@@ -178,4 +178,4 @@ def bounded(problem: Problem, beside: int = 0, growing: Sequence[int] = ()) -> P
     # even s + more s^2 = NUMBERS for the share s, in the form that no small term spoils
     share = 2.0 * NUMBERS / (even + (even**2 + 4.0 * more * NUMBERS) ** 0.5)
     share = min(share, EFFECTS / max([1, *growing]))
-    return problem.shortened(min(ROWS, int(share * whole)))
+    return problem.shortened(min(most, int(share * whole)))

@@ -15,6 +15,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.linear.blocks import Blocks
 from omnidyn.identification.output_error.linear.rows import Linear, Rows
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
+from omnidyn.identification.output_error.problem.decimated import Decimated
 from omnidyn.identification.output_error.problem.problem import Parts, Point, bounded
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.structure.tails import as_counted
@@ -86,9 +87,10 @@ def _blocks(
     """(blocks of one group, how many rows they have). told: parameters whose priors another group has already."""
     whole, point = solution.solver.problem, solution.state.point
     pieces = [replace(piece, margin=own) for piece, own in zip(whole.pieces, margins, strict=True)]
-    problem = bounded(replace(whole, pieces=tuple(pieces)))
-    engine = solution.solver.engine.on(problem)
-    shows: Shows = lambda at: as_counted(solution, problem, engine.residuals(at))  # noqa: E731
+    few = Decimated.of(replace(whole, pieces=tuple(pieces)))
+    problem = bounded(few.problem)
+    engine = solution.solver.engine.on(few.all_rows(problem))
+    shows: Shows = lambda at: as_counted(solution, problem, few.kept(engine.residuals(at)))  # noqa: E731
     bare = [replace(p, prior=None) if k in told else p for k, p in enumerate(problem.parameters)]
     rows = Rows.of(replace(problem, parameters=tuple(bare)), point, shows(point))
     slopes = [np.where(solution.held, 0.0, own) for own in rows.slopes]  # what a bound holds, holds in every block

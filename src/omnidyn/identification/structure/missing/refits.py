@@ -7,7 +7,7 @@ best for more; the difference of what the two fits show is the column by which a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -68,15 +68,16 @@ def refits(
     if problem.robot.wheels.traction_mu is not None:
         return {}
     point, begun = solution.state.point, []
-    coarse = type(solution.solver.engine) if solution.solver.engine.looped else ImplicitEngine
+    fine, few = solution.solver.engine, problem.pieces[0].record is not solution.solver.problem.pieces[0].record
+    kinds = [type(fine) if fine.looped else ImplicitEngine, *([ExactEngine] if few and fine.exact else [])]
     try:
-        off = _by_coarse_steps(problem, parts, point, coarse)
+        off = {kind: _by_coarse_steps(problem, parts, point, kind) for kind in kinds}
     except OmnidynError:  # a nuisance that the implicit engine does not know
         return {}
     for candidate, remedy in _asked(ranked, candidates):
         for way in switches(remedy, problem.robot, _question(problem), solution):
             try:
-                begun.append(_begun(candidate, way, problem, solution, off, coarse).gone_on(STEPS))
+                begun.append(_begun(candidate, way, problem, solution, off).gone_on(STEPS))
             except OmnidynError:  # no engine simulates it, or nothing is left to be fitted
                 continue
     begun.sort(key=lambda each: each.state.objective)
@@ -129,18 +130,23 @@ def _by_coarse_steps(problem: Problem, parts: Sequence[Parts], point: Point, kin
 
 
 def _begun(
-    candidate: Candidate, way: Switch, problem: Problem, solution: Solution, off: Sequence[FloatArray], coarse: Kind
+    candidate: Candidate, way: Switch, problem: Problem, solution: Solution, off: Mapping[Kind, Sequence[FloatArray]]
 ) -> _Refit:
-    """Where a fit with a candidate begins. coarse: the engine of `off`. Raises OmnidynError where none can."""
+    """Where a fit with a candidate begins. off: of engines that may simulate it, the first of them any candidate.
+
+    The exact engine is off by nothing where no rows are left out. Raises OmnidynError where none can.
+    """
     records = list({id(piece.record): piece.record for piece in problem.pieces}.values())
     keys = expand_keys(way.question.free or (), way.robot)
-    kind = ExactEngine if not coarse.looped and is_exact(way.robot) and stays_exact(way.robot, keys) else coarse
+    coarse, few = next(iter(off)), problem.pieces[0].record is not solution.solver.problem.pieces[0].record
+    exact = not coarse.looped and is_exact(way.robot) and stays_exact(way.robot, keys)
+    kind = ExactEngine if exact and (not few or ExactEngine in off) else coarse
     made = make_problem(records, way.robot, replace(way.question, free=keys), kind)
     made = replace(made, pieces=problem.pieces)
     before, values = _values(problem, solution), np.array([p.value for p in made.parameters])
     for k, name in enumerate(made.names[made.robot_count :], made.robot_count):
         values[k] = before.get(name, values[k])  # numbers of the robot stand in it where they were found
-    engine = kind.of(made) if kind.exact else _Coarse(made, kind, off)
+    engine = _Coarse(made, kind, off[kind]) if kind in off else kind.of(made)
     solver = Solver(made, engine, solution.solver.nu, CLOSE, counted=False)
     begins = [values]
     if made.robot.wheels.traction_mu is not None:  # whose leaps lead the latency of wheels that roll astray

@@ -1,0 +1,110 @@
+"""Every so many rows of a problem: rows 1 ms apart say hardly more of what a fit misses than rows 5 ms apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.identification.output_error.problem.problem import ROWS, Parts, Piece, Problem, bounded
+from omnidyn.identification.output_error.problem.record import SHORTEST, Record
+
+LONGEST = 0.01  # [s] of a row that is made of several: motors and robots answer more slowly
+KEPT = 5000  # rows of all logs together, which are left at least
+WHOLE = 0.9  # of the rows of an output that must hold a number: others have a rate of their own
+FINE = 10  # times as many rows as are looked at, that are simulated for them
+
+
+@dataclass(frozen=True, eq=False)
+class Decimated:
+    """problem: with the rows that are kept. whole: with all of them; it is the same one where none is left out.
+
+    rows: of each piece, which rows of its record are kept. Inputs are means over what is between them; outputs are as
+    measured, so that their noise, ticks and outliers are those of the log.
+    """
+
+    problem: Problem
+    whole: Problem
+    rows: Sequence[IntArray]
+
+    @classmethod
+    def of(cls, problem: Problem) -> Decimated:
+        """As few rows as KEPT and LONGEST allow; all where that is none, of a speed loop, whose ticks count, and where
+        outputs have clocks of their own."""
+        records = {id(piece.record): piece.record for piece in problem.pieces}
+        time = sum(float(np.ptp(piece.record.t[[piece.first, piece.last]])) for piece in problem.pieces)
+        every = {key: _stride(record, problem.pieces, time) for key, record in records.items()}
+        if max(every.values()) == 1:
+            return cls(problem, problem, ())
+        whole = bounded(problem, most=FINE * ROWS)
+        rows = [_rows(piece, every[id(piece.record)]) for piece in whole.pieces]
+        pieces = list[Piece]()
+        for key, record in records.items():
+            own = [kept for piece, kept in zip(whole.pieces, rows, strict=True) if piece.record is record]
+            records[key] = _of_record(record, own)
+        for piece, kept in zip(whole.pieces, rows, strict=True):
+            record = records[id(piece.record)]
+            first, last = np.searchsorted(record.t, piece.record.t[kept[[0, -1]]]).tolist()
+            pieces.append(replace(piece, record=record, first=first, last=last))
+        return cls(replace(whole, pieces=tuple(pieces)), whole, rows)
+
+    def all_rows(self, problem: Problem) -> Problem:
+        """The problem to simulate for one that is `problem`, or shorter."""
+        if not self.rows:
+            return problem
+        pieces = [
+            replace(piece, last=int(kept[own.last - own.first]))
+            for piece, own, kept in zip(self.whole.pieces, problem.pieces, self.rows, strict=True)
+        ]
+        return replace(self.whole, pieces=tuple(pieces))
+
+    def kept(self, parts: Sequence[Parts]) -> list[Parts]:
+        """What an engine shows of `all_rows` in the rows that are kept."""
+        if not self.rows:
+            return list(parts)
+        found = []
+        for (residual, slopes, at), piece, kept in zip(parts, self.whole.pieces, self.rows, strict=True):
+            rows = kept[kept < piece.first + residual.shape[1]] - piece.first
+            found.append((residual[:, rows], slopes[:, rows], at))
+        return found
+
+
+def _stride(record: Record, pieces: Sequence[Piece], time: float) -> int:
+    """Of how many rows of a record one is kept. time [s]: of all pieces."""
+    own = [piece for piece in pieces if piece.record is record]
+    measured = np.concatenate([np.isfinite(record.outputs[piece.first : piece.last + 1]) for piece in own])
+    if record.set_point is not None or record.staggered or measured.mean(axis=0).min(initial=1.0) < WHOLE:
+        return 1
+    step = float(np.median(np.concatenate([np.diff(record.t[piece.first : piece.last + 1]) for piece in own])))
+    return max(int(1.001 * min(LONGEST, time / KEPT) / step), 1)
+
+
+def _rows(piece: Piece, stride: int) -> IntArray:
+    """The rows of a piece that are kept; all of one that is short."""
+    rows = np.arange(piece.first, piece.last + 1, stride)
+    return rows if len(rows) >= SHORTEST else np.arange(piece.first, piece.last + 1)
+
+
+def _of_record(record: Record, kept: Sequence[IntArray]) -> Record:
+    """A record of the rows that some pieces keep, and its ends, which say how much of it has gone by."""
+    rows = np.unique(np.concatenate([*kept, [0, len(record.t) - 1]]))
+    pieces = [(int(np.searchsorted(rows, own[0])), int(np.searchsorted(rows, own[-1]))) for own in kept]
+    voltage = record.voltage[rows]
+    for own, (first, last) in zip(kept, pieces, strict=True):
+        voltage[first:last] = _means(record, own)
+    run = record.run
+    if run is not None:
+        run = run.replace(t=run.t[rows], **{name: values[rows] for name, values in run.channels.items()})
+    return replace(
+        record, t=record.t[rows], voltage=voltage, outputs=record.outputs[rows], pieces=tuple(pieces), run=run
+    )
+
+
+def _means(record: Record, rows: IntArray) -> FloatArray:
+    """The mean voltage between some rows, each held until the next. Shape (n - 1, W)."""
+    inner = slice(int(rows[0]), int(rows[-1]))
+    step = np.diff(record.t[inner.start : inner.stop + 1])[:, None]
+    summed = np.add.reduceat(record.voltage[inner] * step, rows[:-1] - rows[0])
+    return summed / np.diff(record.t[rows])[:, None]
