@@ -8,6 +8,7 @@ import pytest
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import MotorLine, SteadyState
 from omnidyn.identification.steady.line import fit_line
+from omnidyn.identification.steady.moment import moments
 from omnidyn.identification.steady.operating_points import force_points
 from omnidyn.identification.steady.shapes import SHAPES, fit_shape, rms_and_error
 from omnidyn.model.robot_file import load_robot
@@ -93,6 +94,12 @@ def test_speeds_that_are_none_make_every_shape_better_or_no_worse(points, shape)
     for k, own in enumerate(points.values()):
         fit = fit_shape(SHAPES[shape], ROBOTINO, own, turning=False, robust=False)
         assert rms_and_error((fit.error**2).sum(axis=1), fit.fold)[0] < LOO[shape][k] + 0.025
+
+
+def test_no_run_over_one_floor_changes_but_one_in_a_hundred(runs):
+    found, tested = moments([run for group in runs.values() for run in group], ROBOTINO, "current")
+    assert len(tested) == 252
+    assert len(found) <= 2
 
 
 def test_the_ellipse_of_each_floor(points):
