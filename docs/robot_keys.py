@@ -73,6 +73,7 @@ MEANING = {
     "friction.direction.yaw_coulomb": "C about yaw",
     "friction.direction.yaw_breakaway": "S about yaw; absent: as yaw_coulomb",
     "friction.direction.yaw_viscous": "B about yaw",
+    "friction.direction.ellipse": "how its force points: (Cx² vx, Cy² vy)/D, or (Cx vx, Cy vy)/abs(v)",
     "friction.direction.law": "which law: how it rests and starts",
     "friction.direction.stribeck_speed": "v_s, over which both levels fall from breakaway to coulomb",
     "friction.direction.yaw_stribeck_speed": "the same about yaw",

@@ -164,6 +164,7 @@ def study(loo, ties=(), std=0.02) -> Any:
         estimates={"all": estimate([std] * 6, Estimate)},
         lack_of_fit={},
         moments=(),
+        untested=(),
     )
 
 

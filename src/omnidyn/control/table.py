@@ -36,8 +36,8 @@ class FeedforwardTable(Shown):
 
     speed: V, kV, shape (wheels, 3). change: A, kA, shape (wheels, 3). directions: d_e of what rubs, shape (k, 3).
     sign: S_e, kS, forward and backward, shape (2, wheels, k). push: P [V/N, V/N, V/(N m)], shape (wheels, 3).
-    ellipse: (Cx, Cy) [N]. turning: M where the body frame turns, else 0 [kg]. centre: c [m], shape (2,). drop [V],
-    shape (wheels,); dead_band [V]. back_emf: of a twist [V], shape (wheels, 3).
+    ellipse: (Cx, Cy) [N]; plain: its force is (Cx vx, Cy vy)/|v|. turning: M where the body frame turns, else 0 [kg].
+    centre: c [m], shape (2,). drop [V], shape (wheels,); dead_band [V]. back_emf: of a twist [V], shape (wheels, 3).
     """
 
     robot: str
@@ -47,6 +47,7 @@ class FeedforwardTable(Shown):
     sign: FloatArray
     push: FloatArray
     ellipse: FloatArray
+    plain: bool
     turning: float
     centre: FloatArray
     drop: FloatArray
@@ -61,9 +62,9 @@ class FeedforwardTable(Shown):
         u = u + self.sign[0] @ np.maximum(np.sign(along), 0.0) - self.sign[1] @ np.maximum(np.sign(-along), 0.0)
         (x, y, w), (c, d) = nu, self.centre
         wrench = self.turning * w * np.array([-y - w * c, x - w * d, c * x + d * y])
-        rubs = float(np.hypot(*(self.ellipse * nu[:2])))
+        rubs = float(np.hypot(*((1.0 if self.plain else self.ellipse) * nu[:2])))
         if rubs > 0.0:
-            wrench[:2] += self.ellipse**2 * nu[:2] / rubs
+            wrench[:2] += (self.ellipse if self.plain else self.ellipse**2) * nu[:2] / rubs
         u = u + self.push @ wrench
         current = np.sign(u - self.back_emf @ nu)
         u = u + self.drop * current
@@ -101,9 +102,10 @@ class FeedforwardTable(Shown):
         off = bool(self.turning) and bool(self.centre.any())
         lines = ["/* volts of each wheel: twist (vx, vy, w) and its derivative (ax, ay, aw) */"]
         if self.ellipse.any():
-            x, y = (self.ellipse**2).tolist()
+            x, y = (self.ellipse if self.plain else self.ellipse**2).tolist()
+            size = "vx*vx + vy*vy" if self.plain else f"{_c(x)}*vx*vx + {_c(y)}*vy*vy"
             lines += [
-                f"d = sqrtf({_c(x)}*vx*vx + {_c(y)}*vy*vy); if (d < 1e-9f) d = 1e-9f;",
+                f"d = sqrtf({size}); if (d < 1e-9f) d = 1e-9f;",
                 f"fx = {_c(x)}*vx/d; fy = {_c(y)}*vy/d;",
             ]
         elif self.turning:
@@ -171,6 +173,7 @@ def feedforward_table(robot: Robot) -> FeedforwardTable:
         _clean(sign),
         _clean(push),
         own.ellipse_slide,
+        own.plain,
         robot.body.mass if robot.body.rotating_frame else 0.0,
         np.array(robot.body.centre),
         per_wheel(robot.motor.voltage_drop, count),

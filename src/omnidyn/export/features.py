@@ -17,6 +17,7 @@ import numpy as np
 
 from omnidyn.errors import UnsupportedError
 from omnidyn.model.dynamics import is_decoupled, state_space
+from omnidyn.model.friction.direction import PLAIN
 from omnidyn.model.friction.kinds import COULOMB, KINDS
 from omnidyn.model.mass import of_body_alone, spin_couples
 from omnidyn.model.motor import DUTY, DYNAMIC, SPEED
@@ -95,6 +96,10 @@ FEATURES = {
         "friction along the direction of travel ([friction.direction])",
         lambda robot: robot.friction.direction != type(robot.friction.direction)(),
     ),
+    "plain": Feature(
+        'a plain ellipse along the direction of travel ([friction.direction] ellipse = "plain")',
+        lambda robot: robot.friction.direction.ellipse == PLAIN,
+    ),
     "wheels": Feature(
         "friction at the wheels ([friction.wheels])",
         lambda robot: robot.friction.wheels != type(robot.friction.wheels)(),
@@ -156,6 +161,7 @@ _DRIVE = {"latency": _DELAY, "loop": _LOOP, "duty": _DUTY}
 _NOT_EXACT = dict.fromkeys(
     (
         "direction",
+        "plain",
         "wheels",
         "falls",
         "bends",
@@ -178,7 +184,8 @@ _ROLL = Cell(LEAVES_OUT, "its wheels roll, whatever they push with")
 _COULOMB = Cell(LEAVES_OUT, "it slides with the Coulomb level at every speed")
 _RIGID = Cell(LEAVES_OUT, "nothing bends, and nothing rests in a band: its levels count")
 _FORWARD = Cell(LEAVES_OUT, "the level forward counts both ways")
-_LAWS = {"falls": _COULOMB, "bends": _RIGID, "sides": _FORWARD}
+_ALONG = Cell(LEAVES_OUT, "of the ellipse it knows the levels along each axis alone")
+_LAWS = {"falls": _COULOMB, "bends": _RIGID, "sides": _FORWARD, "plain": _ALONG}
 
 _GAINS = {
     "slope": _LEVEL,
@@ -265,6 +272,7 @@ TABLE: dict[str, dict[str, Cell]] = {
     "json": {},
     "c-model": {**_NOT_EXACT, **_DRIVE},
     "c-controller": {
+        "plain": Cell(REFUSES, 'its formula has the ellipse of maximum dissipation only: leave ellipse = "plain" out'),
         "falls": Cell(REFUSES, "its formula has signs and sums only: leave stribeck_speed out"),
         "bends": Cell(LEAVES_OUT, "nothing bends, and nothing rests in a band, as for the controller in Python"),
         "inductance": Cell(LEAVES_OUT, "the currents have settled, as for the controller in Python"),

@@ -113,6 +113,7 @@ def steady_verdict(study: SteadyStudy) -> list[Statement]:
             "ties": tuple(each.name for each in study.choice.scores if not each.told_apart and each.name != score.name),
             "misfit": bool(lacks),
             "cause": next((str(r.cause) for each in lacks for r in each.remedies), ""),
+            "untested": bool(study.untested),
             "known": lines_verdict(study.estimates)[0],
         },
     )

@@ -30,6 +30,7 @@ STEPWISE = 0.05  # a command that changes in more than this share of the rows do
 START_SHARE, END_SHARE = 0.5, 0.25  # at most so much of a hold is cut off
 SAFETY = 3  # times what MSER cuts: it leaves a transient as large as the noise of one window, which many do not average
 DEAD_SHARE = 0.05  # of what the speeds tell: an angle that turns less is dead
+ENDS = 2.0  # [s] at either end of a hold: a start-up, or a braking, is looked for there where it is cut in pieces
 DRIFT_ERRORS, DRIFT_SHARE = 4.0, 0.1  # halves that differ by more than both are not steady
 
 CUBIC, CLIPPINGS = 3, 3  # degree of the curve through the speeds of a window; times that its spikes are clipped
@@ -84,6 +85,22 @@ def _plateaus(run: Run, fixed: tuple[float, float] | None) -> Iterator[Plateau]:
             rows = segment if fixed else _settled(run, segment, angle)
             if rows is not None and _long_enough(run, rows) and (fixed or _is_steady(run, rows, angle)):
                 yield replace(_plateau(run, rows, angle), hold=number)
+
+
+def held_pieces(run: Run, *, start: float | None = None, end: float | None = None) -> list[slice]:
+    """Rows of pieces of `WINDOW` seconds into which the holds of a run are cut, without their start-up and braking.
+
+    start, end: as in `find_plateaus`. Whether a piece is steady is not asked: a floor that changes changes speeds, too.
+    """
+    fixed, angle, run_segments, found = _fixed(start, end), live_angle(run), segments(run.t, usual=run.step), []
+    for hold in holds(run):
+        for segment in _between_gaps(run_segments, _share(hold, *fixed) if fixed else hold):
+            rows = segment if fixed else _settled(run, segment, angle, ENDS)
+            if rows is not None and _long_enough(run, rows):
+                count = max(round((run.t[rows.stop - 1] - run.t[rows.start]) / WINDOW), 1)
+                edges = np.linspace(rows.start, rows.stop, count + 1).round().astype(int).tolist()
+                found += [slice(first, last) for first, last in pairwise(edges) if last - first > 1]
+    return found
 
 
 def pool(plateaus: Sequence[Plateau]) -> tuple[Plateau, ...]:
@@ -260,13 +277,16 @@ def _in_every_row(t: FloatArray, values: FloatArray) -> FloatArray:
     return filled
 
 
-def _settled(run: Run, hold: slice, angle: FloatArray | None) -> slice | None:
-    """The hold without its start-up, and without an end that differs."""
+def _settled(run: Run, hold: slice, angle: FloatArray | None, ends: float = np.inf) -> slice | None:
+    """The hold without its start-up, and without an end that differs, each looked for within so many seconds."""
     if not _long_enough(run, hold):
         return None
     scores = _responses(run, hold, angle)
-    first = min(SAFETY * _truncation(scores, START_SHARE), int(START_SHARE * len(scores)))
-    last = min(SAFETY * _truncation(scores[first:][::-1], END_SHARE), int(END_SHARE * len(scores)))
+    t = run.t[hold]
+    head, tail = np.searchsorted(t, t[0] + ends, "right"), np.searchsorted(t, t[-1] - ends)
+    first = min(SAFETY * _truncation(scores[:head], START_SHARE), int(START_SHARE * head))
+    last = _truncation(scores[max(first, tail) :][::-1], END_SHARE)
+    last = min(SAFETY * last, int(END_SHARE * (len(scores) - tail)))
     return slice(hold.start + first, hold.stop - last)
 
 

@@ -72,7 +72,7 @@ class Inverse:
         speed = twist @ own.directions.T
         side = np.clip(speed / np.sqrt(own.directions**2 @ fade**2), -1.0, 1.0)
         slide, ellipse = own.sliding(speed, twist)
-        least = float(np.sqrt(np.sum((own.ellipse_slide * fade[:2]) ** 2)))
+        least = float(np.sqrt(np.sum(((1.0 if own.plain else own.ellipse_slide) * fade[:2]) ** 2)))
         return resisting(own, twist, speed, side, slide, twist[..., :2], ellipse, least)
 
     def wrench(self, twist: FloatArray, acceleration: FloatArray, friction: FloatArray) -> FloatArray:

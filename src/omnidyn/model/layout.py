@@ -44,6 +44,7 @@ BODY = record(
     room=(2,),  # [N] constant force on the centre of mass along x and y of the room
     push=(3,),  # [N] constant wrench on the body, in its own axes
     active=(),  # 1 where there is an ellipse
+    plain=(),  # 1 where its force is (Cx vx, Cy vy)/|v|, not that of maximum dissipation
     coulomb=(2,),  # of the ellipse [N]
     breakaway=(2,),  # [N]
     fall=(),  # the rest of the ellipse as of an element; its bristle bends along x and y

@@ -22,8 +22,9 @@ class Levels(NamedTuple):
 
     directions: of each element, its speed is direction . twist, shape (3 + wheels, 3). viscous: shape (3 + wheels,).
     slide, hold: against forward and backward motion, while sliding and from rest, shape (2, 3 + wheels).
-    ellipse_slide, ellipse_hold: along x and y [N], shape (2,). falls, exponent, shape: of levels that fall with the
-    speed, 1 over the Stribeck speed, 0 where they do not, shape (3 + wheels + 1,): the ellipse last.
+    ellipse_slide, ellipse_hold: along x and y [N], shape (2,). plain: whether its force is (Cx vx, Cy vy)/|v|.
+    falls, exponent, shape: of levels that fall with the speed, 1 over the Stribeck speed, 0 where they do not, shape
+    (3 + wheels + 1,): the ellipse last.
     """
 
     directions: FloatArray
@@ -32,6 +33,7 @@ class Levels(NamedTuple):
     hold: FloatArray
     ellipse_slide: FloatArray
     ellipse_hold: FloatArray
+    plain: bool
     falls: FloatArray
     exponent: FloatArray
     shape: FloatArray
@@ -63,6 +65,7 @@ def levels_of(robot: Robot) -> Levels:
         element["breakaway"].T,
         body.coulomb,
         body.breakaway,
+        bool(body.plain),
         np.append(element["fall"], body.fall),
         np.append(element["exponent"], body.exponent),
         np.append(element["form"], body.form),
@@ -73,8 +76,9 @@ def sliding_wrench(robot: Robot, twist: ArrayLike) -> FloatArray:
     """Wrench of friction on a robot in motion [N, N, N m].
 
     F = -sum g_e (b_e s_e + c_e sgn s_e) - (Cx^2 vx, Cy^2 vy, 0)/sqrt(Cx^2 vx^2 + Cy^2 vy^2) over the elements e (body
-    axes and wheels) with the speed s_e = g_e . twist. An element at rest counts as nothing: what it holds balances
-    what drives it. `twist` [m/s, m/s, rad/s], shape (*batch, 3); returns the same shape.
+    axes and wheels) with the speed s_e = g_e . twist; of a plain ellipse (Cx vx, Cy vy, 0)/|v|. An element at rest
+    counts as nothing: what it holds balances what drives it. `twist` [m/s, m/s, rad/s], shape (*batch, 3); returns the
+    same shape.
     """
     own, twist = levels_of(robot), np.asarray(twist, dtype=float)
     speed = speeds(own, twist)
@@ -102,13 +106,13 @@ def resisting(
 
     side: sgn s_e of each element, or a part of it, shape (*batch, 3 + wheels); slide: levels against either side,
     shape (2, ..). way: in which the ellipse slides, shape (*batch, 2), and its levels, shape (2,) or (*batch, 2);
-    least [N m/s]: what counts as its dissipation where it moves more slowly.
+    least: what counts as its dissipation [N m/s], or of a plain one its speed [m/s], where it moves more slowly.
     """
     coulomb = np.where(side > 0.0, slide[0], slide[1])
     wrench = -(own.viscous * speed + coulomb * side) @ own.directions
-    dissipated = np.sqrt(np.sum((ellipse * way) ** 2, axis=-1, keepdims=True))
-    dissipated = np.maximum(dissipated, least)
-    wrench[..., :2] -= ellipse**2 * way / np.where(dissipated > 0.0, dissipated, 1.0)
+    size = np.sqrt(np.sum(((1.0 if own.plain else ellipse) * way) ** 2, axis=-1, keepdims=True))
+    size = np.maximum(size, least)
+    wrench[..., :2] -= (ellipse if own.plain else ellipse**2) * way / np.where(size > 0.0, size, 1.0)
     return wrench
 
 

@@ -181,8 +181,10 @@ def _changes_within_run(statement: Statement) -> str:
 
 def _change_in_run(statement: Statement) -> str:
     """A change inside a run, in a few words."""
-    change, at = 100.0 * statement.numbers["change"], statement.numbers["at"]
-    return f"{change:+.3g} % in {statement.subject or 'the run'} at {at:.4g} s"
+    numbers = statement.numbers
+    return "{:+.3g} %, from {:.3g} to {:.3g} N, in {} at {:.4g} s".format(
+        100.0 * numbers["change"], numbers["before"], numbers["after"], statement.subject or "the run", numbers["at"]
+    )
 
 
 def _against_motion(statement: Statement) -> str:
@@ -254,6 +256,10 @@ SENTENCES = {
     "internal_force": Sentence("the wheels work against each other with {force:.3g} N (rms): that pushes nowhere"),
     "changes_within_run": Sentence(_changes_within_run),
     "change_in_run": Sentence(_change_in_run),
+    "changes_not_tested": Sentence(
+        "whether the force changes within a run was not tested in {untested} of {runs} runs, such as {subject}: no "
+        "command is held for 4 s or comes again often enough"
+    ),
     "against_motion": Sentence(_against_motion),
     "forces_from_voltage": Sentence("forces are from eq (11): only as accurate as R, K_t and K_v of the robot file"),
     "not_turned": Sentence("the robot hardly turned: friction about yaw is not in these data"),

@@ -80,7 +80,9 @@ def _steady(statement: Statement) -> str:
     names = [f" ({name})" if len(groups) > 1 else "" for name in groups]
     level = all_of([f"{value:.3g} N{name}" for value, name in zip(levels, names, strict=True)])
     if numbers["misfit"]:
-        cause = f"it takes {numbers['cause']} beside it" if numbers["cause"] else "the errors repeat"
+        untested = "whether the force changes within a run was not tested"
+        repeats = untested if numbers["untested"] else "the errors repeat"
+        cause = f"it takes {numbers['cause']} beside it" if numbers["cause"] else repeats
         alike = f"; but no offered shape fits: {cause}"
     else:
         ties = all_of([*numbers["ties"][:NAMED]])

@@ -9,10 +9,14 @@ import pytest
 
 from benchmarks.blind.log import robot_of
 from benchmarks.wrong_worlds.world import BOX, ELLIPSE, WHEELS, World
+from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import SteadyState
-from omnidyn.identification.steady.moment import levelled
+from omnidyn.identification.steady.moment import levelled, moments
 from omnidyn.identification.steady.operating_points import steady_windows
+from omnidyn.model.robot_file import load_robot
+from omnidyn.model.wheels import wheel_speed
+from omnidyn.run import Run
 from tests.support.codes import codes
 from tests.support.constant_speeds import HOLD, ROUND, logged, once
 
@@ -135,3 +139,66 @@ def test_a_shape_that_fits_on_neither_side_of_a_change_is_said_behind_it(factor)
     found = [one for one in study.warnings if one.code in ("changes_within_run", "no_shape_fits")]
     assert codes(found) == ["changes_within_run"] * (factor != 1.0) + ["no_shape_fits"]
     assert found[-1].numbers["changes"] == (factor != 1.0)
+
+
+# ---- one command, held for long -----------------------------------------------------------------------------
+
+
+def held(seed, course, way=0.7, row=0.03):
+    """A robot driven one way for 17 s: levels [N] of time in the currents, with a noise that remembers a second."""
+    rng, robot = np.random.default_rng(seed), load_robot("robotino")
+    t = np.arange(0.0, 17.0, row)
+    twist = 0.2 * np.array([np.cos(way), np.sin(way), 0.0])
+    slow = np.convolve(rng.normal(size=len(t) + 33), np.ones(34) / 34**0.5, "valid")
+    push = np.linalg.pinv(robot.wheels.wrench_matrix) @ [np.cos(way), np.sin(way), 0.0]
+    per_ampere = 0.0514 * 16.0 / 0.040
+    current = course(t)[:, None] * (1.0 + 0.03 * slow)[:, None] * push / per_ampere
+    speed = np.tile(wheel_speed(robot.wheels, twist), (len(t), 1)) * (1.0 - np.exp(-t / 0.1))[:, None]
+    return Run(
+        t=t,
+        twist_command=np.tile(twist, (len(t), 1)),
+        wheel_speed=speed + 0.05 * rng.normal(size=speed.shape),
+        current=current + 0.16 * rng.normal(size=current.shape),
+        source=f"run {seed}",
+    )
+
+
+def changes(*runs):
+    return moments(runs, load_robot("robotino"), "current")[0]
+
+
+def test_two_floors_under_one_command_are_told_with_time_and_levels():
+    rng, right = np.random.default_rng(3), 0
+    for seed in range(20):
+        when = rng.uniform(4.0, 13.0)
+        (moment,) = changes(held(seed, lambda t, when=when: np.where(t < when, 35.0, 14.0), rng.uniform(0.0, 6.28)))
+        levels = moment.before / 35.0, moment.after / 14.0
+        right += abs(moment.at - when) < 1.0 and max(abs(level - 1.0) for level in levels) < 0.1
+    assert right >= 18
+
+
+def test_one_floor_is_no_change():
+    assert len(changes(*(held(seed, lambda t: 35.0 + 0.0 * t) for seed in range(100, 200)))) <= 2
+
+
+@pytest.mark.parametrize("course", [lambda t: 35.0 - 0.4 * t, lambda t: 30.0 + 8.0 * np.exp(-t / 8.0)])
+def test_a_motor_that_warms_up_is_no_change(course):
+    assert len(changes(*(held(seed, course) for seed in range(200, 250)))) <= 5
+
+
+def test_a_run_that_is_too_short_is_not_tested():
+    whole = held(1, lambda t: 35.0 + 0.0 * t)
+    short = whole.replace(**{name: values[:90] for name, values in {"t": whole.t, **whole.channels}.items()})
+    found, tested = moments([short.replace(source="short"), whole], load_robot("robotino"), "current")
+    assert (found, tested) == ((), {"run 1"})
+    runs = [held(k, lambda t: 35.0 + 0.0 * t, way) for k, way in enumerate(np.linspace(0.0, 6.0, 8))]
+    runs[2] = runs[2].replace(t=runs[2].t[:90], **{name: values[:90] for name, values in runs[2].channels.items()})
+    study = identify(runs, load_robot("robotino"), SteadyState(shape="disc")).study
+    assert study.untested == ("run 2",)
+    (note,) = (one for one in study.warnings if one.code == "changes_not_tested")
+    assert note.numbers == {"untested": 1, "runs": 8}
+
+
+def test_one_drive_over_two_floors_says_so_though_no_shape_can_be_fitted():
+    with pytest.raises(InsufficientDataError, match=r"changes within a run \(-6\d.*, from 3\d\.?\d? to 1\d"):
+        identify([held(4, lambda t: np.where(t < 8.0, 35.0, 14.0))], load_robot("robotino"), SteadyState())

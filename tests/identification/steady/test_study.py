@@ -11,6 +11,7 @@ from omnidyn.identification.steady.operating_points import force_points
 from omnidyn.identification.steady.shapes import SHAPES, fit_shape
 from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.robot_file import load_robot, parse_robot, robot_to_toml
+from omnidyn.model.sliding import sliding_wrench
 from omnidyn.run import Run
 from tests.support.codes import codes
 from tests.support.steady_logs import FRICTIONS, TRUTH, clean_runs, robot_with, spoiled, steady_voltage
@@ -253,8 +254,8 @@ def test_too_few_directions_fit_no_shape():
 
 
 def test_a_shape_for_comparison_cannot_be_asked_for():
-    with pytest.raises(InsufficientDataError, match=r"a robot file cannot hold this shape.*got ellipse-plain"):
-        identify(noisy("disc"), AXEBOT, SteadyState(shape="ellipse-plain"))
+    with pytest.raises(InsufficientDataError, match=r"a robot file cannot hold this shape.*got wheel.roller"):
+        identify(noisy("disc"), AXEBOT, SteadyState(shape="wheel+roller"))
 
 
 @pytest.mark.parametrize(
@@ -298,6 +299,34 @@ def test_a_lossy_gear_is_refused():
     lossy = AXEBOT.replace(motor=AXEBOT.motor.replace(gear_efficiency=0.8))
     with pytest.raises(UnsupportedError, match="gear_efficiency below 1"):
         identify(noisy("disc"), lossy, SteadyState())
+
+
+def test_a_plain_ellipse_beside_unequal_wheels_is_told_with_its_levels():
+    """Currents by the formula: (Cx vx, Cy vy)/|v| of the floor, and a level at each wheel."""
+    robot, rng = load_robot("robotino"), np.random.default_rng(0)
+    floor, wheels, count, runs = np.array([42.0, 33.0]), np.array([2.0, 3.5, 1.0]), 60, []
+    g, per_ampere = robot.wheels.wrench_matrix, 0.0514 * 16.0 / 0.040
+    for angle in np.radians(np.arange(0.0, 360.0, 10.0) + 3.0):
+        way = np.array([np.cos(angle), np.sin(angle), 0.0])
+        push = np.linalg.pinv(g) @ np.append(floor * way[:2], 0.0) + wheels * np.sign(way @ g)
+        twist = np.tile(0.2 * way, (count, 1))
+        runs.append(
+            Run(
+                t=0.03 * np.arange(count),
+                twist_command=twist,
+                wheel_speed=twist @ g / 0.040 + 0.05 * rng.normal(size=(count, 3)),
+                current=push / per_ampere + 0.1 * rng.normal(size=(count, 3)),
+                source=f"{angle:.2f}",
+            )
+        )
+    found = identify(runs, robot, SteadyState())
+    assert found.study.choice.chosen == "ellipse-plain+wheels"
+    estimate, truth = found.estimate, np.append(floor, wheels)
+    values = np.array([*estimate.value.values()])
+    assert values[:2] == pytest.approx(floor, rel=0.05)
+    assert np.abs(values - truth).max() < 3.5 * max(estimate.std.values())
+    assert estimate.robot.friction.direction.ellipse == "plain"
+    assert np.abs(sliding_wrench(estimate.robot, [0.0, 0.2, 0.0])[1]) == pytest.approx(33.0 + 1.5 + 3.5, abs=1.5)
 
 
 def test_unknown_shapes_are_never_chosen_alone():

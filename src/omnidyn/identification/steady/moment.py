@@ -1,9 +1,11 @@
 """A change inside a run at constant speeds, of floor, load or supply, by commands that come again.
 
-    y_k = a_c + d [t_k > T] + noise,   y: force of window k along the mean force of its command c, over that mean
+    y_k = a_c + d [t_k > T] + noise,   y: force of piece k along the mean force of its command c and across it, over
+                                       that mean; a held command is cut in pieces of half a second
 
-A command is compared with itself, so that no shape of friction has a part in it. T is the cut between two windows that
-explains most; Student's t of d counts all cuts of all runs (C. E. Bonferroni, 1936).
+A command is compared with itself, so that no shape of friction has a part in it. T is the cut between two pieces that
+explains most; Hotelling's T squared of d, over the memory of what is left, counts all cuts of a run (C. E. Bonferroni,
+1936). A slow drift that explains as much is no step.
 """
 
 from __future__ import annotations
@@ -12,9 +14,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
-from scipy.special import stdtr
+from scipy.special import fdtrc, stdtr
 
-from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.steady.lack_of_fit import LinearShape, all_moving, unoffered_columns
 from omnidyn.identification.steady.operating_points import ForcePoints, HeldForces, held_forces
 from omnidyn.identification.steady.shapes import HUBER, RAYLEIGH, ShapeFit, is_turning
@@ -23,9 +25,11 @@ from omnidyn.run import Run
 from omnidyn.statement import Statement
 from omnidyn.statistics import autocorrelation_time, huber_weight, t_quantile
 
-FALSE = 0.01  # of right logs for which a change is told
-SPARE = 4  # windows beyond the commands that a test needs
-AS_GOOD = 6.0  # of t squared, by which a cut must be worse than the best to be ruled out
+FALSE = 0.002  # of right runs for which a change is told where commands come again; by the shape, of right logs:
+FALSE_BY_SHAPE = 0.01
+SPARE = 4  # degrees of freedom that a test needs
+LEAST = 3  # pieces, or windows, on either side of a cut
+AS_GOOD = 6.0  # of t squared, by which another cut, or a drift, must be worse than the best to be ruled out
 MATTERS = 0.02  # of the force: a smaller change does not matter
 
 
@@ -61,8 +65,9 @@ class Moment:
         return Statement("changes_within_run", subject=self.source, numbers=numbers | gone)
 
     def short(self) -> Statement:
-        """When and by how much."""
-        return Statement("change_in_run", subject=self.source, numbers={"change": self.change, "at": self.at})
+        """When, by how much, and both levels."""
+        names = ("change", "at", "before", "after")
+        return Statement("change_in_run", subject=self.source, numbers={name: getattr(self, name) for name in names})
 
 
 def levelled(points: ForcePoints, found: Sequence[Moment], sources: Mapping[int, str]) -> ForcePoints:
@@ -81,77 +86,113 @@ def levelled(points: ForcePoints, found: Sequence[Moment], sources: Mapping[int,
 
 
 def moments(
-    runs: Sequence[Run], robot: Robot, speed: str, origin: str, window: tuple[float, float] | None = None
-) -> tuple[Moment, ...]:
-    """The changes inside runs, one a run at the most; what commands given once cannot tell is not told."""
-    held = [held_forces(run, robot, speed, origin, window) for run in runs]
-    tests = sum(len(_cuts(each)) for each in held)
-    found = (_moment(each, run.source, tests) for each, run in zip(held, runs, strict=True))
-    return tuple(each for each in found if each is not None)
+    runs: Sequence[Run], robot: Robot, origin: str, window: tuple[float, float] | None = None
+) -> tuple[tuple[Moment, ...], set[str]]:
+    """(the changes inside runs, one a run at the most; names of the runs that could be tested)."""
+    held = {number: held_forces(run, robot, origin, window) for number, run in enumerate(runs)}
+    cuts = {number: _cuts(one) for number, one in held.items()}
+    found = [_moment(held[number], cuts[number], run.source) for number, run in enumerate(runs) if cuts[number]]
+    return tuple(moment for moment in found if moment), {runs[number].source for number in held if cuts[number]}
 
 
 def _cuts(held: HeldForces) -> list[int]:
-    """Windows before which there may be a change: some command must come on both sides, and windows to spare."""
-    n = len(held.start)
-    if n - len(set(held.command.tolist())) < SPARE:
+    """Pieces before which there may be a change: some command must come on both sides, and pieces to spare."""
+    n, command = len(held.command), held.command.tolist()
+    if n - len(set(command)) - 1 < SPARE:
         return []
-    return [k for k in range(2, n - 1) if set(held.command[:k].tolist()) & set(held.command[k:].tolist())]
+    return [cut for cut in range(LEAST, n - LEAST + 1) if set(command[:cut]) & set(command[cut:])]
 
 
-def _moment(held: HeldForces, source: str, tests: int) -> Moment | None:
-    cuts = _cuts(held)
-    if not cuts:
-        return None
+@dataclass(frozen=True, eq=False)
+class _Shift:
+    """d of a cut and its standard error, along the force and across it (2,). size: Hotelling's T squared; degrees: of
+    freedom, both with the memory of what is left. rest (n, 2): what is left."""
+
+    value: FloatArray
+    std: FloatArray
+    size: float
+    degrees: float
+    rest: FloatArray
+
+    @property
+    def chance(self) -> float:
+        """Of as much by noise alone: F = T^2 (m - 1) / (2 m) with 2 and m - 1 degrees of freedom."""
+        if self.degrees < SPARE:
+            return 1.0
+        return float(fdtrc(2.0, self.degrees - 1.0, self.size * (self.degrees - 1.0) / (2.0 * self.degrees)))
+
+
+def _moment(held: HeldForces, cuts: Sequence[int], source: str) -> Moment | None:
     y, size = _along(held)
-    tried = {cut: _shift(y, held, cut) for cut in cuts}
-    best = max(cuts, key=lambda cut: abs(tried[cut][0] / tried[cut][1]))
-    shift, std, degrees = tried[best]
-    p = min(1.0, tests * 2.0 * float(stdtr(degrees, -abs(shift / std))))
-    if p > FALSE or abs(shift) < MATTERS:
+    tried = {cut: _shift(y, held.command, cut) for cut in cuts}
+    best = max(cuts, key=lambda cut: tried[cut].size)
+    shift = tried[best]
+    memory = max(autocorrelation_time(column) for column in shift.rest.T)
+    shift = replace(shift, std=shift.std * np.sqrt(memory), size=shift.size / memory, degrees=shift.degrees / memory)
+    p = min(1.0, len(cuts) * shift.chance)
+    if p > FALSE or abs(shift.value[0]) < MATTERS or _drifts(y, held, shift):
         return None
-    near = [cut for cut in cuts if (tried[cut][0] / tried[cut][1]) ** 2 > (shift / std) ** 2 - AS_GOOD]
-    both = np.array([c in set(held.command[:best]) and c in set(held.command[best:]) for c in held.command])
+    near = [cut for cut in cuts if tried[cut].size / memory > shift.size - AS_GOOD]
+    both = np.isin(held.command, np.intersect1d(held.command[:best], held.command[best:]))
     after = np.arange(len(y)) >= best
     force = float(size[both].mean())
-    spread = t_quantile(degrees)
-    scatter = std * np.sqrt(len(y)) / 2.0  # of one window, over the force
+    spread = t_quantile(shift.degrees)
+    value, std = float(shift.value[0]), float(shift.std[0])
+    scatter = std * np.sqrt(len(y)) / 2.0  # of one piece, over the force
 
     def level(rows: BoolArray) -> tuple[float, tuple[float, float]]:
-        middle, half = force * float(y[rows].mean()), float(spread * force * scatter / np.sqrt(rows.sum()))
+        middle, half = force * float(y[rows, 0].mean()), float(spread * force * scatter / np.sqrt(rows.sum()))
         return middle, (middle - half, middle + half)
 
-    ends = (float(held.start[min(near) - 1]), float(held.end[max(near)]))
-    at = 0.5 * float(held.end[best - 1] + held.start[best])
+    ends = (float(held.span[min(near) - 1, 0]), float(held.span[max(near), 1]))
+    at = 0.5 * float(held.span[best - 1, 1] + held.span[best, 0])
     before, after_it = level(both & ~after), level(both & after)
     base = before[0] / force
-    ci95 = ((shift - spread * std) / base, (shift + spread * std) / base)
-    return Moment(source, at, ends, *before, *after_it, shift / base, ci95, p)
+    ci95 = ((value - spread * std) / base, (value + spread * std) / base)
+    return Moment(source, at, ends, *before, *after_it, value / base, ci95, p)
 
 
 def _along(held: HeldForces) -> tuple[FloatArray, FloatArray]:
-    """(force of each window along the mean of its command, over that mean (n,); the mean [N] (n,))."""
-    y, size = np.zeros(len(held.start)), np.zeros(len(held.start))
+    """(force of each piece along the mean of its command and across it, over that mean (n, 2); the mean [N] (n,))."""
+    y, size = np.zeros(held.force.shape), np.zeros(len(held.force))
     for c in np.unique(held.command):
         rows = held.command == c
-        mean = held.force[rows].mean(axis=0)
+        x, across = mean = held.force[rows].mean(axis=0)
         size[rows] = np.linalg.norm(mean)
-        y[rows] = held.force[rows] @ mean / max(float(mean @ mean), 1e-300)
+        y[rows] = held.force[rows] @ np.array([[x, -across], [across, x]]) / max(float(mean @ mean), 1e-300)
     return y, size
 
 
-def _shift(y: FloatArray, held: HeldForces, cut: int) -> tuple[float, float, int]:
-    """(d, its standard error, degrees of freedom) of a cut, each command with a mean of its own."""
-    after = (np.arange(len(y)) >= cut).astype(float)
-    x, left = after.copy(), y.copy()
-    for c in np.unique(held.command):
-        own = held.command == c
-        x[own] -= x[own].mean()
-        left[own] -= left[own].mean()
+def _without_commands(values: FloatArray, command: IntArray) -> FloatArray:
+    """Columns less their mean at each command."""
+    left = values.copy()
+    for c in np.unique(command):
+        left[command == c] -= left[command == c].mean(axis=0)
+    return left
+
+
+def _shift(y: FloatArray, command: IntArray, cut: int) -> _Shift:
+    """The step at a cut, each command with a mean of its own; without memory."""
+    x = _without_commands((np.arange(len(y)) >= cut).astype(float), command)
+    left = _without_commands(y, command)
     square = float(x @ x)
-    shift = float(x @ left) / square
-    degrees = len(y) - len(np.unique(held.command)) - 1
-    rest = left - shift * x
-    return shift, float(np.sqrt(max(float(rest @ rest), 1e-300) / degrees / square)), degrees
+    value = x @ left / square
+    rest = left - x[:, None] * value
+    degrees = len(y) - len(np.unique(command)) - 1
+    covariance = rest.T @ rest / degrees / square
+    covariance += np.eye(2) * max(1e-9 * float(np.trace(covariance)), 1e-300)  # of a log without noise
+    size = float(value @ np.linalg.solve(covariance, value))
+    return _Shift(value, np.sqrt(np.diag(covariance)), size, degrees, rest)
+
+
+def _drifts(y: FloatArray, held: HeldForces, shift: _Shift) -> bool:
+    """Whether a slow drift, a parabola in time, is nearly as likely as a step, which has as many free numbers."""
+    t = held.span.mean(axis=1) - held.span.mean()
+    slow = _without_commands(np.stack([t, t**2], axis=1), held.command)
+    left = _without_commands(y, held.command)
+    drift = left - slow @ np.linalg.lstsq(slow, left, rcond=None)[0]
+    (_, by_step), (_, by_drift) = (np.linalg.slogdet(rest.T @ rest) for rest in (shift.rest, drift))
+    return bool(shift.degrees * (by_drift - by_step) < AS_GOOD)
 
 
 # A change inside a run where no command comes again: the fitted shape of friction is the yardstick
@@ -164,7 +205,6 @@ def _shift(y: FloatArray, held: HeldForces, cut: int) -> tuple[float, float, int
 # standard error is that of errors with the memory that is left beside the step, and a step that a part which is not
 # offered takes away (lack_of_fit.py) is none.
 
-LEAST = 3  # windows on either side of a cut
 SPARE_NUMBERS = 6  # numbers beyond those that are fitted
 ROUNDS = 10  # of robust weights
 WORST = 1e4  # condition of what determines levels
@@ -209,8 +249,9 @@ def moments_by_shape(
     fit_of: Callable[[str], ShapeFit],
     sources: Mapping[int, str],
     told: Sequence[Moment] = (),
-) -> tuple[Moment, ...]:
-    """The changes inside runs, one a run at the most. fit_of: group -> its fit; sources: of the runs, by number.
+) -> tuple[tuple[Moment, ...], set[str]]:
+    """(the changes inside runs, one a run at the most; names of the runs that could be tested). fit_of: group -> its
+    fit; sources: of the runs, by number.
 
     told: what commands that come again have told; of those runs nothing more is said.
     """
@@ -218,7 +259,8 @@ def moments_by_shape(
     runs = [_run(robot, points, fit_of, number, source) for number, source in sources.items() if source not in known]
     found = [run for run in runs if run is not None]
     tests = sum(len(run.cuts) for run in found)
-    return tuple(moment for run in found if (moment := _change_by_shape(run, tests)) is not None)
+    moments = tuple(moment for run in found if (moment := _change_by_shape(run, tests)) is not None)
+    return moments, {run.source for run in found}
 
 
 def _run(robot: Robot, points: ForcePoints, fit_of: Callable[[str], ShapeFit], number: int, source: str) -> _Run | None:
@@ -259,7 +301,7 @@ def _change_by_shape(run: _Run, tests: int) -> Moment | None:
     best = max(tried, key=lambda cut: tried[cut].size)
     step = tried[best]
     p = step.chance(tests)
-    if p > FALSE or abs(step.value) < MATTERS:
+    if p > FALSE_BY_SHAPE or abs(step.value) < MATTERS:
         return None
     if any((other := _step(run, best, more)) is None or other.chance(1) > SEEN for more in run.rivals):
         return None

@@ -18,7 +18,7 @@ from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.findings.needs import CURRENT, VOLTAGE, force_origin
 from omnidyn.identification.grouping import count_once
 from omnidyn.identification.steady.points import refuse_losses
-from omnidyn.logs.plateaus import ANGLE, COMMANDS, SAME_COMMAND, Plateau, find_plateaus, pool
+from omnidyn.logs.plateaus import ANGLE, COMMANDS, SAME_COMMAND, Plateau, find_plateaus, held_pieces, live_angle, pool
 from omnidyn.logs.segments import on_clock_of_wheels
 from omnidyn.model.actuation import asked_voltage, reaching
 from omnidyn.model.dynamics import frame_wrench, state_space
@@ -203,33 +203,66 @@ def steady_windows(
 
 @dataclass(frozen=True, eq=False)
 class HeldForces:
-    """The steady windows of one run in the order of time: start, end (n,) [s]; command (n,): number of what was asked
-    for, alike where that is the same; force (n, 3): what friction balances, (F_x, F_y) and T / b [N]."""
+    """The pieces of the holds of one run in the order of time. span (n, 2): start and end [s]. command (n,): number of
+    the command, alike where that is the same. force (n, 2): what friction balances along x and y [N]."""
 
-    start: FloatArray
-    end: FloatArray
+    span: FloatArray
     command: IntArray
     force: FloatArray
 
 
-def held_forces(
-    run: Run, robot: Robot, speed: str, origin: str, window: tuple[float, float] | None = None
-) -> HeldForces:
-    """The windows of a run one by one; in ForcePoints those of one command are a single point. As `force_points`."""
+def held_forces(run: Run, robot: Robot, origin: str, window: tuple[float, float] | None = None) -> HeldForces:
+    """The pieces of a run one by one; in ForcePoints all rows of one command are a single point. As `force_points`."""
     run = on_clock_of_wheels(_with_voltage(run, robot) if origin == VOLTAGE else run)
-    found = list(find_plateaus(run, start=window[0], end=window[1]) if window else find_plateaus(run))
-    arm = np.array([1.0, 1.0, float(np.mean(robot.wheels.robot_radius))])
-    force = [_point(run, robot, each, speed, origin)["wrench"] / arm for each in found]
-    names = [name for name in COMMANDS if found and name in found[0].mean]
-    asked = np.array([each.mean[names[0]] for each in found]) if names else np.zeros((0, 1))
-    alike = SAME_COMMAND * max(float(np.abs(asked).max(initial=0.0)), 1e-12)
-    command = np.unique(np.round(asked / alike / 2.0), axis=0, return_inverse=True)[1].ravel()
-    return HeldForces(
-        np.array([each.start for each in found]),
-        np.array([each.end for each in found]),
-        command,
-        np.array(force).reshape(-1, 3),
+    pieces = held_pieces(run, start=window[0], end=window[1]) if window else held_pieces(run)
+    drive, speed, angle = run.current if origin == CURRENT else run.voltage, run.wheel_speed, live_angle(run)
+    if drive is None or not pieces:
+        return HeldForces(np.zeros((0, 2)), np.zeros(0, dtype=int), np.zeros((0, 2)))
+    span = np.array([(run.t[rows.start], run.t[rows.stop - 1]) for rows in pieces])
+    if speed is None and angle is not None:
+        speed = np.gradient(angle, run.t, axis=0)
+    mean = _means(drive, pieces)
+    if speed is None:
+        twist = rate = np.zeros((len(pieces), 3))
+    else:
+        wheels = _means(speed, pieces)
+        if angle is not None:
+            turned = np.array([angle[rows.stop - 1] - angle[rows.start] for rows in pieces])
+            wheels = turned / np.diff(span, axis=1)
+        mean = mean if origin == CURRENT else settled_current(robot.motor, reaching(robot, mean), wheels)
+        twist = twist_from_wheel_speed(robot.wheels, wheels)
+        rate = twist_from_wheel_speed(robot.wheels, np.array([_slope(run.t[rows], speed[rows]) for rows in pieces]))
+    wrench = wrench_from_traction(robot.wheels, traction(robot.motor, robot.wheels, mean))
+    force = (wrench - rate @ mass_matrix(robot).T + frame_wrench(robot, twist))[:, :2]
+    command = _commands(run, pieces)
+    known = np.isfinite(force).all(axis=1)
+    return HeldForces(span[known], command[known], force[known])
+
+
+def _means(values: FloatArray, pieces: Sequence[slice]) -> FloatArray:
+    """The mean of the known rows of each piece; NaN where there is none. Shape (pieces, columns)."""
+    known = np.isfinite(values)
+    sums, counts = (
+        np.array([part[rows].sum(axis=0) for rows in pieces], dtype=float)
+        for part in (np.where(known, values, 0.0), known)
     )
+    return np.where(counts > 0.0, sums / np.maximum(counts, 1.0), np.nan)
+
+
+def _slope(t: FloatArray, values: FloatArray) -> FloatArray:
+    """Rate of change by least squares [1/s], 0 where a number is missing. Shape (columns,)."""
+    centred = t - t.mean()
+    return np.nan_to_num(centred @ values / (centred @ centred))
+
+
+def _commands(run: Run, pieces: Sequence[slice]) -> IntArray:
+    """The number of the command of each piece, alike where it is the same."""
+    given = next((run.channels[name] for name in COMMANDS if name in run.channels), None)
+    if given is None:
+        return np.zeros(len(pieces), dtype=int)
+    command = np.nan_to_num(_means(given, pieces))
+    alike = SAME_COMMAND * max(float(np.abs(command).max(initial=0.0)), 1e-12)
+    return np.unique(np.round(command / alike / 2.0), axis=0, return_inverse=True)[1].ravel()
 
 
 def _origin(runs: Sequence[Run], asked: str) -> str:

@@ -3,7 +3,7 @@
     box             (C_x sgn v_x, C_y sgn v_y)                 the paper, eqs (4)-(6)
     disc            C v / |v|
     ellipse         (C_x^2 v_x, C_y^2 v_y) / sqrt(C_x^2 v_x^2 + C_y^2 v_y^2)    maximum dissipation, as the model has it
-    ellipse-plain   (C_x v_x, C_y v_y) / |v|                   for comparison: it has no potential
+    ellipse-plain   (C_x v_x, C_y v_y) / |v|                   ellipse = "plain" of the model: it has no potential
     wheel, wheels   sum of c g_i sgn(g_i . twist)              one level for all wheels, or one each
     wheel+roller    and c_r along the axle of each wheel       for comparison: the model has no such law
 
@@ -21,7 +21,8 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.identification.steady.levels import FittedLevels
 from omnidyn.identification.steady.operating_points import SPOT_SHARE, ForcePoints
-from omnidyn.model.friction import Friction
+from omnidyn.model.friction import DirectionFriction, Friction
+from omnidyn.model.friction.direction import DISSIPATION, PLAIN
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS, Key, expand
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import rim_speed, sin_cos_deg
@@ -48,13 +49,16 @@ class Term:
 
 @dataclass(frozen=True)
 class Shape:
-    """A shape of friction: its name, its terms, what it says in words, and whether a robot file can hold it."""
+    """A shape of friction: its name, its terms, what it says in words, and whether a robot file can hold it.
+
+    plain: whether its ellipse is the plain one."""
 
     name: str
     words: str
     terms: tuple[Term, ...]
     in_model: bool = True
     viscous: bool = False
+    plain: bool = False
 
     def keys(self, robot: Robot, turning: bool) -> tuple[str, ...]:
         """Keys of the levels; one per wheel where a key ends in [i]."""
@@ -203,20 +207,22 @@ _PLAIN = {
     "disc+wheels": ("a disc, and each wheel its own", ("disc", *_TURN, "wheels"), _BODY),
     "ellipse+wheel": ("an ellipse, and the same at all wheels", ("ellipse", *_TURN, "wheel"), _BODY),
     "ellipse+wheels": ("an ellipse, and each wheel its own", ("ellipse", *_TURN, "wheels"), _BODY),
+    "ellipse-plain": ("an ellipse in the plain form (Cx vx, Cy vy)/|v|", ("plain", *_TURN), _BODY),
+    "ellipse-plain+wheel": ("a plain ellipse, and the same at all wheels", ("plain", *_TURN, "wheel"), _BODY),
+    "ellipse-plain+wheels": ("a plain ellipse, and each wheel its own", ("plain", *_TURN, "wheels"), _BODY),
 }
 
 
 def _shapes() -> dict[str, Shape]:
     found = {}
     for name, (words, terms, viscous) in _PLAIN.items():
-        plain, more = tuple(_TERMS[term] for term in terms), tuple(_TERMS[term] for term in viscous)
-        found[name] = Shape(name, words, plain)
-        found[name + VISCOUS] = Shape(name + VISCOUS, f"{words}; and viscous", (*plain, *more), viscous=True)
-    for name, words, terms in (
-        ("ellipse-plain", "an ellipse in the plain form (Cx vx, Cy vy)/|v|", ("plain", *_TURN)),
-        ("wheel+roller", "at the wheels and along their axles", ("wheel", "roller")),
-    ):
-        found[name] = Shape(name, words, tuple(_TERMS[term] for term in terms), in_model=False)
+        dry, more = tuple(_TERMS[term] for term in terms), tuple(_TERMS[term] for term in viscous)
+        plain = "plain" in terms
+        found[name] = Shape(name, words, dry, plain=plain)
+        both, also = f"{words}; and viscous", (*dry, *more)
+        found[name + VISCOUS] = Shape(name + VISCOUS, both, also, viscous=True, plain=plain)
+    roller = tuple(_TERMS[term] for term in ("wheel", "roller"))
+    found["wheel+roller"] = Shape("wheel+roller", "at the wheels and along their axles", roller, in_model=False)
     return found
 
 
@@ -225,7 +231,8 @@ SHAPES = _shapes()
 
 def friction_of(shape: Shape, robot: Robot, level: dict[str, float]) -> Friction:
     """The friction of a robot file with these levels (key -> level, none negative), and no other."""
-    found = robot.replace(friction=Friction())
+    form = DirectionFriction(ellipse=PLAIN if shape.plain else DISSIPATION)
+    found = robot.replace(friction=Friction(direction=form))
     for name, value in level.items():
         for key in expand(name, found):  # a disc has one level for both its entries
             found = Key.parse(key).set(found, value, checked=False)

@@ -81,7 +81,15 @@ def fit_steady(runs: Sequence[Run], robot: Robot, asked: SteadyState, groups: Se
         runs, robot, groups=groups, speed=asked.speed, force_from=asked.force_from, window=asked.window
     )
     points = windows.points(robot)
-    choice = choose_shape(robot, points, shape=asked.shape, robust=asked.robust)
+    try:
+        choice = choose_shape(robot, points, shape=asked.shape, robust=asked.robust)
+    except InsufficientDataError as error:  # one long drive: what changes in it needs no shape
+        changed, _ = moments(runs, robot, points.force_from, asked.window)
+        numbers = {"changes": tuple(moment.short() for moment in changed)}
+        words = f"{error.what}; {Statement('force_changes_in_run', numbers=numbers)}" if changed else error.what
+        raise InsufficientDataError(
+            words, got=error.got, expected=error.expected, remedy=error.remedy, where=error.where
+        ) from error
     if not SHAPES[choice.chosen].in_model:
         raise InsufficientDataError(
             "a robot file cannot hold this shape: it is for comparison only",
@@ -105,9 +113,11 @@ def undiagnosed(fit: SteadyFit) -> SteadyStudy:
 def diagnosed(fit: SteadyFit) -> SteadyStudy:
     """The study of a fit: what its shape leaves out, what changes inside a run, and what its levels rest on."""
     points, choice, robot = fit.points, fit.choice, fit.robot
-    changed = moments(fit.runs, robot, points.speed_from, points.force_from, fit.asked.window)
+    changed, tested = moments(fit.runs, robot, points.force_from, fit.asked.window)
     sources = {number: run.source for number, run, _ in fit.windows.found}
-    changed += moments_by_shape(robot, points, choice.fit, sources, changed)
+    by_shape, tested_by_shape = moments_by_shape(robot, points, choice.fit, sources, changed)
+    changed += by_shape
+    untested = tuple(name for name in sources.values() if name not in tested | tested_by_shape)
     lack = {
         group: _lack(robot, part, choice, group, changed, sources, fit.asked.robust)
         for group, part in fit.parts.items()
@@ -120,13 +130,25 @@ def diagnosed(fit: SteadyFit) -> SteadyStudy:
     estimates = {
         group: replace(estimate, study=partial(known.__getitem__, group)) for group, estimate in fit.estimates.items()
     }
-    return _study(replace(fit, estimates=estimates), changed, lack, within)
+    return _study(replace(fit, estimates=estimates), changed, lack, within, untested)
 
 
 def _study(
-    fit: SteadyFit, changed: Sequence[Moment], lack: Mapping[str, LackOfFit], within: Collection[str]
+    fit: SteadyFit,
+    changed: Sequence[Moment],
+    lack: Mapping[str, LackOfFit],
+    within: Collection[str],
+    untested: tuple[str, ...] = (),
 ) -> SteadyStudy:
-    """The study. changed: inside a run; lack: group -> what its shape leaves out; within: groups with such a change."""
+    """The study.
+
+    Args:
+        fit: the levels.
+        changed: changes inside a run.
+        lack: group -> what its shape leaves out.
+        within: groups with a change inside a run.
+        untested: runs that could not be tested for one.
+    """
     robot, points, choice, robust = fit.robot, fit.points, fit.choice, fit.asked.robust
     travel = {group: _travel(part) for group, part in fit.parts.items()}
     viscous = {
@@ -161,11 +183,20 @@ def _study(
             *points.notes,
             *point_statements(points, choice, turning),
             *(moment.statement() for moment in changed),
+            *_not_tested(untested, len({number for number, *_ in fit.windows.found})),
             *lack_statements(lack, choice, within),
         ),
         moments=tuple(changed),
+        untested=untested,
         advice=tuple(advice(choice, viscous, lack, turning, points.force_from)),
     )
+
+
+def _not_tested(untested: Sequence[str], runs: int) -> list[Statement]:
+    """That runs are too short to be tested for a change inside, or no command comes again in them."""
+    if not untested:
+        return []
+    return [Statement("changes_not_tested", NOTE, untested[0], {"untested": len(untested), "runs": runs})]
 
 
 def _changed(points: ForcePoints, found: Sequence[Moment], sources: Mapping[int, str]) -> list[Moment]:

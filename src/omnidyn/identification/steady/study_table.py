@@ -38,7 +38,8 @@ class SteadyStudy(Shown):
     friction. travel: group -> force along travel. viscous: group -> what is known of the viscous levels. differences
     between groups. internal: group -> rms of the forces with which the wheels work against each other [N], where there
     are more than three. lack_of_fit: group -> whether any offered shape fits, and what would. moments: changes
-    inside a run. statements: what the data say; warnings: what is weak; advice: what to measure next.
+    inside a run; untested: runs that could not be tested for one. statements: what the data say; warnings: what is
+    weak; advice: what to measure next.
     """
 
     robot: Robot
@@ -54,6 +55,7 @@ class SteadyStudy(Shown):
     warnings: tuple[Statement, ...]
     advice: tuple[Statement, ...]
     moments: tuple[Moment, ...] = ()
+    untested: tuple[str, ...] = ()
 
     @property
     def estimate(self) -> Estimate:
@@ -106,6 +108,7 @@ class SteadyStudy(Shown):
             },
             "lack_of_fit": _lack(next(iter(self.lack_of_fit.values()), None)),
             "moments": [asdict(moment) for moment in self.moments],
+            "not_tested_for_moments": list(self.untested),
             "differences": [{**asdict(pair), "differs": pair.differs} for pair in self.differences],
             "statements": plain(self.statements),
             "warnings": plain(self.warnings),

@@ -1,10 +1,13 @@
 """Friction along the direction of travel: a disc or an ellipse in (v_x, v_y), and a torque about yaw. Laws: kinds.py.
 
     potential  D(v) = sqrt(Cx^2 vx^2 + Cy^2 vy^2)      maximum dissipation; Cx = Cy is a disc, C v/|v|
-    sliding    F = -(Cx^2 vx, Cy^2 vy)/D - B v
+    sliding    F = -(Cx^2 vx, Cy^2 vy)/D - B v;   with ellipse = "plain"   F = -(Cx vx, Cy vy)/|v| - B v
     at rest    F anywhere in the ellipse (Fx/Sx)^2 + (Fy/Sy)^2 <= 1
     Stribeck   Cx and Cy fall with |v| from Sx and Sy
     bristle    F = -(sigma0 z + sigma1 z') - B v, z a vector that turns with the body, its rate in the file of each law
+
+The force of the plain ellipse turns half as far from the direction of travel. It has no potential: item 5 of law.py
+holds but for terms of second order in (Cx - Cy)/(Cx + Cy). It rests as the other does.
 
 On real floors the force is collinear with the velocity and of constant size (252 runs of a Robotino): the shape the
 box of eqs (4)-(6) misses.
@@ -18,7 +21,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.friction.kinds import DIRECTION, refuse_mixtures, spread_on, words_of
+from omnidyn.model.friction.kinds import COULOMB, DIRECTION, refuse_mixtures, spread_on, words_of
 from omnidyn.model.friction.stribeck import LEAST, MOST, SHAPES, USUAL
 from omnidyn.model.layout import N_AXES, YAW, Plant
 from omnidyn.model.value import Value, number, to_list, word_of
@@ -27,14 +30,16 @@ Level = Annotated[float, number(0.0, 1e6)]
 Pair = Annotated[tuple[Level, Level], BeforeValidator(to_list)]
 Speed = Annotated[float, number(1e-7, 1e3)]
 Stiffness = Annotated[float, number(1e-3, 1e12)]
+DISSIPATION, PLAIN = "dissipation", "plain"
 
 
 class DirectionFriction(Value):
     """Friction that follows the direction of travel.
 
     coulomb: (Cx, Cy) [N]; viscous: B [N s/m], the same in every direction; breakaway: (Sx, Sy) >= coulomb [N].
-    yaw_coulomb [N m], yaw_viscous [N m s], yaw_breakaway >= yaw_coulomb [N m]: about the vertical axis. law and the
-    numbers that it takes: kinds.py; yaw_...: those about the vertical axis.
+    yaw_coulomb [N m], yaw_viscous [N m s], yaw_breakaway >= yaw_coulomb [N m]: about the vertical axis. ellipse: where
+    the force of unequal levels points, "dissipation" or "plain". law and the numbers that it takes: kinds.py; yaw_...:
+    those about the vertical axis.
     """
 
     coulomb: Annotated[Pair, Field(description="(Cx, Cy) [N]; equal = a disc")] = (0.0, 0.0)
@@ -43,6 +48,9 @@ class DirectionFriction(Value):
     yaw_coulomb: Annotated[Level, Field(description="[N m]")] = 0.0
     yaw_breakaway: Annotated[Level | None, Field(description=">= yaw_coulomb [N m]")] = None
     yaw_viscous: Annotated[Level, Field(description="[N m s]")] = 0.0
+    ellipse: Annotated[
+        Annotated[str, word_of(DISSIPATION, PLAIN)], Field(description="(Cx^2 vx, Cy^2 vy)/D, or (Cx vx, Cy vy)/|v|")
+    ] = DISSIPATION
     law: Annotated[Annotated[str, word_of(*words_of(DIRECTION))], Field(description="what kind of law")] = "coulomb"
     stribeck_speed: Annotated[Speed | None, Field(description="v_s [m/s]")] = None
     yaw_stribeck_speed: Annotated[Speed | None, Field(description="v_s [rad/s]")] = None
@@ -75,6 +83,7 @@ class DirectionFriction(Value):
         """Add the ellipse, the same damping in every direction, and what resists turning; see FrictionLaw."""
         plant.element["viscous"][:N_AXES] += [self.viscous, self.viscous, self.yaw_viscous / length**2]
         body, turning = plant.body, plant.element[YAW : YAW + 1]
+        body.plain = float(self.ellipse == PLAIN)
         hold = np.array(self.coulomb if self.breakaway is None else self.breakaway)
         spread_on(self, body, np.array(self.coulomb), hold, float(body.mass), self.viscous)
         yaw_hold = self.yaw_coulomb if self.yaw_breakaway is None else self.yaw_breakaway
@@ -90,6 +99,11 @@ class DirectionFriction(Value):
             raise ValueError(f"breakaway {list(self.breakaway)} is below coulomb {list(self.coulomb)}")
         if self.yaw_breakaway is not None and self.yaw_breakaway < self.yaw_coulomb:
             raise ValueError(f"yaw_breakaway {self.yaw_breakaway} is below yaw_coulomb {self.yaw_coulomb}")
+        if self.ellipse == PLAIN and (self.law != COULOMB or self.stribeck_speed is not None):
+            raise ValueError(
+                f'ellipse = "{PLAIN}" is of law = "{COULOMB}" without stribeck_speed; take ellipse = "{DISSIPATION}" '
+                "beside other laws"
+            )
         refuse_mixtures(self)
         refuse_mixtures(self, "yaw_")
         return self

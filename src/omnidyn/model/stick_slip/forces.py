@@ -153,6 +153,7 @@ def residual(plant, stage, x):
     stiff, d0, d1, d2 = body.mass / task.tau, x[0] - task.goal[0], x[1] - task.goal[1], x[2] - task.goal[2]
     r0, r1, r2 = stiff * d0 - task.push[0], stiff * d1 - task.push[1], stiff * d2 - task.push[2]
     j00, j11, j22, j01, j02, j12 = stiff, stiff, stiff, 0.0, 0.0, 0.0
+    skew = 0.0
     if body.spin[2, 2] != 0.0:  # turning on the spot, every wheel spins, and a centre that stands off moves
         often = 1.0 / task.tau
         s00, s11, s22 = often * body.spin[0, 0], often * body.spin[1, 1], often * body.spin[2, 2]
@@ -182,15 +183,23 @@ def residual(plant, stage, x):
         j00, j11, j22 = j00 - slope * g0 * g0, j11 - slope * g1 * g1, j22 - slope * g2 * g2
         j01, j02, j12 = j01 - slope * g0 * g1, j02 - slope * g0 * g2, j12 - slope * g1 * g2
     if task.ellipse == 1.0 and body.fall == 0.0:  # gradient and Hessian of sqrt(Cx^2 vx^2 + Cy^2 vy^2)
-        cx, cy = body.coulomb[0] ** 2, body.coulomb[1] ** 2
-        size = max(math.sqrt(cx * x[0] * x[0] + cy * x[1] * x[1]), 1e-300)
-        px, py = cx * x[0] / size, cy * x[1] / size
+        cx, cy = body.coulomb[0], body.coulomb[1]
+        if body.plain == 0.0:
+            cx, cy = cx * cx, cy * cy
+            size = max(math.sqrt(cx * x[0] * x[0] + cy * x[1] * x[1]), 1e-300)
+            px, py = cx * x[0] / size, cy * x[1] / size
+            j00, j11, j01 = j00 + (cx - px * px) / size, j11 + (cy - py * py) / size, j01 - px * py / size
+        else:  # (Cx vx, Cy vy)/|v|: the gradient of nothing
+            size = max(math.hypot(x[0], x[1]), 1e-150)
+            nx, ny = x[0] / size, x[1] / size
+            px, py = cx * nx, cy * ny
+            j00, j11 = j00 + cx * ny * ny / size, j11 + cy * nx * nx / size
+            j01, skew = j01 - cx * nx * ny / size, (cx - cy) * nx * ny / size
         r0, r1 = r0 + px, r1 + py
-        j00, j11, j01 = j00 + (cx - px * px) / size, j11 + (cy - py * py) / size, j01 - px * py / size
     t0, t1, t2 = body.turning * x[0], body.turning * x[1], body.turning * x[2]
     work.residual[0], work.residual[1], work.residual[2] = r0 - t2 * x[1], r1 + t2 * x[0], r2
     work.jacobian[0, 0], work.jacobian[0, 1], work.jacobian[0, 2] = j00, j01 - t2, j02 - t1
-    work.jacobian[1, 0], work.jacobian[1, 1], work.jacobian[1, 2] = j01 + t2, j11, j12 + t0
+    work.jacobian[1, 0], work.jacobian[1, 1], work.jacobian[1, 2] = j01 + skew + t2, j11, j12 + t0
     work.jacobian[2, 0], work.jacobian[2, 1], work.jacobian[2, 2] = j02, j12, j22
     if body.off != 0.0:
         _add_centre(body, work, x)

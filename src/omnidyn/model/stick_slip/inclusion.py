@@ -247,6 +247,29 @@ def _release(plant, stage, x, slope):
 
 
 @part
+def _passes_tip(stage, x):
+    """Whether Newton's step takes what slides past rest."""
+    d = stage.work.newton
+    return stage.task.ellipse == 1.0 and x[0] * (x[0] + d[0]) + x[1] * (x[1] + d[1]) <= 0.0
+
+
+@part
+def _hold_size(body, work, x):
+    """Make the Jacobian that of a plain ellipse of the speed |v| as it is: (Cx vx, Cy vy)/|v| is then linear.
+
+    A plain ellipse lets go in another direction than that of maximum dissipation in which it is released: Newton's step
+    from there may pass rest, which was found not to hold. This one turns to the right direction.
+    """
+    size = max(math.hypot(x[0], x[1]), 1e-150)
+    nx, ny = x[0] / size, x[1] / size
+    cx, cy = body.coulomb[0] / size, body.coulomb[1] / size
+    work.jacobian[0, 0] += cx * nx * nx
+    work.jacobian[0, 1] += cx * nx * ny
+    work.jacobian[1, 0] += cy * nx * ny
+    work.jacobian[1, 1] += cy * ny * ny
+
+
+@part
 def _set_close(plant, stage):
     """Into work.close, per axis: the residual that is rounding. Its inertia M x*/tau rounds along its own axis alone.
 
@@ -276,11 +299,11 @@ def solve(plant, stage, x):
     """
     set_losses(plant, stage)
     _set_close(plant, stage)
-    stale, known, rank = True, False, 0
+    stale, known, rank, freed = True, False, 0, False
     for iteration in range(CAP):
         if iteration == AFRESH:
             _rest(stage, x)
-            stale = True
+            stale, freed = True, False
         if stale:
             rank = find_active_set(plant, stage)
             while rank > 0 and absorb(plant, stage, rank):
@@ -293,11 +316,15 @@ def solve(plant, stage, x):
             found = worst_direction(plant, stage, rank) if rank > 0 else 0.0
             if found < -_close_along_worst(stage.work):
                 _release(plant, stage, x, found)
+                freed = plant.body.plain == 1.0
             elif not _stop_contradictions(plant, stage, x):
                 onto_active_set(x, stage.work, rank)
                 return iteration
             stale = True
         else:
             newton_direction(stage.work, rank)
+            if freed and _passes_tip(stage, x):
+                _hold_size(plant.body, stage.work, x)
+                newton_direction(stage.work, rank)
             stale, known = _walk(plant, stage, x)
     return CAP

@@ -10,6 +10,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
 from omnidyn.model.friction.bristle import fade_of
+from omnidyn.model.friction.direction import PLAIN
 from omnidyn.model.friction.kinds import AXES, COULOMB, DIRECTION, KARNOPP, WHEELS
 from omnidyn.model.friction.stribeck import steepest_of
 from omnidyn.model.layout import BODY, N_AXES, YAW, Plant
@@ -147,6 +148,8 @@ def _refuse(robot: Robot) -> None:
     places = (AXES, DIRECTION, WHEELS)
     bands = [place for place in places if _law(robot, place) == KARNOPP]
     found += [f'law = "{KARNOPP}" of [friction.{place}]' for place in bands]
+    if robot.friction.direction.ellipse == PLAIN:
+        found.append(f'ellipse = "{PLAIN}" of [friction.direction]: leave it out')
     if robot.body.centre_height > 0.0 and robot.wheels.places is None:
         found.append("the height of the centre of mass on mecanum wheels without wheelbase_m")
     if found:

@@ -24,6 +24,7 @@ from omnidyn.identification.structure.missing.candidates import (
 )
 from omnidyn.model.dynamics import frame_wrench
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.model.friction.direction import DISSIPATION
 from omnidyn.model.friction.kinds import COULOMB, LUGRE
 from omnidyn.model.friction.stribeck import USUAL as EXPONENT
 from omnidyn.model.friction.stribeck import fallen
@@ -179,8 +180,8 @@ def other_laws(friction: Friction) -> list[str]:
     for table in FORCES:
         own = table_of(friction, table)
         one_way = getattr(own, "coulomb_backward", None) is not None
-        if not np.any(own.coulomb):
-            continue
+        if not np.any(own.coulomb) or getattr(own, "ellipse", DISSIPATION) != DISSIPATION:
+            continue  # a plain ellipse takes no other law
         if own.stribeck_speed is None and own.law != DAHL:
             found.append(f"{table}.{FALL}")
         if own.law == COULOMB and own.breakaway is None and not one_way:

@@ -273,6 +273,7 @@ def _beside(robot: Robot, asked: OutputError, each: bool, level: float | tuple[f
             yaw_coulomb=0.5 * direction.yaw_coulomb,
             viscous=direction.viscous,
             yaw_viscous=direction.yaw_viscous,
+            ellipse=direction.ellipse,
         )
         body, where = Friction(direction=half), DIRECTION
     cause = Statement("friction_beside", NOTE, where, {"each": each})
