@@ -212,7 +212,7 @@ SENTENCES = {
     ),
     "speed_no_line": Sentence(_speed_no_line),
     "straightness_not_tested": Sentence(
-        "{subject}: whether speed is a line of the input was not tested: of {held} inputs, {steady} came "
+        "whether the speed of {motors} is a line of the input was not tested: of {held} inputs, at most {steady} came "
         "to a steady speed; hold each longer"
     ),
     "line_misses": Sentence(

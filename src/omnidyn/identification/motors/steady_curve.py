@@ -138,11 +138,17 @@ def curves_of_points(points: MotorTable) -> Curves:
 def _curves(rows: FloatArray, unit: str) -> Curves:
     """rows: (input, speed, its error, motor), shape (n, 4)."""
     rows = rows[np.isfinite(rows).all(axis=1)]
-    found = [_curve_of(int(motor), unit, *rows[rows[:, 3] == motor, :3].T) for motor in np.unique(rows[:, 3])]
-    return (
-        tuple(curve for curve in found if isinstance(curve, SteadyCurve)),
-        tuple(note for note in found if isinstance(note, Statement)),
-    )
+    motors = [int(motor) for motor in np.unique(rows[:, 3])]
+    found = [_curve_of(motor, unit, *rows[rows[:, 3] == motor, :3].T) for motor in motors]
+    few = {
+        f"motor {motor + 1}": levels for motor, levels in zip(motors, found, strict=True) if isinstance(levels, tuple)
+    }
+    notes: list[Statement] = []
+    if few:
+        steady, held = map(max, zip(*few.values(), strict=True))
+        numbers = {"motors": tuple(few), "steady": steady, "held": held}
+        notes.append(Statement("straightness_not_tested", NOTE, numbers=numbers))
+    return tuple(curve for curve in found if isinstance(curve, SteadyCurve)), tuple(notes)
 
 
 def _steady(log: MotorLog) -> Iterator[tuple[float, ...]]:
@@ -189,8 +195,10 @@ def steady_speed(t: FloatArray, speed: FloatArray) -> tuple[float, float]:
 
 def _curve_of(
     motor: int, unit: str, put_in: FloatArray, speed: FloatArray, std: FloatArray
-) -> SteadyCurve | Statement | None:
-    """The curve of one motor, None where a line does, a statement where too few levels are steady. Shape (n,) each."""
+) -> SteadyCurve | tuple[int, int] | None:
+    """The curve of one motor, None where a line does; (levels that are steady, levels that were held) where these are
+    too few. Shape (n,) each.
+    """
     size, level = orientation([(put_in, speed)]) * np.sign(put_in) * speed, np.abs(put_in)
     top = float(size.max(initial=0.0))
     steady = std <= SETTLED * top
@@ -199,9 +207,7 @@ def _curve_of(
     x, y, error = _by_level(level[turns], size[turns], std[turns])
     if len(x) < LEAST_LEVELS:
         held = len(_by_level(level[level > 0.0], level[level > 0.0], std[level > 0.0])[0])
-        numbers = {"steady": len(x), "held": held}
-        few = held >= LEAST_LEVELS and not steady.all()
-        return Statement("straightness_not_tested", NOTE, f"motor {motor + 1}", numbers) if few else None
+        return (len(x), held) if held >= LEAST_LEVELS and not steady.all() else None
     line, neighbours = _left_out(x, y)
     residual = y - np.polyval(np.polyfit(x, y, 1), x)
     if neighbours > CURVED * line or np.sqrt(np.mean(residual**2)) < NOTABLE * top:
