@@ -212,8 +212,8 @@ SENTENCES = {
     ),
     "speed_no_line": Sentence(_speed_no_line),
     "straightness_not_tested": Sentence(
-        "whether the speed of {motors} is a line of the input was not tested: of {held} inputs, at most {steady} came "
-        "to a steady speed; hold each longer"
+        "whether the speed of {motors} is a line of the input was not tested: of {held} inputs, at most {steady} gave "
+        "a steady speed within 2 %; hold each longer"
     ),
     "line_misses": Sentence(
         "the line misses the mean speeds by {rmse:.3g} rad/s, {share:%.2g} % of the largest: speed is no line of the "

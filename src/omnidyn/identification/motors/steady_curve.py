@@ -19,6 +19,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.document import plain
 from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, SLOPE, MotorEstimate
 from omnidyn.identification.motors.log import MotorLog, orientation
+from omnidyn.identification.motors.rest import CURRENT
 from omnidyn.identification.motors.start import NO_LINE, MotorStart
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.logs.plateaus import command_changes, holds
@@ -125,14 +126,14 @@ def curves_of_logs(logs: Sequence[MotorLog]) -> Curves:
     held at enough inputs and settled at too few).
     """
     rows = [row for log in logs for row in _steady(log)]
-    return _curves(np.array(rows).reshape(-1, 4), logs[0].unit) if logs[0].kind != "current" else ((), ())
+    return _curves(np.array(rows).reshape(-1, 4), logs[0].unit) if logs[0].kind != CURRENT else ((), ())
 
 
 def curves_of_points(points: MotorTable) -> Curves:
     """The same of points of steady speed."""
     nothing, motor = np.zeros(len(points)), points.motor.astype(np.float64)
     rows = np.stack([points.put_in, points.speed, nothing, motor], axis=1)
-    return _curves(rows, points.unit) if points.kind != "current" else ((), ())
+    return _curves(rows, points.unit) if points.kind != CURRENT else ((), ())
 
 
 def _curves(rows: FloatArray, unit: str) -> Curves:

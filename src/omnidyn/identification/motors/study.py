@@ -21,7 +21,7 @@ from omnidyn.identification.motors.choice import fit_rmse, is_late
 from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, named
 from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
 from omnidyn.identification.motors.log import GROUND, MotorLog, averaged_statements, motor_logs, orientation_of
-from omnidyn.identification.motors.rest import turned_under
+from omnidyn.identification.motors.rest import CURRENT, turned_under
 from omnidyn.identification.motors.start import (
     STARTS_HEAD,
     MotorStart,
@@ -257,10 +257,10 @@ def _along(study: MotorStudy, found: Curves) -> MotorStudy:
 
 
 def _with_misses(line: MotorEstimate, windows: MotorWindows) -> MotorEstimate:
-    """The line, with a warning where the mean speeds are known and it misses them."""
+    """The line, with a warning where it misses mean speeds that are known; a current makes a torque, no speed."""
     _, speed, error, *_ = windows.of(line.motor)
     share = line.rmse / float(np.abs(speed).max())
-    if share <= MISSES or line.rmse <= CLEAR * float(np.median(error)):
+    if windows.kind == CURRENT or share <= MISSES or line.rmse <= CLEAR * float(np.median(error)):
         return line
     numbers = {"rmse": line.rmse, "share": share}
     return replace(line, warnings=(*line.warnings, Statement("line_misses", WARNING, numbers=numbers)))
