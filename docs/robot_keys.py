@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
-from omnidyn.model.keys import TABLES, unit
+from omnidyn.model.keys import TABLES, find_key, unit
 from omnidyn.model.robot import Robot
 from omnidyn.model.value import keys_of
 
@@ -52,6 +52,7 @@ MEANING = {
     "drive.rate_Hz": "how often the speed loop runs; needed for it",
     "drive.dead_band_V": "of the driver: of a voltage u, (|u| - dead band)+ sgn u reaches the motor",
     "drive.latency_s": "from a command until it acts on the motors",
+    "drive.voltage_map_V": "of a driver that is no line: points [asked, passed on, std or nothing] in V",
     "friction.axes.viscous": "B, per speed: along x, along y, about yaw",
     "friction.axes.coulomb": "C, whatever the speed: along x, along y, about yaw",
     "friction.axes.breakaway": "S, up to which it holds at rest; absent: as coulomb",
@@ -151,7 +152,8 @@ def _unit(key: str, words: str, schema: dict[str, Any]) -> str:
     found = re.search(r"\[(.+?)\]", words)
     if found:
         return found.group(1)
-    return PRETTY.get(unit(key), unit(key)) or ("1" if "number" in str(schema) else "")
+    number = "number" in str(schema) and find_key(key) is not None  # a table of points is none
+    return PRETTY.get(unit(key), unit(key)) or ("1" if number else "")
 
 
 def _literal(value: Any) -> str:
@@ -177,6 +179,8 @@ def _allowed(schema: dict[str, Any]) -> str:
     if not arrays:
         return words
     least, most = (arrays[0].get(f"{which}Items", arrays[0].get(f"{which}Length")) for which in ("min", "max"))
+    if arrays[0].get("items", {}).get("type") == "array":
+        return f"points of {words}, both rising"
     if least is None:
         return f"{words}; or one per wheel"
     return f"{least} × {words}" if least == most else f"{least} to {most} × {words}"

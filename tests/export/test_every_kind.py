@@ -18,6 +18,7 @@ import omnidyn
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.export.features import FEATURES, LEAVES_OUT, PARTLY, REFUSES, cell
 from omnidyn.export.kinds import KINDS, maker
+from omnidyn.model.motor import Drive
 from tests.support.exported import STRICT, exact_robot, sloping
 from tests.support.mixed_robots import random_robot, with_centre, with_spin
 
@@ -29,6 +30,7 @@ ROBOTS = [
     sloping(random_robot(0)),
     with_centre(exact_robot(1), 1),
     with_centre(random_robot(3), 3),
+    exact_robot(2).replace(drive=Drive(voltage_map=((1.0, 2.0), (5.0, 5.0)))),
 ]
 
 

@@ -207,6 +207,7 @@ def test_what_the_verdict_calls_meaningless_is_a_failure():
 def motor(number, band=0.5, seen=True, slope=(0.1, 0.2)) -> Any:
     return SimpleNamespace(
         motor=number,
+        warnings=(),
         name="all motors" if number is None else f"motor {number + 1}",
         unit="V",
         dead_band_seen=seen,

@@ -151,6 +151,13 @@ def feedforward_table(robot: Robot) -> FeedforwardTable:
             expected="1",
             remedy="take voltage_for, which finds out which motors drive",
         )
+    if robot.drive.voltage_map:
+        raise UnsupportedError(
+            "no formula of signs and sums for a driver that is no line",
+            got="[drive] voltage_map_V",
+            expected="none",
+            remedy="take voltage_for, or leave voltage_map_V out",
+        )
     model, count = inverse(robot), robot.wheels.count
     own = model.levels
     if own.falls.any():

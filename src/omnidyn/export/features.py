@@ -147,6 +147,7 @@ FEATURES = {
     "slip": Feature("wheels that may slip ([wheels] traction_mu)", lambda robot: robot.wheels.traction_mu is not None),
     "slope": Feature("a floor that is not level ([floor] tilt_deg)", lambda robot: robot.floor.tilt != 0.0),
     "band": Feature("a dead band of the driver ([drive] dead_band_V)", lambda robot: robot.drive.dead_band > 0.0),
+    "map": Feature("a driver that is no line ([drive] voltage_map_V)", lambda robot: bool(robot.drive.voltage_map)),
     "latency": Feature("latency of the drive ([drive] latency_s)", lambda robot: robot.drive.latency > 0.0),
     "loop": Feature('a speed loop in the firmware ([drive] kind = "speed")', lambda robot: robot.drive.kind == SPEED),
     "duty": Feature('a duty as command ([drive] kind = "duty")', lambda robot: robot.drive.kind == DUTY),
@@ -157,7 +158,8 @@ _LOOP = Cell(LEAVES_OUT, "inputs are the volts at the motors: the speed loop of 
 _DUTY = Cell(
     LEAVES_OUT, "inputs are the volts at the motors: give duty x supply; a motor at 0 V is shorted, never open"
 )
-_DRIVE = {"latency": _DELAY, "loop": _LOOP, "duty": _DUTY}
+_MAP = Cell(REFUSES, "its volts are those at the motors, which a driver that is no line does not pass on as asked")
+_DRIVE = {"latency": _DELAY, "loop": _LOOP, "duty": _DUTY, "map": _MAP}
 _NOT_EXACT = dict.fromkeys(
     (
         "direction",
@@ -207,6 +209,7 @@ _GAINS = {
     "couples": Cell(LEAVES_OUT, "each axis for itself: here one axis also drives another one"),
     "centre": Cell(PARTLY, "kA of turning is about the centre of the wheels; that a push turns the robot is left out"),
     "latency": _DELAY,
+    "map": _MAP,
     "loop": Cell(LEAVES_OUT, "volts at the motors: the speed loop of the firmware is not in it"),
 }
 
@@ -245,6 +248,7 @@ _LINKS = {
     "spin": Cell(PARTLY, "wheels spin about their axles; the format has no word for rotors"),
     "rollers": Cell(LEAVES_OUT, "wheels are plain discs at b from the centre, their axles at the azimuth"),
     "band": Cell(LEAVES_OUT, "there are no motors in the file"),
+    "map": Cell(LEAVES_OUT, "there are no motors in the file"),
     "latency": Cell(LEAVES_OUT, "commands act at once"),
     "loop": Cell(LEAVES_OUT, "there are no motors in the file"),
     "duty": Cell(LEAVES_OUT, "there are no motors in the file"),
@@ -255,7 +259,7 @@ _ROS = {
     "slope": _LEVEL,
     "slip": _ROLL,
     **_LAWS,
-    **dict.fromkeys(("axes", "direction", "wheels", "drop", "band", "centre"), Cell(PARTLY, _KINEMATICS)),
+    **dict.fromkeys(("axes", "direction", "wheels", "drop", "band", "map", "centre"), Cell(PARTLY, _KINEMATICS)),
     **dict.fromkeys(("breakaway", "frame", "inductance", "current", "gear"), Cell(LEAVES_OUT, "kinematics only")),
     **dict.fromkeys(
         ("rollers", "uneven"),
@@ -275,6 +279,7 @@ TABLE: dict[str, dict[str, Cell]] = {
         "plain": Cell(REFUSES, 'its formula has the ellipse of maximum dissipation only: leave ellipse = "plain" out'),
         "falls": Cell(REFUSES, "its formula has signs and sums only: leave stribeck_speed out"),
         "bends": Cell(LEAVES_OUT, "nothing bends, and nothing rests in a band, as for the controller in Python"),
+        "map": Cell(REFUSES, "its formula has signs and sums only: leave voltage_map_V out"),
         "inductance": Cell(LEAVES_OUT, "the currents have settled, as for the controller in Python"),
         "slope": Cell(REFUSES, "controllers know level floors only"),
         "slip": Cell(PARTLY, "it drives as if wheels rolled, with no more current than static loads let them"),

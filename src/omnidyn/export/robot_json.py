@@ -58,7 +58,8 @@ def json_schema() -> dict[str, Any]:
         },
     }
     entry = {"anyOf": [{"type": ["number", "string", "boolean"]}, {"$ref": "#/$defs/known"}]}
-    value = {"anyOf": [entry, {"type": "array", "items": entry}]}
+    point = {"type": "array", "items": {"type": "number"}}
+    value = {"anyOf": [entry, {"type": "array", "items": {"anyOf": [entry, point]}}]}
     tables = {name: _table_schema(Robot, name) for name in TABLES}
     matrix = {"type": "array", "items": {"type": "array", "items": {"type": "number"}}}
     texts = {"type": "array", "items": {"type": "string"}}

@@ -1,9 +1,11 @@
 """What reaches the motors, from what was asked for.
 
     u = clip(duty supply, +-u_max)                                  asked of the driver [V]
-    u_motor = left gain (|u| - dead)+ sgn u,  left = 1 - fade p     what it passes on, p the share of the run gone by
+    u' = map(|u|) sgn u                                             of a driver that is no line
+    u_motor = left gain (|u'| - dead)+ sgn u,  left = 1 - fade p    what it passes on, p the share of the run gone by
 
-A driver that is ideal has gain 1, no dead band and no fade. A fit may find others; their derivatives stand here too.
+A driver that is ideal has no map, gain 1, no dead band and no fade. A fit may find the last three; their derivatives
+stand here too.
 """
 
 from __future__ import annotations
@@ -50,9 +52,27 @@ def clip_voltage(motor: Motor, voltage: FloatArray) -> FloatArray:
     return np.clip(voltage, -limit, limit)
 
 
+def mapped(robot: Robot, voltage: FloatArray, *, backward: bool = False) -> FloatArray:
+    """What the map of the driver makes of a voltage [V], or which voltage it makes this of. Shape (*batch, wheels).
+
+    Beyond its last point it goes on as between the last two.
+    """
+    if not robot.drive.voltage_map:
+        return voltage
+    asked, passed = np.array([(0.0, 0.0), *(point[:2] for point in robot.drive.voltage_map)]).T
+    x, y = (passed, asked) if backward else (asked, passed)
+    size, slope = np.abs(voltage), (y[-1] - y[-2]) / (x[-1] - x[-2])
+    return np.sign(voltage) * (np.interp(size, x, y) + slope * np.maximum(size - x[-1], 0.0))
+
+
+def without_map(robot: Robot) -> Robot:
+    """The robot behind the map of its driver: of voltages that are `mapped`."""
+    return robot.model_copy(update={"drive": robot.drive.model_copy(update={"voltage_map": ()})})
+
+
 def reaching(robot: Robot, voltage: FloatArray) -> FloatArray:
-    """What the driver of a robot passes on to the motors [V]: all but its dead band. Shape (*batch, wheels)."""
-    band = robot.drive.dead_band
+    """What the driver of a robot passes on to the motors [V]: its map, less its dead band. Shape (*batch, wheels)."""
+    band, voltage = robot.drive.dead_band, mapped(robot, voltage)
     if band == 0.0:
         return voltage
     return np.sign(voltage) * np.maximum(np.abs(voltage) - band, 0.0)
@@ -60,7 +80,7 @@ def reaching(robot: Robot, voltage: FloatArray) -> FloatArray:
 
 def asked_for(robot: Robot, voltage: FloatArray) -> FloatArray:
     """What to ask of the driver for a voltage at the motors [V]: `reaching` backward. Shape (*batch, wheels)."""
-    return voltage + robot.drive.dead_band * np.sign(voltage)
+    return mapped(robot, voltage + robot.drive.dead_band * np.sign(voltage), backward=True)
 
 
 @part

@@ -74,7 +74,8 @@ def breakaway_voltage(robot: Robot, pattern: ArrayLike, halvings: int = BISECTIO
     check_order("breakaway_voltage(robot, pattern)", (robot, Robot), (pattern, object))
     pattern = _patterns(robot, pattern)
     motor = robot.motor
-    linear = not np.any(motor.voltage_drop) and motor.current_limit is None and robot.drive.dead_band == 0.0
+    straight = robot.drive.dead_band == 0.0 and not robot.drive.voltage_map
+    linear = not np.any(motor.voltage_drop) and motor.current_limit is None and straight
     if linear and axes_hold_alone(robot):
         wrench_per_volt = np.abs(drive_wrench(robot, np.zeros((*pattern.shape[:-1], 3)), pattern))
         breakaway = robot.friction.axes.levels[2]

@@ -327,6 +327,8 @@ def _places_in(model: type[BaseModel], table: str, path: tuple[str, ...]) -> dic
         if isinstance(annotation, type) and issubclass(annotation, BaseModel):
             found |= _places_in(annotation, name, (*path, field))
         elif lists := list(_lists(annotation)):
+            if any(getattr(entry, "__origin__", None) is tuple for entry in lists[0]):
+                continue  # a table of points is no number
             per_wheel = Ellipsis in lists[0]
             found[name] = _Place((*path, field), 0 if per_wheel else len(lists[0]), per_wheel)
         elif _has_float(annotation):
@@ -391,6 +393,6 @@ def _written(path: str, value: BaseModel, priors: Mapping[str, Prior]) -> Iterat
         if isinstance(content, BaseModel):
             yield from _written(key, content, priors)
         elif isinstance(content, tuple):
-            yield from (f"{key}[{k}]" for k in range(len(content)))
+            yield from (f"{key}[{k}]" for k in range(len(content)) if not isinstance(content[k], tuple))
         elif isinstance(content, float):
             yield key

@@ -7,6 +7,7 @@ T = l K_t i,  f = T / r           (10)
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
 from omnidyn.arrays import FloatArray
-from omnidyn.model.value import PerWheel, Value, number, per_wheel_number
+from omnidyn.model.value import PerWheel, Value, number, per_wheel_number, points
 from omnidyn.model.wheels import Wheels, per_wheel
 
 QUASI_STATIC, DYNAMIC = "quasi-static", "dynamic"
@@ -154,6 +155,8 @@ class Drive(Value):
     kp [V s/rad], ki [V/rad], rate [Hz]: the speed loop, on wheel-side speed; it saturates at the voltage limit and
     stops integrating there.
     dead_band [V]: of a voltage u, (|u| - dead_band)+ sgn u reaches the motor. latency [s]: until a command does.
+    voltage_map: (voltage asked, voltage passed on, its std or nothing) [V] of a driver that is no line, both directions
+    alike, straight between the points, through 0; it comes before the dead band.
     """
 
     kind: Annotated[Literal["voltage", "duty", "speed"], Field(description="what a command is")] = VOLTAGE
@@ -173,6 +176,10 @@ class Drive(Value):
         Annotated[float, number(0.0, MOST_LATENCY)],
         Field(alias="latency_s", description="from a command to the motors"),
     ] = 0.0
+    voltage_map: Annotated[
+        Annotated[tuple[tuple[float, ...], ...], points(1e4)],
+        Field(alias="voltage_map_V", description="asked, passed on, std"),
+    ] = ()
 
     @property
     def coasts(self) -> bool:
@@ -183,4 +190,12 @@ class Drive(Value):
     def _complete(self) -> Drive:
         if self.kind == SPEED and (self.rate is None or (self.kp == 0.0 and self.ki == 0.0)):
             raise ValueError('kind = "speed" needs rate_Hz and kp_V_s_rad or ki_V_rad')
+        if self.kind == SPEED and self.voltage_map:
+            raise ValueError('kind = "speed" takes no voltage_map_V; expected kind = "duty" or "voltage"')
+        asked, passed = ([point[k] for point in self.voltage_map] for k in (0, 1))
+        if any(b <= a for a, b in (*pairwise([0.0, *asked]), *pairwise(passed))) or passed == [0.0]:
+            raise ValueError(
+                f"voltage_map_V is not monotone; got {[list(point[:2]) for point in self.voltage_map]}; expected pairs "
+                "[asked, passed on] above 0 that both rise; only the first may pass on 0"
+            )
         return self

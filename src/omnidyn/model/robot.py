@@ -114,7 +114,7 @@ class Robot(Shown, Value):
     def _one_value_per_wheel(self) -> Robot:
         tables = {"motor": self.motor, "drive": self.drive, "friction.wheels": self.friction.wheels}
         for table, value in tables.items():
-            for name in type(value).model_fields:
+            for name in type(value).model_fields.keys() - {"voltage_map"}:
                 check_count(f"[{table}] {name}", getattr(value, name), self.wheels.count)
         return self
 

@@ -94,6 +94,12 @@ def per_axis_number(low: float, high: float) -> Checked:
     return Checked(Annotated[tuple[one, one, one], BeforeValidator(to_list)])
 
 
+def points(most: float) -> Checked:
+    """Pairs of numbers within 0 to most, each with its standard deviation or without."""
+    one = number(0.0, most).type
+    return Checked(tuple[Annotated[tuple[one, ...], Field(min_length=2, max_length=3)], ...])
+
+
 def place(most: float) -> Checked:
     """Two numbers within -most to most: along x, along y."""
     one = number(-most, most).type

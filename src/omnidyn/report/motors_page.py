@@ -25,13 +25,14 @@ def render_motors(study: MotorStudy, provenance: Mapping[str, Any]) -> str:
     """The page of the motors, as HTML."""
     told = study.document()
     windows = study.windows or study.drawn
-    pictures = [] if windows is None else [draw_motor_lines(study.motors, windows, study.starts)]
+    pictures = [] if windows is None else [draw_motor_lines(study.motors, windows, study.starts, study.curves)]
     sections = [
         section("warnings", "Warnings", told["warnings"], none="None."),
         *([section("next", "What to mend", told["next"])] if study.advice else []),
         *([section("figures", "What each motor needs", *pictures)] if pictures else []),
         section("findings", "What the data say", told["statements"]),
         *([section("starts", "Where each direction starts", told["starts"])] if study.starts else []),
+        *([section("curves", "Where speed is no line of the input", told["curves"])] if study.curves else []),
         section("numbers", "Numbers, with 95 % intervals", told["motors"]),
     ]
     if study.verdicts:

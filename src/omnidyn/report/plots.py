@@ -80,7 +80,7 @@ def _motors(study: MotorStudy) -> Picture:
     windows = study.windows or study.drawn
     if windows is None:
         raise InputError("the logs have no windows to draw", expected="motors that turn, at more than 10 rows a second")
-    return draw_motor_lines(study.motors, windows, study.starts)
+    return draw_motor_lines(study.motors, windows, study.starts, study.curves)
 
 
 def _of_file(robot: Robot) -> list[FrictionCurve]:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.model.actuation import Driver, at_motors
+from omnidyn.model.actuation import Driver, at_motors, mapped
 from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.commands import Commands
@@ -46,7 +46,7 @@ class View:
 
         The dead band behind a speed loop is the loop's own affair.
         """
-        voltage = given.voltage
+        voltage = None if given.voltage is None else mapped(robot, given.voltage)
         if voltage is not None and self.driver != Driver():
             share = np.zeros(len(given.dt)) if self.share is None else self.share
             voltage = at_motors(np.ascontiguousarray(voltage), np.ascontiguousarray(share), self.driver)[0]

@@ -12,7 +12,10 @@ from omnidyn.telling.sentence import Sentence
 NOT_IDENTIFIABLE = "dead band not identifiable here"
 NOT_WRITTEN = {
     "viscous_explains_slope": "friction.wheels.viscous of the file explains all of the slope",
-    "drop_explains_dead_band": "motor.voltage_drop_V of the file explains all of the dead band",
+    "drop_explains_dead_band": "motor.voltage_drop_V and drive.dead_band_V of the file explain all of the dead band",
+    "loop": 'a map behind drive.kind = "speed" is not simulated: give kind = "duty" or "voltage"',
+    "straight": "not all motors have a curve, and the driver has one map: look at the wiring of the others",
+    "unsettled": "the lowest inputs reached no steady speed: hold them longer",
     "negative": "",
     "no_dead_band": "no dead band is seen",
     "no_inertia": "the logs do not determine an inertia",
@@ -72,7 +75,7 @@ def _dead_band_negative(statement: Statement) -> str:
     """The line of a motor meets speed 0 below 0."""
     return (
         f"{NOT_IDENTIFIABLE}: the line meets speed 0 at {_band(statement)}, below 0, and no friction does that; the "
-        "input has an offset, or the speeds are wrong"
+        "input has an offset, speed is no line of it, or the speeds are wrong"
     )
 
 
@@ -85,6 +88,27 @@ def _dead_band_not_needed(statement: Statement) -> str:
     """The interval of a dead band contains 0."""
     high, unit = max(statement.numbers["ci95"][1], 0.0), statement.numbers["unit"]
     return f"{NOT_IDENTIFIABLE}: {_band(statement)} contains 0; it is at most {high:.3g} {unit}, and none is needed"
+
+
+def _speed_no_line(statement: Statement) -> str:
+    """The steady speeds of a motor that are no line of its input, and where one holds."""
+    numbers, unit = statement.numbers, statement.numbers["unit"]
+    words = (
+        f"{statement.subject}: speed is no line of the input: levels left out are missed by {numbers['line']:.3g} "
+        f"rad/s by a line, by {numbers['neighbours']:.3g} by the way between neighbours"
+    )
+    low, high = numbers["straight"]
+    words += f"; a line holds from {low:.3g} to {high:.3g} {unit}" if high > low else ""
+    if numbers["unsettled"]:
+        words += f"; at {numbers['unsettled']:.3g} {unit} no steady speed was reached: hold low inputs longer"
+    return words
+
+
+def _motors_no_line(statement: Statement) -> str:
+    """Motors whose speed is no line of their input, and where a line holds."""
+    low, high = statement.numbers["low"], statement.numbers["high"]
+    words = f"the speed of {all_of(statement.numbers['motors'])} is no line of the input"
+    return f"{words}, except from {low:.3g} to {high:.3g} {statement.numbers['unit']}" if high > low else words
 
 
 def _start_not_seen(statement: Statement) -> str:
@@ -186,6 +210,17 @@ SENTENCES = {
         "{subject}: held-out logs are predicted no better with the dead band (error {with_band:.4g} rad/s, "
         "{without:.4g} without): it may be an effect of something else"
     ),
+    "speed_no_line": Sentence(_speed_no_line),
+    "straightness_not_tested": Sentence(
+        "whether the speed of {motors} is a line of the input was not tested: of {held} inputs, at most {steady} gave "
+        "a steady speed within 2 %; hold each longer"
+    ),
+    "line_misses": Sentence(
+        "the line misses the mean speeds by {rmse:.3g} rad/s, {share:%.2g} % of the largest: speed is no line of the "
+        "input, or something else turns the motor; hold each input until the speed is steady"
+    ),
+    "motors_line_misses": Sentence("no line describes the speed of {motors}"),
+    "motors_no_line": Sentence(_motors_no_line),
     "start_not_seen": Sentence(_start_not_seen),
     "never_sets_off": Sentence("{subject}: it rests up to {low:.3g} {unit}, and never sets off"),
     "sets_off_below": Sentence(
@@ -234,6 +269,11 @@ SENTENCES = {
     ),
     "line_not_determined": Sentence("slope and dead band are not determined: nothing is written"),
     "not_written": Sentence(_not_written),
+    "map_written": Sentence("{subject} is written, with {points} points: it holds what friction takes of the motors"),
+    "map_holds_friction": Sentence(
+        "{subject} takes the place of friction.wheels.coulomb and drive.dead_band_V, which are 0 now"
+    ),
+    "map_removed": Sentence("{subject} of the file is taken out: the speeds are a line of the input"),
     "lag_too_short": Sentence(
         "{subject} is not written: a lag of {lag:m.2g} ms is too short for windows, which blur {smear:m.2g} ms; "
         "`method` output-error fits it"

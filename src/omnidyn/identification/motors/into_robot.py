@@ -2,7 +2,7 @@
 
 A wheel of radius r with friction b v + c sgn v at its rim, behind a gear l, at a constant speed w > 0 (v = r w):
 
-    u = R i + V_d + K_v l w                                              (11), the voltage drop V_d against the current
+    u = R i + V_d + K_v l w                        (11), V_d: the voltage drop, and the dead band of the driver
     l K_t i = r (b r w + c)                                              (10), f = T/r balances friction
     u = (K_v l + b r/g) w + (V_d + c/g),   g = l K_t/(R r) [N/V]         slope and dead band of a voltage
     i = (b r/g) w + c/g,                   g = l K_t/r [N/A]             and of a current
@@ -33,14 +33,17 @@ from omnidyn.errors import InputError
 from omnidyn.identification.estimate import identified
 from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, SLOPE, MotorEstimate
 from omnidyn.identification.motors.log import HEADING
+from omnidyn.identification.motors.steady_curve import map_of
 from omnidyn.identification.motors.study import MotorStudy
 from omnidyn.model.keys import EMF, TORQUE, Key, unit, with_priors
 from omnidyn.model.known.told import with_correlation
+from omnidyn.model.motor import SPEED
 from omnidyn.model.robot import Prior, Robot
 from omnidyn.model.wheels import per_wheel
-from omnidyn.statement import NOTE, Statement
+from omnidyn.statement import NOTE, WARNING, Statement
 
 COULOMB, VISCOUS = "friction.wheels.coulomb", "friction.wheels.viscous"
+MAP = "drive.voltage_map_V"
 ROTOR = "motor.rotor_inertia_kg_m2"
 STEP = 1e-6  # of a standard error: the differences by which errors propagate
 
@@ -84,23 +87,52 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
     if study.speed_from == HEADING:
         return MotorNumbers(robot, {}, {}, (Statement("motors_and_floor"),))
     supply, remarks = _supply(study, robot)
+    bent = [curve.motor for curve in study.curves]
     value: dict[str, float] = {}
     std: dict[str, float] = {}
     priors: dict[str, Prior] = {}
     for each in motors if supply else ():
         wheel = _Wheel(robot, each.motor or 0, study.kind)
-        found, notes = wheel.numbers(each, supply, 0.0 if study.windows is None else study.windows.smear)
+        if each.motor in bent:
+            found, notes = wheel.behind_map(each, supply)
+        else:
+            found, notes = wheel.numbers(each, supply, 0.0 if study.windows is None else study.windows.smear)
         remarks += [remark.of(each.name) for remark in notes]
         for key, (number, spread) in found.items():
             robot = wheel.put(robot, key, number)
             value[key], std[key] = number, spread
             priors[key] = identified(spread, f"motors by {each.way}, {each.source}")
+    if value:
+        robot, notes = _with_map(robot, study, supply)
+        remarks += notes
     floor = [robot.friction.axes, robot.friction.direction]
     if any(key.startswith(COULOMB) for key in value) and any(np.any(f.coulomb) or np.any(f.viscous) for f in floor):
         remarks.append(Statement("floor_friction_kept", NOTE))
     # Motors that were measured anew, each by itself, are no longer off together with what an earlier fit found.
     told = with_correlation(with_priors(robot, priors), [*priors], np.eye(len(priors)))
     return MotorNumbers(told, value, std, tuple(remarks))
+
+
+def _with_map(robot: Robot, study: MotorStudy, supply: float) -> tuple[Robot, list[Statement]]:
+    """(the robot with the map of its driver where its motors show one, remarks).
+
+    The steady speeds hold what friction takes of the motors and what the driver loses: neither is written beside it.
+    """
+    drive, wheels = robot.drive, robot.friction.wheels
+    if not study.curves:
+        removed = [Statement("map_removed", NOTE, MAP)] if drive.voltage_map else []
+        return robot.replace(drive=drive.replace(voltage_map=())), removed
+    why = "loop" if drive.kind == SPEED else ""
+    why = why or ("straight" if len(study.curves) < sum(motor.motor is not None for motor in study.motors) else "")
+    why = why or ("unsettled" if any(curve.unsettled for curve in study.curves) else "")
+    if why:
+        return robot, [Statement("not_written", WARNING, MAP, {"why": why})]
+    points = map_of(study.curves, supply)
+    inside = np.any(wheels.coulomb) or drive.dead_band > 0.0
+    remarks = [Statement("map_written", NOTE, MAP, {"points": len(points)})]
+    remarks += [Statement("map_holds_friction", NOTE, MAP)] if inside else []
+    friction = robot.friction.replace(wheels=type(wheels)(viscous=wheels.viscous))
+    return robot.replace(drive=drive.replace(voltage_map=points, dead_band=0.0), friction=friction), remarks
 
 
 def _supply(study: MotorStudy, robot: Robot) -> tuple[float, list[Statement]]:
@@ -129,7 +161,8 @@ class _Wheel:
         self.torque, self.efficiency = at_wheel(motor.torque_constant), at_wheel(motor.gear_efficiency)
         self.tied = self.torque == at_wheel(motor.emf_constant)
         self.wheel_inertia = at_wheel(robot.wheels.wheel_inertia)
-        self.drop, self.viscous = at_wheel(motor.voltage_drop), at_wheel(robot.friction.wheels.viscous)
+        self.drop = at_wheel(motor.voltage_drop) + robot.drive.dead_band
+        self.viscous = at_wheel(robot.friction.wheels.viscous)
 
     def key(self, name: str) -> str:
         return f"{name}[{self.wheel}]"
@@ -165,6 +198,15 @@ class _Wheel:
             remarks.append(Statement("not_written", NOTE, COULOMB, {"why": "no_dead_band"}))
         inertia, more = self._of_inertia(line, at[0], scale, smear) if found else ({}, [])
         return found | inertia, remarks + more
+
+    def behind_map(self, line: MotorEstimate, scale: float) -> tuple[dict[str, tuple[float, float]], list[Statement]]:
+        """The same of a motor behind the map of its driver: its back-EMF, by the slope."""
+        slope, spread = line.value[SLOPE] * scale, line.std[SLOPE] * scale
+        number = self._emf(slope)
+        if not number > 0.0:
+            return {}, [Statement("not_written", subject=EMF, numbers={"why": "viscous_explains_slope"})]
+        std = (self._emf(slope + STEP * spread) - self._emf(slope - STEP * spread)) / (2.0 * STEP)
+        return {self.key(name): (number, std) for name in ((EMF, TORQUE) if self.tied else (EMF,))}, []
 
     def _laws(self, with_band: bool) -> Iterator[tuple[str, Callable[[float, float], float], str]]:
         """(key, its number of slope and dead band, code of why there is none where that is not above 0)."""

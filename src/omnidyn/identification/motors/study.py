@@ -21,7 +21,7 @@ from omnidyn.identification.motors.choice import fit_rmse, is_late
 from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, named
 from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
 from omnidyn.identification.motors.log import GROUND, MotorLog, averaged_statements, motor_logs, orientation_of
-from omnidyn.identification.motors.rest import turned_under
+from omnidyn.identification.motors.rest import CURRENT, turned_under
 from omnidyn.identification.motors.start import (
     STARTS_HEAD,
     MotorStart,
@@ -30,6 +30,13 @@ from omnidyn.identification.motors.start import (
     points_of_logs,
     starts_of_points,
     windows_of_points,
+)
+from omnidyn.identification.motors.steady_curve import (
+    CURVES_HEAD,
+    Curves,
+    SteadyCurve,
+    curves_of_logs,
+    curves_of_points,
 )
 from omnidyn.identification.motors.windows import MotorWindows, fit_line, motor_windows
 from omnidyn.logs.log import Log
@@ -46,6 +53,8 @@ if TYPE_CHECKING:
 from omnidyn.identification.motors.estimate import BAND, SLOPE
 from omnidyn.identification.motors.start import START
 
+MISSES = 0.1  # of the largest speed: error of a line that describes no motor
+CLEAR = 5.0  # errors of the mean speeds, from which such an error is no noise
 SAME_SPEED = 1e-9  # spread of speeds over the largest, below which they are one
 
 
@@ -57,7 +66,7 @@ class MotorStudy(Shown):
     found. windows: that the lines go through, None of free runs; drawn: those of a picture of free runs. starts: each
     direction of each motor by itself, with the input at which it sets off. supply [V]: of a duty, the mean of the logs;
     NaN where it is not logged. log_warnings: of the logs; `warnings` has those of each motor too. verdicts:
-    of `check` on each log.
+    of `check` on each log. curves: of the motors whose speed is no line of their input.
     """
 
     method: str
@@ -72,6 +81,7 @@ class MotorStudy(Shown):
     log_warnings: tuple[Statement, ...] = ()
     verdicts: tuple[Verdict, ...] = ()
     drawn: MotorWindows | None = None
+    curves: tuple[SteadyCurve, ...] = ()
 
     def __repr__(self) -> str:
         return f"<MotorStudy {self.kind} [{self.unit}], {self.verdict}>"
@@ -87,7 +97,9 @@ class MotorStudy(Shown):
     def statements(self) -> tuple[Statement, ...]:
         """What the logs say of each motor, and whether its dead band is any use on held-out logs."""
         known = {start.motor for start in self.starts if start.sharp}
-        found = [motor.statement(started=motor.motor in known) for motor in self.motors]
+        bent = {curve.motor for curve in self.curves}
+        found = [motor.statement(started=motor.motor in known) for motor in self.motors if motor.motor not in bent]
+        found += [curve.statement() for curve in self.curves]
         for band, plain in zip(self.motors, self.plain, strict=False):
             if band.dead_band_seen and band.held_out > (1.0 - PAYS) * plain.held_out:
                 errors = {"with_band": band.held_out, "without": plain.held_out}
@@ -99,7 +111,7 @@ class MotorStudy(Shown):
         """Which motors answer to their input, and at which input they start; failures first."""
         if faults := unfit(self.verdicts):
             return Statement("failed", ERROR, numbers={"failures": faults})
-        return motors_verdict(self.motors, self.starts)
+        return motors_verdict(self.motors, self.starts, self.curves)
 
     @property
     def failed(self) -> bool:
@@ -136,6 +148,11 @@ class MotorStudy(Shown):
             Table(HEAD, [each.row() for several in pairs for each in several], name="motors"),
             "",
             *([Table(STARTS_HEAD, [start.row() for start in self.starts], name="starts"), ""] if self.starts else []),
+            *(
+                [Table(CURVES_HEAD, [row for c in self.curves for row in c.rows()], name="curves"), ""]
+                if self.curves
+                else []
+            ),
             Points(self.statements, name="statements"),
             by_severity(self.warnings, "warnings"),
             Points(self.advice, "next:", "next"),
@@ -157,6 +174,7 @@ class MotorStudy(Shown):
             "window_s": self.windows.length if self.windows is not None else None,
             "motors": motors,
             "starts": [start.to_dict() for start in self.starts],
+            "curves": [curve.to_dict() for curve in self.curves],
             "statements": plain_values(self.statements),
             "warnings": plain_values(self.warnings),
             "next": plain_values(self.advice),
@@ -206,9 +224,9 @@ def _lines(logs: Sequence[MotorLog], asked: MotorLine) -> MotorStudy:
         line
         if line.motor is None
         else line.bounded(turned_under(logs, line.motor, way=orientation_of(logs, line.motor)), line.rest)
-        for line in lines
+        for line in (_with_misses(line, windows) for line in lines)
     )
-    return MotorStudy(
+    study = MotorStudy(
         STEADY_STATE,
         windows.kind,
         windows.unit,
@@ -220,6 +238,32 @@ def _lines(logs: Sequence[MotorLog], asked: MotorLine) -> MotorStudy:
         _supply(logs),
         (*averaged_statements(logs), *_of_windows(windows, lines)),
     )
+    return _along(study, curves_of_logs(logs))
+
+
+def _along(study: MotorStudy, found: Curves) -> MotorStudy:
+    """The study with what is left of the lines of motors whose speed is none."""
+    curves, notes = found
+    study = replace(study, log_warnings=(*study.log_warnings, *notes))
+    bent = {curve.motor: curve for curve in curves}
+    if not bent:
+        return study
+    motors, plain = (
+        tuple(bent[m.motor].estimate(m) if m.motor in bent else m for m in several if m.motor is not None)
+        for several in (study.motors, study.plain)
+    )
+    starts = tuple(bent[s.motor].start(s) if s.motor in bent else s for s in study.starts)
+    return replace(study, motors=motors, plain=plain, starts=starts, curves=curves)
+
+
+def _with_misses(line: MotorEstimate, windows: MotorWindows) -> MotorEstimate:
+    """The line, with a warning where it misses mean speeds that are known; a current makes a torque, no speed."""
+    _, speed, error, *_ = windows.of(line.motor)
+    share = line.rmse / float(np.abs(speed).max())
+    if windows.kind == CURRENT or share <= MISSES or line.rmse <= CLEAR * float(np.median(error)):
+        return line
+    numbers = {"rmse": line.rmse, "share": share}
+    return replace(line, warnings=(*line.warnings, Statement("line_misses", WARNING, numbers=numbers)))
 
 
 def _of_each(windows: MotorWindows, source: str) -> tuple[list[int], tuple[MotorEstimate, ...]]:
@@ -245,7 +289,7 @@ def study_points(points: MotorTable, origin: str = "a table", remarks: Sequence[
     lines = tuple(
         line if line.motor is None else line.bounded(windows.turned_under(line.motor), line.rest) for line in lines
     )
-    return MotorStudy(
+    study = MotorStudy(
         STEADY_STATE,
         points.kind,
         points.unit,
@@ -256,6 +300,7 @@ def study_points(points: MotorTable, origin: str = "a table", remarks: Sequence[
         starts_of_points(points),
         log_warnings=(*statements(points.notes), *remarks, *_of_windows(windows, lines)),
     )
+    return _along(study, curves_of_points(points))
 
 
 def _free_runs(runs: Sequence[Run], asked: MotorFit, hold_out: Sequence[str], progress: Progress) -> MotorStudy:
@@ -281,7 +326,7 @@ def _free_runs(runs: Sequence[Run], asked: MotorFit, hold_out: Sequence[str], pr
     except InsufficientDataError:  # no window for the line of a direction
         seen = None
     starts = starts_of_points(points_of_logs(logs)) if slow else motor_starts(logs, seen, motors)
-    return MotorStudy(
+    study = MotorStudy(
         OUTPUT_ERROR,
         logs[0].kind,
         logs[0].unit,
@@ -293,6 +338,7 @@ def _free_runs(runs: Sequence[Run], asked: MotorFit, hold_out: Sequence[str], pr
         drawn=seen,
         log_warnings=tuple(averaged_statements(logs, False)),
     )
+    return _along(study, curves_of_points(points_of_logs(logs)) if slow else curves_of_logs(logs))
 
 
 def _latency(nuisances: Sequence[str] | None) -> bool | None:
@@ -324,9 +370,11 @@ def _of_windows(windows: MotorWindows, lines: Sequence[MotorEstimate]) -> Iterat
 # What a study of motors came to
 
 
-def motors_verdict(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart] = ()) -> Statement:
+def motors_verdict(
+    motors: Sequence[MotorEstimate], starts: Sequence[MotorStart] = (), curves: Sequence[SteadyCurve] = ()
+) -> Statement:
     """Which motors answer to their input, and at which input they start: from rest where that was seen, else by the
-    dead band of the line.
+    dead band of the line; and whose speed is no line.
     """
     lines = [motor for motor in motors if motor.motor is not None] or list(motors)  # else that of all together
     levels = {line.name: _levels(line, starts) for line in lines}
@@ -336,14 +384,23 @@ def motors_verdict(motors: Sequence[MotorEstimate], starts: Sequence[MotorStart]
     if len(blind) == len(lines):
         return Statement("no_motor_answers", ERROR, numbers={"motors": blind})
     seen = [line for line in lines if levels[line.name]]
-    without = [line.name for line in lines if not levels[line.name] and line.name not in blind]
+    bent = {curve.motor: curve.straight for curve in curves}
+    missed = [line.name for line in lines if "line_misses" in {warning.code for warning in line.warnings}]
+    straight = [line.name for line in lines if line.motor not in bent and line.name not in missed]
+    without = [name for name in straight if not levels[name] and name not in blind]
     parts = [_starts(seen, levels, starts, len(lines))] if seen else []
     if without:
         numbers = {"motors": without, "too": bool(seen), "total": len(lines)}
         parts.append(Statement("motors_without_dead_band", NOTE, numbers=numbers))
+    if bent:
+        numbers = {"motors": [line.name for line in lines if line.motor in bent], "unit": lines[0].unit}
+        low, high = curves[0].straight if len(bent) == 1 else (0.0, 0.0)
+        parts.append(Statement("motors_no_line", WARNING, numbers=numbers | {"low": low, "high": high}))
+    if missed := [name for name in missed if name not in blind]:
+        parts.append(Statement("motors_line_misses", WARNING, numbers={"motors": missed}))
     if blind:
         parts.append(Statement("motors_not_answering", WARNING, numbers={"motors": blind}))
-    return Statement("motors_answer", WARNING if blind else NOTE, numbers={"parts": parts})
+    return Statement("motors_answer", WARNING if blind or bent or missed else NOTE, numbers={"parts": parts})
 
 
 def _levels(motor: MotorEstimate, starts: Sequence[MotorStart]) -> list[float]:

@@ -18,7 +18,7 @@ from omnidyn.identification.output_error.answer import Combination
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.trust.uncertainty import BLIND, Trust
-from omnidyn.model.actuation import DEAD_BAND
+from omnidyn.model.actuation import DEAD_BAND, without_map
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, push_lost_per_volt, push_per_volt
 from omnidyn.model.dynamics import damping
 from omnidyn.model.frames import AXES
@@ -170,7 +170,7 @@ def _friction(robot: Robot) -> FloatArray:
     if robot.friction.only_axes:
         push = push_per_volt(robot)
         return np.array(robot.friction.axes.coulomb) / np.where(push > 0.0, push, np.nan)
-    ideal = robot.model_copy(update={"drive": robot.drive.model_copy(update={"dead_band": 0.0})})
+    ideal = without_map(robot.model_copy(update={"drive": robot.drive.model_copy(update={"dead_band": 0.0})}))
     return breakaway_voltage(ideal, axis_patterns(ideal))
 
 

@@ -35,7 +35,7 @@ from omnidyn.identification.output_error.problem.starts import (
 )
 from omnidyn.identification.output_error.solve.loop import loop_keys, loop_pieces, looped
 from omnidyn.identification.output_error.trust.breakaway import is_profiled
-from omnidyn.model.actuation import reaching
+from omnidyn.model.actuation import reaching, without_map
 from omnidyn.model.dynamics import drive_wrench, state_space
 from omnidyn.model.frames import AXES
 from omnidyn.model.keys import (
@@ -370,7 +370,7 @@ def _most_drive(records: Sequence[Record], measured: Sequence[BoolArray], robot:
     drive, mass, most = state_space(robot).B, mass_matrix(robot), np.zeros(3)
     for log, known in zip(records, measured, strict=True):
         for first, last in log.pieces:
-            wrench = reaching(robot, log.voltage[first:last]) @ drive.T @ mass
+            wrench = reaching(without_map(robot), log.voltage[first:last]) @ drive.T @ mass
             most = np.maximum(most, np.where(known, np.abs(wrench).max(axis=0), 0.0))
     if robot.wheels.traction_mu is None:
         return most

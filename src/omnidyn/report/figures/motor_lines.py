@@ -10,20 +10,25 @@ from matplotlib.axes import Axes
 
 from omnidyn.identification.motors.estimate import MotorEstimate
 from omnidyn.identification.motors.start import OFFSET, START, MotorStart
+from omnidyn.identification.motors.steady_curve import SteadyCurve
 from omnidyn.identification.motors.windows import MotorWindows
 from omnidyn.report.style import BLUE, GREY, INK, VERMILLION, WIDTH, Picture, look, new_figure, picture, thin_out
 
 MOST = 6  # motors that are drawn
-LINE, WINDOWS = "line", "windows, inertia taken off"
+LINE, STEADY, WINDOWS = "line", "steady speeds", "windows, inertia taken off"
 STARTS, BAND = "start from rest, 95 %", "dead band by the line, 95 %"
 
 
 def draw_motor_lines(
-    motors: Sequence[MotorEstimate], windows: MotorWindows, starts: Sequence[MotorStart] = ()
+    motors: Sequence[MotorEstimate],
+    windows: MotorWindows,
+    starts: Sequence[MotorStart] = (),
+    curves: Sequence[SteadyCurve] = (),
 ) -> Picture:
     """One panel per motor: a mark per window, its inertia taken off, the line, and where the motor starts.
 
     starts: of each direction, which has its own line then. Where none is known, the bar is the dead band of the line.
+    curves: of motors whose speed is no line.
     """
     lines = [line for line in motors if line.motor is not None][:MOST]
     with look():
@@ -37,19 +42,25 @@ def draw_motor_lines(
         )
         for k, (panel, line) in enumerate(zip(panels, lines, strict=False)):
             own = {each.side: each for each in starts if each.motor == line.motor}
-            _panel(panel, windows, line, own)
+            _panel(panel, windows, line, own, next((curve for curve in curves if curve.motor == line.motor), None))
             if k % columns == 0:
                 panel.set_ylabel(f"{windows.kind}, {windows.unit}")
         for panel in panels[len(lines) :]:
             panel.set_axis_off()
         handles = dict(pair[::-1] for panel in panels for pair in zip(*panel.get_legend_handles_labels(), strict=True))
-        names = [name for name in (LINE, STARTS, BAND, WINDOWS) if name in handles]
+        names = [name for name in (LINE, STEADY, STARTS, BAND, WINDOWS) if name in handles]
         columns = 3 if len(names) < 4 else 2
         figure.legend([handles[n] for n in names], names, loc="lower left", bbox_to_anchor=(0.08, 0.0), ncols=columns)
         return picture("motor_lines", "What each motor needs to turn", _words(windows, names), figure)
 
 
-def _panel(axes: Axes, windows: MotorWindows, line: MotorEstimate, starts: dict[float, MotorStart]) -> None:
+def _panel(
+    axes: Axes,
+    windows: MotorWindows,
+    line: MotorEstimate,
+    starts: dict[float, MotorStart],
+    curve: SteadyCurve | None,
+) -> None:
     put_in, speed, error, side, change, _ = windows.of(line.motor)
     inertia = np.nan_to_num(line.value["inertia"]) * change
     axes.errorbar(
@@ -67,7 +78,7 @@ def _panel(axes: Axes, windows: MotorWindows, line: MotorEstimate, starts: dict[
     reach = np.abs(speed).max()
     for way in (-1.0, 1.0):
         if (side * way > 0.0).any():
-            _direction(axes, way, reach, line, starts.get(way))
+            _direction(axes, way, reach, line, starts.get(way), curve)
     axes.axhline(0.0, color=INK, linewidth=0.6)
     axes.axvline(0.0, color=INK, linewidth=0.6)
     axes.set_title(line.name)
@@ -75,16 +86,26 @@ def _panel(axes: Axes, windows: MotorWindows, line: MotorEstimate, starts: dict[
     thin_out(axes, 4, 5)
 
 
-def _direction(axes: Axes, way: float, reach: float, line: MotorEstimate, start: MotorStart | None) -> None:
-    """The line of one direction, and where the motor starts in it."""
+def _direction(
+    axes: Axes,
+    way: float,
+    reach: float,
+    line: MotorEstimate,
+    start: MotorStart | None,
+    curve: SteadyCurve | None,
+) -> None:
+    """The line or the curve of one direction, and where the motor starts in it."""
     slope, at_rest = line.value["slope"], float(np.nan_to_num(line.value["dead_band"]))
     (low, high), name = line.ci95["dead_band"], BAND
     if start is not None and math.isfinite(start.value[OFFSET]):
         slope, at_rest = start.value["slope"], start.value[OFFSET]
     if start is not None and all(map(math.isfinite, start.ci95[START])):
         (low, high), name = start.ci95[START], STARTS
-    span = way * np.linspace(0.0, reach, 20)
-    axes.plot(span, slope * span + at_rest * way, color=BLUE, label=LINE)
+    if curve is not None:
+        axes.plot(way * curve.speed, way * curve.level, "o-", color=BLUE, markersize=3.0, label=STEADY)
+    else:
+        span = way * np.linspace(0.0, reach, 20)
+        axes.plot(span, slope * span + at_rest * way, color=BLUE, label=LINE)
     if math.isfinite(low) and math.isfinite(high):
         # A mark of its own size: the interval of a start that is well known is thinner than any line.
         axes.plot(

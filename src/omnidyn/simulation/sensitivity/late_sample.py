@@ -411,7 +411,7 @@ def derivatives(
     found = differentiate(
         ready, given, rates, (as_start("twist", twist, 3), as_start("pose", pose, 3)), as_tolerance(tol)
     )
-    if given.set_point is not None or not robot.drive.dead_band:
+    if given.set_point is not None or not (robot.drive.dead_band or robot.drive.voltage_map):
         return found
     whole = asked(robot).voltage
     assert whole is not None

@@ -16,7 +16,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.engines.engine import driver_of
 from omnidyn.identification.output_error.problem.heading import HEADING, facing_at_start
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
-from omnidyn.model.actuation import Driver, at_motors
+from omnidyn.model.actuation import Driver, at_motors, without_map
 from omnidyn.model.dynamics import acceleration, settled_currents
 from omnidyn.model.layout import N_AXES, YAW
 from omnidyn.model.mass import mass_matrix
@@ -147,9 +147,9 @@ def _motion(piece: Piece, robot: Robot, state: FloatArray, driver: Driver) -> Mo
 
 
 def _ideal(robot: Robot) -> Robot:
-    """The robot behind its driver, whose dead band and latency were taken off the voltages."""
+    """The robot behind its driver, whose map, dead band and latency were taken off the voltages."""
     drive = robot.drive.model_copy(update={"dead_band": 0.0, "latency": 0.0})
-    return robot.model_copy(update={"drive": drive})
+    return without_map(robot.model_copy(update={"drive": drive}))
 
 
 def _answers(

@@ -15,7 +15,7 @@ from omnidyn.findings.needs import LOOP_REMEDY, has_set_speeds
 from omnidyn.identification.output_error.problem.differences import Differences
 from omnidyn.identification.output_error.problem.outputs import LOG, outputs_of
 from omnidyn.logs.segments import segments
-from omnidyn.model.actuation import asked_voltage, clip_voltage
+from omnidyn.model.actuation import asked_voltage, clip_voltage, mapped
 from omnidyn.model.motor import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings import refuse_slope
@@ -117,6 +117,7 @@ def record(
         rows = {"rows": int(beyond.any(axis=1).sum())}
         notes.append(Statement("input_beyond_limit", WARNING, source, rows))
         voltage = clipped
+    voltage = mapped(robot, voltage)
     found = outputs_of(run, robot, outputs, tick_rad, counted)
     inputs = voltage if set_point is None else set_point
     finite = np.isfinite(inputs)

@@ -18,7 +18,7 @@ from omnidyn.identification.output_error.engines.engine import driver_of
 from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH, TILT
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Problem
-from omnidyn.model.actuation import DEAD_BAND, at_motors
+from omnidyn.model.actuation import DEAD_BAND, at_motors, without_map
 from omnidyn.model.dynamics import drive_wrench, settled_currents
 from omnidyn.model.frames import AXES
 from omnidyn.model.keys import BREAKAWAY, CENTRE, COULOMB, EMF, ROTOR, TORQUE, VISCOUS, WHEEL, Key, find_key
@@ -174,7 +174,7 @@ def _drives(problem: Problem, values: FloatArray) -> tuple[_Drive, ...]:
 def _channels(
     problem: Problem, values: FloatArray, volts: FloatArray, dt: FloatArray, start: FloatArray
 ) -> dict[str, FloatArray]:
-    robot: Robot = problem.robot_at(values)
+    robot: Robot = without_map(problem.robot_at(values))
     driver, _ = driver_of(problem, values)
     share = np.linspace(0.0, 1.0, len(volts))
     at_the_motors = at_motors(np.ascontiguousarray(volts), share, driver)[0]
