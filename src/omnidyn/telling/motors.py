@@ -36,7 +36,7 @@ def _motor_line(statement: Statement) -> str:
         words += f", {channel} late by {1e3 * late:.3g} {known}"
     if rows := numbers["left_out"]:
         words += f" ({rows} rows left out: their input changes too much from row to row)"
-    return f"{words}; {numbers['dead_band']}"
+    return "; ".join(map(str, [words, numbers["dead_band"], *([numbers["offset"]] if numbers["offset"] else [])]))
 
 
 def _band(statement: Statement) -> str:
@@ -44,6 +44,42 @@ def _band(statement: Statement) -> str:
     numbers = statement.numbers
     return "{:.3g} +- {:.2g} {}, 95 % [{:.3g}, {:.3g}]".format(
         numbers["value"], numbers["std"], numbers["unit"], *numbers["ci95"]
+    )
+
+
+def _offset_as_friction(statement: Statement) -> str:
+    """An offset of the input, and the friction that is unequal by direction that it is the same as."""
+    numbers = statement.numbers
+    return "offset {}: the same as friction of {:.3g} {} forward and {:.3g} {} backward".format(
+        _band(statement), numbers["forward"], numbers["unit"], numbers["backward"], numbers["unit"]
+    )
+
+
+def _offset_of_input(statement: Statement) -> str:
+    """An offset of the input that no friction can stand for."""
+    return f"offset {_band(statement)}"
+
+
+def _held_out_blocks(statement: Statement) -> str:
+    """How far free runs miss held-out blocks: that of the motor that is written, and the plain one."""
+    numbers = statement.numbers
+    written, plain = (f"{numbers[name]:.2%}" for name in ("written", "plain"))
+    words = f"{statement.subject}: on held-out blocks its free run misses {written} of the spread of what was measured"
+    words += f", that of slope and lag alone {plain}"
+    names = [name.replace("_", " ") for name in numbers["rejected"]]
+    return f"{words}; {all_of(names)} {'is' if len(names) == 1 else 'are'} no help and not kept" if names else words
+
+
+def _slopes_differ_by_direction(statement: Statement) -> str:
+    """The slope of a motor in each direction, where they differ."""
+    numbers = statement.numbers
+    both = [
+        f"{slope:.4g} [{low:.4g}, {high:.4g}] ({direction})"
+        for slope, (low, high), direction in zip(numbers["slopes"], numbers["ci95"], numbers["directions"], strict=True)
+    ]
+    return (
+        f"{statement.subject}: the slope differs by direction, {both[0]} and {both[1]} {numbers['unit']} s/rad: one "
+        "viscous friction for both fits neither"
     )
 
 
@@ -207,8 +243,23 @@ SENTENCES = {
     "slope_may_be_zero": Sentence(_slope_may_be_zero),
     "dead_band_not_needed": Sentence(_dead_band_not_needed),
     "held_out_no_better": Sentence(
-        "{subject}: held-out logs are predicted no better with the dead band (error {with_band:.4g} rad/s, "
-        "{without:.4g} without): it may be an effect of something else"
+        "{subject}: held-out logs are predicted no better with its dead band (error {written:.4g} rad/s, {plain:.4g} "
+        "by slope and lag alone): it may be an effect of something else"
+    ),
+    "held_out_blocks": Sentence(_held_out_blocks),
+    "dead_band_rejected": Sentence(
+        "no dead band is kept: held-out blocks are predicted as well without; it is at most {high:.3g} {unit}"
+    ),
+    "offset_as_friction": Sentence(_offset_as_friction),
+    "offset_of_input": Sentence(_offset_of_input),
+    "slopes_differ_by_direction": Sentence(_slopes_differ_by_direction),
+    "late_by_rows": Sentence(
+        "{subject} is late by {latency:m.3g} ms, {rows:.2g} rows: rare for a drive; an inertia or a filter may stand "
+        "behind it"
+    ),
+    "late_by_half_a_row": Sentence(
+        "{subject} is late by {latency:m.3g} ms, which half a row explains: a speed that is the mean over the last row "
+        "is so late by its sensor, not by its drive"
     ),
     "speed_no_line": Sentence(_speed_no_line),
     "straightness_not_tested": Sentence(
@@ -228,7 +279,7 @@ SENTENCES = {
     ),
     "start_seen": Sentence(_start_seen),
     "starts_scatter": Sentence("its {subject}s scatter by more than their intervals: the interval spans them"),
-    "no_motor_answers": Sentence("no motor is seen to answer to its input: the slope of {motors} may as well be 0"),
+    "no_motor_answers": Sentence("no motor is seen to answer to its input: the speed of {motors} does not go with it"),
     "motors_answer": Sentence(_motors_answer),
     "starts_both_ways": Sentence(_starts_both_ways),
     "motors_start": Sentence(_motors_start),

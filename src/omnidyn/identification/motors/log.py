@@ -21,7 +21,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import SENSORS, Run
 from omnidyn.statement import Statement
-from omnidyn.statistics import stretches
+from omnidyn.statistics import stretches, t_quantile
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -155,6 +155,41 @@ def orientation(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> float:
 def orientation_of(logs: Sequence[MotorLog], motor: int) -> float:
     """The same of a motor of some logs."""
     return orientation([(log.put_in[:, motor], log.motion[:, motor]) for log in logs])
+
+
+BLOCKS, LEAST_BLOCKS = 20, 8
+MEMORIES = (0.0, 0.05, 0.5)  # [s] over which an input may act
+CERTAIN = 0.998  # quantile of a covariance that is no chance, of which several are tried
+
+
+def follows(pairs: Sequence[tuple[FloatArray, FloatArray]], step: float = 0.0) -> bool | None:
+    """Whether speeds go with their inputs, whichever way, beyond chance; None where too few rows tell.
+
+    pairs: (input, speed) of each log, shape (rows,). step [s]: of a row, 0 of points that have no time: else what the
+    input was up to the row before counts, smoothed over each of MEMORIES.
+    The covariance of both in each of BLOCKS blocks is one number, and their mean is told from 0 by their scatter.
+    """
+    found = []
+    for memory in MEMORIES if step > 0.0 else MEMORIES[:1]:
+        smooth = [_smoothed(put_in, memory / step) if step > 0.0 else put_in for put_in, _ in pairs]
+        u, w = np.concatenate(smooth), np.concatenate([speed for _, speed in pairs])
+        known = np.isfinite(u) & np.isfinite(w)
+        u, w = u[known] - u[known].mean() if known.any() else u[known], w[known]
+        count = min(BLOCKS, len(w) // 2)
+        if count < LEAST_BLOCKS:
+            return None
+        sums = np.array([float(part.sum()) for part in np.array_split(u * (w - w.mean()), count)])
+        found.append(abs(float(sums.mean())) > t_quantile(count - 1, CERTAIN) * float(sums.std(ddof=1)) / count**0.5)
+    return any(found)
+
+
+def _smoothed(put_in: FloatArray, rows: float) -> FloatArray:
+    """The input up to the row before each, its mean by a memory of so many rows. Shape (rows,)."""
+    share, now, found = 1.0 / (1.0 + rows), 0.0, []
+    for value in np.nan_to_num(put_in).tolist():
+        found.append(now)
+        now += share * (value - now)
+    return np.array(found)
 
 
 def rows_with(known: BoolArray, pieces: Sequence[slice]) -> list[tuple[int, int]]:

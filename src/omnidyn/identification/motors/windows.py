@@ -16,8 +16,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InsufficientDataError
-from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, SLOPE, WINDOWS, MotorEstimate
-from omnidyn.identification.motors.log import InputIntegral, MotorLog, rows_with
+from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, OFFSET, SLOPE, WINDOWS, MotorEstimate
+from omnidyn.identification.motors.log import InputIntegral, MotorLog, follows, rows_with
 from omnidyn.logs.plateaus import STEPWISE, find_plateaus
 from omnidyn.logs.resolved import unresolved_input
 from omnidyn.statistics import (
@@ -136,6 +136,25 @@ def motor_windows(
         every=every,
         smear=max(_smear(log, length) for log in logs),
     )
+
+
+def line_numbers(logs: Sequence[MotorLog], motor: int) -> dict[str, float] | None:
+    """Slope, dead band, offset and lag of a motor by least squares over its windows, where a free run may begin; None
+    where the windows do not tell them, or what they tell is no motor.
+
+    mean u = k (mean w) + c (mean sgn w) + offset + m (change of w / length)
+    """
+    try:
+        long = [log for log in logs if len(log.t) > MIN_ROWS]
+        put_in, speed, _, side, change, _ = motor_windows(long).of(motor)
+    except InsufficientDataError:
+        return None
+    table = np.stack([speed, side, np.ones(len(speed)), change], axis=1)
+    numbers, _, rank, _ = np.linalg.lstsq(table, put_in, rcond=1e-9)
+    slope, band, offset, inertia = numbers.tolist()
+    if rank < table.shape[1] or slope <= 0.0 or inertia <= 0.0:
+        return None
+    return {SLOPE: slope, BAND: max(band, 0.0), OFFSET: offset, LAG: inertia / slope}
 
 
 def _usual_speed(logs: Sequence[MotorLog]) -> float:
@@ -360,6 +379,7 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
         rmse=error / abs(slope) if slope else math.inf,
         unidentifiable=tuple(name for name, draws in numbers.items() if np.isnan(draws[0])),
         one_way=bool(np.abs(side.sum()) > 0.98 * np.abs(side).sum()),
+        answers=follows([(put_in, speed)]) is not False,
         rest=float(np.fmax.reduce(windows.rest if motor is None else windows.rest[[motor]])),
         draws={name: draws[1:] for name, draws in numbers.items()},
     )
