@@ -33,7 +33,17 @@ from omnidyn.run import CHANNELS, SCALAR, Run, as_run
 from omnidyn.statement import Statement, statements
 from omnidyn.units import DUTY, known_unit, parse_unit
 
-_SUFFIXES = ("rad_s", "m_s", "duty", "rad", "V", "A", "m", "s")  # as channels.si_suffix gives them, long before short
+_SUFFIXES = (
+    "rad_s",
+    "m_s",
+    "duty",
+    "rad",
+    "V",
+    "A",
+    "m",
+    "N",
+    "s",
+)  # as channels.si_suffix gives them, long before short
 _SHEETS = frozenset((".xlsx", ".xls", ".xlsm", ".ods"))
 _OTHERS = _SHEETS | frozenset(
     (

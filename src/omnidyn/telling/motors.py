@@ -26,7 +26,7 @@ def _motor_line(statement: Statement) -> str:
     """Slope, lag, latencies and dead band of the line of a motor."""
     numbers = statement.numbers
     spread = f" +- {numbers['slope_std']:.2g}" if math.isfinite(numbers["slope_std"]) else ""
-    words = f"{statement.subject}: slope {numbers['slope']:.5g}{spread} {numbers['unit']} s/rad"
+    words = f"{statement.subject}: slope {numbers['slope']:.5g}{spread} {numbers['unit']} s/{numbers['travel']}"
     if not numbers["lag_known"]:
         words += ", lag not determined"
     elif numbers["lag_seen"]:
@@ -78,8 +78,8 @@ def _slopes_differ_by_direction(statement: Statement) -> str:
         for slope, (low, high), direction in zip(numbers["slopes"], numbers["ci95"], numbers["directions"], strict=True)
     ]
     return (
-        f"{statement.subject}: the slope differs by direction, {both[0]} and {both[1]} {numbers['unit']} s/rad: one "
-        "viscous friction for both fits neither"
+        f"{statement.subject}: the slope differs by direction, {both[0]} and {both[1]} {numbers['unit']}: one"
+        " viscous friction for both fits neither"
     )
 
 
@@ -214,9 +214,10 @@ def _other_reading(statement: Statement) -> str:
     """The logs are met as well, or better, with another reading of the input between its rows."""
     numbers = statement.numbers
     verb = "better" if numbers["better"] else "as well"
+    errors = f"error {numbers['other_error']:.3g} {numbers['travel']}/s, {numbers['error']:.3g}"
     return (
-        f"the logs are fitted {verb} where the input is {WORDS[numbers['other']]} (error {numbers['other_error']:.3g} "
-        f"rad/s, {numbers['error']:.3g} where it is {WORDS[numbers['between']]}): the intervals span both"
+        f"the logs are fitted {verb} where the input is {WORDS[numbers['other']]} ({errors} where it is "
+        f"{WORDS[numbers['between']]}): the intervals span both"
     )
 
 
@@ -243,8 +244,8 @@ SENTENCES = {
     "slope_may_be_zero": Sentence(_slope_may_be_zero),
     "dead_band_not_needed": Sentence(_dead_band_not_needed),
     "held_out_no_better": Sentence(
-        "{subject}: held-out logs are predicted no better with its dead band (error {written:.4g} rad/s, {plain:.4g} "
-        "by slope and lag alone): it may be an effect of something else"
+        "{subject}: held-out logs are predicted no better with its dead band (error {written:.4g} {travel}/s, "
+        "{plain:.4g} by slope and lag alone): it may be an effect of something else"
     ),
     "held_out_blocks": Sentence(_held_out_blocks),
     "dead_band_rejected": Sentence(

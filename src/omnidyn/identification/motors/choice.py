@@ -45,17 +45,18 @@ def run_motor(fit: MotorEstimate, runs: Run | Sequence[Run]) -> list[FloatArray]
 
 
 def fit_rmse(fit: MotorEstimate, runs: Run | Sequence[Run]) -> float:
-    """Root mean square error of the speed [rad/s] of free runs beside logs; NaN where none has a speed.
+    """Root mean square error of the speed [rad/s] of free runs beside logs, or of the slope of their angle.
 
     Rows whose input the log does not resolve do not count.
     """
     every = as_list(runs)
     errors = [
-        (ours - run.wheel_speed[:, fit.motor])[~unresolved_rows(getattr(run, fit.kind)[:, fit.motor])]
-        for ours, run in zip(run_motor(fit, every), every, strict=True)
-        if run.wheel_speed is not None
+        (ours - (log.motion if log.speed is None else log.speed)[:, fit.motor])[
+            ~unresolved_rows(log.put_in[:, fit.motor])
+        ]
+        for ours, log in zip(run_motor(fit, every), logs_of_free_runs(every, fit.kind), strict=True)
     ]
-    known = np.concatenate(errors) if errors else np.zeros(0)
+    known = np.concatenate(errors)
     known = known[np.isfinite(known)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
 

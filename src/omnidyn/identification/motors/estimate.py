@@ -34,8 +34,8 @@ HEAD = (
     "lag ms",
     "+-",
     "unit",
-    "rmse rad/s",
-    "held out rad/s",
+    "rmse",
+    "held out",
 )
 
 
@@ -60,7 +60,7 @@ class MotorEstimate:
     speed. count: windows, or rows. at_bound, unidentifiable: names. left_out: rows that do not count, because the log
     does not resolve the input there. one_way: it turned one way only, so a dead band and an offset of the input are
     one. held_out [rad/s]: error of free runs on logs that were not fitted. source: the logs. answers: whether its
-    speed goes with its input.
+    speed goes with its input. travel: "rad", or "m" of a linear axis: what stands here in rad is in that.
     Of windows: rest, the largest input under which the motor stayed at rest, NaN where it never rested; draws: of the
     bootstrap, by name. Of a free run: between, noise by channel, kind of the covariance, whether the fit converged.
     """
@@ -91,6 +91,7 @@ class MotorEstimate:
     answers: bool = True
     blocks: HeldOut | None = None
     rejected: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    travel: str = "rad"
 
     @property
     def name(self) -> str:
@@ -140,6 +141,7 @@ class MotorEstimate:
             "slope": self.value[SLOPE],
             "slope_std": self.std[SLOPE],
             "unit": self.unit,
+            "travel": self.travel,
             "lag": self.value[LAG],
             "lag_known": LAG not in self.unidentifiable,
             "lag_seen": self.ci95[LAG][0] > 0.0,
@@ -176,7 +178,7 @@ class MotorEstimate:
             numbers, (low, high) = {"latency": late, "rows": late / row}, self.ci95[name]
             if late > LATE_ROWS * row:
                 found.append(Statement("late_by_rows", WARNING, name.partition(".")[2], numbers))
-            elif name == f"{LATENCY}.wheel_speed" and 0.0 < low <= 0.5 * row <= high:
+            elif self.between == "hold" and name == f"{LATENCY}.wheel_speed" and 0.0 < low <= 0.5 * row <= high:
                 found.append(Statement("late_by_half_a_row", NOTE, "wheel_speed", numbers))
         return found
 
@@ -219,8 +221,8 @@ class MotorEstimate:
                 f"{1e3 * each:{form}}" if math.isfinite(each) and LAG not in self.unidentifiable else "-"
                 for each, form in ((self.value[LAG], ".3g"), (self.std[LAG], ".2g"))
             ),
-            f"{self.unit}, s/rad",
-            f"{self.rmse:.4g}",
+            f"{self.unit}, s/{self.travel}",
+            f"{self.rmse:.4g}" if math.isfinite(self.rmse) else "-",
             f"{self.held_out:.4g}" if math.isfinite(self.held_out) else "-",
         )
 
@@ -246,13 +248,14 @@ class MotorEstimate:
             {
                 "motor": "all" if self.motor is None else self.motor + 1,
                 "unit": self.unit,
+                "travel_unit": self.travel,
                 "from": self.way,
                 "count": self.count,
                 "parameters": parameters,
                 "answers": self.answers,
                 "dead_band_seen": self.dead_band_seen,
-                "rmse_rad_s": self.rmse,
-                "held_out_rmse_rad_s": self.held_out,
+                f"rmse_{self.travel}_s": self.rmse,
+                f"held_out_rmse_{self.travel}_s": self.held_out,
                 "at_bound": self.at_bound,
                 "unidentifiable": self.unidentifiable,
                 "warnings": self.warnings,

@@ -55,7 +55,7 @@ from omnidyn.statistics import t_quantile
 
 LAGS = (0.005, 0.05, 0.5)  # [s] the search begins at each, and the best end counts
 EDGE = 0.99  # of an input under which the motor rested
-FREE_RUN_INPUTS = ("voltage", "duty")
+FREE_RUN_INPUTS = ("voltage", "duty", "force")
 
 
 def fit_motor(
@@ -177,6 +177,7 @@ def _with_rival(fit: MotorEstimate, rival: MotorEstimate) -> MotorEstimate:
             "other_error": rival.rmse,
             "error": fit.rmse,
             "between": fit.between,
+            "travel": fit.travel,
         },
     )
     return _widened(fit, std, {name: rival.ci95[name] for name in std}, warning)
@@ -240,6 +241,7 @@ def _answer(
         converged=solution.converged,
         answers=follows([(log.put_in[:, motor], log.motion[:, motor]) for log in logs], logs[0].step) is not False,
         one_way=not turns_both_ways(logs, motor),
+        travel=logs[0].travel,
     )
 
 
@@ -254,13 +256,17 @@ def _of_product(problem: MotorProblem, known: Trust, inertia: float) -> tuple[fl
 
 
 def _speed_errors(engine: MotorEngine, point: Point) -> tuple[int, float]:
-    """(rows, root mean square of the error of the speed [rad/s]); NaN where no speed is an output."""
+    """(rows, root mean square of the error of the speed [rad/s]), of the steps of an angle where no speed is known."""
     squares, count = 0.0, 0
     for piece, (predicted, _) in zip(engine.problem.pieces, engine.outputs(point), strict=True):
+        rows = slice(piece.first, piece.last + 1)
         if SPEED in piece.record.columns:
-            c = piece.record.columns.index(SPEED)
-            error = (predicted - piece.record.outputs)[piece.first : piece.last + 1, c]
-            squares, count = squares + float(np.nansum(error**2)), count + int(np.isfinite(error).sum())
+            error = (predicted - piece.record.outputs)[rows, piece.record.columns.index(SPEED)]
+        else:  # of the steps of the angle
+            off = (predicted - piece.record.outputs)[rows, 0]
+            known = np.isfinite(off)
+            error = np.diff(off[known]) / np.diff(piece.record.t[rows][known])
+        squares, count = squares + float(np.nansum(error**2)), count + int(np.isfinite(error).sum())
     return count, float(np.sqrt(squares / count)) if count else float("nan")
 
 

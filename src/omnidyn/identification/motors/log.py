@@ -13,7 +13,7 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.clocks import usual_step
 from omnidyn.errors import InputError
-from omnidyn.findings.needs import MOTOR_INPUTS, motor_input
+from omnidyn.findings.needs import MOTOR_INPUTS, motor_input, turns_known
 from omnidyn.logs.plateaus import STEPWISE, live_angle
 from omnidyn.logs.resolved import rows_of_mean
 from omnidyn.logs.segments import on_clock_of, segments
@@ -27,8 +27,11 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 # Unit of each input, and how many of it in one SI unit.
-INPUTS: dict[str, tuple[str, float]] = dict(zip(MOTOR_INPUTS, (("V", 1.0), ("%", 100.0), ("A", 1.0)), strict=True))
+INPUTS: dict[str, tuple[str, float]] = dict(
+    zip(MOTOR_INPUTS, (("V", 1.0), ("%", 100.0), ("A", 1.0), ("N", 1.0)), strict=True)
+)
 WHEEL, GROUND = "wheel", "ground"
+ANGLE, LENGTH = "rad", "m"  # units of what a motor travels
 HEADING = "heading, the robot turning on the spot"
 
 
@@ -40,6 +43,7 @@ class MotorLog:
     motion [rad/s]: by the angle where there is one. motion_from: its origin in words. pieces: rows between gaps.
     averaged: per motor, over how many rows its motion is a mean; 1 where it is none.
     given: the input as it held, at the times of all sensors, where they share no stamps: rows are those of the motion.
+    travel: unit of the angle, ANGLE; LENGTH of a linear axis, whose speed is in m/s.
     """
 
     run: Run
@@ -52,6 +56,7 @@ class MotorLog:
     pieces: tuple[slice, ...]
     averaged: tuple[int, ...]
     given: tuple[FloatArray, FloatArray] | None = None
+    travel: str = ANGLE
 
     @property
     def t(self) -> FloatArray:
@@ -103,7 +108,10 @@ def motor_logs(
 
 
 def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog:
+    axis = speed == WHEEL and is_axis(run)
     moved = "pose" if speed == GROUND else "wheel_speed" if live_angle(run) is None else "wheel_angle"
+    if axis:
+        moved = "pose" if _along_x(run.pose) is not None else "twist"
     given = (run.t, getattr(run, kind) * INPUTS[kind][1]) if run.staggered and kind not in SENSORS else None
     run = on_clock_of(run, moved)
     put_in, pieces = getattr(run, kind) * INPUTS[kind][1], tuple(segments(run.t))
@@ -117,6 +125,8 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
             )
         angle, measured = run.pose[:, 2:] * wheel_speed(robot.wheels, [0.0, 0.0, 1.0]), None
         origin = HEADING
+    elif axis:
+        angle, measured, origin = _along_x(run.pose), _along_x(run.twist), "x of an axis" if moved == "pose" else "vx"
     elif speed == WHEEL:
         angle, measured = live_angle(run), run.wheel_speed
         origin = "wheel_speed" if angle is None else "wheel_angle"
@@ -127,11 +137,23 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
         raise InputError(
             "the log has no speed and no angle of the motors",
             got=", ".join(run.channels),
-            expected="wheel_angle or wheel_speed",
+            expected="wheel_angle or wheel_speed; x or vx of a linear axis",
             where=run.source,
         )
     averaged = [rows_of_mean(np.asarray(column)) or 1 if angle is None else 1 for column in motion.T]
-    return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces, tuple(averaged), given)
+    travel = LENGTH if axis else ANGLE
+    return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces, tuple(averaged), given, travel)
+
+
+def is_axis(run: Run) -> bool:
+    """Whether a log is of a linear axis: one motor, no speed and no angle of a wheel, but x or vx."""
+    one = run.wheels == 1 and not turns_known(run)
+    return one and (_along_x(run.pose) is not None or _along_x(run.twist) is not None)
+
+
+def _along_x(values: FloatArray | None) -> FloatArray | None:
+    """The first column of a pose or a twist, shape (rows, 1); None where it was not measured."""
+    return None if values is None or not np.isfinite(values[:, 0]).any() else values[:, :1]
 
 
 def averaged_statements(logs: Sequence[MotorLog], allowed: bool = True) -> list[Statement]:

@@ -156,14 +156,14 @@ def motor_starts(
     return tuple(found)
 
 
-def slopes_by_direction(starts: Sequence[MotorStart]) -> Iterator[Statement]:
+def slopes_by_direction(starts: Sequence[MotorStart], travel: str) -> Iterator[Statement]:
     """Which motors have a slope of their own in each direction, beyond their intervals and by more than ALIKE."""
     for one, other in pairwise(starts):
         (low, high), (least, most) = one.ci95[SLOPE], other.ci95[SLOPE]
         apart = abs(one.value[SLOPE] - other.value[SLOPE]) > ALIKE * abs(one.value[SLOPE])
         if one.motor == other.motor and apart and (high < least or most < low):
             numbers = {"slopes": (one.value[SLOPE], other.value[SLOPE]), "ci95": (one.ci95[SLOPE], other.ci95[SLOPE])}
-            directions = {"directions": (one.direction, other.direction), "unit": one.unit}
+            directions = {"directions": (one.direction, other.direction), "unit": f"{one.unit} s/{travel}"}
             yield Statement("slopes_differ_by_direction", WARNING, f"motor {one.motor + 1}", numbers | directions)
 
 

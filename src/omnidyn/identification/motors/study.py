@@ -21,7 +21,7 @@ from omnidyn.identification.motors.choice import fit_rmse
 from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, named
 from omnidyn.identification.motors.fit import logs_of_free_runs
 from omnidyn.identification.motors.held_out import written_and_plain
-from omnidyn.identification.motors.log import GROUND, MotorLog, averaged_statements, motor_logs, orientation_of
+from omnidyn.identification.motors.log import GROUND, MotorLog, averaged_statements, is_axis, motor_logs, orientation_of
 from omnidyn.identification.motors.rest import CURRENT, turned_under
 from omnidyn.identification.motors.start import (
     STARTS_HEAD,
@@ -52,7 +52,7 @@ from omnidyn.statement import ERROR, NOTE, WARNING, Statement, as_verdict, by_se
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-from omnidyn.identification.motors.estimate import BAND
+from omnidyn.identification.motors.estimate import BAND, OFFSET
 from omnidyn.identification.motors.start import START
 
 MISSES = 0.1  # of the largest speed: error of a line that describes no motor
@@ -106,9 +106,13 @@ class MotorStudy(Shown):
         found += [statement for motor in self.motors if (statement := motor.of_blocks())]
         for written, plain in zip(self.motors, self.plain, strict=False):
             if written.dead_band_seen and written.held_out > (1.0 - PAYS) * plain.held_out:
-                errors = {"written": written.held_out, "plain": plain.held_out}
+                errors = {"written": written.held_out, "plain": plain.held_out, "travel": written.travel}
                 found.append(Statement("held_out_no_better", WARNING, written.name, errors))
-        return (*found, *(start.statement() for start in self.starts), *slopes_by_direction(self.starts))
+        return (
+            *found,
+            *(start.statement() for start in self.starts),
+            *slopes_by_direction(self.starts, self.motors[0].travel),
+        )
 
     @property
     def verdict(self) -> Statement:
@@ -207,6 +211,7 @@ def study_motors(
     Raises InputError for a run without the channels, InsufficientDataError where the motors say nothing.
     """
     more = ["pose"] if isinstance(asked, MotorLine) and asked.speed == GROUND else []
+    more += ["pose", "twist"] if any(is_axis(run) for run in runs) else []
     verdicts = log_verdicts([of_motors(log, *more) for log in logs], robot, progress)
     with told_why(verdicts, MOTORS_USE):
         if isinstance(asked, MotorFit):
@@ -397,7 +402,10 @@ def motors_verdict(
 def _levels(motor: MotorEstimate, starts: Sequence[MotorStart]) -> list[float]:
     """The inputs at which a motor starts; none where that is not known."""
     sharp = [start.value[START] for start in starts if start.motor == motor.motor and start.sharp]
-    return sharp or ([motor.value[BAND]] if motor.dead_band_seen else [])
+    if sharp or not motor.dead_band_seen:
+        return sharp
+    offset = motor.value[OFFSET] if motor.offset_seen else 0.0
+    return list(dict.fromkeys([motor.value[BAND] + offset, motor.value[BAND] - offset]))
 
 
 def _starts(

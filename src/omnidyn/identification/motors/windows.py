@@ -54,7 +54,7 @@ class MotorWindows:
     unresolved, resting: windows left out because the log does not resolve their input, or because the motor rested.
     settled: start-ups were left out, so that nothing is known of the inertia. every: of a very long log, only every so
     many-th window was used. smear [s]: over which the speed at an end of a window is averaged; a lag that is shorter
-    comes out too short. NaN where nothing is known of the inertia.
+    comes out too short. NaN where nothing is known of the inertia. travel: of `MotorLog`.
     """
 
     put_in: FloatArray
@@ -74,6 +74,7 @@ class MotorWindows:
     settled: bool
     every: int
     smear: float = math.nan
+    travel: str = "rad"
 
     def of(self, motor: int | None) -> tuple[FloatArray, ...]:
         """(put_in, speed, speed_std, side, change, block) of one motor, or of all."""
@@ -135,6 +136,7 @@ def motor_windows(
         settled=steady or share is not None,
         every=every,
         smear=max(_smear(log, length) for log in logs),
+        travel=first.travel,
     )
 
 
@@ -380,6 +382,7 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
         unidentifiable=tuple(name for name, draws in numbers.items() if np.isnan(draws[0])),
         one_way=bool(np.abs(side.sum()) > 0.98 * np.abs(side).sum()),
         answers=follows([(put_in, speed)]) is not False,
+        travel=windows.travel,
         rest=float(np.fmax.reduce(windows.rest if motor is None else windows.rest[[motor]])),
         draws={name: draws[1:] for name, draws in numbers.items()},
     )
