@@ -295,6 +295,9 @@ SENTENCES = {
     ),
     "other_reading": Sentence(_other_reading),
     "speed_is_mean": Sentence(_speed_is_mean),
+    "speeds_added_up": Sentence(
+        "the speeds are differences of counts: they are added up to angles, which are not late by half a row"
+    ),
     "rows_as_points": Sentence(
         "the rows are more than 0.1 s apart: each is a point of steady speed, and nothing is known of a lag"
     ),
@@ -310,6 +313,7 @@ SENTENCES = {
     "motors_and_floor": Sentence(
         "slope and dead band are those of motors and floor together: of the motors alone nothing is determined"
     ),
+    "axis_not_wheel": Sentence("the log is of an axis, not of the wheels of a robot: nothing is written"),
     "supply_of_logs": Sentence("the supply is the mean of the logs, {supply:.4g} V"),
     "supply_of_file": Sentence("the supply is not logged: that of the file is taken, {supply:g} V"),
     "supply_unknown": Sentence(

@@ -10,6 +10,7 @@ from omnidyn.identification.motors.into_robot import motors_into_robot
 from omnidyn.run import Run
 from tests.support.codes import codes
 
+TICK = 2.0 * np.pi / 2000.0  # [rad] of an encoder
 DT, FINE = 0.005, 50  # [s] of a row; steps in it
 
 
@@ -92,6 +93,16 @@ def test_the_start_from_rest_counts_with_a_latency_too():
     assert np.isfinite(run_motor(fit, run)[0]).all()
     assert abs(fit.value["latency.wheel_speed"] - 0.5 * DT) < 4.0 * fit.std["latency.wheel_speed"] + DT / FINE
     assert fit.ci95["dead_band"][0] <= 0.4 <= fit.ci95["dead_band"][1]
+
+
+@pytest.mark.parametrize("late", [0.0, 0.5, 1.0])
+def test_the_half_row_of_encoder_differences_is_not_the_latency_of_the_drive(late):
+    """A speed made of two counts is the mean over the row before it: half a row late by itself. late: rows."""
+    put_in = 3.0 * stairs(7)
+    count = np.floor(axis(put_in, late=int(late * FINE))[0] / TICK)
+    run = run_of(put_in, np.diff(count, prepend=count[0]) * TICK / DT, noise=0.0)
+    fit = fit_motor(run, latency=True, between="hold")
+    assert fit.value["latency.wheel_angle"] == pytest.approx(late * DT, abs=0.03 * DT)
 
 
 def test_a_latency_of_more_than_two_rows_is_a_warning():

@@ -43,6 +43,7 @@ from omnidyn.identification.motors.rest import rested_under, turned_under, turns
 from omnidyn.identification.motors.windows import line_numbers
 from omnidyn.identification.output_error.conclusion import intervals
 from omnidyn.identification.output_error.fit import degrees
+from omnidyn.identification.output_error.problem.differences import added_up, differences
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
 from omnidyn.identification.output_error.trust.support import at_the_end
@@ -140,8 +141,18 @@ def _trusted(solver: Solver[MotorProblem], solution: Solution, kind: str, rested
 
 
 def logs_of_free_runs(runs: Run | Sequence[Run], kind: str) -> list[MotorLog]:
-    """Runs as a free run takes them."""
-    return motor_logs(as_list(runs), kind, kinds=FREE_RUN_INPUTS)
+    """Runs as a free run takes them.
+
+    Speeds that are differences of counts become the angles that they are of: such a speed is the mean over the row
+    before, half a row late by its sensor, and the angle is not.
+    """
+    every = as_list(runs)
+    counted = differences(every)
+    if counted is not None and counted.why is None:
+        angles = [added_up(run, counted) for run in every]
+        if not any(lost[1:].any() for _, lost in angles):
+            every = [run.replace(wheel_angle=a, wheel_speed=None) for run, (a, _) in zip(every, angles, strict=True)]
+    return motor_logs(every, kind, kinds=FREE_RUN_INPUTS)
 
 
 def _with_bend(fit: MotorEstimate, bent: BentLine | None) -> MotorEstimate:

@@ -28,6 +28,7 @@ from omnidyn.identification.output_error.solve.solver import Solution, Solver
 
 NUMBERS = (BAND, OFFSET, LATENCY)
 FOLDS, BLOCKS, LEAST_BLOCK = 5, 20, 8  # rows of a block at least
+FEW = 12  # iterations of a fit without some blocks, which begins at that to all
 CLEAR = 2.0  # standard errors of its gain by which a number must pay
 WILD = 5.0  # scales of the noise that an error counts at most, where it is that of Student's t
 
@@ -157,7 +158,7 @@ class _HeldOut:
         problem = _problem(kept, names)
         solver = Solver(problem, MotorEngine(problem), self.degrees)
         scales = whole.state.variance if self.degrees else None
-        return solver.minimise(whole.state.point, scales=scales).state.point
+        return solver.minimise(whole.state.point, FEW, scales=scales).state.point
 
 
 def _problem(records: Sequence[MotorRecord], names: Sequence[str]) -> MotorProblem:

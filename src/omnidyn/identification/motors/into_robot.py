@@ -32,7 +32,7 @@ from omnidyn.document import Part, Points, Table, apart, plain
 from omnidyn.errors import InputError
 from omnidyn.identification.estimate import identified
 from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, OFFSET, SLOPE, MotorEstimate
-from omnidyn.identification.motors.log import HEADING
+from omnidyn.identification.motors.log import HEADING, LENGTH
 from omnidyn.identification.motors.steady_curve import map_of
 from omnidyn.identification.motors.study import MotorStudy
 from omnidyn.model.keys import EMF, TORQUE, Key, unit, with_priors
@@ -91,6 +91,8 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
         )
     if study.speed_from == HEADING:
         return MotorNumbers(robot, {}, {}, (Statement("motors_and_floor"),))
+    if study.kind == "force" or motors[0].travel == LENGTH:
+        return MotorNumbers(robot, {}, {}, (Statement("axis_not_wheel"),))
     supply, remarks = _supply(study, robot)
     bent = [curve.motor for curve in study.curves]
     value: dict[str, float] = {}

@@ -21,7 +21,15 @@ from omnidyn.identification.motors.choice import fit_rmse
 from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, named
 from omnidyn.identification.motors.fit import logs_of_free_runs
 from omnidyn.identification.motors.held_out import written_and_plain
-from omnidyn.identification.motors.log import GROUND, MotorLog, averaged_statements, is_axis, motor_logs, orientation_of
+from omnidyn.identification.motors.log import (
+    ANGLE,
+    GROUND,
+    MotorLog,
+    averaged_statements,
+    is_axis,
+    motor_logs,
+    orientation_of,
+)
 from omnidyn.identification.motors.rest import CURRENT, turned_under
 from omnidyn.identification.motors.start import (
     STARTS_HEAD,
@@ -342,9 +350,15 @@ def _free_runs(runs: Sequence[Run], asked: MotorFit, hold_out: Sequence[str], pr
         starts=starts,
         supply=_supply(logs),
         drawn=seen,
-        log_warnings=tuple(averaged_statements(logs, False)),
+        log_warnings=tuple(averaged_statements(logs, False)) + _of_counts(runs, logs),
     )
     return _along(study, curves_of_points(points_of_logs(logs)) if slow else curves_of_logs(logs))
+
+
+def _of_counts(runs: Sequence[Run], logs: Sequence[MotorLog]) -> tuple[Statement, ...]:
+    """Whether speeds were taken for the angles of which they are differences."""
+    added = any(run.wheel_speed is not None for run in runs) and all(log.speed is None for log in logs)
+    return (Statement("speeds_added_up", NOTE),) if added and logs[0].travel == ANGLE else ()
 
 
 def _supply(logs: Sequence[MotorLog]) -> float:
