@@ -35,6 +35,7 @@ CHANNELS = {
     "twist_command": AXIS,
     "pose": AXIS,
     "supply": SCALAR,
+    "force": WHEEL,
 }
 SENSORS = ("wheel_speed", "wheel_angle", "twist", "pose", "current")  # what was measured; all else are inputs
 UNITS = {
@@ -48,6 +49,7 @@ UNITS = {
     "twist_command": "m/s, m/s, rad/s",
     "pose": "m, m, rad",
     "supply": "V",
+    "force": "N",
 }
 
 
@@ -61,7 +63,7 @@ class Run(Shown):
     gear; shape (samples, wheels).
     twist and twist_command: (v_x, v_y, omega) in the body frame [m/s, m/s, rad/s]. Shape (samples, 3).
     pose: (x, y, heading) in the world [m, m, rad], heading not wrapped. Shape (samples, 3).
-    supply: voltage of the battery [V]. Shape (samples,).
+    supply: voltage of the battery [V]. Shape (samples,). force: of the drive of a linear axis [N]. Shape (samples, 1).
     source: where it comes from. warnings: what a reader should know, as statements; text
     given for one is quoted.
     Sensors with clocks of their own keep their times: t holds the stamps of all, and a channel is NaN where its sensor
@@ -81,6 +83,7 @@ class Run(Shown):
     twist_command: FloatArray | None = None
     pose: FloatArray | None = None
     supply: FloatArray | None = None
+    force: FloatArray | None = None
     source: str = ""
     warnings: tuple[Statement, ...] = ()
 

@@ -16,6 +16,7 @@ from omnidyn.errors import InputError
 
 TIME, VOLTAGE, CURRENT, DUTY = "time", "voltage", "current", "duty"
 LENGTH, SPEED, ANGLE, TURN_RATE = "length", "speed", "angle", "turn rate"
+FORCE = "force"
 COUNT = "count"  # of an encoder: an angle once its counts per turn are known
 COUNT_RATE = "count rate"  # a turn rate once they are
 
@@ -66,9 +67,9 @@ _TABLE: dict[str, dict[str, float]] = {
         "Hz": TURN,
     },
     COUNT: {"ticks": 1.0, "tick": 1.0, "counts": 1.0, "count": 1.0, "pulses": 1.0, "pulse": 1.0, "cts": 1.0},
+    FORCE: {"N": 1.0, "mN": 1e-3, "kN": 1e3},
     # Of no channel of a log: what has one of these is nothing that a fit takes.
     "power": {"W": 1.0, "mW": 1e-3, "kW": 1e3},
-    "force": {"N": 1.0, "mN": 1e-3, "kN": 1e3},
     "torque": {"N m": 1.0, "N·m": 1.0, "N⋅m": 1.0, "N*m": 1.0, "N.m": 1.0, "Nm": 1.0, "mNm": 1e-3},
     "temperature": {"°C": 1.0, "degC": 1.0},
     "mass": {"kg": 1.0, "g": 1e-3},

@@ -381,7 +381,7 @@ def test_motors_by_output_error(call, tmp_path):
     for name, true in (("slope", 0.5), ("dead_band", 0.4), ("lag", 0.05)):
         found = motor["parameters"][name]
         assert abs(found["value"] - true) < 4.0 * found["std"] + 2e-3 * true  # and what Euler's steps are off by
-    assert motor["without_dead_band"]["held_out_rmse_rad_s"] > motor["held_out_rmse_rad_s"]
+    assert motor["plain"]["held_out_rmse_rad_s"] > motor["held_out_rmse_rad_s"]
     assert motor["dead_band_seen"]
     assert "Motors from logs" in (tmp_path / "m.html").read_text("utf-8")
 

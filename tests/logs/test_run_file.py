@@ -17,7 +17,7 @@ from omnidyn.run import CHANNELS, Run
 HEADER = (
     "t_s,u1_V,u2_V,u3_V,d1_duty,d2_duty,d3_duty,i1_A,i2_A,i3_A,a1_rad,a2_rad,a3_rad,w1_rad_s,w2_rad_s,w3_rad_s,"
     "w1_cmd_rad_s,w2_cmd_rad_s,w3_cmd_rad_s,vx_m_s,vy_m_s,omega_rad_s,"
-    "vx_cmd_m_s,vy_cmd_m_s,omega_cmd_rad_s,x_m,y_m,heading_rad,supply_V"
+    "vx_cmd_m_s,vy_cmd_m_s,omega_cmd_rad_s,x_m,y_m,heading_rad,supply_V,f1_N,f2_N,f3_N"
 )
 
 

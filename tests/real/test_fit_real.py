@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import real_fit, udea
+from omnidyn import MotorFit, identify
 from omnidyn.identification.motors.choice import choose_motor, fit_rmse
 from omnidyn.identification.motors.fit import fit_motor
 from tests.support import real_logs as logs
@@ -43,12 +44,12 @@ def test_no_friction_is_invented_on_the_bench(fits):
 
 
 def test_a_way_of_reading_the_input_that_the_logs_refute_claims_no_friction(bench):
-    """Held inputs with a latency had 1.8 +- 0.6 mV, [0.4, 3.2]; as means of two rows the same logs are met better."""
+    """Held inputs with a latency had 1.8 +- 0.6 mV, [0.4, 3.2]; as a curve through the rows the logs are met better."""
     fit = fit_motor([runs[0] for runs in bench.values()], between="hold", latency=True)
     assert not fit.dead_band_seen
     low, high = fit.ci95["dead_band"]
     assert low == 0.0 <= 0.35e-3 < high < 0.03 * 0.25
-    assert "the logs are fitted better where the input is the mean of two rows" in str(fit.warnings[0])
+    assert "the logs are fitted better where the input is a curve through the rows" in str(fit.warnings[0])
 
 
 def test_the_way_is_chosen_on_training_logs_alone(bench):
@@ -66,6 +67,14 @@ def test_the_readmes_regression_comes_out_of_our_windows(data):
     assert numbers[0] == pytest.approx(1.96, abs=2 * 0.09)
     assert numbers[1] == pytest.approx(0.85, abs=2 * 0.54)
     assert np.sqrt(np.mean((u - columns @ numbers) ** 2)) == pytest.approx(0.93, abs=0.06)
+
+
+def test_slope_and_lag_alone_are_written(bench):
+    """No dead band, offset or latency that held-out blocks do not need, of either run of a kind."""
+    for k in (0, 1):
+        (motor,) = identify([runs[k] for runs in bench.values()], None, MotorFit()).study.motors
+        assert set(motor.value) == {"slope", "lag", "inertia"}
+        assert set(motor.rejected) == {"dead_band", "offset", "latency"} - ({"offset"} if motor.one_way else set())
 
 
 def test_a_chirp_that_outruns_the_rows_claims_nothing(data):

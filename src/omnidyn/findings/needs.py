@@ -18,7 +18,7 @@ from omnidyn.statement import Statement
 
 OUTPUTS = ("twist", "wheel_speed", "wheel_angle", "current", "pose")  # what a model predicts
 CURRENT, VOLTAGE = "current", "voltage"  # where the force of the motors is from
-MOTOR_INPUTS: tuple[str, ...] = ("voltage", "duty", "current")
+MOTOR_INPUTS: tuple[str, ...] = ("voltage", "duty", "current", "force")
 LOOP_REMEDY = (
     'write the speed loop of the firmware into the robot file: [drive] kind = "speed", kp_V_s_rad, ki_V_rad, rate_Hz '
     "(the gains may be guesses: they are fitted)"

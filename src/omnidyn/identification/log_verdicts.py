@@ -16,7 +16,7 @@ from omnidyn.progress import Progress, Report
 from omnidyn.statement import ERROR, Statement
 
 CHECKED = 1_000_000  # rows that are checked on the way
-OF_MOTORS = ("voltage", "duty", "current", "supply", "wheel_speed", "wheel_angle")
+OF_MOTORS = ("voltage", "duty", "current", "force", "supply", "wheel_speed", "wheel_angle")
 
 
 def log_verdicts(logs: Sequence[Log], robot: Robot | None, progress: Progress) -> tuple[Verdict, ...]:

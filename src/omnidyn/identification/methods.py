@@ -152,12 +152,13 @@ NUISANCES = (
     "Fit what the log does: latency, gain, dead_band, fade, tilt, push, none; default: auto.",
     '"latency.twist" is that of one channel, "push.x" of one axis; a tilt stays in the room. None or "auto": '
     "latency and dead band, and the gain where the supply is only nominal, as far as the logs determine them; a "
-    'warning says what else would fit the logs better. () or "none": none. Of the motors: latency only.',
+    'warning says what else would fit the logs better. () or "none": none. Of the motors: latency, offset, dead_band; '
+    "None: what improves held-out blocks.",
 )
 LOSS = "gaussian, or student-t for logs with outliers."
 SPEED = "Which speed friction is a function of: wheel, set or ground."
 WINDOW = ("Use these shares of each command's rows, such as 0.4,0.95.", "None: the steady rows found.")
-MOTOR_INPUT = "Of the motors: voltage, duty or current; default: the first."
+MOTOR_INPUT = "Of the motors: voltage, duty, current or force; default: the first."
 
 
 @dataclass(frozen=True)
@@ -274,7 +275,7 @@ class MotorLine(Method):
 
 @dataclass(frozen=True)
 class MotorFit(Method):
-    """Each motor as a free run of whole logs, wheels off the ground: with a dead band and without."""
+    """Each motor as a free run of whole logs, wheels off the ground: by what improves held-out blocks, and plain."""
 
     name: ClassVar[str] = OUTPUT_ERROR
     takes: ClassVar[tuple[str, ...]] = (HOLD_OUT,)

@@ -1,7 +1,7 @@
 """Names of what a log can hold: the channels of a Run, taken apart into one component per column.
 
 voltage u1 u2 ..   duty d1 ..   current i1 ..   wheel_angle a1 ..   wheel_speed w1 ..   wheel_speed_command w1_cmd ..
-twist vx vy omega   twist_command vx_cmd vy_cmd omega_cmd   pose x y heading   supply
+twist vx vy omega   twist_command vx_cmd vy_cmd omega_cmd   pose x y heading   supply   force f1
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ _OF_WHEELS = {
     "wheel_angle": "a{}",
     "wheel_speed": "w{}",
     "wheel_speed_command": "w{}_cmd",
+    "force": "f{}",
 }
 _OTHERS = {
     "twist": ("vx", "vy", "omega"),
@@ -38,6 +39,7 @@ _UNITS = {
     "wheel_speed": "rad_s",
     "wheel_speed_command": "rad_s",
     "supply": "V",
+    "force": "N",
     "pose": ("m", "m", "rad"),
     "twist": ("m_s", "m_s", "rad_s"),
     "twist_command": ("m_s", "m_s", "rad_s"),

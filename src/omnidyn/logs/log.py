@@ -31,7 +31,13 @@ OFTEN_BACK = 0.005  # of the rows: no recorder writes so many out of order
 MAX_MISSING = 0.2  # share of rows without a time or without any number
 ON_CHANGE = 0.2  # a component with more blank cells than this share, gaps left out, is recorded on change
 SAME_TIME_SHARE = 1e-6  # of a row: times that are no farther apart are one
-HELD = ("voltage", "duty", "wheel_speed_command", "twist_command")  # what is commanded holds until the next value
+HELD = (
+    "voltage",
+    "duty",
+    "force",
+    "wheel_speed_command",
+    "twist_command",
+)  # what is commanded holds until the next value
 NEVER_MADE_UP = (*HELD, "supply")  # a battery is an input like any other: it holds too
 
 

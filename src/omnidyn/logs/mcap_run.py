@@ -28,7 +28,7 @@ from omnidyn.logs.readers.ros.layout import definition_of
 from omnidyn.logs.readers.ros.usual import heading_of
 from omnidyn.run import Run
 
-ARRAYS = ("voltage", "duty", "current", "wheel_speed_command", "supply")
+ARRAYS = ("voltage", "duty", "current", "wheel_speed_command", "supply", "force")
 LARGEST_NS = 2**62
 NO_COVARIANCE = (0.0,) * 36
 

@@ -1,7 +1,7 @@
 """Run files: a Run as CSV or Parquet, to the last bit.
 
     t_s,u1_V..,d1_duty..,i1_A..,a1_rad..,w1_rad_s..,w1_cmd_rad_s..,vx_m_s,vy_m_s,omega_rad_s,
-    vx_cmd_m_s,vy_cmd_m_s,omega_cmd_rad_s,x_m,y_m,heading_rad,supply_V
+    vx_cmd_m_s,vy_cmd_m_s,omega_cmd_rad_s,x_m,y_m,heading_rad,supply_V,f1_N..
 
 A channel that was not measured has no columns. In CSV a missing value is an empty cell, and numbers are written with
 the shortest digits that read back as the same float. In Parquet a missing value is NaN, and each column has its unit.
@@ -33,7 +33,17 @@ from omnidyn.run import CHANNELS, SCALAR, Run, as_run
 from omnidyn.statement import Statement, statements
 from omnidyn.units import DUTY, known_unit, parse_unit
 
-_SUFFIXES = ("rad_s", "m_s", "duty", "rad", "V", "A", "m", "s")  # as channels.si_suffix gives them, long before short
+_SUFFIXES = (
+    "rad_s",
+    "m_s",
+    "duty",
+    "rad",
+    "V",
+    "A",
+    "m",
+    "N",
+    "s",
+)  # as channels.si_suffix gives them, long before short
 _SHEETS = frozenset((".xlsx", ".xls", ".xlsm", ".ods"))
 _OTHERS = _SHEETS | frozenset(
     (

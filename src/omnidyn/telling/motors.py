@@ -26,7 +26,7 @@ def _motor_line(statement: Statement) -> str:
     """Slope, lag, latencies and dead band of the line of a motor."""
     numbers = statement.numbers
     spread = f" +- {numbers['slope_std']:.2g}" if math.isfinite(numbers["slope_std"]) else ""
-    words = f"{statement.subject}: slope {numbers['slope']:.5g}{spread} {numbers['unit']} s/rad"
+    words = f"{statement.subject}: slope {numbers['slope']:.5g}{spread} {numbers['unit']} s/{numbers['travel']}"
     if not numbers["lag_known"]:
         words += ", lag not determined"
     elif numbers["lag_seen"]:
@@ -36,7 +36,7 @@ def _motor_line(statement: Statement) -> str:
         words += f", {channel} late by {1e3 * late:.3g} {known}"
     if rows := numbers["left_out"]:
         words += f" ({rows} rows left out: their input changes too much from row to row)"
-    return f"{words}; {numbers['dead_band']}"
+    return "; ".join(map(str, [words, numbers["dead_band"], *([numbers["offset"]] if numbers["offset"] else [])]))
 
 
 def _band(statement: Statement) -> str:
@@ -44,6 +44,42 @@ def _band(statement: Statement) -> str:
     numbers = statement.numbers
     return "{:.3g} +- {:.2g} {}, 95 % [{:.3g}, {:.3g}]".format(
         numbers["value"], numbers["std"], numbers["unit"], *numbers["ci95"]
+    )
+
+
+def _offset_as_friction(statement: Statement) -> str:
+    """An offset of the input, and the friction that is unequal by direction that it is the same as."""
+    numbers = statement.numbers
+    return "offset {}: the same as friction of {:.3g} {} forward and {:.3g} {} backward".format(
+        _band(statement), numbers["forward"], numbers["unit"], numbers["backward"], numbers["unit"]
+    )
+
+
+def _offset_of_input(statement: Statement) -> str:
+    """An offset of the input that no friction can stand for."""
+    return f"offset {_band(statement)}"
+
+
+def _held_out_blocks(statement: Statement) -> str:
+    """How far free runs miss held-out blocks: that of the motor that is written, and the plain one."""
+    numbers = statement.numbers
+    written, plain = (f"{numbers[name]:.2%}" for name in ("written", "plain"))
+    words = f"{statement.subject}: on held-out blocks its free run misses {written} of the spread of what was measured"
+    words += f", that of slope and lag alone {plain}"
+    names = [name.replace("_", " ") for name in numbers["rejected"]]
+    return f"{words}; {all_of(names)} {'is' if len(names) == 1 else 'are'} no help and not kept" if names else words
+
+
+def _slopes_differ_by_direction(statement: Statement) -> str:
+    """The slope of a motor in each direction, where they differ."""
+    numbers = statement.numbers
+    both = [
+        f"{slope:.4g} [{low:.4g}, {high:.4g}] ({direction})"
+        for slope, (low, high), direction in zip(numbers["slopes"], numbers["ci95"], numbers["directions"], strict=True)
+    ]
+    return (
+        f"{statement.subject}: the slope differs by direction, {both[0]} and {both[1]} {numbers['unit']}: one"
+        " viscous friction for both fits neither"
     )
 
 
@@ -178,9 +214,10 @@ def _other_reading(statement: Statement) -> str:
     """The logs are met as well, or better, with another reading of the input between its rows."""
     numbers = statement.numbers
     verb = "better" if numbers["better"] else "as well"
+    errors = f"error {numbers['other_error']:.3g} {numbers['travel']}/s, {numbers['error']:.3g}"
     return (
-        f"the logs are fitted {verb} where the input is {WORDS[numbers['other']]} (error {numbers['other_error']:.3g} "
-        f"rad/s, {numbers['error']:.3g} where it is {WORDS[numbers['between']]}): the intervals span both"
+        f"the logs are fitted {verb} where the input is {WORDS[numbers['other']]} ({errors} where it is "
+        f"{WORDS[numbers['between']]}): the intervals span both"
     )
 
 
@@ -207,8 +244,23 @@ SENTENCES = {
     "slope_may_be_zero": Sentence(_slope_may_be_zero),
     "dead_band_not_needed": Sentence(_dead_band_not_needed),
     "held_out_no_better": Sentence(
-        "{subject}: held-out logs are predicted no better with the dead band (error {with_band:.4g} rad/s, "
-        "{without:.4g} without): it may be an effect of something else"
+        "{subject}: held-out logs are predicted no better with its dead band (error {written:.4g} {travel}/s, "
+        "{plain:.4g} by slope and lag alone): it may be an effect of something else"
+    ),
+    "held_out_blocks": Sentence(_held_out_blocks),
+    "dead_band_rejected": Sentence(
+        "no dead band is kept: held-out blocks are predicted as well without; it is at most {high:.3g} {unit}"
+    ),
+    "offset_as_friction": Sentence(_offset_as_friction),
+    "offset_of_input": Sentence(_offset_of_input),
+    "slopes_differ_by_direction": Sentence(_slopes_differ_by_direction),
+    "late_by_rows": Sentence(
+        "{subject} is late by {latency:m.3g} ms, {rows:.2g} rows: rare for a drive; an inertia or a filter may stand "
+        "behind it"
+    ),
+    "late_by_half_a_row": Sentence(
+        "{subject} is late by {latency:m.3g} ms, which half a row explains: a speed that is the mean over the last row "
+        "is so late by its sensor, not by its drive"
     ),
     "speed_no_line": Sentence(_speed_no_line),
     "straightness_not_tested": Sentence(
@@ -228,7 +280,7 @@ SENTENCES = {
     ),
     "start_seen": Sentence(_start_seen),
     "starts_scatter": Sentence("its {subject}s scatter by more than their intervals: the interval spans them"),
-    "no_motor_answers": Sentence("no motor is seen to answer to its input: the slope of {motors} may as well be 0"),
+    "no_motor_answers": Sentence("no motor is seen to answer to its input: the speed of {motors} does not go with it"),
     "motors_answer": Sentence(_motors_answer),
     "starts_both_ways": Sentence(_starts_both_ways),
     "motors_start": Sentence(_motors_start),
@@ -243,6 +295,9 @@ SENTENCES = {
     ),
     "other_reading": Sentence(_other_reading),
     "speed_is_mean": Sentence(_speed_is_mean),
+    "speeds_added_up": Sentence(
+        "the speeds are differences of counts: they are added up to angles, which are not late by half a row"
+    ),
     "rows_as_points": Sentence(
         "the rows are more than 0.1 s apart: each is a point of steady speed, and nothing is known of a lag"
     ),
@@ -258,6 +313,7 @@ SENTENCES = {
     "motors_and_floor": Sentence(
         "slope and dead band are those of motors and floor together: of the motors alone nothing is determined"
     ),
+    "axis_not_wheel": Sentence("the log is of an axis, not of the wheels of a robot: nothing is written"),
     "supply_of_logs": Sentence("the supply is the mean of the logs, {supply:.4g} V"),
     "supply_of_file": Sentence("the supply is not logged: that of the file is taken, {supply:g} V"),
     "supply_unknown": Sentence(

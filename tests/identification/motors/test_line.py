@@ -165,8 +165,8 @@ def test_wrong_options_are_refused(how, words):
         identify([bench(0.4)], None, MotorLine(**how))
 
 
-def test_a_free_run_takes_no_nuisance_but_a_latency():
-    with pytest.raises(InputError, match="of the motors only latency can be fitted; got gain"):
+def test_a_free_run_takes_no_nuisance_that_motors_do_not_have():
+    with pytest.raises(InputError, match="no such nuisance of motors; got gain; expected dead_band, offset, latency"):
         identify([bench(0.4)], None, MotorFit(nuisances="gain", between="hold"))
 
 

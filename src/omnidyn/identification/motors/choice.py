@@ -11,7 +11,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InsufficientDataError, OmnidynError
-from omnidyn.identification.motors.estimate import BAND, MotorEstimate
+from omnidyn.identification.motors.estimate import BAND, OFFSET, MotorEstimate
 from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
 from omnidyn.identification.motors.log import CURVE, HOLD, MEAN, SUB
 from omnidyn.identification.motors.problem import SPEED, MotorEngine, motor_problem, motor_record
@@ -23,8 +23,8 @@ from omnidyn.run import Run, as_list
 def run_motor(fit: MotorEstimate, runs: Run | Sequence[Run]) -> list[FloatArray]:
     """Free runs of a fitted motor under the inputs of other logs: its speed [rad/s], shape (rows,) each.
 
-    Each piece starts at the measured speed, or by the slope of the angle where no speed is logged; NaN outside of the
-    pieces. Latencies are included.
+    Each piece starts at the measured speed, or by the slope of the angle where no speed is logged, and at rest where
+    the log begins so; NaN outside of the pieces. Latencies are included.
     """
     assert fit.motor is not None
     logs = [
@@ -32,7 +32,7 @@ def run_motor(fit: MotorEstimate, runs: Run | Sequence[Run]) -> list[FloatArray]
         for log in logs_of_free_runs(runs, fit.kind)
     ]
     records = [motor_record(log, fit.motor, fit.between, angle=False) for log in logs]
-    problem = motor_problem(records, BAND in fit.value, bool(fit.late))
+    problem = motor_problem(records, BAND in fit.value, bool(fit.late), OFFSET in fit.value)
     late = fit.value.get(f"latency.{SPEED[0]}", next(iter(fit.late.values()), 0.0))
     values = [fit.value.get(name, late) for name in problem.names]
     point = replace(problem.start(), values=np.array(values))
@@ -40,21 +40,23 @@ def run_motor(fit: MotorEstimate, runs: Run | Sequence[Run]) -> list[FloatArray]
     for piece, (predicted, _) in zip(problem.pieces, MotorEngine(problem).outputs(point), strict=True):
         rows = slice(piece.first, piece.last + 1)
         found[id(piece.record)][rows] = predicted[rows, 0]
-    return [speed[:: SUB if fit.between == CURVE else 1] for speed in found.values()]
+    step = SUB if fit.between == CURVE else 1
+    return [speed[int(r.rest) :: step] for r, speed in zip(records, found.values(), strict=True)]
 
 
 def fit_rmse(fit: MotorEstimate, runs: Run | Sequence[Run]) -> float:
-    """Root mean square error of the speed [rad/s] of free runs beside logs; NaN where none has a speed.
+    """Root mean square error of the speed [rad/s] of free runs beside logs, or of the slope of their angle.
 
     Rows whose input the log does not resolve do not count.
     """
     every = as_list(runs)
     errors = [
-        (ours - run.wheel_speed[:, fit.motor])[~unresolved_rows(getattr(run, fit.kind)[:, fit.motor])]
-        for ours, run in zip(run_motor(fit, every), every, strict=True)
-        if run.wheel_speed is not None
+        (ours - (log.motion if log.speed is None else log.speed)[:, fit.motor])[
+            ~unresolved_rows(log.put_in[:, fit.motor])
+        ]
+        for ours, log in zip(run_motor(fit, every), logs_of_free_runs(every, fit.kind), strict=True)
     ]
-    known = np.concatenate(errors) if errors else np.zeros(0)
+    known = np.concatenate(errors)
     known = known[np.isfinite(known)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
 
@@ -104,16 +106,6 @@ def choose_motor(
             "no log can be predicted from the others", got=f"{len(every)} logs", expected="more, or longer ones"
         )
     return MotorChoice(best[0], fit_motor(every, motor, **{**shared, **best[0]}), errors)
-
-
-def is_late(runs: Run | Sequence[Run], motor: int = 0, **shared: Any) -> bool:
-    """Whether logs show that speed or angle of a motor were recorded late: an interval of a latency without 0."""
-    try:
-        fit = fit_motor(runs, motor, dead_band=False, latency=True, **shared)
-    except OmnidynError:
-        return False
-    found = (fit.ci95[name] for name in fit.late if name not in fit.unidentifiable)
-    return fit.converged and any(low > 0.0 or high < 0.0 for low, high in found)
 
 
 def _left_out(runs: Sequence[Run], motor: int, score: Score, how: Mapping[str, Any]) -> float:

@@ -1,22 +1,25 @@
 """MotorEstimate: what logs say of one motor, however it was fitted.
 
-u = slope w + dead_band sgn w + inertia w',   inertia = slope lag,   u in volts, percent of duty, or ampere
+u = slope w + dead_band sgn w + offset + inertia w',   inertia = slope lag,   u in volts, percent of duty, or ampere
+
+An offset is the same as friction that is unequal by direction: dead_band + offset forward, dead_band - offset backward.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from omnidyn.arrays import FloatArray
 from omnidyn.document import plain
 from omnidyn.statement import NOTE, WARNING, Statement
 
-SLOPE, BAND, LAG, INERTIA, LATENCY = "slope", "dead_band", "lag", "inertia", "latency"
+SLOPE, BAND, OFFSET, LAG, INERTIA, LATENCY = "slope", "dead_band", "offset", "lag", "inertia", "latency"
 WINDOWS, FREE_RUN = "windows", "free run"
 PAYS = 0.01  # share by which the error on held-out logs must fall for a dead band to pay
+LATE_ROWS = 2.0  # rows: a drive that is later is rare
 HEAD = (
     "motor",
     "from",
@@ -26,24 +29,38 @@ HEAD = (
     "dead band",
     "+-",
     "95 % interval",
+    "offset",
+    "95 % interval",
     "lag ms",
     "+-",
     "unit",
-    "rmse rad/s",
-    "held out rad/s",
+    "rmse",
+    "held out",
 )
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Errors of free runs on held-out blocks: root mean square of each output over its spread, geometric mean.
+
+    written: of the motor that is written; plain: of one with slope and lag only, from the same starts.
+    """
+
+    written: float
+    plain: float
 
 
 @dataclass(frozen=True, eq=False)
 class MotorEstimate:
-    """value, std, ci95: slope [unit s/rad], dead_band [unit], lag [s], inertia [unit s^2/rad], and of each channel that
-    may be late "latency.CHANNEL" [s]; NaN for what the logs do not determine.
+    """value, std, ci95: slope [unit s/rad], dead_band and offset [unit], lag [s], inertia [unit s^2/rad], and of each
+    channel that may be late "latency.CHANNEL" [s]; NaN for what the logs do not determine.
 
     motor: its number from 0, None for all together. kind, unit: of the input. way: "windows" in integral form, or "free
     run" of whole logs. correlation: of slope and dead band. rmse [rad/s]: of the speed; of windows, of their mean
     speed. count: windows, or rows. at_bound, unidentifiable: names. left_out: rows that do not count, because the log
     does not resolve the input there. one_way: it turned one way only, so a dead band and an offset of the input are
-    one. held_out [rad/s]: error of free runs on logs that were not fitted. source: the logs.
+    one. held_out [rad/s]: error of free runs on logs that were not fitted. source: the logs. answers: whether its
+    speed goes with its input. travel: "rad", or "m" of a linear axis: what stands here in rad is in that.
     Of windows: rest, the largest input under which the motor stayed at rest, NaN where it never rested; draws: of the
     bootstrap, by name. Of a free run: between, noise by channel, kind of the covariance, whether the fit converged.
     """
@@ -71,6 +88,10 @@ class MotorEstimate:
     noise: Mapping[str, float] = field(default_factory=dict)
     covariance: str = ""
     converged: bool = True
+    answers: bool = True
+    blocks: HeldOut | None = None
+    rejected: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    travel: str = "rad"
 
     @property
     def name(self) -> str:
@@ -81,6 +102,11 @@ class MotorEstimate:
         """Whether the interval of the dead band lies above 0, and that of the slope too: else there is no line."""
         known = BAND in self.value and BAND not in self.unidentifiable
         return known and self.ci95[BAND][0] > 0.0 and self.ci95[SLOPE][0] > 0.0
+
+    @property
+    def offset_seen(self) -> bool:
+        """Whether the interval of the offset lies on one side of 0."""
+        return OFFSET in self.value and OFFSET not in self.unidentifiable and not _holds_zero(self.ci95[OFFSET])
 
     def bounded(self, turned: float, rested: float = math.nan) -> MotorEstimate:
         """The same with a dead band that is not above an input under which the motor turned steadily, `turned`.
@@ -115,16 +141,50 @@ class MotorEstimate:
             "slope": self.value[SLOPE],
             "slope_std": self.std[SLOPE],
             "unit": self.unit,
+            "travel": self.travel,
             "lag": self.value[LAG],
             "lag_known": LAG not in self.unidentifiable,
             "lag_seen": self.ci95[LAG][0] > 0.0,
             "late": late,
             "left_out": self.left_out,
             "dead_band": self._of_dead_band(started),
+            "offset": self._of_offset(),
         }
         return Statement("motor_line", NOTE, self.name, numbers)
 
+    def _of_offset(self) -> Statement | None:
+        """The offset, told as friction that is unequal by direction too; None where none was fitted."""
+        if OFFSET not in self.value or OFFSET in self.unidentifiable:
+            return None
+        band, value = self.value.get(BAND, 0.0), self.value[OFFSET]
+        numbers = {"value": value, "std": self.std[OFFSET], "unit": self.unit, "ci95": self.ci95[OFFSET]}
+        levels = {"forward": band + value, "backward": band - value}
+        seen = self.offset_seen and abs(value) <= band
+        return Statement("offset_as_friction" if seen else "offset_of_input", NOTE, numbers=numbers | levels)
+
+    def of_blocks(self) -> Statement | None:
+        """How free runs predict held-out blocks, and those of a plain fit; None where none were held out."""
+        if self.blocks is None:
+            return None
+        numbers = {"written": self.blocks.written, "plain": self.blocks.plain, "rejected": tuple(self.rejected)}
+        return Statement("held_out_blocks", NOTE, self.name, numbers)
+
+    def late_statements(self, row: float) -> list[Statement]:
+        """What to say of latencies beside the time of a row [s]: longer than LATE_ROWS; half a row of a speed."""
+        found = []
+        for name, late in self.late.items():
+            if name in self.unidentifiable:
+                continue
+            numbers, (low, high) = {"latency": late, "rows": late / row}, self.ci95[name]
+            if late > LATE_ROWS * row:
+                found.append(Statement("late_by_rows", WARNING, name.partition(".")[2], numbers))
+            elif self.between == "hold" and name == f"{LATENCY}.wheel_speed" and 0.0 < low <= 0.5 * row <= high:
+                found.append(Statement("late_by_half_a_row", NOTE, "wheel_speed", numbers))
+        return found
+
     def _of_dead_band(self, started: bool) -> Statement:
+        if BAND in self.rejected:
+            return Statement("dead_band_rejected", NOTE, numbers={"high": self.rejected[BAND][1], "unit": self.unit})
         if BAND not in self.value:
             return Statement("dead_band_not_asked", NOTE)
         low, high = self.ci95[BAND]
@@ -153,11 +213,16 @@ class MotorEstimate:
                 else ("-", "-", f"[{low:.3g}, {high:.3g}]" if math.isfinite(high) else "-")
             ),
             *(
+                (f"{self.value[OFFSET]:.3g}", "[{:.3g}, {:.3g}]".format(*self.ci95[OFFSET]))
+                if OFFSET in self.value
+                else ("-", "-")
+            ),
+            *(
                 f"{1e3 * each:{form}}" if math.isfinite(each) and LAG not in self.unidentifiable else "-"
                 for each, form in ((self.value[LAG], ".3g"), (self.std[LAG], ".2g"))
             ),
-            f"{self.unit}, s/rad",
-            f"{self.rmse:.4g}",
+            f"{self.unit}, s/{self.travel}",
+            f"{self.rmse:.4g}" if math.isfinite(self.rmse) else "-",
             f"{self.held_out:.4g}" if math.isfinite(self.held_out) else "-",
         )
 
@@ -175,18 +240,22 @@ class MotorEstimate:
                 "covariance": self.covariance,
                 "converged": self.converged,
                 "left_out": self.left_out,
+                "held_out_blocks": None if self.blocks is None else asdict(self.blocks),
+                "rejected": {name: {"ci95": ends} for name, ends in self.rejected.items()},
             }
         )
         return plain(
             {
                 "motor": "all" if self.motor is None else self.motor + 1,
                 "unit": self.unit,
+                "travel_unit": self.travel,
                 "from": self.way,
                 "count": self.count,
                 "parameters": parameters,
+                "answers": self.answers,
                 "dead_band_seen": self.dead_band_seen,
-                "rmse_rad_s": self.rmse,
-                "held_out_rmse_rad_s": self.held_out,
+                f"rmse_{self.travel}_s": self.rmse,
+                f"held_out_rmse_{self.travel}_s": self.held_out,
                 "at_bound": self.at_bound,
                 "unidentifiable": self.unidentifiable,
                 "warnings": self.warnings,
@@ -194,6 +263,10 @@ class MotorEstimate:
                 **of_way,
             }
         )
+
+
+def _holds_zero(ends: tuple[float, float]) -> bool:
+    return ends[0] <= 0.0 <= ends[1]
 
 
 def named(sources: Sequence[str]) -> str:

@@ -9,7 +9,7 @@ With a duty in place of the voltage the units of slope and dead band are % s/rad
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,27 +24,39 @@ from omnidyn.identification.motors.estimate import (
     INERTIA,
     LAG,
     LATENCY,
+    OFFSET,
     SLOPE,
     MotorEstimate,
     named,
 )
-from omnidyn.identification.motors.log import CURVE, WORDS, MotorLog, motor_logs, orientation_of
-from omnidyn.identification.motors.problem import SPEED, MotorEngine, MotorProblem, begin, motor_problem, motor_record
-from omnidyn.identification.motors.rest import rested_under, turned_under
+from omnidyn.identification.motors.log import CURVE, WORDS, MotorLog, follows, motor_logs, orientation_of
+from omnidyn.identification.motors.problem import (
+    SPEED,
+    MotorEngine,
+    MotorProblem,
+    begin,
+    begin_at,
+    motor_problem,
+    motor_record,
+)
+from omnidyn.identification.motors.rest import rested_under, turned_under, turns_both_ways
+from omnidyn.identification.motors.windows import line_numbers
 from omnidyn.identification.output_error.conclusion import intervals
 from omnidyn.identification.output_error.fit import degrees
+from omnidyn.identification.output_error.problem.differences import added_up, differences
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State
 from omnidyn.identification.output_error.trust.support import at_the_end
 from omnidyn.identification.output_error.trust.uncertainty import RISE, SANDWICH, Trust, trust
 from omnidyn.logs.resolved import unresolved_rows
+from omnidyn.model.layout import YAW
 from omnidyn.run import Run, as_list
 from omnidyn.statement import Statement
 from omnidyn.statistics import t_quantile
 
 LAGS = (0.005, 0.05, 0.5)  # [s] the search begins at each, and the best end counts
 EDGE = 0.99  # of an input under which the motor rested
-FREE_RUN_INPUTS = ("voltage", "duty")
+FREE_RUN_INPUTS = ("voltage", "duty", "force")
 
 
 def fit_motor(
@@ -52,22 +64,26 @@ def fit_motor(
     motor: int = 0,
     *,
     dead_band: bool = True,
+    offset: bool = False,
     kind: str = "",
     between: str = AUTO,
     latency: bool = False,
     angle: bool = False,
     loss: str = GAUSS,
+    start: Mapping[str, float] | None = None,
 ) -> MotorEstimate:
     """Fit slope, dead band and lag of one motor to whole logs by output error.
 
-    motor: its number from 0. dead_band: False leaves Coulomb friction out. kind: "voltage" or "duty"; "" takes the
+    motor: its number from 0. dead_band: False leaves Coulomb friction out. offset: fit a constant one of the input.
+    kind: "voltage" or "duty"; "" takes the
     first that is there. between: "hold": the input of a row holds to the next; "mean": the mean of both rows applies,
     where inputs are sampled as the speeds are; "curve": a smooth curve through the rows, a line where the input jumps;
     "auto": whichever fits best. Intervals span all ways but those that fit clearly worse, and that of a dead band
     that is seen also what is left of it where a smooth bend of the line is fitted too, if one is needed.
     latency: fit how late speed and angle are [s]; a lag and a latency are told apart only by how the speed sets off.
     angle: the angle is an output too, beside the speed (alone, where no speed is logged); what the log does not resolve
-    of the input adds up in it, and then looks like friction.
+    of the input adds up in it, and then looks like friction. start: numbers to begin at, by name, in place of those
+    of a few lags and of the line through windows.
     Raises InputError for a run without the channels, InsufficientDataError where the motor says nothing.
     """
     if between not in (AUTO, *WORDS):
@@ -77,11 +93,11 @@ def fit_motor(
         raise InputError("unknown loss", got=loss, expected=f"{GAUSS} or {STUDENT}", where="loss")
     logs = logs_of_free_runs(runs, kind)
     found: dict[str, tuple[Solver[MotorProblem], Solution]] = {}
+    line = line_numbers(logs, motor) if start is None else start
     for way in WORDS:
-        problem = motor_problem([motor_record(log, motor, way, angle) for log in logs], dead_band, latency)
-        solver = Solver(problem, MotorEngine(problem), degrees(loss))
-        ends = [solver.minimise(begin(problem, lag)) for lag in LAGS]
-        found[way] = solver, min(ends, key=lambda end: end.state.objective)
+        problem = motor_problem([motor_record(log, motor, way, angle) for log in logs], dead_band, latency, offset)
+        solution = solved(problem, degrees(loss), line, start is None)
+        found[way] = solution.solver, solution
     cost = {way: end.state.objective for way, (_, end) in found.items()}
     chosen = between if between != AUTO else min(cost, key=lambda way: cost[way])
     # rows of a refined log have no measured neighbours, so that auto would not see whether these resemble
@@ -96,6 +112,17 @@ def fit_motor(
     if fit.dead_band_seen:
         fit = _with_bend(fit, bend(found[chosen][0], found[chosen][1].state))
     return fit.bounded(turned_under(logs, motor, way=orientation_of(logs, motor)), rested)
+
+
+def solved(problem: MotorProblem, degrees: float, near: Mapping[str, float] | None, anywhere: bool = True) -> Solution:
+    """The best end of descents from numbers `near` the best ones, where there are any, and from LAGS `anywhere`.
+
+    degrees: of Student's t, 0 for Gauss.
+    """
+    solver = Solver(problem, MotorEngine(problem), degrees)
+    starts = [] if near is None else [begin_at(problem, near)]
+    starts += [begin(problem, lag) for lag in LAGS] if anywhere or near is None else []
+    return min((solver.minimise(start) for start in starts), key=lambda end: end.state.objective)
 
 
 def _trusted(solver: Solver[MotorProblem], solution: Solution, kind: str, rested: float) -> Trust:
@@ -114,8 +141,18 @@ def _trusted(solver: Solver[MotorProblem], solution: Solution, kind: str, rested
 
 
 def logs_of_free_runs(runs: Run | Sequence[Run], kind: str) -> list[MotorLog]:
-    """Runs as a free run takes them."""
-    return motor_logs(as_list(runs), kind, kinds=FREE_RUN_INPUTS)
+    """Runs as a free run takes them.
+
+    Speeds that are differences of counts become the angles that they are of: such a speed is the mean over the row
+    before, half a row late by its sensor, and the angle is not.
+    """
+    every = as_list(runs)
+    counted = differences(every)
+    if counted is not None and counted.why is None:
+        angles = [added_up(run, counted) for run in every]
+        if not any(lost[1:].any() for _, lost in angles):
+            every = [run.replace(wheel_angle=a, wheel_speed=None) for run, (a, _) in zip(every, angles, strict=True)]
+    return motor_logs(every, kind, kinds=FREE_RUN_INPUTS)
 
 
 def _with_bend(fit: MotorEstimate, bent: BentLine | None) -> MotorEstimate:
@@ -141,7 +178,7 @@ def _with_rival(fit: MotorEstimate, rival: MotorEstimate) -> MotorEstimate:
     Its 95 % region by likelihood holds all ways that fit worse by no more than RISE, so the intervals do too; the
     difference of the values joins the variance.
     """
-    own = [name for name in (SLOPE, BAND, LAG, INERTIA) if name in fit.value]
+    own = [name for name in (SLOPE, BAND, OFFSET, LAG, INERTIA) if name in fit.value]
     std = {name: float(np.hypot(fit.std[name], fit.value[name] - rival.value[name])) for name in own}
     warning = Statement(
         "other_reading",
@@ -151,6 +188,7 @@ def _with_rival(fit: MotorEstimate, rival: MotorEstimate) -> MotorEstimate:
             "other_error": rival.rmse,
             "error": fit.rmse,
             "between": fit.between,
+            "travel": fit.travel,
         },
     )
     return _widened(fit, std, {name: rival.ci95[name] for name in std}, warning)
@@ -189,7 +227,7 @@ def _answer(
     std[INERTIA], ci95[INERTIA] = _of_product(problem, known, value[INERTIA])
     if ended.keys() & {SLOPE, LAG}:
         std[INERTIA], ci95[INERTIA] = float("nan"), (0.0, float("inf"))
-    names = [name for name in (SLOPE, BAND, LAG, INERTIA, *problem.names) if name in value]
+    names = [name for name in (SLOPE, BAND, OFFSET, LAG, INERTIA, *problem.names) if name in value]
     rows, rmse = _speed_errors(MotorEngine(problem), solution.state.point)
     size = known.std[0] * known.std[at]
     correlation = float(known.covariance[0, at] / size) if at >= 0 and np.isfinite(size) and size > 0.0 else 0.0
@@ -212,6 +250,9 @@ def _answer(
         noise={c[0]: float(np.sqrt(v)) for c, v in zip(problem.columns, solution.state.variance, strict=True)},
         covariance=known.kind,
         converged=solution.converged,
+        answers=follows([(log.put_in[:, motor], log.motion[:, motor]) for log in logs], logs[0].step) is not False,
+        one_way=not turns_both_ways(logs, motor),
+        travel=logs[0].travel,
     )
 
 
@@ -226,13 +267,17 @@ def _of_product(problem: MotorProblem, known: Trust, inertia: float) -> tuple[fl
 
 
 def _speed_errors(engine: MotorEngine, point: Point) -> tuple[int, float]:
-    """(rows, root mean square of the error of the speed [rad/s]); NaN where no speed is an output."""
+    """(rows, root mean square of the error of the speed [rad/s]), of the steps of an angle where no speed is known."""
     squares, count = 0.0, 0
     for piece, (predicted, _) in zip(engine.problem.pieces, engine.outputs(point), strict=True):
+        rows = slice(piece.first, piece.last + 1)
         if SPEED in piece.record.columns:
-            c = piece.record.columns.index(SPEED)
-            error = (predicted - piece.record.outputs)[piece.first : piece.last + 1, c]
-            squares, count = squares + float(np.nansum(error**2)), count + int(np.isfinite(error).sum())
+            error = (predicted - piece.record.outputs)[rows, piece.record.columns.index(SPEED)]
+        else:  # of the steps of the angle
+            off = (predicted - piece.record.outputs)[rows, 0]
+            known = np.isfinite(off)
+            error = np.diff(off[known]) / np.diff(piece.record.t[rows][known])
+        squares, count = squares + float(np.nansum(error**2)), count + int(np.isfinite(error).sum())
     return count, float(np.sqrt(squares / count)) if count else float("nan")
 
 
@@ -331,7 +376,8 @@ def _regression(solver: Solver[MotorProblem], point: Point) -> tuple[FloatArray,
         known = np.isfinite(own) & np.isfinite(piece.record.outputs[rows, c])
         known[: int(np.searchsorted(t, t[0] + piece.margin[c]))] = False
         starts = np.zeros((int(known.sum()), len(pieces)))
-        starts[:, n] = by[rows, c, count + int(np.flatnonzero(piece.free)[0])][known]  # by the speed at the start
+        if piece.free[YAW]:
+            starts[:, n] = by[rows, c, count + YAW][known]  # by the speed at the start
         bent = np.stack([np.interp(t - late, t, b) for b in _bent(t, own, slope, lag)], axis=1)
         residuals.append((piece.record.outputs[rows, c] - own)[known])
         found.append(np.concatenate([np.nan_to_num(by[rows, c, :count][known]), starts, bent[known]], axis=1))

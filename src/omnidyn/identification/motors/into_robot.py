@@ -31,8 +31,8 @@ import numpy as np
 from omnidyn.document import Part, Points, Table, apart, plain
 from omnidyn.errors import InputError
 from omnidyn.identification.estimate import identified
-from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, SLOPE, MotorEstimate
-from omnidyn.identification.motors.log import HEADING
+from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, OFFSET, SLOPE, MotorEstimate
+from omnidyn.identification.motors.log import HEADING, LENGTH
 from omnidyn.identification.motors.steady_curve import map_of
 from omnidyn.identification.motors.study import MotorStudy
 from omnidyn.model.keys import EMF, TORQUE, Key, unit, with_priors
@@ -44,6 +44,11 @@ from omnidyn.statement import NOTE, WARNING, Statement
 
 COULOMB, VISCOUS = "friction.wheels.coulomb", "friction.wheels.viscous"
 MAP = "drive.voltage_map_V"
+BACKWARD = "friction.wheels.coulomb_backward"
+ALONG = {  # levels that go along with another one
+    COULOMB: ("coulomb_backward", "breakaway", "breakaway_backward"),
+    BACKWARD: ("breakaway_backward",),
+}
 ROTOR = "motor.rotor_inertia_kg_m2"
 STEP = 1e-6  # of a standard error: the differences by which errors propagate
 
@@ -86,6 +91,8 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
         )
     if study.speed_from == HEADING:
         return MotorNumbers(robot, {}, {}, (Statement("motors_and_floor"),))
+    if study.kind == "force" or motors[0].travel == LENGTH:
+        return MotorNumbers(robot, {}, {}, (Statement("axis_not_wheel"),))
     supply, remarks = _supply(study, robot)
     bent = [curve.motor for curve in study.curves]
     value: dict[str, float] = {}
@@ -175,14 +182,17 @@ class _Wheel:
         """
         if BAND in line.unidentifiable or SLOPE in line.unidentifiable or not line.ci95[SLOPE][0] > 0.0:
             return {}, [Statement("line_not_determined")]
-        at = np.array([line.value[SLOPE], line.value[BAND]]) * scale
-        spread = np.array([line.std[SLOPE], line.std[BAND]]) * scale
+        at = np.array([line.value[SLOPE], line.value.get(BAND, 0.0)]) * scale
+        offset = scale * line.value[OFFSET] if line.offset_seen else 0.0
+        spread = np.array([line.std[SLOPE], line.std.get(BAND, 0.0)]) * scale
         covariance = np.outer(spread, spread) * np.array([[1.0, line.correlation], [line.correlation, 1.0]])
         found: dict[str, tuple[float, float]] = {}
         remarks: list[Statement] = []
-        for name, of, why in self._laws(line.dead_band_seen):
-            if name == COULOMB and not found:  # how hard a volt pushes is not known either
+        middle = at.copy()
+        for name, of, why in self._laws(line.dead_band_seen, line.offset_seen):
+            if name in (COULOMB, BACKWARD) and not found:  # how hard a volt pushes is not known either
                 continue
+            at = middle + np.array([0.0, offset * {COULOMB: 1.0, BACKWARD: -1.0}.get(name, 0.0)])
             number = float(of(*at))
             if number > 0.0:
                 slopes = np.array(
@@ -208,8 +218,11 @@ class _Wheel:
         std = (self._emf(slope + STEP * spread) - self._emf(slope - STEP * spread)) / (2.0 * STEP)
         return {self.key(name): (number, std) for name in ((EMF, TORQUE) if self.tied else (EMF,))}, []
 
-    def _laws(self, with_band: bool) -> Iterator[tuple[str, Callable[[float, float], float], str]]:
-        """(key, its number of slope and dead band, code of why there is none where that is not above 0)."""
+    def _laws(self, with_band: bool, offset_seen: bool) -> Iterator[tuple[str, Callable[[float, float], float], str]]:
+        """(key, its number of slope and dead band, code of why there is none where that is not above 0).
+
+        offset_seen: the dead band is then that of one direction, and the law of the other follows.
+        """
         if self.kind == "current":
             yield VISCOUS, lambda slope, _: self._push(self.torque) * slope / self.radius, "negative"
         else:
@@ -219,7 +232,8 @@ class _Wheel:
         if with_band:
             drop = 0.0 if self.kind == "current" else self.drop
             why = "drop_explains_dead_band"
-            yield COULOMB, lambda slope, band: self._push(self._torque(slope)) * (band - drop), why
+            for name in (COULOMB, BACKWARD) if offset_seen else (COULOMB,):
+                yield name, lambda slope, level: self._push(self._torque(slope)) * (level - drop), why
 
     def _emf(self, slope: float) -> float:
         """K_v [V s/rad] from the slope [V s/rad]; 0 where the viscous friction of the file leaves none."""
@@ -258,12 +272,14 @@ class _Wheel:
 
     def put(self, robot: Robot, key: str, number: float) -> Robot:
         """The robot with a number; other levels of Coulomb friction at the wheel go along where they have to."""
-        robot = Key.parse(key).set(robot, number, checked=False)
-        if key != self.key(COULOMB):
-            return robot
         wheels = robot.friction.wheels
-        for name, least in (("coulomb_backward", False), ("breakaway", True), ("breakaway_backward", True)):
-            if getattr(wheels, name) is not None:
-                other = Key.parse(self.key(f"friction.wheels.{name}"))
-                robot = other.set(robot, max(number, other.get(robot)) if least else number, checked=False)
+        if key == self.key(BACKWARD) and wheels.coulomb_backward is None:
+            wheels = wheels.replace(coulomb_backward=wheels.coulomb)
+            robot = robot.replace(friction=robot.friction.replace(wheels=wheels))
+        robot = Key.parse(key).set(robot, number, checked=False)
+        others = ALONG.get(key.partition("[")[0], ())
+        for name in (name for name in others if getattr(wheels, name) is not None):
+            other = Key.parse(self.key(f"friction.wheels.{name}"))
+            least = other.get(robot) if name.startswith("breakaway") else 0.0
+            robot = other.set(robot, max(number, least), checked=False)
         return robot

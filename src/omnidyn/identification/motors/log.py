@@ -13,7 +13,7 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.clocks import usual_step
 from omnidyn.errors import InputError
-from omnidyn.findings.needs import MOTOR_INPUTS, motor_input
+from omnidyn.findings.needs import MOTOR_INPUTS, motor_input, turns_known
 from omnidyn.logs.plateaus import STEPWISE, live_angle
 from omnidyn.logs.resolved import rows_of_mean
 from omnidyn.logs.segments import on_clock_of, segments
@@ -21,14 +21,17 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import SENSORS, Run
 from omnidyn.statement import Statement
-from omnidyn.statistics import stretches
+from omnidyn.statistics import stretches, t_quantile
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
 # Unit of each input, and how many of it in one SI unit.
-INPUTS: dict[str, tuple[str, float]] = dict(zip(MOTOR_INPUTS, (("V", 1.0), ("%", 100.0), ("A", 1.0)), strict=True))
+INPUTS: dict[str, tuple[str, float]] = dict(
+    zip(MOTOR_INPUTS, (("V", 1.0), ("%", 100.0), ("A", 1.0), ("N", 1.0)), strict=True)
+)
 WHEEL, GROUND = "wheel", "ground"
+ANGLE, LENGTH = "rad", "m"  # units of what a motor travels
 HEADING = "heading, the robot turning on the spot"
 
 
@@ -40,6 +43,7 @@ class MotorLog:
     motion [rad/s]: by the angle where there is one. motion_from: its origin in words. pieces: rows between gaps.
     averaged: per motor, over how many rows its motion is a mean; 1 where it is none.
     given: the input as it held, at the times of all sensors, where they share no stamps: rows are those of the motion.
+    travel: unit of the angle, ANGLE; LENGTH of a linear axis, whose speed is in m/s.
     """
 
     run: Run
@@ -52,6 +56,7 @@ class MotorLog:
     pieces: tuple[slice, ...]
     averaged: tuple[int, ...]
     given: tuple[FloatArray, FloatArray] | None = None
+    travel: str = ANGLE
 
     @property
     def t(self) -> FloatArray:
@@ -103,7 +108,10 @@ def motor_logs(
 
 
 def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog:
+    axis = speed == WHEEL and is_axis(run)
     moved = "pose" if speed == GROUND else "wheel_speed" if live_angle(run) is None else "wheel_angle"
+    if axis:
+        moved = "pose" if _along_x(run.pose) is not None else "twist"
     given = (run.t, getattr(run, kind) * INPUTS[kind][1]) if run.staggered and kind not in SENSORS else None
     run = on_clock_of(run, moved)
     put_in, pieces = getattr(run, kind) * INPUTS[kind][1], tuple(segments(run.t))
@@ -117,6 +125,8 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
             )
         angle, measured = run.pose[:, 2:] * wheel_speed(robot.wheels, [0.0, 0.0, 1.0]), None
         origin = HEADING
+    elif axis:
+        angle, measured, origin = _along_x(run.pose), _along_x(run.twist), "x of an axis" if moved == "pose" else "vx"
     elif speed == WHEEL:
         angle, measured = live_angle(run), run.wheel_speed
         origin = "wheel_speed" if angle is None else "wheel_angle"
@@ -127,11 +137,23 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
         raise InputError(
             "the log has no speed and no angle of the motors",
             got=", ".join(run.channels),
-            expected="wheel_angle or wheel_speed",
+            expected="wheel_angle or wheel_speed; x or vx of a linear axis",
             where=run.source,
         )
     averaged = [rows_of_mean(np.asarray(column)) or 1 if angle is None else 1 for column in motion.T]
-    return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces, tuple(averaged), given)
+    travel = LENGTH if axis else ANGLE
+    return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces, tuple(averaged), given, travel)
+
+
+def is_axis(run: Run) -> bool:
+    """Whether a log is of a linear axis: one motor, no speed and no angle of a wheel, but x or vx."""
+    one = run.wheels == 1 and not turns_known(run)
+    return one and (_along_x(run.pose) is not None or _along_x(run.twist) is not None)
+
+
+def _along_x(values: FloatArray | None) -> FloatArray | None:
+    """The first column of a pose or a twist, shape (rows, 1); None where it was not measured."""
+    return None if values is None or not np.isfinite(values[:, 0]).any() else values[:, :1]
 
 
 def averaged_statements(logs: Sequence[MotorLog], allowed: bool = True) -> list[Statement]:
@@ -155,6 +177,41 @@ def orientation(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> float:
 def orientation_of(logs: Sequence[MotorLog], motor: int) -> float:
     """The same of a motor of some logs."""
     return orientation([(log.put_in[:, motor], log.motion[:, motor]) for log in logs])
+
+
+BLOCKS, LEAST_BLOCKS = 20, 8
+MEMORIES = (0.0, 0.05, 0.5)  # [s] over which an input may act
+CERTAIN = 0.998  # quantile of a covariance that is no chance, of which several are tried
+
+
+def follows(pairs: Sequence[tuple[FloatArray, FloatArray]], step: float = 0.0) -> bool | None:
+    """Whether speeds go with their inputs, whichever way, beyond chance; None where too few rows tell.
+
+    pairs: (input, speed) of each log, shape (rows,). step [s]: of a row, 0 of points that have no time: else what the
+    input was up to the row before counts, smoothed over each of MEMORIES.
+    The covariance of both in each of BLOCKS blocks is one number, and their mean is told from 0 by their scatter.
+    """
+    found = []
+    for memory in MEMORIES if step > 0.0 else MEMORIES[:1]:
+        smooth = [_smoothed(put_in, memory / step) if step > 0.0 else put_in for put_in, _ in pairs]
+        u, w = np.concatenate(smooth), np.concatenate([speed for _, speed in pairs])
+        known = np.isfinite(u) & np.isfinite(w)
+        u, w = u[known] - u[known].mean() if known.any() else u[known], w[known]
+        count = min(BLOCKS, len(w) // 2)
+        if count < LEAST_BLOCKS:
+            return None
+        sums = np.array([float(part.sum()) for part in np.array_split(u * (w - w.mean()), count)])
+        found.append(abs(float(sums.mean())) > t_quantile(count - 1, CERTAIN) * float(sums.std(ddof=1)) / count**0.5)
+    return any(found)
+
+
+def _smoothed(put_in: FloatArray, rows: float) -> FloatArray:
+    """The input up to the row before each, its mean by a memory of so many rows. Shape (rows,)."""
+    share, now, found = 1.0 / (1.0 + rows), 0.0, []
+    for value in np.nan_to_num(put_in).tolist():
+        found.append(now)
+        now += share * (value - now)
+    return np.array(found)
 
 
 def rows_with(known: BoolArray, pieces: Sequence[slice]) -> list[tuple[int, int]]:

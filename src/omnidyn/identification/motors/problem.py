@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.motors.estimate import BAND, LAG, LATENCY, SLOPE
+from omnidyn.identification.motors.estimate import BAND, LAG, LATENCY, OFFSET, SLOPE
 from omnidyn.identification.motors.log import CURVE, MEAN, SUB, MotorLog, refined, rows_with
 from omnidyn.identification.output_error.engines.engine import Engine, Weighting
 from omnidyn.identification.output_error.engines.exact import march_piece, padded, used_by
 from omnidyn.identification.output_error.kernel.march import KEEP, PATH, Physics, PhysicsSlopes
-from omnidyn.identification.output_error.problem.nuisances import EARLIEST, LATEST
+from omnidyn.identification.output_error.problem.nuisances import CLEAR, EARLIEST, LATEST, SILENT, errors_from_rest
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Piece, PieceSums, Point
 from omnidyn.identification.output_error.problem.record import SHORTEST, Record
@@ -23,7 +23,15 @@ from omnidyn.model.actuation import Driver
 from omnidyn.model.layout import N_AXES, YAW
 
 
-def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> Record:
+@dataclass(frozen=True, eq=False)
+class MotorRecord(Record):
+    """rest: whether the log begins at rest under an input that is held. It then has one row more, LATEST before the
+    others: a latency shows what was before the log, and that is known."""
+
+    rest: bool = False
+
+
+def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> MotorRecord:
     """One motor of a log; rows whose input the log does not resolve have no outputs. angle: is an output too.
 
     Raises InputError for a motor that the log does not have, InsufficientDataError where no piece is long enough.
@@ -56,10 +64,15 @@ def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> Record
             expected=f"{SHORTEST} rows in a row",
             where=log.run.source,
         )
+    rest = pieces[0][0] == 0 and _begins_at_rest(log.put_in[:, motor], values[:, 0], SPEED not in outputs)
     if between == CURVE:
         t, u, values = refined(t, u, values, pieces)
         pieces = [(SUB * first, SUB * last) for first, last in pieces]
-    return Record(
+    if rest:
+        t, u = np.append(t[0] - LATEST, t), np.append(log.put_in[0, motor], u)
+        values = np.concatenate([np.full((1, len(outputs)), np.nan), values])
+        pieces = [(first + (first > 0), last + 1) for first, last in pieces]
+    return MotorRecord(
         t,
         np.nan_to_num(u)[:, None],
         values,
@@ -69,25 +82,47 @@ def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> Record
         log.run.source,
         False,
         (),
+        rest=rest,
     )
 
 
-def motor_problem(records: Sequence[Record], dead_band: bool, latency: bool) -> MotorProblem:
-    """Free numbers and pieces; each piece starts at a fitted speed, and its angle at a fitted one."""
+def _begins_at_rest(u: FloatArray, measured: FloatArray, travels: bool) -> bool:
+    """Whether an input is held in the first rows, and nothing visibly moves in them.
+
+    An input that is not 0 may also turn a motor round: that takes more rows. travels: an angle is measured.
+    """
+    changed = np.flatnonzero(u[: 10 * SILENT] != u[0])
+    rows = int(changed[0]) if changed.size else min(10 * SILENT, len(u))
+    seen = np.diff(measured[:rows]) if travels else measured[:rows]
+    seen = seen[np.isfinite(seen)]
+    if rows < (4 * SILENT if u[0] else SILENT) or len(seen) < 2:
+        return False
+    return errors_from_rest(seen, bool(u[0])) <= CLEAR
+
+
+def motor_problem(
+    records: Sequence[MotorRecord], dead_band: bool, latency: bool, offset: bool = False, margin: bool = False
+) -> MotorProblem:
+    """Free numbers and pieces; each piece starts at a fitted speed, and its angle at a fitted one; a log that begins at
+    rest starts there. margin: leave out the rows that a latency would leave out, whether one is free or not.
+    """
     most = max(float(np.abs(r.voltage).max()) for r in records)
     if most == 0.0:
         raise InsufficientDataError("the motor was never driven", got="an input of 0 throughout", expected="an input")
     numbers = [Parameter(SLOPE, 1.0, 1e-9, 1e9, True), Parameter(LAG, 0.1, 1e-5, 1e3, True)]
     if dead_band:
         numbers.append(Parameter(BAND, 0.0, 0.0, 0.5 * most))
+    if offset:
+        numbers.append(Parameter(OFFSET, 0.0, -0.5 * most, 0.5 * most))
     columns = dict.fromkeys(name for r in records for name, _ in r.columns) if latency else ()
     late = [Parameter(f"{LATENCY}.{name}", 0.0, EARLIEST, LATEST) for name in columns]
     return MotorProblem(
-        (*numbers, *late), tuple(_piece(r, first, last, latency) for r in records for first, last in r.pieces)
+        (*numbers, *late), tuple(_piece(r, first, last, latency or margin) for r in records for first, last in r.pieces)
     )
 
 
-def _piece(record: Record, first: int, last: int, latency: bool) -> Piece:
+def _piece(record: MotorRecord, first: int, last: int, late: bool) -> Piece:
+    rest = record.rest and first == 0
     start, offset = np.zeros(N_AXES), np.zeros(len(record.columns))
     for c, name in enumerate(record.columns):
         column = record.outputs[first : last + 1, c]
@@ -95,16 +130,15 @@ def _piece(record: Record, first: int, last: int, latency: bool) -> Piece:
         begin = float(known[0]) if known.size else 0.0
         if name == ANGLE:
             offset[c] = begin
-        else:
+        elif not rest:
             start[YAW] = begin
-    free = np.array([False, False, True, *(name == ANGLE for name in record.columns)])
-    margin = min(LATEST, 0.1 * float(record.t[last] - record.t[first])) if latency else 0.0
+    free = np.array([False, False, not rest, *(name == ANGLE for name in record.columns)])
+    margin = min(LATEST, 0.1 * float(record.t[last] - record.t[first])) if late and not rest else 0.0
     return Piece(record, first, last, start, offset, free, np.full(len(record.columns), margin))
 
 
 def begin(problem: MotorProblem, lag: float) -> Point:
     """Slope by the regression of the input on the speed that it would bring about without a dead band."""
-    point = problem.start()
     up = low = 0.0
     for r in {id(piece.record): piece.record for piece in problem.pieces}.values():
         known = np.isfinite(r.outputs[:, 0])
@@ -113,14 +147,19 @@ def begin(problem: MotorProblem, lag: float) -> Point:
             speed = np.gradient(speed, r.t[known]) if len(speed) > 1 else np.zeros_like(speed)
         up += float(np.abs(r.voltage[known, 0]).sum())
         low += float(np.abs(speed).sum())
-    values = point.values.copy()
-    values[0], values[1] = up / low if low > 0.0 else 1.0, lag
-    return replace(point, values=values)
+    return begin_at(problem, {SLOPE: up / low if low > 0.0 else 1.0, LAG: lag})
+
+
+def begin_at(problem: MotorProblem, values: Mapping[str, float]) -> Point:
+    """The start of a problem with these values of its numbers by name."""
+    point = problem.start()
+    known = [values.get(p.name, p.value) for p in problem.parameters]
+    return replace(point, values=np.array(known))
 
 
 # The exact step of one motor, with its derivatives: slope, dead band and lag as numbers of the kernel
 #
-# w' = g u - a w - c sgn w,   a = 1/lag,   g = 1/(slope lag),   c = dead_band g
+# w' = g (u - offset) - a w - c sgn w,   a = 1/lag,   g = 1/(slope lag),   c = dead_band g
 #
 # The kernel knows three axes; the motor is the one that turns, and the other two rest.
 
@@ -129,7 +168,7 @@ SPEED, ANGLE = ("wheel_speed", 0), ("wheel_angle", 0)  # columns
 
 @dataclass(frozen=True, eq=False)
 class MotorProblem(Fitted):
-    """parameters: slope, lag, a dead band where it is asked for, latencies. pieces: what is fitted to."""
+    """parameters: slope, lag, a dead band and an offset where asked for, latencies. pieces: what is fitted to."""
 
     parameters: tuple[Parameter, ...]
     pieces: tuple[Piece, ...]
@@ -166,6 +205,10 @@ class MotorEngine(Engine[MotorProblem]):
         problem, columns, count = self.problem, piece.record.columns, len(self.problem.parameters)
         width, room = len(columns), padded(used_by(piece, count))
         law, by_law, drive, by_drive = step_numbers(values, problem.where(BAND), room)
+        push, by_push, at_offset = np.zeros(N_AXES), np.zeros((N_AXES, room)), problem.where(OFFSET)
+        if at_offset >= 0:
+            push[YAW], by_push[YAW] = -values[at_offset] * drive[YAW, 0], -values[at_offset] * by_drive[YAW, 0]
+            by_push[YAW, at_offset] -= drive[YAW, 0]
         speed_map, travel_map = np.zeros((width, N_AXES)), np.zeros((width, PATH))
         speed_map[:, YAW] = [column == SPEED for column in columns]
         travel_map[:, YAW] = [column == ANGLE for column in columns]
@@ -174,7 +217,7 @@ class MotorEngine(Engine[MotorProblem]):
         physics = Physics(
             law,
             drive,
-            np.zeros(N_AXES),
+            push,
             speed_map,
             travel_map,
             np.zeros(width),
@@ -186,7 +229,7 @@ class MotorEngine(Engine[MotorProblem]):
         slopes = PhysicsSlopes(
             by_law,
             by_drive,
-            np.zeros((N_AXES, room)),
+            by_push,
             np.zeros((width, N_AXES, room)),
             np.zeros((width, PATH, room)),
             np.zeros((width, room)),

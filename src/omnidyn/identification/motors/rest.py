@@ -32,6 +32,7 @@ SLOW = 0.01  # of the largest speed: what is slower may be the noise of a sensor
 MOST = 40  # starts of one motor that are looked at, evenly among all
 LOST = 0.25  # of the largest speed: where only faster motion can be told from noise, rest cannot
 BLOCK = 0.25  # [s]
+BOTH_WAYS = 0.05  # of the largest speed that lasts: as fast a motor turns the other way, too
 LAGS_AT_REST = 1.0
 CURRENT = "current"
 SURE = 5.0  # standard errors of a steady speed, from which the motor turns
@@ -105,13 +106,24 @@ def _columns(logs: Sequence[MotorLog], motor: int) -> Iterator[_MotorRows]:
                         yield column
 
 
+def turns_both_ways(logs: Sequence[MotorLog], motor: int) -> bool:
+    """Whether a motor turns both ways for long: else an offset of its input and a dead band are one number."""
+    speeds = np.concatenate([_lasting(log, motor) for log in logs])
+    least = BOTH_WAYS * float(np.abs(speeds).max(initial=0.0))
+    return bool((speeds > least).any() and (speeds < -least).any())
+
+
 def _largest(log: MotorLog, motor: int) -> float:
-    """The largest speed that lasts [rad/s]: of medians over BLOCK seconds, which spikes do not move."""
+    """The largest speed that lasts [rad/s]."""
+    return float(np.abs(_lasting(log, motor)).max(initial=0.0))
+
+
+def _lasting(log: MotorLog, motor: int) -> FloatArray:
+    """Speeds that last [rad/s]: medians over BLOCK seconds, which spikes do not move."""
     known = log.motion[np.isfinite(log.motion[:, motor]), motor]
     rows = max(1, round(BLOCK / log.step)) if len(log.t) > 1 else 1
     whole = len(known) - len(known) % rows
-    medians = np.median(known[:whole].reshape(-1, rows), axis=1) if whole else known
-    return float(np.abs(medians).max(initial=0.0))
+    return np.median(known[:whole].reshape(-1, rows), axis=1) if whole else known
 
 
 def _column(log: MotorLog, motor: int, rows: slice, largest: float, rough: BoolArray) -> _MotorRows | None:

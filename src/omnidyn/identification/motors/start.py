@@ -28,7 +28,7 @@ from omnidyn.identification.motors.log import MotorLog, orientation, orientation
 from omnidyn.identification.motors.rest import LEAST_REST, Span, noise_of_rows, starts_and_stops, turned_under
 from omnidyn.identification.motors.windows import EDGE_SHARE, LENGTHS, MotorWindows, fit_line, motor_windows
 from omnidyn.logs.motor_table import MotorTable
-from omnidyn.statement import NOTE, Statement
+from omnidyn.statement import NOTE, WARNING, Statement
 from omnidyn.statistics import sensor_step, t_quantile
 
 START, STOP, OFFSET = "start", "stop", "offset"
@@ -53,6 +53,7 @@ NO_LINE: dict[str, tuple[float, tuple[float, float]]] = {
 }
 SHARP = 0.5  # a start whose interval is narrower than this share of it is one that a sentence can name
 HIDDEN = 0.02  # of the change of speed over a window: noise by which the inertia may come out too small
+ALIKE = 0.05  # relative difference of slopes by direction that matters to nobody
 ONE_WAY = 0.98  # of the sides of a window, so that it belongs to one direction
 
 
@@ -153,6 +154,17 @@ def motor_starts(
                 turned = turned_under(logs, motor, side, way)
                 found.append(direction_of(motor, side, logs[0].unit, up, down, _numbers(line, way, row), turned))
     return tuple(found)
+
+
+def slopes_by_direction(starts: Sequence[MotorStart], travel: str) -> Iterator[Statement]:
+    """Which motors have a slope of their own in each direction, beyond their intervals and by more than ALIKE."""
+    for one, other in pairwise(starts):
+        (low, high), (least, most) = one.ci95[SLOPE], other.ci95[SLOPE]
+        apart = abs(one.value[SLOPE] - other.value[SLOPE]) > ALIKE * abs(one.value[SLOPE])
+        if one.motor == other.motor and apart and (high < least or most < low):
+            numbers = {"slopes": (one.value[SLOPE], other.value[SLOPE]), "ci95": (one.ci95[SLOPE], other.ci95[SLOPE])}
+            directions = {"directions": (one.direction, other.direction), "unit": f"{one.unit} s/{travel}"}
+            yield Statement("slopes_differ_by_direction", WARNING, f"motor {one.motor + 1}", numbers | directions)
 
 
 def direction_of(

@@ -11,16 +11,25 @@ import numpy as np
 
 from omnidyn.document import Document, Points, Table
 from omnidyn.document import plain as plain_values
-from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.errors import InsufficientDataError
 from omnidyn.findings.finding import Verdict
 from omnidyn.findings.fitness import MOTORS as MOTORS_USE
 from omnidyn.identification.grouping import held_out
 from omnidyn.identification.log_verdicts import checked, log_verdicts, of_motors, told_why, unfit, verdict_advice
 from omnidyn.identification.methods import OUTPUT_ERROR, STEADY_STATE, MotorFit, MotorLine
-from omnidyn.identification.motors.choice import fit_rmse, is_late
+from omnidyn.identification.motors.choice import fit_rmse
 from omnidyn.identification.motors.estimate import HEAD, PAYS, MotorEstimate, named
-from omnidyn.identification.motors.fit import fit_motor, logs_of_free_runs
-from omnidyn.identification.motors.log import GROUND, MotorLog, averaged_statements, motor_logs, orientation_of
+from omnidyn.identification.motors.fit import logs_of_free_runs
+from omnidyn.identification.motors.held_out import written_and_plain
+from omnidyn.identification.motors.log import (
+    ANGLE,
+    GROUND,
+    MotorLog,
+    averaged_statements,
+    is_axis,
+    motor_logs,
+    orientation_of,
+)
 from omnidyn.identification.motors.rest import CURRENT, turned_under
 from omnidyn.identification.motors.start import (
     STARTS_HEAD,
@@ -28,6 +37,7 @@ from omnidyn.identification.motors.start import (
     is_slow,
     motor_starts,
     points_of_logs,
+    slopes_by_direction,
     starts_of_points,
     windows_of_points,
 )
@@ -50,7 +60,7 @@ from omnidyn.statement import ERROR, NOTE, WARNING, Statement, as_verdict, by_se
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-from omnidyn.identification.motors.estimate import BAND, SLOPE
+from omnidyn.identification.motors.estimate import BAND, OFFSET
 from omnidyn.identification.motors.start import START
 
 MISSES = 0.1  # of the largest speed: error of a line that describes no motor
@@ -62,7 +72,7 @@ SAME_SPEED = 1e-9  # spread of speeds over the largest, below which they are one
 class MotorStudy(Shown):
     """motors: an estimate each, the last for all together where there are several in windows.
 
-    plain: the same motors without a dead band, from free runs only. method, kind, unit, speed_from: how they were
+    plain: the same motors by slope and lag alone, from free runs only. method, kind, unit, speed_from: how they were
     found. windows: that the lines go through, None of free runs; drawn: those of a picture of free runs. starts: each
     direction of each motor by itself, with the input at which it sets off. supply [V]: of a duty, the mean of the logs;
     NaN where it is not logged. log_warnings: of the logs; `warnings` has those of each motor too. verdicts:
@@ -98,13 +108,19 @@ class MotorStudy(Shown):
         """What the logs say of each motor, and whether its dead band is any use on held-out logs."""
         known = {start.motor for start in self.starts if start.sharp}
         bent = {curve.motor for curve in self.curves}
-        found = [motor.statement(started=motor.motor in known) for motor in self.motors if motor.motor not in bent]
+        lines = [motor for motor in self.motors if motor.motor not in bent]
+        found = [motor.statement(started=motor.motor in known) for motor in lines]
         found += [curve.statement() for curve in self.curves]
-        for band, plain in zip(self.motors, self.plain, strict=False):
-            if band.dead_band_seen and band.held_out > (1.0 - PAYS) * plain.held_out:
-                errors = {"with_band": band.held_out, "without": plain.held_out}
-                found.append(Statement("held_out_no_better", WARNING, band.name, errors))
-        return (*found, *(start.statement() for start in self.starts))
+        found += [statement for motor in self.motors if (statement := motor.of_blocks())]
+        for written, plain in zip(self.motors, self.plain, strict=False):
+            if written.dead_band_seen and written.held_out > (1.0 - PAYS) * plain.held_out:
+                errors = {"written": written.held_out, "plain": plain.held_out, "travel": written.travel}
+                found.append(Statement("held_out_no_better", WARNING, written.name, errors))
+        return (
+            *found,
+            *(start.statement() for start in self.starts),
+            *slopes_by_direction(self.starts, self.motors[0].travel),
+        )
 
     @property
     def verdict(self) -> Statement:
@@ -163,7 +179,7 @@ class MotorStudy(Shown):
         """The study as JSON can hold it."""
         motors = [motor.to_dict() for motor in self.motors]
         for record, plain in zip(motors, self.plain, strict=False):
-            record["without_dead_band"] = plain.to_dict()
+            record["plain"] = plain.to_dict()
         return {
             **as_verdict(self.verdict),
             "ok": not self.failed,
@@ -203,6 +219,7 @@ def study_motors(
     Raises InputError for a run without the channels, InsufficientDataError where the motors say nothing.
     """
     more = ["pose"] if isinstance(asked, MotorLine) and asked.speed == GROUND else []
+    more += ["pose", "twist"] if any(is_axis(run) for run in runs) else []
     verdicts = log_verdicts([of_motors(log, *more) for log in logs], robot, progress)
     with told_why(verdicts, MOTORS_USE):
         if isinstance(asked, MotorFit):
@@ -307,16 +324,13 @@ def _free_runs(runs: Sequence[Run], asked: MotorFit, hold_out: Sequence[str], pr
     away = held_out([run.source for run in runs], hold_out)
     kept = [run for run, out in zip(runs, away, strict=True) if out]
     logs = logs_of_free_runs([run for run, out in zip(runs, away, strict=True) if not out], asked.input)
-    fitted: list[Run] = [log.run for log in logs]
-    how: dict[str, Any] = {"kind": logs[0].kind, "between": asked.between, "loss": asked.loss}
     motors = [
         m for m in range(min(log.motors for log in logs)) if all(np.isfinite(log.put_in[:, m]).any() for log in logs)
     ] or [0]
-    latency, pairs = _latency(asked.nuisances), []
+    pairs = []
     for motor in motors:
         progress(Report(f"fitting motor {motor + 1} of {len(motors)}"))
-        late = is_late(fitted, motor, **how) if latency is None else latency
-        fits = [fit_motor(fitted, motor, dead_band=band, latency=late, **how) for band in (True, False)]
+        fits = written_and_plain(logs, motor, asked)
         pairs.append([replace(fit, held_out=fit_rmse(fit, kept)) if kept else fit for fit in fits])
     bands, plain = zip(*pairs, strict=True)
     origin = logs[0].motion_from if logs[0].speed is None else "wheel_speed"
@@ -336,17 +350,15 @@ def _free_runs(runs: Sequence[Run], asked: MotorFit, hold_out: Sequence[str], pr
         starts=starts,
         supply=_supply(logs),
         drawn=seen,
-        log_warnings=tuple(averaged_statements(logs, False)),
+        log_warnings=tuple(averaged_statements(logs, False)) + _of_counts(runs, logs),
     )
     return _along(study, curves_of_points(points_of_logs(logs)) if slow else curves_of_logs(logs))
 
 
-def _latency(nuisances: Sequence[str] | None) -> bool | None:
-    """Whether to fit a latency; None is where the logs show one."""
-    for name in nuisances or ():
-        if name.partition(".")[0] != "latency":
-            raise InputError("of the motors only latency can be fitted", got=name, where="nuisances")
-    return None if nuisances is None else bool(nuisances)
+def _of_counts(runs: Sequence[Run], logs: Sequence[MotorLog]) -> tuple[Statement, ...]:
+    """Whether speeds were taken for the angles of which they are differences."""
+    added = any(run.wheel_speed is not None for run in runs) and all(log.speed is None for log in logs)
+    return (Statement("speeds_added_up", NOTE),) if added and logs[0].travel == ANGLE else ()
 
 
 def _supply(logs: Sequence[MotorLog]) -> float:
@@ -378,9 +390,7 @@ def motors_verdict(
     """
     lines = [motor for motor in motors if motor.motor is not None] or list(motors)  # else that of all together
     levels = {line.name: _levels(line, starts) for line in lines}
-    blind = [
-        line.name for line in lines if not line.ci95[SLOPE][0] > 0.0 and not levels[line.name]
-    ]  # may have no slope
+    blind = [line.name for line in lines if not line.answers and not levels[line.name]]
     if len(blind) == len(lines):
         return Statement("no_motor_answers", ERROR, numbers={"motors": blind})
     seen = [line for line in lines if levels[line.name]]
@@ -406,7 +416,10 @@ def motors_verdict(
 def _levels(motor: MotorEstimate, starts: Sequence[MotorStart]) -> list[float]:
     """The inputs at which a motor starts; none where that is not known."""
     sharp = [start.value[START] for start in starts if start.motor == motor.motor and start.sharp]
-    return sharp or ([motor.value[BAND]] if motor.dead_band_seen else [])
+    if sharp or not motor.dead_band_seen:
+        return sharp
+    offset = motor.value[OFFSET] if motor.offset_seen else 0.0
+    return list(dict.fromkeys([motor.value[BAND] + offset, motor.value[BAND] - offset]))
 
 
 def _starts(

@@ -16,8 +16,8 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InsufficientDataError
-from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, SLOPE, WINDOWS, MotorEstimate
-from omnidyn.identification.motors.log import InputIntegral, MotorLog, rows_with
+from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, OFFSET, SLOPE, WINDOWS, MotorEstimate
+from omnidyn.identification.motors.log import InputIntegral, MotorLog, follows, rows_with
 from omnidyn.logs.plateaus import STEPWISE, find_plateaus
 from omnidyn.logs.resolved import unresolved_input
 from omnidyn.statistics import (
@@ -54,7 +54,7 @@ class MotorWindows:
     unresolved, resting: windows left out because the log does not resolve their input, or because the motor rested.
     settled: start-ups were left out, so that nothing is known of the inertia. every: of a very long log, only every so
     many-th window was used. smear [s]: over which the speed at an end of a window is averaged; a lag that is shorter
-    comes out too short. NaN where nothing is known of the inertia.
+    comes out too short. NaN where nothing is known of the inertia. travel: of `MotorLog`.
     """
 
     put_in: FloatArray
@@ -74,6 +74,7 @@ class MotorWindows:
     settled: bool
     every: int
     smear: float = math.nan
+    travel: str = "rad"
 
     def of(self, motor: int | None) -> tuple[FloatArray, ...]:
         """(put_in, speed, speed_std, side, change, block) of one motor, or of all."""
@@ -135,7 +136,27 @@ def motor_windows(
         settled=steady or share is not None,
         every=every,
         smear=max(_smear(log, length) for log in logs),
+        travel=first.travel,
     )
+
+
+def line_numbers(logs: Sequence[MotorLog], motor: int) -> dict[str, float] | None:
+    """Slope, dead band, offset and lag of a motor by least squares over its windows, where a free run may begin; None
+    where the windows do not tell them, or what they tell is no motor.
+
+    mean u = k (mean w) + c (mean sgn w) + offset + m (change of w / length)
+    """
+    try:
+        long = [log for log in logs if len(log.t) > MIN_ROWS]
+        put_in, speed, _, side, change, _ = motor_windows(long).of(motor)
+    except InsufficientDataError:
+        return None
+    table = np.stack([speed, side, np.ones(len(speed)), change], axis=1)
+    numbers, _, rank, _ = np.linalg.lstsq(table, put_in, rcond=1e-9)
+    slope, band, offset, inertia = numbers.tolist()
+    if rank < table.shape[1] or slope <= 0.0 or inertia <= 0.0:
+        return None
+    return {SLOPE: slope, BAND: max(band, 0.0), OFFSET: offset, LAG: inertia / slope}
 
 
 def _usual_speed(logs: Sequence[MotorLog]) -> float:
@@ -360,6 +381,8 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
         rmse=error / abs(slope) if slope else math.inf,
         unidentifiable=tuple(name for name, draws in numbers.items() if np.isnan(draws[0])),
         one_way=bool(np.abs(side.sum()) > 0.98 * np.abs(side).sum()),
+        answers=follows([(put_in, speed)]) is not False,
+        travel=windows.travel,
         rest=float(np.fmax.reduce(windows.rest if motor is None else windows.rest[[motor]])),
         draws={name: draws[1:] for name, draws in numbers.items()},
     )

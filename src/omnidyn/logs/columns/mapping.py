@@ -16,7 +16,7 @@ from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
 from omnidyn.logs.columns.guessed import Doubt
 from omnidyn.model.robot_file import toml_literal
 from omnidyn.statement import Statement
-from omnidyn.units import ANGLE, CURRENT, DUTY, LENGTH, SPEED, TURN_RATE, VOLTAGE, Unit, parse_unit
+from omnidyn.units import ANGLE, CURRENT, DUTY, FORCE, LENGTH, SPEED, TURN_RATE, VOLTAGE, Unit, parse_unit
 from omnidyn.units import TIME as TIME_QUANTITY
 
 SIDED = ("wheel_angle", "wheel_speed", "wheel_speed_command")
@@ -32,6 +32,7 @@ _QUANTITIES = {
     "rad_s": TURN_RATE,
     "m": LENGTH,
     "m_s": SPEED,
+    "N": FORCE,
 }
 _RIM = {TURN_RATE: SPEED, ANGLE: LENGTH}  # what a wheel does -> what its rim does
 _SPEC = re.compile(r"(?P<invert>-)?(?P<name>.+?)(?::(?P<unit>[^:@]*))?(?:@(?P<side>wheel|motor))?", re.DOTALL)
@@ -99,7 +100,7 @@ def component_channel(component: str) -> str:
         raise InputError(
             "unknown channel",
             got=component,
-            expected="t, u1.., d1.., i1.., a1.., w1.., w1_cmd.., vx, vy, omega, vx_cmd.., x, y, heading or supply",
+            expected="t, u1.., d1.., i1.., a1.., w1.., w1_cmd.., vx, vy, omega, vx_cmd.., x, y, heading, supply or f1",
         )
     return found[0]
 

@@ -204,10 +204,10 @@ def _begins_at_rest(record: Record, twist: FloatArray | None, first: int, last: 
         return False
     seen = twist[first : first + rows]
     known = [seen[kept, axis] for axis in range(seen.shape[1]) if (kept := np.isfinite(seen[:, axis])).any()]
-    return bool(known) and all(_motion(each, driven) <= CLEAR for each in known)
+    return bool(known) and all(errors_from_rest(each, driven) <= CLEAR for each in known)
 
 
-def _motion(speed: FloatArray, trend: bool) -> float:
+def errors_from_rest(speed: FloatArray, trend: bool) -> float:
     """How many standard errors a speed is from 0, in the mean; in its trend, too, where that counts."""
     n, mean = len(speed), float(speed.mean())
     time = np.arange(n) - 0.5 * (n - 1)

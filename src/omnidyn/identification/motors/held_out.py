@@ -1,0 +1,232 @@
+"""Which numbers a free run of a motor needs beside slope and lag: those without which it predicts held-out rows worse.
+
+The rows are cut into blocks of equal length. A fifth of them at a time has no outputs for a fit, and is predicted by
+its free run, which goes on through them under the input of the log. Of dead band, offset and latency the one is left
+out that held-out rows need least, as long as they do not need it by more than chance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.errors import InputError
+from omnidyn.identification.methods import AUTO, MotorFit
+from omnidyn.identification.motors.estimate import BAND, LATENCY, OFFSET, HeldOut, MotorEstimate
+from omnidyn.identification.motors.fit import fit_motor, solved
+from omnidyn.identification.motors.log import WORDS, MotorLog
+from omnidyn.identification.motors.problem import MotorEngine, MotorProblem, MotorRecord, motor_problem, motor_record
+from omnidyn.identification.motors.rest import turns_both_ways
+from omnidyn.identification.motors.windows import line_numbers
+from omnidyn.identification.output_error.fit import degrees as degrees_of
+from omnidyn.identification.output_error.problem.nuisances import earliest
+from omnidyn.identification.output_error.problem.problem import Point
+from omnidyn.identification.output_error.solve.solver import Solution, Solver
+
+NUMBERS = (BAND, OFFSET, LATENCY)
+FOLDS, BLOCKS, LEAST_BLOCK = 5, 20, 8  # rows of a block at least
+FEW = 12  # iterations of a fit without some blocks, which begins at that to all
+CLEAR = 2.0  # standard errors of its gain by which a number must pay
+WILD = 5.0  # scales of the noise that an error counts at most, where it is that of Student's t
+
+
+@dataclass(frozen=True, eq=False)
+class MotorModel:
+    """names: of NUMBERS, fitted beside slope and lag. between: how the input goes from row to row. values: of its fit.
+
+    errors (BLOCKS,): squared error of each block over the variance of the output, by fits without the block. size:
+    root mean square of each output over its spread, geometric mean.
+    """
+
+    names: tuple[str, ...]
+    between: str
+    values: Mapping[str, float]
+    errors: FloatArray
+    size: float
+
+    def pays(self, smaller: MotorModel) -> bool:
+        """Whether it predicts held-out rows better than a model with fewer numbers, by more than chance."""
+        gain = smaller.errors - self.errors
+        return float(gain.sum()) > CLEAR * float(gain.std(ddof=1)) * np.sqrt(len(gain))
+
+
+@dataclass(frozen=True, eq=False)
+class ModelChoice:
+    """model: with the numbers that pay; plain: with none of NUMBERS; rejected: those that do not pay."""
+
+    model: MotorModel
+    plain: MotorModel
+    rejected: tuple[str, ...]
+
+
+def choose_model(
+    logs: Sequence[MotorLog], motor: int, between: str, loss: str, wanted: Sequence[str] | None = None
+) -> ModelChoice | None:
+    """What a motor needs; None where the logs are too short to hold any block out.
+
+    wanted: of NUMBERS, all of which are taken; None: those that pay. between, loss: as `fit_motor` has them.
+    """
+    every = tuple(name for name in NUMBERS if wanted is None or name in wanted)
+    if not turns_both_ways(logs, motor):
+        every = tuple(name for name in every if name != OFFSET)
+    held_out = _HeldOut(logs, motor, degrees_of(loss))
+    if not held_out.long_enough:
+        return None
+    ways = [between] if between != AUTO else list(WORDS)
+    plain = min((held_out.model(way, ()) for way in ways), key=lambda model: model.size)
+    model = min((held_out.model(way, every) for way in ways), key=lambda model: model.size) if every else plain
+    while wanted is None and model.names:
+        if useless := [name for name in model.names if not held_out.is_plausible(model, name)]:
+            model = held_out.model(model.between, _without(model.names, *useless), model.values)
+            continue
+        smaller = [
+            held_out.model(way, _without(model.names, name), model.values)
+            for name in model.names
+            for way in (ways if name == LATENCY else [model.between])  # another reading may be as late
+        ]
+        least = min(smaller, key=lambda other: other.size)
+        if model.pays(least):
+            break
+        model = least
+    if wanted is None and plain.size <= model.size:
+        model = plain
+    return ModelChoice(model, plain, _without(every, *model.names))
+
+
+def _without(names: Sequence[str], *away: str) -> tuple[str, ...]:
+    return tuple(name for name in names if name not in away)
+
+
+class _HeldOut:
+    """One motor of some logs, in blocks."""
+
+    def __init__(self, logs: Sequence[MotorLog], motor: int, degrees: float):
+        self.degrees, self.line = degrees, line_numbers(logs, motor)
+        self._records = {way: [motor_record(log, motor, way, False) for log in logs] for way in WORDS}
+        first = next(iter(self._records.values()))
+        self.earliest = earliest(first)
+        self.long_enough = sum(_measured(record).sum() for record in first) >= BLOCKS * LEAST_BLOCK
+
+    def is_plausible(self, model: MotorModel, name: str) -> bool:
+        """Whether a number of NUMBERS is one: no dead band of 0, and no latency before any that a filter explains."""
+        values = [value for key, value in model.values.items() if key.partition(".")[0] == name]
+        return all(value > 0.0 if name == BAND else value > self.earliest or name == OFFSET for value in values)
+
+    def model(self, way: str, names: Sequence[str], near: Mapping[str, float] | None = None) -> MotorModel:
+        """The model with these numbers, and how well it predicts what it was not fitted to. near: where its fit
+        begins, None: where every fit does.
+        """
+        records = self._records[way]
+        problem = _problem(records, names)
+        whole = solved(problem, self.degrees, near or self.line, near is None)
+        block, most = _blocks(records), WILD * np.sqrt(whole.state.variance) if self.degrees else np.inf
+        squares, rows = np.zeros((2, BLOCKS, len(problem.columns)))
+        for fold in range(FOLDS):
+            point = self._without(records, [own % FOLDS == fold for own in block], names, whole)
+            outputs = MotorEngine(problem).outputs(point)
+            for piece, (predicted, _) in zip(problem.pieces, outputs, strict=True):
+                at = [problem.columns.index(column) for column in piece.record.columns]
+                own = block[next(k for k, record in enumerate(records) if record is piece.record)]
+                error = np.clip(piece.record.outputs - predicted, -np.broadcast_to(most, len(at)), most)
+                there = np.isfinite(error) & (own % FOLDS == fold)[:, None]
+                there[: piece.first] = there[piece.last + 1 :] = False
+                for c, column in enumerate(at):
+                    known = there[:, c]
+                    squares[:, column] += np.bincount(own[known], error[known, c] ** 2, BLOCKS)
+                    rows[:, column] += np.bincount(own[known], minlength=BLOCKS)
+        spread = _spread(records, problem)
+        mean = squares.sum(axis=0) / np.maximum(rows.sum(axis=0), 1.0) / spread
+        return MotorModel(
+            tuple(names),
+            way,
+            dict(zip(problem.names, whole.state.point.values.tolist(), strict=True)),
+            (squares / np.maximum(rows, 1.0) / spread).mean(axis=1),
+            float(np.exp(0.5 * np.log(np.maximum(mean, 1e-300)).mean())),
+        )
+
+    def _without(
+        self, records: Sequence[MotorRecord], away: Sequence[FloatArray], names: Sequence[str], whole: Solution
+    ) -> Point:
+        """The fit without the outputs of the rows `away` of each record, near that to all."""
+        kept = [
+            replace(record, outputs=np.where(out[:, None], np.nan, record.outputs))
+            for record, out in zip(records, away, strict=True)
+        ]
+        problem = _problem(kept, names)
+        solver = Solver(problem, MotorEngine(problem), self.degrees)
+        scales = whole.state.variance if self.degrees else None
+        return solver.minimise(whole.state.point, FEW, scales=scales).state.point
+
+
+def _problem(records: Sequence[MotorRecord], names: Sequence[str]) -> MotorProblem:
+    return motor_problem(records, BAND in names, LATENCY in names, OFFSET in names, margin=True)
+
+
+def _measured(record: MotorRecord) -> IntArray:
+    """1 for each row in which something was measured. Shape (rows,)."""
+    return np.isfinite(record.outputs).any(axis=1).astype(np.int64)
+
+
+def _blocks(records: Sequence[MotorRecord]) -> list[IntArray]:
+    """The number of the block of each row of each record, by the rows in which something was measured."""
+    count = np.cumsum(np.concatenate([_measured(record) for record in records])) - 1
+    block = np.maximum(count, 0) * BLOCKS // (int(count[-1]) + 1)
+    return np.split(block, np.cumsum([len(record.t) for record in records])[:-1])
+
+
+def _spread(records: Sequence[MotorRecord], problem: MotorProblem) -> FloatArray:
+    """Variance of each output over all records. Shape (columns,)."""
+    found = []
+    for column in problem.columns:
+        parts = [r.outputs[:, r.columns.index(column)] for r in records if column in r.columns]
+        found.append(float(np.nanvar(np.concatenate(parts))) or 1.0)
+    return np.array(found)
+
+
+def written_and_plain(logs: Sequence[MotorLog], motor: int, asked: MotorFit) -> tuple[MotorEstimate, MotorEstimate]:
+    """(a motor by the numbers that improve held-out blocks, or those that are asked for; by slope and lag alone).
+
+    Raises InputError for a nuisance that motors do not have, and what `fit_motor` raises.
+    """
+    wanted = None if asked.nuisances is None else _wanted(asked.nuisances)
+    choice = choose_model(logs, motor, asked.between, asked.loss, wanted)
+    runs = [log.run for log in logs]
+
+    def fit(names: Sequence[str], model: MotorModel | None) -> MotorEstimate:
+        return fit_motor(
+            runs,
+            motor,
+            dead_band=BAND in names,
+            offset=OFFSET in names,
+            latency=LATENCY in names,
+            kind=logs[0].kind,
+            between=model.between if model else asked.between,
+            loss=asked.loss,
+            start=model.values if model else None,
+        )
+
+    if choice is None:
+        return fit(wanted or (BAND,), None), fit((), None)
+    model, plain = choice.model, choice.plain
+    written = fit(model.names, model)
+    intervals = {name: _interval(fit((*model.names, name), model), name) for name in choice.rejected}
+    blocks = HeldOut(model.size, plain.size)
+    late = tuple(written.late_statements(min(log.step for log in logs)))
+    return replace(written, blocks=blocks, rejected=intervals, warnings=(*written.warnings, *late)), fit((), plain)
+
+
+def _interval(fit: MotorEstimate, name: str) -> tuple[float, float]:
+    """The interval of one of NUMBERS; of latencies that of the first."""
+    return next(ends for key, ends in fit.ci95.items() if key.partition(".")[0] == name)
+
+
+def _wanted(nuisances: Sequence[str]) -> tuple[str, ...]:
+    """The numbers beside slope and lag that are asked for: a dead band with whatever nuisances."""
+    kinds = [name.partition(".")[0] for name in nuisances]
+    for name, kind in zip(nuisances, kinds, strict=True):
+        if kind not in NUMBERS:
+            raise InputError("no such nuisance of motors", got=name, expected=", ".join(NUMBERS), where="nuisances")
+    return tuple(name for name in NUMBERS if name in (BAND, *kinds))
