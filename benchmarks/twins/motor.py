@@ -1,0 +1,88 @@
+"""One motor by plain means: its free run, and the least squares of it. Nothing of omnidyn in it.
+
+inertia w' = u(t - latency) - offset - slope w - dead_band sgn w,   inertia = slope lag
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from benchmarks.twins.worlds import Array, axis_run
+
+STEP = 5e-4  # [s] of the integrator
+TRIM = 0.15  # of the rows of a window at each end, where a sensor has spikes
+LAGS, BANDS = (0.05, 0.4), (0.01, 0.1)  # starts of a plain fit: [s], and shares of the input
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One motor in one log: t [s], u [V, % of duty or A], and its speed [rad/s] or angle [rad], shape (rows,) each.
+
+    window: rows whose mean speed is compared. spiky: its sensor has spikes, so that the mean is a trimmed one.
+    """
+
+    t: Array
+    u: Array
+    speed: Array | None = None
+    angle: Array | None = None
+    window: int = 1
+    spiky: bool = False
+
+    @property
+    def measured(self) -> Array:
+        """Speed of each window [rad/s]; NaN where nothing was measured."""
+        if self.angle is not None:
+            edges = np.arange(0, len(self.t), self.window)
+            return np.diff(self.angle[edges]) / np.diff(self.t[edges])
+        assert self.speed is not None
+        return self._means(self.speed, TRIM if self.spiky else 0.0)
+
+    def error(self, numbers: Mapping[str, float]) -> Array:
+        """Free run less measured speed, of each window that was measured [rad/s]."""
+        model, measured = self._means(free_run(numbers, self.t, self.u)), self.measured
+        count = min(len(model), len(measured))
+        left = model[:count] - measured[:count]
+        return left[np.isfinite(left)]
+
+    def _means(self, speed: Array, trim: float = 0.0) -> Array:
+        count = len(speed) // self.window
+        rows = np.sort(speed[: count * self.window].reshape(count, self.window), axis=1)
+        cut = int(trim * self.window)
+        rows = rows[:, cut : self.window - cut]
+        seen = np.isfinite(rows)
+        total = np.where(seen, rows, 0.0).sum(axis=1)
+        return np.where(seen.any(axis=1), total / np.maximum(seen.sum(axis=1), 1), np.nan)
+
+
+def free_run(numbers: Mapping[str, float], t: Array, u: Array) -> Array:
+    """Speed at each row [rad/s], from rest; the input of a row holds until the next."""
+    slope, inertia = numbers["slope"], numbers["slope"] * numbers["lag"]
+    known, grid = np.isfinite(u), np.arange(t[0], t[-1] + STEP, STEP)
+    acting = grid - numbers.get("latency", 0.0)
+    row = np.searchsorted(t[known], acting + 1e-9, side="right") - 1
+    fine = np.where(row < 0, 0.0, u[known][np.maximum(row, 0)]) - numbers.get("offset", 0.0)
+    band = max(numbers.get("dead_band", 0.0), 0.0)
+    return np.interp(t, grid, axis_run(fine, STEP, 1.0 / inertia, slope, band, band)[1])
+
+
+def plain_fit(drives: Sequence[Drive], *, offset: bool = False) -> dict[str, float]:
+    """Slope, dead band and lag by least squares of free runs, and an offset where that is asked."""
+    names = ["slope", "dead_band", "lag", *(["offset"] if offset else [])]
+    size = float(np.nanpercentile(np.abs(np.concatenate([drive.u for drive in drives])), 90))
+    slope = size / float(np.nanpercentile(np.abs(np.concatenate([drive.measured for drive in drives])), 90))
+
+    def numbers(x: Array) -> dict[str, float]:
+        return dict(zip(names, (slope * np.exp(x[0]), size * x[1], np.exp(x[2]), *(size * x[3:])), strict=True))
+
+    def left(x: Array) -> Array:
+        return np.concatenate([drive.error(numbers(x)) for drive in drives])
+
+    low, high = [-3.0, 0.0, np.log(1e-3)], [3.0, 1.0, np.log(20.0)]
+    bounds = ([*low, *([-1.0] * offset)], [*high, *([1.0] * offset)])
+    starts = [[0.0, band, np.log(lag), *([0.0] * offset)] for band in BANDS for lag in LAGS]
+    found = [least_squares(left, start, bounds=bounds, x_scale=0.1) for start in starts]
+    return numbers(min(found, key=lambda solution: solution.cost).x)
