@@ -27,7 +27,7 @@ class Answer:
     """record: of the result, as `--json` writes it, {} where the call failed: `error` says why. found: the result.
     seconds: of processor time."""
 
-    record: dict[str, Any] = field(default_factory=dict)
+    record: Mapping[str, Any] = field(default_factory=dict)
     found: Identification | None = None
     error: str = ""
     seconds: float = 0.0

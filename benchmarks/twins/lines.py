@@ -45,18 +45,15 @@ class Lines:
     def __init__(self, add: Callable[..., None], twin: str) -> None:
         self._add, self._twin = add, twin
 
-    def at_most(
-        self, what: str, values: Sequence[float | None], most: float, pick: Callable[..., Any] = np.max
-    ) -> None:
-        """The largest, or another pick, of numbers that must be small; None: the number is not there."""
+    def at_most(self, what: str, values: Sequence[float | None], most: float, **how: Any) -> None:
+        """The largest of numbers that must be small; None: the number is not there. how: `pick` another one than the
+        largest, and how many `logs` there are."""
         known = [value for value in values if value is not None]
         missing = len(values) - len(known)
-        value = float(pick(known)) if known else None
+        value = float(how.get("pick", np.max)(known)) if known else None
         words = f"{what} (not there in {missing})" if missing else what
-        self._add(
-            f"<= {most:g}", not missing and value is not None and value <= most, twin=self._twin, what=words, value=value,
-            logs=len(values) if logs is None else logs,
-        )  # fmt: skip
+        met = not missing and value is not None and value <= most
+        self._add(f"<= {most:g}", met, twin=self._twin, what=words, value=value, logs=how.get("logs", len(values)))
 
     def share(self, what: str, hits: Sequence[bool], least: float = SHARE) -> None:
         """The share of logs in which something holds."""
@@ -121,7 +118,7 @@ def wrong_radius(lines: Lines, seeds: Sequence[int]) -> None:
             seconds.append(answer.seconds)
     share = [value is not None and value <= AS_GOOD for value in ratio]
     lines.share("free run of a second log <= 1.05 of the true robot's error", share)
-    lines.at_most("... times the true robot's error, median", ratio, AS_GOOD, np.median)
+    lines.at_most("... times the true robot's error, median", ratio, AS_GOOD, pick=np.median)
     lines.share("latency within 10 ms, or none", [value == 0.0 or abs(value - 0.02) <= LATE for value in late])
     lines.told("... latency in ms, median", 1e3 * float(np.median(late)), len(late))
     lines.told("processor time of a log, s, median", float(np.median(seconds)), len(seconds))

@@ -14,6 +14,7 @@ from scipy.optimize import least_squares
 from benchmarks.twins.worlds import Array, axis_run
 
 STEP = 5e-4  # [s] of the integrator
+HOLD, MEAN = "hold", "mean"
 TRIM = 0.15  # of the rows of a window at each end, where a sensor has spikes
 LAGS, BANDS = (0.05, 0.4), (0.01, 0.1)  # starts of a plain fit: [s], and shares of the input
 
@@ -41,9 +42,13 @@ class Drive:
         assert self.speed is not None
         return self._means(self.speed, TRIM if self.spiky else 0.0)
 
-    def error(self, numbers: Mapping[str, float]) -> Array:
-        """Free run less measured speed, of each window that was measured [rad/s]."""
-        model, measured = self._means(free_run(numbers, self.t, self.u)), self.measured
+    def error(self, numbers: Mapping[str, float], between: str = HOLD) -> Array:
+        """Free run less measured speed, of each window that was measured [rad/s].
+
+        between: what the input is between two rows, that of the first or the mean of both.
+        """
+        u = self.u if between == HOLD else np.append(0.5 * (self.u[1:] + self.u[:-1]), self.u[-1])
+        model, measured = self._means(free_run(numbers, self.t, u)), self.measured
         count = min(len(model), len(measured))
         left = model[:count] - measured[:count]
         return left[np.isfinite(left)]
@@ -69,20 +74,23 @@ def free_run(numbers: Mapping[str, float], t: Array, u: Array) -> Array:
     return np.interp(t, grid, axis_run(fine, STEP, 1.0 / inertia, slope, band, band)[1])
 
 
-def plain_fit(drives: Sequence[Drive], *, offset: bool = False) -> dict[str, float]:
-    """Slope, dead band and lag by least squares of free runs, and an offset where that is asked."""
-    names = ["slope", "dead_band", "lag", *(["offset"] if offset else [])]
+def plain_fit(drives: Sequence[Drive]) -> tuple[dict[str, float], str]:
+    """(slope, dead band and lag by least squares of free runs; what the input is between rows, the better of both)."""
     size = float(np.nanpercentile(np.abs(np.concatenate([drive.u for drive in drives])), 90))
     slope = size / float(np.nanpercentile(np.abs(np.concatenate([drive.measured for drive in drives])), 90))
 
     def numbers(x: Array) -> dict[str, float]:
-        return dict(zip(names, (slope * np.exp(x[0]), size * x[1], np.exp(x[2]), *(size * x[3:])), strict=True))
+        return {"slope": slope * np.exp(x[0]), "dead_band": size * x[1], "lag": np.exp(x[2])}
 
-    def left(x: Array) -> Array:
-        return np.concatenate([drive.error(numbers(x)) for drive in drives])
+    def left(x: Array, between: str) -> Array:
+        return np.concatenate([drive.error(numbers(x), between) for drive in drives])
 
-    low, high = [-3.0, 0.0, np.log(1e-3)], [3.0, 1.0, np.log(20.0)]
-    bounds = ([*low, *([-1.0] * offset)], [*high, *([1.0] * offset)])
-    starts = [[0.0, band, np.log(lag), *([0.0] * offset)] for band in BANDS for lag in LAGS]
-    found = [least_squares(left, start, bounds=bounds, x_scale=0.1) for start in starts]
-    return numbers(min(found, key=lambda solution: solution.cost).x)
+    bounds = [-3.0, 0.0, np.log(1e-3)], [3.0, 1.0, np.log(20.0)]
+    found = [
+        (least_squares(left, [0.0, band, np.log(lag)], bounds=bounds, x_scale=0.1, args=(between,)), between)
+        for between in (HOLD, MEAN)
+        for band in BANDS
+        for lag in LAGS
+    ]
+    best, between = min(found, key=lambda pair: pair[0].cost)
+    return numbers(best.x), between
