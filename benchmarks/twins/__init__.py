@@ -31,7 +31,7 @@ def measure(only: Sequence[str] = (), seeds: int | None = None) -> Table:
     for name, show in TWINS.items():
         if not only or name in only:
             begin = time.process_time()
-            show(Lines(table.add, name), numbers)
+            show(Lines(table, name), numbers)
             print(f"{name}: {time.process_time() - begin:.0f} s of processor time", file=sys.stderr, flush=True)
     if not only or HELD_OUT in only:
         held_out(table, numbers)

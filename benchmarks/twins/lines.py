@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.table import Table
 from benchmarks.twins.answers import (
     MOTOR_METHODS,
     Answer,
@@ -28,6 +29,7 @@ from omnidyn.model.robot_file import parse_robot
 CLOSE, SHARE = 0.05, 0.9
 AS_GOOD = 1.05  # times the error of the true model
 LATE, WHEN, LEVEL = 0.010, 1.0, 0.1  # [s], [s], share of a level
+WITHIN = "changes within a run"  # in an error
 CROSSING, SINGLE, FALSE = 40, 100, 2  # runs over two floors, runs over one, alarms there
 PUSH = "friction.direction.coulomb[{}]", "friction.wheels.coulomb[{}]"
 
@@ -40,10 +42,17 @@ def made(name: str, seed: int) -> Iterator[Twin]:
 
 
 class Lines:
-    """Rows of a table, one a line. counts: shares that are at least a goal less one counting error meet it."""
+    """Rows of a table, one a line; a share meets its goal within one counting error of it."""
 
-    def __init__(self, add: Callable[..., None], twin: str) -> None:
-        self._add, self._twin = add, twin
+    def __init__(self, table: Table, twin: str) -> None:
+        self._table, self._twin = table, twin
+
+    def _add(self, goal: str, met: bool | None, **cells: Any) -> None:
+        self._table.add(goal, met, twin=self._twin, **cells)
+
+    def note(self, words: str) -> None:
+        """A note under the table."""
+        self._table.notes.append(f"{self._twin}: {words}")
 
     def at_most(self, what: str, values: Sequence[float | None], most: float, **how: Any) -> None:
         """The largest of numbers that must be small; None: the number is not there. how: `pick` another one than the
@@ -53,18 +62,18 @@ class Lines:
         value = float(how.get("pick", np.max)(known)) if known else None
         words = f"{what} (not there in {missing})" if missing else what
         met = not missing and value is not None and value <= most
-        self._add(f"<= {most:g}", met, twin=self._twin, what=words, value=value, logs=how.get("logs", len(values)))
+        self._add(f"<= {most:g}", met, what=words, value=value, logs=how.get("logs", len(values)))
 
     def share(self, what: str, hits: Sequence[bool], least: float = SHARE) -> None:
         """The share of logs in which something holds."""
         count = max(len(hits), 1)
         value = sum(hits) / count
         met = value >= least - math.sqrt(least * (1.0 - least) / count) - 1e-9
-        self._add(f">= {least:g}", bool(hits) and met, twin=self._twin, what=what, value=value, logs=len(hits))
+        self._add(f">= {least:g}", bool(hits) and met, what=what, value=value, logs=len(hits))
 
     def told(self, what: str, value: float | None, logs: int) -> None:
         """A figure without a goal."""
-        self._add("", None, twin=self._twin, what=what, value=value, logs=logs)
+        self._add("", None, what=what, value=value, logs=logs)
 
 
 def offset_axis(lines: Lines, seeds: Sequence[int]) -> None:
@@ -159,18 +168,17 @@ def floors(lines: Lines, seeds: Sequence[int]) -> None:
     alarms = len(calm.record.get("moments", ())) if calm.record else None
     most = FALSE * len(singles) / SINGLE
     lines.at_most(
-        f"false alarms in runs of one floor{_why(calm)}",
+        "false alarms in runs of one floor",
         [None if alarms is None else float(alarms)],
         max(most, 1.0),
         logs=len(singles),
     )
     with made("two_floors", 0) as twin:
-        alone = ask([read_log(twin.logs[0], parse_robot(twin.robot), current_unsigned=True)], parse_robot(twin.robot))
-    lines.share(f"found in a log alone{_why(alone)}", [bool(alone.record.get("moments"))], 1.0)
-
-
-def _why(answer: Answer) -> str:
-    return f": {answer.error}" if answer.error else ""
+        robot = parse_robot(twin.robot)
+        alone = ask([read_log(twin.logs[0], robot, current_unsigned=True)], robot)
+    lines.share("said of a log alone", [bool(alone.record.get("moments")) or WITHIN in alone.error], 1.0)
+    for error in filter(None, (answer.error, calm.error)):
+        lines.note(error)
 
 
 def _floor_study(count: int, changes: bool) -> tuple[Answer, dict[str, dict[str, float]]]:
@@ -230,10 +238,11 @@ def _motors(name: str, seeds: Sequence[int]) -> dict[str, list[tuple[Answer, dic
 def _calm(lines: Lines, answers: Sequence[Answer], way: str) -> None:
     """The share of answers that do not contradict themselves."""
     found = [contradictions(answer) for answer in answers]
-    words = ", ".join(dict.fromkeys(word for each in found for word in each))
-    lines.share(
-        f"no claims that exclude each other, {way}{': ' if words else ''}{words}", [not each for each in found], 1.0
-    )
+    lines.share(f"no claims that exclude each other, {way}", [not words for words in found], 1.0)
+    for words in dict.fromkeys(word for answer in found for word in answer):
+        lines.note(f"{way}, in {sum(words in answer for answer in found)} of {len(found)} logs: {words}")
+    for error in dict.fromkeys(answer.error for answer in answers if answer.error):
+        lines.note(f"{way}: {error}")
 
 
 def _map_off(answer: Answer, truth: Mapping[str, float]) -> float | None:
