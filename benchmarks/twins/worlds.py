@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
-FINE = 1e-4  # [s], step of the simulators
+FINE = 1e-4  # [s], of what happens between rows
 
 
 @dataclass(frozen=True)
@@ -42,20 +42,34 @@ def write(path: Path, columns: dict[str, Array]) -> Path:
 
 
 @numba.njit(cache=True)
+def _moved(v, u, gain, viscous, front, back, left):
+    """(way, speed) after a time under a constant drive, in closed form, stops and reversals within it included."""
+    way = 0.0
+    for _ in range(3):
+        if v == 0.0 and -back <= u <= front:
+            return way, 0.0
+        ahead = v > 0.0 or (v == 0.0 and u > front)
+        end, rate = (u - (front if ahead else -back)) / viscous, gain * viscous
+        after = end + (v - end) * math.exp(-rate * left)
+        if (after >= 0.0) == ahead or after == 0.0:
+            return way + end * left + (v - after) / rate, after
+        time = math.log1p(-v / end) / rate
+        way, left, v = way + end * time + v / rate, left - time, 0.0
+    return way, v
+
+
+@numba.njit(cache=True)
 def axis_run(u, step, gain, viscous, front, back):
     """(position, speed) at the begin of each step from rest; u is what drives, Coulomb `front` for v > 0."""
     x, v = np.zeros(len(u)), np.zeros(len(u))
     for k in range(len(u) - 1):
-        drive = v[k] / gain / step + u[k] - viscous * v[k]
-        hold = min(max(drive, -back), front)
-        new = (drive - hold) * gain * step
-        v[k + 1] = new
-        x[k + 1] = x[k] + step * 0.5 * (v[k] + new)
+        way, v[k + 1] = _moved(v[k], u[k], gain, viscous, front, back, step)
+        x[k + 1] = x[k] + way
     return x, v
 
 
 @numba.njit(cache=True)
-def _servo(target, rate, step, row, gain, viscous, coulomb, offset, p, d):
+def _servo(target, rate, row, gain, viscous, coulomb, offset, p, d):
     """(input of each row, position at each row): a cascade of position and speed loops that acts once a row."""
     rows = len(target)
     u, seen = np.zeros(rows), np.zeros(rows)
@@ -65,12 +79,8 @@ def _servo(target, rate, step, row, gain, viscous, coulomb, offset, p, d):
         speed = (x - before) / row if k else 0.0
         before = x
         u[k] = d * (p * (target[k] - x) + rate[k] - speed)
-        for _ in range(round(row / step)):
-            drive = v / gain / step + u[k] - offset - viscous * v
-            hold = min(max(drive, -coulomb), coulomb)
-            new = (drive - hold) * gain * step
-            x += step * 0.5 * (v + new)
-            v = new
+        way, v = _moved(v, u[k] - offset, gain, viscous, coulomb, coulomb, row)
+        x += way
     return u, seen
 
 
@@ -83,7 +93,7 @@ def offset_axis(folder: Path, seed: int) -> Twin:
     logs = []
     for k, size in enumerate((0.25, 0.12)):
         t, target, rate = _trapezoids(rng, 25.0, row, size)
-        u, x = _servo(target, rate, FINE, row, 1.0 / mass, viscous, coulomb, offset, 20.0, 60.0 * mass / 3.0)
+        u, x = _servo(target, rate, row, 1.0 / mass, viscous, coulomb, offset, 20.0, 60.0 * mass / 3.0)
         x = np.round((x + 1e-6 * rng.standard_normal(len(x))) / 1e-6) * 1e-6
         logs.append(write(folder / f"axis{k}.csv", {"t_s": t, "u1_V": u, "a1_rad": x}))
     truth = {"inertia": mass, "viscous": viscous, "coulomb": coulomb, "offset": offset}
@@ -221,7 +231,7 @@ def wrong_radius(folder: Path, seed: int) -> Twin:
         volts = np.concatenate([np.zeros((25, 3)), np.repeat(rng.uniform(-6.0, 6.0, (count, 3)), 40, axis=0)])
         acting = np.concatenate([np.zeros((round(late / row), 3)), volts])[: len(volts)]
         numbers = (np.array([mass, mass, inertia]), gain, emf, viscous, box)
-        twist = _robot(acting, 40, row / 40, wheels(arm), *numbers)
+        twist = _robot(acting, 200, row / 200, wheels(arm), *numbers)
         w = twist @ wheels(arm) / radius + 0.05 * rng.standard_normal((len(volts), 3))
         columns = {"t_s": np.arange(len(volts)) * row}
         columns |= {f"u{m + 1}_V": volts[:, m] for m in range(3)} | {f"w{m + 1}_rad_s": w[:, m] for m in range(3)}
