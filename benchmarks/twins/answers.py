@@ -19,7 +19,7 @@ from omnidyn.run import Run
 BY_DEFAULT, WHOLE_LOGS = "by default", "whole logs"  # of the motors
 MOTOR_METHODS: Mapping[str, Method] = {BY_DEFAULT: MotorLine(), WHOLE_LOGS: MotorFit()}
 NO_ANSWER = "no_motor_answers"
-MAP_NAMES = ("map", "voltage_map", "curve")  # of a driver that is no line, in the record of a motor
+NO_LINE = "speed_no_line"
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,10 @@ def contradictions(answer: Answer) -> list[str]:
     return found
 
 
-def driver_map(answer: Answer) -> Any:
-    """The map of a driver that is no line, as the record has it; None where there is none."""
-    places = (answer.motor, answer.record)
-    return next((place[name] for place in places for name in MAP_NAMES if place.get(name)), None)
+def driver_map(answer: Answer, motor: int = 0) -> list[tuple[float, float]]:
+    """(input, steady speed) of a motor whose speed is no line of its input, as sizes; none where it is one."""
+    curve = next((curve for curve in answer.record.get("curves", ()) if curve["motor"] == motor + 1), None)
+    if curve is None:
+        return []
+    rest = [(curve["rest"], 0.0)] if curve["rest"] else []
+    return [(0.0, 0.0), *rest, *zip(curve["level"], curve["speed"], strict=True)]

@@ -21,7 +21,7 @@ from scipy.stats import trim_mean
 
 from benchmarks import real_nuisances, udea
 from benchmarks.table import Table
-from benchmarks.twins.answers import BY_DEFAULT, MOTOR_METHODS, Answer, ask
+from benchmarks.twins.answers import BY_DEFAULT, MOTOR_METHODS, Answer, ask, driver_map
 from benchmarks.twins.motor import HOLD, MEAN, TRIM, Drive, plain_fit
 from benchmarks.twins.worlds import WORLDS, Array
 from omnidyn.comparison.compare import compare
@@ -170,7 +170,9 @@ def _motor_errors(motor: int, answer: Answer, fitted: Sequence[Drive], held: Seq
     written = numbers | {"latency": late[0] if late else 0.0, "lag": max(numbers.get("lag", 0.0), FASTEST)}
     between = HOLD if record.get("between", HOLD) == HOLD else MEAN
     usable = written.get("slope", 0.0) > 0.0
-    own = {"written": _of_drives(held, written, between)} if usable else {}
+    points = driver_map(answer, motor)
+    driven = [drive.behind(points, written["slope"]) for drive in held] if points and usable else held
+    own = {"written": _of_drives(driven, written, between)} if usable else {}
     return own | {"plain": _of_drives(held, *plain_fit(fitted))}
 
 

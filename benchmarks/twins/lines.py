@@ -14,6 +14,7 @@ import numpy as np
 from benchmarks.table import Table
 from benchmarks.twins.answers import (
     MOTOR_METHODS,
+    NO_LINE,
     Answer,
     ask,
     contradictions,
@@ -105,13 +106,10 @@ def freewheeling_bridge(lines: Lines, seeds: Sequence[int]) -> None:
         mapped = [off is not None and off <= CLOSE for off in good]
         lines.share(f"map within 5 % of the curve, {way}", mapped, 0.8)
         others = [answer for answer, hit in zip((a for a, _ in seen), mapped, strict=True) if not hit]
-        said = [any(code in NO_LINE for code in answer.codes()) for answer in others]
+        said = [NO_LINE in answer.codes() for answer in others]
         if others:
             lines.share(f"said to be no line, of the others, {way}", said, 1.0)
         _calm(lines, [answer for answer, _ in seen], way)
-
-
-NO_LINE = ("driver_is_no_line", "speed_no_line_of_input", "no_line", "driver_map")
 
 
 def wrong_radius(lines: Lines, seeds: Sequence[int]) -> None:
@@ -246,14 +244,13 @@ def _calm(lines: Lines, answers: Sequence[Answer], way: str) -> None:
 
 
 def _map_off(answer: Answer, truth: Mapping[str, float]) -> float | None:
-    """The largest error of the map over the top speed; None where there is no map."""
-    points, slope = driver_map(answer), answer.value("slope")
-    if not points or slope is None:
+    """The largest error of the map over the top speed, at the duties of the curve; None where there is no map."""
+    points = driver_map(answer)
+    if not points:
         return None
-    x, y = np.array([(0.0, 0.0), *(tuple(point)[:2] for point in points)]).T
-    speed = np.interp([100.0 * duty for duty in CURVE], x, y) / slope
+    x, y = np.array(points).T
     true = np.array([truth[f"{duty:g}"] for duty in CURVE])
-    return float(np.max(np.abs(speed - true)) / true.max())
+    return float(np.max(np.abs(np.interp([100.0 * duty for duty in CURVE], x, y) - true)) / true.max())
 
 
 def _latency(numbers: Mapping[str, Any]) -> float:

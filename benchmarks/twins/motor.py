@@ -6,7 +6,7 @@ inertia w' = u(t - latency) - offset - slope w - dead_band sgn w,   inertia = sl
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -32,6 +32,11 @@ class Drive:
     angle: Array | None = None
     window: int = 1
     spiky: bool = False
+
+    def behind(self, points: Sequence[tuple[float, float]], slope: float) -> Drive:
+        """The same behind a driver that is no line: points (input, steady speed [rad/s]) of rising size."""
+        x, speed = np.array(points).T
+        return replace(self, u=np.sign(self.u) * np.interp(np.abs(self.u), x, slope * speed))
 
     @property
     def measured(self) -> Array:

@@ -158,7 +158,7 @@ def _freewheel(duty, row, step, supply, ohm, henry, emf, torque, inertia, viscou
 
 
 FREEWHEEL = {
-    "supply": 12.0, "ohm": 3.0, "henry": 2e-3, "emf": 0.33, "torque": 0.33, "inertia": 0.01, "viscous": 0.001,
+    "supply": 12.0, "ohm": 3.0, "henry": 2e-3, "emf": 0.33, "torque": 0.33, "inertia": 0.001, "viscous": 0.001,
     "coulomb": 0.01, "period": 2e-3, "diode": 0.7,
 }  # fmt: skip
 
@@ -172,7 +172,7 @@ def freewheeling_bridge(folder: Path, seed: int) -> Twin:
     for k in range(2):
         levels = rng.permutation(np.concatenate([[0.08, 0.16, 0.27, 0.51, 0.98], rng.uniform(0.05, 1.0, 5)]))
         levels = levels * rng.choice([-1.0, 1.0], 10)
-        duty = np.concatenate([np.zeros(50), *(np.full(250, level) for level in levels)])
+        duty = np.concatenate([np.zeros(50), *(np.full(300, level) for level in levels)])
         w = _freewheel(duty, row, step, *numbers.values()) + 0.1 * rng.standard_normal(len(duty))
         logs.append(
             write(folder / f"bridge{k}.csv", {"t_s": np.arange(len(duty)) * row, "d1_duty": duty, "w1_rad_s": w})
