@@ -37,6 +37,7 @@ NAMES = {
     "coloured": "output error where errors have a memory: coverage, std beside the Cramer-Rao bound (an hour)",
     "forces": "a right robot under random forces of the floor: what is found, what intervals hold (ten minutes)",
     "ten_robots": "ten robots of a simulator of its own: init, then identify: coverage, what is reported (10 minutes)",
+    "twins": "six twins of real robots and the logs that no fit saw: each line against its bound (20 minutes)",
     "first_minutes": "CSV to report of a robot of `init`, whole commands: nothing compiled, and compiled (3 minutes)",
     "ladder": "identify with its ladder, on wrong and right worlds: what it takes, what then holds (40 minutes)",
     "mpc": "the predictive controller: a step beside others' in the same run, cold starts, tracking, C (8 minutes)",

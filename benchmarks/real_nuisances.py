@@ -27,7 +27,7 @@ FEWEST = 20  # of these rows that must be there
 
 def nuisances(table: Table) -> None:
     """Of the udea drives and turns, each part by the other, and of the Robotino's floor."""
-    robot = _udea()
+    robot = udea_robot()
     drives = [Run(t=r.t, duty=r.duty, wheel_speed=r.wheel_speed, source=r.source) for r in udea.drive_runs()]
     turn = logs.udea_turning(logs.folder())[1]
     half = len(turn) // 2
@@ -45,7 +45,7 @@ def nuisances(table: Table) -> None:
     _beside(table, "robotino", "6 runs by 6 others", load_robot("robotino"), (floor[::12], floor[6::12]), asked)
 
 
-def _udea() -> Robot:
+def udea_robot() -> Robot:
     """What its owner knows; all else a guess."""
     wheels = Wheels(azimuth_deg=(150.0, 270.0, 30.0), robot_radius=0.099, wheel_radius=0.0325)
     robot = first_guess("udea", wheels, 3.178, 22.2, BODY_AXES)

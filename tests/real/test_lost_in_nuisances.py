@@ -18,7 +18,7 @@ def turning(data):
 
 
 def test_the_answer_does_without_a_dead_band_and_a_gain(turning):
-    robot = real_nuisances._udea()
+    robot = real_nuisances.udea_robot()
     fit = identify(turning, robot, OutputError()).estimate
     assert [*fit.nuisances] == ["latency.heading"]
     assert ("dead_band", "gain") in [each.numbers.get("nuisances") for each in fit.warnings]
