@@ -1,10 +1,12 @@
-"""The tables of keys in robot-file.md, made from the model's own fields: `python docs/robot_keys.py` writes them anew.
+"""The tables of keys in robot-file.md, made from the model's own fields: `python docs/robot_keys.py` writes them anew,
+and the schema of the JSON export beside them.
 
-A test fails where the page and the model differ.
+Tests fail where these and the model differ.
 """
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +14,7 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
+from omnidyn.export.robot_json import SCHEMA_FILE, json_schema
 from omnidyn.model.friction.stribeck import SHAPES
 from omnidyn.model.keys import TABLES, unit
 from omnidyn.model.robot import Robot
@@ -227,3 +230,4 @@ def filled(page: str) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(filled(PAGE.read_text("utf-8")), "utf-8")
+    PAGE.with_name(SCHEMA_FILE).write_text(json.dumps(json_schema(), indent=1) + "\n", "utf-8")
