@@ -1,10 +1,12 @@
-"""The tables of keys in robot-file.md, made from the model's own fields: `python docs/robot_keys.py` writes them anew.
+"""The tables of keys in robot-file.md, made from the model's own fields: `python docs/robot_keys.py` writes them anew,
+and the schema of the JSON export beside them.
 
-A test fails where the page and the model differ.
+Tests fail where these and the model differ.
 """
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,12 +14,18 @@ from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
+from omnidyn.export.robot_json import SCHEMA_FILE, json_schema
+from omnidyn.model.friction.stribeck import SHAPES
 from omnidyn.model.keys import TABLES, find_key, unit
 from omnidyn.model.robot import Robot
 from omnidyn.model.value import keys_of
 
 PAGE = Path(__file__).with_name("robot-file.md")
 PRETTY = {"kg m^2": "kg m²", "deg": "degree", "ohm": "Ω"}
+
+# As the docstring of each shape begins: "f = exp(-p), p = ...".
+FORMULAS = [(shape.__doc__ or "").removeprefix("f = ").partition(", ")[0] for shape in SHAPES.values()]
+FALL = f"f of the fall: {', or '.join(FORMULAS)}"
 
 # The descriptions in the model are notes for the margin of a robot file; these are sentences.
 MEANING = {
@@ -61,7 +69,7 @@ MEANING = {
     "friction.axes.law": "which law: how it rests and starts",
     "friction.axes.stribeck_speed": "v_s, over which the level falls from breakaway to coulomb",
     "friction.axes.stribeck_exponent": "d of the fall f((v/v_s)^d)",
-    "friction.axes.stribeck_shape": "f of the fall: exp(-p), or 1/(1 + p)",
+    "friction.axes.stribeck_shape": FALL,
     "friction.axes.karnopp_speed": "Dv, below which Karnopp's law is at rest",
     "friction.axes.stiffness": "σ0 of bristles: coulomb over the way they bend before they slip",
     "friction.axes.damping": "σ1 of LuGre's bristles; absent: critical, 2 √(σ0 M) - viscous",
@@ -79,7 +87,7 @@ MEANING = {
     "friction.direction.stribeck_speed": "v_s, over which both levels fall from breakaway to coulomb",
     "friction.direction.yaw_stribeck_speed": "the same about yaw",
     "friction.direction.stribeck_exponent": "d of the fall f((v/v_s)^d)",
-    "friction.direction.stribeck_shape": "f of the fall: exp(-p), or 1/(1 + p)",
+    "friction.direction.stribeck_shape": FALL,
     "friction.direction.karnopp_speed": "Dv, a speed of travel below which Karnopp's law is at rest",
     "friction.direction.yaw_karnopp_speed": "the same about yaw",
     "friction.direction.stiffness": "σ0 of bristles, which turn with the body",
@@ -98,7 +106,7 @@ MEANING = {
     "friction.wheels.law": "which law: how it rests and starts",
     "friction.wheels.stribeck_speed": "v_s, of the rim, over which the level falls from breakaway to coulomb",
     "friction.wheels.stribeck_exponent": "d of the fall f((v/v_s)^d)",
-    "friction.wheels.stribeck_shape": "f of the fall: exp(-p), or 1/(1 + p)",
+    "friction.wheels.stribeck_shape": FALL,
     "friction.wheels.karnopp_speed": "Dv, of the rim, below which Karnopp's law is at rest",
     "friction.wheels.stiffness": "σ0 of bristles, at the rim",
     "friction.wheels.damping": "σ1 of LuGre's bristles, at the rim; absent: critical",
@@ -227,3 +235,4 @@ def filled(page: str) -> str:
 
 if __name__ == "__main__":
     PAGE.write_text(filled(PAGE.read_text("utf-8")), "utf-8")
+    PAGE.with_name(SCHEMA_FILE).write_text(json.dumps(json_schema(), indent=1) + "\n", "utf-8")

@@ -17,8 +17,7 @@ SMALLEST = EXAMPLES[0][1]
 
 
 def test_the_tables_are_those_of_the_model():
-    """Else run: python docs/robot_keys.py"""
-    assert MADE.filled(PAGE) == PAGE
+    assert MADE.filled(PAGE) == PAGE, "write them again: python docs/robot_keys.py"
 
 
 def test_there_are_as_many_keys_as_numbers_in_the_model():

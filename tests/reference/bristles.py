@@ -19,7 +19,7 @@ import math
 import numpy as np
 from scipy.integrate import DOP853
 
-from tests.reference.modes_plant import left_at, plant_of, to_centre
+from tests.reference.modes_plant import FALLS, plant_of, to_centre
 
 BENDS = ("dahl", "lugre", "elastoplastic")
 
@@ -102,7 +102,7 @@ class Bristles:
         fades, falls = pick(law.damping_speed) or math.inf, pick(law.stribeck_speed) or math.inf
         power = law.dahl_exponent if law.law == "dahl" else 1.0
         elastic = law.elastic_share if law.law == "elastoplastic" else None
-        fall = (falls, law.stribeck_exponent, law.stribeck_shape == "lorentzian")
+        fall = (falls, law.stribeck_exponent, law.stribeck_shape)
         self.rows.append((d, slide, hold, back, hold_back, stiff, damping, fades, fall, power, elastic))
 
     def rates(self, z, u):
@@ -120,7 +120,7 @@ class Bristles:
         if self.way is not None:
             w = self.way
             slow = math.hypot(v[0], v[1]) / (w.stribeck_speed or math.inf)
-            fallen = left_at(slow, w.stribeck_exponent, w.stribeck_shape == "lorentzian")
+            fallen = FALLS[w.stribeck_shape](slow, w.stribeck_exponent)
             c = np.array(w.coulomb) + (np.array(w.breakaway or w.coulomb) - w.coulomb) * fallen
             rate = plane_rate(w, v[:2], z[at : at + 2], c)
             damping = w.damping
@@ -140,7 +140,7 @@ class Bristles:
         d, slide, hold, back, hold_back, stiff, damping, fades, fall, power, elastic = row
         s = float(d @ v)
         low, high = (slide, hold) if s >= 0 else (back, hold_back)
-        g = low + (high - low) * left_at(abs(s) / fall[0], *fall[1:])
+        g = low + (high - low) * FALLS[fall[2]](abs(s) / fall[0], fall[1])
         rate = rate_of(s, stiff * z / g, power, elastic)
         damped = damping * math.exp(-((s / fades) ** 2)) * rate
         return force - d * (stiff * z + damped), rate

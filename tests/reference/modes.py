@@ -46,7 +46,7 @@ from scipy.integrate import DOP853
 from scipy.optimize import brentq, minimize_scalar
 
 from tests.reference.modes_friction import Decision, Gauge, Tie, closure, decide, directions, null, span
-from tests.reference.modes_plant import Plant, left_at, plant_of, to_centre
+from tests.reference.modes_plant import FALLS, Plant, plant_of, to_centre
 
 RTOL, ATOL = 1e-12, 1e-13
 NOISE = 1e-12  # an event function nearer to 0 than this has not said anything yet
@@ -171,11 +171,11 @@ class Mode:
             f[1] -= p.mass[0] * v[2] * v[0]
         for e in np.flatnonzero(np.isfinite(p.stribeck) & (self.sigma != 0.0)):
             speed, side = np.maximum(self.sigma[e] * (p.direction[e] @ v), 0.0), 0 if self.sigma[e] > 0 else 1
-            left = left_at(speed / p.stribeck[e], p.exponent[e], p.lorentzian is not None and p.lorentzian[e])
+            left = FALLS[p.shapes[e]](speed / p.stribeck[e], p.exponent[e])
             more = (p.hold[e, side] - p.slide[e, side]) * left
             f -= np.multiply.outer(p.direction[e] * self.sigma[e], more)
         if self.ellipse_slides:
-            fallen = left_at(np.hypot(v[0], v[1]) / p.stribeck_ellipse, p.exponent_ellipse, p.lorentzian_ellipse)
+            fallen = FALLS[p.shape_ellipse](np.hypot(v[0], v[1]) / p.stribeck_ellipse, p.exponent_ellipse)
             if not math.isfinite(p.stribeck_ellipse):
                 fallen = 0.0 * fallen
             cx = p.slide_ellipse[0] + (p.hold_ellipse[0] - p.slide_ellipse[0]) * fallen

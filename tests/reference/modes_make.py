@@ -39,11 +39,12 @@ def key(robot, voltage, dt) -> str:
     left_out = ["names"] if plant.spin.any() else ["names", "spin"]  # as before there was any
     if not np.isfinite([*plant.stribeck, plant.stribeck_ellipse]).any():
         left_out += ["stribeck", "exponent", "stribeck_ellipse", "exponent_ellipse"]
-    if not plant.lorentzian_ellipse and not np.any(plant.lorentzian):
-        left_out += ["lorentzian", "lorentzian_ellipse"]
+    left_out += ["shapes", "shape_ellipse"]
+    others = [*plant.shapes, plant.shape_ellipse] if {*plant.shapes, plant.shape_ellipse} != {"exponential"} else []
     numbers = [getattr(plant, f.name) for f in fields(plant) if f.name not in left_out]
     flat = [*(n for n in numbers if n is not None), voltage, dt]
-    text = " ".join(f"{x + 0.0:.10g}" for n in flat for x in np.where(np.abs(n) < 1e-12, 0.0, n).ravel().tolist())
+    words = [f"{x + 0.0:.10g}" for n in flat for x in np.where(np.abs(n) < 1e-12, 0.0, n).ravel().tolist()]
+    text = " ".join([*words, *others])
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -11,6 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+FALLS = {"exponential": lambda u, d: np.exp(-(u**d)), "lorentzian": lambda u, d: 1.0 / (1.0 + u**d)}
+"""What is left of a fall at u Stribeck speeds with an exponent d, by the word of its shape. All references ask here."""
+
 
 @dataclass(frozen=True)
 class Plant:
@@ -42,8 +45,8 @@ class Plant:
     exponent: np.ndarray  # (elements,)
     stribeck_ellipse: float = math.inf
     exponent_ellipse: float = 2.0
-    lorentzian: np.ndarray | None = None  # (elements,) whether it falls as 1/(1 + u^d), not as exp(-u^d)
-    lorentzian_ellipse: bool = False
+    shapes: tuple[str, ...] = ()  # (elements,), of FALLS
+    shape_ellipse: str = "exponential"
 
     @property
     def slide_at_rest(self) -> np.ndarray:
@@ -74,11 +77,6 @@ class Plant:
     def dry(self) -> np.ndarray:
         """q of the gear: the part that acts as dry friction."""
         return (1 / self.eta - self.eta) / 2
-
-
-def left_at(u, exponent, lorentzian):
-    """What is left of a fall at u Stribeck speeds."""
-    return 1.0 / (1.0 + u**exponent) if lorentzian else np.exp(-(u**exponent))
 
 
 def to_centre(robot) -> np.ndarray:
@@ -167,6 +165,6 @@ def _plant_of(robot) -> Plant:
         exponent=np.array([row[6] for row in rows], dtype=float),
         stribeck_ellipse=math.inf if way.stribeck_speed is None else way.stribeck_speed,
         exponent_ellipse=way.stribeck_exponent,
-        lorentzian=np.array([row[7] == "lorentzian" for row in rows], dtype=bool),
-        lorentzian_ellipse=way.stribeck_shape == "lorentzian",
+        shapes=tuple(row[7] for row in rows),
+        shape_ellipse=way.stribeck_shape,
     )

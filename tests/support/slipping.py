@@ -16,6 +16,7 @@ from scipy.integrate import solve_ivp
 
 from omnidyn.model.wheels import per_wheel
 from tests.reference.bristles import BENDS, plane_rate, rate_of
+from tests.reference.modes_plant import FALLS
 from tests.reference.slip_holds import Ellipse, least, room
 
 EDGE = 1e-9  # [N, m/s^2] by which what holds and what drives must differ, for a draw to count
@@ -27,8 +28,7 @@ MOVES = 1e-7  # [m/s^2] of an acceleration that is no rounding of the bounded le
 
 def falling(law, speed, slide, hold, inverse):
     """The level at a speed; inverse: 1/v_s."""
-    u = (abs(speed) * inverse) ** law.stribeck_exponent
-    return slide + (hold - slide) * (np.exp(-u) if law.stribeck_shape == "exponential" else 1.0 / (1.0 + u))
+    return slide + (hold - slide) * FALLS[law.stribeck_shape](abs(speed) * inverse, law.stribeck_exponent)
 
 
 class Element:

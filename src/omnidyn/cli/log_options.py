@@ -27,20 +27,6 @@ if TYPE_CHECKING:
     from omnidyn.logs.read_log import LogOptions
     from omnidyn.model.robot import Robot
 
-ENDINGS = (
-    ".csv",
-    ".txt",
-    ".tsv",
-    ".dat",
-    ".parquet",
-    ".pq",
-    ".log",
-    ".mcap",
-    ".db3",
-    ".bag",
-    ".wpilog",
-    ".mat",
-)  # what is taken from a folder
 MAX_FILES = 100_000
 
 LOGS = typer.Argument(metavar="LOG...", help="Logs (CSV, Parquet, bags of ROS, ..), or folders of them.")
@@ -184,15 +170,18 @@ def log_files(arguments: Sequence[str]) -> list[str]:
         if not os.path.isdir(argument) or is_log_folder(argument):
             files.append(argument)
             continue
+        from omnidyn.logs.readers.read_table import LOG_SUFFIXES
+
         folders = log_folders(argument)
         found = [
             str(path)
             for path in Path(argument).rglob("*")
-            if path.suffix.lower() in ENDINGS and path.is_file() and not {*path.parents} & {*folders}
+            if path.suffix.lower() in LOG_SUFFIXES and path.is_file() and not {*path.parents} & {*folders}
         ]
         found += map(str, folders)
         if not found:
-            raise InputError("no log in the folder", expected=f"files that end in {' '.join(ENDINGS)}", where=argument)
+            expected = f"files that end in {' '.join(LOG_SUFFIXES)}"
+            raise InputError("no log in the folder", expected=expected, where=argument)
         files += sorted(found, key=natural)
     if len(files) > MAX_FILES:
         raise InputError("too many files", got=len(files), expected=f"at most {MAX_FILES}")

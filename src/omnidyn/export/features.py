@@ -301,7 +301,7 @@ TABLE: dict[str, dict[str, Cell]] = {
     },
 }
 
-# controller -> what c-controller does with it.
+# controller -> what c-controller does with it; it refuses others.
 CONTROLLERS: dict[str, Cell] = {
     "feedforward": Cell(SAYS),
     "pid": Cell(SAYS),
@@ -330,7 +330,7 @@ def refuse(kind: str, robot: Robot) -> None:
 
 def refuse_controller(kind: str, controller: str) -> None:
     """Raises UnsupportedError for a controller that a kind refuses."""
-    own = CONTROLLERS[controller]
+    own = CONTROLLERS.get(controller, Cell(REFUSES, "there is no C code of it"))
     if own.does == REFUSES:
         raise UnsupportedError(
             f"{kind} cannot be exported for the controller {controller}: {own.words}",

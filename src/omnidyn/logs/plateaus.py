@@ -97,7 +97,7 @@ def held_pieces(run: Run, *, start: float | None = None, end: float | None = Non
         for segment in _between_gaps(run_segments, _share(hold, *fixed) if fixed else hold):
             rows = segment if fixed else _settled(run, segment, angle, ENDS)
             if rows is not None and _long_enough(run, rows):
-                count = max(round((run.t[rows.stop - 1] - run.t[rows.start]) / WINDOW), 1)
+                count = max(round(float(run.t[rows.stop - 1] - run.t[rows.start]) / WINDOW), 1)
                 edges = np.linspace(rows.start, rows.stop, count + 1).round().astype(int).tolist()
                 found += [slice(first, last) for first, last in pairwise(edges) if last - first > 1]
     return found

@@ -27,7 +27,7 @@ from omnidyn.files import check_output, write_atomic
 from omnidyn.logs.channels import components, si_suffix
 from omnidyn.logs.mcap_run import import_mcap, run_to_mcap
 from omnidyn.logs.readers.parquet import SUFFIXES, import_pyarrow, parquet_bytes
-from omnidyn.logs.readers.read_table import read_table
+from omnidyn.logs.readers.read_table import READERS, read_table
 from omnidyn.logs.table.table import Table
 from omnidyn.run import CHANNELS, SCALAR, Run, as_run
 from omnidyn.statement import Statement, statements
@@ -49,12 +49,7 @@ _OTHERS = _SHEETS | frozenset(
     (
         ".npz",
         ".npy",
-        ".h5",
-        ".hdf5",
         ".hdf",
-        ".bag",
-        ".db3",
-        ".wpilog",
         ".ulg",
         ".json",
         ".toml",
@@ -74,6 +69,7 @@ _OTHERS = _SHEETS | frozenset(
     )
 )
 MCAP, MAT = ".mcap", ".mat"
+_READ = {suffix for reader in READERS for suffix in reader.suffixes} - {*SUFFIXES, MCAP, MAT}  # and not written
 _UNIT_OF_DUTY = ("duty", "-", "1")
 
 
@@ -117,7 +113,7 @@ def check_format(path: str | os.PathLike) -> None:
         import_pyarrow(str(path))
     if suffix == MCAP:
         import_mcap(str(path))
-    if suffix in _OTHERS:
+    if suffix in _OTHERS | _READ:
         raise InputError(
             "a run is not written in this format",
             got=suffix,

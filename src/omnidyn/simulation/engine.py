@@ -1,25 +1,13 @@
-"""Engines: what moves a robot under commands. The contract, and `choose_engine`, which picks one.
-
-An engine is made of a robot, the Conditions it moves in, and a tolerance.
-
-1. `serves(robot, conditions)` says whether it can; the first of ENGINES that can is taken.
-2. `start(twist, pose, current)` returns the state of a robot there. Only the engine reads a state.
-3. `advance(state, commands)` holds commands row by row and returns the Motion, with the state at its end. The state
-   that it is given stays as it is: one state may be advanced many times.
-4. `statements(state)` returns what a reader should know of the way so far.
-5. `name` stands in the source of a Run.
-
-`simulate` advances all rows at once, a live robot row by row, both by the same engine.
-"""
+"""Engines by the contract of contract.py, and `choose_engine`, which picks one."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from omnidyn.arrays import BoolArray, FloatArray
+from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.actuation import reaching
 from omnidyn.model.dynamics import drive_wrench, linear_part
@@ -29,6 +17,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import start_state
 from omnidyn.simulation.commands import Commands, as_floats, current_bounds, on_ticks
+from omnidyn.simulation.contract import Conditions, Engine, Motion
 from omnidyn.simulation.exact.inductance import simulate_exact_inductance
 from omnidyn.simulation.exact.march import ExactMarch, why_not_exact
 from omnidyn.simulation.implicit.march import Outcome, capped, room, run_implicit
@@ -40,53 +29,6 @@ from omnidyn.statement import WARNING, Statement
 TOLERANCE = 1e-6
 # Beyond these a step has no meaning and the implicit engine no end: [m/s, rad/s], [m, rad], [A].
 FARTHEST = {"twist": 1e3, "pose": 1e9, "current": 1e6}
-
-
-class Conditions(NamedTuple):
-    """What acts on a robot, beside voltages: whether a speed loop makes these, and whether motors may coast.
-
-    push: a constant wrench on the body [N, N, N m]; tilt: a constant force that stays in the room [N, N].
-    """
-
-    speed_loop: bool = False
-    coasting: bool = False
-    push: tuple[float, float, float] | None = None
-    tilt: tuple[float, float] | None = None
-
-
-class Motion(NamedTuple):
-    """What a robot does under rows of commands: samples at the start and after each row.
-
-    state: at the end. twist, pose: shape (rows + 1, 3). voltage [V]: at the motors over each row, shape (rows, wheels);
-    asked: of the drivers by a speed loop as a row begins, None without one. current [A], wheel_speed [rad/s]: shape
-    (rows + 1, wheels), None where they follow from twist and voltage. stuck: wheels at rest to the last bit.
-    """
-
-    state: Any
-    twist: FloatArray
-    pose: FloatArray
-    voltage: FloatArray
-    asked: FloatArray | None = None
-    current: FloatArray | None = None
-    wheel_speed: FloatArray | None = None
-    stuck: BoolArray | None = None
-
-
-class Engine(Protocol):
-    """The contract at the top of this file."""
-
-    name: str
-
-    def __init__(self, robot: Robot, conditions: Conditions, tol: float) -> None: ...
-
-    @staticmethod
-    def serves(robot: Robot, conditions: Conditions) -> bool: ...
-
-    def start(self, twist: FloatArray, pose: FloatArray, current: FloatArray) -> Any: ...
-
-    def advance(self, state: Any, commands: Commands) -> Motion: ...
-
-    def statements(self, state: Any) -> tuple[Statement, ...]: ...
 
 
 def choose_engine(robot: Robot, conditions: Conditions, tol: float | None = TOLERANCE) -> Engine:

@@ -16,7 +16,8 @@ from omnidyn.model.motor import DUTY, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.commands import Commands
-from omnidyn.simulation.engine import TOLERANCE, Conditions, as_start, choose_engine
+from omnidyn.simulation.contract import Conditions
+from omnidyn.simulation.engine import TOLERANCE, as_start, choose_engine
 from omnidyn.statement import Statement
 
 EDGE = 1e-9  # of a step or a tick: so near, two times are one

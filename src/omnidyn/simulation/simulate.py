@@ -13,7 +13,8 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.run import Run
 from omnidyn.simulation.commands import Commands, commands
-from omnidyn.simulation.engine import TOLERANCE, Conditions, Motion, as_start, choose_engine
+from omnidyn.simulation.contract import Conditions, Motion
+from omnidyn.simulation.engine import TOLERANCE, as_start, choose_engine
 from omnidyn.simulation.view import PLAIN, View, seen_at_once, seen_through
 from omnidyn.statement import Statement
 

@@ -5,13 +5,17 @@ import os
 import struct
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from omnidyn.cli import main
+from omnidyn.cli.log_options import log_files
+from omnidyn.errors import InputError
 from omnidyn.logs.read_log import read_log
-from omnidyn.logs.run_file import read_run, write_run
+from omnidyn.logs.readers.read_table import READERS
+from omnidyn.logs.run_file import check_format, read_run, write_run
 from omnidyn.model.robot_file import load_robot, robot_to_toml
 from omnidyn.run import Run
 
@@ -121,6 +125,16 @@ def test_a_folder_of_bags_is_a_folder_of_logs(tmp_path, capsys):
     code, out, _ = told(capsys, "check", tmp_path / "day")
     assert out.startswith("Of 2 logs")
     assert code in (0, 4)
+
+
+def test_what_a_reader_reads_is_taken_from_a_folder_and_no_run_is_written_as_it(tmp_path):
+    endings = [suffix for reader in READERS for suffix in reader.suffixes]
+    for ending in (*endings, ".csv", ".png"):
+        (tmp_path / f"log{ending}").touch()
+    assert {Path(name).suffix for name in log_files([str(tmp_path)])} == {*endings, ".csv"}
+    for ending in {*endings} - {".parquet", ".pq", ".mcap", ".mat"}:
+        with pytest.raises(InputError, match="a run is not written in this format"):
+            check_format(f"run{ending}")
 
 
 @pytest.mark.parametrize("command", ["info", "check", "compare --robot axebot", "identify --robot axebot", "convert"])

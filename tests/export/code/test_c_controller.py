@@ -173,7 +173,10 @@ def test_a_controller_file_gives_its_options(tmp_path):
 
 
 def test_controllers_and_robots_without_c_are_refused_by_name(monkeypatch):
-    assert set(CONTROLLERS) == {*NAMES, *BESIDE}
+    assert set(CONTROLLERS) <= {*NAMES, *BESIDE}
+    monkeypatch.setitem(NAMES, "new", "omnidyn.control.pid:Pid")
+    with pytest.raises(UnsupportedError, match="the controller new: there is no C code of it"):
+        c_controller(ROBOT, controller="new")
     with pytest.raises(UnsupportedError, match="the controller araujo: it is there for comparison alone"):
         c_controller(ROBOT, controller="araujo")
     monkeypatch.setitem(CONTROLLERS, "speed", Cell(REFUSES, "no C today"))

@@ -14,9 +14,10 @@ from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.ladder import Ladder, Rung
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.linear.free_run import margins_of
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.structure.ladder.climb import offered
-from omnidyn.identification.structure.ladder.held_out import Errors, errors, margins_of
+from omnidyn.identification.structure.ladder.held_out import Errors, errors
 from omnidyn.model.robot_file import load_robot, save_robot
 from omnidyn.report.fit_page import render_fit
 from omnidyn.statement import quoted

@@ -14,8 +14,9 @@ from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.ladder import STANDS
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.fit import Fit
+from omnidyn.identification.output_error.linear.free_run import margins_of
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
-from omnidyn.identification.structure.ladder.held_out import errors, margins_of
+from omnidyn.identification.structure.ladder.held_out import errors
 from omnidyn.identification.structure.ladder.models import Model, can, is_own, moves, moves_apart
 from omnidyn.identification.structure.missing.switches import as_fitted
 from omnidyn.model.robot_file import load_robot

@@ -68,10 +68,7 @@ def test_a_file_keeps_every_law():
 @pytest.mark.parametrize(
     "numbers, words",
     [
-        (
-            {"stiffness": (1.0, 1.0, 1.0)},
-            'stiffness is of law = "dahl" or "lugre" or "elastoplastic"; this table has law = "coulomb"',
-        ),
+        ({"stiffness": (1.0, 1.0, 1.0)}, 'stiffness is of law = "dahl" or "lugre".*; this table has law = "coulomb"'),
         ({"law": "lugre"}, 'law = "lugre" needs stiffness'),
         ({"law": "dahl", "stiffness": (1e4, 1e4, 1e2)}, 'law = "dahl" has one level, coulomb: no breakaway'),
         ({"law": "lugre", "stiffness": (1e4, 1e4, 1e2)}, 'law = "lugre" with a breakaway needs stribeck_speed'),

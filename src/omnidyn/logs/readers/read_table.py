@@ -29,6 +29,8 @@ READERS: tuple[Reader, ...] = (
     MAT,
     HDF5,
 )  # what no other reads is text, or refused by name
+LOG_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".log", *(suffix for reader in READERS for suffix in reader.suffixes))
+"""How names of logs end: what commands take from a folder."""
 ROW_BYTES = 2**10  # what a row takes that is at hand, its text and its numbers
 
 

@@ -152,8 +152,7 @@ def residual(plant, stage, x):
     body, task, work = plant.body, stage.task, stage.work
     stiff, d0, d1, d2 = body.mass / task.tau, x[0] - task.goal[0], x[1] - task.goal[1], x[2] - task.goal[2]
     r0, r1, r2 = stiff * d0 - task.push[0], stiff * d1 - task.push[1], stiff * d2 - task.push[2]
-    j00, j11, j22, j01, j02, j12 = stiff, stiff, stiff, 0.0, 0.0, 0.0
-    skew = 0.0
+    j00, j11, j22, j01, j02, j12, skew = stiff, stiff, stiff, 0.0, 0.0, 0.0, 0.0
     if body.spin[2, 2] != 0.0:  # turning on the spot, every wheel spins, and a centre that stands off moves
         often = 1.0 / task.tau
         s00, s11, s22 = often * body.spin[0, 0], often * body.spin[1, 1], often * body.spin[2, 2]
