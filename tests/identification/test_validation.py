@@ -11,9 +11,8 @@ import omnidyn
 from omnidyn.errors import InputError
 from omnidyn.identification.default_method import why_not_output_error
 from omnidyn.identification.identify import identify
-from omnidyn.identification.methods import OutputError
+from omnidyn.identification.methods import NU, OutputError
 from omnidyn.identification.output_error.conclusion import SCALE_OF_T
-from omnidyn.identification.output_error.fit import NU
 from omnidyn.identification.validation import Score, coloured, validate
 from omnidyn.model.actuation import Driver, at_motors
 from omnidyn.model.keys import Key

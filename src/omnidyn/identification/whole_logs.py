@@ -96,7 +96,7 @@ def _late(found: Solution) -> list[Statement]:
     assert isinstance(problem, Problem)
     step, count = max(piece.step for piece in problem.pieces), problem.robot_count
     return [
-        Statement("late_by_rows", WARNING, parameter.name, {"latency": value, "rows": value / step})
+        Statement("late_by_rows", WARNING, parameter.name.partition(".")[2], {"latency": value, "rows": value / step})
         for parameter, value in zip(problem.parameters[count:], found.state.point.values[count:].tolist(), strict=True)
         if parameter.part == LATENCY and value - problem.robot.drive.latency > LATE_ROWS * step
     ]

@@ -258,14 +258,15 @@ SENTENCES = {
         "{subject} improves the likelihood but worsens the prediction of held-out blocks of the log: it is not fitted"
     ),
     "late_by_rows": Sentence(
-        "{subject} of {latency:m.3g} ms is {rows:.2g} rows of the log: a camera, a network or a filter may be as late; "
-        "a drive is not, and then it stands in for what the model misses"
+        "{subject} is late by {latency:m.3g} ms, {rows:.2g} rows of the log: a camera, a network or a filter may be as "
+        "late; a drive is not, and then an inertia or something else that the model misses stands behind it"
     ),
     "size_fitted": Sentence(_size_fitted, "measure {keys}, and write them into the robot file"),
     "constant_force": Sentence(
         "a constant force pushes the robot ({keys}): with it a free run misses {with:%.3g} % of the spread of the "
         "outputs on held-out blocks of the log, {error:%.3g} % without",
-        "look for a floor that is not level, a cable, a brush, or voltages that are off by a constant",
+        "look for a floor that is not level, a cable, a brush, or voltages that are off by a constant; friction that "
+        "is not the same both ways looks alike",
     ),
     "plain_predicts_better": Sentence(
         "the fit without {nuisances} predicts held-out blocks of the log better (a free run misses {plain:%.3g} % of "

@@ -247,17 +247,13 @@ SENTENCES = {
         "{subject}: held-out logs are predicted no better with its dead band (error {written:.4g} {travel}/s, "
         "{plain:.4g} by slope and lag alone): it may be an effect of something else"
     ),
-    "held_out_blocks": Sentence(_held_out_blocks),
+    "motor_held_out_blocks": Sentence(_held_out_blocks),
     "dead_band_rejected": Sentence(
         "no dead band is kept: held-out blocks are predicted as well without; it is at most {high:.3g} {unit}"
     ),
     "offset_as_friction": Sentence(_offset_as_friction),
     "offset_of_input": Sentence(_offset_of_input),
     "slopes_differ_by_direction": Sentence(_slopes_differ_by_direction),
-    "late_by_rows": Sentence(
-        "{subject} is late by {latency:m.3g} ms, {rows:.2g} rows: rare for a drive; an inertia or a filter may stand "
-        "behind it"
-    ),
     "late_by_half_a_row": Sentence(
         "{subject} is late by {latency:m.3g} ms, which half a row explains: a speed that is the mean over the last row "
         "is so late by its sensor, not by its drive"

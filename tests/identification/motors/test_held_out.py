@@ -71,7 +71,7 @@ def test_held_out_blocks_are_predicted_down_to_the_noise(offset_study, offset_ru
     blocks = offset_study.motors[0].blocks
     assert blocks.written == pytest.approx(0.02 / float(np.std(offset_run.wheel_speed)), rel=0.1)
     assert blocks.plain > 5.0 * blocks.written
-    assert "held_out_blocks" in codes(offset_study.statements)
+    assert "motor_held_out_blocks" in codes(offset_study.statements)
     assert set(offset_study.motors[0].rejected) == {"latency"}
 
 

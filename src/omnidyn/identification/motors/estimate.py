@@ -14,6 +14,7 @@ from typing import Any
 
 from omnidyn.arrays import FloatArray
 from omnidyn.document import plain
+from omnidyn.identification.estimate import HeldOut
 from omnidyn.statement import NOTE, WARNING, Statement
 
 SLOPE, BAND, OFFSET, LAG, INERTIA, LATENCY = "slope", "dead_band", "offset", "lag", "inertia", "latency"
@@ -37,17 +38,6 @@ HEAD = (
     "rmse",
     "held out",
 )
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """Errors of free runs on held-out blocks: root mean square of each output over its spread, geometric mean.
-
-    written: of the motor that is written; plain: of one with slope and lag only, from the same starts.
-    """
-
-    written: float
-    plain: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +157,7 @@ class MotorEstimate:
         if self.blocks is None:
             return None
         numbers = {"written": self.blocks.written, "plain": self.blocks.plain, "rejected": tuple(self.rejected)}
-        return Statement("held_out_blocks", NOTE, self.name, numbers)
+        return Statement("motor_held_out_blocks", NOTE, self.name, numbers)
 
     def late_statements(self, row: float) -> list[Statement]:
         """What to say of latencies beside the time of a row [s]: longer than LATE_ROWS; half a row of a speed."""

@@ -17,7 +17,7 @@ from scipy.special import fdtri
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError, InsufficientDataError
-from omnidyn.identification.methods import AUTO, GAUSS, STUDENT
+from omnidyn.identification.methods import AUTO, GAUSS, STUDENT, degrees
 from omnidyn.identification.motors.estimate import (
     BAND,
     FREE_RUN,
@@ -42,7 +42,6 @@ from omnidyn.identification.motors.problem import (
 from omnidyn.identification.motors.rest import rested_under, turned_under, turns_both_ways
 from omnidyn.identification.motors.windows import line_numbers
 from omnidyn.identification.output_error.conclusion import intervals
-from omnidyn.identification.output_error.fit import degrees
 from omnidyn.identification.output_error.problem.differences import added_up, differences
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver, State

@@ -14,14 +14,15 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError
+from omnidyn.identification.estimate import HeldOut
 from omnidyn.identification.methods import AUTO, MotorFit
-from omnidyn.identification.motors.estimate import BAND, LATENCY, OFFSET, HeldOut, MotorEstimate
+from omnidyn.identification.methods import degrees as degrees_of
+from omnidyn.identification.motors.estimate import BAND, LATENCY, OFFSET, MotorEstimate
 from omnidyn.identification.motors.fit import fit_motor, solved
 from omnidyn.identification.motors.log import WORDS, MotorLog
 from omnidyn.identification.motors.problem import MotorEngine, MotorProblem, MotorRecord, motor_problem, motor_record
 from omnidyn.identification.motors.rest import turns_both_ways
 from omnidyn.identification.motors.windows import line_numbers
-from omnidyn.identification.output_error.fit import degrees as degrees_of
 from omnidyn.identification.output_error.problem.nuisances import earliest
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
@@ -167,12 +168,13 @@ def _problem(records: Sequence[MotorRecord], names: Sequence[str]) -> MotorProbl
 
 def _measured(record: MotorRecord) -> IntArray:
     """1 for each row in which something was measured. Shape (rows,)."""
-    return np.isfinite(record.outputs).any(axis=1).astype(np.int64)
+    return np.where(np.isfinite(record.outputs).any(axis=1), 1, 0)
 
 
 def _blocks(records: Sequence[MotorRecord]) -> list[IntArray]:
     """The number of the block of each row of each record, by the rows in which something was measured."""
-    count = np.cumsum(np.concatenate([_measured(record) for record in records])) - 1
+    rows = np.concatenate([_measured(record) for record in records])
+    count = np.cumsum(rows) - 1
     block = np.maximum(count, 0) * BLOCKS // (int(count[-1]) + 1)
     return np.split(block, np.cumsum([len(record.t) for record in records])[:-1])
 

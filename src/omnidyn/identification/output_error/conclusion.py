@@ -15,6 +15,7 @@ from omnidyn.comparison.verdict import is_missed
 from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.estimate import Correlation, identified, printable
 from omnidyn.identification.force_scale import scale_of_motion
+from omnidyn.identification.methods import GAUSS, NU
 from omnidyn.identification.output_error.answer import Nuisance, OutputErrorEstimate
 from omnidyn.identification.output_error.combinations import combinations, trades
 from omnidyn.identification.output_error.engines.engine import late_by
@@ -483,3 +484,8 @@ def _effects(
 def _added_up(run: Run, late: Mapping[str, float]) -> bool:
     """Whether the wheel speeds of a run were fitted as the angles that they add up to."""
     return "wheel_angle" in late and run.wheel_angle is None and run.wheel_speed is not None and len(run) > 1
+
+
+def loss_words(loss: str) -> str:
+    """A loss as an answer names it."""
+    return "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"

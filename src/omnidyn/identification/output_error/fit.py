@@ -16,11 +16,11 @@ import numpy as np
 
 from omnidyn.errors import InsufficientDataError, UnsupportedError
 from omnidyn.identification.grouping import count_once
-from omnidyn.identification.methods import AUTO, GAUSS, STUDENT, OutputError
+from omnidyn.identification.methods import AUTO, OutputError, degrees
 from omnidyn.identification.output_error.answer import Answer
 from omnidyn.identification.output_error.begin import WHOLE, begun, group_names
 from omnidyn.identification.output_error.choice import beside_given, best_with_force, better_of, why_white
-from omnidyn.identification.output_error.conclusion import conclude, unexplained
+from omnidyn.identification.output_error.conclusion import conclude, loss_words, unexplained
 from omnidyn.identification.output_error.joint import join, joint_start, own_names
 from omnidyn.identification.output_error.linear.blocks import rejected_nuisances
 from omnidyn.identification.output_error.linear.sensitivity import beside_rounding, moved_by_the_file
@@ -51,7 +51,6 @@ from omnidyn.progress import silent
 from omnidyn.run import Run, as_list
 from omnidyn.statement import WARNING, Statement
 
-NU = 4.0  # degrees of freedom of Student's t: 2 % of wild samples hardly count, 95 % efficient without them
 HALFWAY = 3e-4  # [m/s] tolerance of the implicit engine on the way there
 CLOSE = 1e-4  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
 
@@ -255,13 +254,13 @@ class Fit:
             return found
         early = too_early(found.solver, found)
         if not group.engine.exact and not group.engine.looped:
-            kept = tuple(name for name in _nuisances(found.solver.problem) if name not in early)
+            kept = tuple(name for name in found.solver.problem.nuisances if name not in early)
         else:
             progress.enter("which nuisances the logs support")
             kept = supported(found.solver, found, (LATENCY,) if group.engine.looped else automatic(group.records))
         harmful = rejected_nuisances(found) if not group.engine.looped else ()
         kept = tuple(name for name in kept if name not in harmful)
-        lost = [name for name in _nuisances(found.solver.problem) if name not in kept]
+        lost = [name for name in found.solver.problem.nuisances if name not in kept]
         if not lost:
             return self._chosen(found, progress)
         notes = tuple(implausible(name, value, fitted=False) for name, value in early.items())
@@ -282,14 +281,14 @@ class Fit:
         taken = better_of(found, self._plain(found, progress))
         if trust(taken.solver, taken, AUTO).kind != SANDWICH:
             return taken
-        names, aside = _nuisances(taken.solver.problem), progress.aside("once more with a constant force")
+        names, aside = taken.solver.problem.nuisances, progress.aside("once more with a constant force")
         forced = [self._beside(taken, [*names, force], aside) for force in (PUSH, TILT)]
         return best_with_force(taken, forced)
 
     def _plain(self, found: Solution, progress: FitProgress) -> Solution:
         """The fit of the only group without nuisances, but for the gain of a nominal supply; the fit itself where it
         has none."""
-        names = _nuisances(found.solver.problem)
+        names = found.solver.problem.nuisances
         lost = [name for name in names if name != GAIN]
         if not lost or found.plain is not None:
             return found.plain or found
@@ -306,7 +305,7 @@ class Fit:
 
         Beside them the logs may tell no number of the robot at all, or trade them without end, until rounding decides.
         """
-        names = _nuisances(found.solver.problem)
+        names = found.solver.problem.nuisances
         lost = [name for name in names if name.partition(".")[0] != LATENCY]
         if not lost or len(self.groups) != 1 or self.question.nuisances is not None:
             return None
@@ -381,7 +380,7 @@ class Fit:
         warnings, state = [Statement("interrupted")], best.state
         if state is not None:  # it may be of a part of the logs, or of longer steps
             assert isinstance(state.problem, Problem)
-            solver = self._solver(_nuisances(state.problem) if self._settles else None)
+            solver = self._solver(state.problem.nuisances if self._settles else None)
             state = solver.state(state.point, state.variance if solver.scaled.any() else None)
         else:
             solver = self._solver(None)
@@ -408,24 +407,9 @@ class Fit:
         return find_breakaway(solution, names, known, progress)
 
 
-def degrees(loss: str) -> float:
-    """Degrees of freedom of a loss; 0 for Gaussian noise."""
-    return NU if loss == STUDENT else 0.0
-
-
-def loss_words(loss: str) -> str:
-    """A loss as an answer names it."""
-    return "Gaussian noise" if loss == GAUSS else f"Student's t with {NU:g} degrees of freedom"
-
-
 def _in_each_group(names: Iterable[str], problem: Problem) -> list[str]:
     """Names with those of each group written out: KEY stands for KEY@GROUP of all groups."""
     found: list[str] = []
     for name in names:
         found += [each for each in problem.names if each.startswith(f"{name}{AT}")] or [name]
     return list(dict.fromkeys(found))
-
-
-def _nuisances(problem: Problem) -> tuple[str, ...]:
-    """The nuisances of a problem, each once whether groups have their own or not."""
-    return tuple(dict.fromkeys(name.partition(AT)[0] for name in problem.names[problem.robot_count :]))

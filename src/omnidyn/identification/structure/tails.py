@@ -18,8 +18,8 @@ from scipy.stats import mannwhitneyu
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.clocks import time_of_row
 from omnidyn.identification.lack_of_fit import LOSS, Remedy, Wild
+from omnidyn.identification.methods import NU
 from omnidyn.identification.output_error.engines.engine import row_terms
-from omnidyn.identification.output_error.fit import NU
 from omnidyn.identification.output_error.linear.blocks import Blocks
 from omnidyn.identification.output_error.linear.motion import Motion
 from omnidyn.identification.output_error.linear.rows import solved

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
-from omnidyn.identification.output_error.problem.parameters import Parameter, robot_at
+from omnidyn.identification.output_error.problem.parameters import AT, Parameter, robot_at
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.model.robot import Robot
 
@@ -101,6 +101,11 @@ class Problem(Fitted):
     def robot_parameters(self) -> tuple[Parameter, ...]:
         """Those of the robot file."""
         return self.parameters[: self.robot_count]
+
+    @property
+    def nuisances(self) -> tuple[str, ...]:
+        """Names of the others, each once whether groups have their own or not."""
+        return tuple(dict.fromkeys(name.partition(AT)[0] for name in self.names[self.robot_count :]))
 
     def robot_at(self, values: FloatArray) -> Robot:
         """The robot with these values of the parameters, not checked."""
