@@ -129,7 +129,7 @@ def test_a_wrong_model_of_a_robot_with_encoders_is_found(kind):
     """The sum of counts wanders where the model is wrong: it was taken for a memory that says nothing."""
     case, _, _ = drawn(by_name(kind), 69)
     assert case.setup.sensor == COUNTS
-    found = lack(kind, 69)
+    found = lack(kind, 69, ("latency",))
     assert found.found
     assert max(found.channels.values()) > 0.5
 
@@ -155,24 +155,25 @@ def test_noise_beside_rounding_spreads_it():
     assert abs(of_rounding(turned, COUNTED, way, 1.0)[0]) < 1e-3
 
 
-def lack(kind, number=61):
-    """Of a log of a wrong world, a large one; 20 s are enough, but a load is put on late."""
+def lack(kind, number=61, nuisances=None):
+    """Of a log of a wrong world, a large one; 20 s are enough, but a load is put on late. nuisances: without those of
+    the default, a constant force is not fitted."""
     case, seed, large = drawn(by_name(kind), number)
     assert large
     if kind != "payload":
         case = case.setup_but(seconds=20.0)
-    return identify(logged(case, seed), robot_of(case.told), OutputError(free=FRICTION)).lack_of_fit
+    return identify(logged(case, seed), robot_of(case.told), OutputError(free=FRICTION, nuisances=nuisances)).lack_of_fit
 
 
 @pytest.mark.parametrize("kind", ["backward", "sag", "eccentric"])
 def test_what_nobody_offers_is_found_and_has_no_confident_remedy(kind):
-    found = lack(kind)
+    found = lack(kind, nuisances=("latency",))
     assert found.found
     assert not any(remedy.confident for remedy in found.remedies[:1])
 
 
 def test_a_force_in_the_room_is_called_one():
-    found = lack("umbilical")
+    found = lack("umbilical", nuisances=("latency",))
     assert "stays in the room" in str(found.statement())
     assert (found.remedies[0].key, found.remedies[0].confident) == ("tilt", True)
 
