@@ -15,7 +15,7 @@ times of one run.
 
 from __future__ import annotations
 
-from benchmarks.identify_cost import command, diagnosis, long, speed
+from benchmarks.identify_cost import command, default_diagnosis, diagnosis, long, speed
 from benchmarks.identify_draws import breakaway, coverage, impaired, starts
 from benchmarks.identify_peers import compare
 from benchmarks.table import Table, machine
@@ -30,6 +30,6 @@ def measure() -> Table:
     table.notes += [machine(), "times: processor time of this process, or of a child where there is one"]
     robot = load_robot("axebot")
     clean = simulate(robot, excitation(), 1.0 / RATE)
-    for part in (coverage, speed, diagnosis, command, compare, starts, long, impaired, breakaway):
+    for part in (coverage, speed, diagnosis, default_diagnosis, command, compare, starts, long, impaired, breakaway):
         part(table, robot, clean)
     return table

@@ -17,7 +17,7 @@ import omnidyn
 from benchmarks.identify_log import cpu
 from benchmarks.table import Table
 from benchmarks.wrong_worlds.kinds import by_name
-from benchmarks.wrong_worlds.log import logged, robot_of
+from benchmarks.wrong_worlds.log import logged, right_case, robot_of
 from benchmarks.wrong_worlds.remedies import FRICTION
 from benchmarks.wrong_worlds.score import drawn
 from omnidyn.identification.structure.missing.laws import TRACTION, slippery
@@ -27,6 +27,7 @@ from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation, noisy_draw
 
 FIRST = 10.0  # [s] of the command's first run
+MOST = 10.0  # [s] of the diagnosis of 25 s at 1 kHz
 GRIP = 0.3  # of the floor, from which wheels that slip are fitted
 DIAGNOSED = (
     "gain",
@@ -181,6 +182,25 @@ def diagnosis(table: Table, _robot: Robot, _clean: Run) -> None:
         table.add(
             what=f"... in fits of a turning frame instead: {words}", draws=len(by_implicit), value=value, unit="fits"
         )
+
+
+def default_diagnosis(table: Table, _robot: Robot, _clean: Run) -> None:
+    """The default diagnosis of a right robot that turns in its frame, by the implicit engine: 25 s at 1 kHz, and three
+    logs of 40 s at 200 Hz."""
+    for rate, seconds, logs, limit in ((1000.0, 25.0, 1, MOST), (200.0, 40.0, 3, None)):
+        case = right_case(2).setup_but(rate=rate, seconds=seconds)
+        runs = [logged(case, seed).replace(source=f"log {seed}") for seed in range(logs)]
+        spent = []
+        for _ in range(2):  # the first compiles
+            began = time.process_time()
+            fit = omnidyn.identify(runs, robot_of(case.told))
+            fitted = time.process_time()
+            assert fit.lack_of_fit is not None
+            spent.append((time.process_time() - fitted, fitted - began))
+        asked, own = min(spent)
+        words = f"default diagnosis, {logs} of {seconds:g} s at {rate:g} Hz"
+        table.add(*([] if limit is None else [f"<= {limit:g}", asked <= limit]), what=words, value=asked, unit="s")
+        table.add(what="... the fit itself", value=own, unit="s")
 
 
 def _diagnosed(log: Run, robot: Robot) -> tuple[float, float, bool]:

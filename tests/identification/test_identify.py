@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from omnidyn import Run, load_robot, simulate
+from omnidyn.attempts import Attempts
 from omnidyn.errors import InputError
 from omnidyn.identification import advice
+from omnidyn.identification import identify as module
 from omnidyn.identification.default_method import as_driven
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import SteadyState
@@ -111,3 +113,21 @@ def test_a_fit_to_200_logs_without_noise_that_overlap_ends():
     axes = robot.friction.axes.replace(coulomb=(1.5, 1.0, 0.05))
     fit = identify(runs, robot.replace(friction=robot.friction.replace(axes=axes))).estimate
     np.testing.assert_allclose(fit.robot.friction.axes.coulomb, robot.friction.axes.coulomb, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("fit_time", "spent", "is_said"), [(10.0, 70.0, True), (10.0, 40.0, False), (0.1, 1.5, False)])
+def test_a_diagnosis_that_takes_far_longer_than_the_fit_offers_quick(monkeypatch, fit_time, spent, is_said):
+    """Where it takes 5 times the fit, and more than is hardly noticed."""
+    clock, said = [0.0], []
+    monkeypatch.setattr(module, "process_time", lambda: clock[0])
+
+    class Fit:
+        @property
+        def diagnosis(self):
+            clock[0] += spent
+            return "something"
+
+    asked = module._Asked(None, None, (), False, said.append, print, Attempts(), fit_time)
+    module._diagnosed({"all": Fit()}, asked)
+    urgent = [report.phase for report in said if report.urgent]
+    assert urgent == ["the diagnosis took 70 s, 7 times the fit; `quick` leaves it out"] * is_said

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from time import process_time
 from typing import TYPE_CHECKING, Any
 
 from omnidyn.arguments import MADE_BY, check_order, is_frame
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
 
 Logs = Run | Log | Sequence[Run | Log] | SteadyTable | MotorTable
 Save = Callable[[Mapping[str, Estimate]], object]
+DEAR, NOTICED = 5.0, 2.0  # times the fit; [s]: a diagnosis that takes longer than both is worth a word
 
 
 def identify(
@@ -137,7 +139,10 @@ def identify(
 
 @dataclass(frozen=True)
 class _Asked:
-    """What is asked beside the method, who hears what is done, who takes estimates, and what was not made."""
+    """What is asked beside the method, who hears what is done, who takes estimates, and what was not made.
+
+    fit_time [s]: processor time of the fit.
+    """
 
     robot: Robot | None
     groups: str | Sequence[str] | None
@@ -146,6 +151,7 @@ class _Asked:
     progress: Progress
     save: Save
     attempts: Attempts
+    fit_time: float = 0.0
 
     def of_friction(self) -> Robot:
         """The robot. Raises InputError where there is none."""
@@ -266,9 +272,11 @@ def _fitted(runs: Sequence[Run], method: OutputError, check: Sequence[Log], aske
         raise InputError("the logs have only one group", got=names[0], expected="two or more", where="groups")
     verdicts = log_verdicts(check, robot, asked.progress)
     asked.progress(Report("fitting: loading"))
+    began = process_time()
     answer, cut = _answered(
         [run for run, _ in chosen], method, [group for _, group in chosen] if named else None, asked
     )
+    asked = replace(asked, fit_time=process_time() - began)
     aside = {
         name: [run for run, own, out in zip(runs, groups, held, strict=True) if out and own == name]
         for name in answer.estimates
@@ -318,12 +326,16 @@ def _diagnosed(fits: Mapping[str, OutputErrorEstimate], asked: _Asked) -> dict[s
     if asked.quick:
         asked.attempts.leave_out(DIAGNOSIS, BY_QUICK)
         return dict(fits)
-    found = {}
+    found, began = {}, process_time()
     for name, fit in fits.items():
         of = _of_group(name, fits)
         asked.progress(Report(f"diagnosing{of}"))
         made = asked.attempts.make(f"{DIAGNOSIS}{of}", lambda fit=fit: fit.diagnosis)
         found[name] = fit if made is not None else replace(fit, study=None)
+    spent = process_time() - began
+    if spent > max(DEAR * asked.fit_time, NOTICED):
+        words = f"the diagnosis took {spent:.0f} s, {spent / asked.fit_time:.0f} times the fit; `quick` leaves it out"
+        asked.progress(Report(words, urgent=True))
     return found
 
 

@@ -11,8 +11,8 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.output_error.problem.problem import ROWS, Parts, Piece, Problem, bounded
 from omnidyn.identification.output_error.problem.record import SHORTEST, Record
 
-LONGEST = 0.01  # [s] of a row that is made of several: motors and robots answer more slowly
-KEPT = 5000  # rows of all logs together, which are left at least
+LONGEST = 0.02  # [s] of a row that is made of several: most robots answer more slowly
+KEPT = 3000  # rows of all logs together, which are left at least: as many as `bench wrong_worlds` finds causes in
 WHOLE = 0.9  # of the rows of an output that must hold a number: others have a rate of their own
 FINE = 10  # times as many rows as are looked at, that are simulated for them
 
