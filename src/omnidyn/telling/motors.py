@@ -147,6 +147,15 @@ def _motors_no_line(statement: Statement) -> str:
     return f"{words}, except from {low:.3g} to {high:.3g} {statement.numbers['unit']}" if high > low else words
 
 
+def _dead_bands_apart(statement: Statement) -> str:
+    """Free run and windows of one log tell dead bands that exclude each other."""
+    numbers = statement.numbers
+    ends = ("between {:.3g} and {:.3g}".format(*numbers[name]) for name in ("free_run", "windows"))
+    return "{}: the dead band is {} {unit} by free runs, {} {unit} by windows: trust neither".format(
+        statement.subject, *ends, unit=numbers["unit"]
+    )
+
+
 def _start_not_seen(statement: Statement) -> str:
     """No start from rest was seen; where the line meets speed 0, if that is known."""
     numbers = statement.numbers
@@ -269,6 +278,7 @@ SENTENCES = {
     ),
     "motors_line_misses": Sentence("no line describes the speed of {motors}"),
     "motors_no_line": Sentence(_motors_no_line),
+    "dead_bands_apart": Sentence(_dead_bands_apart),
     "start_not_seen": Sentence(_start_not_seen),
     "never_sets_off": Sentence("{subject}: it rests up to {low:.3g} {unit}, and never sets off"),
     "sets_off_below": Sentence(

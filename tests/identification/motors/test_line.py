@@ -1,5 +1,7 @@
 """Lines of motors from windows in integral form, against motors whose line is known exactly."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,8 @@ from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import MotorFit, MotorLine
 from omnidyn.identification.motors.log import motor_logs
-from omnidyn.identification.motors.windows import motor_windows
+from omnidyn.identification.motors.study import dead_bands_apart
+from omnidyn.identification.motors.windows import fit_line, motor_windows
 from omnidyn.run import Run
 
 SLOPE, INERTIA = 0.5, 0.08
@@ -66,6 +69,23 @@ def test_no_friction_is_invented():
     lines = [line_of(bench(0.0, seed, noise=0.1, with_angle=False)) for seed in range(20)]
     assert sum(line.dead_band_seen for line in lines) <= 2
     assert abs(np.mean([line.value["dead_band"] for line in lines])) < 0.02
+
+
+def test_a_dead_band_is_kept_where_windows_left_out_need_it():
+    assert "dead_band" not in line_of(bench(0.4, noise=0.1, with_angle=False)).rejected
+    rejected = line_of(bench(0.0, noise=0.1, with_angle=False))
+    assert "dead_band" in rejected.rejected
+    assert not rejected.dead_band_seen
+    assert "held-out blocks are predicted as well without" in str(rejected.statement())
+
+
+def test_dead_bands_that_exclude_each_other_are_said():
+    windows = motor_windows(motor_logs([bench(0.4)]))
+    line = fit_line(windows, 0, "")
+    other = replace(line, ci95={**line.ci95, "dead_band": (0.1, 0.2)})
+    assert not list(dead_bands_apart([line], windows))
+    (found,) = dead_bands_apart([other], windows)
+    assert "the dead band is between 0.1 and 0.2 V by free runs" in str(found)
 
 
 def test_the_intervals_hold_the_truth():

@@ -51,6 +51,7 @@ class MotorEstimate:
     does not resolve the input there. one_way: it turned one way only, so a dead band and an offset of the input are
     one. held_out [rad/s]: error of free runs on logs that were not fitted. source: the logs. answers: whether its
     speed goes with its input. travel: "rad", or "m" of a linear axis: what stands here in rad is in that.
+    rejected: numbers that held-out blocks do not need, with their intervals.
     Of windows: rest, the largest input under which the motor stayed at rest, NaN where it never rested; draws: of the
     bootstrap, by name. Of a free run: between, noise by channel, kind of the covariance, whether the fit converged.
     """
@@ -89,8 +90,10 @@ class MotorEstimate:
 
     @property
     def dead_band_seen(self) -> bool:
-        """Whether the interval of the dead band lies above 0, and that of the slope too: else there is no line."""
-        known = BAND in self.value and BAND not in self.unidentifiable
+        """Whether held-out blocks improve by the dead band, its interval lies above 0, and that of the slope too: else
+        there is no line.
+        """
+        known = BAND in self.value and BAND not in self.unidentifiable and BAND not in self.rejected
         return known and self.ci95[BAND][0] > 0.0 and self.ci95[SLOPE][0] > 0.0
 
     @property
@@ -221,7 +224,7 @@ class MotorEstimate:
         parameters = {
             name: {"value": value, "std": self.std[name], "ci95": self.ci95[name]} for name, value in self.value.items()
         }
-        of_way = (
+        of_way: dict[str, Any] = (
             {"rest": self.rest, "one_way": self.one_way}
             if self.way == WINDOWS
             else {
@@ -231,9 +234,9 @@ class MotorEstimate:
                 "converged": self.converged,
                 "left_out": self.left_out,
                 "held_out_blocks": None if self.blocks is None else asdict(self.blocks),
-                "rejected": {name: {"ci95": ends} for name, ends in self.rejected.items()},
             }
         )
+        of_way["rejected"] = {name: {"ci95": ends} for name, ends in self.rejected.items()}
         return plain(
             {
                 "motor": "all" if self.motor is None else self.motor + 1,

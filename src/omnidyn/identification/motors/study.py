@@ -352,6 +352,8 @@ def _free_runs(runs: Sequence[Run], asked: MotorFit, hold_out: Sequence[str], pr
         drawn=seen,
         log_warnings=tuple(averaged_statements(logs, False)) + _of_counts(runs, logs),
     )
+    if seen is not None:
+        study = replace(study, log_warnings=(*study.log_warnings, *dead_bands_apart(bands, seen)))
     return _along(study, curves_of_points(points_of_logs(logs)) if slow else curves_of_logs(logs))
 
 
@@ -359,6 +361,20 @@ def _of_counts(runs: Sequence[Run], logs: Sequence[MotorLog]) -> tuple[Statement
     """Whether speeds were taken for the angles of which they are differences."""
     added = any(run.wheel_speed is not None for run in runs) and all(log.speed is None for log in logs)
     return (Statement("speeds_added_up", NOTE),) if added and logs[0].travel == ANGLE else ()
+
+
+def dead_bands_apart(motors: Sequence[MotorEstimate], windows: MotorWindows) -> Iterator[Statement]:
+    """Motors whose windows tell a dead band that their free run excludes, or the other way round."""
+    for motor in motors:
+        try:
+            line = fit_line(windows, motor.motor, motor.source)
+        except InsufficientDataError:
+            continue
+        ends = motor.rejected.get(BAND, motor.ci95.get(BAND, (math.nan, math.nan)))
+        (low, high), (least, most) = ends, line.ci95[BAND]
+        if (motor.dead_band_seen or line.dead_band_seen) and (high < least or most < low):
+            numbers = {"free_run": ends, "windows": (least, most), "unit": motor.unit}
+            yield Statement("dead_bands_apart", WARNING, motor.name, numbers)
 
 
 def _supply(logs: Sequence[MotorLog]) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InsufficientDataError
-from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, OFFSET, SLOPE, WINDOWS, MotorEstimate
+from omnidyn.identification.motors.estimate import BAND, INERTIA, LAG, OFFSET, PAYS, SLOPE, WINDOWS, MotorEstimate
 from omnidyn.identification.motors.log import InputIntegral, MotorLog, follows, rows_with
 from omnidyn.logs.plateaus import STEPWISE, find_plateaus
 from omnidyn.logs.resolved import unresolved_input
@@ -336,6 +336,7 @@ class _Reader:
 # (1989).
 
 DRAWS, SEED, BLOCK = 1000, 20121, 3
+FOLDS = 5  # shares of the windows, in time, that are left out in turn
 ITERATIONS, SETTLED = 200, 1e-8
 HUBER = 2.5
 MIDDLE = 0.6827  # of the draws: a few wild ones, of a line that is hardly determined, do not count in a std
@@ -363,6 +364,7 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
     drawn[1:, used] = _bootstrap(design[:, used], put_in, speed_std, fit, block, windows.settled)
     with np.errstate(invalid="ignore", divide="ignore"):  # a draw without a slope has no lag
         numbers = dict(zip((SLOPE, BAND, INERTIA), drawn.T, strict=True)) | {LAG: drawn[:, 2] / drawn[:, 0]}
+    needless = 1 in used and not _pays(design[:, used], put_in, fit.weight, used.index(1))
     residual = put_in - design[:, used] @ fit.parameters
     slope, error = float(fit.parameters[0]), float(np.sqrt(np.mean(residual**2)))
     with np.errstate(invalid="ignore", divide="ignore"):  # of draws that are all alike there is none
@@ -377,6 +379,7 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
         value={name: float(draws[0]) for name, draws in numbers.items()},
         std={name: 0.5 * float(np.diff(central_interval(draws[1:], MIDDLE))[0]) for name, draws in numbers.items()},
         ci95={name: central_interval(draws[1:]) for name, draws in numbers.items()},
+        rejected={BAND: central_interval(numbers[BAND][1:])} if needless else {},
         correlation=correlation,
         rmse=error / abs(slope) if slope else math.inf,
         unidentifiable=tuple(name for name, draws in numbers.items() if np.isnan(draws[0])),
@@ -386,6 +389,19 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
         rest=float(np.fmax.reduce(windows.rest if motor is None else windows.rest[[motor]])),
         draws={name: draws[1:] for name, draws in numbers.items()},
     )
+
+
+def _pays(design: FloatArray, put_in: FloatArray, weight: FloatArray, column: int) -> bool:
+    """Whether windows left out, a share in turn, are predicted better with a column, by PAYS of the error."""
+    errors, fold = np.zeros(2), np.arange(len(put_in)) * FOLDS // len(put_in)
+    for k, table in enumerate((design, np.delete(design, column, axis=1))):
+        root = np.sqrt(weight)
+        for part in range(FOLDS):
+            kept, out = fold != part, fold == part
+            rows = root[kept, None] * table[kept]
+            parameters = np.linalg.lstsq(rows, root[kept] * put_in[kept], rcond=None)[0]
+            errors[k] += float(weight[out] @ (put_in[out] - table[out] @ parameters) ** 2)
+    return bool(np.sqrt(errors[0]) < (1.0 - PAYS) * np.sqrt(errors[1]))
 
 
 @dataclass(frozen=True, eq=False)
