@@ -173,7 +173,7 @@ def _measured(record: MotorRecord) -> IntArray:
 def _blocks(records: Sequence[MotorRecord]) -> list[IntArray]:
     """The number of the block of each row of each record, by the rows in which something was measured."""
     count = np.cumsum(np.concatenate([_measured(record) for record in records])) - 1
-    block = np.maximum(count, 0) * BLOCKS // (int(count[-1]) + 1)
+    block = np.asarray(np.maximum(count, 0) * BLOCKS // (int(count[-1]) + 1), dtype=np.int64)
     return np.split(block, np.cumsum([len(record.t) for record in records])[:-1])
 
 
