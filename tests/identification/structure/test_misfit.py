@@ -162,7 +162,9 @@ def lack(kind, number=61, nuisances=None):
     assert large
     if kind != "payload":
         case = case.setup_but(seconds=20.0)
-    return identify(logged(case, seed), robot_of(case.told), OutputError(free=FRICTION, nuisances=nuisances)).lack_of_fit
+    return identify(
+        logged(case, seed), robot_of(case.told), OutputError(free=FRICTION, nuisances=nuisances)
+    ).lack_of_fit
 
 
 @pytest.mark.parametrize("kind", ["backward", "sag", "eccentric"])
