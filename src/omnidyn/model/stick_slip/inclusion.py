@@ -3,8 +3,9 @@
     0 in (M/tau)(x - x*) - F(x) + sum_e g_e N_e(g_e . x) + dE(x)
 
 x = (v_x, v_y, rho omega); F: motors, viscous friction, turning frame; N_e: the dry friction of element e, -hold..hold
-at rest and the slide level in motion; E: the potential sqrt(Cx^2 vx^2 + Cy^2 vy^2) of the ellipse. A stage of an
-implicit step is such a problem; with tau = 1, x* = 0 and speeds frozen its solution is the acceleration.
+at rest and the slide level in motion; E: the potential sqrt(Cx^2 vx^2 + Cy^2 vy^2) of the ellipse. In the place of dE
+a plain one has (Cx vx, Cy vy)/|v|, the gradient of nothing. A stage of an implicit step is such a problem; with
+tau = 1, x* = 0 and speeds frozen its solution is the acceleration.
 
 Method: all kinks g_e . x = 0 pass through the origin, so space falls into cells (signs of the elements) and their
 faces (an active set: some stuck). Newton within one; on the way, stop at a kink that holds, pass one that gives way; at
