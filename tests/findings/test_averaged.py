@@ -7,7 +7,8 @@ from omnidyn.findings.check import check
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import MotorLine
 from omnidyn.identification.motors.log import averaged_statements, motor_logs
-from omnidyn.identification.motors.windows import fit_line, motor_windows
+from omnidyn.identification.motors.window_fit import fit_line
+from omnidyn.identification.motors.windows import motor_windows
 from omnidyn.logs.log import Log
 from omnidyn.logs.read_log import load_log
 from omnidyn.logs.resolved import rows_of_mean

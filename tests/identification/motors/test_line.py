@@ -10,7 +10,8 @@ from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import MotorFit, MotorLine
 from omnidyn.identification.motors.log import motor_logs
 from omnidyn.identification.motors.study import dead_bands_apart
-from omnidyn.identification.motors.windows import fit_line, motor_windows
+from omnidyn.identification.motors.window_fit import fit_line
+from omnidyn.identification.motors.windows import motor_windows
 from omnidyn.run import Run
 
 SLOPE, INERTIA = 0.5, 0.08

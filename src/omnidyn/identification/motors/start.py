@@ -26,7 +26,8 @@ from omnidyn.errors import InsufficientDataError
 from omnidyn.identification.motors.estimate import BAND, LAG, SLOPE, MotorEstimate
 from omnidyn.identification.motors.log import MotorLog, orientation, orientation_of
 from omnidyn.identification.motors.rest import LEAST_REST, Span, noise_of_rows, starts_and_stops, turned_under
-from omnidyn.identification.motors.windows import EDGE_SHARE, LENGTHS, MotorWindows, fit_line, motor_windows
+from omnidyn.identification.motors.window_fit import fit_line
+from omnidyn.identification.motors.windows import EDGE_SHARE, LENGTHS, MotorWindows, motor_windows
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.statement import NOTE, WARNING, Statement
 from omnidyn.statistics import sensor_step, t_quantile

@@ -48,7 +48,8 @@ from omnidyn.identification.motors.steady_curve import (
     curves_of_logs,
     curves_of_points,
 )
-from omnidyn.identification.motors.windows import MotorWindows, fit_line, motor_windows
+from omnidyn.identification.motors.window_fit import fit_line
+from omnidyn.identification.motors.windows import MotorWindows, motor_windows
 from omnidyn.logs.log import Log
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.model.robot import Robot
