@@ -211,6 +211,8 @@ def motor(number, band=0.5, seen=True, slope=(0.1, 0.2)) -> Any:
         name="all motors" if number is None else f"motor {number + 1}",
         unit="V",
         dead_band_seen=seen,
+        offset_seen=False,
+        answers=slope[0] > 0.0,
         value={"dead_band": band},
         ci95={"slope": slope},
     )
@@ -231,7 +233,7 @@ def motor(number, band=0.5, seen=True, slope=(0.1, 0.2)) -> Any:
         ),
         (
             [motor(0, seen=False, slope=(-0.1, 0.2))],
-            "No motor is seen to answer to its input: the slope of motor 1 may as well be 0.",
+            "No motor is seen to answer to its input: the speed of motor 1 does not go with it.",
         ),
     ],
 )
