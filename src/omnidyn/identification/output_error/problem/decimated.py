@@ -1,4 +1,4 @@
-"""Every so many rows of a problem: rows 1 ms apart say hardly more of what a fit misses than rows 5 ms apart."""
+"""Means of so many rows of a problem: of what a fit misses, rows 1 ms apart say no more than their means over 20 ms."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ FINE = 10  # times as many rows as are looked at, that are simulated for them
 class Decimated:
     """problem: with the rows that are kept. whole: with all of them; it is the same one where none is left out.
 
-    rows: of each piece, which rows of its record are kept. Inputs are means over what is between them; outputs are as
-    measured, so that their noise, ticks and outliers are those of the log.
+    rows: of each piece, which rows of its record are kept. Inputs are means over what is between them, outputs over
+    what is nearest to each: noise of all rows is averaged, as a fit to all does. Counts are as measured.
     """
 
     problem: Problem
@@ -67,7 +67,10 @@ class Decimated:
         found = []
         for (residual, slopes, at), piece, kept in zip(parts, self.whole.pieces, self.rows, strict=True):
             rows = kept[kept < piece.first + residual.shape[1]] - piece.first
-            found.append((residual[:, rows], slopes[:, rows], at))
+            counts = np.array(piece.record.ticks) > 0.0
+            few, by = _nearest(residual, rows), _nearest(slopes, rows)
+            few[counts], by[counts] = residual[counts][:, rows], slopes[counts][:, rows]
+            found.append((few, by, at))
         return found
 
 
@@ -91,15 +94,15 @@ def _of_record(record: Record, kept: Sequence[IntArray]) -> Record:
     """A record of the rows that some pieces keep, and its ends, which say how much of it has gone by."""
     rows = np.unique(np.concatenate([*kept, [0, len(record.t) - 1]]))
     pieces = [(int(np.searchsorted(rows, own[0])), int(np.searchsorted(rows, own[-1]))) for own in kept]
-    voltage = record.voltage[rows]
+    voltage, outputs, counts = record.voltage[rows], record.outputs[rows], np.array(record.ticks) > 0.0
     for own, (first, last) in zip(kept, pieces, strict=True):
         voltage[first:last] = _means(record, own)
+        means = _nearest(record.outputs[own[0] : own[-1] + 1].T, own - own[0]).T
+        outputs[first : last + 1, ~counts] = means[:, ~counts]
     run = record.run
     if run is not None:
         run = run.replace(t=run.t[rows], **{name: values[rows] for name, values in run.channels.items()})
-    return replace(
-        record, t=record.t[rows], voltage=voltage, outputs=record.outputs[rows], pieces=tuple(pieces), run=run
-    )
+    return replace(record, t=record.t[rows], voltage=voltage, outputs=outputs, pieces=tuple(pieces), run=run)
 
 
 def _means(record: Record, rows: IntArray) -> FloatArray:
@@ -108,3 +111,12 @@ def _means(record: Record, rows: IntArray) -> FloatArray:
     step = np.diff(record.t[inner.start : inner.stop + 1])[:, None]
     summed = np.add.reduceat(record.voltage[inner] * step, rows[:-1] - rows[0])
     return summed / np.diff(record.t[rows])[:, None]
+
+
+def _nearest(values: FloatArray, rows: IntArray) -> FloatArray:
+    """Means of the numbers among values (C, n, ...) that are nearest to each of some rows (K,). Shape (C, K, ...)."""
+    first = np.concatenate([[0], (rows[:-1] + rows[1:] + 1) // 2])
+    there = np.isfinite(values)
+    summed = np.add.reduceat(np.where(there, values, 0.0), first, axis=1)
+    count = np.add.reduceat(there.astype(float), first, axis=1)
+    return np.where(count > 0.0, summed / np.maximum(count, 1.0), np.nan)
