@@ -115,7 +115,7 @@ def _maker(module: str, name: str) -> Callable[..., Any]:
     return lambda value, **options: getattr(importlib.import_module(module), name)(value, **options)
 
 
-shown.made_by(**{what: _maker(*place) for what, place in _MAKERS.items()})
+shown.made_by(**{maker: _maker(*place) for maker, place in _MAKERS.items()})
 
 
 # Public rooms: `omnidyn.export.mjcf(robot)`, `omnidyn.interop.linear_system(robot)`.

@@ -37,24 +37,24 @@ def check_order(call: str, *places: tuple[object, Kinds]) -> None:
     that order; a list stands for what it holds, an empty one for anything.
     Raises InputError, which names both where two were swapped.
     """
-    wrong = [k for k, (given, wanted) in enumerate(places) if not _is(given, wanted)]
-    if not wrong:
+    misfits = [k for k, (value, kind) in enumerate(places) if not _is(value, kind)]
+    if not misfits:
         return
-    for one in wrong:
-        for other, (_, wanted) in enumerate(places):
-            if other != one and _is(places[one][0], wanted) and _is(places[other][0], places[one][1]):
-                first, second = sorted((one, other))
+    for place in misfits:
+        for position, (_, kind) in enumerate(places):
+            if position != place and _is(places[place][0], kind) and _is(places[position][0], places[place][1]):
+                first, second = sorted((place, position))
                 raise InputError(
                     "two arguments stand in each other's place",
                     got=f"{_kind(places[first][0])} before {_kind(places[second][0])}",
                     expected=call,
                 )
-    given, wanted = places[wrong[0]]
-    kinds = wanted if isinstance(wanted, tuple) else (wanted,)
+    value, kind = places[misfits[0]]
+    kinds = kind if isinstance(kind, tuple) else (kind,)
     names = [kind.__name__ for kind in kinds if kind is not type(None)]
     raise InputError(
         f"an argument is no {' or '.join(names)}",
-        got=_kind(given),
+        got=_kind(value),
         expected=call,
         remedy=next((MADE_BY[name] for name in names if name in MADE_BY), ""),
     )
@@ -62,28 +62,28 @@ def check_order(call: str, *places: tuple[object, Kinds]) -> None:
 
 def unknown_option(owner: str, option: str, known: Iterable[str], where: str) -> InputError:
     """The error of an option that something does not have, with the nearest that it has."""
-    near = difflib.get_close_matches(option, list(known), 1, 0.4)
+    matches = difflib.get_close_matches(option, list(known), 1, 0.4)
     return InputError(
         f"{owner} has no such option",
         got=option,
         expected=", ".join(known),
-        remedy=f"did you mean {near[0]}?" if near else "",
+        remedy=f"did you mean {matches[0]}?" if matches else "",
         where=where,
     )
 
 
-def _is(value: object, wanted: Kinds) -> bool:
+def _is(value: object, kind: Kinds) -> bool:
     """Whether a value, or every item of a list, is of a kind. A table in memory stands for a Run."""
     if isinstance(value, list | tuple):
-        return all(isinstance(each, wanted) or _stands_for(each, wanted) for each in value)
-    known = isinstance(value, Iterator) or isinstance(value, wanted)  # noqa: SIM101  what an iterator holds is not known
-    return known or _stands_for(value, wanted)
+        return all(isinstance(item, kind) or _stands_for(item, kind) for item in value)
+    matches = isinstance(value, Iterator) or isinstance(value, kind)  # noqa: SIM101  what an iterator holds is not known
+    return matches or _stands_for(value, kind)
 
 
-def _stands_for(value: object, wanted: Kinds) -> bool:
+def _stands_for(value: object, kind: Kinds) -> bool:
     """Whether a table in memory stands where a Run is wanted."""
-    kinds = wanted if isinstance(wanted, tuple) else (wanted,)
-    return is_frame(value) and any(each.__name__ == "Run" for each in kinds)
+    kinds = kind if isinstance(kind, tuple) else (kind,)
+    return is_frame(value) and any(wanted_kind.__name__ == "Run" for wanted_kind in kinds)
 
 
 def _kind(value: object) -> str:
@@ -91,7 +91,7 @@ def _kind(value: object) -> str:
     if isinstance(value, str | os.PathLike):
         return f"the text {os.fspath(value)!r}"
     if isinstance(value, list | tuple) and value:
-        kinds = dict.fromkeys(type(each).__name__ for each in value)
+        kinds = dict.fromkeys(type(item).__name__ for item in value)
         return f"a {type(value).__name__} of {' and '.join(kinds)}"
     name = type(value).__name__
     return "nothing" if value is None else f"{'an' if name[0] in 'AEIOUaeiou' else 'a'} {name}"

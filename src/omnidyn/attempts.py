@@ -54,15 +54,15 @@ class Attempts:
             self.interrupt = error
         self.leave_out(part, error)
 
-    def leave_out(self, part: str, why: BaseException | str) -> None:
+    def leave_out(self, part: str, cause: BaseException | str) -> None:
         """Note a part that is not made."""
-        self.missing.append(Missing(part, why if isinstance(why, str) else _reason(why)))
+        self.missing.append(Missing(part, cause if isinstance(cause, str) else _reason(cause)))
 
 
 def not_made(missing: Sequence[Missing]) -> Iterator[Statement]:
     """A statement for each reason: "not made: the diagnosis and the page (interrupted)"."""
-    for reason in dict.fromkeys(each.reason for each in missing):
-        parts = tuple(f"the {each.part}" for each in missing if each.reason == reason)
+    for reason in dict.fromkeys(part.reason for part in missing):
+        parts = tuple(f"the {part.part}" for part in missing if part.reason == reason)
         yield Statement("not_made", WARNING, numbers={"parts": parts, "reason": reason})
 
 

@@ -16,8 +16,8 @@ LONGER = 1.5  # times the usual step: a missing value doubles a step of its sens
 
 def sampled(values: FloatArray) -> IntArray:
     """Rows in which a channel holds any number. values: shape (rows,) or (rows, columns)."""
-    known = np.isfinite(values)
-    return np.flatnonzero(known if known.ndim == 1 else known.any(axis=1))
+    finite = np.isfinite(values)
+    return np.flatnonzero(finite if finite.ndim == 1 else finite.any(axis=1))
 
 
 def samples(t: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -64,8 +64,8 @@ def time_of_row(t: FloatArray, staggered: bool) -> float:
 
 
 def _step(t: FloatArray, column: FloatArray) -> float:
-    own = t[sampled(column)] if has_own_clock(t, column) else t
-    return float(np.median(np.diff(own)))
+    times = t[sampled(column)] if has_own_clock(t, column) else t
+    return float(np.median(np.diff(times)))
 
 
 def is_staggered(t: FloatArray, channels: Iterable[FloatArray]) -> bool:

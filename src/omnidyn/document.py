@@ -124,8 +124,8 @@ class Document:
 
     def legend(self) -> list[str]:
         """A line for each word of the trade that occurs in the parts."""
-        told = (part if isinstance(part, str) else "\n".join(part.lines(WIDTH, _bare)) for part in self.parts)
-        return explained("\n".join(told))
+        texts = (part if isinstance(part, str) else "\n".join(part.lines(WIDTH, _bare)) for part in self.parts)
+        return explained("\n".join(texts))
 
     def to_text(self, width: int = WIDTH, paint: Paint = _bare) -> str:
         """The document for people, without a line break at its end. paint: how signs get their colours."""
@@ -146,8 +146,8 @@ def sentence(words: str) -> str:
 
 def all_of(names: Sequence[str]) -> str:
     """Names in a sentence: "x", "x and y", "x, y and z"; "" for none."""
-    *most, last = names or ("",)
-    return f"{', '.join(most)} and {last}" if most else last
+    *names_before, last = names or ("",)
+    return f"{', '.join(names_before)} and {last}" if names_before else last
 
 
 def apart(*blocks: Sequence[Part]) -> list[Part]:

@@ -147,13 +147,13 @@ def pieces(stream: BinaryIO, size: int) -> Iterator[bytes]:
         yield block
 
 
-def growth(stream: BinaryIO, size: int, who: str = "") -> tuple[str, ...]:
+def growth(stream: BinaryIO, size: int, owner: str = "") -> tuple[str, ...]:
     """What is to be said of a file that no longer is as long as when it was opened: `size` bytes; else nothing."""
     now = os.fstat(stream.fileno()).st_size
     if now == size:
         return ()
-    how = "grew" if now > size else "shrank"
-    return (f"{who or 'the file'} {how} while it was read, from {size} to {now} bytes: is it still being written?",)
+    verb = "grew" if now > size else "shrank"
+    return (f"{owner or 'the file'} {verb} while it was read, from {size} to {now} bytes: is it still being written?",)
 
 
 def read_bytes(path: str | os.PathLike, max_bytes: int = MAX_TEXT_BYTES) -> bytes:
@@ -228,8 +228,8 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
     deep = _DEEP_KEY.search(text)
     if deep is not None:
         line = text.count("\n", 0, deep.start() + 1) + 1
-        key, most = deep[0].strip(" \t\n[{,"), f"at most {MAX_KEY_PARTS} parts"
-        raise InputError("a key nests too deeply", got=key, expected=most, where=f"{where}:{line}")
+        key, expected = deep[0].strip(" \t\n[{,"), f"at most {MAX_KEY_PARTS} parts"
+        raise InputError("a key nests too deeply", got=key, expected=expected, where=f"{where}:{line}")
     try:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
@@ -269,8 +269,8 @@ def _behind_links(path: Path) -> Path:
         pass
     except (OSError, ValueError) as error:  # a name that is too long, or that holds a zero byte; links in a circle
         circle = isinstance(error, OSError) and error.errno == errno.ELOOP
-        what, expected = ("links in a circle", "a file") if circle else ("not a file name", "a shorter name")
-        raise InputError(what, got=str(path), expected=expected, where=str(error)) from None
+        problem, expected = ("links in a circle", "a file") if circle else ("not a file name", "a shorter name")
+        raise InputError(problem, got=str(path), expected=expected, where=str(error)) from None
     return Path(os.path.realpath(path)) if path.is_symlink() else path
 
 
@@ -284,16 +284,16 @@ def keep_apart(outputs: Iterable[str | os.PathLike], inputs: Iterable[str | os.P
     for path in (path for path in outputs if path):
         place = _identity(path)
         if place in replaced:
-            what, other = replaced[place]
-            raise InputError(what, got=str(other), expected="another name", where=str(path))
+            problem, conflict = replaced[place]
+            raise InputError(problem, got=str(conflict), expected="another name", where=str(path))
         replaced[place] = ("two results in one file", path)
 
 
 def _identity(path: str | os.PathLike) -> object:
     """What two names of one file have in common."""
     with contextlib.suppress(OSError, ValueError):
-        found = os.stat(path)
-        return (found.st_dev, found.st_ino)
+        status = os.stat(path)
+        return (status.st_dev, status.st_ino)
     with contextlib.suppress(OSError, ValueError):
         return os.path.normcase(os.path.realpath(path))
     return os.fspath(path)

@@ -15,7 +15,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.clocks import fastest_step, has_own_clock, is_staggered, samples, usual_step
 from omnidyn.document import Document, Points, Table
 from omnidyn.errors import InputError
-from omnidyn.shown import DATASET, FIGURE, FRAME, RUN, Shown, make
+from omnidyn.shown import DATASET, FIGURE, FRAME, RUN, Displayable, make
 from omnidyn.statement import Statement, statements
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ UNITS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Run(Shown):
+class Run(Displayable):
     """One run. All channels have the length of `t`; one that was not measured is None, a missing value is NaN.
 
     t: time [s], strictly increasing, need not be regular. Shape (samples,).
@@ -89,9 +89,11 @@ class Run(Shown):
 
     def __post_init__(self) -> None:
         time = _read_only("t", self.t, None)
-        bad = np.flatnonzero(~(np.diff(time) > 0.0))
-        if bad.size:
-            raise InputError("time does not increase", got=f"row {bad[0] + 1}: t = {time[bad[0] + 1]}", where="t")
+        bad_steps = np.flatnonzero(~(np.diff(time) > 0.0))
+        if bad_steps.size:
+            raise InputError(
+                "time does not increase", got=f"row {bad_steps[0] + 1}: t = {time[bad_steps[0] + 1]}", where="t"
+            )
         object.__setattr__(self, "t", time)
         object.__setattr__(self, "warnings", statements(self.warnings))
         for name, kind in CHANNELS.items():
@@ -204,7 +206,7 @@ class Run(Shown):
 
 def as_list(runs: Run | Sequence[Run]) -> list[Run]:
     """One run, or several, as a list. Data frames and Datasets become runs."""
-    return [as_run(runs)] if isinstance(runs, Run) or is_frame(runs) else [as_run(each) for each in runs]
+    return [as_run(runs)] if isinstance(runs, Run) or is_frame(runs) else [as_run(run) for run in runs]
 
 
 def as_run(run: Any) -> Any:
@@ -217,12 +219,16 @@ def _rows(channel: str, values: FloatArray, t: FloatArray) -> Iterator[tuple[str
     columns = values.reshape(len(values), -1)
     units = UNITS[channel].split(", ")
     for k, column in enumerate(columns.T):
-        known = column[np.isfinite(column)]
-        numbers = [f"{each:.4g}" for each in (known.min(), known.mean(), known.max())] if known.size else ["-"] * 3
-        missing = 0.0 if has_own_clock(t, column) else 1.0 - known.size / len(column)
+        finite_values = column[np.isfinite(column)]
+        numbers = (
+            [f"{number:.4g}" for number in (finite_values.min(), finite_values.mean(), finite_values.max())]
+            if finite_values.size
+            else ["-"] * 3
+        )
+        absent_share = 0.0 if has_own_clock(t, column) else 1.0 - finite_values.size / len(column)
         of = {WHEEL: f"wheel {k + 1}", AXIS: ("x", "y", "yaw")[k % 3], SCALAR: ""}[CHANNELS[channel]]
         name = channel.replace("_", " ") if k == 0 else ""
-        yield name, of, units[k % len(units)], *numbers, f"{missing:.0%}" if missing else ""
+        yield name, of, units[k % len(units)], *numbers, f"{absent_share:.0%}" if absent_share else ""
 
 
 def _values(run: Run) -> Iterator[Any]:
@@ -239,8 +245,8 @@ def _read_only(name: str, value: ArrayLike, kind: str | None, samples: int | Non
     """A read-only float64 copy of the right shape; an array that nobody can write to is not copied."""
     array = np.asarray(value, dtype=float)
     dimensions = 2 if kind in (WHEEL, AXIS) else 1
-    wrong = array.ndim != dimensions or array.shape[0] == 0 or (kind == AXIS and array.shape[1] != 3)
-    if wrong or (samples is not None and array.shape[0] != samples):
+    bad_shape = array.ndim != dimensions or array.shape[0] == 0 or (kind == AXIS and array.shape[1] != 3)
+    if bad_shape or (samples is not None and array.shape[0] != samples):
         shape = {WHEEL: "(samples, wheels)", AXIS: "(samples, 3)"}.get(kind or "", "(samples,)")
         length = f" with {samples} samples" if samples is not None else ""
         raise InputError("wrong shape", got=array.shape, expected=shape + length, where=name)

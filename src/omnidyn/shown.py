@@ -1,4 +1,4 @@
-"""Shown: what `print`, a notebook and `plot` make of a result, all from its one Document.
+"""Displayable: what `print`, a notebook and `plot` make of a result, all from its one Document.
 
 Pages, pictures and tables of other tools stand on floors above every result, and nothing imports from above itself. The
 public package stands above them all, and is imported before anything in it: `omnidyn/__init__.py` hands down, once,
@@ -31,7 +31,7 @@ def make(what: str, value: Any, /, **options: Any) -> Any:
     return _MAKERS[what](value, **options)
 
 
-class Shown:
+class Displayable:
     """A result that has a `document()`: it prints as text, and as tables in a notebook. Its `repr` stays a line."""
 
     __slots__ = ()

@@ -89,9 +89,9 @@ def as_verdict(verdict: Statement) -> dict[str, str]:
     return {"verdict": sentence(str(verdict)), "verdict_code": verdict.code}
 
 
-def by_severity(found: Iterable[Statement], name: str = "") -> Points:
+def by_severity(items: Iterable[Statement], name: str = "") -> Points:
     """Statements as points of a document, the gravest first, each behind its severity."""
-    ordered = sorted(found, key=lambda one: SEVERITIES.index(one.severity))
+    ordered = sorted(items, key=lambda statement: SEVERITIES.index(statement.severity))
     return Points(ordered, "", name)
 
 

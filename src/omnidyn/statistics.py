@@ -17,13 +17,13 @@ from omnidyn.arrays import BoolArray, FloatArray, IntArray
 MAD_TO_STD = 1.4826  # of a normal distribution: standard deviation / median absolute deviation, 1 / 0.6745
 UPPER_TAIL = 0.975  # below it lies all but the upper end of a 95 % interval
 HUBER_CLIP = 2.5  # scales of a mean beyond which a number pulls no harder
-MAX_ITERATIONS, SETTLED = 50, 1e-9  # of a Huber mean, in scales
+MAX_ITERATIONS, HUBER_TOLERANCE = 50, 1e-9  # of a Huber mean, in scales
 SOKAL = 5.0  # autocorrelation times to sum over
 RESIDUE = 1e-6  # of the largest: what a filter or rounding leaves of a rest
-SAME = 1e-6  # readings that differ by less than this share of their range are one reading
+SAME_READING = 1e-6  # readings that differ by less than this share of their range are one reading
 MEMORY_SHARE = 4.0  # a block of a bootstrap is so many times the memory of its series
-ENOUGH, LEAST_ROWS = 20_000, 20  # rows looked at for a tick; rows that change, without which there is none
-FINE = 1e-3  # of the usual change from row to row: a smaller tick is noise like any other
+TICK_ROWS, LEAST_ROWS = 20_000, 20  # rows looked at for a tick; rows that change, without which there is none
+FINE_TICK = 1e-3  # of the usual change from row to row: a smaller tick is noise like any other
 TEXT = 0.05  # of a tick that the text of a log may round by
 # Ticks in the least change that are looked for; as many different changes, each within TEXT of a whole number, are no
 # chance: (2 TEXT)^5 for each number of ticks tried.
@@ -63,7 +63,7 @@ def difference_noise(*pieces: FloatArray) -> float:
     pieces: of the signal, shape (n,) each, NaN where missing; no difference reaches from one to the next. The median of
     the differences is 0.954 sigma; where most are 0, the signal is quantised, and half of its step is taken.
     """
-    steps = np.concatenate([np.diff(each[np.isfinite(each)]) for each in pieces] or [np.zeros(0)])
+    steps = np.concatenate([np.diff(piece[np.isfinite(piece)]) for piece in pieces] or [np.zeros(0)])
     size = np.abs(steps[:: max(len(steps) // SAMPLE, 1)])
     size = size[np.isfinite(size)]
     middle = median(size) / DIFFERENCE if size.size else 0.0
@@ -76,7 +76,7 @@ def sensor_step(values: FloatArray) -> float:
     if len(readings) < 2 or len(readings) > max(2, len(values) // 2):
         return 0.0
     steps = np.diff(readings)
-    return float(steps[steps > SAME * (readings[-1] - readings[0])].min())
+    return float(steps[steps > SAME_READING * (readings[-1] - readings[0])].min())
 
 
 # ---- stretches --------------------------------------------------------------------------------------------
@@ -122,8 +122,8 @@ def autocorrelation_time(series: FloatArray) -> float:
     if covariance[0] <= 0.0:
         return 1.0
     times = 2.0 * np.cumsum(covariance / covariance[0]) - 1.0
-    enough = np.flatnonzero(np.arange(len(series)) >= SOKAL * times)
-    return max(1.0, float(times[enough[0]] if enough.size else times.max()))
+    windows = np.flatnonzero(np.arange(len(series)) >= SOKAL * times)
+    return max(1.0, float(times[windows[0]] if windows.size else times.max()))
 
 
 def standard_error(series: FloatArray) -> float:
@@ -144,14 +144,14 @@ def block_length(pieces: Sequence[FloatArray]) -> int:
     """
     total = sum(map(len, pieces))
     mean = float(np.concatenate(list(pieces)).mean())
-    centred = [each - mean for each in pieces]
-    power, longest = sum(float(each @ each) for each in centred), max(map(len, pieces))
+    centred = [piece - mean for piece in pieces]
+    power, longest = sum(float(piece @ piece) for piece in centred), max(map(len, pieces))
     shortest = int(np.ceil(total ** (1.0 / 3.0)))
     if power <= 0.0:
         return min(shortest, longest)
     correlation = np.zeros(longest)
-    for each in centred:
-        correlation[: len(each)] += autocovariance(each) / power
+    for piece in centred:
+        correlation[: len(piece)] += autocovariance(piece) / power
     memory = -1.0
     for lag in range(0, longest - 1, 2):
         pair = float(correlation[lag] + correlation[lag + 1])
@@ -169,10 +169,10 @@ def bootstrap_error(
     A block is `length` neighbours, beginning at any row from which so many follow; a shorter piece is one block.
     H. R. Kuensch, Ann. Stat. 17, 1217 (1989).
     """
-    sums, counts = zip(*(_block_sums(each, min(length, len(each))) for each in pieces), strict=True)
+    sums, counts = zip(*(_block_sums(piece, min(length, len(piece))) for piece in pieces), strict=True)
     all_sums, all_counts = np.concatenate(sums), np.concatenate(counts)
-    drawn = random.integers(0, len(all_sums), size=(draws, blocks))
-    return float(np.std(all_sums[drawn].sum(axis=1) / all_counts[drawn].sum(axis=1), ddof=1))
+    block_indices = random.integers(0, len(all_sums), size=(draws, blocks))
+    return float(np.std(all_sums[block_indices].sum(axis=1) / all_counts[block_indices].sum(axis=1), ddof=1))
 
 
 def _block_sums(series: FloatArray, length: int) -> tuple[FloatArray, FloatArray]:
@@ -189,9 +189,9 @@ def drawn_times(count: int, length: int, draws: int, random: np.random.Generator
     D. N. Politis, J. P. Romano, in Exploring the Limits of Bootstrap (1992), the circular block bootstrap.
     """
     starts = random.integers(0, count, size=(draws, -(-count // length)))
-    chosen = ((starts[:, :, None] + np.arange(length)) % count).reshape(draws, -1)[:, :count]
+    indices = ((starts[:, :, None] + np.arange(length)) % count).reshape(draws, -1)[:, :count]
     times = np.zeros((draws, count))
-    np.add.at(times, (np.arange(draws)[:, None], chosen), 1.0)
+    np.add.at(times, (np.arange(draws)[:, None], indices), 1.0)
     return times
 
 
@@ -238,7 +238,7 @@ def huber_mean(x: FloatArray) -> tuple[float, FloatArray, float]:
         if share == 0.0:  # two heaps of readings, far apart: nothing is a spike
             return float(np.mean(x)), x - np.mean(x), 1.0
         change = float(np.mean(pull)) / share
-        if abs(change) <= SETTLED * scale:
+        if abs(change) <= HUBER_TOLERANCE * scale:
             break
         centre += change
     return centre, pull, share
@@ -288,11 +288,11 @@ def errors_in_variables(
     `tolerance` of it. Iterating weights alone would leave the slope too flat, as much as least squares does.
     """
     columns = np.ascontiguousarray(np.swapaxes(design, -1, -2))
-    moved = columns
+    instruments = columns
     inner = np.broadcast_to(weight / np.where(np.asarray(variance) > 0.0, variance, 1.0), y.shape)
     parameters, converged = np.zeros(design.shape[:-2] + design.shape[-1:]), False
     for _ in range(most):
-        weighted = inner[..., None, :] * moved
+        weighted = inner[..., None, :] * instruments
         previous = parameters
         parameters = solve(weighted @ np.swapaxes(columns, -1, -2), (weighted @ y[..., None])[..., 0])
         if not wobble.any():
@@ -302,12 +302,12 @@ def errors_in_variables(
         square = np.float_power(slope, 2.0)  # to the last bit what Python makes of a number
         certain = 1.0 / (variance + square * wobble + 1e-300)
         residual = y - (design @ parameters[..., None])[..., 0]
-        inner, moved = weight * certain, columns.copy()
-        moved[..., 0, :] += slope * wobble * certain * residual
+        inner, instruments = weight * certain, columns.copy()
+        instruments[..., 0, :] += slope * wobble * certain * residual
         converged = bool(np.abs(parameters - previous).max() <= tolerance * np.abs(parameters).max())
         if converged:
             break
-    return FittedLine(parameters, np.ascontiguousarray(np.swapaxes(moved, -1, -2)), inner, converged)
+    return FittedLine(parameters, np.ascontiguousarray(np.swapaxes(instruments, -1, -2)), inner, converged)
 
 
 def find_tick(values: FloatArray) -> float:
@@ -315,20 +315,20 @@ def find_tick(values: FloatArray) -> float:
 
     values (rows,), NaN where missing. Rounding of the text of a log may be up to TEXT of the step.
     """
-    known = values[np.isfinite(values)][:ENOUGH]
-    change = np.abs(np.diff(known))
+    samples = values[np.isfinite(values)][:TICK_ROWS]
+    change = np.abs(np.diff(samples))
     if change.size < LEAST_ROWS or not change.any():
         return 0.0
-    moved = change[change > 1e-9 * max(float(np.abs(known).max()), 1.0)]
+    moves = change[change > 1e-9 * max(float(np.abs(samples).max()), 1.0)]
     typical = float(np.sqrt(np.mean(change**2)))
-    if moved.size < LEAST_ROWS:
+    if moves.size < LEAST_ROWS:
         return 0.0
     for parts in range(1, MOST_IN_LEAST + 1):  # from one row to the next even the least change may be several ticks
-        step, turns = _step(moved, float(moved.min()) / parts)
-        if step <= FINE * typical:
+        step, turns = _step(moves, float(moves.min()) / parts)
+        if step <= FINE_TICK * typical:
             return 0.0
         by_chance = parts > 1 and np.unique(turns).size < LEAST_DISTINCT
-        if float(np.quantile(np.abs(moved / step - turns), 0.99)) <= TEXT and not by_chance:
+        if float(np.quantile(np.abs(moves / step - turns), 0.99)) <= TEXT and not by_chance:
             return step
     return 0.0
 

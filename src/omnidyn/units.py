@@ -154,19 +154,19 @@ def parse_unit(text: str) -> Unit:
         return Unit(usual, *_NAMES[usual])
     match = _UNIT.fullmatch(clean) if len(clean) <= MAX_TEXT else None
     name = _usual(match[2].strip()) if match else clean[:MAX_TEXT]
-    found = _NAMES.get(name)
-    if found is None and match and (found := _per_time(usual)) is not None:
-        return Unit(usual, *found)
-    found = found or _per_time(name)
-    if match is None or found is None:
-        close = difflib.get_close_matches(name, [*_NAMES, *_SPELLINGS], n=1, cutoff=0.5)
+    meaning = _NAMES.get(name)
+    if meaning is None and match and (meaning := _per_time(usual)) is not None:
+        return Unit(usual, *meaning)
+    meaning = meaning or _per_time(name)
+    if match is None or meaning is None:
+        matches = difflib.get_close_matches(name, [*_NAMES, *_SPELLINGS], n=1, cutoff=0.5)
         raise InputError(
             "unknown unit",
             got=text,
             expected="a unit such as rad/s, rpm, mA or ticks/2000",
-            remedy=f"did you mean {close[0]}?" if close else "",
+            remedy=f"did you mean {matches[0]}?" if matches else "",
         )
-    quantity, size = found
+    quantity, size = meaning
     if match[3]:
         divisor = float(match[3])
         quantity, size = _per_turn(quantity, size, name)
@@ -183,15 +183,15 @@ def parse_unit(text: str) -> Unit:
 def _usual(name: str) -> str:
     """The usual spelling of a name; the name itself where it has none."""
     name = _PER.sub("/", name)
-    known = _SPELLINGS.get(name, name)
-    if known not in _NAMES:
-        known = _FOLDED.get(name.lower(), known)
-    known = _SPELLINGS.get(known, known)
-    head, per, time = known.rpartition("/")
-    if known in _NAMES or not per or len(known) > MAX_TEXT:
-        return known
-    whole = f"{_usual(head)}/{_usual(time)}"  # Rad/Sec
-    return whole if whole in _NAMES else known
+    spelling = _SPELLINGS.get(name, name)
+    if spelling not in _NAMES:
+        spelling = _FOLDED.get(name.lower(), spelling)
+    spelling = _SPELLINGS.get(spelling, spelling)
+    head, per, time = spelling.rpartition("/")
+    if spelling in _NAMES or not per or len(spelling) > MAX_TEXT:
+        return spelling
+    joined = f"{_usual(head)}/{_usual(time)}"  # Rad/Sec
+    return joined if joined in _NAMES else spelling
 
 
 def _per_time(name: str) -> tuple[str, float] | None:

@@ -6,7 +6,7 @@ import pytest
 from typer.main import get_command
 
 from omnidyn.cli.app import app
-from omnidyn.cli.terminal.help import FIRST, MORE
+from omnidyn.cli.terminal.help import FIRST, MORE_PANEL
 
 COMMANDS = sorted(get_command(app).commands)  # type: ignore[attr-defined]
 NEEDED_FIRST = (
@@ -33,14 +33,14 @@ def flags(text):
 def test_identify_has_what_one_needs_first(call):
     code, out, _ = call("identify", "--help")
     assert code == 0
-    first, more = out.partition(f"{FIRST}:\n")[2].split(f"{MORE}:\n")
+    first, more = out.partition(f"{FIRST}:\n")[2].split(f"{MORE_PANEL}:\n")
     assert flags(first) == [*NEEDED_FIRST, "--help"]
     assert {"--nuisance", "--profile", "--shape", "--force", "--map", "--sort"} <= set(flags(more))
     assert not set(flags(first)) & set(flags(more))
 
 
 def test_a_command_of_few_options_has_one_group(call):
-    assert MORE not in call("deadzone", "--help")[1]
+    assert MORE_PANEL not in call("deadzone", "--help")[1]
 
 
 @pytest.mark.parametrize("name", COMMANDS)

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.control.controller import BACKWARDS, BAD_PATH, BAD_POSE, BAD_TIME, BAD_TWIST, ENDED, OK, STILL
+from omnidyn.control.controller import (
+    BACKWARDS,
+    BAD_PATH,
+    BAD_POSE,
+    BAD_TIME,
+    BAD_TWIST,
+    OK,
+    PATH_ENDED,
+    TIME_STANDS_STILL,
+)
 from omnidyn.control.controllers import (
     NAMES,
     ControllerFile,
@@ -81,7 +90,7 @@ def test_time_that_stands_still_or_goes_back(name):
     control = controller_named(name, AXEBOT)
     first = control.step(1.0, REST, REST, EIGHT)
     np.testing.assert_array_equal(control.step(1.0, [0.5, 0.5, 0.5], REST, EIGHT), first)
-    assert control.info.status == STILL
+    assert control.info.status == TIME_STANDS_STILL
     assert not control.step(0.5, REST, REST, EIGHT).any()
     assert control.info.status == BACKWARDS
     control.step(0.52, REST, REST, EIGHT)
@@ -142,7 +151,7 @@ def test_a_path_that_ends_is_held(name):
     goal = omnidyn.path("goal:x_m=0.3,travel_s=0.5")
     control = controller_named(name, AXEBOT)
     control.step(9.0, [0.3, 0.0, 0.0], REST, goal)
-    assert control.info.status == ENDED
+    assert control.info.status == PATH_ENDED
     assert control.info.ok
 
 

@@ -8,8 +8,8 @@ import pytest
 
 import omnidyn
 from omnidyn.cli.terminal.flags import of_place, with_flags
-from omnidyn.cli.terminal.identify_options import asked as asked_of
 from omnidyn.cli.terminal.identify_options import default_of, options
+from omnidyn.cli.terminal.identify_options import identify_request as asked_of
 from omnidyn.errors import InputError
 from omnidyn.identification.grouping import names_of_groups
 from omnidyn.identification.methods import METHODS, MotorFit, MotorLine, OutputError, SteadyState, choices

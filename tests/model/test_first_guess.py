@@ -10,7 +10,7 @@ from omnidyn.model.deadzone import axis_patterns, dead_zone_force
 from omnidyn.model.dynamics import drive_wrench
 from omnidyn.model.first_guess import (
     BODY_AXES,
-    WHY,
+    REASONS,
     default_prior,
     even_azimuths,
     first_guess,
@@ -99,9 +99,9 @@ def test_every_number_says_where_it_comes_from_and_every_guess_how_wide():
             prior, value = robot.priors.get(str(key)) or robot.priors[key.name], key.get(robot)
             assert (prior.std is not None) == (prior.origin == GUESS)
             assert prior.std is None or 0.4 * value < prior.std < 1.1 * value
-        assert {key for key, _ in reasons(robot)} <= set(WHY)
+        assert {key for key, _ in reasons(robot)} <= set(REASONS)
         assert len(reasons(robot)) == len({Key.parse(key).name for key, p in robot.priors.items() if p.std})
-    assert set(WHY) == {
+    assert set(REASONS) == {
         key for robot in (MINI, first_guess("box", omni(), 8.0, shape=BODY_AXES), looped) for key, _ in reasons(robot)
     }
 

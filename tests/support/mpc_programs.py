@@ -9,7 +9,7 @@ import numpy as np
 
 from omnidyn import load_robot
 from omnidyn.compiled.kernel import kernel
-from omnidyn.control.mpc.interior_point import ROOM_SIZE, Program, solve
+from omnidyn.control.mpc.interior_point import ROOM_SIZE, QuadraticProgram, solve
 from omnidyn.control.mpc.model import numbers, volts
 from omnidyn.control.mpc.observer import ESTIMATE_SIZE, SCALE
 from omnidyn.control.mpc.program import make_costs, make_stages
@@ -75,9 +75,9 @@ class Solver:
         self.inverse, self.target, self.u = (np.zeros((n, wheels)) for _ in range(3))
         self.active, self.room = np.zeros((n, wheels), np.int64), np.zeros((ROOM_SIZE, n, wheels))
 
-    def program(self, problem: Problem, x: np.ndarray) -> Program:
+    def program(self, problem: Problem, x: np.ndarray) -> QuadraticProgram:
         """The program, with the arrays that it is solved in."""
-        return Program(
+        return QuadraticProgram(
             problem.push,
             problem.weight,
             problem.stage,

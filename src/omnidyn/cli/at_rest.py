@@ -31,18 +31,18 @@ def deadzone(
     keep_inputs([], [robot], [], picture)
 
     loaded, source = omnidyn.load_robot(robot), robot_input(robot)
-    found = omnidyn.dead_zone(loaded, [number_list("--pattern", pattern)] if pattern else None, draws=draws)
-    tell(found.document(), json, provenance([source]))
+    zone = omnidyn.dead_zone(loaded, [number_list("--pattern", pattern)] if pattern else None, draws=draws)
+    tell(zone.document(), json, provenance([source]))
     if picture:
-        _draw(found, picture, force)
+        _draw(zone, picture, force)
 
 
-def _draw(found: DeadZone, path: str, force: bool) -> None:
+def _draw(zone: DeadZone, path: str, force: bool) -> None:
     from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
 
     with shown_progress("drawing the map"):
-        name = found.robot.name
-        write_picture(draw_dead_zone_map({name: found.robot}, {name: found}), path, force)
+        name = zone.robot.name
+        write_picture(draw_dead_zone_map({name: zone.robot}, {name: zone}), path, force)
 
 
 # omnidyn friction ROBOT: what the friction of a robot does, near zero speed above all
@@ -60,9 +60,9 @@ def friction(
     from omnidyn.simulation.friction_study import friction_study
 
     loaded, source = omnidyn.load_robot(robot), robot_input(robot)
-    found = friction_study(loaded)
-    tell(found.document(), json, provenance([source]))
+    study = friction_study(loaded)
+    tell(study.document(), json, provenance([source]))
     if picture:
         from omnidyn.report.friction_picture import draw_friction
 
-        write_picture(draw_friction({loaded.name: found}), picture, force)
+        write_picture(draw_friction({loaded.name: study}), picture, force)

@@ -33,7 +33,7 @@ BAD_INPUT, INSUFFICIENT = 3, 4
 
 
 @dataclass
-class Checked:
+class CheckedLog:
     """One log: its verdict, or why it could not be read."""
 
     path: str
@@ -72,14 +72,14 @@ def check(
     with shown_progress("reading") as progress:
         files = log_options.log_files(log)
         loaded = omnidyn.load_robot(robot) if robot else None
-        done = [_checked(path, loaded, options, maps, progress, bool(picture)) for path in files]
-    _compare_data(done)
-    _tell(done, json, full, robot)
+        checked_logs = [_checked(path, loaded, options, maps, progress, bool(picture)) for path in files]
+    _compare_data(checked_logs)
+    _tell(checked_logs, json, full, robot)
     if picture:
-        _draw(done[0], picture, force)
-    if any(log.error is not None for log in done):
+        _draw(checked_logs[0], picture, force)
+    if any(log.error is not None for log in checked_logs):
         raise typer.Exit(BAD_INPUT)
-    if any(log.verdict is not None and (log.verdict.has_errors or log.verdict.useless) for log in done):
+    if any(log.verdict is not None and (log.verdict.has_errors or log.verdict.useless) for log in checked_logs):
         raise typer.Exit(INSUFFICIENT)
 
 
@@ -90,9 +90,9 @@ def _checked(
     maps: log_options.Maps,
     progress: Progress,
     picture: bool,
-) -> Checked:
+) -> CheckedLog:
     """One log, block by block; an error in reading it does not stop the others."""
-    done, digest = Checked(path), _Digest()
+    checked, digest = CheckedLog(path), _Digest()
     progress(Report(f"reading {path}"))
 
     def listen(report: Report) -> None:
@@ -106,23 +106,23 @@ def _checked(
         log, only, blocks = _first(digest.through(iter_logs(path, robot, options, rows=BLOCK, progress=listen)))
         if log is not None:
             maps.show(path, log.columns, doubts=False)
-            done.notes = log.notes
-        done.verdict = check_log(log, robot) if log is not None and only else check_blocks(blocks, robot)
-        done.log = log if picture else None
+            checked.notes = log.notes
+        checked.verdict = check_log(log, robot) if log is not None and only else check_blocks(blocks, robot)
+        checked.log = log if picture else None
     except OmnidynError as error:
-        done.error = error
-    done.digest, done.sha256 = digest.value, digest.sha256
-    return done
+        checked.error = error
+    checked.digest, checked.sha256 = digest.value, digest.sha256
+    return checked
 
 
-def _draw(done: Checked, picture: str, force: bool) -> None:
+def _draw(checked: CheckedLog, picture: str, force: bool) -> None:
     """The picture of a log that could be read."""
-    if done.log is None or done.verdict is None:
+    if checked.log is None or checked.verdict is None:
         return
     with shown_progress("drawing"):
         from omnidyn.report.figures.raw_log import draw_raw_log
 
-        write_picture(draw_raw_log(done.log, done.verdict), picture, force)
+        write_picture(draw_raw_log(checked.log, checked.verdict), picture, force)
 
 
 def _first(blocks: Iterator[Log]) -> tuple[Log | None, bool, Iterator[Log]]:
@@ -153,54 +153,60 @@ class _Digest:
             yield block
 
 
-def _compare_data(done: list[Checked]) -> None:
+def _compare_data(checked_logs: list[CheckedLog]) -> None:
     """Logs that hold the same numbers under two names: evidence that counts once."""
     from omnidyn.findings.finding import Finding, in_order
 
-    first: dict[str, Checked] = {}
-    for log in done:
+    first: dict[str, CheckedLog] = {}
+    for log in checked_logs:
         if log.verdict is None:
             continue
-        other = first.setdefault(log.digest, log)
-        if other is not log:
-            finding = Finding("same_data", WARNING, "", {"other": other.path})
+        twin = first.setdefault(log.digest, log)
+        if twin is not log:
+            finding = Finding("same_data", WARNING, "", {"other": twin.path})
             log.verdict = replace(log.verdict, findings=in_order([*log.verdict.findings, finding]))
 
 
-def _tell(done: list[Checked], json: bool, full: bool, robot: str) -> None:
-    for log in done:
+def _tell(checked_logs: list[CheckedLog], json: bool, full: bool, robot: str) -> None:
+    for log in checked_logs:
         if log.error is not None:
             say(f"omnidyn: error: {log.error}")
-        for note in log.notes if full or len(done) == 1 else ():
+        for note in log.notes if full or len(checked_logs) == 1 else ():
             say(f"omnidyn: {log.path}: {note}")
     if json:
-        show_json(_document(done, robot))
+        show_json(_document(checked_logs, robot))
         return
     from omnidyn.telling import log_verdict
 
-    read = [log.verdict for log in done if log.verdict is not None]
+    read = [log.verdict for log in checked_logs if log.verdict is not None]
     documents = []
-    if len(done) > 1:
-        documents.append(log_verdict.of_several({log.path: log.verdict for log in done}, width(), full))
+    if len(checked_logs) > 1:
+        documents.append(log_verdict.of_several({log.path: log.verdict for log in checked_logs}, width(), full))
     if full:
         documents += [verdict.document() for verdict in read]
-    elif len(done) == 1:
+    elif len(checked_logs) == 1:
         documents += [log_verdict.in_brief(verdict, width()) for verdict in read]
     for document in documents:
         show(document.to_text(width(), painted))
 
 
-def _document(done: list[Checked], robot: str) -> dict[str, Any]:
+def _document(checked_logs: list[CheckedLog], robot: str) -> dict[str, Any]:
     from omnidyn.telling.log_verdict import overall
 
     logs = [
         log.verdict.to_dict() | {"source": log.path, "notes": [note.to_dict() for note in log.notes]}
-        for log in done
+        for log in checked_logs
         if log.verdict is not None
     ]
-    errors = [{"source": log.path, "error": str(log.error)} for log in done if log.error is not None]
-    inputs = [{"role": "log", "name": log.path, "sha256": log.sha256} for log in done if log.verdict is not None]
+    errors = [{"source": log.path, "error": str(log.error)} for log in checked_logs if log.error is not None]
+    inputs = [
+        {"role": "log", "name": log.path, "sha256": log.sha256} for log in checked_logs if log.verdict is not None
+    ]
     record = provenance([*([robot_input(robot)] if robot else []), *inputs])
-    verdict = logs[0]["verdict"] if len(done) == 1 and logs else overall({log.path: log.verdict for log in done})
+    verdict = (
+        logs[0]["verdict"]
+        if len(checked_logs) == 1 and logs
+        else overall({log.path: log.verdict for log in checked_logs})
+    )
     has_errors = any(log["has_errors"] for log in logs)
     return {"verdict": verdict, "logs": logs, "unread": errors, "has_errors": has_errors, "provenance": record}

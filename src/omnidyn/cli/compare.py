@@ -65,15 +65,15 @@ def compare(
         files, robots = log_options.log_files(log), _robots(robot, with_)
         runs, hashes = _runs(files, robots[0], options, flags.sort, maps, progress)
         channels = _channels(robots, runs, apply, rules, show_channels if picture else "")
-        found = _compared(robots, runs, apply, hold, current_unsigned, band, progress)
-    told = found.document(segments) if json or full or segments else _brief(found)
-    tell(told, json, _record(robot, files, hashes))
+        comparison = _compared(robots, runs, apply, hold, current_unsigned, band, progress)
+    document = comparison.document(segments) if json or full or segments else _brief(comparison)
+    tell(document, json, _record(robot, files, hashes))
     if picture:
         with shown_progress("drawing"):
-            _draw(found, picture, channels, force)
-    refuse_exceeded(found, rules)
-    if found.failed:
-        end_failed(found.verdict)
+            _draw(comparison, picture, channels, force)
+    refuse_exceeded(comparison, rules)
+    if comparison.failed:
+        end_failed(comparison.verdict)
 
 
 def _robots(names: Sequence[str], with_: str) -> list[Robot]:
@@ -87,16 +87,16 @@ def _runs(
 ) -> tuple[list[Run], list[str]]:
     """The logs as Runs, and the hashes of their files. Currents stay as recorded: they may be compared by size."""
     runs, hashes = [], []
-    for path, each in log_options.load_logs(files, robot, options, progress):
-        maps.show(path, each.columns)
-        run = each.to_run(sort=sort)
-        runs.append(run.replace(warnings=(*run.warnings, *each.columns.doubts)))
-        hashes.append(each.sha256)
+    for path, loaded in log_options.load_logs(files, robot, options, progress):
+        maps.show(path, loaded.columns)
+        run = loaded.to_run(sort=sort)
+        runs.append(run.replace(warnings=(*run.warnings, *loaded.columns.doubts)))
+        hashes.append(loaded.sha256)
     return runs, hashes
 
 
 def _channels(
-    robots: Sequence[Robot], runs: Sequence[Run], apply: str, rules: Sequence[Threshold], shown: str
+    robots: Sequence[Robot], runs: Sequence[Run], apply: str, rules: Sequence[Threshold], names: str
 ) -> list[str]:
     """The channels of the picture; refuses, before anything is simulated, rules and channels the logs cannot serve."""
     from omnidyn.comparison.compare import what_is_compared
@@ -104,9 +104,9 @@ def _channels(
 
     compared = what_is_compared(robots, runs, apply or None)
     refuse_absent(rules, compared)
-    wanted = [name.strip() for name in shown.split(",") if name.strip()]
-    refuse_absent(wanted, compared, "--show")
-    return wanted
+    channels = [name.strip() for name in names.split(",") if name.strip()]
+    refuse_absent(channels, compared, "--show")
+    return channels
 
 
 def _compared(
@@ -130,16 +130,22 @@ def _compared(
     )
 
 
-def _brief(found: Comparison) -> Document:
+def _brief(comparison: Comparison) -> Document:
     """The comparison on one screen."""
-    return brief_document(found.verdict, found.brief_table(), found.warnings, head=found.brief_head(), more="component")
+    return brief_document(
+        comparison.verdict,
+        comparison.brief_table(),
+        comparison.warnings,
+        head=comparison.brief_head(),
+        row_word="component",
+    )
 
 
-def _draw(found: Comparison, path: str, channels: Sequence[str], force: bool) -> None:
+def _draw(comparison: Comparison, path: str, channels: Sequence[str], force: bool) -> None:
     from omnidyn.report.figures.overlay import draw_overlay
 
-    which = f", the first of {len(found.measured)} logs" if len(found.measured) > 1 else ""
-    write_picture(draw_overlay(found, channels=channels), path, force, which)
+    remark = f", the first of {len(comparison.measured)} logs" if len(comparison.measured) > 1 else ""
+    write_picture(draw_overlay(comparison, channels=channels), path, force, remark)
 
 
 def _record(robots: Sequence[str], files: Sequence[str], hashes: Sequence[str]) -> dict[str, Any]:
@@ -160,9 +166,9 @@ def drift(
     """
     refuse_picture(picture, force)
     log_options.keep_inputs([], fit, [], picture)
-    found = omnidyn.drift(fit)
-    tell(found.document(), json, provenance([robot_input(path) for path in fit]))
+    comparison = omnidyn.drift(fit)
+    tell(comparison.document(), json, provenance([robot_input(path) for path in fit]))
     if picture:
         from omnidyn.report.drift_picture import draw_drift
 
-        write_picture(draw_drift(found), picture, force)
+        write_picture(draw_drift(comparison), picture, force)

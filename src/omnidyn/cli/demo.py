@@ -74,9 +74,9 @@ def _document(claims: tuple[Claim, ...], pictures: list[Picture]) -> Document:
     """What the claims say; for machines the figures too."""
     from omnidyn.paper.claims import claims_document
 
-    told = claims_document(claims)
-    figures = [{"name": each.name, "title": each.title, "caption": each.caption} for each in pictures]
-    return replace(told, data={**told.data, "figures": figures})
+    document = claims_document(claims)
+    figures = [{"name": picture.name, "title": picture.title, "caption": picture.caption} for picture in pictures]
+    return replace(document, data={**document.data, "figures": figures})
 
 
 def _files(
@@ -164,4 +164,4 @@ def _made_before(folder: Path) -> set[str]:
         return set()
     names = names if isinstance(names, list) else []
     parts = {name: Path(name).parts for name in names if isinstance(name, str) and not Path(name).is_absolute()}
-    return {name for name, each in parts.items() if each and ".." not in each}
+    return {name for name, file_name in parts.items() if file_name and ".." not in file_name}

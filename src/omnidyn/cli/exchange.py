@@ -102,8 +102,8 @@ def export(
     make = maker(kind)
     if out == "-" and json:
         raise typer.BadParameter("-o - and --json both want stdout.")
-    given = {"precision": precision or None, "height": height, "horizon": horizon, "dt": dt}
-    options = _options(kind, make, {**given, "controller": controller or None})
+    values = {"precision": precision or None, "height": height, "horizon": horizon, "dt": dt}
+    options = _options(kind, make, {**values, "controller": controller or None})
     loaded = omnidyn.load_robot(robot)
     if log:
         options |= _options(
@@ -112,31 +112,31 @@ def export(
     inputs = [robot_path(robot), *log, *([controller] if controller.endswith(".toml") else [])]
     if out not in ("", "-"):
         keep_apart([out], inputs)
-    made = make(loaded, **options)
-    if made.folder and out not in ("", "-"):
-        keep_apart([Path(out, name) for name in made.files], inputs)
+    exported = make(loaded, **options)
+    if exported.folder and out not in ("", "-"):
+        keep_apart([Path(out, name) for name in exported.files], inputs)
     record = provenance([robot_input(robot), *(input_file("log", path) for path in log)])
     if out == "-":
-        show(made.text.rstrip("\n"))
-        _say_missing(made)
+        show(exported.text.rstrip("\n"))
+        _say_missing(exported)
         return
-    written = [str(path) for path in made.write(out, force)] if out else []
-    tell(made.document(), json, record, output=written or None)
+    written = [str(path) for path in exported.write(out, force)] if out else []
+    tell(exported.document(), json, record, output=written or None)
     if not json:
         say(f"omnidyn: wrote {', '.join(written)}" if written else "omnidyn: nothing written; -o OUT writes it")
 
 
-def _options(kind: str, make: Any, given: dict[str, Any]) -> dict[str, Any]:
+def _options(kind: str, make: Any, values: dict[str, Any]) -> dict[str, Any]:
     """The options that were given. Ends as wrong usage where the kind has none of that name."""
-    known = inspect.signature(make).parameters
-    options = {name: value for name, value in given.items() if value is not None}
+    parameters = inspect.signature(make).parameters
+    options = {name: value for name, value in values.items() if value is not None}
     for name in options:
-        if name not in known:
+        if name not in parameters:
             flag = {"runs": "log"}.get(name, name)
             raise typer.BadParameter(f"--{flag} is not for {kind}.")
     return options
 
 
-def _say_missing(made: Export) -> None:
-    for words in made.missing:
+def _say_missing(exported: Export) -> None:
+    for words in exported.missing:
         say(f"omnidyn: not in it: {words}")

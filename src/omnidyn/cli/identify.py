@@ -19,8 +19,8 @@ from omnidyn.cli.identify_show import Out, say_written
 from omnidyn.cli.log_options import NO_FLAGS, LogFlags, reads_logs
 from omnidyn.cli.terminal import identify_options
 from omnidyn.cli.terminal.flags import flags
-from omnidyn.cli.terminal.help import MORE
-from omnidyn.cli.terminal.identify_options import MOTORS, Asked
+from omnidyn.cli.terminal.help import MORE_PANEL
+from omnidyn.cli.terminal.identify_options import MOTORS, IdentifyRequest
 from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say
@@ -44,12 +44,12 @@ def _asks(command: Callable[..., None]) -> Callable[..., None]:
         many = isinstance(default, list)
         words = f"{spec.metadata['words']}{' Repeatable.' if many else ''}"
         kind: Any = list[str] if many else type(default)
-        least, metavar = 0 if kind is int else None, spec.metadata["metavar"] or None
-        panel = None if spec.metadata["first"] else MORE
-        option = typer.Option(default, flags()[name], metavar=metavar, help=words, min=least, rich_help_panel=panel)
+        minimum, metavar = 0 if kind is int else None, spec.metadata["metavar"] or None
+        panel = None if spec.metadata["first"] else MORE_PANEL
+        option = typer.Option(default, flags()[name], metavar=metavar, help=words, min=minimum, rich_help_panel=panel)
         flagged.append(inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=option, annotation=kind))
-    own = [p for p in inspect.signature(command).parameters.values() if p.kind is not p.VAR_KEYWORD]
-    command.__signature__ = inspect.Signature([*own[:4], *flagged, *own[4:]])  # type: ignore[attr-defined]
+    parameters = [p for p in inspect.signature(command).parameters.values() if p.kind is not p.VAR_KEYWORD]
+    command.__signature__ = inspect.Signature([*parameters[:4], *flagged, *parameters[4:]])  # type: ignore[attr-defined]
     return command
 
 
@@ -64,7 +64,7 @@ def identify(
     *,
     out: str = typer.Option("", "-o", "--out", metavar="OUT", help="Robot file to write (TOML), one per group."),
     report: str = typer.Option("", metavar="FILE.html", help="A page with pictures, numbers and what they say."),
-    force: bool = typer.Option(False, "--force", help="Replace files that exist.", rich_help_panel=MORE),
+    force: bool = typer.Option(False, "--force", help="Replace files that exist.", rich_help_panel=MORE_PANEL),
     json: bool = typer.Option(False, "--json", help="The result for machines."),
     full: bool = typer.Option(False, "--full", help="All that the result says, not only the first screen."),
     flags: LogFlags = NO_FLAGS,
@@ -80,8 +80,8 @@ def identify(
     from omnidyn.cli.identify_logs import Reading, is_motor_table, is_steady_table
     from omnidyn.cli.identify_show import Out, tell_table
 
-    asked, to = identify_options.asked(given), Out(report, out, force, json, full)
-    if not robot and asked.what != MOTORS:
+    request, to = identify_options.identify_request(given), Out(report, out, force, json, full)
+    if not robot and request.what != MOTORS:
         of_motors = len(logs) == 1 and os.path.isfile(logs[0]) and is_motor_table(logs[0])
         table = f" {logs[0]} is a table of motors: say --what motors, which needs no robot." if of_motors else ""
         raise typer.BadParameter(f"Missing option '--robot'.{table}")
@@ -90,16 +90,16 @@ def identify(
             check_output(path, force)
     options.keep_inputs(logs, [robot], [flags.map_file], out, report, flags.save_map)
     options.refuse_missing(logs)
-    if asked.what != MOTORS and len(logs) == 1 and is_steady_table(logs[0]):
-        tell_table(logs[0], robot, asked, to)
+    if request.what != MOTORS and len(logs) == 1 and is_steady_table(logs[0]):
+        tell_table(logs[0], robot, request, to)
         return
-    if asked.what == MOTORS and len(logs) == 1 and flags.rate is None and is_motor_table(logs[0]):
-        tell_motor_table(logs[0], robot, asked, to)
+    if request.what == MOTORS and len(logs) == 1 and flags.rate is None and is_motor_table(logs[0]):
+        tell_motor_table(logs[0], robot, request, to)
         return
-    _identify(logs, robot, asked, Reading(flags.options(), flags.sort, flags.maps(force)), to)
+    _identify(logs, robot, request, Reading(flags.options(), flags.sort, flags.maps(force)), to)
 
 
-def _identify(arguments: list[str], robot: str, asked: Asked, reading: Any, to: Any) -> None:
+def _identify(arguments: list[str], robot: str, request: IdentifyRequest, reading: Any, to: Any) -> None:
     """Read, choose the method, identify, tell."""
     from omnidyn.cli.identify_logs import load_runs
     from omnidyn.cli.identify_show import load_meanwhile, outputs, tell
@@ -108,14 +108,14 @@ def _identify(arguments: list[str], robot: str, asked: Asked, reading: Any, to: 
 
     with shown_progress("reading") as progress:
         start = omnidyn.load_robot(robot) if robot else None
-        loaded = load_runs(arguments, asked, start, reading, progress)
+        loaded = load_runs(arguments, request, start, reading, progress)
         record = provenance([*([robot_input(robot)] if robot else []), *loaded.inputs])
-        if asked.what == MOTORS:
-            run_motors(asked, loaded, start, record, to, progress)
+        if request.what == MOTORS:
+            run_motors(request, loaded, start, record, to, progress)
             return
         assert start is not None
-        method = asked.method or default_method(loaded.runs, as_driven(start, loaded.runs), progress)[0]
-        groups = asked.groups
+        method = request.method or default_method(loaded.runs, as_driven(start, loaded.runs), progress)[0]
+        groups = request.groups
         if loaded.folders and isinstance(method, SteadyState):
             groups = loaded.folders
         elif loaded.folders:
@@ -123,47 +123,47 @@ def _identify(arguments: list[str], robot: str, asked: Asked, reading: Any, to: 
         if groups:
             names = dict.fromkeys(pattern.partition("=")[0] for pattern in groups)
             outputs(to, [*names], record["inputs"])  # refused before any work
-        load_meanwhile(to, asked.quick)
+        load_meanwhile(to, request.quick)
         with shared_out(start) if isinstance(method, OutputError) else nullcontext():
-            found = omnidyn.identify(
+            result = omnidyn.identify(
                 loaded.runs,
                 start,
                 method,
-                hold_out=asked.hold_out,
+                hold_out=request.hold_out,
                 groups=groups,
-                quick=asked.quick,
+                quick=request.quick,
                 progress=progress,
                 check=loaded.logs,
                 keep_best=True,
                 save=lambda fits: to.save({name: fit.robot for name, fit in fits.items()}, record["inputs"]),
             )
-            attempts = found.after.attempts
-        if found.interrupted:
+            attempts = result.after.attempts
+        if result.interrupted:
             progress(Report("interrupted: the numbers are the best so far, not the best there are", urgent=True))
-        tell(found, attempts, record, to, progress)
-    if found.failures:
-        end_failed(found.verdict)
+        tell(result, attempts, record, to, progress)
+    if result.failures:
+        end_failed(result.verdict)
 
 
 # The part of `omnidyn identify` for motors: fit them, write the robot file and the page, show the result
 
 
 def run_motors(
-    asked: Asked, loaded: Loaded, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress
+    request: IdentifyRequest, loaded: Loaded, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress
 ) -> None:
     """Fit; write robot file and report; show the result."""
-    found = omnidyn.identify(
-        loaded.runs, robot, asked.method, hold_out=asked.hold_out, progress=progress, check=loaded.logs
+    result = omnidyn.identify(
+        loaded.runs, robot, request.method, hold_out=request.hold_out, progress=progress, check=loaded.logs
     )
-    _tell(cast("MotorStudy", found.study), robot, record, to, progress)
+    _tell(cast("MotorStudy", result.study), robot, record, to, progress)
 
 
-def tell_motor_table(table: str, robot: str, asked: Asked, to: Out) -> None:
+def tell_motor_table(table: str, robot: str, request: IdentifyRequest, to: Out) -> None:
     """The same from a table input,speed[,motor], which has no time."""
     from omnidyn.logs.motor_table import read_motor_table
 
     start, data = omnidyn.load_robot(robot) if robot else None, read_motor_table(table)
-    study = omnidyn.identify(data, start, asked.method).study
+    study = omnidyn.identify(data, start, request.method).study
     inputs = [{"role": "data", "name": table, "sha256": data.sha256}]
     _tell(
         cast("MotorStudy", study),
@@ -176,17 +176,17 @@ def tell_motor_table(table: str, robot: str, asked: Asked, to: Out) -> None:
 
 def _tell(study: MotorStudy, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress) -> None:
     attempts, report, numbers = Attempts(), "", _into_file(study, robot, record, to)
-    told = study.document()
+    document = study.document()
     if numbers is not None:
-        told = replace(told, parts=apart(told.parts, numbers.parts()))
+        document = replace(document, parts=apart(document.parts, numbers.parts()))
     if to.report:
         progress(Report("drawing"))
         report = to.write_report(attempts, lambda: _page(study, record))
     progress(Report("writing"))
-    verdict = " ".join([told.verdict_text, *(sentence(str(each)) for each in not_made(attempts.missing))])
-    told = replace(told, verdict=verdict, data={**told.data, "verdict": verdict})
-    own, missing = numbers.to_dict() if numbers is not None else None, [*map(asdict, attempts.missing)]
-    tell(told, to.json, record, robot=own, output=to.files.get(""), report=report or None, missing=missing)
+    verdict = " ".join([document.verdict_text, *(sentence(str(statement)) for statement in not_made(attempts.missing))])
+    document = replace(document, verdict=verdict, data={**document.data, "verdict": verdict})
+    robot_dict, omissions = numbers.to_dict() if numbers is not None else None, [*map(asdict, attempts.missing)]
+    tell(document, to.json, record, robot=robot_dict, output=to.files.get(""), report=report or None, missing=omissions)
     say_written([*to.files.values(), report])
     to.finish(attempts)
     if study.failed:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from omnidyn.cli.log_options import Maps, load_logs, log_files
-from omnidyn.cli.terminal.identify_options import Asked
+from omnidyn.cli.terminal.identify_options import IdentifyRequest
 from omnidyn.cli.terminal.streams import say
 from omnidyn.files import open_regular
 from omnidyn.progress import Progress
@@ -65,28 +65,28 @@ def _first_names(path: str) -> set[str]:
 
 
 def load_runs(
-    arguments: Sequence[str], asked: Asked, robot: Robot | None, reading: Reading, progress: Progress
+    arguments: Sequence[str], request: IdentifyRequest, robot: Robot | None, reading: Reading, progress: Progress
 ) -> Loaded:
     """The runs of LOG... that belong to a group, where there are any; what the readers had to decide is said once."""
     files = log_files(arguments)
-    folders = () if asked.groups else _folders(arguments)
-    used = _of_groups(files, asked.groups or folders, asked.group_option)
-    found, said = Loaded([], [], [], folders), {}
-    for path, log in load_logs(used, robot, reading.options, progress):
+    folders = () if request.groups else _folders(arguments)
+    used_files = _of_groups(files, request.groups or folders, request.group_option)
+    loaded, notes = Loaded([], [], [], folders), {}
+    for path, log in load_logs(used_files, robot, reading.options, progress):
         reading.maps.show(path, log.columns)
         run = log.to_run(sort=reading.sort)
         for words in run.warnings:
-            said.setdefault(words, []).append(path)
-        found.runs.append(run)
-        found.logs.append(log)
-        found.inputs.append({"role": "log", "name": path, "sha256": log.sha256})
-    _say_notes(said, len(used))
-    return found
+            notes.setdefault(words, []).append(path)
+        loaded.runs.append(run)
+        loaded.logs.append(log)
+        loaded.inputs.append({"role": "log", "name": path, "sha256": log.sha256})
+    _say_notes(notes, len(used_files))
+    return loaded
 
 
 def _folders(arguments: Sequence[str]) -> tuple[str, ...]:
     """NAME=FOLDER of each folder, where several are given and nothing else."""
-    folders = [each for each in arguments if os.path.isdir(each)]
+    folders = [argument for argument in arguments if os.path.isdir(argument)]
     if len(folders) < 2 or len(folders) < len(arguments):
         return ()
     return tuple(f"{Path(os.path.abspath(folder)).name}={folder}" for folder in folders)
@@ -98,15 +98,15 @@ def _of_groups(files: Sequence[str], patterns: Sequence[str], option: str) -> li
 
     if not patterns:
         return list(files)
-    used = [path for path, name in zip(files, group_names(files, patterns, option), strict=True) if name]
-    if len(used) < len(files):
-        say(f"omnidyn: {len(files) - len(used)} of {len(files)} logs belong to no group and are not used")
-    return used
+    used_files = [path for path, name in zip(files, group_names(files, patterns, option), strict=True) if name]
+    if len(used_files) < len(files):
+        say(f"omnidyn: {len(files) - len(used_files)} of {len(files)} logs belong to no group and are not used")
+    return used_files
 
 
-def _say_notes(said: Mapping[str, Sequence[str]], files: int) -> None:
-    for words, paths in list(said.items())[:SHOWN_NOTES]:
-        where = paths[0] if len(paths) == 1 and files > 1 else f"{len(paths)} logs" if files > 1 else paths[0]
-        say(f"omnidyn: {where}: {words}")
-    if len(said) > SHOWN_NOTES:
-        say(f"omnidyn: and {len(said) - SHOWN_NOTES} more notes of the readers (omnidyn check shows all)")
+def _say_notes(notes: Mapping[str, Sequence[str]], files: int) -> None:
+    for words, paths in list(notes.items())[:SHOWN_NOTES]:
+        place = paths[0] if len(paths) == 1 and files > 1 else f"{len(paths)} logs" if files > 1 else paths[0]
+        say(f"omnidyn: {place}: {words}")
+    if len(notes) > SHOWN_NOTES:
+        say(f"omnidyn: and {len(notes) - SHOWN_NOTES} more notes of the readers (omnidyn check shows all)")

@@ -14,7 +14,7 @@ import typer
 import omnidyn
 from omnidyn.attempts import Attempts
 from omnidyn.cli.terminal.flags import with_flags
-from omnidyn.cli.terminal.identify_options import Asked
+from omnidyn.cli.terminal.identify_options import IdentifyRequest
 from omnidyn.cli.terminal.progress import shown_progress
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import say
@@ -67,8 +67,8 @@ class Out:
 
     def finish(self, attempts: Attempts) -> None:
         """Name what is missing; raise what kept a robot file from being written, or the interrupt."""
-        for each in attempts.missing:
-            say(f"omnidyn: not made: the {each.part}: {each.reason}")
+        for omission in attempts.missing:
+            say(f"omnidyn: not made: the {omission.part}: {omission.reason}")
         for error in self.refused:
             say("omnidyn: the robot file could not be written; the result is on stdout")
             raise error
@@ -90,46 +90,46 @@ def load_meanwhile(to: Out, quick: bool) -> None:
     threading.Thread(target=load).start()
 
 
-def tell(found: Identification, attempts: Attempts, record: dict[str, Any], to: Out, progress: Progress) -> None:
+def tell(result: Identification, attempts: Attempts, record: dict[str, Any], to: Out, progress: Progress) -> None:
     """Draw the page of an identification, and show the result."""
     report = ""
-    if to.report and _has_page(found):
+    if to.report and _has_page(result):
         progress(Report("drawing"))
-        report = to.write_report(attempts, lambda: _page(found, record))
+        report = to.write_report(attempts, lambda: _page(result, record))
     progress(Report("writing"))
     written = [*to.files.values(), *([report] if report else [])]
-    told = found.document() if to.json or to.full else brief(found)
-    tell_document(told, to.json, record, output=to.files or None, report=report or None)
+    document = result.document() if to.json or to.full else brief(result)
+    tell_document(document, to.json, record, output=to.files or None, report=report or None)
     say_written(written)
     to.finish(attempts)
 
 
-def _has_page(found: Identification) -> bool:
+def _has_page(result: Identification) -> bool:
     """Whether there is a report to write."""
-    if found.study is None and not isinstance(found.method, OutputError):
+    if result.study is None and not isinstance(result.method, OutputError):
         say("omnidyn: --shape line has no page; --report is not used")
-    return found.study is not None or isinstance(found.method, OutputError)
+    return result.study is not None or isinstance(result.method, OutputError)
 
 
-def _page(found: Identification, record: dict[str, Any]) -> str:
+def _page(result: Identification, record: dict[str, Any]) -> str:
     """The report."""
-    if isinstance(found.method, SteadyState) and found.study is not None:
+    if isinstance(result.method, SteadyState) and result.study is not None:
         from omnidyn.report.steady_page import render_study
 
-        study: Any = found.study  # a SteadyStudy: this method makes no other
-        return render_study(study, record, verdict=found.verdict, verdicts=found.verdicts)
+        study: Any = result.study  # a SteadyStudy: this method makes no other
+        return render_study(study, record, verdict=result.verdict, verdicts=result.verdicts)
     from omnidyn.report.fit_page import render_fit
 
-    return render_fit(found, record)
+    return render_fit(result, record)
 
 
-def tell_table(table: str, robot: str, asked: Asked, to: Out) -> None:
+def tell_table(table: str, robot: str, request: IdentifyRequest, to: Out) -> None:
     """The paper's way, from a table of steady points; what the reader had to decide joins the warnings."""
     if to.report:
         raise typer.BadParameter("--report needs logs; a table of points has none.")
     with shown_progress("identifying"):
         start, data = omnidyn.load_robot(robot), omnidyn.read_steady_table(table)
-        estimate = omnidyn.identify(data, start, asked.method).estimate
+        estimate = omnidyn.identify(data, start, request.method).estimate
         record = provenance([robot_input(robot), {"role": "data", "name": table, "sha256": data.sha256}])
     to.save({"": estimate.robot}, record["inputs"])
     tell_document(estimate.document(), to.json, record, output=to.files.get(""))
@@ -149,9 +149,9 @@ def outputs(to: Out, names: Sequence[str], inputs: Sequence[Mapping[str, str]] =
     plain = ["".join(c if c.isalnum() or c in "-_." else "-" for c in group) for group in names]
     several = [str(path.with_name(f"{path.stem}-{word}{path.suffix}")) for word in plain]
     files = dict(zip(names, [to.out] if len(names) == 1 else several, strict=True))
-    keep_apart([*files.values(), to.report], [each["name"] for each in inputs])
-    for group, each in files.items():
-        check_output(each, to.force or group in to.files)
+    keep_apart([*files.values(), to.report], [source["name"] for source in inputs])
+    for group, file in files.items():
+        check_output(file, to.force or group in to.files)
     return files
 
 
@@ -165,16 +165,16 @@ def say_written(paths: Iterable[str]) -> None:
 # The result of `omnidyn identify` on one screen
 
 
-def brief(found: Identification) -> Document:
+def brief(result: Identification) -> Document:
     """What the result says in about 20 lines: verdict, numbers, the gravest warnings, the next step."""
-    groups = len(found.groups)
-    rows = [row for group, estimate in found.groups.items() for row in _rows(group, estimate, groups)]
-    of_study = found.study.warnings if found.study is not None else ()
-    warnings = [*of_study, *(warning for estimate in found.groups.values() for warning in estimate.warnings)]
+    groups = len(result.groups)
+    rows = [row for group, estimate in result.groups.items() for row in _rows(group, estimate, groups)]
+    of_study = result.study.warnings if result.study is not None else ()
+    warnings = [*of_study, *(warning for estimate in result.groups.values() for warning in estimate.warnings)]
     table = Table(("number", "value", "95 % interval", "unit", "key"), rows, "<>><<")
-    blocks = [fit.held_out.statement() for fit in found.fits.values() if fit.held_out is not None]
+    blocks = [fit.held_out.statement() for fit in result.fits.values() if fit.held_out is not None]
     head = [Words(sentence(str(statement))) for statement in blocks]
-    return brief_document(found.headline, table, warnings, found.advice, head)
+    return brief_document(result.headline, table, warnings, result.advice, head)
 
 
 def _rows(group: str, estimate: Estimate, groups: int) -> Iterator[tuple[str, ...]]:
@@ -185,9 +185,9 @@ def _rows(group: str, estimate: Estimate, groups: int) -> Iterator[tuple[str, ..
 
     of = f" in {group}" if groups > 1 else ""
     for name, value in estimate.value.items():
-        known = NOT_DETERMINED if name in estimate.unidentifiable else interval_cell(estimate.ci95[name])
-        yield f"{in_words(name)}{of}", f"{value:.4g}", known, unit(name), name
+        interval = NOT_DETERMINED if name in estimate.unidentifiable else interval_cell(estimate.ci95[name])
+        yield f"{in_words(name)}{of}", f"{value:.4g}", interval, unit(name), name
     if isinstance(estimate, OutputErrorEstimate):
-        for name, own in estimate.nuisances.items():
-            known = NOT_DETERMINED if name in estimate.unidentifiable else interval_cell(own.ci95)
-            yield f"{name} of the log{of}", f"{own.value:.4g}", known, own.unit, ""
+        for name, nuisance in estimate.nuisances.items():
+            interval = NOT_DETERMINED if name in estimate.unidentifiable else interval_cell(nuisance.ci95)
+            yield f"{name} of the log{of}", f"{nuisance.value:.4g}", interval, nuisance.unit, ""

@@ -54,7 +54,7 @@ def init(
     Needs where the wheels stand, two radii and a mass; asks for them at a terminal.
     The rest is guessed, with a wide spread, and marked as a guess.
     """
-    given = {
+    values = {
         "wheels": wheels,
         "azimuth": _listed("azimuth", azimuth),
         "wheel_radius": _radii("wheel_radius", wheel_radius),
@@ -65,47 +65,47 @@ def init(
         "gear_ratio": gear_ratio,
         "rotor_inertia": rotor_inertia,
     }
-    _refuse_words(given, mecanum, friction, like, out, json)
-    _refuse_numbers(given)
+    _refuse_words(values, mecanum, friction, like, out, json)
+    _refuse_numbers(values)
     path = _checked_path(name := name.removesuffix(".toml"), out, force)
     log_options.keep_inputs(log, [like], [flags.map_file], "" if path == "-" else path)
     log_options.refuse_missing(log)
     from omnidyn.cli import init_robot
 
     preset = omnidyn.load_robot(like) if like else None
-    told = [key for key, value in given.items() if value is not None]
+    given_keys = [key for key, value in values.items() if value is not None]
     if not log and flags != NO_FLAGS:
         raise typer.BadParameter("--map, --column, --assume, --no-header, --rate, --max-bytes and --var are for --log.")
-    seen = init_robot.from_logs(given, log, flags.options(), mecanum, bool(like)) if log else None
-    robot = init_robot.robot_of(name, given, told, preset, mecanum, friction, seen)
+    geometry = init_robot.from_logs(values, log, flags.options(), mecanum, bool(like)) if log else None
+    robot = init_robot.robot_of(name, values, given_keys, preset, mecanum, friction, geometry)
     _write(robot.name, *init_robot.file_of(robot), path, force, json, like)
 
 
-def _refuse_words(given: dict[str, Any], mecanum: bool, friction: str, like: str, out: str, json: bool) -> None:
+def _refuse_words(values: dict[str, Any], mecanum: bool, friction: str, like: str, out: str, json: bool) -> None:
     """Options that contradict each other."""
-    count, azimuth = given["wheels"], given["azimuth"]
+    count, azimuth = values["wheels"], values["azimuth"]
     if mecanum and (azimuth is not None or count not in (None, 4)):
         raise typer.BadParameter("--mecanum stands for four wheels and where they stand; leave out the rest.")
     if azimuth is not None and count is not None and len(azimuth) != count:
         raise typer.BadParameter(f"--azimuth has {len(azimuth)} values for --wheels {count}.")
     if friction not in ("", "direction", "axes"):
         raise typer.BadParameter("--friction is direction or axes.")
-    for flag in ("--friction",) * bool(friction) + ("--speed-loop",) * bool(given["speed_loop"]):
+    for flag in ("--friction",) * bool(friction) + ("--speed-loop",) * bool(values["speed_loop"]):
         if like:
             raise typer.BadParameter(f"{flag} is for a guess; with --like it comes from there.")
     if out == "-" and json:
         raise typer.BadParameter("-o - and --json both want stdout.")
 
 
-def _refuse_numbers(given: dict[str, Any]) -> None:
+def _refuse_numbers(values: dict[str, Any]) -> None:
     """Numbers with which no robot can be guessed, by the names that they have here. Raises InputError."""
-    azimuth, limit, loop = given["azimuth"], given["voltage_limit"], given["speed_loop"]
-    count = given["wheels"] or (azimuth and len(azimuth))
+    azimuth, limit, loop = values["azimuth"], values["voltage_limit"], values["speed_loop"]
+    count = values["wheels"] or (azimuth and len(azimuth))
     for key in ("wheel_radius", "robot_radius"):
-        if count and isinstance(given[key], tuple) and len(given[key]) != count:
+        if count and isinstance(values[key], tuple) and len(values[key]) != count:
             raise InputError(
                 "wrong number of values",
-                got=number_words(given[key]),
+                got=number_words(values[key]),
                 expected=f"1, or one per wheel ({count})",
                 where=f"--{key.replace('_', '-')}",
             )
@@ -131,7 +131,7 @@ def _refuse_numbers(given: dict[str, Any]) -> None:
             remedy="leave it out for a guess",
             where="--voltage-limit",
         )
-    gear = given["gear_ratio"]
+    gear = values["gear_ratio"]
     if gear is not None and not 0.0 < gear < float("inf"):
         raise InputError(
             "no gear has this ratio", got=f"{gear:g}", expected="more than 0, such as 30", where="--gear-ratio"
@@ -174,8 +174,8 @@ def _write(name: str, text: str, guesses: list[str], path: str, force: bool, jso
     else:
         write_atomic(path, text, force)
     if path != "-":
-        told = Document([printable(path)], {"robot": name, "output": path, "guessed": guesses})
-        tell(told, json, provenance([robot_input(like)] if like else []))
+        document = Document([printable(path)], {"robot": name, "output": path, "guessed": guesses})
+        tell(document, json, provenance([robot_input(like)] if like else []))
     if guesses:
         say(f"omnidyn: guessed: {', '.join(guesses)}")
     if like:

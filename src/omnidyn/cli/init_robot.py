@@ -67,31 +67,31 @@ class Answers:
 
 def robot_of(
     name: str,
-    given: dict[str, Any],
-    told: Collection[str],
+    values: dict[str, Any],
+    given_keys: Collection[str],
     preset: Robot | None,
     mecanum: bool,
     friction: str,
-    seen: Geometry | None,
+    geometry: Geometry | None,
 ) -> Robot:
     """The robot of all that is known. Raises InputError.
 
     Args:
         name: of the robot.
-        given: name of an option -> its value, from the command line or from logs; None where not known.
-        told: names of the options of the command line.
+        values: name of an option -> its value, from the command line or from logs; None where not known.
+        given_keys: names of the options of the command line.
         preset: whose numbers are taken for what is not given.
         mecanum: four mecanum wheels.
         friction: where guessed friction acts, "" for the default.
-        seen: what logs show of its wheels.
+        geometry: what logs show of its wheels.
     """
-    known = {key: value for key, value in given.items() if value is not None}
-    refuse_sizes(_sizes(known, preset))
-    answers = complete(dict(known), preset, mecanum)
+    sizes = {key: value for key, value in values.items() if value is not None}
+    refuse_sizes(_sizes(sizes, preset))
+    answers = complete(dict(sizes), preset, mecanum)
     refuse_sizes(_sizes(answers.value, preset))
-    from_logs = {KEYS[key] for key in KEYS.keys() & (known.keys() - set(told))}
-    robot = _as_seen(_guessed_robot(name, answers, preset, mecanum, friction), seen, from_logs)
-    return _with_motor(robot, given, preset is not None)
+    from_logs = {KEYS[key] for key in KEYS.keys() & (sizes.keys() - set(given_keys))}
+    robot = _as_seen(_guessed_robot(name, answers, preset, mecanum, friction), geometry, from_logs)
+    return _with_motor(robot, values, preset is not None)
 
 
 def complete(value: dict[str, Any], preset: Robot | None, mecanum: bool) -> Answers:
@@ -99,18 +99,18 @@ def complete(value: dict[str, Any], preset: Robot | None, mecanum: bool) -> Answ
     if mecanum:
         value["wheels"] = 4
     answers = Answers(value)
-    needed = [key for key in QUESTIONS if key not in value and not (mecanum and key == "azimuth")]
-    if _at_terminal() and needed:
-        _ask_for(needed, answers, preset)
+    questions = [key for key in QUESTIONS if key not in value and not (mecanum and key == "azimuth")]
+    if _at_terminal() and questions:
+        _ask_for(questions, answers, preset)
     elif preset is not None:
         answers.accepted = {
             key
-            for key in needed
+            for key in questions
             if key != "azimuth" or (value.get("wheels", preset.wheels.count) == preset.wheels.count)
         }
-        needed = [key for key in needed if key not in answers.accepted]
-    if not _at_terminal() and needed:
-        flags = ", ".join(f"--{key.replace('_', '-')}" for key in needed)
+        questions = [key for key in questions if key not in answers.accepted]
+    if not _at_terminal() and questions:
+        flags = ", ".join(f"--{key.replace('_', '-')}" for key in questions)
         raise typer.BadParameter(f"{flags} missing; without them it asks, but only at a terminal.")
     return answers
 
@@ -119,10 +119,10 @@ def _at_terminal() -> bool:
     return sys.stdin is not None and sys.stdin.isatty() and sys.stderr.isatty()
 
 
-def _ask_for(needed: list[str], answers: Answers, preset: Robot | None) -> None:
+def _ask_for(questions: list[str], answers: Answers, preset: Robot | None) -> None:
     """Ask one by one; Enter takes what stands in brackets."""
     say("Enter takes what stands in brackets.")
-    for key in needed:
+    for key in questions:
         if key == "azimuth":
             _ask_for_wheels(answers, preset)
             continue
@@ -145,13 +145,13 @@ def _ask_for_wheels(answers: Answers, preset: Robot | None) -> None:
         usual = preset.wheels.count if preset else 3
         count = _ask(f"how many wheels [{usual}]: ", _count) or usual
         answers.value["wheels"] = count
-    taken = preset is not None and preset.wheels.count == count
-    default = preset.wheels.azimuth_deg if preset is not None and taken else even_azimuths(count)
+    fits_preset = preset is not None and preset.wheels.count == count
+    default = preset.wheels.azimuth_deg if preset is not None and fits_preset else even_azimuths(count)
     typed = _ask(
         f"{QUESTIONS['azimuth']} [{number_words(default)}]: ",
         lambda text: _checked("azimuth", _several(text, count), {}),
     )
-    if typed is not None or not taken:
+    if typed is not None or not fits_preset:
         answers.value["azimuth"] = list(default) if typed is None else typed
     if typed is None:
         answers.accepted.add("azimuth")
@@ -192,9 +192,9 @@ def _count(text: str) -> int:
     return int(text)
 
 
-def _checked(key: str, value: Any, known: Mapping[str, Any]) -> Any:
+def _checked(key: str, value: Any, known_values: Mapping[str, Any]) -> Any:
     """The value, if a robot may have it beside what is known. Raises InputError."""
-    refuse_sizes({**known, key: value})
+    refuse_sizes({**known_values, key: value})
     if key == "mass":
         Body(mass=value, inertia=1.0)
     else:
@@ -203,7 +203,7 @@ def _checked(key: str, value: Any, known: Mapping[str, Any]) -> Any:
     return value
 
 
-def _sizes(given: dict[str, Any], preset: Robot | None) -> dict[str, Any]:
+def _sizes(values: dict[str, Any], preset: Robot | None) -> dict[str, Any]:
     """What is given of lengths, angles and the mass, the rest from the preset."""
     of_preset = (
         {}
@@ -214,7 +214,7 @@ def _sizes(given: dict[str, Any], preset: Robot | None) -> dict[str, Any]:
             "mass": preset.body.mass,
         }
     )
-    return of_preset | {key: value for key, value in given.items() if value is not None}
+    return of_preset | {key: value for key, value in values.items() if value is not None}
 
 
 def _guessed_robot(name: str, answers: Answers, preset: Robot | None, mecanum: bool, friction: str) -> Robot:
@@ -222,11 +222,11 @@ def _guessed_robot(name: str, answers: Answers, preset: Robot | None, mecanum: b
     value = answers.value
     wheels, mass = _wheels(value, preset, mecanum), value.get("mass", preset.body.mass if preset else None)
     Body(mass=mass, inertia=1.0)
-    told = {KEYS[key] for key in value if key in KEYS and key not in answers.accepted}
-    told |= {KEYS["azimuth"], KEYS["roller"]} if mecanum else set()
+    given_keys = {KEYS[key] for key in value if key in KEYS and key not in answers.accepted}
+    given_keys |= {KEYS["azimuth"], KEYS["roller"]} if mecanum else set()
     try:
         if preset is not None:
-            robot = like(preset, name, wheels, mass, value.get("voltage_limit"), told)
+            robot = like(preset, name, wheels, mass, value.get("voltage_limit"), given_keys)
         else:
             robot = first_guess(
                 name, wheels, mass, value.get("voltage_limit"), friction or DIRECTION, value.get("speed_loop", ())
@@ -236,19 +236,19 @@ def _guessed_robot(name: str, answers: Answers, preset: Robot | None, mecanum: b
             "cannot make such a robot", got=str(error), remedy="check the units: m, kg, V, degree", where=name
         ) from None
     accepted = {KEYS[key]: value[key] for key in answers.accepted if key in value}
-    return robot.replace(priors=robot.priors | {key: default_prior(key, one) for key, one in accepted.items()})
+    return robot.replace(priors=robot.priors | {key: default_prior(key, number) for key, number in accepted.items()})
 
 
-def _with_motor(robot: Robot, given: dict[str, Any], copied: bool) -> Robot:
+def _with_motor(robot: Robot, values: dict[str, Any], copied: bool) -> Robot:
     """The robot with the gear and the rotor that were given. copied: from a preset, whose motors stay as they are.
 
     Raises InputError for a rotor behind a gear that is only guessed: at the wheel it counts with its square.
     """
-    gear, rotor = given["gear_ratio"], given["rotor_inertia"]
+    gear, rotor = values["gear_ratio"], values["rotor_inertia"]
     if gear is not None and copied:
-        known = {key: prior for key, prior in robot.priors.items() if not key.startswith(GEAR)}
+        priors = {key: prior for key, prior in robot.priors.items() if not key.startswith(GEAR)}
         motor = robot.motor.replace(gear_ratio=gear)
-        robot = robot.replace(motor=motor, priors=known | {GEAR: Prior(origin=GIVEN)})
+        robot = robot.replace(motor=motor, priors=priors | {GEAR: Prior(origin=GIVEN)})
     elif gear is not None:
         robot = with_gear(robot, gear, "", GIVEN)
     if rotor is None:
@@ -265,13 +265,13 @@ def _with_motor(robot: Robot, given: dict[str, Any], copied: bool) -> Robot:
 
 
 def _wheels(value: dict[str, Any], preset: Robot | None, mecanum: bool) -> Wheels:
-    known: dict[str, Any] = {key: value[key] for key in ("wheel_radius", "robot_radius") if key in value}
+    radii: dict[str, Any] = {key: value[key] for key in ("wheel_radius", "robot_radius") if key in value}
     if preset is not None and not mecanum:
-        changed = {"azimuth_deg": value["azimuth"]} if "azimuth" in value else {}
-        return preset.wheels.replace(**known, **changed)
+        azimuths = {"azimuth_deg": value["azimuth"]} if "azimuth" in value else {}
+        return preset.wheels.replace(**radii, **azimuths)
     if preset is not None:
-        known = {"wheel_radius": preset.wheels.wheel_radius, "robot_radius": preset.wheels.robot_radius} | known
-    return mecanum_wheels(**known) if mecanum else Wheels(azimuth_deg=value["azimuth"], **known)
+        radii = {"wheel_radius": preset.wheels.wheel_radius, "robot_radius": preset.wheels.robot_radius} | radii
+    return mecanum_wheels(**radii) if mecanum else Wheels(azimuth_deg=value["azimuth"], **radii)
 
 
 def file_of(robot: Robot) -> tuple[str, list[str]]:
@@ -284,51 +284,51 @@ def file_of(robot: Robot) -> tuple[str, list[str]]:
     guesses = reasons(robot)
     if guesses:
         lines += ["", "How it was guessed (M mass, b centre to wheel):"]
-        lines += [f"  {key}: {why}" for key, why in guesses]
+        lines += [f"  {key}: {reason}" for key, reason in guesses]
     head = "".join(f"# {line}".rstrip() + "\n" for line in lines)
     return f"{head}\n{robot_to_toml(robot)}", guessed(robot)
 
 
-def from_logs(given: dict[str, Any], log: list[str], options: LogOptions, mecanum: bool, copied: bool) -> Geometry:
+def from_logs(values: dict[str, Any], log: list[str], options: LogOptions, mecanum: bool, copied: bool) -> Geometry:
     """Azimuths and radii, of the robot where it turned, from logs; what is given on the command line stays.
 
     copied: the wheels are those of a preset, whose radius then tells the gear.
     """
     runs, maps = [], log_options.Maps()
-    for path, each in log_options.load_logs(log_options.log_files(log), None, options):
-        maps.show(path, each.columns)
-        runs.append(each.to_run())
-    seen = wheel_geometry(runs, "--robot-radius" if mecanum else "`azimuth`")
-    azimuth = [round(angle, 2) for angle in seen.azimuth_deg]
-    where = "pushing towards" if mecanum else "at"
-    told = f"from {seen.source} ({seen.residual:.1%} unexplained)"
-    say(f"omnidyn: wheels {where} {number_words(tuple(azimuth))} degrees, {told}")
+    for path, loaded in log_options.load_logs(log_options.log_files(log), None, options):
+        maps.show(path, loaded.columns)
+        runs.append(loaded.to_run())
+    geometry = wheel_geometry(runs, "--robot-radius" if mecanum else "`azimuth`")
+    azimuth = [round(angle, 2) for angle in geometry.azimuth_deg]
+    verb = "pushing towards" if mecanum else "at"
+    remark = f"from {geometry.source} ({geometry.residual:.1%} unexplained)"
+    say(f"omnidyn: wheels {verb} {number_words(tuple(azimuth))} degrees, {remark}")
     if mecanum:
-        seen = as_mecanum(seen)
-    elif given["azimuth"] is None and given["wheels"] in (None, len(azimuth)):
-        given["azimuth"], given["wheels"] = azimuth, len(azimuth)
-    if given["robot_radius"] is None and seen.robot_radius is not None and seen.robot_radius > 0.0:
-        given["robot_radius"] = round(seen.robot_radius, 4)
-        say(f"omnidyn: centre to wheel {given['robot_radius']:g} m")
-    elif given["robot_radius"] is None:
+        geometry = as_mecanum(geometry)
+    elif values["azimuth"] is None and values["wheels"] in (None, len(azimuth)):
+        values["azimuth"], values["wheels"] = azimuth, len(azimuth)
+    if values["robot_radius"] is None and geometry.robot_radius is not None and geometry.robot_radius > 0.0:
+        values["robot_radius"] = round(geometry.robot_radius, 4)
+        say(f"omnidyn: centre to wheel {values['robot_radius']:g} m")
+    elif values["robot_radius"] is None:
         say("omnidyn: the logs do not turn, or hold no turn rate: the distance from centre to wheel is not in them")
-    radius = 1.0 / seen.per_metre
-    if given["wheel_radius"] is None and seen.measured and not copied and LEAST_RADIUS < radius < LARGEST_RADIUS:
-        given["wheel_radius"] = round(radius, 4)
+    radius = 1.0 / geometry.per_metre
+    if values["wheel_radius"] is None and geometry.measured and not copied and LEAST_RADIUS < radius < LARGEST_RADIUS:
+        values["wheel_radius"] = round(radius, 4)
         say(f"omnidyn: wheel radius {radius:.4g} m, if the logged speeds are those of the wheels, behind the gear")
-    return seen
+    return geometry
 
 
-def _as_seen(robot: Robot, seen: Geometry | None, from_logs: set[str]) -> Robot:
+def _as_seen(robot: Robot, geometry: Geometry | None, from_logs: set[str]) -> Robot:
     """The robot with the gear that the logged speeds show: those of the motor shaft are faster by it.
 
     from_logs: keys of the robot file whose numbers the logs gave; their source says so.
     """
-    if seen is None:
+    if geometry is None:
         return robot
-    told = Prior(source=f"logs: {seen.source}", origin=MEASURED)
-    robot = robot.replace(priors=robot.priors | dict.fromkeys(from_logs, told))
-    ratio = seen.per_metre * float(robot.wheels.radii.mean())
+    prior = Prior(source=f"logs: {geometry.source}", origin=MEASURED)
+    robot = robot.replace(priors=robot.priors | dict.fromkeys(from_logs, prior))
+    ratio = geometry.per_metre * float(robot.wheels.radii.mean())
     if ratio < GEARED:
         return robot
     say(f"omnidyn: logged speeds are {ratio:.4g} times those of such wheels: taken as those of the motor, gear ratio")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 import omnidyn
-from omnidyn.cli.terminal.help import MORE
+from omnidyn.cli.terminal.help import MORE_PANEL
 from omnidyn.cli.terminal.streams import say
 from omnidyn.errors import InputError
 from omnidyn.files import check_output, keep_apart, open_regular
@@ -36,7 +36,7 @@ WITH = typer.Option(
 
 
 MAX_BYTES = typer.Option(
-    0, min=0, metavar="N", help="Most bytes held at once; default: a quarter of the memory.", rich_help_panel=MORE
+    0, min=0, metavar="N", help="Most bytes held at once; default: a quarter of the memory.", rich_help_panel=MORE_PANEL
 )
 
 
@@ -45,7 +45,7 @@ class LogFlags:
     """How logs are read, as the command line says it: an option for each field."""
 
     map_file: str = typer.Option(
-        "", "--map", metavar="FILE", help="Which column is what (TOML), instead of a guess.", rich_help_panel=MORE
+        "", "--map", metavar="FILE", help="Which column is what (TOML), instead of a guess.", rich_help_panel=MORE_PANEL
     )
     column: Sequence[str] = typer.Option(
         [], metavar="CH=COL:UNIT", help="One column: u1=motor_1_volts:V, w2=-m2vel:rpm@motor. Repeatable."
@@ -57,33 +57,35 @@ class LogFlags:
         "Repeatable.",
     )
     latency: Sequence[str] = typer.Option(
-        [], metavar="CH=SECONDS", help="How late a channel was recorded. Repeatable.", rich_help_panel=MORE
+        [], metavar="CH=SECONDS", help="How late a channel was recorded. Repeatable.", rich_help_panel=MORE_PANEL
     )
-    save_map: str = typer.Option("", metavar="FILE", help="Write the map that was used (TOML).", rich_help_panel=MORE)
+    save_map: str = typer.Option(
+        "", metavar="FILE", help="Write the map that was used (TOML).", rich_help_panel=MORE_PANEL
+    )
     sort: bool = typer.Option(
-        False, "--sort", help="Sort rows whose time goes back, instead of refusing them.", rich_help_panel=MORE
+        False, "--sort", help="Sort rows whose time goes back, instead of refusing them.", rich_help_panel=MORE_PANEL
     )
     no_header: bool = typer.Option(
-        False, "--no-header", help="The file has no header: columns are c1, c2, ...", rich_help_panel=MORE
+        False, "--no-header", help="The file has no header: columns are c1, c2, ...", rich_help_panel=MORE_PANEL
     )
     rate: float | None = typer.Option(
-        None, metavar="HZ", help="The file has no time: so many rows a second.", rich_help_panel=MORE
+        None, metavar="HZ", help="The file has no time: so many rows a second.", rich_help_panel=MORE_PANEL
     )
     skip_bad_rows: bool = typer.Option(
-        False, "--skip-bad-rows", help="Leave out rows that cannot be read, and count them.", rich_help_panel=MORE
+        False, "--skip-bad-rows", help="Leave out rows that cannot be read, and count them.", rich_help_panel=MORE_PANEL
     )
     max_bytes: int = MAX_BYTES
     var: Sequence[str] = typer.Option(
         [],
         metavar="NAME",
         help="Read this variable of a MATLAB file alone, with all in it. Repeatable.",
-        rich_help_panel=MORE,
+        rich_help_panel=MORE_PANEL,
     )
     current_unsigned: bool = typer.Option(
         False,
         "--current-unsigned",
         help="Currents are |i|: they get the sign of the commanded speed.",
-        rich_help_panel=MORE,
+        rich_help_panel=MORE_PANEL,
     )
 
     def options(self) -> LogOptions:
@@ -116,12 +118,12 @@ _KINDS = {"Sequence[str]": list[str], "str": str, "bool": bool, "int": int, "flo
 
 def reads_logs(*without: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """A command with an option for every field of LogFlags but those `without`, in the place of its `flags`."""
-    used = [option for option in fields(LogFlags) if option.name not in without]
+    used_fields = [option for option in fields(LogFlags) if option.name not in without]
     options = [
         inspect.Parameter(
             option.name, inspect.Parameter.KEYWORD_ONLY, default=option.default, annotation=_KINDS[str(option.type)]
         )
-        for option in used
+        for option in used_fields
     ]
 
     def with_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -129,18 +131,18 @@ def reads_logs(*without: str) -> Callable[[Callable[..., None]], Callable[..., N
 
         @functools.wraps(command)
         def run(**given: Any) -> None:
-            flags = replace(NO_FLAGS, **{option.name: given.pop(option.name) for option in used})
+            flags = replace(NO_FLAGS, **{option.name: given.pop(option.name) for option in used_fields})
             command(**given, flags=flags)
 
-        own = list(inspect.signature(command).parameters.values())
-        place = [parameter.name for parameter in own].index("flags")
-        named = [
+        parameters = list(inspect.signature(command).parameters.values())
+        place = [parameter.name for parameter in parameters].index("flags")
+        by_name = [
             parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
-            for parameter in own
+            for parameter in parameters
             if parameter.kind is not parameter.VAR_KEYWORD
         ]
-        rest = [parameter for parameter in own if parameter.kind is parameter.VAR_KEYWORD]
-        run.__signature__ = inspect.Signature([*named[:place], *options, *named[place + 1 :], *rest])  # type: ignore[attr-defined]
+        rest = [parameter for parameter in parameters if parameter.kind is parameter.VAR_KEYWORD]
+        run.__signature__ = inspect.Signature([*by_name[:place], *options, *by_name[place + 1 :], *rest])  # type: ignore[attr-defined]
         return run
 
     return with_options
@@ -173,16 +175,16 @@ def log_files(arguments: Sequence[str]) -> list[str]:
         from omnidyn.logs.readers.read_table import LOG_SUFFIXES
 
         folders = log_folders(argument)
-        found = [
+        matches = [
             str(path)
             for path in Path(argument).rglob("*")
             if path.suffix.lower() in LOG_SUFFIXES and path.is_file() and not {*path.parents} & {*folders}
         ]
-        found += map(str, folders)
-        if not found:
+        matches += map(str, folders)
+        if not matches:
             expected = f"files that end in {' '.join(LOG_SUFFIXES)}"
             raise InputError("no log in the folder", expected=expected, where=argument)
-        files += sorted(found, key=natural)
+        files += sorted(matches, key=natural)
     if len(files) > MAX_FILES:
         raise InputError("too many files", got=len(files), expected=f"at most {MAX_FILES}")
     once = list(dict.fromkeys(files))
@@ -191,13 +193,13 @@ def log_files(arguments: Sequence[str]) -> list[str]:
     return once
 
 
-def keep_inputs(logs: Sequence[str], robots: Sequence[str], others: Sequence[str], *outputs: str) -> None:
+def keep_inputs(logs: Sequence[str], robots: Sequence[str], other_files: Sequence[str], *outputs: str) -> None:
     """Before anything slow is loaded: all that is read is there, and no result replaces it or another result.
 
-    others: files that are read beside logs and robots. --force or not. Raises InputError.
+    other_files: files that are read beside logs and robots. --force or not. Raises InputError.
     """
     files = [robot_path(robot) for robot in robots if robot]
-    for path in (path for path in others if path):
+    for path in (path for path in other_files if path):
         with open_regular(path):
             files.append(path)
     keep_apart(outputs, [*log_files(logs), *files])
@@ -236,16 +238,16 @@ class Maps:
         """
         from omnidyn.logs.columns.mapping import save_map
 
-        taken, told = tuple(columns.lines()), tuple(f"doubt: {doubt.with_remedy}" for doubt in columns.doubts)
-        if (taken, told) in self.said:
+        lines, doubt_lines = tuple(columns.lines()), tuple(f"doubt: {doubt.with_remedy}" for doubt in columns.doubts)
+        if (lines, doubt_lines) in self.said:
             return
         if self.save and not self.said:
             save_map(columns, self.save, self.force)
-        again = (path, taken) in self.said  # read for another method, which has more doubts
-        self.said |= {(taken, told), (path, taken)}
+        again = (path, lines) in self.said  # read for another method, which has more doubts
+        self.said |= {(lines, doubt_lines), (path, lines)}
         if not again:
             say(f"omnidyn: columns of {path}:")
-        for line in (*(() if again else taken), *(told if doubts else ())):
+        for line in (*(() if again else lines), *(doubt_lines if doubts else ())):
             say(f"omnidyn:   {line}")
         if doubts and columns.passed_over:
             say(f"omnidyn:   not used: {', '.join(columns.passed_over)}")

@@ -104,6 +104,6 @@ def info(
             progress(report._replace(phase=f"reading {file}"))
 
         loaded = omnidyn.load_robot(robot) if robot else None
-        found = read_info(file, loaded, flags.options(), progress=listen)
-    inputs = [*([robot_input(robot)] if robot else []), {"role": "log", "name": file, "sha256": found.sha256}]
-    tell(found.document(), json, provenance(inputs), width=width())
+        log_info = read_info(file, loaded, flags.options(), progress=listen)
+    inputs = [*([robot_input(robot)] if robot else []), {"role": "log", "name": file, "sha256": log_info.sha256}]
+    tell(log_info.document(), json, provenance(inputs), width=width())

@@ -69,17 +69,17 @@ def track(
     around = Circumstances(dt, duration, skip, noise, delay, seed)
     believed = omnidyn.load_robot(robot)
     driven, follow = vary_as(omnidyn.load_robot(plant) if plant else believed, with_), omnidyn.path(path)
-    asked, options = omnidyn.path_demand(believed, follow), told_of_loop(believed, around)
+    demand, options = omnidyn.path_demand(believed, follow), told_of_loop(believed, around)
     options |= {} if horizon is None else {"horizon": horizon}
-    found: list[Tracking] = []
+    trackings: list[Tracking] = []
     with shown_progress("tracking") as progress:
-        for each in several(controller, believed, no_friction, no_observer, **options):
-            progress(Report(f"tracking with {each.name}, {len(found) + 1} of {len(controller)}"))
-            found.append(tracked(driven, follow, each, around))
-    document = trackings_document(found, notes := [asked.verdict, *asked.statements()])
+        for follower in several(controller, believed, no_friction, no_observer, **options):
+            progress(Report(f"tracking with {follower.name}, {len(trackings) + 1} of {len(controller)}"))
+            trackings.append(tracked(driven, follow, follower, around))
+    document = trackings_document(trackings, notes := [demand.verdict, *demand.statements()])
     record = _record(robot, plant, files)
-    _write(found, out, force)
-    _draw(found, driven, notes, record, report, gif, force)
+    _write(trackings, out, force)
+    _draw(trackings, driven, notes, record, report, gif, force)
     tell(document, json, record, output=out or None, report=report or None, gif=gif or None)
 
 
@@ -97,13 +97,13 @@ def _check_outputs(out: str, report: str, gif: str, force: bool) -> None:
         check_output(out, force)
 
 
-def _write(found: list[Tracking], out: str, force: bool) -> None:
+def _write(trackings: list[Tracking], out: str, force: bool) -> None:
     if out:
-        omnidyn.write_run(found[0].run, out, force)
+        omnidyn.write_run(trackings[0].run, out, force)
 
 
 def _draw(
-    found: list[Tracking],
+    trackings: list[Tracking],
     robot: Robot,
     notes: list[Statement],
     record: dict[str, Any],
@@ -115,17 +115,17 @@ def _draw(
         if report:
             from omnidyn.report.tracking_page import render_tracking
 
-            write_atomic(report, render_tracking(found, robot, record, notes=notes), force)
+            write_atomic(report, render_tracking(trackings, robot, record, notes=notes), force)
         if gif:
             from omnidyn.report.tracking_page import animation
 
-            write_atomic(gif, animation(found, robot), force)
+            write_atomic(gif, animation(trackings, robot), force)
 
 
 def _record(robot: str, plant: str, files: list[str]) -> dict[str, Any]:
     robots = [robot_input(robot), *([robot_input(plant)] if plant else [])]
-    others = [input_file("controller" if name.endswith(".toml") else "path", name) for name in files]
-    return provenance([*robots, *others])
+    input_files = [input_file("controller" if name.endswith(".toml") else "path", name) for name in files]
+    return provenance([*robots, *input_files])
 
 
 # omnidyn tune ROBOT --path NAME|FILE --controller NAME|FILE: gains by simulation, as a controller file
@@ -156,11 +156,11 @@ def tune(
     from omnidyn.control.controllers import save_controller
     from omnidyn.control.tune import tune as tune_controller
 
-    others = [input_file("controller" if name == controller else "path", name) for name in files]
-    record = provenance([robot_input(robot), *others])
+    input_files = [input_file("controller" if name == controller else "path", name) for name in files]
+    record = provenance([robot_input(robot), *input_files])
     loaded = omnidyn.load_robot(robot)
     with shown_progress("tuning") as progress:
-        found = tune_controller(
+        tuned = tune_controller(
             loaded,
             path,
             controller,
@@ -174,5 +174,5 @@ def tune(
             progress=progress,
         )
     if out:
-        save_controller(found.controller, out, force)
-    tell(found.document(), json, record, output=out or None)
+        save_controller(tuned.controller, out, force)
+    tell(tuned.document(), json, record, output=out or None)

@@ -99,14 +99,14 @@ def _usage(error: typer.TyperException) -> int:
 def _take_debug(arguments: list[str]) -> tuple[bool, list[str]]:
     """--debug may stand anywhere before a bare --."""
     end = arguments.index("--") if "--" in arguments else len(arguments)
-    kept = [word for word in arguments[:end] if word != "--debug"]
-    return len(kept) < end, kept + arguments[end:]
+    words = [word for word in arguments[:end] if word != "--debug"]
+    return len(words) < end, words + arguments[end:]
 
 
 def _is_closed_pipe(error: BaseException) -> bool:
     """typer turns a closed pipe into an exit; what it saw hangs on it."""
-    seen = error.__context__ if isinstance(error, SystemExit) else error
-    return isinstance(seen, OSError) and seen.errno == errno.EPIPE
+    cause = error.__context__ if isinstance(error, SystemExit) else error
+    return isinstance(cause, OSError) and cause.errno == errno.EPIPE
 
 
 @contextlib.contextmanager
@@ -114,11 +114,11 @@ def _interrupts_come_again() -> Iterator[None]:
     """While it holds, an interrupt that Python swallows, as in the callback of a weak reference, comes once more."""
     before = sys.unraisablehook
 
-    def swallowed(told: sys.UnraisableHookArgs) -> None:
-        if not isinstance(told.exc_value, INTERRUPTS):
-            before(told)
+    def swallowed(unraisable: sys.UnraisableHookArgs) -> None:
+        if not isinstance(unraisable.exc_value, INTERRUPTS):
+            before(unraisable)
             return
-        number = signal.SIGTERM if isinstance(told.exc_value, Terminated) else signal.SIGINT
+        number = signal.SIGTERM if isinstance(unraisable.exc_value, Terminated) else signal.SIGINT
         again = threading.Timer(0.01, _thread.interrupt_main, (number,))  # not at once: it would be swallowed again
         again.daemon = True
         again.start()

@@ -110,9 +110,9 @@ class _Job:
         from omnidyn.model.vary import vary_as
 
         loaded = vary_as(omnidyn.load_robot(robot), with_)
-        held = omnidyn.read_commands(voltages, loaded.wheels.count, duration, max_steps)
-        record = provenance([robot_input(robot), {"role": "voltages", "name": voltages, "sha256": held.sha256}])
-        return cls(loaded, held, record)
+        commands = omnidyn.read_commands(voltages, loaded.wheels.count, duration, max_steps)
+        record = provenance([robot_input(robot), {"role": "voltages", "name": voltages, "sha256": commands.sha256}])
+        return cls(loaded, commands, record)
 
     @property
     def guesses(self) -> list[str]:
@@ -134,8 +134,8 @@ class _Job:
         """Between which lines it may lie, at the times of the run."""
         from omnidyn.simulation.band import confidence_band
 
-        found = confidence_band(self.robot, **self._commands, **options)
-        return found._replace(low=found.low.replace(t=run.t), high=found.high.replace(t=run.t))
+        band = confidence_band(self.robot, **self._commands, **options)
+        return band._replace(low=band.low.replace(t=run.t), high=band.high.replace(t=run.t))
 
 
 def _write(run: Run, out: str, force: bool) -> None:
@@ -184,10 +184,10 @@ def _last_lines(run: Run, ends: Band | None) -> list[str]:
     """Where it ends, in words; with a band, its ends in brackets."""
     units = {"vx": "m/s", "vy": "m/s", "omega": "rad/s", "x": "m", "y": "m", "heading": "rad"}
     runs = [run, *((ends.low, ends.high) if ends else ())]
-    values = [[value for part in _last(each).values() for value in part.values()] for each in runs]
+    values = [[value for part in _last(end).values() for value in part.values()] for end in runs]
     words = [
-        f"{name} {own:.4f}{f' [{sides[0]:.4f}, {sides[1]:.4f}]' if sides else ''} {unit}"
-        for (name, unit), (own, *sides) in zip(units.items(), zip(*values, strict=True), strict=True)
+        f"{name} {value:.4f}{f' [{sides[0]:.4f}, {sides[1]:.4f}]' if sides else ''} {unit}"
+        for (name, unit), (value, *sides) in zip(units.items(), zip(*values, strict=True), strict=True)
     ]
     return [f"at the end   {'   '.join(words[:3])}", f"             {'   '.join(words[3:])}"]
 
@@ -200,12 +200,11 @@ def _with_band(
         return Document(lines, data, verdict=verdict)
     from omnidyn.model.known.told import told
 
-    known = told(robot)
-    words = (
-        f"[..]: 95 %, {ends.draws} robots drawn from the std and correlations of {len(known.keys)} numbers of the file"
-    )
+    uncertain = told(robot)
+    count = len(uncertain.keys)
+    words = f"[..]: 95 %, {ends.draws} robots drawn from the std and correlations of {count} numbers of the file"
     sides = {"low": _last(ends.low), "high": _last(ends.high)}
-    band = {"draws": ends.draws, **sides, "guesses": list(known.guessed), "output": files or None}
+    band = {"draws": ends.draws, **sides, "guesses": list(uncertain.guessed), "output": files or None}
     return Document([*lines, words], {**data, "band": band}, verdict=verdict)
 
 

@@ -21,7 +21,7 @@ def warm(json: bool = typer.Option(False, "--json", help="For machines.")) -> No
     Small runs, fits and closed loops of every kind are made; what is compiled for them stays on disk. Takes about a
     minute, and a second where all is there. After an update only what has changed is compiled.
     """
-    started = time.monotonic()
+    start = time.monotonic()
     with shown_progress("loading", hint="") as progress, heard() as compiling:
         from omnidyn.compiled.warmed import circumstances, recalled, remember
 
@@ -30,7 +30,7 @@ def warm(json: bool = typer.Option(False, "--json", help="For machines.")) -> No
         if not caches:
             caches = _make(progress, compiling)
             remember(caches, made_with)
-    seconds = time.monotonic() - started
+    seconds = time.monotonic() - start
     if not caches:
         say("omnidyn: warning: no folder is writable, so each process compiles for itself; name one in NUMBA_CACHE_DIR")
         result: dict[str, Any] = {"folders": [], "entries": 0, "bytes": 0}
@@ -48,12 +48,12 @@ def _make(progress: Progress, compiling: Compiling) -> list[Any]:
     from omnidyn.control import first_runs as of_control
     from omnidyn.identification import first_runs as of_identification
 
-    every = [*of_identification.first_runs(), *of_control.first_runs()]
-    for k, (what, make) in enumerate(every):
-        done, step = len(compiling.done), f"{k + 1} of {len(every)}, {what}"
+    runs = [*of_identification.first_runs(), *of_control.first_runs()]
+    for k, (name, make) in enumerate(runs):
+        compiled, step = len(compiling.done), f"{k + 1} of {len(runs)}, {name}"
         progress(Report(step))
         make()
-        new = compiling.done[done:]
+        new = compiling.done[compiled:]
         if new:
             say(f"omnidyn: {step}: {', '.join(f'{name} {seconds:.1f} s' for name, seconds in new)}")
     return kept()

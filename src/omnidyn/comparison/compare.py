@@ -46,12 +46,22 @@ def compare(
 
     The logged input drives the model: voltage, else duty times supply, else the speed loop of the robot file. Each
     segment between gaps is a free run from the measured start; the model never sees what was measured after it.
-    run: one Run or several. other: a second robot under the same inputs. apply: another input than the first that was
-    logged. hold: how long a missing input keeps its value [s]. current_unsigned: compare currents by size, for a
-    sensor without sign. tol: as in `simulate`. seed: of the bootstrap. progress: hears what is being replayed.
-    band: how far each model may be off by the std of its robot file, from a hundred plausible robots (`with_bands`).
-    log: what the logs do beside the robot, such as `robot.log` of a fit; None: what the file of a robot says of its own
-    logs, which are known by what they hold; others get none of it.
+
+    Args:
+        robot: The model.
+        run: One Run or several.
+        other: A second robot under the same inputs.
+        apply: Another input than the first that was logged.
+        hold: How long a missing input keeps its value [s].
+        current_unsigned: Compare currents by size, for a sensor without sign.
+        tol: As in `simulate`.
+        seed: Of the bootstrap.
+        progress: Hears what is being replayed.
+        band: Whether to add how far each model may be off by the std of its robot file, from a hundred plausible
+            robots (`with_bands`).
+        log: What the logs do beside the robot, such as `robot.log` of a fit; None: what the file of a robot says of its
+            own logs, which are known by what they hold; others get none of it.
+
     Raises InputError when a log does not fit a robot, InsufficientDataError when there is nothing to compare.
     """
     other_robot = (Robot, type(None))
@@ -67,27 +77,27 @@ def compare(
     segments = _segments(runs, next(iter(replays.values())))
     traces = {name: _traces(runs, parts, segments, channels, current_unsigned) for name, parts in replays.items()}
     overall = {name: _overall(by) for name, by in traces.items()}
-    kept = tuple(key for key in channels if all(key in found for found in overall.values()))
-    if not kept:
+    components = tuple(key for key in channels if all(key in metrics_of for metrics_of in overall.values()))
+    if not components:
         raise InsufficientDataError("no measured value falls into a replayed segment", expected="speeds or a pose")
-    found = Comparison(
+    comparison = Comparison(
         robots=tuple(robots),
         measured=runs,
         simulated={name: tuple(part.run for part in parts) for name, parts in replays.items()},
         applied={name: tuple(dict.fromkeys(part.driver for part in parts)) for name, parts in replays.items()},
-        channels=kept,
+        channels=components,
         segments=segments,
         overall=overall,
-        by_segment={name: _by_segment(by, kept) for name, by in traces.items()},
-        difference=_differences([*traces.values()], kept, seed) if len(robots) == 2 else {},
+        by_segment={name: _by_segment(by, components) for name, by in traces.items()},
+        difference=_differences([*traces.values()], components, seed) if len(robots) == 2 else {},
         current_unsigned=current_unsigned,
         rests_on={name: tuple(rests_on(model)) for name, model in robots.items()},
         warnings=(*_warnings(runs, replays), *_sign_warnings(runs, traces, current_unsigned)),
     )
     if not band:
-        return found
+        return comparison
     progress(Report("replaying plausible robots for the band"))
-    return with_bands(found, [*robots.values()], apply=apply, hold=hold, seed=seed, log=log)
+    return with_bands(comparison, [*robots.values()], apply=apply, hold=hold, seed=seed, log=log)
 
 
 def what_is_compared(robots: Sequence[Robot], runs: Sequence[Run], apply: str | None = None) -> tuple[str, ...]:
@@ -97,22 +107,22 @@ def what_is_compared(robots: Sequence[Robot], runs: Sequence[Run], apply: str | 
     """
     if not runs:
         raise InsufficientDataError("no log to compare with", got="0 runs", expected="at least one")
-    found: dict[str, None] = {}
+    components: dict[str, None] = {}
     for run in runs:
         try:
             for robot in robots:
                 refuse_other_robot(robot, run)
-                found |= dict.fromkeys(compared_components(run, choose_input(robot, run, apply)))
+                components |= dict.fromkeys(compared_components(run, choose_input(robot, run, apply)))
         except OmnidynError as error:
             raise error.at(run.source) if run.source else error from None
-    if not found:
+    if not components:
         raise InsufficientDataError(
             "the logs hold nothing that a model predicts",
             got=", ".join(runs[0].channels),
             expected="twist, wheel_speed, wheel_angle, current or pose",
             remedy="map the columns of speeds, angles, currents or the pose",
         )
-    return in_order(found, robots[0].wheels.count)
+    return in_order(components, robots[0].wheels.count)
 
 
 def in_order(names: Mapping[str, None], wheels: int) -> tuple[str, ...]:
@@ -158,33 +168,33 @@ def _traces(
 
 def _overall(traces: Mapping[str, list[Trace]]) -> dict[str, Metrics]:
     """Component -> metrics over all traces. What counts from the start has no lag: a speed would look the same."""
-    found: dict[str, Metrics] = {}
+    overall: dict[str, Metrics] = {}
     for key, rows in traces.items():
-        known = counts_from_start(key)
-        each = metrics(rows, errors_for_whiteness(key, traces), with_lag=not known, start_known=known)
-        if each is not None:
-            found[key] = each
-    return found
+        anchored = counts_from_start(key)
+        scores = metrics(rows, errors_for_whiteness(key, traces), with_lag=not anchored, start_known=anchored)
+        if scores is not None:
+            overall[key] = scores
+    return overall
 
 
 def _by_segment(traces: Mapping[str, list[Trace]], channels: Sequence[str]) -> dict[str, tuple[Metrics | None, ...]]:
     """Component -> metrics of each segment, without a lag."""
-    found = {}
+    by_component = {}
     for key in channels:
         pairs = zip(traces[key], errors_for_whiteness(key, traces), strict=True)
-        found[key] = tuple(metrics([trace], [error], with_lag=False) for trace, error in pairs)
-    return found
+        by_component[key] = tuple(metrics([trace], [error], with_lag=False) for trace, error in pairs)
+    return by_component
 
 
 def _differences(
     traces: Sequence[Mapping[str, list[Trace]]], channels: Sequence[str], seed: int
 ) -> dict[str, ModelDifference]:
     first, second = traces
-    found = (
+    pairs = (
         (key, difference(first[key], second[key], len(channels), seed, whole=counts_from_start(key)))
         for key in channels
     )
-    return {key: each for key, each in found if each is not None}
+    return {key: gap for key, gap in pairs if gap is not None}
 
 
 def _sign_warnings(
@@ -213,17 +223,17 @@ def _warnings(runs: Sequence[Run], replays: Mapping[str, Sequence[Replay]]) -> I
 
 # Bands of a comparison: what of the distance between model and robot the std of the robot file may explain
 
-COARSE = 1e-4  # [m/s] of the implicit engine: a band is a hundred times as wide, or of no interest
+BAND_TOLERANCE = 1e-4  # [m/s] of the implicit engine: a band is a hundred times as wide, or of no interest
 
 
 def with_bands(
-    found: Comparison,
+    comparison: Comparison,
     robots: Sequence[Robot],
     *,
     logs: Sequence[int] | None = None,
     apply: str | None = None,
     hold: float = HOLD,
-    tol: float | None = COARSE,
+    tol: float | None = BAND_TOLERANCE,
     draws: int = DRAWS,
     seed: int = 0,
     log: LogEffects | None = None,
@@ -233,36 +243,41 @@ def with_bands(
     robots: those compared, in order. logs: which logs, all by default. apply, hold, tol, log: as they were compared. A
     robot whose file has no std has no band, and a warning says so.
     """
-    which = range(len(found.measured)) if logs is None else logs
+    indices = range(len(comparison.measured)) if logs is None else logs
     bands: dict[str, Mapping[int, Band]] = {}
     warnings, guessed = [], {}
-    for name, robot in zip(found.robots, robots, strict=True):
-        known = told(robot)
-        if not known.keys:
+    for name, robot in zip(comparison.robots, robots, strict=True):
+        uncertain = told(robot)
+        if not uncertain.keys:
             warnings.append(Statement("no_band", subject=name))
             continue
-        drawn = plausible(robot, draws, seed)
+        candidates = plausible(robot, draws, seed)
         bands[name] = {
             k: band_of(
-                drawn, lambda each, k=k: replay(each, found.measured[k], apply=apply, hold=hold, tol=tol, log=log).run
+                candidates,
+                lambda candidate, k=k: (
+                    replay(candidate, comparison.measured[k], apply=apply, hold=hold, tol=tol, log=log).run
+                ),
             )
-            for k in which
+            for k in indices
         }
-        guessed[name] = known.guessed
-        if known.guessed:
-            warnings.append(Statement("band_rests_on_guesses", subject=name, numbers={"guesses": known.guessed}))
-    return replace(found, bands=bands, guesses=guessed, warnings=(*found.warnings, *warnings))
+        guessed[name] = uncertain.guessed
+        if uncertain.guessed:
+            warnings.append(Statement("band_rests_on_guesses", subject=name, numbers={"guesses": uncertain.guessed}))
+    return replace(comparison, bands=bands, guesses=guessed, warnings=(*comparison.warnings, *warnings))
 
 
-def with_fitted_band(found: Comparison, robot: Robot, log: int = 0) -> Comparison:
+def with_fitted_band(comparison: Comparison, robot: Robot, log: int = 0) -> Comparison:
     """The comparison with the band of a robot that was fitted, in one of its logs: to first order.
 
     That is what a fit knows of its numbers, and some of them it knows only together: see `first_order_std`. The runs
     that slopes are taken from have one step a row, as those of the fit. No band where no number has a std.
     """
-    (name,) = found.robots
+    (name,) = comparison.robots
     if not told(robot).keys:
-        return found
-    run = found.simulated[name][log]
-    band = first_order_band(robot, run, lambda each: replay(each, found.measured[log], tol=None, log=robot.log).run)
-    return replace(found, bands={name: {log: band}})
+        return comparison
+    run = comparison.simulated[name][log]
+    band = first_order_band(
+        robot, run, lambda candidate: replay(candidate, comparison.measured[log], tol=None, log=robot.log).run
+    )
+    return replace(comparison, bands={name: {log: band}})

@@ -24,7 +24,7 @@ from omnidyn.model.keys import CENTRE, Key, expand, in_words, unit
 from omnidyn.model.known.told import Told, told
 from omnidyn.model.robot import IDENTIFIED, Robot
 from omnidyn.model.robot_file import load_robot
-from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.shown import FIGURE, Displayable, make
 from omnidyn.statement import NOTE, WARNING, Statement, as_verdict, by_severity
 from omnidyn.statistics import homogeneity
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 LEVEL = 0.05  # chance of any change in fits of one and the same robot
 UPPER = float(ndtri(0.975))
 SAME_EIGENVALUE = 1e-9  # of the largest eigenvalue of a matrix whose diagonal is 1: below it two numbers are one
-TAKEN = (
+ASSUMED_KEYS = (
     "body.mass_kg",
     "body.inertia_kg_m2",
     CENTRE,
@@ -83,7 +83,7 @@ class Drifting:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Drift(Shown):
+class Drift(Displayable):
     """Fits beside each other. fits: their names, in the order given; numbers: each that two or more tell.
 
     together: (chi squared, degrees of freedom, chance) of all numbers that all fits tell. warnings: what makes the
@@ -111,21 +111,21 @@ class Drift(Shown):
     @property
     def verdict(self) -> Statement:
         """What changed, the surest first."""
-        changed = sorted((number for number in self.numbers if number.changed), key=lambda each: each.p)
-        if not changed and self.together[2] <= LEVEL:
+        changes = sorted((number for number in self.numbers if number.changed), key=lambda number: number.p)
+        if not changes and self.together[2] <= LEVEL:
             return Statement("fits_differ_together", WARNING, numbers={"fits": len(self.fits)})
-        if not changed:
+        if not changes:
             return Statement("no_number_changed", NOTE, numbers={"count": len(self.numbers)})
-        numbers = {"count": len(self.numbers), "changed": [number.statement() for number in changed]}
+        numbers = {"count": len(self.numbers), "changed": [number.statement() for number in changes]}
         return Statement("numbers_changed", WARNING, numbers=numbers)
 
     def document(self) -> Document:
         """All of it, as text, page and machines have it."""
         chi2, degrees, p = self.together
-        whole = (
+        summary = (
             f"all numbers together: chi squared {chi2:.3g} with {degrees} degrees of freedom, chance {chance_cell(p)}"
         )
-        parts: list[Part] = [self.table(), "", whole, by_severity(self.warnings)]
+        parts: list[Part] = [self.table(), "", summary, by_severity(self.warnings)]
         return Document(parts, self.to_dict(), self.warnings, ascii=True, verdict=self.verdict)
 
     def table(self) -> Table:
@@ -192,25 +192,25 @@ def drift(fits: Sequence[Robot | str | os.PathLike], names: Sequence[str] = ()) 
         got = "one" if isinstance(fits, str | os.PathLike | Robot) else str(len(fits))
         raise InputError("drift compares fits", got=got, expected="two robots or more", where="fits")
     robots = [fit if isinstance(fit, Robot) else load_robot(fit) for fit in fits]
-    called = _names(fits, robots, names)
-    known = [_fitted(robot, name) for robot, name in zip(robots, called, strict=True)]
-    keys = list(dict.fromkeys(key for numbers in known for key in numbers))
-    shared = [key for key in keys if sum(key in numbers for numbers in known) > 1]
+    labels = _names(fits, robots, names)
+    fits_numbers = [_fitted(robot, name) for robot, name in zip(robots, labels, strict=True)]
+    keys = list(dict.fromkeys(key for numbers in fits_numbers for key in numbers))
+    shared = [key for key in keys if sum(key in numbers for numbers in fits_numbers) > 1]
     if not shared:
         raise InsufficientDataError(
             "no number is in two of the fits",
-            got="; ".join(f"{n}: {', '.join(k)}" for n, k in zip(called, known, strict=True)),
+            got="; ".join(f"{n}: {', '.join(k)}" for n, k in zip(labels, fits_numbers, strict=True)),
             expected="fits of the same numbers",
             where="fits",
         )
-    numbers = [_number(key, called, known, len(shared)) for key in shared]
-    everywhere = [key for key in shared if all(key in numbers for numbers in known)]
+    numbers = [_number(key, labels, fits_numbers, len(shared)) for key in shared]
+    everywhere = [key for key in shared if all(key in numbers for numbers in fits_numbers)]
     return Drift(
         robots[0].name,
-        tuple(called),
+        tuple(labels),
         tuple(numbers),
-        _together(robots, known, everywhere),
-        tuple(_doubts(robots, called, set(shared))),
+        _together(robots, fits_numbers, everywhere),
+        tuple(_doubts(robots, labels, set(shared))),
     )
 
 
@@ -219,54 +219,56 @@ Fitted = Mapping[str, tuple[float, float, bool]]  # key -> value, std, whether i
 
 def _fitted(robot: Robot, name: str) -> Fitted:
     """The numbers of a robot that a fit found, each once: of a list that was one number, its first entry."""
-    own = told(robot)
-    found = {}
-    for k, key in enumerate(own.keys):
+    uncertain = told(robot)
+    numbers = {}
+    for k, key in enumerate(uncertain.keys):
         prior = robot.priors.get(key) or robot.priors.get(Key.parse(key).name)
         of_list = key not in robot.priors and Key.parse(key).index not in (None, 0)
-        if prior is not None and prior.origin == IDENTIFIED and own.std[k] > 0.0 and not of_list:
-            found[key] = (float(own.value[k]), float(own.std[k]), bool(own.log[k]))
-    if not found:
+        if prior is not None and prior.origin == IDENTIFIED and uncertain.std[k] > 0.0 and not of_list:
+            numbers[key] = (float(uncertain.value[k]), float(uncertain.std[k]), bool(uncertain.log[k]))
+    if not numbers:
         raise InputError(
             "no number of this file was fitted",
             got=", ".join(robot.priors) or "no std of any number",
             expected="a robot file that identify wrote, with the std of its numbers",
             where=name,
         )
-    return found
+    return numbers
 
 
 def _names(fits: Sequence[Any], robots: Sequence[Robot], names: Sequence[str]) -> list[str]:
     if names and (len(names) != len(fits) or len(set(names)) < len(names)):
         got = f"{len(names)} names, {len(set(names))} of them different, for {len(fits)} fits"
         raise InputError("every fit needs a name of its own", got=got, where="names")
-    found = list(names) or [r.name if isinstance(f, Robot) else os.fspath(f) for f, r in zip(fits, robots, strict=True)]
-    if len(set(found)) < len(found):
-        found = [f"{name} ({k + 1})" for k, name in enumerate(found)]
-    return found
+    labels = list(names) or [
+        r.name if isinstance(f, Robot) else os.fspath(f) for f, r in zip(fits, robots, strict=True)
+    ]
+    if len(set(labels)) < len(labels):
+        labels = [f"{name} ({k + 1})" for k, name in enumerate(labels)]
+    return labels
 
 
-def _number(key: str, called: Sequence[str], known: Sequence[Fitted], tests: int) -> Drifting:
-    at = [k for k, numbers in enumerate(known) if key in numbers]
-    value, std = (np.array([known[k][key][i] for k in at]) for i in (0, 1))
-    log = all(known[k][key][2] for k in at)
+def _number(key: str, labels: Sequence[str], fitted: Sequence[Fitted], tests: int) -> Drifting:
+    at = [k for k, numbers in enumerate(fitted) if key in numbers]
+    value, std = (np.array([fitted[k][key][i] for k in at]) for i in (0, 1))
+    log = all(fitted[k][key][2] for k in at)
     # A logarithm where all have one: what is far from 0 is as far off as a share of itself.
     x, spread = (np.log(value), std / value) if log else (value, std)
     chi2, degrees = homogeneity(x, np.diag(spread**2))
     ends = [(v - UPPER * s, v + UPPER * s) for v, s in zip(x.tolist(), spread.tolist(), strict=True)]
     ci95 = tuple((float(np.exp(a)), float(np.exp(b))) if log else (a, b) for a, b in ends)
     p = min(1.0, tests * float(chdtrc(degrees, chi2)))
-    return Drifting(key, tuple(called[k] for k in at), value, std, ci95, chi2, degrees, p)
+    return Drifting(key, tuple(labels[k] for k in at), value, std, ci95, chi2, degrees, p)
 
 
-def _together(robots: Sequence[Robot], known: Sequence[Fitted], keys: Sequence[str]) -> tuple[float, int, float]:
+def _together(robots: Sequence[Robot], fitted: Sequence[Fitted], keys: Sequence[str]) -> tuple[float, int, float]:
     """(chi squared, its degrees of freedom, the chance of as much) of the numbers that all fits tell."""
     if not keys:
         return 0.0, 0, 1.0
-    first = np.array([known[0][key][0] for key in keys])
-    unit_ = np.array([max(numbers[key][1] for numbers in known) for key in keys])
+    first = np.array([fitted[0][key][0] for key in keys])
+    unit_ = np.array([max(numbers[key][1] for numbers in fitted) for key in keys])
     total, pulled, chi2, degrees = np.zeros((len(keys), len(keys))), np.zeros(len(keys)), 0.0, 0
-    for robot, numbers in zip(robots, known, strict=True):
+    for robot, numbers in zip(robots, fitted, strict=True):
         std = np.array([numbers[key][1] for key in keys])
         weight, rank = _inverse(_correlation(told(robot), keys) * np.outer(std / unit_, std / unit_))
         off = (np.array([numbers[key][0] for key in keys]) - first) / unit_
@@ -277,35 +279,35 @@ def _together(robots: Sequence[Robot], known: Sequence[Fitted], keys: Sequence[s
     return chi2, degrees, float(chdtrc(degrees, chi2)) if degrees else 1.0
 
 
-def _correlation(own: Told, keys: Sequence[str]) -> FloatArray:
-    at = [own.keys.index(key) for key in keys]
-    return own.correlation[np.ix_(at, at)]
+def _correlation(uncertain: Told, keys: Sequence[str]) -> FloatArray:
+    at = [uncertain.keys.index(key) for key in keys]
+    return uncertain.correlation[np.ix_(at, at)]
 
 
 def _inverse(matrix: FloatArray) -> tuple[FloatArray, int]:
     """(inverse without the directions in which it is 0, how many others there are)."""
     size = np.sqrt(np.diag(matrix))
     values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
-    kept = values > SAME_EIGENVALUE * values[-1]
-    root = vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
-    return root @ root.T, int(kept.sum())
+    regular = values > SAME_EIGENVALUE * values[-1]
+    root = vectors[:, regular] / np.sqrt(values[regular]) / size[:, None]
+    return root @ root.T, int(regular.sum())
 
 
-def _doubts(robots: Sequence[Robot], called: Sequence[str], compared: set[str]) -> list[Statement]:
+def _doubts(robots: Sequence[Robot], labels: Sequence[str], compared: set[str]) -> list[Statement]:
     """What makes the comparison doubtful: one log behind two fits, and numbers that were taken as they stand."""
     doubts = []
-    seen: dict[str, str] = {}
-    for robot, name in zip(robots, called, strict=True):
+    owners: dict[str, str] = {}
+    for robot, name in zip(robots, labels, strict=True):
         sources = {p.source for k, p in robot.priors.items() if p.origin == IDENTIFIED and p.source and k in compared}
         for source in sorted(sources):
-            if (other := seen.setdefault(source, name)) != name:
-                doubts.append(Statement("fits_of_one_log", subject=source, numbers={"fits": [other, name]}))
-    for name in TAKEN:
-        if any(Key.parse(each).name == name for each in compared):
+            if (owner := owners.setdefault(source, name)) != name:
+                doubts.append(Statement("fits_of_one_log", subject=source, numbers={"fits": [owner, name]}))
+    for name in ASSUMED_KEYS:
+        if any(Key.parse(key).name == name for key in compared):
             continue
         values = [_taken(robot, name) for robot in robots]
         if len(set(values)) > 1:
-            doubts.append(Statement("taken_differently", subject=name, numbers={"values": values, "fits": called}))
+            doubts.append(Statement("taken_differently", subject=name, numbers={"values": values, "fits": labels}))
     return doubts
 
 

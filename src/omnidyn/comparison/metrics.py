@@ -82,14 +82,14 @@ def both_known(traces: Sequence[Trace]) -> tuple[FloatArray, FloatArray]:
     measured, model = (
         np.concatenate(parts) for parts in zip(*[(trace.measured, trace.model) for trace in traces], strict=True)
     )
-    known = np.isfinite(measured) & np.isfinite(model)
-    return measured[known], model[known]
+    finite = np.isfinite(measured) & np.isfinite(model)
+    return measured[finite], model[finite]
 
 
 def _levelled(trace: Trace) -> Trace:
     """The trace about the mean of its measured values."""
-    known = np.isfinite(trace.error)
-    mean = float(trace.measured[known].mean()) if known.any() else 0.0
+    finite = np.isfinite(trace.error)
+    mean = float(trace.measured[finite].mean()) if finite.any() else 0.0
     return Trace(trace.t, trace.measured - mean, trace.model - mean)
 
 
@@ -125,23 +125,23 @@ def lag_of(traces: Sequence[Trace]) -> float | None:
     Positive: the robot (or its sensor) is later than the model. The correlation does not see gain and offset. 0 where
     no lag explains clearly more than none; None where a signal is constant, too short, or the best lag is out of reach.
     """
-    usable = [known for trace in traces if len((known := _known(trace)).t) > 1]
+    usable = [trimmed for trace in traces if len((trimmed := _known(trace)).t) > 1]
     if not usable:
         return None
     reach = min(LONGEST_LAG, max(float(trace.t[-1] - trace.t[0]) for trace in usable) / 4.0)
     usual = float(np.median(np.concatenate([np.diff(trace.t) for trace in usable])))
-    none = unexplained(usable, 0.0)
-    if none is None:
+    unshifted = unexplained(usable, 0.0)
+    if unshifted is None:
         return None
     centre, width = 0.0, reach
-    best = none
+    best = unshifted
     for _ in range(ROUNDS):
         lags = np.clip(np.linspace(centre - width, centre + width, GRID), -reach, reach)
-        tried = [unexplained(usable, float(lag)) for lag in lags]
-        scores = np.array([np.inf if score is None else score for score in tried])
+        costs = [unexplained(usable, float(lag)) for lag in lags]
+        scores = np.array([np.inf if score is None else score for score in costs])
         k = int(np.argmin(scores))
         centre, best, width = float(lags[k]), float(scores[k]), 2.0 * width / (GRID - 1)
-    if best > WORTHWHILE_SHARE * none or abs(centre) < 0.25 * usual:
+    if best > WORTHWHILE_SHARE * unshifted or abs(centre) < 0.25 * usual:
         return 0.0
     return None if abs(centre) > 0.98 * reach else centre
 
@@ -160,8 +160,8 @@ def unexplained(traces: Sequence[Trace], lag: float) -> float | None:
 
 def _known(trace: Trace) -> Trace:
     """The rows that both have."""
-    known = np.isfinite(trace.measured) & np.isfinite(trace.model)
-    return Trace(trace.t[known], trace.measured[known], trace.model[known])
+    finite = np.isfinite(trace.measured) & np.isfinite(trace.model)
+    return Trace(trace.t[finite], trace.measured[finite], trace.model[finite])
 
 
 # Are the errors of a model white, that is noise without memory? If not, the model misses something that lasts
@@ -193,11 +193,11 @@ def whiteness(errors: Sequence[FloatArray], lags: int = LAGS) -> Whiteness | Non
     are white at any spacing of the rows, so uneven sampling does not hurt; it only blurs what a lag means in seconds.
     The mean is taken off: a bias is reported as such. None for fewer than 30 samples, or errors that never change.
     """
-    known = np.concatenate([error[np.isfinite(error)] for error in errors] or [np.zeros(0)])
-    lags = min(lags, len(known) // 5)
-    if len(known) < FEWEST_SAMPLES or float(np.ptp(known)) <= 1e-12 * float(np.abs(known).max()):
+    samples = np.concatenate([error[np.isfinite(error)] for error in errors] or [np.zeros(0)])
+    lags = min(lags, len(samples) // 5)
+    if len(samples) < FEWEST_SAMPLES or float(np.ptp(samples)) <= 1e-12 * float(np.abs(samples).max()):
         return None
-    mean, power = known.mean(), float(np.mean((known - known.mean()) ** 2))
+    mean, power = samples.mean(), float(np.mean((samples - samples.mean()) ** 2))
     centred = [error - mean for error in errors]
     sums = [_products(centred, lag) for lag in range(1, lags + 1)]
     pairs, total, squares = (np.array(column) for column in zip(*sums, strict=True))
@@ -254,29 +254,31 @@ def difference(
     with Student's t for the number of blocks. whole: every piece is one block, for a pose: what its start was off by
     stays in all of the piece and is one draw of chance. None where they share no sample.
     """
-    parts = [known for a, b in zip(first, second, strict=True) if len(known := _midpoint_and_gap(a, b))]
+    parts = [rows for a, b in zip(first, second, strict=True) if len(rows := _midpoint_and_gap(a, b))]
     if not parts:
         return None
     error, apart = np.concatenate(parts).T
-    one, two = (float(np.sqrt(np.mean((error + half * apart) ** 2))) for half in (0.5, -0.5))
+    rmse_a, rmse_b = (float(np.sqrt(np.mean((error + half * apart) ** 2))) for half in (0.5, -0.5))
     power = float(apart @ apart)
-    if power == 0.0 or one + two == 0.0:
+    if power == 0.0 or rmse_a + rmse_b == 0.0:
         return ModelDifference(0.0, 0.0, None, len(error))
     share = float(error @ apart) / power
-    left = [2.0 * part[:, 1] * (part[:, 0] - share * part[:, 1]) for part in parts]
-    length = max(map(len, left)) if whole else block_length(left)
-    blocks = sum(max(1, len(errors) // length) for errors in left)
-    gap = one - two
+    terms = [2.0 * part[:, 1] * (part[:, 0] - share * part[:, 1]) for part in parts]
+    length = max(map(len, terms)) if whole else block_length(terms)
+    blocks = sum(max(1, len(errors) // length) for errors in terms)
+    gap = rmse_a - rmse_b
     if blocks < FEWEST_BLOCKS:
         return ModelDifference(gap, None, None, blocks)
     # the mean and the share were fitted to the blocks: two degrees of freedom
     loss = np.sqrt(blocks / (blocks - 2.0))
-    spread = loss * bootstrap_error(left, length, blocks, BOOTSTRAP_DRAWS, np.random.default_rng(seed)) / (one + two)
-    sure = t_quantile(blocks - 2, 1.0 - 0.5 * ALPHA / tests) * spread
-    return ModelDifference(gap, spread, (0 if gap < 0.0 else 1) if abs(gap) > sure else None, blocks)
+    spread = (
+        loss * bootstrap_error(terms, length, blocks, BOOTSTRAP_DRAWS, np.random.default_rng(seed)) / (rmse_a + rmse_b)
+    )
+    margin = t_quantile(blocks - 2, 1.0 - 0.5 * ALPHA / tests) * spread
+    return ModelDifference(gap, spread, (0 if gap < 0.0 else 1) if abs(gap) > margin else None, blocks)
 
 
 def _midpoint_and_gap(first: Trace, second: Trace) -> FloatArray:
     """Error of the mean of two models, and first minus second, where all is known. Shape (n, 2)."""
-    both = np.stack([0.5 * (first.error + second.error), first.error - second.error], axis=1)
-    return both[np.isfinite(both).all(axis=1)]
+    pairs = np.stack([0.5 * (first.error + second.error), first.error - second.error], axis=1)
+    return pairs[np.isfinite(pairs).all(axis=1)]

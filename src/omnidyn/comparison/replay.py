@@ -28,7 +28,7 @@ from omnidyn.run import CHANNELS, WHEEL, Run
 from omnidyn.simulation.commands import Commands, commands
 from omnidyn.simulation.engine import TOLERANCE
 from omnidyn.simulation.simulate import simulate_seen
-from omnidyn.simulation.view import LATE, View, seen_at_once, seen_through
+from omnidyn.simulation.view import LATE_CHANNELS, View, seen_at_once, seen_through
 from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import stretches
 
@@ -38,7 +38,7 @@ STARTS = ("twist", "wheel_speed", "wheel_angle", "heading", "position")  # which
 SIMULATED = ("voltage", "current", "wheel_speed", "wheel_angle", "twist", "pose")
 HOLD = 0.2  # [s] a missing input keeps its last value for so long
 FEWEST_ROWS = 3  # rows of a piece
-SHOWN = 3  # warnings of one kind
+SHOWN_WARNINGS = 3  # warnings of one kind
 FINEST, MOST_PARTS = 2.5e-3, 20  # [s] rows over which the angles of wheels are summed, and half their number in a row
 
 
@@ -78,14 +78,14 @@ def replay(
         refuse_other_robot(robot, run)
         applied = choose_input(robot, run, apply)
         pieces, inputs, supply, warnings = _prepared(run, applied, hold)
-        log, told = (log, []) if log is not None else effects_of(robot, run)
+        log, notes = (log, []) if log is not None else effects_of(robot, run)
         parts = [_free_run(robot, run, rows, applied, inputs, supply, tol, log) for rows in pieces]
     except OmnidynError as error:
         raise error.at(run.source) if run.source else error from None
     warnings += [*_from_simulation(parts), *_loop_warnings(robot, run, applied, parts)]
     whole = _assembled(run, robot, pieces, [part for part, _ in parts])
     driver = _driver(robot, applied, supply is not None, log.words if log is not None else "")
-    return Replay(whole, tuple(pieces), applied, driver, tuple([*warnings, *told]))
+    return Replay(whole, tuple(pieces), applied, driver, tuple([*warnings, *notes]))
 
 
 def effects_of(robot: Robot, run: Run) -> tuple[LogEffects | None, list[Statement]]:
@@ -120,44 +120,44 @@ def refuse_other_robot(robot: Robot, run: Run) -> None:
 
 def choose_input(robot: Robot, run: Run, apply: str | None = None) -> str:
     """Which logged channel drives the model. Raises InputError when there is none that this robot takes."""
-    there = [name for name in INPUTS if (values := getattr(run, name)) is not None and np.isfinite(values).any()]
+    inputs = [name for name in INPUTS if (values := getattr(run, name)) is not None and np.isfinite(values).any()]
     if apply is not None:
-        _refuse_apply(apply, there)
-    if not there:
+        _refuse_apply(apply, inputs)
+    if not inputs:
         raise InputError(
             "the log has no input to replay",
             got=", ".join(run.channels) or "no channels",
             expected=" or ".join(INPUTS),
             remedy="map the columns of the motor voltages, duties or set speeds",
         )
-    whole = [name for name in there if not _blank_components(run, name)]
+    complete_inputs = [name for name in inputs if not _blank_components(run, name)]
     # A duty of 0 that coasts is an open circuit, which its voltage of 0 does not tell.
-    chosen = apply or (DUTY if robot.drive.coasts and DUTY in whole else [*whole, *there][0])
-    blank = _blank_components(run, chosen)
+    choice = apply or (DUTY if robot.drive.coasts and DUTY in complete_inputs else [*complete_inputs, *inputs][0])
+    blank = _blank_components(run, choice)
     if blank:
         raise InputError(
             f"{', '.join(blank)} was not recorded",
-            got=f"{chosen} without it",
+            got=f"{choice} without it",
             expected=f"an input for all {robot.wheels.count} wheels and axes of {robot.name}",
             remedy="choose the robot of this log, or map the columns that are missing",
         )
-    if chosen in SET_SPEEDS and robot.drive.kind != SPEED:
+    if choice in SET_SPEEDS and robot.drive.kind != SPEED:
         raise InputError(
             "the log has set speeds only, and the robot no speed loop to follow them",
             got=f'[drive] kind = "{robot.drive.kind}" of {robot.name}',
             expected="a logged voltage or duty, or the speed loop of the firmware",
             remedy='map the voltages, or add [drive] kind = "speed", kp_V_s_rad, ki_V_rad, rate_Hz to the robot file',
         )
-    return chosen
+    return choice
 
 
-def _refuse_apply(apply: str, there: list[str]) -> None:
-    if apply in there:
+def _refuse_apply(apply: str, inputs: list[str]) -> None:
+    if apply in inputs:
         return
-    close = difflib.get_close_matches(apply, there or INPUTS, n=1, cutoff=0.4)
-    what = "the log does not hold this input" if apply in INPUTS else "no such input"
-    remedy = f"did you mean {close[0]}?" if close else ""
-    raise InputError(what, got=apply, expected=" or ".join(there or INPUTS), remedy=remedy, where="apply")
+    matches = difflib.get_close_matches(apply, inputs or INPUTS, n=1, cutoff=0.4)
+    problem = "the log does not hold this input" if apply in INPUTS else "no such input"
+    remedy = f"did you mean {matches[0]}?" if matches else ""
+    raise InputError(problem, got=apply, expected=" or ".join(inputs or INPUTS), remedy=remedy, where="apply")
 
 
 def _blank_components(run: Run, channel: str) -> list[str]:
@@ -171,30 +171,30 @@ def _prepared(
     run: Run, applied: str, hold: float
 ) -> tuple[list[slice], FloatArray, FloatArray | None, list[Statement]]:
     """The pieces to run, the inputs and the supply with what is missing held, and what had to be left out."""
-    inputs, alone = np.asarray(getattr(run, applied)), applied != DUTY or run.supply is None
-    supply = None if alone or not np.isfinite(run.supply).any() else run.supply  # type: ignore[arg-type]
+    inputs, no_supply = np.asarray(getattr(run, applied)), applied != DUTY or run.supply is None
+    supply = None if no_supply or not np.isfinite(run.supply).any() else run.supply  # type: ignore[arg-type]
     table = inputs if supply is None else np.column_stack([inputs, supply])
     stretches = segments(run.t, usual=run.step)
-    held, usable = np.empty_like(table), np.zeros(len(run), dtype=bool)
+    held_table, usable = np.empty_like(table), np.zeros(len(run), dtype=bool)
     for rows in stretches:
-        held[rows], usable[rows] = held_inputs(run.t[rows], table[rows], hold)
+        held_table[rows], usable[rows] = held_inputs(run.t[rows], table[rows], hold)
     pieces = [piece for rows in stretches for piece in _usable_pieces(rows, usable)]
-    kept = [piece for piece in pieces if piece.stop - piece.start >= FEWEST_ROWS]
-    if not kept:
+    long_pieces = [piece for piece in pieces if piece.stop - piece.start >= FEWEST_ROWS]
+    if not long_pieces:
         raise InsufficientDataError(
             "nothing can be replayed",
             got=f"{len(pieces)} stretches with inputs, the longest too short",
             expected=f"{FEWEST_ROWS} rows in a row without a gap",
             remedy="look at the log with omnidyn check",
         )
-    left = len(run) - sum(piece.stop - piece.start for piece in kept)
+    omitted = len(run) - sum(piece.stop - piece.start for piece in long_pieces)
     warnings = []
     if len(stretches) > 1:
         warnings.append(Statement("restarts_at_gaps", numbers={"gaps": len(stretches) - 1}))
-    if left:
-        warnings.append(Statement("rows_not_replayed", numbers={"left": left, "rows": len(run), "hold": hold}))
+    if omitted:
+        warnings.append(Statement("rows_not_replayed", numbers={"left": omitted, "rows": len(run), "hold": hold}))
     width = inputs.shape[1]
-    return kept, held[:, :width], held[:, width] if supply is not None else None, warnings
+    return long_pieces, held_table[:, :width], held_table[:, width] if supply is not None else None, warnings
 
 
 def held_inputs(t: FloatArray, values: FloatArray, hold: float) -> tuple[FloatArray, BoolArray]:
@@ -204,8 +204,8 @@ def held_inputs(t: FloatArray, values: FloatArray, hold: float) -> tuple[FloatAr
     values, shape (n, columns). Returns the same shape, and shape (n,); NaN stays where nothing is known.
     """
     rows = np.arange(len(t))
-    known = np.where(np.isfinite(values), rows[:, None], -1)
-    last = np.maximum.accumulate(known, axis=0)
+    finite_rows = np.where(np.isfinite(values), rows[:, None], -1)
+    last = np.maximum.accumulate(finite_rows, axis=0)
     filled = np.where(last >= 0, np.take_along_axis(values, np.maximum(last, 0), axis=0), np.nan)
     ends = np.append(t[1:], t[-1])
     age = ends[:, None] - ends[last]
@@ -231,71 +231,73 @@ def _free_run(
 ) -> tuple[Run, str]:
     """One piece: simulated from its measured start to its end. Also returns where the start came from."""
     start = start_of(run, robot, rows)
-    held = slice(rows.start, rows.stop - 1)
-    extra = {} if supply is None else {"supply": supply[held]}
+    steps = slice(rows.start, rows.stop - 1)
+    extra = {} if supply is None else {"supply": supply[steps]}
     current = None
     if run.current is not None and np.isfinite(run.current[rows.start]).all():
         current = run.current[rows.start]
     dt, twist = np.diff(run.t[rows]), start.twist
-    given = _commands(robot, dt, applied, inputs[held], extra)
-    view = _view(robot, run, held, given, log)
-    simulated = simulate_seen(robot, given, view, twist=twist, pose=start.pose, current=current, tol=tol)
+    applied_commands = _commands(robot, dt, applied, inputs[steps], extra)
+    view = _view(robot, run, steps, applied_commands, log)
+    simulated = simulate_seen(robot, applied_commands, view, twist=twist, pose=start.pose, current=current, tol=tol)
     if run.wheel_angle is not None:
         parts = 2 * min(int(np.ceil(dt.max() / (2.0 * FINEST))), MOST_PARTS)
         many = {name: np.repeat(values, parts, axis=0) for name, values in extra.items()}
-        given = _commands(robot, np.repeat(dt / parts, parts), applied, np.repeat(inputs[held], parts, axis=0), many)
-        view = _view(robot, run, held, given, log, parts, of_angles=True)
-        fine = simulate_seen(robot, given, view, twist=twist, pose=np.zeros(3), current=current, tol=tol)
+        applied_commands = _commands(
+            robot, np.repeat(dt / parts, parts), applied, np.repeat(inputs[steps], parts, axis=0), many
+        )
+        view = _view(robot, run, steps, applied_commands, log, parts, of_angles=True)
+        fine = simulate_seen(robot, applied_commands, view, twist=twist, pose=np.zeros(3), current=current, tol=tol)
         simulated = simulated.replace(wheel_angle=start.angle + _turned(fine, parts))
     return simulated, start.source
 
 
 def _commands(robot: Robot, dt: FloatArray, applied: str, inputs: FloatArray, extra: dict[str, FloatArray]) -> Commands:
     """The logged inputs as commands."""
-    named = dict.fromkeys((*INPUTS, "supply")) | {applied: inputs} | extra
+    channels = dict.fromkeys((*INPUTS, "supply")) | {applied: inputs} | extra
     return commands(
         robot,
-        named["voltage"],
+        channels["voltage"],
         dt,
-        named["duty"],
-        named["wheel_speed_command"],
-        named["twist_command"],
-        named["supply"],
+        channels["duty"],
+        channels["wheel_speed_command"],
+        channels["twist_command"],
+        channels["supply"],
     )
 
 
 def _view(
     robot: Robot,
     run: Run,
-    held: slice,
-    given: Commands,
+    steps: slice,
+    applied_commands: Commands,
     log: LogEffects | None,
     parts: int = 1,
     of_angles: bool = False,
 ) -> View:
-    """What a log shows of a piece, whose rows are `held`. parts: steps of the simulation in a row.
+    """What a log shows of a piece, whose rows are `steps`. parts: steps of the simulation in a row.
 
-    The start was measured by the first channel of LATE: the run begins by so much earlier as that is late.
+    The start was measured by the first channel of LATE_CHANNELS: the run begins by so much earlier as that is late.
     of_angles: wheel speeds are wanted as late as the angles that they add up to.
     """
-    moving = given.set_point is None  # a speed loop rests before its first command
+    moving = applied_commands.set_point is None  # a speed loop rests before its first command
     if log is None:
-        return seen_at_once(robot, given, held=moving)
+        return seen_at_once(robot, applied_commands, held=moving)
     t, drive, row = run.t, robot.drive.latency, run.step
-    late = {name: log.latency.of(name, drive, row) for name in LATE}
+    late = {name: log.latency.of(name, drive, row) for name in LATE_CHANNELS}
     if of_angles:
         late["wheel_speed"] = late["wheel_angle"]
-    share = np.repeat((t[held] - t[0]) / (t[-1] - t[0]), parts)
-    return seen_through(robot, given, log, late, share, late[_first(run)] if moving else None)
+    share = np.repeat((t[steps] - t[0]) / (t[-1] - t[0]), parts)
+    return seen_through(robot, applied_commands, log, late, share, late[_first(run)] if moving else None)
 
 
 def _first(run: Run) -> str:
     """The channel that tells where a free run of this log starts."""
-    there = {name for name in LATE if getattr(run, name, None) is not None}
+    channels = {name for name in LATE_CHANNELS if getattr(run, name, None) is not None}
     if run.pose is not None:
-        there |= {"heading"} if np.isfinite(run.pose[:, 2]).any() else {"position"}
+        channels |= {"heading"} if np.isfinite(run.pose[:, 2]).any() else {"position"}
     return next(
-        (name for name in ("twist", "wheel_speed", "wheel_angle", "heading", "position") if name in there), "twist"
+        (name for name in ("twist", "wheel_speed", "wheel_angle", "heading", "position") if name in channels), "twist"
     )
 
 
@@ -305,9 +307,9 @@ def _turned(fine: Run, parts: int) -> FloatArray:
     rule = np.where(np.arange(parts + 1) % 2, 4.0, 2.0) / 3.0
     rule[[0, -1]] = 1.0 / 3.0
     first = np.arange(0, len(fine) - 1, parts)
-    held = fine.wheel_speed[first[:, None] + np.arange(parts + 1)]
-    steps = np.einsum("p,kpw->kw", rule, held) * np.diff(fine.t)[first, None]
-    return np.vstack([np.zeros(held.shape[2]), np.cumsum(steps, axis=0)])
+    speeds = fine.wheel_speed[first[:, None] + np.arange(parts + 1)]
+    steps = np.einsum("p,kpw->kw", rule, speeds) * np.diff(fine.t)[first, None]
+    return np.vstack([np.zeros(speeds.shape[2]), np.cumsum(steps, axis=0)])
 
 
 def _assembled(run: Run, robot: Robot, pieces: list[slice], parts: list[Run]) -> Run:
@@ -317,10 +319,10 @@ def _assembled(run: Run, robot: Robot, pieces: list[slice], parts: list[Run]) ->
         if getattr(parts[0], name) is None:
             continue
         width = robot.wheels.count if CHANNELS[name] == WHEEL else 3
-        whole = np.full((len(run), width), np.nan)
+        column = np.full((len(run), width), np.nan)
         for rows, part in zip(pieces, parts, strict=True):
-            whole[rows] = getattr(part, name)
-        channels[name] = whole
+            column[rows] = getattr(part, name)
+        channels[name] = column
     return Run(t=run.t, **channels, source=f"replay of {run.source or 'a run'}: {parts[0].source}")
 
 
@@ -331,11 +333,11 @@ def _from_simulation(parts: list[tuple[Run, str]]) -> list[Statement]:
         for k, (part, _) in enumerate(parts)
         for warning in part.warnings
     ]
-    more = len(warnings) - SHOWN
-    cut = [Statement("more_warnings", numbers={"more": more})] if more > 0 else []
+    surplus = len(warnings) - SHOWN_WARNINGS
+    ellipsis = [Statement("more_warnings", numbers={"more": surplus})] if surplus > 0 else []
     assumed = sum(source == REST for _, source in parts)
     starts = [Statement("start_assumed", numbers={"assumed": assumed, "pieces": len(parts)})] if assumed else []
-    return [*warnings[:SHOWN], *cut, *starts]
+    return [*warnings[:SHOWN_WARNINGS], *ellipsis, *starts]
 
 
 def _loop_warnings(robot: Robot, run: Run, applied: str, parts: list[tuple[Run, str]]) -> list[Statement]:

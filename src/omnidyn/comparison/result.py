@@ -16,7 +16,7 @@ from omnidyn.document import Document, Part, Table, Words, cell, chance_cell, pl
 from omnidyn.logs.channels import place
 from omnidyn.model.first_guess import guess_line
 from omnidyn.run import Run
-from omnidyn.shown import FIGURE, FRAME, Shown, make
+from omnidyn.shown import FIGURE, FRAME, Displayable, make
 from omnidyn.simulation.band import Band
 from omnidyn.statement import Statement, as_verdict, by_severity
 
@@ -41,7 +41,7 @@ class Segment:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Shown):
+class Comparison(Displayable):
     """How near one or two models come to the logs of a robot.
 
     robots: their names, the first one being what `rmse`, `fit_percent` and `vaf` are about. measured: the logs.
@@ -91,22 +91,22 @@ class Comparison(Shown):
     @property
     def rmse(self) -> dict[str, float]:
         """Component -> rmse of the first robot, in SI units."""
-        return {name: each.rmse for name, each in self.overall[self.robots[0]].items()}
+        return {name: metrics.rmse for name, metrics in self.overall[self.robots[0]].items()}
 
     @property
     def fit_percent(self) -> dict[str, float | None]:
         """Component -> fit of the first robot [%], None where the measured signal never changes."""
-        return {name: each.fit_percent for name, each in self.overall[self.robots[0]].items()}
+        return {name: metrics.fit_percent for name, metrics in self.overall[self.robots[0]].items()}
 
     @property
     def vaf(self) -> dict[str, float | None]:
         """Component -> variance accounted for by the first robot [%], None where the measured signal never changes."""
-        return {name: each.vaf for name, each in self.overall[self.robots[0]].items()}
+        return {name: metrics.vaf for name, metrics in self.overall[self.robots[0]].items()}
 
     def better(self, component: str) -> str | None:
         """Name of the robot that is surely nearer in a component; None where chance could have done it."""
-        found = self.difference[component].better
-        return None if found is None else self.robots[found]
+        index = self.difference[component].better
+        return None if index is None else self.robots[index]
 
     @property
     def verdict(self) -> Statement:
@@ -126,11 +126,11 @@ class Comparison(Shown):
 
     def band(self, robot: str, component: str, segment: Segment) -> tuple[FloatArray, FloatArray] | None:
         """(low, high) end of the band of one component over one segment, None where there is none."""
-        own, channel = self.bands.get(robot, {}).get(segment.log), (place(component) or ("",))[0]
-        if own is None or getattr(own.low, channel, None) is None:
+        run_band, channel = self.bands.get(robot, {}).get(segment.log), (place(component) or ("",))[0]
+        if run_band is None or getattr(run_band.low, channel, None) is None:
             return None
         real = self.measured[segment.log]
-        low, high = (trace_of(component, real, end, segment.rows).model for end in (own.low, own.high))
+        low, high = (trace_of(component, real, end, segment.rows).model for end in (run_band.low, run_band.high))
         if self.current_unsigned and channel == "current":
             inside = (low < 0.0) & (high > 0.0)
             low, high = np.where(inside, 0.0, np.minimum(abs(low), abs(high))), np.maximum(abs(low), abs(high))
@@ -138,13 +138,13 @@ class Comparison(Shown):
 
     def half_widths(self, robot: str) -> dict[str, float]:
         """Component -> mean half width of its band, in SI units; nothing where there is no band."""
-        found = {}
+        widths = {}
         for name in self.channels:
             ends = [ends for segment in self.segments if (ends := self.band(robot, name, segment)) is not None]
             width = np.concatenate([0.5 * (high - low) for low, high in ends]) if ends else np.zeros(0)
             if np.isfinite(width).any():
-                found[name] = float(np.nanmean(width))
-        return found
+                widths[name] = float(np.nanmean(width))
+        return widths
 
     def summary(self, segments: bool = False) -> str:
         """The comparison as plain tables, for reading; with `segments`, each segment too. ASCII only."""
@@ -156,11 +156,11 @@ class Comparison(Shown):
         for robot in self.robots:
             parts += [*self._title(robot), "", metrics_table(self.channels, self.overall[robot]), ""]
             for k in range(len(self.segments) if segments else 0):
-                of_segment = {name: found[k] for name, found in self.by_segment[robot].items()}
+                of_segment = {name: scores[k] for name, scores in self.by_segment[robot].items()}
                 parts += [self._name(k), metrics_table(self.channels, of_segment, head=()), ""]
         for robot in self.bands:
-            told = f"95 % band of {robot}, from the std of its file: mean half width beside the error"
-            parts += [told, "", band_table(self.half_widths(robot), self.overall[robot]), ""]
+            caption = f"95 % band of {robot}, from the std of its file: mean half width beside the error"
+            parts += [caption, "", band_table(self.half_widths(robot), self.overall[robot]), ""]
         if self.difference:
             first, second = self.robots
             parts += [
@@ -169,22 +169,22 @@ class Comparison(Shown):
                 difference_table(self.robots, self.difference),
                 "",
             ]
-        parts += legend([metrics for found in self.overall.values() for metrics in found.values()])
+        parts += legend([metrics for scores in self.overall.values() for metrics in scores.values()])
         parts += ["currents are compared by size, without sign."] if self.current_unsigned else []
         parts.append(by_severity(self.warnings))
         return Document(parts, self.to_dict(), self.warnings, ascii=True, verdict=self.verdict)
 
     def brief_table(self) -> Table:
         """How near one model comes, or which of two is nearer: a row per component, without what is for experts."""
-        first, *others = self.robots
-        found = self.overall[first]
+        first, *rivals = self.robots
+        scores = self.overall[first]
         if self.difference:
-            second = others[0]
+            second = rivals[0]
             rows = [
                 (
                     name,
                     unit(name),
-                    f"{found[name].rmse:.4g}",
+                    f"{scores[name].rmse:.4g}",
                     f"{self.overall[second][name].rmse:.4g}",
                     self.better(name) or ("the same" if gap.std_error == 0.0 else "cannot tell"),
                 )
@@ -193,7 +193,7 @@ class Comparison(Shown):
             return Table(("", "unit", f"rmse of {first}", f"rmse of {second}", "nearer"), rows, "<<>><", (8, 6))
         widths = self.half_widths(first) if self.bands else {}
         bands = [(f"{widths[name]:.4g}" if name in widths else "",) * bool(self.bands) for name in self.channels]
-        rows = [(*_row(name, found[name]), *extra) for name, extra in zip(self.channels, bands, strict=True)]
+        rows = [(*_row(name, scores[name]), *extra) for name, extra in zip(self.channels, bands, strict=True)]
         return Table((*HEAD, *(("band +-",) * bool(self.bands))), rows, "<<>", WIDTHS)
 
     def brief_head(self) -> list[Words]:
@@ -208,11 +208,11 @@ class Comparison(Shown):
         robot = robot or names
         seconds = sum(segment.end - segment.begin for segment in self.segments)
         logs, count = len(self.measured), len(self.segments)
-        where = self.measured[0].source or "one run"
-        where = where if logs == 1 else f"{logs} logs, first {where}"
-        title = f"{names} against {where}: {count} free run{'s' * (count > 1)}, {seconds:.4g} s"
-        held = [Words(line)] if (line := guess_line(self.rests_on.get(robot, ()))) else []
-        return Words(title), Words(f"applied: {self.applied_text(robot)}"), *held
+        source = self.measured[0].source or "one run"
+        source = source if logs == 1 else f"{logs} logs, first {source}"
+        title = f"{names} against {source}: {count} free run{'s' * (count > 1)}, {seconds:.4g} s"
+        guess_words = [Words(line)] if (line := guess_line(self.rests_on.get(robot, ()))) else []
+        return Words(title), Words(f"applied: {self.applied_text(robot)}"), *guess_words
 
     def applied_text(self, robot: str) -> str:
         """What drove a robot, in words."""
@@ -229,7 +229,7 @@ class Comparison(Shown):
             name: {
                 "applied": plain(self.applied[name]),
                 "rests_on_guesses": list(self.rests_on.get(name, ())),
-                "overall": {key: asdict(each) for key, each in self.overall[name].items()},
+                "overall": {key: asdict(metrics) for key, metrics in self.overall[name].items()},
                 "by_segment": {
                     key: [None if metrics is None else asdict(metrics) for metrics in row]
                     for key, row in self.by_segment[name].items()
@@ -260,48 +260,48 @@ HEAD = ("", "unit", "samples", "rmse", "max", "bias", "fit %", "VAF %", "white p
 WIDTHS = (8, 6, 7, 9, 9, 9, 7, 7, 7, 6)  # the same for all tables, so that they can be read below each other
 
 
-def metrics_table(names: Sequence[str], found: Mapping[str, Metrics | None], head: Sequence[str] = HEAD) -> Table:
+def metrics_table(names: Sequence[str], scores: Mapping[str, Metrics | None], head: Sequence[str] = HEAD) -> Table:
     """How near a model comes, a row per component."""
-    return Table(head, [_row(name, found[name]) for name in names], "<<>", WIDTHS)
+    return Table(head, [_row(name, scores[name]) for name in names], "<<>", WIDTHS)
 
 
-def _row(name: str, each: Metrics | None) -> tuple[str, ...]:
-    if each is None:
+def _row(name: str, metrics: Metrics | None) -> tuple[str, ...]:
+    if metrics is None:
         return name, unit(name), "0"
     return (
         name,
         unit(name),
-        f"{each.samples}",
-        f"{each.rmse:.4g}",
-        f"{each.max:.4g}",
-        f"{each.bias:+.3g}",
-        cell(each.fit_percent, ".1f"),
-        cell(each.vaf, ".1f"),
-        chance_cell(each.whiteness),
-        cell(each.lag, "+.3f"),
+        f"{metrics.samples}",
+        f"{metrics.rmse:.4g}",
+        f"{metrics.max:.4g}",
+        f"{metrics.bias:+.3g}",
+        cell(metrics.fit_percent, ".1f"),
+        cell(metrics.vaf, ".1f"),
+        chance_cell(metrics.whiteness),
+        cell(metrics.lag, "+.3f"),
     )
 
 
-def band_table(half_widths: Mapping[str, float], found: Mapping[str, Metrics]) -> Table:
+def band_table(half_widths: Mapping[str, float], scores: Mapping[str, Metrics]) -> Table:
     """How wide the band of a model is, a row per component, beside how far the model is off."""
-    rows = [(name, unit(name), f"{half:.4g}", f"{found[name].rmse:.4g}") for name, half in half_widths.items()]
+    rows = [(name, unit(name), f"{half:.4g}", f"{scores[name].rmse:.4g}") for name, half in half_widths.items()]
     return Table(("", "unit", "half width", "rmse"), rows, "<<>", (8, 6, 10, 9))
 
 
-def difference_table(robots: Sequence[str], found: Mapping[str, ModelDifference]) -> Table:
+def difference_table(robots: Sequence[str], gaps: Mapping[str, ModelDifference]) -> Table:
     """Which of two robots is better, a row per component."""
     rows = []
-    for name, gap in found.items():
+    for name, gap in gaps.items():
         nearer = "the same" if gap.std_error == 0.0 else "cannot tell"
         nearer = nearer if gap.better is None else robots[gap.better]
         rows.append((name, f"{gap.rmse_difference:+.4g}", cell(gap.std_error, ".2g"), f"{gap.blocks}", nearer))
     return Table(("", "difference", "std error", "blocks", "better"), rows, "<>>><", (8, 12, 9, 6))
 
 
-def legend(shown: Sequence[Metrics]) -> Iterator[str]:
+def legend(scores: Sequence[Metrics]) -> Iterator[str]:
     """What the columns mean, where it is not plain."""
     yield "error = model - measured."
-    if any(metrics.lag for metrics in shown):
+    if any(metrics.lag for metrics in scores):
         yield "lag: the robot is later than the model by so much, where that explains clearly more; a hint."
-    if any(metrics.fit_percent is None for metrics in shown):
+    if any(metrics.fit_percent is None for metrics in scores):
         yield "no fit and no VAF where the measured signal never changes."

@@ -92,8 +92,8 @@ def scatter(t: FloatArray, values: FloatArray) -> float:
     Each sample against the line between its neighbours: e_1 - w e_0 - (1 - w) e_2 has the variance of one error times
     1 + w^2 + (1 - w)^2.
     """
-    known = np.isfinite(values)
-    t, values = t[known], values[known]
+    finite = np.isfinite(values)
+    t, values = t[finite], values[finite]
     if len(t) < 3:
         return 0.0
     w = (t[2:] - t[1:-1]) / (t[2:] - t[:-2])
@@ -105,8 +105,10 @@ def _is_spike(t: FloatArray, values: FloatArray, noise: float, at_rest: bool) ->
     """Whether the first sample has nothing to do with the next four."""
     slope, level = theil_sen(t[1:FEWEST_SAMPLES], values[1:FEWEST_SAMPLES])
     expected = level + slope * t[0]
-    far = abs(values[0] - expected) > SPIKE_RANGES * (float(np.ptp(values[1:FEWEST_SAMPLES])) + SURE_ERRORS * noise)
-    return bool(far and not (at_rest and abs(values[0]) < abs(expected)))
+    outlying = abs(values[0] - expected) > SPIKE_RANGES * (
+        float(np.ptp(values[1:FEWEST_SAMPLES])) + SURE_ERRORS * noise
+    )
+    return bool(outlying and not (at_rest and abs(values[0]) < abs(expected)))
 
 
 def theil_sen(t: FloatArray, values: FloatArray) -> tuple[float, float]:
@@ -127,17 +129,17 @@ def _first_samples(t: FloatArray, values: FloatArray) -> tuple[FloatArray, Float
 
     They are thinned to MOST_SAMPLES.
     """
-    known = np.flatnonzero(np.isfinite(values))
-    if not len(known):
+    finite = np.flatnonzero(np.isfinite(values))
+    if not len(finite):
         return t[:0], values[:0]
-    t, values = t[known[0] :], values[known[0] :]
+    t, values = t[finite[0] :], values[finite[0] :]
     rows = int(np.searchsorted(t, t[0] + WINDOW, side="right"))
     if len(t) >= FEWEST_SAMPLES and t[FEWEST_SAMPLES - 1] - t[0] <= LONGEST_TIME:
         rows = max(FEWEST_SAMPLES, rows)
     t, values = t[:rows], values[:rows]
-    kept = np.flatnonzero(np.isfinite(values))
-    kept = kept[:: max(1, -(-len(kept) // MOST_SAMPLES))]
-    return t[kept], values[kept]
+    finite_rows = np.flatnonzero(np.isfinite(values))
+    finite_rows = finite_rows[:: max(1, -(-len(finite_rows) // MOST_SAMPLES))]
+    return t[finite_rows], values[finite_rows]
 
 
 def _continuous(pose: FloatArray) -> FloatArray:
@@ -169,13 +171,13 @@ def first_slope(t: FloatArray, values: FloatArray) -> float:
     slope, error = theil_sen(t, values)[0], noise / (float(np.std(t)) * np.sqrt(len(t)))
     if len(t) >= FEWEST_SAMPLES:
         design = np.vander(t, 3, increasing=True)
-        found = np.linalg.lstsq(design, values, rcond=None)[0]
+        coefficients = np.linalg.lstsq(design, values, rcond=None)[0]
         errors = noise * np.sqrt(np.diag(np.linalg.pinv(design.T @ design, rcond=1e-20, hermitian=True)))
-        left, bend = np.abs(values - design @ found).max(), abs(found[2])
+        misfit, bend = np.abs(values - design @ coefficients).max(), abs(coefficients[2])
         if (
-            bend > SURE_ERRORS * errors[2] and left <= FIT * noise + FLAT * bend * t[-1] ** 2
+            bend > SURE_ERRORS * errors[2] and misfit <= FIT * noise + FLAT * bend * t[-1] ** 2
         ):  # and none of them is a spike
-            slope, error = float(found[1]), float(errors[1])
+            slope, error = float(coefficients[1]), float(errors[1])
     return slope if abs(slope) > SURE_ERRORS * error else 0.0
 
 

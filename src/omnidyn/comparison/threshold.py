@@ -50,10 +50,10 @@ def parse_threshold(text: str) -> Threshold:
     return Threshold(component, metric, sign, float(number))
 
 
-def refuse_absent(wanted: Sequence[Threshold | str], compared: Sequence[str], where: str = "`fail_if`") -> None:
+def refuse_absent(requests: Sequence[Threshold | str], compared: Sequence[str], where: str = "`fail_if`") -> None:
     """Raises InputError when a threshold, or a component asked for, is about what will not be compared."""
-    for each in wanted:
-        name = each if isinstance(each, str) else each.component
+    for request in requests:
+        name = request if isinstance(request, str) else request.component
         if name not in compared:
             raise _unknown("the logs cannot judge this component", name, compared, where)
 
@@ -63,9 +63,9 @@ def exceeded(comparison: Comparison, thresholds: Sequence[Threshold], robot: str
 
     Raises InsufficientDataError where the metric is not known, such as the fit of a signal that never changes.
     """
-    found, words = comparison.overall[robot or comparison.robots[0]], []
+    scores, words = comparison.overall[robot or comparison.robots[0]], []
     for threshold in thresholds:
-        value = getattr(found[threshold.component], threshold.metric) if threshold.component in found else None
+        value = getattr(scores[threshold.component], threshold.metric) if threshold.component in scores else None
         if value is None:
             raise InsufficientDataError(
                 f"the data do not tell {threshold.component}.{threshold.metric}",
@@ -87,7 +87,7 @@ def refuse_exceeded(comparison: Comparison, thresholds: Sequence[Threshold]) -> 
         raise ThresholdError(f"{count} for {comparison.robots[0]}: {', '.join(words)}")
 
 
-def _unknown(what: str, name: str, known: Sequence[str], where: str = "`fail_if`") -> InputError:
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.3)
-    remedy = f"did you mean {close[0]}?" if close else ""
-    return InputError(what, got=name, expected=", ".join(known), remedy=remedy, where=where)
+def _unknown(problem: str, name: str, names: Sequence[str], where: str = "`fail_if`") -> InputError:
+    matches = difflib.get_close_matches(name, names, n=1, cutoff=0.3)
+    remedy = f"did you mean {matches[0]}?" if matches else ""
+    return InputError(problem, got=name, expected=", ".join(names), remedy=remedy, where=where)

@@ -36,21 +36,21 @@ def compared_components(run: Run, applied: str) -> tuple[str, ...]:
     The voltage counts where the speed loop of the model had to make it.
     """
     channels = (*COMPARED, "voltage") if applied in SET_SPEEDS else COMPARED
-    found = []
+    present = []
     for channel in channels:
         values = getattr(run, channel)
         if values is not None:
             names = components(channel, values.shape[1])
-            found += [name for name, column in zip(names, values.T, strict=True) if np.isfinite(column).any()]
-    return tuple(found)
+            present += [name for name, column in zip(names, values.T, strict=True) if np.isfinite(column).any()]
+    return tuple(present)
 
 
 def trace_of(component: str, measured: Run, model: Run, rows: slice, current_unsigned: bool = False) -> Trace:
     """One component over some rows. A heading is compared without its turns; currents by size where told so."""
-    found = place(component)
-    if found is None:
+    location = place(component)
+    if location is None:
         raise KeyError(component)
-    channel, column = found
+    channel, column = location
     ours = np.asarray(getattr(model, channel))[rows, column]
     real = np.asarray(getattr(measured, channel))[rows, column]
     if component == "heading":
@@ -66,18 +66,18 @@ def unwrapped(measured: FloatArray, model: FloatArray) -> FloatArray:
     What is unwrapped is the difference: it changes slowly even where the robot turns fast or rows are missing.
     Both shape (n,); NaN stays. Returns shape (n,).
     """
-    result, known = measured.copy(), np.isfinite(measured) & np.isfinite(model)
-    if not known.any():
+    result, finite = measured.copy(), np.isfinite(measured) & np.isfinite(model)
+    if not finite.any():
         return result
-    error = np.unwrap(model[known] - measured[known])
-    result[known] = model[known] - (error - TURN * np.round(error[0] / TURN))
+    error = np.unwrap(model[finite] - measured[finite])
+    result[finite] = model[finite] - (error - TURN * np.round(error[0] / TURN))
     return result
 
 
 def counts_from_start(component: str) -> bool:
     """Whether a component counts from where a piece begins: its level there was given to the model."""
-    found = place(component)
-    return found is not None and found[0] in SINCE_START
+    location = place(component)
+    return location is not None and location[0] in SINCE_START
 
 
 def unit(component: str) -> str:
@@ -119,19 +119,19 @@ def _without_pose(x: Trace, y: Trace) -> tuple[FloatArray, FloatArray]:
     if len(x.t) != len(y.t):
         return _centred(x.error), _centred(y.error)
     error = np.stack([x.error, y.error])
-    known = np.isfinite(error).all(axis=0)
-    if not known.any():
+    finite = np.isfinite(error).all(axis=0)
+    if not finite.any():
         return x.error, y.error
-    error = error - error[:, known].mean(axis=1, keepdims=True)
+    error = error - error[:, finite].mean(axis=1, keepdims=True)
     path = np.stack([x.model, y.model])
-    path = path - path[:, known].mean(axis=1, keepdims=True)
+    path = path - path[:, finite].mean(axis=1, keepdims=True)
     turned = np.stack([-path[1], path[0]])
-    power = float((turned[:, known] ** 2).sum())
-    turn = float((turned[:, known] * error[:, known]).sum()) / power if power > 0.0 else 0.0
+    power = float((turned[:, finite] ** 2).sum())
+    turn = float((turned[:, finite] * error[:, finite]).sum()) / power if power > 0.0 else 0.0
     error = error - turn * turned
     return error[0], error[1]
 
 
 def _centred(error: FloatArray) -> FloatArray:
-    known = np.isfinite(error)
-    return error - error[known].mean() if known.any() else error
+    finite = np.isfinite(error)
+    return error - error[finite].mean() if finite.any() else error

@@ -77,23 +77,25 @@ def followed(scores: Mapping[str, Scored]) -> list[FollowedSignal]:
     kinds: dict[str, list[tuple[str, FollowedSignal]]] = {}
     for name, score in scores.items():
         if score.fit_percent is not None:
-            each = FollowedSignal(name, _level(score), _share(score), score.rmse, unit(name))
-            kinds.setdefault(plain_name(name), []).append((name, each))
-    found = []
+            signal = FollowedSignal(name, _level(score), _share(score), score.rmse, unit(name))
+            kinds.setdefault(plain_name(name), []).append((name, signal))
+    signals = []
     for plain, members in kinds.items():
         alike: dict[int, list[tuple[str, FollowedSignal]]] = {}
         for member in members:
             alike.setdefault(member[1].level, []).append(member)
-        for same in alike.values():
-            share, error = (max(values) for values in zip(*((each.share, each.error) for _, each in same), strict=True))
-            called = plain if len(alike) == 1 else f"{all_of([name for name, _ in same])} ({plain})"
-            found.append(FollowedSignal(called, same[0][1].level, share, error, same[0][1].unit))
-    return sorted(found, key=lambda each: each.level)
+        for group in alike.values():
+            share, error = (
+                max(values) for values in zip(*((signal.share, signal.error) for _, signal in group), strict=True)
+            )
+            label = plain if len(alike) == 1 else f"{all_of([name for name, _ in group])} ({plain})"
+            signals.append(FollowedSignal(label, group[0][1].level, share, error, group[0][1].unit))
+    return sorted(signals, key=lambda signal: signal.level)
 
 
-def nothing_followed(found: Sequence[FollowedSignal]) -> bool:
+def nothing_followed(signals: Sequence[FollowedSignal]) -> bool:
     """Whether the model does not follow: something changes, and nothing of it is followed even roughly."""
-    return bool(found) and all(signal.level >= HARDLY for signal in found)
+    return bool(signals) and all(signal.level >= HARDLY for signal in signals)
 
 
 def is_missed(share: float, error: float, scatter: float = 0.0) -> bool:
@@ -107,10 +109,10 @@ def is_missed(share: float, error: float, scatter: float = 0.0) -> bool:
 
 def plain_name(component: str) -> str:
     """The kind of measurement that a component belongs to, in plain words."""
-    where = place(component)
-    if where is None:
+    location = place(component)
+    if location is None:
         return component
-    return OF_WHEELS.get(where[0]) or PLAIN.get(where, component)
+    return OF_WHEELS.get(location[0]) or PLAIN.get(location, component)
 
 
 def _share(score: Scored) -> float:
@@ -127,12 +129,12 @@ def _level(score: Scored) -> int:
     return ROUGHLY if share <= HALF else HARDLY if share < NOTHING else NOT
 
 
-def follows(model: str, found: Sequence[FollowedSignal]) -> Statement:
+def follows(model: str, followed_signals: Sequence[FollowedSignal]) -> Statement:
     """How well a model follows each kind of measurement. model: its name."""
-    signals = {"signals": [signal.statement() for signal in found]}
-    if not found:
+    signals = {"signals": [signal.statement() for signal in followed_signals]}
+    if not followed_signals:
         return Statement("nothing_changes", WARNING, model)
-    if nothing_followed(found):
+    if nothing_followed(followed_signals):
         return Statement("model_does_not_follow", ERROR, model, signals)
     return Statement("follows", NOTE, model, signals)
 

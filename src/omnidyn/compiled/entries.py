@@ -39,9 +39,9 @@ class Entries(_Cache):
     """
 
     def __init__(self, function: Callable[..., Any]):
-        known = FunctionCache(function)
-        self._key, self._impl = known._index_key, known._impl
-        self._folder = Path(known.cache_path)
+        cache = FunctionCache(function)
+        self._key, self._impl = cache._index_key, cache._impl
+        self._folder = Path(cache.cache_path)
         self._stem = re.sub(r"[^\w.]", "", f"{Path(function.__code__.co_filename).stem}.{function.__qualname__}")
         self._enabled = True
         self.stamp = stamp(function)
@@ -61,8 +61,8 @@ class Entries(_Cache):
             content = self.content(file) if self._enabled else None
             if content is None:
                 return None
-            found, reduced = pickle.loads(content)
-            return self._rebuilt(target_context, reduced) if found == key else None
+            saved_key, reduced = pickle.loads(content)
+            return self._rebuilt(target_context, reduced) if saved_key == key else None
         except Exception:  # whole, but of another numba or system: whatever that means, it is compiled again
             return None
 
@@ -119,11 +119,11 @@ class Entries(_Cache):
     def content(self, file: Path) -> bytes | None:
         """What stands in an entry behind its head; None where the head is not the right one."""
         try:
-            whole = file.read_bytes()
+            content = file.read_bytes()
         except OSError:
             return None
         size = len(self._head(b""))
-        return whole[size:] if whole[:size] == self._head(whole[size:]) else None
+        return content[size:] if content[:size] == self._head(content[size:]) else None
 
 
 class Keeper(Protocol):
@@ -221,6 +221,6 @@ def loaded(context: Any, saved: Any) -> Any:
         reload_init=reload_init,
         referenced_envs=environments,
     )
-    for each in environments:
-        context.codegen().set_env(each.env_name, each)
+    for environ in environments:
+        context.codegen().set_env(environ.env_name, environ)
     return result

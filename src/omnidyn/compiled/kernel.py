@@ -85,8 +85,10 @@ def machine_code(kernel: Callable[..., Any], *arguments: Any) -> Callable[..., A
 def kept() -> list[Any]:
     """What keeps the kernels of the package that have been imported, see entries.py; nothing keeps those in memory."""
     modules = [module for name, module in tuple(sys.modules.items()) if name.startswith("omnidyn.")]
-    every: dict[int, Any] = {id(value): value for each in modules for value in vars(each).values() if is_jitted(value)}
-    return [each._cache for each in every.values() if hasattr(each._cache, "stamp")]
+    kernels: dict[int, Any] = {
+        id(value): value for module in modules for value in vars(module).values() if is_jitted(value)
+    }
+    return [kernel._cache for kernel in kernels.values() if hasattr(kernel._cache, "stamp")]
 
 
 def part(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -102,22 +104,22 @@ def one_of(functions: Sequence[Callable[..., Any]]) -> Any:
     """A part that hands what it is given to one of several parts: its first argument is the number of it, from 0."""
     last = functions[-1]
 
-    def only(number, *given):
-        return last(*given)
+    def only(number, *arguments):
+        return last(*arguments)
 
-    chosen = part(only)
+    choice = part(only)
     for number in reversed(range(len(functions) - 1)):
-        chosen = _either(number, functions[number], chosen)
-    return chosen
+        choice = _either(number, functions[number], choice)
+    return choice
 
 
-def _either(own: int, this: Callable[..., Any], others: Callable[..., Any]) -> Any:
-    """A part that is `this` for its own number, else what others are."""
+def _either(position: int, function: Callable[..., Any], fallback: Callable[..., Any]) -> Any:
+    """A part that is `function` for its own number, else what others are."""
 
-    def either(number, *given):
-        if number == own:
-            return this(*given)
-        return others(number, *given)
+    def either(number, *arguments):
+        if number == position:
+            return function(*arguments)
+        return fallback(number, *arguments)
 
     return part(either)
 
@@ -138,13 +140,13 @@ def _linked(function: Callable[..., Any], counted: bool) -> Any:
     numba counts who holds an array: it adds and removes one, atomically, around nearly every call that has a branch. In
     small functions of arithmetic that costs three times as much as the rest.
     """
-    tried = private.used()
-    options: dict[str, Any] = {"_nrt": counted} if tried else {}
-    whole = numba.njit(error_model=ERROR_MODEL, **options)(function)
-    if whole is function or not tried:
-        return whole
+    supported = private.used()
+    options: dict[str, Any] = {"_nrt": counted} if supported else {}
+    dispatcher = numba.njit(error_model=ERROR_MODEL, **options)(function)
+    if dispatcher is function or not supported:
+        return dispatcher
 
-    return Linked(whole)
+    return Linked(dispatcher)
 
 
 # Parts of kernels: code to link, optimised once, in the kernel that calls it
@@ -159,10 +161,10 @@ def _linked(function: Callable[..., Any], counted: bool) -> Any:
 class Linked(CPUDispatcher):
     """A function that kernels link; called from Python, which only tests do, it is compiled for itself as well."""
 
-    def __init__(self, whole: Any):
-        options = whole.targetoptions | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        super().__init__(whole.py_func, targetoptions=options, pipeline_class=LinkedCompiler)
-        self.whole = whole
+    def __init__(self, dispatcher: Any):
+        options = dispatcher.targetoptions | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        super().__init__(dispatcher.py_func, targetoptions=options, pipeline_class=LinkedCompiler)
+        self.whole = dispatcher
 
     def __call__(self, *arguments: Any, **names: Any) -> Any:
         return self.whole(*arguments, **names)
@@ -194,22 +196,22 @@ class LinkedLibrary(JITCodeLibrary):
         if self._shared_module is None:
             module = self._final_module.clone()
             for library in self._below({}):
-                other = library._final_module if isinstance(library, LinkedLibrary) else None
-                module.link_in(other or library._get_module_for_linking(), preserve=True)
+                final = library._final_module if isinstance(library, LinkedLibrary) else None
+                module.link_in(final or library._get_module_for_linking(), preserve=True)
             for function in module.functions:
                 if not function.is_declaration and function.linkage == Linkage.external:
                     function.linkage = "linkonce_odr"  # there may be the same code from another one
             self._shared_module = module
         return self._shared_module
 
-    def _below(self, found: dict[Any, None]) -> dict[Any, None]:
+    def _below(self, libraries: dict[Any, None]) -> dict[Any, None]:
         """All libraries that this one needs, itself left out, in the order in which they are met."""
         for library in self._linking_libraries:
-            if library not in found:
-                found[library] = None
+            if library not in libraries:
+                libraries[library] = None
                 if isinstance(library, LinkedLibrary):
-                    library._below(found)
-        return found
+                    library._below(libraries)
+        return libraries
 
 
 class Branches(JITCodeLibrary):

@@ -35,13 +35,13 @@ def heard() -> Iterator[Compiling]:
 @contextlib.contextmanager
 def told(name: str) -> Iterator[None]:
     """Tells all who listen that a kernel is being compiled, and, unless that fails, that it has been."""
-    listeners, started = tuple(_listeners), time.perf_counter()
-    for each in listeners:
-        each.under_way.append(name)
+    listeners, start = tuple(_listeners), time.perf_counter()
+    for listener in listeners:
+        listener.under_way.append(name)
     try:
         yield
-        for each in listeners:
-            each.done.append((name, time.perf_counter() - started))
+        for listener in listeners:
+            listener.done.append((name, time.perf_counter() - start))
     finally:
-        for each in listeners:
-            each.under_way.remove(name)
+        for listener in listeners:
+            listener.under_way.remove(name)

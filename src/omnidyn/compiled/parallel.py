@@ -27,19 +27,19 @@ def side_by_side(task: Callable[[T], R], items: Iterable[T]) -> list[R]:
 
     Raises what the first task raises that fails.
     """
-    every = list(items)
-    threads = min(os.cpu_count() or 1, MOST_THREADS, len(every))
+    tasks = list(items)
+    threads = min(os.cpu_count() or 1, MOST_THREADS, len(tasks))
     if threads < 2:
-        return [task(item) for item in every]
+        return [task(item) for item in tasks]
     with ThreadPoolExecutor(threads) as pool:
-        return list(pool.map(lambda item, context: context.run(task, item), every, [copy_context() for _ in every]))
+        return list(pool.map(lambda item, context: context.run(task, item), tasks, [copy_context() for _ in tasks]))
 
 
 def one_by_one(task: Callable[[T], R], items: Iterable[T]) -> Iterator[R]:
     """The same where results are large: no more of them are there at a time than processors."""
-    every, threads = list(items), min(os.cpu_count() or 1, MOST_THREADS)
-    for begin in range(0, len(every), threads):
-        yield from side_by_side(task, every[begin : begin + threads])
+    tasks, threads = list(items), min(os.cpu_count() or 1, MOST_THREADS)
+    for begin in range(0, len(tasks), threads):
+        yield from side_by_side(task, tasks[begin : begin + threads])
 
 
 _within: list[AbstractContextManager[object]] = []  # the one limit, once for each who is within `small_matrices`

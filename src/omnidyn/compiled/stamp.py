@@ -40,7 +40,7 @@ def stamp(function: Callable[..., Any]) -> str:
     code = function.__code__
     file = os.path.realpath(code.co_filename)
     digest = hashlib.sha256(f"{tools()} {code.co_qualname}:{code.co_firstlineno}\n".encode())
-    for name, content in sorted((each.removeprefix(PACKAGE), read(each)[0]) for each in reach(file)):
+    for name, content in sorted((path.removeprefix(PACKAGE), read(path)[0]) for path in reach(file)):
         digest.update(f"{name} {content}\n".encode())
     return digest.hexdigest()
 
@@ -56,13 +56,13 @@ def tools() -> str:
 def reach(file: str) -> frozenset[str]:
     """The file itself, and all files of the package that are carried out for it: its folders, what it imports."""
     module = file.removeprefix(PACKAGE).removesuffix(".py").replace(os.sep, ".") if file.startswith(PACKAGE) else ""
-    found = {file, *_passed(module)}
-    left = list(found)
-    while left:
-        new = read(left.pop())[1] - found
-        found |= new
-        left += new
-    return frozenset(found)
+    files = {file, *_passed(module)}
+    stack = list(files)
+    while stack:
+        new = read(stack.pop())[1] - files
+        files |= new
+        stack += new
+    return frozenset(files)
 
 
 @cache
@@ -76,16 +76,16 @@ def read(file: str) -> tuple[str, frozenset[str]]:
 def imported(text: str) -> frozenset[str]:
     """The files of the package that a source imports, folders passed through with their `__init__`."""
     text = TYPES_ONLY.sub("\n", text)
-    found: set[str] = set()
+    files: set[str] = set()
     for match in MENTIONED.finditer(text):
         before = text[text.rfind("\n", 0, match.start()) + 1 : match.start()].lstrip()
         if before not in IMPORTS and not before.endswith(DYNAMIC):
             continue
         module, names = match.groups()
-        found |= _passed(module)
+        files |= _passed(module)
         if names and os.path.isdir(_place(module)):
-            found = found.union(*(_passed(f"{module}.{name}") for name in re.findall(r"\w+", names)))
-    return frozenset(found)
+            files = files.union(*(_passed(f"{module}.{name}") for name in re.findall(r"\w+", names)))
+    return frozenset(files)
 
 
 @cache

@@ -37,7 +37,7 @@ class Remembered:
 
     def still_there(self) -> bool:
         """Whether its entries are the same to the last bit. Raises OSError where one is gone."""
-        return all(sha256(Path(file).read_bytes()) == known for file, known in self.files.items())
+        return all(sha256(Path(file).read_bytes()) == digest for file, digest in self.files.items())
 
 
 def remember(caches: Sequence[Entries], made_with: str) -> None:
@@ -45,28 +45,28 @@ def remember(caches: Sequence[Entries], made_with: str) -> None:
 
     made_with: `circumstances()` before they were imported; "" notes nothing.
     """
-    if not made_with or any(each.content(file) is None for each in caches for file in each.asked):
+    if not made_with or any(cache.content(file) is None for cache in caches for file in cache.asked):
         return
     with contextlib.suppress(OSError, RuntimeError, OmnidynError):
-        known = [
-            Remembered(each.stamp, each.cache_path, {str(file): sha256(file.read_bytes()) for file in each.asked})
-            for each in caches
+        kernels = [
+            Remembered(cache.stamp, cache.cache_path, {str(file): sha256(file.read_bytes()) for file in cache.asked})
+            for cache in caches
         ]
         file = place()
         file.parent.mkdir(parents=True, exist_ok=True)
-        content = {"made_with": made_with, "kernels": [asdict(each) for each in known]}
+        content = {"made_with": made_with, "kernels": [asdict(kernel) for kernel in kernels]}
         write_atomic(file, json.dumps(content), force=True)
 
 
 def recalled(made_with: str) -> list[Remembered]:
     """The kernels of the last `remember`; none where one of their entries, or what they were made with, is another."""
     try:
-        found: Any = json.loads(place().read_bytes())
-        kernels = [Remembered(**each) for each in found["kernels"]]
-        same = found["made_with"] == made_with and all(each.still_there() for each in kernels)
+        record: Any = json.loads(place().read_bytes())
+        kernels = [Remembered(**kernel) for kernel in record["kernels"]]
+        unchanged = record["made_with"] == made_with and all(kernel.still_there() for kernel in kernels)
     except (OSError, RuntimeError, ValueError, TypeError, LookupError, AttributeError):  # not there, or not ours
         return []
-    return kernels if same else []
+    return kernels if unchanged else []
 
 
 def place() -> Path:
@@ -80,7 +80,7 @@ def circumstances() -> str:
     cpu, switched_off = context.codegen().magic_tuple(), getattr(config, "DISABLE_JIT", None)
     digest = hashlib.sha256(f"{tools()} {switched_off} {cpu}\n".encode())
     try:
-        for file in sorted(each for each in Path(PACKAGE).rglob("*") if each.suffix in SOURCES):
+        for file in sorted(path for path in Path(PACKAGE).rglob("*") if path.suffix in SOURCES):
             digest.update(f"{file.relative_to(PACKAGE)} {sha256(file.read_bytes())}\n".encode())
     except OSError:
         return ""

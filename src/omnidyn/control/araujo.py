@@ -34,7 +34,7 @@ from omnidyn.model.frames import world_to_body
 from omnidyn.model.robot import Robot
 
 AHEAD, MOVES, HOME = 5, 3, 4.0  # steps predicted, moves, [1/s]
-ERROR, MOVE, LEAST, ALSO = 10.0, 0.1, 800.0, 1e-3  # square roots of Q and R, eps, weight of g
+ERROR, MOVE, LEAST_CONE_SIZE, SIZE_WEIGHT = 10.0, 0.1, 800.0, 1e-3  # square roots of Q and R, eps, weight of g
 MET = 1e-4  # [V] from a limit, as near as the solver comes
 
 
@@ -61,9 +61,9 @@ class Araujo(Guarded):
         super()._take(robot)
         if self.output == WHEEL_SPEED:
             raise UnsupportedError("araujo gives volts", got="a drive that takes speeds of wheels", remedy="take mpc")
-        known = numbers(robot, self.dt, friction=False)
-        decay, gain = (known.linear[0, at : at + 9].reshape(3, 3) for at in (DECAY, PHI))
-        self._free, self._moved = _predicted(decay, gain @ known.push)
+        model = numbers(robot, self.dt, friction=False)
+        decay, gain = (model.linear[0, at : at + 9].reshape(3, 3) for at in (DECAY, PHI))
+        self._free, self._moved = _predicted(decay, gain @ model.push)
         self._volts, self._wheels = volts(robot), robot.wheels.count
         self._problem = self._cones()
 
@@ -78,14 +78,14 @@ class Araujo(Guarded):
         motion = path.at(t + self.dt * np.arange(1, AHEAD + 2))
         off = motion.pose - pose
         off[:, 2] -= 2.0 * math.pi * np.round(off[0, 2] / (2.0 * math.pi))
-        wanted = (motion.velocity + self.home * off) @ world_to_body(np.asarray(pose[2])).T
+        reference = (motion.velocity + self.home * off) @ world_to_body(np.asarray(pose[2])).T
         change = np.zeros(3) if self._before is None else twist - self._before
         self._before = twist.copy()
-        gap = (self._free @ change).reshape(-1, 3) + twist - np.concatenate([wanted[:AHEAD], wanted[1:]])
-        found = self._solved(gap.ravel(), max(self._bound, LEAST)) or self._solved(gap.ravel(), math.inf)
-        if found is None:
+        gap = (self._free @ change).reshape(-1, 3) + twist - np.concatenate([reference[:AHEAD], reference[1:]])
+        solution = self._solved(gap.ravel(), max(self._bound, LEAST_CONE_SIZE)) or self._solved(gap.ravel(), math.inf)
+        if solution is None:
             raise ArithmeticError("no moves found")
-        moves, self._bound = found
+        moves, self._bound = solution
         self._sent_volts = np.clip(self._sent_volts + moves, -self._volts, self._volts)
         met = ("voltage",) if bool((np.abs(self._sent_volts) >= self._volts - MET).any()) else ()
         return self._sent(self._sent_volts), met
@@ -101,26 +101,26 @@ class Araujo(Guarded):
         steps = np.zeros((2 * n, size))
         steps[:n, :n], steps[n:, :n], steps[n:, n : 2 * n] = sums, first, sums
         rows = [below, steps, -steps]
-        for k, moved in enumerate(self._moved):
-            cone = np.zeros((2 + len(moved) + n, size))  # |(2 y, g - 1)| <= g + 1 is |y|^2 <= g
+        for k, response in enumerate(self._moved):
+            cone = np.zeros((2 + len(response) + n, size))  # |(2 y, g - 1)| <= g + 1 is |y|^2 <= g
             cone[[0, -1], 2 * n + k] = -1.0
-            cone[1 : 1 + len(moved), : 2 * n] = -2.0 * ERROR * moved
-            cone[1 + len(moved) : -1, k * n : (k + 1) * n] = -2.0 * MOVE * np.eye(n)
+            cone[1 : 1 + len(response), : 2 * n] = -2.0 * ERROR * response
+            cone[1 + len(response) : -1, k * n : (k + 1) * n] = -2.0 * MOVE * np.eye(n)
             rows.append(cone)
         cones = [self._solver.NonnegativeConeT(3 + 4 * n)]
         cones += [self._solver.SecondOrderConeT(len(cone)) for cone in rows[3:]]
         cost = np.zeros(size)
-        cost[-2:] = ALSO, 1.0
+        cost[-2:] = SIZE_WEIGHT, 1.0
         return sparse.csc_matrix((size, size)), cost, sparse.csc_matrix(np.concatenate(rows)), cones
 
-    def _solved(self, gap: FloatArray, most: float) -> tuple[FloatArray, float] | None:
+    def _solved(self, gap: FloatArray, bound: float) -> tuple[FloatArray, float] | None:
         """(first move [V], g) for the errors there would be without it; None where the cones have nothing in common."""
         n, half = MOVES * self._wheels, len(gap) // 2
         up = np.tile(self._volts - self._sent_volts, 2 * MOVES)
         down = np.tile(self._volts + self._sent_volts, 2 * MOVES)
-        sides = [np.array([0.0, -LEAST, min(most, 1e9)]), up, down]
-        for own in (gap[:half], gap[half:]):
-            sides += [np.ones(1), 2.0 * ERROR * own, np.zeros(n), -np.ones(1)]
+        sides = [np.array([0.0, -LEAST_CONE_SIZE, min(bound, 1e9)]), up, down]
+        for errors in (gap[:half], gap[half:]):
+            sides += [np.ones(1), 2.0 * ERROR * errors, np.zeros(n), -np.ones(1)]
         hessian, cost, matrix, cones = self._problem
         solution = self._solver.DefaultSolver(hessian, cost, matrix, np.concatenate(sides), cones, self._how).solve()
         z = np.asarray(solution.x)

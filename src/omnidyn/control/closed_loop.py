@@ -63,8 +63,8 @@ class Circumstances:
 
     def steps(self, path: Path) -> int:
         """How many steps it takes. Raises InputError for a path of too many."""
-        wanted = path.duration if self.duration is None else self.duration
-        count = max(1, round(wanted / self.dt))
+        duration = path.duration if self.duration is None else self.duration
+        count = max(1, round(duration / self.dt))
         if count > MOST_STEPS:
             raise InputError("too many steps", got=count, expected=f"at most {MOST_STEPS}", remedy="set a `duration`")
         return count
@@ -87,17 +87,27 @@ def track(
 ) -> Tracking:
     """Drive a simulated robot along a path with a controller, and see how near it comes.
 
-    robot: that the controller believes to drive. path: a Path, or what `path` takes. controller: a Controller, or the
-    name of one ("feedforward", "speed", "pid", ..), or a controller file, by path or as read. plant: the robot that is
-    driven in truth; the same by default. It starts on the path, at rest.
-    dt: time between two steps [s]. duration: that is tracked [s]; that of the path by default. skip: errors before it
-    count for nothing [s]: the start from rest is no error of tracking.
-    noise: std of the measured speeds [m/s]; on omega 4 times as many rad/s, on x and y 0.2 s, on the heading 0.4 s
-    times as much. seed: of the noise. delay: steps until an output acts; a controller that can take it into account is
-    told, and the loop begins as many steps before the path does: a path is known ahead, and who waits where it begins
-    can be in motion on time. push: a constant wrench on the body [N, N, N m] that no model knows. supply: behind a duty
-    [V].
-    Returns a Tracking. Raises InputError for what cannot be driven, or a number out of range.
+    The robot starts on the path, at rest. A controller that can take a delay into account is told of it, and the loop
+    begins as many steps before the path does: a path is known ahead, and who waits where it begins can be in motion on
+    time.
+
+    Args:
+        robot: That the controller believes to drive.
+        path: A Path, or what `path` takes.
+        controller: A Controller, or the name of one ("feedforward", "speed", "pid", ..), or a controller file, by path
+            or as read.
+        plant: The robot that is driven in truth; the same by default.
+        dt: Time between two steps [s].
+        duration: That is tracked [s]; that of the path by default.
+        skip: Errors before it count for nothing [s]: the start from rest is no error of tracking.
+        noise: Std of the measured speeds [m/s]; on omega 4 times as many rad/s, on x and y 0.2 s, on the heading 0.4 s
+            times as much.
+        delay: Steps until an output acts.
+        seed: Of the noise.
+        push: A constant wrench on the body [N, N, N m] that no model knows.
+        supply: Behind a duty [V].
+
+    Raises InputError for what cannot be driven, or a number out of range.
     """
     check_order("track(robot, path, controller)", (robot, Robot), (path, (Path, Run, str)), (controller, object))
     if not 0 <= delay <= MOST_DELAY or delay != int(delay):
@@ -136,15 +146,15 @@ def tracked(plant: Robot, path: Path, controller: Controller, around: Circumstan
     draws = np.random.default_rng(around.seed).standard_normal((count + early, 6)) * (around.noise * NOISE)
     sent, volts, state = np.empty((count, n)), np.empty((count, n)), np.empty((count + 1, 6 + n))
     for k in range(-early, 0):  # it waits where the path begins; what is sent now acts when it does
-        seen = np.array([*live.pose, *live.twist]) + draws[k]
-        live.step(controller.step(k * dt, seen[:3], seen[3:], path))
+        measured = np.array([*live.pose, *live.twist]) + draws[k]
+        live.step(controller.step(k * dt, measured[:3], measured[3:], path))
     state[0] = *live.pose, *live.twist, *live.wheel_speed
     took, words = np.empty(count), dict[str, int]()
     for k in range(count):
-        seen = state[k, :6] + draws[k]
-        begun = time.perf_counter()
-        sent[k] = controller.step(float(t[k]), seen[:3], seen[3:], path)
-        took[k] = time.perf_counter() - begun
+        measured = state[k, :6] + draws[k]
+        start = time.perf_counter()
+        sent[k] = controller.step(float(t[k]), measured[:3], measured[3:], path)
+        took[k] = time.perf_counter() - start
         live.step(sent[k])
         volts[k] = live.voltage
         state[k + 1] = *live.pose, *live.twist, *live.wheel_speed

@@ -37,11 +37,11 @@ from omnidyn.model.surroundings import refuse_slope
 from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.slip.plant import grips
 
-OK, WAITING, ENDED = "ok", "no step yet", "path ended: holding its last pose"
-BAD_TIME, BACKWARDS, STILL = "time is no finite number", "time went backwards", "time stands still"
+OK, WAITING, PATH_ENDED = "ok", "no step yet", "path ended: holding its last pose"
+BAD_TIME, BACKWARDS, TIME_STANDS_STILL = "time is no finite number", "time went backwards", "time stands still"
 BAD_POSE, BAD_TWIST, BAD_COMMAND = "pose missing", "twist missing", "command missing"
 BAD_PATH, FAILED = "no path", "no output found"
-FARTHEST = 1e9  # of any number of a state: what is beyond is no place, and no speed
+LARGEST_STATE = 1e9  # of any number of a state: what is beyond is no place, and no speed
 VOLTAGE, WHEEL_SPEED = "voltage", "wheel_speed"
 
 
@@ -63,7 +63,7 @@ class Info:
     @property
     def ok(self) -> bool:
         """Whether the output is what the controller wanted to send, a path at its end included."""
-        return self.status in (OK, ENDED)
+        return self.status in (OK, PATH_ENDED)
 
 
 class Followed(Protocol):
@@ -151,14 +151,14 @@ class Safe:
 
     def replace(self, *, robot: Robot) -> Self:
         """The same controller, its memory included, for another robot."""
-        other = copy(self)
+        clone = copy(self)
         for key, value in vars(self).items():
             if isinstance(value, np.ndarray):  # changed in place, some of them
-                setattr(other, key, value.copy())
-        other._take(robot)
-        if len(other._last) != robot.wheels.count:
-            other.reset()
-        return other
+                setattr(clone, key, value.copy())
+        clone._take(robot)
+        if len(clone._last) != robot.wheels.count:
+            clone.reset()
+        return clone
 
     def _guarded(
         self, t: Any, word: str, status: str, output: Callable[[float], tuple[FloatArray, tuple[str, ...]]] | None
@@ -167,38 +167,38 @@ class Safe:
 
         word: what is wrong already; status: where all goes well; output: from the time since the last step.
         """
-        begun, now, before = time.perf_counter(), _number(t), self._t
+        start, now, before = time.perf_counter(), _number(t), self._t
         if not math.isfinite(now):
-            return self._safe(BAD_TIME, begun)
+            return self._safe(BAD_TIME, start)
         dt = 0.0 if before is None else now - before
         self._t = now
         if before is not None and dt <= 0.0:
             if dt < 0.0:
                 self._forget()
-                return self._safe(BACKWARDS, begun)
-            self.info = Info(STILL, time=time.perf_counter() - begun)
+                return self._safe(BACKWARDS, start)
+            self.info = Info(TIME_STANDS_STILL, time=time.perf_counter() - start)
             return self._last.copy()
         if word or output is None:
-            return self._safe(word, begun)
+            return self._safe(word, start)
         try:
-            wanted, limits = output(dt)
-            sent = np.clip(wanted, -self.limit, self.limit)
+            demand, limits = output(dt)
+            sent = np.clip(demand, -self.limit, self.limit)
             fine = sent.shape == self.limit.shape and bool(np.isfinite(sent).all())
         except Exception as raised:  # the loop of a robot must not end here, but where a user ends it
             error = told_by(raised)
             if isinstance(error, INTERRUPTS):
                 raise error from raised
-            return self._safe(f"{FAILED}: {type(raised).__name__}", begun)
+            return self._safe(f"{FAILED}: {type(raised).__name__}", start)
         if not fine:
-            return self._safe(FAILED, begun)
+            return self._safe(FAILED, start)
         self._last = sent
-        self.info = Info(status, time=time.perf_counter() - begun, limits=limits)
+        self.info = Info(status, time=time.perf_counter() - start, limits=limits)
         return sent.copy()
 
-    def _safe(self, word: str, begun: float) -> FloatArray:
+    def _safe(self, word: str, start: float) -> FloatArray:
         """Zeros, and why."""
         self._last = self._zeros.copy()
-        self.info = Info(word, time=time.perf_counter() - begun)
+        self.info = Info(word, time=time.perf_counter() - start)
         return self._last.copy()
 
     def _forget(self) -> None:
@@ -222,7 +222,7 @@ class Guarded(Safe, ABC):
             return self._guarded(t, BAD_POSE if place is None else BAD_TWIST, "", None)
         if not callable(getattr(path, "at", None)):
             return self._guarded(t, BAD_PATH, "", None)
-        status = ENDED if _ended(path, t) else OK
+        status = PATH_ENDED if _ended(path, t) else OK
         return self._guarded(t, "", status, lambda dt: self._output(float(t), dt, place, speed, path))
 
     @abstractmethod
@@ -248,8 +248,8 @@ def output_limit(robot: Robot) -> FloatArray:
 
 def supply_of(robot: Robot, supply: float | None = None) -> float:
     """The volts that a duty of 1 is: as given, as in the file, else the least voltage limit of its motors [V]."""
-    known = supply if supply is not None else robot.drive.supply
-    return float(known if known is not None else np.min(robot.motor.voltage_limit))
+    volts = supply if supply is not None else robot.drive.supply
+    return float(volts if volts is not None else np.min(robot.motor.voltage_limit))
 
 
 def _number(value: Any) -> float:
@@ -274,16 +274,20 @@ def vector(value: Any) -> FloatArray | None:
         array = np.asarray(value, dtype=float)
         if array.shape != (3,):
             return None
-        one, two, three = array.tolist()
+        first, second, third = array.tolist()
     except Exception:  # whatever stands in place of a state, it is none
         return None
-    sane = -FARTHEST <= one <= FARTHEST and -FARTHEST <= two <= FARTHEST and -FARTHEST <= three <= FARTHEST
+    sane = (
+        -LARGEST_STATE <= first <= LARGEST_STATE
+        and -LARGEST_STATE <= second <= LARGEST_STATE
+        and -LARGEST_STATE <= third <= LARGEST_STATE
+    )
     return array if sane else None
 
 
 # What controllers believe of a robot whose wheels may slip: wheels that roll, and currents that keep them rolling
 
-LEAST = 1e-6  # [A] of the motor of a wheel that carries nothing
+LEAST_AMPERES = 1e-6  # [A] of the motor of a wheel that carries nothing
 
 
 def without_slip(robot: Robot) -> Robot:
@@ -296,8 +300,8 @@ def without_slip(robot: Robot) -> Robot:
         return robot
     motor, count = robot.motor, robot.wheels.count
     push = per_wheel(motor.gear_ratio, count) * per_wheel(motor.torque_constant, count) / robot.wheels.radii  # [N/A]
-    own = per_wheel(np.inf if motor.current_limit is None else motor.current_limit, count)
-    limit = np.clip(grips(robot) / push, LEAST, own)
+    motor_limit = per_wheel(np.inf if motor.current_limit is None else motor.current_limit, count)
+    limit = np.clip(grips(robot) / push, LEAST_AMPERES, motor_limit)
     return robot.replace(
         wheels=robot.wheels.replace(traction_mu=None), motor=motor.replace(current_limit=tuple(limit.tolist()))
     )

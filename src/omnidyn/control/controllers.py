@@ -39,7 +39,7 @@ NAMES = {
     "mpc": "omnidyn.control.mpc.controller:Mpc",
 }
 # The same, for comparison alone: each needs a package of its own.
-BESIDE = {"araujo": "omnidyn.control.araujo:Araujo"}
+UNLISTED_NAMES = {"araujo": "omnidyn.control.araujo:Araujo"}
 OF_THE_CALL = ("dt", "supply", "delay")  # what the loop says, not the file
 SETTINGS = "settings"  # an argument of some controllers: a value type, whose fields are options here
 LONGEST_LIST = 16
@@ -58,53 +58,62 @@ class ControllerFile:
 
     def make(self, robot: Robot, **options: Any) -> Controller:
         """The controller for a robot; what it does not know of the options is left out."""
-        kind, known = controller_class(self.controller), options_of(self.controller)
-        every = {**{key: value for key, value in options.items() if key in known}, **self.options}
-        kept = settings_of(kind)
-        if kept is None:
-            return kind(robot, **every)
-        own = {each.name: every.pop(each.name) for each in fields(kept) if each.name in every}
-        return kind(robot, settings=kept(**{key: _tuple(value) for key, value in own.items()}), **every)
+        kind, names = controller_class(self.controller), options_of(self.controller)
+        arguments = {**{key: value for key, value in options.items() if key in names}, **self.options}
+        settings_type = settings_of(kind)
+        if settings_type is None:
+            return kind(robot, **arguments)
+        settings = {spec.name: arguments.pop(spec.name) for spec in fields(settings_type) if spec.name in arguments}
+        return kind(
+            robot, settings=settings_type(**{key: _tuple(value) for key, value in settings.items()}), **arguments
+        )
 
     def to_toml(self) -> str:
         """The text of its file."""
         head = {"schema": SCHEMA, "controller": self.controller, "source": self.source}
-        lines = [[f"{key} = {toml_literal(value)}" for key, value in each.items()] for each in (head, self.options)]
+        lines = [[f"{key} = {toml_literal(value)}" for key, value in table.items()] for table in (head, self.options)]
         return "\n".join([*lines[0], "", "[options]", *lines[1], ""])
 
 
 def controller_class(name: str) -> type[Any]:
     """The class of a controller. Raises InputError for a name that none has."""
-    every = NAMES | BESIDE
-    if name not in every:
-        near = difflib.get_close_matches(name, every, 1)
+    places = NAMES | UNLISTED_NAMES
+    if name not in places:
+        matches = difflib.get_close_matches(name, places, 1)
         raise InputError(
             "unknown controller",
             got=name,
-            expected=f"{', '.join(every)}, or a controller file (.toml)",
-            remedy=f"did you mean {near[0]}?" if near else "",
+            expected=f"{', '.join(places)}, or a controller file (.toml)",
+            remedy=f"did you mean {matches[0]}?" if matches else "",
             where="controller",
         )
-    module, _, own = every[name].partition(":")
-    return getattr(importlib.import_module(module), own)
+    module, _, class_name = places[name].partition(":")
+    return getattr(importlib.import_module(module), class_name)
 
 
 def options_of(name: str) -> dict[str, Any]:
     """What a controller can be told beside its robot -> what it is by default; the fields of its settings too."""
     kind = controller_class(name)
     parameters = inspect.signature(kind.__init__).parameters.values()
-    known = {each.name: each.default for each in parameters if each.kind == inspect.Parameter.KEYWORD_ONLY}
-    kept = settings_of(kind)
-    if kept is not None:
-        known |= {each.name: each.default for each in fields(kept)}
-        del known[SETTINGS]
-    return known
+    defaults = {
+        parameter.name: parameter.default
+        for parameter in parameters
+        if parameter.kind == inspect.Parameter.KEYWORD_ONLY
+    }
+    settings_type = settings_of(kind)
+    if settings_type is not None:
+        defaults |= {spec.name: spec.default for spec in fields(settings_type)}
+        del defaults[SETTINGS]
+    return defaults
 
 
 def settings_of(kind: type[Any]) -> type[Any] | None:
     """The value type that a controller takes as `settings`, where it does."""
     hint = get_type_hints(kind.__init__).get(SETTINGS)
-    return next((each for each in (hint, *get_args(hint)) if isinstance(each, type) and is_dataclass(each)), None)
+    return next(
+        (candidate for candidate in (hint, *get_args(hint)) if isinstance(candidate, type) and is_dataclass(candidate)),
+        None,
+    )
 
 
 def _tuple(value: Any) -> Any:
@@ -113,10 +122,10 @@ def _tuple(value: Any) -> Any:
 
 def check_options(name: str, options: Mapping[str, Any]) -> None:
     """Raises InputError for an option that the controller does not have, or a value of another kind."""
-    known = [key for key in options_of(name) if key not in OF_THE_CALL]
+    names = [key for key in options_of(name) if key not in OF_THE_CALL]
     for key, value in options.items():
-        if key not in known:
-            raise unknown_option(name, key, known, f"options.{key}")
+        if key not in names:
+            raise unknown_option(name, key, names, f"options.{key}")
         if not _plain(value):
             raise InputError(
                 "not a value of an option",
@@ -129,7 +138,7 @@ def check_options(name: str, options: Mapping[str, Any]) -> None:
 def _plain(value: Any) -> bool:
     """Whether a value is a flag, a word, a finite number, or a short list of such."""
     if isinstance(value, list | tuple):
-        return len(value) <= LONGEST_LIST and all(_plain(each) and not isinstance(each, list | tuple) for each in value)
+        return len(value) <= LONGEST_LIST and all(_plain(item) and not isinstance(item, list | tuple) for item in value)
     return isinstance(value, bool | str) or (isinstance(value, int | float) and math.isfinite(value))
 
 
@@ -156,8 +165,8 @@ def several(
     name are told apart by a number. Raises InputError where an option given is none of any of them.
     """
     specs = [_spec(name, no_friction, no_observer) for name in names]
-    wanted = [*(key for key in options if key not in OF_THE_CALL), *(["observer"] if no_observer else [])]
-    for key in wanted:
+    keys = [*(key for key in options if key not in OF_THE_CALL), *(["observer"] if no_observer else [])]
+    for key in keys:
         if not any(key in options_of(spec.controller) for spec in specs):
             raise InputError(
                 "none of these controllers has that",
@@ -165,12 +174,12 @@ def several(
                 expected=f"one with the option {key}",
                 where=f"no_{key}" if key == "observer" else key,
             )
-    made = [spec.make(robot, **options) for spec in specs]
-    for k, each in enumerate(made):
-        before = sum(other.name.partition(" ")[0] == each.name for other in made[:k])
+    controllers = [spec.make(robot, **options) for spec in specs]
+    for k, controller in enumerate(controllers):
+        before = sum(earlier.name.partition(" ")[0] == controller.name for earlier in controllers[:k])
         if before:
-            each.name = f"{each.name} {before + 1}"  # pyright: ignore[reportAttributeAccessIssue]
-    return made
+            controller.name = f"{controller.name} {before + 1}"  # pyright: ignore[reportAttributeAccessIssue]
+    return controllers
 
 
 def _spec(text: str, no_friction: bool, no_observer: bool) -> ControllerFile:
@@ -184,28 +193,31 @@ def _spec(text: str, no_friction: bool, no_observer: bool) -> ControllerFile:
         without |= {"friction", "observer"}
     if no_observer:
         without.add("observer")
-    known = options_of(spec.controller)
-    return replace(spec, options={**spec.options, **{key: False for key in sorted(without) if key in known}})
+    names = options_of(spec.controller)
+    return replace(spec, options={**spec.options, **{key: False for key in sorted(without) if key in names}})
 
 
 def load_controller(path: str | os.PathLike) -> ControllerFile:
     """Read a controller file. Raises InputError, which names the nearest key for one that is unknown."""
-    where = os.fspath(path)
-    table = parse_toml(read_text(path), where)
-    known = ("schema", "controller", "source", "options")
+    file_name = os.fspath(path)
+    table = parse_toml(read_text(path), file_name)
+    keys = ("schema", "controller", "source", "options")
     for key in table:
-        if key not in known:
-            near = difflib.get_close_matches(key, known, 1, 0.4)
+        if key not in keys:
+            matches = difflib.get_close_matches(key, keys, 1, 0.4)
             raise InputError(
                 "unknown key",
                 got=key,
-                expected=", ".join(known),
-                remedy=f"did you mean {near[0]}?" if near else "",
-                where=where,
+                expected=", ".join(keys),
+                remedy=f"did you mean {matches[0]}?" if matches else "",
+                where=file_name,
             )
     if table.get("schema") != SCHEMA:
         raise InputError(
-            "not a controller file", got=f"schema = {table.get('schema')}", expected=f"schema = {SCHEMA}", where=where
+            "not a controller file",
+            got=f"schema = {table.get('schema')}",
+            expected=f"schema = {SCHEMA}",
+            where=file_name,
         )
     name, options, source = table.get("controller"), table.get("options", {}), table.get("source", "")
     if not isinstance(name, str) or not isinstance(options, dict) or not isinstance(source, str):
@@ -213,12 +225,12 @@ def load_controller(path: str | os.PathLike) -> ControllerFile:
             "not a controller file",
             got="controller, options or source of another kind",
             expected='controller = "name", source = "words", and a table [options]',
-            where=where,
+            where=file_name,
         )
     try:
         return ControllerFile(name, options, source)
     except InputError as error:
-        raise error.at(where) from None
+        raise error.at(file_name) from None
 
 
 def save_controller(spec: ControllerFile, path: str | os.PathLike, force: bool = False) -> Path:

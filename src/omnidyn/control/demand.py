@@ -19,7 +19,7 @@ from omnidyn.model.inverse import inverse
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 from omnidyn.run import Run
-from omnidyn.shown import Shown
+from omnidyn.shown import Displayable
 from omnidyn.statement import NOTE, WARNING, Statement, as_verdict
 
 SAMPLES = 4001  # times at which a path is asked
@@ -28,7 +28,7 @@ CORNER = 3.0  # times what the acceleration beside it makes of a sample: more is
 
 
 @dataclass(frozen=True, eq=False)
-class Demand(Shown):
+class Demand(Displayable):
     """What a path asks of a robot.
 
     robot, path: names. speed [m/s], turn [rad/s], acceleration [m/s^2], turn_acceleration [rad/s^2]: the largest.
@@ -71,11 +71,11 @@ class Demand(Shown):
     def statements(self) -> list[Statement]:
         """What it asks for."""
         names = ("speed", "acceleration", "turn", "turn_acceleration")
-        found = [Statement("path_asks_for", NOTE, self.path, {name: getattr(self, name) for name in names})]
+        statements = [Statement("path_asks_for", NOTE, self.path, {name: getattr(self, name) for name in names})]
         if self.corners:
             jumps = {name: getattr(self, name) for name in ("corners", "jump", "turn_jump")}
-            found.append(Statement("speed_jumps", NOTE, numbers=jumps))
-        return found
+            statements.append(Statement("speed_jumps", NOTE, numbers=jumps))
+        return statements
 
     def document(self) -> Document:
         """What it says."""
@@ -101,12 +101,12 @@ def path_demand(robot: Robot, path: Path | Run | str) -> Demand:
     effort = effort_for(inverse(rolls), twist, change)
     count, motor = robot.wheels.count, rolls.motor
     limit = per_wheel(motor.voltage_limit, count)
-    most = per_wheel(np.inf if motor.current_limit is None else motor.current_limit, count)
-    own = per_wheel(np.inf if robot.motor.current_limit is None else robot.motor.current_limit, count)
+    limit_amperes = per_wheel(np.inf if motor.current_limit is None else motor.current_limit, count)
+    motor_amperes = per_wheel(np.inf if robot.motor.current_limit is None else robot.motor.current_limit, count)
     volts, amperes = np.abs(effort.voltage), np.abs(effort.current)
-    beyond = (volts > limit * (1.0 + 1e-9)).any(axis=1) | (amperes > most * (1.0 + 1e-9)).any(axis=1)
+    beyond = (volts > limit * (1.0 + 1e-9)).any(axis=1) | (amperes > limit_amperes * (1.0 + 1e-9)).any(axis=1)
     worst = int(np.argmax(volts.max(axis=0) / limit))
-    hottest = int(np.argmax(amperes.max(axis=0) / (most if np.isfinite(most).all() else 1.0)))
+    hottest = int(np.argmax(amperes.max(axis=0) / (limit_amperes if np.isfinite(limit_amperes).all() else 1.0)))
     corners, jump, turn_jump = _corners(t, follow.at(t).velocity, follow.at(t).acceleration)
     return Demand(
         robot.name,
@@ -118,8 +118,8 @@ def path_demand(robot: Robot, path: Path | Run | str) -> Demand:
         float(volts[:, worst].max()),
         float(limit[worst]),
         float(amperes[:, hottest].max()),
-        None if motor.current_limit is None else float(most[hottest]),
-        bool(most[hottest] < own[hottest]),
+        None if motor.current_limit is None else float(limit_amperes[hottest]),
+        bool(limit_amperes[hottest] < motor_amperes[hottest]),
         float(beyond.mean()),
         corners,
         jump,

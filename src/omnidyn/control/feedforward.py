@@ -29,7 +29,7 @@ from omnidyn.model.wheels import per_wheel, wheel_speed
 DT = 0.02  # [s] between two steps, where nobody says
 FADE = 0.25  # on paths and floors beside, errors no longer fall below it, while voltages grow restless
 MOST_DELAY = 100  # [steps]
-SHORTEST, LONGEST = 1e-5, 10.0  # [s] that may lie between two steps
+SHORTEST_STEP, LONGEST_STEP = 1e-5, 10.0  # [s] that may lie between two steps
 
 
 def voltage_for(robot: Robot, twist: ArrayLike, acceleration: ArrayLike) -> FloatArray:
@@ -60,7 +60,7 @@ def _vectors(name: str, value: ArrayLike) -> FloatArray:
     return array
 
 
-class Held(NamedTuple):
+class StepMatrices(NamedTuple):
     """A sliding robot over one held step: nu' = A nu + alpha. A [1/s], decay A_d, gain Phi [s], shapes (3, 3)."""
 
     A: FloatArray
@@ -74,13 +74,13 @@ class Held(NamedTuple):
         return -np.diag(self.A).copy()
 
 
-def held(model: Inverse, dt: float) -> Held:
+def step_matrices(model: Inverse, dt: float) -> StepMatrices:
     """What a step of dt [s] does, viscous friction of every shape included."""
-    own = model.levels
-    viscous = (own.directions.T * own.viscous) @ own.directions
+    levels = model.levels
+    viscous = (levels.directions.T * levels.viscous) @ levels.directions
     matrix = per_mass(model.robot, motor_wrench(model.robot).braking - viscous).T
-    both = np.asarray(expm(np.block([[matrix, np.eye(3)], [np.zeros((3, 6))]]) * dt), dtype=float)
-    return Held(matrix, both[:3, :3], both[:3, 3:], np.asarray(np.linalg.inv(both[:3, 3:]), dtype=float))
+    block = np.asarray(expm(np.block([[matrix, np.eye(3)], [np.zeros((3, 6))]]) * dt), dtype=float)
+    return StepMatrices(matrix, block[:3, :3], block[:3, 3:], np.asarray(np.linalg.inv(block[:3, 3:]), dtype=float))
 
 
 class Volts:
@@ -92,10 +92,10 @@ class Volts:
     def __init__(self, robot: Robot, dt: float, friction: bool = True) -> None:
         model = inverse(robot)
         if not friction:
-            none = {name: 0.0 * getattr(model.levels, name) for name in model.levels._fields[2:]}
-            model = Inverse(robot, model.mass, model.levels._replace(**none), model.per_ampere, model.share)
+            zeros = {name: 0.0 * getattr(model.levels, name) for name in model.levels._fields[2:]}
+            model = Inverse(robot, model.mass, model.levels._replace(**zeros), model.per_ampere, model.share)
         self.model, self.dt = model, dt
-        self.held = held(model, dt)
+        self.held = step_matrices(model, dt)
         self.fade = _fade(model, dt)
         count, limit = robot.wheels.count, robot.motor.current_limit
         self.limit = per_wheel(robot.motor.voltage_limit, count)
@@ -103,8 +103,8 @@ class Volts:
 
     def change(self, now: FloatArray, then: FloatArray) -> FloatArray:
         """The acceleration at the start of a step that takes the twist from now to then. Shape (3,)."""
-        held = self.held
-        return held.back @ (then - held.decay @ now) + held.A @ now
+        step = self.held
+        return step.back @ (then - step.decay @ now) + step.A @ now
 
     def exactly(self, now: FloatArray, then: FloatArray) -> Effort:
         """What takes the twist from now to then, friction as the model has it; from rest, what breaks it loose."""
@@ -129,8 +129,8 @@ class Volts:
 
     def _viscous(self, off: FloatArray) -> FloatArray:
         """Viscous friction of the difference of two twists."""
-        own = self.model.levels
-        return -(own.viscous * (own.directions @ off)) @ own.directions
+        levels = self.model.levels
+        return -(levels.viscous * (levels.directions @ off)) @ levels.directions
 
     def within(self, effort: Effort, together: bool = False) -> tuple[FloatArray, tuple[str, ...]]:
         """The volts within the limit of each motor, and the limits met.
@@ -155,16 +155,16 @@ def _fade(model: Inverse, dt: float) -> FloatArray:
     to and fro with every bit of noise. Where nothing rubs, 1.
     """
     force = -model.friction(np.eye(3), np.zeros((3, 3)))[range(3), range(3)]
-    own = model.levels
-    dry = force - ((own.directions**2).T @ own.viscous)
+    levels = model.levels
+    dry = force - ((levels.directions**2).T @ levels.viscous)
     fade = FADE * dry / np.diag(model.mass) * dt
     return np.where(fade > 1e-12, fade, 1.0)
 
 
 def check_dt(dt: float) -> float:
     """The time between two steps [s]. Raises InputError outside 1e-5..10 s."""
-    if not isinstance(dt, int | float) or not SHORTEST <= dt <= LONGEST:
-        raise InputError("step out of range", got=dt, expected=f"{SHORTEST:g} to {LONGEST:g} s", where="dt")
+    if not isinstance(dt, int | float) or not SHORTEST_STEP <= dt <= LONGEST_STEP:
+        raise InputError("step out of range", got=dt, expected=f"{SHORTEST_STEP:g} to {LONGEST_STEP:g} s", where="dt")
     return float(dt)
 
 

@@ -20,10 +20,10 @@ PATH, SECONDS = "circle", 0.2  # [s]
 
 def first_runs() -> list[tuple[str, Callable[[], object]]]:
     """(what it stands for, how to make it), in the order in which they are wanted. Compiled, each takes below 1 s."""
-    paper, other = load_robot("axebot"), load_robot("mecanum")
+    paper, mecanum = load_robot("axebot"), load_robot("mecanum")
     return [
         ("predictive controller", partial(_tracked, paper)),
-        ("predictive controller, any friction", partial(_tracked, other)),
+        ("predictive controller, any friction", partial(_tracked, mecanum)),
         ("predictive controllers of many robots", partial(_many, paper)),
     ]
 

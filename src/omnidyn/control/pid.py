@@ -90,8 +90,8 @@ class Pid(Guarded):
         aim = self.aim(off, pose[2], twist, motion.velocity)
         if self.output == WHEEL_SPEED:
             return wheel_speed(self.robot.wheels, aim.way), ()
-        more = self._sum + off * min(dt, MOST_STEPS * self.dt)
-        for total in (more, self._sum):  # at a limit, nothing is added to the sum
+        raised_sum = self._sum + off * min(dt, MOST_STEPS * self.dt)
+        for total in (raised_sum, self._sum):  # at a limit, nothing is added to the sum
             sent, met = self.volts.within(self.effort(aim, total))
             if not met and np.isfinite(sent).all():
                 self._sum = total
@@ -104,9 +104,9 @@ class Pid(Guarded):
         velocity: of the path in the world now, when the output acts, and a step later. Shape (3, 3).
         """
         turned = world_to_body(heading + np.array([0.0, 1.0]) * self.dt * velocity[1, 2])
-        here, now, then = turned[0] @ off, turned[0] @ velocity[1], turned[1] @ velocity[2]
-        back = self.gains.speed * (turned[0] @ velocity[0] - twist) + self.gains.place * here
-        change, way = self.volts.change(now, then), 0.5 * (now + then) + self._home * here
+        error, now, then = turned[0] @ off, turned[0] @ velocity[1], turned[1] @ velocity[2]
+        back = self.gains.speed * (turned[0] @ velocity[0] - twist) + self.gains.place * error
+        change, way = self.volts.change(now, then), 0.5 * (now + then) + self._home * error
         if not self.feedforward:
             now, change = 0.0 * now, 0.0 * change
         return Aim(turned[0], now, change + back, way)

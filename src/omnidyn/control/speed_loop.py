@@ -26,7 +26,7 @@ MOST_STEPS = 5.0  # no error counts for longer: a loop that stood still has not 
 SETTLED = 0.2  # of the speed below which friction fades: so near, the command is reached
 
 
-class _Loop(Safe):
+class _VelocityLoop(Safe):
     """What both loops share: a reference for the twist, the inverse model in front, PI behind."""
 
     name = "speed"
@@ -62,8 +62,8 @@ class _Loop(Safe):
         """The output that takes the reference from now to then, the twist being what it is."""
         if self.output == WHEEL_SPEED:  # a loop in the firmware does the rest
             return wheel_speed(self.robot.wheels, then), ()
-        more = self._sum + (now - twist) * min(dt, MOST_STEPS * self.dt)
-        for total in (more, self._sum):  # at a limit, nothing is added to the sum
+        raised_sum = self._sum + (now - twist) * min(dt, MOST_STEPS * self.dt)
+        for total in (raised_sum, self._sum):  # at a limit, nothing is added to the sum
             sent, met = self.volts.within(self.effort(twist, now, then, total), together=True)
             if not met and np.isfinite(sent).all():
                 self._sum = total
@@ -72,11 +72,11 @@ class _Loop(Safe):
 
     def effort(self, twist: FloatArray, now: FloatArray, then: FloatArray, total: FloatArray) -> Effort:
         """What takes the reference from now to then, with a sum of errors [m, m, rad]. Shape (3,) -> (wheels,)."""
-        wanted = self.volts.change(now, then) + self.gains.speed * (now - twist) + self.gains.sum * total
-        return self.volts.softly(now, wanted, 0.5 * (now + then))
+        acceleration = self.volts.change(now, then) + self.gains.speed * (now - twist) + self.gains.sum * total
+        return self.volts.softly(now, acceleration, 0.5 * (now + then))
 
 
-class SpeedLoop(_Loop):
+class SpeedLoop(_VelocityLoop):
     """Follows commanded twists: `step(t, twist, command)`, as often as the robot measures its twist.
 
     dt [s]: between two steps. faster: how many times as fast as the robot by itself the loop settles. friction: whether
@@ -90,10 +90,10 @@ class SpeedLoop(_Loop):
 
         twist: measured, command: wanted, both (v_x, v_y, omega) in the body frame [m/s, m/s, rad/s].
         """
-        speed, wanted = vector(twist), vector(command)
-        if speed is None or wanted is None:
+        speed, set_point = vector(twist), vector(command)
+        if speed is None or set_point is None:
             return self._guarded(t, BAD_TWIST if speed is None else BAD_COMMAND, "", None)
-        return self._guarded(t, "", OK, lambda dt: self._follow(dt, speed, wanted))
+        return self._guarded(t, "", OK, lambda dt: self._follow(dt, speed, set_point))
 
     def _follow(self, dt: float, twist: FloatArray, command: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
         now = twist if self._reference is None else self._reference
@@ -103,7 +103,7 @@ class SpeedLoop(_Loop):
         return self._drive(dt, twist, now, then)
 
 
-class SpeedController(_Loop, Guarded):
+class SpeedController(_VelocityLoop, Guarded):
     """A SpeedLoop as a Controller: its command is the twist of the path; where the robot stands it does not ask.
 
     That is how a robot comes along that has no place to measure. Arguments as for SpeedLoop.
@@ -159,11 +159,11 @@ def pole_rate(rates: FloatArray, faster: float, dt: float, late: float = 0.0) ->
 
 def pose_gains(rates: FloatArray, faster: float, integral: float, dt: float, late: float = 0.0) -> PoseGains:
     """Two poles at `pole_rate`, one at the share `integral` of it. rates a [1/s], shape (3,)."""
-    found = [
+    gains = [
         _ackermann(float(a), float(rate), float(integral * rate), dt)
         for a, rate in zip(rates, pole_rate(rates, faster, dt, late), strict=True)
     ]
-    return PoseGains(*np.array(found).T)
+    return PoseGains(*np.array(gains).T)
 
 
 def _ackermann(a: float, rate: float, slow: float, dt: float) -> FloatArray:
@@ -174,15 +174,15 @@ def _ackermann(a: float, rate: float, slow: float, dt: float) -> FloatArray:
     p, q = np.exp(-rate * dt), np.exp(-slow * dt)
     if slow == 0.0:  # no sum: two poles, two gains
         move, push = move[:2, :2], push[:2]
-    wanted = (move - p * np.eye(len(move))) @ (move - p * np.eye(len(move)))
+    polynomial = (move - p * np.eye(len(move))) @ (move - p * np.eye(len(move)))
     reach = [push]
     for _ in range(len(push) - 1):
         reach.append(move @ reach[-1])
     if slow > 0.0:
-        wanted = wanted @ (move - q * np.eye(3))
+        polynomial = polynomial @ (move - q * np.eye(3))
     last = np.zeros(len(push))
     last[-1] = 1.0
-    gains = -last @ np.linalg.inv(np.column_stack(reach)) @ wanted  # alpha = gains . errors, and the errors fall
+    gains = -last @ np.linalg.inv(np.column_stack(reach)) @ polynomial  # alpha = gains . errors, and the errors fall
     return np.array([gains[0] - dt * gains[2], gains[1], gains[2]]) if slow > 0.0 else np.append(gains, 0.0)
 
 

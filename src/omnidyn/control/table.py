@@ -25,13 +25,13 @@ from omnidyn.model.inverse import inverse
 from omnidyn.model.motor import back_emf
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel, wheel_speed
-from omnidyn.shown import Shown
+from omnidyn.shown import Displayable
 
 ROUNDING = 1e-13  # of the largest number of a table
 
 
 @dataclass(frozen=True, eq=False)
-class FeedforwardTable(Shown):
+class FeedforwardTable(Displayable):
     """Numbers of the formula above.
 
     speed: V, kV, shape (wheels, 3). change: A, kA, shape (wheels, 3). directions: d_e of what rubs, shape (k, 3).
@@ -84,14 +84,14 @@ class FeedforwardTable(Shown):
             "",
         ]
         if len(self.directions):
-            shown = [("along", *(f"kS {k + 1}" for k in range(len(self.speed))))]
-            shown += [
+            sign_rows = [("along", *(f"kS {k + 1}" for k in range(len(self.speed))))]
+            sign_rows += [
                 (_way(way), *(f"{value:.5g}" for value in self.sign[0, :, e])) for e, way in enumerate(self.directions)
             ]
             parts += [
                 "volts against dry friction, times the sign of the speed along",
                 "",
-                Table(shown[0], shown[1:], "<>", name="sign"),
+                Table(sign_rows[0], sign_rows[1:], "<>", name="sign"),
                 "",
             ]
         parts += [*self.code(), ""]
@@ -122,8 +122,8 @@ class FeedforwardTable(Shown):
             terms += [self._sign_term(k, e) for e in range(len(self.directions))]
             if self.ellipse.any() or self.turning:
                 terms.append(_sum(self.push[k] if off else self.push[k, :2], ("fx", "fy", "ft")[: 3 if off else 2]))
-            told = " + ".join(term for term in terms if term != "0").replace("+ -", "- ")
-            lines.append(f"u{k + 1} = {told or '0'};")
+            expression = " + ".join(term for term in terms if term != "0").replace("+ -", "- ")
+            lines.append(f"u{k + 1} = {expression or '0'};")
             if self.drop[k]:
                 emf = _sum(self.back_emf[k], ("vx", "vy", "w"))
                 lines.append(f"u{k + 1} += {_c(self.drop[k])}*sgn(u{k + 1} - ({emf}));")
@@ -159,8 +159,8 @@ def feedforward_table(robot: Robot) -> FeedforwardTable:
             remedy="take voltage_for, or leave voltage_map_V out",
         )
     model, count = inverse(robot), robot.wheels.count
-    own = model.levels
-    if own.falls.any():
+    levels = model.levels
+    if levels.falls.any():
         raise UnsupportedError(
             "no formula of signs and sums for friction that falls with the speed",
             got="stribeck_speed",
@@ -168,19 +168,19 @@ def feedforward_table(robot: Robot) -> FeedforwardTable:
             remedy="take voltage_for, or leave stribeck_speed out: then it pushes with coulomb",
         )
     push = per_wheel(robot.motor.resistance, count)[:, None] * model.share
-    viscous = (own.directions.T * own.viscous) @ own.directions
+    viscous = (levels.directions.T * levels.viscous) @ levels.directions
     emf = back_emf(robot.motor, wheel_speed(robot.wheels, np.eye(3))).T
-    rubs = own.slide.any(axis=0)
-    sign = np.einsum("wi,ei,se->swe", push, own.directions[rubs], own.slide[:, rubs])
+    rubs = levels.slide.any(axis=0)
+    sign = np.einsum("wi,ei,se->swe", push, levels.directions[rubs], levels.slide[:, rubs])
     return FeedforwardTable(
         robot.name,
         _clean(emf + push @ viscous),
         _clean(push @ model.mass),
-        _clean(own.directions[rubs]),
+        _clean(levels.directions[rubs]),
         _clean(sign),
         _clean(push),
-        own.ellipse_slide,
-        own.plain,
+        levels.ellipse_slide,
+        levels.plain,
         robot.body.mass if robot.body.rotating_frame else 0.0,
         np.array(robot.body.centre),
         per_wheel(robot.motor.voltage_drop, count),

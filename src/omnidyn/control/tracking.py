@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.control.controller import ENDED
+from omnidyn.control.controller import PATH_ENDED
 from omnidyn.document import Document, Part, Points, Table, plain
 from omnidyn.run import Run
-from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.shown import FIGURE, Displayable, make
 from omnidyn.statement import NOTE, WARNING, Statement, as_verdict, by_severity
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ MICRO = 1e6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Tracking(Shown):
+class Tracking(Displayable):
     """What a closed loop did.
 
     controller, plant, path: their names. run: what the robot did. wanted: poses of the path at the times of the run,
@@ -133,14 +133,14 @@ class Tracking(Shown):
         return make(FIGURE, self)
 
 
-def _of_run(tracking: Tracking, named: bool) -> list[Statement]:
+def _of_run(tracking: Tracking, with_name: bool) -> list[Statement]:
     """What the simulation of the robot itself has to say, such as of wheels that slip."""
-    return [warning.of(tracking.controller) if named else warning for warning in tracking.run.warnings]
+    return [warning.of(tracking.controller) if with_name else warning for warning in tracking.run.warnings]
 
 
-def trackings_document(found: Sequence[Tracking], notes: Sequence[Statement] = ()) -> Document:
+def trackings_document(trackings: Sequence[Tracking], notes: Sequence[Statement] = ()) -> Document:
     """What controllers on one path did, side by side. notes: what is said beside, such as what the path asks for."""
-    first = found[0]
+    first = trackings[0]
     span = float(first.run.t[-1])
     head = (
         f"{first.plant} along {first.path}: {len(first.step_times)} steps of {first.dt:g} s, {span:.6g} s; errors from "
@@ -148,17 +148,17 @@ def trackings_document(found: Sequence[Tracking], notes: Sequence[Statement] = (
     head += f"{first.skip:g} s on"
     rows = [
         (
-            each.controller,
-            f"{1e3 * each.rmse_position:.3f}",
-            f"{1e3 * each.rmse_heading:.2f}",
-            f"{1e3 * each.worst_position:.2f}",
-            f"{100.0 * each.saturated_share:.1f}",
-            f"{each.effort:.2f}",
-            f"{each.restlessness:.3f}",
-            f"{each.step_us['median']:.0f}",
-            f"{each.step_us['p99']:.0f}",
+            tracking.controller,
+            f"{1e3 * tracking.rmse_position:.3f}",
+            f"{1e3 * tracking.rmse_heading:.2f}",
+            f"{1e3 * tracking.worst_position:.2f}",
+            f"{100.0 * tracking.saturated_share:.1f}",
+            f"{tracking.effort:.2f}",
+            f"{tracking.restlessness:.3f}",
+            f"{tracking.step_us['median']:.0f}",
+            f"{tracking.step_us['p99']:.0f}",
         )
-        for each in found
+        for tracking in trackings
     ]
     columns = (
         "controller",
@@ -171,8 +171,10 @@ def trackings_document(found: Sequence[Tracking], notes: Sequence[Statement] = (
         "step us",
         "p99 us",
     )
-    warnings = [warning for each in found for warning in (*_odd(each), *_of_run(each, len(found) > 1))]
-    verdict = _verdict(found)
+    warnings = [
+        warning for tracking in trackings for warning in (*_odd(tracking), *_of_run(tracking, len(trackings) > 1))
+    ]
+    verdict = _verdict(trackings)
     parts: list[Part] = [
         head,
         "",
@@ -189,21 +191,21 @@ def trackings_document(found: Sequence[Tracking], notes: Sequence[Statement] = (
         "dt_s": first.dt,
         "duration_s": span,
         "skip_s": first.skip,
-        "controllers": [each.to_dict() for each in found],
+        "controllers": [tracking.to_dict() for tracking in trackings],
         "notes": plain(list(notes)),
         "warnings": plain(warnings),
     }
     return Document(parts, data, warnings, verdict=verdict)
 
 
-def _verdict(found: Sequence[Tracking]) -> Statement:
+def _verdict(trackings: Sequence[Tracking]) -> Statement:
     """The best of several first."""
-    best = min(found, key=lambda each: each.rmse_position)
-    if len(found) == 1:
+    best = min(trackings, key=lambda tracking: tracking.rmse_position)
+    if len(trackings) == 1:
         return best.verdict
-    others = [each for each in found if each is not best]
-    times = [each.rmse_position / max(best.rmse_position, 1e-12) for each in others]
-    numbers = {"best": best.verdict, "others": [each.controller for each in others], "times": times}
+    rivals = [tracking for tracking in trackings if tracking is not best]
+    times = [tracking.rmse_position / max(best.rmse_position, 1e-12) for tracking in rivals]
+    numbers = {"best": best.verdict, "others": [tracking.controller for tracking in rivals], "times": times}
     return Statement("best_tracked", NOTE, best.controller, numbers)
 
 
@@ -213,5 +215,5 @@ def _odd(tracking: Tracking) -> list[Statement]:
     return [
         Statement("steps_with_status", WARNING, status, {"count": count, "steps": steps}).of(tracking.controller)
         for status, count in tracking.statuses.items()
-        if status != ENDED
+        if status != PATH_ENDED
     ]

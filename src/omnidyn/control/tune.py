@@ -31,13 +31,13 @@ from omnidyn.model.known.told import told
 from omnidyn.model.known.uncertainty import plausible
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
-from omnidyn.shown import Shown
+from omnidyn.shown import Displayable
 from omnidyn.statement import NOTE, Statement, as_verdict
 
 DRAWS, EVALUATIONS, NOISE = 8, 30, 0.005
 MOST_DRAWS, MOST_EVALUATIONS = 1000, 10_000
 SPREAD = 0.15  # of the range of each gain: the first step of the search
-DONE = 1e-3  # of J: a search that gains less has ended
+GAIN_TOLERANCE = 1e-3  # of J: a search that gains less has ended
 
 
 class Range(NamedTuple):
@@ -71,7 +71,7 @@ TUNED: dict[str, dict[str, Range]] = {
 }
 
 
-class Score(NamedTuple):
+class TuningScore(NamedTuple):
     """What gains come to over the robots: J [m], the mean and the worst position rmse [m], restlessness [V]."""
 
     cost: float
@@ -81,7 +81,7 @@ class Score(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Tuned(Shown):
+class Tuned(Displayable):
     """What `tune` found.
 
     robot, paths: names. controller: with the gains found, as a file has it. start: the gains it began with. before,
@@ -95,10 +95,10 @@ class Tuned(Shown):
     paths: tuple[str, ...]
     controller: ControllerFile
     start: Mapping[str, float]
-    before: Score
-    after: Score
-    own_before: Score
-    own_after: Score
+    before: TuningScore
+    after: TuningScore
+    own_before: TuningScore
+    own_after: TuningScore
     draws: int
     evaluations: int
     noise: float
@@ -130,25 +130,34 @@ class Tuned(Shown):
     def statements(self) -> list[Statement]:
         """What was optimised, and what that gave up."""
         names = ("paths", "draws", "noise", "delay", "dt", "evaluations")
-        found = [Statement("optimised", NOTE, numbers={name: getattr(self, name) for name in names})]
-        found += [Statement("judged_on_other_draws", NOTE)] if self.draws else []
+        statements = [Statement("optimised", NOTE, numbers={name: getattr(self, name) for name in names})]
+        statements += [Statement("judged_on_other_draws", NOTE)] if self.draws else []
         errors = {
             "given_up_rest": (self.before.restless, self.after.restless),
             "given_up_on_file": (self.own_before.mean, self.own_after.mean),
             "given_up_on_worst": (self.before.worst, self.after.worst),
         }
-        lost = [
+        losses = [
             Statement(code, NOTE, numbers={"before": before, "after": after})
             for code, (before, after) in errors.items()
             if after > 1.02 * before
         ]
-        return [*found, *(lost or [Statement("given_up_nothing", NOTE)])]
+        return [*statements, *(losses or [Statement("given_up_nothing", NOTE)])]
 
     def document(self) -> Document:
         """What it says."""
         rows = [
-            (name, f"{1e3 * own.mean:.3f}", f"{1e3 * each.mean:.3f}", f"{1e3 * each.worst:.3f}", f"{each.restless:.3f}")
-            for name, own, each in (("before", self.own_before, self.before), ("tuned", self.own_after, self.after))
+            (
+                name,
+                f"{1e3 * own_score.mean:.3f}",
+                f"{1e3 * score.mean:.3f}",
+                f"{1e3 * score.worst:.3f}",
+                f"{score.restless:.3f}",
+            )
+            for name, own_score, score in (
+                ("before", self.own_before, self.before),
+                ("tuned", self.own_after, self.after),
+            )
         ]
         head = ("", "this robot mm", "robots mm", "worst mm", "change V")
         scores, words = Table(head, rows, "<>", name="scores"), Points(self.statements(), "-", "statements")
@@ -191,47 +200,60 @@ def tune(
 ) -> Tuned:
     """Find the gains of a controller by simulation, over the robots that the file says may be meant.
 
-    path: a Path or what `path` takes; or several. controller: a name or a controller file: its options are where the
-    search begins. draws: robots that are driven. evaluations: settings that are tried, at the most. noise, delay, dt,
-    duration, seed: as for `track`; noise 0 and no delay make gains as large as dt allows.
     Returns a Tuned, whose `controller` is what `track` reads from a file (`save_controller`).
+
+    Args:
+        robot: The robot, its std with it.
+        path: A Path or what `path` takes; or several.
+        controller: A name or a controller file: its options are where the search begins.
+        draws: Robots that are driven.
+        evaluations: Settings that are tried, at the most.
+        noise: As for `track` [m/s]; noise 0 and no delay make gains as large as dt allows.
+        delay: As for `track`.
+        dt: As for `track` [s].
+        duration: As for `track` [s].
+        seed: As for `track`.
+        progress: Hears what is being driven.
+
     Raises InputError for a controller without gains, or a number out of range.
     """
     paths: list[Any] = [path] if isinstance(path, Path | str) else list(path)
     check_order("tune(robot, path, controller)", (robot, Robot), (paths, (Path, str)), (controller, str))
     _check_counts(draws, evaluations, paths)
     around = Circumstances(dt, duration, noise=noise, delay=delay, seed=seed)
-    follow = [each if isinstance(each, Path) else path_named(each) for each in paths]
+    follow = [item if isinstance(item, Path) else path_named(item) for item in paths]
     spec = controller_spec(controller)
     ranges = _ranges(spec)
-    known = bool(told(robot).keys)
-    seen = plausible(robot, draws, seed) if known else [robot]
-    unseen = plausible(robot, draws, seed + 1) if known else [robot]
-    tried: list[tuple[float, dict[str, float]]] = []
+    uncertain = bool(told(robot).keys)
+    training = plausible(robot, draws, seed) if uncertain else [robot]
+    held_out = plausible(robot, draws, seed + 1) if uncertain else [robot]
+    trials: list[tuple[float, dict[str, float]]] = []
 
     def cost(places: FloatArray) -> float:
-        gains = {name: each.at(float(place)) for (name, each), place in zip(ranges.items(), places, strict=True)}
+        gains = {
+            name: interval.at(float(place)) for (name, interval), place in zip(ranges.items(), places, strict=True)
+        }
         outside = float(np.sum(np.maximum(np.abs(places - 0.5) - 0.5, 0.0)))
         progress(Report(f"trying {', '.join(f'{name} {value:g}' for name, value in gains.items())}"))
-        found = _score(robot, seen, follow, _with(spec, gains), around).cost
-        tried.append((found, gains))
-        return math.log(found) + outside
+        value = _score(robot, training, follow, _with(spec, gains), around).cost
+        trials.append((value, gains))
+        return math.log(value) + outside
 
     defaults = options_of(spec.controller)
     start = {name: float(spec.options.get(name, defaults[name])) for name in ranges}
-    first = np.array([each.of(start[name]) for name, each in ranges.items()])
+    first = np.array([interval.of(start[name]) for name, interval in ranges.items()])
     corners = np.vstack([first, *(first + _aside(first, k) for k in range(len(first)))])
-    how = {"maxfev": evaluations, "initial_simplex": corners, "xatol": 1e-2, "fatol": DONE}
-    minimize(cost, first, method="Nelder-Mead", options=how)
-    best = min(tried, key=lambda each: each[0])[1]
+    options = {"maxfev": evaluations, "initial_simplex": corners, "xatol": 1e-2, "fatol": GAIN_TOLERANCE}
+    minimize(cost, first, method="Nelder-Mead", options=options)
+    best = min(trials, key=lambda trial: trial[0])[1]
     old, new = _with(spec, start), _with(spec, best)
     fresh = replace(around, seed=seed + 1)
-    before, after = (_score(robot, unseen, follow, each, fresh) for each in (old, new))
-    own_before, own_after = (_score(robot, [robot], follow, each, fresh) for each in (old, new))
+    before, after = (_score(robot, held_out, follow, gains, fresh) for gains in (old, new))
+    own_before, own_after = (_score(robot, [robot], follow, gains, fresh) for gains in (old, new))
     if after.cost >= before.cost:
         new, after, own_after = old, before, own_before
-    names = tuple(each.name for each in follow)
-    source = f"tuned for {robot.name} on {all_of(names)}, {draws if known else 0} draws, seed {seed}"
+    names = tuple(route.name for route in follow)
+    source = f"tuned for {robot.name} on {all_of(names)}, {draws if uncertain else 0} draws, seed {seed}"
     return Tuned(
         robot.name,
         names,
@@ -241,8 +263,8 @@ def tune(
         after,
         own_before,
         own_after,
-        draws if known else 0,
-        len(tried),
+        draws if uncertain else 0,
+        len(trials),
         noise,
         delay,
         dt,
@@ -250,9 +272,9 @@ def tune(
 
 
 def _check_counts(draws: int, evaluations: int, paths: Sequence[Any]) -> None:
-    for name, value, most in (("draws", draws, MOST_DRAWS), ("evaluations", evaluations, MOST_EVALUATIONS)):
-        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= most:
-            raise InputError("out of range", got=value, expected=f"1 to {most}", where=name)
+    for name, value, largest in (("draws", draws, MOST_DRAWS), ("evaluations", evaluations, MOST_EVALUATIONS)):
+        if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= largest:
+            raise InputError("out of range", got=value, expected=f"1 to {largest}", where=name)
     if not paths:
         raise InputError("nothing to follow", got="no path", expected="a path, or several", where="path")
 
@@ -283,22 +305,22 @@ def _aside(first: FloatArray, k: int) -> FloatArray:
 
 def _score(
     robot: Robot, plants: Sequence[Robot], paths: Sequence[Path], spec: ControllerFile, around: Circumstances
-) -> Score:
+) -> TuningScore:
     """What a controller for one robot comes to when it drives the others."""
     control = spec.make(robot, **told_of_loop(robot, around))
     rim = float(np.mean(robot.wheels.robot_radius))
-    found = [[tracked(plant, path, control, around) for plant in plants] for path in paths]
-    every = [each for row in found for each in row]
-    logs = [math.log(max(math.sqrt(float(np.mean([_square(each, rim) for each in row]))), 1e-9)) for row in found]
-    errors = [each.rmse_position for each in every]
-    return Score(
+    runs = [[tracked(plant, path, control, around) for plant in plants] for path in paths]
+    all_runs = [run for row in runs for run in row]
+    logs = [math.log(max(math.sqrt(float(np.mean([_square(run, rim) for run in row]))), 1e-9)) for row in runs]
+    errors = [run.rmse_position for run in all_runs]
+    return TuningScore(
         math.exp(float(np.mean(logs))),
         float(np.mean(errors)),
         max(errors),
-        float(np.mean([each.restlessness for each in every])),
+        float(np.mean([run.restlessness for run in all_runs])),
     )
 
 
-def _square(each: Tracking, rim: float) -> float:
+def _square(tracking: Tracking, rim: float) -> float:
     """Squared error of a run, heading at the rim included [m^2]."""
-    return each.rmse_position**2 + (rim * each.rmse_heading) ** 2
+    return tracking.rmse_position**2 + (rim * tracking.rmse_heading) ** 2

@@ -22,13 +22,13 @@ from pathlib import Path
 from omnidyn.document import Document, Part, Points
 from omnidyn.errors import InputError
 from omnidyn.files import TEMPORARY_PREFIX, check_output, write_atomic
-from omnidyn.shown import Shown
+from omnidyn.shown import Displayable
 
 Content = str | bytes
 
 
 @dataclass(frozen=True, repr=False)
-class Export(Shown):
+class Export(Displayable):
     """The files of one export, and what they leave out.
 
     files: name -> content. A kind with one file is written to a file, one with several (`folder`) into a folder.

@@ -318,29 +318,31 @@ def cell(kind: str, feature: str) -> Cell:
 
 def refuse(kind: str, robot: Robot) -> None:
     """Raises UnsupportedError, which names every feature of a robot that a kind refuses."""
-    found = [name for name, feature in FEATURES.items() if cell(kind, name).does == REFUSES and feature.has(robot)]
-    if found:
-        words = dict.fromkeys(cell(kind, name).words for name in found)
+    refused = [name for name, feature in FEATURES.items() if cell(kind, name).does == REFUSES and feature.has(robot)]
+    if refused:
+        words = dict.fromkeys(cell(kind, name).words for name in refused)
         raise UnsupportedError(
             f"{kind} cannot be exported for {robot.name}: {'; '.join(words)}",
-            got="; ".join(FEATURES[name].words for name in found)[:300],
+            got="; ".join(FEATURES[name].words for name in refused)[:300],
             remedy="docs/exports.md says which kinds take it",
         )
 
 
 def refuse_controller(kind: str, controller: str) -> None:
     """Raises UnsupportedError for a controller that a kind refuses."""
-    own = CONTROLLERS.get(controller, Cell(REFUSES, "there is no C code of it"))
-    if own.does == REFUSES:
+    support = CONTROLLERS.get(controller, Cell(REFUSES, "there is no C code of it"))
+    if support.does == REFUSES:
         raise UnsupportedError(
-            f"{kind} cannot be exported for the controller {controller}: {own.words}",
+            f"{kind} cannot be exported for the controller {controller}: {support.words}",
             got=controller,
-            expected=" or ".join(name for name, each in CONTROLLERS.items() if each.does != REFUSES),
+            expected=" or ".join(name for name, candidate in CONTROLLERS.items() if candidate.does != REFUSES),
             where="controller",
         )
 
 
 def left_out(kind: str, robot: Robot) -> tuple[str, ...]:
     """What a kind cannot say of a robot, or says only partly: one line for each feature that the robot has."""
-    named = ((feature, cell(kind, name)) for name, feature in FEATURES.items())
-    return tuple(f"{feature.words}: {each.words}" for feature, each in named if each.words and feature.has(robot))
+    cells = ((feature, cell(kind, name)) for name, feature in FEATURES.items())
+    return tuple(
+        f"{feature.words}: {support.words}" for feature, support in cells if support.words and feature.has(robot)
+    )

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from omnidyn.export.contract import Export
 
 
-class Kind(NamedTuple):
+class ExportKind(NamedTuple):
     """A kind of export: the module and function that make it, and what it is, in words."""
 
     module: str
@@ -22,20 +22,24 @@ class Kind(NamedTuple):
 
 
 KINDS = {
-    "json": Kind("omnidyn.export.robot_json", "robot_json", "the robot with what is known of its numbers"),
-    "c-model": Kind("omnidyn.export.code.c_model", "c_model", "the exact step as C99, for a microcontroller"),
-    "c-controller": Kind(
+    "json": ExportKind("omnidyn.export.robot_json", "robot_json", "the robot with what is known of its numbers"),
+    "c-model": ExportKind("omnidyn.export.code.c_model", "c_model", "the exact step as C99, for a microcontroller"),
+    "c-controller": ExportKind(
         "omnidyn.export.code.c_controller", "c_controller", "a controller as C99, for a microcontroller"
     ),
-    "fmu": Kind("omnidyn.export.code.fmu", "fmu", "an FMI 2 co-simulation FMU, from the same C"),
-    "wpilib": Kind("omnidyn.export.feedforward.wpilib", "wpilib", "kS, kV, kA as constants in Java, C++ and Python"),
-    "road-runner": Kind("omnidyn.export.feedforward.road_runner", "road_runner", "kS, kV, kA for Road Runner"),
-    "gains": Kind("omnidyn.export.feedforward.gains", "gains_csv", "kS, kV, kA with standard errors as CSV"),
-    "mjcf": Kind("omnidyn.export.bodies.mjcf", "mjcf", "a MuJoCo model, motors in volts"),
-    "urdf": Kind("omnidyn.export.bodies.urdf", "urdf", "base and wheels as links and joints, for ROS"),
-    "sdf": Kind("omnidyn.export.bodies.sdf", "sdf", "base and wheels as links and joints, for Gazebo"),
-    "ros2-control": Kind("omnidyn.export.ros.ros2_control", "ros2_control", "omni_wheel_drive_controller for ROS 2"),
-    "ros2-node": Kind(
+    "fmu": ExportKind("omnidyn.export.code.fmu", "fmu", "an FMI 2 co-simulation FMU, from the same C"),
+    "wpilib": ExportKind(
+        "omnidyn.export.feedforward.wpilib", "wpilib", "kS, kV, kA as constants in Java, C++ and Python"
+    ),
+    "road-runner": ExportKind("omnidyn.export.feedforward.road_runner", "road_runner", "kS, kV, kA for Road Runner"),
+    "gains": ExportKind("omnidyn.export.feedforward.gains", "gains_csv", "kS, kV, kA with standard errors as CSV"),
+    "mjcf": ExportKind("omnidyn.export.bodies.mjcf", "mjcf", "a MuJoCo model, motors in volts"),
+    "urdf": ExportKind("omnidyn.export.bodies.urdf", "urdf", "base and wheels as links and joints, for ROS"),
+    "sdf": ExportKind("omnidyn.export.bodies.sdf", "sdf", "base and wheels as links and joints, for Gazebo"),
+    "ros2-control": ExportKind(
+        "omnidyn.export.ros.ros2_control", "ros2_control", "omni_wheel_drive_controller for ROS 2"
+    ),
+    "ros2-node": ExportKind(
         "omnidyn.export.ros.node", "ros2_node", "a node that drives by feed-forward or a controller, as text"
     ),
 }
@@ -49,8 +53,8 @@ def python_name(kind: str) -> str:
 def maker(kind: str) -> Callable[..., Export]:
     """The function that makes a kind of export of a robot. Raises InputError for a kind that there is not."""
     if kind not in KINDS:
-        close = difflib.get_close_matches(kind, KINDS, n=1)
-        remedy = f"did you mean {close[0]}?" if close else ""
+        matches = difflib.get_close_matches(kind, KINDS, n=1)
+        remedy = f"did you mean {matches[0]}?" if matches else ""
         raise InputError("no such kind of export", got=kind, expected=", ".join(KINDS), remedy=remedy, where="KIND")
-    known = KINDS[kind]
-    return getattr(importlib.import_module(known.module), known.function)
+    spec = KINDS[kind]
+    return getattr(importlib.import_module(spec.module), spec.function)

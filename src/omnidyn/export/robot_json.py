@@ -28,16 +28,16 @@ SCHEMA_FILE = f"robot-export-{VERSION}.schema.json"
 def robot_json(robot: Robot) -> Export:
     """The robot as JSON: the tree of its file, and the covariance of the numbers that have a std."""
     refuse("json", robot)
-    known = told(robot)
-    covariance = known.std[:, None] * known.correlation * known.std[None, :]
+    uncertain = told(robot)
+    covariance = uncertain.std[:, None] * uncertain.correlation * uncertain.std[None, :]
     document = {
         "format": FORMAT,
         "version": VERSION,
         "robot": parse_toml(robot_to_toml(robot), robot.name),
         "covariance": {
-            "keys": list(known.keys),
-            "units": [unit(key) for key in known.keys],
-            "matrix": np.asarray(covariance).reshape(len(known.keys), len(known.keys)).tolist(),
+            "keys": list(uncertain.keys),
+            "units": [unit(key) for key in uncertain.keys],
+            "matrix": np.asarray(covariance).reshape(len(uncertain.keys), len(uncertain.keys)).tolist(),
         },
     }
     text = json.dumps(document, indent=1, ensure_ascii=True, allow_nan=False) + "\n"
@@ -46,7 +46,7 @@ def robot_json(robot: Robot) -> Export:
 
 def json_schema() -> dict[str, Any]:
     """The schema of the file (JSON Schema 2020-12), from the fields of the model."""
-    known = {
+    uncertain_schema = {
         "type": "object",
         "required": ["value"],
         "additionalProperties": False,
@@ -101,7 +101,7 @@ def json_schema() -> dict[str, Any]:
             "robot": robot,
             "covariance": covariance,
         },
-        "$defs": {"known": known, "value": value},
+        "$defs": {"known": uncertain_schema, "value": value},
     }
 
 
@@ -112,9 +112,11 @@ def _table_schema(model: type[BaseModel], name: str) -> dict[str, Any]:
     assert issubclass(inner, BaseModel)
     properties: dict[str, Any] = {}
     for key, field in keys_of(inner, []).items():
-        own = inner.model_fields[field]
-        if isinstance(own.annotation, type) and issubclass(own.annotation, BaseModel):
+        field_info = inner.model_fields[field]
+        if isinstance(field_info.annotation, type) and issubclass(field_info.annotation, BaseModel):
             properties[key] = _table_schema(inner, field)
         else:
-            properties[key] = {"$ref": "#/$defs/value"} | ({"description": own.description} if own.description else {})
+            properties[key] = {"$ref": "#/$defs/value"} | (
+                {"description": field_info.description} if field_info.description else {}
+            )
     return {"type": "object", "additionalProperties": False, "properties": properties}

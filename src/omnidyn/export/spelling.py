@@ -30,7 +30,7 @@ _JAVA = (
 )
 _NOT_NAMES = "world base_link con prn aux nul"  # SDF has a frame of that name; Windows has such devices
 # Words that a language keeps for itself; an identifier made of a name always ends differently.
-_TAKEN = frozenset(
+_RESERVED_WORDS = frozenset(
     [*f"{_C} {_JAVA} {_NOT_NAMES}".split(), *map(str.lower, keyword.kwlist), *keyword.softkwlist]
     + [f"{port}{n}" for port in ("com", "lpt") for n in range(10)]
 )
@@ -39,7 +39,7 @@ _WORD = re.compile(r"@(\w+)@")
 
 def filled(template: str, **words: str) -> str:
     """A template with each @NAME@ replaced by that word, in one pass: what was put in is never looked at again."""
-    return _WORD.sub(lambda found: words[found[1]], template)
+    return _WORD.sub(lambda match: words[match[1]], template)
 
 
 def number(value: float) -> str:
@@ -76,7 +76,7 @@ def identifier(name: str, fallback: str = "robot") -> str:
     """A name as an identifier of C, Java, Python, ROS, XML: small ASCII letters, digits and _, a letter first."""
     text = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")[:LONGEST].strip("_")
     text = text if text and text[0].isalpha() else f"{fallback}_{text}".rstrip("_")
-    return f"{text}_" if text in _TAKEN else text
+    return f"{text}_" if text in _RESERVED_WORDS else text
 
 
 def attribute(text: str) -> str:

@@ -60,7 +60,7 @@ FAMILIES: tuple[Family, ...] = (
 )
 
 # What only a whole log can show: dropped unless every block shows it.
-WHOLE = ("never_moved", "few_rows")
+WHOLE_LOG_CODES = ("never_moved", "few_rows")
 # What is said of the columns, once for all blocks of a log.
 DOUBT, UNUSED, READING = "not_taken", "not_used", "reading"
 OF_COLUMNS = (DOUBT, UNUSED, READING)
@@ -85,25 +85,27 @@ def check_log(log: Log, robot: Robot | None = None) -> Verdict:
     """The verdict on a log, which it does not keep: many logs need no more memory than one."""
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of means over nothing: NaN is the answer wanted
-        found, work = begin(log, robot)
-        found += _no_channel(log) + _other_count(log, robot) + _about_columns(log)
+        findings, work = begin(log, robot)
+        findings += _no_channel(log) + _other_count(log, robot) + _about_columns(log)
         for family in FAMILIES:
-            more, changed = family(work)
-            said = with_guesses(more, robot, found)
-            found += said
-            if not more or any(not finding.rests_on for finding in said):  # a guess puts nothing right
-                work = changed
-        good = uses(log, robot, {finding.code for finding in found})
+            new_findings, changed_work = family(work)
+            judged_findings = with_guesses(new_findings, robot, findings)
+            findings += judged_findings
+            if not new_findings or any(
+                not finding.rests_on for finding in judged_findings
+            ):  # a guess puts nothing right
+                work = changed_work
+        log_uses = uses(log, robot, {finding.code for finding in findings})
     length = float(work.t[-1] - work.t[0]) if len(work) > 1 else 0.0
     return Verdict(
-        in_order(found),
+        in_order(findings),
         work.known.get("excitation", {}),
         len(log),
         length,
         1.0 / work.step if work.step > 0.0 else 0.0,
         tuple(name for name in log.channels if work_has(log, name)),
         log.source,
-        good,
+        log_uses,
     )
 
 
@@ -143,28 +145,32 @@ def check_blocks(blocks: Iterable[Log], robot: Robot | None = None) -> Verdict:
 
     Findings of one kind and place are joined; what only a whole log can show has to hold in every block.
     """
-    found: dict[tuple[str, str], list[Finding]] = {}
+    by_code: dict[tuple[str, str], list[Finding]] = {}
     once: list[Finding] = []
-    parts, good, rows, duration, rates, channels, source = [], [], 0, 0.0, [], (), ""
+    parts, block_uses, rows, duration, rates, channels, source = [], [], 0, 0.0, [], (), ""
     last: tuple[float, int] | None = None
     count = 0
     for block in blocks:
         count += 1
         verdict = check_log(block, robot)
-        good.append(verdict.uses)
-        more, last = between(last, block, verdict.rate)
-        for finding in (*more, *verdict.findings):
+        block_uses.append(verdict.uses)
+        new_findings, last = between(last, block, verdict.rate)
+        for finding in (*new_findings, *verdict.findings):
             if finding.code in OF_COLUMNS:
                 once += [finding] if count == 1 else []
             elif finding.code not in OF_EXCITATION:
-                found.setdefault((finding.code, finding.subject), []).append(finding)
+                by_code.setdefault((finding.code, finding.subject), []).append(finding)
         parts.append(verdict.excitation)
         rows, duration = rows + verdict.rows, duration + verdict.duration
         rates.append(verdict.rate)
         channels, source = tuple(dict.fromkeys((*channels, *verdict.channels))), verdict.source
-    together = [merged(group, count) for (code, _), group in found.items() if code not in WHOLE or len(group) == count]
-    known = joined(parts)
+    together = [
+        merged(group, count)
+        for (code, _), group in by_code.items()
+        if code not in WHOLE_LOG_CODES or len(group) == count
+    ]
+    measures = joined(parts)
     length = float(np.mean(robot.wheels.robot_radius)) if robot is not None else 0.15
     rate = float(np.median(rates)) if rates else 0.0
-    findings = in_order([*once, *together, *judge(known, length)])
-    return Verdict(findings, known, rows, duration, rate, channels, source, joined_uses(good))
+    findings = in_order([*once, *together, *judge(measures, length)])
+    return Verdict(findings, measures, rows, duration, rate, channels, source, joined_uses(block_uses))

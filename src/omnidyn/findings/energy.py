@@ -34,18 +34,18 @@ def check_energy(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     if voltage is None or robot is None or speed is None or voltage.shape != speed.shape or len(work) < 2:
         return [], work
     points = len(work) < MIN_ROWS and work.step >= 0.1
-    bad, worst = _points(robot, voltage, speed) if points else _windows(work, robot, voltage, speed)
-    if not bad.any() or bad.mean() < (0.0 if points else LEAST_SHARE):
+    mask, worst = _points(robot, voltage, speed) if points else _windows(work, robot, voltage, speed)
+    if not mask.any() or mask.mean() < (0.0 if points else LEAST_SHARE):
         return [], work
-    excess = _excess(robot, voltage[bad], speed[bad])
+    excess = _excess(robot, voltage[mask], speed[mask])
     return [
         Finding(
             "energy",
             ERROR,
             "",
             {"worst_W": worst, "emf_over_voltage": excess},
-            rows=work.lines(bad),
-            count=int(bad.sum()),
+            rows=work.lines(mask),
+            count=int(mask.sum()),
             rests_on=OF_BACK_EMF,
         )
     ], work
@@ -55,15 +55,19 @@ def _speed(work: LogUnderCheck) -> FloatArray | None:
     speed, robot = work.full("wheel_speed"), work.geometry
     if speed is not None or robot is None:
         return speed
-    seen = ground(work)
-    return wheel_speed(robot.wheels, seen.twist) if seen is not None and len(seen.axes) == 3 else None
+    floor_motion = ground(work)
+    return (
+        wheel_speed(robot.wheels, floor_motion.twist)
+        if floor_motion is not None and len(floor_motion.axes) == 3
+        else None
+    )
 
 
 def _power(robot: Robot, voltage: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(mechanical power of the motors [W], power that turns with the back-EMF [W], the scale of it). Shape (rows,)."""
     torque = wheel_torque(robot.motor, settled_current(robot.motor, voltage, speed))
-    own = wheel_torque(robot.motor, settled_current(robot.motor, back_emf(robot.motor, speed), 0.0 * speed))
-    return (torque * speed).sum(axis=1), np.abs(own * speed).sum(axis=1)
+    braking_torque = wheel_torque(robot.motor, settled_current(robot.motor, back_emf(robot.motor, speed), 0.0 * speed))
+    return (torque * speed).sum(axis=1), np.abs(braking_torque * speed).sum(axis=1)
 
 
 def _excess(robot: Robot, voltage: FloatArray, speed: FloatArray) -> float:
@@ -76,28 +80,28 @@ def _points(robot: Robot, voltage: FloatArray, speed: FloatArray) -> tuple[BoolA
     power, scale = _power(robot, voltage, speed)
     counter = np.sqrt((back_emf(robot.motor, speed) ** 2).sum(axis=1))
     with np.errstate(invalid="ignore"):
-        bad = (power < -MARGIN * scale) & (counter > MOVING_SHARE * np.nanquantile(counter, 0.95))
-    return bad, float(-power[bad].min()) if bad.any() else 0.0
+        mask = (power < -MARGIN * scale) & (counter > MOVING_SHARE * np.nanquantile(counter, 0.95))
+    return mask, float(-power[mask].min()) if mask.any() else 0.0
 
 
 def _windows(work: LogUnderCheck, robot: Robot, voltage: FloatArray, speed: FloatArray) -> tuple[BoolArray, float]:
     """Balance over windows: work of the motors, change of kinetic energy."""
-    none = np.zeros(len(work), dtype=bool), 0.0
+    nothing = np.zeros(len(work), dtype=bool), 0.0
     width = max(4, round(WINDOW / work.step))
     edges = []
     for segment in work.segments:
         ends = ((a, min(a + width, segment.stop - 1)) for a in range(segment.start, segment.stop, width))
         edges += [(a, b) for a, b in ends if b - a >= width // 2]
     if not edges:
-        return none
+        return nothing
     low, high = np.array(edges).T
     length = np.diff(work.t)
     mean = 0.5 * (speed[1:] + speed[:-1])
     power, scale = _power(robot, voltage[:-1], mean)
-    good = np.isfinite(power)
-    done, size, whole = (
-        np.concatenate([[0.0], np.cumsum(np.nan_to_num(each))])
-        for each in (power * length, scale * length, np.where(good, 0.0, 1.0))
+    finite = np.isfinite(power)
+    work_done, size, missing_count = (
+        np.concatenate([[0.0], np.cumsum(np.nan_to_num(column))])
+        for column in (power * length, scale * length, np.where(finite, 0.0, 1.0))
     )
     twist = twist_from_wheel_speed(robot.wheels, speed)
     mass = mass_matrix(robot)
@@ -107,23 +111,23 @@ def _windows(work: LogUnderCheck, robot: Robot, voltage: FloatArray, speed: Floa
     change = kinetic[high] - kinetic[low]
     unsure = 4.0 * np.sqrt(((momentum[low] * noise) ** 2).sum(axis=1) + ((momentum[high] * noise) ** 2).sum(axis=1))
     unsure += (np.diag(mass) * noise**2).sum() * 6.0
-    spent = done[high] - done[low]
-    wrong = (spent - change < -MARGIN * (size[high] - size[low]) - unsure - MARGIN * np.abs(change)) & (
-        whole[high] - whole[low] == 0.0
+    spent = work_done[high] - work_done[low]
+    impossible = (spent - change < -MARGIN * (size[high] - size[low]) - unsure - MARGIN * np.abs(change)) & (
+        missing_count[high] - missing_count[low] == 0.0
     )
     # Only where the back-EMF is the larger of the two, and the robot moves.
     counter = np.sqrt((back_emf(robot.motor, mean) ** 2).sum(axis=1))
     applied = np.sqrt((voltage[:-1] ** 2).sum(axis=1))
     bar = MOVING_SHARE * float(np.nanquantile(counter, 0.95))
-    e, u = (np.concatenate([[0.0], np.cumsum(np.nan_to_num(each))]) for each in (counter, applied))
-    wrong &= (e[high] - e[low] > 1.02 * (u[high] - u[low])) & (e[high] - e[low] > bar * (high - low))
+    e, u = (np.concatenate([[0.0], np.cumsum(np.nan_to_num(column))]) for column in (counter, applied))
+    impossible &= (e[high] - e[low] > 1.02 * (u[high] - u[low])) & (e[high] - e[low] > bar * (high - low))
     # Noise of the speed makes E[w^2] too large, which looks like back-EMF.
     lift, _ = _power(robot, np.zeros((1, speed.shape[1])), np.array([[white_noise(column) for column in speed.T]]))
     span = work.t[high] - work.t[low]
-    wrong &= spent - change < -MARGIN * (size[high] - size[low]) - unsure + 2.0 * float(lift[0]) * span
-    bad = np.zeros(len(work), dtype=bool)
-    for a, b in zip(low[wrong], high[wrong], strict=True):
-        bad[a:b] = True
-    if not wrong.any():
-        return none
-    return bad, float((-(spent - change) / span)[wrong].max())
+    impossible &= spent - change < -MARGIN * (size[high] - size[low]) - unsure + 2.0 * float(lift[0]) * span
+    mask = np.zeros(len(work), dtype=bool)
+    for a, b in zip(low[impossible], high[impossible], strict=True):
+        mask[a:b] = True
+    if not impossible.any():
+        return nothing
+    return mask, float((-(spent - change) / span)[impossible].max())

@@ -63,7 +63,7 @@ def check_filters(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         filtered = _filter_of(speed, work.step)
         if filtered is not None:
             alike.setdefault(filtered, []).append(speed)
-    return [_finding(each, speeds, work.step) for each, speeds in alike.items()], work
+    return [_finding(spec, speeds, work.step) for spec, speeds in alike.items()], work
 
 
 def _finding(filtered: Filter, speeds: list[Speed], step: float) -> Finding:
@@ -97,9 +97,9 @@ def _filter_of(speed: Speed, step: float) -> Filter | None:
 def _low_pass(speed: Speed, step: float) -> Filter | None:
     """y_k = y_(k-1) + a (d_k - y_(k-1)), d the differences to the row before; late by about its time constant."""
     change, ahead = np.diff(speed.values), speed.back[1:] - speed.values[:-1]
-    good = np.isfinite(change) & np.isfinite(ahead)
-    power = float((ahead[good] ** 2).sum())
-    share = float((change[good] * ahead[good]).sum()) / power if power > 0.0 else 0.0
+    finite = np.isfinite(change) & np.isfinite(ahead)
+    power = float((ahead[finite] ** 2).sum())
+    share = float((change[finite] * ahead[finite]).sum()) / power if power > 0.0 else 0.0
     if not STRONGEST < share < PLAIN or not _off(change - share * ahead, ahead) < NOISE_SHARE * share * speed.noise:
         return None
     constant = (1.0 - share) / share
@@ -111,8 +111,8 @@ def _off(errors: FloatArray, rate: FloatArray) -> float:
 
     A speed that is made of positions is so in every row; the middle error would be that of rest.
     """
-    good = np.isfinite(errors) & np.isfinite(rate) & moving(rate)
-    return float(np.quantile(np.abs(errors[good]), ALIKE_SHARE)) if good.sum() >= MIN_ROWS else np.inf
+    usable = np.isfinite(errors) & np.isfinite(rate) & moving(rate)
+    return float(np.quantile(np.abs(errors[usable]), ALIKE_SHARE)) if usable.sum() >= MIN_ROWS else np.inf
 
 
 def _speeds(work: LogUnderCheck) -> Iterator[Speed]:
@@ -130,12 +130,12 @@ def _speeds(work: LogUnderCheck) -> Iterator[Speed]:
         return
     place, heading = pose[:MOST_ROWS, :2], unwrapped(pose[:MOST_ROWS, 2])
     for component, values in work.columns("twist"):
-        own = values[:MOST_ROWS]
+        first_values = values[:MOST_ROWS]
         if component == "omega":
-            yield from _made(component, "heading", own, heading[:, None], t, work.step, None)
+            yield from _made(component, "heading", first_values, heading[:, None], t, work.step, None)
         else:
             row = world_to_body(heading)[:, ["vx", "vy"].index(component), :2]
-            yield from _made(component, "x y", own, place, t, work.step, row)
+            yield from _made(component, "x y", first_values, place, t, work.step, row)
 
 
 def _made(
@@ -149,31 +149,31 @@ def _made(
 ) -> Iterator[Speed]:
     """The speed beside the rates of its positions, shape (rows, n); row (rows, n): which part of them it is."""
     part = np.ones_like(place) if row is None else row
-    near = np.concatenate([[False], np.diff(t) < LATE_STEP * step])
+    in_step = np.concatenate([[False], np.diff(t) < LATE_STEP * step])
 
     def rate(back: int, on: int) -> FloatArray:
         """From `back` rows before to `on` rows after each row."""
-        own = np.full(len(t), np.nan)
+        rates = np.full(len(t), np.nan)
         inside = slice(back, len(t) - on)
         change = place[back + on :] - place[: len(t) - back - on]
-        own[inside] = (part[inside] * change).sum(axis=1) / (t[back + on :] - t[: len(t) - back - on])
-        own[inside][~_together(near, back + on)] = np.nan
-        return own
+        rates[inside] = (part[inside] * change).sum(axis=1) / (t[back + on :] - t[: len(t) - back - on])
+        rates[inside][~_together(in_step, back + on)] = np.nan
+        return rates
 
     over = tuple(rate(rows, 0) for rows in range(1, LONGEST_MEAN + 1))
     turns = np.isfinite(over[0]) & moving(over[0])
     if turns.sum() < MIN_ROWS or np.nanmin(values) == np.nanmax(values):
         return
-    rough = (part[2:-2] * np.diff(place, 4, axis=0)).sum(axis=1)[turns[2:-2] & _together(near, 4)]
+    rough = (part[2:-2] * np.diff(place, 4, axis=0)).sum(axis=1)[turns[2:-2] & _together(in_step, 4)]
     rough = rough[np.isfinite(rough)]
     noise = float(robust_std(rough, 0.0)) / FOURTH if rough.size >= MIN_ROWS else 0.0
     yield Speed(component, origin, values, over[0], rate(1, 1), over, noise * np.sqrt(2.0) / step)
 
 
-def _together(near: BoolArray, count: int) -> BoolArray:
+def _together(in_step: BoolArray, count: int) -> BoolArray:
     """Whether `count` + 1 rows from each row on follow one another without a gap. Shape (rows - count,)."""
-    far = np.concatenate([[0], np.cumsum(~near)])
-    return far[count + 1 :] == far[1 : len(near) - count + 1]
+    gaps = np.concatenate([[0], np.cumsum(~in_step)])
+    return gaps[count + 1 :] == gaps[1 : len(in_step) - count + 1]
 
 
 # Speeds that are means over a window of rows, as some motor controllers give them: late, and slow to show a change

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from omnidyn.arrays import BoolArray, IntArray
 from omnidyn.document import Document, plain, sentence
 from omnidyn.logs.log import Log
-from omnidyn.shown import DOCUMENT, FIGURE, Shown, make
+from omnidyn.shown import DOCUMENT, FIGURE, Displayable, make
 from omnidyn.statement import ERROR, NOTE, SEVERITIES, WARNING, Statement
 from omnidyn.statistics import stretches
 
@@ -45,7 +45,7 @@ class Finding(Statement):
 
 
 @dataclass(frozen=True, repr=False)
-class Verdict(Shown):
+class Verdict(Displayable):
     """All findings of one log, gravest first, and what the log excites.
 
     excitation: name of a measure -> value (see excitation.py). rows: of the log. duration [s]. rate [Hz].
@@ -150,9 +150,9 @@ def in_order(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     return tuple(sorted(findings, key=lambda finding: SEVERITIES.index(finding.severity)))
 
 
-def spans_of(bad: BoolArray, lines: IntArray) -> tuple[Span, ...]:
-    """The first stretches of rows where `bad` holds, as (first line, last line). Shapes (rows,)."""
-    return tuple((int(lines[a]), int(lines[b - 1])) for a, b in stretches(bad)[:MAX_SPANS])
+def spans_of(mask: BoolArray, lines: IntArray) -> tuple[Span, ...]:
+    """The first stretches of rows where `mask` holds, as (first line, last line). Shapes (rows,)."""
+    return tuple((int(lines[a]), int(lines[b - 1])) for a, b in stretches(mask)[:MAX_SPANS])
 
 
 def merged(findings: Sequence[Finding], blocks: int) -> Finding:
@@ -203,13 +203,13 @@ def with_guesses(findings: Iterable[Finding], robot: Robot | None, before: Itera
 
     One that rests on guesses of a finding `before` is left out: one wrong guess explains both.
     """
-    found, doubted = [], {key for finding in before if finding.severity != NOTE for key in finding.rests_on}
+    kept_findings, doubted = [], {key for finding in before if finding.severity != NOTE for key in finding.rests_on}
     for finding in findings:
-        each = _with_guess(finding, robot)
-        if not each.rests_on or not doubted.issuperset(each.rests_on):
-            found.append(each)
-            doubted.update(each.rests_on if each.severity != NOTE else ())
-    return found
+        judged = _with_guess(finding, robot)
+        if not judged.rests_on or not doubted.issuperset(judged.rests_on):
+            kept_findings.append(judged)
+            doubted.update(judged.rests_on if judged.severity != NOTE else ())
+    return kept_findings
 
 
 def _with_guess(finding: Finding, robot: Robot | None) -> Finding:
@@ -233,15 +233,15 @@ def judged_again(verdict: Verdict, fitted: Verdict) -> Verdict:
 
     fitted: what check says of the same log and the fitted robot.
     """
-    kept = [finding for finding in verdict.findings if not finding.rests_on]
-    known = {(finding.code, finding.subject) for finding in kept}
+    settled = [finding for finding in verdict.findings if not finding.rests_on]
+    places = {(finding.code, finding.subject) for finding in settled}
     doubted = {(finding.code, finding.subject): finding for finding in verdict.findings if finding.rests_on}
     for finding in fitted.findings:
         place = finding.code, finding.subject
-        if place in doubted or (finding.severity == ERROR and place not in known):
-            kept.append(replace(finding, numbers={**finding.numbers, "by_fit": True}))
+        if place in doubted or (finding.severity == ERROR and place not in places):
+            settled.append(replace(finding, numbers={**finding.numbers, "by_fit": True}))
             doubted.pop(place, None)
-    return replace(verdict, findings=in_order([*kept, *map(_gone, doubted.values())]))
+    return replace(verdict, findings=in_order([*settled, *map(_gone, doubted.values())]))
 
 
 def _gone(finding: Finding) -> Finding:

@@ -24,26 +24,26 @@ from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.statement import ERROR, NOTE, WARNING, Statement
 
-WHOLE, STEADY, MOTORS, GEOMETRY = "whole logs", "steady state", "motors", "geometry"
-USES = (WHOLE, STEADY, MOTORS, GEOMETRY)
+WHOLE_LOGS, STEADY, MOTORS, GEOMETRY = "whole logs", "steady state", "motors", "geometry"
+USES = (WHOLE_LOGS, STEADY, MOTORS, GEOMETRY)
 MOST_WINDOWS = 12  # steady windows that are counted
 AT_REST = 0.02  # [rad/s] of a wheel: 1 mm/s at the rim of one of 5 cm
 SURE_ERRORS = 2.0  # standard errors: a mean speed below is not known to be one
-NEVER, FEW = "never_moved", "few_rows"  # findings that leave nothing to do
+NEVER, FEW_ROWS = "never_moved", "few_rows"  # findings that leave nothing to do
 INPUTS, SET_SPEEDS = ("voltage", "duty"), ("wheel_speed_command", "twist_command")
 WHEELS = ("wheel_speed", "wheel_angle")
 
 
 def uses(log: Log, robot: Robot | None = None, codes: Collection[str] = ()) -> tuple[Use, ...]:
     """What a log can be used for as it stands. codes: of the findings on it. Never raises for what the log holds."""
-    why, run = _why_nothing(log, codes), None
+    reason, run = _why_nothing(log, codes), None
     try:
-        run = None if why else log.to_run()
+        run = None if reason else log.to_run()
     except OmnidynError as error:
-        why = _refused(error)
-    if run is None or why is not None:
-        assert why is not None
-        return tuple(Use(name, False, why) for name in USES)
+        reason = _refused(error)
+    if run is None or reason is not None:
+        assert reason is not None
+        return tuple(Use(name, False, reason) for name in USES)
     columns = log.columns
     return (_whole(run, robot, columns), _steady(run, robot, columns), _motors(run, columns), _geometry(run))
 
@@ -51,7 +51,7 @@ def uses(log: Log, robot: Robot | None = None, codes: Collection[str] = ()) -> t
 def _why_nothing(log: Log, codes: Collection[str]) -> Statement | None:
     if len(log) < 2:
         return Statement("no_two_rows", ERROR)
-    if FEW in codes:
+    if FEW_ROWS in codes:
         return Statement("too_few_rows", ERROR, "", {"rows": len(log), "least": MIN_ROWS})
     return Statement("robot_rests", ERROR) if NEVER in codes else None
 
@@ -75,19 +75,19 @@ def _yes(use: str, code: str, **numbers: object) -> Use:
 
 def _whole(run: Run, robot: Robot | None, columns: ColumnMap) -> Use:
     """A fit of the whole log by output error."""
-    why = needs.why_not_whole(run, robot)
-    if why is not None:
+    reason = needs.why_not_whole(run, robot)
+    if reason is not None:
         no_output = not any(getattr(run, name) is not None for name in needs.OUTPUTS)
         no_input = run.voltage is None and run.duty is None
         channels = (*(INPUTS if no_input else ()), *(needs.OUTPUTS if no_output else ()))
-        return _not(WHOLE, why.code, columns, *channels)
-    if use := _not_robot(WHOLE, run, robot, columns) or _no_battery(WHOLE, run, robot, columns):
+        return _not(WHOLE_LOGS, reason.code, columns, *channels)
+    if use := _not_robot(WHOLE_LOGS, run, robot, columns) or _no_battery(WHOLE_LOGS, run, robot, columns):
         return use
     if use := _no_stretch(run, robot, columns):
         return use
     drives = next(name for name in (*INPUTS, *SET_SPEEDS) if getattr(run, name) is not None)
     outputs = [name for name in needs.OUTPUTS if getattr(run, name) is not None]
-    return _yes(WHOLE, "serves_whole", input=drives, outputs=outputs, needs=_needs_of_robot(run, robot, drives))
+    return _yes(WHOLE_LOGS, "serves_whole", input=drives, outputs=outputs, needs=_needs_of_robot(run, robot, drives))
 
 
 def _needs_of_robot(run: Run, robot: Robot | None, drives: str) -> str:
@@ -116,10 +116,10 @@ def _no_stretch(run: Run, robot: Robot | None, columns: ColumnMap) -> Use | None
     name = next((name for name in INPUTS if getattr(run, name) is not None), "")
     if not name or (robot is not None and robot.drive.kind == SPEED):
         return None
-    known = np.isfinite(getattr(run, name))
-    missing = [int(k) + 1 for k in np.flatnonzero(~known.any(axis=0))]
-    if missing or known.all(axis=1).sum() < MIN_ROWS:
-        return _not(WHOLE, "input_incomplete", columns, channel=name, missing=missing)
+    finite = np.isfinite(getattr(run, name))
+    absent = [int(k) + 1 for k in np.flatnonzero(~finite.any(axis=0))]
+    if absent or finite.all(axis=1).sum() < MIN_ROWS:
+        return _not(WHOLE_LOGS, "input_incomplete", columns, channel=name, missing=absent)
     return None
 
 
@@ -140,12 +140,12 @@ def _steady(run: Run, robot: Robot | None, columns: ColumnMap) -> Use:
     if not count:
         return _not(STEADY, "no_steady_stretch", columns, hold_s=MIN_DURATION, at_rest=len(windows))
     drives = "duty" if origin == needs.VOLTAGE and run.voltage is None else origin
-    more = len(windows) == MOST_WINDOWS
+    truncated = len(windows) == MOST_WINDOWS
     return _yes(
         STEADY,
         "serves_steady",
         stretches=count,
-        more=more,
+        more=truncated,
         force_from=drives,
         needs=_needs_of_robot(run, robot, drives),
     )
@@ -174,9 +174,9 @@ def _geometry(run: Run) -> Use:
     if not shows_both(run):
         return Use(GEOMETRY, False, Statement("no_two_motions"))
     try:
-        seen = wheel_geometry([run])
+        geometry = wheel_geometry([run])
     except OmnidynError as error:
         return Use(GEOMETRY, False, _refused(error))
     except np.linalg.LinAlgError:
         return Use(GEOMETRY, False, Statement("speeds_beyond_robots"))
-    return _yes(GEOMETRY, "serves_geometry", azimuth_deg=seen.azimuth_deg, source=seen.source)
+    return _yes(GEOMETRY, "serves_geometry", azimuth_deg=geometry.azimuth_deg, source=geometry.source)

@@ -30,10 +30,12 @@ def check_limits(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         findings += _saturated(work, channel)
     findings += at_each_clock(work, _too_fast)[0] + _sag(work) + _no_supply(work)
     for channel in ("voltage", "duty"):
-        more = _one_way_drive(work, channel)
-        work, findings = work.replace(**{channel: None}) if more else work, findings + more
-    more = _unsigned(work)
-    return findings + more, work.replace(current=None) if any(finding.severity == ERROR for finding in more) else work
+        new_findings = _one_way_drive(work, channel)
+        work, findings = work.replace(**{channel: None}) if new_findings else work, findings + new_findings
+    new_findings = _unsigned(work)
+    return findings + new_findings, work.replace(current=None) if any(
+        finding.severity == ERROR for finding in new_findings
+    ) else work
 
 
 def _one_way_drive(work: LogUnderCheck, channel: str) -> list[Finding]:
@@ -50,8 +52,10 @@ def _one_way_drive(work: LogUnderCheck, channel: str) -> list[Finding]:
         usual = np.maximum(0.3 * np.nanquantile(np.abs(mean), 0.9), 5.0 * noise / np.sqrt(width))
         pushed = driven > 0.2 * high
         back, ahead = ((side * mean > usual) & pushed for side in (-1.0, 1.0))
-        both = np.minimum(back.mean(axis=0), ahead.mean(axis=0))
-    names = [name for name, share in zip(components(channel, driven.shape[1]), both, strict=True) if share > BOTH_WAYS]
+        shares = np.minimum(back.mean(axis=0), ahead.mean(axis=0))
+    names = [
+        name for name, share in zip(components(channel, driven.shape[1]), shares, strict=True) if share > BOTH_WAYS
+    ]
     if not names:
         return []
     share = float(back.mean())
@@ -75,7 +79,7 @@ def _limit(work: LogUnderCheck, channel: str) -> tuple[FloatArray | float | None
 
 def _saturated(work: LogUnderCheck, channel: str) -> list[Finding]:
     values = work.get(channel)
-    limit, whose = _limit(work, channel)
+    limit, owner = _limit(work, channel)
     if values is None or limit is None:
         return []
     tolerance = np.array(
@@ -84,8 +88,8 @@ def _saturated(work: LogUnderCheck, channel: str) -> list[Finding]:
     tolerance = np.minimum(tolerance, 0.03 * np.max(limit))
     with np.errstate(invalid="ignore"):
         at = np.abs(values) >= limit - tolerance
-    bad = np.asarray(at.any(axis=1))
-    share = float(bad.mean())
+    mask = np.asarray(at.any(axis=1))
+    share = float(mask.mean())
     if share < LEAST_SHARE:
         return []
     names = [
@@ -99,27 +103,32 @@ def _saturated(work: LogUnderCheck, channel: str) -> list[Finding]:
             "saturation",
             WARNING,
             " ".join(names),
-            {"share": share, "limit": level, "limited_by": whose},
-            rows=work.lines(bad),
-            count=int(bad.sum()),
+            {"share": share, "limit": level, "limited_by": owner},
+            rows=work.lines(mask),
+            count=int(mask.sum()),
         )
     ]
 
 
 def _too_fast(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Inputs that change more from row to row than the rows can tell."""
-    name = next((each for each in ("voltage", "duty") if work.get(each) is not None), "")
+    name = next((channel for channel in ("voltage", "duty") if work.get(channel) is not None), "")
     columns = work.sampled_columns(name) if name else []
     if not columns:
         return [], work
     fast = np.array([unresolved_rows(column) for _, column in columns]).T
-    bad = np.asarray(fast.any(axis=1))
-    if bad.mean() < TOO_FAST:
+    mask = np.asarray(fast.any(axis=1))
+    if mask.mean() < TOO_FAST:
         return [], work
-    names = [each for (each, _), column in zip(columns, fast.T, strict=True) if column.any()]
+    names = [name for (name, _), column in zip(columns, fast.T, strict=True) if column.any()]
     return [
         Finding(
-            "too_fast", NOTE, " ".join(names), {"share": float(bad.mean())}, rows=work.lines(bad), count=int(bad.sum())
+            "too_fast",
+            NOTE,
+            " ".join(names),
+            {"share": float(mask.mean())},
+            rows=work.lines(mask),
+            count=int(mask.sum()),
         )
     ], work
 
@@ -138,7 +147,7 @@ def _sag(work: LogUnderCheck) -> list[Finding]:
     drop = (high - low) / high
     if drop < SAG or high - low < 4.0 * noise:
         return []
-    bad = level < high - 0.5 * (high - low)
+    mask = level < high - 0.5 * (high - low)
     return [
         Finding(
             "sag",
@@ -146,8 +155,8 @@ def _sag(work: LogUnderCheck) -> list[Finding]:
             "supply",
             {"drop": drop, "high_V": high, "low_V": low, "lowest_at_s": float(work.t[int(np.nanargmin(level))])},
             "of_duty" if work.get("duty") is not None else "",
-            rows=work.lines(bad),
-            count=int(bad.sum()),
+            rows=work.lines(mask),
+            count=int(mask.sum()),
         )
     ]
 

@@ -15,7 +15,7 @@ from omnidyn.model.wheels import wheel_speed
 from omnidyn.statement import ERROR, NOTE, WARNING
 from omnidyn.statistics import stretches
 
-SETTLE, HELD = 0.4, 0.3  # [s]
+SETTLE, HOLD_TIME = 0.4, 0.3  # [s]
 DROOP = 0.05
 NOISE_QUANTILE = 0.99  # of noise at rest: a row in some thousands is beyond its level,
 NOISE_FACTOR = 1.5  # none beyond so many times that
@@ -59,9 +59,9 @@ def _start_up(work: LogUnderCheck, still: BoolArray) -> list[Finding]:
 
 def _still(work: LogUnderCheck, times: float = 1.0) -> BoolArray | None:
     """Rows in which nothing moves beyond so many times its noise; None where no motion was recorded."""
-    speed, seen = work.get("wheel_speed"), ground(work)
-    if speed is None and seen is not None and len(seen.axes) == 3:
-        speed = seen.twist
+    speed, floor_motion = work.get("wheel_speed"), ground(work)
+    if speed is None and floor_motion is not None and len(floor_motion.axes) == 3:
+        speed = floor_motion.twist
     if speed is None:  # a gyro alone does not know
         return None
     width = work.width(0.1)
@@ -81,9 +81,9 @@ def _rest_level(column: FloatArray, width: int) -> float:
 def _level(work: LogUnderCheck) -> float:
     """The same as a speed of wheels [rad/s]."""
     speed, robot = work.get("wheel_speed"), work.geometry
-    seen = ground(work)
-    if speed is None and seen is not None and robot is not None:
-        speed = wheel_speed(robot.wheels, seen.twist)
+    floor_motion = ground(work)
+    if speed is None and floor_motion is not None and robot is not None:
+        speed = wheel_speed(robot.wheels, floor_motion.twist)
     width = work.width(0.1)
     return np.inf if speed is None else max(_rest_level(column, width) for column in speed.T)
 
@@ -101,7 +101,7 @@ def _blocked(work: LogUnderCheck, still: BoolArray) -> list[Finding]:
     voltage, robot = volts(work), work.geometry
     current = work.get("current")
     if voltage is not None and robot is not None and voltage.shape[1] == work.wheels:
-        bad = np.zeros(len(work), dtype=bool)
+        mask = np.zeros(len(work), dtype=bool)
         rest = np.flatnonzero(still & np.isfinite(voltage).all(axis=1))
         if rest.size:
             levels, back = np.unique(np.round(voltage[rest], 3), axis=0, return_inverse=True)
@@ -110,38 +110,38 @@ def _blocked(work: LogUnderCheck, still: BoolArray) -> list[Finding]:
                 grips = robot.replace(wheels=robot.wheels.replace(traction_mu=None))  # as all wheels do at rest
                 start = acceleration(grips, np.zeros((len(levels), 3)), levels / SAFETY)
                 soon = np.abs(wheel_speed(robot.wheels, MOMENT * start)).max(axis=1)
-                bad[rest] = (soon > 3.0 * _level(work))[back.ravel()]
+                mask[rest] = (soon > 3.0 * _level(work))[back.ravel()]
     elif current is not None:
         load = np.nansum(np.abs(smooth(current, 9)), axis=1)
         moving = load[~still]
-        bad = still & (load > 2.0 * np.quantile(moving, 0.99)) if moving.size > MIN_ROWS else np.zeros(len(work), bool)
+        mask = still & (load > 2.0 * np.quantile(moving, 0.99)) if moving.size > MIN_ROWS else np.zeros(len(work), bool)
     else:
         return []
-    bad = _long(bad, round(SETTLE / work.step))
-    if not bad.any():
+    mask = _long(mask, round(SETTLE / work.step))
+    if not mask.any():
         return []
     return [
         Finding(
             "blocked",
             WARNING,
             "",
-            {"seconds": float(bad.sum() * work.step)},
-            rows=work.lines(bad),
-            count=int(bad.sum()),
+            {"seconds": float(mask.sum() * work.step)},
+            rows=work.lines(mask),
+            count=int(mask.sum()),
         )
     ]
 
 
-def _long(bad: BoolArray, least: int) -> BoolArray:
+def _long(mask: BoolArray, least_rows: int) -> BoolArray:
     """Only the stretches of at least so many rows, without their first half second of starting."""
-    out = np.zeros_like(bad)
-    for a, b in stretches(bad):
-        if b - a >= max(least, 5):
+    out = np.zeros_like(mask)
+    for a, b in stretches(mask):
+        if b - a >= max(least_rows, 5):
             out[a:b] = True
     return out
 
 
-def held(work: LogUnderCheck, command: FloatArray, seconds: float = HELD) -> BoolArray:
+def held(work: LogUnderCheck, command: FloatArray, seconds: float = HOLD_TIME) -> BoolArray:
     """Rows whose command has been the same for so long. Shape (rows,)."""
     change = np.concatenate([[True], (np.diff(command, axis=0) != 0.0).any(axis=1)])
     last = np.maximum.accumulate(np.where(change, np.arange(len(change)), 0))
@@ -178,7 +178,7 @@ def _droop(work: LogUnderCheck) -> list[Finding]:
 
 # Small things that a reader of the log should know: bursts of a tracker, a last row that is not like the others
 
-BURST, SHORT = 10.0, 0.25  # times what 90 % of the rows stay below; [s]
+BURST, SHORT_TIME = 10.0, 0.25  # times what 90 % of the rows stay below; [s]
 
 
 def check_oddities(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -196,20 +196,20 @@ def _bursts(work: LogUnderCheck) -> list[Finding]:
     for component, values in work.columns("twist"):
         size = np.abs(values)
         usual = float(np.nanquantile(size, 0.9))
-        bad = np.zeros(len(work), dtype=bool)
+        mask = np.zeros(len(work), dtype=bool)
         for a, b in stretches(size > BURST * usual):
-            bad[a:b] = work.t[min(b, len(work) - 1)] - work.t[a] < SHORT
-        if usual <= 0.0 or not bad.any():
+            mask[a:b] = work.t[min(b, len(work) - 1)] - work.t[a] < SHORT_TIME
+        if usual <= 0.0 or not mask.any():
             continue
-        top = int(np.flatnonzero(bad)[np.argmax(size[bad])])
+        top = int(np.flatnonzero(mask)[np.argmax(size[mask])])
         findings.append(
             Finding(
                 "burst",
                 NOTE,
                 component,
-                {"farthest": float(values[top]), "usual": usual, "at_s": float(work.t[top]), "longest_s": SHORT},
-                rows=work.lines(bad),
-                count=int(bad.sum()),
+                {"farthest": float(values[top]), "usual": usual, "at_s": float(work.t[top]), "longest_s": SHORT_TIME},
+                rows=work.lines(mask),
+                count=int(mask.sum()),
             )
         )
     return findings
@@ -220,6 +220,6 @@ def _last_row(work: LogUnderCheck) -> list[Finding]:
     for channel in INPUTS:
         values = work.get(channel)
         if values is not None and not values[-1].any() and values[-2].any() and np.isfinite(values[-2:]).all():
-            bad = np.arange(len(work)) == len(work) - 1
-            return [Finding("last_row", NOTE, channel, rows=work.lines(bad), count=1)]
+            mask = np.arange(len(work)) == len(work) - 1
+            return [Finding("last_row", NOTE, channel, rows=work.lines(mask), count=1)]
     return []

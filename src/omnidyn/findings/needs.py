@@ -33,19 +33,19 @@ def is_exact(robot: Robot) -> bool:
 def why_no_inputs(runs: Sequence[Run], robot: Robot) -> str:
     """Which log has no input that the robot follows, or no output, in words; "" where all have both."""
     for run in runs:
-        why = why_not_whole(run, robot)
-        if why is not None:
-            return f"{run.source or 'a log'} {why}"
+        reason = why_not_whole(run, robot)
+        if reason is not None:
+            return f"{run.source or 'a log'} {reason}"
     return ""
 
 
 def why_not_whole(run: Run, robot: Robot | None) -> Statement | None:
     """Why a log cannot be fitted whole; None where it can be. Without a robot: by no robot that there is."""
-    none = run.voltage is None and run.duty is None
-    if none and has_set_speeds(run):
+    no_drive = run.voltage is None and run.duty is None
+    if no_drive and has_set_speeds(run):
         if robot is not None and robot.drive.kind != SPEED:
             return Statement("set_speeds_only")
-    elif none:
+    elif no_drive:
         return Statement("no_input")
     if not any(getattr(run, name) is not None for name in OUTPUTS):
         return Statement("no_output")

@@ -37,8 +37,8 @@ def begin(log: Log, robot: Robot | None) -> tuple[list[Finding], LogUnderCheck]:
     again = np.concatenate([[False], np.diff(log.t[rows]) == 0.0]) if rows.size else np.zeros(0, dtype=bool)
     findings += _repeated(log, rows, again) + restarts_of(log)
     rows = rows[~again]
-    more, work = at_each_clock(leading(log, robot, rows), check_counters)
-    findings, work = findings + more, with_speed(work)
+    new_findings, work = at_each_clock(leading(log, robot, rows), check_counters)
+    findings, work = findings + new_findings, with_speed(work)
     if work.get("wheel_speed") is not None and work.derived_speed:
         findings.append(Finding("speed_from_angle", NOTE))
     return findings + _gaps(work) + _jitter(work) + _unit(work) + _few(work), work
@@ -64,9 +64,9 @@ def _empty_rows(log: Log, empty: BoolArray) -> list[Finding]:
 def _padded(log: Log, rows: IntArray) -> list[Finding]:
     if not rows.size:
         return []
-    bad = np.zeros(len(log), dtype=bool)
-    bad[rows] = True
-    return [Finding("padding", WARNING, "t", rows=spans_of(bad, log.lines), count=int(rows.size))]
+    mask = np.zeros(len(log), dtype=bool)
+    mask[rows] = True
+    return [Finding("padding", WARNING, "t", rows=spans_of(mask, log.lines), count=int(rows.size))]
 
 
 def _backward(log: Log, rows: IntArray) -> list[Finding]:
@@ -74,7 +74,7 @@ def _backward(log: Log, rows: IntArray) -> list[Finding]:
     count = int(back.sum())
     if not count:
         return []
-    bad = np.concatenate([[False], back])
+    mask = np.concatenate([[False], back])
     farthest = float(-np.diff(log.t[rows]).min())
     return [
         Finding(
@@ -83,7 +83,7 @@ def _backward(log: Log, rows: IntArray) -> list[Finding]:
             "t",
             {"farthest_s": farthest},
             "often" if goes_back_often(count, len(rows)) else "",
-            rows=spans_of(bad, log.lines[rows]),
+            rows=spans_of(mask, log.lines[rows]),
             count=count,
         )
     ]
@@ -94,9 +94,9 @@ def _repeated(log: Log, rows: IntArray, again: BoolArray) -> list[Finding]:
     if not count:
         return []
     share = count / len(rows)
-    where = np.argsort(rows[again], kind="stable")
-    bad = np.zeros(len(log), dtype=bool)
-    bad[rows[again][where]] = True
+    order = np.argsort(rows[again], kind="stable")
+    mask = np.zeros(len(log), dtype=bool)
+    mask[rows[again][order]] = True
     return [
         Finding(
             "time_repeats",
@@ -104,7 +104,7 @@ def _repeated(log: Log, rows: IntArray, again: BoolArray) -> list[Finding]:
             "t",
             {"share": share},
             "often" if share > 0.01 else "",
-            rows=spans_of(bad, log.lines),
+            rows=spans_of(mask, log.lines),
             count=count,
         )
     ]
@@ -112,13 +112,13 @@ def _repeated(log: Log, rows: IntArray, again: BoolArray) -> list[Finding]:
 
 def _gaps(work: LogUnderCheck) -> list[Finding]:
     lines = work.log.lines[work.rows]
-    known = [restart.line for restart in work.log.restarts if restart.is_gap]  # a gap of their own
+    restart_lines = [restart.line for restart in work.log.restarts if restart.is_gap]  # a gap of their own
     cuts = [segment.start for segment in work.segments[1:]]
-    cuts = [k for k in cuts if not any(lines[k - 1] < line <= lines[k] for line in known)]
+    cuts = [k for k in cuts if not any(lines[k - 1] < line <= lines[k] for line in restart_lines)]
     if not cuts:
         return []
     lengths = np.array([work.t[k] - work.t[k - 1] for k in cuts])
-    lost = int(min(np.round(lengths / work.step - 1.0).sum(), 1e15))
+    lost_rows = int(min(np.round(lengths / work.step - 1.0).sum(), 1e15))
     return [
         Finding(
             "gap",
@@ -126,7 +126,7 @@ def _gaps(work: LogUnderCheck) -> list[Finding]:
             "t",
             {
                 "longest_s": float(lengths.max()),
-                "lost_rows": float(lost),
+                "lost_rows": float(lost_rows),
                 "at_s": float(work.t[cuts[int(lengths.argmax())] - 1]),
             },
             rows=tuple((int(lines[k - 1]), int(lines[k])) for k in cuts[:20]),
@@ -170,20 +170,20 @@ def between(last: tuple[float, int] | None, block: Log, rate: float) -> tuple[li
     timed = np.flatnonzero(np.isfinite(block.t))
     if not timed.size:
         return [], last
-    here = float(block.t[timed[-1]]), int(block.lines[timed[-1]])
+    row_end = float(block.t[timed[-1]]), int(block.lines[timed[-1]])
     if last is None or rate <= 0.0:
-        return [], here
+        return [], row_end
     first, line = float(block.t[timed[0]]), int(block.lines[timed[0]])
     step = first - last[0]
     pair = Log(np.array([last[0], first]), {}, np.array([last[1], line]), source=block.source)
     if step < 0.0:
-        return _backward(pair, np.arange(2)), here
+        return _backward(pair, np.arange(2)), row_end
     if step == 0.0:
-        return _repeated(pair, np.arange(2), np.array([False, True])), here
+        return _repeated(pair, np.arange(2), np.array([False, True])), row_end
     if step * rate <= GAP:
-        return [], here
+        return [], row_end
     apart = (slice(0, 1), slice(1, 2))
-    return _gaps(LogUnderCheck(pair, None, np.arange(2), pair.t, 1.0 / rate, apart, {})), here
+    return _gaps(LogUnderCheck(pair, None, np.arange(2), pair.t, 1.0 / rate, apart, {})), row_end
 
 
 # Counters and clocks that begin again, or start over: what the reader mended, and what stands in a Run
@@ -210,8 +210,8 @@ def check_counters(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             continue
         if period is None and not rows:
             continue
-        bad = np.zeros(len(work), dtype=bool)
-        bad[list(rows)] = True
+        mask = np.zeros(len(work), dtype=bool)
+        mask[list(rows)] = True
         findings.append(
             Finding(
                 COUNTER if rows else FULL,
@@ -219,7 +219,7 @@ def check_counters(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
                 component,
                 {} if period is None else {"period_rad": period},
                 "of_run",
-                rows=work.lines(bad),
+                rows=work.lines(mask),
                 count=len(rows),
             )
         )

@@ -17,7 +17,7 @@ from omnidyn.model.first_guess import rests_on_guesses
 from omnidyn.model.keys import in_words, unit
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.robot_file import robot_to_toml
-from omnidyn.shown import FIGURE, FRAME, Shown, make
+from omnidyn.shown import FIGURE, FRAME, Displayable, make
 from omnidyn.statement import NOTE, Statement, by_severity, statements
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ class Correlation:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Estimate(Shown):
+class Estimate(Displayable):
     """What data say about a robot. Parameters are named by their key in the robot file: "friction.axes.viscous[0]".
 
     robot: with the fitted numbers; its priors hold std, source and origin, so that its file tells where they come from.

@@ -31,7 +31,7 @@ from omnidyn.identification.verdict import (
     steady_failure,
     steady_verdict,
 )
-from omnidyn.shown import FIGURE, FRAME, Shown, make
+from omnidyn.shown import FIGURE, FRAME, Displayable, make
 from omnidyn.statement import ERROR, SEVERITIES, Statement
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class After(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Identification(Shown):
+class Identification(Displayable):
     """All that logs say about a robot: estimates of each group, differences between groups, and what to do next.
 
     It has what the Estimate of its only group has, such as value, std, ci95, robot or lack_of_fit; one of motors has

@@ -38,16 +38,16 @@ def to_dataframe(value: Run | Estimate | Identification | Comparison, library: s
         raise InputError(
             "no such library of data frames", got=library, expected=" or ".join(LIBRARIES), where="library"
         )
-    made = _library(library)
+    module = _library(library)
     if isinstance(value, Run):
-        return _of_run(value, made, library)
+        return _of_run(value, module, library)
     if isinstance(value, Identification):
         columns, attributes = _of_groups(value)
     elif isinstance(value, Estimate):
         columns, attributes = _of_estimate(value)
     else:
         columns, attributes = _of_comparison(value)
-    frame = made.DataFrame(columns)
+    frame = module.DataFrame(columns)
     if library == PANDAS:
         frame.attrs |= attributes
     return frame
@@ -60,40 +60,42 @@ def _library(name: str) -> Any:
         raise MissingExtraError(f"a data frame needs {name}", remedy=INSTALL) from None
 
 
-def _of_run(run: Run, made: Any, library: str) -> Any:
+def _of_run(run: Run, module: Any, library: str) -> Any:
     columns = run_columns(run)
     if library == POLARS:
-        return made.DataFrame({name: np.ascontiguousarray(values) for name, values in columns.items()})
+        return module.DataFrame({name: np.ascontiguousarray(values) for name, values in columns.items()})
     units = {name: unit_of_column(name) for name in columns}
-    index = made.Index(columns.pop("t_s"), name="t_s")
-    frame = made.DataFrame(columns, index=index)
+    index = module.Index(columns.pop("t_s"), name="t_s")
+    frame = module.DataFrame(columns, index=index)
     frame.attrs |= {"source": run.source, "warnings": [*map(str, run.warnings)], "units": units}
     return frame
 
 
-def _of_groups(found: Identification) -> tuple[Mapping[str, list[Any]], dict[str, Any]]:
+def _of_groups(result: Identification) -> tuple[Mapping[str, list[Any]], dict[str, Any]]:
     """The rows of all groups, with a column for the group where there are several."""
-    if len(found.groups) == 1:
-        return _of_estimate(found.estimate)
-    if not found.groups:
+    if len(result.groups) == 1:
+        return _of_estimate(result.estimate)
+    if not result.groups:
         raise InputError("a study of motors has no data frame", expected="an identification of friction")
-    tables = {group: _of_estimate(estimate) for group, estimate in found.groups.items()}
+    tables = {group: _of_estimate(estimate) for group, estimate in result.groups.items()}
     names = [group for group, (columns, _) in tables.items() for _ in columns["parameter"]]
     first = next(iter(tables.values()))[0]
     columns = {name: [cell for columns, _ in tables.values() for cell in columns[name]] for name in first}
-    return {"group": names, **columns}, {"warnings": [w for _, more in tables.values() for w in more["warnings"]]}
+    return {"group": names, **columns}, {
+        "warnings": [w for _, attributes in tables.values() for w in attributes["warnings"]]
+    }
 
 
 def _of_estimate(estimate: Estimate) -> tuple[Mapping[str, list[Any]], dict[str, Any]]:
     names = list(estimate.value)
     unknown = set(estimate.unidentifiable)
-    known = [name not in unknown for name in names]
+    determined = [name not in unknown for name in names]
     columns = {
         "parameter": names,
         "value": [float(estimate.value[name]) for name in names],
-        "std": [float(estimate.std[name]) if k else np.nan for name, k in zip(names, known, strict=True)],
-        "low": [float(estimate.ci95[name][0]) if k else np.nan for name, k in zip(names, known, strict=True)],
-        "high": [float(estimate.ci95[name][1]) if k else np.nan for name, k in zip(names, known, strict=True)],
+        "std": [float(estimate.std[name]) if k else np.nan for name, k in zip(names, determined, strict=True)],
+        "low": [float(estimate.ci95[name][0]) if k else np.nan for name, k in zip(names, determined, strict=True)],
+        "high": [float(estimate.ci95[name][1]) if k else np.nan for name, k in zip(names, determined, strict=True)],
         "unit": [unit(name) for name in names],
     }
     attributes = {
@@ -106,15 +108,17 @@ def _of_estimate(estimate: Estimate) -> tuple[Mapping[str, list[Any]], dict[str,
     return columns, attributes
 
 
-def _of_comparison(found: Comparison) -> tuple[Mapping[str, list[Any]], dict[str, Any]]:
-    rows = [(robot, name, each) for robot in found.robots for name, each in found.overall[robot].items()]
+def _of_comparison(comparison: Comparison) -> tuple[Mapping[str, list[Any]], dict[str, Any]]:
+    rows = [
+        (robot, name, metrics) for robot in comparison.robots for name, metrics in comparison.overall[robot].items()
+    ]
     columns: dict[str, list[Any]] = {
         "robot": [robot for robot, _, _ in rows],
         "component": [name for _, name, _ in rows],
         "unit": [component_unit(name) for _, name, _ in rows],
     }
     for metric in METRICS:
-        values = [getattr(each, metric) for _, _, each in rows]
+        values = [getattr(metrics, metric) for _, _, metrics in rows]
         columns[metric] = values if metric == "samples" else [np.nan if v is None else float(v) for v in values]
     units = {
         "fit_percent": "%",
@@ -125,4 +129,4 @@ def _of_comparison(found: Comparison) -> tuple[Mapping[str, list[Any]], dict[str
         "max": "unit",
         "bias": "unit",
     }
-    return columns, {"warnings": [*map(str, found.warnings)], "units": units}
+    return columns, {"warnings": [*map(str, comparison.warnings)], "units": units}

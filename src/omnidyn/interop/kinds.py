@@ -11,7 +11,7 @@ from omnidyn.files import read_text
 from omnidyn.model.robot import Robot
 
 
-class Reader(NamedTuple):
+class RobotImporter(NamedTuple):
     """Who reads a kind of file: module and function. completes: it needs another robot for what the file lacks."""
 
     module: str
@@ -20,9 +20,9 @@ class Reader(NamedTuple):
 
 
 READERS = {
-    "json": Reader("omnidyn.interop.robot_json", "robot_of_json", False),
-    "urdf": Reader("omnidyn.interop.urdf", "robot_of_urdf", True),
-    "mjcf": Reader("omnidyn.interop.mjcf", "robot_of_mjcf", True),
+    "json": RobotImporter("omnidyn.interop.robot_json", "robot_of_json", False),
+    "urdf": RobotImporter("omnidyn.interop.urdf", "robot_of_urdf", True),
+    "mjcf": RobotImporter("omnidyn.interop.mjcf", "robot_of_mjcf", True),
 }
 MAX_BYTES = 8 * 2**20
 
@@ -32,8 +32,12 @@ def import_robot(
 ) -> Robot:
     """The robot in a file of another tool; origins of what was read are "imported".
 
-    like: gives what the file does not say, motors above all; without it that is guessed, and marked as a guess.
-    wheel_radius [m]: of a URDF file whose wheels are meshes.
+    Args:
+        kind: Of the file: a name of `READERS`.
+        path: The file.
+        like: Gives what the file does not say, motors above all; without it that is guessed, and marked as a guess.
+        wheel_radius: Of a URDF file whose wheels are meshes [m].
+
     Raises InputError for a kind that is not read, and for a file that cannot be used.
     """
     if kind not in READERS:
@@ -49,5 +53,5 @@ def import_robot(
         )
     read = getattr(importlib.import_module(reader.module), reader.function)
     text = read_text(path, MAX_BYTES)
-    more = {} if wheel_radius is None else {"wheel_radius": wheel_radius}
-    return read(text, os.fspath(path), like, **more) if reader.completes else read(text, os.fspath(path))
+    options = {} if wheel_radius is None else {"wheel_radius": wheel_radius}
+    return read(text, os.fspath(path), like, **options) if reader.completes else read(text, os.fspath(path))

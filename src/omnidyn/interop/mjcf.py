@@ -27,12 +27,12 @@ def robot_of_mjcf(text: str, where: str = "robot.xml", other: Robot | None = Non
     if root.tag != "mujoco":
         raise InputError("not a MuJoCo model", got=f"<{root.tag}>", expected="<mujoco>", where=where)
     mujoco, model, data = _compiled(read_parts(root, where), where)
-    found = _wheels(mujoco, model, data)
-    base = int(model.body_rootid[found[0][0]]) if found else 1
+    wheels = _wheels(mujoco, model, data)
+    base = int(model.body_rootid[wheels[0][0]]) if wheels else 1
     lumps = [
         _lump(model, data, k) for k in range(model.nbody) if model.body_rootid[k] == base and model.body_mass[k] > 0.0
     ]
-    axles = [axle for body, axle in found if model.body_rootid[body] == base]
+    axles = [axle for body, axle in wheels if model.body_rootid[body] == base]
     return robot_of_parts(root.get("model") or "robot", lumps, axles, where, other)
 
 
@@ -65,22 +65,22 @@ def _lump(model: Any, data: Any, body: int) -> Lump:
 def _wheels(mujoco: Any, model: Any, data: Any) -> list[tuple[int, Axle]]:
     """(body, wheel) of each geom that is one."""
     round_ = (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_ELLIPSOID)
-    found, seen = [], set()
+    wheels, bodies = [], set()
     for k in range(model.ngeom):
         geom, body = model.geom(k), int(model.geom_bodyid[k])
         named_body = "wheel" in model.body(body).name.lower()
         if int(model.geom_type[k]) not in map(int, round_) or not (named_body or "wheel" in geom.name.lower()):
             continue
-        if named_body and body in seen:
+        if named_body and body in bodies:
             continue
-        seen.add(body)
+        bodies.add(body)
         hinges = [j for j in range(model.njnt) if model.jnt_bodyid[j] == body and _is_axle(mujoco, model, data, j)]
         axis = np.array(data.xaxis[hinges[0]]) if hinges else np.array(data.geom_xmat[k]).reshape(3, 3)[:, 2]
         lump = _lump(model, data, body)
         spins = float(axis @ lump.inertia @ axis) if hinges else 0.0
         name = geom.name or model.body(body).name
-        found.append((body, Axle(name, np.array(data.geom_xpos[k]), axis, float(model.geom_size[k][0]), spins)))
-    return found
+        wheels.append((body, Axle(name, np.array(data.geom_xpos[k]), axis, float(model.geom_size[k][0]), spins)))
+    return wheels
 
 
 def _is_axle(mujoco: Any, model: Any, data: Any, joint: int) -> bool:
@@ -95,7 +95,7 @@ def _is_axle(mujoco: Any, model: Any, data: Any, joint: int) -> bool:
 MOST_PARTS, DEEPEST = 1000, 100
 _TURNS = {"quat", "axisangle", "xyaxes", "zaxis", "euler"}
 # element -> its attributes that are read; others are left out
-KEPT = {
+READ_ATTRIBUTES = {
     "mujoco": {"model"},
     "compiler": {
         "angle",
@@ -130,11 +130,11 @@ KEPT = {
     },
 }
 # They say nothing of masses and wheels.
-_OTHERS = """
+_OTHER_ELEMENTS = """
     option size visual statistic asset contact equality tendon actuator sensor keyframe custom site camera light
     material motor position velocity general damper intvelocity cylinder muscle adhesion pair mesh
 """
-LEFT_OUT = frozenset(_OTHERS.split())
+LEFT_OUT = frozenset(_OTHER_ELEMENTS.split())
 _NEVER_NEGATIVE = ("mass", "density", "diaginertia")  # MuJoCo takes 0 in place of some that are
 _FROM_ELSEWHERE = ("mesh", "hfield", "sdf")  # shapes of a geom that stand in other files
 
@@ -142,17 +142,17 @@ _FROM_ELSEWHERE = ("mesh", "hfield", "sdf")  # shapes of a geom that stand in ot
 def read_parts(root: ET.Element, where: str) -> str:
     """The text of a model with nothing in it but what is read. Raises InputError where that is not the whole robot."""
     for node in root.iter():
-        other = next((value for name, value in node.items() if name.startswith("file")), None)
-        if node.tag == "include" or other is not None:
+        reference = next((value for name, value in node.items() if name.startswith("file")), None)
+        if node.tag == "include" or reference is not None:
             raise InputError(
                 "the model takes from other files",
-                got=other or f"<{node.tag}>",
+                got=reference or f"<{node.tag}>",
                 expected="one file",
                 remedy="save the compiled model: mj_saveLastXML",
                 where=where,
             )
-    kept = ET.Element("mujoco", _attributes(root))
-    waiting, parts = [(root, kept, 1)], 0
+    root_copy = ET.Element("mujoco", _attributes(root))
+    waiting, parts = [(root, root_copy, 1)], 0
     while waiting:
         node, copy, depth = waiting.pop()
         for child in node:
@@ -161,16 +161,16 @@ def read_parts(root: ET.Element, where: str) -> str:
             parts += 1
             _refuse(child, depth, parts, where)
             waiting.append((child, ET.SubElement(copy, str(child.tag), _attributes(child)), depth + 1))
-    return ET.tostring(kept, encoding="unicode")
+    return ET.tostring(root_copy, encoding="unicode")
 
 
 def _attributes(node: ET.Element) -> dict[str, str]:
-    return {name: value for name, value in node.items() if name in KEPT[node.tag]}
+    return {name: value for name, value in node.items() if name in READ_ATTRIBUTES[node.tag]}
 
 
 def _refuse(node: ET.Element, depth: int, parts: int, where: str) -> None:
     """Raises InputError for an element that cannot be read, and where there are too many."""
-    if node.tag not in KEPT:
+    if node.tag not in READ_ATTRIBUTES:
         raise InputError(
             "this element is not read",
             got=f"<{node.tag}>",

@@ -21,11 +21,11 @@ from omnidyn.model.robot import IMPORTED, Prior, Robot
 from omnidyn.model.value import to_list
 from omnidyn.model.wheels import MAX_WHEELS, MIN_WHEELS, Wheels
 
-RADIAL = math.radians(1.0)  # by which an axle may miss the centre
-NEGLIGIBLE = 1e-3  # of the distance of the wheels: files give angles as 1.57 and the like
-NEAR = 1e-9  # relative: numbers that differ by less are one number
+AXLE_ANGLE = math.radians(1.0)  # by which an axle may miss the centre
+NEGLIGIBLE_SHARE = 1e-3  # of the distance of the wheels: files give angles as 1.57 and the like
+SAME_NUMBER = 1e-9  # relative: numbers that differ by less are one number
 LONGEST_NAMES = 150
-LARGEST = 1e9  # of any number of a part, in SI units
+LARGEST_NUMBER = 1e9  # of any number of a part, in SI units
 
 
 class Lump(NamedTuple):
@@ -75,33 +75,33 @@ def _refuse_impossible(lumps: Sequence[Lump], axles: Sequence[Axle]) -> None:
     """Raises InputError for a mass or inertia that no body has, and for numbers that are too large to add up."""
     for lump in lumps:
         sizes = np.concatenate([[lump.mass], lump.centre, lump.inertia.ravel()])
-        if not np.all(np.abs(sizes) <= LARGEST):
+        if not np.all(np.abs(sizes) <= LARGEST_NUMBER):
             raise InputError(
-                "a part beyond all robots", got=float(np.max(np.abs(sizes))), expected=f"below {LARGEST:g}"
+                "a part beyond all robots", got=float(np.max(np.abs(sizes))), expected=f"below {LARGEST_NUMBER:g}"
             )
-        least = float(np.linalg.eigvalsh(lump.inertia)[0])
-        if lump.mass < 0.0 or least < -NEAR * float(np.abs(lump.inertia).max()):
+        least_inertia = float(np.linalg.eigvalsh(lump.inertia)[0])
+        if lump.mass < 0.0 or least_inertia < -SAME_NUMBER * float(np.abs(lump.inertia).max()):
             raise InputError(
                 "no body has a negative mass or inertia",
-                got=f"{lump.mass:g} kg, {least:g} kg m^2 about one axis",
+                got=f"{lump.mass:g} kg, {least_inertia:g} kg m^2 about one axis",
                 expected="0 or more",
                 remedy="correct the signs of its inertial part",
             )
     for axle in axles:
-        if not np.all(np.abs([*axle.centre, *axle.axis, axle.radius or 0.0, axle.inertia]) <= LARGEST):
-            raise InputError("a part beyond all robots", got=axle.name, expected=f"numbers below {LARGEST:g}")
+        if not np.all(np.abs([*axle.centre, *axle.axis, axle.radius or 0.0, axle.inertia]) <= LARGEST_NUMBER):
+            raise InputError("a part beyond all robots", got=axle.name, expected=f"numbers below {LARGEST_NUMBER:g}")
 
 
 def _robot(name: str, lumps: Sequence[Lump], axles: Sequence[Axle], where: str, other: Robot | None) -> Robot:
     mass, turning, centre = whole(lumps)
     middle = _middle(axles, centre)
     wheels, off = _wheels(axles, middle), centre[:2] - middle[:2]
-    made = first_guess(name, wheels, mass) if other is None else like(other, name, wheels, mass)
+    robot = first_guess(name, wheels, mass) if other is None else like(other, name, wheels, mass)
     if turning > 0.0:
-        made = made.replace(body=made.body.replace(inertia=turning))
+        robot = robot.replace(body=robot.body.replace(inertia=turning))
     if off.any():
-        made = made.replace(body=made.body.replace(centre=off))
-    told = {
+        robot = robot.replace(body=robot.body.replace(centre=off))
+    imported_keys = {
         "body.mass_kg",
         "wheels.azimuth_deg",
         "wheels.robot_radius_m",
@@ -110,11 +110,12 @@ def _robot(name: str, lumps: Sequence[Lump], axles: Sequence[Axle], where: str, 
         *(["body.inertia_kg_m2"] if turning > 0.0 else []),
         *(["wheels.inertia_kg_m2"] if wheels.wheel_inertia else []),
     }
-    kept = {key: prior for key, prior in made.priors.items() if key.partition("[")[0] not in told}
+    other_priors = {key: prior for key, prior in robot.priors.items() if key.partition("[")[0] not in imported_keys}
     origin = Prior(source=f"imported from {where}"[:300], origin=IMPORTED)
     joints = ", ".join(axle.name for axle in axles)[:LONGEST_NAMES]
-    return made.replace(
-        source=f"imported from {where}; wheels: {joints}"[:400], priors=kept | dict.fromkeys(told, origin)
+    return robot.replace(
+        source=f"imported from {where}; wheels: {joints}"[:400],
+        priors=other_priors | dict.fromkeys(imported_keys, origin),
     )
 
 
@@ -122,13 +123,13 @@ def _middle(axles: Sequence[Axle], centre: FloatArray) -> FloatArray:
     """Where the axles meet, by least squares; the centre of mass where that is as near as makes no matter."""
     if not axles:
         return centre
-    across = np.array([[-axle.axis[1], axle.axis[0]] for axle in axles])
+    normals = np.array([[-axle.axis[1], axle.axis[0]] for axle in axles])
     places = np.array([axle.centre[:2] for axle in axles]) - centre[:2]
-    if np.linalg.matrix_rank(across, tol=RADIAL) < 2:
+    if np.linalg.matrix_rank(normals, tol=AXLE_ANGLE) < 2:
         return centre
-    off = np.linalg.lstsq(across, np.sum(across * places, axis=1), rcond=None)[0]
-    far = float(np.max(np.hypot(*places.T)))
-    return centre if math.hypot(*off) <= NEGLIGIBLE * far else np.add(centre, [*off, 0.0])
+    off = np.linalg.lstsq(normals, np.sum(normals * places, axis=1), rcond=None)[0]
+    largest_distance = float(np.max(np.hypot(*places.T)))
+    return centre if math.hypot(*off) <= NEGLIGIBLE_SHARE * largest_distance else np.add(centre, [*off, 0.0])
 
 
 def _wheels(axles: Sequence[Axle], centre: FloatArray) -> Wheels:
@@ -150,12 +151,12 @@ def _wheels(axles: Sequence[Axle], centre: FloatArray) -> Wheels:
             expected="a cylinder or a sphere, or the radius [m]",
             remedy="give it, such as `wheel_radius` 0.05",
         )
-    azimuth, far = [], []
+    azimuth, distances = [], []
     for axle in axles:
         away = axle.centre - centre
         angle, turned = math.atan2(away[1], away[0]), math.atan2(axle.axis[1], axle.axis[0])
         off = abs(math.remainder(turned - angle, math.pi))
-        if off > RADIAL:
+        if off > AXLE_ANGLE:
             raise InputError(
                 "an axle does not point to the centre",
                 got=f"{axle.name} is off by {math.degrees(off):.3g} degrees",
@@ -163,10 +164,10 @@ def _wheels(axles: Sequence[Axle], centre: FloatArray) -> Wheels:
                 remedy="for mecanum wheels begin with `omnidyn init`, with `mecanum`",
             )
         azimuth.append(math.degrees(angle))
-        far.append(math.hypot(away[0], away[1]))
+        distances.append(math.hypot(away[0], away[1]))
     return Wheels(
-        azimuth_deg=tuple(float(f"{each:.12g}") for each in azimuth),
-        robot_radius=_one_or_all(far),
+        azimuth_deg=tuple(float(f"{angle:.12g}") for angle in azimuth),
+        robot_radius=_one_or_all(distances),
         wheel_radius=_one_or_all(radii),
         wheel_inertia=_one_or_all([axle.inertia for axle in axles]),
     )
@@ -175,6 +176,6 @@ def _wheels(axles: Sequence[Axle], centre: FloatArray) -> Wheels:
 def _one_or_all(values: Sequence[float]) -> float | tuple[float, ...]:
     """One number where all are the same, else one for each wheel."""
     array = np.asarray(values, dtype=float)
-    if np.ptp(array) <= NEAR * np.abs(array).max():
+    if np.ptp(array) <= SAME_NUMBER * np.abs(array).max():
         return float(array[0])
     return tuple(to_list(array))

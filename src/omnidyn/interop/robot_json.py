@@ -60,12 +60,12 @@ def _parsed(text: str, where: str) -> Any:
         raise InputError("not a finite number", got=word, expected="a number", where=where)
 
     def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found = dict(pairs)
-        if len(found) < len(pairs):
-            seen = set[str]()
-            twice = next(key for key, _ in pairs if key in seen or seen.add(key))
+        table = dict(pairs)
+        if len(table) < len(pairs):
+            keys = set[str]()
+            twice = next(key for key, _ in pairs if key in keys or keys.add(key))
             raise InputError("a key stands twice", got=twice, expected="once", where=where)
-        return found
+        return table
 
     try:
         return json.loads(text, parse_constant=refuse, object_pairs_hook=once)

@@ -43,8 +43,8 @@ def _of_dataset(dataset: Any) -> Run:
         )
     channels = {}
     for name, variable in dataset.data_vars.items():
-        others = [each for each in variable.dims if each != TIME]
-        channels[str(name)] = _numbers(str(name), variable.transpose(TIME, *others))
+        dimensions = [dimension for dimension in variable.dims if dimension != TIME]
+        channels[str(name)] = _numbers(str(name), variable.transpose(TIME, *dimensions))
     return Run(
         t=_numbers(TIME, dataset.coords[TIME]),
         source=str(dataset.attrs.get("source", "an xarray Dataset")),
@@ -64,12 +64,12 @@ def _numbers(name: str, values: Any) -> FloatArray:
         raise InputError("not numbers", got=f"{plain.dtype}", expected="numbers", where=f"column {name}")
     if plain.dtype.kind == "O":
         plain = np.array([np.nan if value is None or value != value else value for value in plain.ravel()], dtype=float)
-    found = np.array(plain, dtype=float)
-    if np.isinf(found).any():
+    numbers = np.array(plain, dtype=float)
+    if np.isinf(numbers).any():
         raise InputError(
             "an infinite value", got="inf", expected="a number, or NaN where missing", where=f"column {name}"
         )
-    return found
+    return numbers
 
 
 def _only_missing_and_numbers(values: Any) -> bool:

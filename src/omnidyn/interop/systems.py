@@ -22,10 +22,10 @@ def linear_system(system: StateSpace | Robot) -> Any:
     Dry friction has no place in it: K sgn(x) is left out. Raises MissingExtraError where python-control is missing.
     """
     control = _control()
-    found = state_space(system) if isinstance(system, Robot) else system
-    inputs = [f"u{k + 1}" for k in range(found.B.shape[1])]
-    zero = np.zeros((found.C.shape[0], found.B.shape[1]))
-    return control.ss(found.A, found.B, found.C, zero, inputs=inputs, states=list(STATES), outputs=list(STATES))
+    model = state_space(system) if isinstance(system, Robot) else system
+    inputs = [f"u{k + 1}" for k in range(model.B.shape[1])]
+    zero = np.zeros((model.C.shape[0], model.B.shape[1]))
+    return control.ss(model.A, model.B, model.C, zero, inputs=inputs, states=list(STATES), outputs=list(STATES))
 
 
 def nonlinear_system(robot: Robot) -> Any:

@@ -79,13 +79,15 @@ def _parts(root: ET.Element) -> tuple[list[Lump], list[Axle]]:
     frames = _frames(links, joints)
     lumps = [lump for name, frame in frames.items() for lump in _lump(links[name], frame)]
     turning = [joint for joint in joints if joint.get("type") == "continuous" and _child(joint) in frames]
-    found = [(joint, axle) for joint in turning if (axle := _axle(joint, links, frames)) is not None]
-    upon = {_child(joint) for joint, _ in found}
+    candidates = [(joint, axle) for joint in turning if (axle := _axle(joint, links, frames)) is not None]
+    upon = {_child(joint) for joint, _ in candidates}
     axles = [
-        (joint, axle) for joint, axle in found if not _parents(joint, joints) & upon and not _NO_WHEEL(_name(joint))
+        (joint, axle)
+        for joint, axle in candidates
+        if not _parents(joint, joints) & upon and not _NO_WHEEL(_name(joint))
     ]
-    named = [axle for joint, axle in axles if _WHEEL(_name(joint))]
-    return lumps, named or [axle for _, axle in axles if axle.radius is not None]
+    called_wheels = [axle for joint, axle in axles if _WHEEL(_name(joint))]
+    return lumps, called_wheels or [axle for _, axle in axles if axle.radius is not None]
 
 
 _WHEEL, _NO_WHEEL = re.compile("wheel|whl|rim", re.IGNORECASE).search, re.compile("roller|cast[eo]r", re.I).search
@@ -98,13 +100,17 @@ def _name(joint: ET.Element) -> str:
 
 def _parents(joint: ET.Element, joints: list[ET.Element]) -> set[str]:
     """The links above a joint, up to the root of a tree."""
-    above = {_child(each): parent.get("link", "") for each in joints if (parent := each.find("parent")) is not None}
-    found: set[str] = set()
+    above = {
+        _child(link_joint): parent.get("link", "")
+        for link_joint in joints
+        if (parent := link_joint.find("parent")) is not None
+    }
+    links: set[str] = set()
     link = above.get(_child(joint))
-    while link is not None and link not in found:
-        found.add(link)
+    while link is not None and link not in links:
+        links.add(link)
         link = above.get(link)
-    return found
+    return links
 
 
 def _child(joint: ET.Element) -> str:
@@ -115,23 +121,25 @@ def _child(joint: ET.Element) -> str:
 def _frames(links: dict[str, ET.Element], joints: list[ET.Element]) -> dict[str, Frame]:
     """The frame of each link, from the root outwards. Raises InputError where the joints are no tree."""
     parents = {_child(joint): joint for joint in joints}
-    found: dict[str, Frame] = {}
+    frames: dict[str, Frame] = {}
     for name in links:
         if name not in parents:
-            found[name] = np.zeros(3), np.eye(3)
-    if len(found) != 1:
-        raise InputError("the joints are no tree", got=f"{len(found)} links without a parent", expected="one")
+            frames[name] = np.zeros(3), np.eye(3)
+    if len(frames) != 1:
+        raise InputError("the joints are no tree", got=f"{len(frames)} links without a parent", expected="one")
     for _ in range(DEEPEST):
         for name, joint in parents.items():
             parent = joint.find("parent")
-            above = found.get("" if parent is None else parent.get("link", ""))
-            if name in links and name not in found and above is not None:
+            above = frames.get("" if parent is None else parent.get("link", ""))
+            if name in links and name not in frames and above is not None:
                 place, turn = _origin(joint.find("origin"))
-                found[name] = above[0] + above[1] @ place, above[1] @ turn
-    if len(found) < len(links):
-        lost = ", ".join(name for name in links if name not in found)
-        raise InputError("the joints are no tree", got=f"no way from the root to {lost}", expected="one to every link")
-    return found
+                frames[name] = above[0] + above[1] @ place, above[1] @ turn
+    if len(frames) < len(links):
+        unreached = ", ".join(name for name in links if name not in frames)
+        raise InputError(
+            "the joints are no tree", got=f"no way from the root to {unreached}", expected="one to every link"
+        )
+    return frames
 
 
 def _origin(node: ET.Element | None) -> Frame:
@@ -153,7 +161,7 @@ def _numbers(node: ET.Element, name: str, count: int, default: str = "") -> Floa
     """Numbers of an attribute. Raises InputError for fewer, more, words, and what is not finite."""
     text = node.get(name, default)
     try:
-        values = np.array([float(each) for each in text.split()])
+        values = np.array([float(word) for word in text.split()])
     except ValueError:
         values = np.full(1, np.nan)
     if len(values) != count or not np.isfinite(values).all():
@@ -187,9 +195,9 @@ def _axle(joint: ET.Element, links: dict[str, ET.Element], frames: dict[str, Fra
     name = _child(joint)
     place, turn = frames[name]
     node = joint.find("axis")
-    own = np.array([1.0, 0.0, 0.0]) if node is None else _numbers(node, "xyz", 3)
-    length = float(np.linalg.norm(own))
-    axis = turn @ own / (length or 1.0)
+    joint_axis = np.array([1.0, 0.0, 0.0]) if node is None else _numbers(node, "xyz", 3)
+    length = float(np.linalg.norm(joint_axis))
+    axis = turn @ joint_axis / (length or 1.0)
     radius = next(
         (float(_numbers(shape, "radius", 1)[0]) for kind in ("cylinder", "sphere") for shape in links[name].iter(kind)),
         None,

@@ -22,7 +22,7 @@ _OF_WHEELS = {
     "wheel_speed_command": "w{}_cmd",
     "force": "f{}",
 }
-_OTHERS = {
+_OTHER_COMPONENTS = {
     "twist": ("vx", "vy", "omega"),
     "twist_command": ("vx_cmd", "vy_cmd", "omega_cmd"),
     "pose": ("x", "y", "heading"),
@@ -50,12 +50,12 @@ def components(channel: str, wheels: int) -> tuple[str, ...]:
     """Components of a channel in the order of its columns: ("u1", "u2", "u3") or ("vx", "vy", "omega")."""
     if CHANNELS[channel] == WHEEL:
         return tuple(_OF_WHEELS[channel].format(wheel + 1) for wheel in range(wheels))
-    return _OTHERS[channel]
+    return _OTHER_COMPONENTS[channel]
 
 
 def place(component: str) -> tuple[str, int] | None:
     """Channel and column of a component: ("voltage", 1) for "u2"; None for a name that is none."""
-    for channel, names in _OTHERS.items():
+    for channel, names in _OTHER_COMPONENTS.items():
         if component in names:
             return channel, names.index(component)
     match = _WHEEL_COMPONENT.fullmatch(component)
@@ -69,8 +69,8 @@ def si_suffix(component: str) -> str:
     """SI unit of a component as it ends a column of a run file: "rad_s" of "w1". KeyError for an unknown name."""
     if component == TIME:
         return "s"
-    found = place(component)
-    if found is None:
+    location = place(component)
+    if location is None:
         raise KeyError(component)
-    unit = _UNITS[found[0]]
-    return unit if isinstance(unit, str) else unit[found[1]]
+    unit = _UNITS[location[0]]
+    return unit if isinstance(unit, str) else unit[location[1]]

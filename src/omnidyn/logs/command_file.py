@@ -56,7 +56,14 @@ class HeldCommands:
 def read_voltages(
     path: str | os.PathLike, wheels: int, duration: float | None = None, max_steps: int = MAX_STEPS
 ) -> HeldCommands:
-    """Read a voltage file for a robot of `wheels` wheels; see `read_commands`, of which only volts are taken."""
+    """Read a voltage file for a robot of `wheels` wheels; see `read_commands`, of which only volts are taken.
+
+    Args:
+        path: The file.
+        wheels: Number of wheels.
+        duration: Of all rows together [s].
+        max_steps: Largest number of rows.
+    """
     return _read(path, wheels, duration, max_steps, KINDS[:1])
 
 
@@ -68,6 +75,13 @@ def read_commands(
     Each row holds until the next. The last row holds as long as the one before it, or until `duration` [s] after the
     first row; a file of one row needs `duration`. Rows that begin after the duration are left out, with a note.
     Times on a regular grid, up to the rounding of decimal numbers, give one and the same dt everywhere.
+
+    Args:
+        path: The file.
+        wheels: Number of wheels.
+        duration: Of all rows together [s].
+        max_steps: Largest number of rows.
+
     Raises InputError for wrong columns, times that do not increase, more than `max_steps` rows, a bad duration.
     """
     return _read(path, wheels, duration, max_steps, KINDS)
@@ -93,12 +107,12 @@ def _read(
     rows = np.stack([table.measured(name) for name in columns_of(kind, wheels)], axis=1)
     supply = table.measured("supply_V") if "supply_V" in table.names else None
     _check_time(table, t)
-    dt, used = _intervals(table, t, duration)
+    dt, row_count = _intervals(table, t, duration)
     notes = table.notes
-    if used < len(t):
-        notes = (*notes, f"{len(t) - used} rows begin after the duration: left out")
-    battery = None if supply is None else supply[:used]
-    return HeldCommands(kind, rows[:used], dt, float(t[0]), table.sha256, battery, notes)
+    if row_count < len(t):
+        notes = (*notes, f"{len(t) - row_count} rows begin after the duration: left out")
+    battery = None if supply is None else supply[:row_count]
+    return HeldCommands(kind, rows[:row_count], dt, float(t[0]), table.sha256, battery, notes)
 
 
 def _numbered(table: Table, kind: str) -> list[str]:
@@ -112,9 +126,9 @@ def _numbered(table: Table, kind: str) -> list[str]:
 def _check_columns(table: Table, kind: str, wheels: int) -> None:
     expected = ["t_s", *columns_of(kind, wheels)]
     optional = ["supply_V"] if kind == "duty" else []
-    found = _numbered(table, kind)
-    others = len(table.names) - len(found) - sum(name in table.names for name in ("t_s", *optional))
-    if "t_s" in table.names and found and not others and len(found) != len(expected) - 1:
+    input_columns = _numbered(table, kind)
+    strangers = len(table.names) - len(input_columns) - sum(name in table.names for name in ("t_s", *optional))
+    if "t_s" in table.names and input_columns and not strangers and len(input_columns) != len(expected) - 1:
         raise InputError(
             "the file is for another number of wheels",
             got=", ".join(table.names),
@@ -127,9 +141,9 @@ def _check_columns(table: Table, kind: str, wheels: int) -> None:
 
 
 def _check_time(table: Table, t: FloatArray) -> None:
-    bad = np.flatnonzero(~(np.diff(t) > 0.0))
-    if bad.size:
-        row = int(bad[0]) + 1
+    bad_steps = np.flatnonzero(~(np.diff(t) > 0.0))
+    if bad_steps.size:
+        row = int(bad_steps[0]) + 1
         word = "the same time stands twice" if t[row] == t[row - 1] else "time runs backwards"
         raise table.fault(
             row,
@@ -156,11 +170,11 @@ def _intervals(table: Table, t: FloatArray, duration: float | None) -> tuple[Flo
         return np.append(steps, steps[-1]), len(t)
     starts = np.concatenate([[0.0], np.cumsum(steps)])
     # A row that begins less than a rounding error before the end holds for no time: it is not used.
-    used = int(np.searchsorted(starts, duration * (1.0 - 1e-12), side="left"))
-    last = duration - starts[used - 1]
-    if used > 1 and abs(last - steps[used - 2]) <= 1e-9 * last:
-        last = steps[used - 2]
-    return np.append(steps[: used - 1], last), used
+    row_count = int(np.searchsorted(starts, duration * (1.0 - 1e-12), side="left"))
+    last = duration - starts[row_count - 1]
+    if row_count > 1 and abs(last - steps[row_count - 2]) <= 1e-9 * last:
+        last = steps[row_count - 2]
+    return np.append(steps[: row_count - 1], last), row_count
 
 
 def _regular(t: FloatArray) -> FloatArray:

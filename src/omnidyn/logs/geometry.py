@@ -105,15 +105,15 @@ def _compared(run: Run, body: str, wheels: str) -> tuple[FloatArray, FloatArray]
     return mean_speeds(run, body, wheels)
 
 
-def as_mecanum(seen: Geometry) -> Geometry:
+def as_mecanum(geometry: Geometry) -> Geometry:
     """The same wheels as mecanum wheels with rollers at 45 degrees: front left, front right, rear left, rear right.
 
     Every wheel counts counter-clockwise about the robot, those on the left backward: w_i = (-+ v_x +- v_y + b omega)/r
     is an omni wheel's law with sqrt(2)/r for 1/r and b/sqrt(2) for b, b being half track + half wheelbase. Raises
     InputError where they do not push in these directions.
     """
-    angle = [round(each, 1) for each in seen.azimuth_deg]
-    off = [(each - there + 180.0) % 360.0 - 180.0 for each, there in zip(angle, AS_OMNI, strict=False)]
+    angle = [round(azimuth, 1) for azimuth in geometry.azimuth_deg]
+    off = [(azimuth - expected + 180.0) % 360.0 - 180.0 for azimuth, expected in zip(angle, AS_OMNI, strict=False)]
     if len(angle) != len(AS_OMNI) or max(map(abs, off)) > MAX_TURNED:
         raise InputError(
             "the wheels do not push as mecanum wheels in an X do",
@@ -121,8 +121,10 @@ def as_mecanum(seen: Geometry) -> Geometry:
             expected=f"{list(AS_OMNI)}: front left, front right, rear left, rear right, counter-clockwise positive",
             remedy="name the columns in this order, a left wheel that counts forward with a minus: `column` w1=-LEFT",
         )
-    radius = None if seen.robot_radius is None else float(np.sqrt(2.0)) * seen.robot_radius
-    return replace(seen, azimuth_deg=AS_OMNI, per_metre=seen.per_metre / float(np.sqrt(2.0)), robot_radius=radius)
+    radius = None if geometry.robot_radius is None else float(np.sqrt(2.0)) * geometry.robot_radius
+    return replace(
+        geometry, azimuth_deg=AS_OMNI, per_metre=geometry.per_metre / float(np.sqrt(2.0)), robot_radius=radius
+    )
 
 
 def _moving(twist: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -207,9 +209,9 @@ def _tracks(t: FloatArray, values: FloatArray, speed: bool) -> list[Track]:
     """The way of each component by its own samples: the integral of a speed, or the position itself."""
     tracks = []
     for column in values.T:
-        own, known = samples(t, column)
-        means = 0.5 * (known[1:] + known[:-1]) * np.diff(own)
-        tracks.append((own, np.append(0.0, np.cumsum(means))[: len(own)] if speed else known))
+        times, column_values = samples(t, column)
+        means = 0.5 * (column_values[1:] + column_values[:-1]) * np.diff(times)
+        tracks.append((times, np.append(0.0, np.cumsum(means))[: len(times)] if speed else column_values))
     return tracks
 
 
@@ -223,8 +225,8 @@ def _body_tracks(run: Run, body: str) -> list[Track]:
         if values.size and np.isnan(values[:, 2]).all():
             values = np.column_stack([values[:, :2], np.zeros(len(values))])
         return _tracks(t, values, True)
-    whole = np.isfinite(values).all(axis=1) if values.ndim == 2 else np.zeros(len(t), dtype=bool)
-    t, pose = t[whole], values[whole]
+    complete = np.isfinite(values).all(axis=1) if values.ndim == 2 else np.zeros(len(t), dtype=bool)
+    t, pose = t[complete], values[complete]
     if len(t) < 2:
         return []
     heading = unwrapped(pose[:, 2])
@@ -236,9 +238,9 @@ def _body_tracks(run: Run, body: str) -> list[Track]:
 
 def _between(t: FloatArray, way: FloatArray, edges: FloatArray) -> FloatArray:
     """How far a component went from each edge to the next, shape (edges - 1,); NaN across a gap of its samples."""
-    gone = np.diff(np.interp(edges, t, way))
+    distances = np.diff(np.interp(edges, t, way))
     gaps = np.append(0, np.cumsum(np.diff(t) > GAP * usual_step(t)))
     after = np.clip(np.searchsorted(t, edges[1:]), 0, len(t) - 1)
     before = np.clip(np.searchsorted(t, edges[:-1], side="right") - 1, 0, len(t) - 1)
     crossed = gaps[after] - gaps[before]
-    return np.where(crossed > 0, np.nan, gone)
+    return np.where(crossed > 0, np.nan, distances)

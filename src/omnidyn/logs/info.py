@@ -66,7 +66,7 @@ class LogInfo:
         table = Cells(("topic", "type", "count", "rate [Hz]", "longest gap [s]", ""), rows, "<<>>><", name="topics")
         lines = self.mapping.lines() if self.mapping is not None else [f"nothing: {self.why}"]
         doubts = self.mapping.doubts if self.mapping is not None else ()
-        taken = Points(lines, "taken:", "mapping")
+        mapping_lines = Points(lines, "taken:", "mapping")
         open_questions = [doubt.with_remedy for doubt in doubts]
         return Document(
             [
@@ -74,7 +74,7 @@ class LogInfo:
                 "",
                 table,
                 "",
-                taken,
+                mapping_lines,
                 Points(open_questions, "doubt:", "doubts"),
                 Points(self.notes, "note:", "notes"),
             ],
@@ -128,18 +128,20 @@ def read_info(
     recording = reader.recording(path, ReadOptions(max_bytes=limit, progress=progress))
     if not any(topic.count for topic in recording.topics):
         raise InputError("no messages", got="0 messages", expected=reader.least, where=str(path))
-    topics, span, mapping, why = tuple(recording.topics), 0.0, None, ""
+    topics, span, mapping, reason = tuple(recording.topics), 0.0, None, ""
     try:
         table = next(completed(recording.tables(PIECE), reader.least))
         mapping = map_columns(table, robot, options)
     except InputError as error:
-        why = str(error)
+        reason = str(error)
     if recording.tracks:
         first = min(int(track.stamps.min()) for track in recording.tracks if len(track.stamps))
         last = max(int(track.stamps.max()) for track in recording.tracks if len(track.stamps))
         span = (last - first) / 1e9
     notes = statements((*recording.notes, *(mapping.notes if mapping is not None else ())))
-    return LogInfo(printable(str(path)), kind, topics, mapping, span, recording.salvaged, notes, why, recording.sha256)
+    return LogInfo(
+        printable(str(path)), kind, topics, mapping, span, recording.salvaged, notes, reason, recording.sha256
+    )
 
 
 @dataclass
@@ -155,12 +157,12 @@ class _Seen:
     def add(self, cells: Any, t: FloatArray | None) -> None:
         """Count the cells of a block, (rows,), and the times t (rows,) [s] between them."""
         words = isinstance(cells, tuple)
-        known = np.array([bool(cell) for cell in cells]) if words else np.isfinite(cells)
+        present = np.array([bool(cell) for cell in cells]) if words else np.isfinite(cells)
         self.numbers &= not words
-        self.count += int(known.sum())
+        self.count += int(present.sum())
         if t is None:
             return
-        times = t[known & np.isfinite(t)]
+        times = t[present & np.isfinite(t)]
         steps = np.diff(times, prepend=self.last) if np.isfinite(self.last) else np.diff(times)
         if times.size:
             self.last = float(times[-1])
@@ -173,25 +175,27 @@ def _of_columns(
     path: str | os.PathLike, kind: str, robot: Robot | None, options: LogOptions, progress: Progress
 ) -> LogInfo:
     """A table: a topic for each column. It is read in pieces, whatever its length."""
-    seen: dict[str, _Seen] = {}
-    mapping, why, clock, table = None, "", Clock(), None
+    statistics: dict[str, _Seen] = {}
+    mapping, reason, clock, table = None, "", Clock(), None
     first, last = np.inf, -np.inf
     for table in _tables(path, options, progress):
-        if not seen:
+        if not statistics:
             try:
                 mapping = map_columns(table, robot, options)
             except InputError as error:
-                why = str(error)
+                reason = str(error)
         t = clock.times(table, mapping.columns[TIME], []) if mapping is not None else None
         for name, cells in table.columns.items():
-            seen.setdefault(name, _Seen()).add(cells, t)
+            statistics.setdefault(name, _Seen()).add(cells, t)
         if t is not None and np.isfinite(t).any():
             first, last = min(first, float(np.nanmin(t))), max(last, float(np.nanmax(t)))
     assert table is not None
-    taken = {column.name for column in mapping.columns.values()} if mapping is not None else set()
-    topics = tuple(_topic(name, values, table, name in taken) for name, values in seen.items())
+    taken_names = {column.name for column in mapping.columns.values()} if mapping is not None else set()
+    topics = tuple(_topic(name, values, table, name in taken_names) for name, values in statistics.items())
     notes = statements((*table.notes, *(mapping.notes if mapping is not None else ())))
-    return LogInfo(printable(str(path)), kind, topics, mapping, max(0.0, last - first), None, notes, why, table.sha256)
+    return LogInfo(
+        printable(str(path)), kind, topics, mapping, max(0.0, last - first), None, notes, reason, table.sha256
+    )
 
 
 def _tables(path: str | os.PathLike, options: LogOptions, progress: Progress) -> Iterator[Table]:
@@ -199,9 +203,9 @@ def _tables(path: str | os.PathLike, options: LogOptions, progress: Progress) ->
     return timed(tables, options.rate, options.skip_bad_rows)
 
 
-def _topic(name: str, seen: _Seen, table: Table, taken: bool) -> Topic:
-    steps = seen.steps[seen.steps > 0.0]
+def _topic(name: str, statistics: _Seen, table: Table, is_taken: bool) -> Topic:
+    steps = statistics.steps[statistics.steps > 0.0]
     rate = 1.0 / float(np.median(steps)) if steps.size else 0.0
     unit = table.units.get(name, "")
-    kind = f"numbers{f' [{unit}]' * bool(unit)}" if seen.numbers else "words"
-    return Topic(name, kind, seen.count, rate, seen.longest, taken)
+    kind = f"numbers{f' [{unit}]' * bool(unit)}" if statistics.numbers else "words"
+    return Topic(name, kind, statistics.count, rate, statistics.longest, is_taken)

@@ -31,14 +31,14 @@ OFTEN_BACK = 0.005  # of the rows: no recorder writes so many out of order
 MAX_MISSING = 0.2  # share of rows without a time or without any number
 ON_CHANGE = 0.2  # a component with more blank cells than this share, gaps left out, is recorded on change
 SAME_TIME_SHARE = 1e-6  # of a row: times that are no farther apart are one
-HELD = (
+COMMAND_CHANNELS = (
     "voltage",
     "duty",
     "force",
     "wheel_speed_command",
     "twist_command",
 )  # what is commanded holds until the next value
-NEVER_MADE_UP = (*HELD, "supply")  # a battery is an input like any other: it holds too
+NEVER_MADE_UP = (*COMMAND_CHANNELS, "supply")  # a battery is an input like any other: it holds too
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,20 +134,20 @@ class Log:
         late = {key: column.latency for key, column in self.columns.columns.items() if column.latency and place(key)}
         if not late or len(self) < 2:
             return self
-        near = SAME_TIME_SHARE * fastest_step(self.t, self.channels.values())
+        tolerance = SAME_TIME_SHARE * fastest_step(self.t, self.channels.values())
         at = {key: self.t - seconds for key, seconds in late.items()}
         new = np.unique(np.concatenate([times for times in at.values()]))
-        new = new[(new > self.t[0]) & (new < self.t[-1]) & (np.abs(new - self.t[_nearest(new, self.t)]) > near)]
-        t = np.sort(np.concatenate([self.t, new[np.append(True, np.diff(new) > near)]])) if new.size else self.t
-        own = np.searchsorted(t, self.t)
+        new = new[(new > self.t[0]) & (new < self.t[-1]) & (np.abs(new - self.t[_nearest(new, self.t)]) > tolerance)]
+        t = np.sort(np.concatenate([self.t, new[np.append(True, np.diff(new) > tolerance)]])) if new.size else self.t
+        row_places = np.searchsorted(t, self.t)
         channels = {}
         for name, values in self.channels.items():
             columns = values.reshape(len(self), -1)
             table = np.full((len(t), columns.shape[1]), np.nan)
             for k, key in enumerate(components(name, columns.shape[1])):
-                rows = _nearest(at[key], t) if key in late else own
-                there = np.abs(t[rows] - at[key]) <= near if key in late else np.ones(len(own), dtype=bool)
-                table[rows[there], k] = columns[there, k]
+                rows = _nearest(at[key], t) if key in late else row_places
+                at_row = np.abs(t[rows] - at[key]) <= tolerance if key in late else np.ones(len(row_places), dtype=bool)
+                table[rows[at_row], k] = columns[at_row, k]
             channels[name] = table[:, 0] if CHANNELS[name] == SCALAR else table
         warnings += [Statement("latency_taken_out", NOTE, key, {"seconds": seconds}) for key, seconds in late.items()]
         settled = {key: replace(column, latency=0.0) for key, column in self.columns.columns.items()}
@@ -161,7 +161,7 @@ class Log:
             own_clocks=self.own_clocks or len(t) > len(self),
         )
         empty = log.empty_rows()
-        empty[own] = False
+        empty[row_places] = False
         return log.rows(~empty)
 
     def joined(self) -> Log:
@@ -182,8 +182,8 @@ class Log:
         keep = ~fits[group] | joins
         channels = {}
         for name, values in self.channels.items():
-            whole = np.fmax.reduceat(values, first)[group]
-            channels[name] = np.where(joins if values.ndim == 1 else joins[:, None], whole, values)[keep]
+            combined = np.fmax.reduceat(values, first)[group]
+            channels[name] = np.where(joins if values.ndim == 1 else joins[:, None], combined, values)[keep]
         note = Statement("rows_joined", NOTE, "t", {"joined": int((~keep).sum()), "rows": len(self)})
         return replace(self, t=self.t[keep], channels=channels, lines=self.lines[keep], notes=(*self.notes, note))
 
@@ -195,19 +195,19 @@ class Log:
         And the latency of each component taken out. `values` has the shape of the channel, and so has the result.
         """
         columns = values.reshape(len(self), -1)
-        changed = columns.copy()
+        aligned_columns = columns.copy()
         for k, component in enumerate(components(channel, columns.shape[1])):
             if self.now_and_then(columns[:, k]):
                 hold = channel in NEVER_MADE_UP
-                changed[:, k] = _held(columns[:, k]) if hold else filled(self.t, columns[:, k])
+                aligned_columns[:, k] = _held(columns[:, k]) if hold else filled(self.t, columns[:, k])
                 if not self.own_clocks:
                     share = float(np.isnan(columns[:, k]).mean())
                     warnings.append(Statement("on_change", NOTE, component, {"blank": share, "held": hold}))
             late = self.columns.columns[component].latency if component in self.columns.columns else 0.0
             if late:
-                changed[:, k] = np.interp(self.t + late, self.t, changed[:, k], right=np.nan)
+                aligned_columns[:, k] = np.interp(self.t + late, self.t, aligned_columns[:, k], right=np.nan)
                 warnings.append(Statement("latency_taken_out", NOTE, component, {"seconds": late}))
-        return changed[:, 0] if CHANNELS[channel] == SCALAR else changed
+        return aligned_columns[:, 0] if CHANNELS[channel] == SCALAR else aligned_columns
 
     def now_and_then(self, values: FloatArray) -> bool:
         """Whether a component, shape (rows,), was recorded when it changed, or at times of its own.
@@ -215,11 +215,11 @@ class Log:
         By the share of blanks outside its gaps: where a sensor or a driver was out, it is missing. Fewer blanks are
         those of a clock of its own where its steps say so.
         """
-        there = np.isfinite(values)
-        if there.all():
+        present = np.isfinite(values)
+        if present.all():
             return False
-        covered = there | np.isfinite(filled(self.t, values))
-        blank = 1.0 - there.sum() / max(covered.sum(), 1)
+        covered = present | np.isfinite(filled(self.t, values))
+        blank = 1.0 - present.sum() / max(covered.sum(), 1)
         return 0.0 < blank < 1.0 and (self.own_clocks or blank > ON_CHANGE or has_own_clock(self.t, values))
 
     def between(self, channel: str) -> BoolArray:
@@ -248,20 +248,20 @@ class Log:
         """Rows at the end that all repeat the last one while time has gone back."""
         padding = np.zeros(len(self), dtype=bool)
         table = np.column_stack([self.t, *(values.reshape(len(self), -1) for values in self.channels.values())])
-        same = (table == table[-1:]) | (np.isnan(table) & np.isnan(table[-1:]))
-        differs = np.flatnonzero(~same.all(axis=1))
+        equal_cells = (table == table[-1:]) | (np.isnan(table) & np.isnan(table[-1:]))
+        differs = np.flatnonzero(~equal_cells.all(axis=1))
         first = int(differs[-1]) + 1 if differs.size else 0
         if 0 < first < len(self) and self.t[first] < self.t[first - 1]:
             padding[first:] = True
         return padding
 
-    def _without(self, bad: BoolArray, code: str, warnings: list[Statement | str], bound: float = MAX_MISSING) -> Log:
+    def _without(self, mask: BoolArray, code: str, warnings: list[Statement | str], bound: float = MAX_MISSING) -> Log:
         """The other rows, with a warning; refused where more than a share of `bound` would go."""
-        count = int(bad.sum())
+        count = int(mask.sum())
         if not count:
             return self
-        first = int(self.lines[np.flatnonzero(bad)[0]])
-        said = Statement(code, WARNING, "", {"left_out": count, "rows": len(self), "first": first})
+        first = int(self.lines[np.flatnonzero(mask)[0]])
+        warning = Statement(code, WARNING, "", {"left_out": count, "rows": len(self), "first": first})
         if count > bound * len(self) or count == len(self):
             raise InputError(
                 f"{count} of {len(self)} rows {REFUSED[code]}",
@@ -270,8 +270,8 @@ class Log:
                 remedy="mend the recording, or map another column to t",
                 where=self.source,
             )
-        warnings.append(said)
-        return self.rows(~bad)
+        warnings.append(warning)
+        return self.rows(~mask)
 
     def _refuse_backward(self) -> None:
         back = np.flatnonzero(np.diff(self.t) < 0.0)
@@ -314,18 +314,23 @@ def _nearest(at: FloatArray, t: FloatArray) -> IntArray:
     return np.where(at - t[after - 1] <= t[after] - at, after - 1, after)
 
 
-def _far_from(at: FloatArray, known: FloatArray, t: FloatArray) -> BoolArray:
-    """Which times `at` have no time of `known` within half a row of `t`. Shape of `at`."""
-    near = 0.5 * usual_step(t)
-    after = np.clip(np.searchsorted(known, at), 1, max(len(known) - 1, 1))
-    return np.minimum(np.abs(at - known[after - 1]), np.abs(at - known[np.minimum(after, len(known) - 1)])) > near
+def _far_from(at: FloatArray, known_times: FloatArray, t: FloatArray) -> BoolArray:
+    """Which times `at` have no time of `known_times` within half a row of `t`. Shape of `at`."""
+    half_row = 0.5 * usual_step(t)
+    after = np.clip(np.searchsorted(known_times, at), 1, max(len(known_times) - 1, 1))
+    return (
+        np.minimum(
+            np.abs(at - known_times[after - 1]), np.abs(at - known_times[np.minimum(after, len(known_times) - 1)])
+        )
+        > half_row
+    )
 
 
 def component(log: Log, name: str) -> FloatArray | None:
     """The values of one component, such as "u2" or "heading"; shape (rows,). None where it was not recorded."""
-    found = place(name)
-    values = log.channels.get(found[0]) if found else None
-    if found is None or values is None:
+    location = place(name)
+    values = log.channels.get(location[0]) if location else None
+    if location is None or values is None:
         return None
-    column = values if values.ndim == 1 else values[:, found[1]] if found[1] < values.shape[1] else None
+    column = values if values.ndim == 1 else values[:, location[1]] if location[1] < values.shape[1] else None
     return None if column is None or np.isnan(column).all() else column

@@ -59,7 +59,7 @@ def run_to_mcap(run: Run) -> bytes:
     writer.start("ros2", "omnidyn")
     writer.add_metadata("omnidyn", {"run": "written by omnidyn: every channel is as it was, none from another"})
     channels: dict[str, int] = {}
-    for stamp, topic, kind, data in sorted(messages(run), key=lambda each: each.stamp):
+    for stamp, topic, kind, data in sorted(messages(run), key=lambda message: message.stamp):
         if topic not in channels:
             schema = writer.register_schema(kind, "ros2msg", definition_of(kind).encode())
             channels[topic] = writer.register_channel(topic, "cdr", schema)
@@ -104,16 +104,16 @@ def stamps_of(run: Run) -> IntArray:
 
 def _told(values: FloatArray) -> list[int]:
     """The rows in which anything was measured."""
-    known = np.isfinite(values)
-    return np.flatnonzero(known if known.ndim == 1 else known.any(axis=1)).tolist()
+    finite = np.isfinite(values)
+    return np.flatnonzero(finite if finite.ndim == 1 else finite.any(axis=1)).tolist()
 
 
 def _turns_lost(heading: FloatArray) -> bool:
     """Whether full turns are lost on the way through a quaternion. heading: shape (rows,), NaN where missing."""
-    known = heading[np.isfinite(heading)]
-    sine, cosine = _half_turned(known).T
-    zero = np.zeros(len(known))
-    return bool((np.abs(heading_of(zero, zero, sine, cosine) - known) > 1.0).any())
+    headings = heading[np.isfinite(heading)]
+    sine, cosine = _half_turned(headings).T
+    zero = np.zeros(len(headings))
+    return bool((np.abs(heading_of(zero, zero, sine, cosine) - headings) > 1.0).any())
 
 
 def _half_turned(heading: FloatArray) -> FloatArray:
@@ -126,10 +126,10 @@ def _joints(run: Run, stamps: IntArray) -> Iterator[Sent]:
     parts = [run.wheel_angle, run.wheel_speed]
     wheels = next((part.shape[1] for part in parts if part is not None), 0)
     names = [f"wheel_{k + 1}" for k in range(wheels)]
-    told = [set(_told(part)) if part is not None else set() for part in parts]
-    for k in sorted(told[0] | told[1]):
+    row_sets = [set(_told(part)) if part is not None else set() for part in parts]
+    for k in sorted(row_sets[0] | row_sets[1]):
         packed = Packer().header(int(stamps[k])).texts(names)
-        for values, rows in zip(parts, told, strict=True):
+        for values, rows in zip(parts, row_sets, strict=True):
             packed.array(values[k].tolist() if values is not None and k in rows else ())
         yield Sent(int(stamps[k]), "/joint_states", "sensor_msgs/msg/JointState", bytes(packed.array(())))
 

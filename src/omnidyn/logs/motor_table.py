@@ -68,10 +68,10 @@ class MotorTable:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        wrong = {len(self.put_in), len(self.speed), len(self.motor)}
-        if len(wrong) > 1:
+        lengths = {len(self.put_in), len(self.speed), len(self.motor)}
+        if len(lengths) > 1:
             raise InputError(
-                "columns of different lengths", got=sorted(wrong), expected="one point a row", where=self.source
+                "columns of different lengths", got=sorted(lengths), expected="one point a row", where=self.source
             )
 
     def __len__(self) -> int:
@@ -81,7 +81,7 @@ class MotorTable:
 def is_motor_table(names: Iterable[str]) -> bool:
     """Whether a table is one of inputs and steady speeds, told by the names of its columns: no time, nothing else."""
     lower = [_bare(name) for name in names]
-    kinds = [sum(name in known for name in lower) for known in (_INPUTS, _SPEEDS, (MOTOR,))]
+    kinds = [sum(name in kind_names for name in lower) for kind_names in (_INPUTS, _SPEEDS, (MOTOR,))]
     return kinds[:2] == [1, 1] and sum(kinds) == len(lower) and len(lower) > 1
 
 
@@ -94,7 +94,7 @@ def _bare(name: str) -> str:
 def read_motor_table(path: str | os.PathLike) -> MotorTable:
     """Read a table `input,speed[,motor]`. Raises InputError with file, line and column for what cannot be used."""
     table = read_table(path)
-    found = {_bare(name): name for name in table.names}
+    columns = {_bare(name): name for name in table.names}
     if not is_motor_table(table.names):
         raise InputError(
             "no table of motors",
@@ -103,14 +103,16 @@ def read_motor_table(path: str | os.PathLike) -> MotorTable:
             remedy="name the columns so, or voltage_V, duty_%, speed_rpm",
             where=table.source,
         )
-    own = next(name for name in found if name in _INPUTS)
-    kind, unit, size = _INPUTS[_UNITS.get(table.units.get(found[own], ""), own) if own == "input" else own]
-    put_in, notes = table.measured(found[own]) * size, table.notes
+    input_name = next(name for name in columns if name in _INPUTS)
+    kind, unit, size = _INPUTS[
+        _UNITS.get(table.units.get(columns[input_name], ""), input_name) if input_name == "input" else input_name
+    ]
+    put_in, notes = table.measured(columns[input_name]) * size, table.notes
     if unit == "%" and size == 100.0 and np.abs(put_in).max(initial=0.0) > 100.0 * MOST_DUTY:
-        put_in, notes = put_in / size, (*notes, f"{found[own]} goes beyond 1: it was read as percent")
-    fast = next(name for name in found if name in _SPEEDS)
-    speed = table.measured(found[fast]) * _speed_size(table, found[fast], fast)
-    motor = _motors(table, found[MOTOR]) if MOTOR in found else np.zeros(len(speed), dtype=np.int64)
+        put_in, notes = put_in / size, (*notes, f"{columns[input_name]} goes beyond 1: it was read as percent")
+    fast = next(name for name in columns if name in _SPEEDS)
+    speed = table.measured(columns[fast]) * _speed_size(table, columns[fast], fast)
+    motor = _motors(table, columns[MOTOR]) if MOTOR in columns else np.zeros(len(speed), dtype=np.int64)
     _refuse_log(put_in, speed, motor, table.source)
     rows = f"{len(speed)} rows without a time are taken as points at steady speed; of a log, give its `rate`"
     notes = (rows, *notes)
@@ -122,8 +124,8 @@ def _refuse_log(put_in: FloatArray, speed: FloatArray, motor: IntArray, source: 
     steps, spread = np.abs(np.diff(speed)), float(np.std(speed))
     turns = np.diff(put_in)
     swings = int((np.diff(np.sign(turns[turns != 0.0])) != 0.0).sum())
-    close = len(speed) >= LOG_ROWS and float(np.median(steps)) < LOG_STEP * spread
-    if close and (swings > SWEEPS or len(speed) >= SURELY_LOG) and not motor.any():
+    dense = len(speed) >= LOG_ROWS and float(np.median(steps)) < LOG_STEP * spread
+    if dense and (swings > SWEEPS or len(speed) >= SURELY_LOG) and not motor.any():
         raise InputError(
             "a log without a time, and no table of steady points",
             got=f"{len(speed)} rows that follow each other",
@@ -152,7 +154,7 @@ def _speed_size(table: Table, name: str, bare: str) -> float:
 def _motors(table: Table, name: str) -> IntArray:
     """Numbers from 0."""
     numbers = table.measured(name)
-    wrong = np.flatnonzero((numbers < 1.0) | (numbers != np.round(numbers)) | (numbers > 1000.0))
-    if wrong.size:
-        raise table.fault(int(wrong[0]), name, "no number of a motor", float(numbers[wrong[0]]), "1, 2, 3, ...")
+    bad_rows = np.flatnonzero((numbers < 1.0) | (numbers != np.round(numbers)) | (numbers > 1000.0))
+    if bad_rows.size:
+        raise table.fault(int(bad_rows[0]), name, "no number of a motor", float(numbers[bad_rows[0]]), "1, 2, 3, ...")
     return numbers.astype(np.int64) - 1

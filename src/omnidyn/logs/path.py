@@ -67,12 +67,12 @@ def body_twist(run: Run, robot: Robot | None = None) -> FloatArray | None:
 
 def driven(twists: Sequence[FloatArray | None]) -> list[tuple[float, float] | None]:
     """The middle 90 % of the speeds at which logs moved along x, along y and about yaw; None for an axis without."""
-    found: list[tuple[float, float] | None] = []
+    ranges: list[tuple[float, float] | None] = []
     for axis in range(3):
         speeds = np.concatenate([np.zeros(0), *(twist[:, axis] for twist in twists if twist is not None)])
         speeds = speeds[np.isfinite(speeds) & moving(speeds)]
-        found.append((float(np.quantile(speeds, 0.05)), float(np.quantile(speeds, 0.95))) if speeds.size else None)
-    return found
+        ranges.append((float(np.quantile(speeds, 0.05)), float(np.quantile(speeds, 0.95))) if speeds.size else None)
+    return ranges
 
 
 def _twist(run: Run, robot: Robot | None) -> tuple[FloatArray | None, str]:
@@ -98,6 +98,6 @@ def _without_gaps(run: Run, step: FloatArray) -> FloatArray:
 
 def _filled(at: FloatArray, pose: FloatArray) -> FloatArray:
     """The pose with what is missing between two known ones on the line between them. at: places on it, (samples,)."""
-    known = np.isfinite(pose).all(axis=1)
-    columns = [np.interp(at, at[known], column[known], left=np.nan, right=np.nan) for column in pose.T]
+    complete = np.isfinite(pose).all(axis=1)
+    columns = [np.interp(at, at[complete], column[complete], left=np.nan, right=np.nan) for column in pose.T]
     return np.stack(columns, axis=1)

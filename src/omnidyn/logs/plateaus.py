@@ -73,17 +73,17 @@ def find_plateaus(run: Run, *, start: float | None = None, end: float | None = N
     return tuple(_plateaus(run, _fixed(start, end)))
 
 
-def first_plateaus(run: Run, most: int) -> tuple[Plateau, ...]:
+def first_plateaus(run: Run, limit: int) -> tuple[Plateau, ...]:
     """The first steady windows of a run, as `find_plateaus` finds them: no more than are asked for."""
-    return tuple(islice(_plateaus(run, None), most))
+    return tuple(islice(_plateaus(run, None), limit))
 
 
-def _plateaus(run: Run, fixed: tuple[float, float] | None) -> Iterator[Plateau]:
+def _plateaus(run: Run, shares: tuple[float, float] | None) -> Iterator[Plateau]:
     angle, run_segments = live_angle(run), segments(run.t, usual=run.step)
     for number, hold in enumerate(holds(run)):
-        for segment in _between_gaps(run_segments, _share(hold, *fixed) if fixed else hold):
-            rows = segment if fixed else _settled(run, segment, angle)
-            if rows is not None and _long_enough(run, rows) and (fixed or _is_steady(run, rows, angle)):
+        for segment in _between_gaps(run_segments, _share(hold, *shares) if shares else hold):
+            rows = segment if shares else _settled(run, segment, angle)
+            if rows is not None and _long_enough(run, rows) and (shares or _is_steady(run, rows, angle)):
                 yield replace(_plateau(run, rows, angle), hold=number)
 
 
@@ -106,8 +106,8 @@ def held_pieces(run: Run, *, start: float | None = None, end: float | None = Non
 def pool(plateaus: Sequence[Plateau]) -> tuple[Plateau, ...]:
     """One point per hold: the windows of a run between which a gap lies, averaged by their rows."""
     holds: dict[int, list[Plateau]] = {}
-    for each in plateaus:
-        holds.setdefault(each.hold, []).append(each)
+    for plateau in plateaus:
+        holds.setdefault(plateau.hold, []).append(plateau)
     return tuple(windows[0] if len(windows) == 1 else _pooled(windows) for windows in holds.values())
 
 
@@ -140,13 +140,13 @@ def _plateau(run: Run, rows: slice, angle: FloatArray | None) -> Plateau:
         if name not in ("wheel_angle", "pose"):
             mean[name], std[name] = robust_mean(values[rows])
     speed_from = SPEED if "wheel_speed" in mean else ""
-    if angle is not None and len(seen := _seen(angle[rows])) > 1:
-        at, turned = t[seen], angle[rows][seen]
+    if angle is not None and len(sample_rows := _seen(angle[rows])) > 1:
+        at, turned = t[sample_rows], angle[rows][sample_rows]
         mean["wheel_speed"], std["wheel_speed"] = _rate(at, turned)
         speeds["wheel_speed"] = _middle(at), np.diff(turned, axis=0) / np.diff(at)[:, None]
         speed_from = ANGLE
-    if run.twist is None and run.pose is not None and len(seen := _seen(run.pose[rows])) > 1:
-        at, pose = t[seen], run.pose[rows][seen]
+    if run.twist is None and run.pose is not None and len(sample_rows := _seen(run.pose[rows])) > 1:
+        at, pose = t[sample_rows], run.pose[rows][sample_rows]
         mean["twist"], std["twist"] = _body_rate(at, pose)
         speeds["twist"] = _middle(at), _body_steps(pose) / np.diff(at)[:, None]
     rates = {name: _rate_of_change(*speed) for name, speed in speeds.items()}
@@ -168,9 +168,9 @@ def live_angle(run: Run) -> FloatArray | None:
     if run.wheel_angle is None or run.wheel_speed is None:
         return run.wheel_angle
     for angle, speed in zip(run.wheel_angle.T, run.wheel_speed.T, strict=True):
-        known = np.isfinite(speed)
-        told = np.sum(np.abs(speed[known][:-1]) * np.diff(run.t[known]))
-        if np.sum(np.abs(np.diff(angle[np.isfinite(angle)]))) < DEAD_SHARE * told:
+        finite = np.isfinite(speed)
+        speed_path = np.sum(np.abs(speed[finite][:-1]) * np.diff(run.t[finite]))
+        if np.sum(np.abs(np.diff(angle[np.isfinite(angle)]))) < DEAD_SHARE * speed_path:
             return None
     return run.wheel_angle
 
@@ -198,13 +198,13 @@ def holds(run: Run) -> list[slice]:
 
 def _between_gaps(run_segments: Sequence[slice], hold: slice) -> list[slice]:
     """A hold cut at the gaps of the run."""
-    cut = [slice(max(p.start, hold.start), min(p.stop, hold.stop)) for p in run_segments]
-    return [segment for segment in cut if segment.stop > segment.start]
+    pieces = [slice(max(p.start, hold.start), min(p.stop, hold.stop)) for p in run_segments]
+    return [segment for segment in pieces if segment.stop > segment.start]
 
 
 def command_changes(run: Run) -> BoolArray | None:
     """Rows with another command than the row before; None where no command comes in steps."""
-    changed, known = np.zeros(len(run), dtype=bool), False
+    changes, stepwise = np.zeros(len(run), dtype=bool), False
     if len(run) < 2:
         return None
     for name in COMMANDS:
@@ -212,11 +212,11 @@ def command_changes(run: Run) -> BoolArray | None:
         if values is None or not np.isfinite(values).any():
             continue
         bound = SAME_COMMAND * float(np.nanmax(np.abs(values)))
-        moved = (np.abs(np.diff(values, axis=0)) > bound).any(axis=1)
-        if moved.mean() <= STEPWISE:
-            changed[1:] |= moved
-            known = True
-    return changed if known else None
+        steps = (np.abs(np.diff(values, axis=0)) > bound).any(axis=1)
+        if steps.mean() <= STEPWISE:
+            changes[1:] |= steps
+            stepwise = True
+    return changes if stepwise else None
 
 
 def _cut(t: FloatArray, segment: slice) -> list[slice]:
@@ -270,10 +270,10 @@ def _in_every_row(t: FloatArray, values: FloatArray) -> FloatArray:
     if np.isfinite(values).all():
         return values
     filled = values.copy()
-    for column, own in zip(filled.T, values.T, strict=True):
-        known = np.isfinite(own)
-        if known.sum() >= MIN_ROWS:
-            column[:] = np.interp(t, t[known], own[known])
+    for column, column_samples in zip(filled.T, values.T, strict=True):
+        finite = np.isfinite(column_samples)
+        if finite.sum() >= MIN_ROWS:
+            column[:] = np.interp(t, t[finite], column_samples[finite])
     return filled
 
 
@@ -308,10 +308,10 @@ def _is_steady(run: Run, rows: slice, angle: FloatArray | None) -> bool:
     half = (rows.start + rows.stop) // 2
     halves = slice(rows.start, half), slice(half, rows.stop)
     if angle is not None:
-        seen = [part.start + _seen(angle[part]) for part in halves]
-        if min(map(len, seen)) < 2:
+        sample_rows = [part.start + _seen(angle[part]) for part in halves]
+        if min(map(len, sample_rows)) < 2:
             return False
-        pairs = [_rate(run.t[part], angle[part]) for part in seen]
+        pairs = [_rate(run.t[part], angle[part]) for part in sample_rows]
     elif speed is not None:
         pairs = [robust_mean(speed[part]) for part in halves]
     else:
@@ -347,9 +347,9 @@ def _rate_of_change(t: FloatArray, speed: FloatArray) -> tuple[FloatArray, Float
     2 (c_1 + c_3). The line of least squares does not tell it: it looks at the middle, a transient is at the start.
     0 and infinity for a column without enough numbers.
     """
-    known = [np.isfinite(column) for column in speed.T]
-    found = [_rise(t[seen], column[seen]) for seen, column in zip(known, speed.T, strict=True)]
-    rise, error = np.array(found).reshape(-1, 2).T
+    masks = [np.isfinite(column) for column in speed.T]
+    rises = [_rise(t[finite], column[finite]) for finite, column in zip(masks, speed.T, strict=True)]
+    rise, error = np.array(rises).reshape(-1, 2).T
     return rise / (t[-1] - t[0]), error / (t[-1] - t[0])
 
 
@@ -365,6 +365,6 @@ def _rise(t: FloatArray, speed: FloatArray) -> tuple[float, float]:
         residual = speed - curve
         bound = HUBER_CLIP * float(robust_std(residual, 0.0)) or np.inf
         clipped = curve + np.clip(residual, -bound, bound)
-    left = clipped - design @ (inverse @ clipped)
-    spread = np.sqrt(left @ left / (len(t) - CUBIC - 1) * autocorrelation_time(left))
+    misfit = clipped - design @ (inverse @ clipped)
+    spread = np.sqrt(misfit @ misfit / (len(t) - CUBIC - 1) * autocorrelation_time(misfit))
     return float(ends @ inverse @ clipped), float(spread * np.linalg.norm(ends @ inverse))

@@ -99,25 +99,31 @@ def read_log(
 
     Columns are guessed from names and units, and what was guessed stands in the warnings of the Run.
 
-    robot: settles what names leave open, and is needed for speeds of the motor shaft. columns: a ColumnMap, the path of
-    one (TOML), or overrides such as {"u1": "motor_1_volts:V"}. sort: rows whose time goes back are sorted instead of
-    refused.
-    assume: unit by column or letter of a component, where the file gives none, such as {"d": "duty/255"}. latency: how
-    late components were recorded, by their letter [s]. header: whether there is one. skip_bad_rows: leave out rows that
-    cannot be read. current_unsigned: currents are |i|; they get the sign of the commanded speed, or of the voltage.
-    max_bytes: of what is held at once; None: a quarter of the memory. variables: of a MATLAB file, those to read.
-    beside: other files of the same experiment, stamped by one clock: their topics and columns are joined by time.
-    rate: rows per second [1/s] of a file that has no time.
+    Args:
+        path: The file, or the folder of a bag.
+        robot: Settles what names leave open, and is needed for speeds of the motor shaft.
+        columns: A ColumnMap, the path of one (TOML), or overrides such as {"u1": "motor_1_volts:V"}.
+        assume: Unit by column or letter of a component, where the file gives none, such as {"d": "duty/255"}.
+        latency: How late components were recorded, by their letter [s].
+        sort: Whether rows whose time goes back are sorted instead of refused.
+        header: Whether there is one.
+        skip_bad_rows: Whether to leave out rows that cannot be read.
+        current_unsigned: Currents are |i|; they get the sign of the commanded speed, or of the voltage.
+        max_bytes: Of what is held at once; None: a quarter of the memory.
+        variables: Of a MATLAB file, those to read.
+        beside: Other files of the same experiment, stamped by one clock: their topics and columns are joined by time.
+        rate: Rows per second [1/s] of a file that has no time.
+
     Raises InputError for what cannot be read or is doubtful, with file, line and remedy.
     """
-    given = columns if isinstance(columns, ColumnMap) else None
+    column_map = columns if isinstance(columns, ColumnMap) else None
     overrides: tuple[str, ...] = ()
     if isinstance(columns, Mapping):
         overrides = tuple(f"{component}={text}" for component, text in columns.items())
-    elif columns is not None and given is None:
-        given = load_map(columns)  # type: ignore[arg-type]
+    elif columns is not None and column_map is None:
+        column_map = load_map(columns)  # type: ignore[arg-type]
     options = LogOptions(
-        given,
+        column_map,
         overrides,
         assume or {},
         latency or {},
@@ -144,9 +150,13 @@ def load_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOp
     if options.beside and options.rate is not None:
         raise InputError("files without time cannot be joined by time", got="`rate` with files beside", expected="one")
     if options.beside:
-        how = ReadOptions(options.header, options.skip_bad_rows, options.max_bytes, variables=options.variables)
-        alone = replace(options, overrides=())  # columns of the whole, which one file alone need not have
-        table = joined_table([path, *options.beside], how, lambda part: map_columns(part, None, alone))
+        read_options = ReadOptions(
+            options.header, options.skip_bad_rows, options.max_bytes, variables=options.variables
+        )
+        options_of_file = replace(options, overrides=())  # columns of the whole, which one file alone need not have
+        table = joined_table(
+            [path, *options.beside], read_options, lambda part: map_columns(part, None, options_of_file)
+        )
     else:
         table = read_table(path, **options.of_tables)
         table = next(timed([with_joined_stamp(table)], options.rate, options.skip_bad_rows))
@@ -155,20 +165,20 @@ def load_log(path: str | os.PathLike, robot: Robot | None = None, options: LogOp
 
 def map_columns(table: Table, robot: Robot | None, options: LogOptions) -> ColumnMap:
     """The map of a table: given or guessed, with the overrides on top. Raises InputError for a column it lacks."""
-    columns, more = options.columns, dict(parse_column(text, table.names) for text in options.overrides)
+    columns, overrides = options.columns, dict(parse_column(text, table.names) for text in options.overrides)
     if options.rate is not None:
-        refuse_second_time(table, options.assume, columns, more)
+        refuse_second_time(table, options.assume, columns, overrides)
     if columns is None:
-        columns = guess_columns(table, robot, options.assume, {column.name: key for key, column in more.items()})
+        columns = guess_columns(table, robot, options.assume, {column.name: key for key, column in overrides.items()})
     else:
-        used = {column.name for column in columns.columns.values()}
-        columns = replace(columns, unused=tuple(name for name in table.names if name not in used))
-    columns = _delayed(_called_as_in(table, columns.with_columns(more)), options.latency)
+        used_names = {column.name for column in columns.columns.values()}
+        columns = replace(columns, unused=tuple(name for name in table.names if name not in used_names))
+    columns = _delayed(_called_as_in(table, columns.with_columns(overrides)), options.latency)
     columns = with_frames(columns, options.assume)
     for component, column in columns.columns.items():
         if column.name not in table.names:
-            close = difflib.get_close_matches(column.name, table.names, n=1, cutoff=0.5)
-            remedy = f'did you mean "{close[0]}"?' if close else ""
+            matches = difflib.get_close_matches(column.name, table.names, n=1, cutoff=0.5)
+            remedy = f'did you mean "{matches[0]}"?' if matches else ""
             raise InputError(
                 f"the log has no column {column.name} for {component}",
                 got=", ".join(table.names),
@@ -194,10 +204,10 @@ def _delayed(columns: ColumnMap, latency: Mapping[str, float]) -> ColumnMap:
     """The map with latencies; "w" means every wheel's."""
     late: dict[str, Column] = {}
     for name, seconds in latency.items():
-        mine = [key for key in columns.columns if name in (key, key.rstrip("0123456789"), component_channel(key))]
-        if not mine or mine == [TIME]:
+        keys = [key for key in columns.columns if name in (key, key.rstrip("0123456789"), component_channel(key))]
+        if not keys or keys == [TIME]:
             raise InputError("no such channel to delay", got=name, expected=", ".join(columns.columns))
-        late |= {key: replace(columns.columns[key], latency=seconds) for key in mine}
+        late |= {key: replace(columns.columns[key], latency=seconds) for key in keys}
     return replace(columns, columns={**columns.columns, **late}) if late else columns
 
 
@@ -213,25 +223,25 @@ def log_from_table(
     if robot is not None and wheels > 1:
         wheels = robot.wheels.count
     clock = clock or Clock()
-    known = len(clock.restarts)
+    restart_count = len(clock.restarts)
     t = clock.times(table, columns.columns[TIME], notes)
     episodes = [Restart(EPISODE, TIME, line) for line in table.begins]
-    counters = Counters(table, t, [*episodes, *clock.restarts[known:]])
+    counters = Counters(table, t, [*episodes, *clock.restarts[restart_count:]])
     channels: dict[str, FloatArray] = {}
     for key, column in columns.columns.items():
-        found = place(key)
-        if found is None:
+        location = place(key)
+        if location is None:
             continue
         values = table.measured(column.name, missing=True, skip=options.skip_bad_rows)
-        if found[0] == "wheel_angle":
+        if location[0] == "wheel_angle":
             values = counters.angle(key, column, values)
-        if found[0] == "wheel_speed":
+        if location[0] == "wheel_speed":
             values = counters.speed(key, column, values)
         values = values * column.factor
-        if found[0] in SIDED:
-            values = values / _divisor(column, key, robot, found[1], table.source)
-        width = len(components(found[0], wheels))
-        channels.setdefault(found[0], np.full((len(table), width), np.nan))[:, found[1]] = values
+        if location[0] in SIDED:
+            values = values / _divisor(column, key, robot, location[1], table.source)
+        width = len(components(location[0], wheels))
+        channels.setdefault(location[0], np.full((len(table), width), np.nan))[:, location[1]] = values
     notes += _side_notes(columns, robot)
     if "pose" in channels:
         channels["pose"][:, 2] = unwrapped(channels["pose"][:, 2])
@@ -252,8 +262,8 @@ def log_from_table(
         table.own_clocks,
         tuple(restarts),
     )
-    beside = counters.beside_restarts()
-    log = log.rows(~beside) if beside.any() else log
+    restart_rows = counters.beside_restarts()
+    log = log.rows(~restart_rows) if restart_rows.any() else log
     log = _without_other_topics(log).joined()
     log = replace(log, own_clocks=log.own_clocks or is_staggered(log.t, log.channels.values()))
     return _signed(log, robot) if options.current_unsigned else log
@@ -278,11 +288,13 @@ def _wheel_count(columns: ColumnMap, robot: Robot | None, where: str) -> int:
     Columns of wheels 1 to N, three or more, are those of a robot of N wheels; one or two may be motors on a bench, and
     currents those of some sensors.
     """
-    found = [(each, key) for key in columns.columns if (each := place(key)) and CHANNELS[each[0]] == WHEEL]
-    count = max((index + 1 for (_, index), _ in found), default=0)
-    if robot is None or not found:
+    located = [
+        (location, key) for key in columns.columns if (location := place(key)) and CHANNELS[location[0]] == WHEEL
+    ]
+    count = max((index + 1 for (_, index), _ in located), default=0)
+    if robot is None or not located:
         return count
-    turning = {index for (channel, index), _ in found if channel != "current"}
+    turning = {index for (channel, index), _ in located if channel != "current"}
     fewer = MIN_WHEELS <= len(turning) == count < robot.wheels.count
     if count > robot.wheels.count or fewer:
         raise InputError(
@@ -293,7 +305,7 @@ def _wheel_count(columns: ColumnMap, robot: Robot | None, where: str) -> int:
             remedy="name the robot of this log, or make its file with `omnidyn init`"
             + (
                 "; where columns of a wheel were not found, say which they are: `column` "
-                f"{found[-1][1][0]}{robot.wheels.count}=NAME:UNIT"
+                f"{located[-1][1][0]}{robot.wheels.count}=NAME:UNIT"
             )
             * fewer,
         )
@@ -380,23 +392,25 @@ def joined_table(paths: Sequence[str | os.PathLike], options: ReadOptions, mappe
     """
     limit = default_max_bytes() if options.max_bytes is None else options.max_bytes
     options = options._replace(max_bytes=limit)
-    found = [_recording(path, options, mapped) for path in paths]
-    spans = [_span(recording) for recording in found]
-    for recording, (first, last) in zip(found[1:], spans[1:], strict=True):
+    recordings = [_recording(path, options, mapped) for path in paths]
+    spans = [_span(recording) for recording in recordings]
+    for recording, (first, last) in zip(recordings[1:], spans[1:], strict=True):
         if first > spans[0][1] or last < spans[0][0]:
             raise InputError(
                 "the files were not recorded at the same time",
                 got=f"{_moments(first, last)}, {recording.source}",
-                expected=f"times within {_moments(*spans[0])}, as in {found[0].source}",
+                expected=f"times within {_moments(*spans[0])}, as in {recordings[0].source}",
                 remedy="give stamps of one clock, such as seconds since 1970; logs of several runs need no joining",
                 where=recording.source,
             )
-    taken: set[str] = set()
-    tracks = [_renamed(track, Path(recording.source).stem, taken) for recording in found for track in recording.tracks]
-    notes = [f"{len(found)} files are one experiment: {', '.join(recording.source for recording in found)}"]
-    notes += [note for recording in found for note in recording.notes]
-    digest = sha256("".join(recording.sha256 for recording in found))
-    tables = Recording(tracks, [], found[0].source, digest, notes).tables(ROWS)
+    names: set[str] = set()
+    tracks = [
+        _renamed(track, Path(recording.source).stem, names) for recording in recordings for track in recording.tracks
+    ]
+    notes = [f"{len(recordings)} files are one experiment: {', '.join(recording.source for recording in recordings)}"]
+    notes += [note for recording in recordings for note in recording.notes]
+    digest = sha256("".join(recording.sha256 for recording in recordings))
+    tables = Recording(tracks, [], recordings[0].source, digest, notes).tables(ROWS)
     return join(completed(tables, "one row"), limit)
 
 
@@ -404,8 +418,8 @@ def _recording(path: str | os.PathLike, options: ReadOptions, mapped: Mapped) ->
     """A file as topics with stamps; a table is one topic, by its own time."""
     reader = reader_of(path)
     if reader.recording is not None:
-        found = reader.recording(path, options)
-        return replace(found, tracks=[track for track in found.tracks if len(track.stamps) and track.columns])
+        recording = reader.recording(path, options)
+        return replace(recording, tracks=[track for track in recording.tracks if len(track.stamps) and track.columns])
     table = with_joined_stamp(
         read_table(
             path,
@@ -417,10 +431,10 @@ def _recording(path: str | os.PathLike, options: ReadOptions, mapped: Mapped) ->
     )
     column, clock = mapped(table).columns[TIME], Clock()
     t = clock.times(table, column, [])
-    known = np.isfinite(t)
-    stamps = np.rint(t[known] * 1e9).astype(np.int64) + round(clock.start(column) * 1e9)
+    finite = np.isfinite(t)
+    stamps = np.rint(t[finite] * 1e9).astype(np.int64) + round(clock.start(column) * 1e9)
     numbers = {
-        name: values[known]
+        name: values[finite]
         for name, values in table.columns.items()
         if name != column.name and not isinstance(values, tuple)
     }
@@ -441,17 +455,19 @@ def _moments(first: int, last: int) -> str:
     """A span in words: dates where it counts from 1970."""
     if first < 10**17:
         return f"{first / 1e9:.6g} to {last / 1e9:.6g} s"
-    return " to ".join(datetime.fromtimestamp(each / 1e9, UTC).strftime("%Y-%m-%d %H:%M:%S") for each in (first, last))
+    return " to ".join(
+        datetime.fromtimestamp(stamp / 1e9, UTC).strftime("%Y-%m-%d %H:%M:%S") for stamp in (first, last)
+    )
 
 
-def _renamed(track: Track, stem: str, taken: set[str]) -> Track:
+def _renamed(track: Track, stem: str, taken_names: set[str]) -> Track:
     """The track with the name of its file before columns whose names are taken."""
-    names = {name: name if name not in taken else f"{stem}/{name}" for name in track.columns}
-    taken |= set(names.values())
+    names = {name: name if name not in taken_names else f"{stem}/{name}" for name in track.columns}
+    taken_names |= set(names.values())
     return Track(
         track.topic,
         track.stamps,
         {names[name]: values for name, values in track.columns.items()},
         {names[name]: unit for name, unit in track.units.items()},
-        {names[name]: said for name, said in track.says.items() if name in names},
+        {names[name]: declaration for name, declaration in track.says.items() if name in names},
     )

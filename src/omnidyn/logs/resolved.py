@@ -13,21 +13,21 @@ JITTER, JITTER_SIZE = 0.15, 0.2  # an input that changes so much from row to row
 JITTER_ROWS = 0.6  # of the spread of the input, from row to row: about ten rows a swing; what is faster is not there
 
 
-def unresolved_input(whole: FloatArray, window: slice, largest: float, jitter: float = JITTER) -> bool:
+def unresolved_input(values: FloatArray, window: slice, largest: float, jitter: float = JITTER) -> bool:
     """Whether the input jumps about so much between rows that what happened there is not in the log.
 
-    whole: the input of one motor, shape (rows,); largest: its largest size in the run. jitter: how much from
+    values: the input of one motor, shape (rows,); largest: its largest size in the run. jitter: how much from
     row to row is too much, as a share of the spread.
     """
-    more = max(0, CONTEXT_ROWS - (window.stop - window.start)) // 2
-    own = whole[max(0, window.start - more) : window.stop + more]
-    return bool(_jumps(own, largest, jitter))
+    margin = max(0, CONTEXT_ROWS - (window.stop - window.start)) // 2
+    excerpt = values[max(0, window.start - margin) : window.stop + margin]
+    return bool(_jumps(excerpt, largest, jitter))
 
 
-def _jumps(own: FloatArray, largest: float, jitter: float) -> BoolArray:
-    """The test of `unresolved_input` for many windows. own: shape (..., rows), result (...,)."""
-    spread = np.std(own, axis=-1)
-    jumps = np.abs(np.diff(own))
+def _jumps(windows: FloatArray, largest: float, jitter: float) -> BoolArray:
+    """The test of `unresolved_input` for many windows. windows: shape (..., rows), result (...,)."""
+    spread = np.std(windows, axis=-1)
+    jumps = np.abs(np.diff(windows))
     size = np.sqrt(np.mean(jumps**2, axis=-1))
     many = np.mean(jumps > spread[..., None] / 10.0, axis=-1) > 2.0 * STEPWISE  # a step alone is no jitter
     return np.asarray(many & (spread > JITTER_SIZE * largest) & (size > jitter * spread))
@@ -40,11 +40,11 @@ def unresolved_rows(u: FloatArray) -> BoolArray:
     that of the rows looks slow for as long as it is near.
     """
     rough, largest = np.zeros(len(u), dtype=bool), float(np.nanmax(np.abs(u), initial=0.0))
-    whole = len(u) - len(u) % CONTEXT_ROWS
-    windows = u[:whole].reshape(-1, CONTEXT_ROWS)
-    rough[:whole] = np.repeat(_jumps(windows, largest, JITTER_ROWS), CONTEXT_ROWS)
-    if whole < len(u) > 1:
-        rough[whole:] = unresolved_input(u, slice(whole, len(u)), largest, JITTER_ROWS)
+    full_rows = len(u) - len(u) % CONTEXT_ROWS
+    windows = u[:full_rows].reshape(-1, CONTEXT_ROWS)
+    rough[:full_rows] = np.repeat(_jumps(windows, largest, JITTER_ROWS), CONTEXT_ROWS)
+    if full_rows < len(u) > 1:
+        rough[full_rows:] = unresolved_input(u, slice(full_rows, len(u)), largest, JITTER_ROWS)
     begin, end = stretches(rough).T
     length = end - begin
     for k in range(len(length) - 1):
@@ -69,10 +69,10 @@ ONE_PHASE = 0.8  # of the changes in two of n phases: a value that is held for n
 
 def rows_of_mean(values: FloatArray) -> int:
     """Over how many rows each value is a mean; 0 where it is none, or nothing tells. Shape (rows,)."""
-    known = values[np.isfinite(values)][:MOST_ROWS]
-    if len(known) < FEWEST_CHANGES:
+    samples = values[np.isfinite(values)][:MOST_ROWS]
+    if len(samples) < FEWEST_CHANGES:
         return 0
-    bend = np.diff(known, n=4)
+    bend = np.diff(samples, n=4)
     changes = np.abs(bend[bend != 0.0])
     if len(changes) < FEWEST_CHANGES:
         return 0
@@ -83,9 +83,11 @@ def rows_of_mean(values: FloatArray) -> int:
     if not lags.size:
         return 0
     rows = int(lags[np.argmin(like[lags])])
-    others = np.r_[4 : rows - 3, rows + 4 : 3 * rows]
+    off_lags = np.r_[4 : rows - 3, rows + 4 : 3 * rows]
     chance = 5.0 / np.sqrt(len(changes))
-    if like[rows] > ECHO_CORRELATION - chance or (others.size and np.abs(like[others]).max() > NO_CORRELATION + chance):
+    if like[rows] > ECHO_CORRELATION - chance or (
+        off_lags.size and np.abs(like[off_lags]).max() > NO_CORRELATION + chance
+    ):
         return 0
     phases = np.bincount(np.arange(len(bend)) % rows, bend**2, rows)
     return 0 if np.sort(phases)[-2:].sum() > ONE_PHASE * phases.sum() else rows

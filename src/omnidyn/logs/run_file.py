@@ -45,7 +45,7 @@ _SUFFIXES = (
     "s",
 )  # as channels.si_suffix gives them, long before short
 _SHEETS = frozenset((".xlsx", ".xls", ".xlsm", ".ods"))
-_OTHERS = _SHEETS | frozenset(
+_OTHER_SUFFIXES = _SHEETS | frozenset(
     (
         ".npz",
         ".npy",
@@ -113,7 +113,7 @@ def check_format(path: str | os.PathLike) -> None:
         import_pyarrow(str(path))
     if suffix == MCAP:
         import_mcap(str(path))
-    if suffix in _OTHERS | _READ:
+    if suffix in _OTHER_SUFFIXES | _READ:
         raise InputError(
             "a run is not written in this format",
             got=suffix,
@@ -177,8 +177,8 @@ def read_run(path: str | os.PathLike) -> Run:
     """
     table = read_table(path)
     wheels = _wheel_count(table.names)
-    known = {channel: columns_of(channel, wheels) for channel in CHANNELS}
-    table.check_names(["t_s"], [name for names in known.values() for name in names])
+    names_of = {channel: columns_of(channel, wheels) for channel in CHANNELS}
+    table.check_names(["t_s"], [name for names in names_of.values() for name in names])
     refuse_other_units(table)
     channels: dict[str, Any] = {
         channel: _complete(
@@ -187,12 +187,12 @@ def read_run(path: str | os.PathLike) -> Run:
             names,
             table.source,
         )
-        for channel, names in known.items()
+        for channel, names in names_of.items()
     }
     time = table.numbers("t_s")
-    bad = np.flatnonzero(~(np.diff(time) > 0.0))
-    if bad.size:
-        row = int(bad[0]) + 1
+    bad_steps = np.flatnonzero(~(np.diff(time) > 0.0))
+    if bad_steps.size:
+        row = int(bad_steps[0]) + 1
         got = f"{time[row]:.17g} after {time[row - 1]:.17g}"
         raise table.fault(row, "t_s", "time does not increase", got, "increasing times")
     return Run(t=time, **channels, source=str(path), warnings=statements(table.notes))
@@ -206,9 +206,9 @@ def run_of_columns(
     Raises InputError for another column, a channel that is not complete, and a time that does not increase.
     """
     wheels = _wheel_count(tuple(columns))
-    known = {channel: columns_of(channel, wheels) for channel in CHANNELS}
-    every = {"t_s", *(name for names in known.values() for name in names)}
-    strange = [name for name in columns if name not in every]
+    names_of = {channel: columns_of(channel, wheels) for channel in CHANNELS}
+    allowed_names = {"t_s", *(name for names in names_of.values() for name in names)}
+    strange = [name for name in columns if name not in allowed_names]
     if strange or "t_s" not in columns:
         raise InputError(
             "not the columns of a run",
@@ -217,20 +217,22 @@ def run_of_columns(
             remedy=remedy,
             where=source,
         )
-    channels: dict[str, Any] = {channel: _complete(columns, channel, names, source) for channel, names in known.items()}
+    channels: dict[str, Any] = {
+        channel: _complete(columns, channel, names, source) for channel, names in names_of.items()
+    }
     return Run(t=columns["t_s"], source=source, warnings=warnings, **channels)
 
 
 def _complete(columns: Mapping[str, FloatArray], channel: str, names: list[str], source: str) -> FloatArray | None:
     """A channel from its columns, None where there are none of them. Raises InputError where some are missing."""
-    there = [name for name in names if name in columns]
-    if not there:
+    present = [name for name in names if name in columns]
+    if not present:
         return None
-    if len(there) < len(names):
-        absent = [name for name in names if name not in there]
+    if len(present) < len(names):
+        absent = [name for name in names if name not in present]
         raise InputError(
             f"the channel {channel} is not complete",
-            got=", ".join(there),
+            got=", ".join(present),
             expected=", ".join(names),
             remedy=f"add {', '.join(absent)}",
             where=source,
@@ -242,12 +244,16 @@ def _complete(columns: Mapping[str, FloatArray], channel: str, names: list[str],
 def refuse_other_units(table: Table) -> None:
     """Raises InputError where a unit given in a row or a bracket is not the one in the name of the column."""
     for name, text in table.units.items():
-        own, given = parse_unit(unit_of_column(name)), known_unit(text)
-        if text not in _UNIT_OF_DUTY if own.quantity == DUTY else given is None or given[1:] != own[1:]:
+        name_unit, table_unit = parse_unit(unit_of_column(name)), known_unit(text)
+        if (
+            text not in _UNIT_OF_DUTY
+            if name_unit.quantity == DUTY
+            else table_unit is None or table_unit[1:] != name_unit[1:]
+        ):
             raise InputError(
                 "the row of units contradicts the name",
                 got=text,
-                expected=own.text,
+                expected=name_unit.text,
                 remedy="convert the column",
                 where=f"{table.source}, column {name}",
             )

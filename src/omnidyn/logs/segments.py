@@ -32,12 +32,12 @@ def segments(t: FloatArray, gap: float = GAP, usual: float | None = None) -> lis
 
 def filled(t: FloatArray, values: FloatArray) -> FloatArray:
     """Each blank between two values on the line between them; outside, and in a gap between values, there is none."""
-    whole, known = values.copy(), np.flatnonzero(np.isfinite(values))
-    for segment in segments(t[known]):
-        rows = known[segment]
+    result, sample_rows = values.copy(), np.flatnonzero(np.isfinite(values))
+    for segment in segments(t[sample_rows]):
+        rows = sample_rows[segment]
         if rows.size:
-            whole[rows[0] : rows[-1] + 1] = np.interp(t[rows[0] : rows[-1] + 1], t[rows], values[rows])
-    return whole
+            result[rows[0] : rows[-1] + 1] = np.interp(t[rows[0] : rows[-1] + 1], t[rows], values[rows])
+    return result
 
 
 # A run in the rows of one of its sensors: for what compares channels row by row, or holds inputs over a row
@@ -52,14 +52,14 @@ def on_clock_of(run: Run, channel: str) -> Run:
     values = getattr(run, channel)
     if values is None or not run.staggered:
         return run
-    own = max((samples(run.t, column)[0] for column in values.reshape(len(run), -1).T), key=len)
-    if len(own) < 2:
+    clock = max((samples(run.t, column)[0] for column in values.reshape(len(run), -1).T), key=len)
+    if len(clock) < 2:
         return run
-    there = {
-        name: _on_line(run.t, values, own) if name in SENSORS else _held(run.t, values, own)
+    channels = {
+        name: _on_line(run.t, values, clock) if name in SENSORS else _held(run.t, values, clock)
         for name, values in run.channels.items()
     }
-    return run.replace(t=own, **there)
+    return run.replace(t=clock, **channels)
 
 
 def on_clock_of_wheels(run: Run) -> Run:
@@ -69,15 +69,15 @@ def on_clock_of_wheels(run: Run) -> Run:
 
 def _on_line(t: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:
     """What a sensor gave at some times, on the line between its samples; NaN outside of them and in their gaps."""
-    found = np.full((len(at), values.shape[1]), np.nan)
+    result = np.full((len(at), values.shape[1]), np.nan)
     for k, column in enumerate(values.T):
-        own, known = samples(t, column)
-        if len(own) < 2:
+        times, measured = samples(t, column)
+        if len(times) < 2:
             continue
-        after = np.clip(np.searchsorted(own, at), 1, len(own) - 1)
-        there = (at >= own[0]) & (at <= own[-1]) & (own[after] - own[after - 1] <= GAP * usual_step(own))
-        found[there, k] = np.interp(at[there], own, known)
-    return found
+        after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
+        covered = (at >= times[0]) & (at <= times[-1]) & (times[after] - times[after - 1] <= GAP * usual_step(times))
+        result[covered, k] = np.interp(at[covered], times, measured)
+    return result
 
 
 def _held(t: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:
@@ -85,14 +85,14 @@ def _held(t: FloatArray, values: FloatArray, at: FloatArray) -> FloatArray:
     columns = values.reshape(len(t), -1)
     ends = np.append(at[1:], at[-1] + usual_step(at))
     first, middle, last = (
-        np.maximum(np.searchsorted(t, each, side="right") - 1, 0)
-        for each in (at, 0.5 * (at + ends), np.nextafter(ends, 0.0))
+        np.maximum(np.searchsorted(t, moment, side="right") - 1, 0)
+        for moment in (at, 0.5 * (at + ends), np.nextafter(ends, 0.0))
     )
     way = np.vstack([np.zeros(columns.shape[1]), np.cumsum(columns[:-1] * np.diff(t)[:, None], axis=0)])
-    found = np.empty((len(at), columns.shape[1]))
+    result = np.empty((len(at), columns.shape[1]))
     for k, column in enumerate(columns.T):
         changes = np.append(0, np.cumsum((column[1:] != column[:-1]) & np.isfinite(column[:-1])))
         means = (np.interp(ends, t, way[:, k]) - np.interp(at, t, way[:, k])) / (ends - at)
         plain = (changes[last] - changes[first] < 2) | ~np.isfinite(means)
-        found[:, k] = np.where(plain, column[middle], means)
-    return found if values.ndim == 2 else found[:, 0]
+        result[:, k] = np.where(plain, column[middle], means)
+    return result if values.ndim == 2 else result[:, 0]

@@ -82,19 +82,19 @@ class SteadyTable:
         return tuple(self._axis(k, name) for k, name in enumerate(names))
 
     def _axis(self, row: int, name: str) -> str:
-        known = ALIASES.get(name.lower(), name.lower())
-        if known not in AXES:
+        axis = ALIASES.get(name.lower(), name.lower())
+        if axis not in AXES:
             raise InputError(
                 "no such axis", got=name, expected="x, y or yaw (or v, v_n, w)", where=self.place(row, "axis")
             )
-        return known
+        return axis
 
     def _check_numbers(self) -> None:
         self._refuse("speed", ~(np.abs(self.speed) <= MAX_SPEED), f"a finite number up to {MAX_SPEED:g} m/s or rad/s")
         self._refuse("force", ~(np.abs(self.force) <= MAX_FORCE), f"a finite number up to {MAX_FORCE:g} N or N m")
         if self.force_std is not None:
-            wrong = ~((self.force_std >= MIN_STD) & (self.force_std <= MAX_FORCE))
-            self._refuse("force_std", wrong, f"a number from {MIN_STD:g} to {MAX_FORCE:g}")
+            bad_rows = ~((self.force_std >= MIN_STD) & (self.force_std <= MAX_FORCE))
+            self._refuse("force_std", bad_rows, f"a number from {MIN_STD:g} to {MAX_FORCE:g}")
         if self.speed_std is not None:
             self._refuse(
                 "speed_std", ~((self.speed_std >= 0.0) & (self.speed_std <= MAX_SPEED)), "a number, 0 or above"
@@ -104,15 +104,15 @@ class SteadyTable:
         if self.force_from not in FORCE_SOURCES:
             raise InputError("unknown origin of the force", got=self.force_from, expected=", ".join(FORCE_SOURCES))
 
-    def _refuse(self, name: str, wrong: BoolArray, expected: str) -> None:
-        for row in np.flatnonzero(wrong)[:1]:
+    def _refuse(self, name: str, bad_rows: BoolArray, expected: str) -> None:
+        for row in np.flatnonzero(bad_rows)[:1]:
             got = float(getattr(self, name)[row])
             raise InputError("number out of range", got=got, expected=expected, where=self.place(int(row), name))
 
     def place(self, row: int, column: str = "") -> str:
         """Where a row stands, for messages: file:line, or row k."""
-        where = f"row {row}" if self.lines is None else f"{self.source}:{self.lines[row]}"
-        return f"{where}, column {column}" if column else where
+        location = f"row {row}" if self.lines is None else f"{self.source}:{self.lines[row]}"
+        return f"{location}, column {column}" if column else location
 
     def __len__(self) -> int:
         return len(self.speed)
@@ -174,16 +174,16 @@ def _per_wheel(table: Table, letter: str, unit: str) -> FloatArray | None:
 
 
 def _alias_notes(words: Sequence[str]) -> list[str]:
-    used = [word for word in ALIASES if word in {word.lower() for word in words}]
-    return [f"axis {word} was read as {ALIASES[word]}" for word in used]
+    aliases = [word for word in ALIASES if word in {word.lower() for word in words}]
+    return [f"axis {word} was read as {ALIASES[word]}" for word in aliases]
 
 
 def _check_units(table: Table, words: Sequence[str]) -> None:
     """A row of units must say what is expected for the axes in the table."""
     axes = {ALIASES.get(word.lower(), word.lower()) for word in words} & set(AXES)
     for name, unit in table.units.items():
-        own = {name.rpartition("_")[2]}  # u1_V
-        per_axis = _UNITS.get(name.removesuffix("_std"), {axis: own for axis in AXES})
+        ending = {name.rpartition("_")[2]}  # u1_V
+        per_axis = _UNITS.get(name.removesuffix("_std"), {axis: ending for axis in AXES})
         expected = set().union(*(per_axis[axis] for axis in axes)) if axes else {unit}
         if unit not in expected:
             raise InputError(
@@ -206,8 +206,8 @@ def _array(name: str, value: ArrayLike, dimensions: int, count: int | None = Non
     except (TypeError, ValueError):
         raise InputError("not numbers", got=value, expected="an array of numbers", where=name) from None
     shape = {1: "(points,)", 2: "(points, 3)" if name == "twist" else "(points, wheels)"}[dimensions]
-    wrong = array.ndim != dimensions or (name == "twist" and array.shape[-1] != 3)
-    if wrong or (count is not None and len(array) != count):
+    bad_shape = array.ndim != dimensions or (name == "twist" and array.shape[-1] != 3)
+    if bad_shape or (count is not None and len(array) != count):
         expected = shape if count is None else f"{shape} with {count} points"
         raise InputError("wrong shape", got=array.shape, expected=expected, where=name)
     array.flags.writeable = False

@@ -40,8 +40,8 @@ def moving_axes(robot: Robot, voltage: ArrayLike) -> BoolArray:
         return ~robot.friction.axes.holds(drive_wrench(robot, at_rest, voltage))
     length = np.array([1.0, 1.0, float(np.mean(robot.wheels.robot_radius))])
     driven = np.abs(per_mass(robot, drive_wrench(robot, at_rest, voltage))) * length
-    least = ROUNDING * driven.max(axis=-1, keepdims=True)  # a push along y is 1e-16 of itself along x too
-    return np.abs(acceleration(robot, at_rest, voltage)) * length > least
+    rounding_level = ROUNDING * driven.max(axis=-1, keepdims=True)  # a push along y is 1e-16 of itself along x too
+    return np.abs(acceleration(robot, at_rest, voltage)) * length > rounding_level
 
 
 def axis_patterns(robot: Robot) -> FloatArray:
@@ -158,6 +158,6 @@ def _bisect(robot: Robot, patterns: FloatArray, halvings: int) -> FloatArray:
         still &= holds_at(high[:, None] * patterns)
     for _ in range(halvings):
         middle = 0.5 * (low + high)
-        held = holds_at(middle[:, None] * patterns)
-        low, high = np.where(held, middle, low), np.where(held, high, middle)
+        is_held = holds_at(middle[:, None] * patterns)
+        low, high = np.where(is_held, middle, low), np.where(is_held, high, middle)
     return np.where(still, np.inf, low)

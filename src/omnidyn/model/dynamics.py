@@ -227,13 +227,13 @@ def motor_wrench(robot: Robot) -> MotorWrench:
 def _motor_wrench(motor: Motor, wheels: Wheels) -> MotorWrench:
     """Asked for several times in each fit, mostly of the same motors."""
     at_rest, no_volts = np.zeros(3), np.zeros(wheels.count)
-    found = MotorWrench(
+    wrench = MotorWrench(
         wrench_of_motors(motor, wheels, np.eye(3), no_volts),
         wrench_of_motors(motor, wheels, at_rest, np.eye(wheels.count)),
     )
-    for each in found:
-        each.flags.writeable = False
-    return found
+    for matrix in wrench:
+        matrix.flags.writeable = False
+    return wrench
 
 
 def state_space(robot: Robot, motors: MotorWrench | None = None) -> StateSpace:

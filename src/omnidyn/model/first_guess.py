@@ -51,11 +51,11 @@ SPREAD = {
 }
 FRICTION_SPREAD = 1.0
 LIKE_SPREAD = 0.3  # of what is taken over from another robot
-EXACT = ("wheels.azimuth_deg", "wheels.roller_angle_deg")  # a drawing, not a measurement
+EXACT_KEYS = ("wheels.azimuth_deg", "wheels.roller_angle_deg")  # a drawing, not a measurement
 
 _COULOMB, _VISCOUS = f"{FRICTION_SHARE:g} of the weight", f"{VISCOUS_SHARE:g} C at 1 m/s"
 _YAW = f"{YAW_SHARE:g} C b"
-WHY = {
+REASONS = {
     "body.inertia_kg_m2": "a uniform disc out to the wheels, M b^2/2",
     "motor.voltage_limit_V": "a common battery",
     "motor.resistance_ohm": f"stalled motors push with M * {STALL_ACCELERATION:g} m/s^2",
@@ -120,11 +120,11 @@ def first_guess(
         priors={},
         drive=_speed_loop(motor, speed_loop),
     )
-    given = {"body.mass_kg"} | ({"motor.voltage_limit_V"} if voltage_limit is not None else set())
-    given |= {RATE} if len(speed_loop) == 1 else {RATE, *GAINS}
+    given_keys = {"body.mass_kg"} | ({"motor.voltage_limit_V"} if voltage_limit is not None else set())
+    given_keys |= {RATE} if len(speed_loop) == 1 else {RATE, *GAINS}
     priors = {}
     for key in map(Key.parse, all_keys(robot)):
-        if key.name in given or key.part == "wheels":
+        if key.name in given_keys or key.part == "wheels":
             priors[key.name] = Prior(origin=GIVEN)
         else:
             spread = SPREAD.get(key.name, FRICTION_SPREAD)
@@ -132,17 +132,17 @@ def first_guess(
     return robot.replace(priors=priors)
 
 
-def _speed_loop(motor: Motor, given: Sequence[float]) -> Drive:
+def _speed_loop(motor: Motor, loop_numbers: Sequence[float]) -> Drive:
     """The firmware's loop, none where nothing is given of it.
 
     Guessed gains: the whole voltage for an error of half the no-load speed, and the integral takes over in 0.2 s.
     """
-    if not given:
+    if not loop_numbers:
         return Drive()
-    if len(given) == 3:
-        return Drive(kind=SPEED, kp=given[0], ki=given[1], rate=given[2])
+    if len(loop_numbers) == 3:
+        return Drive(kind=SPEED, kp=loop_numbers[0], ki=loop_numbers[1], rate=loop_numbers[2])
     kp = _round(2.0 * float(np.mean(motor.emf_constant)) * float(np.mean(motor.gear_ratio)))
-    return Drive(kind=SPEED, kp=kp, ki=_round(kp / LOOP_TIME), rate=given[0])
+    return Drive(kind=SPEED, kp=kp, ki=_round(kp / LOOP_TIME), rate=loop_numbers[0])
 
 
 def with_gear(robot: Robot, gear_ratio: float, source: str, origin: Origin = MEASURED) -> Robot:
@@ -177,7 +177,9 @@ def with_rotor(robot: Robot, rotor_inertia: float) -> Robot:
 
 def default_prior(key: str, value: Any) -> Prior:
     """What is known of a number of `init` that its user took as it was offered: not much."""
-    return Prior(std=None if key in EXACT else _round(LIKE_SPREAD * value), source="default of omnidyn init, accepted")
+    return Prior(
+        std=None if key in EXACT_KEYS else _round(LIKE_SPREAD * value), source="default of omnidyn init, accepted"
+    )
 
 
 def _friction(mass: float, robot_radius: float) -> DirectionFriction:
@@ -217,14 +219,14 @@ def _motor(wheels: Wheels, mass: float, friction: DirectionFriction, voltage_lim
     The rotors J add lambda J l^2/r^2 = 0.1 M in that direction.
     """
     stall = mass * STALL_ACCELERATION
-    held = friction.coulomb[0] + friction.viscous * TOP_SPEED
-    no_load = TOP_SPEED * stall / (stall - held)
+    rolling_force = friction.coulomb[0] + friction.viscous * TOP_SPEED
+    no_load = TOP_SPEED * stall / (stall - rolling_force)
     plane = wheels.wrench_matrix[:2]
     weakest, radius = float(np.linalg.eigvalsh(plane @ plane.T)[0]), float(wheels.radii.mean())
-    one, constant = stall / weakest, _round(voltage_limit / MOTOR_SPEED)
+    motor_stall, constant = stall / weakest, _round(voltage_limit / MOTOR_SPEED)
     gear = _round(MOTOR_SPEED * radius / no_load)
     return Motor(
-        resistance=_round(voltage_limit**2 / (no_load * one)),
+        resistance=_round(voltage_limit**2 / (no_load * motor_stall)),
         torque_constant=constant,
         emf_constant=constant,
         gear_ratio=gear,
@@ -239,13 +241,13 @@ def like(
     wheels: Wheels,
     mass: float,
     voltage_limit: float | None = None,
-    given: Collection[str] = (),
+    given_keys: Collection[str] = (),
 ) -> Robot:
     """A robot built like another one: its motors and drive, its inertia and friction scaled to the new size.
 
     Inertia goes with M b^2, friction with M (the weight on the floor), about yaw with M b, viscous M b^2.
-    given: keys of the file that were not taken from the preset. Raises InputError, also where the preset has one value
-    per wheel and another number of wheels.
+    given_keys: keys of the file that were not taken from the preset. Raises InputError, also where the preset has
+    one value per wheel and another number of wheels.
     """
     heavier, wider = mass / preset.body.mass, _mean(wheels.robot_radius) / _mean(preset.wheels.robot_radius)
     friction = _scaled(preset.friction, heavier, wider, preset.wheels.count / wheels.count)
@@ -261,23 +263,23 @@ def like(
         friction=friction,
         priors={},
     )
-    return robot.replace(priors=_priors_like(robot, preset, given))
+    return robot.replace(priors=_priors_like(robot, preset, given_keys))
 
 
-def _priors_like(robot: Robot, preset: Robot, given: Collection[str]) -> dict[str, Prior]:
+def _priors_like(robot: Robot, preset: Robot, given_keys: Collection[str]) -> dict[str, Prior]:
     """Source and spread of every number: at least 30 %, more where the preset is less certain than that."""
-    there, priors, taken = all_keys(preset), {}, Prior(source=f"like {preset.name}", origin=IMPORTED)
+    preset_keys, priors, copied_prior = all_keys(preset), {}, Prior(source=f"like {preset.name}", origin=IMPORTED)
     for text in all_keys(robot.replace(priors=preset.priors)):
         key = Key.parse(text)
-        if key.name in given:
+        if key.name in given_keys:
             priors[key.name] = Prior(origin=GIVEN)
-        elif key.name in EXACT:
-            priors[key.name] = taken
+        elif key.name in EXACT_KEYS:
+            priors[key.name] = copied_prior
         else:
-            known = preset.priors.get(text) or preset.priors.get(key.name) or Prior()
-            value, before = key.get(robot), key.get(preset) if text in there else 0.0
-            std = max(LIKE_SPREAD * abs(value), (known.std or 0.0) * (abs(value / before) if before else 1.0))
-            priors[text] = taken.replace(std=_round(std) if std > 0.0 else None)
+            prior = preset.priors.get(text) or preset.priors.get(key.name) or Prior()
+            value, before = key.get(robot), key.get(preset) if text in preset_keys else 0.0
+            std = max(LIKE_SPREAD * abs(value), (prior.std or 0.0) * (abs(value / before) if before else 1.0))
+            priors[text] = copied_prior.replace(std=_round(std) if std > 0.0 else None)
     return priors
 
 
@@ -287,9 +289,9 @@ def _scaled(friction: Friction, heavier: float, wider: float, wheels: float) -> 
     axes, along, rim = friction.axes, friction.direction, friction.wheels
     about_yaw = {field: turning_viscous if field in PER_SPEED else turning for field in SCALED}
     return Friction(
-        axes=_changed(axes, {field: (heavier, heavier, each) for field, each in about_yaw.items()}),
+        axes=_changed(axes, {field: (heavier, heavier, factor) for field, factor in about_yaw.items()}),
         direction=_changed(
-            along, dict.fromkeys(SCALED, heavier) | {f"yaw_{field}": each for field, each in about_yaw.items()}
+            along, dict.fromkeys(SCALED, heavier) | {f"yaw_{field}": factor for field, factor in about_yaw.items()}
         ),
         wheels=_changed(rim, dict.fromkeys(SCALED, heavier * wheels)),
     )
@@ -317,7 +319,7 @@ def _times(value: Any, factor: float | tuple[float, ...]) -> Any:
         return value
     if isinstance(value, tuple):
         factors = factor if isinstance(factor, tuple) else (factor,) * len(value)
-        return tuple(_times(one, each) for one, each in zip(value, factors, strict=True))
+        return tuple(_times(item, item_factor) for item, item_factor in zip(value, factors, strict=True))
     return _round(value * factor, 6)
 
 
@@ -333,10 +335,12 @@ def rests_on(robot: Robot, at_rest: bool = False) -> list[str]:
     Numbers that only show together, and were fitted together, are right as the sum or product that any answer takes
     from them: they are not named. at_rest: of what a robot at rest does, which no mass, speed or back-EMF changes.
     """
-    kept = {key: prior for key, prior in robot.priors.items() if prior.guessed}
+    guesses = {key: prior for key, prior in robot.priors.items() if prior.guessed}
     if at_rest:
-        kept = {key: prior for key, prior in kept.items() if (place := find_key(key)) and not _shows_in_motion(place)}
-    return guessed(robot.model_copy(update={"priors": kept}))
+        guesses = {
+            key: prior for key, prior in guesses.items() if (place := find_key(key)) and not _shows_in_motion(place)
+        }
+    return guessed(robot.model_copy(update={"priors": guesses}))
 
 
 def rests_on_guesses(robot: Robot, at_rest: bool = False) -> str:
@@ -358,8 +362,10 @@ def _shows_in_motion(key: Key) -> bool:
 def reasons(robot: Robot) -> list[tuple[str, str]]:
     """(key, why) of every guess of `first_guess`, in the order of the file."""
     keys = dict.fromkeys(name_of(key) for key, prior in robot.priors.items() if prior.origin in GUESSES)
-    why = WHY if GEAR in keys else WHY | {EMF: WHY[GEAR]}  # behind a gear that is known the speed tells the constant
-    return [(key, why[key]) for key in keys if key in why]
+    reason_of = (
+        REASONS if GEAR in keys else REASONS | {EMF: REASONS[GEAR]}
+    )  # behind a gear that is known the speed tells the constant
+    return [(key, reason_of[key]) for key in keys if key in reason_of]
 
 
 def _mean(value: PerWheel) -> float:

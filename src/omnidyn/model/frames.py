@@ -39,7 +39,7 @@ def world_to_body(heading: ArrayLike) -> FloatArray:
 
 def unwrapped(angle: FloatArray, period: float = 2.0 * math.pi) -> FloatArray:
     """The angle without its jumps by a period, same unit. Shape (rows,); what is missing (NaN) stays missing."""
-    known = np.isfinite(angle)
+    finite = np.isfinite(angle)
     smooth = angle.copy()
-    smooth[known] = np.unwrap(angle[known], period=period)
+    smooth[finite] = np.unwrap(angle[finite], period=period)
     return smooth

@@ -20,10 +20,10 @@ from omnidyn.model.dynamics import frame_wrench
 from omnidyn.model.mass import mass_matrix
 from omnidyn.model.motor import traction, voltage_of_current
 from omnidyn.model.robot import Robot
-from omnidyn.model.sliding import ROUNDING, Levels, levels_of, resisting, speeds
+from omnidyn.model.sliding import ROUNDING, FrictionLevels, levels_of, resisting, speeds
 from omnidyn.model.wheels import per_wheel, wheel_speed
 
-SLIGHT = 1e-10  # [1/s] of the fastest speed: an acceleration less than that is rounding
+ROUNDING_RATE = 1e-10  # [1/s] of the fastest speed: an acceleration less than that is rounding
 AGAIN = 8  # times that the motors which drive are told apart from those which are driven
 
 
@@ -40,7 +40,7 @@ class Inverse:
 
     robot: Robot
     mass: FloatArray
-    levels: Levels
+    levels: FrictionLevels
     per_ampere: FloatArray
     share: FloatArray  # currents of least heat per wrench, without losses of gears, (wheels, 3)
     rounding: float = ROUNDING  # of the fastest element: slower is at rest; more where numbers have fewer digits
@@ -50,30 +50,30 @@ class Inverse:
 
         An element at rest that is about to move resists with all that can hold it: its breakaway level.
         """
-        own, still, slight = self.levels, np.zeros(2), max(SLIGHT, self.rounding)
-        speed, about = (speeds(own, each, self.rounding) for each in (twist, acceleration))
+        levels, still, slight = self.levels, np.zeros(2), max(ROUNDING_RATE, self.rounding)
+        speed, about = (speeds(levels, motion, self.rounding) for motion in (twist, acceleration))
         fastest = np.abs(speed).max(axis=-1, keepdims=True)
         about = np.where(np.abs(about) <= slight * fastest, 0.0, about)
         rests = speed == 0.0
-        slide, ellipse = own.sliding(speed, twist)
-        coulomb = resisting(own, twist, speed, np.sign(speed), slide, twist[..., :2], ellipse)
+        slide, ellipse = levels.sliding(speed, twist)
+        coulomb = resisting(levels, twist, speed, np.sign(speed), slide, twist[..., :2], ellipse)
         rising = np.where(rests, np.sign(about), 0.0)
         stands = np.all(twist[..., :2] == 0.0, axis=-1, keepdims=True)
         faint = np.abs(acceleration[..., :2]) <= slight * fastest
         way = np.where(stands & ~faint, acceleration[..., :2], still)
-        return coulomb + resisting(own, 0.0 * twist, 0.0 * speed, rising, own.hold, way, own.ellipse_hold)
+        return coulomb + resisting(levels, 0.0 * twist, 0.0 * speed, rising, levels.hold, way, levels.ellipse_hold)
 
     def soft_friction(self, twist: FloatArray, fade: FloatArray) -> FloatArray:
         """Wrench of friction at a twist (*batch, 3), its dry part in proportion to the speed below `fade`, shape (3,).
 
         For a controller, whose twist is never exactly 0; no friction is like that.
         """
-        own = self.levels
-        speed = twist @ own.directions.T
-        side = np.clip(speed / np.sqrt(own.directions**2 @ fade**2), -1.0, 1.0)
-        slide, ellipse = own.sliding(speed, twist)
-        least = float(np.sqrt(np.sum(((1.0 if own.plain else own.ellipse_slide) * fade[:2]) ** 2)))
-        return resisting(own, twist, speed, side, slide, twist[..., :2], ellipse, least)
+        levels = self.levels
+        speed = twist @ levels.directions.T
+        side = np.clip(speed / np.sqrt(levels.directions**2 @ fade**2), -1.0, 1.0)
+        slide, ellipse = levels.sliding(speed, twist)
+        least_dissipation = float(np.sqrt(np.sum(((1.0 if levels.plain else levels.ellipse_slide) * fade[:2]) ** 2)))
+        return resisting(levels, twist, speed, side, slide, twist[..., :2], ellipse, least_dissipation)
 
     def wrench(self, twist: FloatArray, acceleration: FloatArray, friction: FloatArray) -> FloatArray:
         """Wrench of the motors [N, N, N m] that a motion takes. Shapes (*batch, 3)."""
@@ -99,8 +99,8 @@ class Inverse:
         for _ in range(AGAIN):
             sides = np.sign(current) * turning
             gain = self.per_ampere * efficiency**sides
-            found = np.einsum("...wk,...k->...w", _least_heat(self.robot, gain), wrench)
-            settled, current = bool((np.sign(found) * turning == sides).all()), found
+            trial = np.einsum("...wk,...k->...w", _least_heat(self.robot, gain), wrench)
+            settled, current = bool((np.sign(trial) * turning == sides).all()), trial
             if settled:
                 break
         return current

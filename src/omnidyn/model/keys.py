@@ -224,13 +224,13 @@ def friction_keys(robot: Robot) -> tuple[str, ...]:
     on = [f"{DIRECTION}.coulomb"] if any(direction.coulomb) else []
     on += [f"{DIRECTION}.{name}" for name in (VISCOUS, "yaw_coulomb", "yaw_viscous") if getattr(direction, name)]
     on += [f"{WHEELS}.{name}" for name in (COULOMB, VISCOUS) if np.any(getattr(wheels, name))]
-    return (*keys, *(each for name in on for each in expand(name, robot)))
+    return (*keys, *(key for name in on for key in expand(name, robot)))
 
 
 def gain_keys(robot: Robot) -> tuple[str, ...]:
     """The gains of the speed loop, one for all wheels or one each, as far as they are not 0."""
-    every = (each for name in GAINS for each in expand(name, robot))
-    return tuple(key for key in every if Key.parse(key).get(robot) > 0.0)
+    gains = (key for name in GAINS for key in expand(name, robot))
+    return tuple(key for key in gains if Key.parse(key).get(robot) > 0.0)
 
 
 def expand(name: str, robot: Robot) -> tuple[str, ...]:
@@ -256,22 +256,22 @@ def all_keys(robot: Robot) -> tuple[str, ...]:
 
 def is_told(path: str, priors: Mapping[str, Prior]) -> bool:
     """Whether something is known of a key, of an entry of its list, or of a key in the table of that name."""
-    return any(known == path or known.startswith((f"{path}[", f"{path}.")) for known in priors)
+    return any(key == path or key.startswith((f"{path}[", f"{path}.")) for key in priors)
 
 
-def with_priors(robot: Robot, known: Mapping[str, Prior]) -> Robot:
+def with_priors(robot: Robot, new_priors: Mapping[str, Prior]) -> Robot:
     """The robot with what is now known about some numbers, by their keys.
 
     What was known of a list as a whole goes to all its entries where more is known of one of them.
     """
-    if not known:
+    if not new_priors:
         return robot
     priors = dict(robot.priors)
-    for key in map(Key.parse, known):
+    for key in map(Key.parse, new_priors):
         if key.index is not None and key.name in priors:
-            whole = priors.pop(key.name)
-            priors |= dict.fromkeys(expand(key.name, robot), whole)
-    return robot.replace(priors=priors | dict(known))
+            list_prior = priors.pop(key.name)
+            priors |= dict.fromkeys(expand(key.name, robot), list_prior)
+    return robot.replace(priors=priors | dict(new_priors))
 
 
 @lru_cache(maxsize=4096)
@@ -301,7 +301,7 @@ def in_words(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class _Place:
+class _KeyLocation:
     """Where numbers stand in a robot. path: names of fields. entries: of a list of fixed length; 0: none is fixed."""
 
     path: tuple[str, ...]
@@ -310,30 +310,30 @@ class _Place:
 
 
 @lru_cache(maxsize=1)
-def _places() -> dict[str, _Place]:
+def _places() -> dict[str, _KeyLocation]:
     """Every number, and every list of numbers, of the schema."""
-    found: dict[str, _Place] = {}
+    places: dict[str, _KeyLocation] = {}
     for table in TABLES:
         annotation = Robot.model_fields[table].annotation
         assert isinstance(annotation, type)
-        found |= _places_in(annotation, table, (table,))
-    return found
+        places |= _places_in(annotation, table, (table,))
+    return places
 
 
-def _places_in(model: type[BaseModel], table: str, path: tuple[str, ...]) -> dict[str, _Place]:
-    found: dict[str, _Place] = {}
+def _places_in(model: type[BaseModel], table: str, path: tuple[str, ...]) -> dict[str, _KeyLocation]:
+    places: dict[str, _KeyLocation] = {}
     for key, field in keys_of(model, []).items():
         name, annotation = f"{table}.{key}", model.model_fields[field].annotation
         if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-            found |= _places_in(annotation, name, (*path, field))
+            places |= _places_in(annotation, name, (*path, field))
         elif lists := list(_lists(annotation)):
             if any(getattr(entry, "__origin__", None) is tuple for entry in lists[0]):
                 continue  # a table of points is no number
             per_wheel = Ellipsis in lists[0]
-            found[name] = _Place((*path, field), 0 if per_wheel else len(lists[0]), per_wheel)
+            places[name] = _KeyLocation((*path, field), 0 if per_wheel else len(lists[0]), per_wheel)
         elif _has_float(annotation):
-            found[name] = _Place((*path, field), 0, False)
-    return found
+            places[name] = _KeyLocation((*path, field), 0, False)
+    return places
 
 
 def _lists(annotation: Any) -> Iterator[tuple[Any, ...]]:
@@ -368,17 +368,17 @@ def _parsed(text: str) -> Key:
 
 def _unknown(name: str, text: str) -> InputError:
     """Why a name that may be misspelt is none of a number, with the nearest one that is."""
-    known, (table, _, field) = list(_places()), name.rpartition(".")
-    below = [key for key in known if key.startswith(f"{name}.")]
+    key_names, (table, _, field) = list(_places()), name.rpartition(".")
+    below = [key for key in key_names if key.startswith(f"{name}.")]
     if below:
         return InputError("a table, not a number", got=text, expected=f"a number in it, such as {below[0]}")
     if table and field in keys_of(Robot, table.split(".")):
         return InputError("not a number", got=text, expected="the key of a number")
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    beside = [key for key in known if key.startswith(f"{table}.")] or ["a key such as body.mass_kg"]
-    if close:
-        return InputError("unknown key", got=text, remedy=f"did you mean {close[0]}?")
-    return InputError("unknown key", got=text, expected=" or ".join(beside))
+    matches = difflib.get_close_matches(name, key_names, n=1, cutoff=0.5)
+    table_keys = [key for key in key_names if key.startswith(f"{table}.")] or ["a key such as body.mass_kg"]
+    if matches:
+        return InputError("unknown key", got=text, remedy=f"did you mean {matches[0]}?")
+    return InputError("unknown key", got=text, expected=" or ".join(table_keys))
 
 
 def _no_entry(text: str, count: int) -> InputError:

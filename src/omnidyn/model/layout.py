@@ -1,7 +1,7 @@
 """The named parts that the compiled solvers work in: constants of a robot, the state of a run, a stage of a step.
 
     plant.body.mass, plant.element[e].coulomb[side]      constants: a Plant. No solver writes into one that it is given
-    state.x[a], state.each[e].sign, .current, .bend      the State of a run
+    state.x[a], state.each[e].sign, .current, .bend      the PlantState of a run
     stage.task.tau, stage.each[e].sign                   the problem of one stage, and what its solution leaves
     stage.work.jacobian[a, b]                            room to work in
 
@@ -104,7 +104,7 @@ TASK = record(
     aimed_bend=(2,),  # z* of its bristle [m]
     bend=(2,),  # and z at the solution
 )
-EACH = record(
+ELEMENT_STAGE = record(
     sign=(),  # 1 and -1 slide forward and backward, 0 stuck, 2 no dry friction
     hold=(2,),  # what it holds at rest [N]
     loss=(2,),  # gear loss at rest [N]
@@ -118,8 +118,8 @@ EACH = record(
     found=(),  # marks of the solver
     before=(),
 )
-EACH_STATE = record(
-    sign=(),  # as in EACH
+ELEMENT_STATE = record(
+    sign=(),  # as in ELEMENT_STAGE
     current=(),  # of a motor [A]
     bend=(),  # z of a bristle [m]; of a body axis, where anything gathers, the speed gathered along it [m/s]
 )
@@ -158,8 +158,8 @@ class Plant(NamedTuple):
         return Plant(self.body.copy(), self.element.copy())
 
 
-class State(NamedTuple):
-    """The state of a run. x: (3,) [m/s]; each: shape (3 + wheels + 2,), of EACH_STATE.
+class PlantState(NamedTuple):
+    """The state of a run. x: (3,) [m/s]; each: shape (3 + wheels + 2,), of ELEMENT_STATE.
 
     Behind the elements stands the ellipse, along x and along y; its sign is in the first of the two. Of many instants,
     or robots: one more axis in front.
@@ -168,28 +168,28 @@ class State(NamedTuple):
     x: Any
     each: Any
 
-    def at(self, rows: Any) -> State:
+    def at(self, rows: Any) -> PlantState:
         """The state, or the states, of some of many."""
-        return State(*(part[rows] for part in self))
+        return PlantState(*(part[rows] for part in self))
 
 
 class Stage(NamedTuple):
-    """A stage of a step: task, a record TASK; each, shape (3 + wheels,), of EACH; work, a record WORK."""
+    """A stage of a step: task, a record TASK; each, shape (3 + wheels,), of ELEMENT_STAGE; work, a record WORK."""
 
     task: Any
     each: Any
     work: Any
 
 
-class Problem(NamedTuple):
+class PlantStage(NamedTuple):
     """A plant and a stage of it."""
 
     plant: Plant
     stage: Stage
 
-    def copy(self) -> Problem:
+    def copy(self) -> PlantStage:
         """The same numbers in arrays of their own."""
-        return Problem(self.plant.copy(), Stage(*(part.copy() for part in self.stage)))
+        return PlantStage(self.plant.copy(), Stage(*(part.copy() for part in self.stage)))
 
 
 def blank_plant(wheels: int) -> Plant:
@@ -200,18 +200,20 @@ def blank_plant(wheels: int) -> Plant:
 def many(plants: Sequence[Plant]) -> Plant:
     """Plants of as many elements each, as one. Python hands arrays of records to a kernel, and be it of one: a record
     takes it twenty times as long."""
-    return Plant(np.array([each.body for each in plants], BODY), np.array([each.element for each in plants], ELEMENT))
+    return Plant(
+        np.array([plant.body for plant in plants], BODY), np.array([plant.element for plant in plants], ELEMENT)
+    )
 
 
-def new_states(plant: Plant, count: int) -> State:
+def new_states(plant: Plant, count: int) -> PlantState:
     """So many states of rest of one plant, without currents: all that can stick is stuck."""
     body, element = plant
-    states = State(np.zeros((count, 3)), np.zeros((count, len(element) + 2), EACH_STATE))
+    states = PlantState(np.zeros((count, 3)), np.zeros((count, len(element) + 2), ELEMENT_STATE))
     states.each["sign"] = 2.0 - 2.0 * np.concatenate([element["active"], [body.active, 0.0]])
     return states
 
 
-def new_state(plant: Plant) -> State:
+def new_state(plant: Plant) -> PlantState:
     """One of them."""
     return new_states(plant, 1).at(0)
 
@@ -219,7 +221,9 @@ def new_state(plant: Plant) -> State:
 def new_stage(plant: Plant) -> Stage:
     """A stage of a plant: all that can stick is stuck, nothing drives; of many plants, as many stages."""
     stage = Stage(
-        np.zeros(plant.body.shape, TASK)[()], np.zeros(plant.element.shape, EACH), np.zeros(plant.body.shape, WORK)[()]
+        np.zeros(plant.body.shape, TASK)[()],
+        np.zeros(plant.element.shape, ELEMENT_STAGE),
+        np.zeros(plant.body.shape, WORK)[()],
     )
     body, element = plant
     stage.task["ellipse"], stage.each["sign"] = 2.0 - 2.0 * body["active"], 2.0 - 2.0 * element["active"]

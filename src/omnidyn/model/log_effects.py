@@ -17,7 +17,7 @@ from omnidyn.model.value import Flag, Levels, Text, Value, number, per_axis_numb
 from omnidyn.run import Run
 
 SAME_TIME = 9  # decimals of a second to which times since the first row are compared
-TOLD = 1e-4  # [s] below which what is late is not worth a word
+LEAST_LATENCY = 1e-4  # [s] below which what is late is not worth a word
 MOST_LATE, HARDEST, MOST_FADE = 10.0, 1e6, 1.0  # [s], [N, N m], -
 
 Seconds = Annotated[float, number(-MOST_LATE, MOST_LATE)]
@@ -41,8 +41,8 @@ class Lateness(Value):
         """By how much a channel is late [s]. drive: the latency of the robot [s]; row: of the log [s]."""
         if channel == "wheel_speed" and self.averaged:
             return (drive if self.wheel_angle is None else self.wheel_angle) + 0.5 * row
-        own = getattr(self, channel)
-        return drive if own is None else float(own)
+        delay = getattr(self, channel)
+        return drive if delay is None else float(delay)
 
 
 Force = Annotated[float, number(-HARDEST, HARDEST)]
@@ -84,14 +84,14 @@ class LogEffects(Value):
     @property
     def words(self) -> str:
         """Its numbers in words: "gain 0.94, heading 0.038 s late"."""
-        told = [f"gain {self.gain:.3g}"] if self.gain != 1.0 else []
-        told += [f"fade {self.fade:.3g}"] if self.fade else []
+        parts = [f"gain {self.gain:.3g}"] if self.gain != 1.0 else []
+        parts += [f"fade {self.fade:.3g}"] if self.fade else []
         for name, force in (("tilt", self.tilt), ("push", self.push)):
-            told += [f"a {name} of " + ", ".join(f"{each:.3g}" for each in force)] if any(force) else []
+            parts += [f"a {name} of " + ", ".join(f"{component:.3g}" for component in force)] if any(force) else []
         late = [(n.replace("_", " "), v) for n, v in dict(self.latency).items() if n != "averaged" and v is not None]
-        late = [(name, value) for name, value in late if abs(value) >= TOLD]
-        told += [f"{name} {abs(value):.3g} s {'late' if value >= 0.0 else 'early'}" for name, value in late]
-        return ", ".join(told + (["speeds that are means over a row"] if self.latency.averaged else []))
+        late = [(name, value) for name, value in late if abs(value) >= LEAST_LATENCY]
+        parts += [f"{name} {abs(value):.3g} s {'late' if value >= 0.0 else 'early'}" for name, value in late]
+        return ", ".join(parts + (["speeds that are means over a row"] if self.latency.averaged else []))
 
 
 def log_mark(run: Run) -> str:
@@ -99,11 +99,11 @@ def log_mark(run: Run) -> str:
 
     Of currents alone the size counts: one reader may have given them a sign, and another not.
     """
-    found = hashlib.sha256(np.round(run.t - run.t[0], SAME_TIME).tobytes())
+    digest = hashlib.sha256(np.round(run.t - run.t[0], SAME_TIME).tobytes())
     for name, values in run.channels.items():
-        found.update(name.encode())
-        found.update((np.abs(values) if name == "current" else np.ascontiguousarray(values) + 0.0).tobytes())
-    return found.hexdigest()[:32]
+        digest.update(name.encode())
+        digest.update((np.abs(values) if name == "current" else np.ascontiguousarray(values) + 0.0).tobytes())
+    return digest.hexdigest()[:32]
 
 
 # Which numbers of a robot are off together: the table [correlation] of a robot file
@@ -144,13 +144,13 @@ class KeyCorrelation(Value):
 
     def of(self, keys: tuple[str, ...]) -> FloatArray:
         """The correlations of some numbers, 0 between those that are not in the table. Shape (keys, keys)."""
-        found, place = np.eye(len(keys)), {key: k for k, key in enumerate(self.keys)}
-        known = [k for k, key in enumerate(keys) if key in place]
-        at = [place[keys[k]] for k in known]
+        correlations, place = np.eye(len(keys)), {key: k for k, key in enumerate(self.keys)}
+        rows = [k for k, key in enumerate(keys) if key in place]
+        at = [place[keys[k]] for k in rows]
         matrix = np.array(self.matrix).reshape(len(self.keys), len(self.keys))
-        found[np.ix_(known, known)] = 0.5 * (matrix + matrix.T)[np.ix_(at, at)]
-        np.fill_diagonal(found, 1.0)
-        return found
+        correlations[np.ix_(rows, rows)] = 0.5 * (matrix + matrix.T)[np.ix_(at, at)]
+        np.fill_diagonal(correlations, 1.0)
+        return correlations
 
 
 def _check(matrix: FloatArray, keys: tuple[str, ...]) -> None:
@@ -166,10 +166,10 @@ def _check(matrix: FloatArray, keys: tuple[str, ...]) -> None:
             f"the matrix is not symmetric; got {matrix[i, j]:g} and {matrix[j, i]:g} between {keys[i]} and {keys[j]}; "
             "expected the same number twice"
         )
-    least = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T)).min()) if len(keys) else 0.0
-    if least < -ROUNDING * len(keys):
+    eigenvalue = float(np.linalg.eigvalsh(0.5 * (matrix + matrix.T)).min()) if len(keys) else 0.0
+    if eigenvalue < -ROUNDING * len(keys):
         raise ValueError(
-            f"no numbers can be correlated like this; got an eigenvalue of {least:.3g}; expected a matrix that is "
+            f"no numbers can be correlated like this; got an eigenvalue of {eigenvalue:.3g}; expected a matrix that is "
             "positive semidefinite: let identify write it, or remove the table"
         )
 

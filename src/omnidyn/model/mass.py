@@ -43,8 +43,8 @@ def added_mass(robot: Robot) -> FloatArray:
     """What rotors and wheels add by their spin: G diag(`mass_at_rim`) G^T [kg, kg m, kg m^2]. Shape (3, 3)."""
     if robot.motor.rotor_inertia == 0.0 and robot.wheels.wheel_inertia == 0.0:  # asked for often, and mostly so
         return np.zeros((3, 3))
-    wrench, each = robot.wheels.wrench_matrix, mass_at_rim(robot.motor, robot.wheels)
-    added = (wrench * each) @ wrench.T
+    wrench, rim_mass = robot.wheels.wrench_matrix, mass_at_rim(robot.motor, robot.wheels)
+    added = (wrench * rim_mass) @ wrench.T
     added = 0.5 * (added + added.T)  # symmetric to the last bit
     along = np.sqrt(np.abs(np.diag(added)))
     return np.where(np.abs(added) <= ROUNDING * np.outer(along, along), 0.0, added)

@@ -13,10 +13,10 @@ from omnidyn.errors import printable
 from omnidyn.model.friction import Friction
 from omnidyn.model.log_effects import KeyCorrelation, LogEffects
 from omnidyn.model.motor import Drive, Motor, mass_at_rim
-from omnidyn.model.surroundings import FARTHEST, Floor, Variations
+from omnidyn.model.surroundings import FARTHEST_LOAD, Floor, Variations
 from omnidyn.model.value import Flag, Text, Value, number, place
 from omnidyn.model.wheels import Wheels, check_count
-from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.shown import FIGURE, Displayable, make
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -48,7 +48,7 @@ class Body(Value):
         float, number(1e-9, 1e6), Field(alias="inertia_kg_m2", description="I_n, about the vertical axis")
     ]
     centre: Annotated[
-        Annotated[tuple[float, float], place(FARTHEST)],
+        Annotated[tuple[float, float], place(FARTHEST_LOAD)],
         Field(alias="centre_m", description="of mass, from that of the wheels"),
     ] = (0.0, 0.0)
     rotating_frame: Annotated[Flag, Field(description="terms M omega v of a turning body")] = False
@@ -89,7 +89,7 @@ class Prior(Value):
         return self.origin == GUESS
 
 
-class Robot(Shown, Value):
+class Robot(Displayable, Value):
     """A robot: all that eqs (1)-(14) need. Frozen; `replace` makes a changed copy.
 
     priors: key of the robot file, such as "motor.resistance_ohm" or "friction.axes.coulomb[0]", -> Prior.
@@ -154,7 +154,7 @@ class Robot(Shown, Value):
     def __repr__(self) -> str:
         return f"<Robot {self.name}: {self.wheels.count} wheels, {self.body.mass:.6g} kg>"
 
-    __str__ = Shown.__str__  # pydantic's own would come first in a subclass
+    __str__ = Displayable.__str__  # pydantic's own would come first in a subclass
 
     def document(self) -> Document:
         """Its numbers, and where each comes from."""
@@ -162,11 +162,13 @@ class Robot(Shown, Value):
         keys = ("key", "value", "std", "origin")
         numbers = [dict(zip(keys, row, strict=False)) for row in table.rows]
         head = [f"{self.name}: {self.wheels.count} wheels", *([self.source] if self.source else []), ""]
-        named = self.variations.names
-        told = [f"can be varied by {kind}: {', '.join(names)}" for kind, names in named.items()]
+        variation_names = self.variations.names
+        variation_lines = [f"can be varied by {kind}: {', '.join(names)}" for kind, names in variation_names.items()]
         data = {"name": self.name, "source": self.source, "numbers": numbers}
-        data |= {"variations": {kind: list(names) for kind, names in named.items()}} if named else {}
-        return Document([*head, table, *(["", *told] if told else [])], data)
+        data |= (
+            {"variations": {kind: list(names) for kind, names in variation_names.items()}} if variation_names else {}
+        )
+        return Document([*head, table, *(["", *variation_lines] if variation_lines else [])], data)
 
     def plot(self, what: Literal["layout", "dead zone", "friction"] = "layout") -> Figure:
         """A picture of it, as a matplotlib Figure.
@@ -208,9 +210,9 @@ def _rows(path: str, value: BaseModel, priors: Mapping[str, Known]) -> Iterator[
             yield from _rows(key, content, priors)
         else:
             count = len(content) if isinstance(content, tuple) else 0
-            known = [priors[each] for each in (key, *(f"{key}[{k}]" for k in range(count))) if each in priors]
-            stds = ", ".join(f"{each.std:.3g}" for each in known if each.std is not None)
-            origins = ", ".join(dict.fromkeys(each.origin for each in known))
+            key_priors = [priors[entry] for entry in (key, *(f"{key}[{k}]" for k in range(count))) if entry in priors]
+            stds = ", ".join(f"{prior.std:.3g}" for prior in key_priors if prior.std is not None)
+            origins = ", ".join(dict.fromkeys(prior.origin for prior in key_priors))
             yield key, _text(content), stds, origins, field.description or ""
 
 

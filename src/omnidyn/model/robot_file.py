@@ -73,9 +73,9 @@ def _without_priors(node: Any, path: tuple[str | int, ...], priors: dict[str, Pr
     """The same tree with every { value, std, source, origin } replaced by its value; its rest goes to `priors`."""
     known_of = isinstance(node, dict) and "value" in node and table_at(Robot, path) is None
     if known_of and path[0] != TOGETHER:  # nothing is known of a correlation
-        known = {key: value for key, value in node.items() if key != "value"}
+        fields = {key: value for key, value in node.items() if key != "value"}
         try:
-            prior = Prior(**{"origin": _origin_in(known.get("source")), **known})
+            prior = Prior(**{"origin": _origin_in(fields.get("source")), **fields})
         except InputError as error:
             raise error.at(key_path(path)) from None
         joint = prior.guessed and prior.source.startswith(WITH_THE_FIT)  # as files say it from before "joint"
@@ -137,11 +137,13 @@ def _table(name: str, value: BaseModel, priors: dict[str, Prior]) -> str:
 
 def _by_name(robot: Robot) -> str:
     """The tables of what the robot can be varied by."""
-    found = robot.variations
-    every = (
-        (f"variations.{kind}.{name}", getattr(found, kind)[name]) for kind in found.names for name in found.names[kind]
+    variations = robot.variations
+    tables = (
+        (f"variations.{kind}.{name}", getattr(variations, kind)[name])
+        for kind in variations.names
+        for name in variations.names[kind]
     )
-    return "".join(_table(path, value, robot.priors) or f"\n[{path}]\n" for path, value in every)
+    return "".join(_table(path, value, robot.priors) or f"\n[{path}]\n" for path, value in tables)
 
 
 def _of_logs(robot: Robot) -> str:
@@ -151,12 +153,12 @@ def _of_logs(robot: Robot) -> str:
 
 def _together(robot: Robot) -> str:
     """The table of correlations, of the numbers that the robot has; a key and a row each on a line of its own."""
-    known = correlation_of(robot)
-    if known is None:
+    correlation = correlation_of(robot)
+    if correlation is None:
         return ""
-    keys = "".join(f"  {toml_literal(key)},\n" for key in known.keys)
-    rows = "".join(f"  {toml_literal(row)},\n" for row in known.matrix)
-    std = "" if known.std is None else f"std = {toml_literal(known.std)}  # of the fit\n"
+    keys = "".join(f"  {toml_literal(key)},\n" for key in correlation.keys)
+    rows = "".join(f"  {toml_literal(row)},\n" for row in correlation.matrix)
+    std = "" if correlation.std is None else f"std = {toml_literal(correlation.std)}  # of the fit\n"
     return f"\n[correlation]  # which numbers are off together\nkeys = [\n{keys}]\nmatrix = [\n{rows}]\n{std}"
 
 

@@ -17,7 +17,7 @@ from omnidyn.model.wheels import per_wheel
 ROUNDING = 1e-12  # of the fastest element: slower is at rest
 
 
-class Levels(NamedTuple):
+class FrictionLevels(NamedTuple):
     """All dry friction of a robot, element by element: three body axes, then the wheels; and the ellipse.
 
     directions: of each element, its speed is direction . twist, shape (3 + wheels, 3). viscous: shape (3 + wheels,).
@@ -43,22 +43,22 @@ class Levels(NamedTuple):
         if not self.falls.any():
             return self.slide, self.ellipse_slide
         falls, exponent, shape = self.falls, self.exponent, self.shape
-        left = np.where(falls[:-1] > 0.0, fallen(speed, falls[:-1], exponent[:-1], shape[:-1]), 0.0)
-        slide = np.stack([low + (high - low) * left for low, high in zip(self.slide, self.hold, strict=True)])
+        falling = np.where(falls[:-1] > 0.0, fallen(speed, falls[:-1], exponent[:-1], shape[:-1]), 0.0)
+        slide = np.stack([low + (high - low) * falling for low, high in zip(self.slide, self.hold, strict=True)])
         if falls[-1] == 0.0:
             return slide, self.ellipse_slide
         way = fallen(np.hypot(twist[..., 0], twist[..., 1]), falls[-1], exponent[-1], shape[-1])[..., None]
         return slide, self.ellipse_slide + (self.ellipse_hold - self.ellipse_slide) * way
 
 
-def levels_of(robot: Robot) -> Levels:
+def levels_of(robot: Robot) -> FrictionLevels:
     """The friction of a robot, all its parts put together, yaw in radians. Bristles as they are once they have bent."""
-    own = blank_plant(robot.wheels.count)
+    plant = blank_plant(robot.wheels.count)
     for law in robot.friction.rigid.laws:
-        law.add_to(own, 1.0)
-    body, element = own
+        law.add_to(plant, 1.0)
+    body, element = plant
     directions = np.concatenate([np.eye(N_AXES), robot.wheels.wrench_matrix.T])
-    return Levels(
+    return FrictionLevels(
         directions,
         element["viscous"],
         element["coulomb"].T,
@@ -80,27 +80,27 @@ def sliding_wrench(robot: Robot, twist: ArrayLike) -> FloatArray:
     counts as nothing: what it holds balances what drives it. `twist` [m/s, m/s, rad/s], shape (*batch, 3); returns the
     same shape.
     """
-    own, twist = levels_of(robot), np.asarray(twist, dtype=float)
-    speed = speeds(own, twist)
-    slide, ellipse = own.sliding(speed, twist)
-    return resisting(own, twist, speed, np.sign(speed), slide, twist[..., :2], ellipse)
+    levels, twist = levels_of(robot), np.asarray(twist, dtype=float)
+    speed = speeds(levels, twist)
+    slide, ellipse = levels.sliding(speed, twist)
+    return resisting(levels, twist, speed, np.sign(speed), slide, twist[..., :2], ellipse)
 
 
-def speeds(own: Levels, twist: FloatArray, rounding: float = ROUNDING) -> FloatArray:
+def speeds(levels: FrictionLevels, twist: FloatArray, rounding: float = ROUNDING) -> FloatArray:
     """Speed of each element, exactly 0 where it is that but for rounding. Shape (*batch, 3 + wheels)."""
-    speed = twist @ own.directions.T
+    speed = twist @ levels.directions.T
     return np.where(np.abs(speed) <= rounding * np.abs(speed).max(axis=-1, keepdims=True), 0.0, speed)
 
 
 def resisting(
-    own: Levels,
+    levels: FrictionLevels,
     twist: FloatArray,
     speed: FloatArray,
     side: FloatArray,
     slide: FloatArray,
     way: FloatArray,
     ellipse: FloatArray,
-    least: float = 0.0,
+    least_dissipation: float = 0.0,
 ) -> FloatArray:
     """The formula of `sliding_wrench`, of elements that move, or are about to, to a side. Shape (*batch, 3).
 
@@ -109,10 +109,10 @@ def resisting(
     least: what counts as its dissipation [N m/s], or of a plain one its speed [m/s], where it moves more slowly.
     """
     coulomb = np.where(side > 0.0, slide[0], slide[1])
-    wrench = -(own.viscous * speed + coulomb * side) @ own.directions
-    size = np.sqrt(np.sum(((1.0 if own.plain else ellipse) * way) ** 2, axis=-1, keepdims=True))
-    size = np.maximum(size, least)
-    wrench[..., :2] -= (ellipse if own.plain else ellipse**2) * way / np.where(size > 0.0, size, 1.0)
+    wrench = -(levels.viscous * speed + coulomb * side) @ levels.directions
+    size = np.sqrt(np.sum(((1.0 if levels.plain else ellipse) * way) ** 2, axis=-1, keepdims=True))
+    size = np.maximum(size, least_dissipation)
+    wrench[..., :2] -= (ellipse if levels.plain else ellipse**2) * way / np.where(size > 0.0, size, 1.0)
     return wrench
 
 

@@ -39,11 +39,11 @@ class Floor(Value):
         return size * np.array([np.cos(angle), np.sin(angle)])
 
 
-def refuse_slope(floor: Floor, who: str) -> None:
-    """Raises UnsupportedError where the floor is not level, for `who` knows level floors only."""
+def refuse_slope(floor: Floor, user: str) -> None:
+    """Raises UnsupportedError where the floor is not level, for `user` knows level floors only."""
     if floor.tilt:
         raise UnsupportedError(
-            f"{who} no floor that is not level",
+            f"{user} no floor that is not level",
             got=f"{floor.tilt:g} degrees",
             expected="0",
             remedy="take the robot without it",
@@ -61,7 +61,7 @@ def refuse_slope(floor: Floor, who: str) -> None:
 # varied/vary.py makes the robot that carries, stands on and is fed by them.
 
 _NAME = re.compile(r"[\w-]{1,60}", re.ASCII)
-FARTHEST = 100.0  # [m]
+FARTHEST_LOAD = 100.0  # [m]
 
 
 class Payload(Value):
@@ -73,7 +73,7 @@ class Payload(Value):
         Annotated[float, number(0.0, 1e6)], Field(alias="inertia_kg_m2", description="about its own vertical axis")
     ] = 0.0
     offset: Annotated[
-        Annotated[tuple[float, float], place(FARTHEST)],
+        Annotated[tuple[float, float], place(FARTHEST_LOAD)],
         Field(alias="offset_m", description="of its centre, x and y"),
     ] = (0.0, 0.0)
 
@@ -123,7 +123,7 @@ class Variations(Value):
     @property
     def names(self) -> dict[str, tuple[str, ...]]:
         """The names of each kind that there are."""
-        return {kind: tuple(found) for kind in KINDS if (found := getattr(self, kind))}
+        return {kind: tuple(table) for kind in KINDS if (table := getattr(self, kind))}
 
 
 KINDS = ("payload", "floor", "tilt", "battery")

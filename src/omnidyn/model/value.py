@@ -61,7 +61,7 @@ def _shape_of(value: Any) -> str:
 
 
 @dataclass(frozen=True)
-class Checked:
+class FieldType:
     """What a field may hold, for use in `Annotated`: the type that pydantic checks instead of the plain one."""
 
     type: Any
@@ -70,46 +70,46 @@ class Checked:
         return handler.generate_schema(self.type)
 
 
-def number(low: float, high: float, *, above: bool = False) -> Checked:
+def number(low: float, high: float, *, above: bool = False) -> FieldType:
     """A finite number in [low, high], or (low, high] when `above`; a bool or a string is refused."""
     bound = Field(gt=low, le=high, allow_inf_nan=False) if above else Field(ge=low, le=high, allow_inf_nan=False)
-    return Checked(Annotated[float, Strict(), bound, BeforeValidator(to_list)])
+    return FieldType(Annotated[float, Strict(), bound, BeforeValidator(to_list)])
 
 
-def per_wheel_number(low: float, high: float) -> Checked:
+def per_wheel_number(low: float, high: float) -> FieldType:
     """A number, or a tuple with one number per wheel."""
-    one = number(low, high).type
-    return Checked(
+    single = number(low, high).type
+    return FieldType(
         Annotated[
-            Annotated[one, Tag("one")] | Annotated[tuple[one, ...], Tag("many")],
+            Annotated[single, Tag("one")] | Annotated[tuple[single, ...], Tag("many")],
             Discriminator(_shape_of),
             BeforeValidator(to_list),
         ]
     )
 
 
-def per_axis_number(low: float, high: float) -> Checked:
+def per_axis_number(low: float, high: float) -> FieldType:
     """Three numbers: along x, along y, about yaw."""
-    one = number(low, high).type
-    return Checked(Annotated[tuple[one, one, one], BeforeValidator(to_list)])
+    single = number(low, high).type
+    return FieldType(Annotated[tuple[single, single, single], BeforeValidator(to_list)])
 
 
-def points(most: float) -> Checked:
-    """Pairs of numbers within 0 to most, each with its standard deviation or without."""
-    one = number(0.0, most).type
-    return Checked(tuple[Annotated[tuple[one, ...], Field(min_length=2, max_length=3)], ...])
+def points(bound: float) -> FieldType:
+    """Pairs of numbers within 0 to `bound`, each with its standard deviation or without."""
+    single = number(0.0, bound).type
+    return FieldType(tuple[Annotated[tuple[single, ...], Field(min_length=2, max_length=3)], ...])
 
 
-def place(most: float) -> Checked:
-    """Two numbers within -most to most: along x, along y."""
-    one = number(-most, most).type
-    return Checked(Annotated[tuple[one, one], BeforeValidator(to_list)])
+def place(bound: float) -> FieldType:
+    """Two numbers within -`bound` to `bound`: along x, along y."""
+    single = number(-bound, bound).type
+    return FieldType(Annotated[tuple[single, single], BeforeValidator(to_list)])
 
 
-def word_of(*words: str) -> Checked:
+def word_of(*words: str) -> FieldType:
     """One of some words."""
     choices: Any = Literal
-    return Checked(choices[words])
+    return FieldType(choices[words])
 
 
 PerWheel = float | tuple[float, ...]
@@ -130,18 +130,18 @@ def from_validation(error: ValidationError, model: type[BaseModel]) -> InputErro
     if first["type"] == "missing":
         first = next((fault for fault in faults if fault["type"] == "extra_forbidden"), first)
     path = [part for part in first["loc"] if part not in ("one", "many")]
-    kind, more = first["type"], f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-    where = key_path(path)
+    kind, remark = first["type"], f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    location = key_path(path)
     if kind == "extra_forbidden":
-        return InputError(f"unknown key{more}", got=str(path[-1]), remedy=_nearest(path, model), where=where)
+        return InputError(f"unknown key{remark}", got=str(path[-1]), remedy=_nearest(path, model), where=location)
     if kind == "missing" and isinstance(path[-1], int):
-        return InputError(f"too few values{more}", got=f"{path[-1]}", expected="more", where=key_path(path[:-1]))
+        return InputError(f"too few values{remark}", got=f"{path[-1]}", expected="more", where=key_path(path[:-1]))
     if kind == "missing":
-        return InputError(f"a key is missing{more}", expected=str(path[-1]), remedy="add it", where=where)
+        return InputError(f"a key is missing{remark}", expected=str(path[-1]), remedy="add it", where=location)
     if kind == "value_error":  # one of our own checks: its words are complete
-        return InputError(first["msg"].removeprefix("Value error, ") + more, where=where)
+        return InputError(first["msg"].removeprefix("Value error, ") + remark, where=location)
     expected = "a list" if kind == "tuple_type" else first["msg"].removeprefix("Input should be ")
-    return InputError(f"cannot use this value{more}", got=first["input"], expected=expected, where=where)
+    return InputError(f"cannot use this value{remark}", got=first["input"], expected=expected, where=location)
 
 
 def key_path(path: list[Any] | tuple[Any, ...]) -> str:
@@ -156,9 +156,9 @@ def key_path(path: list[Any] | tuple[Any, ...]) -> str:
 
 def _nearest(path: list[Any], model: type[BaseModel]) -> str:
     """The known keys at the place of an unknown one, the nearest name first."""
-    known = sorted(keys_of(model, path[:-1]))
-    close = difflib.get_close_matches(str(path[-1]), known, n=1, cutoff=0.5)
-    return f"did you mean {close[0]}?" if close else f"known keys: {', '.join(known)}"
+    keys = sorted(keys_of(model, path[:-1]))
+    matches = difflib.get_close_matches(str(path[-1]), keys, n=1, cutoff=0.5)
+    return f"did you mean {matches[0]}?" if matches else f"known keys: {', '.join(keys)}"
 
 
 def table_at(model: type[BaseModel], path: Sequence[Any]) -> type[BaseModel] | None:

@@ -31,55 +31,60 @@ def vary_robot(
 ) -> Robot:
     """The robot with a load, on another floor, on a slope, with another battery: by the names of its file, or by value.
 
-    payload: adds mass and inertia, and moves the centre of mass towards its own. floor: friction between robot and
-    floor. tilt: a slope, whose pull stays where it is in the room. battery: what duties are shares of, and the most
-    that a motor gets.
     What is known of a number that is replaced goes; what is known of one that grows stays. The robot no longer knows
-    the kinds that were chosen. Raises InputError for a name that the file does not have, or a load under which the
-    robot would tip over.
+    the kinds that were chosen.
+
+    Args:
+        robot: The robot.
+        payload: Adds mass [kg] and inertia [kg m^2], and moves the centre of mass towards its own.
+        floor: Friction between robot and floor.
+        tilt: A slope, whose pull stays where it is in the room.
+        battery: What duties are shares of [V], and the most that a motor gets.
+
+    Raises InputError for a name that the file does not have, or a load under which the robot would tip over.
     """
     check_order("vary_robot(robot)", (robot, Robot))
-    chosen = {"payload": payload, "floor": floor, "tilt": tilt, "battery": battery}
-    said = []
-    own = robot
-    for kind, choice in chosen.items():
+    choices = {"payload": payload, "floor": floor, "tilt": tilt, "battery": battery}
+    descriptions = []
+    original = robot
+    for kind, choice in choices.items():
         if isinstance(choice, str) and not choice:
             continue
-        value = _named(own, kind, choice) if isinstance(choice, str) else _of_kind(kind, choice)
-        robot = _CHANGES[kind](robot, value, _priors_of(own, kind, choice))
-        said.append(f"{kind} {choice}" if isinstance(choice, str) else kind)
-    if not said:
+        value = _named(original, kind, choice) if isinstance(choice, str) else _of_kind(kind, choice)
+        robot = _CHANGES[kind](robot, value, _priors_of(original, kind, choice))
+        descriptions.append(f"{kind} {choice}" if isinstance(choice, str) else kind)
+    if not descriptions:
         return robot
-    gone = [kind for kind, choice in chosen.items() if choice]
-    heads = tuple(f"variations.{kind}." for kind in gone)
+    used_kinds = [kind for kind, choice in choices.items() if choice]
+    heads = tuple(f"variations.{kind}." for kind in used_kinds)
     return robot.replace(
-        name=f"{robot.name} with {', '.join(said)}"[:400],
-        variations=own.variations.replace(**{k: {} for k in gone}),
+        name=f"{robot.name} with {', '.join(descriptions)}"[:400],
+        variations=original.variations.replace(**{k: {} for k in used_kinds}),
         priors={key: prior for key, prior in robot.priors.items() if not key.startswith(heads)},
     )
 
 
 def vary_as(robot: Robot, text: str) -> Robot:
     """`vary_robot` by a text such as "payload=2kg,floor=carpet"; the robot for an empty one. Raises InputError."""
-    chosen: dict[str, Any] = {}
-    for part in filter(None, (each.strip() for each in text.split(","))):
-        kind, equals, name = (each.strip() for each in part.partition("="))
+    choices: dict[str, Any] = {}
+    for part in filter(None, (piece.strip() for piece in text.split(","))):
+        kind, equals, name = (piece.strip() for piece in part.partition("="))
         if not equals or not name:
             raise InputError("not a variation", got=part, expected="kind=name, such as payload=2kg", where="with")
         if kind not in KINDS:
             raise InputError("no such kind of variation", got=kind, remedy=_nearest(kind, KINDS), where="with")
-        if kind in chosen:
-            raise InputError("asked for twice", got=f"{kind}={chosen[kind]}, {part}", expected="one", where="with")
-        chosen[kind] = name
-    return vary_robot(robot, **chosen)
+        if kind in choices:
+            raise InputError("asked for twice", got=f"{kind}={choices[kind]}, {part}", expected="one", where="with")
+        choices[kind] = name
+    return vary_robot(robot, **choices)
 
 
 def _named(robot: Robot, kind: str, name: str) -> Any:
     """What a robot file knows under a name. Raises InputError, with the nearest name, where there is none."""
-    known: Mapping[str, Any] = getattr(robot.variations, kind)
-    if name in known:
-        return known[name]
-    if not known:
+    named_values: Mapping[str, Any] = getattr(robot.variations, kind)
+    if name in named_values:
+        return named_values[name]
+    if not named_values:
         raise InputError(
             f"{robot.name} knows no {kind} by name",
             got=name,
@@ -87,19 +92,19 @@ def _named(robot: Robot, kind: str, name: str) -> Any:
             remedy="add the table to the robot file",
             where=kind,
         )
-    raise InputError(f"no {kind} of this name", got=name, remedy=_nearest(name, list(known)), where=kind)
+    raise InputError(f"no {kind} of this name", got=name, remedy=_nearest(name, list(named_values)), where=kind)
 
 
 def _of_kind(kind: str, value: Any) -> Any:
-    wanted = {"payload": Payload, "floor": Surface, "tilt": Floor, "battery": Battery}[kind]
-    if not isinstance(value, wanted):
-        raise InputError("not a variation", got=value, expected=f"a name, or {wanted.__name__}(..)", where=kind)
+    value_type = {"payload": Payload, "floor": Surface, "tilt": Floor, "battery": Battery}[kind]
+    if not isinstance(value, value_type):
+        raise InputError("not a variation", got=value, expected=f"a name, or {value_type.__name__}(..)", where=kind)
     return value
 
 
-def _nearest(name: str, known: Sequence[str]) -> str:
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    return f"did you mean {close[0]}?" if close else f"known names: {', '.join(known)}"
+def _nearest(name: str, names: Sequence[str]) -> str:
+    matches = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    return f"did you mean {matches[0]}?" if matches else f"known names: {', '.join(names)}"
 
 
 def _priors_of(robot: Robot, kind: str, choice: object) -> dict[str, Prior]:
@@ -108,70 +113,91 @@ def _priors_of(robot: Robot, kind: str, choice: object) -> dict[str, Prior]:
     return {key.removeprefix(head): prior for key, prior in robot.priors.items() if key.startswith(head)}
 
 
-def _loaded(robot: Robot, payload: Payload, told: Mapping[str, Prior]) -> Robot:
+def _loaded(robot: Robot, payload: Payload, load_priors: Mapping[str, Prior]) -> Robot:
     """Body and load as one: their common centre of mass, and their inertias about it by Steiner's theorem."""
     body, total = robot.body, robot.body.mass + payload.mass
     centre = (body.mass * np.array(body.centre) + payload.mass * np.array(payload.offset)) / total
-    moved, beside = (float(np.sum((each - centre) ** 2)) for each in (np.array(body.centre), np.array(payload.offset)))
-    inertia = (body.inertia + body.mass * moved) + (payload.inertia + payload.mass * beside)
-    centred = _of_centre(robot, payload.mass / total, told)
+    body_shift, load_shift = (
+        float(np.sum((place - centre) ** 2)) for place in (np.array(body.centre), np.array(payload.offset))
+    )
+    inertia = (body.inertia + body.mass * body_shift) + (payload.inertia + payload.mass * load_shift)
+    centred = _of_centre(robot, payload.mass / total, load_priors)
     priors = {key: prior for key, prior in robot.priors.items() if key != "body.centre_m" or not centred} | centred
     for name in ("mass_kg", "inertia_kg_m2"):
-        before, more = priors.get(f"body.{name}"), told.get(name)
-        if before is not None and more is not None and before.std is not None and more.std is not None:
-            priors[f"body.{name}"] = before.replace(std=float(np.hypot(before.std, more.std)))
+        before, load_prior = priors.get(f"body.{name}"), load_priors.get(name)
+        if before is not None and load_prior is not None and before.std is not None and load_prior.std is not None:
+            priors[f"body.{name}"] = before.replace(std=float(np.hypot(before.std, load_prior.std)))
     try:
         return robot.replace(body=body.replace(mass=total, inertia=inertia, centre=centre.tolist()), priors=priors)
     except InputError as error:
         raise error.at("payload") from None
 
 
-def _of_centre(robot: Robot, share: float, told: Mapping[str, Prior]) -> dict[str, Prior]:
+def _of_centre(robot: Robot, share: float, load_priors: Mapping[str, Prior]) -> dict[str, Prior]:
     """What is known of the common centre of mass, of which the load is a share: by key."""
-    found = {}
+    priors = {}
     for k in range(2):
-        before, more = (
-            of.get(f"{name}[{k}]", of.get(name)) for of, name in ((robot.priors, "body.centre_m"), (told, "offset_m"))
+        before, load_prior = (
+            of.get(f"{name}[{k}]", of.get(name))
+            for of, name in ((robot.priors, "body.centre_m"), (load_priors, "offset_m"))
         )
-        known = more or before
-        if known is not None:
-            parts = [(before, 1.0 - share), (more, share)]
-            std = math.hypot(*(part * each.std for each, part in parts if each is not None and each.std is not None))
-            found[f"body.centre_m[{k}]"] = known.replace(std=std or None)
-    return found
+        prior = load_prior or before
+        if prior is not None:
+            parts = [(before, 1.0 - share), (load_prior, share)]
+            std = math.hypot(
+                *(
+                    part * one_prior.std
+                    for one_prior, part in parts
+                    if one_prior is not None and one_prior.std is not None
+                )
+            )
+            priors[f"body.centre_m[{k}]"] = prior.replace(std=std or None)
+    return priors
 
 
-def _on_surface(robot: Robot, surface: Surface, told: Mapping[str, Prior]) -> Robot:
+def _on_surface(robot: Robot, surface: Surface, surface_priors: Mapping[str, Prior]) -> Robot:
     parts = {*ON_FLOOR, *surface.friction.model_fields_set}
     friction = robot.friction.replace(**{part: getattr(surface.friction, part) for part in sorted(parts)})
-    gone = tuple(f"friction.{part}" for part in parts)
-    priors = {key: prior for key, prior in robot.priors.items() if not key.startswith(gone)}
-    told = {key if key != "traction_mu" else "wheels.traction_mu": prior for key, prior in told.items()}
+    replaced_parts = tuple(f"friction.{part}" for part in parts)
+    priors = {key: prior for key, prior in robot.priors.items() if not key.startswith(replaced_parts)}
+    surface_priors = {
+        key if key != "traction_mu" else "wheels.traction_mu": prior for key, prior in surface_priors.items()
+    }
     if surface.traction_mu is not None:
         robot = robot.replace(wheels=robot.wheels.replace(traction_mu=surface.traction_mu))
-    return robot.replace(friction=friction, priors=priors | dict(told), correlation=_without(robot.correlation, gone))
+    return robot.replace(
+        friction=friction, priors=priors | dict(surface_priors), correlation=_without(robot.correlation, replaced_parts)
+    )
 
 
-def _without(known: KeyCorrelation | None, gone: tuple[str, ...]) -> KeyCorrelation | None:
+def _without(correlation: KeyCorrelation | None, removed_keys: tuple[str, ...]) -> KeyCorrelation | None:
     """The correlations of the numbers that stay; None where fewer than two do."""
-    kept = [k for k, key in enumerate(known.keys if known is not None else ()) if not key.startswith(gone)]
-    if known is None or len(kept) < 2:
+    indices = [
+        k
+        for k, key in enumerate(correlation.keys if correlation is not None else ())
+        if not key.startswith(removed_keys)
+    ]
+    if correlation is None or len(indices) < 2:
         return None
-    keys, std = tuple(known.keys[k] for k in kept), known.std
-    return key_correlation(keys, known.of(keys), None if std is None else tuple(std[k] for k in kept))
+    keys, std = tuple(correlation.keys[k] for k in indices), correlation.std
+    return key_correlation(keys, correlation.of(keys), None if std is None else tuple(std[k] for k in indices))
 
 
-def _on_slope(robot: Robot, floor: Floor, told: Mapping[str, Prior]) -> Robot:
-    return robot.replace(floor=floor, priors=robot.priors | {f"floor.{key}": prior for key, prior in told.items()})
+def _on_slope(robot: Robot, floor: Floor, slope_priors: Mapping[str, Prior]) -> Robot:
+    return robot.replace(
+        floor=floor, priors=robot.priors | {f"floor.{key}": prior for key, prior in slope_priors.items()}
+    )
 
 
-def _fed(robot: Robot, battery: Battery, told: Mapping[str, Prior]) -> Robot:
+def _fed(robot: Robot, battery: Battery, battery_priors: Mapping[str, Prior]) -> Robot:
     limit = robot.motor.voltage_limit
-    least = tuple(min(each, battery.supply) for each in np.atleast_1d(limit).tolist())
-    motor = robot.motor.replace(voltage_limit=least if isinstance(limit, tuple) else least[0])
+    limits = tuple(min(volts, battery.supply) for volts in np.atleast_1d(limit).tolist())
+    motor = robot.motor.replace(voltage_limit=limits if isinstance(limit, tuple) else limits[0])
     drive = robot.drive.replace(supply=battery.supply)
     priors = {key: prior for key, prior in robot.priors.items() if key != "drive.supply_V"}
-    return robot.replace(motor=motor, drive=drive, priors=priors | {f"drive.{key}": each for key, each in told.items()})
+    return robot.replace(
+        motor=motor, drive=drive, priors=priors | {f"drive.{key}": prior for key, prior in battery_priors.items()}
+    )
 
 
 _CHANGES: dict[str, Callable[[Robot, Any, Mapping[str, Prior]], Robot]] = {

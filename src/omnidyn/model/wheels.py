@@ -81,11 +81,11 @@ class Wheels(Value):
         sin, cos = sin_cos_deg(per_wheel(self.roller_angle_deg, self.count))
         if not sin.all():
             raise ValueError(f"wheelbase_m {wheelbase} is of mecanum wheels; roller_angle_deg has a 0: leave it out")
-        most = float((2.0 * per_wheel(self.robot_radius, self.count) * cos / np.abs(sin)).min())
-        if wheelbase >= most:
+        largest = float((2.0 * per_wheel(self.robot_radius, self.count) * cos / np.abs(sin)).min())
+        if wheelbase >= largest:
             raise ValueError(
                 f"wheelbase_m {wheelbase} leaves no track: robot_radius_m is half track + half wheelbase; expected "
-                f"less than {most:.4g}"
+                f"less than {largest:.4g}"
             )
 
     @property
@@ -160,8 +160,8 @@ def sin_cos_deg(angle: ArrayLike) -> tuple[FloatArray, FloatArray]:
 def _quarter_sin_cos(angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Sine and cosine of angles in [0, 90] degrees; folded, so that mirrored wheels get equal numbers."""
     sin, cos = np.sin(np.radians(angle)), np.cos(np.radians(angle))
-    known = {0.0: (0.0, 1.0), 30.0: (0.5, SIN_60), 45.0: (SIN_45, SIN_45), 60.0: (SIN_60, 0.5), 90.0: (1.0, 0.0)}
-    for degrees, (exact_sin, exact_cos) in known.items():
+    exact_values = {0.0: (0.0, 1.0), 30.0: (0.5, SIN_60), 45.0: (SIN_45, SIN_45), 60.0: (SIN_60, 0.5), 90.0: (1.0, 0.0)}
+    for degrees, (exact_sin, exact_cos) in exact_values.items():
         sin, cos = np.where(angle == degrees, exact_sin, sin), np.where(angle == degrees, exact_cos, cos)
     return sin, cos
 
@@ -208,11 +208,11 @@ def _product(vectors: FloatArray, matrix: FloatArray) -> FloatArray:
     return total
 
 
-def refuse_slip(wheels: Wheels, who: str) -> None:
-    """Raises UnsupportedError where wheels may slip, for `who` knows only wheels that roll."""
+def refuse_slip(wheels: Wheels, user: str) -> None:
+    """Raises UnsupportedError where wheels may slip, for `user` knows only wheels that roll."""
     if wheels.traction_mu is not None:
         raise UnsupportedError(
-            f"{who} no wheels that slip",
+            f"{user} no wheels that slip",
             got=f"traction_mu = {wheels.traction_mu}",
             expected="wheels that roll",
             remedy="take the robot without it",

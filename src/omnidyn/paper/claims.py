@@ -45,7 +45,7 @@ def headlines(claims: Sequence[Claim]) -> list[str]:
     corrected = [place for place in dict.fromkeys(places) if place.startswith("eq")]
     table_2 = [claim for claim in claims if claim.place == "Table 2"]
     right = [claim for claim in table_2 if claim.verdict is ClaimVerdict.REPRODUCED]
-    wrong = [f"{c.statement.split()[0]}: {c.ours}, printed {c.printed}" for c in table_2 if c not in right]
+    mismatches = [f"{c.statement.split()[0]}: {c.ours}, printed {c.printed}" for c in table_2 if c not in right]
     zones = [by_key[f"dead-zone-{axis}"] for axis in AXES]
     rows = by_key["one-robot"].numbers
     yes, mended, no = (counts[verdict] for verdict in ClaimVerdict if verdict.judged)
@@ -55,7 +55,7 @@ def headlines(claims: Sequence[Claim]) -> list[str]:
         f"{len(claims) - judged} more are not in the text we have, or about another paper.",
         f"The equations hold, but for misprints and signs: corrected are {'; '.join(corrected)}.",
         f"{len(right)} of {len(table_2)} numbers of Table 2 come out of Table 1 by least squares"
-        + (f"; not {'; '.join(wrong)}." if wrong else "."),
+        + (f"; not {'; '.join(mismatches)}." if mismatches else "."),
         f"Tables 1 and 3 are not of one robot: {rows['agreeing']:g} of {rows['rows']:g} steady speeds agree, and no "
         f"single change of a parameter, nor any pair, explains more than {rows['most_agreeing']:g}.",
         f"The dead zones of v, v_n and w come out as {', '.join(zone.ours for zone in zones)}; the text says "

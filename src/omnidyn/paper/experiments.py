@@ -93,12 +93,12 @@ def _ramp(robot: Robot, axis: str, pattern: FloatArray) -> Ramp:
     peak = RAMP_PEAK * DEAD_ZONE_TEXT[axis]
     scale = ramp([1.0], peak, RAMP_SECONDS, DT)
     run = simulate(robot, scale * pattern, DT)
-    held = np.append(scale, scale[-1])  # a run repeats its last input row
-    held.flags.writeable = False
+    padded_scale = np.append(scale, scale[-1])  # a run repeats its last input row
+    padded_scale.flags.writeable = False
     return Ramp(
         axis=axis,
         pattern=pattern_of(axis),
-        scale=held,
+        scale=padded_scale,
         run=run,
         breakaway_voltage=float(breakaway_voltage(robot, pattern)),
         printed_voltage=DEAD_ZONE_TEXT[axis],

@@ -56,10 +56,10 @@ def _steady_law(robot: Robot) -> Claim:
     row = np.arange(len(steps))
     force = drive_wrench(robot, twist, volts)[row, column]
     data = SteadyTable([axis for axis, _ in steps], twist[row, column], force, source="the model under Table 4")
-    found = fit_steady_state(robot, data).robot.friction.axes
+    axes = fit_steady_state(robot, data).robot.friction.axes
     true = robot.friction.axes
-    pairs = zip((*found.viscous, *found.coulomb), (*true.viscous, *true.coulomb), strict=True)
-    error = max(abs(ours / wanted - 1.0) for ours, wanted in pairs)
+    pairs = zip((*axes.viscous, *axes.coulomb), (*true.viscous, *true.coulomb), strict=True)
+    error = max(abs(ours / expected - 1.0) for ours, expected in pairs)
     return Claim(
         key="steady-law",
         place="eqs (15)-(17)",
@@ -110,7 +110,7 @@ def _table_2(kind: str, axis: int, line: Estimate, bound: Estimate) -> Claim:
 
 def _rows_at_rest(line: Estimate, bound: Estimate) -> Claim:
     viscous, coulomb = ([_name(kind, axis) for axis in range(len(AXES))] for kind in ("viscous", "coulomb"))
-    changed = {name: bound.value[name] / line.value[name] - 1.0 for name in (*viscous, *coulomb)}
+    changes = {name: bound.value[name] / line.value[name] - 1.0 for name in (*viscous, *coulomb)}
     first = [TABLE_1[axis][0] for axis in AXES]
     resting = all(row.at_rest for row in first)
     words = "; ".join(
@@ -125,12 +125,12 @@ def _rows_at_rest(line: Estimate, bound: Estimate) -> Claim:
         ours="three rows, and a lower bound of breakaway",
         verdict=judge(not resting, bool(bound.lower_bound)),
         why=f"At rest friction only balances the drive: the row says that breakaway is at least {_forces(first)}. "
-        f"Without it B / C are {words}: B changes by {_percent(changed, viscous)}, C by {_percent(changed, coulomb)}.",
+        f"Without it B / C are {words}: B changes by {_percent(changes, viscous)}, C by {_percent(changes, coulomb)}.",
         numbers=plain(
             viscous=[bound.value[name] for name in viscous],
             coulomb=[bound.value[name] for name in coulomb],
             breakaway_at_least=[row.force for row in first],
-            relative_change=list(changed.values()),
+            relative_change=list(changes.values()),
         ),
     )
 
@@ -165,5 +165,5 @@ def _forces(rows: list) -> str:
     return ", ".join(f"{row.force:g} {unit}" for row, unit in zip(rows, units, strict=True))
 
 
-def _percent(changed: dict[str, float], names: list[str]) -> str:
-    return ", ".join(f"{100 * changed[name]:+.0f}" for name in names) + " %"
+def _percent(changes: dict[str, float], names: list[str]) -> str:
+    return ", ".join(f"{100 * changes[name]:+.0f}" for name in names) + " %"

@@ -74,9 +74,9 @@ def _eq_3_rows(robot: Robot) -> Claim:
 def _eq_3_sign(robot: Robot) -> Claim:
     ours, printed = model_eq_3(robot)[1, 0], EQ_3[1][0]
     back = printed_eq_3(robot) @ wheel_speed(robot.wheels, [0.0, 1.0, 0.0])
-    given = printed_eq_3(robot) @ wheel_speed(robot.wheels, TWIST)
+    printed_twist = printed_eq_3(robot) @ wheel_speed(robot.wheels, TWIST)
     at_wheels = TRACTION @ rim_speed(robot.wheels, TWIST)
-    at_body = wrench_from_traction(robot.wheels, TRACTION) @ given
+    at_body = wrench_from_traction(robot.wheels, TRACTION) @ printed_twist
     drive = state_space(robot).B[1, 0]
     pattern = printed_eq_3(robot)[1] @ printed_voltage("y")[-1]
     inverse = np.abs(twist_from_wheel_speed(robot.wheels, wheel_speed(robot.wheels, TWIST)) - TWIST).max()

@@ -30,7 +30,7 @@ def _one_robot(trials: Sequence[Reconciliation]) -> Claim:
     )
     friction = next(trial for trial in everywhere if trial.freed == (FRICTION,))
     forces = [printed_force(axis).max() for axis in AXES]
-    most = max(trial.explained for trial in everywhere)
+    best_count = max(trial.explained for trial in everywhere)
     return Claim(
         key="one-robot",
         place="Tables 1, 3",
@@ -41,11 +41,11 @@ def _one_robot(trials: Sequence[Reconciliation]) -> Claim:
         why=f"Of one number {single.words()} leaves least: {_left(single)}, {single.explained} rows; of two "
         f"{pair.words()}: {_left(pair)}, {pair.explained} rows. Friction alone wants {friction.words()}, against "
         f"forces of at most {listed(forces)} in Table 1, and leaves {_left(friction)}. No fit explains more than "
-        f"{most} of {nothing.rows} rows, within {100 * TOLERANCE:g} % or at rest: no single change does, and no "
+        f"{best_count} of {nothing.rows} rows, within {100 * TOLERANCE:g} % or at rest: no single change does, and no "
         "pair.",
         numbers=plain(
             agreeing=nothing.explained,
-            most_agreeing=most,
+            most_agreeing=best_count,
             rows=nothing.rows,
             **{"rmse_" + ("_".join(trial.freed) or "nothing"): list(trial.rmse.values()) for trial in everywhere},
             **{"values_" + "_".join(trial.freed): trial.values for trial in everywhere if trial.freed},
@@ -55,10 +55,12 @@ def _one_robot(trials: Sequence[Reconciliation]) -> Claim:
 
 def _wanted(trials: Sequence[Reconciliation]) -> Claim:
     """What each axis would want of one number."""
-    alone = {(trial.freed[0], trial.axes[0]): trial for trial in trials if len(trial.freed) == len(trial.axes) == 1}
-    resistance = [alone["R", axis] for axis in AXES]
-    drop = [alone["drop", axis] for axis in AXES]
-    radius, wheel = alone["b", "yaw"], alone["r", "yaw"]
+    single_trials = {
+        (trial.freed[0], trial.axes[0]): trial for trial in trials if len(trial.freed) == len(trial.axes) == 1
+    }
+    resistance = [single_trials["R", axis] for axis in AXES]
+    drop = [single_trials["drop", axis] for axis in AXES]
+    radius, wheel = single_trials["b", "yaw"], single_trials["r", "yaw"]
     values = [trial.values[0] for trial in resistance]
     return Claim(
         key="axes-disagree",

@@ -36,9 +36,9 @@ def _balance(robot: Robot) -> Claim:
     """Power: what the motors give is what the body gains and friction takes."""
     plain_frame = turning_frame(robot, False)
     gained = (axis_masses(robot) * TWIST) @ acceleration(plain_frame, TWIST, VOLTAGE)
-    given = drive_wrench(robot, TWIST, VOLTAGE) @ TWIST
-    taken = robot.friction.axes.sliding_wrench(TWIST) @ TWIST
-    error = float(abs(gained - given - taken))
+    power = drive_wrench(robot, TWIST, VOLTAGE) @ TWIST
+    loss = robot.friction.axes.sliding_wrench(TWIST) @ TWIST
+    error = float(abs(gained - power - loss))
     return Claim(
         key="dynamics",
         place="eqs (4)-(6)",
@@ -46,9 +46,9 @@ def _balance(robot: Robot) -> Claim:
         printed="M dv/dt = F - B v - C sgn(v)",
         ours=f"power balances within {tiny(error, 'W')}",
         verdict=judge(error < ROUNDING),
-        why=f"At v, v_n, w = {listed(TWIST)} the motors give {given:.3f} W, friction takes {-taken:.3f} W, the body "
+        why=f"At v, v_n, w = {listed(TWIST)} the motors give {power:.3f} W, friction takes {-loss:.3f} W, the body "
         f"gains {gained:.3f} W.",
-        numbers=plain(power_given=given, power_of_friction=taken, power_gained=gained),
+        numbers=plain(power_given=power, power_of_friction=loss, power_gained=gained),
     )
 
 
@@ -63,16 +63,16 @@ def settled_in_turning_frame(robot: Robot, voltage: FloatArray) -> FloatArray:
     turning = turning_frame(robot, True)
     start = settled_twist(robot, voltage)
     start = np.where(start == 0.0, 0.1 * np.sign(frame_wrench(turning, start)), start)
-    found = root(lambda twist: acceleration(turning, twist, voltage), start, tol=1e-13)
-    return found.x
+    solution = root(lambda twist: acceleration(turning, twist, voltage), start, tol=1e-13)
+    return solution.x
 
 
 def _turning_frame(robot: Robot) -> Claim:
-    missing = np.abs(frame_wrench(turning_frame(robot, True), TURNING)[:2]).max()
+    frame_force = np.abs(frame_wrench(turning_frame(robot, True), TURNING)[:2]).max()
     coulomb = robot.friction.axes.coulomb[0]
     voltage = np.array(DIAGONAL_RUN)
-    without, kept = settled_twist(robot, voltage), settled_in_turning_frame(robot, voltage)
-    left = np.abs(acceleration(turning_frame(robot, True), kept, voltage)).max()
+    without, with_terms = settled_twist(robot, voltage), settled_in_turning_frame(robot, voltage)
+    acceleration_left = np.abs(acceleration(turning_frame(robot, True), with_terms, voltage)).max()
     single = np.abs(frame_wrench(turning_frame(robot, True), np.diag([1.0, 1.0, 10.0]))).max()
     holds_at_single_axis = bool(single == 0.0)
     return Claim(
@@ -80,12 +80,14 @@ def _turning_frame(robot: Robot) -> Claim:
         place="eqs (4) (5)",
         statement="Newton's law holds in the body frame without further terms.",
         printed="no M w v_n, M w v",
-        ours=f"{missing:.1f} N at {TURNING[0]:g} m/s and {TURNING[2]:g} rad/s",
-        verdict=judge(bool(missing < ROUNDING), holds_at_single_axis and left < 1e-9),
+        ours=f"{frame_force:.1f} N at {TURNING[0]:g} m/s and {TURNING[2]:g} rad/s",
+        verdict=judge(bool(frame_force < ROUNDING), holds_at_single_axis and acceleration_left < 1e-9),
         why=f"Along one axis, as in all runs of the paper, the terms are {single:g}. At {TURNING[0]:g} m/s and "
-        f"{TURNING[2]:g} rad/s they are {missing:.1f} N, against a Coulomb friction of {coulomb:g} N: u = "
-        f"({listed(voltage)}) V settles at ({listed(without)}) without them and at ({listed(kept)}) with them.",
-        numbers=plain(force=missing, coulomb=coulomb, settled_without=without, settled_with=kept, single_axis=single),
+        f"{TURNING[2]:g} rad/s they are {frame_force:.1f} N, against a Coulomb friction of {coulomb:g} N: u = "
+        f"({listed(voltage)}) V settles at ({listed(without)}) without them and at ({listed(with_terms)}) with them.",
+        numbers=plain(
+            force=frame_force, coulomb=coulomb, settled_without=without, settled_with=with_terms, single_axis=single
+        ),
     )
 
 
@@ -104,7 +106,7 @@ def _sign_at_rest(robot: Robot) -> Claim:
     voltage = np.array([0.0, SMALL_VOLTAGE, -SMALL_VOLTAGE])
     literal = drive_wrench(robot, np.zeros(3), voltage)[0] / axis_masses(robot)[0]
     ours = acceleration(robot, np.zeros(3), voltage)[0]
-    moved = creep(robot, voltage, CREEP_SECONDS, CREEP_STEP)
+    crept = creep(robot, voltage, CREEP_SECONDS, CREEP_STEP)
     finer = creep(robot, voltage, CREEP_SECONDS, CREEP_STEP / 10.0)
     return Claim(
         key="sign-at-rest",
@@ -114,10 +116,10 @@ def _sign_at_rest(robot: Robot) -> Claim:
         ours="at rest friction balances the drive, up to C",
         verdict=judge(bool(abs(literal - ours) < ROUNDING), bool(ours == 0.0)),
         why=f"Then {SMALL_VOLTAGE:g} V, inside the dead zone of section 4, accelerates a robot at rest by "
-        f"{literal:.2f} m/s^2, and steps of {1e3 * CREEP_STEP:g} ms creep {1e3 * moved:.1f} mm in {CREEP_SECONDS:g} s "
+        f"{literal:.2f} m/s^2, and steps of {1e3 * CREEP_STEP:g} ms creep {1e3 * crept:.1f} mm in {CREEP_SECONDS:g} s "
         f"({1e3 * finer:.2f} mm with steps ten times shorter: the answer depends on the step). With friction "
         f"set-valued at rest it stays: {ours:g} m/s^2.",
-        numbers=plain(acceleration_as_printed=literal, acceleration=ours, creep=moved, creep_finer_step=finer),
+        numbers=plain(acceleration_as_printed=literal, acceleration=ours, creep=crept, creep_finer_step=finer),
     )
 
 
@@ -159,17 +161,17 @@ def _a33(robot: Robot) -> Claim:
     inertia = robot.body.inertia
     rate = state_space(robot).A[2, 2]
     doubled = robot.replace(body=robot.body.replace(inertia=2.0 * inertia))
-    whole = rate / state_space(doubled).A[2, 2]
+    ratio = rate / state_space(doubled).A[2, 2]
     return Claim(
         key="inertia-symbol",
         place="eq (13), A_33",
         statement="A_33 holds two inertias, J and I_n.",
         printed=" and ".join(EQ_13_SYMBOLS_OF_A33),
         ours=f"one inertia, {inertia:g} kg m^2",
-        verdict=judge(False, bool(abs(whole - 2.0) < ROUNDING)),
-        why=f"All of A_33 = {rate:.4f} 1/s is divided by one inertia: twice I_n divides it by {whole:.3f}. Table 3 "
+        verdict=judge(False, bool(abs(ratio - 2.0) < ROUNDING)),
+        why=f"All of A_33 = {rate:.4f} 1/s is divided by one inertia: twice I_n divides it by {ratio:.3f}. Table 3 "
         "has no J.",
-        numbers=plain(a33=rate, divided_by=whole, inertia=inertia),
+        numbers=plain(a33=rate, divided_by=ratio, inertia=inertia),
     )
 
 
@@ -177,9 +179,9 @@ def _inertia(robot: Robot) -> Claim:
     """I = M a^2/2 of a cylinder about its axis."""
     mass, inertia, radius = robot.body.mass, robot.body.inertia, float(np.mean(robot.wheels.robot_radius))
     cylinder = mass * radius**2 / 2.0
-    needed = float(np.sqrt(2.0 * inertia / mass))
+    needed_m = float(np.sqrt(2.0 * inertia / mass))
     small = robot.replace(body=robot.body.replace(inertia=cylinder))
-    settling = [float(state_space(one).time_constants[2]) for one in (robot, small)]
+    settling = [float(state_space(variant).time_constants[2]) for variant in (robot, small)]
     return Claim(
         key="inertia",
         place="Table 3",
@@ -188,10 +190,10 @@ def _inertia(robot: Robot) -> Claim:
         ours=f"{cylinder:.4f} kg m^2",
         verdict=judge(bool(same(cylinder, inertia))),
         why=f"A cylinder of {mass:g} kg and radius b = {radius:g} m has {cylinder:.4f} kg m^2, "
-        f"{inertia / cylinder:.1f} times less; {inertia:g} needs a radius of {needed:.2f} m. Steady speeds do not "
+        f"{inertia / cylinder:.1f} times less; {inertia:g} needs a radius of {needed_m:.2f} m. Steady speeds do not "
         f"tell which is right: I_n only sets how fast w settles, {settling[0]:.3f} s with the printed one and "
         f"{settling[1]:.3f} s with the cylinder's.",
         numbers=plain(
-            settling=settling, cylinder=cylinder, printed=inertia, radius_needed=needed, ratio=inertia / cylinder
+            settling=settling, cylinder=cylinder, printed=inertia, radius_needed=needed_m, ratio=inertia / cylinder
         ),
     )

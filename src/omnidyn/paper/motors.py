@@ -29,8 +29,8 @@ def power_of_gear(robot: Robot, printed_emf: bool) -> tuple[float, float]:
     """The power of the gear ratio in (the motor's part of A, B) of the state space, by doubling the ratio."""
     doubled = robot.replace(motor=robot.motor.replace(gear_ratio=np.multiply(2.0, robot.motor.gear_ratio)))
     before, after = (
-        state_space(without_gear_in_emf(one) if printed_emf else one)
-        for one in (_frictionless(robot), _frictionless(doubled))
+        state_space(without_gear_in_emf(variant) if printed_emf else variant)
+        for variant in (_frictionless(robot), _frictionless(doubled))
     )
     return float(np.log2(after.A[0, 0] / before.A[0, 0])), float(np.log2(after.B[0, 1] / before.B[0, 1]))
 
@@ -41,10 +41,10 @@ def _frictionless(robot: Robot) -> Robot:
 
 
 def _force(robot: Robot) -> Claim:
-    ones = np.ones(robot.wheels.count)
-    torque, force = wheel_torque(robot.motor, ones), traction(robot.motor, robot.wheels, ones)
+    amperes = np.ones(robot.wheels.count)
+    torque, force = wheel_torque(robot.motor, amperes), traction(robot.motor, robot.wheels, amperes)
     error = np.abs(force * robot.wheels.radii - torque).max()
-    power = float((wheel_torque(robot.motor, ones) - back_emf(robot.motor, ones)) @ ones)
+    power = float((wheel_torque(robot.motor, amperes) - back_emf(robot.motor, amperes)) @ amperes)
     return Claim(
         key="traction",
         place="eq (10)",
@@ -60,7 +60,7 @@ def _force(robot: Robot) -> Claim:
 
 def _back_emf(robot: Robot) -> Claim:
     with_gear, without = power_of_gear(robot, False), power_of_gear(robot, True)
-    wanted = (EQ_13_POWER_OF_GEAR["A"], EQ_13_POWER_OF_GEAR["B"])
+    powers = (EQ_13_POWER_OF_GEAR["A"], EQ_13_POWER_OF_GEAR["B"])
     ours, printed = np.diag(state_space(robot).A), np.diag(state_space(without_gear_in_emf(robot)).A)
     speed = np.full(robot.wheels.count, float(no_load_speed(robot.motor, np.array([1.0]))[0]))
     volts = back_emf(robot.motor, speed)[0], back_emf(without_gear_in_emf(robot).motor, speed)[0]
@@ -70,8 +70,8 @@ def _back_emf(robot: Robot) -> Claim:
         statement="The back-EMF is K_v w_m, with w_m the speed of the wheel.",
         printed=f"K_v l^{EQ_11_POWER_OF_GEAR} w_m",
         ours=f"K_v l^{with_gear[0] - with_gear[1]:.0f} w_m",
-        verdict=judge(np.allclose(without, wanted), np.allclose(with_gear, wanted)),
-        why=f"(13) prints l^{wanted[0]} in A. That follows with the gear ratio in the back-EMF; as printed it would "
+        verdict=judge(np.allclose(without, powers), np.allclose(with_gear, powers)),
+        why=f"(13) prints l^{powers[0]} in A. That follows with the gear ratio in the back-EMF; as printed it would "
         f"be l^{without[0]:.0f}, and the diagonal of A {listed(printed, '.3f')} instead of {listed(ours, '.3f')} 1/s. "
         f"At a wheel speed of {speed[0]:.2f} rad/s the motor makes {volts[0]:.3f} V, as printed {volts[1]:.3f} V.",
         numbers=plain(power_with_gear=with_gear, power_as_printed=without, a_with_gear=ours, a_as_printed=printed),
@@ -96,7 +96,7 @@ def _inductance(robot: Robot) -> Claim:
 def _current_sign(robot: Robot) -> Claim:
     volts = np.array([row for axis in AXES for row in TABLE_4[axis]])
     currents = settled_currents(robot, settled_twist(robot, volts), volts)
-    negative, none, count = int((currents < 0.0).sum()), int((currents == 0.0).sum()), currents.size
+    negative, zeros, count = int((currents < 0.0).sum()), int((currents == 0.0).sum()), currents.size
     return Claim(
         key="current-sign",
         place="eq (12)",
@@ -107,8 +107,8 @@ def _current_sign(robot: Robot) -> Claim:
             negative == 0, bool((np.abs(currents) < np.abs(volts).max() / np.min(robot.motor.resistance)).all())
         ),
         why=f"{negative} of the {count} steady currents of Table 4 are negative ({100 * negative / count:.0f} %), the "
-        f"lowest {currents.min():.2f} A; {none} are 0. As printed, motors could neither turn backwards nor brake.",
-        numbers=plain(negative=negative, zero=none, count=count, fraction=negative / count, currents=currents),
+        f"lowest {currents.min():.2f} A; {zeros} are 0. As printed, motors could neither turn backwards nor brake.",
+        numbers=plain(negative=negative, zero=zeros, count=count, fraction=negative / count, currents=currents),
     )
 
 

@@ -73,11 +73,11 @@ TRIALS: tuple[tuple[str, ...], ...] = (
 PART_TRIALS: tuple[tuple[tuple[str, ...], tuple[str, ...]], ...] = (
     (("b",), ("yaw",)),
     *(((name,), (axis,)) for name in ("r", "R", "drop") for axis in AXES),
-    *((freed, ("x", "y")) for freed in (("R",), ("drop",), ("R", "drop"))),
+    *((names, ("x", "y")) for names in (("R",), ("drop",), ("R", "drop"))),
 )
 """What single axes would want, and v and v_n together: (freed, axes fitted). b moves w only."""
 FRICTION = "friction"
-NEAR = 1e-6  # this close to a bound, as a share of the range, is at the bound
+BOUND_TOLERANCE = 1e-6  # this close to a bound, as a share of the range, is at the bound
 STARTS = 4  # starting points per number, evenly spaced within its bounds
 
 VOLTAGE = np.concatenate([printed_voltage(axis) for axis in AXES])
@@ -131,33 +131,33 @@ def reconciliations(robot: Robot) -> tuple[Reconciliation, ...]:
 @cache
 def _reconciliations(text: str) -> tuple[Reconciliation, ...]:
     robot = parse_robot(text)
-    parts = (reconcile(robot, freed, axes) for freed, axes in PART_TRIALS)
-    return (*(reconcile(robot, freed) for freed in TRIALS), reconcile_friction(robot), *parts)
+    parts = (reconcile(robot, names, axes) for names, axes in PART_TRIALS)
+    return (*(reconcile(robot, names) for names in TRIALS), reconcile_friction(robot), *parts)
 
 
-def reconcile(robot: Robot, freed: tuple[str, ...], axes: tuple[str, ...] = AXES) -> Reconciliation:
-    """Fit the numbers named in `freed` (keys of CHANGES) to the steady speeds of Table 1 along `axes`."""
-    changes = [CHANGES[name] for name in freed]
+def reconcile(robot: Robot, names: tuple[str, ...], axes: tuple[str, ...] = AXES) -> Reconciliation:
+    """Fit the numbers named in `names` (keys of CHANGES) to the steady speeds of Table 1 along `axes`."""
+    changes = [CHANGES[name] for name in names]
     if not changes:
-        return _result(freed, axes, np.array([]), _changed_speeds(robot, [], np.array([])))
-    wanted = np.isin(COLUMN, [AXES.index(axis) for axis in axes])
+        return _result(names, axes, np.array([]), _changed_speeds(robot, [], np.array([])))
+    rows_used = np.isin(COLUMN, [AXES.index(axis) for axis in axes])
 
     def residuals(values: FloatArray) -> FloatArray:
-        return ((_changed_speeds(robot, changes, values) - SPEED) / SCALE)[wanted]
+        return ((_changed_speeds(robot, changes, values) - SPEED) / SCALE)[rows_used]
 
     low, high = np.array([change.low for change in changes]), np.array([change.high for change in changes])
     fractions = (np.arange(STARTS) + 0.5) / STARTS
     grid = [low + (high - low) * np.array(point) for point in product(fractions, repeat=len(changes))]
     start = min(grid, key=lambda values: rms(residuals(values)))
     fit = least_squares(residuals, start, bounds=(low, high), x_scale=high - low, xtol=1e-10)
-    found, at_bound = _on_bounds(fit.x, low, high)
-    return _result(freed, axes, found, _changed_speeds(robot, changes, found), at_bound)
+    solution, at_bound = _on_bounds(fit.x, low, high)
+    return _result(names, axes, solution, _changed_speeds(robot, changes, solution), at_bound)
 
 
 def _on_bounds(values: FloatArray, low: FloatArray, high: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Fitted values, put exactly on a bound they all but reach, and which did."""
-    near = NEAR * np.where(np.isfinite(high), high - low, 1.0)
-    values = np.where(values - low < near, low, np.where(high - values < near, high, values))
+    tolerance = BOUND_TOLERANCE * np.where(np.isfinite(high), high - low, 1.0)
+    values = np.where(values - low < tolerance, low, np.where(high - values < tolerance, high, values))
     return values, (values == low) | (values == high)
 
 
@@ -172,8 +172,8 @@ def reconcile_friction(robot: Robot) -> Reconciliation:
     start = np.concatenate([viscous, coulomb])
     bounds = (np.zeros(6), np.full(6, np.inf))
     fit = least_squares(lambda values: (speeds(values) - SPEED) / SCALE, start, bounds=bounds, x_scale=start)
-    found, _ = _on_bounds(fit.x, *bounds)
-    return _result((FRICTION,), AXES, found, speeds(found))
+    solution, _ = _on_bounds(fit.x, *bounds)
+    return _result((FRICTION,), AXES, solution, speeds(solution))
 
 
 def _changed_speeds(robot: Robot, changes: list[Change], values: FloatArray) -> FloatArray:
@@ -189,7 +189,7 @@ def _speeds(robot: Robot, voltage: FloatArray) -> FloatArray:
 
 
 def _result(
-    freed: tuple[str, ...],
+    names: tuple[str, ...],
     axes: tuple[str, ...],
     values: FloatArray,
     speeds: FloatArray,
@@ -197,10 +197,10 @@ def _result(
 ) -> Reconciliation:
     off = speeds - SPEED
     return Reconciliation(
-        freed=freed,
+        freed=names,
         axes=axes,
         values=tuple(float(value) for value in values),
-        at_bound=tuple(name for name, there in zip(freed, at_bound, strict=False) if there),
+        at_bound=tuple(name for name, is_at_bound in zip(names, at_bound, strict=False) if is_at_bound),
         speeds={axis: speeds[k == COLUMN].tolist() for k, axis in enumerate(AXES)},
         rmse={axis: rms(off[k == COLUMN]) for k, axis in enumerate(AXES)},
         cost=rms(off / SCALE),

@@ -72,7 +72,7 @@ def _steady_speed(robot: Robot, axis: str) -> Claim:
 def _rest_row(robot: Robot, axis: str) -> Claim:
     voltage = printed_voltage(axis)[0]
     moving = bool(moving_axes(robot, voltage)[AXES.index(axis)])
-    speed, needed = model_speed(robot, axis)[0], float(breakaway_voltage(robot, pattern_of(axis)))
+    speed, breakaway = model_speed(robot, axis)[0], float(breakaway_voltage(robot, pattern_of(axis)))
     level = float(np.abs(voltage).max())
     return Claim(
         key=f"at-rest-{axis}",
@@ -81,8 +81,8 @@ def _rest_row(robot: Robot, axis: str) -> Claim:
         printed="0",
         ours=f"{speed:.3f} {SPEED_UNIT[axis]}",
         verdict=judge(not moving),
-        why=f"The model of Table 3 starts to move at {needed:.3f} V already.",
-        numbers=plain(voltage=level, speed=speed, breakaway_voltage=needed),
+        why=f"The model of Table 3 starts to move at {breakaway:.3f} V already.",
+        numbers=plain(voltage=level, speed=speed, breakaway_voltage=breakaway),
     )
 
 
@@ -92,19 +92,19 @@ def _force(robot: Robot, axis: str) -> Claim:
     ours = drive_wrench(robot, printed_twist(axis), printed_voltage(axis))[:, column]
     resistance = float(np.mean(robot.motor.resistance)) * ours[0] / printed[0]  # at rest i = u/R
     drop = float(np.abs(printed_voltage(axis)[0]).max()) * (1.0 - printed[0] / ours[0])
-    close = int(same(ours, printed).sum())
+    agreeing = int(same(ours, printed).sum())
     return Claim(
         key=f"force-{axis}",
         place="Table 1, eq (11)",
         statement=f"Voltage, speed and force of Table 1 along {PAPER_AXES[axis]} belong to one motor.",
         printed=f"{listed(printed)} {FORCE_UNIT[axis]}",
         ours=f"{listed(ours)} {FORCE_UNIT[axis]} from voltage and speed",
-        verdict=judge(close == len(ours)),
-        why=f"{close} of {len(ours)} rows agree within {100 * TOLERANCE:g} %. At rest the current is u/R: the "
+        verdict=judge(agreeing == len(ours)),
+        why=f"{agreeing} of {len(ours)} rows agree within {100 * TOLERANCE:g} %. At rest the current is u/R: the "
         f"printed force implies R = {resistance:.2f} ohm where Table 3 prints {np.mean(robot.motor.resistance):g}, or "
         f"{drop:.2f} V lost of the largest voltage.",
         numbers=plain(
-            printed=printed, ours=ours, implied_resistance=resistance, implied_drop=drop, rows_that_agree=close
+            printed=printed, ours=ours, implied_resistance=resistance, implied_drop=drop, rows_that_agree=agreeing
         ),
     )
 

@@ -21,7 +21,7 @@ def validation_claims(robot: Robot) -> tuple[Claim, ...]:
 def _table_4(robot: Robot) -> Claim:
     volts = np.array([row for axis in AXES for row in TABLE_4[axis]])
     moving = moving_axes(robot, volts)
-    alone = bool((moving.sum(axis=1) == 1).all())
+    single_axis = bool((moving.sum(axis=1) == 1).all())
     inside = bool(np.abs(volts).max() <= np.min(robot.motor.voltage_limit))
     speeds = {axis: [settled_speed(robot, axis, row) for row in TABLE_4[axis]] for axis in AXES}
     return Claim(
@@ -30,7 +30,7 @@ def _table_4(robot: Robot) -> Claim:
         statement="Nine voltage steps, each along one axis.",
         printed="2, 3 and 4 V on each axis",
         ours=f"{int(moving.any(axis=1).sum())} of {len(volts)} move the robot, each along one axis",
-        verdict=judge(alone and inside),
+        verdict=judge(single_axis and inside),
         why=f"The largest is {np.abs(volts).max():g} V, the limit {np.max(robot.motor.voltage_limit):g} V. They "
         f"settle at v {listed(speeds['x'])}, v_n {listed(speeds['y'])} m/s and w {listed(speeds['yaw'])} rad/s.",
         numbers=plain(**speeds),
@@ -54,23 +54,23 @@ def _fig_2(robot: Robot) -> Claim:
 
 
 def _fig_4(robot: Robot) -> Claim:
-    both = [
+    pairs = [
         (settled_speed(robot, axis, row), speed)
         for axis in AXES
         for row in TABLE_4[axis]
         if (speed := measured_speed(axis, row)) is not None
     ]
-    ours, measured = np.array(both).T
+    ours, measured = np.array(pairs).T
     steps = sum(len(TABLE_4[axis]) for axis in AXES)
     off = ours / measured - 1.0
-    close = int(same(ours, measured).sum())
+    agreeing = int(same(ours, measured).sum())
     return Claim(
         key="fig-4",
         place="Fig. 4",
         statement="The model follows the robot through the nine steps of Table 4.",
         printed="curves, not in the text we have",
-        ours=f"{close} of {len(off)} speeds within {100 * TOLERANCE:g} %",
-        verdict=judge(close == steps),
+        ours=f"{agreeing} of {len(off)} speeds within {100 * TOLERANCE:g} %",
+        verdict=judge(agreeing == steps),
         why=f"Table 1 has the same voltages for {len(off)} of the {steps} steps. There the model settles "
         f"{listed(100 * off, '+.0f')} % off. How the robot got there was not printed as numbers.",
         numbers=plain(model=ours, measured=measured, relative_error=off),

@@ -33,16 +33,16 @@ Fits = Mapping[str, OutputErrorEstimate]
 Bands = tuple[Comparison, Comparison | None]
 
 
-def render_fit(found: Identification, provenance: Mapping[str, Any]) -> str:
+def render_fit(result: Identification, provenance: Mapping[str, Any]) -> str:
     """The page of an identification by output error, as HTML."""
-    fits, validations = found.fits, found.validations
+    fits, validations = result.fits, result.validations
     with ThreadPoolExecutor(1) as pool:  # bands take many runs, which leave the interpreter to whoever draws
-        banded = {group: pool.submit(_with_bands, fits, group, each) for group, each in validations.items()}
-        return _page(found, fits, validations, banded, provenance)
+        banded = {group: pool.submit(_with_bands, fits, group, validation) for group, validation in validations.items()}
+        return _page(result, fits, validations, banded, provenance)
 
 
 def _page(
-    found: Identification,
+    result: Identification,
     fits: Fits,
     validations: Mapping[str, Validation],
     banded: Mapping[str, Future[Bands]],
@@ -51,16 +51,16 @@ def _page(
     """All of it. banded: group -> its comparisons with the band of the model, which are on their way."""
     first = next(iter(fits.values()))
     robot = first.robot.name
-    made = (
+    method_words = (
         f"Numbers of {robot} for which the model, run freely under the logged inputs, comes nearest to all that was "
         f"measured: {first.method}. Data: {'; '.join(f.data for f in fits.values())}."
     )
-    between = [section("differences", "Between the groups", difference_table(found.differences))]
+    between = [section("differences", "Between the groups", difference_table(result.differences))]
     friction = draw_estimates(fits, driven=_driven(fits, validations))
     travelled = _paths(fits, validations)
     unchecked = paragraph("The logs are too long to be checked on the way: see omnidyn check.")
-    checked = content(verdict_table(found.verdicts)) if found.verdicts else unchecked
-    warnings, advice = list(dict.fromkeys(_warnings(fits, validations))), list(dict.fromkeys(found.advice))
+    checked = content(verdict_table(result.verdicts)) if result.verdicts else unchecked
+    warnings, advice = list(dict.fromkeys(_warnings(fits, validations))), list(dict.fromkeys(result.advice))
     residuals = "".join(_residuals(g, fits[g], v) for g, v in validations.items())
     climbed = _ladder(next(iter(fits.values())))  # all groups have the same
     numbers = _each(fits, lambda group, fit: content(*filter(None, (number_table(fit), fit.alone_table()))))
@@ -77,18 +77,27 @@ def _page(
         Section("stability", "Whether the numbers are the same throughout the logs", _each(fits, _stability)),
         Section("residuals", "Residuals", residuals),
         Section("correlation", "What cannot be told apart", "".join(_correlations(fits))),
-        Section("numbers", "All numbers, with standard errors", paragraph(made) + numbers),
-        *(between if found.differences else []),
-        Section("scores", "How near the model comes", _each(validations, lambda group, each: content(each.table()))),
+        Section("numbers", "All numbers, with standard errors", paragraph(method_words) + numbers),
+        *(between if result.differences else []),
+        Section(
+            "scores",
+            "How near the model comes",
+            _each(validations, lambda group, validation: content(validation.table())),
+        ),
         Section("data", "The logs, and what check says of them", checked),
     ]
     runs = Section("runs", "Measured and model", _each(banded, _runs))  # the last to be drawn: bands take longest
     sections.insert(2, runs)
     group, fit = next(iter(fits.items()))
     screen = beside(content(short_table(fit)), _first_overlay(group, banded))
-    more = f"Verdict in full: {found.verdict}" if found.verdict != found.headline else ""
+    full_verdict = f"Verdict in full: {result.verdict}" if result.verdict != result.headline else ""
     return page(
-        f"{robot}: identified from whole logs", more, sections, provenance, verdict=found.headline, screen=screen
+        f"{robot}: identified from whole logs",
+        full_verdict,
+        sections,
+        provenance,
+        verdict=result.headline,
+        screen=screen,
     )
 
 
@@ -96,8 +105,10 @@ def _first_overlay(group: str, banded: Mapping[str, Future[Bands]]) -> str:
     """Model and measurement of the first log held out, or fitted where none was; nothing where none was compared."""
     if group not in banded:
         return ""
-    fitted, held_out = banded[group].result()
-    return figure(_renamed(draw_overlay(held_out or fitted), "overlay-first", "held out" if held_out else "fitted"))
+    fit_comparison, held_out = banded[group].result()
+    return figure(
+        _renamed(draw_overlay(held_out or fit_comparison), "overlay-first", "held out" if held_out else "fitted")
+    )
 
 
 def _named(group: str, words: object, fits: Mapping[str, Any]) -> str:
@@ -105,21 +116,21 @@ def _named(group: str, words: object, fits: Mapping[str, Any]) -> str:
 
 
 def _findings(fits: Fits, validations: Mapping[str, Validation]) -> list[str]:
-    found = [_named(group, each.statement(), fits) for group, each in validations.items()]
+    findings = [_named(group, validation.statement(), fits) for group, validation in validations.items()]
     for group, fit in fits.items():
         for words, name, value, _, interval, unit, mark in number_table(fit).rows:
             if name in fit.nuisances:
                 continue  # of the log, not of the robot: they stand in the table
             plain = f"{words}, " if words else ""
-            known = f" = {value} {unit}".rstrip() + f", 95 % {interval}" if interval else ""
-            found.append(_named(group, f"{plain}{name}{known}{f' ({mark})' if mark else ''}", fits))
-    return found
+            value_words = f" = {value} {unit}".rstrip() + f", 95 % {interval}" if interval else ""
+            findings.append(_named(group, f"{plain}{name}{value_words}{f' ({mark})' if mark else ''}", fits))
+    return findings
 
 
 def _each(parts: Mapping[str, Any], content: Callable[[str, Any], str]) -> str:
     if len(parts) == 1:
-        return "".join(content("", each) for each in parts.values())
-    return "".join(paragraph(f"{group}:") + content(group, each) for group, each in parts.items())
+        return "".join(content("", part) for part in parts.values())
+    return "".join(paragraph(f"{group}:") + content(group, part) for group, part in parts.items())
 
 
 def _with_bands(fits: Fits, group: str, validation: Validation) -> Bands:
@@ -130,8 +141,8 @@ def _with_bands(fits: Fits, group: str, validation: Validation) -> Bands:
 
 
 def _runs(group: str, banded: Future[Bands]) -> str:
-    fitted, held_out = banded.result()
-    pictures = [_renamed(draw_overlay(fitted), f"overlay-fitted{group}", "on a log it was fitted to")]
+    fit_comparison, held_out = banded.result()
+    pictures = [_renamed(draw_overlay(fit_comparison), f"overlay-fitted{group}", "on a log it was fitted to")]
     if held_out is not None:
         pictures.append(_renamed(draw_overlay(held_out), f"overlay-held-out{group}", "on a log held out"))
     return content(*pictures)
@@ -142,8 +153,8 @@ def _misfit(group: str, fit: OutputErrorEstimate) -> str:
     lack = fit.lack_of_fit
     if lack is None or fit.not_followed:
         return paragraph("Not looked for: the fit was cut short, or the model does not follow the logs at all.")
-    drawn = [draw_misfit(lack.pictures, _anchor(f"misfit-in-bins{group}"))] if lack.pictures else []
-    return content(Points(lack.statements()), *drawn, *([lack.table()] if lack.remedies else []))
+    pictures = [draw_misfit(lack.pictures, _anchor(f"misfit-in-bins{group}"))] if lack.pictures else []
+    return content(Points(lack.statements()), *pictures, *([lack.table()] if lack.remedies else []))
 
 
 def _ladder(fit: OutputErrorEstimate) -> str:
@@ -171,8 +182,8 @@ def _measured(validations: Mapping[str, Validation]) -> list[tuple[str, Run]]:
     """(group, run) of every run that was compared, fitted or held out."""
     return [
         (group, run)
-        for group, each in validations.items()
-        for comparison in (each.fitted, each.held_out)
+        for group, validation in validations.items()
+        for comparison in (validation.fitted, validation.held_out)
         if comparison is not None
         for run in comparison.measured
     ]
@@ -184,12 +195,12 @@ def _driven(fits: Fits, validations: Mapping[str, Validation]) -> list[tuple[flo
 
 
 def _paths(fits: Fits, validations: Mapping[str, Validation]) -> list[BodyPath]:
-    every = (path_of(run, fits[group].robot) for group, run in _measured(validations))
-    return [path for path in every if path is not None]
+    all_paths = (path_of(run, fits[group].robot) for group, run in _measured(validations))
+    return [path for path in all_paths if path is not None]
 
 
-def _renamed(drawn: Picture, name: str, words: str) -> Picture:
-    return replace(drawn, name=_anchor(name), title=f"{drawn.title}, {words}")
+def _renamed(drawing: Picture, name: str, words: str) -> Picture:
+    return replace(drawing, name=_anchor(name), title=f"{drawing.title}, {words}")
 
 
 def _anchor(name: str) -> str:
@@ -200,11 +211,11 @@ def _residuals(group: str, fit: OutputErrorEstimate, validation: Validation) -> 
     logs = [("fitted", validation.fitted, ", logs it was fitted to")]
     if validation.held_out is not None:
         logs.append(("held-out", validation.held_out, ", logs held out"))
-    found = []
-    for which, comparison, words in logs:
-        noise = _noise(fit, validation.scores[FITTED if which == "fitted" else HELD_OUT], comparison)
-        found.append(figure(draw_residuals(comparison, noise, _anchor(f"residuals-{which}{group}"), words)))
-    return "".join(found)
+    figures = []
+    for role, comparison, words in logs:
+        noise = _noise(fit, validation.scores[FITTED if role == "fitted" else HELD_OUT], comparison)
+        figures.append(figure(draw_residuals(comparison, noise, _anchor(f"residuals-{role}{group}"), words)))
+    return "".join(figures)
 
 
 def _noise(fit: OutputErrorEstimate, scores: Mapping[str, Score], comparison: Comparison) -> dict[str, float]:
@@ -213,32 +224,32 @@ def _noise(fit: OutputErrorEstimate, scores: Mapping[str, Score], comparison: Co
     Of a counted angle the noise of the fit is that before its encoder rounds: rounding adds to it, and chi2 of the
     score, which allows for both, says how much.
     """
-    found = {}
+    noise = {}
     for key in comparison.channels:
         name, score = output_name(key), scores.get(key)
         if name not in fit.noise:
             continue
-        found[key] = fit.noise[name]
+        noise[key] = fit.noise[name]
         if score is not None and score.chi2 and component_channel(key) == "wheel_angle":
-            found[key] = math.sqrt(float(np.mean(residuals_of(comparison, key) ** 2)) / score.chi2)
-    return found
+            noise[key] = math.sqrt(float(np.mean(residuals_of(comparison, key) ** 2)) / score.chi2)
+    return noise
 
 
 def _correlations(fits: Fits) -> list[str]:
-    found = []
+    blocks = []
     for group, fit in fits.items():
-        drawn = draw_correlation(fit.correlation)
-        title = _named(group, drawn.title, fits)
-        found.append(figure(replace(drawn, name=_anchor(f"correlation{group}"), title=title)))
-        lost = [f"{name} is not identifiable from these logs" for name in fit.unidentifiable]
-        found.append(bullets([_named(group, words, fits) for words in [*lost, *fit.blind]]))
-    return found
+        drawing = draw_correlation(fit.correlation)
+        title = _named(group, drawing.title, fits)
+        blocks.append(figure(replace(drawing, name=_anchor(f"correlation{group}"), title=title)))
+        remarks = [f"{name} is not identifiable from these logs" for name in fit.unidentifiable]
+        blocks.append(bullets([_named(group, words, fits) for words in [*remarks, *fit.blind]]))
+    return blocks
 
 
 def _warnings(fits: Fits, validations: Mapping[str, Validation]) -> list[str]:
-    words = [_named(group, each, fits) for group, fit in fits.items() for each in map(str, fit.warnings)]
-    for each in validations.values():
-        for comparison in (each.fitted, each.held_out):
+    words = [_named(group, warning, fits) for group, fit in fits.items() for warning in map(str, fit.warnings)]
+    for validation in validations.values():
+        for comparison in (validation.fitted, validation.held_out):
             words += map(str, comparison.warnings) if comparison is not None else ()
     return words
 
@@ -254,10 +265,10 @@ def draw_misfit(pictures: Sequence[Binned], name: str = "misfit") -> Picture:
         figure = new_figure(WIDTH, HEIGHT)
         figure.subplots(2, 2, squeeze=False, sharey=True)
         figure.subplots_adjust(left=0.11, right=0.975, top=0.95, bottom=0.12, hspace=0.42, wspace=0.1)
-        for panel, each in zip(figure.axes, pictures, strict=False):
+        for panel, binned in zip(figure.axes, pictures, strict=False):
             panel.axhline(0.0, color=GREY, linewidth=0.8)
-            panel.errorbar(each.at, each.mean, each.error, color=BLUE, marker="o", markersize=4.0, linewidth=1.2)
-            panel.set_xlabel(each.against)
+            panel.errorbar(binned.at, binned.mean, binned.error, color=BLUE, marker="o", markersize=4.0, linewidth=1.2)
+            panel.set_xlabel(binned.against)
             thin_out(panel, y=4)
         for panel in figure.axes[len(pictures) :]:
             panel.set_visible(False)

@@ -23,7 +23,7 @@ from omnidyn.report.style import (
 from omnidyn.simulation.friction_study import FrictionStudy
 
 COLOURS, LINES = (BLUE, VERMILLION, GREEN, PURPLE, GREY), ("-", "--", "-.", (0, (1, 1)), (0, (4, 1, 1, 1)))
-NEAR = 0.15  # of the top speed: the part of a curve that is shown
+SLOW_SHARE = 0.15  # of the top speed: the part of a curve that is shown
 
 
 def draw_friction(studies: Mapping[str, FrictionStudy], axis: int = 0) -> Picture:
@@ -31,18 +31,18 @@ def draw_friction(studies: Mapping[str, FrictionStudy], axis: int = 0) -> Pictur
     with look():
         figure, panels = axis_panels(4.1, top=0.9, bottom=0.27)
         for (name, study), colour, line in zip(studies.items(), COLOURS, LINES, strict=False):
-            own = study.axes[axis]
-            near = np.abs(own.speed) <= NEAR * own.speed.max()
-            for k, side in enumerate((own.speed < 0.0, own.speed > 0.0)):
-                shown, label = near & side, name if k == 0 else None
-                panels[0].plot(own.speed[shown], own.force[shown], color=colour, linestyle=line, label=label)
-            panels[0].plot([0.0, 0.0], [-own.holds[1], own.holds[0]], color=colour, linestyle=line)
+            curves = study.axes[axis]
+            slow = np.abs(curves.speed) <= SLOW_SHARE * curves.speed.max()
+            for k, side in enumerate((curves.speed < 0.0, curves.speed > 0.0)):
+                rows, label = slow & side, name if k == 0 else None
+                panels[0].plot(curves.speed[rows], curves.force[rows], color=colour, linestyle=line, label=label)
+            panels[0].plot([0.0, 0.0], [-curves.holds[1], curves.holds[0]], color=colour, linestyle=line)
             milli = 1e3
-            if own.bends > 0.0:
-                panels[1].plot(own.way * milli, own.loop, color=colour, linestyle=line)
+            if curves.bends > 0.0:
+                panels[1].plot(curves.way * milli, curves.loop, color=colour, linestyle=line)
             else:
-                panels[1].plot([0.0, 0.0], [-own.holds[1], own.holds[0]], color=colour, linestyle=line)
-            panels[2].plot(own.rate, own.breakaway, color=colour, linestyle=line, marker=".")
+                panels[1].plot([0.0, 0.0], [-curves.holds[1], curves.holds[0]], color=colour, linestyle=line)
+            panels[2].plot(curves.rate, curves.breakaway, color=colour, linestyle=line, marker=".")
         unit = next(iter(studies.values())).axes[axis].unit
         speed, way = ("rad/s", "mrad") if unit == "N m" else ("m/s", "mm")
         for panel, title, below in zip(
@@ -60,9 +60,9 @@ def draw_friction(studies: Mapping[str, FrictionStudy], axis: int = 0) -> Pictur
             thin_out(panel, 3, 6)
         handles, names = panels[0].get_legend_handles_labels()
         figure.legend(handles, names, loc="lower left", bbox_to_anchor=(0.065, 0.0), ncols=3, columnspacing=1.5)
-        where = ("along x", "along y", "about yaw")[axis]
+        along = ("along x", "along y", "about yaw")[axis]
         words = (
-            f"Friction {where}: in motion (left; at speed 0 anything up to the vertical line), on a slow way there and "
+            f"Friction {along}: in motion (left; at speed 0 anything up to the vertical line), on a slow way there and "
             "back (middle; a vertical line holds without moving), and the most that resists a force that rises so "
             "fast (right)."
         )

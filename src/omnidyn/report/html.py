@@ -64,20 +64,21 @@ def page(
 
     provenance: version ("omnidyn"), "command" and "inputs" (role, name, sha256); it is the last section.
     """
-    every = [*sections, Section("made", "How this was made", provenance_table(provenance))]
-    links = "".join(f'<a href="#{escaped(each.key)}">{escaped(each.title)}</a>' for each in every)
+    all_sections = [*sections, Section("made", "How this was made", provenance_table(provenance))]
+    links = "".join(f'<a href="#{escaped(part.key)}">{escaped(part.title)}</a>' for part in all_sections)
     first = f"<p><strong>{escaped(verdict)}</strong></p>" if verdict else ""
     words = f"<p>{escaped(introduction)}</p>" if introduction else ""
     head = f"<header><h1>{escaped(title)}</h1>{first}{screen}{words}{lead}<nav>{links}</nav></header>"
     parts = (
-        f'<section id="{escaped(each.key)}"><h2>{escaped(each.title)}</h2>{each.content}</section>' for each in every
+        f'<section id="{escaped(part.key)}"><h2>{escaped(part.title)}</h2>{part.content}</section>'
+        for part in all_sections
     )
     return _document(title, head + "".join(parts))
 
 
 def _document(title: str, body: str) -> str:
-    allowed = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
-    policy = f"default-src 'none'; img-src data:; style-src 'sha256-{allowed}'; base-uri 'none'; form-action 'none'"
+    style_hash = base64.b64encode(hashlib.sha256(STYLE.encode()).digest()).decode()
+    policy = f"default-src 'none'; img-src data:; style-src 'sha256-{style_hash}'; base-uri 'none'; form-action 'none'"
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
@@ -107,7 +108,7 @@ def _cell(text: str) -> str:
 
 def bullets(words: Sequence[str]) -> str:
     """A list of sentences; nothing where there are none."""
-    return f"<ul>{''.join(f'<li>{escaped(each)}</li>' for each in words)}</ul>" if words else ""
+    return f"<ul>{''.join(f'<li>{escaped(sentence)}</li>' for sentence in words)}</ul>" if words else ""
 
 
 def paragraph(words: str) -> str:
@@ -132,7 +133,7 @@ SHOWN_INPUTS = 20
 def provenance_table(provenance: Mapping[str, Any]) -> str:
     """Version, command and inputs with their hashes; many logs of one folder fold up."""
     rows = [("omnidyn", provenance["omnidyn"]), ("command", provenance["command"])]
-    inputs = [(each["role"], f"{each['name']}, sha256 {each['sha256']}") for each in provenance["inputs"]]
+    inputs = [(source["role"], f"{source['name']}, sha256 {source['sha256']}") for source in provenance["inputs"]]
     if len(inputs) <= SHOWN_INPUTS:
         return _made([*rows, *inputs])
     return _made(rows) + f"<details><summary>{len(inputs)} inputs with their hashes</summary>{_made(inputs)}</details>"

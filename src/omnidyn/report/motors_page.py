@@ -23,19 +23,19 @@ FREE_RUNS = (
 
 def render_motors(study: MotorStudy, provenance: Mapping[str, Any]) -> str:
     """The page of the motors, as HTML."""
-    told = study.document()
+    document = study.document()
     windows = study.windows or study.drawn
     pictures = [] if windows is None else [draw_motor_lines(study.motors, windows, study.starts, study.curves)]
     sections = [
-        section("warnings", "Warnings", told["warnings"], none="None."),
-        *([section("next", "What to mend", told["next"])] if study.advice else []),
+        section("warnings", "Warnings", document["warnings"], none="None."),
+        *([section("next", "What to mend", document["next"])] if study.advice else []),
         *([section("figures", "What each motor needs", *pictures)] if pictures else []),
-        section("findings", "What the data say", told["statements"]),
-        *([section("starts", "Where each direction starts", told["starts"])] if study.starts else []),
-        *([section("curves", "Where speed is no line of the input", told["curves"])] if study.curves else []),
-        section("numbers", "Numbers, with 95 % intervals", told["motors"]),
+        section("findings", "What the data say", document["statements"]),
+        *([section("starts", "Where each direction starts", document["starts"])] if study.starts else []),
+        *([section("curves", "Where speed is no line of the input", document["curves"])] if study.curves else []),
+        section("numbers", "Numbers, with 95 % intervals", document["motors"]),
     ]
     if study.verdicts:
         sections += [section("logs", "What check says of the logs", verdict_table(study.verdicts))]
-    how = WINDOWS if study.windows is not None else FREE_RUNS
-    return page("Motors from logs", how, sections, provenance, verdict=told.verdict_text)
+    introduction = WINDOWS if study.windows is not None else FREE_RUNS
+    return page("Motors from logs", introduction, sections, provenance, verdict=document.verdict_text)

@@ -23,7 +23,7 @@ SIGNS = {
 }
 
 # Which pictures stand beside the claims of which subject.
-BESIDE = {
+PICTURES_OF = {
     "Frames and wheels": ("fig1_robot",),
     "Friction, Table 2": ("fig3_friction",),
     "Steady speeds, Table 1": ("fig2_traces",),
@@ -41,10 +41,10 @@ def render_page(
     """
     subjects = dict.fromkeys(claim.subject for claim in claims)
     sections = [_subject(subject, claims, pictures) for subject in subjects]
-    beside = {name for subject in subjects for name in BESIDE.get(subject, ())}
-    others = [each for each in pictures if each.name not in beside]
-    more = [Section("figures", "Figures", "".join(map(figure, others)))] if others else []
-    return page(title, introduction, [*sections, *more], provenance, lead=_lead(claims))
+    placed_pictures = {name for subject in subjects for name in PICTURES_OF.get(subject, ())}
+    rest_pictures = [picture for picture in pictures if picture.name not in placed_pictures]
+    rest_sections = [Section("figures", "Figures", "".join(map(figure, rest_pictures)))] if rest_pictures else []
+    return page(title, introduction, [*sections, *rest_sections], provenance, lead=_lead(claims))
 
 
 def _lead(claims: Sequence[Claim]) -> str:
@@ -53,8 +53,8 @@ def _lead(claims: Sequence[Claim]) -> str:
         lines = headlines(claims)
     except KeyError:  # some claims only
         lines = []
-    told = f'<ol class="lines">{"".join(f"<li>{formula(line)}</li>" for line in lines)}</ol>' if lines else ""
-    return f'{told}{_counts(claims)}<p class="rule">{escaped(RULE)}</p>'
+    line_list = f'<ol class="lines">{"".join(f"<li>{formula(line)}</li>" for line in lines)}</ol>' if lines else ""
+    return f'{line_list}{_counts(claims)}<p class="rule">{escaped(RULE)}</p>'
 
 
 def _counts(claims: Sequence[Claim]) -> str:
@@ -65,13 +65,13 @@ def _counts(claims: Sequence[Claim]) -> str:
 
 def _subject(subject: str, claims: Sequence[Claim], pictures: Sequence[Picture]) -> Section:
     """Pictures, then the claims that were judged, then those that were not."""
-    own = [claim for claim in claims if claim.subject == subject]
-    shown = [figure(each) for name in BESIDE.get(subject, ()) for each in pictures if each.name == name]
-    judged = [claim for claim in own if claim.verdict.judged]
-    apart = [claim for claim in own if not claim.verdict.judged]
+    own_claims = [claim for claim in claims if claim.subject == subject]
+    figures = [figure(picture) for name in PICTURES_OF.get(subject, ()) for picture in pictures if picture.name == name]
+    judged = [claim for claim in own_claims if claim.verdict.judged]
+    apart = [claim for claim in own_claims if not claim.verdict.judged]
     rest = f"<h3>Nothing to judge</h3>{_table(apart)}" if apart else ""
     key = "".join(c if c.isalnum() else "-" for c in subject.lower()) or "claims"
-    return Section(key, subject or "Claims", "".join(shown) + (_table(judged) if judged else "") + rest)
+    return Section(key, subject or "Claims", "".join(figures) + (_table(judged) if judged else "") + rest)
 
 
 def _badge(verdict: ClaimVerdict) -> str:
@@ -113,7 +113,7 @@ PLAIN_SIGNS = {"&lt;=": "≤", "&gt;=": "≥", "+-": "±"}
 _RULES = (
     (r"sqrt\((\d+)\)", r"√\1"),
     (r"d\((\w+)\)/dt", r"d\1/dt"),
-    (r"(?:\b|(?<=\bd))(theta|xi|delta|omega)(?:\b|(?=/dt))", lambda found: GREEK[found[1]]),
+    (r"(?:\b|(?<=\bd))(theta|xi|delta|omega)(?:\b|(?=/dt))", lambda match: GREEK[match[1]]),
     (r"(?<![\w&])([A-Za-z])_([A-Za-z0-9]+)\b", r"<i>\1</i><sub>\2</sub>"),
     (r"\b([wr])([123])\b", r"<i>\1</i><sub>\2</sub>"),
     (r"(?<=[A-Za-z0-9)])\^(-?\w+)", r"<sup>\1</sup>"),
@@ -127,9 +127,9 @@ _RULES = (
 
 def formula(text: str) -> str:
     """The text as HTML: K_t, r1, l^2, sqrt(3) and theta as one writes them by hand; every other text as it stands."""
-    shown = escaped(text)
-    for sign, meant in PLAIN_SIGNS.items():
-        shown = shown.replace(sign, meant)
-    for pattern, meant in _RULES:
-        shown = re.sub(pattern, meant, shown)
-    return shown
+    html = escaped(text)
+    for sign, replacement in PLAIN_SIGNS.items():
+        html = html.replace(sign, replacement)
+    for pattern, replacement in _RULES:
+        html = re.sub(pattern, replacement, html)
+    return html

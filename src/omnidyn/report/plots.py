@@ -24,7 +24,7 @@ from omnidyn.model.sliding import top_speeds
 from omnidyn.report.drift_picture import draw_drift
 from omnidyn.report.figures.channels import draw_run
 from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
-from omnidyn.report.figures.friction_speed import WHOLE, draw_estimates, draw_friction_speed, speeds_up_to
+from omnidyn.report.figures.friction_speed import ONLY_GROUP, draw_estimates, draw_friction_speed, speeds_up_to
 from omnidyn.report.figures.motor_lines import draw_motor_lines
 from omnidyn.report.figures.overlay import draw_overlay
 from omnidyn.report.figures.path import draw_path
@@ -38,9 +38,9 @@ from omnidyn.run import Run
 
 def plot(result: Any, **options: Any) -> Figure:
     """The figure of a result; its title and caption are those of the page. Raises InputError for wrong options."""
-    drawn = next(draw(result, **options) for kind, draw in PICTURES.items() if isinstance(result, kind))
-    drawn.figure.set_label(drawn.title)
-    return drawn.figure
+    picture = next(draw(result, **options) for kind, draw in PICTURES.items() if isinstance(result, kind))
+    picture.figure.set_label(picture.title)
+    return picture.figure
 
 
 def _robot(robot: Robot, what: str) -> Picture:
@@ -98,8 +98,8 @@ PICTURES: dict[type, Callable[..., Picture]] = {
     Verdict: _verdict,
     Comparison: draw_overlay,
     Drift: draw_drift,
-    Estimate: lambda estimate: draw_estimates({WHOLE: estimate}),
-    Identification: lambda found: draw_estimates(found.groups) if found.groups else _motors(found.study),
+    Estimate: lambda estimate: draw_estimates({ONLY_GROUP: estimate}),
+    Identification: lambda result: draw_estimates(result.groups) if result.groups else _motors(result.study),
     MotorStudy: _motors,
     SteadyStudy: draw_polar,
     Tracking: draw_tracking,

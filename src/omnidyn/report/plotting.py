@@ -9,12 +9,12 @@ from __future__ import annotations
 import contextlib
 import os
 
-_asked = os.environ.pop("MPLBACKEND", None)
+_backend = os.environ.pop("MPLBACKEND", None)
 try:
     import matplotlib
 finally:
-    if _asked is not None:
-        os.environ["MPLBACKEND"] = _asked
-if _asked:
+    if _backend is not None:
+        os.environ["MPLBACKEND"] = _backend
+if _backend:
     with contextlib.suppress(ValueError):
-        matplotlib.rcParams["backend"] = _asked
+        matplotlib.rcParams["backend"] = _backend

@@ -23,22 +23,22 @@ def render_study(
 ) -> str:
     """The page of a steady-state study, as HTML. verdict: what it came to; "" is the study's own word. verdicts: of
     `check` on each log."""
-    points, told = study.points, study.document()
+    points, document = study.points, study.document()
     introduction = (
         f"Friction of {study.robot.name} from stretches of constant speed: there it balances what the motors push. "
         f"Forces are from {FORCES[points.force_from]}; the motion is the {SPEEDS[points.speed_from]}."
     )
     errors, *pictures = shape_pictures(study)
     sections = [
-        section("warnings", "Warnings", told.joined("warnings", "warnings of fits"), none="None."),
-        section("next", "What to measure next", told["next"], none="Nothing: every number is well determined."),
+        section("warnings", "Warnings", document.joined("warnings", "warnings of fits"), none="None."),
+        section("next", "What to measure next", document["next"], none="Nothing: every number is well determined."),
         section("forces", "Forces", *pictures),
         section("friction", "Friction against speed", draw_estimates(study.estimates, driven=driven([points.twist]))),
-        section("findings", "What the data say", told["statements"]),
-        section("shapes", "Which shape", errors, told["shapes"]),
-        section("levels", "Friction, with 95 % intervals", told["levels"]),
-        dead_zone_section({group: each.robot for group, each in study.estimates.items()}),
-        section("data", "What was used", told["travel"]),
+        section("findings", "What the data say", document["statements"]),
+        section("shapes", "Which shape", errors, document["shapes"]),
+        section("levels", "Friction, with 95 % intervals", document["levels"]),
+        dead_zone_section({group: estimate.robot for group, estimate in study.estimates.items()}),
+        section("data", "What was used", document["travel"]),
     ]
     sections += [section("logs", "What check says of the logs", verdict_table(verdicts))] if verdicts else []
     title = f"{study.robot.name}: friction from logs"
@@ -47,5 +47,5 @@ def render_study(
         introduction,
         sections,
         provenance,
-        verdict=verdict or " ".join(sentence(str(each)) for each in steady_verdict(study)),
+        verdict=verdict or " ".join(sentence(str(estimate)) for estimate in steady_verdict(study)),
     )

@@ -104,7 +104,7 @@ def look() -> Iterator[None]:
         yield
 
 
-class Shown(Figure):
+class NotebookFigure(Figure):
     """A Figure that a notebook shows without pyplot."""
 
     def _repr_png_(self) -> bytes:
@@ -113,7 +113,7 @@ class Shown(Figure):
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure [inch], drawn by Agg."""
-    figure = Shown(figsize=(width, height), facecolor="white")
+    figure = NotebookFigure(figsize=(width, height), facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 
@@ -139,10 +139,10 @@ def axis_panels(height: float, top: float, bottom: float) -> tuple[Figure, Seque
     return figure, panels
 
 
-def dress_panel(axes: Axes, title: str, across: str, end: float, steps: int = 6, pad: float | None = None) -> None:
-    """Words, range and ticks of such a panel: `across` runs from 0 to `end`."""
+def dress_panel(axes: Axes, title: str, label: str, end: float, steps: int = 6, pad: float | None = None) -> None:
+    """Words, range and ticks of such a panel: `label` runs from 0 to `end`."""
     axes.set_title(title, pad=pad)
-    axes.set_xlabel(across)
+    axes.set_xlabel(label)
     axes.set_xlim(0.0, end)
     thin_out(axes, 4, steps)
 
@@ -155,12 +155,12 @@ def thin_out(axes: Axes, x: int | None = None, y: int | None = None) -> None:
         axes.locator_params(axis="y", nbins=y)
 
 
-def log_scale(axes: Axes, which: str) -> None:
+def log_scale(axes: Axes, axis_name: str) -> None:
     """A logarithmic "x" or "y" with plain labels: those of matplotlib are formulas, which no text here is read as."""
-    axes.set(**{f"{which}scale": "log"})
-    own = axes.xaxis if which == "x" else axes.yaxis
-    own.set_major_formatter(lambda value, _: f"{value:g}")
-    own.set_minor_formatter(NullFormatter())
+    axes.set(**{f"{axis_name}scale": "log"})
+    axis_object = axes.xaxis if axis_name == "x" else axes.yaxis
+    axis_object.set_major_formatter(lambda value, _: f"{value:g}")
+    axis_object.set_minor_formatter(NullFormatter())
 
 
 def axis_title(axis: str) -> str:
@@ -182,7 +182,7 @@ def around_robot(axes: PolarAxes, top: float, ways: Mapping[float, str] = FOUR_W
     axes.set_thetagrids(list(ways), list(ways.values()), fontsize=10.0)
     axes.set_ylim(0.0, room * top)
     ticks = MaxNLocator(4, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, room * top)
-    axes.set_rgrids([each for each in ticks if 0.0 < each <= room * top], angle=-112.5, fontsize=9.5, color=INK)
+    axes.set_rgrids([tick for tick in ticks if 0.0 < tick <= room * top], angle=-112.5, fontsize=9.5, color=INK)
     for label in axes.get_yticklabels():
         label.set(bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8, "alpha": 0.85}, ha="center", va="center")
     axes.spines["polar"].set_visible(True)
@@ -190,7 +190,7 @@ def around_robot(axes: PolarAxes, top: float, ways: Mapping[float, str] = FOUR_W
     axes.grid(color=GREY, alpha=0.35)
 
 
-def note(axes: Axes, x: float, y: float, words: str, **how) -> None:
+def note(axes: Axes, x: float, y: float, words: str, **options) -> None:
     """Words at a place in the data, on a white ground that keeps lines away from them."""
     ground = {"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85}
-    axes.text(x, y, words, **{"fontsize": 10.0, "bbox": ground, **how})
+    axes.text(x, y, words, **{"fontsize": 10.0, "bbox": ground, **options})

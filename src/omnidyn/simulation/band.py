@@ -12,13 +12,13 @@ from scipy.special import ndtri
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import one_by_one
-from omnidyn.model.known.uncertainty import DRAWS, Ends, first_order_std, plausible
+from omnidyn.model.known.uncertainty import DRAWS, QuantileTails, first_order_std, plausible
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 
 COMMANDED = ("duty", "wheel_speed_command", "twist_command", "supply")  # the same for every robot
-WIDTH = float(ndtri(0.975))  # half of a 95 % interval, in std of a normal
+HALF_WIDTH = float(ndtri(0.975))  # half of a 95 % interval, in std of a normal
 
 
 class Band(NamedTuple):
@@ -44,15 +44,23 @@ def confidence_band(
 ) -> Band:
     """The band of `simulate(robot, voltage, dt, **options)`: the same run by so many plausible robots.
 
+    Args:
+        robot: A robot whose file has std.
+        voltage: As in `simulate` [V], shape (n, wheels).
+        dt: Length of the rows [s], a number or shape (n,).
+        draws: Number of plausible robots.
+        seed: Of the draws.
+        options: Other arguments of `simulate`.
+
     Raises InsufficientDataError where no number of the robot has a std, and what `simulate` raises.
     """
     check_order("confidence_band(robot, voltage, dt)", (robot, Robot), (voltage, object))
-    return band_of(plausible(robot, draws, seed), lambda each: simulate(each, voltage, dt, **options))
+    return band_of(plausible(robot, draws, seed), lambda candidate: simulate(candidate, voltage, dt, **options))
 
 
 def band_of(robots: Sequence[Robot], run_of: Callable[[Robot], Run]) -> Band:
     """The band over the runs of some robots, all at the same times. The kernels let other threads run."""
-    first, ends = run_of(robots[0]), Ends(len(robots))
+    first, ends = run_of(robots[0]), QuantileTails(len(robots))
     ends.add(_predicted(first))
     for run in one_by_one(run_of, robots[1:]):
         ends.add(_predicted(run))
@@ -66,7 +74,7 @@ def first_order_band(robot: Robot, run: Run, run_of: Callable[[Robot], Run]) -> 
     run_of: what robots beside it do, at the same times; their runs may be coarse, for only their differences count.
     What is about to move, or to stop, has no slope: where it rests, the band has no width.
     """
-    half = WIDTH * first_order_std(robot, lambda each: _predicted(run_of(each)))
+    half = HALF_WIDTH * first_order_std(robot, lambda candidate: _predicted(run_of(candidate)))
     at = _predicted(run)
     return Band(_as_run(run, at - half, "low"), _as_run(run, at + half, "high"), 0)
 
@@ -76,10 +84,10 @@ def _predicted(run: Run) -> FloatArray:
     return np.hstack([values for name, values in run.channels.items() if name not in COMMANDED])
 
 
-def _as_run(like: Run, end: FloatArray, which: str) -> Run:
+def _as_run(like: Run, end: FloatArray, end_name: str) -> Run:
     channels, column = {}, 0
     for name, values in like.channels.items():
         if name not in COMMANDED:
             channels[name] = end[:, column : column + values.shape[1]]
             column += values.shape[1]
-    return Run(t=like.t, **channels, source=f"{like.source}, {which} end of the 95 % band")
+    return Run(t=like.t, **channels, source=f"{like.source}, {end_name} end of the 95 % band")

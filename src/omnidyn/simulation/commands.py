@@ -17,7 +17,7 @@ from omnidyn.model.wheels import per_wheel, wheel_speed
 from omnidyn.statement import WARNING, Statement
 
 MIN_DT, MAX_DT = 1e-9, 3600.0
-SAME = 1e-9  # of a tick: times that are nearer are one
+SAME_TIME = 1e-9  # of a tick: times that are nearer are one
 
 
 class Commands(NamedTuple):
@@ -50,27 +50,27 @@ def commands(
 
     Raises InputError for wrong shapes, values that are not finite, dt out of range, or a kind the drive cannot take.
     """
-    given = {
+    inputs = {
         "voltage": voltage,
         "duty": duty,
         "wheel_speed_command": wheel_speed_command,
         "twist_command": twist_command,
     }
-    named = [name for name, value in given.items() if value is not None]
-    if len(named) != 1 or dt is None:
+    given_names = [name for name, value in inputs.items() if value is not None]
+    if len(given_names) != 1 or dt is None:
         raise InputError(
             "cannot tell what to apply",
-            got=" and ".join(named) or "no command",
-            expected=f"one of {', '.join(given)}, and dt",
+            got=" and ".join(given_names) or "no command",
+            expected=f"one of {', '.join(inputs)}, and dt",
         )
-    name, width = named[0], 3 if named[0] == "twist_command" else robot.wheels.count
-    rows = as_floats(name, given[name])
+    name, width = given_names[0], 3 if given_names[0] == "twist_command" else robot.wheels.count
+    rows = as_floats(name, inputs[name])
     if rows.ndim != 2 or rows.shape[1] != width or not len(rows):
         raise InputError("wrong shape", got=rows.shape, expected=f"(n, {width}), n >= 1", where=name)
-    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
-    if bad.size:
+    bad_rows = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if bad_rows.size:
         raise InputError(
-            "not a finite number", got=rows[bad[0]].tolist(), expected="numbers", where=f"{name} row {bad[0]}"
+            "not a finite number", got=rows[bad_rows[0]].tolist(), expected="numbers", where=f"{name} row {bad_rows[0]}"
         )
     steps = _steps(dt, len(rows))
     if name == "voltage":
@@ -107,36 +107,36 @@ def _from_duty(robot: Robot, rows: FloatArray, steps: FloatArray, supply: ArrayL
     battery = np.broadcast_to(battery, (len(rows),))
     duty = np.clip(rows, -1.0, 1.0)
     applied = voltage_of_duty(duty, battery)
-    held = clip_voltage(robot.motor, applied)
+    limited = clip_voltage(robot.motor, applied)
     coasts = (duty == 0.0) if robot.drive.coasts else None
-    warnings = _clipped("duty", rows != duty) + _clipped("voltage", applied != held)
-    return Commands(steps, held, open_circuit=coasts, duty=duty, supply=battery, warnings=warnings)
+    warnings = _clipped("duty", rows != duty) + _clipped("voltage", applied != limited)
+    return Commands(steps, limited, open_circuit=coasts, duty=duty, supply=battery, warnings=warnings)
 
 
 def on_ticks(
-    robot: Robot, given: Commands, now: float = 0.0
+    robot: Robot, held_commands: Commands, now: float = 0.0
 ) -> tuple[FloatArray, FloatArray, BoolArray, NDArray[np.intp]]:
     """A speed loop's own time grid: rows that begin `now` [s] after its first tick, cut at its ticks.
 
     Returns (dt, set point, whether the loop runs at the start of the row, index where each original row begins, and
     the end). A command counts from the first tick at or after its start, as in a firmware that polls.
     """
-    assert given.set_point is not None
-    if len(given.dt) == 1:
-        return _one_on_ticks(robot, given.set_point, now, float(given.dt[0]))
-    edges = np.zeros(len(given.dt) + 1)
-    np.cumsum(given.dt, out=edges[1:])
+    assert held_commands.set_point is not None
+    if len(held_commands.dt) == 1:
+        return _one_on_ticks(robot, held_commands.set_point, now, float(held_commands.dt[0]))
+    edges = np.zeros(len(held_commands.dt) + 1)
+    np.cumsum(held_commands.dt, out=edges[1:])
     period = 1.0 / (robot.drive.rate or np.inf)
-    first, end = (math.ceil(time / period - SAME) for time in (now, now + float(edges[-1])))
+    first, end = (math.ceil(time / period - SAME_TIME) for time in (now, now + float(edges[-1])))
     ticks = np.arange(first, end) * period - now
-    near = np.minimum(np.maximum(edges.searchsorted(ticks), 1), len(edges) - 1)
-    nearest = np.where(np.abs(edges[near] - ticks) < np.abs(edges[near - 1] - ticks), near, near - 1)
-    snapped = np.where(np.abs(edges[nearest] - ticks) <= SAME * period, edges[nearest], ticks)
+    after = np.minimum(np.maximum(edges.searchsorted(ticks), 1), len(edges) - 1)
+    nearest = np.where(np.abs(edges[after] - ticks) < np.abs(edges[after - 1] - ticks), after, after - 1)
+    snapped = np.where(np.abs(edges[nearest] - ticks) <= SAME_TIME * period, edges[nearest], ticks)
     times = np.sort(np.concatenate((edges, snapped)))
     grid = times[np.concatenate(([True], times[1:] != times[:-1]))]
     keep, begins = grid.searchsorted(edges), np.zeros(len(grid), np.bool_)
     begins[grid.searchsorted(snapped)] = True
-    return np.diff(grid), given.set_point.repeat(np.diff(keep), axis=0), begins[:-1], keep
+    return np.diff(grid), held_commands.set_point.repeat(np.diff(keep), axis=0), begins[:-1], keep
 
 
 def _one_on_ticks(
@@ -144,9 +144,9 @@ def _one_on_ticks(
 ) -> tuple[FloatArray, FloatArray, BoolArray, NDArray[np.intp]]:
     """`on_ticks` of a single row, in a tenth of the time: a live robot asks for it at every step."""
     period = 1.0 / (robot.drive.rate or np.inf)
-    first, end = (math.ceil(time / period - SAME) for time in (now, now + length))
+    first, end = (math.ceil(time / period - SAME_TIME) for time in (now, now + length))
     ticks = [tick * period - now for tick in range(first, end)]
-    at_once = bool(ticks) and abs(ticks[0]) <= SAME * period
+    at_once = bool(ticks) and abs(ticks[0]) <= SAME_TIME * period
     times = [0.0, *(ticks[1:] if at_once else ticks), length]
     begins = np.ones(len(times) - 1, np.bool_)
     begins[0] = at_once
@@ -166,13 +166,13 @@ def _steps(dt: ArrayLike, count: int) -> FloatArray:
     if steps.ndim > 1 or (steps.ndim == 1 and len(steps) != count):
         raise InputError("wrong shape", got=steps.shape, expected=f"a number or ({count},)", where="dt")
     steps = np.array(np.broadcast_to(steps, (count,)))  # writable: kernels are compiled once for it
-    bad = np.flatnonzero(~((steps >= MIN_DT) & (steps <= MAX_DT)))
-    if bad.size:
+    bad_rows = np.flatnonzero(~((steps >= MIN_DT) & (steps <= MAX_DT)))
+    if bad_rows.size:
         raise InputError(
             "step out of range",
-            got=float(steps[bad[0]]),
+            got=float(steps[bad_rows[0]]),
             expected=f"{MIN_DT:g} to {MAX_DT:g} s",
-            where=f"dt row {bad[0]}",
+            where=f"dt row {bad_rows[0]}",
         )
     return steps
 
@@ -185,18 +185,18 @@ def as_floats(name: str, value: ArrayLike | None) -> FloatArray:
         raise InputError("not numbers", got=value, expected="an array of numbers", where=name) from None
 
 
-def _clipped(name: str, changed: BoolArray) -> tuple[Statement, ...]:
+def _clipped(name: str, mask: BoolArray) -> tuple[Statement, ...]:
     """The warning that values were clipped; none where nothing changed."""
-    rows = np.flatnonzero(changed.any(axis=1))
+    rows = np.flatnonzero(mask.any(axis=1))
     if not rows.size:
         return ()
-    return (Statement("clipped", WARNING, name, {"clipped": rows.size, "rows": len(changed), "first": int(rows[0])}),)
+    return (Statement("clipped", WARNING, name, {"clipped": rows.size, "rows": len(mask), "first": int(rows[0])}),)
 
 
-def current_bounds(robot: Robot, given: Commands, rows: int) -> FloatArray:
+def current_bounds(robot: Robot, held_commands: Commands, rows: int) -> FloatArray:
     """What the current of each motor may not exceed [A]: its limit, or 0 while it coasts. Shape (rows, wheels)."""
     limit = robot.motor.current_limit
     bound = np.full((rows, robot.wheels.count), np.inf if limit is None else limit, dtype=float)
-    if given.open_circuit is not None:
-        bound[given.open_circuit] = 0.0
+    if held_commands.open_circuit is not None:
+        bound[held_commands.open_circuit] = 0.0
     return bound

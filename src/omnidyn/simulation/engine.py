@@ -20,15 +20,15 @@ from omnidyn.simulation.commands import Commands, as_floats, current_bounds, on_
 from omnidyn.simulation.contract import Conditions, Engine, Motion
 from omnidyn.simulation.exact.inductance import simulate_exact_inductance
 from omnidyn.simulation.exact.march import ExactMarch, why_not_exact
-from omnidyn.simulation.implicit.march import Outcome, capped, room, run_implicit
+from omnidyn.simulation.implicit.march import Outcome, capped, march_workspace, run_implicit
 from omnidyn.simulation.slip.march import SlipOutcome, rolling, run_slipping
 from omnidyn.simulation.slip.plant import slip_plant, wheel_loads
-from omnidyn.simulation.speed_loop import Loop, loop_of, no_loop
+from omnidyn.simulation.speed_loop import LoopCommands, loop_of, no_loop
 from omnidyn.statement import WARNING, Statement
 
 TOLERANCE = 1e-6
 # Beyond these a step has no meaning and the implicit engine no end: [m/s, rad/s], [m, rad], [A].
-FARTHEST = {"twist": 1e3, "pose": 1e9, "current": 1e6}
+LARGEST_START = {"twist": 1e3, "pose": 1e9, "current": 1e6}
 
 
 def choose_engine(robot: Robot, conditions: Conditions, tol: float | None = TOLERANCE) -> Engine:
@@ -41,7 +41,7 @@ def choose_engine(robot: Robot, conditions: Conditions, tol: float | None = TOLE
     return next(engine for engine in ENGINES if engine.serves(robot, conditions))(robot, conditions, tolerance)
 
 
-class _Exact:
+class _PaperLaw:
     """What the two engines of the paper's law share."""
 
     name = "exact engine"
@@ -53,11 +53,11 @@ class _Exact:
 
 def _follows_paper(robot: Robot, conditions: Conditions) -> bool:
     """Whether a robot moves by the paper's law under voltages that are given."""
-    given = not (conditions.speed_loop or conditions.coasting or conditions.tilt)
-    return given and not why_not_exact(robot)
+    under_voltages = not (conditions.speed_loop or conditions.coasting or conditions.tilt)
+    return under_voltages and not why_not_exact(robot)
 
 
-class Exact(_Exact):
+class Exact(_PaperLaw):
     """The paper's law, currents settled. State: twist, pose."""
 
     def __init__(self, robot: Robot, conditions: Conditions, tol: float) -> None:
@@ -81,7 +81,7 @@ class Exact(_Exact):
         return Motion((twists[-1], poses[-1]), twists, poses, commands.voltage)
 
 
-class ExactInductance(_Exact):
+class ExactInductance(_PaperLaw):
     """The paper's law with winding inductance. State: twist, pose, current."""
 
     def __init__(self, robot: Robot, conditions: Conditions, tol: float) -> None:
@@ -115,13 +115,13 @@ class Stepped(NamedTuple):
     count: Any
 
 
-class _Rows(NamedTuple):
+class _SolverRows(NamedTuple):
     """Commands on the grid of the solver. first: where the rows asked for begin; keep: that, and the end."""
 
     dt: FloatArray
     voltage: FloatArray
     bound: FloatArray
-    loop: Loop
+    loop: LoopCommands
     first: Any = slice(None)
     keep: Any = slice(None)
 
@@ -140,12 +140,12 @@ class _Stepping:
     def _begin(self, motion: Any, pose: FloatArray, count: Any) -> Stepped:
         return Stepped(motion, pose, 0.0, np.zeros_like(self._loop.sum), self._loop.sum, count)
 
-    def _rows(self, state: Stepped, commands: Commands) -> _Rows:
+    def _rows(self, state: Stepped, commands: Commands) -> _SolverRows:
         """The rows to solve, their voltages yet to be filled by a speed loop: a tick cuts a row."""
         if commands.set_point is None:
             assert commands.voltage is not None
             bound = current_bounds(self._robot, commands, len(commands.dt))
-            return _Rows(commands.dt, commands.voltage.copy(), bound, self._loop)
+            return _SolverRows(commands.dt, commands.voltage.copy(), bound, self._loop)
         dt, set_point, tick, keep = on_ticks(self._robot, commands, state.now)
         voltage = np.zeros_like(set_point)
         voltage[-1] = state.asked  # a row before the first tick takes the voltage of the row before it: the last one
@@ -153,19 +153,19 @@ class _Stepping:
         bound, first = current_bounds(self._robot, commands, len(dt)), keep[:-1]
         if len(first) == 1:
             first = keep = slice(None, None, len(dt))  # a view, where indices make copies
-        return _Rows(dt, voltage, bound, loop, first, keep)
+        return _SolverRows(dt, voltage, bound, loop, first, keep)
 
-    def _after(self, state: Stepped, motion: Any, pose: FloatArray, rows: _Rows, count: Any) -> Stepped:
+    def _after(self, state: Stepped, motion: Any, pose: FloatArray, rows: _SolverRows, count: Any) -> Stepped:
         if not rows.loop.period:
             return Stepped(motion, pose, state.now, state.asked, state.total, count)
         return Stepped(motion, pose, state.now + float(rows.dt.sum()), rows.voltage[-1], rows.loop.sum, count)
 
-    def _volts(self, rows: _Rows, looped: bool) -> tuple[FloatArray, FloatArray | None]:
+    def _volts(self, rows: _SolverRows, looped: bool) -> tuple[FloatArray, FloatArray | None]:
         """(the voltages at the motors, those that a speed loop asked for) of each row."""
         if not looped:
             return rows.voltage, None
-        asked = rows.voltage[rows.first]
-        return reaching(self._robot, asked), asked
+        loop_volts = rows.voltage[rows.first]
+        return reaching(self._robot, loop_volts), loop_volts
 
 
 class Implicit(_Stepping):
@@ -180,7 +180,7 @@ class Implicit(_Stepping):
             self._plant.body.room += conditions.tilt
         if conditions.push:
             self._plant.body.push += np.array(conditions.push) / [1.0, 1.0, self._plant.body.length]
-        self._work, self._units = room(self._plant), np.array([1.0, 1.0, self._plant.body.length])
+        self._work, self._units = march_workspace(self._plant), np.array([1.0, 1.0, self._plant.body.length])
 
     @staticmethod
     def serves(robot: Robot, conditions: Conditions) -> bool:
@@ -199,9 +199,11 @@ class Implicit(_Stepping):
         )
         count = state.count[0] + capped(out), state.count[1] + len(out.iterations)
         after = self._after(state, out.state.at(-1), out.pose[-1], rows, count)
-        volts, asked = self._volts(rows, commands.set_point is not None)
-        kept = out if asked is None else out._replace(pose=out.pose[rows.keep], state=out.state.at(rows.keep))
-        return implicit_motion(self._robot, self._units, kept, volts, asked, after)
+        volts, loop_volts = self._volts(rows, commands.set_point is not None)
+        row_outcome = (
+            out if loop_volts is None else out._replace(pose=out.pose[rows.keep], state=out.state.at(rows.keep))
+        )
+        return implicit_motion(self._robot, self._units, row_outcome, volts, loop_volts, after)
 
     def statements(self, state: Stepped) -> tuple[Statement, ...]:
         """Whether the solver gave up its last digits."""
@@ -213,9 +215,9 @@ def named(kind: str, tol: float) -> str:
     return f"{kind}, tol {tol:g} m/s" if tol else f"{kind}, fixed step"
 
 
-def cap_warnings(stopped: int, rows: int) -> tuple[Statement, ...]:
+def cap_warnings(capped_rows: int, rows: int) -> tuple[Statement, ...]:
     """That the solver hit its cap in some of so many rows; nothing where it hit it in none."""
-    return (not_converged(stopped, rows),) if stopped else ()
+    return (not_converged(capped_rows, rows),) if capped_rows else ()
 
 
 def implicit_motion(
@@ -223,7 +225,7 @@ def implicit_motion(
     units: FloatArray,
     outcome: Outcome,
     voltage: FloatArray,
-    asked: FloatArray | None = None,
+    loop_volts: FloatArray | None = None,
     state: Any = None,
 ) -> Motion:
     """The Motion of an outcome of the implicit engine.
@@ -237,7 +239,7 @@ def implicit_motion(
     states, wheels = outcome.state, slice(N_AXES, N_AXES + robot.wheels.count)
     current = states.each["current"][:, wheels] if robot.motor.electrical == DYNAMIC else None
     stuck = states.each["sign"][:, wheels] == 0.0
-    return Motion(state, states.x / units, outcome.pose, voltage, asked, current, stuck=stuck)
+    return Motion(state, states.x / units, outcome.pose, voltage, loop_volts, current, stuck=stuck)
 
 
 class Slipping(_Stepping):
@@ -275,11 +277,13 @@ class Slipping(_Stepping):
         out = run_slipping(
             self._plant, rows.voltage, rows.bound, rows.dt, state.motion, state.pose, rows.loop, self._tol
         )
-        volts, asked = self._volts(rows, commands.set_point is not None)
+        volts, loop_volts = self._volts(rows, commands.set_point is not None)
         after = self._after(state, out.state[-1], out.pose[-1], rows, state.count.with_run(out))
         current = out.current[rows.keep] if robot.motor.electrical == DYNAMIC else None
         turning = out.rims[rows.keep] / robot.wheels.radii
-        return Motion(after, out.twist[rows.keep], out.pose[rows.keep], volts - self._push, asked, current, turning)
+        return Motion(
+            after, out.twist[rows.keep], out.pose[rows.keep], volts - self._push, loop_volts, current, turning
+        )
 
     def statements(self, state: Stepped) -> tuple[Statement, ...]:
         """Which wheels slipped, or left the ground."""
@@ -317,8 +321,8 @@ def as_start(name: str, value: ArrayLike, size: int) -> FloatArray:
     array = as_floats(name, value)
     if array.shape != (size,) or not np.isfinite(array).all():
         raise InputError("cannot start there", got=value, expected=f"{size} finite numbers", where=name)
-    if (np.abs(array) > FARTHEST[name]).any():
-        expected = f"{size} numbers within -{FARTHEST[name]:g} to {FARTHEST[name]:g}, in SI units"
+    if (np.abs(array) > LARGEST_START[name]).any():
+        expected = f"{size} numbers within -{LARGEST_START[name]:g} to {LARGEST_START[name]:g}, in SI units"
         raise InputError("no robot starts there", got=value, expected=expected, where=name)
     return array
 
@@ -370,6 +374,6 @@ class Grip(NamedTuple):
         return (*air, *([slip] if wheels.size else []), *capped, *lifted)
 
 
-def not_converged(stopped: int, rows: int) -> Statement:
+def not_converged(capped_rows: int, rows: int) -> Statement:
     """That the friction solver hit its cap in some rows of a run."""
-    return Statement("not_converged", WARNING, numbers={"stopped": stopped, "rows": rows})
+    return Statement("not_converged", WARNING, numbers={"stopped": capped_rows, "rows": rows})

@@ -30,8 +30,8 @@ UNITS = ("N", "N", "N m")
 POINTS = 200  # of a curve, both ways
 SLOWEST = 1e-4  # of the top speed: where a curve begins
 BENT = 4.0  # times the way a bristle bends before it slips: how far a loop goes
-RAMPS = (10.0, 1.0, 0.1, 0.01)  # [s] from no force to BEYOND times breakaway
-BEYOND, RAMP_ROWS = 1.5, 400
+RAMPS = (10.0, 1.0, 0.1, 0.01)  # [s] from no force to RAMP_END times breakaway
+RAMP_END, RAMP_ROWS = 1.5, 400
 AFTER, AFTER_ROWS = 0.2, 100  # [s] the force then stays: a bristle takes its time to give way
 
 
@@ -68,8 +68,8 @@ class FrictionStudy:
     def document(self) -> Document:
         """What it says: a table, and words."""
         head = ("axis", "law", "holds", "slides slowly", "at top speed", "bends", "breakaway, slow to fast ramp")
-        table = Table(head, [_row(each) for each in self.axes], "<<", name="axes")
-        data = {"robot": self.robot.name, "axes": [_told(each) for each in self.axes], "notes": plain(self.notes)}
+        table = Table(head, [_row(axis) for axis in self.axes], "<<", name="axes")
+        data = {"robot": self.robot.name, "axes": [_told(axis) for axis in self.axes], "notes": plain(self.notes)}
         return Document([f"friction of {self.robot.name}", "", table, "", Points(self.notes)], data)
 
 
@@ -106,18 +106,18 @@ def _parts(numbers: Plant, k: int) -> list[tuple[float, FloatArray, Any, Any]]:
 
     As a plant counts them: a torque over rho.
     """
-    found = []
+    parts = []
     for row in numbers.element:
         g = float(row.g[k])
         if g == 0.0:
             continue
         level = _slowest(row, row.stiffness > 0.0)
-        found.append((g, level if g > 0.0 else level[::-1], row, LAWS[int(row.law)]))
+        parts.append((g, level if g > 0.0 else level[::-1], row, LAWS[int(row.law)]))
     if k < 2:
         body = numbers.body
         level = _slowest(body, body.stiffness > 0.0)[k]
-        found.append((1.0, np.array([level, level]), body, LAWS[int(body.law)]))
-    return [each for each in found if each[1].any()]
+        parts.append((1.0, np.array([level, level]), body, LAWS[int(body.law)]))
+    return [part for part in parts if part[1].any()]
 
 
 def _slowest(row: Any, bends: bool) -> FloatArray:
@@ -130,30 +130,30 @@ def _slowest(row: Any, bends: bool) -> FloatArray:
 def _loop(numbers: Plant, k: int, unit: float) -> tuple[FloatArray, FloatArray, float]:
     """(way, force, the way that bristles bend before they slip) of a slow loop along axis k; empty where none bends."""
     parts = _parts(numbers, k)
-    bent = [float(level.max() / own.stiffness) / abs(g) for g, level, own, _ in parts if own.stiffness > 0.0]
+    bent = [float(level.max() / record.stiffness) / abs(g) for g, level, record, _ in parts if record.stiffness > 0.0]
     bends = max(bent, default=0.0)
     if bends == 0.0:
         return np.zeros(0), np.zeros(0), 0.0
     reach, step = BENT * bends, np.linspace(0.0, 1.0, POINTS)
     way = np.concatenate([reach * step, reach * (1.0 - 2.0 * step), reach * (2.0 * step - 1.0)])
     force = np.zeros(len(way))
-    for g, level, own, law in parts:
-        force += abs(g) * _slow(way * abs(g), level, own, law)
+    for g, level, record, law in parts:
+        force += abs(g) * _slow(way * abs(g), level, record, law)
     return way / unit, force * unit, bends / unit
 
 
-def _slow(way: FloatArray, level: FloatArray, own: Any, law: Any) -> FloatArray:
+def _slow(way: FloatArray, level: FloatArray, record: Any, law: Any) -> FloatArray:
     """Force [N] of one part along a way [m] that is gone slowly, by the closed form of its law for each half loop."""
-    out, z, before, stiff = np.zeros(len(way)), 0.0, way[0], float(own.stiffness)
+    out, z, before, stiff = np.zeros(len(way)), 0.0, way[0], float(record.stiffness)
     for j, x in enumerate(way):
-        gone = x - before
-        limit = level[0] if gone >= 0.0 else level[1]
-        side = 1.0 if gone >= 0.0 else -1.0
+        distance = x - before
+        limit = level[0] if distance >= 0.0 else level[1]
+        side = 1.0 if distance >= 0.0 else -1.0
         if stiff == 0.0:
-            out[j] = side * limit if gone != 0.0 else 0.0
+            out[j] = side * limit if distance != 0.0 else 0.0
         else:
-            left, far = 1.0 - stiff * z * side / limit, stiff * abs(gone) / limit
-            z = (1.0 - law.slow(own, left, far)) * side * limit / stiff
+            remainder, relative_distance = 1.0 - stiff * z * side / limit, stiff * abs(distance) / limit
+            z = (1.0 - law.slow(record, remainder, relative_distance)) * side * limit / stiff
             out[j] = stiff * z
         before = x
     return out
@@ -176,16 +176,16 @@ def _ramps(
 ) -> tuple[FloatArray, FloatArray]:
     """(rate, the most that dry friction resists) of forces that rise; NaN where the motors cannot break it loose."""
     unit = float(numbers.body.length)
-    reach = BEYOND * volts * float(np.abs(pattern).max())
+    reach = RAMP_END * volts * float(np.abs(pattern).max())
     limit = float(np.min(robot.motor.voltage_limit))
     if not np.isfinite(reach) or reach > limit:
         return np.full(len(RAMPS), np.nan), np.full(len(RAMPS), np.nan)
-    full = float(drive_wrench(robot, np.zeros(3), BEYOND * volts * pattern)[k])
-    found, per_speed = [], float(numbers.element["g"][:, k] ** 2 @ numbers.element["viscous"])
+    full = float(drive_wrench(robot, np.zeros(3), RAMP_END * volts * pattern)[k])
+    breakaways, per_speed = [], float(numbers.element["g"][:, k] ** 2 @ numbers.element["viscous"])
     viscous = per_speed * (1.0 if k < 2 else unit**2)
     for length in RAMPS if bends else ():
         rise = (np.arange(RAMP_ROWS) + 0.5) / RAMP_ROWS
-        voltage = np.outer(np.append(rise, np.ones(AFTER_ROWS)) * BEYOND * volts, pattern)
+        voltage = np.outer(np.append(rise, np.ones(AFTER_ROWS)) * RAMP_END * volts, pattern)
         dt = np.repeat([length / RAMP_ROWS, AFTER / AFTER_ROWS], [RAMP_ROWS, AFTER_ROWS])
         run = simulate(robot, voltage, dt, tol=1e-5)
         assert run.twist is not None
@@ -194,14 +194,14 @@ def _ramps(
         dry = (drive_wrench(robot, middle, voltage) + frame_wrench(robot, middle) - gained)[:, k] - viscous * middle[
             :, k
         ]
-        found.append(float(dry.max()))
+        breakaways.append(float(dry.max()))
     rest = float(drive_wrench(robot, np.zeros(3), volts * pattern)[k])
-    return full / np.array(RAMPS), np.array(found) if bends else np.full(len(RAMPS), rest)
+    return full / np.array(RAMPS), np.array(breakaways) if bends else np.full(len(RAMPS), rest)
 
 
 def _law(robot: Robot, k: int) -> str:
     """The laws that act along an axis, in words."""
-    friction, named = robot.friction, []
+    friction, law_names = robot.friction, []
     for name in type(friction).model_fields:
         part = getattr(friction, name)
         turning = name == "direction" and k == 2
@@ -210,52 +210,54 @@ def _law(robot: Robot, k: int) -> str:
             continue
         hold = part.yaw_breakaway if turning else part.breakaway
         speed = part.yaw_stribeck_speed if turning else part.stribeck_speed
-        more = hold is not None and np.any(np.asarray(hold) > np.asarray(part.yaw_coulomb if turning else part.coulomb))
-        falls = "Stribeck" if more and speed is not None else ("breakaway" if more else "")
+        holds_more = hold is not None and np.any(
+            np.asarray(hold) > np.asarray(part.yaw_coulomb if turning else part.coulomb)
+        )
+        falls = "Stribeck" if holds_more and speed is not None else ("breakaway" if holds_more else "")
         words = falls if part.law == COULOMB else ""
-        named.append(f"{words or KINDS[part.law].name} ({name})")
-    return " + ".join(named) or "viscous only"
+        law_names.append(f"{words or KINDS[part.law].name} ({name})")
+    return " + ".join(law_names) or "viscous only"
 
 
 def _notes(robot: Robot, axes: Sequence[AxisFriction]) -> list[Statement]:
     codes = ["holds_exactly"]
     kinds = [KINDS[getattr(robot.friction, name).law] for name in type(robot.friction).model_fields]
-    codes += ["creeps"] if any(each.bends and each.drifts for each in kinds) else []
-    codes += ["bristles_damp"] if any(each.bends for each in kinds) else []
+    codes += ["creeps"] if any(kind.bends and kind.drifts for kind in kinds) else []
+    codes += ["bristles_damp"] if any(kind.bends for kind in kinds) else []
     codes += ["wheels_roll"] if robot.wheels.traction_mu is not None else []
-    weak = [each.axis for each in axes if np.isnan(each.rate).any()]
+    weak = [axis.axis for axis in axes if np.isnan(axis.rate).any()]
     too_weak = [Statement("motors_too_weak", NOTE, numbers={"axes": weak})] if weak else []
     return [*(Statement(code, NOTE) for code in codes), *too_weak]
 
 
-def _row(each: AxisFriction) -> tuple[str, ...]:
-    middle, unit = len(each.speed) // 2, each.unit
-    way = "" if each.bends == 0.0 else f"{each.bends * 1e3:.3g} {'mrad' if unit == 'N m' else 'mm'}"
-    holds = f"{each.holds[0]:.4g}" + ("" if each.holds[0] == each.holds[1] else f", back {each.holds[1]:.4g}")
-    ramps = ", ".join(f"{value:.4g}" for value in each.breakaway) if np.isfinite(each.breakaway).all() else "-"
+def _row(axis: AxisFriction) -> tuple[str, ...]:
+    middle, unit = len(axis.speed) // 2, axis.unit
+    way = "" if axis.bends == 0.0 else f"{axis.bends * 1e3:.3g} {'mrad' if unit == 'N m' else 'mm'}"
+    holds = f"{axis.holds[0]:.4g}" + ("" if axis.holds[0] == axis.holds[1] else f", back {axis.holds[1]:.4g}")
+    ramps = ", ".join(f"{value:.4g}" for value in axis.breakaway) if np.isfinite(axis.breakaway).all() else "-"
     return (
-        each.axis,
-        each.law,
+        axis.axis,
+        axis.law,
         f"{holds} {unit}",
-        f"{each.force[middle]:.4g}",
-        f"{each.force[-1]:.4g}",
+        f"{axis.force[middle]:.4g}",
+        f"{axis.force[-1]:.4g}",
         way,
         ramps,
     )
 
 
-def _told(each: AxisFriction) -> dict[str, Any]:
-    finite = np.isfinite(each.rate).all()
+def _told(axis: AxisFriction) -> dict[str, Any]:
+    finite = np.isfinite(axis.rate).all()
     return {
-        "axis": each.axis,
-        "unit": each.unit,
-        "law": each.law,
-        "speed": each.speed.tolist(),
-        "force": each.force.tolist(),
-        "holds": list(each.holds),
-        "bends": each.bends,
-        "way": each.way.tolist(),
-        "loop": each.loop.tolist(),
-        "rate": each.rate.tolist() if finite else None,
-        "breakaway": each.breakaway.tolist() if finite else None,
+        "axis": axis.axis,
+        "unit": axis.unit,
+        "law": axis.law,
+        "speed": axis.speed.tolist(),
+        "force": axis.force.tolist(),
+        "holds": list(axis.holds),
+        "bends": axis.bends,
+        "way": axis.way.tolist(),
+        "loop": axis.loop.tolist(),
+        "rate": axis.rate.tolist() if finite else None,
+        "breakaway": axis.breakaway.tolist() if finite else None,
     }

@@ -72,10 +72,10 @@ class LiveRobot:
 
     def step(self, command: FloatArray) -> None:
         """Hold a command for dt: volts, a duty, or wheel speeds, shape (wheels,), whichever the drive takes."""
-        given = np.array(command, dtype=float)
+        output = np.array(command, dtype=float)
         if self._kind != SPEED:
-            given = self.voltage = self._volts(given)
-        self._queue.append(given)
+            output = self.voltage = self._volts(output)
+        self._queue.append(output)
         self._fresh = True
         parts = [(1.0, self._queue[0])]
         if self._part:

@@ -36,17 +36,25 @@ def simulate(
 ) -> Run:
     """Simulate a robot under commands held from row to row, eqs (1)-(14).
 
-    voltage: one row per step [V], shape (n, wheels); what exceeds the motor's limit is clipped, with a warning.
-    duty: in place of a voltage, -1..1 of the supply, shape (n, wheels). supply: voltage of the battery behind a duty
-    [V], a number or shape (n,). wheel_speed_command: in place of a voltage, for a drive with a speed loop [rad/s],
-    shape (n, wheels). twist_command: the same for the body [m/s, m/s, rad/s], shape (n, 3).
-    dt: length of the rows [s], a number or shape (n,). twist, pose, current: where it starts, shapes (3,), (3,),
-    (wheels,); current [A] matters for dynamic electrics only.
-    tol: global error of the implicit engine [m/s], 10 tol [rad/s]; None takes one fixed step per row. The exact
-    engine, used wherever the robot allows it, needs no tolerance; Run.source says which engine ran.
-    log: what a log did beside the robot, such as `robot.log` of a fit: a battery that sagged, sensors that were late.
     Returns a Run of n + 1 samples: t, voltage (the last row repeats), current, wheel_speed, twist, pose.
-    What is at rest within its dead zone has a speed of exactly 0.0.
+    What is at rest within its dead zone has a speed of exactly 0.0. Run.source says which engine ran.
+
+    Args:
+        robot: The robot.
+        voltage: One row per step [V], shape (n, wheels); what exceeds the motor's limit is clipped, with a warning.
+        dt: Length of the rows [s], a number or shape (n,).
+        duty: In place of a voltage, -1..1 of the supply, shape (n, wheels).
+        wheel_speed_command: In place of a voltage, for a drive with a speed loop [rad/s], shape (n, wheels).
+        twist_command: The same for the body [m/s, m/s, rad/s], shape (n, 3).
+        supply: Voltage of the battery behind a duty [V], a number or shape (n,).
+        twist: At the start [m/s, m/s, rad/s], shape (3,).
+        pose: At the start [m, m, rad], shape (3,).
+        current: At the start [A], shape (wheels,); it matters for dynamic electrics only.
+        tol: Global error of the implicit engine [m/s], 10 tol [rad/s]; None takes one fixed step per row. The exact
+            engine, used wherever the robot allows it, needs no tolerance.
+        log: What a log did beside the robot, such as `robot.log` of a fit: a battery that sagged, sensors that were
+            late.
+
     Raises InputError for wrong shapes, NaN, infinite values, a start beyond 1e3 m/s, dt outside 1e-9..3600 s, a missing
     supply, or a tol outside 1e-10..1 m/s.
     """
@@ -55,14 +63,14 @@ def simulate(
         check_order(call, (robot, Robot), (voltage, type(robot)), (dt, object))
     if isinstance(voltage, int | float) and isinstance(dt, list | tuple | np.ndarray):
         raise InputError("two arguments stand in each other's place", got="the time before the voltage", expected=call)
-    given = commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
-    view = seen_at_once(robot, given) if log is None else seen_through(robot, given, log)
-    return simulate_seen(robot, given, view, twist=twist, pose=pose, current=current, tol=tol)
+    held_commands = commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
+    view = seen_at_once(robot, held_commands) if log is None else seen_through(robot, held_commands, log)
+    return simulate_seen(robot, held_commands, view, twist=twist, pose=pose, current=current, tol=tol)
 
 
 def simulate_seen(
     robot: Robot,
-    given: Commands,
+    held_commands: Commands,
     view: View,
     *,
     twist: ArrayLike,
@@ -71,7 +79,7 @@ def simulate_seen(
     tol: float | None,
 ) -> Run:
     """`simulate` of commands that were checked, as the log of a view shows them."""
-    n, acting = robot.wheels.count, view.acting(robot, given)
+    n, acting = robot.wheels.count, view.acting(robot, held_commands)
     start = (
         as_start("twist", twist, 3),
         as_start("pose", pose, 3),
@@ -80,12 +88,12 @@ def simulate_seen(
     around = Conditions(acting.set_point is not None, acting.open_circuit is not None, view.push, view.room)
     engine = choose_engine(robot, around, tol)
     motion = engine.advance(engine.start(*start), acting)
-    return as_run(robot, given, acting, motion, engine.name, engine.statements(motion.state), view)
+    return as_run(robot, held_commands, acting, motion, engine.name, engine.statements(motion.state), view)
 
 
 def as_run(
     robot: Robot,
-    given: Commands,
+    held_commands: Commands,
     acting: Commands,
     motion: Motion,
     engine: str,
@@ -96,14 +104,14 @@ def as_run(
 
     Args:
         robot: that moved.
-        given: the commands, as a log has them.
+        held_commands: the commands, as a log has them.
         acting: the commands as they reached the motors.
         motion: what it did.
         engine: the name of the engine.
         warnings: of the engine.
         view: how the log shows it.
     """
-    dt = given.dt
+    dt = held_commands.dt
     t = np.arange(len(dt) + 1) * dt[0] if np.all(dt == dt[0]) else np.concatenate([[0.0], np.cumsum(dt)])
     turning = wheel_speed(robot.wheels, motion.twist) if motion.wheel_speed is None else motion.wheel_speed
     current = motion.current
@@ -113,23 +121,23 @@ def as_run(
         turning[motion.stuck] = 0.0
     if acting.open_circuit is not None:
         current = np.where(_with_last(acting.open_circuit), 0.0, current)
-    if given.voltage is None:  # a speed loop makes it, at its own ticks
+    if held_commands.voltage is None:  # a speed loop makes it, at its own ticks
         voltage = view.of("voltage", _with_last(motion.voltage if motion.asked is None else motion.asked))
     else:
-        voltage = _with_last(given.voltage)
+        voltage = _with_last(held_commands.voltage)
     return Run(
         t=t,
         voltage=voltage,
-        duty=None if given.duty is None else _with_last(given.duty),
+        duty=None if held_commands.duty is None else _with_last(held_commands.duty),
         current=view.of("current", current),
         wheel_speed=view.of("wheel_speed", turning),
-        wheel_speed_command=None if given.set_point is None else _with_last(given.set_point),
+        wheel_speed_command=None if held_commands.set_point is None else _with_last(held_commands.set_point),
         twist=view.of("twist", motion.twist),
-        twist_command=None if given.twist is None else _with_last(given.twist),
+        twist_command=None if held_commands.twist is None else _with_last(held_commands.twist),
         pose=np.hstack([view.of("position", motion.pose[:, :2]), view.of("heading", motion.pose[:, 2:])]),
-        supply=None if given.supply is None else _with_last(given.supply),
+        supply=None if held_commands.supply is None else _with_last(held_commands.supply),
         source=f"simulated: {robot.name}, {engine}",
-        warnings=given.warnings + warnings,
+        warnings=held_commands.warnings + warnings,
     )
 
 

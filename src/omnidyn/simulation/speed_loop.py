@@ -20,7 +20,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.simulation.commands import loop_gains
 
 
-class Loop(NamedTuple):
+class LoopCommands(NamedTuple):
     """Gains and set points of a speed loop; without commands the voltages are given."""
 
     kp: FloatArray  # (n,) [V s/rad]
@@ -34,16 +34,18 @@ class Loop(NamedTuple):
     dead: float  # [V] of what the loop asks for the driver passes on all but this
 
 
-def no_loop(wheels: int) -> Loop:
+def no_loop(wheels: int) -> LoopCommands:
     """No speed loop: voltages are given."""
     zeros = np.zeros(wheels)
-    return Loop(zeros, zeros, zeros, zeros, np.zeros((0, wheels)), np.zeros(0, np.bool_), 0.0, zeros.copy(), 0.0)
+    return LoopCommands(
+        zeros, zeros, zeros, zeros, np.zeros((0, wheels)), np.zeros(0, np.bool_), 0.0, zeros.copy(), 0.0
+    )
 
 
-def loop_of(robot: Robot, set_point: FloatArray, tick: BoolArray) -> Loop:
+def loop_of(robot: Robot, set_point: FloatArray, tick: BoolArray) -> LoopCommands:
     """The loop of a robot at rest. set_point [rad/s], shape (rows, n), and tick, shape (rows,): see `on_ticks`."""
     period, total = 1.0 / (robot.drive.rate or np.inf), np.zeros(robot.wheels.count)
-    return Loop(*loop_gains(robot), set_point, tick, period, total, robot.drive.dead_band)
+    return LoopCommands(*loop_gains(robot), set_point, tick, period, total, robot.drive.dead_band)
 
 
 @part
@@ -63,10 +65,10 @@ def seen_speed(g, x, radius, moves):
 @part
 def tick_branch(kp, ki, limit, period, error, total):
     """(whether the integral takes its step, side of the limit at which the voltage stands: -1, 0 or 1)."""
-    more = total + ki * error * period
-    wanted = kp * error + more
-    takes = (abs(wanted) <= limit) | (wanted * error < 0.0)
-    volts = wanted if takes else kp * error + total
+    next_total = total + ki * error * period
+    wanted_volts = kp * error + next_total
+    takes = (abs(wanted_volts) <= limit) | (wanted_volts * error < 0.0)
+    volts = wanted_volts if takes else kp * error + total
     return takes, (1.0 if volts > limit else (-1.0 if volts < -limit else 0.0))
 
 

@@ -20,7 +20,8 @@ from omnidyn.model.log_effects import LogEffects
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.commands import Commands
 
-LATE = ("twist", "wheel_speed", "current", "heading", "position", "wheel_angle")  # the first sets where a start is
+# The first sets where a start is.
+LATE_CHANNELS = ("twist", "wheel_speed", "current", "heading", "position", "wheel_angle")
 DIGITS = 12  # of a second: latenesses that differ by less are one
 
 
@@ -33,7 +34,7 @@ class View:
     [N, N, N m].
     """
 
-    clock: Clock | None = None
+    clock: StepGrid | None = None
     late: Mapping[str, int] = field(default_factory=dict)
     driver: Driver = Driver()  # noqa: RUF009
     share: FloatArray | None = None
@@ -41,21 +42,23 @@ class View:
     held: bool = False
     room: tuple[float, float] | None = None
 
-    def acting(self, robot: Robot, given: Commands) -> Commands:
+    def acting(self, robot: Robot, held_commands: Commands) -> Commands:
         """The commands as they reach the motors, or the speed loop, over each step of the simulation.
 
         The dead band behind a speed loop is the loop's own affair.
         """
-        voltage = None if given.voltage is None else mapped(robot, given.voltage)
+        voltage = None if held_commands.voltage is None else mapped(robot, held_commands.voltage)
         if voltage is not None and self.driver != Driver():
-            share = np.zeros(len(given.dt)) if self.share is None else self.share
+            share = np.zeros(len(held_commands.dt)) if self.share is None else self.share
             voltage = at_motors(np.ascontiguousarray(voltage), np.ascontiguousarray(share), self.driver)[0]
         if self.clock is not None:
-            given = given._replace(
-                dt=self.clock.dt, set_point=self._stepped(given.set_point), open_circuit=self._open(given)
+            held_commands = held_commands._replace(
+                dt=self.clock.dt,
+                set_point=self._stepped(held_commands.set_point),
+                open_circuit=self._open(held_commands),
             )
             voltage = self._stepped(voltage)
-        return given if voltage is given.voltage else given._replace(voltage=voltage)
+        return held_commands if voltage is held_commands.voltage else held_commands._replace(voltage=voltage)
 
     def of(self, channel: str, samples: FloatArray) -> FloatArray:
         """What a channel shows at the rows, of all samples of the simulation. Shape (rows + 1, columns)."""
@@ -65,30 +68,30 @@ class View:
         """Commands of rows, over each step; what acted before the first is itself, or nothing."""
         if rows is None or self.clock is None:
             return rows
-        found = rows[np.maximum(self.clock.row, 0)]
+        stepped = rows[np.maximum(self.clock.row, 0)]
         if not self.held:
-            found[self.clock.row < 0] = 0.0
-        return found
+            stepped[self.clock.row < 0] = 0.0
+        return stepped
 
-    def _open(self, given: Commands) -> BoolArray | None:
-        if given.open_circuit is None or self.clock is None:
-            return given.open_circuit
-        found = given.open_circuit[np.maximum(self.clock.row, 0)]
-        return found if self.held else np.where((self.clock.row < 0)[:, None], True, found)
+    def _open(self, held_commands: Commands) -> BoolArray | None:
+        if held_commands.open_circuit is None or self.clock is None:
+            return held_commands.open_circuit
+        is_open = held_commands.open_circuit[np.maximum(self.clock.row, 0)]
+        return is_open if self.held else np.where((self.clock.row < 0)[:, None], True, is_open)
 
 
 PLAIN = View()
 
 
-def seen_at_once(robot: Robot, given: Commands, held: bool = False) -> View:
+def seen_at_once(robot: Robot, held_commands: Commands, held: bool = False) -> View:
     """What instruments that are never late show of a robot."""
     latency, driver = robot.drive.latency, Driver(dead_band=robot.drive.dead_band)
-    return View(clock(given.dt, latency) if latency else None, {}, driver, held=held)
+    return View(clock(held_commands.dt, latency) if latency else None, {}, driver, held=held)
 
 
 def seen_through(
     robot: Robot,
-    given: Commands,
+    held_commands: Commands,
     log: LogEffects,
     late: Mapping[str, float] | None = None,
     share: FloatArray | None = None,
@@ -99,15 +102,15 @@ def seen_through(
 
     start: by how much the channel that tells the start is late [s], for a log that begins in motion; None: it rests.
     """
-    dt, drive, row = given.dt, robot.drive.latency, float(np.median(given.dt))
+    dt, drive, row = held_commands.dt, robot.drive.latency, float(np.median(held_commands.dt))
     if share is None:
         share = np.concatenate([[0.0], np.cumsum(dt[:-1])]) / float(np.sum(dt))
-    late = late or {name: log.latency.of(name, drive, row) for name in LATE}
+    late = late or {name: log.latency.of(name, drive, row) for name in LATE_CHANNELS}
     main = drive if start is None else start
-    late = {name: round(each - main, DIGITS) for name, each in late.items()}
+    late = {name: round(delay - main, DIGITS) for name, delay in late.items()}
     apart = sorted({0.0, *late.values()})
     time = clock(dt, main, apart) if main or any(apart) else None
-    at = {"voltage": apart.index(0.0)} | {name: apart.index(each) for name, each in late.items()}
+    at = {"voltage": apart.index(0.0)} | {name: apart.index(delay) for name, delay in late.items()}
     driver, room = Driver(log.gain, robot.drive.dead_band, log.fade), log.tilt if any(log.tilt) else None
     return View(time, at, driver, share, log.push if any(log.push) else None, start is not None, room)
 
@@ -118,11 +121,11 @@ def seen_through(
 # shows at t_k what was at t_k - late. Both are exact: the simulation takes steps that end at these times too. Before
 # the start nothing is known: a channel shows the start, and what acted before the first command is what `before` says.
 
-SAME = 1e-9  # of a row: times that are nearer are one
+SAME_TIME = 1e-9  # of a row: times that are nearer are one
 
 
 @dataclass(frozen=True, eq=False)
-class Clock:
+class StepGrid:
     """dt [s]: steps of the simulation, shape (steps,). row: which command acts over each, -1 before the first.
 
     at: for every lateness asked for, the samples of the simulation that a channel shows at each row, shape (rows + 1,).
@@ -133,7 +136,7 @@ class Clock:
     at: tuple[NDArray[np.intp], ...]
 
 
-def clock(dt: FloatArray, latency: float = 0.0, late: Sequence[float] = (0.0,)) -> Clock:
+def clock(dt: FloatArray, latency: float = 0.0, late: Sequence[float] = (0.0,)) -> StepGrid:
     """The steps of a simulation of rows `dt` [s], shape (rows,), where commands are `latency` [s] late.
 
     late [s]: of the channels. One that is early, below 0, is shown beyond the last row, where the last command still
@@ -141,19 +144,19 @@ def clock(dt: FloatArray, latency: float = 0.0, late: Sequence[float] = (0.0,)) 
     """
     rows = len(dt)
     if latency == 0.0 and not any(late):
-        return Clock(dt, np.arange(rows), (np.arange(rows + 1),) * len(late))
+        return StepGrid(dt, np.arange(rows), (np.arange(rows + 1),) * len(late))
     edges = np.concatenate([[0.0], np.cumsum(dt)])
     end = edges[-1] + max(0.0, -min(late))
     acts = edges[:-1] + latency
-    shown = [np.clip(edges - each, 0.0, end) for each in late]
-    times = np.unique(np.concatenate([edges, acts[acts < end], *shown]))
-    near = SAME * float(np.min(dt))
-    times = times[np.concatenate([[True], np.diff(times) > near])]
+    sample_times = [np.clip(edges - delay, 0.0, end) for delay in late]
+    times = np.unique(np.concatenate([edges, acts[acts < end], *sample_times]))
+    resolution = SAME_TIME * float(np.min(dt))
+    times = times[np.concatenate([[True], np.diff(times) > resolution])]
     row = np.searchsorted(acts, 0.5 * (times[1:] + times[:-1]), side="right") - 1
-    return Clock(np.diff(times), row, tuple(_nearest(times, each) for each in shown))
+    return StepGrid(np.diff(times), row, tuple(_nearest(times, moments) for moments in sample_times))
 
 
-def _nearest(times: FloatArray, wanted: FloatArray) -> NDArray[np.intp]:
-    """Where the time nearest to each of `wanted` stands."""
-    after = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
-    return np.where(wanted - times[after - 1] <= times[after] - wanted, after - 1, after)
+def _nearest(times: FloatArray, targets: FloatArray) -> NDArray[np.intp]:
+    """Where the time nearest to each of `targets` stands."""
+    after = np.clip(np.searchsorted(times, targets), 1, len(times) - 1)
+    return np.where(targets - times[after - 1] <= times[after] - targets, after - 1, after)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.control.controllers import BESIDE, NAMES, ControllerFile, save_controller
-from omnidyn.control.paths.motion import Motion, Path
+from omnidyn.control.controllers import NAMES, UNLISTED_NAMES, ControllerFile, save_controller
+from omnidyn.control.paths.motion import Path, Reference
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.export.code.c_controller import c_controller
 from omnidyn.export.features import CONTROLLERS, REFUSES, Cell
@@ -55,7 +55,7 @@ class Given(Path):
 
     def at(self, t):
         count = len(np.atleast_1d(t))
-        return Motion(self.pose[-count:].copy(), self.velocity[-count:].copy(), np.zeros((count, 3)))
+        return Reference(self.pose[-count:].copy(), self.velocity[-count:].copy(), np.zeros((count, 3)))
 
 
 def steps(seed, count):
@@ -173,7 +173,7 @@ def test_a_controller_file_gives_its_options(tmp_path):
 
 
 def test_controllers_and_robots_without_c_are_refused_by_name(monkeypatch):
-    assert set(CONTROLLERS) <= {*NAMES, *BESIDE}
+    assert set(CONTROLLERS) <= {*NAMES, *UNLISTED_NAMES}
     monkeypatch.setitem(NAMES, "new", "omnidyn.control.pid:Pid")
     with pytest.raises(UnsupportedError, match="the controller new: there is no C code of it"):
         c_controller(ROBOT, controller="new")

@@ -8,7 +8,7 @@ import pytest
 
 from omnidyn.export.code.expressions import INT, REAL, Array, TranslationError
 from omnidyn.export.code.sources import Source, function
-from omnidyn.export.code.translate import Program
+from omnidyn.export.code.translate import CProgram
 
 
 def source(text):
@@ -29,23 +29,23 @@ def source(text):
 )
 def test_what_it_does_not_know_is_refused(text):
     with pytest.raises((TranslationError, AttributeError)):
-        Program().function(source(text), (REAL,))
+        CProgram().function(source(text), (REAL,))
 
 
 def test_a_swap_goes_through_temporaries():
-    program = Program()
+    program = CProgram()
     program.function(source("def f(a, b):\n    a, b = b, a\n    return a - b"), (REAL, REAL))
     assert "held1 = b;\n    held2 = a;\n    a = held1;\n    b = held2;" in program.text()
 
 
 def test_integers_divide_as_numbers():
-    program = Program(single=True)
+    program = CProgram(single=True)
     program.function(source("def f(n):\n    return 1 / (n + 1)"), (INT,))
     assert "return 1.0f / (float)(n + 1);" in program.text()
 
 
 def test_a_name_may_be_a_word_of_c():
-    program = Program()
+    program = CProgram()
     program.function(source("def f(double):\n    int = 2.0 * double\n    return int"), (REAL,))
     assert "double f(double double_)" in program.text()
 
@@ -56,7 +56,7 @@ def test_the_translated_formula_computes_the_same(tmp_path):
         pytest.skip("no gcc here")
     from omnidyn.simulation.exact.step import exact_step
 
-    program = Program()
+    program = CProgram()
     found = function("omnidyn.simulation.exact.step", "exact_step")
     assert found is not None
     program.function(found, (REAL,) * 7)
@@ -78,7 +78,7 @@ def test_the_translated_formula_computes_the_same(tmp_path):
 
 
 def test_tables_that_are_written_are_not_constant():
-    program = Program()
+    program = CProgram()
     made = program.function(source("def f(a, b):\n    a[0] = b[1]"), (Array((3,)), Array((3,))))
     assert made.writes == {0}
     assert "void f(double a[3], const double b[3])" in program.text()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from omnidyn.compiled.kernel import plain
-from omnidyn.model.friction.newton import SETTLED, newton
+from omnidyn.model.friction.newton import ROOT_TOLERANCE, newton
 
 RISING = {
     "cube": (lambda x: x**3 - 2.0, lambda x: 3.0 * x**2, 2.0 ** (1.0 / 3.0)),
@@ -25,7 +25,7 @@ def test_it_settles_on_the_root_and_stays(name):
         while True:
             before, rounds = found, rounds + 1
             found, low, high = plain(newton)(found, value(found), max(slope(found), 1e-300), low, high)
-            if abs(found - before) <= SETTLED * abs(found):
+            if abs(found - before) <= ROOT_TOLERANCE * abs(found):
                 break
             assert rounds < 20
         assert found == pytest.approx(root, rel=4e-16)

@@ -8,7 +8,7 @@ from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.keys import Key
 from omnidyn.model.known.told import with_correlation
-from omnidyn.model.known.uncertainty import Ends, effects, interval_of, plausible
+from omnidyn.model.known.uncertainty import QuantileTails, effects, interval_of, plausible
 from omnidyn.model.robot import Prior
 from omnidyn.model.robot_file import load_robot, robot_to_toml
 
@@ -119,7 +119,7 @@ def test_a_robot_without_std_has_nothing_to_draw():
 @pytest.mark.parametrize("count", [20, 39, 40, 41, 100, 257, 1000])
 def test_the_ends_are_the_quantiles_of_all_results(count):
     results = np.random.default_rng(count).normal(size=(count, 3, 2))
-    ends = Ends(count)
+    ends = QuantileTails(count)
     for each in results:
         ends.add(each)
     np.testing.assert_allclose(ends.interval, np.quantile(results, [0.025, 0.975], axis=0, method="hazen"))
@@ -131,7 +131,7 @@ def test_fewer_than_twenty_draws_have_no_interval():
 
 
 def test_infinity_is_a_result_and_nan_none():
-    ends = Ends(100)
+    ends = QuantileTails(100)
     for k in range(100):
         ends.add(np.array([float(k), np.inf if k >= 90 else float(k), np.inf, np.nan if k == 50 else 1.0]))
     low, high = ends.interval

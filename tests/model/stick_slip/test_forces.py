@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.model.stick_slip.forces import NONE, winding, winding_answer, winding_branch
+from omnidyn.model.stick_slip.forces import NO_CURRENT, winding, winding_answer, winding_branch
 
 EMF, RESISTANCE, TAU = 2.0, 4.0, 0.5
 
@@ -33,7 +33,7 @@ def test_at_its_limit_the_current_stays(voltage, expected):
 
 
 @pytest.mark.parametrize(
-    "voltage, branch", [(0.4, NONE), (0.7, 1.0), (-0.7, -1.0), (4.4, 1.0), (4.6, 2.0), (-4.6, -2.0)]
+    "voltage, branch", [(0.4, NO_CURRENT), (0.7, 1.0), (-0.7, -1.0), (4.4, 1.0), (4.6, 2.0), (-4.6, -2.0)]
 )
 def test_a_branch_goes_on_beyond_its_ends(voltage, branch):
     """With a drop of 0.5 V and a limit of 1 A, the branch of one voltage asked about another."""
@@ -41,7 +41,7 @@ def test_a_branch_goes_on_beyond_its_ends(voltage, branch):
     assert winding_branch(0.0, voltage, *rest) == branch
     for other in (-5.0, -0.1, 0.1, 5.0):
         side = np.sign(branch)
-        expected = {NONE: 0.0, 1.0: (other - side * 0.5) / RESISTANCE, 2.0: side}[abs(branch)]
+        expected = {NO_CURRENT: 0.0, 1.0: (other - side * 0.5) / RESISTANCE, 2.0: side}[abs(branch)]
         i, slope = winding_answer(branch, 0.0, other, *rest)
         assert i == pytest.approx(expected, abs=1e-15)
         assert slope == (-EMF / RESISTANCE if abs(branch) == 1.0 else 0.0)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog, lsq_linear, minimize
 
-from omnidyn.model.layout import N_AXES, Problem, new_stage
+from omnidyn.model.layout import N_AXES, PlantStage, new_stage
 from omnidyn.model.stick_slip.inclusion import CAP, solve
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import put, start_state
@@ -28,7 +28,7 @@ def problem(seed, turning=True):
     random = np.random.default_rng(seed)
     robot = random_robot(seed // PROBLEMS)
     own = plant(robot)
-    p = Problem(own, new_stage(own))
+    p = PlantStage(own, new_stage(own))
     task, each = p.stage.task, p.stage.each
     scale = 10.0 ** random.uniform(-3.0, 0.5)
     twist = scale * random.normal(size=3) * [1.0, 1.0, 8.0] * (random.random(3) < 0.8)

@@ -33,7 +33,7 @@ def test_steps_far_below_the_shortest_share_are_not_halved_in_vain():
 
 
 def test_a_robot_too_fast_to_be_followed_is_refused(monkeypatch):
-    monkeypatch.setattr(implicit, "MOST", (2e3, 1e4))
+    monkeypatch.setattr(implicit, "MOST_STEPS", (2e3, 1e4))
     voltage = np.random.default_rng(0).uniform(-6, 6, (50, 3))
     with pytest.raises(InputError, match=r"moves too fast to be followed; got more than 2\.5e\+03 steps up to row \d"):
         simulate(LIMITED, voltage, 1e-3)

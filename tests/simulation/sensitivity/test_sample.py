@@ -5,7 +5,7 @@ import pytest
 
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction
 from omnidyn.model.keys import Key
-from omnidyn.simulation.sensitivity.late_sample import Direction, Program, derivatives, late_samples
+from omnidyn.simulation.sensitivity.late_sample import Direction, VoltageProgram, derivatives, late_samples
 from omnidyn.simulation.sensitivity.stage import EPS
 from omnidyn.simulation.simulate import simulate
 
@@ -46,7 +46,9 @@ def ways(robot):
 def test_between_the_rows(robot):
     """Values, rates and derivatives at t - late; NaN outside the run."""
     voltage = program(120)
-    seen, capped = late_samples(robot, Program(np.arange(121) * 0.01, voltage, np.zeros(3)), ways(robot), LATE, 1e-7)
+    seen, capped = late_samples(
+        robot, VoltageProgram(np.arange(121) * 0.01, voltage, np.zeros(3)), ways(robot), LATE, 1e-7
+    )
     assert capped == 0
     for own, late in zip(seen, LATE, strict=True):
         twist, heading = at(robot, voltage, 0.01, late)
@@ -69,15 +71,15 @@ def test_between_the_rows(robot):
 def test_a_look_beyond_the_last_row_sees_its_voltage_hold_on(robot):
     """Of voltages that do, as of a run that has a row more; of a voltage less, there is nothing to see."""
     voltage, t = program(60), np.arange(60) * 0.01
-    seen, _ = late_samples(robot, Program(t, voltage, np.zeros(3)), ways(robot), (-0.004, 0.0), 1e-7)
-    more = Program(np.arange(61) * 0.01, voltage, np.zeros(3))
+    seen, _ = late_samples(robot, VoltageProgram(t, voltage, np.zeros(3)), ways(robot), (-0.004, 0.0), 1e-7)
+    more = VoltageProgram(np.arange(61) * 0.01, voltage, np.zeros(3))
     longer, _ = late_samples(robot, more, ways(robot), (-0.004, 0.0), 1e-7)
     for own, more in zip(seen, longer, strict=True):
         assert np.isfinite(own.twist).all()
         np.testing.assert_allclose(own.twist, more.twist[:60], atol=1e-6)
         np.testing.assert_allclose(own.dtwist, more.dtwist[:60], atol=1e-5)
         np.testing.assert_array_equal(own.voltage, more.voltage[:60])
-    shorter, _ = late_samples(robot, Program(t, voltage[:-1], np.zeros(3)), [], (-0.004,), 1e-7)
+    shorter, _ = late_samples(robot, VoltageProgram(t, voltage[:-1], np.zeros(3)), [], (-0.004,), 1e-7)
     assert np.flatnonzero(np.isnan(shorter[0].twist[:, 0])).tolist() == [59]
 
 
@@ -87,7 +89,7 @@ def test_a_look_between_fixed_steps_is_of_second_order(robot):
     for refine in (1, 2):
         voltage, dt = np.repeat(program(60), refine, axis=0), 0.01 / refine
         t = np.arange(len(voltage) + 1) * dt
-        seen, _ = late_samples(robot, Program(t, voltage, np.zeros(3)), [], (0.0, 0.37 * dt), None)
+        seen, _ = late_samples(robot, VoltageProgram(t, voltage, np.zeros(3)), [], (0.0, 0.37 * dt), None)
         own = [seen[0].twist[20 * refine :], seen[1].twist[20 * refine :]]
         true = [at(robot, voltage, dt, late)[0][20 * refine :] for late in (0.0, 0.37 * dt)]
         errors.append([np.abs(a - b).max() for a, b in zip(own, true, strict=True)])
@@ -115,7 +117,7 @@ def test_a_row_that_would_be_cut_into_many_steps_is_run_within_a_tolerance(axebo
     falls = AxesFriction(stribeck_speed=(speed, speed, 10.0 * speed), **levels)
     robot, t, voltage = axebot.replace(friction=Friction(axes=falls)), np.arange(61) * 0.01, program(60)
     rough, fixed, fine = (
-        late_samples(robot, Program(t, voltage, np.zeros(3)), [], [0.0], tol)[0][0] for tol in (1e-3, None, 1e-6)
+        late_samples(robot, VoltageProgram(t, voltage, np.zeros(3)), [], [0.0], tol)[0][0] for tol in (1e-3, None, 1e-6)
     )
     assert np.array_equal(rough.twist, fixed.twist) == adaptive
     np.testing.assert_allclose(fixed.twist, fine.twist, atol=1e-2)  # ten times 1e-3 in rad/s

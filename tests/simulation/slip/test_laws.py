@@ -9,7 +9,7 @@ import pytest
 import omnidyn
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.sensitivity.directions import EPS
-from omnidyn.simulation.sensitivity.late_sample import Direction, Program
+from omnidyn.simulation.sensitivity.late_sample import Direction, VoltageProgram
 from omnidyn.simulation.sensitivity.slipping import slipping_samples
 from omnidyn.simulation.slip.march import rolling, run_slipping
 from omnidyn.simulation.slip.plant import load_shift, slip_plant, wheel_loads
@@ -336,7 +336,7 @@ def test_derivatives_follow(name, key):
 
     t = np.arange(len(u) + 1) * dt
     one = Direction(key, moved(EPS), moved(-EPS))
-    found = slipping_samples(robot, Program(t, u, np.zeros(3)), [one], [0.0], 4, 1e-6)[0].dtwist[:, 0, 0]
+    found = slipping_samples(robot, VoltageProgram(t, u, np.zeros(3)), [one], [0.0], 4, 1e-6)[0].dtwist[:, 0, 0]
     far, near = (omnidyn.simulate(moved(side), u, dt, tol=1e-9).twist[:, 0] for side in (step, -step))
     expected = (far - near) / (2.0 * step)
     assert np.abs(expected).max() > 1e-3
@@ -399,7 +399,9 @@ def test_derivatives_by_the_grip_beside_what_bends_are_those_of_the_events(numbe
 
     one = Direction("wheels.traction_mu", moved(EPS), moved(-EPS))
     t = np.arange(rows + 1) * DT
-    found = slipping_samples(robot, Program(t, levels[:rows], np.zeros(3)), [one], [0.0], 250, 1e-6)[0].dtwist[:, 0]
+    found = slipping_samples(robot, VoltageProgram(t, levels[:rows], np.zeros(3)), [one], [0.0], 250, 1e-6)[0].dtwist[
+        :, 0
+    ]
     ends = []
     for side in (1e-3 * mu, -1e-3 * mu):
         each = moved(side)

@@ -6,7 +6,7 @@ import re
 from functools import cache
 
 # Options beside those of `omnidyn identify`, and those whose flag is not their name.
-OTHERS = (
+PLAIN_OPTIONS = (
     "assume",
     "azimuth",
     "column",
@@ -40,7 +40,7 @@ OTHERS = (
     "wheel_radius",
     "with",
 )
-_NAMED = re.compile(r"`([a-z_]+)`")
+_OPTION_IN_TEXT = re.compile(r"`([a-z_]+)`")
 
 
 @cache
@@ -48,18 +48,21 @@ def flags() -> dict[str, str]:
     """Option -> flag."""
     from omnidyn.cli.terminal.identify_options import options
 
-    asked = {name: spec.metadata["flag"] or name for name, spec in options().items()}
-    asked["groups"] = "per"
-    asked["beside"] = "with"
-    asked["variables"] = "var"  # of a file of MATLAB
-    return {name: f"--{word.replace('_', '-')}" for name, word in {**{name: name for name in OTHERS}, **asked}.items()}
+    words = {name: spec.metadata["flag"] or name for name, spec in options().items()}
+    words["groups"] = "per"
+    words["beside"] = "with"
+    words["variables"] = "var"  # of a file of MATLAB
+    return {
+        name: f"--{word.replace('_', '-')}"
+        for name, word in {**{name: name for name in PLAIN_OPTIONS}, **words}.items()
+    }
 
 
 def with_flags(text: str) -> str:
     """The text with every option in backticks as its flag."""
-    return _NAMED.sub(lambda found: flags().get(found[1], found[0]), text) if "`" in text else text
+    return _OPTION_IN_TEXT.sub(lambda match: flags().get(match[1], match[0]), text) if "`" in text else text
 
 
-def of_place(where: str) -> str:
+def of_place(place: str) -> str:
     """Where an error stands: the flag, where that is an option."""
-    return flags().get(where, where)
+    return flags().get(place, place)

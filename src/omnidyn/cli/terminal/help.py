@@ -6,7 +6,7 @@ from typing import Any
 
 from typer.core import TyperCommand
 
-FIRST, MORE = "Options", "More options"
+FIRST, MORE_PANEL = "Options", "More options"
 
 
 class Grouped(TyperCommand):
@@ -15,11 +15,15 @@ class Grouped(TyperCommand):
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Arguments, then the groups, FIRST before the others."""
         groups: dict[str, list[tuple[str, str]]] = {"Arguments": [], FIRST: []}
-        for each in self.get_params(ctx):
-            told = each.get_help_record(ctx)
-            if told is not None:
-                own = "Arguments" if each.param_type_name == "argument" else getattr(each, "rich_help_panel", None)
-                groups.setdefault(own or FIRST, []).append(told)
+        for parameter in self.get_params(ctx):
+            record = parameter.get_help_record(ctx)
+            if record is not None:
+                panel = (
+                    "Arguments"
+                    if parameter.param_type_name == "argument"
+                    else getattr(parameter, "rich_help_panel", None)
+                )
+                groups.setdefault(panel or FIRST, []).append(record)
         for head, lines in groups.items():
             if lines:
                 with formatter.section(head):

@@ -45,7 +45,7 @@ class RunOptions:
     CHOICES: ClassVar[dict[str, tuple[str, ...]]] = {"method": (*NAMES,), "what": (FRICTION, MOTORS)}
 
 
-class Asked(NamedTuple):
+class IdentifyRequest(NamedTuple):
     """What the command line asks for. method: None where robot and logs choose it. groups: NAME=GLOB each."""
 
     method: Method | None
@@ -63,8 +63,8 @@ class Asked(NamedTuple):
 @cache
 def options() -> dict[str, Field[Any]]:
     """Every option that has a flag, by name, in the order of the help."""
-    found = {spec.name: spec for kind in (RunOptions, *METHODS) for spec in fields(kind)}
-    return {name: spec for name, spec in found.items() if spec.metadata["flag"] is not None}
+    specs = {spec.name: spec for kind in (RunOptions, *METHODS) for spec in fields(kind)}
+    return {name: spec for name, spec in specs.items() if spec.metadata["flag"] is not None}
 
 
 def default_of(spec: Field[Any]) -> Any:
@@ -72,12 +72,14 @@ def default_of(spec: Field[Any]) -> Any:
     return [] if takes_names(spec) else "" if spec.default is None else spec.default
 
 
-def asked(given: Mapping[str, Any]) -> Asked:
-    """What is asked for. given: every option, as the command line has it.
+def identify_request(option_values: Mapping[str, Any]) -> IdentifyRequest:
+    """What is asked for. option_values: every option, as the command line has it.
 
     Raises InputError for words that mean nothing, for an option of another method, or of something else than is asked.
     """
-    values: dict[str, Any] = {name: value for name, value in given.items() if value != default_of(options()[name])}
+    values: dict[str, Any] = {
+        name: value for name, value in option_values.items() if value != default_of(options()[name])
+    }
     values = {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}
     if "window" in values:
         values["window"] = tuple(number_list("--window", values["window"]))
@@ -88,7 +90,7 @@ def asked(given: Mapping[str, Any]) -> Asked:
     kind = _method(name, what, [*values])
     groups = values.pop("per", ()) or values.pop("group", ())
     about = {"hold_out": values.pop("hold_out", ()), "groups": groups, "quick": values.pop("quick", False)}
-    return Asked(kind(**values) if kind else None, what, **about)
+    return IdentifyRequest(kind(**values) if kind else None, what, **about)
 
 
 def _takes(kind: type[Method], name: str) -> bool:
@@ -98,21 +100,19 @@ def _takes(kind: type[Method], name: str) -> bool:
     return name in kind.takes if name in (HOLD_OUT, QUICK) else name in {spec.name for spec in fields(kind)}
 
 
-def _method(name: str, what: str, given: Sequence[str]) -> type[Method] | None:
+def _method(name: str, what: str, option_names: Sequence[str]) -> type[Method] | None:
     """The method by its name, or by options that one alone has; None where robot and logs say it."""
     kinds = MOTOR_METHODS if what == MOTORS else FRICTION_METHODS
-    takers = {asked: [kind.name for kind in kinds if _takes(kind, asked)] for asked in given}
-    for asked, methods in takers.items():
+    takers = {word: [kind.name for kind in kinds if _takes(kind, word)] for word in option_names}
+    for word, methods in takers.items():
         if not methods and what == MOTORS:
-            raise InputError("not an option of the motors", got=f"`{asked}`", where=f"`what` {MOTORS}")
+            raise InputError("not an option of the motors", got=f"`{word}`", where=f"`what` {MOTORS}")
         if not methods:
-            raise InputError(
-                "an option of the motors", got=f"`{asked}`", expected=f"`what` {MOTORS}", where=f"`{asked}`"
-            )
-    steady, fit = ([asked for asked, has in takers.items() if has == [only]] for only in (STEADY_STATE, OUTPUT_ERROR))
+            raise InputError("an option of the motors", got=f"`{word}`", expected=f"`what` {MOTORS}", where=f"`{word}`")
+    steady, fit = ([word for word, has in takers.items() if has == [only]] for only in (STEADY_STATE, OUTPUT_ERROR))
     if fit and (name == STEADY_STATE or (steady and name == AUTO)):
-        others = ", ".join(f"`{asked}`" for asked in steady) or "`method`"
-        raise _refusal(STEADY_STATE, fit[0], f"leave it out, or leave out {others}")
+        alternatives = ", ".join(f"`{word}`" for word in steady) or "`method`"
+        raise _refusal(STEADY_STATE, fit[0], f"leave it out, or leave out {alternatives}")
     if steady and name == OUTPUT_ERROR:
         raise _refusal(OUTPUT_ERROR, steady[0], "for groups use `per`" if steady[0] == "group" else "leave it out")
     name = OUTPUT_ERROR if fit else STEADY_STATE if steady else name

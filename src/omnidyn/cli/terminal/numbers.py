@@ -20,7 +20,7 @@ def number_list(name: str, text: str) -> list[float]:
 
 def number_words(value: float | tuple[float, ...]) -> str:
     """A number, or several, as they are given on the command line."""
-    return ",".join(f"{one:g}" for one in value) if isinstance(value, tuple) else f"{value:g}"
+    return ",".join(f"{number:g}" for number in value) if isinstance(value, tuple) else f"{value:g}"
 
 
 def _number(word: str) -> float | None:

@@ -22,7 +22,7 @@ def refuse_picture(path: str, force: bool) -> None:
         check_output(path, force)
 
 
-def write_picture(drawn: Picture, path: str, force: bool, which: str = "") -> None:
-    """Write it in the format that its name asks for, and say so. which: what of the data it shows, in words."""
-    write_atomic(path, drawn.svg if path.endswith(".svg") else drawn.png, force)
-    say(f"omnidyn: wrote {path}{which}")
+def write_picture(picture: Picture, path: str, force: bool, remark: str = "") -> None:
+    """Write it in the format that its name asks for, and say so. remark: what of the data it shows, in words."""
+    write_atomic(path, picture.svg if path.endswith(".svg") else picture.png, force)
+    say(f"omnidyn: wrote {path}{remark}")

@@ -23,7 +23,7 @@ def shown_progress(phase: str, hint: str = WARM) -> Iterator[Progress]:
     hint: said once, where the compiler is waited for; "": nothing.
     Yields the listener; what is urgent is said at once.
     """
-    steps, done = [Report(phase)], threading.Event()
+    steps, finished = [Report(phase)], threading.Event()
 
     def listen(report: Report) -> None:
         if report.urgent:
@@ -32,25 +32,25 @@ def shown_progress(phase: str, hint: str = WARM) -> Iterator[Progress]:
             steps[0] = report
 
     with heard() as compiling:
-        teller = threading.Thread(target=_tell, args=(steps, done, compiling, hint), daemon=True)
+        teller = threading.Thread(target=_tell, args=(steps, finished, compiling, hint), daemon=True)
         teller.start()
         try:
             yield listen
         finally:
-            done.set()
+            finished.set()
             teller.join()
 
 
-def _tell(steps: list[Report], done: threading.Event, compiling: Compiling, hint: str) -> None:
-    said, wait, started = "", SILENT_S, time.monotonic()
-    while not done.wait(wait):
-        if _now(steps, compiling) == said and done.wait(BEAT_S - NEW_S):
+def _tell(steps: list[Report], finished: threading.Event, compiling: Compiling, hint: str) -> None:
+    message, wait, start = "", SILENT_S, time.monotonic()
+    while not finished.wait(wait):
+        if _now(steps, compiling) == message and finished.wait(BEAT_S - NEW_S):
             return
-        said, wait = _now(steps, compiling), NEW_S
+        message, wait = _now(steps, compiling), NEW_S
         if hint and compiling.under_way:
             say(hint)
             hint = ""
-        say(f"omnidyn: {said} ... {time.monotonic() - started:.0f} s")
+        say(f"omnidyn: {message} ... {time.monotonic() - start:.0f} s")
 
 
 def _now(steps: list[Report], compiling: Compiling) -> str:

@@ -55,9 +55,9 @@ def _call(key: str, value: Any) -> str:
 
 def _smaller(wheel: Any, robot: Any) -> str:
     """The options with radii that may be meant: the one of the wheel in another unit, else both swapped."""
-    meant = _meant(wheel, (USUAL_WHEEL[0], min(_numbers(robot))))
-    if meant is not None:
-        return _call("wheel_radius", meant)
+    radius = _meant(wheel, (USUAL_WHEEL[0], min(_numbers(robot))))
+    if radius is not None:
+        return _call("wheel_radius", radius)
     return f"say --wheel-radius {number_words(robot)} --robot-radius {number_words(wheel)} if they are swapped; "
 
 
@@ -65,21 +65,21 @@ def _refuse_radians(azimuth: list[float] | None) -> None:
     """Angles all within a turn in radians: in degrees all wheels would stand side by side."""
     if not azimuth or max(map(abs, azimuth)) > TURN * 1.001 or not any(azimuth):
         return
-    degrees = [math.degrees(each) for each in azimuth]
-    whole = [round(each) if abs(each - round(each)) < ANGLES else round(each, 2) for each in degrees]
+    degrees = [math.degrees(angle) for angle in azimuth]
+    rounded = [round(angle) if abs(angle - round(angle)) < ANGLES else round(angle, 2) for angle in degrees]
     raise InputError(
         "these angles look like radians",
         got=number_words(tuple(azimuth)),
         expected="degrees, such as 60,180,300",
-        remedy=f"{_call('azimuth', tuple(map(float, whole)))}{SAYING}",
+        remedy=f"{_call('azimuth', tuple(map(float, rounded)))}{SAYING}",
         where="--azimuth",
     )
 
 
 def _refuse_length(key: str, value: Any, possible: tuple[float, float], usual: tuple[float, float]) -> None:
-    if value is None or all(possible[0] <= each <= possible[1] for each in _numbers(value)):
+    if value is None or all(possible[0] <= length <= possible[1] for length in _numbers(value)):
         return
-    if not all(each > 0.0 for each in _numbers(value)):
+    if not all(length > 0.0 for length in _numbers(value)):
         return  # which no robot file takes
     raise InputError(
         f"no {key.replace('_', ' ')} is so {'small' if min(_numbers(value)) < possible[0] else 'large'}",
@@ -93,8 +93,8 @@ def _refuse_length(key: str, value: Any, possible: tuple[float, float], usual: t
 def _meant(value: float | tuple[float, ...], usual: tuple[float, float]) -> Any:
     """The value in metres, were it in mm, cm or in: the first that is usual; None where none is."""
     for unit in LENGTHS:
-        metres = tuple(float(f"{each * unit:.4g}") for each in _numbers(value))
-        if all(usual[0] <= each <= usual[1] for each in metres):
+        metres = tuple(float(f"{number * unit:.4g}") for number in _numbers(value))
+        if all(usual[0] <= length <= usual[1] for length in metres):
             return metres if isinstance(value, tuple) else metres[0]
     return None
 
@@ -104,14 +104,14 @@ def _refuse_mass(mass: float, side: float) -> None:
     density = mass / side**3
     if not mass > 0.0 or DENSITY[0] <= density <= DENSITY[1]:
         return
-    meant = float(f"{mass * (GRAMS if density > DENSITY[1] else TONNES):.4g}")
-    fits = DENSITY[0] <= meant / side**3 <= DENSITY[1]
+    intended = float(f"{mass * (GRAMS if density > DENSITY[1] else TONNES):.4g}")
+    fits = DENSITY[0] <= intended / side**3 <= DENSITY[1]
     raise InputError(
         f"no robot of this size is so {'heavy' if density > DENSITY[1] else 'light'}",
         got=f"{mass:g} kg in {side:.2g} m",
         expected=f"kilograms, {_two(DENSITY[0] * side**3)} to {_two(DENSITY[1] * side**3)}",
         where="--mass",
-        remedy=f"{_call('mass', meant if fits else None)}{SAYING}",
+        remedy=f"{_call('mass', intended if fits else None)}{SAYING}",
     )
 
 

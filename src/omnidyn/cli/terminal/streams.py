@@ -76,8 +76,8 @@ def prepare() -> None:
 
 def _ascii_locale() -> bool:
     """Python shows UTF-8 in the C locale; whoever asks for that locale may not be able to read it."""
-    asked = next((os.environ[name] for name in ("LC_ALL", "LC_CTYPE", "LANG") if os.environ.get(name)), "")
-    return asked in ("C", "POSIX")
+    locale = next((os.environ[name] for name in ("LC_ALL", "LC_CTYPE", "LANG") if os.environ.get(name)), "")
+    return locale in ("C", "POSIX")
 
 
 def say(words: str) -> None:
@@ -133,13 +133,13 @@ def width() -> int:
 
 def painted(word: str, tone: str) -> str:
     """The word in the colour of its tone, where stdout is a terminal that wants colours."""
-    wanted = (
+    colours = (
         sys.stdout is not None
         and sys.stdout.isatty()
         and not os.environ.get("NO_COLOR")
         and os.environ.get("TERM") != "dumb"
     )
-    if not wanted or not tone:
+    if not colours or not tone:
         return word
     styled = typer.style(printable(word), fg=COLOURS[tone])
     _coloured.add(styled)

@@ -54,7 +54,7 @@ def brief_document(
     warnings: Iterable[Statement],
     advice: Sequence[object] = (),
     head: Sequence[Words] = (),
-    more: str = "number",
+    row_word: str = "number",
 ) -> Document:
     """A result on one screen: verdict, table, the gravest warnings, the next step, and how much `--full` adds.
 
@@ -64,35 +64,35 @@ def brief_document(
         warnings: of all severities; notes are only counted.
         advice: next steps, the best first.
         head: what stands before the table.
-        more: what a row of the table is, in the singular.
+        row_word: what a row of the table is, in the singular.
     """
-    every = dict.fromkeys(warnings)
-    grave = [warning for severity in (ERROR, WARNING) for warning in every if warning.severity == severity]
-    shown = replace(table, rows=table.rows[:BRIEF_ROWS])
+    statements = dict.fromkeys(warnings)
+    grave = [warning for severity in (ERROR, WARNING) for warning in statements if warning.severity == severity]
+    brief_table = replace(table, rows=table.rows[:BRIEF_ROWS])
     title = Document((), verdict=verdict).verdict_text
-    room = BRIEF_LINES - SPARE_LINES - _height([Words(title), *head]) - len(shown.rows)
+    room = BRIEF_LINES - SPARE_LINES - _height([Words(title), *head]) - len(brief_table.rows)
     worst = [Words(f"{warning.severity}: {warning}", rest="  ") for warning in grave[:BRIEF_WARNINGS]]
     worst = _that_fit(worst, room - 2 * bool(advice))
     steps = _that_fit([Words(f"next: {step}", rest="  ") for step in advice[:BRIEF_STEPS]], room - _height(worst))
     hidden = {
-        more: len(table.rows) - len(shown.rows),
+        row_word: len(table.rows) - len(brief_table.rows),
         "warning": len(grave) - len(worst),
-        "note": len(every) - len(grave),
+        "note": len(statements) - len(grave),
         "next step": len(advice) - len(steps),
     }
     counts = ", ".join(f"{count} more {name}{'s' * (count > 1)}" for name, count in hidden.items() if count > 0)
     last = f"--full shows all{f': {counts}' if counts else ''}."
-    return Brief([*head, shown, "", *worst, *steps, last], ascii=True, verdict=verdict)
+    return Brief([*head, brief_table, "", *worst, *steps, last], ascii=True, verdict=verdict)
 
 
 def _that_fit(paragraphs: Sequence[Words], room: int) -> list[Words]:
     """The first paragraphs that take no more than so many lines together; the gravest one always."""
-    kept = list[Words]()
+    fitting = list[Words]()
     for paragraph in paragraphs:
-        if kept and _height([*kept, paragraph]) > room:
+        if fitting and _height([*fitting, paragraph]) > room:
             break
-        kept.append(paragraph)
-    return kept
+        fitting.append(paragraph)
+    return fitting
 
 
 def _height(paragraphs: Sequence[Words]) -> int:

@@ -23,10 +23,10 @@ from omnidyn.control.controller import (
     BAD_POSE,
     BAD_TIME,
     BAD_TWIST,
-    ENDED,
     FAILED,
     OK,
-    STILL,
+    PATH_ENDED,
+    TIME_STANDS_STILL,
     WAITING,
     WHEEL_SPEED,
     Info,
@@ -37,7 +37,7 @@ from omnidyn.control.controller import (
     without_slip,
 )
 from omnidyn.control.feedforward import DT, check_dt
-from omnidyn.control.mpc.loop import Batch, Memory, Room, control_step
+from omnidyn.control.mpc.loop import Batch, Memory, MpcWorkspace, control_step
 from omnidyn.control.mpc.model import numbers, volts
 from omnidyn.control.mpc.observer import PUSH, SCALE
 from omnidyn.control.mpc.settings import Preview, Settings
@@ -91,7 +91,7 @@ class Mpc:
         self.steps_late = latency if self.delay is None else self.delay
         self._zeros = np.zeros(robot.wheels.count)
         self._preview = Preview(self.dt, self.steps_late, self.horizon)
-        self._room = Room.of(self.horizon, volts(robot))
+        self._room = MpcWorkspace.of(self.horizon, volts(robot))
         self._numbers = numbers(robot, self.dt, self.friction)
         self._tables = self.settings.tables(robot, self.dt, self.observer)
         self._control = None  # compiled by the first step
@@ -104,17 +104,17 @@ class Mpc:
 
     def replace(self, *, robot: Robot) -> Self:
         """The same controller for another robot. Where the friction is another, its share is learned anew."""
-        other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__)
-        other._take(robot)
-        if robot.wheels.count != self.robot.wheels.count or other.steps_late != self.steps_late:
-            other.reset()
-            return other
-        same = robot.friction == self.robot.friction
-        other._memory, other._state = self._memory.copied(None if same else self.settings), self._state.copy()
-        other._preview = copy(self._preview)  # what it has sampled stays as it is, to the last bit
-        other._last = np.clip(self._last, -other.limit, other.limit)
-        return other
+        clone = object.__new__(type(self))
+        clone.__dict__.update(self.__dict__)
+        clone._take(robot)
+        if robot.wheels.count != self.robot.wheels.count or clone.steps_late != self.steps_late:
+            clone.reset()
+            return clone
+        same_friction = robot.friction == self.robot.friction
+        clone._memory, clone._state = self._memory.copied(None if same_friction else self.settings), self._state.copy()
+        clone._preview = copy(self._preview)  # what it has sampled stays as it is, to the last bit
+        clone._last = np.clip(self._last, -clone.limit, clone.limit)
+        return clone
 
     @property
     def learned(self) -> dict[str, FloatArray]:
@@ -131,57 +131,57 @@ class Mpc:
     def info(self) -> Info:
         """What the last step did."""
         status, iterations, took = self._asked
-        if status not in (OK, ENDED):
+        if status not in (OK, PATH_ENDED):
             return Info(status, iterations, took)
         return Info(status, iterations, took, self._memory.x[1:, :3].copy(), self._met())
 
     def _met(self) -> tuple[str, ...]:
         """The limits that the last output met."""
         memory, limit = self._memory, self._tables.limit
-        volts, held = memory.u[0], memory.active[0] != 0
+        volts, at_bound = memory.u[0], memory.active[0] != 0
         at_voltage = np.abs(volts) >= limit[0] - MET
         at_current = np.abs(volts - self._tables.emf @ memory.x[0, 3:]) >= limit[1] - MET
         met = {
             "voltage": at_voltage.any(),
             "current": at_current.any(),
-            "slew": (held & ~at_voltage & ~at_current).any(),
+            "slew": (at_bound & ~at_voltage & ~at_current).any(),
             "speed": memory.fast[0].any(),
         }
         return tuple(name for name, value in met.items() if value)
 
     def step(self, t: float, pose: Any, twist: Any, path: Any) -> FloatArray:
         """What to send to the drive from t [s] on. Shape (wheels,). Never raises."""
-        begun = time.perf_counter()
+        start = time.perf_counter()
         try:
             since = t - self._t
             if since <= 0.0 or since != since:
                 word = self._timing(t, since)
                 if word:
-                    return self._other(word, begun)
+                    return self._other(word, start)
             self._t, state = t, self._state
             if pose.__class__ is not np.ndarray or pose.shape != (3,):
                 pose = vector(pose)
             if twist.__class__ is not np.ndarray or twist.shape != (3,):
                 twist = vector(twist)
             state[:3], state[3:] = pose, twist
-            return self._solved(t, since, path, begun)
+            return self._solved(t, since, path, start)
         except Exception as raised:  # the loop of a robot must not end here, but where a user ends it
             error = told_by(raised)
             if isinstance(error, INTERRUPTS):
                 raise error from raised
-            return self._refused(t, pose, twist, path, raised, begun)
+            return self._refused(t, pose, twist, path, raised, start)
 
-    def _solved(self, t: float, since: float, path: Any, begun: float) -> FloatArray:
+    def _solved(self, t: float, since: float, path: Any, start: float) -> FloatArray:
         """The output of a step whose arguments look well."""
         preview = self._preview
         row = preview.row_at(t, path)
-        known = self._known and 0.5 * self.dt < since < 1.5 * self.dt
-        given = self._numbers, self._tables, preview.rows, row, self._state, known, self._memory, self._room
+        consecutive = self._known and 0.5 * self.dt < since < 1.5 * self.dt
+        arguments = self._numbers, self._tables, preview.rows, row, self._state, consecutive, self._memory, self._room
         if self._control is None:
-            self._control = machine_code(control_step, *given)
-        passes = self._control(*given)
+            self._control = machine_code(control_step, *arguments)
+        passes = self._control(*arguments)
         if passes < 0:
-            return self._failed(t, passes, begun)
+            return self._failed(t, passes, start)
         self._known = True
         sent = self._memory.u[0] * self._per_volt
         if self.output == WHEEL_SPEED:
@@ -189,16 +189,16 @@ class Mpc:
         elif self._per_volt != 1.0:
             sent = np.clip(sent, -self.limit, self.limit)
         self._last = sent
-        self._asked = (ENDED if t > preview.end else OK, passes, time.perf_counter() - begun)
+        self._asked = (PATH_ENDED if t > preview.end else OK, passes, time.perf_counter() - start)
         return sent.copy()
 
-    def _failed(self, t: float, passes: int, begun: float) -> FloatArray:
+    def _failed(self, t: float, passes: int, start: float) -> FloatArray:
         """Zeros for a state that is none, and where no input was found: the memory may be why, and goes."""
         if passes == -1:
-            return self._other(BAD_POSE if _bad(self._state[:3]) else BAD_TWIST, begun)
+            return self._other(BAD_POSE if _bad(self._state[:3]) else BAD_TWIST, start)
         self.reset()
         self._t = t
-        return self._other(FAILED, begun)
+        return self._other(FAILED, start)
 
     def _speeds(self) -> FloatArray:
         """Speeds of the wheels [rad/s] by which the loop of the drive makes the volts wanted.
@@ -219,23 +219,23 @@ class Mpc:
             self.reset()
             self._t = float(t)
             return BACKWARDS
-        return STILL if since == 0.0 else ""
+        return TIME_STANDS_STILL if since == 0.0 else ""
 
-    def _other(self, word: str, begun: float) -> FloatArray:
+    def _other(self, word: str, start: float) -> FloatArray:
         """Zeros, and why; the last output again where time stands still."""
-        if word != STILL:
+        if word != TIME_STANDS_STILL:
             self._last, self._known = self._zeros.copy(), False
             self._memory.sent[:] = 0.0
-        self._asked = (word, 0, time.perf_counter() - begun)
+        self._asked = (word, 0, time.perf_counter() - start)
         return self._last.copy()
 
-    def _refused(self, t: Any, pose: Any, twist: Any, path: Any, error: Exception, begun: float) -> FloatArray:
+    def _refused(self, t: Any, pose: Any, twist: Any, path: Any, error: Exception, start: float) -> FloatArray:
         """What to do after an exception: find out what it was about."""
         try:
-            good = math.isfinite(float(t))
+            finite_time = math.isfinite(float(t))
         except (TypeError, ValueError, OverflowError):
-            good = False
-        if not good:
+            finite_time = False
+        if not finite_time:
             word = BAD_TIME
         elif vector(pose) is None:
             word = BAD_POSE
@@ -245,7 +245,7 @@ class Mpc:
             word = BAD_PATH
         else:
             word = f"{FAILED}: {type(error).__name__}"
-        return self._other(word, begun)
+        return self._other(word, start)
 
 
 def _bad(values: FloatArray) -> bool:

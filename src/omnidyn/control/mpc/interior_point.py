@@ -37,13 +37,13 @@ from omnidyn.control.mpc.small import dot, matrix, plus, put3, tv, vector
 
 LOW, HIGH, DROP_LOW, DROP_HIGH, NEXT, SLOPE = 0, 1, 2, 3, 4, 5  # tables of the room to work in
 ROOM_SIZE = 6
-MARGIN = 0.1  # of the width of a bound, that the start keeps
+START_MARGIN = 0.1  # of the width of a bound, that the start keeps
 BACK_OFF = 0.995  # of the way to the nearest bound that a step goes
-MOST = 40
-LEAST = 1e-14  # [V] from a bound: rounding takes less than that to 0
+MOST_PASSES = 40
+LEAST_SLACK = 1e-14  # [V] from a bound: rounding takes less than that to 0
 
 
-class Program(NamedTuple):
+class QuadraticProgram(NamedTuple):
     """A quadratic program of n steps, and the arrays that it is solved in.
 
     Args:
@@ -116,7 +116,7 @@ def begin(program):
     for k in range(n):
         for i in range(m):
             low, high = bounds[0, k, i], bounds[1, k, i]
-            margin = MARGIN * (high - low)
+            margin = START_MARGIN * (high - low)
             u[k, i] = min(max(u[k, i], low + margin), high - margin)
     slopes(program, room[SLOPE])
     size = 0.0
@@ -154,7 +154,7 @@ def barrier(program, mu, correct):
     u, room = program.u, program.room
     for k in range(u.shape[0]):
         for i in range(u.shape[1]):
-            sl, sh = max(u[k, i] - bounds[0, k, i], LEAST), max(bounds[1, k, i] - u[k, i], LEAST)
+            sl, sh = max(u[k, i] - bounds[0, k, i], LEAST_SLACK), max(bounds[1, k, i] - u[k, i], LEAST_SLACK)
             rl, rh = 1.0 / sl, 1.0 / sh
             d = room[LOW, k, i] * rl + room[HIGH, k, i] * rh
             tl = th = mu
@@ -174,7 +174,7 @@ def reach(program):
     along = 1.0 / BACK_OFF
     for k in range(u.shape[0]):
         for i in range(u.shape[1]):
-            sl, sh = max(u[k, i] - bounds[0, k, i], LEAST), max(bounds[1, k, i] - u[k, i], LEAST)
+            sl, sh = max(u[k, i] - bounds[0, k, i], LEAST_SLACK), max(bounds[1, k, i] - u[k, i], LEAST_SLACK)
             ml, mh, du = room[LOW, k, i], room[HIGH, k, i], room[NEXT, k, i] - u[k, i]
             cl = room[DROP_LOW, k, i] - ml - ml * du / sl
             ch = room[DROP_HIGH, k, i] - mh + mh * du / sh
@@ -214,12 +214,12 @@ def newton(program, again):
 def interior_point(program, mu, until):
     """Go on from `u` and multipliers in `room` until the mean of m s is below `until`. Returns (passes, mu)."""
     count = 0
-    while mu > until and count < MOST:
+    while mu > until and count < MOST_PASSES:
         barrier(program, 0.0, False)
         newton(program, False)
         along = reach(program)
-        least = mean_product(program, along, True)
-        barrier(program, mu * (least / mu) ** 3, True)
+        affine_product = mean_product(program, along, True)
+        barrier(program, mu * (affine_product / mu) ** 3, True)
         newton(program, True)
         move(program, reach(program))
         mu = mean_product(program, 0.0, False)
@@ -255,7 +255,7 @@ def guess(program):
 # interior_point.py takes over. Source: primal-dual active set, Hintermueller, Ito, Kunisch, SIAM J. Optim. 13 (2002).
 
 LOWER, FREE, UPPER = -1, 0, 1
-BEYOND = 1e-10  # [V] an input may be beyond its bound, and as far may a slope, over the weight, be off
+BOUND_TOLERANCE = 1e-10  # [V] an input may be beyond its bound, and as far may a slope, over the weight, be off
 
 
 @part
@@ -264,17 +264,17 @@ def hold(program, top):
     weight, wanted, bounds, active = program.weight, program.wanted, program.bounds, program.active
     for k in range(top + 1):
         for i in range(active.shape[1]):
-            held = active[k, i] != FREE
-            program.inverse[k, i] = 0.0 if held else 1.0 / weight[i]
-            program.target[k, i] = bounds[0 if active[k, i] < 0 else 1, k, i] if held else wanted[k, i]
+            at_bound = active[k, i] != FREE
+            program.inverse[k, i] = 0.0 if at_bound else 1.0 / weight[i]
+            program.target[k, i] = bounds[0 if active[k, i] < 0 else 1, k, i] if at_bound else wanted[k, i]
 
 
 @part
 def corrected(side, u, low, high, slope):
     """Where an input belongs: LOWER, FREE or UPPER. slope: of the cost by that input [1/V of its weight]."""
     if side == FREE:
-        return UPPER if u > high + BEYOND else (LOWER if u < low - BEYOND else FREE)
-    return FREE if side * slope > BEYOND else side
+        return UPPER if u > high + BOUND_TOLERANCE else (LOWER if u < low - BOUND_TOLERANCE else FREE)
+    return FREE if side * slope > BOUND_TOLERANCE else side
 
 
 @part
@@ -299,22 +299,22 @@ def forward_corrected(program):
 
 
 @part
-def active_set(program, most):
+def active_set(program, most_passes):
     """Solve from the guess in `active`. Returns the passes it took, most + 1 where they did not do."""
     top = len(program.stage) - 1
-    for count in range(most):
+    for count in range(most_passes):
         hold(program, top)
         backward(program.stage, program.answer, program.push, program.inverse, program.target, top)
         top = forward_corrected(program)
         if top < 0:
             return count + 1
-    return most + 1
+    return most_passes + 1
 
 
 # The program solved: active set from the last step's guess, else interior point, then active set from its answer
 
 FIRST, LAST = 6, 8  # passes of the active set before and after the interior point method
-EARLY, TIGHT = 1e-6, 1e-13  # of the mean of m s that it begins with, where it stops
+EARLY_GAP, FINAL_GAP = 1e-6, 1e-13  # of the mean of m s that it begins with, where it stops
 
 
 @part
@@ -330,9 +330,9 @@ def solve(program):
     begin(program)
     mu = mean_product(program, 0.0, False)
     total, start = FIRST, mu
-    for until in (EARLY, TIGHT):
-        more, mu = interior_point(program, mu, until * start)
-        total += more
+    for until in (EARLY_GAP, FINAL_GAP):
+        passes, mu = interior_point(program, mu, until * start)
+        total += passes
         guess(program)
         for k in range(u.shape[0]):
             for i in range(u.shape[1]):
@@ -396,14 +396,14 @@ def weigh_speeds(settings, stage, fast, sign):
 @part
 def too_fast(settings, x, fast):
     """Note which speeds are beyond their limits. Returns whether others than before are."""
-    changed = False
+    differs = False
     for k in range(len(fast)):
         for i in range(3):
             limit, speed = settings[SPEED + i], x[k + 1, 3 + i]
             side = 0 if limit <= 0.0 else (1 if speed > limit else (-1 if speed < -limit else 0))
-            changed |= side != fast[k, i]
+            differs |= side != fast[k, i]
             fast[k, i] = side
-    return changed
+    return differs
 
 
 @part

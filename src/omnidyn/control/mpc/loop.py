@@ -12,7 +12,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel, part
-from omnidyn.control.mpc.interior_point import ROOM_SIZE, Program, make_bounds, solve_limited
+from omnidyn.control.mpc.interior_point import ROOM_SIZE, QuadraticProgram, make_bounds, solve_limited
 from omnidyn.control.mpc.model import Numbers
 from omnidyn.control.mpc.observer import (
     DD,
@@ -52,7 +52,7 @@ from omnidyn.control.mpc.settings import Preview, Settings, Tables
 from omnidyn.control.mpc.small import put3, vector
 from omnidyn.errors import InputError
 
-FARTHEST = 1e9  # of any number of a state
+LARGEST_STATE = 1e9  # of any number of a state
 
 
 # The arrays that a controller works in: what it remembers from step to step, and room that it does not
@@ -87,7 +87,7 @@ class Memory(NamedTuple):
 
     def copied(self, relearn: Settings | None) -> Self:
         """A copy; for other friction, `relearn`, the push stays and the share of friction is learned anew."""
-        copy = self._make(np.copy(each) for each in self)
+        copy = self._make(np.copy(array) for array in self)
         if relearn is None:
             return copy
         push = copy.estimate[PUSH].copy()
@@ -106,8 +106,8 @@ def _unlearn(estimate: FloatArray, settings: Settings) -> None:
     estimate[DD] = (START_PUSH * estimate[WALK_PUSH]) ** 2
 
 
-class Room(NamedTuple):
-    """What a step works in: stage, answer, inverse, target, wanted, bounds, interior of its Program; before (n + 1, 6):
+class MpcWorkspace(NamedTuple):
+    """What a step works in: stage, answer, inverse, target, wanted, bounds, interior of its program; before (n + 1, 6):
     the motion along which it was made."""
 
     stage: FloatArray
@@ -148,7 +148,7 @@ def past_delay(numbers, memory, stage):
 
 
 @part
-def control(numbers, tables, preview, start, state, known, memory, room):
+def control(numbers, tables, preview, start, state, consecutive, memory, room):
     """One step from a measured state (6,). Returns passes of the solver; u[0] is the answer, within bounds.
 
     -1 where the state is no number, or no place; -2 where no input was found: then nothing of the step is of use.
@@ -157,11 +157,11 @@ def control(numbers, tables, preview, start, state, known, memory, room):
     estimate, sent, x, u, fast = memory.estimate, memory.sent, memory.x, memory.u, memory.fast
     stage, bounds, before = room.stage, room.bounds, room.before
     for i in range(6):
-        if not abs(state[i]) <= FARTHEST:
+        if not abs(state[i]) <= LARGEST_STATE:
             return -1
-    shift(memory, known, preview, start)
+    shift(memory, consecutive, preview, start)
     if settings[LEARN] != 0.0:
-        if known:
+        if consecutive:
             observe(numbers, estimate, stage, state, drive_of(numbers.push, sent, 0))
         else:
             begin_with(estimate, state)
@@ -172,13 +172,13 @@ def control(numbers, tables, preview, start, state, known, memory, room):
             x[0, i] = state[i]
     past_delay(numbers, memory, stage)
     add = nearest_turn(x[0, 2], preview[start, 2])
-    if not known:
+    if not consecutive:
         for k in range(1, len(x)):
             x[k, 2] += add
     if rests(preview, start, x):
         stay(x)
     limited = settings[CURRENT] != 0.0
-    program = Program(
+    program = QuadraticProgram(
         numbers.push,
         tables.weight,
         stage,
@@ -209,7 +209,7 @@ def control(numbers, tables, preview, start, state, known, memory, room):
         if not moved(numbers.levels, tables.emf, limited, x, before):
             break
     for i in range(u.shape[1]):
-        if not abs(u[0, i]) <= FARTHEST:
+        if not abs(u[0, i]) <= LARGEST_STATE:
             return -2
         u[0, i] = min(max(u[0, i], bounds[0, 0, i]), bounds[1, 0, i])
         u[0, i] = min(max(u[0, i], -limit[0, i]), limit[0, i])  # bounds that leave no room are off by rounding
@@ -220,13 +220,13 @@ def control(numbers, tables, preview, start, state, known, memory, room):
 
 
 @kernel
-def control_step(numbers, tables, preview, start, state, known, memory, room):
+def control_step(numbers, tables, preview, start, state, consecutive, memory, room):
     """`control` of one robot."""
-    return control(numbers, tables, preview, start, state, known, memory, room)
+    return control(numbers, tables, preview, start, state, consecutive, memory, room)
 
 
 @kernel
-def control_batch(numbers, tables, previews, start, states, known, memories, room):
+def control_batch(numbers, tables, previews, start, states, consecutive, memories, room):
     """`control` of many robots: what each remembers has one more axis in front. Returns the passes of each.
 
     start: (which of the previews, its row) of each robot.
@@ -236,7 +236,9 @@ def control_batch(numbers, tables, previews, start, states, known, memories, roo
         memory = Memory(
             memories.estimate[i], memories.sent[i], memories.x[i], memories.u[i], memories.active[i], memories.fast[i]
         )
-        passes[i] = control(numbers, tables, previews[start[i, 0]], start[i, 1], states[i], known[i], memory, room)
+        passes[i] = control(
+            numbers, tables, previews[start[i, 0]], start[i, 1], states[i], consecutive[i], memory, room
+        )
     return passes
 
 
@@ -247,7 +249,7 @@ class Batch:
     """The controllers of `count` robots; made by `Mpc.batch`. Gives volts."""
 
     def __init__(
-        self, numbers: Numbers, tables: Tables, room: Room, settings: Settings, preview: Preview, count: int
+        self, numbers: Numbers, tables: Tables, room: MpcWorkspace, settings: Settings, preview: Preview, count: int
     ) -> None:
         self.count, self._numbers, self._tables, self._room, self._settings = count, numbers, tables, room, settings
         self._like = preview
@@ -255,8 +257,8 @@ class Batch:
 
     def reset(self) -> None:
         """Forget all steps."""
-        one = Memory.of(self._like.ahead, len(self._tables.weight), self._like.late, self._settings)
-        self._memory = Memory._make(np.repeat(each[None], self.count, axis=0) for each in one)
+        blank = Memory.of(self._like.ahead, len(self._tables.weight), self._like.late, self._settings)
+        self._memory = Memory._make(np.repeat(array[None], self.count, axis=0) for array in blank)
         self._known = np.zeros(self.count, bool)
         self._previews: list[Preview] = []
 
@@ -273,9 +275,11 @@ class Batch:
             raise InputError("no path for each robot", got=len(paths), expected=f"1 or {self.count}", where="path")
         while len(self._previews) < len(paths):
             self._previews.append(self._like.another())
-        rows = [preview.row_at(t, each) for preview, each in zip(self._previews, paths, strict=False)]
+        rows = [preview.row_at(t, route) for preview, route in zip(self._previews, paths, strict=False)]
         need = self._like.ahead + 1
-        previews = np.stack([each.rows[row : row + need] for each, row in zip(self._previews, rows, strict=False)])
+        previews = np.stack(
+            [preview.rows[row : row + need] for preview, row in zip(self._previews, rows, strict=False)]
+        )
         start = np.zeros((self.count, 2), np.int64)
         if len(paths) > 1:
             start[:, 0] = np.arange(self.count)

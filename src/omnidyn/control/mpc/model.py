@@ -26,10 +26,10 @@ from omnidyn.simulation.exact.slopes import hold_slopes
 DECAY, PHI, PSI, FEED, TURNING, BY_MASS = 0, 9, 18, 27, 36, 45  # columns of `linear`, matrices row by row
 ELLIPSE, STEP = 54, 57  # levels Cx, Cy [N], and the width of their slope [N m/s]; dt [s]
 ELLIPSE_FALL, LINEAR_SIZE = 58, 63  # 1/v_s [s/m], shape, exponent, and how much more at rest, along x and y [N]
-GX, ACROSS, FORWARD, BACKWARD = 0, 3, 6, 7  # columns of `levels`: direction g, M^-1 g, levels of both directions,
-WIDTH, SOFT = 8, 9  # speed below which the level falls to 0, and below which it has a slope
+GX, BY_MASS_GX, FORWARD, BACKWARD = 0, 3, 6, 7  # columns of `levels`: direction g, M^-1 g, levels of both directions,
+SLOW_SPEED, SOFT_SPEED = 8, 9  # speed below which the level falls to 0, and below which it has a slope
 FALLING, SHAPE, POWER, MORE_FORWARD, MORE_BACKWARD, LEVEL_SIZE = 10, 11, 12, 13, 14, 15  # 1/v_s, d, more at rest
-SLOW = np.array([0.002, 0.002, 0.02])  # [m/s, m/s, rad/s] below which the predicted friction falls linearly to 0
+SLOW_SPEEDS = np.array([0.002, 0.002, 0.02])  # [m/s, m/s, rad/s] below which the predicted friction falls linearly to 0
 SOFTER = np.array([30.0, 30.0, 40.0])  # times as wide, it has a slope: how soon the program may count on friction
 
 
@@ -44,8 +44,8 @@ class Numbers(NamedTuple):
 
 def numbers(robot: Robot, dt: float, friction: bool = True) -> Numbers:
     """The numbers of a robot for steps of dt [s]; friction: whether dry friction is among them."""
-    own, directions = _friction(robot)
-    viscous = (directions.T * own.element["viscous"]) @ directions
+    plant, directions = _friction(robot)
+    viscous = (directions.T * plant.element["viscous"]) @ directions
     motors = motor_wrench(robot)
     rates = per_mass(robot, motors.braking - viscous).T + 0.0
     decay, phi, psi = _held(robot, rates, dt)
@@ -65,11 +65,11 @@ def numbers(robot: Robot, dt: float, friction: bool = True) -> Numbers:
     push = np.ascontiguousarray(per_mass(robot, motors.driving).T)
     levels = np.zeros((0, LEVEL_SIZE))
     if friction:
-        body = own.body
+        body = plant.body
         linear[0, ELLIPSE : ELLIPSE + 2] = body.coulomb
-        linear[0, ELLIPSE + 2] = SLOW[0] * body.coulomb.max()
+        linear[0, ELLIPSE + 2] = SLOW_SPEEDS[0] * body.coulomb.max()
         linear[0, ELLIPSE_FALL:LINEAR_SIZE] = body.fall, body.form, body.exponent, *(body.breakaway - body.coulomb)
-        levels = _levels(robot, own.element, directions)
+        levels = _levels(robot, plant.element, directions)
     return Numbers(linear, push, np.asarray(np.linalg.pinv(push), dtype=float), levels)
 
 
@@ -87,10 +87,10 @@ def emf(robot: Robot) -> FloatArray:
 
 def _friction(robot: Robot) -> tuple[Plant, FloatArray]:
     """All friction, in SI, and the direction of each element."""
-    own = blank_plant(robot.wheels.count)
+    plant = blank_plant(robot.wheels.count)
     for law in robot.friction.rigid.laws:
-        law.add_to(own, 1.0)
-    return own, np.concatenate([np.eye(N_AXES), robot.wheels.wrench_matrix.T])
+        law.add_to(plant, 1.0)
+    return plant, np.concatenate([np.eye(N_AXES), robot.wheels.wrench_matrix.T])
 
 
 def _held(robot: Robot, rates: FloatArray, dt: float) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -102,22 +102,24 @@ def _held(robot: Robot, rates: FloatArray, dt: float) -> tuple[FloatArray, Float
         return np.diag(1.0 + np.diag(rates) * phi), np.diag(phi), np.diag(psi)
     block = np.zeros((9, 9))
     block[:3, :3], block[:3, 3:6], block[3:6, 6:] = rates, np.eye(3), np.eye(3)
-    whole = expm(block * dt)
-    whole = np.asarray(whole, dtype=float)
-    return whole[:3, :3], whole[:3, 3:6], whole[:3, 6:]
+    exponential = expm(block * dt)
+    exponential = np.asarray(exponential, dtype=float)
+    return exponential[:3, :3], exponential[:3, 3:6], exponential[:3, 6:]
 
 
 def _levels(robot: Robot, element: Any, directions: FloatArray) -> FloatArray:
     """The parts of dry friction that act on one scalar speed each, those of level 0 left out."""
     coulomb = element["coulomb"]
-    kept = np.nonzero(coulomb.sum(axis=1) > 0.0)[0]
-    table = np.zeros((len(kept), LEVEL_SIZE))
-    table[:, GX : GX + 3] = directions[kept]
-    table[:, ACROSS : ACROSS + 3] = per_mass(robot, directions[kept])
-    table[:, FORWARD], table[:, BACKWARD] = coulomb[kept].T
+    elements = np.nonzero(coulomb.sum(axis=1) > 0.0)[0]
+    table = np.zeros((len(elements), LEVEL_SIZE))
+    table[:, GX : GX + 3] = directions[elements]
+    table[:, BY_MASS_GX : BY_MASS_GX + 3] = per_mass(robot, directions[elements])
+    table[:, FORWARD], table[:, BACKWARD] = coulomb[elements].T
     for column, field in ((FALLING, "fall"), (SHAPE, "form"), (POWER, "exponent")):
-        table[:, column] = element[field][kept]
-    table[:, MORE_FORWARD : MORE_BACKWARD + 1] = (element["breakaway"] - coulomb)[kept]
-    table[:, WIDTH] = np.where(kept < N_AXES, SLOW[np.minimum(kept, 2)], SLOW[0])
-    table[:, SOFT] = table[:, WIDTH] * np.where(kept < N_AXES, SOFTER[np.minimum(kept, 2)], SOFTER[0])
+        table[:, column] = element[field][elements]
+    table[:, MORE_FORWARD : MORE_BACKWARD + 1] = (element["breakaway"] - coulomb)[elements]
+    table[:, SLOW_SPEED] = np.where(elements < N_AXES, SLOW_SPEEDS[np.minimum(elements, 2)], SLOW_SPEEDS[0])
+    table[:, SOFT_SPEED] = table[:, SLOW_SPEED] * np.where(
+        elements < N_AXES, SOFTER[np.minimum(elements, 2)], SOFTER[0]
+    )
     return table

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from omnidyn.compiled.kernel import part
-from omnidyn.control.mpc.model import DECAY, FALLING, FEED, SLOW, TURNING, WIDTH
+from omnidyn.control.mpc.model import DECAY, FALLING, FEED, SLOW_SPEED, SLOW_SPEEDS, TURNING
 from omnidyn.control.mpc.observer import PUSH, SCALE
 from omnidyn.control.mpc.riccati import PULL, WAY, WEIGHT
 from omnidyn.control.mpc.small import dot, matrix, minus, mv, plus, put3, vector
@@ -68,9 +68,9 @@ def make_stages(numbers, estimate, program):
     for k in range(len(stage)):
         end, way = vector(x, k + 1, 3), vector(stage, k, WAY)
         sense = (
-            end[0] + min(max(way[0], -NEAR[0]), NEAR[0]),
-            end[1] + min(max(way[1], -NEAR[1]), NEAR[1]),
-            end[2] + min(max(way[2], -NEAR[2]), NEAR[2]),
+            end[0] + min(max(way[0], -STANDSTILL[0]), STANDSTILL[0]),
+            end[1] + min(max(way[1], -STANDSTILL[1]), STANDSTILL[1]),
+            end[2] + min(max(way[2], -STANDSTILL[2]), STANDSTILL[2]),
         )
         friction = friction_at(linear, levels, estimate[SCALE], sense, 1.0, True)
         linear_stage(linear, friction, push, stage, k, x[k, 2], vector(x, k, 3), end)
@@ -79,17 +79,18 @@ def make_stages(numbers, estimate, program):
 # The motion along which a step is made linear: that of the step before, shifted by one; and whether to do it again
 
 TURN = 6.283185307179586
-NEAR = tuple(SLOW.tolist())  # [m/s, m/s, rad/s] below which robot and path stand still
-SOON = 21  # steps of the horizon that are compared: later ones are looked at again before they matter
-MOVED, TURNED, PULLED = 0.25, 0.02, 0.05  # share of friction, [rad], [V]: what differs by less is the same motion
+STANDSTILL = tuple(SLOW_SPEEDS.tolist())  # [m/s, m/s, rad/s] below which robot and path stand still
+COMPARED_STEPS = 21  # steps of the horizon that are compared: later ones are looked at again before they matter
+# Share of friction, [rad], [V]: what differs by less is the same motion.
+FRICTION_CHANGE, HEADING_CHANGE, VOLTAGE_CHANGE = 0.25, 0.02, 0.05
 
 
 @part
-def shift(memory, known, preview, start):
+def shift(memory, consecutive, preview, start):
     """The prediction of the last step as guess of this one; the reference where there is none."""
     x, u, active, fast = memory.x, memory.u, memory.active, memory.fast
     n = len(u)
-    if not known:
+    if not consecutive:
         for k in range(n + 1):
             put3(x, k, 0, vector(preview, start + k, 0))
             put3(x, k, 3, vector(preview, start + k, 3))
@@ -112,10 +113,10 @@ def shift(memory, known, preview, start):
 def rests(preview, start, x):
     """Whether robot and path stand still: then the motion predicted last is no guess for this step."""
     for i in range(3):
-        if abs(x[0, 3 + i]) >= NEAR[i]:
+        if abs(x[0, 3 + i]) >= STANDSTILL[i]:
             return False
         for k in range(len(x)):
-            if abs(preview[start + k, 3 + i]) >= NEAR[i]:
+            if abs(preview[start + k, 3 + i]) >= STANDSTILL[i]:
                 return False
     return True
 
@@ -148,23 +149,23 @@ def moved(levels, emf, limited, x, before):
 
     limited: or, where currents are limited, another back-EMF.
     """
-    for k in range(1, min(len(x), SOON)):
-        if abs(x[k, 2] - before[k, 2]) > TURNED:
+    for k in range(1, min(len(x), COMPARED_STEPS)):
+        if abs(x[k, 2] - before[k, 2]) > HEADING_CHANGE:
             return True
-        one, two = vector(x, k, 3), vector(before, k, 3)
+        twist, twist_before = vector(x, k, 3), vector(before, k, 3)
         for e in range(len(levels)):
             g = vector(levels, e, 0)
-            r = 1.0 / levels[e, WIDTH]
-            a, b = min(max(dot(g, one) * r, -1.0), 1.0), min(max(dot(g, two) * r, -1.0), 1.0)
-            if abs(a - b) > MOVED:
+            r = 1.0 / levels[e, SLOW_SPEED]
+            a, b = min(max(dot(g, twist) * r, -1.0), 1.0), min(max(dot(g, twist_before) * r, -1.0), 1.0)
+            if abs(a - b) > FRICTION_CHANGE:
                 return True
             if levels[e, FALLING] > 0.0:
-                now, then = level_at(levels, e, dot(g, one))[0], level_at(levels, e, dot(g, two))[0]
-                if abs(now - then) > MOVED * now:
+                now, then = level_at(levels, e, dot(g, twist))[0], level_at(levels, e, dot(g, twist_before))[0]
+                if abs(now - then) > FRICTION_CHANGE * now:
                     return True
         if limited:
-            change = one[0] - two[0], one[1] - two[1], one[2] - two[2]
+            change = twist[0] - twist_before[0], twist[1] - twist_before[1], twist[2] - twist_before[2]
             for i in range(len(emf)):
-                if abs(dot(vector(emf, i, 0), change)) > PULLED:
+                if abs(dot(vector(emf, i, 0), change)) > VOLTAGE_CHANGE:
                     return True
     return False

@@ -118,8 +118,8 @@ def factor_stage(stage, answer, push, inverse, k, n):
     put3(answer, k, H2, plus(tv(s12, c1), sv(s22, c2)))
     hp, hv = matrix(stage, k, HP), matrix(stage, k, HV)
     l1, l2 = added(sm(s11, hp), mm(s12, hv)), added(tm(s12, hp), sm(s22, hv))
-    y, other = tms(hp, l1), tms(hv, l2)
-    y = y[0] + other[0], y[1] + other[1], y[2] + other[2], y[3] + other[3], y[4] + other[4], y[5] + other[5]
+    y, second = tms(hp, l1), tms(hv, l2)
+    y = y[0] + second[0], y[1] + second[1], y[2] + second[2], y[3] + second[3], y[4] + second[4], y[5] + second[5]
     w = gain_of(y, compliance(push, inverse, k))
     put6(answer, k, Y, y)
     put6(answer, k, W, w)

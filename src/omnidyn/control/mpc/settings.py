@@ -80,7 +80,7 @@ class Settings:
             if value is not None and not 0.0 < value <= 1e9:
                 raise InputError("no limit", got=value, expected="a number above 0, or None", where=name)
         speed = self.speed
-        if speed is not None and (len(speed) != 3 or not all(0.0 < each <= 1e9 for each in speed)):
+        if speed is not None and (len(speed) != 3 or not all(0.0 < limit <= 1e9 for limit in speed)):
             raise InputError("no limits", got=speed, expected="three numbers above 0, or None", where="speed")
         for name, low, high in (("volts", 1e-9, 1e9), ("last", 0.0, 1e6), ("again", 1, 20), ("scale_walk", 0.0, 10.0)):
             if not low <= getattr(self, name) <= high:
@@ -92,11 +92,13 @@ class Settings:
         table[POSE_WEIGHT : POSE_WEIGHT + 3], table[TWIST_WEIGHT : TWIST_WEIGHT + 3] = self.pose, self.twist
         table[LAST_WEIGHT], table[AGAIN], table[LEARN] = self.last, self.again, learn
         table[SLEW] = 0.0 if self.slew is None else self.slew * dt
-        own = robot.motor.current_limit
-        table[CURRENT] = self.current is not None or own is not None
+        motor_current = robot.motor.current_limit
+        table[CURRENT] = self.current is not None or motor_current is not None
         if self.speed is not None:
             table[SPEED : SPEED + 3], table[SPEED_WEIGHT] = self.speed, self.speed_weight
-        amperes = np.minimum(*(per_wheel(np.inf if each is None else each, count) for each in (self.current, own)))
+        amperes = np.minimum(
+            *(per_wheel(np.inf if maximum is None else maximum, count) for maximum in (self.current, motor_current))
+        )
         limit = np.array([volts(robot), np.minimum(amperes * per_wheel(robot.motor.resistance, count), 1e9)])
         return Tables(table, np.full(count, float(self.volts)), limit, emf(robot))
 
@@ -104,7 +106,7 @@ class Settings:
 # The part of a path that lies ahead, on the grid of the steps: sampled in blocks, so that a step only looks it up
 
 BLOCK = 512  # steps sampled at once
-OFF_GRID = 1e-6  # of a step
+GRID_TOLERANCE = 1e-6  # of a step
 
 
 class Preview:
@@ -126,11 +128,11 @@ class Preview:
     def row_at(self, t: float, path: Any) -> int:
         """The row of `rows` at which the horizon of a step at time t [s] begins."""
         if path is self._path:
-            where = (t - self._begin) / self._dt
-            row = round(where)
-            if 0 <= row <= self._most and abs(where - row) < OFF_GRID * max(1.0, abs(row)):
+            position = (t - self._begin) / self._dt
+            row = round(position)
+            if 0 <= row <= self._most and abs(position - row) < GRID_TOLERANCE * max(1.0, abs(row)):
                 return row + self.late
-            aligned = row > self._most and abs(where - row) < OFF_GRID * max(1.0, abs(row))
+            aligned = row > self._most and abs(position - row) < GRID_TOLERANCE * max(1.0, abs(row))
         else:
             aligned = True
         self._most = BLOCK if aligned else 0  # a clock that trembles meets no row twice

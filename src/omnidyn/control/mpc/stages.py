@@ -21,9 +21,9 @@ import math
 
 from omnidyn.compiled.kernel import part
 from omnidyn.control.mpc.model import (
-    ACROSS,
     BACKWARD,
     BY_MASS,
+    BY_MASS_GX,
     DECAY,
     ELLIPSE,
     ELLIPSE_FALL,
@@ -35,16 +35,16 @@ from omnidyn.control.mpc.model import (
     POWER,
     PSI,
     SHAPE,
-    SOFT,
+    SLOW_SPEED,
+    SOFT_SPEED,
     STEP,
     TURNING,
-    WIDTH,
 )
 from omnidyn.control.mpc.riccati import CP, CV, GX, GY, HP, HV, E, V
 from omnidyn.control.mpc.small import added, inverse, matrix, minus, mm, mv, plus, put3, put9, vector
 from omnidyn.model.friction.stribeck import fall
 
-NONE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+ZERO_MATRIX = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @part
@@ -54,9 +54,9 @@ def level_at(levels, e, speed):
     level = levels[e, FORWARD] if forward else levels[e, BACKWARD]
     if levels[e, FALLING] == 0.0:
         return level, 0.0
-    left, slope = fall(abs(speed) * levels[e, FALLING], levels[e, SHAPE], levels[e, POWER])
-    more = levels[e, MORE_FORWARD] if forward else levels[e, MORE_BACKWARD]
-    return level + more * left, more * slope * levels[e, FALLING]
+    falling, slope = fall(abs(speed) * levels[e, FALLING], levels[e, SHAPE], levels[e, POWER])
+    excess = levels[e, MORE_FORWARD] if forward else levels[e, MORE_BACKWARD]
+    return level + excess * falling, excess * slope * levels[e, FALLING]
 
 
 @part
@@ -70,14 +70,14 @@ def friction_at(linear, levels, scale, twist, narrow, soft):
     s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = 0.0
     for e in range(len(levels)):
         x, y, z = vector(levels, e, 0)
-        dx, dy, dz = vector(levels, e, ACROSS)
-        speed, width = x * twist[0] + y * twist[1] + z * twist[2], narrow * levels[e, WIDTH]
+        dx, dy, dz = vector(levels, e, BY_MASS_GX)
+        speed, width = x * twist[0] + y * twist[1] + z * twist[2], narrow * levels[e, SLOW_SPEED]
         level, falls = level_at(levels, e, speed)
         share = min(max(speed / width, -1.0), 1.0)
         slope = level / width if abs(speed) < width else 0.0
         if soft:
-            near = levels[e, SOFT]
-            slope = 2.0 * level / near * max(0.0, 1.0 - abs(speed) / near)
+            soft_width = levels[e, SOFT_SPEED]
+            slope = 2.0 * level / soft_width * max(0.0, 1.0 - abs(speed) / soft_width)
         slope += abs(share) * falls
         force = level * share
         f0, f1, f2 = f0 + dx * force, f1 + dy * force, f2 + dz * force
@@ -91,8 +91,8 @@ def friction_at(linear, levels, scale, twist, narrow, soft):
             more_x, more_y = linear[0, ELLIPSE_FALL + 3], linear[0, ELLIPSE_FALL + 4]
             speed = math.hypot(twist[0], twist[1])
             shape, power = linear[0, ELLIPSE_FALL + 1], linear[0, ELLIPSE_FALL + 2]
-            left, by_speed = fall(speed * linear[0, ELLIPSE_FALL], shape, power)
-            ax, ay, by_speed = ax + more_x * left, ay + more_y * left, by_speed * linear[0, ELLIPSE_FALL]
+            falling, by_speed = fall(speed * linear[0, ELLIPSE_FALL], shape, power)
+            ax, ay, by_speed = ax + more_x * falling, ay + more_y * falling, by_speed * linear[0, ELLIPSE_FALL]
             bx, by = more_x * by_speed / ax, more_y * by_speed / ay
         qx, qy = ax * ax, ay * ay
         size = math.sqrt(qx * twist[0] * twist[0] + qy * twist[1] * twist[1])
@@ -101,8 +101,8 @@ def friction_at(linear, levels, scale, twist, narrow, soft):
         bend = r if size > width else 0.0
         grows_x = grows_y = 0.0
         if speed > 0.0:
-            both = 0.0 if bend == 0.0 else (fx * twist[0] * bx + fy * twist[1] * by) * bend
-            grows_x, grows_y = fx * (2.0 * bx - both) / speed, fy * (2.0 * by - both) / speed
+            coupling = 0.0 if bend == 0.0 else (fx * twist[0] * bx + fy * twist[1] * by) * bend
+            grows_x, grows_y = fx * (2.0 * bx - coupling) / speed, fy * (2.0 * by - coupling) / speed
         b = matrix(linear, 0, BY_MASS)
         g = mm(
             b,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from omnidyn.arrays import FloatArray
-from omnidyn.control.paths.motion import Motion, Path
+from omnidyn.control.paths.motion import Path, Reference
 from omnidyn.errors import InputError
 from omnidyn.model.frames import unwrapped
 from omnidyn.run import Run
@@ -55,7 +55,7 @@ class Curve(Path):
             ways = np.unwrap(np.arctan2(speed[:, 1], speed[:, 0]))
         object.__setattr__(self, "_branch", ways)
 
-    def at(self, t: ArrayLike) -> Motion:
+    def at(self, t: ArrayLike) -> Reference:
         """See Path. Before t = 0 it stands at its start."""
         time = np.asarray(t, dtype=float)
         now = np.maximum(time.reshape(-1), 0.0)
@@ -65,7 +65,7 @@ class Curve(Path):
         before = time.reshape(-1) < 0.0
         for part in stack[1:]:
             part[before] = 0.0
-        return Motion(*(part.reshape(*time.shape, 3) for part in stack))
+        return Reference(*(part.reshape(*time.shape, 3) for part in stack))
 
     def _heading(self, t: FloatArray, speed: FloatArray, change: FloatArray, jerk: FloatArray) -> FloatArray:
         """The heading and its first two derivatives. Shape (3, k).
@@ -86,10 +86,10 @@ class Curve(Path):
         """Direction of travel [rad], continuous over all rounds; it begins within half a turn of 0."""
         rounds = np.floor(t / self.period)
         share = t / self.period - rounds
-        near = np.interp(share, np.linspace(0.0, 1.0, len(self._branch)), self._branch)
-        near = near + rounds * (self._branch[-1] - self._branch[0])
+        guess = np.interp(share, np.linspace(0.0, 1.0, len(self._branch)), self._branch)
+        guess = guess + rounds * (self._branch[-1] - self._branch[0])
         angle = np.arctan2(speed[:, 1], speed[:, 0])
-        return angle + 2.0 * math.pi * np.round((near - angle) / (2.0 * math.pi))
+        return angle + 2.0 * math.pi * np.round((guess - angle) / (2.0 * math.pi))
 
 
 def eight(size: float, period: float) -> Plane:
@@ -125,12 +125,12 @@ def square(side: float, speed: float) -> Plane:
     corners = side * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
 
     def plane(t: FloatArray) -> FloatArray:
-        gone = t * speed / side
-        which = np.floor(gone + CORNER).astype(int) % 4
-        share = np.maximum(gone - np.floor(gone + CORNER), 0.0)[:, None]
+        sides = t * speed / side
+        corner = np.floor(sides + CORNER).astype(int) % 4
+        share = np.maximum(sides - np.floor(sides + CORNER), 0.0)[:, None]
         out = np.zeros((4, len(t), 2))
-        out[0] = corners[which] + share * (corners[which + 1] - corners[which])
-        out[1] = (corners[which + 1] - corners[which]) * speed / side
+        out[0] = corners[corner] + share * (corners[corner + 1] - corners[corner])
+        out[1] = (corners[corner + 1] - corners[corner]) * speed / side
         return out
 
     return plane
@@ -164,7 +164,7 @@ COLUMNS = ("t_s", "x_m", "y_m", "heading_rad")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Lines(Path):
+class Polyline(Path):
     """t [s], shape (rows,), from 0 on; pose [m, m, rad], shape (rows, 3)."""
 
     name: str
@@ -181,7 +181,7 @@ class Lines(Path):
         """The last row [s]: it stays there."""
         return float(self.t[-1])
 
-    def at(self, t: ArrayLike) -> Motion:
+    def at(self, t: ArrayLike) -> Reference:
         """See Path. On a row, the velocity is that of the line after it."""
         time = np.asarray(t, dtype=float)
         now = time.reshape(-1)
@@ -191,10 +191,10 @@ class Lines(Path):
         step = self.pose[line + 1] - self.pose[line]
         moving = ((now >= 0.0) & (now < self.t[-1]))[:, None]
         parts = self.pose[line] + share * step, np.where(moving, step / span, 0.0), np.zeros((len(now), 3))
-        return Motion(*(part.reshape(*time.shape, 3) for part in parts))
+        return Reference(*(part.reshape(*time.shape, 3) for part in parts))
 
 
-def lines(t: ArrayLike, pose: ArrayLike, name: str) -> Lines:
+def lines(t: ArrayLike, pose: ArrayLike, name: str) -> Polyline:
     """A path through poses [m, m, rad], shape (rows, 3), at times t [s], shape (rows,); the first is its t = 0.
 
     Headings within half a turn of 0 that jump by more than half a turn are taken to be wrapped.
@@ -208,10 +208,13 @@ def lines(t: ArrayLike, pose: ArrayLike, name: str) -> Lines:
             expected="(rows,) and (rows, 3), rows >= 2",
             where=name,
         )
-    bad = np.flatnonzero(~np.isfinite(np.column_stack([time, place])).all(axis=1))
-    if bad.size:
+    bad_rows = np.flatnonzero(~np.isfinite(np.column_stack([time, place])).all(axis=1))
+    if bad_rows.size:
         raise InputError(
-            "not a finite number", got=place[bad[0]].tolist(), expected="numbers", where=f"{name}, row {bad[0]}"
+            "not a finite number",
+            got=place[bad_rows[0]].tolist(),
+            expected="numbers",
+            where=f"{name}, row {bad_rows[0]}",
         )
     back = np.flatnonzero(np.diff(time) <= 0.0)
     if back.size:
@@ -224,10 +227,10 @@ def lines(t: ArrayLike, pose: ArrayLike, name: str) -> Lines:
         )
     if np.abs(place[:, 2]).max() <= np.pi + 1e-6:
         place[:, 2] = unwrapped(place[:, 2])
-    return Lines(name, time - time[0], place)
+    return Polyline(name, time - time[0], place)
 
 
-def path_of_run(run: Run) -> Lines:
+def path_of_run(run: Run) -> Polyline:
     """The path that a Run went: its poses. Raises InputError for a Run without, or with gaps in them."""
     if run.pose is None:
         raise InputError(
@@ -237,22 +240,22 @@ def path_of_run(run: Run) -> Lines:
             remedy="take a run of a simulation, or a log with a pose",
             where=run.source,
         )
-    known = np.isfinite(run.pose).all(axis=1)
-    return lines(run.t[known], run.pose[known], run.source or "a run")
+    finite = np.isfinite(run.pose).all(axis=1)
+    return lines(run.t[finite], run.pose[finite], run.source or "a run")
 
 
-def path_of_file(path: str | os.PathLike) -> Lines:
+def path_of_file(path: str | os.PathLike) -> Polyline:
     """A path from a table with the columns t_s, x_m, y_m and heading_rad; others, of a run file, are not looked at."""
     from omnidyn.logs.readers.read_table import read_table  # imported lazily: named paths need no reader
 
     table = read_table(path)
-    missing = [name for name in COLUMNS if name not in table.names]
-    if missing:
+    absent = [name for name in COLUMNS if name not in table.names]
+    if absent:
         raise InputError(
             "no path in this file",
             got=", ".join(table.names),
             expected=", ".join(COLUMNS),
-            remedy=f"add {', '.join(missing)}",
+            remedy=f"add {', '.join(absent)}",
             where=table.source,
         )
     t, *pose = (table.measured(name) for name in COLUMNS)

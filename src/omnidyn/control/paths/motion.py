@@ -20,7 +20,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.model.frames import world_to_body
 
 
-class Motion(NamedTuple):
+class Reference(NamedTuple):
     """pose [m, m, rad], heading not wrapped; velocity and acceleration: its derivatives in the world frame, (*t, 3)."""
 
     pose: FloatArray
@@ -36,7 +36,7 @@ class Path(ABC):
     end: float
 
     @abstractmethod
-    def at(self, t: ArrayLike) -> Motion:
+    def at(self, t: ArrayLike) -> Reference:
         """Where to be at times t [s], how fast, and how that changes. Shapes (*t.shape, 3)."""
 
     def twist_at(self, t: ArrayLike) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -15,13 +15,23 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arguments import unknown_option
 from omnidyn.arrays import FloatArray
-from omnidyn.control.paths.curve import Curve, Lines, circle, eight, path_of_file, path_of_run, square, swinging, zigzag
-from omnidyn.control.paths.motion import Motion, Path
+from omnidyn.control.paths.curve import (
+    Curve,
+    Polyline,
+    circle,
+    eight,
+    path_of_file,
+    path_of_run,
+    square,
+    swinging,
+    zigzag,
+)
+from omnidyn.control.paths.motion import Path, Reference
 from omnidyn.errors import InputError
 from omnidyn.run import Run
 
 HEADINGS = ("held", "turning", "along")
-MOST = 1e6  # of any option: more is a unit that was mistaken
+LARGEST_OPTION = 1e6  # of any option: more is a unit that was mistaken
 TURNING = {"heading": "held", "heading_rad": 0.0, "turn_rad_s": 0.0, "rounds": 2.0}
 # Name -> its options and what they are by default; a None follows from the others.
 OPTIONS: dict[str, dict[str, Any]] = {
@@ -74,12 +84,12 @@ def path(what: str | os.PathLike | Run, **options: Any) -> Path:
     if FilePath(text).suffix or os.path.exists(text):
         _refuse_options(options, "a file")
         return path_of_file(text)
-    near = difflib.get_close_matches(name, OPTIONS, 1)
+    matches = difflib.get_close_matches(name, OPTIONS, 1)
     raise InputError(
         "unknown path",
         got=text,
         expected=f"{', '.join(OPTIONS)}, or a file of t_s, x_m, y_m, heading_rad",
-        remedy=f"did you mean {near[0]}?" if near else "",
+        remedy=f"did you mean {matches[0]}?" if matches else "",
         where="path",
     )
 
@@ -89,62 +99,70 @@ def _refuse_options(options: Mapping[str, Any], what: str) -> None:
         raise InputError(f"{what} is followed as it is", got=", ".join(options), expected="no options", where="path")
 
 
-def _parsed(text: str, whole: str) -> dict[str, str]:
+def _parsed(text: str, source: str) -> dict[str, str]:
     """Options in the text of a command line: "period_s=3.2,heading=along"."""
-    found = {}
+    options = {}
     for part in filter(None, text.split(",")):
         name, sign, value = part.partition("=")
         if not sign:
-            raise InputError("no option of a path", got=part, expected="name=value", where=whole)
-        found[name.strip()] = value.strip()
-    return found
+            raise InputError("no option of a path", got=part, expected="name=value", where=source)
+        options[name.strip()] = value.strip()
+    return options
 
 
-def _named(name: str, given: Mapping[str, Any]) -> Path:
+def _named(name: str, options: Mapping[str, Any]) -> Path:
     """A named path with its options checked."""
-    known = OPTIONS[name]
-    for option in given:
-        if option not in known:
-            raise unknown_option(name, option, known, f"path {name}")
-    values = {option: _value(name, option, given.get(option, default)) for option, default in known.items()}
-    words = ",".join(f"{option}={given[option]}" for option in given)
-    return _MAKERS[name](f"{name}:{words}" if words else name, values, given)
+    defaults = OPTIONS[name]
+    for option in options:
+        if option not in defaults:
+            raise unknown_option(name, option, defaults, f"path {name}")
+    values = {option: _value(name, option, options.get(option, default)) for option, default in defaults.items()}
+    words = ",".join(f"{option}={options[option]}" for option in options)
+    return _MAKERS[name](f"{name}:{words}" if words else name, values, options)
 
 
 def _value(name: str, option: str, value: Any) -> Any:
     """A value as a number within reach, or the word it must be."""
-    where = f"path {name}, {option}"
+    place = f"path {name}, {option}"
     if option == "heading":
         if value not in HEADINGS:
-            raise InputError("unknown heading", got=value, expected=" or ".join(HEADINGS), where=where)
+            raise InputError("unknown heading", got=value, expected=" or ".join(HEADINGS), where=place)
         return value
     if value is None:
         return None
     try:
         number = float(value)
     except (TypeError, ValueError):
-        raise InputError("not a number", got=value, expected="a number", where=where) from None
-    if not -MOST <= number <= MOST:
-        raise InputError("out of range", got=number, expected=f"-{MOST:g} to {MOST:g}, in SI units", where=where)
-    low = 1e-6 if option in POSITIVE else 0.0 if option.endswith("_s") and not option.startswith("turn") else -MOST
+        raise InputError("not a number", got=value, expected="a number", where=place) from None
+    if not -LARGEST_OPTION <= number <= LARGEST_OPTION:
+        raise InputError(
+            "out of range", got=number, expected=f"-{LARGEST_OPTION:g} to {LARGEST_OPTION:g}, in SI units", where=place
+        )
+    low = (
+        1e-6
+        if option in POSITIVE
+        else 0.0
+        if option.endswith("_s") and not option.startswith("turn")
+        else -LARGEST_OPTION
+    )
     if "_m_s" in option and option not in POSITIVE:
-        low = -MOST
+        low = -LARGEST_OPTION
     if number < low:
-        raise InputError("out of range", got=number, expected=f"at least {low:g}", where=where)
+        raise InputError("out of range", got=number, expected=f"at least {low:g}", where=place)
     return number
 
 
-def _turning(name: str, values: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+def _turning(name: str, values: Mapping[str, Any], options: Mapping[str, Any]) -> dict[str, Any]:
     """What the heading of a curve does."""
-    how = values["heading"] if "heading" in given else ("turning" if values["turn_rad_s"] else "held")
-    if how == "held" and values["turn_rad_s"]:
+    mode = values["heading"] if "heading" in options else ("turning" if values["turn_rad_s"] else "held")
+    if mode == "held" and values["turn_rad_s"]:
         raise InputError(
             "a heading that is held does not turn",
             got=f"turn_rad_s={values['turn_rad_s']:g}",
             expected="heading=turning",
             where=name,
         )
-    if how == "along" and name == "square":
+    if mode == "along" and name == "square":
         raise InputError(
             "a heading along a square turns at once at its corners",
             got="heading=along",
@@ -152,26 +170,26 @@ def _turning(name: str, values: Mapping[str, Any], given: Mapping[str, Any]) -> 
             remedy="take an eight or a circle",
             where=name,
         )
-    turn = values["turn_rad_s"] if "turn_rad_s" in given or how != "turning" else 1.0
-    return {"heading": values["heading_rad"], "turn": turn if how == "turning" else 0.0, "along": how == "along"}
+    turn = values["turn_rad_s"] if "turn_rad_s" in options or mode != "turning" else 1.0
+    return {"heading": values["heading_rad"], "turn": turn if mode == "turning" else 0.0, "along": mode == "along"}
 
 
 def _curve(make: Callable[[Mapping[str, Any], float], Any], around: Callable[[Mapping[str, Any]], float]) -> Any:
     """A maker of a curve; `around`: its length [m], that a speed goes round in a period."""
 
-    def made(name: str, values: Mapping[str, Any], given: Mapping[str, Any]) -> Path:
+    def made(name: str, values: Mapping[str, Any], options: Mapping[str, Any]) -> Path:
         period = values["period_s"]
         if period is None:
             period = around(values) / values["speed_m_s"]
-        elif "speed_m_s" in given and "period_s" in given:
+        elif "speed_m_s" in options and "period_s" in options:
             raise InputError("speed and period say the same", got="both", expected="speed_m_s or period_s", where=name)
         kind = name.partition(":")[0]
-        return Curve(name, make(values, period), period, period * values["rounds"], **_turning(kind, values, given))
+        return Curve(name, make(values, period), period, period * values["rounds"], **_turning(kind, values, options))
 
     return made
 
 
-def _zigzag(name: str, values: Mapping[str, Any], given: Mapping[str, Any]) -> Path:
+def _zigzag(name: str, values: Mapping[str, Any], options: Mapping[str, Any]) -> Path:
     half, lag, speed = 0.5 * values["period_s"], values["lag_s"], values["speed_m_s"]
     sideways = 0.7 * speed if values["sideways_m_s"] is None else values["sideways_m_s"]
     swing = swinging(values["turn_rad_s"], half, 2.0 * lag)
@@ -179,7 +197,7 @@ def _zigzag(name: str, values: Mapping[str, Any], given: Mapping[str, Any]) -> P
     return Curve(name, plane, period, period * values["rounds"], heading=values["heading_rad"], swing=swing)
 
 
-def _goal(name: str, values: Mapping[str, Any], given: Mapping[str, Any]) -> Path:
+def _goal(name: str, values: Mapping[str, Any], options: Mapping[str, Any]) -> Path:
     start: FloatArray = np.array([values["from_x_m"], values["from_y_m"], values["from_heading_rad"]])
     goal: FloatArray = np.array([values["x_m"], values["y_m"], values["heading_rad"]])
     duration = values["travel_s"] + values["hold_s"]
@@ -189,16 +207,19 @@ def _goal(name: str, values: Mapping[str, Any], given: Mapping[str, Any]) -> Pat
 
 
 _MAKERS: dict[str, Callable[[str, Mapping[str, Any], Mapping[str, Any]], Path]] = {
-    "eight": _curve(lambda own, period: eight(own["size_m"], period), lambda own: math.nan),
-    "circle": _curve(lambda own, period: circle(own["radius_m"], period), lambda own: 2.0 * math.pi * own["radius_m"]),
+    "eight": _curve(lambda options, period: eight(options["size_m"], period), lambda options: math.nan),
+    "circle": _curve(
+        lambda options, period: circle(options["radius_m"], period), lambda options: 2.0 * math.pi * options["radius_m"]
+    ),
     "square": _curve(
-        lambda own, period: square(own["side_m"], 4.0 * own["side_m"] / period), lambda own: 4.0 * own["side_m"]
+        lambda options, period: square(options["side_m"], 4.0 * options["side_m"] / period),
+        lambda options: 4.0 * options["side_m"],
     ),
     "zigzag": _zigzag,
     "goal": _goal,
 }
 
-__all__ = ["Lines", "Path", "path"]
+__all__ = ["Path", "Polyline", "path"]
 
 
 # One pose to reach and to hold: from rest at the start to rest at the goal along a straight line
@@ -221,15 +242,15 @@ class Goal(Path):
         """When it is at the goal [s]."""
         return self.travel
 
-    def at(self, t: ArrayLike) -> Motion:
+    def at(self, t: ArrayLike) -> Reference:
         """See Path."""
         time = np.asarray(t, dtype=float)
         way = self.goal - self.start
         if self.travel == 0.0:
             rest = np.zeros((*time.shape, 3))
-            return Motion(np.broadcast_to(self.goal, rest.shape).copy(), rest, rest.copy())
+            return Reference(np.broadcast_to(self.goal, rest.shape).copy(), rest, rest.copy())
         p = np.clip(time / self.travel, 0.0, 1.0)[..., None]
         part = p**3 * (10.0 - 15.0 * p + 6.0 * p**2)
         rate = 30.0 * p**2 * (1.0 - p) ** 2 / self.travel
         change = 60.0 * p * (1.0 - p) * (1.0 - 2.0 * p) / self.travel**2
-        return Motion(self.start + part * way, rate * way, change * way)
+        return Reference(self.start + part * way, rate * way, change * way)

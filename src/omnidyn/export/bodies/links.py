@@ -19,19 +19,19 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 
 LIGHT = 1e-3  # of the robot: the mass of a wheel of which no inertia is known
-MOST = 0.25  # of the robot: what all wheels together may weigh, and may add about the vertical axis
+LARGEST_WHEEL_SHARE = 0.25  # of the robot: what all wheels together may weigh, and may add about the vertical axis
 ROUNDING = 1e-12  # of the distance of the wheels
-ACROSS = 0.55  # of the inertia about the axle: that about the other axes, a little more than of a flat disc
+ACROSS_AXLE_RATIO = 0.55  # of the inertia about the axle: that about the other axes, a little more than of a flat disc
 
 
-class Wheel(NamedTuple):
+class WheelLink(NamedTuple):
     """A wheel and its joint. inertia: about the axle and across it [kg m^2]; effort [N m], speed [rad/s]: its limits.
 
     damping [N m s], friction [N m]: at the joint.
     """
 
     name: str
-    place: Place
+    place: WheelPlace
     mass: float
     inertia: tuple[float, float]
     effort: float
@@ -56,31 +56,37 @@ class Links(NamedTuple):
     centre: tuple[float, float]
     inertia: tuple[float, float, float]
     tall: float
-    wheels: tuple[Wheel, ...]
+    wheels: tuple[WheelLink, ...]
     notes: tuple[str, ...]
 
 
 def links(robot: Robot, tall: float) -> Links:
     """The parts of a robot whose base has the height `tall` [m]."""
-    n, where = robot.wheels.count, places(robot)
+    n, wheel_places = robot.wheels.count, places(robot)
     axle = per_wheel(robot.wheels.wheel_inertia, n)
-    most = MOST * robot.body.inertia / n
-    spins = np.minimum(axle, 0.5 * most / ACROSS)
-    radius, far = robot.wheels.radii, per_wheel(robot.wheels.robot_radius, n)
+    largest = LARGEST_WHEEL_SHARE * robot.body.inertia / n
+    spins = np.minimum(axle, 0.5 * largest / ACROSS_AXLE_RATIO)
+    radius, distance = robot.wheels.radii, per_wheel(robot.wheels.robot_radius, n)
     mass = np.where(axle > 0.0, 2.0 * axle / radius**2, LIGHT * robot.body.mass)
-    mass = np.minimum.reduce([mass, np.full(n, MOST * robot.body.mass / n), 0.5 * most / far**2])
+    mass = np.minimum.reduce([mass, np.full(n, LARGEST_WHEEL_SHARE * robot.body.mass / n), 0.5 * largest / distance**2])
     flat = 0.5 * mass * radius**2
-    spins = np.where(axle > 0.0, spins, np.minimum(flat, 0.5 * most / ACROSS))
-    across = ACROSS * spins
+    spins = np.where(axle > 0.0, spins, np.minimum(flat, 0.5 * largest / ACROSS_AXLE_RATIO))
+    across_axle = ACROSS_AXLE_RATIO * spins
     base = float(robot.body.mass - mass.sum())
-    stands, whole = np.array([[each.x, each.y] for each in where]), np.array(robot.body.centre)
-    centre = (robot.body.mass * whole - mass @ stands) / base
-    centre = np.where(np.abs(centre) <= ROUNDING * far.max(), 0.0, centre)
-    apart = base * np.sum((centre - whole) ** 2) + mass @ np.sum((stands - whole) ** 2, axis=1)
-    turning = robot.body.inertia - float(apart + across.sum())
+    stands, centre_of_mass = np.array([[place.x, place.y] for place in wheel_places]), np.array(robot.body.centre)
+    centre = (robot.body.mass * centre_of_mass - mass @ stands) / base
+    centre = np.where(np.abs(centre) <= ROUNDING * distance.max(), 0.0, centre)
+    apart = base * np.sum((centre - centre_of_mass) ** 2) + mass @ np.sum((stands - centre_of_mass) ** 2, axis=1)
+    turning = robot.body.inertia - float(apart + across_axle.sum())
     notes = ("a wheel is lighter in the file than its inertia says: it would weigh more than the robot",)
     wheels = tuple(
-        Wheel(f"wheel{k + 1}", where[k], float(mass[k]), (float(spins[k]), float(across[k])), *_joint(robot, k))
+        WheelLink(
+            f"wheel{k + 1}",
+            wheel_places[k],
+            float(mass[k]),
+            (float(spins[k]), float(across_axle[k])),
+            *_joint(robot, k),
+        )
         for k in range(n)
     )
     return Links(
@@ -119,7 +125,7 @@ def _joint(robot: Robot, wheel: int) -> tuple[float, float, float, float]:
 HIGHEST = 100.0  # [m]
 
 
-class Place(NamedTuple):
+class WheelPlace(NamedTuple):
     """Where a wheel stands: x, y [m], azimuth [rad] of its axle, radius [m]."""
 
     x: float
@@ -141,17 +147,17 @@ def height_of(robot: Robot, height: float | None) -> float:
 
 def inertias(mass: float, about_vertical: float, height: float) -> tuple[float, float, float]:
     """(I_xx, I_yy, I_zz) [kg m^2] of a body of this height that is alike from all sides."""
-    across = 0.5 * about_vertical + mass * height**2 / 12.0
-    return across, across, about_vertical
+    horizontal = 0.5 * about_vertical + mass * height**2 / 12.0
+    return horizontal, horizontal, about_vertical
 
 
-def places(robot: Robot) -> list[Place]:
+def places(robot: Robot) -> list[WheelPlace]:
     """Where each wheel stands: at its azimuth, at the distance b from the centre."""
     wheels = robot.wheels
-    far = per_wheel(wheels.robot_radius, wheels.count)
+    distance = per_wheel(wheels.robot_radius, wheels.count)
     return [
-        Place(float(b * np.cos(phi)), float(b * np.sin(phi)), float(phi), float(r))
-        for b, phi, r in zip(far, wheels.azimuth, wheels.radii, strict=True)
+        WheelPlace(float(b * np.cos(phi)), float(b * np.sin(phi)), float(phi), float(r))
+        for b, phi, r in zip(distance, wheels.azimuth, wheels.radii, strict=True)
     ]
 
 

@@ -34,14 +34,14 @@ NOTES = (
 def mjcf(robot: Robot, height: float | None = None) -> Export:
     """A robot as a MuJoCo model. height [m]: of the body, for the inertia about the other axes."""
     refuse("mjcf", robot)
-    missing, tall = left_out("mjcf", robot), height_of(robot, height)
+    omissions, tall = left_out("mjcf", robot), height_of(robot, height)
     text = "\n".join(
         [
             f"<mujoco model={attribute(robot.name)}>",
             xml_comment(
                 [
                     f"{robot.name}, by omnidyn. SI units.",
-                    *(f"Not as in omnidyn: {words}" for words in missing),
+                    *(f"Not as in omnidyn: {words}" for words in omissions),
                     f"Height of the body {tall:g} m, for its inertia about x and y: a guess, it does not tip.",
                 ]
             ),
@@ -56,7 +56,7 @@ def mjcf(robot: Robot, height: float | None = None) -> Export:
             "</mujoco>\n",
         ]
     )
-    return Export("mjcf", robot.name, {"robot.xml": text}, missing, NOTES)
+    return Export("mjcf", robot.name, {"robot.xml": text}, omissions, NOTES)
 
 
 def _body(robot: Robot, tall: float) -> list[str]:
@@ -80,10 +80,10 @@ def _body(robot: Robot, tall: float) -> list[str]:
         )
     lines.append('      <site name="body"/>')
     lines += [
-        f'      <geom name="wheel{k + 1}" type="cylinder" pos="{several(each.x, each.y, 0.0)}" '
-        f'zaxis="{several(np.cos(each.azimuth), np.sin(each.azimuth), 0.0)}" '
-        f'size="{several(each.radius, 0.3 * each.radius)}" mass="0" contype="0" conaffinity="0"/>'
-        for k, each in enumerate(places(robot))
+        f'      <geom name="wheel{k + 1}" type="cylinder" pos="{several(place.x, place.y, 0.0)}" '
+        f'zaxis="{several(np.cos(place.azimuth), np.sin(place.azimuth), 0.0)}" '
+        f'size="{several(place.radius, 0.3 * place.radius)}" mass="0" contype="0" conaffinity="0"/>'
+        for k, place in enumerate(places(robot))
     ]
     return [*lines, "    </body>"]
 
@@ -98,13 +98,13 @@ def _actuators(robot: Robot) -> list[str]:
     braking = braking + per_wheel(robot.friction.wheels.viscous, n)
     lines = []
     for k, line in enumerate(wheels.wrench_matrix.T):
-        more = ""
+        force_range = ""
         if motor.current_limit is not None:
-            most = number(traction(motor, wheels, per_wheel(motor.current_limit, n))[k])
-            more += f' forcerange="-{most} {most}"'
+            largest = number(traction(motor, wheels, per_wheel(motor.current_limit, n))[k])
+            force_range += f' forcerange="-{largest} {largest}"'
         lines.append(
             f'    <general name="u{k + 1}" site="body" gear="{several(line[0], line[1], 0.0, 0.0, 0.0, line[2])}" '
             f'ctrlrange="-{number(limit[k])} {number(limit[k])}" gainprm="{number(gain[k])}" '
-            f'biastype="affine" biasprm="0 0 -{number(braking[k])}"{more}/>'
+            f'biastype="affine" biasprm="0 0 -{number(braking[k])}"{force_range}/>'
         )
     return lines

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from omnidyn.export.bodies.links import Links, Wheel, height_of, links, several
+from omnidyn.export.bodies.links import Links, WheelLink, height_of, links, several
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.spelling import number, xml_comment
@@ -21,7 +21,7 @@ def sdf(robot: Robot, height: float | None = None) -> Export:
     refuse("sdf", robot)
     tall = height_of(robot, height)
     parts = links(robot, tall)
-    missing = (*left_out("sdf", robot), *parts.notes)
+    omissions = (*left_out("sdf", robot), *parts.notes)
     text = "\n".join(
         [
             '<?xml version="1.0"?>',
@@ -30,18 +30,18 @@ def sdf(robot: Robot, height: float | None = None) -> Export:
             xml_comment(
                 [
                     f"{robot.name}, by omnidyn. SI units.",
-                    *(f"Not as in omnidyn: {words}" for words in missing),
+                    *(f"Not as in omnidyn: {words}" for words in omissions),
                     f"Height of the base {tall:g} m, for its inertia about x and y: a guess.",
                 ]
             ),
-            f"    <pose>{several(0, 0, max(each.place.radius for each in parts.wheels), 0, 0, 0)}</pose>",
+            f"    <pose>{several(0, 0, max(wheel.place.radius for wheel in parts.wheels), 0, 0, 0)}</pose>",
             *_base(parts),
-            *(line for each in parts.wheels for line in _wheel(each)),
+            *(line for wheel in parts.wheels for line in _wheel(wheel)),
             "  </model>",
             "</sdf>\n",
         ]
     )
-    return Export("sdf", robot.name, {"robot.sdf": text}, missing, NOTES)
+    return Export("sdf", robot.name, {"robot.sdf": text}, omissions, NOTES)
 
 
 def _inertial(mass: float, about: tuple[float, float, float], centre: tuple[float, float] = (0.0, 0.0)) -> list[str]:
@@ -54,7 +54,7 @@ def _inertial(mass: float, about: tuple[float, float, float], centre: tuple[floa
 
 
 def _base(parts: Links) -> list[str]:
-    radius = max(math.hypot(each.place.x, each.place.y) for each in parts.wheels)
+    radius = max(math.hypot(wheel.place.x, wheel.place.y) for wheel in parts.wheels)
     shape = f"<cylinder><radius>{number(radius)}</radius><length>{number(parts.tall)}</length></cylinder>"
     return [
         '    <link name="base_link">',
@@ -64,16 +64,16 @@ def _base(parts: Links) -> list[str]:
     ]
 
 
-def _wheel(wheel: Wheel) -> list[str]:
+def _wheel(wheel: WheelLink) -> list[str]:
     """The link of a wheel, its axle along x, and its joint, which turns about -x: inwards."""
-    place, (axle, across) = wheel.place, wheel.inertia
+    place, (axle, radial) = wheel.place, wheel.inertia
     shape = f"<cylinder><radius>{number(place.radius)}</radius><length>{number(wheel.width)}</length></cylinder>"
     turned = f"<pose>{several(0.0, 0.0, 0.0, 0.0, 0.5 * math.pi, 0.0)}</pose>"
     parts = [f"{turned}<geometry>{shape}</geometry>"] * 2
     return [
         f'    <link name="{wheel.name}">',
         f'      <pose relative_to="base_link">{several(place.x, place.y, 0.0, 0.0, 0.0, place.azimuth)}</pose>',
-        *_inertial(wheel.mass, (axle, across, across)),
+        *_inertial(wheel.mass, (axle, radial, radial)),
         f'      <visual name="looks">{parts[0]}</visual>',
         f'      <collision name="touches">{parts[1]}</collision>',
         "    </link>",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from omnidyn.export.bodies.links import Links, Wheel, height_of, links, several
+from omnidyn.export.bodies.links import Links, WheelLink, height_of, links, several
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.spelling import attribute, number, xml_comment
@@ -21,15 +21,15 @@ def urdf(robot: Robot, height: float | None = None) -> Export:
     refuse("urdf", robot)
     tall = height_of(robot, height)
     parts = links(robot, tall)
-    missing = (*left_out("urdf", robot), *parts.notes)
-    return Export("urdf", robot.name, {"robot.urdf": description(robot.name, parts, missing)}, missing, NOTES)
+    omissions = (*left_out("urdf", robot), *parts.notes)
+    return Export("urdf", robot.name, {"robot.urdf": description(robot.name, parts, omissions)}, omissions, NOTES)
 
 
-def description(name: str, parts: Links, missing: tuple[str, ...], outward: bool = False) -> str:
+def description(name: str, parts: Links, omissions: tuple[str, ...], outward: bool = False) -> str:
     """The parts of a robot as URDF. outward: axes of joints point outwards, as some controllers of ROS have it."""
     about = [
         f"{name}, by omnidyn. SI units.",
-        *(f"Not as in omnidyn: {words}" for words in missing),
+        *(f"Not as in omnidyn: {words}" for words in omissions),
         f"Height of the base {parts.tall:g} m, for its inertia about x and y: a guess.",
         *(["Joints turn the other way than the wheels of omnidyn: their axes point outwards."] if outward else []),
     ]
@@ -39,7 +39,7 @@ def description(name: str, parts: Links, missing: tuple[str, ...], outward: bool
             f"<robot name={attribute(name)}>",
             xml_comment(about),
             *_base(parts),
-            *(line for each in parts.wheels for line in _wheel(each, "1 0 0" if outward else "-1 0 0")),
+            *(line for wheel in parts.wheels for line in _wheel(wheel, "1 0 0" if outward else "-1 0 0")),
             *control(parts),
             "</robot>\n",
         ]
@@ -58,7 +58,7 @@ def inertial(mass: float, about: tuple[float, float, float], centre: tuple[float
 
 
 def _base(parts: Links) -> list[str]:
-    radius = max(math.hypot(each.place.x, each.place.y) for each in parts.wheels)
+    radius = max(math.hypot(wheel.place.x, wheel.place.y) for wheel in parts.wheels)
     shape = f'<geometry><cylinder radius="{number(radius)}" length="{number(parts.tall)}"/></geometry>'
     return [
         '  <link name="base_link">',
@@ -68,14 +68,14 @@ def _base(parts: Links) -> list[str]:
     ]
 
 
-def _wheel(wheel: Wheel, axis: str) -> list[str]:
+def _wheel(wheel: WheelLink, axis: str) -> list[str]:
     """The link of a wheel, its axle along x, which points outwards, and its joint."""
-    place, (axle, across) = wheel.place, wheel.inertia
+    place, (axle, radial) = wheel.place, wheel.inertia
     shape = f'<cylinder radius="{number(place.radius)}" length="{number(wheel.width)}"/>'
     turned = f'<origin rpy="{several(0.0, 0.5 * math.pi, 0.0)}"/>'
     return [
         f'  <link name="{wheel.name}">',
-        *inertial(wheel.mass, (axle, across, across)),
+        *inertial(wheel.mass, (axle, radial, radial)),
         f"    <visual>{turned}<geometry>{shape}</geometry></visual>",
         "  </link>",
         f'  <joint name="{wheel.name}_joint" type="continuous">',

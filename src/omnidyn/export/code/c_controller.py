@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.control.controller import FARTHEST, WHEEL_SPEED, Safe
+from omnidyn.control.controller import LARGEST_STATE, WHEEL_SPEED, Safe
 from omnidyn.control.controllers import controller_spec
 from omnidyn.control.feedforward import DT, Feedforward, check_dt
 from omnidyn.control.mpc.controller import Mpc
-from omnidyn.control.paths.motion import Motion, Path
+from omnidyn.control.paths.motion import Path, Reference
 from omnidyn.control.pid import Pid
 from omnidyn.control.speed_loop import MOST_STEPS, SpeedController
 from omnidyn.export.code.mpc_code import mpc_code, mpc_input, mpc_memory
@@ -50,31 +50,31 @@ def c_controller(robot: Robot, controller: str | os.PathLike = "pid", dt: float 
     spec = controller_spec(controller)
     refuse_controller(KIND, spec.controller)
     refuse(KIND, robot)
-    made, missing = spec.make(robot, dt=dt), left_out(KIND, robot)
-    predicts = isinstance(made, Mpc)
-    code = mpc_code(made) if predicts else control_code(made)  # pyright: ignore[reportArgumentType]  none is refused
-    about = [f"{made.name} of {robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in missing)]
+    law, omissions = spec.make(robot, dt=dt), left_out(KIND, robot)
+    predicts = isinstance(law, Mpc)
+    code = mpc_code(law) if predicts else control_code(law)  # pyright: ignore[reportArgumentType]  none is refused
+    about = [f"{law.name} of {robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in omissions)]
     head = c_comment(about)
-    files = {"omnidyn_control.h": _header(made, head), "omnidyn_control.c": f"{head}\n{_INCLUDES}\n{code}\n"}
-    return Export(KIND, robot.name, files, missing, NOTES, folder=True)
+    files = {"omnidyn_control.h": _header(law, head), "omnidyn_control.c": f"{head}\n{_INCLUDES}\n{code}\n"}
+    return Export(KIND, robot.name, files, omissions, NOTES, folder=True)
 
 
-def _header(made: Any, about: str) -> str:
-    predicts = isinstance(made, Mpc)
-    late = made.steps_late * made.dt if predicts else made.late
+def _header(law: Any, about: str) -> str:
+    predicts = isinstance(law, Mpc)
+    late = law.steps_late * law.dt if predicts else law.late
     numbers = {
-        "WHEELS": str(made.robot.wheels.count),
-        "DT": c_number(made.dt, True),
+        "WHEELS": str(law.robot.wheels.count),
+        "DT": c_number(law.dt, True),
         "LATE": c_number(late, True),
-    } | ({"HORIZON": str(made.horizon)} if predicts else {})
+    } | ({"HORIZON": str(law.horizon)} if predicts else {})
     defines = "\n".join(f"#define OMNIDYN_{name} {text}" for name, text in numbers.items())
     return filled(
         _HEADER,
         ABOUT=about,
         DEFINES=defines,
-        UNITS=_UNITS[made.output],
-        MEMORY=mpc_memory(made) if predicts else _MEMORY,
-        INPUT=f"{mpc_input(made)}\n\n" if predicts else "",
+        UNITS=_UNITS[law.output],
+        MEMORY=mpc_memory(law) if predicts else _MEMORY,
+        INPUT=f"{mpc_input(law)}\n\n" if predicts else "",
         AHEAD=_AHEAD if predicts else _NOW_AND_AHEAD,
         ROWS="OMNIDYN_HORIZON + 1" if predicts else "3",
     ).lstrip()
@@ -167,13 +167,13 @@ def control_code(controller: AnyOf) -> str:
     share = np.where(np.abs(model.share) <= NOTHING * np.abs(model.share).max(), 0.0, model.share)
     controller.volts.model = replace(model, share=share, rounding=ROUNDING)
     if isinstance(controller, Feedforward):
-        traced, wanted = _feedforward(controller)
+        traced, body = _feedforward(controller)
     else:
-        traced, wanted = _pid(controller) if isinstance(controller, Pid) else _speed(controller)
+        traced, body = _pid(controller) if isinstance(controller, Pid) else _speed(controller)
     helpers = [text for name, text in _HELPERS if f"{name}(" in "".join(traced)]
     tables = {"LIMIT": controller.limit} if controller.output == WHEEL_SPEED else _limits(controller)
-    constants = [f"static const float {name}[{len(each)}] = {{{_numbers(each)}}};" for name, each in tables.items()]
-    step = filled(_STEP, WANTED=textwrap.indent(wanted, "    "), FARTHEST=_c(FARTHEST), LARGEST="3.0e38f")
+    constants = [f"static const float {name}[{len(table)}] = {{{_numbers(table)}}};" for name, table in tables.items()]
+    step = filled(_STEP, WANTED=textwrap.indent(body, "    "), FARTHEST=_c(LARGEST_STATE), LARGEST="3.0e38f")
     parts = ["\n".join(constants), "\n".join(helpers), *traced, *_within(controller), step.strip()]
     return "\n\n".join(part for part in parts if part)
 
@@ -191,12 +191,12 @@ def _within(controller: AnyOf) -> list[str]:
         return []
     current = bool(np.isfinite(controller.volts.current_limit).all())
     together = isinstance(controller, SpeedController)
-    own = ("\n    float share = 1.0f;" if together else "") + ("" if current else "\n    (void)current;")
+    declarations = ("\n    float share = 1.0f;" if together else "") + ("" if current else "\n    (void)current;")
     text = filled(
         _WITHIN,
         CURRENT=" || fabsf(current[k]) > CURRENT_LIMIT[k]" if current else "",
-        OWN=own,
-        EACH=(_SHARE if together else _EACH).lstrip("\n"),
+        OWN=declarations,
+        EACH=(_SHARE if together else _CLIP_EACH).lstrip("\n"),
         TOGETHER=_TOGETHER if together else "",
         PER_VOLT=_c(float(controller._sent(np.ones(1))[0])),
     )
@@ -209,9 +209,9 @@ class _Given(Path):
     name, duration, end = "given", 1.0, 1.0
 
     def __init__(self, pose: Any, velocity: Any) -> None:
-        self._motion = Motion(pose, velocity, Traced.of(np.zeros((len(pose.nodes), 3))))
+        self._motion = Reference(pose, velocity, Traced.of(np.zeros((len(pose.nodes), 3))))
 
-    def at(self, t: Any) -> Motion:
+    def at(self, t: Any) -> Reference:
         """The motion that was given, one row for each of the times."""
         return self._motion
 
@@ -234,15 +234,15 @@ def _feedforward(controller: Feedforward) -> tuple[list[str], str]:
 
     head = "float place[2][3], velocity[2][3]"
     if controller.output == WHEEL_SPEED:
-        call = f"(void)elapsed;\n{_LOOK_AHEAD}wheel_speeds({_GIVEN}, output);"
+        call = f"(void)elapsed;\n{_LOOK_AHEAD}wheel_speeds({_ARGUMENTS}, output);"
         return [_function("wheel_speeds", names, efforts(False), controller)], f"{head};\n{call}"
-    made = [_function(each, names, efforts(each == "starting"), controller) for each in ("moving", "starting")]
+    functions = [_function(name, names, efforts(name == "starting"), controller) for name in ("moving", "starting")]
     call = (
         "if (velocity[0][0] == 0.0f && velocity[0][1] == 0.0f && velocity[0][2] == 0.0f) {\n"
-        f"    starting({_GIVEN}, output, current);\n}} else {{\n"
-        f"    moving({_GIVEN}, output, current);\n}}\nlimited = within(output, current);"
+        f"    starting({_ARGUMENTS}, output, current);\n}} else {{\n"
+        f"    moving({_ARGUMENTS}, output, current);\n}}\nlimited = within(output, current);"
     )
-    return made, f"{head}, current[OMNIDYN_WHEELS];\n(void)elapsed;\n{_LOOK_AHEAD}{call}"
+    return functions, f"{head}, current[OMNIDYN_WHEELS];\n(void)elapsed;\n{_LOOK_AHEAD}{call}"
 
 
 def _speed(controller: SpeedController) -> tuple[list[str], str]:
@@ -258,7 +258,7 @@ def _speed(controller: SpeedController) -> tuple[list[str], str]:
         def speeds(pose: Any, velocity: Any) -> dict[str, Any]:
             return {"output": wheel_speed(controller.robot.wheels, twists(pose, velocity)[1])}
 
-        call = f"(void)elapsed;\n{_LOOK_AHEAD}wheel_speeds({_GIVEN}, output);"
+        call = f"(void)elapsed;\n{_LOOK_AHEAD}wheel_speeds({_ARGUMENTS}, output);"
         return [_function("wheel_speeds", names, speeds, controller)], f"{head};\n{call}"
 
     def efforts(pose: Any, velocity: Any, twist: Any, total: Any) -> dict[str, Any]:
@@ -268,17 +268,17 @@ def _speed(controller: SpeedController) -> tuple[list[str], str]:
     def errors(pose: Any, velocity: Any, twist: Any) -> dict[str, Any]:
         return {"off": twists(pose, velocity)[0] - twist}
 
-    made = [
+    functions = [
         _function("errors", {**names, "twist": (3,)}, errors, controller),
         _function("effort", {**names, "twist": (3,), "total": (3,)}, efforts, controller),
     ]
-    call = f"{_LOOK_AHEAD}errors({_GIVEN}, twist, off);\n{_summed(controller, f'{_GIVEN}, twist')}"
-    return made, f"{head}, off[3], more[3], current[OMNIDYN_WHEELS];\n{call}"
+    call = f"{_LOOK_AHEAD}errors({_ARGUMENTS}, twist, off);\n{_summed(controller, f'{_ARGUMENTS}, twist')}"
+    return functions, f"{head}, off[3], more[3], current[OMNIDYN_WHEELS];\n{call}"
 
 
-def _summed(controller: Pid | SpeedController, given: str) -> str:
+def _summed(controller: Pid | SpeedController, arguments: str) -> str:
     """The loop over sums of errors in C: given, the arguments of `effort` before the sum."""
-    return filled(_SUMMED, LONGEST=_c(MOST_STEPS * controller.dt), GIVEN=given).strip()
+    return filled(_SUMMED, LONGEST=_c(MOST_STEPS * controller.dt), GIVEN=arguments).strip()
 
 
 def _pid(controller: Pid) -> tuple[list[str], str]:
@@ -292,8 +292,8 @@ def _pid(controller: Pid) -> tuple[list[str], str]:
     )
     if controller.output == WHEEL_SPEED:
 
-        def speeds(*given: Any) -> dict[str, Any]:
-            return {"output": wheel_speed(controller.robot.wheels, controller.aim(*given).way)}
+        def speeds(*arguments: Any) -> dict[str, Any]:
+            return {"output": wheel_speed(controller.robot.wheels, controller.aim(*arguments).way)}
 
         call = "(void)elapsed;\nwheel_speeds(off, pose[2], twist, (const float(*)[3])velocity, output);"
         return [_function("wheel_speeds", names, speeds, controller)], f"{head};\n{gather}{call}"
@@ -301,9 +301,9 @@ def _pid(controller: Pid) -> tuple[list[str], str]:
     def efforts(off: Any, heading: Any, twist: Any, velocity: Any, total: Any) -> dict[str, Any]:
         return _named(controller.effort(controller.aim(off, heading, twist, velocity), total))
 
-    made = [_function("effort", {**names, "total": (3,)}, efforts, controller)]
+    functions = [_function("effort", {**names, "total": (3,)}, efforts, controller)]
     call = _summed(controller, "off, pose[2], twist, (const float(*)[3])velocity")
-    return made, f"{head}, more[3], current[OMNIDYN_WHEELS];\n{gather}{call}"
+    return functions, f"{head}, more[3], current[OMNIDYN_WHEELS];\n{gather}{call}"
 
 
 def _named(effort: Any) -> dict[str, Any]:
@@ -311,16 +311,16 @@ def _named(effort: Any) -> dict[str, Any]:
 
 
 def _function(
-    name: str, given: Mapping[str, tuple[int, ...]], run: Callable[..., dict[str, Any]], controller: Safe
+    name: str, arguments: Mapping[str, tuple[int, ...]], run: Callable[..., dict[str, Any]], controller: Safe
 ) -> str:
     """A function of C: its inputs by name and shape, then its outputs."""
-    found = run(*(inputs(each, shape) for each, shape in given.items()))
-    lines = [f"(void){each};" for each in given] + statements(found, single=True)
+    outputs = run(*(inputs(name, shape) for name, shape in arguments.items()))
+    lines = [f"(void){name};" for name in arguments] + statements(outputs, single=True)
     takes = [
-        f"const float {each}{''.join(f'[{n}]' for n in shape)}" if shape else f"float {each}"
-        for each, shape in given.items()
+        f"const float {name}{''.join(f'[{n}]' for n in shape)}" if shape else f"float {name}"
+        for name, shape in arguments.items()
     ]
-    takes += [f"float {each}[{len(values.nodes)}]" for each, values in found.items()]
+    takes += [f"float {name}[{len(values.nodes)}]" for name, values in outputs.items()]
     head = textwrap.fill(f"static void {name}({', '.join(takes)})", 110, subsequent_indent="    ")
     return (
         f"/* Traced from {controller.name} of omnidyn. */\n{head}\n{{\n" + "\n".join(f"    {x}" for x in lines) + "\n}"
@@ -340,7 +340,7 @@ _LOOK_AHEAD = """for (k = 0; k < 6; k++) {
     velocity[k / 3][k % 3] = path[1 + k / 3].velocity[k % 3];
 }
 """
-_GIVEN = "(const float(*)[3])place, (const float(*)[3])velocity"
+_ARGUMENTS = "(const float(*)[3])place, (const float(*)[3])velocity"
 
 _WITHIN = """
 /* Keep the volts within the limits, and make them what the drive takes; whether a limit was met. */
@@ -354,7 +354,7 @@ static int within(float volts[OMNIDYN_WHEELS], const float current[OMNIDYN_WHEEL
     return met;
 }
 """
-_EACH = """
+_CLIP_EACH = """
         volts[k] = volts[k] > VOLTAGE_LIMIT[k] ? VOLTAGE_LIMIT[k] : volts[k];
         volts[k] = volts[k] < -VOLTAGE_LIMIT[k] ? -VOLTAGE_LIMIT[k] : volts[k];
 """

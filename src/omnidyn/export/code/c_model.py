@@ -32,10 +32,10 @@ def c_model(robot: Robot, precision: Literal["double", "single"] = DOUBLE) -> Ex
     if precision not in (DOUBLE, SINGLE):
         raise InputError("no such precision", got=precision, expected=f"{DOUBLE} or {SINGLE}", where="precision")
     refuse("c-model", robot)
-    code, missing = step_code(robot, precision == SINGLE), left_out("c-model", robot)
-    about = c_comment([f"{robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in missing)])
+    code, omissions = step_code(robot, precision == SINGLE), left_out("c-model", robot)
+    about = c_comment([f"{robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in omissions)])
     files = {"omnidyn_step.h": _header(code, about, precision), "omnidyn_step.c": _source(code, about)}
-    return Export("c-model", robot.name, files, missing, NOTES, folder=True)
+    return Export("c-model", robot.name, files, omissions, NOTES, folder=True)
 
 
 def _header(code: StepCode, about: str, precision: str) -> str:

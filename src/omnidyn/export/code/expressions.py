@@ -112,17 +112,21 @@ class Expressions:
         return f"(-{text})", kind
 
     def _binop(self, node: ast.BinOp) -> Typed:
-        (left, one), (right, other) = self.of(node.left), self.of(node.right)
+        (left_text, left_kind), (right_text, right_kind) = self.of(node.left), self.of(node.right)
         if type(node.op) in _BITS:
-            return f"({left} {_BITS[type(node.op)]} {right})", BOOL
+            return f"({left_text} {_BITS[type(node.op)]} {right_text})", BOOL
         if isinstance(node.op, ast.Pow) and isinstance(node.right, ast.Constant) and node.right.value == 2:
-            return f"({left} * {left})", one
+            return f"({left_text} * {left_text})", left_kind
         if type(node.op) not in _BINARY:
             raise TranslationError(f"{self.body.source.name}: no C for {ast.unparse(node)}")
-        kind = joined(one, other) if BOOL not in (one, other) else REAL
+        kind = joined(left_kind, right_kind) if BOOL not in (left_kind, right_kind) else REAL
         if kind == REAL or isinstance(node.op, ast.Div):
-            left, right, kind = self._as_real(left, one), self._as_real(right, other), REAL
-        return f"({left} {_BINARY[type(node.op)]} {right})", kind
+            left_text, right_text, kind = (
+                self._as_real(left_text, left_kind),
+                self._as_real(right_text, right_kind),
+                REAL,
+            )
+        return f"({left_text} {_BINARY[type(node.op)]} {right_text})", kind
 
     def _as_real(self, text: str, kind: Type) -> str:
         if kind == REAL:
@@ -131,28 +135,28 @@ class Expressions:
 
     def _boolop(self, node: ast.BoolOp) -> Typed:
         sign = " && " if isinstance(node.op, ast.And) else " || "
-        return f"({sign.join(self.of(each)[0] for each in node.values)})", BOOL
+        return f"({sign.join(self.of(value)[0] for value in node.values)})", BOOL
 
     def _compare(self, node: ast.Compare) -> Typed:
         sides = [node.left, *node.comparators]
         parts = []
-        for left, operator, right in zip(sides, node.ops, node.comparators, strict=False):
-            (a, one), (b, other) = self.of(left), self.of(right)
-            if REAL in (one, other):
-                a, b = self._as_real(a, one), self._as_real(b, other)
+        for left_node, operator, right_node in zip(sides, node.ops, node.comparators, strict=False):
+            (a, kind_a), (b, kind_b) = self.of(left_node), self.of(right_node)
+            if REAL in (kind_a, kind_b):
+                a, b = self._as_real(a, kind_a), self._as_real(b, kind_b)
             parts.append(f"({a} {_COMPARE[type(operator)]} {b})")
         return (parts[0] if len(parts) == 1 else f"({' && '.join(parts)})"), BOOL
 
     def _ifexp(self, node: ast.IfExp) -> Typed:
-        test, (one, kind), (other, second) = self.of(node.test)[0], self.of(node.body), self.of(node.orelse)
-        whole = joined(kind, second)
-        if whole == REAL:
-            one, other = self._as_real(one, kind), self._as_real(other, second)
-        return f"({test} ? {one} : {other})", whole
+        test, (body, kind), (alternative, second) = self.of(node.test)[0], self.of(node.body), self.of(node.orelse)
+        common = joined(kind, second)
+        if common == REAL:
+            body, alternative = self._as_real(body, kind), self._as_real(alternative, second)
+        return f"({test} ? {body} : {alternative})", common
 
     def _tuple(self, node: ast.Tuple) -> Typed:
-        items = [self.of(each) for each in node.elts]
-        kind = Many(tuple(each if each != INT else INT for _, each in items))
+        items = [self.of(element) for element in node.elts]
+        kind = Many(tuple(item_kind if item_kind != INT else INT for _, item_kind in items))
         return self.program.packed(kind, [text for text, _ in items]), kind
 
     def _attribute(self, node: ast.Attribute) -> Typed:
@@ -163,15 +167,15 @@ class Expressions:
         return f"{text}{'->' if kind.by_address else '.'}{c_name(node.attr)}", kind.field(node.attr)
 
     def _subscript(self, node: ast.Subscript) -> Typed:
-        if (found := self._column(node)) is not None:
-            return found
+        if (column := self._column(node)) is not None:
+            return column
         text, kind = self.of(node.value)
         indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
-        if isinstance(kind, Columns):
+        if isinstance(kind, ColumnTypes):
             return f"{text}[{self.of(indices[0])[0]}]", kind
         assert isinstance(kind, Array), ast.unparse(node)
-        for each in indices:
-            text += f"[{self.of(each)[0]}]"
+        for index in indices:
+            text += f"[{self.of(index)[0]}]"
         rest = kind.shape[len(indices) :]
         return text, Array(rest) if rest else REAL
 
@@ -180,11 +184,11 @@ class Expressions:
         if not isinstance(node.value, ast.Subscript) or not isinstance(node.slice, ast.Constant):
             return None
         text, kind = self.of(node.value)
-        if not isinstance(kind, Columns) or not isinstance(node.slice.value, int):
+        if not isinstance(kind, ColumnTypes) or not isinstance(node.slice.value, int):
             return None
-        own = kind.columns[node.slice.value]
-        cast = "(int)" if own == INT else ""
-        return f"{cast}{text}[{node.slice.value}]", own
+        column_kind = kind.columns[node.slice.value]
+        cast = "(int)" if column_kind == INT else ""
+        return f"{cast}{text}[{node.slice.value}]", column_kind
 
     def _call(self, node: ast.Call) -> Typed:
         if isinstance(node.func, ast.Attribute):
@@ -193,13 +197,13 @@ class Expressions:
         name = node.func.id
         if name in ("abs", "min", "max", "len"):
             return self._builtin(name, node.args)
-        called = sources.function(self.body.source.module, name)
-        if called is not None:
-            return self._own(called, node.args)
-        made = sources.value(self.body.source.module, name)
-        if isinstance(made, type) and issubclass(made, tuple):
-            kind = self.program.struct(made)
-            return f"({kind.name}){{{', '.join(self.real(each) for each in node.args)}}}", kind
+        source = sources.function(self.body.source.module, name)
+        if source is not None:
+            return self._own(source, node.args)
+        value = sources.value(self.body.source.module, name)
+        if isinstance(value, type) and issubclass(value, tuple):
+            kind = self.program.struct(value)
+            return f"({kind.name}){{{', '.join(self.real(argument) for argument in node.args)}}}", kind
         raise TranslationError(f"{self.body.source.name}: no C for {ast.unparse(node)}")
 
     def _of_math(self, node: ast.Call) -> Typed:
@@ -217,30 +221,30 @@ class Expressions:
         if name == "abs":
             return f"fabs{'f' if self.program.single else ''}({first})", REAL
         text = self.real(nodes[-1])
-        for each in reversed(nodes[:-1]):
-            text = f"{name}_of({self.real(each)}, {text})"
+        for argument in reversed(nodes[:-1]):
+            text = f"{name}_of({self.real(argument)}, {text})"
         return text, REAL
 
-    def _own(self, called: sources.Source, nodes: list[ast.expr]) -> Typed:
+    def _own(self, source: sources.Source, nodes: list[ast.expr]) -> Typed:
         """A call of another function of the package, translated for arguments of these types."""
-        given = [self.of(each) for each in nodes]
-        made = self.program.function(
-            called, tuple(REAL if kind == INT and ("." in text) else kind for text, kind in given)
+        arguments = [self.of(node) for node in nodes]
+        function = self.program.function(
+            source, tuple(REAL if kind == INT and ("." in text) else kind for text, kind in arguments)
         )
         for position, node in enumerate(nodes):
-            if position in made.writes:
+            if position in function.writes:
                 self.body.writes_to(node)
-        return f"{made.name}({', '.join(text for text, _ in given)})", made.returns
+        return f"{function.name}({', '.join(text for text, _ in arguments)})", function.returns
 
 
-def table_type(value: Any) -> Array | Columns:
+def table_type(value: Any) -> Array | ColumnTypes:
     """The type of a constant table."""
     if isinstance(value, tuple) and value and isinstance(value[0], tuple):
         kinds: list[Scalar] = [
             INT if all(isinstance(row[k], int) for row in value) else REAL for k in range(len(value[0]))
         ]
         if INT in kinds:
-            return Columns(len(value), tuple(kinds))
+            return ColumnTypes(len(value), tuple(kinds))
     return Array(np.shape(value))
 
 
@@ -281,7 +285,7 @@ class Struct:
     @property
     def by_address(self) -> bool:
         """Whether it holds tables, into which functions write."""
-        return any(isinstance(each, Array) for _, each in self.fields)
+        return any(isinstance(kind, Array) for _, kind in self.fields)
 
     def field(self, name: str) -> Type:
         """The type of a field."""
@@ -289,14 +293,14 @@ class Struct:
 
 
 @dataclass(frozen=True)
-class Columns:
+class ColumnTypes:
     """A constant table whose columns have types of their own, such as ((4, 0.25), (8, 3.0))."""
 
     rows: int
     columns: tuple[Scalar, ...]
 
 
-Type = Scalar | Many | Array | Struct | Columns
+Type = Scalar | Many | Array | Struct | ColumnTypes
 Typed = tuple[str, Type]
 
 
@@ -304,10 +308,10 @@ class TranslationError(Exception):
     """A kernel uses what the translator does not know: a fault of ours, found by tests, never by a user."""
 
 
-def joined(one: Type | None, other: Type) -> Type:
+def joined(first: Type | None, second: Type) -> Type:
     """The type of a name that holds the one and the other."""
-    if one is None or one == other:
-        return other
-    if isinstance(one, Scalar) and isinstance(other, Scalar):
-        return REAL if REAL in (one, other) else INT
-    raise TranslationError(f"a name holds {one} and {other}")
+    if first is None or first == second:
+        return second
+    if isinstance(first, Scalar) and isinstance(second, Scalar):
+        return REAL if REAL in (first, second) else INT
+    raise TranslationError(f"a name holds {first} and {second}")

@@ -22,7 +22,7 @@ from omnidyn.export.features import left_out, refuse
 from omnidyn.export.spelling import attribute, c_number, filled, identifier
 from omnidyn.files import sha256
 from omnidyn.model.robot import Robot
-from omnidyn.simulation.engine import FARTHEST
+from omnidyn.simulation.engine import LARGEST_START
 
 OUTPUTS = ("vx_m_s", "vy_m_s", "omega_rad_s", "x_m", "y_m", "heading_rad")
 _OUTPUT_UNITS = ("m/s", "m/s", "rad/s", "m", "m", "rad")
@@ -46,24 +46,24 @@ def fmu(robot: Robot, compiled: bool = True) -> Export:
     Raises UnsupportedError for other robots.
     """
     refuse("fmu", robot)
-    code, name, missing = step_code(robot), identifier(robot.name), left_out("fmu", robot)
+    code, name, omissions = step_code(robot), identifier(robot.name), left_out("fmu", robot)
     guid = sha256(_source(code, ""))[:32]
     entries: dict[str, bytes] = {
-        "modelDescription.xml": _description(robot, name, code, guid, missing).encode("utf-8"),
+        "modelDescription.xml": _description(robot, name, code, guid, omissions).encode("utf-8"),
         f"sources/{name}.c": _source(code, guid).encode("utf-8"),
     }
-    library, why = _library(entries[f"sources/{name}.c"], name) if compiled else (None, "not asked for")
+    library, reason = _library(entries[f"sources/{name}.c"], name) if compiled else (None, "not asked for")
     notes = (
         "the volts of a step are held all through it: the step is exact, however long",
         *(
             (f"a library for {_platform()} is in it; other systems compile sources/{name}.c",)
             if library
-            else (f"sources only ({why}): the tool that loads it compiles sources/{name}.c",)
+            else (f"sources only ({reason}): the tool that loads it compiles sources/{name}.c",)
         ),
     )
     if library is not None:
         entries[f"binaries/{_platform()}/{name}{_suffix()}"] = library
-    return Export("fmu", robot.name, {f"{name}.fmu": _archive(entries)}, missing, notes)
+    return Export("fmu", robot.name, {f"{name}.fmu": _archive(entries)}, omissions, notes)
 
 
 def _archive(entries: dict[str, bytes]) -> bytes:
@@ -89,7 +89,7 @@ def _suffix() -> str:
 
 def _library(source: bytes, name: str) -> tuple[bytes | None, str]:
     """The compiled source, or None and why not. Only for the processor that FMI 2 has a folder for."""
-    compiler = next((path for each in COMPILERS if (path := shutil.which(each))), None)
+    compiler = next((path for command in COMPILERS if (path := shutil.which(command))), None)
     if compiler is None:
         return None, "no C compiler here"
     if platform.machine().lower() not in ("x86_64", "amd64"):
@@ -112,8 +112,8 @@ def _source(code: StepCode, guid: str) -> str:
         STEP=code.text,
         WHEELS=str(code.wheels),
         GUID=guid,
-        TWIST=c_number(FARTHEST["twist"]),
-        POSE=c_number(FARTHEST["pose"]),
+        TWIST=c_number(LARGEST_START["twist"]),
+        POSE=c_number(LARGEST_START["pose"]),
         FORCE="unit->force, " if code.inductance else "",
     ).lstrip()
 
@@ -133,12 +133,12 @@ def _variables(wheels: int) -> list[str]:
     return lines
 
 
-def _description(robot: Robot, name: str, code: StepCode, guid: str, missing: tuple[str, ...]) -> str:
+def _description(robot: Robot, name: str, code: StepCode, guid: str, omissions: tuple[str, ...]) -> str:
     """modelDescription.xml."""
-    units = "\n".join(f"  <Unit name={quoteattr(each)}><BaseUnit {_BASE[each]}/></Unit>" for each in _BASE)
+    units = "\n".join(f"  <Unit name={quoteattr(unit)}><BaseUnit {_BASE[unit]}/></Unit>" for unit in _BASE)
     # Each output hangs on nothing of the same moment: the step has gone by when it is read.
     outputs = [f'   <Unknown index="{code.wheels + k + 1}" dependencies=""/>' for k in range(len(OUTPUTS))]
-    words = f"{robot.name}: the exact step of omnidyn" + "".join(f"; not in it: {each}" for each in missing)
+    words = f"{robot.name}: the exact step of omnidyn" + "".join(f"; not in it: {omission}" for omission in omissions)
     lines = "\n".join(_variables(code.wheels))
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName={attribute(robot.name)} guid="{guid}" description={attribute(words)}

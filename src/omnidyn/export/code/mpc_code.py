@@ -7,19 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.control.controller import FARTHEST, WHEEL_SPEED
+from omnidyn.control.controller import LARGEST_STATE, WHEEL_SPEED
 from omnidyn.control.mpc import interior_point, loop, observer, program
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.mpc.model import (
-    ACROSS,
     BY_MASS,
+    BY_MASS_GX,
     DECAY,
     ELLIPSE,
     FEED,
     GX,
     PHI,
     PSI,
-    SOFT,
+    SOFT_SPEED,
     TURNING,
     volts,
 )
@@ -31,10 +31,10 @@ from omnidyn.model.wheels import wheel_speed
 FOLDER = files("omnidyn.export.code") / "mpc"
 PARTS = ("model.c", "solver.c", "step.c")
 # What float32 asks for in place of the constants of Python, whose rounding is 1e9 times as small.
-BEYOND, NARROWEST = 1e-3, 1e-3  # [V]
+BOUND_TOLERANCE, NARROWEST = 1e-3, 1e-3  # [V]
 # Of the interior point method: where its mean product stops, how fast it falls, passes, [V] from a bound. It need find
 # the bounds that are met alone: the active set finds the inputs.
-TIGHT, CENTRE, MOST, LEAST = 1e-4, 0.1, 30, 2e-6
+FINAL_GAP, CENTRING, MOST_PASSES, LEAST_SLACK = 1e-4, 0.1, 30, 2e-6
 
 _INPUT = """/* An input of the horizon: its volts, and room to find them. */
 typedef struct {
@@ -60,8 +60,8 @@ def mpc_code(controller: Mpc) -> str:
 
 def mpc_input(controller: Mpc) -> str:
     """The type of what is known of one input of the horizon."""
-    own = " bound[2]," if _bounded(controller) else ""
-    return filled(_INPUT, OWN=own)
+    bounds = " bound[2]," if _bounded(controller) else ""
+    return filled(_INPUT, OWN=bounds)
 
 
 def mpc_memory(controller: Mpc) -> str:
@@ -105,28 +105,28 @@ def _constants(controller: Mpc) -> str:
         "WHEEL_SPEED": controller.output == WHEEL_SPEED,
         "LATE_STEPS": controller.steps_late,
         "PASSES": observer.PASSES,
-        "SOON": program.SOON,
+        "SOON": program.COMPARED_STEPS,
         "AGAIN": settings.again,
         "FIRST_PASSES": interior_point.FIRST,
         "LAST_PASSES": interior_point.LAST,
-        "MOST": MOST,
+        "MOST": MOST_PASSES,
     }
     numbers = {
-        "FARTHEST": FARTHEST,
-        "EXACT": observer.EXACT,
+        "FARTHEST": LARGEST_STATE,
+        "EXACT": observer.STICKING_SHARE,
         "LAST_WEIGHT": settings.last,
         "VOLTS_WEIGHT": settings.volts,
-        "BEYOND": BEYOND,
+        "BEYOND": BOUND_TOLERANCE,
         "BACK_OFF": interior_point.BACK_OFF,
-        "CENTRE": CENTRE,
-        "TIGHT": TIGHT,
-        "LEAST": LEAST,
+        "CENTRE": CENTRING,
+        "TIGHT": FINAL_GAP,
+        "LEAST": LEAST_SLACK,
         "NARROWEST": NARROWEST,
-        "TURNED": program.TURNED,
-        "MOVED": program.MOVED,
-        "PULLED": program.PULLED,
-        "FARTHEST_OFF": observer.BEYOND,
-        "MOST_SCALE": observer.MOST,
+        "TURNED": program.HEADING_CHANGE,
+        "MOVED": program.FRICTION_CHANGE,
+        "PULLED": program.VOLTAGE_CHANGE,
+        "FARTHEST_OFF": observer.OUTLIER_SQUARE,
+        "MOST_SCALE": observer.LARGEST_SCALE,
         "START_PUSH": loop.START_PUSH,
         "START_SCALE": loop.START_SCALE,
         "SHARP": settings.volts,
@@ -142,24 +142,24 @@ def _constants(controller: Mpc) -> str:
     matrices = _matrices(controller, linear) | ({"FRAME": _square(linear, TURNING)} if turning else {})
     matrices |= {"BY_MASS": _square(linear, BY_MASS)} if ellipse else {}
     matrices |= _outputs(controller, robot)
-    made = [_table(name, np.asarray(each, float)) for name, each in matrices.items()]
-    made += [_by_wheel(name, each) for name, each in _wheels(controller).items()]
-    return "\n".join([*lines, "", *made])
+    tables = [_table(name, np.asarray(matrix, float)) for name, matrix in matrices.items()]
+    tables += [_by_wheel(name, column) for name, column in _wheels(controller).items()]
+    return "\n".join([*lines, "", *tables])
 
 
 def _matrices(controller: Mpc, linear: np.ndarray) -> dict[str, Any]:
     """Tables of the model, the cost and the observer."""
-    settings, own = controller.settings, controller._numbers
-    found: dict[str, Any] = {"GAINS": np.concatenate([_square(linear, at) for at in (DECAY, PHI, PSI)])}
-    found |= {"FEED": _square(linear, FEED), "PUSH": own.push.T, "PULL": own.pull}
-    found |= {"WEIGHT": (*settings.pose, *settings.twist)}
-    found |= {"NEAR": program.NEAR, "HOME": program.HOME, "ARRIVED": program.ARRIVED}
-    if len(own.levels):
-        assert (GX, ACROSS, SOFT) == (0, 3, 9)  # columns that model.c counts by hand
-        found["LEVEL"] = own.levels[:, : SOFT + 1]  # what falls with the speed has no C
+    settings, numbers = controller.settings, controller._numbers
+    matrices: dict[str, Any] = {"GAINS": np.concatenate([_square(linear, at) for at in (DECAY, PHI, PSI)])}
+    matrices |= {"FEED": _square(linear, FEED), "PUSH": numbers.push.T, "PULL": numbers.pull}
+    matrices |= {"WEIGHT": (*settings.pose, *settings.twist)}
+    matrices |= {"NEAR": program.STANDSTILL, "HOME": program.HOME, "ARRIVED": program.ARRIVED}
+    if len(numbers.levels):
+        assert (GX, BY_MASS_GX, SOFT_SPEED) == (0, 3, 9)  # columns that model.c counts by hand
+        matrices["LEVEL"] = numbers.levels[:, : SOFT_SPEED + 1]  # what falls with the speed has no C
     if controller.observer:
-        found |= _noise(settings)
-    return found
+        matrices |= _noise(settings)
+    return matrices
 
 
 def _noise(settings: Settings) -> dict[str, Any]:
@@ -172,13 +172,13 @@ def _noise(settings: Settings) -> dict[str, Any]:
 
 def _outputs(controller: Mpc, robot: Any) -> dict[str, Any]:
     """Tables of optional limits, and of how twists become speeds of wheels."""
-    settings, found = controller.settings, dict[str, Any]()
+    settings, tables = controller.settings, dict[str, Any]()
     if controller.output == WHEEL_SPEED:
-        found["SPEED_OF"] = np.array([wheel_speed(robot.wheels, each) for each in np.eye(3)]).T
+        tables["SPEED_OF"] = np.array([wheel_speed(robot.wheels, axis) for axis in np.eye(3)]).T
     if _current(controller):
         limit, emf = settings.tables(robot, controller.dt, True)[2:4]
-        found |= {"CURRENT_VOLTS": limit[1], "EMF": emf}
-    return found
+        tables |= {"CURRENT_VOLTS": limit[1], "EMF": emf}
+    return tables
 
 
 def _wheels(controller: Mpc) -> dict[str, np.ndarray]:
@@ -207,5 +207,5 @@ def _table(name: str, values: np.ndarray) -> str:
 
 
 def _braces(values: np.ndarray) -> str:
-    inner = (_braces(each) if values.ndim > 1 else c_number(float(each), True) for each in values)
+    inner = (_braces(value) if values.ndim > 1 else c_number(float(value), True) for value in values)
     return f"{{{', '.join(inner)}}}"

@@ -24,7 +24,7 @@ class Source:
     @property
     def parameters(self) -> list[str]:
         """The names of its parameters."""
-        return [each.arg for each in self.tree.args.args]
+        return [argument.arg for argument in self.tree.args.args]
 
     @property
     def statements(self) -> list[ast.stmt]:

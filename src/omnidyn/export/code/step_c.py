@@ -14,7 +14,7 @@ import numpy as np
 
 from omnidyn.export.code import sources
 from omnidyn.export.code.expressions import INT, REAL, Array, Type
-from omnidyn.export.code.translate import Program
+from omnidyn.export.code.translate import CProgram
 from omnidyn.export.spelling import SINGLE_MAX, c_number, filled
 from omnidyn.model.actuation import Driver
 from omnidyn.model.dynamics import state_space
@@ -22,7 +22,7 @@ from omnidyn.model.motor import DYNAMIC
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.commands import MAX_DT
-from omnidyn.simulation.engine import FARTHEST
+from omnidyn.simulation.engine import LARGEST_START
 from omnidyn.simulation.exact import inductance, march
 from omnidyn.simulation.exact.inductance import COUNT, GAUSS, Axes, Nodes, axis_laws, current_gain
 from omnidyn.simulation.exact.inductance_step import AxisLaw
@@ -60,7 +60,7 @@ class StepCode:
 def step_code(robot: Robot, single: bool = False) -> StepCode:
     """The step of a robot for which there is an exact one; `omnidyn_advance` is its entry."""
     dynamic = robot.motor.electrical == DYNAMIC
-    program = Program(single, MOST_TURNS_WITH_INDUCTANCE if dynamic else MOST_TURNS)
+    program = CProgram(single, MOST_TURNS_WITH_INDUCTANCE if dynamic else MOST_TURNS)
     kernels = _with_inductance(program) if dynamic else _settled(program)
     if robot.drive.dead_band:
         _function(program, "omnidyn.model.actuation", "at_motor", REAL, REAL, program.struct(Driver))
@@ -79,13 +79,13 @@ def step_code(robot: Robot, single: bool = False) -> StepCode:
     return StepCode(text, robot.wheels.count, dynamic)
 
 
-def _function(program: Program, module: str, name: str, *arguments: Type) -> None:
+def _function(program: CProgram, module: str, name: str, *arguments: Type) -> None:
     source = sources.function(module, name)
     assert source is not None, name
     program.function(source, arguments)
 
 
-def _settled(program: Program) -> dict[tuple[str, str], tuple[Type, ...]]:
+def _settled(program: CProgram) -> dict[tuple[str, str], tuple[Type, ...]]:
     """The kernels of a robot whose currents settle at once, with the types of their arguments."""
     nodes = Array(NODES.shape)
     return {
@@ -97,7 +97,7 @@ def _settled(program: Program) -> dict[tuple[str, str], tuple[Type, ...]]:
     }
 
 
-def _with_inductance(program: Program) -> dict[tuple[str, str], tuple[Type, ...]]:
+def _with_inductance(program: CProgram) -> dict[tuple[str, str], tuple[Type, ...]]:
     """The kernels of a robot with winding inductance, with the types of their arguments."""
     program.shapes[Axes] = dict.fromkeys(Axes._fields, (3,))
     program.shapes[Nodes] = {
@@ -130,21 +130,21 @@ def _tables(robot: Robot) -> dict[str, np.ndarray]:
 
 def _tables_with_inductance(robot: Robot) -> dict[str, np.ndarray]:
     laws = axis_laws(robot)
-    most = FARTHEST["current"] * np.abs(current_gain(robot)).sum(axis=1)
-    return {"LAWS": laws, "RATES": np.array(_rates(laws)), "GAUSS": GAUSS, "MOST_FORCE": most}
+    largest_force = LARGEST_START["current"] * np.abs(current_gain(robot)).sum(axis=1)
+    return {"LAWS": laws, "RATES": np.array(_rates(laws)), "GAUSS": GAUSS, "MOST_FORCE": largest_force}
 
 
 def _rates(laws: np.ndarray) -> np.ndarray:
     """How fast the axes change: made inside kernels, called here as it stands."""
-    made = sources.value(PLACE, "_rates")
-    return getattr(made, "py_func", made)(laws)
+    rates = sources.value(PLACE, "_rates")
+    return getattr(rates, "py_func", rates)(laws)
 
 
-def _drive(program: Program, robot: Robot) -> str:
+def _drive(program: CProgram, robot: Robot) -> str:
     """The drive of the axes from the volts: clipped, less the dead band, summed in the order of the wheels."""
     band, single = robot.drive.dead_band, program.single
     reach = "volts = at_motor(volts, ZERO, driver).a0;" if band else ""
-    driver = ", ".join(c_number(each, single) for each in (1.0, band, 0.0))
+    driver = ", ".join(c_number(number, single) for number in (1.0, band, 0.0))
     return _DRIVE.format(
         real=program.real,
         wheels=robot.wheels.count,
@@ -154,7 +154,7 @@ def _drive(program: Program, robot: Robot) -> str:
     ).strip()
 
 
-def _advance(program: Program, robot: Robot) -> str:
+def _advance(program: CProgram, robot: Robot) -> str:
     """The step with what it checks before and after."""
     dynamic, single = robot.motor.electrical == DYNAMIC, program.single
     largest = SINGLE_MAX if single else sys.float_info.max
@@ -162,8 +162,8 @@ def _advance(program: Program, robot: Robot) -> str:
     numbers = {
         "LARGEST": largest,
         "LONGEST": MAX_DT,
-        "TWIST": FARTHEST["twist"],
-        "POSE": FARTHEST["pose"],
+        "TWIST": LARGEST_START["twist"],
+        "POSE": LARGEST_START["pose"],
         "FULL_TURN": piece * program.most_turns,
     }
     words = {name: c_number(value, single) for name, value in numbers.items()}

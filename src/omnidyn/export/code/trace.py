@@ -96,53 +96,55 @@ def _is(value: Any, number: float) -> bool:
 
 
 def _made(operation: str, *of: Any) -> Node:
-    return Node(operation, tuple(each if isinstance(each, Node) else float(each) for each in of))
+    return Node(operation, tuple(operand if isinstance(operand, Node) else float(operand) for operand in of))
 
 
-def _sum(one: Any, other: Any) -> Any:
-    if _is(one, 0.0) or _is(other, 0.0):
-        return other if _is(one, 0.0) else one
-    return _made("+", one, other)
+def _sum(first: Any, second: Any) -> Any:
+    if _is(first, 0.0) or _is(second, 0.0):
+        return second if _is(first, 0.0) else first
+    return _made("+", first, second)
 
 
-def _product(one: Any, other: Any) -> Any:
-    for a, b in ((one, other), (other, one)):
+def _product(first: Any, second: Any) -> Any:
+    for a, b in ((first, second), (second, first)):
         if _is(a, 0.0):
             return 0.0
         if _is(a, 1.0):
             return b
         if _is(a, -1.0):
             return -b
-    return _made("*", one, other)
+    return _made("*", first, second)
 
 
-def _elementwise(operation: str, known: Callable[..., Any], arguments: int) -> np.ufunc:
-    """An operation entry by entry: worked out by `known` where all operands are numbers, else an expression."""
+def _elementwise(operation: str, operator: Callable[..., Any], arguments: int) -> np.ufunc:
+    """An operation entry by entry: worked out by `operator` where all operands are numbers, else an expression."""
 
     def one(*of: Any) -> Any:
-        return _made(operation, *of) if any(isinstance(each, Node) for each in of) else known(*of)
+        return _made(operation, *of) if any(isinstance(operand, Node) for operand in of) else operator(*of)
 
     return np.frompyfunc(one, arguments, 1)
 
 
-def _both(one: Any, other: Any) -> Any:
+def _both(first: Any, second: Any) -> Any:
     """The logical and; a truth that is known decides or falls away."""
-    if isinstance(one, Node) and isinstance(other, Node):
-        return _made("and", one, other)
-    known, left = (one, other) if not isinstance(one, Node) else (other, one)
-    return left if known else False
+    if isinstance(first, Node) and isinstance(second, Node):
+        return _made("and", first, second)
+    truth, remainder = (first, second) if not isinstance(first, Node) else (second, first)
+    return remainder if truth else False
 
 
-def _chosen(test: Any, one: Any, other: Any) -> Any:
+def _chosen(test: Any, chosen: Any, alternative: Any) -> Any:
     """np.where of an entry."""
     if not isinstance(test, Node):
-        return one if test else other
-    same = one is other or (not isinstance(one, Node) and not isinstance(other, Node) and one == other)
-    return one if same else _made("?", test, one, other)
+        return chosen if test else alternative
+    alike = chosen is alternative or (
+        not isinstance(chosen, Node) and not isinstance(alternative, Node) and chosen == alternative
+    )
+    return chosen if alike else _made("?", test, chosen, alternative)
 
 
 _WHERE = np.frompyfunc(_chosen, 3, 1)
-_OWN: dict[Any, np.ufunc] = {
+_UFUNCS: dict[Any, np.ufunc] = {
     **{
         ufunc: _elementwise(sign, ufunc, 2)
         for ufunc, sign in (
@@ -166,7 +168,7 @@ _OWN: dict[Any, np.ufunc] = {
             (np.invert, "not"),
         )
     },
-    np.square: np.frompyfunc(lambda each: each * each, 1, 1),
+    np.square: np.frompyfunc(lambda value: value * value, 1, 1),
     np.bitwise_and: np.frompyfunc(_both, 2, 1),
     np.logical_and: np.frompyfunc(_both, 2, 1),
 }
@@ -185,9 +187,9 @@ class Traced(np.ndarray):
     def of(cls, nodes: Any) -> Self:
         """An array of these expressions and numbers."""
         nodes = np.asarray(nodes, dtype=object)
-        made = np.full(nodes.shape, np.nan).view(cls)
-        made.nodes = nodes
-        return made
+        array = np.full(nodes.shape, np.nan).view(cls)
+        array.nodes = nodes
+        return array
 
     def __getitem__(self, index: Any) -> Traced:
         return Traced.of(self.nodes[index])
@@ -202,13 +204,13 @@ class Traced(np.ndarray):
         raise TranslationError("a branch on an input: trace both sides")
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, out: Any = None, **options: Any) -> Any:
-        if ufunc not in _OWN and ufunc not in _ARITHMETIC:
+        if ufunc not in _UFUNCS and ufunc not in _ARITHMETIC:
             raise TranslationError(f"no C for {ufunc}")
         options = {key: value for key, value in options.items() if key in ("axis", "keepdims")}
-        found = getattr(_OWN.get(ufunc, ufunc), method)(*map(_objects, inputs), **options)
+        result = getattr(_UFUNCS.get(ufunc, ufunc), method)(*map(_objects, inputs), **options)
         if out is None:
-            return Traced.of(found)
-        out[0].nodes[...] = found
+            return Traced.of(result)
+        out[0].nodes[...] = result
         return out[0]
 
     def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
@@ -217,7 +219,7 @@ class Traced(np.ndarray):
         if func is np.clip:
             return np.minimum(np.maximum(args[0], args[1]), args[2])
         if func in _REDUCED:
-            return Traced.of(_OWN[_REDUCED[func]].reduce(_objects(args[0]), **kwargs))
+            return Traced.of(_UFUNCS[_REDUCED[func]].reduce(_objects(args[0]), **kwargs))
         return Traced.of(func(*_deep(args), **{key: _deep(value) for key, value in kwargs.items()}))
 
 
@@ -232,7 +234,7 @@ def _objects(value: Any) -> Any:
 def _deep(value: Any) -> Any:
     """Arguments of a function of NumPy, arrays in lists too."""
     if isinstance(value, list | tuple):
-        return type(value)(_deep(each) for each in value)
+        return type(value)(_deep(item) for item in value)
     return _objects(value) if isinstance(value, np.ndarray) else value
 
 
@@ -246,10 +248,10 @@ def inputs(name: str, shape: tuple[int, ...]) -> Traced:
 
 def statements(outputs: Mapping[str, Any], single: bool) -> list[str]:
     """The lines of C that give arrays of these names their values. What is used more than once is worked out once."""
-    return _Lines(single).of({name: _objects(value) for name, value in outputs.items()})
+    return _StatementWriter(single).of({name: _objects(value) for name, value in outputs.items()})
 
 
-class _Lines:
+class _StatementWriter:
     """Expressions as statements, equal ones once."""
 
     def __init__(self, single: bool) -> None:
@@ -262,8 +264,8 @@ class _Lines:
     def of(self, outputs: dict[str, Any]) -> list[str]:
         """See `statements`."""
         for values in outputs.values():
-            for each in values.ravel():
-                self._count(each)
+            for node in values.ravel():
+                self._count(node)
         last = []
         for name, values in outputs.items():
             for index in np.ndindex(values.shape):
@@ -275,8 +277,8 @@ class _Lines:
         if isinstance(node, Node):
             self.uses[id(node)] = self.uses.get(id(node), 0) + 1
             if self.uses[id(node)] == 1:
-                for each in node.of:
-                    self._count(each)
+                for operand in node.of:
+                    self._count(operand)
 
     def _text(self, node: Any) -> str:
         if not isinstance(node, Node):

@@ -44,7 +44,7 @@ class Function:
 
 
 @dataclass
-class Program:
+class CProgram:
     """Translated functions and what they need, in an order that C can read. single: in float, not double.
 
     most_turns: of a while loop. One that is cut short makes its function return no number: NAN.
@@ -69,9 +69,11 @@ class Program:
         if key not in self.functions:
             # A local name may be that of a private function without its underscore.
             name = c_name(source.name) + ("_of" if source.name.startswith("_") else "")
-            taken = {made.name for made in self.functions.values()}
-            name = next(each for each in (name, *(f"{name}_{k}" for k in range(2, 99))) if each not in taken)
-            body = Body(self, source, dict(zip(source.parameters, arguments, strict=True)), name)
+            names = {function.name for function in self.functions.values()}
+            name = next(
+                candidate for candidate in (name, *(f"{name}_{k}" for k in range(2, 99))) if candidate not in names
+            )
+            body = FunctionBody(self, source, dict(zip(source.parameters, arguments, strict=True)), name)
             self.texts.append(body.text())
             self.functions[key] = Function(name, body.returns, frozenset(body.written))
         return self.functions[key]
@@ -87,16 +89,19 @@ class Program:
     def table(self, name: str, values: np.ndarray) -> str:
         """A constant table of numbers."""
         shape = "".join(f"[{n}]" for n in values.shape)
-        numbers = [c_number(float(each), self.single) for each in values.ravel()]
+        numbers = [c_number(float(value), self.single) for value in values.ravel()]
         return f"static const {self.real} {name}{shape} = {_nested(numbers, values.shape)};"
 
     def struct(self, cls: type) -> Struct:
         """A NamedTuple as a struct; tables in it have the shapes of `shapes`."""
         shapes = self.shapes.get(cls, {})
         hints = get_type_hints(cls)
-        kind = Struct(cls.__name__, tuple((each, Array(shapes[each]) if each in shapes else REAL) for each in hints))
+        kind = Struct(
+            cls.__name__,
+            tuple((field_name, Array(shapes[field_name]) if field_name in shapes else REAL) for field_name in hints),
+        )
         if kind.name not in self.structs:
-            lines = [f"    {self.declared(each, c_name(name))};" for name, each in kind.fields]
+            lines = [f"    {self.declared(field_kind, c_name(name))};" for name, field_kind in kind.fields]
             self.structs[kind.name] = "typedef struct {\n" + "\n".join(lines) + f"\n}} {kind.name};"
         return kind
 
@@ -106,10 +111,10 @@ class Program:
 
     def many(self, kind: Many) -> str:
         """The struct of several values."""
-        letters = "".join("r" if each == REAL else "i" for each in kind.items)
+        letters = "".join("r" if item == REAL else "i" for item in kind.items)
         name = f"many_{letters}"
         if name not in self.structs:
-            lines = [f"    {self.declared(each, f'a{k}')};" for k, each in enumerate(kind.items)]
+            lines = [f"    {self.declared(item, f'a{k}')};" for k, item in enumerate(kind.items)]
             self.structs[name] = "typedef struct {\n" + "\n".join(lines) + f"\n}} {name};"
         return name
 
@@ -126,18 +131,18 @@ class Program:
 
     def text(self) -> str:
         """All of it: structs, tables, functions."""
-        least = [
+        helpers = [
             f"static {self.real} {name}_of({self.real} a, {self.real} b) {{ return {test} ? a : b; }}"
             for name, test in (("min", "a < b"), ("max", "a > b"))
             if any(f"{name}_of(" in text for text in self.texts)
         ]
-        return "\n\n".join([*self.structs.values(), *self.tables.values(), *least, *self.texts])
+        return "\n\n".join([*self.structs.values(), *self.tables.values(), *helpers, *self.texts])
 
 
-class Body:
+class FunctionBody:
     """One function being translated. types: of its names; written: which parameters it writes into."""
 
-    def __init__(self, program: Program, source: sources.Source, types: dict[str, Type], name: str) -> None:
+    def __init__(self, program: CProgram, source: sources.Source, types: dict[str, Type], name: str) -> None:
         self.program, self.source, self.types, self.name = program, source, dict(types), name
         self.parameters, self.returns = list(types), INT
         self.written: set[int] = set()
@@ -156,17 +161,17 @@ class Body:
                 break
         self.returns = self._found or INT
         kind = "void" if self._found is None else self.program.declared(self.returns, "").rstrip()
-        given = ", ".join(
-            self.program.declared(self.types[each], c_name(each), self._is_constant(k))
-            for k, each in enumerate(self.parameters)
+        parameters = ", ".join(
+            self.program.declared(self.types[parameter], c_name(parameter), self._is_constant(k))
+            for k, parameter in enumerate(self.parameters)
         )
-        own = [each for each in self.types if each not in self.parameters]
-        head = [f"    {self._local(each)};" for each in own]
-        unused = [each for each in self.types if each not in self._read() and each not in self._held]
-        head += [f"    (void){c_name(each)};" for each in unused]
+        local_names = [parameter for parameter in self.types if parameter not in self.parameters]
+        head = [f"    {self._local(name)};" for name in local_names]
+        unused = [name for name in self.types if name not in self._read() and name not in self._held]
+        head += [f"    (void){c_name(name)};" for name in unused]
         words = textwrap.wrap(self.source.summary, 110)
         comment = "/* " + "\n   ".join(line.replace("*/", "* /") for line in words) + " */\n"
-        return f"{comment}static {kind} {self.name}({given})\n{{\n" + "\n".join([*head, *lines]) + "\n}"
+        return f"{comment}static {kind} {self.name}({parameters})\n{{\n" + "\n".join([*head, *lines]) + "\n}"
 
     def writes_to(self, node: ast.expr) -> None:
         """Remember that the name behind an expression is written into."""
@@ -191,14 +196,14 @@ class Body:
 
     def _read(self) -> set[str]:
         """Names that are read somewhere."""
-        nodes = [node for each in self.source.statements for node in ast.walk(each)]
+        nodes = [node for statement in self.source.statements for node in ast.walk(statement)]
         read = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load)}
         return read | {
             node.target.id for node in nodes if isinstance(node, ast.For) and isinstance(node.target, ast.Name)
         }
 
     def _block(self, statements: list[ast.stmt], depth: int) -> list[str]:
-        return [line for each in statements for line in self._statement(each, depth)]
+        return [line for statement in statements for line in self._statement(statement, depth)]
 
     def _statement(self, node: ast.stmt, depth: int) -> list[str]:
         method = getattr(self, f"_{type(node).__name__.lower()}", None)
@@ -228,10 +233,10 @@ class Body:
             return ["return;"]
         text, kind = self.expressions.of(node.value)
         if isinstance(kind, Many) and isinstance(self._found, Many):
-            whole = Many(tuple(joined(a, b) for a, b in zip(self._found.items, kind.items, strict=True)))
+            common = Many(tuple(joined(a, b) for a, b in zip(self._found.items, kind.items, strict=True)))
             if isinstance(node.value, ast.Tuple):
-                text = self.program.packed(whole, [self.expressions.of(each)[0] for each in node.value.elts])
-            self._found = whole
+                text = self.program.packed(common, [self.expressions.of(element)[0] for element in node.value.elts])
+            self._found = common
         else:
             self._found = joined(self._found, kind)
         return [f"return {_bare(text)};"]
@@ -244,15 +249,15 @@ class Body:
 
     def _while(self, node: ast.While, depth: int) -> list[str]:
         turns = self._temporary(INT)
-        cut = [f"    if (++{turns} > {self.program.most_turns}) {{", f"        return{self._no_number()};", "    }"]
-        return [f"while ({_bare(self.expressions.of(node.test)[0])}) {{", *cut, *self._nest(node.body), "}"]
+        guard = [f"    if (++{turns} > {self.program.most_turns}) {{", f"        return{self._no_number()};", "    }"]
+        return [f"while ({_bare(self.expressions.of(node.test)[0])}) {{", *guard, *self._nest(node.body), "}"]
 
     def _no_number(self) -> str:
         """What a function returns that did not come to its end."""
-        none, kind = f"({self.program.real})NAN", self._ends
+        no_number, kind = f"({self.program.real})NAN", self._ends
         if isinstance(kind, Many):
-            return f" {self.program.packed(kind, [none if each == REAL else '0' for each in kind.items])}"
-        return "" if kind is None else f" {none if kind == REAL else '0'}"
+            return f" {self.program.packed(kind, [no_number if item == REAL else '0' for item in kind.items])}"
+        return "" if kind is None else f" {no_number if kind == REAL else '0'}"
 
     def _for(self, node: ast.For, depth: int) -> list[str]:
         assert isinstance(node.target, ast.Name)
@@ -261,11 +266,11 @@ class Body:
         counter, loop = c_name(name), node.iter
         if isinstance(loop, ast.Tuple):  # a few numbers, one after the other
             lines = []
-            for each in loop.elts:
-                lines += [f"{counter} = {self.expressions.of(each)[0]};", "{", *self._nest(node.body), "}"]
+            for element in loop.elts:
+                lines += [f"{counter} = {self.expressions.of(element)[0]};", "{", *self._nest(node.body), "}"]
             return lines
         assert isinstance(loop, ast.Call)
-        ends = [self.expressions.of(each)[0] for each in loop.args]
+        ends = [self.expressions.of(bound)[0] for bound in loop.args]
         first, last = ("0", ends[0]) if len(ends) == 1 else ends
         head = f"for ({counter} = {first}; {counter} < {last}; {counter}++) {{"
         return [head, *self._nest(node.body), "}"]
@@ -309,14 +314,14 @@ class Body:
 
     def _several(self, targets: ast.Tuple, values: ast.Tuple) -> list[str]:
         """a, b = x, y: through temporaries where a later value needs what an earlier target held."""
-        given = [self._value(each) for each in values.elts]
-        names = {node.id for each in targets.elts for node in ast.walk(each) if isinstance(node, ast.Name)}
-        needs = {node.id for each in values.elts for node in ast.walk(each) if isinstance(node, ast.Name)}
+        texts = [self._value(value) for value in values.elts]
+        names = {node.id for target in targets.elts for node in ast.walk(target) if isinstance(node, ast.Name)}
+        needs = {node.id for value in values.elts for node in ast.walk(value) if isinstance(node, ast.Name)}
         if not names & needs:
-            pairs = zip(targets.elts, given, strict=True)
+            pairs = zip(targets.elts, texts, strict=True)
             return [line for target, (text, kind) in pairs for line in self._put(target, text, kind)]
         before, after = [], []
-        for target, (text, kind) in zip(targets.elts, given, strict=True):
+        for target, (text, kind) in zip(targets.elts, texts, strict=True):
             name = self._temporary(kind)
             before.append(f"{name} = {_bare(text)};")
             after += self._put(target, name, kind)
@@ -329,8 +334,8 @@ class Body:
             raise TranslationError(f"{self.source.name}: cannot take apart {ast.unparse(value)}")
         name = self._temporary(kind)
         lines = [f"{name} = {text};"]
-        for k, (target, each) in enumerate(zip(targets.elts, kind.items, strict=True)):
-            lines += self._put(target, f"{name}.a{k}", each)
+        for k, (target, item_kind) in enumerate(zip(targets.elts, kind.items, strict=True)):
+            lines += self._put(target, f"{name}.a{k}", item_kind)
         return lines
 
     def _temporary(self, kind: Type) -> str:

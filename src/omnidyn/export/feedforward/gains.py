@@ -38,7 +38,7 @@ NAMES = ("kS", "kV", "kA")
 UNITS = (("V", "V s/m", "V s^2/m"), ("V", "V s/m", "V s^2/m"), ("V", "V s/rad", "V s^2/rad"))
 WHEEL_UNITS = ("V", "V s/rad", "V s^2/rad")
 STEP = 1e-5  # of a std, for a central difference
-LEAST = 1e-9  # of a pattern or a rim speed: less turns no wheel
+LEAST_SHARE = 1e-9  # of a pattern or a rim speed: less turns no wheel
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Gains:
     wheel_std: FloatArray
 
 
-class Row(NamedTuple):
+class GainRow(NamedTuple):
     """One gain: where it acts ("x", "wheel 2 on x"), its name, value, standard error (NaN: not known) and unit."""
 
     place: str
@@ -68,25 +68,25 @@ class Row(NamedTuple):
 
 def gains(robot: Robot) -> Gains:
     """The gains of a robot, with what its file knows of them."""
-    known = told(robot)
+    uncertain = told(robot)
     value, wheel = axis_gains(robot), wheel_gains(robot)
-    if not known.keys:
+    if not uncertain.keys:
         return Gains(value, np.full((3, 3), np.nan), axis_patterns(robot), wheel, np.full(wheel.shape, np.nan))
     slopes, wheel_slopes = [], []
-    for key, std in zip(known.keys, known.std, strict=True):
+    for key, std in zip(uncertain.keys, uncertain.std, strict=True):
         at, step = Key.parse(key), STEP * float(std)
-        here = at.get(robot)
+        nominal = at.get(robot)
         # Rounding shows where the step is far below the number; a number may also stand at the end of its range.
-        step = max(step, 1e-7 * abs(here))
-        ends = [at.set(robot, here + side * step, checked=False) for side in (1.0, -1.0)]
+        step = max(step, 1e-7 * abs(nominal))
+        ends = [at.set(robot, nominal + side * step, checked=False) for side in (1.0, -1.0)]
         slopes.append((axis_gains(ends[0]) - axis_gains(ends[1])) / (2.0 * step) * std)
         wheel_slopes.append((wheel_gains(ends[0]) - wheel_gains(ends[1])) / (2.0 * step) * std)
     return Gains(
         value,
-        _spread(np.array(slopes), known.correlation),
+        _spread(np.array(slopes), uncertain.correlation),
         axis_patterns(robot),
         wheel,
-        _spread(np.array(wheel_slopes), known.correlation),
+        _spread(np.array(wheel_slopes), uncertain.correlation),
     )
 
 
@@ -94,31 +94,33 @@ def axis_gains(robot: Robot) -> FloatArray:
     """kS, kV, kA of each axis. Shape (3, 3)."""
     push = push_per_volt(robot)
     drop = per_wheel(robot.motor.voltage_drop, robot.wheels.count) + robot.drive.dead_band
-    lost = np.diag((np.sign(axis_patterns(robot)) * drop) @ motor_wrench(robot).driving)
-    return np.stack([(coulomb_along(robot) + lost) / push, damping(robot) / push, axis_masses(robot) / push], axis=1)
+    drop_force = np.diag((np.sign(axis_patterns(robot)) * drop) @ motor_wrench(robot).driving)
+    return np.stack(
+        [(coulomb_along(robot) + drop_force) / push, damping(robot) / push, axis_masses(robot) / push], axis=1
+    )
 
 
 def wheel_gains(robot: Robot) -> FloatArray:
     """The same per rad/s of each wheel, on each axis; NaN where a wheel does not turn. Shape (3, wheels, 3)."""
     pattern, turns = axis_patterns(robot), robot.wheels.wrench_matrix / robot.wheels.radii  # [rad/m], shape (3, wheels)
-    rests = (np.abs(pattern) < LEAST) | (np.abs(turns) < LEAST * np.abs(turns).max(axis=1, keepdims=True))
+    rests = (np.abs(pattern) < LEAST_SHARE) | (np.abs(turns) < LEAST_SHARE * np.abs(turns).max(axis=1, keepdims=True))
     turns = np.where(rests, np.nan, turns)
     value = axis_gains(robot)[:, None, :] * pattern[..., None]
     return value / np.stack([np.sign(turns), turns, turns], axis=-1)
 
 
-def rows(robot: Robot) -> Iterator[Row]:
+def rows(robot: Robot) -> Iterator[GainRow]:
     """Every gain of a robot, one after the other: the axes, then the wheels on each axis."""
-    found = gains(robot)
+    numbers = gains(robot)
     for axis, name in enumerate(AXES):
         for k, gain in enumerate(NAMES):
-            yield Row(name, gain, float(found.value[axis, k]), float(found.std[axis, k]), UNITS[axis][k])
+            yield GainRow(name, gain, float(numbers.value[axis, k]), float(numbers.std[axis, k]), UNITS[axis][k])
     for axis, name in enumerate(AXES):
         for wheel in range(robot.wheels.count):
             for k, gain in enumerate(NAMES):
-                value, std = found.wheel[axis, wheel, k], found.wheel_std[axis, wheel, k]
+                value, std = numbers.wheel[axis, wheel, k], numbers.wheel_std[axis, wheel, k]
                 if np.isfinite(value):
-                    yield Row(f"wheel {wheel + 1} on {name}", gain, float(value), float(std), WHEEL_UNITS[k])
+                    yield GainRow(f"wheel {wheel + 1} on {name}", gain, float(value), float(std), WHEEL_UNITS[k])
 
 
 def _spread(slopes: FloatArray, correlation: FloatArray) -> FloatArray:
@@ -133,19 +135,19 @@ def _spread(slopes: FloatArray, correlation: FloatArray) -> FloatArray:
 def gains_csv(robot: Robot) -> Export:
     """kS, kV and kA of each axis and of each wheel on it. A std that nothing is known of is an empty cell."""
     refuse("gains", robot)
-    missing = left_out("gains", robot)
+    omissions = left_out("gains", robot)
     lines = ["place,gain,value,std,unit"]
     lines += [f"{row.place},{row.name},{number(row.value)},{_std(row)},{row.unit}" for row in rows(robot)]
     head = hash_comment(
-        [f"{robot.name}: volts of the most loaded motor, by omnidyn", *(f"not in it: {words}" for words in missing)]
+        [f"{robot.name}: volts of the most loaded motor, by omnidyn", *(f"not in it: {words}" for words in omissions)]
     )
-    return Export("gains", robot.name, {"gains.csv": head + "\n".join(lines) + "\n"}, missing)
+    return Export("gains", robot.name, {"gains.csv": head + "\n".join(lines) + "\n"}, omissions)
 
 
-def _std(row: Row) -> str:
+def _std(row: GainRow) -> str:
     return number(row.std) if math.isfinite(row.std) else ""
 
 
-def spread(row: Row) -> str:
+def spread(row: GainRow) -> str:
     """How sure a gain is, in words for a comment: "+- 0.02 V", or that nothing is known."""
     return f"+- {row.std:.2g} {row.unit}" if math.isfinite(row.std) else f"{row.unit}, std not known"

@@ -12,7 +12,7 @@ import numpy as np
 
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
-from omnidyn.export.feedforward.gains import AXES, Row, gains, rows, spread
+from omnidyn.export.feedforward.gains import AXES, GainRow, gains, rows, spread
 from omnidyn.export.spelling import c_comment, java_comment, number, python_comment
 from omnidyn.model.robot import Robot
 
@@ -20,36 +20,38 @@ NOTES = (
     "the volts of motor i: the sum over x, y, yaw of PATTERN[axis][i] x SimpleMotorFeedforward(kS, kV, kA) of the axis",
     "the gains of a wheel hold on the axis that names them: a wheel carries another share of the robot on each",
 )
-HOW = "Volts of motor i: sum over x, y, yaw of PATTERN[axis][i] * feedforward(axis). Axes: x forward, y left, yaw ccw."
+USAGE = (
+    "Volts of motor i: sum over x, y, yaw of PATTERN[axis][i] * feedforward(axis). Axes: x forward, y left, yaw ccw."
+)
 
 
 def wpilib(robot: Robot) -> Export:
     """kS, kV and kA with standard errors as constants in Java, C++ and Python."""
     refuse("wpilib", robot)
-    missing = left_out("wpilib", robot)
+    omissions = left_out("wpilib", robot)
     about = [
         f"{robot.name}: feed-forward gains by omnidyn, SI units, volts.",
-        HOW,
-        *(f"Not in it: {m}" for m in missing),
+        USAGE,
+        *(f"Not in it: {m}" for m in omissions),
     ]
-    every = [(_constant(row), row) for row in rows(robot)]
+    constants = [(_constant(row), row) for row in rows(robot)]
     pattern = gains(robot).pattern
     files = {
-        "RobotGains.java": _java(about, every, pattern),
-        "robot_gains.h": _cpp(about, every, pattern),
-        "robot_gains.py": _python(about, every, pattern),
+        "RobotGains.java": _java(about, constants, pattern),
+        "robot_gains.h": _cpp(about, constants, pattern),
+        "robot_gains.py": _python(about, constants, pattern),
     }
-    return Export("wpilib", robot.name, files, missing, NOTES, folder=True)
+    return Export("wpilib", robot.name, files, omissions, NOTES, folder=True)
 
 
-def _constant(row: Row) -> str:
+def _constant(row: GainRow) -> str:
     """X_KS, WHEEL2_ON_X_KV."""
     return f"{row.place.replace('wheel ', 'wheel').replace(' ', '_')}_{row.name}".upper()
 
 
-def _java(about: list[str], every: list[tuple[str, Row]], pattern: np.ndarray) -> str:
-    lines = [f"  public static final double {name} = {number(row.value)}; // {spread(row)}" for name, row in every]
-    table = ",\n".join(f"    {{{', '.join(map(number, each))}}}" for each in pattern.tolist())
+def _java(about: list[str], constants: list[tuple[str, GainRow]], pattern: np.ndarray) -> str:
+    lines = [f"  public static final double {name} = {number(row.value)}; // {spread(row)}" for name, row in constants]
+    table = ",\n".join(f"    {{{', '.join(map(number, row))}}}" for row in pattern.tolist())
     return (
         java_comment(about)
         + "public final class RobotGains {\n  private RobotGains() {}\n\n"
@@ -58,9 +60,9 @@ def _java(about: list[str], every: list[tuple[str, Row]], pattern: np.ndarray) -
     )
 
 
-def _cpp(about: list[str], every: list[tuple[str, Row]], pattern: np.ndarray) -> str:
-    lines = [f"inline constexpr double {name} = {number(row.value)};  // {spread(row)}" for name, row in every]
-    table = ",\n".join(f"    {{{', '.join(map(number, each))}}}" for each in pattern.tolist())
+def _cpp(about: list[str], constants: list[tuple[str, GainRow]], pattern: np.ndarray) -> str:
+    lines = [f"inline constexpr double {name} = {number(row.value)};  // {spread(row)}" for name, row in constants]
+    table = ",\n".join(f"    {{{', '.join(map(number, row))}}}" for row in pattern.tolist())
     count = pattern.shape[1]
     return (
         c_comment(about)
@@ -70,8 +72,8 @@ def _cpp(about: list[str], every: list[tuple[str, Row]], pattern: np.ndarray) ->
     )
 
 
-def _python(about: list[str], every: list[tuple[str, Row]], pattern: np.ndarray) -> str:
-    lines = [f"{name} = {number(row.value)}  # {spread(row)}" for name, row in every]
-    table = ",\n".join(f"    ({', '.join(map(number, each))})" for each in pattern.tolist())
-    assert all(math.isfinite(row.value) for _, row in every)
+def _python(about: list[str], constants: list[tuple[str, GainRow]], pattern: np.ndarray) -> str:
+    lines = [f"{name} = {number(row.value)}  # {spread(row)}" for name, row in constants]
+    table = ",\n".join(f"    ({', '.join(map(number, row))})" for row in pattern.tolist())
+    assert all(math.isfinite(row.value) for _, row in constants)
     return python_comment(about) + "\n" + "\n".join(lines) + f"\n\nPATTERN = (\n{table},\n)\n"

@@ -41,38 +41,42 @@ def ros2_node(
 ) -> Export:
     """A node for /cmd_vel and /joint_states that gives duties, and the loop in it as plain Python.
 
-    controller: by name or file, then the node takes a path or /cmd_vel, and /odom, and steers by its C. dt [s]: between
-    two steps; 0.01, or 0.02 with a controller. timeout [s]: without a command for so long the robot stops. Raises
-    InputError, and UnsupportedError for a robot or a controller that cannot be exported.
+    Args:
+        robot: The robot.
+        controller: By name or file; then the node takes a path or /cmd_vel, and /odom, and steers by its C.
+        dt: Between two steps [s]; 0.01, or 0.02 with a controller.
+        timeout: Without a command for so long the robot stops [s].
+
+    Raises InputError, and UnsupportedError for a robot or a controller that cannot be exported.
     """
 
     dt = dt if dt is not None else (DT if controller else 1.0 / RATE)
-    for name, value, most in (("dt", dt, 1.0), ("timeout", timeout, 60.0)):
-        if not 0.0 < value <= most:
-            raise InputError("out of range", got=value, expected=f"more than 0 and at most {most:g}", where=name)
-    own = "c-controller" if controller else KIND
-    refuse(own, robot)
-    missing = left_out(own, robot)
+    for name, value, largest in (("dt", dt, 1.0), ("timeout", timeout, 60.0)):
+        if not 0.0 < value <= largest:
+            raise InputError("out of range", got=value, expected=f"more than 0 and at most {largest:g}", where=name)
+    kind = "c-controller" if controller else KIND
+    refuse(kind, robot)
+    omissions = left_out(kind, robot)
     about = python_comment(
         [
             f"{robot.name}, by omnidyn. SI units.",
-            *(f"Not in it: {words}" for words in missing),
+            *(f"Not in it: {words}" for words in omissions),
             "Checked without ROS, see docs/exports.md: try it on blocks first.",
         ]
     )
     if controller:
         files = follower(robot, controller, dt, timeout, about)
-        return Export(KIND, robot.name, files, missing, (*NOTES, BUILD), folder=True)
+        return Export(KIND, robot.name, files, omissions, (*NOTES, BUILD), folder=True)
     files = {
         "drive_loop.py": about + _constants(robot, 1.0 / dt, timeout) + NUMBERS + _LOOP,
         "omnidyn_node.py": about + _NODE + NODE_END,
     }
-    return Export(KIND, robot.name, files, missing, NOTES, folder=True)
+    return Export(KIND, robot.name, files, omissions, NOTES, folder=True)
 
 
 def _constants(robot: Robot, rate: float, timeout: float) -> str:
     """What the loop knows of the robot."""
-    found, (_, acceleration) = gains(robot), limits(robot)
+    robot_gains, (_, acceleration) = gains(robot), limits(robot)
     to_twist = twist_from_wheel_speed(robot.wheels, np.eye(robot.wheels.count)).T
     supply = robot.drive.supply or float(np.max(robot.motor.voltage_limit))
     holding = np.minimum(breakaway_voltage(robot, axis_patterns(robot)), HIGHEST)
@@ -89,11 +93,11 @@ TIMEOUT = {number(timeout)}  # [s] without a command, after which the robot stop
 LIMIT = {number(float(np.min(robot.motor.voltage_limit)))}  # [V] of a motor
 SUPPLY = {number(supply)}  # [V], where none is given
 # Along x, along y, about yaw: volts of the most loaded motor per unit of sign, speed, acceleration.
-KS = {_row(found.value[:, 0])}
-KV = {_row(found.value[:, 1])}
-KA = {_row(found.value[:, 2])}
+KS = {_row(robot_gains.value[:, 0])}
+KV = {_row(robot_gains.value[:, 1])}
+KA = {_row(robot_gains.value[:, 2])}
 START = {_row(holding)}  # [V] from rest
-PATTERN = {_table(found.pattern)}  # [axis][motor]
+PATTERN = {_table(robot_gains.pattern)}  # [axis][motor]
 TO_TWIST = {_table(to_twist)}  # [axis][wheel]: twist from the speeds of the wheels [rad/s]
 ACCELERATION = {_row(acceleration)}  # [m/s^2, m/s^2, rad/s^2] that the motors can keep
 '''
@@ -231,8 +235,8 @@ def follower(robot: Robot, controller: str | os.PathLike, dt: float, timeout: fl
     timeout [s]: without a pose, or a command where one is followed, for so long the robot stops.
     """
     code = c_controller(robot, controller, dt)
-    made: Any = controller_spec(controller).make(robot, dt=dt)
-    if made.output == "wheel_speed":
+    law: Any = controller_spec(controller).make(robot, dt=dt)
+    if law.output == "wheel_speed":
         raise UnsupportedError(
             "a node gives duties, and this drive takes speeds of wheels",
             got=robot.drive.kind,
@@ -240,10 +244,10 @@ def follower(robot: Robot, controller: str | os.PathLike, dt: float, timeout: fl
             remedy="ros2-control drives such a robot",
             where="drive.kind",
         )
-    if isinstance(made, Mpc):
-        ahead = [made.steps_late * dt + k * dt for k in range(made.horizon + 1)]
+    if isinstance(law, Mpc):
+        ahead = [law.steps_late * dt + k * dt for k in range(law.horizon + 1)]
     else:
-        ahead = [0.0, made.late, made.late + dt]
+        ahead = [0.0, law.late, law.late + dt]
     constants = f'''"""The loop: a path or a twist that is wanted and the pose in, duties out. No ROS, no omnidyn."""
 
 import bisect
@@ -261,9 +265,9 @@ WHEELS = {robot.wheels.count}
 DT = {number(dt)}  # [s] between two steps
 TIMEOUT = {number(timeout)}  # [s] without a pose, or without a command, after which the robot stops
 SUPPLY = {number(robot.drive.supply or float(np.min(robot.motor.voltage_limit)))}  # [V], where none is given
-IN_VOLTS = {made.output == "voltage"}  # what the controller gives; else duties
+IN_VOLTS = {law.output == "voltage"}  # what the controller gives; else duties
 # [s] from now: when it wants to know the path.
-AHEAD = ({", ".join(number(each) for each in ahead)})
+AHEAD = ({", ".join(number(time) for time in ahead)})
 '''
     return {
         **code.files,

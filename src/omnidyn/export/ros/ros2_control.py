@@ -42,20 +42,27 @@ def ros2_control(
 ) -> Export:
     """The files of a robot with evenly spaced omni wheels for ros2_control.
 
-    runs: logs with wheel speeds and a measured twist, for the covariances. horizon [s]: of the covariance of the pose.
-    height [m]: of the base. Raises UnsupportedError for other wheels, InputError for runs that cannot tell.
+    Args:
+        robot: The robot.
+        runs: Logs with wheel speeds and a measured twist, for the covariances.
+        horizon: Of the covariance of the pose [s].
+        height: Of the base [m].
+
+    Raises UnsupportedError for other wheels, InputError for runs that cannot tell.
     """
     refuse("ros2-control", robot)
-    found, missing = covariance(robot, as_list(runs), horizon), left_out("ros2-control", robot)
-    about = [f"{robot.name}, by omnidyn.", *(f"Not in it: {words}" for words in missing), *NOTES]
+    covariances, omissions = covariance(robot, as_list(runs), horizon), left_out("ros2-control", robot)
+    about = [f"{robot.name}, by omnidyn.", *(f"Not in it: {words}" for words in omissions), *NOTES]
     parts = links(robot, height_of(robot, height))
     files = {
-        "controllers.yaml": hash_comment(about) + _controllers(robot, found, horizon),
+        "controllers.yaml": hash_comment(about) + _controllers(robot, covariances, horizon),
         "velocity_smoother.yaml": hash_comment(about[:1]) + _smoother(robot),
-        "robot.urdf": description(robot.name, parts, missing, outward=True),
+        "robot.urdf": description(robot.name, parts, omissions, outward=True),
         "bringup.launch.py": python_comment(about[:1]) + _LAUNCH,
     }
-    return Export("ros2-control", robot.name, files, missing, (f"covariances: {found.words}", *NOTES), folder=True)
+    return Export(
+        "ros2-control", robot.name, files, omissions, (f"covariances: {covariances.words}", *NOTES), folder=True
+    )
 
 
 def order(robot: Robot) -> list[int]:
@@ -74,14 +81,14 @@ def limits(robot: Robot) -> tuple[FloatArray, FloatArray]:
     [m/s, m/s, rad/s] and [m/s^2, m/s^2, rad/s^2], with some headroom; 0 on an axis that its friction holds.
     """
     volts = float(np.min(robot.motor.voltage_limit))
-    left = np.maximum(volts - axis_gains(robot)[:, 0], 0.0)
-    return HEADROOM * left / axis_gains(robot)[:, 1], HEADROOM * left / axis_gains(robot)[:, 2]
+    volts_left = np.maximum(volts - axis_gains(robot)[:, 0], 0.0)
+    return HEADROOM * volts_left / axis_gains(robot)[:, 1], HEADROOM * volts_left / axis_gains(robot)[:, 2]
 
 
-def _controllers(robot: Robot, found: Covariance, horizon: float) -> str:
+def _controllers(robot: Robot, covariances: Covariance, horizon: float) -> str:
     names = ", ".join(f'"wheel{k + 1}_joint"' for k in order(robot))
     return f"""\
-# Covariances: {found.words}.
+# Covariances: {covariances.words}.
 controller_manager:
   ros__parameters:
     update_rate: {RATE}
@@ -102,8 +109,8 @@ omni_wheel_drive_controller:
     cmd_vel_timeout: 0.5
     diagonal_covariance:
       # of the pose after {horizon:g} s
-      pose: {_diagonal(found.pose)}
-      twist: {_diagonal(found.twist)}
+      pose: {_diagonal(covariances.pose)}
+      twist: {_diagonal(covariances.twist)}
 """
 
 
@@ -205,20 +212,20 @@ def odometry_error(robot: Robot, run: Run) -> FloatArray:
 
 def _from_runs(robot: Robot, runs: Sequence[Run], horizon: float) -> Covariance:
     errors = [odometry_error(robot, run) for run in runs]
-    known = np.concatenate([error[np.isfinite(error).all(axis=1)] for error in errors])
-    if len(known) < LEAST_SAMPLES:
+    samples = np.concatenate([error[np.isfinite(error).all(axis=1)] for error in errors])
+    if len(samples) < LEAST_SAMPLES:
         raise InputError(
             "too few samples for a covariance",
-            got=f"{len(known)} samples with wheel speeds and twist",
+            got=f"{len(samples)} samples with wheel speeds and twist",
             expected=f"{LEAST_SAMPLES} or more",
             remedy="give longer logs",
         )
-    twist = np.mean(known**2, axis=0)
+    twist = np.mean(samples**2, axis=0)
     ways = [_windows(error, run.t, horizon) for error, run in zip(errors, runs, strict=True)]
-    whole = np.concatenate(ways)
-    words = f"from {len(runs)} log{'s' * (len(runs) > 1)}, {len(known)} samples of odometry and measured twist"
-    if len(whole):
-        return Covariance(twist, np.mean(whole**2, axis=0), f"{words}, {len(whole)} windows of {horizon:g} s")
+    windows = np.concatenate(ways)
+    words = f"from {len(runs)} log{'s' * (len(runs) > 1)}, {len(samples)} samples of odometry and measured twist"
+    if len(windows):
+        return Covariance(twist, np.mean(windows**2, axis=0), f"{words}, {len(windows)} windows of {horizon:g} s")
     steps = np.concatenate([np.diff(run.t) for run in runs])
     # No log is that long: errors that do not last, summed as often as there are samples in the horizon.
     pose = twist * float(np.median(steps)) * horizon
@@ -236,20 +243,20 @@ def _windows(error: FloatArray, t: FloatArray, horizon: float) -> FloatArray:
 
 def _from_robot(robot: Robot, horizon: float) -> Covariance:
     speed = 0.5 * top_speeds(robot)
-    scale, known = _scale(robot)
+    scale, has_std = _scale(robot)
     twist = (scale * speed) ** 2
     words = (
-        "from the std of the radii" if known else f"a guess: {100 * UNKNOWN:g} % of the speed, as no radius has a std"
+        "from the std of the radii" if has_std else f"a guess: {100 * UNKNOWN:g} % of the speed, as no radius has a std"
     )
     return Covariance(twist, twist * horizon**2, f"{words}, at half of the top speed: an error that lasts; give logs")
 
 
 def _scale(robot: Robot) -> tuple[FloatArray, bool]:
     """(relative error of v_x, v_y and omega that the radii bring, whether anything is known of them)."""
-    told = numbers_told(robot)
+    priors = numbers_told(robot)
 
     def share(name: str, value: float) -> float:
-        stds = [prior.std for key, prior in told.items() if key.partition("[")[0] == name and prior.std is not None]
+        stds = [prior.std for key, prior in priors.items() if key.partition("[")[0] == name and prior.std is not None]
         return float(np.mean(stds)) / value if stds else 0.0
 
     wheel = share("wheels.wheel_radius_m", float(robot.wheels.radii.mean()))

@@ -86,8 +86,8 @@ def _off(work: LogUnderCheck, pair: SpeedPair) -> Slope | None:
     """rate = slope * speed, where that is surely not 1 and the two are alike otherwise."""
     ids, count = work.windows()
     line = slope(pair.rate, pair.value, ids, count)
-    good = line.value != 0.0 and line.differs(1.0, LEAST_DEVIATION, SURE_ERRORS) and line.windows >= 4
-    return line if good and _likeness(pair.rate, pair.value, ids, count) >= LEAST_LIKENESS else None
+    clear_cut = line.value != 0.0 and line.differs(1.0, LEAST_DEVIATION, SURE_ERRORS) and line.windows >= 4
+    return line if clear_cut and _likeness(pair.rate, pair.value, ids, count) >= LEAST_LIKENESS else None
 
 
 def _joined(lines: list[tuple[SpeedPair, Slope]]) -> list[tuple[SpeedPair, Slope]]:
@@ -107,7 +107,7 @@ def _joined(lines: list[tuple[SpeedPair, Slope]]) -> list[tuple[SpeedPair, Slope
         on=(first.on[0], columns),
         witness=None if None in witness else (witness[0][0], np.hstack([channel[1] for channel in witness])),  # type: ignore[index]
     )
-    line = Slope(float(ratios.mean()), max(each.error for _, each in wheels), wheels[0][1].windows)
+    line = Slope(float(ratios.mean()), max(line.error for _, line in wheels), wheels[0][1].windows)
     return [(joined, line)]
 
 
@@ -121,8 +121,8 @@ def _judged(work: LogUnderCheck, pair: SpeedPair, line: Slope) -> tuple[Finding,
     }
     if not side:
         side = POSITION_SIDE if any(units[POSITION_SIDE]) and not any(units[SPEED_SIDE]) else SPEED_SIDE
-    name, other = (pair.speed, pair.position) if side == SPEED_SIDE else (pair.position, pair.speed)
-    compared = {"position": pair.position, "speed": pair.speed, "source": by, "agrees_with": other if by else ""}
+    name, counterpart = (pair.speed, pair.position) if side == SPEED_SIDE else (pair.position, pair.speed)
+    compared = {"position": pair.position, "speed": pair.speed, "source": by, "agrees_with": counterpart if by else ""}
     clock = unit_of(1.0 / ratio, TIME_UNITS)
     if any(units[side]):
         factor = 1.0 / ratio if side == SPEED_SIDE else ratio
@@ -160,8 +160,8 @@ def _blamed(work: LogUnderCheck, pair: SpeedPair, ratio: float) -> tuple[str, st
     return name, POSITION_SIDE if off_speed < off_position else SPEED_SIDE
 
 
-def _of_time(which: tuple[SpeedPair, Slope]) -> Finding:
-    pair, line = which
+def _of_time(mismatch: tuple[SpeedPair, Slope]) -> Finding:
+    pair, line = mismatch
     clock = unit_of(1.0 / line.value, TIME_UNITS)
     return Finding(
         "time_unit",
@@ -183,8 +183,11 @@ def _scaled(work: LogUnderCheck, channel: str, columns: tuple[int, ...], factor:
 
 def _likeness(y: FloatArray, x: FloatArray, ids, count: int) -> float:
     """Correlation, about 0, of window means: 1 where one is the other times a number. Shapes (rows, k)."""
-    good = np.isfinite(y) & np.isfinite(x)
-    a, b = (np.concatenate([windowed(ids, count, column) for column in np.where(good, each, 0.0).T]) for each in (y, x))
+    finite = np.isfinite(y) & np.isfinite(x)
+    a, b = (
+        np.concatenate([windowed(ids, count, column) for column in np.where(finite, columns, 0.0).T])
+        for columns in (y, x)
+    )
     return float(abs(a @ b) / max(np.sqrt((a @ a) * (b @ b)), 1e-300))
 
 
@@ -194,9 +197,9 @@ def _turn(work: LogUnderCheck) -> Iterator[SpeedPair]:
     pose, twist, speed = work.get("pose"), work.get("twist"), work.full("wheel_speed")
     if pose is None or twist is None or not np.isfinite(pose[:, 2]).any() or not np.isfinite(twist[:, 2]).any():
         return
-    own = None if speed is None else wheels_twist(work, speed, 2 * half + 1)
+    wheel_motion = None if speed is None else wheels_twist(work, speed, 2 * half + 1)
     rate = central_rate(unwrapped(pose[:, 2]), work.t, half)
-    witness = None if own is None else ("wheels", own[:, 2:])
+    witness = None if wheel_motion is None else ("wheels", wheel_motion[:, 2:])
     yield SpeedPair(
         "turn",
         "omega",
@@ -241,8 +244,8 @@ def _path(work: LogUnderCheck) -> Iterator[SpeedPair]:
     if pose is None or twist is None or len(work) < 3 * MIN_ROWS:
         return
     body, width = pose_twist(work, pose)
-    own = None if speed is None else wheels_twist(work, speed, width)
-    witness = None if own is None else ("wheels", own[:, :2])
+    wheel_motion = None if speed is None else wheels_twist(work, speed, width)
+    witness = None if wheel_motion is None else ("wheels", wheel_motion[:, :2])
     yield SpeedPair(
         "path",
         "vx vy",

@@ -38,17 +38,17 @@ def check_lag(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     findings: list[Finding] = []
     if len(work) < 3 * MIN_ROWS or work.step <= 0.0:
         return findings, work
-    for own, pair in _pairs(work):
-        line = lag(own, pair.y, pair.x)
+    for clock_work, pair in _pairs(work):
+        line = lag(clock_work, pair.y, pair.x)
         if line is None or not line.error < VAGUE_ROWS:
             continue
         rows = line.value
         if abs(rows) < NOTE_FROM or abs(rows) < SURE_ERRORS * line.error:
             continue
-        of_means = late_by(own, pair.late) - late_by(own, pair.against)
+        of_means = late_by(clock_work, pair.late) - late_by(clock_work, pair.against)
         if of_means and abs(rows - of_means) < 1.0:
             continue  # named already
-        findings.append(_finding(own, pair, line))
+        findings.append(_finding(clock_work, pair, line))
     return findings, work
 
 
@@ -65,25 +65,25 @@ def _finding(work: LogUnderCheck, pair: LagPair, line: Slope) -> Finding:
 def _pairs(work: LogUnderCheck) -> Iterator[tuple[LogUnderCheck, LagPair]]:
     """What can be compared, and in which rows; `late` is the channel whose lag is positive."""
     speed = work.full("wheel_speed")
-    seen = ground(work)
-    if speed is not None and seen is not None and work.geometry is not None:
-        own = wheels_twist(work, speed, seen.width)
-        assert own is not None
+    floor_motion = ground(work)
+    if speed is not None and floor_motion is not None and work.geometry is not None:
+        wheel_motion = wheels_twist(work, speed, floor_motion.width)
+        assert wheel_motion is not None
         length = np.array([1.0, 1.0, float(np.mean(work.geometry.wheels.robot_radius))])
-        axes = seen.axes
+        axes = floor_motion.axes
         pair = LagPair(
             "wheel_speed",
-            seen.name,
-            own[:, axes] * length[axes],
-            seen.twist[:, axes] * length[axes],
-            f"wheel_speed {seen.name}",
+            floor_motion.name,
+            wheel_motion[:, axes] * length[axes],
+            floor_motion.twist[:, axes] * length[axes],
+            f"wheel_speed {floor_motion.name}",
         )
         yield work, pair
     # A current jumps with the voltage, a speed does not: between samples of the current nothing is on a line.
-    here = sampled_with(work, "current", ("voltage", "duty", "supply", "wheel_speed"))
-    speed = here.full("wheel_speed")
+    clock_work = sampled_with(work, "current", ("voltage", "duty", "supply", "wheel_speed"))
+    speed = clock_work.full("wheel_speed")
     if speed is not None:
-        yield from ((here, pair) for pair in _of_motors(here, speed))
+        yield from ((clock_work, pair) for pair in _of_motors(clock_work, speed))
     pose, twist = work.get("pose"), work.get("twist")
     if pose is not None and twist is not None and np.isfinite(pose[:, 2]).any() and np.isfinite(twist[:, 2]).any():
         rate = central_rate(unwrapped(pose[:, 2]), work.t, 1)
@@ -95,11 +95,11 @@ def _of_motors(work: LogUnderCheck, speed: FloatArray) -> Iterator[LagPair]:
     voltage, current = volts(work), work.full("current")
     if voltage is None or current is None or electric_speed(work) is None:
         return
-    counter, lost = emf(work, speed), ohmic(work, current)
-    if counter is None or lost is None or voltage.shape != lost.shape:
+    counter, ohmic_drop = emf(work, speed), ohmic(work, current)
+    if counter is None or ohmic_drop is None or voltage.shape != ohmic_drop.shape:
         return
     names = "voltage" if work.get("voltage") is not None else "duty"
-    yield LagPair("current", f"{names} wheel_speed", lost, voltage - counter, "current")
+    yield LagPair("current", f"{names} wheel_speed", ohmic_drop, voltage - counter, "current")
 
 
 def lag(work: LogUnderCheck, y: FloatArray, x: FloatArray) -> Slope | None:
@@ -113,12 +113,12 @@ def lag(work: LogUnderCheck, y: FloatArray, x: FloatArray) -> Slope | None:
     y, x = smooth(y, width), smooth(x, width)
     n = len(y)
     inside = slice(FARTHEST_ROWS + 4, n - FARTHEST_ROWS - 4)
-    good = np.asarray(np.isfinite(y).all(axis=1) & np.isfinite(x).all(axis=1))
+    finite = np.asarray(np.isfinite(y).all(axis=1) & np.isfinite(x).all(axis=1))
     for segment in work.segments[1:]:
         if segment.start > n:
             break
-        good[max(0, segment.start - FARTHEST_ROWS - 4) : segment.start + FARTHEST_ROWS + 4] = False
-    keep = good[inside]
+        finite[max(0, segment.start - FARTHEST_ROWS - 4) : segment.start + FARTHEST_ROWS + 4] = False
+    keep = finite[inside]
     if keep.sum() < MIN_ROWS:
         return None
     target = np.where(keep[:, None], y[inside], 0.0)
@@ -127,16 +127,16 @@ def lag(work: LogUnderCheck, y: FloatArray, x: FloatArray) -> Slope | None:
         part = values[inside.start - by : inside.stop - by]
         return np.where(keep[:, None] & np.isfinite(part), part, 0.0)
 
-    best, least, at = 0, np.inf, {}
+    best, least_misfit, at = 0, np.inf, {}
     for by in range(-FARTHEST_ROWS, FARTHEST_ROWS + 1):
         shifted = moved(x, by)
         size, along = float((shifted**2).sum()), float((target * shifted).sum())
-        left = float((target**2).sum()) - along * (along / size) if size > 0.0 and along > 0.0 else np.inf
-        at[by] = left
-        if left < least:
-            best, least = by, left
+        misfit = float((target**2).sum()) - along * (along / size) if size > 0.0 and along > 0.0 else np.inf
+        at[by] = misfit
+        if misfit < least_misfit:
+            best, least_misfit = by, misfit
     total = float((target**2).sum())
-    if not np.isfinite(least) or least > 0.5 * total or abs(best) == FARTHEST_ROWS:
+    if not np.isfinite(least_misfit) or least_misfit > 0.5 * total or abs(best) == FARTHEST_ROWS:
         return None
     shifted = moved(x, best)
     a = float((target * shifted).sum() / (shifted**2).sum())

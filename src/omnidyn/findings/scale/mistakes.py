@@ -114,13 +114,13 @@ def duty_as_voltage(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     limit, high = float(np.max(robot.motor.voltage_limit)), float(np.nanmax(np.abs(voltage)))
     names, speed = " ".join(components("voltage", work.wheels)), work.get("wheel_speed")
     counter = None if speed is None else emf(work, speed)
-    needed = 0.0 if counter is None else float(np.nanquantile(np.abs(counter), 0.95))
+    emf_level = 0.0 if counter is None else float(np.nanquantile(np.abs(counter), 0.95))
     if high > 1.5 * limit:
         pwm = 2.0 * limit < high <= 256.0 and limit < 100.0
         mistake = ("duty/255", "V") if pwm else ("mV", "V") if high > 100.0 * limit else NO_MISTAKE
         measured = {"shown_by": "driver", "high_V": high, "limit_V": limit}
-    elif high <= 1.0 < 0.5 * limit and needed > 1.5 * high:
-        mistake, measured = ("duty", "V"), {"shown_by": "speed", "high_V": high, "needed_V": needed}
+    elif high <= 1.0 < 0.5 * limit and emf_level > 1.5 * high:
+        mistake, measured = ("duty", "V"), {"shown_by": "speed", "high_V": high, "needed_V": emf_level}
     else:
         return [], work
     return [unit_finding(names, high / limit, mistake, LIMITS, **measured)], work.replace(voltage=None)
@@ -132,10 +132,10 @@ def emf_alone(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     counter = None if speed is None else emf(work, speed)
     if counter is None or voltage is None or speed is None or counter.shape != voltage.shape:
         return [], work
-    good = np.isfinite(counter) & np.isfinite(voltage)
-    if not good.any():
+    finite = np.isfinite(counter) & np.isfinite(voltage)
+    if not finite.any():
         return [], work
-    excess = float((np.abs(counter[good]) * np.abs(voltage[good])).sum() / max((voltage[good] ** 2).sum(), 1e-12))
+    excess = float((np.abs(counter[finite]) * np.abs(voltage[finite])).sum() / max((voltage[finite] ** 2).sum(), 1e-12))
     if excess < 1.5:
         return [], work
     robot = work.geometry

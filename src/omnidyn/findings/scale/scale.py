@@ -33,7 +33,7 @@ from omnidyn.findings.signal.reference import (
     keys_behind,
     wheels_twist,
 )
-from omnidyn.findings.signal.robust import HELD, Slope, quantum, slope, smooth, turned_by
+from omnidyn.findings.signal.robust import HELD_HEADING, Slope, quantum, slope, smooth, turned_by
 from omnidyn.logs.channels import components
 from omnidyn.statement import ERROR, NOTE, WARNING
 from omnidyn.units import TURN
@@ -41,7 +41,7 @@ from omnidyn.units import TURN
 LEAST_DEVIATION = 0.02  # a scale that is off by less is not worth a word
 NO_MOTION_SHARE = 0.003  # of the motion: no unit mistake makes as little of it
 FOLLOWS = 0.95  # likeness of a wheel and what the other channels say of it, lag, slip and scale apart
-ALONE = 0.15  # of the motion: an axis that moves less is no witness
+WITNESS_SHARE = 0.15  # of the motion: an axis that moves less is no witness
 
 
 class Scales(NamedTuple):
@@ -61,8 +61,8 @@ def check_scale(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         return [], work
     findings: list[Finding] = []
     for part in (current_unit, duty_as_voltage, _speeds, _single_wheels):
-        more, work = part(work)
-        findings += more
+        new_findings, work = part(work)
+        findings += new_findings
     return findings, work
 
 
@@ -81,10 +81,10 @@ def _without_stand_in(work: LogUnderCheck) -> LogUnderCheck:
         return work
     speed = work.channels["wheel_speed"]
     width = work.width(0.1)
-    own, told = smooth(speed, width), smooth(expected[1], width)
-    good = np.isfinite(own).all(axis=1) & np.isfinite(told).all(axis=1)
-    cross = (own[good] * told[good]).sum(axis=0)
-    alike = cross / np.sqrt((own[good] ** 2).sum(axis=0) * (told[good] ** 2).sum(axis=0))
+    logged, predicted = smooth(speed, width), smooth(expected[1], width)
+    finite = np.isfinite(logged).all(axis=1) & np.isfinite(predicted).all(axis=1)
+    cross = (logged[finite] * predicted[finite]).sum(axis=0)
+    alike = cross / np.sqrt((logged[finite] ** 2).sum(axis=0) * (predicted[finite] ** 2).sum(axis=0))
     if (np.delete(alike, dead) > FOLLOWS).all():
         return work
     return work.masked("wheel_speed", dead, work.everywhere).knowing(dead_wheel=None)
@@ -95,11 +95,11 @@ def scales(work: LogUnderCheck) -> Scales | None:
     speed = work.full("wheel_speed")
     if speed is None or work.geometry is None:
         return None
-    seen = ground(work)
+    floor_motion = ground(work)
     ids, count = work.windows()
     linear = yaw = electric = None
-    if seen is not None:
-        linear, yaw = _against_floor(work, seen, speed, ids, count)
+    if floor_motion is not None:
+        linear, yaw = _against_floor(work, floor_motion, speed, ids, count)
     implied = electric_speed(work)
     if implied is not None:
         # The noise of the speed is small beside that of the currents: it is the better regressor.
@@ -108,30 +108,30 @@ def scales(work: LogUnderCheck) -> Scales | None:
 
 
 def _against_floor(
-    work: LogUnderCheck, seen: Ground, speed: FloatArray, ids, count: int
+    work: LogUnderCheck, floor_motion: Ground, speed: FloatArray, ids, count: int
 ) -> tuple[Slope | None, Slope | None]:
-    own = wheels_twist(work, speed, seen.width)
-    if own is None:
+    wheel_motion = wheels_twist(work, speed, floor_motion.width)
+    if wheel_motion is None:
         return None, None
     robot = work.geometry
     length = float(np.mean(robot.wheels.robot_radius)) if robot else 0.1
-    size = np.nanmean(own[:, :2] ** 2) + np.nanmean((own[:, 2] * length) ** 2)
-    axes = [k for k in seen.axes if k < 2]
+    size = np.nanmean(wheel_motion[:, :2] ** 2) + np.nanmean((wheel_motion[:, 2] * length) ** 2)
+    axes = [k for k in floor_motion.axes if k < 2]
     linear = yaw = None
-    if axes and np.nanmean(own[:, axes] ** 2) > ALONE**2 * size:
-        linear = slope(seen.twist[:, axes], own[:, axes], ids, count)
-    if 2 in seen.axes and np.nanmean((own[:, 2] * length) ** 2) > ALONE**2 * size:
-        yaw = slope(seen.twist[:, 2], own[:, 2], ids, count)
+    if axes and np.nanmean(wheel_motion[:, axes] ** 2) > WITNESS_SHARE**2 * size:
+        linear = slope(floor_motion.twist[:, axes], wheel_motion[:, axes], ids, count)
+    if 2 in floor_motion.axes and np.nanmean((wheel_motion[:, 2] * length) ** 2) > WITNESS_SHARE**2 * size:
+        yaw = slope(floor_motion.twist[:, 2], wheel_motion[:, 2], ids, count)
     return linear, yaw
 
 
 def _speeds(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """The one scale of all wheel speeds, judged by floor and motors together."""
-    these = scales(work)
-    if these is None:
+    slopes = scales(work)
+    if slopes is None:
         return [], work
-    floor = _joined([line for line in (these.linear, these.yaw) if line is not None])
-    electric = these.electric if these.electric is not None and these.electric.windows >= 4 else None
+    floor = _joined([line for line in (slopes.linear, slopes.yaw) if line is not None])
+    electric = slopes.electric if slopes.electric is not None and slopes.electric.windows >= 4 else None
     robot = work.geometry
     assert robot is not None
     factor = floor if floor is not None else electric
@@ -153,28 +153,32 @@ def _speeds(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         source = FLOOR if floor is not None else CURRENT_AND_VOLTAGE
         finding = unit_finding(names, 1.0 / factor.value, mistake, keys_behind(source), shown_by="ratio", source=source)
         return [finding], work.replace(wheel_speed=speed * factor.value)
-    return _ratio_findings(work, these, floor, electric, names)
+    return _ratio_findings(work, slopes, floor, electric, names)
 
 
 def _against(work: LogUnderCheck, floor: Slope) -> list[Finding]:
     """A motion over the floor that goes the other way, or not at all."""
-    seen = ground(work)
-    if seen is None:
+    floor_motion = ground(work)
+    if floor_motion is None:
         return []
-    names = {"twist": ("vx", "vy", "omega"), "pose": ("x", "y", "heading")}[seen.name]
-    subject = " ".join(names[k] for k in seen.axes)
+    names = {"twist": ("vx", "vy", "omega"), "pose": ("x", "y", "heading")}[floor_motion.name]
+    subject = " ".join(names[k] for k in floor_motion.axes)
     if floor.value > -4.0 * floor.error:
-        if abs(floor.value) > 0.1 or floor.error > 0.03 or _held(work, seen):
+        if abs(floor.value) > 0.1 or floor.error > 0.03 or _held(work, floor_motion):
             return []
         return [Finding("dead", WARNING, subject, {"ratio": floor.value, "error": floor.error})]
     return [Finding("inverted", ERROR, subject, {"ratio": floor.value, "error": floor.error}, rests_on=GEOMETRY)]
 
 
-def _held(work: LogUnderCheck, seen: Ground) -> bool:
+def _held(work: LogUnderCheck, floor_motion: Ground) -> bool:
     """Whether a heading alone is known, and the wheels turn the robot by next to nothing: it was held."""
     speed = work.full("wheel_speed")
-    own = None if speed is None else wheels_twist(work, speed, seen.width)
-    return tuple(seen.axes) == (2,) and own is not None and turned_by(own[:, 2], work.t) < HELD
+    wheel_motion = None if speed is None else wheels_twist(work, speed, floor_motion.width)
+    return (
+        tuple(floor_motion.axes) == (2,)
+        and wheel_motion is not None
+        and turned_by(wheel_motion[:, 2], work.t) < HELD_HEADING
+    )
 
 
 def _joined(lines: list[Slope]) -> Slope | None:
@@ -188,7 +192,7 @@ def _joined(lines: list[Slope]) -> Slope | None:
 
 
 def _ratio_findings(
-    work: LogUnderCheck, these: Scales, floor: Slope | None, electric: Slope | None, names: str
+    work: LogUnderCheck, slopes: Scales, floor: Slope | None, electric: Slope | None, names: str
 ) -> tuple[list[Finding], LogUnderCheck]:
     off_floor = floor is not None and floor.differs(1.0, LEAST_DEVIATION)
     off_motor = electric is not None and electric.differs(1.0, LEAST_DEVIATION)
@@ -197,16 +201,16 @@ def _ratio_findings(
         if line is not None:
             numbers |= {name: line.value, name + "_error": line.error}
     speed = work.channels["wheel_speed"]
-    if these.linear is not None and these.yaw is not None:
-        apart = _apart(these.linear, these.yaw)
-        if apart is not None and not these.linear.differs(1.0, LEAST_DEVIATION):
+    if slopes.linear is not None and slopes.yaw is not None:
+        apart = _apart(slopes.linear, slopes.yaw)
+        if apart is not None and not slopes.linear.differs(1.0, LEAST_DEVIATION):
             return [
-                Finding("robot_radius", WARNING, "omega", {"ratio": these.yaw.value, "error": these.yaw.error})
+                Finding("robot_radius", WARNING, "omega", {"ratio": slopes.yaw.value, "error": slopes.yaw.error})
             ], work
     if off_floor and floor is not None and off_motor and electric is not None and _same(floor, electric):
-        both = _joined([floor, electric]) or floor
-        return [Finding("gear", WARNING, names, {**numbers, "ratio": both.value, "error": both.error})], work.replace(
-            wheel_speed=speed * both.value
+        joint = _joined([floor, electric]) or floor
+        return [Finding("gear", WARNING, names, {**numbers, "ratio": joint.value, "error": joint.error})], work.replace(
+            wheel_speed=speed * joint.value
         ).knowing(floor_ratio=None)
     findings = []
     if off_floor and floor is not None:
@@ -253,8 +257,8 @@ def _dead_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     for k, (a, size) in enumerate(zip(slopes, sizes, strict=True)):
         name = components("wheel_speed", work.wheels)[k]
         coarse = 4.0 * quantum(work.channels["wheel_speed"][:, k])
-        sure = np.isfinite(a.error) and a.windows >= 4 and abs(a.value) < 0.1 and a.error < 0.05
-        if sure and size > max(0.2 * max(sizes), coarse) and not _told_to_rest(work, k):
+        silent = np.isfinite(a.error) and a.windows >= 4 and abs(a.value) < 0.1 and a.error < 0.05
+        if silent and size > max(0.2 * max(sizes), coarse) and not _told_to_rest(work, k):
             findings.append(
                 Finding(
                     "dead",
@@ -284,8 +288,8 @@ def _wheel_lines(work: LogUnderCheck) -> tuple[str, list[Slope], list[float]] | 
     speed, expected = work.get("wheel_speed"), expected_wheel_speed(work)
     if speed is None or expected is None or expected[1].shape != speed.shape or work.geometry is None:
         return None
-    seen = ground(work)
-    width = seen.width if seen is not None and expected[0] == seen.name else 1
+    floor_motion = ground(work)
+    width = floor_motion.width if floor_motion is not None and expected[0] == floor_motion.name else 1
     w = smooth(speed, width)
     ids, count = work.windows()
     slopes = [slope(w[:, k], expected[1][:, k], ids, count) for k in range(speed.shape[1])]
@@ -303,19 +307,19 @@ def _single_wheels(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     if ratio is not None and abs(ratio.value - 1.0) > 0.1:
         return [], work  # a robot that slips does so more in one direction than in another
     coarse = [10.0 * quantum(column) for column in work.channels["wheel_speed"].T]
-    good = [
+    reliable = [
         k
         for k, a in enumerate(slopes)
         if np.isfinite(a.error) and a.windows >= 4 and sizes[k] > max(0.2 * max(sizes), coarse[k])
     ]
-    if len(good) < 3:
+    if len(reliable) < 3:
         return [], work
     findings = []
-    for k in good:
-        others = [slopes[j].value for j in good if j != k]
-        if np.ptp(others) > 0.02 or not slopes[k].differs(float(np.mean(others)), 0.03, 5.0):
+    for k in reliable:
+        rest_values = [slopes[j].value for j in reliable if j != k]
+        if np.ptp(rest_values) > 0.02 or not slopes[k].differs(float(np.mean(rest_values)), 0.03, 5.0):
             continue
-        off = slopes[k].value / float(np.mean(others))
+        off = slopes[k].value / float(np.mean(rest_values))
         name = components("wheel_speed", work.wheels)[k]
         if off < 0.0:
             findings.append(
@@ -346,20 +350,20 @@ def check_turn_rate(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     can have been mistaken.
     """
     speed, twist = work.full("wheel_speed"), work.get("twist")
-    own = None if speed is None or len(work) < MIN_ROWS else wheels_twist(work, speed)
-    if own is None or twist is None or not np.isfinite(twist[:, 2]).any():
+    wheel_motion = None if speed is None or len(work) < MIN_ROWS else wheels_twist(work, speed)
+    if wheel_motion is None or twist is None or not np.isfinite(twist[:, 2]).any():
         return [], work
-    sizes = [float(np.sqrt(np.nanmean(values[:, 2] ** 2))) for values in (twist, own)]
+    sizes = [float(np.sqrt(np.nanmean(values[:, 2] ** 2))) for values in (twist, wheel_motion)]
     if not sizes[1] > 0.0 or abs(np.log(max(sizes[0], 1e-300) / sizes[1])) < SAME_UNIT_LOG:
         return [], work
     ids, count = work.windows()
-    yaw = slope(twist[:, 2], own[:, 2], ids, count)
+    yaw = slope(twist[:, 2], wheel_motion[:, 2], ids, count)
     mistake = unit_of(yaw.value, possible(TURN_UNITS, work, "omega")) if yaw.windows >= 4 else NO_MISTAKE
     if not any(mistake) or not yaw.differs(1.0, SAME_UNIT_LOG):
         return [], work
     for axes in ([0], [1]):
         if np.isfinite(twist[:, axes]).any():
-            path = slope(twist[:, axes], own[:, axes], ids, count)
+            path = slope(twist[:, axes], wheel_motion[:, axes], ids, count)
             if path.windows >= 4 and path.value > 0.0 and abs(np.log(path.value)) > SAME_UNIT_LOG:
                 return [], work
     implied = electric_speed(work)

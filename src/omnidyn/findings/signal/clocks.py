@@ -28,19 +28,21 @@ def clocks_of(log: Log) -> tuple[SensorClock, ...]:
     """The clocks of a log in order of time, that of the wheels first; one where no component has its own."""
     groups: list[tuple[BoolArray, set[str]]] = []
     for name, column in _columns(log):
-        there = np.isfinite(column) if log.now_and_then(column) else np.ones(len(log), dtype=bool)
-        same = next((k for k, (rows, _) in enumerate(groups) if _alike(rows, there)), None)
-        if same is None:
-            groups.append((there, {name}))
+        row_mask = np.isfinite(column) if log.now_and_then(column) else np.ones(len(log), dtype=bool)
+        index = next((k for k, (rows, _) in enumerate(groups) if _alike(rows, row_mask)), None)
+        if index is None:
+            groups.append((row_mask, {name}))
         else:
-            groups[same] = (groups[same][0] | there, {*groups[same][1], name})
+            groups[index] = (groups[index][0] | row_mask, {*groups[index][1], name})
     if not groups:
         return (SensorClock(np.arange(len(log)), frozenset()),)
     first = _leading(groups)
     ordered = [groups[first], *(group for k, group in enumerate(groups) if k != first)]
     # An input that a Run holds in every row keeps no stamps of its own: it is judged where the wheels were sampled.
-    held = {name for rows, names in ordered[1:] if rows.all() for name in names if place(name)[0] in NEVER_MADE_UP}  # type: ignore[index]
-    ordered = [(rows, names | held if k == 0 else names - held) for k, (rows, names) in enumerate(ordered)]
+    continuous = {
+        name for rows, names in ordered[1:] if rows.all() for name in names if place(name)[0] in NEVER_MADE_UP
+    }  # type: ignore[index]
+    ordered = [(rows, names | continuous if k == 0 else names - continuous) for k, (rows, names) in enumerate(ordered)]
     return tuple(SensorClock(np.flatnonzero(rows), frozenset(names)) for rows, names in ordered if names)
 
 
@@ -53,10 +55,10 @@ def _columns(log: Log) -> Iterator[tuple[str, FloatArray]]:
                 yield name, column
 
 
-def _alike(one: BoolArray, other: BoolArray) -> bool:
+def _alike(first: BoolArray, second: BoolArray) -> bool:
     """Whether the rows of one clock are those of another, a few missing ones apart."""
-    both, least, most = int((one & other).sum()), *sorted((int(one.sum()), int(other.sum())))
-    return both == least >= SHARED * most
+    common, fewer, longer = int((first & second).sum()), *sorted((int(first.sum()), int(second.sum())))
+    return common == fewer >= SHARED * longer
 
 
 def _leading(groups: list[tuple[BoolArray, set[str]]]) -> int:
@@ -109,18 +111,20 @@ def with_speed(work: LogUnderCheck) -> LogUnderCheck:
     return work.replace(wheel_speed=speed)
 
 
-def sampled_with(work: LogUnderCheck, channel: str, others: Sequence[str]) -> LogUnderCheck:
+def sampled_with(work: LogUnderCheck, channel: str, companions: Sequence[str]) -> LogUnderCheck:
     """The work in the rows of the clock of a channel; as it is where there is one clock, or some of the channels were
-    mended since, and now differ from what was logged. others: channels that are wanted beside it."""
+    mended since, and now differ from what was logged. companions: channels that are wanted beside it."""
     if work.merged is None or len(work.merged.clocks) == 1:
         return work
     first, *clocks = work.merged.clocks
-    own = [clock for clock in clocks if any(place(name)[0] == channel for name in clock.components)]  # type: ignore[index]
+    clocks_of_channel = [clock for clock in clocks if any(place(name)[0] == channel for name in clock.components)]  # type: ignore[index]
     logged, now = at_clock(work, first).channels, work.channels
-    wanted = [name for name in (channel, *others) if name in now]
-    if not own or not all(name in logged and np.array_equal(now[name], logged[name], True) for name in wanted):
+    names = [name for name in (channel, *companions) if name in now]
+    if not clocks_of_channel or not all(
+        name in logged and np.array_equal(now[name], logged[name], True) for name in names
+    ):
         return work
-    return at_clock(work, own[0])
+    return at_clock(work, clocks_of_channel[0])
 
 
 def at_each_clock(
@@ -130,35 +134,37 @@ def at_each_clock(
     findings, after = family(work)
     if work.merged is None or len(work.merged.clocks) == 1:
         return findings, after
-    first, *others = work.merged.clocks
+    first, *other_clocks = work.merged.clocks
     log, _ = _put(work.merged.log, first, work, after)
-    for clock in others:
-        here = at_clock(replace(after, merged=work.merged._replace(log=log)), clock)
-        here = here.replace(**{name: None for name in here.channels if name not in after.channels})  # taken out before
-        more, judged = family(here)
-        log, changed = _put(log, clock, here, judged)
-        findings, after = findings + more, _again(after, log, first, changed)
+    for clock in other_clocks:
+        clock_work = at_clock(replace(after, merged=work.merged._replace(log=log)), clock)
+        clock_work = clock_work.replace(
+            **{name: None for name in clock_work.channels if name not in after.channels}
+        )  # taken out before
+        new_findings, judged = family(clock_work)
+        log, changed_names = _put(log, clock, clock_work, judged)
+        findings, after = findings + new_findings, _again(after, log, first, changed_names)
     return findings, replace(after, merged=work.merged._replace(log=log))
 
 
 def _put(log: Log, clock: SensorClock, before: LogUnderCheck, after: LogUnderCheck) -> tuple[Log, frozenset[str]]:
     """(the log of all clocks with what a family changed in the components of one of them, those components)."""
-    channels, changed = dict(log.channels), set()
+    channels, changed_names = dict(log.channels), set()
     for name in clock.components:
         channel, k = place(name)  # type: ignore[misc]
         if channel not in before.channels or channel not in after.channels:
             continue
-        one, other = (_column(work.channels, channel, k) for work in (before, after))
-        if not np.array_equal(one, other, equal_nan=True):
+        old, new = (_column(work.channels, channel, k) for work in (before, after))
+        if not np.array_equal(old, new, equal_nan=True):
             channels[channel] = channels[channel].copy()
-            _column(channels, channel, k)[clock.rows] += other - one
-            changed.add(name)
-    return replace(log, channels=channels), frozenset(changed)
+            _column(channels, channel, k)[clock.rows] += new - old
+            changed_names.add(name)
+    return replace(log, channels=channels), frozenset(changed_names)
 
 
-def _again(work: LogUnderCheck, log: Log, clock: SensorClock, changed: frozenset[str]) -> LogUnderCheck:
+def _again(work: LogUnderCheck, log: Log, clock: SensorClock, changed_names: frozenset[str]) -> LogUnderCheck:
     """The work in the rows of its clock with some components of other clocks as they now are."""
-    for channel, k in (place(name) for name in changed):  # type: ignore[misc]
+    for channel, k in (place(name) for name in changed_names):  # type: ignore[misc]
         values = work.channels[channel].copy()
         now = log.aligned(channel, log.channels[channel], [])[clock.rows]
         _column({channel: values}, channel, k)[:] = _column({channel: now}, channel, k)

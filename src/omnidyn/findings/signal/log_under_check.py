@@ -116,9 +116,9 @@ class LogUnderCheck:
             if self.sampled is None or (name.replace("w", "a") if derived else name) in self.sampled
         ]
 
-    def lines(self, bad: BoolArray) -> tuple[Span, ...]:
-        """Lines of the file where `bad`, shape (rows kept,), holds."""
-        return spans_of(bad, self.log.lines[self.rows])
+    def lines(self, mask: BoolArray) -> tuple[Span, ...]:
+        """Lines of the file where `mask`, shape (rows kept,), holds."""
+        return spans_of(mask, self.log.lines[self.rows])
 
     def windows(self, seconds: float = 0.2) -> tuple[IntArray, int]:
         """(window of each row, number of windows)."""
@@ -144,17 +144,17 @@ class LogUnderCheck:
 
     def replace(self, **channels: FloatArray | None) -> LogUnderCheck:
         """The log with some channels changed, or taken out where None."""
-        changed = {**self.channels, **channels}
-        return replace(self, channels={name: values for name, values in changed.items() if values is not None})
+        merged_channels = {**self.channels, **channels}
+        return replace(self, channels={name: values for name, values in merged_channels.items() if values is not None})
 
     def knowing(self, **facts: Any) -> LogUnderCheck:
         """The log with more facts known."""
         return replace(self, known={**self.known, **facts})
 
-    def masked(self, channel: str, column: int, bad: BoolArray) -> LogUnderCheck:
-        """The log without the values of one component where `bad` holds."""
-        if not bad.any():
+    def masked(self, channel: str, column: int, mask: BoolArray) -> LogUnderCheck:
+        """The log without the values of one component where `mask` holds."""
+        if not mask.any():
             return self
         values = self.channels[channel].copy()
-        (values if values.ndim == 1 else values[:, column])[bad] = np.nan
+        (values if values.ndim == 1 else values[:, column])[mask] = np.nan
         return self.replace(**{channel: values})

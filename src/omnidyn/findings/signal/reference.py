@@ -48,12 +48,14 @@ def ground(work: LogUnderCheck) -> Ground | None:
     A twist without all axes, of a gyroscope, yields to a pose that was recorded in most rows and tells all of them.
     """
     twist, pose = work.get("twist"), work.get("pose")
-    seen = Ground("twist", twist, 1) if twist is not None else None
+    twist_ground = Ground("twist", twist, 1) if twist is not None else None
     if pose is None or work.step <= 0.0 or len(work) < 20:
-        return seen
+        return twist_ground
     often = min(len(work.recorded("pose", k)) for k in range(3)) > 0.5 * len(work)
-    if seen is not None and (len(seen.axes) == 3 or not often or not np.isfinite(pose).any(axis=0).all()):
-        return seen
+    if twist_ground is not None and (
+        len(twist_ground.axes) == 3 or not often or not np.isfinite(pose).any(axis=0).all()
+    ):
+        return twist_ground
     return Ground("pose", *pose_twist(work, pose))
 
 
@@ -95,9 +97,9 @@ def ohmic(work: LogUnderCheck, current: FloatArray) -> FloatArray | None:
     if robot is None:
         return None
     motor, n = robot.motor, robot.wheels.count
-    lost = per_wheel(motor.resistance, n) * current
+    voltage_drop = per_wheel(motor.resistance, n) * current
     drop = per_wheel(motor.voltage_drop, n)
-    return lost + drop * np.sign(current) if drop.any() else lost
+    return voltage_drop + drop * np.sign(current) if drop.any() else voltage_drop
 
 
 def stall_current(robot: Robot) -> float:
@@ -124,8 +126,8 @@ def electric_speed(work: LogUnderCheck) -> FloatArray | None:
         return None
     if beyond_stall(robot, current) > BEYOND_RATIO:
         return None
-    lost = ohmic(work, current)
-    return None if lost is None else no_load_speed(robot.motor, voltage - lost)
+    ohmic_drop = ohmic(work, current)
+    return None if ohmic_drop is None else no_load_speed(robot.motor, voltage - ohmic_drop)
 
 
 def emf(work: LogUnderCheck, speed: FloatArray) -> FloatArray | None:
@@ -135,9 +137,9 @@ def emf(work: LogUnderCheck, speed: FloatArray) -> FloatArray | None:
 
 def expected_wheel_speed(work: LogUnderCheck, without: str = "") -> tuple[str, FloatArray] | None:
     """(source, wheel speed by it, shape (rows, wheels)), from the most exact source there is."""
-    robot, seen = work.geometry, ground(work)
-    if robot is not None and seen is not None and len(seen.axes) == 3:
-        return seen.name, wheel_speed(robot.wheels, seen.twist)
+    robot, floor_motion = work.geometry, ground(work)
+    if robot is not None and floor_motion is not None and len(floor_motion.axes) == 3:
+        return floor_motion.name, wheel_speed(robot.wheels, floor_motion.twist)
     electric = electric_speed(work)
     if electric is not None:
         return CURRENT_AND_VOLTAGE, electric

@@ -12,7 +12,7 @@ from omnidyn.statistics import RESIDUE, robust_std
 
 ROUNDING = 1e-9  # of the largest: nothing that was measured
 GYRO_OFFSET = 0.05  # [rad/s]
-HELD = 0.3  # [rad] a heading that should have changed by less may have been held, or be too coarse to show it
+HELD_HEADING = 0.3  # [rad] a heading that should have changed by less may have been held, or be too coarse to show it
 SAMPLE = 40_000  # rows that are enough to learn a noise or a quantum from
 
 
@@ -23,10 +23,10 @@ class Slope(NamedTuple):
     error: float
     windows: int
 
-    def differs(self, other: float, least: float, errors: float = 4.0) -> bool:
-        """Whether it is off `other` by more than `least` and by more than so many standard errors."""
-        away = abs(self.value - other)
-        return bool(np.isfinite(self.error) and away > least and away > errors * self.error)
+    def differs(self, reference: float, tolerance: float, errors: float = 4.0) -> bool:
+        """Whether it is off `reference` by more than `tolerance` and by more than so many standard errors."""
+        away = abs(self.value - reference)
+        return bool(np.isfinite(self.error) and away > tolerance and away > errors * self.error)
 
 
 def sample(values: FloatArray) -> FloatArray:
@@ -112,19 +112,20 @@ def products(y: FloatArray, x: FloatArray, ids: IntArray, count: int) -> tuple[F
     odd = (np.arange(len(x)) & 1).astype(bool)
     top, below = np.zeros(count), np.zeros(count)
     for k in range(x.shape[1]):
-        good = np.isfinite(y[:, k]) & np.isfinite(x[:, k])
-        both, half = np.where(good, x[:, k], 0.0), good & odd
-        number, odds = windowed(ids, count, good), windowed(ids, count, half)
+        finite = np.isfinite(y[:, k]) & np.isfinite(x[:, k])
+        x_filled, half = np.where(finite, x[:, k], 0.0), finite & odd
+        number, odds = windowed(ids, count, finite), windowed(ids, count, half)
         evens = number - odds
-        mean, one, all_x = (
-            windowed(ids, count, each) for each in (np.where(good, y[:, k], 0.0), np.where(half, both, 0.0), both)
+        mean, odd_mean, all_x = (
+            windowed(ids, count, column)
+            for column in (np.where(finite, y[:, k], 0.0), np.where(half, x_filled, 0.0), x_filled)
         )
-        other = all_x - one
+        even_mean = all_x - odd_mean
         with np.errstate(divide="ignore", invalid="ignore"):
-            one, other, mean = one / odds, other / evens, mean / number
+            odd_mean, even_mean, mean = odd_mean / odds, even_mean / evens, mean / number
         full = (odds >= 2) & (evens >= 2)
-        top += np.where(full, number * mean * 0.5 * (one + other), 0.0)
-        below += np.where(full, number * one * other, 0.0)
+        top += np.where(full, number * mean * 0.5 * (odd_mean + even_mean), 0.0)
+        below += np.where(full, number * odd_mean * even_mean, 0.0)
     return top, below
 
 
@@ -156,9 +157,9 @@ def smooth(values: FloatArray, width: int) -> FloatArray:
     if width <= 1 or len(values) < 2:
         return values
     half = width // 2
-    good = np.isfinite(values)
-    total = np.cumsum(np.concatenate([np.zeros_like(values[:1]), np.where(good, values, 0.0)]), axis=0)
-    number = np.cumsum(np.concatenate([np.zeros_like(good[:1], dtype=float), good.astype(float)]), axis=0)
+    finite = np.isfinite(values)
+    total = np.cumsum(np.concatenate([np.zeros_like(values[:1]), np.where(finite, values, 0.0)]), axis=0)
+    number = np.cumsum(np.concatenate([np.zeros_like(finite[:1], dtype=float), finite.astype(float)]), axis=0)
     n = len(values)
     low, high = np.maximum(np.arange(n) - half, 0), np.minimum(np.arange(n) + half + 1, n)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -167,10 +168,10 @@ def smooth(values: FloatArray, width: int) -> FloatArray:
 
 def turned_by(rate: FloatArray, t: FloatArray) -> float:
     """How far a turn rate [rad/s] leads away, at most, from one heading to another [rad], its offset apart."""
-    good = np.isfinite(rate)
-    if good.sum() < 2:
+    finite = np.isfinite(rate)
+    if finite.sum() < 2:
         return 0.0
-    angle = np.concatenate([[0.0], np.cumsum(np.where(good, rate, 0.0)[:-1] * np.diff(t))])
+    angle = np.concatenate([[0.0], np.cumsum(np.where(finite, rate, 0.0)[:-1] * np.diff(t))])
     drift = float(np.clip(angle[-1] / max(t[-1] - t[0], 1e-9), -GYRO_OFFSET, GYRO_OFFSET))
     return float(np.ptp(angle - drift * (t - t[0])))
 

@@ -29,9 +29,9 @@ def check_codes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         return findings, work
     for channel in work.channels:
         for component, values in work.sampled_columns(channel):
-            more, work, values = _wrapped(work, channel, component, values)
+            new_findings, work, values = _wrapped(work, channel, component, values)
             also, work, _ = _placeholder(work, channel, component, values)
-            findings += more + also
+            findings += new_findings + also
     return findings, work
 
 
@@ -65,28 +65,28 @@ def _placeholder(work: LogUnderCheck, channel: str, component: str, values: Floa
     cells = values / _cell_size(work, component)
     size = np.abs(cells)
     top = float(np.nanmax(size))
-    bad = size == top
-    others = float(np.max(size[~bad & np.isfinite(size)], initial=0.0))
+    mask = size == top
+    rest_level = float(np.max(size[~mask & np.isfinite(size)], initial=0.0))
     code = round(top) in CODES and abs(top - round(top)) <= 1e-9 * top
-    if not code or bad.sum() < 2 or bad.mean() > MAX_MISSING or not 0.0 < FAR_RATIO * others < top:
+    if not code or mask.sum() < 2 or mask.mean() > MAX_MISSING or not 0.0 < FAR_RATIO * rest_level < top:
         return [], work, values
-    cell = float(cells[np.flatnonzero(bad)[0]])
+    cell = float(cells[np.flatnonzero(mask)[0]])
     finding = Finding(
         "placeholder",
         ERROR,
         component,
-        {"cell": cell, "share": float(bad.mean()), "times": top / others},
-        rows=work.lines(bad),
-        count=int(bad.sum()),
+        {"cell": cell, "share": float(mask.mean()), "times": top / rest_level},
+        rows=work.lines(mask),
+        count=int(mask.sum()),
     )
-    kept = np.where(bad, np.nan, values)
-    return [finding], _changed(work, channel, component, kept), kept
+    cleaned = np.where(mask, np.nan, values)
+    return [finding], _changed(work, channel, component, cleaned), cleaned
 
 
 def _changed(work: LogUnderCheck, channel: str, component: str, values: FloatArray) -> LogUnderCheck:
-    whole = work.channels[channel].copy()
-    (whole if whole.ndim == 1 else whole[:, place(component)[1]])[:] = values  # type: ignore[index]
-    return work.replace(**{channel: whole})
+    column = work.channels[channel].copy()
+    (column if column.ndim == 1 else column[:, place(component)[1]])[:] = values  # type: ignore[index]
+    return work.replace(**{channel: column})
 
 
 def _cell_size(work: LogUnderCheck, component: str) -> float:
@@ -108,66 +108,66 @@ SPIKE = 10.0  # a single value so many times the noise away from both its neighb
 def check_spikes(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     """Single values (or two) far away from both neighbours, which agree with each other."""
     findings = []
-    changed = _spikes_changed(work)
+    changes = _spikes_changed(work)
     for channel in MEASURED:
         for component, values in work.sampled_columns(channel):
             k = place(component)[1]  # type: ignore[index]
-            own = work.recorded(channel, k)
-            bad = np.zeros(len(work), dtype=bool)
-            bad[own] = _isolated(values[own]) & ~_kicked(changed[own])
-            if not bad.any() or bad.mean() > 0.2:
+            recorded_rows = work.recorded(channel, k)
+            mask = np.zeros(len(work), dtype=bool)
+            mask[recorded_rows] = _isolated(values[recorded_rows]) & ~_kicked(changes[recorded_rows])
+            if not mask.any() or mask.mean() > 0.2:
                 continue
-            worst = int(np.flatnonzero(bad)[np.argmax(np.abs(values[bad] - np.nanmedian(values)))])
+            worst = int(np.flatnonzero(mask)[np.argmax(np.abs(values[mask] - np.nanmedian(values)))])
             findings.append(
                 Finding(
                     "spike",
                     WARNING,
                     component,
-                    {"farthest": float(values[worst]), "share": float(bad.mean()), "at_s": float(work.t[worst])},
-                    rows=work.lines(bad),
-                    count=int(bad.sum()),
+                    {"farthest": float(values[worst]), "share": float(mask.mean()), "at_s": float(work.t[worst])},
+                    rows=work.lines(mask),
+                    count=int(mask.sum()),
                 )
             )
-            work = work.masked(channel, k, bad)
+            work = work.masked(channel, k, mask)
     return findings, work
 
 
 def _spikes_changed(work: LogUnderCheck) -> IntArray:
     """How often a command has changed up to each row."""
-    changed = np.zeros(len(work), dtype=bool)
+    steps = np.zeros(len(work), dtype=bool)
     for channel in INPUTS:
         values = work.get(channel)
         if values is not None:
-            changed[1:] |= (np.diff(values, axis=0) != 0.0).any(axis=1)
-    return np.cumsum(changed)
+            steps[1:] |= (np.diff(values, axis=0) != 0.0).any(axis=1)
+    return np.cumsum(steps)
 
 
-def _kicked(changed: IntArray) -> BoolArray:
+def _kicked(changes: IntArray) -> BoolArray:
     """Rows just after a change of a command, where a kick is no error; none where commands change all the time."""
-    near = np.diff(changed, prepend=changed[:1]) > 0
-    if near.mean() > 0.2:
-        return np.zeros(len(near), dtype=bool)
+    kicks = np.diff(changes, prepend=changes[:1]) > 0
+    if kicks.mean() > 0.2:
+        return np.zeros(len(kicks), dtype=bool)
     for _ in range(3):
-        near[1:] |= near[:-1]
-    near[:-1] |= near[1:]
-    return near
+        kicks[1:] |= kicks[:-1]
+    kicks[:-1] |= kicks[1:]
+    return kicks
 
 
 def _isolated(values: FloatArray) -> BoolArray:
     n = len(values)
-    bad = np.zeros(n, dtype=bool)
+    mask = np.zeros(n, dtype=bool)
     if n < MIN_ROWS:
-        return bad
+        return mask
     before, after = values[:-2], values[2:]
     jump = np.abs(values[1:-1] - 0.5 * (before + after))
     apart = np.abs(after - before)
     small = sample(jump)
     small = small[np.isfinite(small)]
     if not small.size:
-        return bad
+        return mask
     scale = max(float(robust_std(small, 0.0)), quantum(values), 1e-3 * spread(values), 1e-12)
     # Heavy tails are no spikes: what is far must be far beyond the usual largest as well.
     scale = max(scale, float(np.quantile(small, 0.99)) / 3.0)
     with np.errstate(invalid="ignore"):
-        bad[1:-1] = (jump > SPIKE * scale) & (apart < 0.25 * jump)
-    return bad
+        mask[1:-1] = (jump > SPIKE * scale) & (apart < 0.25 * jump)
+    return mask

@@ -37,7 +37,7 @@ def check_stuck(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         # The longest repeat first: a wheel that sticks is no witness against the others.
         sampled = work.sampled_columns(channel)
         columns = [(name, values, _repeats(values), rest_level(values)) for name, values in sampled]
-        for component, values, repeats, rest in sorted(columns, key=lambda each: -_longest(*each[1:])):
+        for component, values, repeats, rest in sorted(columns, key=lambda column: -_longest(*column[1:])):
             k = place(component)[1]  # type: ignore[index]
             judge = _StuckJudge(work, values, repeats, rest)
             judge.steady = _Steady(work, channel, k).during
@@ -46,22 +46,22 @@ def check_stuck(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
             if channel == "wheel_speed" and expected is not None and k < expected[1].shape[1]:
                 judge.expected = _Away(values, expected[1][:, k])
                 judge.measured = expected[0] in MEASUREMENTS
-            bad = judge.frozen()
-            if not bad.any():
+            mask = judge.frozen()
+            if not mask.any():
                 continue
-            each = stretches(bad)
-            longest = max(work.t[b - 1] - work.t[a] for a, b in each)
+            spans = stretches(mask)
+            longest = max(work.t[b - 1] - work.t[a] for a, b in spans)
             findings.append(
                 Finding(
                     "stuck",
                     WARNING,
                     component,
-                    {"longest_s": float(longest), "share": float(bad.mean()), "times": len(each)},
-                    rows=work.lines(bad),
-                    count=int(bad.sum()),
+                    {"longest_s": float(longest), "share": float(mask.mean()), "times": len(spans)},
+                    rows=work.lines(mask),
+                    count=int(mask.sum()),
                 )
             )
-            work = work.masked(channel, k, bad)
+            work = work.masked(channel, k, mask)
             predictor = WheelPredictor(work)
     return findings, work
 
@@ -100,21 +100,21 @@ class _StuckJudge:
     def repeated(self) -> BoolArray:
         """Rows in repeats that are asked about: nothing is taken from them."""
         edges = np.zeros(len(self.values) + 1, dtype=np.int64)
-        asked = self.repeats[self.lengths >= max(LONG_ROWS, self.slow // 2)]
-        np.add.at(edges, asked[:, 0], 1)
-        np.add.at(edges, asked[:, 1], -1)
+        repeats = self.repeats[self.lengths >= max(LONG_ROWS, self.slow // 2)]
+        np.add.at(edges, repeats[:, 0], 1)
+        np.add.at(edges, repeats[:, 1], -1)
         return np.cumsum(edges[:-1]) > 0
 
     def frozen(self) -> BoolArray:
         """Rows that stick."""
-        bad = np.zeros(len(self.values), dtype=bool)
+        mask = np.zeros(len(self.values), dtype=bool)
         if not self.long.any():
-            return bad
+            return mask
         chance, usual = _chance_of_a_repeat(self.lengths[self.moving])
         for a, b in self.repeats[self.long]:
             if self._unlikely(a, b, chance, usual) or self._walked(a, b):
-                bad[a:b] = True
-        return bad
+                mask[a:b] = True
+        return mask
 
     def _unlikely(self, a: int, b: int, chance: float, usual: float) -> bool:
         """Whether so many repeats of a speed are no chance: by other repeats of the log, and by the rows beside."""
@@ -123,8 +123,8 @@ class _StuckJudge:
             return False
         if self._rough(a, b):
             return n * self._rare ** (length - 1) < IMPOSSIBLE
-        beside = np.r_[self.values[max(0, a - 8) : a], self.values[b : b + 8]]
-        chance = max(chance, (float((beside == self.values[a]).sum()) + 1.0) / (len(beside) + 2.0))
+        neighbours = np.r_[self.values[max(0, a - 8) : a], self.values[b : b + 8]]
+        chance = max(chance, (float((neighbours == self.values[a]).sum()) + 1.0) / (len(neighbours) + 2.0))
         unlikely = n * chance ** (length - 1)
         if length <= 3 * usual or unlikely >= IMPOSSIBLE or (self.steady is not None and self.steady(a, b)):
             return False
@@ -159,8 +159,8 @@ class _StuckJudge:
     def _walked(self, a: int, b: int) -> bool:
         """Whether a reference walks away from the value that repeats."""
         turning, length = bool(self.turns[a]), b - a
-        asked = length >= (self.slow // 2 if self.measured else self.slow) and (self.measured or turning)
-        if self.expected is not None and asked and self.expected.during(a, b):
+        judgeable = length >= (self.slow // 2 if self.measured else self.slow) and (self.measured or turning)
+        if self.expected is not None and judgeable and self.expected.during(a, b):
             return True
         if not turning or 2 * length < self.slow or self.predicted is None:
             return False
@@ -179,7 +179,9 @@ class _Steady:
         """Over rows a to b."""
         settled = a + (b - a) // 10
         still = bool(self.inputs) and all(not np.ptp(values[settled:b], axis=0).any() for values in self.inputs)
-        return still and bool(self.others) and all(same[a : b - 1].mean() > TOGETHER for same in self.others)
+        return (
+            still and bool(self.others) and all(equal_rows[a : b - 1].mean() > TOGETHER for equal_rows in self.others)
+        )
 
 
 class _RowWalk:
@@ -224,8 +226,8 @@ class _RowWalk:
         starts = starts[self.gaps[starts + length] == self.gaps[starts]]
         ranges = self._range(starts, length)
         clean = ranges[self.holes[starts + length] == self.holes[starts]]
-        most = float(clean.max()) if len(clean) * step >= 5 * length else math.inf
-        return most, starts, np.maximum.accumulate(ranges), np.maximum.accumulate(ranges[::-1])[::-1]
+        largest = float(clean.max()) if len(clean) * step >= 5 * length else math.inf
+        return largest, starts, np.maximum.accumulate(ranges), np.maximum.accumulate(ranges[::-1])[::-1]
 
     def during(self, a: int, b: int) -> bool:
         """Whether the reference changes over rows a to b by more than it is off anywhere else."""
@@ -258,8 +260,8 @@ class _Away:
         if not high - low > 6.0 * self.least:
             return False
         # Where the robot speeds up the two differ more, by a lag or by means: the larger of two measures counts.
-        others = np.concatenate([self.size[:a][self.good[:a]], self.size[b:][self.good[b:]]])
-        return bool(others.size) and bool(high - low > 6.0 * float(np.quantile(others, 0.95)) / 1.6)
+        remainder = np.concatenate([self.size[:a][self.good[:a]], self.size[b:][self.good[b:]]])
+        return bool(remainder.size) and bool(high - low > 6.0 * float(np.quantile(remainder, 0.95)) / 1.6)
 
 
 def _chance_of_a_repeat(lengths: IntArray) -> tuple[float, float]:
@@ -270,10 +272,10 @@ def _chance_of_a_repeat(lengths: IntArray) -> tuple[float, float]:
     """
     rest = np.sort(lengths)[:-3] - 1  # number of repeats in each stretch
     repeats, again = float(rest.sum()), float((rest - 1).sum())
-    seen = (again + 3.0) / (repeats + 6.0)
-    seen = min(1.0, seen + SURE_ERRORS * math.sqrt(seen * max(0.0, 1.0 - seen) / (repeats + 6.0)))
+    chance = (again + 3.0) / (repeats + 6.0)
+    chance = min(1.0, chance + SURE_ERRORS * math.sqrt(chance * max(0.0, 1.0 - chance) / (repeats + 6.0)))
     after, middle = _repeats_by_noise()
-    return float(np.interp(seen, after[::-1], middle[::-1])), float(rest.max(initial=0) + 1)
+    return float(np.interp(chance, after[::-1], middle[::-1])), float(rest.max(initial=0) + 1)
 
 
 @lru_cache(maxsize=1)
@@ -318,9 +320,9 @@ class WheelPredictor:
         driven = work.get("duty") if driven is None else driven
         if driven is not None and work.step > 0.0:
             parts += [_remembered(np.nan_to_num(driven), work.step / seconds) for seconds in MEMORY] + [driven]
-        current, seen = work.get("current"), ground(work)
+        current, floor_motion = work.get("current"), ground(work)
         parts += [] if current is None else [current]
-        parts += [] if seen is None else [seen.twist]
+        parts += [] if floor_motion is None else [floor_motion.twist]
         return np.hstack(parts)
 
     def wheel_speed(self, k: int, without: BoolArray) -> FloatArray:
@@ -331,20 +333,20 @@ class WheelPredictor:
         speed = self.work.channels["wheel_speed"]
         x = np.hstack([self._shared, np.delete(speed, k, axis=1)])
         x = x[:, np.isfinite(x).mean(axis=0) > 0.5]
-        told = np.isfinite(x).all(axis=1)
-        taught = told & np.isfinite(speed[:, k]) & ~without
+        finite = np.isfinite(x).all(axis=1)
+        taught = finite & np.isfinite(speed[:, k]) & ~without
         out = np.full(len(x), np.nan)
         if taught.sum() < ROWS_PER_COLUMN * x.shape[1]:
             return out
-        x = x / np.maximum(np.abs(x[told]).max(axis=0), 1e-300)
+        x = x / np.maximum(np.abs(x[finite]).max(axis=0), 1e-300)
         edges = np.linspace(0, len(x), FOLDS + 1).astype(int)
         folds = [slice(a, b) for a, b in pairwise(edges)]
         grams, sides = zip(*(_normal(x[p][taught[p]], speed[p, k][taught[p]]) for p in folds), strict=True)
         gram, side = sum(grams), sum(sides)
-        least = 1e-9 * np.trace(gram) * np.eye(x.shape[1])
-        for fold, own, of_own in zip(folds, grams, sides, strict=True):
-            out[fold] = x[fold] @ np.linalg.solve(gram - own + least, side - of_own)
-        return np.where(told, out, np.nan)
+        ridge = 1e-9 * np.trace(gram) * np.eye(x.shape[1])
+        for fold, fold_gram, of_own in zip(folds, grams, sides, strict=True):
+            out[fold] = x[fold] @ np.linalg.solve(gram - fold_gram + ridge, side - of_own)
+        return np.where(finite, out, np.nan)
 
 
 def _normal(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

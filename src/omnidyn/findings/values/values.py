@@ -16,7 +16,7 @@ from omnidyn.findings.signal.reference import (
     expected_wheel_speed,
     keys_behind,
 )
-from omnidyn.findings.signal.robust import HELD, quantum, smooth, turned_by, white_noise
+from omnidyn.findings.signal.robust import HELD_HEADING, quantum, smooth, turned_by, white_noise
 from omnidyn.findings.values.codes import check_codes, check_spikes
 from omnidyn.findings.values.stuck import check_stuck
 from omnidyn.logs.channels import components, place
@@ -43,22 +43,22 @@ def _at_its_clock(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     findings = _missing(work)
     if len(work) < MIN_ROWS:
         return findings, work
-    more, work = check_codes(work)
-    findings += more + _quantised(work)
+    new_findings, work = check_codes(work)
+    findings += new_findings + _quantised(work)
     for family in (_constant, check_stuck, check_spikes):
-        more, work = family(work)
-        findings += more
+        new_findings, work = family(work)
+        findings += new_findings
     return findings, work
 
 
-def _with_dead_wheel(work: LogUnderCheck, found: list[Finding]) -> LogUnderCheck:
+def _with_dead_wheel(work: LogUnderCheck, findings: list[Finding]) -> LogUnderCheck:
     """The speed of one dead wheel as the other channels say it, on the scale of the other wheels.
 
     Else it hides what is wrong with them: neither floor nor circuit can be held against a robot with a wheel missing.
     """
     dead = [
         at[1]
-        for finding in found
+        for finding in findings
         if finding.code == "dead" and (at := place(finding.subject)) and at[0] == "wheel_speed"
     ]
     expected = expected_wheel_speed(work, without="wheel_speed")
@@ -66,9 +66,12 @@ def _with_dead_wheel(work: LogUnderCheck, found: list[Finding]) -> LogUnderCheck
         return work
     speed = work.channels["wheel_speed"].copy()
     width = work.width(0.2)  # noise of what tells the speed would make it look larger
-    own, told = np.delete(smooth(speed, width), dead, axis=1), np.delete(smooth(expected[1], width), dead, axis=1)
-    known = np.isfinite(own) & np.isfinite(told)
-    size, turned = float((told[known] ** 2).sum()), float((own[known] ** 2).sum())
+    logged, predicted = (
+        np.delete(smooth(speed, width), dead, axis=1),
+        np.delete(smooth(expected[1], width), dead, axis=1),
+    )
+    finite = np.isfinite(logged) & np.isfinite(predicted)
+    size, turned = float((predicted[finite] ** 2).sum()), float((logged[finite] ** 2).sum())
     if not size > 0.0 or not turned > 0.0:
         return work
     ratio = float(np.sqrt(turned / size))
@@ -82,8 +85,8 @@ def _missing(work: LogUnderCheck) -> list[Finding]:
         return findings
     for channel in work.channels:
         for component, values in work.sampled_columns(channel):
-            bad = ~np.isfinite(values)
-            share = float(bad.mean())
+            mask = ~np.isfinite(values)
+            share = float(mask.mean())
             if share > 0.0:
                 grave = share > MAX_MISSING and channel not in ("pose", "twist", "supply")
                 findings.append(
@@ -92,8 +95,8 @@ def _missing(work: LogUnderCheck) -> list[Finding]:
                         WARNING if grave else NOTE,
                         component,
                         {"share": share},
-                        rows=work.lines(bad),
-                        count=int(bad.sum()),
+                        rows=work.lines(mask),
+                        count=int(mask.sum()),
                     )
                 )
     return findings
@@ -108,22 +111,22 @@ def _quantised(work: LogUnderCheck) -> list[Finding]:
     for channel in SENSORS:
         for component, values in work.sampled_columns(channel):
             k = place(component)[1]  # type: ignore[index]
-            own = values[work.recorded(channel, k)]
-            step = quantum(own)
-            busy = np.abs(own[np.isfinite(own) & moving(own)])
+            recorded_values = values[work.recorded(channel, k)]
+            step = quantum(recorded_values)
+            busy = np.abs(recorded_values[np.isfinite(recorded_values) & moving(recorded_values)])
             usual = float(np.median(busy)) if busy.size else 0.0
             if not step or step < max(0.02 * usual, TINY):
                 continue
             key = next(
-                (known for known in groups if known[0] == channel and abs(known[1] / step - 1.0) < 0.01),
+                (group for group in groups if group[0] == channel and abs(group[1] / step - 1.0) < 0.01),
                 (channel, step),
             )
-            groups.setdefault(key, []).append((component, step / usual, white_noise(own)))
+            groups.setdefault(key, []).append((component, step / usual, white_noise(recorded_values)))
             if channel == "wheel_speed" and expected is not None and expected[1].shape[1] > k:
                 findings += _reads_zero(work, component, values, step, expected[0], expected[1][:, k])
     for (_, step), members in groups.items():
         names = [name for name, _, _ in members]
-        share, noise = max(each for _, each, _ in members), max(each for _, _, each in members)
+        share, noise = max(steps for _, steps, _ in members), max(noises for _, _, noises in members)
         findings.append(
             Finding(
                 "quantised",
@@ -141,10 +144,10 @@ def _reads_zero(
     """A wheel slower than its encoder can say."""
     width = work.width(0.1)
     # What lies between two measurements is no measurement, and a mean over such rows no better than they are.
-    own = _told(work, source)
+    source_rows = _told(work, source)
     turning = np.abs(smooth(reference, width))
-    sure = 5.0 * white_noise(reference[own]) / np.sqrt(max(1.0, width * len(own) / len(work)))
-    slow = ~moving(values) & np.isfinite(values) & (turning > max(0.3 * step, sure)) & (turning < 2.0 * step)
+    noise_level = 5.0 * white_noise(reference[source_rows]) / np.sqrt(max(1.0, width * len(source_rows) / len(work)))
+    slow = ~moving(values) & np.isfinite(values) & (turning > max(0.3 * step, noise_level)) & (turning < 2.0 * step)
     if slow.mean() < 0.2:
         return []
     return [
@@ -168,8 +171,8 @@ def _in_column(work: LogUnderCheck, component: str, step: float) -> dict[str, ob
     size = unit.size
     if work.robot is not None and component_channel(component) in SIDED:
         size /= column.divisor(work.robot, place(component)[1])  # type: ignore[index]
-    known = {"step_in_column": step / size, "unit": unit.text, "column": column.name}
-    return {} if abs(size - 1.0) < 1e-9 else known
+    details = {"step_in_column": step / size, "unit": unit.text, "column": column.name}
+    return {} if abs(size - 1.0) < 1e-9 else details
 
 
 def _constant(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
@@ -209,10 +212,10 @@ def _should_move(work: LogUnderCheck, channel: str, k: int, all_flat: bool) -> s
     if channel == "current":
         if work.log.current_unsigned and not _driven(work, k):
             return ""  # 0 is what it was given for a sign
-        for other in ("voltage", "duty"):
-            values = work.get(other)
+        for drive in ("voltage", "duty"):
+            values = work.get(drive)
             if values is not None and k < values.shape[1] and _moves(values[:, k]):
-                return other
+                return drive
         return "other_motors" if not all_flat and _wheel_moves(work, k) else ""
     if channel in ("wheel_speed", "wheel_angle"):
         return _wheel_reason(work, channel, k)
@@ -220,19 +223,19 @@ def _should_move(work: LogUnderCheck, channel: str, k: int, all_flat: bool) -> s
         speed, robot = work.full("wheel_speed"), work.geometry
         if speed is None or robot is None:
             return ""
-        own = twist_from_wheel_speed(robot.wheels, speed)[:, k]
+        wheel_motion = twist_from_wheel_speed(robot.wheels, speed)[:, k]
         scale = float(np.nanstd(twist_from_wheel_speed(robot.wheels, speed), axis=0).max())
-        return WHEELS if float(np.nanstd(own)) > 0.1 * scale and _moves(own) else ""
+        return WHEELS if float(np.nanstd(wheel_motion)) > 0.1 * scale and _moves(wheel_motion) else ""
     if channel == "pose" and k == 2:
         twist, speed, robot = work.get("twist"), work.full("wheel_speed"), work.geometry
         if twist is not None and _moves(twist[:, 2]):
-            return "omega" if turned_by(twist[:, 2], work.t) > HELD else ""
+            return "omega" if turned_by(twist[:, 2], work.t) > HELD_HEADING else ""
         if speed is None or robot is None:
             return ""
-        own = smooth(twist_from_wheel_speed(robot.wheels, speed), work.width(0.3))
-        turning = spread_of_motion(own[:, 2]) * float(np.mean(robot.wheels.robot_radius))
-        straight = max(spread_of_motion(own[:, 0]), spread_of_motion(own[:, 1]))
-        if turning > 0.3 * straight and turned_by(own[:, 2], work.t) > HELD:
+        wheel_motion = smooth(twist_from_wheel_speed(robot.wheels, speed), work.width(0.3))
+        turning = spread_of_motion(wheel_motion[:, 2]) * float(np.mean(robot.wheels.robot_radius))
+        straight = max(spread_of_motion(wheel_motion[:, 0]), spread_of_motion(wheel_motion[:, 1]))
+        if turning > 0.3 * straight and turned_by(wheel_motion[:, 2], work.t) > HELD_HEADING:
             return "turning_wheels"
     return ""
 
@@ -249,11 +252,11 @@ def _wheel_reason(work: LogUnderCheck, channel: str, k: int) -> str:
     expected = expected_wheel_speed(work, without=channel)
     if expected is None or k >= expected[1].shape[1]:
         return ""
-    own = expected[1][:, k]
-    others = np.delete(expected[1], k, axis=1)
-    sizes = [spread_of_motion(column) for column in others.T]
+    expected_speed = expected[1][:, k]
+    rest_speeds = np.delete(expected[1], k, axis=1)
+    sizes = [spread_of_motion(column) for column in rest_speeds.T]
     usual = max(sizes) if sizes else 0.0
-    return expected[0] if spread_of_motion(own) > 0.1 * usual and _moves(own) else ""
+    return expected[0] if spread_of_motion(expected_speed) > 0.1 * usual and _moves(expected_speed) else ""
 
 
 def spread_of_motion(values: FloatArray) -> float:
@@ -328,8 +331,8 @@ def _is_command(work: LogUnderCheck, values: FloatArray, command: FloatArray, ro
     later, before = values[rows:], command[: len(command) - rows].copy()
     for segment in work.segments[1:]:
         before[max(0, segment.start - rows) : segment.start] = np.nan
-    known = np.isfinite(later) & np.isfinite(before) & ((later != 0.0) | (before != 0.0))
+    finite = np.isfinite(later) & np.isfinite(before) & ((later != 0.0) | (before != 0.0))
     size = np.nanmax(np.abs(command), axis=0, initial=0.0)
-    same = np.abs(later - before) <= ECHO_TOLERANCE * np.maximum(size, 1e-9)
-    changes = [int(np.count_nonzero(np.diff(own[np.isfinite(own)]))) for own in command.T]
-    return sum(changes) >= CHANGES and bool(known.any()) and float(same[known].mean()) >= SAME_SHARE
+    equal = np.abs(later - before) <= ECHO_TOLERANCE * np.maximum(size, 1e-9)
+    changes = [int(np.count_nonzero(np.diff(column[np.isfinite(column)]))) for column in command.T]
+    return sum(changes) >= CHANGES and bool(finite.any()) and float(equal[finite].mean()) >= SAME_SHARE

@@ -49,8 +49,8 @@ def _within(work: LogUnderCheck, seconds: float) -> tuple[str, WiringChoice] | N
     speed, robot = work.full("wheel_speed"), work.geometry
     if speed is None or robot is None:
         return None
-    seen = ground(work)
-    floor, width = (work.get("twist_command"), 1) if seen is None else (seen.twist, seen.width)
+    floor_motion = ground(work)
+    floor, width = (work.get("twist_command"), 1) if floor_motion is None else (floor_motion.twist, floor_motion.width)
     n = robot.wheels.count
     axes = [] if floor is None else [k for k in range(3) if np.isfinite(floor[:, k]).any()]
     if not axes and n == 3:
@@ -68,20 +68,20 @@ def _within(work: LogUnderCheck, seconds: float) -> tuple[str, WiringChoice] | N
     if len(w) < 8:
         return None
     v = rest[0] if rest else np.zeros((len(w), 0))
-    rims, least = float(((w * robot.wheels.radii) ** 2).sum()), SEEN_BY[len(axes)]
-    if axes and (v**2).sum() < least**2 * rims * len(axes) / n:
+    rims, least_share = float(((w * robot.wheels.radii) ** 2).sum()), SEEN_BY[len(axes)]
+    if axes and (v**2).sum() < least_share**2 * rims * len(axes) / n:
         return None  # a robot that does not turn says nothing through its heading
     target = np.column_stack([v, np.zeros((len(w), len(null)))])
     moments = target.T @ target, target.T @ w, w.T @ w
-    tried = list(wirings(n))
-    costs = np.array([_cost(rows @ wiring.matrix, moments, bool(axes)) for wiring in tried])
+    candidates = list(wirings(n))
+    costs = np.array([_cost(rows @ wiring.matrix, moments, bool(axes)) for wiring in candidates])
     total = (
         float(np.trace(moments[0]))
         if axes
         else float(np.trace(rows @ moments[2] @ rows.T) + (w**2).sum() * (rows**2).sum() / max(rows.shape[1], 1))
     )
-    answer = choose(tried, costs, total)
-    turned = _by_axes(rows, moments, axes, total) if axes and seen is not None else None
+    answer = choose(candidates, costs, total)
+    turned = _by_axes(rows, moments, axes, total) if axes and floor_motion is not None else None
     return _simpler(work, answer, turned)
 
 
@@ -130,20 +130,20 @@ def _by_axes(rows: FloatArray, moments: Moments, axes: list[int], total: float) 
     vv, vw, ww = moments
     n, free = len(axes), len(vv) - len(axes)
     exchanges = [tuple(range(n))] + ([(1, 0, *range(2, n))] if axes[:2] == [0, 1] else [])
-    tried = [Wiring(order, tuple(sign)) for order in exchanges for sign in product((1.0, -1.0), repeat=n)]
+    candidates = [Wiring(order, tuple(sign)) for order in exchanges for sign in product((1.0, -1.0), repeat=n)]
     costs = []
-    for wiring in tried:
+    for wiring in candidates:
         turn = np.eye(n + free)
         turn[:n, :n] = wiring.matrix
         costs.append(_cost(rows, (turn @ vv @ turn.T, turn @ vw, ww), True))
-    return choose(tried, np.array(costs), total, 0.5)  # so few are tried that chance is no matter
+    return choose(candidates, np.array(costs), total, 0.5)  # so few are tried that chance is no matter
 
 
 def _axes_names(work: LogUnderCheck) -> tuple[str, tuple[str, ...]]:
-    seen = ground(work)
-    assert seen is not None
-    names = components("twist", 0) if seen.name == "twist" else ("x", "y", "heading")
-    return seen.name, tuple(names[k] for k in seen.axes)
+    floor_motion = ground(work)
+    assert floor_motion is not None
+    names = components("twist", 0) if floor_motion.name == "twist" else ("x", "y", "heading")
+    return floor_motion.name, tuple(names[k] for k in floor_motion.axes)
 
 
 def axes_finding(work: LogUnderCheck, answer: WiringChoice) -> Finding:
@@ -151,11 +151,11 @@ def axes_finding(work: LogUnderCheck, answer: WiringChoice) -> Finding:
     channel, names = _axes_names(work)
     turn = _turn_of_pose(work, answer.best)
     also = [] if turn is None else turned_names(turn)
-    wrong = answer.best.touched(names) + also
+    axes_names = answer.best.touched(names) + also
     return Finding(
         code_of(answer.best),
         ERROR,
-        " ".join(wrong),
+        " ".join(axes_names),
         {
             "explained_as_logged": 1.0 - answer.logged,
             "explained_put_right": 1.0 - answer.left,
@@ -170,7 +170,11 @@ def axes_finding(work: LogUnderCheck, answer: WiringChoice) -> Finding:
 
 def turned_names(turn: FloatArray) -> list[str]:
     """Which of x, y and heading such a matrix changes."""
-    return [name for name, row, own in zip(("x", "y", "heading"), turn, np.eye(3), strict=True) if (row != own).any()]
+    return [
+        name
+        for name, row, unit_row in zip(("x", "y", "heading"), turn, np.eye(3), strict=True)
+        if (row != unit_row).any()
+    ]
 
 
 def _turn_of_pose(work: LogUnderCheck, wiring: Wiring) -> FloatArray | None:
@@ -179,39 +183,43 @@ def _turn_of_pose(work: LogUnderCheck, wiring: Wiring) -> FloatArray | None:
     A mirrored frame has y, heading, vy and omega mirrored. A pose that agrees with the twist as logged goes with it:
     axes A of the plane and the sign s of the turn are those of another frame where det A = s.
     """
-    seen, pose, twist = ground(work), work.full("pose"), work.full("twist")
-    if seen is None or seen.name != "twist" or pose is None or twist is None or len(wiring.order) != 3:
+    floor_motion, pose, twist = ground(work), work.full("pose"), work.full("twist")
+    if floor_motion is None or floor_motion.name != "twist" or pose is None or twist is None or len(wiring.order) != 3:
         return None
     turn = wiring.matrix
     if np.linalg.det(turn[:2, :2]) != turn[2, 2]:
         return None
     body, width = pose_twist(work, pose)
-    told, own = means(work, body, smooth(twist, width))
-    size = np.sqrt((told**2).sum() * (own**2).sum())
-    return turn if size > 0.0 and (told * own).sum() > 0.9 * size else None
+    from_pose, from_twist = means(work, body, smooth(twist, width))
+    size = np.sqrt((from_pose**2).sum() * (from_twist**2).sum())
+    return turn if size > 0.0 and (from_pose * from_twist).sum() > 0.9 * size else None
 
 
 def mended_axes(work: LogUnderCheck, wiring: Wiring) -> LogUnderCheck:
     """The log with these axes put right; NaN where a pose cannot be."""
-    seen = ground(work)
-    assert seen is not None
-    values = work.channels[seen.name].copy()
-    if seen.name == "pose":
+    floor_motion = ground(work)
+    assert floor_motion is not None
+    values = work.channels[floor_motion.name].copy()
+    if floor_motion.name == "pose":
         # A mirrored or turned picture: only the signs of the heading can be put right here.
         signs = np.ones(3)
-        signs[seen.axes] = wiring.sign
+        signs[floor_motion.axes] = wiring.sign
         values = values * signs if tuple(wiring.order) == tuple(range(len(wiring.order))) else values * np.nan
     else:
-        values[:, seen.axes] = wiring.applied(values[:, seen.axes])
+        values[:, floor_motion.axes] = wiring.applied(values[:, floor_motion.axes])
         if (turn := _turn_of_pose(work, wiring)) is not None:
             work = work.replace(pose=work.channels["pose"] @ turn.T)
-    return work.replace(**{seen.name: values})
+    return work.replace(**{floor_motion.name: values})
 
 
 def wheels_finding(work: LogUnderCheck, answer: WiringChoice, blamed: str) -> Finding:
     """Errors: wheel speeds in another order, or of the opposite sign, than floor or commands say."""
-    seen = ground(work)
-    against = seen.name if seen is not None else ("twist_command" if work.get("twist_command") is not None else "")
+    floor_motion = ground(work)
+    against = (
+        floor_motion.name
+        if floor_motion is not None
+        else ("twist_command" if work.get("twist_command") is not None else "")
+    )
     names = components("wheel_speed", work.wheels)
     return Finding(
         code_of(answer.best),
@@ -235,10 +243,10 @@ def wheels_finding(work: LogUnderCheck, answer: WiringChoice, blamed: str) -> Fi
 # The frame of a pose against its own heading: turned, or mirrored; and whether the pose follows the wheels at all
 
 
-def check_frame(work: LogUnderCheck, left: float) -> tuple[list[Finding], LogUnderCheck]:
+def check_frame(work: LogUnderCheck, misfit: float) -> tuple[list[Finding], LogUnderCheck]:
     """A pose whose x and y belong to another frame than its heading: turned, or mirrored as a picture from above is.
 
-    left: what the best other wiring of the wheels leaves unexplained.
+    misfit: what the best other wiring of the wheels leaves unexplained.
     """
     speed, pose, robot = work.full("wheel_speed"), work.full("pose"), work.geometry
     if speed is None or pose is None or robot is None or work.get("twist") is not None or len(work) < 3 * MIN_ROWS:
@@ -247,9 +255,9 @@ def check_frame(work: LogUnderCheck, left: float) -> tuple[list[Finding], LogUnd
     for mirror in (1.0, -1.0):
         turned = pose * [1.0, mirror, mirror]
         twist, width = pose_twist(work, turned)
-        own = wheels_twist(work, speed, width)
-        assert own is not None
-        w, g = means(work, own[:, :2], twist[:, :2])
+        wheel_motion = wheels_twist(work, speed, width)
+        assert wheel_motion is not None
+        w, g = means(work, wheel_motion[:, :2], twist[:, :2])
         if len(w) < 8:
             return [], work
         wheel, floor = w @ [1.0, 1.0j], g @ [1.0, 1.0j]
@@ -264,7 +272,7 @@ def check_frame(work: LogUnderCheck, left: float) -> tuple[list[Finding], LogUnd
     trusted = commands_agree(work)
     if trusted and plain < 0.5 and alike < 0.8:
         return [Finding("pose_unlike", WARNING, "x y heading", {"likeness_as_logged": plain})], work.replace(pose=None)
-    if not trusted and left < 0.6 * (1.0 - alike**2) + 0.005:
+    if not trusted and misfit < 0.6 * (1.0 - alike**2) + 0.005:
         return [], work
     if alike < (0.8 if trusted else 0.9) or plain > 0.95 * alike or not (trusted or _turns_say(work, mirror)):
         return _marker(work) if mirror > 0.0 else ([], work)
@@ -289,9 +297,9 @@ def _marker(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
     assert speed is not None
     assert pose is not None
     body, width = pose_twist(work, pose)
-    own = wheels_twist(work, speed, width)
-    assert own is not None
-    turn = turned(work, body[:, :2], own[:, :2], body[:, 2])
+    wheel_motion = wheels_twist(work, speed, width)
+    assert wheel_motion is not None
+    turn = turned(work, body[:, :2], wheel_motion[:, :2], body[:, 2])
     if turn is None or not is_turned(turn):
         return [], work
     return [marker_finding(turn, WHEELS)], with_marker(work, pose, turn.angle)
@@ -302,9 +310,9 @@ def commands_agree(work: LogUnderCheck) -> bool:
     orders, speed, robot = work.full("twist_command"), work.full("wheel_speed"), work.geometry
     if orders is None or speed is None or robot is None:
         return False
-    wanted, turned = means(work, wheel_speed(robot.wheels, orders), speed)
-    size = np.sqrt((wanted**2).sum() * (turned**2).sum())
-    return bool(size > 0.0 and (wanted * turned).sum() > 0.9 * size)
+    commanded, turned = means(work, wheel_speed(robot.wheels, orders), speed)
+    size = np.sqrt((commanded**2).sum() * (turned**2).sum())
+    return bool(size > 0.0 and (commanded * turned).sum() > 0.9 * size)
 
 
 def _turns_say(work: LogUnderCheck, mirror: float) -> bool:
@@ -313,10 +321,10 @@ def _turns_say(work: LogUnderCheck, mirror: float) -> bool:
     if speed is None or pose is None:
         return False
     twist, width = pose_twist(work, pose * [1.0, mirror, mirror])
-    own = wheels_twist(work, speed, width)
-    assert own is not None
-    w, g = means(work, own[:, 2:], twist[:, 2:])
+    wheel_motion = wheels_twist(work, speed, width)
+    assert wheel_motion is not None
+    w, g = means(work, wheel_motion[:, 2:], twist[:, 2:])
     size = np.sqrt((w**2).sum() * (g**2).sum())
-    moved = np.sqrt((w**2).sum()) * float(np.mean(work.geometry.wheels.robot_radius))  # type: ignore[union-attr]
-    planar = np.sqrt((means(work, own[:, :2])[0] ** 2).sum())
-    return bool(size > 0.0 and (w * g).sum() > 0.97 * size and moved > 0.3 * planar)
+    turn_size = np.sqrt((w**2).sum()) * float(np.mean(work.geometry.wheels.robot_radius))  # type: ignore[union-attr]
+    planar = np.sqrt((means(work, wheel_motion[:, :2])[0] ** 2).sum())
+    return bool(size > 0.0 and (w * g).sum() > 0.97 * size and turn_size > 0.3 * planar)

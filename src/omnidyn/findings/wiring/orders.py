@@ -51,8 +51,8 @@ class Wiring(NamedTuple):
 
     def touched(self, names: tuple[str, ...]) -> list[str]:
         """The columns that are wrong."""
-        wrong = {j for k, (j, s) in enumerate(zip(self.order, self.sign, strict=True)) if j != k or s < 0.0}
-        return [names[j] for j in sorted(wrong)]
+        columns = {j for k, (j, s) in enumerate(zip(self.order, self.sign, strict=True)) if j != k or s < 0.0}
+        return [names[j] for j in sorted(columns)]
 
 
 class WiringChoice(NamedTuple):
@@ -82,17 +82,17 @@ def wirings(n: int) -> Iterator[Wiring]:
 
 
 def choose(
-    tried: list[Wiring], costs: FloatArray, total: float, better: float = BEST_SHARE, poor: float = POOR
+    candidates: list[Wiring], costs: FloatArray, total: float, better: float = BEST_SHARE, poor: float = POOR
 ) -> WiringChoice | None:
     """The wiring that the costs call for; None where that of the log, the first, is not clearly wrong."""
-    logged, least = float(costs[0]), float(costs.min())
-    if not np.isfinite(logged) or total <= 0.0 or logged < poor * total or least > better * logged:
+    logged, least_cost = float(costs[0]), float(costs.min())
+    if not np.isfinite(logged) or total <= 0.0 or logged < poor * total or least_cost > better * logged:
         return None
-    alike = [k for k in np.flatnonzero(costs <= least + AS_GOOD_SHARE * (logged - least))]
-    alike.sort(key=lambda k: (tried[k].changes, costs[k]))
+    alike = [k for k in np.flatnonzero(costs <= least_cost + AS_GOOD_SHARE * (logged - least_cost))]
+    alike.sort(key=lambda k: (candidates[k].changes, costs[k]))
     # Of those with fewest changes the cheapest; a rival is one that does not need more changes.
-    best = tried[alike[0]]
-    rivals = [tried[k] for k in alike[1:] if tried[k].changes == best.changes]
+    best = candidates[alike[0]]
+    rivals = [candidates[k] for k in alike[1:] if candidates[k].changes == best.changes]
     return WiringChoice(
         best, len(rivals), rivals[0] if rivals else None, float(costs[alike[0]]) / total, logged / total
     )
@@ -102,9 +102,9 @@ def means(work: LogUnderCheck, *channels: FloatArray, seconds: float = WINDOWS[0
     """Means over short windows, rows without all channels left out. Shapes (windows, columns)."""
     ids, count = work.windows(seconds)
     table = np.column_stack(channels)
-    good = np.asarray(np.isfinite(table).all(axis=1))
-    number = windowed(ids, count, good)
-    sums = np.column_stack([windowed(ids, count, np.where(good, column, 0.0)) for column in table.T])
+    finite = np.asarray(np.isfinite(table).all(axis=1))
+    number = windowed(ids, count, finite)
+    sums = np.column_stack([windowed(ids, count, np.where(finite, column, 0.0)) for column in table.T])
     keep = number >= 3
     means = sums[keep] / number[keep, None]
     return np.split(means, np.cumsum([values.shape[1] for values in channels])[:-1], axis=1)
@@ -138,13 +138,13 @@ class Turned(NamedTuple):
     plain: float
 
 
-def turned(work: LogUnderCheck, own: FloatArray, other: FloatArray, rate: FloatArray) -> Turned | None:
-    """How `other` is turned against `own`, shapes (rows, 2), in a robot that turns at `rate` [rad/s], shape (rows,).
+def turned(work: LogUnderCheck, reference: FloatArray, second: FloatArray, rate: FloatArray) -> Turned | None:
+    """How `second` is turned against `reference`, shapes (rows, 2), in a robot that turns at `rate` [rad/s], (rows,).
 
     angle of other/own over short windows = angle + lag * rate + c cos(2 d) + s sin(2 d), d the direction of travel: a
     lag of one of the two and an axis with another scale are no turn. None where too little moves.
     """
-    z, y, turning = (mean for mean in means(work, own, other, np.nan_to_num(rate)[:, None]))
+    z, y, turning = (mean for mean in means(work, reference, second, np.nan_to_num(rate)[:, None]))
     z, y = z @ [1.0, 1.0j], y @ [1.0, 1.0j]
     size = np.abs(z)
     moving = size > MOVING_SHARE * np.quantile(size, 0.9) if size.size else np.zeros(0, dtype=bool)
@@ -159,15 +159,15 @@ def turned(work: LogUnderCheck, own: FloatArray, other: FloatArray, rate: FloatA
     gram += 1e-9 * np.trace(gram) * np.eye(4)
     inverse = np.linalg.inv(gram)
     solved = inverse @ (weighted.T @ (rest * size))
-    left = (rest - x @ solved) * size
-    error = float(np.sqrt((left @ left) / (len(z) - 4) * inverse[0, 0]))
+    residual = (rest - x @ solved) * size
+    error = float(np.sqrt((residual @ residual) / (len(z) - 4) * inverse[0, 0]))
     return Turned(float(np.angle(slope) + solved[0]), error, float(abs(slope)), float(slope.real))
 
 
 def is_turned(turn: Turned) -> bool:
     """Whether a turn is sure, and no matter of noise."""
-    far = turn.alike > TURNED_LIKENESS and abs(turn.angle) > FAR_ANGLE
-    return far or (
+    large_turn = turn.alike > TURNED_LIKENESS and abs(turn.angle) > FAR_ANGLE
+    return large_turn or (
         turn.alike > TURNED_LIKENESS and abs(turn.angle) > LEAST_ANGLE and abs(turn.angle) > SURE_ERRORS * turn.error
     )
 

@@ -56,11 +56,11 @@ def _against_twist(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> 
         return [], work
     if plain.turn.plain > TURNED_LIKENESS and not is_turned(plain.turn):
         return [], work
-    tried = [_found(work, pose, twist, (1.0, 1.0, 1.0), True)]
-    tried += [_found(work, pose, twist, (1.0, y, turn), False) for y, turn in product((1.0, -1.0), repeat=2)]
-    known = [candidate for candidate in tried if candidate is not None]
-    best = min(known, key=lambda each: each.left)
-    room = known[0]
+    candidates = [_found(work, pose, twist, (1.0, 1.0, 1.0), True)]
+    candidates += [_found(work, pose, twist, (1.0, y, turn), False) for y, turn in product((1.0, -1.0), repeat=2)]
+    answers = [candidate for candidate in candidates if candidate is not None]
+    best = min(answers, key=lambda answer: answer.left)
+    room = answers[0]
     if (
         room.left < best.left + 0.02
         and 1.0 - room.left > TURNED_LIKENESS
@@ -79,8 +79,8 @@ def _found(
     work: LogUnderCheck, pose: FloatArray, twist: FloatArray, signs: tuple[float, float, float], room: bool
 ) -> FrameCandidate | None:
     body, width = pose_twist(work, pose * signs)
-    own = smooth(twist[:, :2], width) if not room else smooth(_as_in_body(work, pose, twist)[:, :2], width)
-    turn = turned(work, body[:, :2], own, body[:, 2])
+    plane_velocity = smooth(twist[:, :2], width) if not room else smooth(_as_in_body(work, pose, twist)[:, :2], width)
+    turn = turned(work, body[:, :2], plane_velocity, body[:, 2])
     return None if turn is None else FrameCandidate(signs, room, turn)
 
 
@@ -91,11 +91,11 @@ def _as_in_body(work: LogUnderCheck, pose: FloatArray, twist: FloatArray) -> Flo
 
 
 def _mirror_finding(plain: FrameCandidate, best: FrameCandidate) -> Finding:
-    wrong = [name for name, sign in zip(NAMES, best.signs, strict=True) if sign < 0.0]
+    columns = [name for name, sign in zip(NAMES, best.signs, strict=True) if sign < 0.0]
     return Finding(
         "pose_frame",
         ERROR,
-        " ".join(wrong),
+        " ".join(columns),
         {"likeness": best.turn.alike, "likeness_as_logged": plain.turn.plain, "mirrored": 1.0},
     )
 
@@ -105,8 +105,8 @@ def _turned(
 ) -> tuple[list[Finding], LogUnderCheck]:
     """A twist and a pose that are turned against each other: what else is known says which of them is wrong."""
     body, width = pose_twist(work, pose)
-    for name, other in _others(work, width):
-        against = turned(work, other, smooth(twist[:, :2], width), body[:, 2])
+    for name, velocity in _others(work, width):
+        against = turned(work, velocity, smooth(twist[:, :2], width), body[:, 2])
         if against is None or against.alike < TURNED_LIKENESS:
             continue
         if abs(against.angle - turn.angle) < abs(against.angle):  # the other agrees with the pose
@@ -118,9 +118,9 @@ def _turned(
 def _others(work: LogUnderCheck, width: int) -> list[tuple[str, FloatArray]]:
     """What else says how the robot moves in the plane: (name, velocity, shape (rows, 2))."""
     speed, command = work.full("wheel_speed"), work.full("twist_command")
-    own = None if speed is None else wheels_twist(work, speed, width)
-    found = [] if own is None else [(WHEELS, own[:, :2])]
-    return found + ([] if command is None else [("twist_command", smooth(command[:, :2], width))])
+    wheel_motion = None if speed is None else wheels_twist(work, speed, width)
+    sources = [] if wheel_motion is None else [(WHEELS, wheel_motion[:, :2])]
+    return sources + ([] if command is None else [("twist_command", smooth(command[:, :2], width))])
 
 
 def _sensor_finding(turn: Turned, name: str) -> Finding:

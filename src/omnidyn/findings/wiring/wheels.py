@@ -42,9 +42,9 @@ def check_wiring(work: LogUnderCheck) -> tuple[list[Finding], LogUnderCheck]:
         findings.append(axes_finding(work, floor[1]))
         work = mended_axes(work, floor[1].best)
     elif floor is not None:
-        whole = circuit.known or (motor_known(work) and likeness is None)
-        findings.append(wheels_finding(work, floor[1], "motors" if whole else "wheel_speed"))
-        work = _mended(work, MOTOR if whole else ("wheel_speed", "wheel_angle"), floor[1].best)
+        motors_trusted = circuit.known or (motor_known(work) and likeness is None)
+        findings.append(wheels_finding(work, floor[1], "motors" if motors_trusted else "wheel_speed"))
+        work = _mended(work, MOTOR if motors_trusted else ("wheel_speed", "wheel_angle"), floor[1].best)
         likeness = None if circuit.known else by_drive(work)
     if likeness is not None:
         findings.append(motor_finding(work, *likeness))
@@ -99,36 +99,36 @@ def by_circuit(work: LogUnderCheck) -> Circuit:
     robot = work.geometry
     if voltage is None or current is None or speed is None or robot is None or work.log.current_unsigned:
         return Circuit(False)
-    lost, counter = ohmic(work, current), emf(work, speed)
-    assert lost is not None
+    ohmic_drop, counter = ohmic(work, current), emf(work, speed)
+    assert ohmic_drop is not None
     assert counter is not None
-    u, r, e = means(work, voltage, lost, counter)
+    u, r, e = means(work, voltage, ohmic_drop, counter)
     if len(u) < 8:
         return Circuit(False)
-    tried = list(wirings(u.shape[1]))
+    candidates = list(wirings(u.shape[1]))
     total = float((u**2).sum())
     names = ("duty" if work.get("voltage") is None else "voltage", "current", "wheel_speed")
     best: tuple[str, WiringChoice] | None = None
     holds = False
-    for name, changed, rest in zip(names, (u, r, e), ((r, e, 1), (u, e, -1), (u, r, -1)), strict=True):
-        fixed = rest[0] + rest[1] if rest[2] > 0 else rest[0] - rest[1]
-        m = changed.T @ fixed
-        size = float((changed**2).sum() + (fixed**2).sum())
-        costs = np.array([size - 2.0 * float((wiring.matrix * m.T).sum()) for wiring in tried])
+    for name, permuted, rest in zip(names, (u, r, e), ((r, e, 1), (u, e, -1), (u, r, -1)), strict=True):
+        remainder = rest[0] + rest[1] if rest[2] > 0 else rest[0] - rest[1]
+        m = permuted.T @ remainder
+        size = float((permuted**2).sum() + (remainder**2).sum())
+        costs = np.array([size - 2.0 * float((wiring.matrix * m.T).sum()) for wiring in candidates])
         holds |= bool(costs.min() < HOLDS * total)
-        answer = choose(tried, costs, total, poor=EXACT_SHARE)
+        answer = choose(candidates, costs, total, poor=EXACT_SHARE)
         if answer is not None and (best is None or answer.left < best[1].left):
             best = (name, answer)
-    return Circuit(True, best) if holds or best is not None else _by_scaled_speed(tried, u - r, e, total)
+    return Circuit(True, best) if holds or best is not None else _by_scaled_speed(candidates, u - r, e, total)
 
 
-def _by_scaled_speed(tried: list[Wiring], left: FloatArray, e: FloatArray, total: float) -> Circuit:
+def _by_scaled_speed(candidates: list[Wiring], emf_target: FloatArray, e: FloatArray, total: float) -> Circuit:
     """The same where no wiring makes the relation hold: speeds in another unit, K l w times any number."""
-    along = np.array([float((wiring.matrix * (e.T @ left).T).sum()) for wiring in tried])
-    costs = float((left**2).sum()) - np.maximum(along, 0.0) ** 2 / max(float((e**2).sum()), 1e-300)
+    along = np.array([float((wiring.matrix * (e.T @ emf_target).T).sum()) for wiring in candidates])
+    costs = float((emf_target**2).sum()) - np.maximum(along, 0.0) ** 2 / max(float((e**2).sum()), 1e-300)
     if not costs.min() < HOLDS * total:
         return Circuit(False)
-    answer = choose(tried, costs, total, poor=EXACT_SHARE)
+    answer = choose(candidates, costs, total, poor=EXACT_SHARE)
     return Circuit(True, None if answer is None else ("wheel_speed", answer))
 
 
@@ -145,17 +145,17 @@ def by_likeness(work: LogUnderCheck, channel: str) -> WiringChoice | None:
         return None  # a wheel that is not driven tells nothing of its place
     alike = (u.T @ w) / np.outer(su, sw)
     n = len(alike)
-    tried = list(wirings(n))
+    candidates = list(wirings(n))
     costs = np.array(
         [
             sum(
                 1.0 - (s * alike[j, k]) * abs(alike[j, k])
                 for k, (j, s) in enumerate(zip(wiring.order, wiring.sign, strict=True))
             )
-            for wiring in tried
+            for wiring in candidates
         ]
     )
-    answer = choose(tried, costs, float(n))
+    answer = choose(candidates, costs, float(n))
     return answer if answer is not None and (answer.logged - answer.left) * n > 1.0 else None
 
 

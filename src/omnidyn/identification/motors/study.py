@@ -55,7 +55,7 @@ from omnidyn.logs.motor_table import MotorTable
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run
-from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.shown import FIGURE, Displayable, make
 from omnidyn.statement import ERROR, NOTE, WARNING, Statement, as_verdict, by_severity, statements
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ SAME_SPEED = 1e-9  # spread of speeds over the largest, below which they are one
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MotorStudy(Shown):
+class MotorStudy(Displayable):
     """motors: an estimate each, the last for all together where there are several in windows.
 
     plain: the same motors by slope and lag alone, from free runs only. method, kind, unit, speed_from: how they were

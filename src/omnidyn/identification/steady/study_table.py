@@ -15,7 +15,7 @@ from omnidyn.identification.steady.moment import Moment
 from omnidyn.identification.steady.operating_points import FORCES, SPEEDS, ForcePoints
 from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
-from omnidyn.shown import FIGURE, Shown, make
+from omnidyn.shown import FIGURE, Displayable, make
 from omnidyn.statement import Statement, by_severity
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ from omnidyn.statement import NOTE
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SteadyStudy(Shown):
+class SteadyStudy(Displayable):
     """All that steady windows say about friction.
 
     points: what was used. choice: shapes compared. estimates: group -> Estimate, whose robot holds that group's

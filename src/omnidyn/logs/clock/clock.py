@@ -22,7 +22,7 @@ DAY = 86_400.0  # [s]
 COUNTERS = (2.0**16, 2.0**32)  # counts that fit into two and four bytes
 NEAR_STEPS = 50.0  # usual steps: the rows about the jump are no farther apart
 LONG_PERIOD_STEPS = 1000.0  # a period is longer
-EARLY = 0.1  # of what had passed: a clock that restarted is back as near to its begin, or some line is no row
+EARLY_SHARE = 0.1  # of what had passed: a clock that restarted is back as near to its begin, or some line is no row
 FOLLOWING = 5  # rows at most, two at least, that then go on
 SELDOM = 0.005  # of the rows: a clock that goes back more often is read wrong
 SEAM = 1.0  # [s] at least, between two recordings: nobody knows how long it took
@@ -71,9 +71,9 @@ class Clock:
             return self._summed(counts, column, notes)
         counts = _without_strays(counts, table.lines, column, notes)
         counts = self._going_on(counts, table.lines, column, notes)
-        known = counts[np.isfinite(counts)]
-        if self._start is None and known.size:
-            self._start = float(known[0]) if abs(known[0] * column.factor) > EPOCH else 0.0
+        finite_counts = counts[np.isfinite(counts)]
+        if self._start is None and finite_counts.size:
+            self._start = float(finite_counts[0]) if abs(finite_counts[0] * column.factor) > EPOCH else 0.0
         if isinstance(self._start, float) and self._start:
             start = self._start * column.factor
             notes.append(f"time starts at {start:.6f} s, counted from an epoch: it begins at 0 here")
@@ -101,20 +101,20 @@ class Clock:
         rows = np.flatnonzero(np.isfinite(counts))
         before = [] if self._count is None else [self._count]
         read = np.concatenate([before, counts[rows]])
-        where = np.concatenate([[self._line] * len(before), lines[rows]])
+        line_numbers = np.concatenate([[self._line] * len(before), lines[rows]])
         if not read.size:
             return counts
         steps = np.diff(read)
-        self._count, self._line = float(read[-1]), int(where[-1])
+        self._count, self._line = float(read[-1]), int(line_numbers[-1])
         self._begin = float(read[0]) if self._begin is None else self._begin
         if not (steps < 0.0).any() or not (steps > 0.0).any():
             return counts + self._passed
-        lost = self._over(read, column, notes)
-        if lost is None:
-            lost = self._begun_again(read, where, column, notes)
-        passed = self._passed + np.cumsum(np.concatenate([[0.0], lost]))
-        self._passed, counts = float(passed[-1]), counts.copy()
-        counts[rows] += passed[len(before) :]
+        missing_counts = self._over(read, column, notes)
+        if missing_counts is None:
+            missing_counts = self._begun_again(read, line_numbers, column, notes)
+        offsets = self._passed + np.cumsum(np.concatenate([[0.0], missing_counts]))
+        self._passed, counts = float(offsets[-1]), counts.copy()
+        counts[rows] += offsets[len(before) :]
         return counts
 
     @staticmethod
@@ -134,22 +134,22 @@ class Clock:
     def _begun_again(self, read: FloatArray, lines: IntArray, column: Column, notes: Notes) -> FloatArray:
         """What each step lacks: where the board was started again, the way to a seam behind what stood before."""
         steps = np.diff(read)
-        lost, cuts = np.zeros(len(steps)), np.flatnonzero(steps < 0.0)
+        missing_counts, cuts = np.zeros(len(steps)), np.flatnonzero(steps < 0.0)
         begins = [self._begin, *read[cuts + 1]]
         if len(cuts) > max(1.0, SELDOM * len(read)) or not all(
-            _is_restart(read, lines, int(cut), float(begin)) for cut, begin in zip(cuts, begins, strict=False)
+            _is_restart(read, lines, int(row), float(begin)) for row, begin in zip(cuts, begins, strict=False)
         ):
-            return lost
+            return missing_counts
         usual = np.sort(steps[steps > 0.0])
         seam = max(SEAM / abs(column.factor), 2.0 * GAP * float(usual[int(0.95 * (len(usual) - 1))]))
-        lost[cuts] = seam - steps[cuts]
-        for cut in cuts.tolist():
-            line = int(lines[cut + 1])
-            before, behind = (float(count * column.factor) for count in read[cut : cut + 2])
+        missing_counts[cuts] = seam - steps[cuts]
+        for row in cuts.tolist():
+            line = int(lines[row + 1])
+            before, behind = (float(count * column.factor) for count in read[row : row + 2])
             self.restarts.append(Restart(CLOCK, "t", line, {"before_s": before, "behind_s": behind}))
             notes.append(self.restarts[-1].statement)
         self._begin = float(begins[-1])  # type: ignore[arg-type]
-        return lost
+        return missing_counts
 
     def _from_dates(self, table: Table, name: str, cells: tuple[str, ...], notes: Notes) -> FloatArray:
         self._bare = self._bare or _are_bare(cells)
@@ -179,36 +179,41 @@ class Clock:
 
 def _without_strays(counts: FloatArray, lines: IntArray, column: Column, notes: Notes) -> FloatArray:
     """The counts, NaN where a single one lies far from all others."""
-    known = np.flatnonzero(np.isfinite(counts))
-    bad = known[astray(counts[known], DAY / abs(column.factor))]
-    if not bad.size:
+    finite_rows = np.flatnonzero(np.isfinite(counts))
+    stray_rows = finite_rows[astray(counts[finite_rows], DAY / abs(column.factor))]
+    if not stray_rows.size:
         return counts
-    first, many = f"{counts[bad[0]]:.9g} {column.unit} in line {lines[bad[0]]}", f"{len(bad)} rows have times"
-    notes.append(f"{many if len(bad) > 1 else '1 row has a time'} far from all others (first: {first}): left out")
+    first, many = (
+        f"{counts[stray_rows[0]]:.9g} {column.unit} in line {lines[stray_rows[0]]}",
+        f"{len(stray_rows)} rows have times",
+    )
+    notes.append(
+        f"{many if len(stray_rows) > 1 else '1 row has a time'} far from all others (first: {first}): left out"
+    )
     counts = counts.copy()
-    counts[bad] = np.nan
+    counts[stray_rows] = np.nan
     return counts
 
 
-def _is_restart(read: FloatArray, lines: IntArray, cut: int, begin: float) -> bool:
-    """Whether a time that goes back behind `cut` begins again, and no row stands in another's place.
+def _is_restart(read: FloatArray, lines: IntArray, row: int, begin: float) -> bool:
+    """Whether a time that goes back behind `row` begins again, and no row stands in another's place.
 
     begin: of the recording before. It is back near there, or lines that are no rows stand between; and it goes on.
     """
-    following = read[cut + 1 : cut + 1 + FOLLOWING]
-    goes_on = len(following) > 1 and bool((np.diff(following) > 0.0).all()) and following[1] < read[cut]
-    early = read[cut + 1] - begin <= EARLY * (read[cut] - begin)
-    return goes_on and (early or int(lines[cut + 1] - lines[cut]) > 1)
+    following = read[row + 1 : row + 1 + FOLLOWING]
+    goes_on = len(following) > 1 and bool((np.diff(following) > 0.0).all()) and following[1] < read[row]
+    early = read[row + 1] - begin <= EARLY_SHARE * (read[row] - begin)
+    return goes_on and (early or int(lines[row + 1] - lines[row]) > 1)
 
 
 def are_steps(name: str, values: FloatArray) -> bool:
     """Whether a column holds the time from row to row, as it is called: all alike, above 0, and no clock."""
-    known = values[np.isfinite(values)]
-    if not _STEP_NAME.fullmatch(_STEP_UNIT.sub("", name.strip())) or len(known) < 2 or (known < 0.0).any():
+    steps = values[np.isfinite(values)]
+    if not _STEP_NAME.fullmatch(_STEP_UNIT.sub("", name.strip())) or len(steps) < 2 or (steps < 0.0).any():
         return False
-    usual = float(np.median(known))
-    alike = float(np.mean((known > 0.5 * usual) & (known < 2.0 * usual)))
-    return usual > 0.0 and alike > MAJORITY_SHARE and float(np.mean(np.diff(known) > 0.0)) < MAJORITY_SHARE
+    usual = float(np.median(steps))
+    alike = float(np.mean((steps > 0.5 * usual) & (steps < 2.0 * usual)))
+    return usual > 0.0 and alike > MAJORITY_SHARE and float(np.mean(np.diff(steps) > 0.0)) < MAJORITY_SHARE
 
 
 def _are_bare(cells: tuple[str, ...]) -> bool:
@@ -232,7 +237,7 @@ def _instants(cells: tuple[str, ...]) -> FloatArray:
 
 
 def _padded(cell: str) -> str:
-    return _FRACTION.sub(lambda found: f"{found[0][0]}{found[1]:0>3}", cell, count=1)
+    return _FRACTION.sub(lambda match: f"{match[0][0]}{match[1]:0>3}", cell, count=1)
 
 
 def is_dates(cells: FloatArray | tuple[str, ...]) -> bool:

@@ -25,13 +25,13 @@ from omnidyn.statistics import median, robust_std
 from omnidyn.units import TURN, parse_unit
 
 COUNTERS = (2.0**16, 2.0**32)  # counts that fit into two and four bytes
-WHOLE = 1.01  # readings of what starts over stay within this many periods
+PERIOD_SLACK = 1.01  # readings of what starts over stay within this many periods
 MOST_FULL = 0.9  # and come as near to a period
 JUMP = 0.5  # of a period: more than that between two rows is no motion
 FAST_SHARE = 0.3  # of a period: a wheel that usually goes so far between rows cannot be followed
 NEAR_HALF = 0.46  # of a period: a wheel that is followed from rest up to such steps can go so fast
 USUAL = 0.99
-FILLED, OFTEN = 0.99, 0.05  # of a period; of the steps: so full, and so often over the end
+FILLED, OVERFLOW_SHARE = 0.99, 0.05  # of a period; of the steps: so full, and so often over the end
 OVER_STEP_RATIO = 1.5  # where a counter starts over, it moves no farther than so many times its longest step
 TICKS = 2.0  # and so many ticks
 WHOLE_TICKS = 0.1  # readings that were counted are as near to whole ticks
@@ -40,13 +40,13 @@ LEAST_STEPS = 4 * NEIGHBOURS
 ODD, SLACK = 2.0, 8.0  # a step is odd beyond so many neighbouring steps and so many ticks (or times the noise)
 STEPS_AGAINST_MOTION = 3.0  # an odd step against the motion is none beyond so many of the longest steps
 STEPS_ALONG_MOTION = 20.0  # the same along the motion
-TO_ZERO = 6.0  # and beyond so many of the steps beside it, where the counter is at 0 behind it
+TO_ZERO_RATIO = 6.0  # and beyond so many of the steps beside it, where the counter is at 0 behind it
 DOUBT = 0.01  # of a period at most
-ALONE = 0.1  # of the distance to the next number as plain: so small is the doubt of a period
+DOUBT_SHARE = 0.1  # of the distance to the next number as plain: so small is the doubt of a period
 MOVING_SHARE = 0.1  # of the rows at least: else the log has too little motion to compare with
 SMALL_STEP_SHARE = 0.1  # of an odd step: a smaller one beside it does not matter
 TOP_SPEED = 2000.0  # [turns/s] no motor turns faster
-LATE = 1.5  # usual steps of time: a longer one hides what the wheel did
+LATE_STEP = 1.5  # usual steps of time: a longer one hides what the wheel did
 
 
 class Unrolled(NamedTuple):
@@ -83,14 +83,14 @@ def unrolled(counts: FloatArray, unit: str, where: str, t: FloatArray | None = N
     rows = rows[np.argsort(t[rows], kind="stable")]
     readings, steps = counts[rows], np.diff(counts[rows])
     tick = 1.0 if "/" in unit else tick_of(np.abs(steps), float(np.ptp(readings)) if rows.size else 0.0)
-    found = compared(steps, t[rows], tick) if len(steps) >= LEAST_STEPS else None
-    period = _full(readings, steps, unit, tick) if found is None else _period(readings, found, unit, tick)
+    comparison = compared(steps, t[rows], tick) if len(steps) >= LEAST_STEPS else None
+    period = _full(readings, steps, unit, tick) if comparison is None else _period(readings, comparison, unit, tick)
     smooth, restarts = steps if period is None else _wrapped(steps, period), np.zeros(0, dtype=np.int64)
-    if found is not None:
-        found = found if period is None else compared(smooth, t[rows], tick)
-        restarts = _restarts(readings, found, TURN / parse_unit(unit).size, tick)
+    if comparison is not None:
+        comparison = comparison if period is None else compared(smooth, t[rows], tick)
+        restarts = _restarts(readings, comparison, TURN / parse_unit(unit).size, tick)
         smooth = smooth.copy()
-        smooth[restarts] = found.expected[restarts]
+        smooth[restarts] = comparison.expected[restarts]
     if period is None and not restarts.size:
         return Unrolled(counts, None, ())
     _refuse_fast(smooth, period, where)
@@ -101,10 +101,10 @@ def unrolled(counts: FloatArray, unit: str, where: str, t: FloatArray | None = N
 
 def _without_padding(rows: IntArray, t: FloatArray) -> IntArray:
     """The rows but for those at the end that repeat one time which is earlier than that of the row before them."""
-    other = np.flatnonzero(t[rows] != t[rows[-1:]])
-    if not other.size or len(rows) - other[-1] < 3 or t[rows[-1]] > t[rows[other[-1]]]:
+    earlier_rows = np.flatnonzero(t[rows] != t[rows[-1:]])
+    if not earlier_rows.size or len(rows) - earlier_rows[-1] < 3 or t[rows[-1]] > t[rows[earlier_rows[-1]]]:
         return rows
-    return rows[: other[-1] + 1]
+    return rows[: earlier_rows[-1] + 1]
 
 
 def _refuse_fast(steps: FloatArray, period: float | None, where: str) -> None:
@@ -136,9 +136,9 @@ def _wrapped(steps: FloatArray, period: float) -> FloatArray:
 
 def _period(readings: FloatArray, steps: Steps, unit: str, tick: float) -> float | None:
     """What the readings start over after, None where they do not. A jump across missing rows shows nothing."""
-    at_once = np.where(steps.rows < LATE, steps.size, 0.0)
-    known = _full(readings, at_once, unit, tick)
-    return known or _common(readings, steps, unit, tick) or _fast(readings, at_once, tick)
+    at_once = np.where(steps.rows < LATE_STEP, steps.size, 0.0)
+    counter_range = _full(readings, at_once, unit, tick)
+    return counter_range or _common(readings, steps, unit, tick) or _fast(readings, at_once, tick)
 
 
 def _fast(readings: FloatArray, steps: FloatArray, tick: float) -> float | None:
@@ -149,7 +149,7 @@ def _fast(readings: FloatArray, steps: FloatArray, tick: float) -> float | None:
     for base in (2.0, 10.0):
         period = tick * base ** np.floor(np.log(high / tick) / np.log(base) + 1.0 + 1e-12)
         often = float((np.abs(steps) > JUMP * period).mean())
-        if low < (1.0 - FILLED) * period and high >= FILLED * period and often > OFTEN:
+        if low < (1.0 - FILLED) * period and high >= FILLED * period and often > OVERFLOW_SHARE:
             return float(period)
     return None
 
@@ -162,7 +162,7 @@ def _full(readings: FloatArray, steps: FloatArray, unit: str, tick: float) -> fl
     turn = TURN / parse_unit(unit).size
     periods = [turn, *(tick * size for size in COUNTERS if tick > 0.0)]  # counts, so many of which make a turn
     for period in sorted(periods):
-        if MOST_FULL * period < width <= WHOLE * period and farthest > JUMP * period:
+        if MOST_FULL * period < width <= PERIOD_SLACK * period and farthest > JUMP * period:
             return period if period == turn or _goes_on(steps, period, tick) else None
     return None
 
@@ -176,12 +176,12 @@ def _goes_on(steps: FloatArray, period: float, tick: float) -> bool:
 
 def tick_of(size: FloatArray, width: float) -> float:
     """What all steps are whole multiples of, where they are; else 0. size: of the steps, (rows,)."""
-    moved = size[(size > 0.0) & (size < JUMP * width)]
-    if not moved.size:
+    moves = size[(size > 0.0) & (size < JUMP * width)]
+    if not moves.size:
         return 0.0
-    tick = float(moved.min())
-    tick = float(moved.sum() / np.round(moved / tick).sum())
-    return tick if float(np.abs(moved / tick - np.round(moved / tick)).max()) < WHOLE_TICKS else 0.0
+    tick = float(moves.min())
+    tick = float(moves.sum() / np.round(moves / tick).sum())
+    return tick if float(np.abs(moves / tick - np.round(moves / tick)).max()) < WHOLE_TICKS else 0.0
 
 
 # ---- steps that the steps beside them do not explain ------------------------------------------------------
@@ -193,11 +193,13 @@ def compared(steps: FloatArray, t: FloatArray, tick: float) -> Steps:
     rows = np.maximum(1.0, lasts / max(median(lasts), 1e-12))
     seconds = np.maximum(lasts, (t[-1] - t[0]) / len(t))  # stamps of rows that came in one packet are no times
     speed = np.pad(steps / rows, NEIGHBOURS, mode="reflect")
-    beside = np.stack([np.roll(speed, k) for k in range(-NEIGHBOURS, NEIGHBOURS + 1) if k])[:, NEIGHBOURS:-NEIGHBOURS]
+    neighbours = np.stack([np.roll(speed, k) for k in range(-NEIGHBOURS, NEIGHBOURS + 1) if k])[
+        :, NEIGHBOURS:-NEIGHBOURS
+    ]
     noise = float(robust_std(np.diff(steps), 0.0))
-    usual = np.median(beside[1:-1], axis=0)  # the two steps before and the two behind
+    usual = np.median(neighbours[1:-1], axis=0)  # the two steps before and the two behind
     expected = np.where(np.abs(steps - rows * usual) < np.abs(steps - usual), rows * usual, usual)
-    return Steps(steps, expected, rows * np.median(np.abs(beside), axis=0), rows, seconds, max(tick, noise))
+    return Steps(steps, expected, rows * np.median(np.abs(neighbours), axis=0), rows, seconds, max(tick, noise))
 
 
 def _odd(steps: Steps) -> IntArray:
@@ -215,7 +217,7 @@ def _common(readings: FloatArray, steps: Steps, unit: str, tick: float) -> float
         return None
     period, width = median(np.abs(away[onward])), float(np.ptp(readings))
     alike = onward & (np.abs(np.abs(away) - period) <= steps.beside[odd] + SLACK * steps.tick)
-    if alike.sum() < 2 or not MOST_FULL * period < width <= WHOLE * period:
+    if alike.sum() < 2 or not MOST_FULL * period < width <= PERIOD_SLACK * period:
         return None
     jumps = odd[alike]
     speed = np.pad(steps.size / steps.rows, 1, mode="reflect")
@@ -236,8 +238,8 @@ def _plainest(period: float, doubt: float, width: float, turn: float, tick: floa
         decades = tick * 10.0 ** np.arange(np.floor(np.log10(period / tick)), -1.0, -1.0)
         choices += [(power, power), *((decade * np.round(period / decade), decade) for decade in decades)]
     for value, apart in choices:
-        near = min(DOUBT * period, ALONE * apart, 5.0 * doubt + TICKS * tick)
-        if value > width and doubt <= ALONE * apart and abs(value - period) <= near:
+        tolerance = min(DOUBT * period, DOUBT_SHARE * apart, 5.0 * doubt + TICKS * tick)
+        if value > width and doubt <= DOUBT_SHARE * apart and abs(value - period) <= tolerance:
             return float(value)
     if doubt > DOUBT * period:
         return None
@@ -257,10 +259,10 @@ def _restarts(readings: FloatArray, steps: Steps, turn: float, tick: float) -> I
     beyond = np.abs(away) > np.where(along, STEPS_ALONG_MOTION, STEPS_AGAINST_MOTION) * longest
     beyond &= (float((speeds > (0.5 * tick or 2.0 * steps.tick)).mean()) > MOVING_SHARE) | (np.abs(away) < speeds.sum())
     beyond |= np.abs(away) > TOP_SPEED * turn * steps.seconds[odd]
-    beside = np.abs(np.pad(steps.size, 2, mode="reflect"))
-    most = np.stack([beside[odd + k] for k in (0, 1, 3, 4)]).max(axis=0)
+    sizes = np.abs(np.pad(steps.size, 2, mode="reflect"))
+    largest_neighbour = np.stack([sizes[odd + k] for k in (0, 1, 3, 4)]).max(axis=0)
     to_zero = np.abs(readings[odd + 1]) <= 2.0 * (steps.beside[odd] + steps.tick)
-    to_zero &= (np.abs(away) > TO_ZERO * most + SLACK * steps.tick) & (steps.rows[odd] < LATE)
+    to_zero &= (np.abs(away) > TO_ZERO_RATIO * largest_neighbour + SLACK * steps.tick) & (steps.rows[odd] < LATE_STEP)
     return odd[(beyond | to_zero) & _alone(odd, np.abs(away), len(steps.size) - 1)]
 
 
@@ -269,11 +271,11 @@ def _alone(odd: IntArray, away: FloatArray, last: int) -> BoolArray:
 
     last: the last step, of which nobody knows what comes behind it; nor of the first what came before.
     """
-    near = np.diff(odd) <= NEIGHBOURS
-    alone = (odd > 0) & (odd < last)
-    alone[:-1] &= ~near | (away[1:] < SMALL_STEP_SHARE * away[:-1])
-    alone[1:] &= ~near | (away[:-1] < SMALL_STEP_SHARE * away[1:])
-    return alone
+    adjacent = np.diff(odd) <= NEIGHBOURS
+    isolated = (odd > 0) & (odd < last)
+    isolated[:-1] &= ~adjacent | (away[1:] < SMALL_STEP_SHARE * away[:-1])
+    isolated[1:] &= ~adjacent | (away[:-1] < SMALL_STEP_SHARE * away[1:])
+    return isolated
 
 
 # The columns of a table that count: angles that go on, speeds beyond their bits, and what was found on the way
@@ -282,9 +284,9 @@ def _alone(odd: IntArray, away: FloatArray, last: int) -> BoolArray:
 class Counters:
     """Reads counts and speeds of a table. t [s]: of its rows, shape (rows,). found: restarts of its clock."""
 
-    def __init__(self, table: Table, t: FloatArray, found: Sequence[Restart]):
-        self.table, self.t, self.found = table, t, list(found)
-        self.begins = np.flatnonzero(np.isin(table.lines, [restart.line for restart in found])).tolist()
+    def __init__(self, table: Table, t: FloatArray, restarts: Sequence[Restart]):
+        self.table, self.t, self.found = table, t, list(restarts)
+        self.begins = np.flatnonzero(np.isin(table.lines, [restart.line for restart in restarts])).tolist()
         self.counters: list[Counter] = []
 
     def angle(self, key: str, column: Column, values: FloatArray) -> FloatArray:
@@ -296,8 +298,12 @@ class Counters:
         for part in recordings(len(values), self.begins):
             where = f"{self.table.source}, column {column.name}"
             readings, period, restarts = unrolled(values[part], column.unit, where, self.t[part])
-            known = [each[np.isfinite(each)] for each in (*parts[-1:], readings)]
-            shift = known[0][-1] - known[1][0] if len(known) == 2 and all(each.size for each in known) else 0.0
+            finite_parts = [piece[np.isfinite(piece)] for piece in (*parts[-1:], readings)]
+            shift = (
+                finite_parts[0][-1] - finite_parts[1][0]
+                if len(finite_parts) == 2 and all(piece.size for piece in finite_parts)
+                else 0.0
+            )
             parts.append(readings + shift)
             periods += [] if period is None else [period]
             again += [part.start + row for row in restarts]
@@ -330,7 +336,7 @@ SLOW_STEP_SHARE = 0.15  # of the range: shorter steps beside a jump show that th
 MAJORITY_SHARE = 0.5  # of the jumps, where it is so
 CLEAR_TICKS = 8.0  # ticks, or noises: a longer step has a direction
 OVERFLOW_RATIO = 1.5  # of the longest other step: changes of speed over a jump
-FOLLOWED = 0.25  # of the range: longest step
+FOLLOWED_SHARE = 0.25  # of the range: longest step
 REST = 0.01  # of the range: what is nearer to 0 is at rest
 WIDTH_SHARE = 0.8  # of the range, between the slowest and the fastest value at least
 
@@ -353,8 +359,8 @@ def widened(speeds: FloatArray, t: FloatArray) -> tuple[FloatArray, int, bool]:
     ):
         return speeds, 0, True
     longest = float(np.abs(steps[~jumps]).max(initial=0.0))
-    across = np.abs(np.abs(steps[jumps]) - size)  # what the speed changed over each jump
-    if longest > FOLLOWED * size or (across > OVERFLOW_RATIO * longest).any():
+    bridged = np.abs(np.abs(steps[jumps]) - size)  # what the speed changed over each jump
+    if longest > FOLLOWED_SHARE * size or (bridged > OVERFLOW_RATIO * longest).any():
         return speeds, int(jumps.sum()), False
     right = speeds.copy()
     for part in segments(t[rows]):
@@ -385,5 +391,5 @@ def _from_rest(values: FloatArray, size: float) -> FloatArray:
     """The same, whole ranges away, where most rest is at 0: the first row may be beyond the range already."""
     ranges = np.round(values / size)
     rest = ranges[np.abs(values - size * ranges) < REST * size]
-    found, count = np.unique(rest, return_counts=True)
-    return values - size * float(found[np.argmax(count)]) if found.size else values
+    levels, count = np.unique(rest, return_counts=True)
+    return values - size * float(levels[np.argmax(count)]) if levels.size else values

@@ -16,7 +16,7 @@ from omnidyn.statistics import median
 
 CLOCK, COUNTER, FULL, OVERFLOW = "clock_restart", "counter_restart", "counter_full", "speed_overflow"
 EPISODE = "episode"
-MARGIN = 1.1  # of the least gap
+GAP_MARGIN = 1.1  # of the least gap
 
 
 @dataclass(frozen=True)
@@ -61,26 +61,26 @@ def counter_restarts(counters: Sequence[Counter], lines: Sequence[int] | np.ndar
     for counter in counters:
         for row in counter.restarts:
             by_row.setdefault(row, []).append(counter)
-    found = []
+    restarts = []
     for row, members in sorted(by_row.items()):
-        known = members[0].values[:row]
-        known = known[np.isfinite(known)]
+        readings = members[0].values[:row]
+        readings = readings[np.isfinite(readings)]
         numbers = {"columns": [counter.column for counter in members], "after": members[0].values[row]}
-        numbers |= {"before": known[-1]} if known.size else {}
-        found.append(Restart(COUNTER, " ".join(member.component for member in members), int(lines[row]), numbers))
-    return found
+        numbers |= {"before": readings[-1]} if readings.size else {}
+        restarts.append(Restart(COUNTER, " ".join(member.component for member in members), int(lines[row]), numbers))
+    return restarts
 
 
 def beside_restarts(t: FloatArray, counters: Sequence[Counter]) -> BoolArray:
     """The rows to leave out, so that a gap lies where counters were set to another value. t [s]. Shape (rows,)."""
     left_out = np.zeros(len(t), dtype=bool)
     for counter in counters:
-        known = np.sort(t[np.isfinite(counter.values) & np.isfinite(t)])
-        steps = np.diff(known)
+        sample_times = np.sort(t[np.isfinite(counter.values) & np.isfinite(t)])
+        steps = np.diff(sample_times)
         for row in counter.restarts:
-            least = MARGIN * max(GAP * median(steps), 2.0 * float(np.quantile(steps, 0.95)))
-            before = known[np.searchsorted(known, t[row]) - 1]
-            left_out |= np.abs(t - 0.5 * (before + t[row])) < 0.5 * max(least, t[row] - before)
+            least_gap = GAP_MARGIN * max(GAP * median(steps), 2.0 * float(np.quantile(steps, 0.95)))
+            before = sample_times[np.searchsorted(sample_times, t[row]) - 1]
+            left_out |= np.abs(t - 0.5 * (before + t[row])) < 0.5 * max(least_gap, t[row] - before)
     return left_out
 
 

@@ -14,9 +14,9 @@ import numpy as np
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.logs.channels import TIME
-from omnidyn.logs.table.table import Said, Table
+from omnidyn.logs.table.table import Declaration, Table
 
-_WHOLE = ("sec", "secs", "seconds")
+_SECOND_WORDS = ("sec", "secs", "seconds")
 _REST = {
     "nanoseconds": 1e-9,
     "nanosecs": 1e-9,
@@ -39,8 +39,8 @@ def astray(stamps: FloatArray | IntArray, day: float) -> BoolArray:
         return np.zeros(len(stamps), dtype=bool)
     times = stamps.astype(float)
     low, middle, high = np.quantile(times, [ASTRAY_SHARE, 0.5, 1.0 - ASTRAY_SHARE])
-    far = np.abs(times - middle) > max(abs(day), LENGTHS * float(high - low))
-    return far if far.sum() <= max(1.0, ASTRAY_SHARE * len(far)) else np.zeros(len(far), dtype=bool)
+    stray = np.abs(times - middle) > max(abs(day), LENGTHS * float(high - low))
+    return stray if stray.sum() <= max(1.0, ASTRAY_SHARE * len(stray)) else np.zeros(len(stray), dtype=bool)
 
 
 def with_joined_stamp(table: Table) -> Table:
@@ -52,14 +52,14 @@ def with_joined_stamp(table: Table) -> Table:
     for name in table.names if TIME not in lower else ():
         match = _NAME.fullmatch(name)
         stem = match["stem"].lower() if match else ""
-        seconds = next((lower[stem + word] for word in _WHOLE if stem + word in lower), None) if match else None
+        seconds = next((lower[stem + word] for word in _SECOND_WORDS if stem + word in lower), None) if match else None
         if match is None or seconds is None:
             continue
-        whole, rest = table.columns[seconds], table.columns[name]
+        whole_seconds, rest = table.columns[seconds], table.columns[name]
         size = _REST[match["rest"].lower()]
-        if isinstance(whole, tuple) or isinstance(rest, tuple) or not _rest_of_a_second(rest * size):
+        if isinstance(whole_seconds, tuple) or isinstance(rest, tuple) or not _rest_of_a_second(rest * size):
             continue
-        columns = {TIME: whole + size * rest, **table.columns}
+        columns = {TIME: whole_seconds + size * rest, **table.columns}
         note = f"{TIME} is {seconds} + {size:g} {name}"
         units, names = {**table.units, TIME: "s"}, (TIME, *table.names)
         return replace(table, names=names, columns=columns, units=units, notes=(*table.notes, note))
@@ -67,8 +67,8 @@ def with_joined_stamp(table: Table) -> Table:
 
 
 def _rest_of_a_second(values: np.ndarray) -> bool:
-    known = values[np.isfinite(values)]
-    return bool(known.size) and float(known.min()) >= 0.0 and float(known.max()) < 1.0
+    fractions = values[np.isfinite(values)]
+    return bool(fractions.size) and float(fractions.min()) >= 0.0 and float(fractions.max()) < 1.0
 
 
 # Times of a file that has no column of time, from the rate of its rows, which the user gives
@@ -84,20 +84,20 @@ def timed(tables: Iterable[Table], rate: float | None, skipped: bool = False) ->
     """
     if rate is not None and not 0.0 < rate < np.inf:
         raise InputError("not a rate", got=rate, expected="rows per second, above 0", where="rate")
-    first, done = None, 0
+    first, row_count = None, 0
     for table in tables:
         if rate is None:
             yield table
             continue
         first = int(table.lines[0]) if first is None and len(table) else first or 0
-        rows = table.lines - first if skipped else np.arange(done, done + len(table))
-        done += len(table)
+        rows = table.lines - first if skipped else np.arange(row_count, row_count + len(table))
+        row_count += len(table)
         name = TIME if TIME not in table.names else BY_RATE
         yield replace(
             table,
             names=(name, *table.names),
             columns={name: rows / rate, **table.columns},
             units={**table.units, name: "s"},
-            says={**table.says, name: Said(TIME)},
+            says={**table.says, name: Declaration(TIME)},
             notes=(*table.notes, f"time was made of the rate: {rate:g} rows a second"),
         )

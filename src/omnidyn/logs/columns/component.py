@@ -30,7 +30,7 @@ _NUMBERED = (
 _OF_A_RIM = {words.LINEAR, words.RATE, words.WHEEL, words.MOTOR, words.COMMAND, words.MEASURED}
 BY_UNIT = {VOLTAGE: "u", CURRENT: "i", DUTY: "d", TURN_RATE: "w", COUNT_RATE: "w", ANGLE: "a", COUNT: "a"}
 _KIN = {"u": "ud", "d": "ud", "i": "i", "w": "wa", "a": "wa"}  # what a word may say beside a unit of the first
-_HELD = {*BY_UNIT, SPEED, LENGTH, TIME_UNIT}  # quantities of the channels of a log
+_LOG_QUANTITIES = {*BY_UNIT, SPEED, LENGTH, TIME_UNIT}  # quantities of the channels of a log
 DRIVES = frozenset({words.VOLTAGE, words.DUTY, words.MOTOR, words.WHEEL, words.COMMAND})  # words of what drives a motor
 _BODY = {"x": ("vx", "x"), "y": ("vy", "y")}
 
@@ -66,7 +66,7 @@ def component_of_parts(name: NameParts, unit: Unit | None, wheel: int | None) ->
     unit = unit or name.unit
     if is_other(name) and not (name.of_one_wheel and unit):
         return None
-    if unit is not None and unit.quantity not in _HELD:
+    if unit is not None and unit.quantity not in _LOG_QUANTITIES:
         return None
     command = "_cmd" if words.COMMAND in name.roles else ""
     letter = numbered_kind(name, unit)
@@ -88,19 +88,19 @@ def numbered_kind(name: NameParts, unit: Unit | None) -> str | None:
     if not name.of_one_wheel:
         return None
     unit, roles = unit or name.unit, name.roles
-    if unit is not None and unit.quantity not in _HELD:
+    if unit is not None and unit.quantity not in _LOG_QUANTITIES:
         return None
     if unit is not None and unit.quantity == SPEED and words.LINEAR in roles and roles <= _OF_A_RIM:
         return "w"  # v1_m_s: of the rim of wheel 1
-    said = [letter for role, letter in _NUMBERED if role in roles]
-    letter = said[0] if said else None
+    letters = [letter for role, letter in _NUMBERED if role in roles]
+    letter = letters[0] if letters else None
     by_unit = BY_UNIT.get(unit.quantity) if unit is not None else None
     if by_unit is not None:
         volts = by_unit == "u" and roles == {words.LINEAR}  # V1 [V]
         unknown = frozenset() if by_unit == "d" else {words.OTHER}  # humidity_% is no duty
         no_word = volts or roles & {words.MOTOR, words.WHEEL} or not roles - {words.CHANNEL, words.COMMAND, *unknown}
         kin = _KIN[by_unit] + ("w" if by_unit == "d" and words.COMMAND in roles else "")  # a speed is set in percent
-        if (set(said) & set(kin)) if said else no_word:
+        if (set(letters) & set(kin)) if letters else no_word:
             letter = by_unit
     return None if letter in ("u", "d") and words.SENSOR in roles else letter
 

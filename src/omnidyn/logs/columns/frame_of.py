@@ -23,15 +23,15 @@ def with_frames(columns: ColumnMap, assume: Mapping[str, str]) -> ColumnMap:
     """
     framed: dict[str, Column] = {}
     for name in FRAMES.keys() & assume.keys():
-        mine = [key for key in FRAMES[name] if key in columns.columns]
-        if not mine:
+        keys = [key for key in FRAMES[name] if key in columns.columns]
+        if not keys:
             raise InputError(
                 f"no column has this frame: the log has no {' or '.join(FRAMES[name])}",
                 got=f"{name}={assume[name]}",
                 expected="a frame of a column that is there",
                 where="assume",
             )
-        framed |= {key: replace(columns.columns[key], frame=assume[name].strip()) for key in mine}
+        framed |= {key: replace(columns.columns[key], frame=assume[name].strip()) for key in keys}
     return replace(columns, columns={**columns.columns, **framed}) if framed else columns
 
 
@@ -61,16 +61,16 @@ def turn_to_body(t: FloatArray, channels: dict[str, FloatArray], columns: Column
         angle = _heading(t, channels, channel, where) if frame == ROOM else columns.columns[keys[0]].mounted_at
         plane = (channels[channel][:, 0] + 1j * channels[channel][:, 1]) * np.exp(-1j * np.asarray(angle))
         channels[channel][:, 0], channels[channel][:, 1] = plane.real, plane.imag
-        how = "from the frame of the room by the heading" if frame == ROOM else f"back by {frame}"
-        notes.append(f"{keys[0]} and {keys[1]} are turned {how}")
+        manner = "from the frame of the room by the heading" if frame == ROOM else f"back by {frame}"
+        notes.append(f"{keys[0]} and {keys[1]} are turned {manner}")
     return notes
 
 
 def _heading(t: FloatArray, channels: Mapping[str, FloatArray], channel: str, where: str) -> FloatArray:
     """The heading [rad] in each row; between two measurements on the line between them."""
     pose = channels.get("pose")
-    known = np.isfinite(t) & np.isfinite(pose[:, 2]) if pose is not None else np.zeros(len(t), dtype=bool)
-    if pose is None or not known.any():
+    measured = np.isfinite(t) & np.isfinite(pose[:, 2]) if pose is not None else np.zeros(len(t), dtype=bool)
+    if pose is None or not measured.any():
         raise InputError(
             f"a {channel} in the frame of the room needs a heading to be turned by",
             got="no heading",
@@ -78,5 +78,5 @@ def _heading(t: FloatArray, channels: Mapping[str, FloatArray], channel: str, wh
             remedy="say which column it is: `column` heading=NAME:deg",
             where=where,
         )
-    order = np.flatnonzero(known)[np.argsort(t[known], kind="stable")]
-    return np.where(known, pose[:, 2], np.interp(t, t[order], pose[order, 2]))
+    order = np.flatnonzero(measured)[np.argsort(t[measured], kind="stable")]
+    return np.where(measured, pose[:, 2], np.interp(t, t[order], pose[order, 2]))

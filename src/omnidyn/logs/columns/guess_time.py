@@ -25,7 +25,7 @@ SHORTEST_STEP, LONGEST_STEP = 1e-4, 1.0  # [s] between rows: what a log of a rob
 TIME_NAMES = ("s", "ms", "us", "ns")
 
 
-def take_time(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
+def take_time(table: Table, assumed: Mapping[str, str], guess: Guess) -> None:
     """The column of time and its unit, which must be given or unmistakable."""
     candidates = [name for name in table.names if words.TIME in read_name(name).roles]
     dates = [name for name in candidates if is_dates(table.columns[name])]
@@ -39,33 +39,33 @@ def take_time(table: Table, assumed: Mapping[str, str], found: Guess) -> None:
         candidates = timed if len(timed) == 1 else []
     candidates.sort(key=lambda name: (name != "t_s", table.names.index(name)))
     if dates and not candidates:
-        found.columns[TIME] = Column(dates[0], "s")
-        found.note("dates", column=dates[0])
+        guess.columns[TIME] = Column(dates[0], "s")
+        guess.note("dates", column=dates[0])
         return
     if not candidates and wordy:
         cell = first_word(table.columns[wordy[0]])
-        found.doubts.append(doubt(wordy[0], TIME, "cells_not_dates", (), cell=cell))
+        guess.doubts.append(doubt(wordy[0], TIME, "cells_not_dates", (), cell=cell))
         return
     steps = [
         name for name in table.names if is_numeric(cells := table.columns[name]) and are_steps(name, floats(cells))
     ]
     if steps and (not candidates or candidates == steps):
-        _take_steps(table, steps[0], assumed, found)
+        _take_steps(table, steps[0], assumed, guess)
         return
     if not candidates:
         increasing = [name for name in table.names if _increases(table.columns[name])]
         if increasing:
-            found.doubts.append(doubt(increasing[0], TIME, "clock_unit_unknown"))
+            guess.doubts.append(doubt(increasing[0], TIME, "clock_unit_unknown"))
         return
     name = candidates[0]
     text = assumed.get(name) or assumed.get(TIME) or table.units.get(name, "")
     unit = known_unit(text) or _unit(table, name, assumed)
     if unit is None:
-        unit = _plausible_time(floats(table.columns[name]), name, text, found)
+        unit = _plausible_time(floats(table.columns[name]), name, text, guess)
     if unit is not None and unit.quantity == TIME_UNIT:
-        found.columns[TIME] = Column(name, unit.text)
+        guess.columns[TIME] = Column(name, unit.text)
     elif unit is not None:
-        found.doubts.append(doubt(name, TIME, "unit_of_other", unit=unit.text, quantity="time"))
+        guess.doubts.append(doubt(name, TIME, "unit_of_other", unit=unit.text, quantity="time"))
 
 
 def _is_span(name: str) -> bool:
@@ -73,15 +73,15 @@ def _is_span(name: str) -> bool:
     return bool(re.search(r"(?:^|[\W_])(?:d|dt|delta|diff|step|period|cycle|remaining|left)(?:$|[\W_])", name.lower()))
 
 
-def _take_steps(table: Table, name: str, assumed: Mapping[str, str], found: Guess) -> None:
+def _take_steps(table: Table, name: str, assumed: Mapping[str, str], guess: Guess) -> None:
     """A column that holds the time from row to row, where there is no other clock: it is summed up."""
     text = assumed.get(name) or assumed.get(TIME) or table.units.get(name, "")
     values = floats(table.columns[name])
-    unit = known_unit(text) or read_name(name).unit or _plausible_time(np.cumsum(values), name, text, found)
+    unit = known_unit(text) or read_name(name).unit or _plausible_time(np.cumsum(values), name, text, guess)
     if unit is not None and unit.quantity == TIME_UNIT:
-        found.columns[TIME] = Column(name, unit.text)
+        guess.columns[TIME] = Column(name, unit.text)
     elif unit is not None:
-        found.doubts.append(doubt(name, TIME, "unit_of_other", unit=unit.text, quantity="time"))
+        guess.doubts.append(doubt(name, TIME, "unit_of_other", unit=unit.text, quantity="time"))
 
 
 def _is_clock(table: Table, name: str, assumed: Mapping[str, str]) -> bool:
@@ -98,11 +98,11 @@ def _unit(table: Table, name: str, assumed: Mapping[str, str]) -> Unit | None:
 def _increases(values: FloatArray | tuple[str, ...]) -> bool:
     """Whether nearly every row is later than the one before: it may be a clock."""
     values = floats(values)
-    known = values[np.isfinite(values)]
-    return len(known) > 1 and float(np.mean(known[1:] > known[:-1])) > 0.9
+    times = values[np.isfinite(values)]
+    return len(times) > 1 and float(np.mean(times[1:] > times[:-1])) > 0.9
 
 
-def _plausible_time(values: FloatArray, name: str, given: str, found: Guess) -> Unit | None:
+def _plausible_time(values: FloatArray, name: str, declared_unit: str, guess: Guess) -> Unit | None:
     """The one unit under which rows are 0.1 ms to 1 s apart; None where there are two or none."""
     finite = values[np.isfinite(values)]
     steps = np.diff(finite)
@@ -110,32 +110,35 @@ def _plausible_time(values: FloatArray, name: str, given: str, found: Guess) -> 
     step = float(np.median(steps)) if steps.size else 0.0
     units = [parse_unit(text) for text in TIME_NAMES]
     possible = [unit for unit in units if SHORTEST_STEP <= step * unit.size <= LONGEST_STEP]
-    if given and given not in ("-", "SI"):
-        found.doubts.append(doubt(name, TIME, "unit_unknown", unit=given))
+    if declared_unit and declared_unit not in ("-", "SI"):
+        guess.doubts.append(doubt(name, TIME, "unit_unknown", unit=declared_unit))
         return None
     if len(possible) != 1:
         texts = tuple(unit.text for unit in possible)
-        found.doubts.append(doubt(name, TIME, "time_without_unit", texts or UNIT, step=step))
+        guess.doubts.append(doubt(name, TIME, "time_without_unit", texts or UNIT, step=step))
         return None
-    found.note("time_unit_taken", column=name, unit=possible[0].text, step_s=step * possible[0].size)
+    guess.note("time_unit_taken", column=name, unit=possible[0].text, step_s=step * possible[0].size)
     return possible[0]
 
 
 def refuse_second_time(
-    table: Table, assumed: Mapping[str, str], given: ColumnMap | None, more: Mapping[str, Column]
+    table: Table, assumed: Mapping[str, str], column_map: ColumnMap | None, overrides: Mapping[str, Column]
 ) -> None:
     """Raises InputError where a table whose time was made of a rate has a time of its own, or one is named."""
-    made = next(name for name, said in table.says.items() if said.component == TIME)
-    named = more.get(TIME) or (given.columns.get(TIME) if given is not None else None)
-    if named is None:
-        found, others = Guess(), {name: said for name, said in table.says.items() if name != made}
-        own = next((name for name, said in others.items() if said.component == TIME), "")
-        take_time(replace(table, names=table.names[1:], says=others), assumed, found)
-        named = Column(own, "s") if own else found.columns.get(TIME)
-    if named is not None and named.name != made:
+    rate_column = next(name for name, declaration in table.says.items() if declaration.component == TIME)
+    time_column = overrides.get(TIME) or (column_map.columns.get(TIME) if column_map is not None else None)
+    if time_column is None:
+        guess, declarations = (
+            Guess(),
+            {name: declaration for name, declaration in table.says.items() if name != rate_column},
+        )
+        declared_time = next((name for name, declaration in declarations.items() if declaration.component == TIME), "")
+        take_time(replace(table, names=table.names[1:], says=declarations), assumed, guess)
+        time_column = Column(declared_time, "s") if declared_time else guess.columns.get(TIME)
+    if time_column is not None and time_column.name != rate_column:
         raise InputError(
             "the log has a time already",
-            got=f"the column {named.name}, and `rate`",
+            got=f"the column {time_column.name}, and `rate`",
             expected="one of the two",
             remedy="leave `rate` out",
             where=table.source,

@@ -30,41 +30,41 @@ FASTEST_TURN = 35.0  # [rad/s] of a body: the 2000 deg/s at which gyroscopes end
 SI = {"rad_s": "rad/s", "m_s": "m/s"}
 
 
-def unit_of(table: Table, name: str, component: str, robot: Robot | None, found: Guess) -> Unit | None:
+def unit_of(table: Table, name: str, component: str, robot: Robot | None, guess: Guess) -> Unit | None:
     """The unit where the file gives none: SI, said in words; volts only where they cannot be a duty."""
     suffix = si_suffix(component)
     if suffix == "rad" and _turns_in_degrees(floats(table.columns[name])):
-        found.doubts.append(doubt(name, component, "turns_in_degrees", ("deg",)))
+        guess.doubts.append(doubt(name, component, "turns_in_degrees", ("deg",)))
         return None
     if suffix in ("V", "duty") and component != "supply":
-        return _command_unit(table, name, component, robot, found)
+        return _command_unit(table, name, component, robot, guess)
     if suffix == "rad" and component != "heading" and _are_counts(floats(table.columns[name])):
-        found.doubts.append(doubt(name, component, "counts_per_turn_unknown", ("ticks/COUNTS_PER_TURN",)))
+        guess.doubts.append(doubt(name, component, "counts_per_turn_unknown", ("ticks/COUNTS_PER_TURN",)))
         return None
     if fast := doubt_of_rate(table, name, component):
-        found.doubts.append(fast)
+        guess.doubts.append(fast)
         return None
-    found.si[name] = SI.get(suffix, suffix)
-    return parse_unit(found.si[name])
+    guess.si[name] = SI.get(suffix, suffix)
+    return parse_unit(guess.si[name])
 
 
-def implausible(component: str, unit: Unit, values: FloatArray, said: bool, robot: Robot | None) -> Doubt | None:
+def implausible(component: str, unit: Unit, values: FloatArray, is_declared: bool, robot: Robot | None) -> Doubt | None:
     """The doubt, of no column yet, about values that cannot be in their unit; None where they can.
 
-    said: whether the user said the unit: what is only unlikely is then believed.
+    is_declared: whether the user said the unit: what is only unlikely is then believed.
     """
-    if quantity_of(component) == ANGLE and unit == parse_unit("rad") and not said and _turns_in_degrees(values):
+    if quantity_of(component) == ANGLE and unit == parse_unit("rad") and not is_declared and _turns_in_degrees(values):
         return doubt("", component, "turns_in_degrees", ("deg",), unit="rad")
     if component[0] not in "ud" or not component[1:].isdigit():
         return None
     largest = _largest(values)
     if component[0] == "u":
-        most = _most_volts(robot)
-        code, numbers = "too_many_volts", {"largest": largest, "unit": unit.text, "most_V": most}
+        limit = _most_volts(robot)
+        code, numbers = "too_many_volts", {"largest": largest, "unit": unit.text, "most_V": limit}
     else:
-        most = 1.0 if unit.text in PERCENT and largest > MOST_PERCENT and _are_whole(values) else MOST_DUTY
+        limit = 1.0 if unit.text in PERCENT and largest > MOST_PERCENT and _are_whole(values) else MOST_DUTY
         code, numbers = "too_much_duty", {"largest": largest, "unit": unit.text if unit.text in PERCENT else ""}
-    return doubt("", component, code, _scales(largest), **numbers) if largest * unit.size > most else None
+    return doubt("", component, code, _scales(largest), **numbers) if largest * unit.size > limit else None
 
 
 def _most_volts(robot: Robot | None) -> float:
@@ -94,10 +94,10 @@ def doubt_of_rate(table: Table, name: str, component: str, unit: str = "") -> Do
 
 def _turns_in_degrees(values: FloatArray) -> bool:
     """Whether an angle without a unit stays within a turn of 360 and jumps back or forth by more than half of it."""
-    known = values[np.isfinite(values)]
-    if len(known) < 2:
+    angles = values[np.isfinite(values)]
+    if len(angles) < 2:
         return False
-    width, jump = float(np.ptp(known)), float(np.abs(np.diff(known)).max())
+    width, jump = float(np.ptp(angles)), float(np.abs(np.diff(angles)).max())
     return NEAR_A_TURN < width <= 361.0 and jump > 180.0
 
 
@@ -122,28 +122,30 @@ def _largest(values: FloatArray) -> float:
     return float(finite.max()) if finite.size else 0.0
 
 
-def _command_unit(table: Table, name: str, component: str, robot: Robot | None, found: Guess) -> Unit | None:
+def _command_unit(table: Table, name: str, component: str, robot: Robot | None, guess: Guess) -> Unit | None:
     """Volts or duty? Volts where a name spells them, or the largest lies between 1 and the robot's limit."""
     largest = _largest(floats(table.columns[name]))
     if component.startswith("d") and largest <= 1.0:
-        found.note("taken_as_duty", column=name)
+        guess.note("taken_as_duty", column=name)
         return parse_unit("duty")
     spoken = any(word in name.lower() for word in ("volt", "spannung"))
     if component.startswith("u") and 1.0 < largest <= MOST_VOLTS and spoken:
-        found.note("taken_as_volts", column=name)
+        guess.note("taken_as_volts", column=name)
         return parse_unit("V")
     if component.startswith("u") and robot is not None and 1.0 < largest <= 1.05 * _limit(robot):
-        found.note("taken_as_volts", column=name, largest=largest)
+        guess.note("taken_as_volts", column=name, largest=largest)
         return parse_unit("V")
-    alike = [other for other in table.names if re.sub(r"\d+", "", other) == re.sub(r"\d+", "", name)]
-    largest = max(_largest(floats(table.columns[other])) for other in alike)  # of all wheels: one sentence for all
-    least = min(float(np.nanmin(floats(table.columns[other]), initial=np.inf)) for other in alike)
-    if SERVO[0] <= least and largest <= SERVO[1]:
-        found.doubts.append(doubt(name, component, "servo_pulses", (), least=least, largest=largest))
+    alike = [column_name for column_name in table.names if re.sub(r"\d+", "", column_name) == re.sub(r"\d+", "", name)]
+    largest = max(
+        _largest(floats(table.columns[column_name])) for column_name in alike
+    )  # of all wheels: one sentence for all
+    smallest = min(float(np.nanmin(floats(table.columns[column_name]), initial=np.inf)) for column_name in alike)
+    if SERVO[0] <= smallest and largest <= SERVO[1]:
+        guess.doubts.append(doubt(name, component, "servo_pulses", (), least=smallest, largest=largest))
         return None
     scales = _scales(largest)
     volts = ("V",) * (largest <= _most_volts(robot))
-    found.doubts.append(doubt(name, component, "command_without_unit", (*volts, *scales), largest=largest))
+    guess.doubts.append(doubt(name, component, "command_without_unit", (*volts, *scales), largest=largest))
     return None
 
 
@@ -156,37 +158,37 @@ def _limit(robot: Robot) -> float:
 SAME_SIDE = 0.05  # commands of wheels and of the body agree within this share on one side of the gear only
 
 
-def settle_side(table: Table, robot: Robot | None, found: Guess) -> None:
+def settle_side(table: Table, robot: Robot | None, guess: Guess) -> None:
     """Commands of body and of wheels tell the side of the gear: they differ by the gear ratio on the other one."""
     if robot is None:
         return
     count = robot.wheels.count
-    body = [found.columns.get(name) for name in ("vx_cmd", "vy_cmd", "omega_cmd")]
-    mine = [found.columns.get(f"w{wheel + 1}_cmd") for wheel in range(count)]
+    body = [guess.columns.get(name) for name in ("vx_cmd", "vy_cmd", "omega_cmd")]
+    wheel_columns = [guess.columns.get(f"w{wheel + 1}_cmd") for wheel in range(count)]
     gear = per_wheel(robot.motor.gear_ratio, count)
-    rims = any(column is not None and column.of_rim for column in mine)  # these are behind the gear
-    if None in body or None in mine or rims or np.all(np.abs(gear - 1.0) < 2.0 * SAME_SIDE):
+    rims = any(column is not None and column.of_rim for column in wheel_columns)  # these are behind the gear
+    if None in body or None in wheel_columns or rims or np.all(np.abs(gear - 1.0) < 2.0 * SAME_SIDE):
         return
-    twist, speed = (_values(table, columns) for columns in (body, mine))
+    twist, speed = (_values(table, columns) for columns in (body, wheel_columns))
     expected = wheel_speed(robot.wheels, twist)
     size = float(np.nansum(np.abs(expected)))
     if not size > 0.0:
         return
     ratio = float(np.nansum(np.abs(speed))) / size
     for side, factor in ((WHEEL_SIDE, 1.0), (MOTOR_SIDE, float(np.mean(gear)))):
-        if abs(ratio / factor - 1.0) < SAME_SIDE and mine[0].side != side:  # type: ignore[union-attr]
-            for component, column in found.columns.items():
+        if abs(ratio / factor - 1.0) < SAME_SIDE and wheel_columns[0].side != side:  # type: ignore[union-attr]
+            for component, column in guess.columns.items():
                 if component_channel(component) in SIDED and not column.of_rim:
-                    found.columns[component] = Column(column.name, column.unit, side)
-            found.note("side_of_gear", side=side, ratio=ratio)
+                    guess.columns[component] = Column(column.name, column.unit, side)
+            guess.note("side_of_gear", side=side, ratio=ratio)
 
 
-def take_sides(sides: Mapping[str, str], found: Guess) -> None:
+def take_sides(sides: Mapping[str, str], guess: Guess) -> None:
     """The sides of the gear that the user says. sides: column, component or its letter -> side."""
-    for component, column in found.columns.items():
+    for component, column in guess.columns.items():
         for name in (component.rstrip("0123456789"), component, column.name):
             if name in sides:
-                found.columns[component] = replace(found.columns[component], side=sides[name])
+                guess.columns[component] = replace(guess.columns[component], side=sides[name])
 
 
 def _values(table: Table, columns: list[Column | None]) -> FloatArray:

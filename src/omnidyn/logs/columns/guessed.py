@@ -43,8 +43,8 @@ def is_numeric(cells: FloatArray | tuple[str, ...]) -> bool:
     """Whether a column holds numbers, be it with words among them: those are refused where the column is used."""
     if not isinstance(cells, tuple):
         return True
-    there = [cell for cell in cells if cell]
-    return 2 * sum(map(looks_like_number, there)) > len(there)
+    filled_cells = [cell for cell in cells if cell]
+    return 2 * sum(map(looks_like_number, filled_cells)) > len(filled_cells)
 
 
 def floats(cells: FloatArray | tuple[str, ...]) -> FloatArray:
@@ -88,8 +88,8 @@ class Doubt(Statement):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
-        own = {"columns": self.columns, "components": self.components, "declarations": self.declarations}
-        return super().to_dict() | plain(own)
+        details = {"columns": self.columns, "components": self.components, "declarations": self.declarations}
+        return super().to_dict() | plain(details)
 
 
 def doubt(name: str, component: str, code: str, units: tuple[str, ...] = UNIT, **numbers: Any) -> Doubt:

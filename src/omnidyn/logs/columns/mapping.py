@@ -56,9 +56,9 @@ class ColumnMap:
         for component, column in self.columns.items():
             check_quantity(component, parse_unit(column.unit))
             if column.side == MOTOR_SIDE and (component_channel(component) not in SIDED or column.of_rim):
-                what = "what is in metres is of the rim, behind the gear" if column.of_rim else ""
+                reason = "what is in metres is of the rim, behind the gear" if column.of_rim else ""
                 raise InputError(
-                    what or "only speeds and angles of wheels have a motor side",
+                    reason or "only speeds and angles of wheels have a motor side",
                     got=f"{component}: {column}",
                     expected="side wheel",
                 )
@@ -69,13 +69,13 @@ class ColumnMap:
                     expected=f"no frame, or one of {', '.join(FRAMED)}",
                 )
 
-    def with_columns(self, more: Mapping[str, Column]) -> ColumnMap:
+    def with_columns(self, overrides: Mapping[str, Column]) -> ColumnMap:
         """The same with some columns set, and no longer unused."""
-        taken = {column.name for column in more.values()}
-        kept = {name: column for name, column in self.columns.items() if column.name not in taken}
-        unused = tuple(name for name in self.unused if name not in taken)
-        doubts = tuple(doubt for doubt in self.doubts if not doubt.columns or not taken.issuperset(doubt.columns))
-        return replace(self, columns={**kept, **more}, unused=unused, doubts=doubts)
+        names = {column.name for column in overrides.values()}
+        columns = {name: column for name, column in self.columns.items() if column.name not in names}
+        unused = tuple(name for name in self.unused if name not in names)
+        doubts = tuple(doubt for doubt in self.doubts if not doubt.columns or not names.issuperset(doubt.columns))
+        return replace(self, columns={**columns, **overrides}, unused=unused, doubts=doubts)
 
     @property
     def passed_over(self) -> tuple[str, ...]:
@@ -95,14 +95,14 @@ def component_channel(component: str) -> str:
     """The channel of a component, "time" for t. Raises InputError for a name that is no component."""
     if component == TIME:
         return "time"
-    found = place(component)
-    if found is None:
+    location = place(component)
+    if location is None:
         raise InputError(
             "unknown channel",
             got=component,
             expected="t, u1.., d1.., i1.., a1.., w1.., w1_cmd.., vx, vy, omega, vx_cmd.., x, y, heading, supply or f1",
         )
-    return found[0]
+    return location[0]
 
 
 def quantity_of(component: str) -> str:
@@ -113,13 +113,13 @@ def quantity_of(component: str) -> str:
 
 def check_quantity(component: str, unit: Unit) -> None:
     """Raises InputError where a unit measures something else than the component; a wheel may have that of its rim."""
-    wanted = quantity_of(component)
-    if unit.quantity != wanted and not is_of_rim(component, unit):
+    quantity = quantity_of(component)
+    if unit.quantity != quantity and not is_of_rim(component, unit):
         remedy = "say how many make a turn: ticks/2000" if unit.quantity == "count" else ""
         raise InputError(
             f"{component} cannot have this unit",
             got=f"{unit.text} ({unit.quantity})",
-            expected=f"a {wanted}",
+            expected=f"a {quantity}",
             remedy=remedy,
         )
 
@@ -148,7 +148,7 @@ def parse_column(text: str, names: Sequence[str] = ()) -> tuple[str, Column]:
     if rest.strip() in names:
         name, unit, side, invert = rest.strip(), None, None, False
     if unit is None or not unit.strip():
-        unit = next(suffix for suffix, each in _QUANTITIES.items() if each == quantity).replace("_", "/")
+        unit = next(suffix for suffix, measure in _QUANTITIES.items() if measure == quantity).replace("_", "/")
     return component, Column(name, unit.strip(), side or WHEEL_SIDE, invert)
 
 

@@ -94,7 +94,17 @@ _ROLE = {word: role for role, words in _WORDS.items() if role != SENSOR for word
 _SENSORS = frozenset(_WORDS[SENSOR].split())
 _ROLE |= dict.fromkeys(_SENSORS - _ROLE.keys(), SENSOR)  # an encoder tells an angle too
 _ROLE |= {"vx": "vx", "vy": "vy", "vn": "vy"}
-_SHORT = ("x", "y", "z", "v", "b", "w", "m", "u", "i")  # single letters that compounds such as "vbx" are made of
+_COMPOUND_LETTERS = (
+    "x",
+    "y",
+    "z",
+    "v",
+    "b",
+    "w",
+    "m",
+    "u",
+    "i",
+)  # letters that compounds such as "vbx" are made of
 
 
 class NameParts(NamedTuple):
@@ -130,9 +140,9 @@ def read_name(name: str) -> NameParts:
     if CHANNEL in roles and all(len(word) == 1 or _roles(word) == [CHANNEL] for word in words):
         roles = {CHANNEL}  # channel A
     number, before = (None, "") if roles <= {CHANNEL} else _number(spread)
-    place, others = place_in(words, _ROLE) if number is None else (None, words)
+    place, words_left = place_in(words, _ROLE) if number is None else (None, words)
     if place is not None:
-        roles, before = {role for word in others for role in _roles(word)}, " ".join(others)
+        roles, before = {role for word in words_left for role in _roles(word)}, " ".join(words_left)
     return NameParts(frozenset(roles), number, unit, before, place)
 
 
@@ -182,13 +192,13 @@ def _number(text: str) -> tuple[int | None, str]:
 
     That of an imu0 or a robot2 is none.
     """
-    numbers = [(found[1], found) for found in re.finditer(r"([^\W\d_]*)[\W_]*(\d+)", text)]
-    roles = [(set(_roles(word)) if word else set(), found) for word, found in numbers]
-    behind = [found for each, found in roles if each & _OF_A_WHEEL]
-    chosen = next(iter([*behind, *(found for each, found in roles if not each & _OF_NO_WHEEL)]), None)
-    if chosen is None or len(chosen[2]) > 2:
+    numbers = [(match[1], match) for match in re.finditer(r"([^\W\d_]*)[\W_]*(\d+)", text)]
+    roles = [(set(_roles(word)) if word else set(), match) for word, match in numbers]
+    behind = [match for role_set, match in roles if role_set & _OF_A_WHEEL]
+    choice = next(iter([*behind, *(match for role_set, match in roles if not role_set & _OF_NO_WHEEL)]), None)
+    if choice is None or len(choice[2]) > 2:
         return None, ""
-    return int(chosen[2]), text[: chosen.start(2)]
+    return int(choice[2]), text[: choice.start(2)]
 
 
 def _split_unit(name: str) -> tuple[str, Unit | None]:
@@ -240,7 +250,7 @@ def _compound(word: str) -> tuple[str, ...]:
     best: tuple[str, ...] = ()
     for end in range(len(word), 0, -1):
         head, rest = word[:end], word[end:]
-        if head not in _ROLE or (len(head) == 1 and head not in _SHORT):
+        if head not in _ROLE or (len(head) == 1 and head not in _COMPOUND_LETTERS):
             continue
         if not rest:
             return (head,)
@@ -279,34 +289,34 @@ WIDEST_GAP = 180.0  # [degree] between neighbours of wheels that stand around a 
 FARTHEST_ANGLE = 40.0  # [degree] from its place beyond which a wheel is another one
 
 
-def place_in(words: Sequence[str], known: Collection[str] = ()) -> tuple[float | None, list[str]]:
+def place_in(words: Sequence[str], known_words: Collection[str] = ()) -> tuple[float | None, list[str]]:
     """(the place that the words of a name say, the other words); (None, all words) where they say none or two.
 
-    words: in small letters. known: words that a pair of letters may stand at: "fl" in flspeed or wheelfl.
+    words: in small letters. known_words: words that a pair of letters may stand at: "fl" in flspeed or wheelfl.
     """
     sides: list[str] = []
-    others: list[str] = []
+    words_left: list[str] = []
     for word in words:
-        found, rest = _sides_of(word, known)
-        sides += found
-        others += [rest] if rest else []
+        sides_of_word, rest = _sides_of(word, known_words)
+        sides += sides_of_word
+        words_left += [rest] if rest else []
     lengthwise, crosswise = set(sides) & {_FRONT, _REAR}, set(sides) & {_LEFT, _RIGHT}
     if not sides or len(lengthwise) > 1 or len(crosswise) > 1 or "emf" in words:
         return None, list(words)
     place = ANGLES["".join(lengthwise), "".join(crosswise)]
-    return place, [word for word in others if word not in _MIDDLE]
+    return place, [word for word in words_left if word not in _MIDDLE]
 
 
-def _sides_of(word: str, known: Collection[str]) -> tuple[list[str], str]:
+def _sides_of(word: str, known_words: Collection[str]) -> tuple[list[str], str]:
     """(sides that a word says, what is left of it)."""
     if word in _SIDES:
         return [_SIDES[word]], ""
-    both = re.fullmatch(f"({'|'.join(_SIDES)})({'|'.join(_SIDES)})", word)
-    if both:
-        return [_SIDES[both[1]], _SIDES[both[2]]], ""
-    for pair, rest in ((word[:2], word[2:]), (word[-2:], word[:-2])) if word not in known else ():
+    pair_match = re.fullmatch(f"({'|'.join(_SIDES)})({'|'.join(_SIDES)})", word)
+    if pair_match:
+        return [_SIDES[pair_match[1]], _SIDES[pair_match[2]]], ""
+    for pair, rest in ((word[:2], word[2:]), (word[-2:], word[:-2])) if word not in known_words else ():
         sides = _pair(pair)
-        if sides and (not rest or rest in known):
+        if sides and (not rest or rest in known_words):
             return sides, rest
     return [], word
 
@@ -328,20 +338,20 @@ def wheels_at(places: Collection[float], robot: Robot | None = None) -> dict[flo
     With a robot of as many wheels: the wheel that stands there, where each has its own. Else of three wheels or more
     all around: four in the order front left, front right, rear left, rear right, others counter-clockwise from forward.
     """
-    asked = sorted({*places}, key=lambda place: place % 360.0)
-    gaps = [(after - before) % 360.0 for before, after in zip(asked, [*asked[1:], *asked[:1]], strict=True)]
-    if not MIN_WHEELS <= len(asked) <= MAX_WHEELS or max(gaps) > WIDEST_GAP:
+    angles = sorted({*places}, key=lambda place: place % 360.0)
+    gaps = [(after - before) % 360.0 for before, after in zip(angles, [*angles[1:], *angles[:1]], strict=True)]
+    if not MIN_WHEELS <= len(angles) <= MAX_WHEELS or max(gaps) > WIDEST_GAP:
         return {}
-    if robot is None or robot.wheels.count != len(asked):
-        return {place: k for k, place in enumerate(FOUR if {*asked} == {*FOUR} else asked, 1)}
+    if robot is None or robot.wheels.count != len(angles):
+        return {place: k for k, place in enumerate(FOUR if {*angles} == {*FOUR} else angles, 1)}
     from scipy.optimize import linear_sum_assignment  # imported lazily: 0.1 s that most logs do not need
 
     stand = _angles(robot)
-    apart = np.abs((np.subtract.outer(asked, stand) + 180.0) % 360.0 - 180.0)
+    apart = np.abs((np.subtract.outer(angles, stand) + 180.0) % 360.0 - 180.0)
     rows, wheels = linear_sum_assignment(apart)
     if (apart[rows, wheels] > FARTHEST_ANGLE).any():
         return {}
-    return {asked[row]: int(wheel) + 1 for row, wheel in zip(rows, wheels, strict=True)}
+    return {angles[row]: int(wheel) + 1 for row, wheel in zip(rows, wheels, strict=True)}
 
 
 def _angles(robot: Robot) -> list[float]:

@@ -41,7 +41,7 @@ class Family(NamedTuple):
         return path or "", word.endswith("["), word if of_motor else ""
 
 
-def wheel_numbers(table: Table, names: Iterable[str], found: Guess) -> dict[str, int]:
+def wheel_numbers(table: Table, names: Iterable[str], guess: Guess) -> dict[str, int]:
     """Name -> number of the wheel from 1, of the names with a number or a place; a family from 0 on is shifted.
 
     A family that does not count from 0 itself is shifted with one of its style that does (the current of wheel 0 may
@@ -59,45 +59,51 @@ def wheel_numbers(table: Table, names: Iterable[str], found: Guess) -> dict[str,
                 families.setdefault(family, {})[name] = parts.number
             elif parts.place is not None:
                 placed.setdefault(family, {})[name] = parts.place
-    _leave_out_boards(families, found)
+    _leave_out_boards(families, guess)
     ends: dict[tuple[str, bool, str], int] = {}
-    for family, mine in families.items():
-        if 0 in mine.values():
-            ends[family.style] = max(ends.get(family.style, 0), *mine.values())
+    for family, members in families.items():
+        if 0 in members.values():
+            ends[family.style] = max(ends.get(family.style, 0), *members.values())
     shifted = [
         family
-        for family, mine in families.items()
-        if 0 in mine.values() or max(mine.values()) <= ends.get(family.style, -1)
+        for family, members in families.items()
+        if 0 in members.values() or max(members.values()) <= ends.get(family.style, -1)
     ]
     if shifted:
-        others = sorted({family.letter for family in families if family not in shifted})
-        found.note("wheels_from_zero", from_one=others)
-    numbers = {name: number + (family in shifted) for family, mine in families.items() for name, number in mine.items()}
-    kept = {name: number for name, number in numbers.items() if 0 < number <= MAX_WHEELS}
+        letters = sorted({family.letter for family in families if family not in shifted})
+        guess.note("wheels_from_zero", from_one=letters)
+    numbers = {
+        name: number + (family in shifted) for family, members in families.items() for name, number in members.items()
+    }
+    valid = {name: number for name, number in numbers.items() if 0 < number <= MAX_WHEELS}
     counted = {family.letter for family in families}
-    return kept | _by_place({family: mine for family, mine in placed.items() if family.letter not in counted}, found)
+    return valid | _by_place(
+        {family: members for family, members in placed.items() if family.letter not in counted}, guess
+    )
 
 
-def _by_place(families: Mapping[Family, Mapping[str, float]], found: Guess) -> dict[str, int]:
+def _by_place(families: Mapping[Family, Mapping[str, float]], guess: Guess) -> dict[str, int]:
     """Name -> number of the wheel from 1 at the place in it, of families whose places decide."""
     numbers: dict[str, int] = {}
-    for mine in families.values():
-        wheels = wheels_at(mine.values(), found.robot)
-        numbers |= {name: wheels[place] for name, place in mine.items() if place in wheels}
+    for members in families.values():
+        wheels = wheels_at(members.values(), guess.robot)
+        numbers |= {name: wheels[place] for name, place in members.items() if place in wheels}
     first = {wheel: name for name, wheel in reversed(numbers.items())}
     if first:
-        found.note(BY_PLACES, columns=[first[wheel] for wheel in sorted(first)], wheels=sorted(first))
+        guess.note(BY_PLACES, columns=[first[wheel] for wheel in sorted(first)], wheels=sorted(first))
     return numbers
 
 
-def _leave_out_boards(families: dict[Family, dict[str, int]], found: Guess) -> None:
+def _leave_out_boards(families: dict[Family, dict[str, int]], guess: Guess) -> None:
     """Doubt currents of many more places than there are motors, as of a board: nobody knows which are the motors'."""
-    motors = max((len(mine) for family, mine in families.items() if family.letter != "i"), default=0)
-    boards = [family for family, mine in families.items() if family.letter == "i" and len(mine) >= BOARD * motors > 0]
+    motors = max((len(members) for family, members in families.items() if family.letter != "i"), default=0)
+    boards = [
+        family for family, members in families.items() if family.letter == "i" and len(members) >= BOARD * motors > 0
+    ]
     for family in boards:
-        mine = list(families.pop(family))
-        numbers = {"currents": len(mine), "motors": motors, "first": mine[0]}
-        found.doubts += [doubt(name, "i1", "more_currents", (), **numbers) for name in mine]
+        board_names = list(families.pop(family))
+        numbers = {"currents": len(board_names), "motors": motors, "first": board_names[0]}
+        guess.doubts += [doubt(name, "i1", "more_currents", (), **numbers) for name in board_names]
 
 
 # Which wheel is which, where names do not say: the motion of the body tells, if something else has measured it
@@ -107,18 +113,18 @@ MOST_WHEELS, LEAST_ROWS = 6, 40  # wheels that are tried; rows needed
 CLEAR_LEAD = 0.05  # of the correlation: by so much the best order is better than the next
 
 
-def proposed_wheels(table: Table, names: Sequence[str], found: Guess) -> str:
+def proposed_wheels(table: Table, names: Sequence[str], guess: Guess) -> str:
     """The words of --column that the motion proposes for columns of wheel speeds; "" where it tells nothing.
 
     The speed of each wheel follows from the speed of the body and the robot's geometry; the order and the signs under
     which the columns go along with it best are proposed, never taken by themselves.
     """
-    robot, body = found.robot, [found.columns.get(name) for name in ("vx", "vy", "omega")]
-    if robot is None or len(names) != robot.wheels.count or len(names) > MOST_WHEELS or TIME not in found.columns:
+    robot, body = guess.robot, [guess.columns.get(name) for name in ("vx", "vy", "omega")]
+    if robot is None or len(names) != robot.wheels.count or len(names) > MOST_WHEELS or TIME not in guess.columns:
         return ""
     if any(column is None for column in body):
         return ""
-    t = floats(table.columns[found.columns[TIME].name])
+    t = floats(table.columns[guess.columns[TIME].name])
     twist = np.stack(
         [floats(table.columns[column.name]) * parse_unit(column.unit).size for column in body if column is not None],
         axis=1,
@@ -130,8 +136,8 @@ def proposed_wheels(table: Table, names: Sequence[str], found: Guess) -> str:
     alike = _correlation(wheel_speed(robot.wheels, twist[rows]), columns)
     orders = sorted(permutations(range(len(names))), key=lambda order: -_fit(alike, order))
     best = orders[0]
-    known = min(abs(alike[wheel, column]) for wheel, column in enumerate(best)) > SURE_CORRELATION
-    if not known or (len(orders) > 1 and _fit(alike, best) - _fit(alike, orders[1]) < CLEAR_LEAD):
+    clear_match = min(abs(alike[wheel, column]) for wheel, column in enumerate(best)) > SURE_CORRELATION
+    if not clear_match or (len(orders) > 1 and _fit(alike, best) - _fit(alike, orders[1]) < CLEAR_LEAD):
         return ""
     return ", ".join(
         f"w{wheel + 1}={'-' * bool(alike[wheel, column] < 0.0)}{names[column]}" for wheel, column in enumerate(best)
@@ -140,8 +146,8 @@ def proposed_wheels(table: Table, names: Sequence[str], found: Guess) -> str:
 
 def _at(times: FloatArray, t: FloatArray, values: FloatArray) -> FloatArray:
     """A column at other times, on the line between its own: to compare, never to fit."""
-    known = np.isfinite(values) & np.isfinite(t)
-    return np.interp(times, t[known], values[known]) if known.any() else np.zeros(len(times))
+    finite = np.isfinite(values) & np.isfinite(t)
+    return np.interp(times, t[finite], values[finite]) if finite.any() else np.zeros(len(times))
 
 
 def _correlation(wheels: FloatArray, columns: FloatArray) -> FloatArray:

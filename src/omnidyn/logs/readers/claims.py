@@ -10,7 +10,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.logs.columns.guessed import NO_NUMBER
 from omnidyn.logs.readers.recording import Track
-from omnidyn.logs.table.table import Said
+from omnidyn.logs.table.table import Declaration
 from omnidyn.statement import Statement
 
 USUAL_NAMES = ("odom", "cmd_vel", "joint_states", "battery_state", "data", "pose", "tf")
@@ -36,16 +36,16 @@ class TopicClaim(NamedTuple):
 
 def tracks_of(claims: Sequence[TopicClaim], notes: list[str]) -> Iterator[Track]:
     """The tracks, each component given to one topic; what was passed over goes to `notes`."""
-    wanted: dict[str, list[TopicClaim]] = {}
+    claims_of: dict[str, list[TopicClaim]] = {}
     for claim in claims:
         for out in claim.columns:
             if out.component and not np.isnan(out.values).all():
-                wanted.setdefault(out.component, []).append(claim)
-    owners = {component: _owner(claim) for component, claim in wanted.items()}
-    _say(wanted, owners, notes)
+                claims_of.setdefault(out.component, []).append(claim)
+    owners = {component: _owner(claim) for component, claim in claims_of.items()}
+    _say(claims_of, owners, notes)
     for claim in claims:
         says = {
-            out.name: _said(out, out.component, claim, wanted, owners)
+            out.name: _said(out, out.component, claim, claims_of, owners)
             for out in claim.columns
             if out.component is not None
         }
@@ -57,39 +57,39 @@ def _said(
     out: TopicColumn,
     component: str,
     claim: TopicClaim,
-    wanted: dict[str, list[TopicClaim]],
+    claims_of: dict[str, list[TopicClaim]],
     owners: dict[str, str | None],
-) -> Said:
+) -> Declaration:
     """What a column is; why it is not taken."""
-    if component and component not in wanted:
-        return Said(component, Statement("no_heading_number" if component == "heading" else NO_NUMBER))
+    if component and component not in claims_of:
+        return Declaration(component, Statement("no_heading_number" if component == "heading" else NO_NUMBER))
     if np.isnan(out.values).all():
-        return Said("")
+        return Declaration("")
     owner = owners.get(component)
     if component and owner is None:
-        others = sorted(each.topic for each in wanted[component])[:4]
-        return Said(component, Statement("several_topics", numbers={"topics": others}))
-    return Said(component if owner == claim.topic else "")
+        topics = sorted(rival.topic for rival in claims_of[component])[:4]
+        return Declaration(component, Statement("several_topics", numbers={"topics": topics}))
+    return Declaration(component if owner == claim.topic else "")
 
 
 def _owner(claims: Sequence[TopicClaim]) -> str | None:
     """The topic that gives a component: of the least rank, and of those the one with a usual name; None where two."""
-    least = min(claim.rank for claim in claims)
-    topics = [claim.topic for claim in claims if claim.rank == least]
+    least_rank = min(claim.rank for claim in claims)
+    topics = [claim.topic for claim in claims if claim.rank == least_rank]
     if len(topics) > 1:
         topics = [topic for topic in topics if topic.rpartition("/")[2] in USUAL_NAMES] or topics
     return topics[0] if len(topics) == 1 else None
 
 
-def _say(wanted: dict[str, list[TopicClaim]], owners: dict[str, str | None], notes: list[str]) -> None:
+def _say(claims_of: dict[str, list[TopicClaim]], owners: dict[str, str | None], notes: list[str]) -> None:
     """Which topics give the same as another, and are not taken."""
-    passed: dict[tuple[str, str], list[str]] = {}
-    for component, claims in wanted.items():
+    yielded: dict[tuple[str, str], list[str]] = {}
+    for component, claims in claims_of.items():
         owner = owners[component]
         for claim in claims:
             if owner is not None and claim.topic != owner:
-                passed.setdefault((claim.topic, owner), []).append(component)
+                yielded.setdefault((claim.topic, owner), []).append(component)
     notes += [
         f"{', '.join(components)} of {topic} are not taken: {owner} gives them (`column` takes others)"
-        for (topic, owner), components in passed.items()
+        for (topic, owner), components in yielded.items()
     ]

@@ -32,15 +32,15 @@ def is_log_folder(path: str | os.PathLike) -> bool:
 
 def log_folders(path: str | os.PathLike) -> list[Path]:
     """The folders below a path that are one log each."""
-    found = [file.parent for file in Path(path).rglob(METADATA)]
-    found += [file.parent.parent for file in Path(path).rglob("info.json") if file.parent.name == "meta"]
-    return [folder for folder in found if is_log_folder(folder)]
+    folders = [file.parent for file in Path(path).rglob(METADATA)]
+    folders += [file.parent.parent for file in Path(path).rglob("info.json") if file.parent.name == "meta"]
+    return [folder for folder in folders if is_log_folder(folder)]
 
 
 def data_files(folder: Path) -> list[Path]:
     """The files of the rows of a dataset, in their order."""
-    found = [file for file in (folder / "data").rglob("*.parquet") if file.is_file()]
-    return sorted(found, key=lambda file: natural(str(file)))
+    files = [file for file in (folder / "data").rglob("*.parquet") if file.is_file()]
+    return sorted(files, key=lambda file: natural(str(file)))
 
 
 def files_of(path: str | os.PathLike) -> list[Path]:
@@ -51,8 +51,8 @@ def files_of(path: str | os.PathLike) -> list[Path]:
 
 
 def _files(folder: Path) -> list[Path]:
-    found = [file for file in folder.iterdir() if file.name.lower().endswith(BAG_SUFFIXES) and file.is_file()]
-    return sorted(found, key=lambda each: natural(each.name))
+    files = [file for file in folder.iterdir() if file.name.lower().endswith(BAG_SUFFIXES) and file.is_file()]
+    return sorted(files, key=lambda file: natural(file.name))
 
 
 def natural(name: str) -> list[tuple[int, str]]:

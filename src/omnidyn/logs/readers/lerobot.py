@@ -34,7 +34,7 @@ from omnidyn.logs.readers.parquet import (
 from omnidyn.logs.readers.parquet_pages import declared_bytes
 from omnidyn.logs.readers.reader import Reader, ReadOptions
 from omnidyn.logs.table.rows import refuse_infinite
-from omnidyn.logs.table.table import MAX_CELLS, Said, Table
+from omnidyn.logs.table.table import MAX_CELLS, Declaration, Table
 from omnidyn.progress import Report
 
 ACTION, STATE = "action", "observation.state"
@@ -45,7 +45,7 @@ BETWEEN = 10.0  # [s] that a gap between two episodes is given
 ABOVE = 3  # folders between a file and that of its dataset
 
 
-class _Clock:
+class _EpisodeClock:
     """Time over episodes, each of which counts its own from 0; what comes next lies BETWEEN behind."""
 
     def __init__(self) -> None:
@@ -105,18 +105,18 @@ def _info(path: Path) -> Mapping[str, Any] | None:
     if file is None:
         return None
     try:
-        found = json.loads(read_text(file, MAX_INFO))
+        content = json.loads(read_text(file, MAX_INFO))
     except (ValueError, RecursionError):
-        found = None
-    if not isinstance(found, dict) or not isinstance(found.get("features"), dict):
+        content = None
+    if not isinstance(content, dict) or not isinstance(content.get("features"), dict):
         raise InputError("not the description of a dataset", got=INFO, expected='JSON with "features"', where=str(file))
-    return found
+    return content
 
 
 def _names_of(info: Mapping[str, Any], feature: str) -> list[str]:
     """The names of the numbers of a feature: a list, or a list under one key, as older versions write it."""
-    own = info["features"].get(feature)
-    names = own.get("names") if isinstance(own, dict) else None
+    description = info["features"].get(feature)
+    names = description.get("names") if isinstance(description, dict) else None
     if isinstance(names, dict) and len(names) == 1:
         (names,) = names.values()
     return [str(name) for name in names] if isinstance(names, list) else []
@@ -126,29 +126,30 @@ def _dataset_tables(
     files: Sequence[Path], names: Mapping[str, list[str]], source: str, rows: int, options: ReadOptions
 ) -> Iterator[Table]:
     """The tables of the files of a dataset, one after the other."""
-    found = {
-        f"{feature}.{name}": (feature, own.index(name), component, unit)
-        for feature, own in names.items()
+    columns_of = {
+        f"{feature}.{name}": (feature, feature_names.index(name), component, unit)
+        for feature, feature_names in names.items()
         for name, (component, unit) in SPEEDS.items()
-        if name in own
+        if name in feature_names
     }
-    if not found:
-        every = [name for own in names.values() for name in own]
+    if not columns_of:
+        all_names = [name for feature_names in names.values() for name in feature_names]
         raise InputError(
             "no speeds of a base in the dataset",
-            got=shortened(", ".join(dict.fromkeys(every)) or "no names", 200),
+            got=shortened(", ".join(dict.fromkeys(all_names)) or "no names", 200),
             expected=f"{', '.join(SPEEDS)} in {ACTION} or {STATE}",
             where=source,
         )
-    units = {STAMP: "s"} | {column: unit for column, (*_, unit) in found.items()}
-    says = {STAMP: Said("t")} | {
-        column: Said(component + "_cmd" * (feature == ACTION)) for column, (feature, _, component, _) in found.items()
+    units = {STAMP: "s"} | {column: unit for column, (*_, unit) in columns_of.items()}
+    says = {STAMP: Declaration("t")} | {
+        column: Declaration(component + "_cmd" * (feature == ACTION))
+        for column, (feature, _, component, _) in columns_of.items()
     }
-    others = dict.fromkeys(name for own in names.values() for name in own if name not in SPEEDS)
-    clock, done, digests = _Clock(), 0, list[str]()
+    unread = dict.fromkeys(name for feature_names in names.values() for name in feature_names if name not in SPEEDS)
+    clock, row_count, digests = _EpisodeClock(), 0, list[str]()
 
     def table(columns: Mapping[str, FloatArray], lines: IntArray, sha256: str = "") -> Table:
-        notes = _notes(len(clock.shifts), list(others)) if sha256 else ()
+        notes = _notes(len(clock.shifts), list(unread)) if sha256 else ()
         begins = tuple(int(lines[row]) for row in clock.begins) if columns else ()
         return Table(tuple(units), dict(columns), lines, units, source, sha256, notes, {}, says, begins=begins)
 
@@ -158,20 +159,20 @@ def _dataset_tables(
                 digests.append(digest)
                 continue
             columns = {STAMP: clock.times(part[STAMP], part[EPISODE])}
-            for column, (feature, place, _, _) in found.items():
-                columns[column] = _place(part[feature], place, len(names[feature]), str(file), done)
-            lines = np.arange(done + 1, done + 1 + len(columns[STAMP]))
+            for column, (feature, place, _, _) in columns_of.items():
+                columns[column] = _place(part[feature], place, len(names[feature]), str(file), row_count)
+            lines = np.arange(row_count + 1, row_count + 1 + len(columns[STAMP]))
             refuse_infinite(columns, lines, source)
-            done += len(lines)
+            row_count += len(lines)
             yield table(columns, lines)
-    whole = digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
-    yield table({}, np.zeros(0, dtype=np.int64), whole)
+    total_digest = digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
+    yield table({}, np.zeros(0, dtype=np.int64), total_digest)
 
 
-def _notes(episodes: int, others: list[str]) -> tuple[str, ...]:
+def _notes(episodes: int, unread: list[str]) -> tuple[str, ...]:
     many = f"{episodes} episodes are recordings of their own: a gap of {BETWEEN:g} s is put before each"
-    left = f"not speeds of the base, and not read: {shortened(', '.join(others), 200)}"
-    return (*([many] if episodes > 1 else []), *([left] if others else []))
+    note = f"not speeds of the base, and not read: {shortened(', '.join(unread), 200)}"
+    return (*([many] if episodes > 1 else []), *([note] if unread else []))
 
 
 def _parts(
@@ -186,21 +187,25 @@ def _parts(
         with damage(pyarrow, source):
             data = parquet.ParquetFile(stream, pre_buffer=False, page_checksum_verification=True)
             pages, present = declared_bytes(stream), set(data.schema_arrow.names)
-        lost = [name for name in (STAMP, *features) if name not in present]
-        if lost:
+        absent = [name for name in (STAMP, *features) if name not in present]
+        if absent:
             raise InputError(
                 "a file of a dataset without its columns",
-                got=f"no {', '.join(lost)}",
+                got=f"no {', '.join(absent)}",
                 where=source,
                 expected=", ".join((STAMP, EPISODE, *features)),
             )
         check_size(data.metadata, pages, count, size, options.max_bytes, source)
-        chosen = [name for name in (STAMP, EPISODE, *features) if name in present]
-        for done, batch in batches_of(pyarrow, data, max(1, min(rows, MAX_CELLS // count)), source, chosen):
+        wanted_columns = [name for name in (STAMP, EPISODE, *features) if name in present]
+        for row_count, batch in batches_of(
+            pyarrow, data, max(1, min(rows, MAX_CELLS // count)), source, wanted_columns
+        ):
             with damage(pyarrow, source):
-                part = {name: _numbers(batch.column(name)) for name in chosen}
+                part = {name: _numbers(batch.column(name)) for name in wanted_columns}
             part.setdefault(EPISODE, np.zeros(batch.num_rows))
-            options.progress(Report("reading", size * (done + batch.num_rows) // max(1, data.metadata.num_rows), size))
+            options.progress(
+                Report("reading", size * (row_count + batch.num_rows) // max(1, data.metadata.num_rows), size)
+            )
             yield part, ""
     yield {}, digest
 
@@ -209,16 +214,16 @@ def _numbers(array: Any) -> FloatArray:
     """Numbers, or lists of numbers as they follow on one another, NaN where missing. Shape (rows,) or (numbers,)."""
     if hasattr(array, "flatten") and "list" in str(array.type):
         array = array.flatten()
-    missing = missing_of(array)
-    return np.where(missing, np.nan, numbers_of(array.cast("float64", safe=False)))
+    blank = missing_of(array)
+    return np.where(blank, np.nan, numbers_of(array.cast("float64", safe=False)))
 
 
-def _place(values: FloatArray, place: int, count: int, source: str, done: int) -> FloatArray:
+def _place(values: FloatArray, place: int, count: int, source: str, first_row: int) -> FloatArray:
     """One of `count` numbers of each row. Raises InputError for rows that hold more or fewer."""
     if count == 0 or len(values) % count:
         raise InputError(
             "rows without all numbers of a feature",
-            got=f"{len(values)} numbers from row {done + 1} on",
+            got=f"{len(values)} numbers from row {first_row + 1} on",
             expected=f"{count} in each row, as meta/info.json names them",
             where=source,
         )

@@ -90,15 +90,17 @@ def parquet_tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> 
             notes = (*reader.notes, *(growth(stream, size) if sha256 else ()))
             return Table(columns.names, values, lines, columns.units, source, sha256, notes, columns.titles)
 
-        for done, batch in batches_of(pyarrow, file, max(1, min(rows, MAX_CELLS // len(columns.names))), source):
+        for row_count, batch in batches_of(pyarrow, file, max(1, min(rows, MAX_CELLS // len(columns.names))), source):
             with damage(pyarrow, source):
-                values, lines = reader.read(batch, done)
-            options.progress(Report("reading", size * (done + batch.num_rows) // max(1, file.metadata.num_rows), size))
+                values, lines = reader.read(batch, row_count)
+            options.progress(
+                Report("reading", size * (row_count + batch.num_rows) // max(1, file.metadata.num_rows), size)
+            )
             yield table(values, lines)
         yield table({}, np.zeros(0, dtype=np.int64), digest)
 
 
-def _opened(pyarrow: Any, parquet: Any, stream: BinaryIO, source: str) -> tuple[Any, _Columns]:
+def _opened(pyarrow: Any, parquet: Any, stream: BinaryIO, source: str) -> tuple[Any, _ParquetColumns]:
     """The file and its columns. Words stay a dictionary and indices: a long word repeated often takes no memory."""
     options = {
         "page_checksum_verification": True,
@@ -108,7 +110,7 @@ def _opened(pyarrow: Any, parquet: Any, stream: BinaryIO, source: str) -> tuple[
         "thrift_container_size_limit": MAX_THRIFT_ITEMS,
     }
     file = parquet.ParquetFile(stream, **options)
-    columns = _Columns(pyarrow, file.schema_arrow, source)
+    columns = _ParquetColumns(pyarrow, file.schema_arrow, source)
     words = [name for name, kind in zip(columns.raw, columns.kinds, strict=True) if kind == WORDS]
     return parquet.ParquetFile(stream, read_dictionary=words, **options), columns
 
@@ -135,7 +137,7 @@ def batches_of(
     pyarrow: Any, file: Any, rows: int, source: str, columns: list[str] | None = None
 ) -> Iterator[tuple[int, Any]]:
     """Blocks of the file, of all its columns or some, and how many rows stand before each."""
-    done = 0
+    row_count = 0
     with damage(pyarrow, source):
         batches = iter(file.iter_batches(batch_size=rows, use_threads=False, columns=columns))
     while True:
@@ -143,8 +145,8 @@ def batches_of(
             batch = next(batches, None)
         if batch is None:
             return
-        yield done, batch
-        done += batch.num_rows
+        yield row_count, batch
+        row_count += batch.num_rows
 
 
 @contextlib.contextmanager
@@ -170,7 +172,7 @@ def sha256_of(stream: BinaryIO, size: int) -> str:
     return digest.hexdigest()
 
 
-class _Columns:
+class _ParquetColumns:
     """What the columns of a file are: `raw` names in the file, `names` without units, `kinds`, units and titles.
 
     Raises InputError for nested columns, raw bytes, blank or repeated names, and too many columns.
@@ -201,11 +203,13 @@ class _Columns:
         self.notes = [f"{', '.join(moments)}: moments were read as seconds since 1970 (UTC)"] if moments else []
 
     def _refuse(self, schema: Any, source: str) -> None:
-        bad = [f"{field.name} ({field.type})" for field, kind in zip(schema, self.kinds, strict=True) if not kind]
-        if bad:
+        bad_columns = [
+            f"{field.name} ({field.type})" for field, kind in zip(schema, self.kinds, strict=True) if not kind
+        ]
+        if bad_columns:
             raise InputError(
-                f"{'columns' if len(bad) > 1 else 'a column'} that hold no single numbers or words",
-                got=", ".join(bad),
+                f"{'columns' if len(bad_columns) > 1 else 'a column'} that hold no single numbers or words",
+                got=", ".join(bad_columns),
                 expected="plain columns, one for each wheel or axis",
                 remedy="write each component as a column of its own",
                 where=source,
@@ -238,7 +242,7 @@ def _kind(types: Any, kind: Any) -> str:
 class _RowGroups:
     """Batches into columns of floats and words."""
 
-    def __init__(self, columns: _Columns, source: str, skip: bool):
+    def __init__(self, columns: _ParquetColumns, source: str, skip: bool):
         self.columns, self.source, self.skip = columns, source, skip
         self.rounded: set[str] = set()
         self.skipped: list[int] = []
@@ -250,23 +254,23 @@ class _RowGroups:
         rounded = [f"{name}: whole numbers beyond 2^53 were rounded" for name in sorted(self.rounded)]
         return (*self.columns.notes, *rounded, *([skip_note(INFINITE, self.skipped)] if self.skipped else []))
 
-    def read(self, batch: Any, done: int) -> tuple[dict[str, Column], Any]:
+    def read(self, batch: Any, row_count: int) -> tuple[dict[str, Column], Any]:
         """Columns and numbers of the rows, counted from 1. Raises InputError for an infinite number."""
         columns = {
             name: self._column(name, kind, array)
             for name, kind, array in zip(self.columns.names, self.columns.kinds, batch.columns, strict=True)
         }
-        lines = np.arange(done + 1, done + 1 + batch.num_rows)
+        lines = np.arange(row_count + 1, row_count + 1 + batch.num_rows)
         if not self.skip:
             refuse_infinite(columns, lines, self.source)
             return columns, lines
-        good = np.ones(len(lines), dtype=bool)
+        finite = np.ones(len(lines), dtype=bool)
         for column in columns.values():
-            good &= True if isinstance(column, tuple) else ~np.isinf(column)
-        if good.all():
+            finite &= True if isinstance(column, tuple) else ~np.isinf(column)
+        if finite.all():
             return columns, lines
-        self.skipped += lines[~good].tolist()
-        return {name: _where(column, good) for name, column in columns.items()}, lines[good]
+        self.skipped += lines[~finite].tolist()
+        return {name: _where(column, finite) for name, column in columns.items()}, lines[finite]
 
     def _column(self, name: str, kind: str, array: Any) -> Column:
         if hasattr(array, "dictionary"):
@@ -278,14 +282,14 @@ class _RowGroups:
             return column
         if hasattr(array, "dictionary_decode"):
             array = array.dictionary_decode()
-        missing = missing_of(array)
+        blank = missing_of(array)
         if kind in (MOMENT, DURATION, DAY):
-            return np.where(missing, np.nan, _seconds(array))
+            return np.where(blank, np.nan, _seconds(array))
         if str(array.type) in ("int64", "uint64") and not _is_exact(_whole(array)).all():
             self.rounded.add(name)
         if kind == TRUTH:
             array = array.cast("int8")
-        return np.where(missing, np.nan, numbers_of(array.cast("float64", safe=False)))
+        return np.where(blank, np.nan, numbers_of(array.cast("float64", safe=False)))
 
 
 def _whole(array: Any) -> Any:
@@ -303,8 +307,12 @@ def numbers_of(array: Any) -> Any:
     return np.frombuffer(array.buffers()[1], dtype=str(array.type).replace("double", "float64"))[start:stop]
 
 
-def _is_exact(whole: Any) -> Any:
-    return (whole <= EXACT_WHOLE) & (whole >= -EXACT_WHOLE) if whole.dtype.kind == "i" else whole <= EXACT_WHOLE
+def _is_exact(integers: Any) -> Any:
+    return (
+        (integers <= EXACT_WHOLE) & (integers >= -EXACT_WHOLE)
+        if integers.dtype.kind == "i"
+        else integers <= EXACT_WHOLE
+    )
 
 
 def _seconds(array: Any) -> FloatArray:
@@ -321,8 +329,8 @@ def _seconds(array: Any) -> FloatArray:
 def _words(array: Any, before: bool) -> Column:
     """Words, or the numbers that are all they hold, as in a CSV file; words where an earlier block held some."""
     if hasattr(array, "dictionary"):
-        known = [word or "" for word in array.dictionary.to_pylist()]
-        cells = ["" if k is None else known[k] for k in array.indices.to_pylist()]
+        vocabulary = [word or "" for word in array.dictionary.to_pylist()]
+        cells = ["" if k is None else vocabulary[k] for k in array.indices.to_pylist()]
     else:
         cells = [word or "" for word in array.to_pylist()]
     return tuple(cells) if before else column_of([cell.strip() for cell in cells])
@@ -330,5 +338,5 @@ def _words(array: Any, before: bool) -> Column:
 
 def _where(column: Column, keep: Any) -> Column:
     if isinstance(column, tuple):
-        return tuple(cell for cell, good in zip(column, keep, strict=True) if good)
+        return tuple(cell for cell, is_kept in zip(column, keep, strict=True) if is_kept)
     return column[keep]

@@ -46,7 +46,7 @@ class Reader(NamedTuple):
     variables: bool = False
 
 
-def completed(tables: Iterable[Table], least: str) -> Iterator[Table]:
+def completed(tables: Iterable[Table], minimum: str) -> Iterator[Table]:
     """The tables that have rows, each once the next one is there: so the last of them has the hash and all notes."""
     waiting: Table | None = None
     table = None
@@ -56,5 +56,5 @@ def completed(tables: Iterable[Table], least: str) -> Iterator[Table]:
                 yield waiting
             waiting = table
     if waiting is None:
-        raise InputError("no rows", got="0 samples", expected=least, where=table.source if table is not None else "")
+        raise InputError("no rows", got="0 samples", expected=minimum, where=table.source if table is not None else "")
     yield replace(waiting, sha256=table.sha256, notes=table.notes)  # type: ignore[union-attr]

@@ -14,7 +14,7 @@ from omnidyn.logs.clock.stamps import astray
 from omnidyn.logs.table.dialect import MAX_NAME
 from omnidyn.logs.table.header import MAX_COLUMNS
 from omnidyn.logs.table.rows import Column, refuse_infinite
-from omnidyn.logs.table.table import MAX_CELLS, Said, Table
+from omnidyn.logs.table.table import MAX_CELLS, Declaration, Table
 
 TIME_COLUMN = "t_s"
 DAY_NS = 86_400 * 10**9
@@ -49,7 +49,7 @@ class Track:
     stamps: IntArray
     columns: dict[str, FloatArray]
     units: dict[str, str] = field(default_factory=dict)
-    says: dict[str, Said] = field(default_factory=dict)
+    says: dict[str, Declaration] = field(default_factory=dict)
 
     def in_order(self) -> Track:
         """The same by stamps; those of one stamp in their order."""
@@ -79,8 +79,8 @@ class Recording:
 
         Raises InputError where no topic holds numbers.
         """
-        named = self._without_strays(self._named())
-        tracks = [track.in_order() for track in named if len(track.stamps) and track.columns]
+        named_tracks = self._without_strays(self._named())
+        tracks = [track.in_order() for track in named_tracks if len(track.stamps) and track.columns]
         names = (TIME_COLUMN, *(name for track in tracks for name in track.columns))
         if not tracks:
             raise self._nothing()
@@ -93,7 +93,9 @@ class Recording:
                 remedy="record fewer topics, or cut it with `ros2 bag convert`",
             )
         units = {TIME_COLUMN: "s"} | {name: unit for track in tracks for name, unit in track.units.items()}
-        says = {TIME_COLUMN: Said("t")} | {name: said for track in tracks for name, said in track.says.items()}
+        says = {TIME_COLUMN: Declaration("t")} | {
+            name: declaration for track in tracks for name, declaration in track.says.items()
+        }
         first, start = min(int(track.stamps[0]) for track in tracks), 0
         notes = tuple(self.notes)
         if first >= EPOCH_NS:
@@ -101,24 +103,28 @@ class Recording:
             moment = np.datetime64(start, "ns").astype("datetime64[ms]")
             notes = (*notes, f"time begins at 0 with the first stamp, {moment} UTC")
         rest = (units, self.source)
-        own, done = len(tracks) > 1, 0
+        several_clocks, row_count = len(tracks) > 1, 0
         for stamps, columns in _blocks(tracks, max(1, min(rows, MAX_CELLS // len(names)))):
-            lines = np.arange(done + 1, done + 1 + len(stamps))
-            done += len(stamps)
+            lines = np.arange(row_count + 1, row_count + 1 + len(stamps))
+            row_count += len(stamps)
             block: dict[str, Column] = {TIME_COLUMN: (stamps - start) / 1e9, **columns}
             refuse_infinite(block, lines, self.source)
-            yield Table(names, block, lines, *rest, "", notes, says=says, own_clocks=own)
-        yield Table(names, {}, np.zeros(0, dtype=np.int64), *rest, self.sha256, notes, says=says, own_clocks=own)
+            yield Table(names, block, lines, *rest, "", notes, says=says, own_clocks=several_clocks)
+        yield Table(
+            names, {}, np.zeros(0, dtype=np.int64), *rest, self.sha256, notes, says=says, own_clocks=several_clocks
+        )
 
     def _without_strays(self, tracks: list[Track]) -> list[Track]:
         """The tracks without single stamps far from all others."""
         stamps = np.concatenate([track.stamps for track in tracks] or [np.zeros(0, dtype=np.int64)])
-        bad = astray(stamps, DAY_NS)
-        if not bad.any():
+        stray = astray(stamps, DAY_NS)
+        if not stray.any():
             return tracks
-        parts = np.split(bad, np.cumsum([len(track.stamps) for track in tracks])[:-1])
+        parts = np.split(stray, np.cumsum([len(track.stamps) for track in tracks])[:-1])
         topic = next(track.topic for track, part in zip(tracks, parts, strict=True) if part.any())
-        left_out = LeftOut(int(bad.sum()), f"a time of {stamps[bad][0] / 1e9:.9g} s in {topic}, far from all others")
+        left_out = LeftOut(
+            int(stray.sum()), f"a time of {stamps[stray][0] / 1e9:.9g} s in {topic}, far from all others"
+        )
         self.notes += left_out.notes
         return [track.rows(~part) for track, part in zip(tracks, parts, strict=True)]
 
@@ -132,10 +138,10 @@ class Recording:
         return [track for track in self.tracks if longest[id(track)] <= MAX_NAME]
 
     def _nothing(self) -> InputError:
-        told = [f"{topic.name} ({topic.type}, {topic.count})" for topic in self.topics if topic.count]
+        topic_words = [f"{topic.name} ({topic.type}, {topic.count})" for topic in self.topics if topic.count]
         return InputError(
             "no topic holds numbers that can be read",
-            got=shortened(", ".join(told), 400) or "no messages",
+            got=shortened(", ".join(topic_words), 400) or "no messages",
             expected="JointState, Odometry, Twist, BatteryState, Imu or messages with plain numbers",
             remedy="record the topics of wheels and commands too",
             where=self.source,
@@ -162,37 +168,37 @@ def _stamps(tracks: Sequence[Track]) -> IntArray:
     return np.repeat(stamps, counts)
 
 
-def _blocks(tracks: Sequence[Track], most: int) -> Iterator[tuple[IntArray, dict[str, FloatArray]]]:
-    """(stamps [ns] of at most `most` rows, the columns in them), block by block; each topic's stamps are in order.
+def _blocks(tracks: Sequence[Track], block_rows: int) -> Iterator[tuple[IntArray, dict[str, FloatArray]]]:
+    """(stamps [ns] of at most `block_rows` rows, the columns in them), block by block; stamps of a topic are in order.
 
     A block is a stretch of time, so that no more than a block is ever put together.
     """
-    done = [0] * len(tracks)
-    while any(at < len(track.stamps) for at, track in zip(done, tracks, strict=True)):
-        until = _until(tracks, done, most)
+    positions = [0] * len(tracks)
+    while any(at < len(track.stamps) for at, track in zip(positions, tracks, strict=True)):
+        until = _until(tracks, positions, block_rows)
         ends = [int(np.searchsorted(track.stamps, until, side="right")) for track in tracks]
         parts = [
             Track(track.topic, track.stamps[a:b], {name: values[a:b] for name, values in track.columns.items()})
-            for a, b, track in zip(done, ends, tracks, strict=True)
+            for a, b, track in zip(positions, ends, tracks, strict=True)
         ]
-        done, stamps = ends, _stamps(parts)
+        positions, stamps = ends, _stamps(parts)
         rows = [np.searchsorted(stamps, part.stamps) + _repeats(part.stamps) for part in parts]
-        for first in range(0, len(stamps), most):  # one stamp may have more messages than a block has rows
+        for first in range(0, len(stamps), block_rows):  # one stamp may have more messages than a block has rows
             columns: dict[str, FloatArray] = {}
-            for part, mine in zip(parts, rows, strict=True):
-                columns |= _placed(part, mine, first, min(most, len(stamps) - first))
-            yield stamps[first : first + most], columns
+            for part, track_rows in zip(parts, rows, strict=True):
+                columns |= _placed(part, track_rows, first, min(block_rows, len(stamps) - first))
+            yield stamps[first : first + block_rows], columns
 
 
-def _until(tracks: Sequence[Track], done: Sequence[int], most: int) -> int:
-    """The latest stamp [ns] up to which all topics have at most `most` messages more; the next one at least."""
-    ahead = [track.stamps[at : at + most + 1] for at, track in zip(done, tracks, strict=True)]
+def _until(tracks: Sequence[Track], positions: Sequence[int], block_rows: int) -> int:
+    """The latest stamp [ns] up to which all topics have at most `block_rows` messages more; the next one at least."""
+    ahead = [track.stamps[at : at + block_rows + 1] for at, track in zip(positions, tracks, strict=True)]
     ahead = [stamps for stamps in ahead if len(stamps)]
     low, high = min(int(stamps[0]) for stamps in ahead), max(int(stamps[-1]) for stamps in ahead)
     while low < high:
         middle = (low + high + 1) // 2
         count = sum(int(np.searchsorted(stamps, middle, side="right")) for stamps in ahead)
-        low, high = (middle, high) if count <= most else (low, middle - 1)
+        low, high = (middle, high) if count <= block_rows else (low, middle - 1)
     return low
 
 
@@ -207,7 +213,7 @@ def _placed(track: Track, rows: IntArray, first: int, count: int) -> Mapping[str
     return placed
 
 
-def topic_of(name: str, kind: str, stamps: IntArray, read: bool = False, why: str = "") -> Topic:
+def topic_of(name: str, kind: str, stamps: IntArray, read: bool = False, reason: str = "") -> Topic:
     """A Topic with its rate and gaps. stamps [ns]."""
     steps = np.diff(stamps)
     if (steps < 0).any():
@@ -215,7 +221,7 @@ def topic_of(name: str, kind: str, stamps: IntArray, read: bool = False, why: st
     longest = int(steps.max(initial=0)) / 1e9
     positive = steps if len(steps) and steps.min() > 0 else steps[steps > 0]
     rate = 1e9 / float(np.median(positive, overwrite_input=True)) if positive.size else 0.0
-    return Topic(shortened(name, MAX_NAME), kind, len(stamps), rate, longest, read, why)
+    return Topic(shortened(name, MAX_NAME), kind, len(stamps), rate, longest, read, reason)
 
 
 # Records that are whole and cannot be used, one by one: each costs itself, not what follows
@@ -227,10 +233,10 @@ class LeftOut:
     def __init__(self, count: int = 0, first: str = "") -> None:
         self.count, self.first = count, first
 
-    def add(self, why: str) -> None:
+    def add(self, reason: str) -> None:
         """One more."""
         self.count += 1
-        self.first = self.first or why
+        self.first = self.first or reason
 
     @property
     def notes(self) -> list[str]:

@@ -65,13 +65,17 @@ def _as_they_stand(path: str | os.PathLike, rows: int, options: ReadOptions) -> 
     rows_of_head = [text for number, text in head if number >= layout.first and not dialect.is_comment(text)]
     sample = rows_of_head[: dialect.SAMPLE_ROWS]
     parser = RowParser(layout, file.source, options.skip_bad_rows, sample)
-    most = max(1, min(rows, MAX_CELLS // len(layout.names)))
+    block_rows = max(1, min(rows, MAX_CELLS // len(layout.names)))
 
     def table(columns: dict[str, Column], lines: IntArray, sha256: str = "") -> Table:
         notes = (*layout.notes, *file.notes, *parser.notes)
         return Table(layout.names, columns, lines, layout.units, file.source, sha256, notes, layout.titles)
 
-    pieces = (TextBlock(first + k, texts[k : k + most]) for first, texts in blocks for k in range(0, len(texts), most))
+    pieces = (
+        TextBlock(first + k, texts[k : k + block_rows])
+        for first, texts in blocks
+        for k in range(0, len(texts), block_rows)
+    )
     for block in pieces:
         texts, lines = _kept(block, layout.first)
         if texts and file.ends_open and lines[-1] == file.last and _is_cut(texts[-1], layout):
@@ -92,7 +96,7 @@ def _head(blocks: Iterator[TextBlock]) -> tuple[list[FileLine], Iterator[TextBlo
     Blank lines, all comments of a run but its last two, and blocks of nothing else are let go of: a file may begin
     with more of them than fit into memory.
     """
-    taken: list[TextBlock] = []
+    head_blocks: list[TextBlock] = []
     lines: list[FileLine] = []
     rows = comments = 0
     for block in blocks:
@@ -106,10 +110,10 @@ def _head(blocks: Iterator[TextBlock]) -> tuple[list[FileLine], Iterator[TextBlo
             if comments > KEPT_COMMENTS:
                 del lines[-1 - KEPT_COMMENTS]
             if rows > HEAD_ROWS:
-                return lines, chain([*taken, block], blocks)
+                return lines, chain([*head_blocks, block], blocks)
         if rows > before:
-            taken.append(block)
-    return lines, iter(taken)
+            head_blocks.append(block)
+    return lines, iter(head_blocks)
 
 
 def _tabbed(blocks: Iterable[TextBlock]) -> Iterator[TextBlock]:
@@ -121,9 +125,9 @@ def _kept(block: TextBlock, first: int) -> tuple[list[str], IntArray]:
     """The rows in a block, without blank lines, comments and what stands above line `first`; and their lines."""
     begin = max(0, first - block.first)
     lines = block.lines[begin:]
-    kept = [k for k, line in enumerate(lines) if line and not line.isspace() and not dialect.is_comment(line)]
-    texts = lines if len(kept) == len(lines) else [lines[k] for k in kept]
-    return texts, np.array(kept, dtype=np.int64) + (block.first + begin)
+    indices = [k for k, line in enumerate(lines) if line and not line.isspace() and not dialect.is_comment(line)]
+    texts = lines if len(indices) == len(lines) else [lines[k] for k in indices]
+    return texts, np.array(indices, dtype=np.int64) + (block.first + begin)
 
 
 def _is_cut(text: str, layout: Layout) -> bool:
@@ -157,7 +161,7 @@ def recording_of(tables: Iterable[Table], max_bytes: int) -> Recording:
     """The topics of a list; times are in seconds. Raises InputError for a time that is none, or for too many values."""
     stamps: dict[str, array] = {}
     values: dict[str, array] = {}
-    table, words, held = None, set(), 0
+    table, words, held_bytes = None, set(), 0
     for table in tables:
         if not len(table):  # the last one, with the hash
             continue
@@ -166,8 +170,8 @@ def recording_of(tables: Iterable[Table], max_bytes: int) -> Recording:
         beyond = np.flatnonzero(np.abs(seconds) > LATEST)
         if beyond.size:
             raise table.fault(int(beyond[0]), table.names[0], "a time beyond all clocks", float(seconds[beyond[0]]))
-        held += 16 * len(time)
-        if held > max_bytes:
+        held_bytes += 16 * len(time)
+        if held_bytes > max_bytes:
             raise too_large(table.source, max_bytes, TOO_LARGE_REMEDY)
         for k, (key, stamp) in enumerate(zip(keys, np.rint(seconds * 1e9).astype(np.int64).tolist(), strict=True)):
             number = _number(cells, k)
@@ -185,11 +189,13 @@ def recording_of(tables: Iterable[Table], max_bytes: int) -> Recording:
             stamps.setdefault(str(key), array("q")).append(stamp)
             values.setdefault(str(key), array("d")).append(number)
     assert table is not None
-    tracks = [Track(key, np.array(stamps[key], dtype=np.int64), {key: np.array(mine)}) for key, mine in values.items()]
+    tracks = [
+        Track(key, np.array(stamps[key], dtype=np.int64), {key: np.array(numbers)}) for key, numbers in values.items()
+    ]
     topics = [topic_of(track.topic, "numbers", track.stamps, True) for track in tracks]
-    lost = sorted(words - set(stamps))
+    word_keys = sorted(words - set(stamps))
     notes = [*table.notes, "a row for every value: each key is a topic with times of its own"]
-    notes += [f"words are not read: {', '.join(lost[:8])}"] if lost else []
+    notes += [f"words are not read: {', '.join(word_keys[:8])}"] if word_keys else []
     return Recording(tracks, topics, table.source, table.sha256, notes)
 
 
@@ -200,7 +206,7 @@ def _number(cells: Column, row: int) -> float | None:
         return float(cell)
     if cell.lower() in TRUTH:
         return TRUTH[cell.lower()]
-    return dialect.to_float(cell) if dialect.NUMBER.fullmatch(cell) or dialect.MISSING.fullmatch(cell) else None
+    return dialect.to_float(cell) if dialect.NUMBER.fullmatch(cell) or dialect.MISSING_CELL.fullmatch(cell) else None
 
 
 # Tables whose columns are separated by runs of spaces or tabs, as many loggers and `numpy.savetxt` write them
@@ -222,10 +228,10 @@ def is_spaced(lines: Sequence[str]) -> bool:
     They are where no comma, semicolon or tab separates them all, the first line and most others have the same number
     of cells, two or more, and most rows hold two numbers or more.
     """
-    kept = [line for line in lines if line.strip() and not is_comment(line)][: SAMPLE_ROWS + HEAD]
-    if not kept or not _has_spaces(kept[0]) or _separated(kept):
+    content_lines = [line for line in lines if line.strip() and not is_comment(line)][: SAMPLE_ROWS + HEAD]
+    if not content_lines or not _has_spaces(content_lines[0]) or _separated(content_lines):
         return False
-    first, rows = cells(kept[0]), [cells(line) for line in kept[1:]] or [cells(kept[0])]
+    first, rows = cells(content_lines[0]), [cells(line) for line in content_lines[1:]] or [cells(content_lines[0])]
     width, often = Counter(map(len, rows)).most_common(1)[0]
     body = rows[HEAD:] or rows[-1:]
     numbers = sum(sum(map(looks_like_number, row)) >= LEAST_NUMBERS for row in body)
@@ -236,12 +242,14 @@ def _has_spaces(line: str) -> bool:
     return " " in line.strip() or "\t" in line.strip()
 
 
-def _separated(kept: Sequence[str]) -> bool:
+def _separated(content_lines: Sequence[str]) -> bool:
     """Whether a comma or semicolon separates the first line, or tabs separate it and most others."""
     for separator in SEPARATORS:
-        count = min(counts(kept[0], separator))
-        fits = sum(count in counts(row, separator) for row in kept[1:])
-        if count > 1 and (separator != "\t" or (2 * fits >= len(kept) - 1 and not _numbers_between_tabs(kept[1:]))):
+        count = min(counts(content_lines[0], separator))
+        fits = sum(count in counts(row, separator) for row in content_lines[1:])
+        if count > 1 and (
+            separator != "\t" or (2 * fits >= len(content_lines) - 1 and not _numbers_between_tabs(content_lines[1:]))
+        ):
             return True
     return False
 
@@ -256,14 +264,14 @@ def cells(line: str) -> list[str]:
     """The cells of a line: a quoted one may hold spaces; a unit in brackets belongs to the name before it."""
     if '"' not in line and "[" not in line and "(" not in line:
         return [cell for cell in line.replace("\t", " ").split(" ") if cell]
-    found: list[str] = []
+    result: list[str] = []
     for cell in _CELL.findall(line):
-        unit = bool(found) and _BRACKETS.fullmatch(cell) and not _BRACKETS.fullmatch(found[-1])
+        unit = bool(result) and _BRACKETS.fullmatch(cell) and not _BRACKETS.fullmatch(result[-1])
         if unit:
-            found[-1] = f"{found[-1]} {cell}"
+            result[-1] = f"{result[-1]} {cell}"
         else:
-            found.append(cell)
-    return found
+            result.append(cell)
+    return result
 
 
 def tabbed(line: str) -> str:

@@ -37,7 +37,7 @@ SIZES = {"boolean": ("u1", 1), "int64": ("i8", 8), "float": ("f4", 4), "double":
 SIZES["int"] = SIZES["int64"]  # as it was called until 2024
 MAX_ARRAY, MAX_ENTRIES, MAX_VALUE = 64, 20_000, 2**28
 STRUCT, SCHEMA, SCHEMA_ENTRY = "struct:", "structschema", "/.schema/struct:"
-_LATE = 2**62 // 1000  # [us]
+_LATEST_STAMP = 2**62 // 1000  # [us]
 STRAY = 20  # values in a row of entries that were nowhere started: nobody knows where the next record begins
 
 
@@ -57,7 +57,7 @@ class Entry:
             self.values += value
 
 
-class _Ends(Exception):
+class _EndOfRecords(Exception):
     """The file ends here, or what follows is no record; the message says which."""
 
 
@@ -88,7 +88,7 @@ class WpilogFile:
         try:
             for entry, stamp, value in self._records():
                 self._take(entry, stamp, value)
-        except _Ends as end:
+        except _EndOfRecords as end:
             self.damage = str(end)
         if self.damage and not self.count:
             raise self._nothing(self.damage)
@@ -96,12 +96,12 @@ class WpilogFile:
             raise self._nothing(self.odd.first)
 
     def _records(self) -> Iterator[tuple[int, int, bytes]]:
-        buffer, at, done = b"", 0, self.stream.tell()
+        buffer, at, offset = b"", 0, self.stream.tell()
         while True:
             if len(buffer) - at < 32:  # the longest head takes 17
-                done += at
+                offset += at
                 buffer, at = buffer[at:] + self._more(BLOCK_BYTES), 0
-                self.options.progress(Report("reading", done, self.size))
+                self.options.progress(Report("reading", offset, self.size))
             if at == len(buffer):
                 return
             sizes = buffer[at]
@@ -110,38 +110,38 @@ class WpilogFile:
             c = b + (sizes >> 2 & 3) + 1
             d = c + (sizes >> 4 & 7) + 1
             if d > len(buffer):
-                raise _Ends("it ends in the middle of a record")
+                raise _EndOfRecords("it ends in the middle of a record")
             entry, length = int.from_bytes(buffer[a:b], "little"), int.from_bytes(buffer[b:c], "little")
             stamp = int.from_bytes(buffer[c:d], "little", signed=d - c == 8)
-            if length > self.size - (done + d):
-                raise _Ends("it ends in the middle of a record")
+            if length > self.size - (offset + d):
+                raise _EndOfRecords("it ends in the middle of a record")
             if sizes & 0x80 or length > MAX_VALUE:
-                raise _Ends(f"what stands at byte {done + at} is no record")
+                raise _EndOfRecords(f"what stands at byte {offset + at} is no record")
             if d + length > len(buffer):
-                buffer, done, at, d = buffer[at:] + self._more(length + BLOCK_BYTES), done + at, 0, d - at
+                buffer, offset, at, d = buffer[at:] + self._more(length + BLOCK_BYTES), offset + at, 0, d - at
                 if d + length > len(buffer):
-                    raise _Ends("it ends in the middle of a record")
+                    raise _EndOfRecords("it ends in the middle of a record")
             yield entry, stamp, buffer[d : d + length]
             at = d + length
 
-    def _more(self, most: int) -> bytes:
+    def _more(self, count: int) -> bytes:
         """What follows, up to what the file held when it was opened."""
-        return self.stream.read(max(0, min(most, self.size - self.stream.tell())))
+        return self.stream.read(max(0, min(count, self.size - self.stream.tell())))
 
     def _take(self, number: int, stamp: int, value: bytes) -> None:
         if number == START:
-            if why := self._control(value):
-                self.odd.add(why)
+            if reason := self._control(value):
+                self.odd.add(reason)
             return
         entry = self.open.get(number)
         if entry is None:
             self.odd.add(f"a value of entry {number}, which is nowhere started")
             self.stray += 1
             if self.stray >= STRAY:
-                raise _Ends(self.odd.first)
+                raise _EndOfRecords(self.odd.first)
             return
         self.stray = 0
-        if not 0 <= stamp <= _LATE:
+        if not 0 <= stamp <= _LATEST_STAMP:
             self.odd.add(f"a value of {printable(entry.name)} at {stamp / 1e6:.6g} s")
             return
         entry.add(stamp, value)
@@ -163,7 +163,7 @@ class WpilogFile:
                 return "a text that is longer than its record"
             key = (name, form)
             if key not in self.entries and len(self.entries) >= MAX_ENTRIES:
-                raise _Ends(f"more than {MAX_ENTRIES} entries")
+                raise _EndOfRecords(f"more than {MAX_ENTRIES} entries")
             self.open[number] = self.entries.setdefault(key, Entry(name, form))
         elif kind == 1:
             self.open.pop(number, None)
@@ -171,10 +171,10 @@ class WpilogFile:
             return f"a control record of kind {kind}"
         return ""
 
-    def _nothing(self, why: str) -> InputError:
+    def _nothing(self, reason: str) -> InputError:
         return InputError(
             "the data log is damaged or cut short",
-            got=why,
+            got=reason,
             expected="at least one whole record",
             remedy="copy it again from the robot; nothing in it can be saved",
             where=self.source,
@@ -209,26 +209,26 @@ def read_wpilog(path: str | os.PathLike, options: ReadOptions) -> Recording:
     claims, topics = [], []
     for entry in file.entries.values():
         stamps = np.array(entry.stamps, dtype=np.int64) * 1000
-        outs, why = _outs(entry, schemas, source, notes)
+        outs, reason = _outs(entry, schemas, source, notes)
         if outs:
             claims.append(TopicClaim(entry.name, stamps, outs, 1))
-        topics.append(topic_of(printable(entry.name), printable(entry.kind), stamps, bool(outs), why))
+        topics.append(topic_of(printable(entry.name), printable(entry.kind), stamps, bool(outs), reason))
     tracks = list(tracks_of(_renamed(claims), notes))
     return Recording(tracks, topics, source, digest.hexdigest(), notes, file.count if file.damage else None)
 
 
 def _renamed(claims: list[TopicClaim]) -> list[TopicClaim]:
     """Two entries of one name and two types are told apart by a number: no column may be called as another."""
-    seen: set[str] = set()
-    found = []
+    names: set[str] = set()
+    renamed = []
     for claim in claims:
         columns = []
         for out in claim.columns:
-            name = out.name if out.name not in seen else f"{out.name} ({len(seen)})"
-            seen.add(name)
+            name = out.name if out.name not in names else f"{out.name} ({len(names)})"
+            names.add(name)
             columns.append(out._replace(name=name))
-        found.append(claim._replace(columns=columns))
-    return found
+        renamed.append(claim._replace(columns=columns))
+    return renamed
 
 
 def _outs(entry: Entry, schemas: dict[str, str], source: str, notes: list[str]) -> tuple[list[TopicColumn], str]:
@@ -239,7 +239,7 @@ def _outs(entry: Entry, schemas: dict[str, str], source: str, notes: list[str]) 
     starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     content = np.frombuffer(bytes(entry.values), dtype=np.uint8)
     try:
-        found = (
+        columns = (
             _struct(entry, schemas, sizes, starts, content)
             if entry.kind.startswith(STRUCT)
             else _plain(entry, sizes, starts, content)
@@ -247,7 +247,7 @@ def _outs(entry: Entry, schemas: dict[str, str], source: str, notes: list[str]) 
     except BadSchemaError as error:
         return [], f"its values cannot be read: {printable(str(error))}"
     outs = []
-    for out in found:
+    for out in columns:
         infinite = np.isinf(out.values)
         if infinite.any():
             notes.append(f"{printable(out.name)}: {int(infinite.sum())} infinite numbers are taken as missing")
@@ -276,10 +276,10 @@ def _plain(entry: Entry, sizes: IntArray, starts: IntArray, content: np.ndarray)
     ]
 
 
-def _numbers(there: np.ndarray, starts: IntArray, content: np.ndarray, size: int, code: str) -> FloatArray:
+def _numbers(mask: np.ndarray, starts: IntArray, content: np.ndarray, size: int, code: str) -> FloatArray:
     values = np.full(len(starts), np.nan)
-    if there.any():
-        values[there] = np.ascontiguousarray(_block(content, starts[there], size)).view(code)[:, 0]
+    if mask.any():
+        values[mask] = np.ascontiguousarray(_block(content, starts[mask], size)).view(code)[:, 0]
     return values
 
 
@@ -292,18 +292,18 @@ def _struct(
     if not size:
         return []
     many = min(int(sizes.max()) // size, MAX_ARRAY) if kind.endswith("[]") else 1
-    found: list[TopicColumn] = []
+    columns: list[TopicColumn] = []
     for k in range(many):
-        there = sizes >= (k + 1) * size if kind.endswith("[]") else sizes == size
-        if not there.any():
+        mask = sizes >= (k + 1) * size if kind.endswith("[]") else sizes == size
+        if not mask.any():
             continue
-        block = _block(content, starts[there] + k * size, size)
+        block = _block(content, starts[mask] + k * size, size)
         for path, leaf in leaves.items():
             values = np.full(len(sizes), np.nan)
-            values[there] = column(block, leaf)
+            values[mask] = column(block, leaf)
             index = f"[{k}]" if kind.endswith("[]") else ""
-            found.append(TopicColumn(f"{entry.name}{index}/{path}", values))
-    return [_known(kind, entry.name, out) for out in found]
+            columns.append(TopicColumn(f"{entry.name}{index}/{path}", values))
+    return [_known(kind, entry.name, out) for out in columns]
 
 
 _POSE = {"translation/x": ("x", "m"), "translation/y": ("y", "m"), "rotation/value": ("heading", "rad")}
@@ -351,7 +351,7 @@ CODES = {
 _FIELD = re.compile(r"(?:enum\s*)?(?:\{[^}]*\}\s*)?([\w:]+)\s+(\w+)\s*(?:\[(\d+)\])?", re.ASCII)
 
 # The usual ones, for logs that lost their schemas. Facts of WPILib.
-KNOWN = {
+KNOWN_SCHEMAS = {
     "Translation2d": "double x;double y",
     "Rotation2d": "double value",
     "Pose2d": "Translation2d translation;Rotation2d rotation",
@@ -366,12 +366,12 @@ class BadSchemaError(ValueError):
 
 def leaves_of(name: str, schemas: Mapping[str, str]) -> tuple[dict[str, Leaf], int]:
     """(path of each number -> where it lies, size of the whole [bytes]). Raises BadSchemaError."""
-    found: dict[str, Leaf] = {}
-    return found, _walk(name, schemas, "", 0, found, 0)
+    leaves: dict[str, Leaf] = {}
+    return leaves, _walk(name, schemas, "", 0, leaves, 0)
 
 
-def _walk(name: str, schemas: Mapping[str, str], path: str, at: int, found: dict[str, Leaf], depth: int) -> int:
-    text = schemas.get(name, KNOWN.get(name))
+def _walk(name: str, schemas: Mapping[str, str], path: str, at: int, leaves: dict[str, Leaf], depth: int) -> int:
+    text = schemas.get(name, KNOWN_SCHEMAS.get(name))
     if text is None or len(text) > MAX_SCHEMA or depth > MAX_DEPTH:
         raise BadSchemaError(f"no schema of {name}" if text is None else f"the schema of {name} does not end")
     for declaration in filter(None, (part.strip() for part in text.split(";"))):
@@ -382,12 +382,12 @@ def _walk(name: str, schemas: Mapping[str, str], path: str, at: int, found: dict
         if len(count or "") > MAX_DIGITS:
             raise BadSchemaError(f"an array of more than {MAX_LEAVES} in {name}")
         for k in range(int(count or 1)):
-            here = f"{path}{field}{f'[{k}]' if count else ''}"
-            if len(found) >= MAX_LEAVES:
+            leaf_path = f"{path}{field}{f'[{k}]' if count else ''}"
+            if len(leaves) >= MAX_LEAVES:
                 raise BadSchemaError(f"more than {MAX_LEAVES} numbers in {name}")
             if kind in CODES:
-                found[here] = Leaf(at, f"<{CODES[kind]}")
+                leaves[leaf_path] = Leaf(at, f"<{CODES[kind]}")
                 at += int(CODES[kind][1])
             else:
-                at = _walk(kind, schemas, f"{here}/", at, found, depth + 1)
+                at = _walk(kind, schemas, f"{leaf_path}/", at, leaves, depth + 1)
     return at

@@ -72,7 +72,7 @@ class PointMeaning:
                 return
             if "." in cell and dialect.GROUPED_POINT.fullmatch(cell):
                 self._grouped.setdefault(k, (cell, line))
-            elif dialect.WHOLE.fullmatch(cell):
+            elif dialect.WHOLE_NUMBER.fullmatch(cell):
                 self._whole.add(k)
 
     def _settles(self, text: str) -> bool:

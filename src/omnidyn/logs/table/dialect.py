@@ -22,11 +22,11 @@ SAMPLE_ROWS = 50  # rows that vote on the separator; a later row that differs is
 
 NUMBER = re.compile(r"[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 INFINITE = re.compile(r"[+-]?inf(?:inity)?", re.IGNORECASE | re.ASCII)
-MISSING = re.compile(r"(?:[+-]?nan(?:\(\w*\))?)?", re.IGNORECASE | re.ASCII)  # C prints -nan and nan(ind) as well
+MISSING_CELL = re.compile(r"(?:[+-]?nan(?:\(\w*\))?)?", re.IGNORECASE | re.ASCII)  # C prints -nan and nan(ind) as well
 COMMA_NUMBER = re.compile(r"[+-]?(?:\d+,\d*|,\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 GROUPED_NUMBER = re.compile(r"[+-]?[1-9]\d{0,2}(?:,\d{3})+", re.ASCII)  # 1,500: fifteen hundred or one and a half?
 GROUPED_POINT = re.compile(r"[+-]?[1-9]\d{0,2}\.\d{3}", re.ASCII)  # 1.500: the same question where commas are decimal
-WHOLE = re.compile(r"[+-]?\d{1,3}", re.ASCII)
+WHOLE_NUMBER = re.compile(r"[+-]?\d{1,3}", re.ASCII)
 
 # A spreadsheet's error values begin like a comment; to skip such a row would lose it in silence.
 _SPREADSHEET_ERROR = re.compile(r"#(?:N/A|REF!|VALUE!|NAME\?|NUM!|NULL!|DIV/0!)", re.IGNORECASE)
@@ -67,12 +67,12 @@ def split_cells(line: str, separator: str, where: str) -> list[str]:
 
 def is_number_or_missing(cell: str) -> bool:
     """Whether a cell (without decimal comma) can stand in a column of numbers: a number, infinite, nan or blank."""
-    return bool(NUMBER.fullmatch(cell) or MISSING.fullmatch(cell) or INFINITE.fullmatch(cell))
+    return bool(NUMBER.fullmatch(cell) or MISSING_CELL.fullmatch(cell) or INFINITE.fullmatch(cell))
 
 
 def to_float(cell: str) -> float:
     """The number in a cell for which `is_number_or_missing` holds; NaN where it is missing."""
-    return math.nan if MISSING.fullmatch(cell) else float(cell)
+    return math.nan if MISSING_CELL.fullmatch(cell) else float(cell)
 
 
 def looks_like_number(cell: str) -> bool:
@@ -145,9 +145,11 @@ def is_units_row(cells: Sequence[str]) -> bool:
     plain = [strip_brackets(cell) for cell in cells if cell]
     if not plain or any(map(looks_like_number, plain)):
         return False
-    known = sum(map(is_unit, plain))
+    unit_count = sum(map(is_unit, plain))
     bracketed = all(strip_brackets(cell) != cell for cell in cells if cell)
-    return known == len(plain) or (known > 0 and bracketed) or (known > 2 and 2 * known > len(plain))
+    return (
+        unit_count == len(plain) or (unit_count > 0 and bracketed) or (unit_count > 2 and 2 * unit_count > len(plain))
+    )
 
 
 def strip_brackets(cell: str) -> str:

@@ -64,47 +64,49 @@ def find_layout(lines: Sequence[FileLine], source: str, header: bool = True) -> 
     `header` False: there are no names, the columns are called c1, c2, ...
     Raises InputError when there is no header, or one that cannot be used.
     """
-    kept = [line for line in lines if line.text.strip() and not dialect.is_comment(line.text)]
-    told = _SEPARATOR_LINE.fullmatch(kept[0].text.strip()) if kept else None
-    kept = kept[1:] if told else kept
-    above = preamble([line.text for line in kept]) if header else 0
+    content_lines = [line for line in lines if line.text.strip() and not dialect.is_comment(line.text)]
+    separator_line = _SEPARATOR_LINE.fullmatch(content_lines[0].text.strip()) if content_lines else None
+    content_lines = content_lines[1:] if separator_line else content_lines
+    above = preamble([line.text for line in content_lines]) if header else 0
     if above:
-        layout = find_layout([line for line in lines if line.number >= kept[above].number], source)
-        said = f"line {kept[above].number} gives the names: what stands above it was left out"
-        return replace(layout, notes=(said, *layout.notes))
-    if not kept:
+        layout = find_layout([line for line in lines if line.number >= content_lines[above].number], source)
+        note = f"line {content_lines[above].number} gives the names: what stands above it was left out"
+        return replace(layout, notes=(note, *layout.notes))
+    if not content_lines:
         raise InputError(
             "no table in the file", got="only blank lines and comments", expected="a header and rows", where=source
         )
-    separator = told[1] if told else ""
+    separator = separator_line[1] if separator_line else ""
     if not header:
-        return _without_header(kept, separator, source)
-    above = _commented_header(lines, kept[0]) if _has_number(kept[0].text) else []
+        return _without_header(content_lines, separator, source)
+    above = _commented_header(lines, content_lines[0]) if _has_number(content_lines[0].text) else []
     if above:
-        return _layout([*above, *kept], len(above), separator, source)
-    if dialect.looks_like_data(kept[0].text):
+        return _layout([*above, *content_lines], len(above), separator, source)
+    if dialect.looks_like_data(content_lines[0].text):
         raise InputError(
             "the table has no header: its first row is numbers",
-            got=kept[0].text,
+            got=content_lines[0].text,
             expected="column names such as t_s,u1_V",
             remedy="add a first line with the column names, or use `no_header`",
-            where=f"{source}:{kept[0].number}",
+            where=f"{source}:{content_lines[0].number}",
         )
-    return _layout(kept, 0, separator, source)
+    return _layout(content_lines, 0, separator, source)
 
 
 def _has_number(line: str) -> bool:
     return any(dialect.looks_like_number(cell.strip(' "')) for cell in re.split(r"[,;\t]", line))
 
 
-def _without_header(kept: list[FileLine], separator: str, source: str) -> Layout:
-    texts = [line.text for line in kept]
-    separator = separator or dialect.find_separator(texts[0], texts, f"{source}:{kept[0].number}")
+def _without_header(content_lines: list[FileLine], separator: str, source: str) -> Layout:
+    texts = [line.text for line in content_lines]
+    separator = separator or dialect.find_separator(texts[0], texts, f"{source}:{content_lines[0].number}")
     ending = _other_ending(texts[:SAMPLE_ROWS], separator)
     counts = [dialect.counts(text, separator) for text in texts[:SAMPLE_ROWS]]
     count = max(1, min(counts[0]) if all(trimmed < full for full, trimmed in counts) else counts[0][0])
-    _refuse_width(count, f"{source}:{kept[0].number}")
-    layout = _with_ending(Layout(separator, _numbered(count), kept[0].number), kept[:SAMPLE_ROWS], ending)
+    _refuse_width(count, f"{source}:{content_lines[0].number}")
+    layout = _with_ending(
+        Layout(separator, _numbered(count), content_lines[0].number), content_lines[:SAMPLE_ROWS], ending
+    )
     names = f"no header: the columns are called c1 to c{count}"
     return replace(layout, notes=(names, *_separator_notes(separator), *layout.notes))
 
@@ -136,16 +138,16 @@ def _are_names(cells: Sequence[str]) -> bool:
     return all(cells) and len(set(cells)) == len(cells) and not any(map(dialect.looks_like_number, cells))
 
 
-def _layout(kept: list[FileLine], commented: int, separator: str, source: str) -> Layout:
+def _layout(content_lines: list[FileLine], commented: int, separator: str, source: str) -> Layout:
     """The layout of a file whose first line that counts is a header; the first `commented` of them were comments."""
-    where = f"{source}:{kept[0].number}"
-    rows = [line.text for line in kept[max(1, commented) :]]
-    separator = separator or dialect.find_separator(kept[0].text, rows, where)
+    where = f"{source}:{content_lines[0].number}"
+    rows = [line.text for line in content_lines[max(1, commented) :]]
+    separator = separator or dialect.find_separator(content_lines[0].text, rows, where)
     ending = _other_ending(rows[HEAD_ROWS if len(rows) > 2 * HEAD_ROWS else 0 :][:SAMPLE_ROWS], separator)
     if ending:
-        kept = [FileLine(line.number, line.text.rstrip().removesuffix(ending)) for line in kept]
-    head = _head(kept[: commented or HEAD_ROWS + 1], separator, source)
-    body = kept[len(head.lines) :]
+        content_lines = [FileLine(line.number, line.text.rstrip().removesuffix(ending)) for line in content_lines]
+    head = _head(content_lines[: commented or HEAD_ROWS + 1], separator, source)
+    body = content_lines[len(head.lines) :]
     if not body:
         raise InputError("no rows", got="0 samples", expected="at least one row under the header", where=source)
     names, renamed = _told_apart(_names(head, separator, body, source))
@@ -165,8 +167,8 @@ class _Head(NamedTuple):
     units: int | None = None
     titles: int | None = None
 
-    def cells_of(self, which: int | None) -> list[str]:
-        return [] if which is None else self.cells[which]
+    def cells_of(self, index: int | None) -> list[str]:
+        return [] if index is None else self.cells[index]
 
 
 def _head(first: list[FileLine], separator: str, source: str) -> _Head:
@@ -304,25 +306,27 @@ def _units(names: list[str], head: _Head, where: str) -> tuple[list[str], dict[s
     return plain, units
 
 
-def _with_ending(layout: Layout, rows: list[FileLine], other: str) -> Layout:
+def _with_ending(layout: Layout, rows: list[FileLine], ending: str) -> Layout:
     """The layout with what stands at the end of its rows and means nothing: its own separator, or another."""
     count = len(layout.names)
-    own = [dialect.counts(row.text, layout.separator) for row in rows]
-    if any(full == count + 1 == trimmed + 1 for full, trimmed in own):
+    counts = [dialect.counts(row.text, layout.separator) for row in rows]
+    if any(full == count + 1 == trimmed + 1 for full, trimmed in counts):
         note = f"every row ends with {SEPARATOR_WORDS[layout.separator]}: the blank last column was left out"
         return replace(layout, ending=layout.separator, notes=(note,))
-    if other:
-        return replace(layout, ending=other, notes=(f"every row ends with {SEPARATOR_WORDS[other]}: it was left out",))
+    if ending:
+        return replace(
+            layout, ending=ending, notes=(f"every row ends with {SEPARATOR_WORDS[ending]}: it was left out",)
+        )
     return layout
 
 
 def _other_ending(rows: Sequence[str], separator: str) -> str:
     """A separator that stands at the end of every row, the last one perhaps excepted, and nowhere else in it."""
-    for other in SEPARATORS:
-        ends = [row.rstrip().endswith(other) and row.count(other) == 1 for row in rows]
-        whole = ends and (ends[-1] or other not in rows[-1])
-        if other != separator and whole and all(ends[:-1] or ends):
-            return other
+    for sign in SEPARATORS:
+        ends = [row.rstrip().endswith(sign) and row.count(sign) == 1 for row in rows]
+        complete = ends and (ends[-1] or sign not in rows[-1])
+        if sign != separator and complete and all(ends[:-1] or ends):
+            return sign
     return ""
 
 

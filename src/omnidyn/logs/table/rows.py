@@ -46,7 +46,7 @@ class RowParser:
         first = [cells for text in sample if len(cells := self._cells_or_none(text)) == count]
         self._numeric = tuple(_mostly_numbers([cells[k] for cells in first]) for k in range(count))
         wordy = [not self._numeric[k] if skip else _holds_words(cells[k] for cells in first) for k in range(count)]
-        self._maybe_words = {name for name, each in zip(layout.names, wordy, strict=True) if each}
+        self._maybe_words = {name for name, is_wordy in zip(layout.names, wordy, strict=True) if is_wordy}
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -66,11 +66,11 @@ class RowParser:
         texts: without blank lines and comments; `later` gives the texts of all rows that follow, where a decimal comma
         is not certain yet. Raises InputError, at the first bad row of all.
         """
-        columns, given = self._plain(texts), lines
+        columns, all_lines = self._plain(texts), lines
         if columns is None:
             columns, lines = self._careful(texts, lines, later)
         if not self._comma:
-            self._points.look(texts, given, columns, later)
+            self._points.look(texts, all_lines, columns, later)
         self._rows += len(texts)
         return columns, lines
 
@@ -222,7 +222,7 @@ class RowParser:
             if reason:
                 self._leave_out(reason, int(line))
                 keep[k] = False
-        return [row for row, good in zip(rows, keep, strict=True) if good], lines[keep]
+        return [row for row, is_finite in zip(rows, keep, strict=True) if is_finite], lines[keep]
 
     def _column(self, name: str, cells: list[str]) -> Column:
         column = tuple(cells) if name in self._words else column_of(cells)
@@ -242,9 +242,9 @@ def refuse_infinite(columns: Mapping[str, Column], lines: Lines, source: str) ->
     """Raises InputError at the first row that holds an infinite number."""
     first: tuple[int, str] | None = None
     for name, column in columns.items():
-        bad = [] if isinstance(column, tuple) else np.flatnonzero(np.isinf(column))
-        if len(bad) and (first is None or bad[0] < first[0]):
-            first = int(bad[0]), name
+        infinite_rows = [] if isinstance(column, tuple) else np.flatnonzero(np.isinf(column))
+        if len(infinite_rows) and (first is None or infinite_rows[0] < first[0]):
+            first = int(infinite_rows[0]), name
     if first is not None:
         raise InputError(
             "not a finite number",
@@ -305,18 +305,18 @@ def _holds_words(cells: Iterable[str]) -> bool:
 
 
 def _mostly_numbers(cells: Sequence[str]) -> bool:
-    there = [cell for cell in cells if cell]
-    return 2 * sum(map(dialect.looks_like_number, there)) >= len(there)
+    filled_cells = [cell for cell in cells if cell]
+    return 2 * sum(map(dialect.looks_like_number, filled_cells)) >= len(filled_cells)
 
 
-def _ragged_hint(separator: str, more: bool) -> str:
+def _ragged_hint(separator: str, has_more: bool) -> str:
     """What to do about a row with more cells than the header, or with fewer."""
-    commas = "a decimal comma? then separate the columns by semicolons; else " if more and separator == "," else ""
+    commas = "a decimal comma? then separate the columns by semicolons; else " if has_more and separator == "," else ""
     return f"{commas}correct or remove the row, or leave such rows out with `skip_bad_rows`"
 
 
 def skip_note(reason: str, lines: list[int]) -> str:
     """How many rows were left out, why, and where the first of them stand."""
-    shown = ", ".join(map(str, lines[:SHOWN_LINES])) + (", ..." if len(lines) > SHOWN_LINES else "")
+    line_words = ", ".join(map(str, lines[:SHOWN_LINES])) + (", ..." if len(lines) > SHOWN_LINES else "")
     rows = "1 row was" if len(lines) == 1 else f"{len(lines)} rows were"
-    return f"{rows} left out for {reason} (line{'s' if len(lines) > 1 else ''} {shown})"
+    return f"{rows} left out for {reason} (line{'s' if len(lines) > 1 else ''} {line_words})"

@@ -21,10 +21,13 @@ from omnidyn.statement import Statement
 ROWS = 500_000
 MAX_CELLS = 2**24  # in one block: 128 MiB of floats
 MIN_HELD_BYTES = 64 * 2**20
-LEAST, LARGEST = 1e-100, 1e20  # sizes that a number of a log may have, beside 0: counters of 64 bits go to 2e19
+LEAST_SIZE, LARGEST_SIZE = (
+    1e-100,
+    1e20,
+)  # sizes of a number of a log, beside 0: counters of 64 bits go to 2e19
 
 
-class Said(NamedTuple):
+class Declaration(NamedTuple):
     """What a format itself says of a column: a message of ROS names what its fields are.
 
     component: such as "vx", "t"; "" for a column that is nothing by itself and is taken only by `column`.
@@ -57,29 +60,36 @@ class Table:
     sha256: str
     notes: tuple[str, ...] = ()
     titles: Mapping[str, str] = field(default_factory=dict)
-    says: Mapping[str, Said] = field(default_factory=dict)
+    says: Mapping[str, Declaration] = field(default_factory=dict)
     own_clocks: bool = False
     begins: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
-        shown = {name: printable(name) for name in self.names if not name.isprintable()}
-        if any(name != told for name, told in shown.items()) or not self.source.isprintable():
-            self._rename(shown)
+        printable_names = {name: printable(name) for name in self.names if not name.isprintable()}
+        if (
+            any(name != printable_name for name, printable_name in printable_names.items())
+            or not self.source.isprintable()
+        ):
+            self._rename(printable_names)
         for values in (self.lines, *self.columns.values()):
             if not isinstance(values, tuple):
                 values.flags.writeable = False
 
-    def _rename(self, shown: Mapping[str, str]) -> None:
+    def _rename(self, printable_names: Mapping[str, str]) -> None:
         """Call columns and file by names that can be shown; two that look alike then are told apart by a number."""
-        taken: dict[str, str] = {}
+        new_names: dict[str, str] = {}
         for name in self.names:
-            told = shown.get(name, name)
-            taken[name] = told if told not in taken.values() else f"{told} ({len(taken) + 1})"
-        object.__setattr__(self, "names", tuple(taken.values()))
+            printable_name = printable_names.get(name, name)
+            new_names[name] = (
+                printable_name
+                if printable_name not in new_names.values()
+                else f"{printable_name} ({len(new_names) + 1})"
+            )
+        object.__setattr__(self, "names", tuple(new_names.values()))
         object.__setattr__(self, "source", printable(self.source))
         for field_name in ("columns", "units", "titles", "says"):
             old = getattr(self, field_name)
-            object.__setattr__(self, field_name, {taken.get(name, name): value for name, value in old.items()})
+            object.__setattr__(self, field_name, {new_names.get(name, name): value for name, value in old.items()})
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -91,31 +101,31 @@ class Table:
         """
         column = self.columns[name]
         if isinstance(column, tuple):
-            bad = (k for k, cell in enumerate(column) if not dialect.is_number_or_missing(cell))
-            row = next(bad, 0)  # all are numbers in a later block of a column that began with words
+            faults = (k for k, cell in enumerate(column) if not dialect.is_number_or_missing(cell))
+            row = next(faults, 0)  # all are numbers in a later block of a column that began with words
             raise self.fault(
                 row, name, "not a number", column[row], "a number such as -1.5 or 2e-3", _hint(column[row])
             )
-        bad = np.flatnonzero(np.isnan(column))
-        if bad.size and not missing:
+        faults = np.flatnonzero(np.isnan(column))
+        if faults.size and not missing:
             raise self.fault(
-                int(bad[0]),
+                int(faults[0]),
                 name,
                 "a number is missing",
                 "a blank cell or nan",
                 "a number",
-                f"fill it in, or remove the row ({bad.size} of {len(self)} are missing)",
+                f"fill it in, or remove the row ({faults.size} of {len(self)} are missing)",
             )
         return column
 
     def measured(self, name: str, *, missing: bool = False, skip: bool = False) -> FloatArray:
-        """A column of numbers of a size that a sensor may give: one below LEAST is 0; see `numbers`.
+        """A column of numbers of a size that a sensor may give: one below LEAST_SIZE is 0; see `numbers`.
 
-        skip: whether one beyond LARGEST is NaN; otherwise it raises InputError.
+        skip: whether one beyond LARGEST_SIZE is NaN; otherwise it raises InputError.
         """
         column = self.numbers(name, missing=missing)
         size = np.abs(column)
-        large, small = (size > LARGEST) & np.isfinite(size), (size < LEAST) & (size > 0.0)
+        large, small = (size > LARGEST_SIZE) & np.isfinite(size), (size < LEAST_SIZE) & (size > 0.0)
         if large.any() and not skip:
             row = int(np.argmax(large))
             remedy = "leave the cell blank, or use `skip_bad_rows`" if missing else "correct it, or remove the row"
@@ -125,7 +135,7 @@ class Table:
                 name,
                 "no sensor gives such a number",
                 float(column[row]),
-                f"at most {LARGEST:g} in size{many}",
+                f"at most {LARGEST_SIZE:g} in size{many}",
                 remedy,
             )
         if large.any() or small.any():
@@ -146,20 +156,20 @@ class Table:
 
     def check_names(self, required: Sequence[str], optional: Sequence[str] = ()) -> None:
         """Raises InputError when a column is unknown (the nearest known name is given) or missing."""
-        known = [*required, *optional]
+        allowed = [*required, *optional]
         for name in self.names:
-            if name not in known:
-                close = difflib.get_close_matches(name, known, n=1, cutoff=0.4)
-                remedy = f"did you mean {close[0]}?" if close else "remove the column"
+            if name not in allowed:
+                matches = difflib.get_close_matches(name, allowed, n=1, cutoff=0.4)
+                remedy = f"did you mean {matches[0]}?" if matches else "remove the column"
                 raise InputError(
-                    "unknown column", got=name, expected=", ".join(known), remedy=remedy, where=self.source
+                    "unknown column", got=name, expected=", ".join(allowed), remedy=remedy, where=self.source
                 )
         absent = [name for name in required if name not in self.names]
         if absent:
             raise InputError(
                 "a column is missing",
                 got=", ".join(self.names),
-                expected=", ".join(known),
+                expected=", ".join(allowed),
                 remedy=f"add {', '.join(absent)}",
                 where=self.source,
             )
@@ -168,11 +178,11 @@ class Table:
 def join(tables: Iterable[Table], max_bytes: int | None = None) -> Table:
     """One table from the blocks of a file. Raises InputError when their numbers take more than `max_bytes`."""
     parts: list[Table] = []
-    held = 0
+    held_bytes = 0
     for table in tables:
         parts.append(table)
-        held += 8 * len(table) * (len(table.names) + 1)
-        if max_bytes is not None and held > max(max_bytes, MIN_HELD_BYTES):
+        held_bytes += 8 * len(table) * (len(table.names) + 1)
+        if max_bytes is not None and held_bytes > max(max_bytes, MIN_HELD_BYTES):
             raise too_large(table.source, max_bytes, TOO_LARGE_REMEDY)
     last = parts[-1]
     if len(parts) == 1:

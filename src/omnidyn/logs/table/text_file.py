@@ -94,17 +94,19 @@ class TextFile:
     def _blocks(self) -> Iterator[bytes]:
         with open_regular(self.path) as stream:
             total = os.fstat(stream.fileno()).st_size
-            done = 0
+            read_bytes = 0
             if self._max_bytes is not None and total > self._max_bytes:
                 raise too_large(self.path, self._max_bytes, TOO_LARGE_REMEDY)
-            while block := stream.read(min(total - done, BLOCK_BYTES if done else max(BLOCK_BYTES, START_BYTES))):
-                if not done:
+            while block := stream.read(
+                min(total - read_bytes, BLOCK_BYTES if read_bytes else max(BLOCK_BYTES, START_BYTES))
+            ):
+                if not read_bytes:
                     kind = file_format(block)
-                    what = "this is not a text file" if kind else "this is not a table"
+                    problem = "this is not a text file" if kind else "this is not a table"
                     kind = kind or text_format(block)
                     if kind is not None:
                         raise InputError(
-                            what,
+                            problem,
                             got=kind.words,
                             expected="text with a row for each moment",
                             remedy=kind.remedy,
@@ -112,11 +114,11 @@ class TextFile:
                         )
                     self._start = block[:SHOWN_BYTES]
                 self._hash.update(block)
-                done += len(block)
+                read_bytes += len(block)
                 yield block
-                self._progress(Report("reading", done, total))
+                self._progress(Report("reading", read_bytes, total))
             self.notes += growth(stream, total)
-        if not done:
+        if not read_bytes:
             raise empty(self.source)
 
     def _utf8(self, blocks: Iterator[bytes]) -> Iterator[bytes]:

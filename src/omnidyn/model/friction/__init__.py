@@ -20,14 +20,14 @@ from omnidyn.model.value import Value
 
 __all__ = ["AxesFriction", "DirectionFriction", "Friction", "FrictionLaw", "WheelFriction"]
 
-NONE = (0.0, 0.0, 0.0)
+NO_FRICTION = (0.0, 0.0, 0.0)
 
 
 class Friction(Value):
     """All friction of a robot, by where it acts; what is absent is off. A field is all that a new place needs here."""
 
     axes: Annotated[AxesFriction, Field(description="on the body axes, eqs (4)-(6)")] = AxesFriction(
-        viscous=NONE, coulomb=NONE
+        viscous=NO_FRICTION, coulomb=NO_FRICTION
     )
     direction: Annotated[DirectionFriction, Field(description="along the direction of travel")] = DirectionFriction()
     wheels: Annotated[WheelFriction, Field(description="at the wheels")] = WheelFriction()
@@ -63,9 +63,9 @@ class Friction(Value):
     @model_validator(mode="after")
     def _one_law_about_yaw(self) -> Friction:
         axes, way = self.axes, self.direction
-        both = axes.coulomb[2] > 0.0 and way.yaw_coulomb > 0.0
+        both_act = axes.coulomb[2] > 0.0 and way.yaw_coulomb > 0.0
         falls = axes.stribeck_speed is not None or way.yaw_stribeck_speed is not None
-        if both and (falls or axes.law != "coulomb" or way.law != "coulomb"):
+        if both_act and (falls or axes.law != "coulomb" or way.law != "coulomb"):
             raise ValueError(
                 "friction about yaw stands in [friction.axes] and in [friction.direction], and one of them has another "
                 "law than coulomb: put all of it into one table"

@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.model.friction.kinds import AXES, refuse_mixtures, spread_on, words_of
-from omnidyn.model.friction.stribeck import LEAST, MOST, SHAPES, USUAL
+from omnidyn.model.friction.stribeck import LARGEST_EXPONENT, LEAST_EXPONENT, SHAPES, USUAL_EXPONENT
 from omnidyn.model.layout import N_AXES, Plant
 from omnidyn.model.value import Levels, Value, number, per_axis_number, word_of
 
@@ -38,7 +38,9 @@ class AxesFriction(Value):
     breakaway_backward: Annotated[Level | None, Field(description="S backward [N, N, N m]")] = None
     law: Annotated[Annotated[str, word_of(*words_of(AXES))], Field(description="what kind of law")] = "coulomb"
     stribeck_speed: Annotated[Speeds | None, Field(description="v_s [m/s, m/s, rad/s]")] = None
-    stribeck_exponent: Annotated[Annotated[float, number(LEAST, MOST)], Field(description="d")] = USUAL
+    stribeck_exponent: Annotated[Annotated[float, number(LEAST_EXPONENT, LARGEST_EXPONENT)], Field(description="d")] = (
+        USUAL_EXPONENT
+    )
     stribeck_shape: Annotated[Annotated[str, word_of(*SHAPES)], Field(description="f of the fall")] = "exponential"
     karnopp_speed: Annotated[Speeds, Field(description="Dv [m/s, m/s, rad/s]")] = (1e-4, 1e-4, 1e-4)
     stiffness: Annotated[Stiffness | None, Field(description="sigma0 [N/m, N/m, N m/rad]")] = None

@@ -7,12 +7,13 @@ micrometres; what holds exactly is Coulomb's or Stribeck's law. Under a force th
 drift: a property of the laws, not of the solver.
 
 The rate is that of one of LAWS, each a file:
-    rate(own, aimed, speed, tau, level, slope)   (z', dz'/ds) at the end of a stage of length tau from z* = aimed,
-        solved for z' beforehand, so that a stiff bristle is no matter; tau = 0: at z* itself. own: the record ELEMENT
+    rate(record, aimed, speed, tau, level, slope)   (z', dz'/ds) at the end of a stage of length tau from z* = aimed,
+        solved for z' beforehand, so that a stiff bristle is no matter; tau = 0: at z* itself. record: of ELEMENT
         with the numbers of the law (layout.py). level, slope: g(s) > 0 and dg/ds; slipping, sigma0 |z| = g
-    plane(own, aimed, speed, tau, levels)   the same of the ellipse, whose own is the record BODY: aimed, speed pairs
+    plane(record, aimed, speed, tau, levels)   the same of the ellipse, whose record is of BODY: aimed, speed pairs
         along x and y, levels (Cx, Cy, their slopes by |v|, |v|); (zx', zy', zx' by v_x, by v_y, zy' by v_x, by v_y)
-    slow(own, left, far)   of left = 1 - sigma0 z sgn(s)/C, what a slow way leaves, far times C/sigma0: for pictures
+    slow(record, remainder, distance)   of remainder = 1 - sigma0 z sgn(s)/C, what a slow way of distance times C/sigma0
+        leaves: for pictures
     KIND   its word, and the keys that it takes
 All else, force, steps, errors and derivatives, follows here and in stick_slip/.
 """
@@ -29,11 +30,11 @@ from omnidyn.model.friction.stribeck import fall
 LAWS = (dahl, lugre, elastoplastic)
 """The laws of those that bend. A record has the number of its law, in this order."""
 
-FADES = 0.75  # times the damping: the steepest way in which one that fades lets go
+FADE_STEEPNESS = 0.75  # times the damping: the steepest way in which one that fades lets go
 
-NUMBER_OF = {each.KIND.word: number for number, each in enumerate(LAWS)}
-_rate = one_of([each.rate for each in LAWS])
-_plane_rate = one_of([each.plane for each in LAWS])
+NUMBER_OF = {law.KIND.word: number for number, law in enumerate(LAWS)}
+_rate = one_of([law.rate for law in LAWS])
+_plane_rate = one_of([law.plane for law in LAWS])
 
 
 @part
@@ -57,15 +58,17 @@ def damping_at(speed, damping, inverse):
 
 
 @part
-def bristle_force(own, speed, aimed, tau):
-    """(force, slope, z) at the end of a stage of length tau from z* = aimed; own: the record ELEMENT, see layout.py."""
+def bristle_force(record, speed, aimed, tau):
+    """(force, slope, z) at the end of a stage of length tau from z* = aimed; record: ELEMENT of layout.py."""
     side = 0 if speed >= 0.0 else 1
-    g, dg = level_at(speed, own.bristle_coulomb[side], own.bristle_breakaway[side], own.fall, own.form, own.exponent)
-    rate, slope = _rate(own.law, own, aimed, speed, tau, g, dg)
-    damping, fades = damping_at(speed, own.damping, own.fade)
+    g, dg = level_at(
+        speed, record.bristle_coulomb[side], record.bristle_breakaway[side], record.fall, record.form, record.exponent
+    )
+    rate, slope = _rate(record.law, record, aimed, speed, tau, g, dg)
+    damping, fades = damping_at(speed, record.damping, record.fade)
     bent = aimed + tau * rate
-    force = -own.stiffness * bent - damping * rate
-    return force, -(own.stiffness * tau + damping) * slope - fades * rate, bent
+    force = -record.stiffness * bent - damping * rate
+    return force, -(record.stiffness * tau + damping) * slope - fades * rate, bent
 
 
 @part
@@ -99,6 +102,6 @@ def plane_force(body, x, y, aimed, tau):
     return force, slopes, (x_bent, y_bent)
 
 
-def fade_of(own: Any) -> float:
-    """A bound of how steeply a damping that fades lets go [N s/m]; own: the record of an element, or of the body."""
-    return FADES * own.damping if own.fade > 0.0 else 0.0
+def fade_of(record: Any) -> float:
+    """A bound of how steeply a damping that fades lets go [N s/m]; record: the record of an element, or of the body."""
+    return FADE_STEEPNESS * record.damping if record.fade > 0.0 else 0.0

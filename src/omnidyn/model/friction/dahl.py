@@ -19,46 +19,46 @@ from typing import Any
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.friction import lugre
-from omnidyn.model.friction.law import Kind, Number
-from omnidyn.model.friction.newton import SETTLED, newton
+from omnidyn.model.friction.law import LawKind, Number
+from omnidyn.model.friction.newton import ROOT_TOLERANCE, newton
 
-LEAST = 1e-30  # of the way to slipping: below it there is nothing left
+LEAST_SHARE = 1e-30  # of the way to slipping: below it there is nothing left
 ROUNDS = 60  # of Newton's steps for a general exponent; bisection needs no more
 
 
 def rate_of(psi: Any) -> Any:
     """The rate z' = s psi(w), w = sigma0 z sgn(s)/g, of a law whose psi falls with w.
 
-    psi(own, w) -> (psi, -psi'), a part. r(z') = z' - s psi(w(z* + tau z')) rises with z': Newton within a bracket.
+    psi(record, w) -> (psi, -psi'), a part. r(z') = z' - s psi(w(z* + tau z')) rises with z': Newton within a bracket.
     """
 
-    def rate(own, aimed, speed, tau, level, slope):
+    def rate(record, aimed, speed, tau, level, slope):
         """(z', dz'/ds); see LAWS of bristle.py."""
-        stiffness = own.stiffness
+        stiffness = record.stiffness
         if speed == 0.0:
-            return 0.0, psi(own, stiffness * aimed / level)[0]
+            return 0.0, psi(record, stiffness * aimed / level)[0]
         side = 1.0 if speed > 0.0 else -1.0
-        start = speed * psi(own, stiffness * aimed * side / level)[0]
-        low, high, found = min(start, 0.0), max(start, 0.0), 0.5 * start
+        start = speed * psi(record, stiffness * aimed * side / level)[0]
+        low, high, bristle_rate = min(start, 0.0), max(start, 0.0), 0.5 * start
         bend = tau * abs(speed) * stiffness / level
         for _ in range(ROUNDS):
-            value, steep = psi(own, stiffness * (aimed + tau * found) * side / level)
-            before = found
-            found, low, high = newton(found, found - speed * value, 1.0 + bend * steep, low, high)
-            if abs(found - before) <= SETTLED * abs(start):
+            value, steep = psi(record, stiffness * (aimed + tau * bristle_rate) * side / level)
+            before = bristle_rate
+            bristle_rate, low, high = newton(bristle_rate, bristle_rate - speed * value, 1.0 + bend * steep, low, high)
+            if abs(bristle_rate - before) <= ROOT_TOLERANCE * abs(start):
                 break
-        w = stiffness * (aimed + tau * found) * side / level
-        value, steep = psi(own, w)
-        return found, (value + speed * steep * w * slope / level) / (1.0 + bend * steep)
+        w = stiffness * (aimed + tau * bristle_rate) * side / level
+        value, steep = psi(record, w)
+        return bristle_rate, (value + speed * steep * w * slope / level) / (1.0 + bend * steep)
 
     return part(rate)
 
 
 @part
-def _psi(own, w):
-    left, a = 1.0 - w, own.dahl_exponent
-    size = abs(left) ** a
-    return math.copysign(size, left), a * size / max(abs(left), 1e-300)
+def _psi(record, w):
+    remainder, a = 1.0 - w, record.dahl_exponent
+    size = abs(remainder) ** a
+    return math.copysign(size, remainder), a * size / max(abs(remainder), 1e-300)
 
 
 @part
@@ -68,33 +68,37 @@ def _left_of_way(aimed, bend_x, bend_y, a):
     q/|Y(q)| - 1 rises with q: Newton within a bracket.
     """
     low, high = 0.0, math.hypot(aimed[0], aimed[1])
-    found = high
+    root = high
     for _ in range(ROUNDS if high > 0.0 else 0):
-        power = found ** (a - 1.0)
+        power = root ** (a - 1.0)
         below_x, below_y = 1.0 + bend_x * power, 1.0 + bend_y * power
         x, y = aimed[0] / below_x, aimed[1] / below_y
         size = max(math.hypot(x, y), 1e-300)
         rises = (a - 1.0) * power * (bend_x * x * x / below_x + bend_y * y * y / below_y) / (size * size)
-        before = found
-        found, low, high = newton(found, found - size, 1.0 + rises, low, high)
-        if abs(found - before) <= SETTLED * found:
+        before = root
+        root, low, high = newton(root, root - size, 1.0 + rises, low, high)
+        if abs(root - before) <= ROOT_TOLERANCE * root:
             break
-    return found
+    return root
 
 
 @part
-def _plane_by_newton(own, aimed, speed, tau, levels):
+def _plane_by_newton(record, aimed, speed, tau, levels):
     """As `plane`, for a general exponent."""
-    (x, y), cx, cy, a = speed, levels[0], levels[1], own.dahl_exponent
+    (x, y), cx, cy, a = speed, levels[0], levels[1], record.dahl_exponent
     work = math.hypot(cx * x, cy * y)
     if work == 0.0:
         return 0.0, 0.0, 1.0, 0.0, 0.0, 1.0
-    n, stiff = (cx * x / work, cy * y / work), tau * own.stiffness * work
-    start = (own.stiffness * aimed[0] / cx - n[0], own.stiffness * aimed[1] / cy - n[1])
-    power = max(_left_of_way(start, stiff / (cx * cx), stiff / (cy * cy), a), LEAST) ** (a - 1.0)
+    n, stiff = (cx * x / work, cy * y / work), tau * record.stiffness * work
+    start = (record.stiffness * aimed[0] / cx - n[0], record.stiffness * aimed[1] / cy - n[1])
+    power = max(_left_of_way(start, stiff / (cx * cx), stiff / (cy * cy), a), LEAST_SHARE) ** (a - 1.0)
     u, v = start[0] / (1.0 + stiff * power / (cx * cx)), start[1] / (1.0 + stiff * power / (cy * cy))
-    q, more = max(math.hypot(u, v), 1e-300), (a - 1.0) * power
-    xx, xy, yy = power + more * (u / q) ** 2, more * (u / q) * (v / q), power + more * (v / q) ** 2  # |Y|^(a-1) Y by Y
+    q, extra_power = max(math.hypot(u, v), 1e-300), (a - 1.0) * power
+    xx, xy, yy = (
+        power + extra_power * (u / q) ** 2,
+        extra_power * (u / q) * (v / q),
+        power + extra_power * (v / q) ** 2,
+    )  # |Y|^(a-1) Y by Y
     turn_x, turn_y = xx * n[0] + xy * n[1] + power * u, xy * n[0] + yy * n[1] + power * v
     by = lugre.within(
         (1.0 + stiff * xx / (cx * cx), stiff * xy / (cx * cy), stiff * xy / (cx * cy), 1.0 + stiff * yy / (cy * cy)),
@@ -108,31 +112,31 @@ _linear_plane = lugre.plane
 
 
 @part
-def rate(own, aimed, speed, tau, level, slope):
+def rate(record, aimed, speed, tau, level, slope):
     """(z', dz'/ds); see LAWS of bristle.py."""
-    if own.dahl_exponent == 1.0:
-        return _linear(own, aimed, speed, tau, level, slope)
-    return _by_newton(own, aimed, speed, tau, level, slope)
+    if record.dahl_exponent == 1.0:
+        return _linear(record, aimed, speed, tau, level, slope)
+    return _by_newton(record, aimed, speed, tau, level, slope)
 
 
 @part
-def plane(own, aimed, speed, tau, levels):
+def plane(record, aimed, speed, tau, levels):
     """(zx', zy', their slopes by v_x and v_y); see LAWS of bristle.py."""
-    if own.dahl_exponent == 1.0:
-        return _linear_plane(own, aimed, speed, tau, levels)
-    return _plane_by_newton(own, aimed, speed, tau, levels)
+    if record.dahl_exponent == 1.0:
+        return _linear_plane(record, aimed, speed, tau, levels)
+    return _plane_by_newton(record, aimed, speed, tau, levels)
 
 
-def slow(own: Any, left: float, far: float) -> float:
+def slow(record: Any, remainder: float, distance: float) -> float:
     """What is left of the way to slipping, on a slow way: it decays by a power, for a = 1 by exp."""
-    a = float(own.dahl_exponent)
+    a = float(record.dahl_exponent)
     if a == 1.0:
-        return lugre.slow(own, left, far)
-    if left <= 0.0:
-        return left
-    below = left ** (1.0 - a) + (a - 1.0) * far
+        return lugre.slow(record, remainder, distance)
+    if remainder <= 0.0:
+        return remainder
+    below = remainder ** (1.0 - a) + (a - 1.0) * distance
     return below ** (1.0 / (1.0 - a)) if below > 0.0 else 0.0
 
 
 TAKES = {"stiffness": lugre.STIFFNESS, "dahl_exponent": Number("dahl_exponent")}
-KIND = Kind("dahl", "Dahl", TAKES, falls=False, bends=True)
+KIND = LawKind("dahl", "Dahl", TAKES, falls=False, bends=True)

@@ -22,7 +22,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from omnidyn.arrays import FloatArray
 from omnidyn.model.friction.kinds import COULOMB, DIRECTION, refuse_mixtures, spread_on, words_of
-from omnidyn.model.friction.stribeck import LEAST, MOST, SHAPES, USUAL
+from omnidyn.model.friction.stribeck import LARGEST_EXPONENT, LEAST_EXPONENT, SHAPES, USUAL_EXPONENT
 from omnidyn.model.layout import N_AXES, YAW, Plant
 from omnidyn.model.value import Value, number, to_list, word_of
 
@@ -54,7 +54,9 @@ class DirectionFriction(Value):
     law: Annotated[Annotated[str, word_of(*words_of(DIRECTION))], Field(description="what kind of law")] = "coulomb"
     stribeck_speed: Annotated[Speed | None, Field(description="v_s [m/s]")] = None
     yaw_stribeck_speed: Annotated[Speed | None, Field(description="v_s [rad/s]")] = None
-    stribeck_exponent: Annotated[Annotated[float, number(LEAST, MOST)], Field(description="d")] = USUAL
+    stribeck_exponent: Annotated[Annotated[float, number(LEAST_EXPONENT, LARGEST_EXPONENT)], Field(description="d")] = (
+        USUAL_EXPONENT
+    )
     stribeck_shape: Annotated[Annotated[str, word_of(*SHAPES)], Field(description="f of the fall")] = "exponential"
     karnopp_speed: Annotated[Speed, Field(description="Dv [m/s]")] = 1e-4
     yaw_karnopp_speed: Annotated[Speed, Field(description="Dv [rad/s]")] = 1e-4

@@ -17,16 +17,16 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.model.friction import bristle
-from omnidyn.model.friction.law import SPEED, Kind, Number
+from omnidyn.model.friction.law import SPEED, LawKind, Number
 from omnidyn.model.friction.stribeck import SHAPES
 
 AXES, DIRECTION, WHEELS = "axes", "direction", "wheels"
 COULOMB, KARNOPP, LUGRE = "coulomb", "karnopp", "lugre"
 _STICKING = (
-    Kind(COULOMB, "Coulomb"),
-    Kind(KARNOPP, "Karnopp", takes={"karnopp_speed": Number("band", -1, units=SPEED)}, falls=False),
+    LawKind(COULOMB, "Coulomb"),
+    LawKind(KARNOPP, "Karnopp", takes={"karnopp_speed": Number("band", -1, units=SPEED)}, falls=False),
 )
-KINDS = {each.word: each for each in (*_STICKING, *(law.KIND for law in bristle.LAWS))}
+KINDS = {kind.word: kind for kind in (*_STICKING, *(law.KIND for law in bristle.LAWS))}
 
 
 FALL = {
@@ -34,14 +34,14 @@ FALL = {
     "stribeck_exponent": Number("exponent"),
     "stribeck_shape": Number("form"),
 }
-OF_LAWS = {key: number for each in KINDS.values() for key, number in each.takes.items()}
+OF_LAWS = {key: number for kind in KINDS.values() for key, number in kind.takes.items()}
 NUMBERS = FALL | OF_LAWS
 """Every number that a law takes, by its key without "yaw_"."""
 
 
 def words_of(place: str) -> tuple[str, ...]:
     """The words of the laws that a table knows: "axes", "direction" or "wheels"."""
-    return tuple(each.word for each in KINDS.values() if place in each.places)
+    return tuple(kind.word for kind in KINDS.values() if place in kind.places)
 
 
 def spread_on(
@@ -70,15 +70,15 @@ def spread_on(
 
 
 def _take(
-    kind: Kind, table: Any, rows: Any, used: Any, mass: Any, viscous: Any, units: FloatArray | float, yaw: str
+    kind: LawKind, table: Any, rows: Any, rows_in_use: Any, mass: Any, viscous: Any, units: FloatArray | float, yaw: str
 ) -> None:
     """The numbers of a law."""
     for key, number in kind.takes.items():
         value = _number(table, yaw, key, number, units)
         if value is None and key in kind.usual:
             value = kind.usual[key](_number(table, yaw, "stiffness", kind.takes["stiffness"], units), mass, viscous)
-        _put(rows, used, number.field, value)
-    _put(rows, used, "law", bristle.NUMBER_OF.get(kind.word))
+        _put(rows, rows_in_use, number.field, value)
+    _put(rows, rows_in_use, "law", bristle.NUMBER_OF.get(kind.word))
 
 
 def _number(table: Any, yaw: str, key: str, number: Number, units: FloatArray | float) -> Any:
@@ -93,10 +93,10 @@ def _number(table: Any, yaw: str, key: str, number: Number, units: FloatArray | 
     return 1.0 / value if number.inverse else value
 
 
-def _put(rows: Any, where: Any, field: str, value: Any) -> None:
+def _put(rows: Any, mask: Any, field: str, value: Any) -> None:
     """One number, or one per row, into a field of some rows."""
     if value is not None:
-        rows[field] = np.where(where, value, rows[field])
+        rows[field] = np.where(mask, value, rows[field])
 
 
 def refuse_mixtures(table: Any, yaw: str = "") -> None:
@@ -107,15 +107,15 @@ def refuse_mixtures(table: Any, yaw: str = "") -> None:
     for name in () if yaw else fields:
         plain = name.removeprefix("yaw_")
         if plain in OF_LAWS and plain not in kind.takes and getattr(table, name) != fields[name].default:
-            wanted = " or ".join(f'"{each.word}"' for each in KINDS.values() if plain in each.takes)
-            raise ValueError(f"{name} is of law = {wanted}; this table has {law}")
+            takers = " or ".join(f'"{kind.word}"' for kind in KINDS.values() if plain in kind.takes)
+            raise ValueError(f"{name} is of law = {takers}; this table has {law}")
     if kind.bends and np.any(getattr(table, coulomb)) and getattr(table, stiffness) is None:
         words = "the Coulomb level over the distance it bends before it slips"
         raise ValueError(f"{law} needs {stiffness} beside {coulomb}: {words}")
     holds, falls = getattr(table, breakaway) is not None, getattr(table, speed) is not None
     if kind.bends and not kind.falls and (holds or falls):
-        other = " or ".join(f'law = "{each.word}"' for each in KINDS.values() if each.bends and each.falls)
-        raise ValueError(f"{law} has one level, {coulomb}: no {breakaway} and no {speed}; {other} has both")
+        alternative = " or ".join(f'law = "{kind.word}"' for kind in KINDS.values() if kind.bends and kind.falls)
+        raise ValueError(f"{law} has one level, {coulomb}: no {breakaway} and no {speed}; {alternative} has both")
     if kind.bends and holds and not falls:
         raise ValueError(f"{law} with a {breakaway} needs {speed}: how fast the level falls from it")
     if not kind.falls and falls:

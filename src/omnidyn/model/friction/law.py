@@ -1,7 +1,7 @@
 """The contract of a friction law. One file per place where friction acts; the parts of a robot's friction add up.
 
 How the level falls with the speed is one of the SHAPES of stribeck.py, what bends one of the LAWS of bristle.py, each
-a file; what a table may say of them is a Kind, with the Numbers that it takes.
+a file; what a table may say of them is a LawKind, with the Numbers that it takes.
 
 A law acts between body and floor. It must:
 
@@ -46,7 +46,7 @@ class Number(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Kind:
+class LawKind:
     """A law that a table may choose by a word; kinds.py lists them.
 
     word: in the robot file; name: what people call it. takes: the keys that it takes beside those of every law. falls:

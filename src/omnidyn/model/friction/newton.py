@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from omnidyn.compiled.kernel import part
 
-SETTLED = 4e-16  # of what is looked for: a change that is rounding
+ROOT_TOLERANCE = 4e-16  # of what is looked for: a change that is rounding
 
 
 @part
-def newton(found, off, slope, low, high):
-    """(the next guess, low, high) from what is left at `found`, `off`, and its slope.
+def newton(guess, off, slope, low, high):
+    """(the next guess, low, high) from what is left at `guess`, `off`, and its slope.
 
     The middle, where Newton's step leaves the bracket; an end of it may be the root.
     """
     if off > 0.0:
-        high = found
+        high = guess
     else:
-        low = found
-    new = found - off / slope
+        low = guess
+    new = guess - off / slope
     return (new if low <= new <= high else 0.5 * (low + high)), low, high

@@ -26,13 +26,13 @@ from omnidyn.model.friction import exponential, lorentzian
 SHAPES = {"exponential": exponential, "lorentzian": lorentzian}
 """The shapes by their words in a robot file. A record has the number of its shape, in this order."""
 
-USUAL = 2.0
-LEAST, MOST = 0.3, 10.0  # of the exponent
+USUAL_EXPONENT = 2.0
+LEAST_EXPONENT, LARGEST_EXPONENT = 0.3, 10.0  # of the exponent
 CHORD = 2.0**-16
-BENDS = 1.5  # a bristle follows what falls late: so much steeper at the most
+BRISTLE_STEEPNESS = 1.5  # a bristle follows what falls late: so much steeper at the most
 
-_left = one_of([each.left for each in SHAPES.values()])
-_steepest = one_of([each.steepest for each in SHAPES.values()])
+_left = one_of([shape.left for shape in SHAPES.values()])
+_steepest = one_of([shape.steepest for shape in SHAPES.values()])
 
 
 @part
@@ -71,24 +71,24 @@ def steepness_left(u, shape, exponent):
 
 
 @part
-def excess(own, at, speed):
+def excess(record, at, speed):
     """(force, slope) by which an element that slides resists more than its Coulomb level, against its sign.
 
-    own, at: the records ELEMENT and EACH of it, see layout.py.
+    record, at: the records ELEMENT and EACH of it, see layout.py.
     """
     sign, side = at.sign, 0 if at.sign > 0.0 else 1
-    f, slope = fall(max(sign * speed, 0.0) * own.fall, own.form, own.exponent)
-    more = at.hold[side] - own.coulomb[side]
-    return -sign * more * f, -more * slope * own.fall
+    f, slope = fall(max(sign * speed, 0.0) * record.fall, record.form, record.exponent)
+    extra = at.hold[side] - record.coulomb[side]
+    return -sign * extra * f, -extra * slope * record.fall
 
 
-def steepest_of(own: Any) -> float:
-    """A bound of how steeply an element falls [N s/m], what it sticks with and its bristle; own: its record."""
-    if own.fall == 0.0:
+def steepest_of(record: Any) -> float:
+    """A bound of how steeply an element falls [N s/m], what it sticks with and its bristle; record: its record."""
+    if record.fall == 0.0:
         return 0.0
-    more = max((own.breakaway - own.coulomb).max(), 0.0)
-    bends = max((own.bristle_breakaway - own.bristle_coulomb).max(), 0.0)
-    return (more + BENDS * bends) * own.fall * steepest_of_all(own.form, own.exponent)
+    extra = max((record.breakaway - record.coulomb).max(), 0.0)
+    bends = max((record.bristle_breakaway - record.bristle_coulomb).max(), 0.0)
+    return (extra + BRISTLE_STEEPNESS * bends) * record.fall * steepest_of_all(record.form, record.exponent)
 
 
 def fallen(speed: ArrayLike, inverse: ArrayLike, exponent: ArrayLike, shape: ArrayLike = 0.0) -> FloatArray:
@@ -102,9 +102,9 @@ def fallen(speed: ArrayLike, inverse: ArrayLike, exponent: ArrayLike, shape: Arr
 
 def _fallen(shape: ArrayLike, p: Any) -> FloatArray:
     """f(p), each of its own shape."""
-    first, *others = (plain(each.left) for each in SHAPES.values())
-    found = first(p)[0]
-    for number, left in enumerate(others, start=1):
+    first, *rest_shapes = (plain(form.left) for form in SHAPES.values())
+    values = first(p)[0]
+    for number, function in enumerate(rest_shapes, start=1):
         if np.any(np.equal(shape, number)):
-            found = np.where(np.equal(shape, number), left(p)[0], found)
-    return found
+            values = np.where(np.equal(shape, number), function(p)[0], values)
+    return values

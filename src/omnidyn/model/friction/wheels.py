@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from omnidyn.model.friction.kinds import WHEELS, refuse_mixtures, spread_on, words_of
-from omnidyn.model.friction.stribeck import LEAST, MOST, SHAPES, USUAL
+from omnidyn.model.friction.stribeck import LARGEST_EXPONENT, LEAST_EXPONENT, SHAPES, USUAL_EXPONENT
 from omnidyn.model.layout import N_AXES, Plant
 from omnidyn.model.value import PerWheel, Value, number, per_wheel_number, word_of
 
@@ -36,7 +36,9 @@ class WheelFriction(Value):
     viscous: Annotated[Level, Field(description="b [N s/m] at the rim")] = 0.0
     law: Annotated[Annotated[str, word_of(*words_of(WHEELS))], Field(description="what kind of law")] = "coulomb"
     stribeck_speed: Annotated[Speed | None, Field(description="v_s [m/s] of the rim")] = None
-    stribeck_exponent: Annotated[Annotated[float, number(LEAST, MOST)], Field(description="d")] = USUAL
+    stribeck_exponent: Annotated[Annotated[float, number(LEAST_EXPONENT, LARGEST_EXPONENT)], Field(description="d")] = (
+        USUAL_EXPONENT
+    )
     stribeck_shape: Annotated[Annotated[str, word_of(*SHAPES)], Field(description="f of the fall")] = "exponential"
     karnopp_speed: Annotated[Speed, Field(description="Dv [m/s] of the rim")] = 1e-4
     stiffness: Annotated[Stiffness | None, Field(description="sigma0 [N/m] at the rim")] = None
@@ -73,8 +75,8 @@ class WheelFriction(Value):
             self.hold_forward,
             self.hold_backward,
         )
-        seen = plant.body.mass / np.maximum((wheels["g"] ** 2).sum(axis=1), 1e-300)
-        spread_on(self, wheels, slide, hold, seen, wheels["viscous"])
+        mass_at_wheel = plant.body.mass / np.maximum((wheels["g"] ** 2).sum(axis=1), 1e-300)
+        spread_on(self, wheels, slide, hold, mass_at_wheel, wheels["viscous"])
 
     @model_validator(mode="after")
     def _breakaway_at_least_coulomb(self) -> WheelFriction:

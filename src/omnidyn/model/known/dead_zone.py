@@ -24,12 +24,12 @@ from omnidyn.statement import ERROR, NOTE, WARNING, Statement, as_verdict
 WAYS = {"x": "forward", "y": "sideways", "yaw": "turning"}
 AROUND = np.radians(np.arange(0.0, 360.0, 5.0))  # directions of travel that are answered for
 HALVINGS = 20  # of a drawn robot: a millionth of its voltage
-BEYOND = 1.0 + 1e-9
-FELT = 1e-5  # share that a number must change the answer by to be named
+BEYOND_RATIO = 1.0 + 1e-9
+FELT_SHARE = 1e-5  # share that a number must change the answer by to be named
 
 
 @dataclass(frozen=True, eq=False)
-class Breakaway:
+class PatternBreakaway:
     """One pattern of voltages. pattern: shape (wheels,), no unit. scale: volts times the pattern at which it gives way.
 
     axis: what gives way first, "x", "y", "yaw" or several; "" where it never moves. duty: of the most loaded motor.
@@ -77,7 +77,7 @@ class DeadZone:
     """
 
     robot: Robot
-    rows: tuple[Breakaway, ...]
+    rows: tuple[PatternBreakaway, ...]
     directions: FloatArray
     voltage: FloatArray
     band: Interval | None
@@ -89,7 +89,7 @@ class DeadZone:
     @property
     def guesses(self) -> tuple[str, ...]:
         """The guesses that it rests on."""
-        return tuple(each.key for each in self.rests_on if each.guessed)
+        return tuple(basis.key for basis in self.rests_on if basis.guessed)
 
     def summary(self) -> str:
         """The dead zone as text."""
@@ -141,8 +141,11 @@ class DeadZone:
         duty = Statement("duty_of", NOTE, self.full_of, {"volts": self.full})
         if not np.isfinite(self.voltage).any():
             return [duty]
-        least, most = (1.0 + FELT) * self.voltage.min(), (1.0 - FELT) * self.voltage.max()  # the first of equals
-        ends = [int(np.argmax(self.voltage <= least)), int(np.argmax(self.voltage >= most))]
+        easiest, hardest = (
+            (1.0 + FELT_SHARE) * self.voltage.min(),
+            (1.0 - FELT_SHARE) * self.voltage.max(),
+        )  # the first of equals
+        ends = [int(np.argmax(self.voltage <= easiest)), int(np.argmax(self.voltage >= hardest))]
         band = self.band
         numbers = {
             "volts": self.voltage[ends],
@@ -153,17 +156,17 @@ class DeadZone:
 
     def _warnings(self) -> list[Statement]:
         """Guesses that it rests on, by name, and where there is no interval."""
-        found = []
+        warnings = []
         for duty in (False, True):
-            named = [each for each in self.rests_on if each.guessed and each.duty == duty]
-            effects = [None if each.std is None else each.effect for each in named]
-            numbers = {"duty": duty, "keys": [each.key for each in named], "effects": effects}
-            found += [Statement("dead_zone_rests_on_guesses", WARNING, numbers=numbers)] if named else []
+            guesses = [guess for guess in self.rests_on if guess.guessed and guess.duty == duty]
+            effects = [None if guess.std is None else guess.effect for guess in guesses]
+            numbers = {"duty": duty, "keys": [guess.key for guess in guesses], "effects": effects}
+            warnings += [Statement("dead_zone_rests_on_guesses", WARNING, numbers=numbers)] if guesses else []
         if self.band is None:
-            found.append(Statement("no_interval", WARNING))
-        elif not any(each.std is not None and not each.duty for each in self.rests_on):
-            found.append(Statement("empty_intervals", WARNING))
-        return found
+            warnings.append(Statement("no_interval", WARNING))
+        elif not any(basis.std is not None and not basis.duty for basis in self.rests_on):
+            warnings.append(Statement("empty_intervals", WARNING))
+        return warnings
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
@@ -194,7 +197,7 @@ class DeadZone:
                 "directions": around,
                 "duty_of": {"volts": self.full, "of": self.full_of},
                 "warnings": self._warnings(),
-                "rests_on": [vars(each) for each in self.rests_on],
+                "rests_on": [vars(basis) for basis in self.rests_on],
                 "guesses": self.guesses,
                 "draws": self.draws if self.band is not None else 0,
             }
@@ -204,23 +207,29 @@ class DeadZone:
 def dead_zone(robot: Robot, patterns: ArrayLike | None = None, *, draws: int = DRAWS, seed: int = 0) -> DeadZone:
     """The dead zone of a robot at rest: along each axis and over the direction of travel, each with its 95 % interval.
 
-    patterns: of voltages, shape (k, wheels), no unit; by default those of `axis_patterns`. The intervals follow from
-    the std and the correlations of the robot file, guesses included, by so many draws (`plausible`); a file without
-    any std has none. A pattern stays the same volts for every draw.
+    The intervals follow from the std and the correlations of the robot file, guesses included; a file without any std
+    has none. A pattern stays the same volts for every draw.
+
+    Args:
+        robot: The robot, at rest.
+        patterns: Of voltages, shape (k, wheels), no unit; by default those of `axis_patterns`.
+        draws: Number of plausible robots of the intervals (`plausible`).
+        seed: Of the draws.
+
     Raises InputError where a pattern has not one entry per wheel, or for a strange number of draws.
     """
     check_order("dead_zone(robot)", (robot, Robot), (patterns, object))
-    own = axis_patterns(robot) if patterns is None else np.atleast_2d(np.asarray(patterns, dtype=float))
-    scale = breakaway_voltage(robot, own)
+    asked_patterns = axis_patterns(robot) if patterns is None else np.atleast_2d(np.asarray(patterns, dtype=float))
+    scale = breakaway_voltage(robot, asked_patterns)
     voltage, around = dead_zone_map(robot, AROUND)
-    every = np.concatenate([own, around])
-    found = None
+    all_patterns = np.concatenate([asked_patterns, around])
+    interval = None
     if told(robot).keys:
-        found = interval_of(robot, partial(_volts_and_duty, patterns=every), draws, seed)
-    count, full, full_of = len(own), *_full(robot)
-    rows = [_row(robot, own[k], float(scale[k]), full, found, k, len(every)) for k in range(count)]
-    band = None if found is None else Interval(*(end[count : len(every)] for end in found))
-    return DeadZone(robot, tuple(rows), AROUND, voltage, band, full, full_of, _rests_on(robot, own), draws)
+        interval = interval_of(robot, partial(_volts_and_duty, patterns=all_patterns), draws, seed)
+    count, full, full_of = len(asked_patterns), *_full(robot)
+    rows = [_row(robot, asked_patterns[k], float(scale[k]), full, interval, k, len(all_patterns)) for k in range(count)]
+    band = None if interval is None else Interval(*(end[count : len(all_patterns)] for end in interval))
+    return DeadZone(robot, tuple(rows), AROUND, voltage, band, full, full_of, _rests_on(robot, asked_patterns), draws)
 
 
 def _volts_and_duty(robot: Robot, patterns: FloatArray) -> FloatArray:
@@ -242,41 +251,43 @@ def _full(robot: Robot) -> tuple[float, str]:
 
 
 def _row(
-    robot: Robot, pattern: FloatArray, scale: float, full: float, found: Interval | None, k: int, every: int
-) -> Breakaway:
+    robot: Robot, pattern: FloatArray, scale: float, full: float, interval: Interval | None, k: int, pattern_count: int
+) -> PatternBreakaway:
     duty = float(_duty(np.array([scale]), pattern[None], full)[0])
-    ends = None if found is None else (float(found.low[k]), float(found.high[k]))
-    duty_ends = None if found is None else (float(found.low[every + k]), float(found.high[every + k]))
+    ends = None if interval is None else (float(interval.low[k]), float(interval.high[k]))
+    duty_ends = (
+        None if interval is None else (float(interval.low[pattern_count + k]), float(interval.high[pattern_count + k]))
+    )
     if not np.isfinite(scale):
-        return Breakaway("", pattern, scale, duty, ends, duty_ends, False)
+        return PatternBreakaway("", pattern, scale, duty, ends, duty_ends, False)
     volts = np.multiply(scale, pattern)
-    moving = [axis for axis, moved in zip(AXES, moving_axes(robot, BEYOND * volts), strict=True) if moved]
+    moving = [axis for axis, moves in zip(AXES, moving_axes(robot, BEYOND_RATIO * volts), strict=True) if moves]
     reachable = bool((clip_voltage(robot.motor, volts) == volts).all())
-    return Breakaway("+".join(moving), pattern, scale, duty, ends, duty_ends, reachable)
+    return PatternBreakaway("+".join(moving), pattern, scale, duty, ends, duty_ends, reachable)
 
 
 def _rests_on(robot: Robot, patterns: FloatArray) -> tuple[RestsOn, ...]:
     """The numbers with a std, and the guesses, that the volts of the patterns change with."""
-    own = {key: p for key, p in numbers_told(robot).items() if p.std is not None or p.origin in GUESSES}
+    priors = {key: p for key, p in numbers_told(robot).items() if p.std is not None or p.origin in GUESSES}
     moving = patterns[np.isfinite(breakaway_voltage(robot, patterns, HALVINGS))]
-    if not own or not len(moving):
+    if not priors or not len(moving):
         return ()
-    both = partial(_volts_and_duty, patterns=moving)
-    volts = effects(robot, partial(breakaway_voltage, pattern=moving, halvings=HALVINGS), [*own])
-    found = [
-        RestsOn(key, own[key].origin, own[key].guessed, own[key].std, size, volts[key] <= FELT)
-        for key, size in effects(robot, both, [*own]).items()
-        if size > FELT
+    function = partial(_volts_and_duty, patterns=moving)
+    volts = effects(robot, partial(breakaway_voltage, pattern=moving, halvings=HALVINGS), [*priors])
+    bases = [
+        RestsOn(key, priors[key].origin, priors[key].guessed, priors[key].std, size, volts[key] <= FELT_SHARE)
+        for key, size in effects(robot, function, [*priors]).items()
+        if size > FELT_SHARE
     ]
-    return tuple(sorted(found, key=lambda each: (each.duty, -each.effect)))
+    return tuple(sorted(bases, key=lambda basis: (basis.duty, -basis.effect)))
 
 
-def _way(row: Breakaway) -> str:
+def _way(row: PatternBreakaway) -> str:
     """Which way a pattern moves the robot, in words."""
     return all_of([WAYS[axis] for axis in row.axis.split("+") if axis]) or "along the pattern"
 
 
-def _line(row: Breakaway) -> str:
+def _line(row: PatternBreakaway) -> str:
     """A pattern in words. The limit stands there where the motors cannot reach what it takes."""
     pattern = ", ".join(f"{value:g}" for value in row.pattern)
     if not np.isfinite(row.scale):

@@ -18,8 +18,8 @@ from omnidyn.model.log_effects import KeyCorrelation, key_correlation
 from omnidyn.model.robot import IDENTIFIED, Prior, Robot
 from omnidyn.model.value import Value
 
-SAME = 1e-9  # relative: std that differ by no more are the same
-NEAR = 0.5  # std over value, from which on a friction may be 0
+SAME_STD = 1e-9  # relative: std that differ by no more are the same
+NEAR_ZERO = 0.5  # std over value, from which on a friction may be 0
 SIGNED = ("wheels.azimuth_deg", "wheels.roller_angle_deg", CENTRE)  # numbers that may as well be below 0
 
 
@@ -40,16 +40,16 @@ class Told:
 
 def told(robot: Robot) -> Told:
     """What the file of a robot says of how far its numbers may be off."""
-    own = {key: prior for key, prior in numbers_told(robot).items() if prior.std is not None}
+    priors = {key: prior for key, prior in numbers_told(robot).items() if prior.std is not None}
     together = robot.correlation
-    std = {key: float(prior.std or 0.0) for key, prior in own.items()}
+    std = {key: float(prior.std or 0.0) for key, prior in priors.items()}
     if together is not None and together.std is not None:
         std |= {key: s for key, s in zip(together.keys, together.std, strict=True) if key in std and s > 0.0}
-    keys, value = tuple(own), np.array([Key.parse(key).get(robot) for key in own])
+    keys, value = tuple(priors), np.array([Key.parse(key).get(robot) for key in priors])
     spread = np.array([std[key] for key in keys])
     correlation = np.eye(len(keys)) if together is None else together.of(keys)
     log = np.array([is_log(key, v, s) for key, v, s in zip(keys, value, spread, strict=True)], dtype=bool)
-    return Told(keys, value, spread, correlation, log, tuple(k for k, prior in own.items() if prior.guessed))
+    return Told(keys, value, spread, correlation, log, tuple(k for k, prior in priors.items() if prior.guessed))
 
 
 def numbers_told(robot: Robot) -> dict[str, Prior]:
@@ -57,11 +57,11 @@ def numbers_told(robot: Robot) -> dict[str, Prior]:
 
     Friction of a shape that is off has no number, whatever is still told of it.
     """
-    found = {}
+    priors = {}
     for name, prior in robot.priors.items():
         if find_key(name) is not None:
-            found |= {key: prior for key in expand(name, robot) if _has(robot, key)}
-    return found
+            priors |= {key: prior for key in expand(name, robot) if _has(robot, key)}
+    return priors
 
 
 def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:
@@ -69,12 +69,12 @@ def known_priors(robot: Robot) -> dict[str, tuple[float, float]]:
 
     One of a number that this robot no longer has, because a part of it was exchanged, is left out.
     """
-    found = {}
+    independent = {}
     for name, prior in robot.priors.items():
         if prior.std is not None and prior.origin != IDENTIFIED:
             with contextlib.suppress(InputError):
-                found |= {key: (float(Key.parse(key).get(robot)), prior.std) for key in expand(name, robot)}
-    return found
+                independent |= {key: (float(Key.parse(key).get(robot)), prior.std) for key in expand(name, robot)}
+    return independent
 
 
 def guesses(robot: Robot) -> tuple[str, ...]:
@@ -109,20 +109,20 @@ def is_log(name: str, value: float, std: float) -> bool:
     """Whether a number has a logarithmic scale: what must be positive, and what may be 0 but is far from it."""
     key = Key.parse(name)
     may_be_0 = bool(key.level) or key.name in (DEAD_BAND, LATENCY)
-    return key.name not in SIGNED and value > 0.0 and (not may_be_0 or std < NEAR * value)
+    return key.name not in SIGNED and value > 0.0 and (not may_be_0 or std < NEAR_ZERO * value)
 
 
 def correlation_of(robot: Robot) -> KeyCorrelation | None:
     """The correlations of the numbers that the robot has; None where fewer than two are left."""
-    own = robot.correlation
-    if own is None:
+    correlation = robot.correlation
+    if correlation is None:
         return None
-    kept = [k for k, key in enumerate(own.keys) if _has(robot, key)]
-    if len(kept) == len(own.keys):
-        return own if kept else None
-    keys = tuple(own.keys[k] for k in kept)
-    std = None if own.std is None else tuple(own.std[k] for k in kept)
-    return key_correlation(keys, own.of(keys), std) if len(keys) > 1 else None
+    indices = [k for k, key in enumerate(correlation.keys) if _has(robot, key)]
+    if len(indices) == len(correlation.keys):
+        return correlation if indices else None
+    keys = tuple(correlation.keys[k] for k in indices)
+    std = None if correlation.std is None else tuple(correlation.std[k] for k in indices)
+    return key_correlation(keys, correlation.of(keys), std) if len(keys) > 1 else None
 
 
 def refuse_strange_keys(robot: Robot) -> None:
@@ -147,34 +147,34 @@ def with_correlation(robot: Robot, keys: Sequence[str], matrix: ArrayLike, std: 
     kept where it is not what stands beside the number. Raises InputError for keys that are none of the robot, and for
     what is no matrix of correlations.
     """
-    tied = [(k, each) for k, key in enumerate(keys) for each in expand(key, robot)]
+    tied = [(k, entry) for k, key in enumerate(keys) for entry in expand(key, robot)]
     at = [k for k, _ in tied]
     matrix = np.asarray(matrix, dtype=float).reshape(len(keys), len(keys))[np.ix_(at, at)]
-    keys, std = [each for _, each in tied], [std[k] for k in at] if len(std) else ()
+    keys, std = [entry for _, entry in tied], [std[k] for k in at] if len(std) else ()
     before = correlation_of(robot)
     old = tuple(key for key in (before.keys if before is not None else ()) if key not in keys)
-    every = (*old, *keys)
-    whole = np.eye(len(every))
+    all_keys = (*old, *keys)
+    joint_matrix = np.eye(len(all_keys))
     if before is not None:
-        whole[: len(old), : len(old)] = before.of(old)
-    whole[len(old) :, len(old) :] = matrix
-    own = numbers_told(robot)
-    beside = [float(own[key].std or 0.0) if key in own else 0.0 for key in every]
+        joint_matrix[: len(old), : len(old)] = before.of(old)
+    joint_matrix[len(old) :, len(old) :] = matrix
+    priors = numbers_told(robot)
+    file_std = [float(priors[key].std or 0.0) if key in priors else 0.0 for key in all_keys]
     earlier = dict(zip(before.keys, before.std, strict=True)) if before is not None and before.std is not None else {}
-    joint = [*(earlier.get(key, beside[k]) for k, key in enumerate(old)), *(std or beside[len(old) :])]
-    apart = not all(a == b or abs(a - b) <= SAME * abs(b) for a, b in zip(joint, beside, strict=True))
-    found = key_correlation(every, whole, tuple(map(float, joint)) if apart else None)
-    refuse_strange_keys(robot.model_copy(update={"correlation": found}))
-    return robot.model_copy(update={"correlation": found if apart else _without_the_free(found)})
+    joint = [*(earlier.get(key, file_std[k]) for k, key in enumerate(old)), *(std or file_std[len(old) :])]
+    apart = not all(a == b or abs(a - b) <= SAME_STD * abs(b) for a, b in zip(joint, file_std, strict=True))
+    joined = key_correlation(all_keys, joint_matrix, tuple(map(float, joint)) if apart else None)
+    refuse_strange_keys(robot.model_copy(update={"correlation": joined}))
+    return robot.model_copy(update={"correlation": joined if apart else _without_the_free(joined)})
 
 
-def _without_the_free(known: KeyCorrelation) -> KeyCorrelation | None:
+def _without_the_free(correlation: KeyCorrelation) -> KeyCorrelation | None:
     """The correlations without numbers that are off for themselves; None where all are."""
-    matrix = known.of(known.keys)
-    keys = tuple(key for key, row in zip(known.keys, matrix, strict=True) if np.count_nonzero(row) > 1)
-    if keys == tuple(known.keys):
-        return known if keys else None
-    return key_correlation(keys, known.of(keys)) if keys else None
+    matrix = correlation.of(correlation.keys)
+    keys = tuple(key for key, row in zip(correlation.keys, matrix, strict=True) if np.count_nonzero(row) > 1)
+    if keys == tuple(correlation.keys):
+        return correlation if keys else None
+    return key_correlation(keys, correlation.of(keys)) if keys else None
 
 
 # Levels of breakaway by their keys: what holds a robot at rest, nowhere less than the Coulomb friction it slides with
@@ -190,18 +190,22 @@ def holding(robot: Robot, levels: Mapping[str, float] | None = None) -> Robot:
 
     Not checked. One that is below its Coulomb friction, such as 0, is that.
     """
-    friction, changed = robot.friction, {}
-    asked = [(Key.parse(name), level) for name, level in (levels or {}).items()]
+    friction, laws = robot.friction, {}
+    requests = [(Key.parse(name), level) for name, level in (levels or {}).items()]
     for table in type(friction).model_fields:
         law = getattr(friction, table)
-        held = {field: value for field, value in dict(law).items() if BREAKAWAY in field}
-        for key, level in asked:
+        breakaways = {field: value for field, value in dict(law).items() if BREAKAWAY in field}
+        for key, level in requests:
             if key.table.rpartition(".")[2] == table:
-                held[key.field] = _with(held[key.field], slides(robot, key), key.index, level, robot.wheels.count)
-        held = {k: _at_least(level, getattr(law, COULOMB_OF[k])) for k, level in held.items() if level is not None}
-        if held:
-            changed[table] = law.model_copy(update=held)
-    return robot.model_copy(update={"friction": friction.model_copy(update=changed)}) if changed else robot
+                breakaways[key.field] = _with(
+                    breakaways[key.field], slides(robot, key), key.index, level, robot.wheels.count
+                )
+        breakaways = {
+            k: _at_least(level, getattr(law, COULOMB_OF[k])) for k, level in breakaways.items() if level is not None
+        }
+        if breakaways:
+            laws[table] = law.model_copy(update=breakaways)
+    return robot.model_copy(update={"friction": friction.model_copy(update=laws)}) if laws else robot
 
 
 def slides(robot: Robot, key: Key) -> Any:
@@ -216,19 +220,19 @@ def slides_least(robot: Robot, name: str) -> float:
     return float(levels[key.index] if key.index is not None and len(levels) > 1 else levels.min())
 
 
-def _with(own: Any, below: Any, index: int | None, level: float, count: int) -> Any:
-    """A level, or a list of them, with one changed. own: as it is, or None; below: of Coulomb friction."""
+def _with(present: Any, below: Any, index: int | None, level: float, count: int) -> Any:
+    """A level, or a list of them, with one changed. present: as it is, or None; below: of Coulomb friction."""
     if index is None:
         return level
-    many = np.array(below if own is None else own, dtype=float)
+    many = np.array(below if present is None else present, dtype=float)
     many = many if many.ndim else np.full(count, float(many))
     many[index] = level
     return tuple(many.tolist())
 
 
-def _at_least(level: Any, least: Any) -> Any:
+def _at_least(level: Any, floor: Any) -> Any:
     """Level by level; one for all wheels stays one where each slides with less."""
-    higher = np.maximum(level, least)
+    higher = np.maximum(level, floor)
     return (
         level
         if np.array_equal(higher, np.broadcast_to(level, higher.shape))

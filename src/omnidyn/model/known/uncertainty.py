@@ -37,10 +37,10 @@ DRAWS = 100
 NOISE = 1e-13  # of an eigenvalue of a correlation: less is rounding, and numbers that are one stay one
 SMALL = 1e-5  # of a number: the most that it is off by where a slope is taken
 FURTHEST = math.log(1e4)  # of a logarithm: the span of a fit
-LOW = 0.025  # share of the results below a 95 % interval, and above it
-LEAST = 1e-6  # of value or std, that a friction stays above: 0 would switch a part of it off
+TAIL_SHARE = 0.025  # share of the results below a 95 % interval, and above it
+LEAST_SHARE = 1e-6  # of value or std, that a friction stays above: 0 would switch a part of it off
 PULLS = 60  # halvings that bring a draw out of range back to the value itself
-FEWEST, MOST_DRAWS = 20, 1_000_000  # of fewer draws even the outermost two are less than 95 % apart
+FEWEST_DRAWS, MOST_DRAWS = 20, 1_000_000  # of fewer draws even the outermost two are less than 95 % apart
 
 
 class Interval(NamedTuple):
@@ -56,30 +56,30 @@ def plausible(robot: Robot, count: int = DRAWS, seed: int = 0) -> list[Robot]:
     Raises InsufficientDataError where no number of the robot has a std, InputError for a strange count.
     """
     check_order("plausible(robot, count)", (robot, Robot), (count, object))
-    keys, known = _known(robot)
+    keys, uncertain = _known(robot)
     if not 1 <= count <= MOST_DRAWS:
         raise InputError("strange number of draws", got=count, expected=f"1 to {MOST_DRAWS}", where="draws")
-    return [_drawn(robot, keys, known, off) for off in _errors(known, count, seed)]
+    return [_drawn(robot, keys, uncertain, off) for off in _errors(uncertain, count, seed)]
 
 
 def _known(robot: Robot) -> tuple[list[Key], Told]:
     """The numbers that have a std. Raises InsufficientDataError where there are none."""
-    known = told(robot)
-    if not known.keys:
+    uncertain = told(robot)
+    if not uncertain.keys:
         raise InsufficientDataError(
             "nothing says how far the numbers of this robot may be off",
             got=f"{robot.name} without any std",
             expected="{ value = .., std = .. } at the numbers of its file",
             remedy="let identify write it, or add std",
         )
-    return [Key.parse(key) for key in known.keys], known
+    return [Key.parse(key) for key in uncertain.keys], uncertain
 
 
 def interval_of(robot: Robot, function: Callable[[Robot], ArrayLike], count: int = DRAWS, seed: int = 0) -> Interval:
     """The 95 % interval of a function of the robot, each element for itself; raises what `plausible` raises."""
-    ends = Ends(count)
-    for each in plausible(robot, count, seed):
-        ends.add(np.asarray(function(each), dtype=float))
+    ends = QuantileTails(count)
+    for candidate in plausible(robot, count, seed):
+        ends.add(np.asarray(function(candidate), dtype=float))
     return ends.interval
 
 
@@ -89,19 +89,19 @@ def first_order_std(robot: Robot, function: Callable[[Robot], FloatArray]) -> Fl
     Numbers that a log tells only together, such as two inertias of which it sees the sum, have stds beyond all measure,
     and the sum has not: slopes keep to it, draws on the scales of the numbers do not. Raises what `plausible` raises.
     """
-    keys, known = _known(robot)
-    size = np.where(known.value == 0.0, known.std, abs(known.value))
-    ways = (_root(known.correlation) * known.std[:, None]).T
+    keys, uncertain = _known(robot)
+    size = np.where(uncertain.value == 0.0, uncertain.std, abs(uncertain.value))
+    ways = (_root(uncertain.correlation) * uncertain.std[:, None]).T
     ways = ways[ways.any(axis=1)]
     shares = [SMALL / max(float((abs(way[size > 0.0]) / size[size > 0.0]).max()), SMALL) for way in ways]
-    moved = [_aside(robot, keys, known, share * way) for share, way in zip(shares, ways, strict=True)]
-    ends, total = one_by_one(function, [each for pair in moved for each in pair]), 0.0
+    pairs = [_aside(robot, keys, uncertain, share * way) for share, way in zip(shares, ways, strict=True)]
+    ends, total = one_by_one(function, [candidate for pair in pairs for candidate in pair]), 0.0
     for share in shares:
         total = total + ((next(ends) - next(ends)) / share) ** 2
     return np.sqrt(total)
 
 
-class Ends:
+class QuantileTails:
     """The 95 % interval of so many results (20 or more), added one by one: what lies far inside of it is not kept.
 
     Result k of n, in order, stands for the share (k - 1/2)/n (Hazen), as each draw of a Latin hypercube does. Infinity
@@ -109,11 +109,11 @@ class Ends:
     """
 
     def __init__(self, count: int) -> None:
-        if count < FEWEST:
+        if count < FEWEST_DRAWS:
             raise InputError(
-                "too few draws for a 95 % interval", got=count, expected=f"{FEWEST} or more", where="draws"
+                "too few draws for a 95 % interval", got=count, expected=f"{FEWEST_DRAWS} or more", where="draws"
             )
-        self._below, self._share = divmod(max(LOW * count - 0.5, 0.0), 1.0)
+        self._below, self._share = divmod(max(TAIL_SHARE * count - 0.5, 0.0), 1.0)
         self._kept = min(int(self._below) + 2, count)
         self._lowest: list[FloatArray] = []
 
@@ -142,12 +142,12 @@ class Ends:
         return Interval(low + 0.0, 0.0 - high)
 
 
-def _errors(known: Told, count: int, seed: int) -> FloatArray:
+def _errors(uncertain: Told, count: int, seed: int) -> FloatArray:
     """Errors of the numbers on their scales. Shape (count, keys)."""
-    scale = known.std / np.where(known.log, known.value, 1.0)
-    root = _root(known.correlation)
+    scale = uncertain.std / np.where(uncertain.log, uncertain.value, 1.0)
+    root = _root(uncertain.correlation)
     random = np.random.default_rng(seed)
-    place = np.stack([random.permutation(count) for _ in known.keys], axis=1)
+    place = np.stack([random.permutation(count) for _ in uncertain.keys], axis=1)
     normal = ndtri((place + 0.5) / count)
     return normal @ root.T * scale
 
@@ -158,58 +158,58 @@ def _root(correlation: FloatArray) -> FloatArray:
     return vectors * np.sqrt(np.where(values > NOISE, values, 0.0))
 
 
-def _aside(robot: Robot, keys: Sequence[Key], known: Told, off: FloatArray) -> list[Robot]:
+def _aside(robot: Robot, keys: Sequence[Key], uncertain: Told, off: FloatArray) -> list[Robot]:
     """Two robots, one as far off as that from the other: on one side, for at 0, or at the end of a range, another
     engine may run. It is the side on which a robot file may be."""
     for side in (1.0, -1.0):
-        moved = []
-        for far in (side, 2.0 * side):
-            changed = robot
-            for key, value in zip(keys, (known.value + far * off).tolist(), strict=True):
-                changed = key.set(changed, value, checked=False)
-            moved.append(holding(changed))
-        if not _out_of_range(moved[1], robot):
+        robots = []
+        for factor in (side, 2.0 * side):
+            moved_robot = robot
+            for key, value in zip(keys, (uncertain.value + factor * off).tolist(), strict=True):
+                moved_robot = key.set(moved_robot, value, checked=False)
+            robots.append(holding(moved_robot))
+        if not _out_of_range(robots[1], robot):
             break
-    return moved
+    return robots
 
 
-def _drawn(robot: Robot, keys: Sequence[Key], known: Told, off: FloatArray) -> Robot:
+def _drawn(robot: Robot, keys: Sequence[Key], uncertain: Told, off: FloatArray) -> Robot:
     """One robot. What no robot file may hold comes half-way back to the value, as often as that takes."""
     for _ in range(PULLS):
         draw = robot
         for k, key in enumerate(keys):
-            value = float(known.value[k])
-            draw = key.set(draw, _off(key, value, float(off[k]), bool(known.log[k])), checked=False)
+            value = float(uncertain.value[k])
+            draw = key.set(draw, _off(key, value, float(off[k]), bool(uncertain.log[k])), checked=False)
         draw = holding(draw)
-        bad = _out_of_range(draw, robot)
-        if not bad:
+        bad_parts = _out_of_range(draw, robot)
+        if not bad_parts:
             return draw
-        off = np.where([key.part in bad for key in keys], 0.5 * off, off)
+        off = np.where([key.part in bad_parts for key in keys], 0.5 * off, off)
     return robot
 
 
 def _off(key: Key, value: float, error: float, log: bool) -> float:
     if log:
         return value * math.exp(min(max(error, -FURTHEST), FURTHEST))
-    return value + error if key.name in SIGNED else max(LEAST * max(value, abs(error)), value + error)
+    return value + error if key.name in SIGNED else max(LEAST_SHARE * max(value, abs(error)), value + error)
 
 
 def _out_of_range(robot: Robot, origin: Robot) -> set[str]:
     """The parts of a robot that hold what no file may hold; those that are still the ones of its origin do not."""
-    bad = set()
+    bad_parts = set()
     for part in ("body", "wheels", "motor", "drive"):
-        own = getattr(robot, part)
+        part_value = getattr(robot, part)
         try:
-            if own is not getattr(origin, part):
-                own.replace()
+            if part_value is not getattr(origin, part):
+                part_value.replace()
         except InputError:
-            bad.add(part)
+            bad_parts.add(part)
     for law in robot.friction.laws if robot.friction is not origin.friction else ():
         try:
             law.replace()  # pyright: ignore[reportAttributeAccessIssue]
         except InputError:
-            bad.add("friction")
-    return bad
+            bad_parts.add("friction")
+    return bad_parts
 
 
 def effects(robot: Robot, function: Callable[[Robot], ArrayLike], keys: Sequence[str]) -> dict[str, float]:
@@ -217,14 +217,14 @@ def effects(robot: Robot, function: Callable[[Robot], ArrayLike], keys: Sequence
 
     By its std, or by 1 % where it has none.
     """
-    at, own, found = np.asarray(function(robot), dtype=float), numbers_told(robot), {}
+    at, priors, changes = np.asarray(function(robot), dtype=float), numbers_told(robot), {}
     for name in keys:
         key = Key.parse(name)
         value = float(key.get(robot))
-        std = (own[name].std if name in own else None) or 0.01 * abs(value)
+        std = (priors[name].std if name in priors else None) or 0.01 * abs(value)
         log = is_log(name, value, std)
-        moved = holding(key.set(robot, _off(key, value, std / value if log else std, log), checked=False))
-        other = at if _out_of_range(moved, robot) else np.asarray(function(moved), dtype=float)
+        moved_robot = holding(key.set(robot, _off(key, value, std / value if log else std, log), checked=False))
+        moved_value = at if _out_of_range(moved_robot, robot) else np.asarray(function(moved_robot), dtype=float)
         with np.errstate(invalid="ignore", divide="ignore"):
-            found[name] = float(np.nanmax(np.abs(other - at) / np.abs(at), initial=0.0))
-    return found
+            changes[name] = float(np.nanmax(np.abs(moved_value - at) / np.abs(at), initial=0.0))
+    return changes

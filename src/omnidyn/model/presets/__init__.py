@@ -28,12 +28,12 @@ def robot_path(name: str) -> str:
         return str(PRESETS / f"{name}.toml")
     looks_like_a_name = os.path.basename(name) == name and not name.endswith(".toml")
     if looks_like_a_name and not os.path.exists(name):
-        beside = f"{name}.toml" if os.path.exists(f"{name}.toml") else ""
+        neighbour = f"{name}.toml" if os.path.exists(f"{name}.toml") else ""
         raise InputError(
             "no such robot",
             got=name,
             expected=f"a TOML file or a preset: {', '.join(preset_names())}",
-            remedy=f"did you mean {beside}?" if beside else "",
+            remedy=f"did you mean {neighbour}?" if neighbour else "",
         )
     with open_regular(name):
         return name

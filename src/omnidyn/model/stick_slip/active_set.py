@@ -51,9 +51,9 @@ def find_active_set(plant, stage):
     element, work = plant.element, stage.work
     rank = 0
     for e in range(len(element)):
-        own = element[e]
+        record = element[e]
         if stage.each[e].sign == 0.0:
-            rank = _forbid(work, rank, own.g[0], own.g[1], own.g[2])
+            rank = _forbid(work, rank, record.g[0], record.g[1], record.g[2])
     if stage.task.ellipse == 0.0:
         rank = _forbid(work, rank, 1.0, 0.0, 0.0)
         rank = _forbid(work, rank, 0.0, 1.0, 0.0)
@@ -82,7 +82,7 @@ def moves_along(g0, g1, g2, d0, d1, d2):
 def absorb(plant, stage, rank):
     """What these velocities cannot move is stuck too, the ellipse included. Returns whether any element was not yet."""
     element, work = plant.element, stage.work
-    changed = False
+    has_changed = False
     for e in range(len(element)):
         at = stage.each[e]
         if at.sign == 1.0 or at.sign == -1.0:
@@ -90,14 +90,14 @@ def absorb(plant, stage, rank):
             for i in range(3 - rank):
                 moves |= moves_along(g[0], g[1], g[2], work.basis[i, 0], work.basis[i, 1], work.basis[i, 2])
             if not moves:
-                at.sign, changed = 0.0, True
+                at.sign, has_changed = 0.0, True
     if stage.task.ellipse == 1.0:
         moves = False
         for i in range(3 - rank):
             moves |= (work.basis[i, 0] != 0.0) | (work.basis[i, 1] != 0.0)
         if not moves:
-            stage.task.ellipse, changed = 0.0, True
-    return changed
+            stage.task.ellipse, has_changed = 0.0, True
+    return has_changed
 
 
 @part
@@ -148,11 +148,11 @@ def newton_direction(work, rank):
 def is_solved(work, rank):
     """Whether B' r is 0 within rounding, which is work.close along the axes."""
     for i in range(3 - rank):
-        total, close = 0.0, 0.0
+        total, rounding = 0.0, 0.0
         for a in range(3):
             total += work.basis[i, a] * work.residual[a]
-            close += abs(work.basis[i, a]) * work.close[a]
-        if not abs(total) <= close:
+            rounding += abs(work.basis[i, a]) * work.close[a]
+        if not abs(total) <= rounding:
             return False
     return True
 
@@ -175,9 +175,9 @@ def gap(plant, stage, d0, d1, d2):
     element, task, work = plant.element, stage.task, stage.work
     total = work.residual[0] * d0 + work.residual[1] * d1 + work.residual[2] * d2
     for e in range(len(element)):
-        own, at = element[e], stage.each[e]
+        record, at = element[e], stage.each[e]
         if at.sign == 0.0:
-            w = own.g[0] * d0 + own.g[1] * d1 + own.g[2] * d2
+            w = record.g[0] * d0 + record.g[1] * d1 + record.g[2] * d2
             if w > 0.0:
                 total += (at.hold[0] + at.loss[0]) * w
             else:
@@ -188,57 +188,57 @@ def gap(plant, stage, d0, d1, d2):
 
 
 @part
-def _keep_worst(plant, stage, d0, d1, d2, found):
+def _keep_worst(plant, stage, d0, d1, d2, worst):
     """Try the direction d as a unit vector; keep it when it is the worst so far. Returns the worst phi."""
     work = stage.work
     size = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
     if size == 0.0:
-        return found
+        return worst
     d0, d1, d2 = d0 / size, d1 / size, d2 / size
     value = gap(plant, stage, d0, d1, d2)
-    if value < found:
+    if value < worst:
         work.worst[0], work.worst[1], work.worst[2] = d0, d1, d2
         return value
-    return found
+    return worst
 
 
 @part
-def _both_ways(plant, stage, d0, d1, d2, found):
-    found = _keep_worst(plant, stage, d0, d1, d2, found)
-    return _keep_worst(plant, stage, -d0, -d1, -d2, found)
+def _both_ways(plant, stage, d0, d1, d2, worst):
+    worst = _keep_worst(plant, stage, d0, d1, d2, worst)
+    return _keep_worst(plant, stage, -d0, -d1, -d2, worst)
 
 
 @part
-def _normal(plant, stage, u0, u1, u2, e, found):
+def _normal(plant, stage, u0, u1, u2, e, worst):
     """Try the cross product of u and the direction of element e, both directions."""
-    own = plant.element[e]
-    v0, v1, v2 = own.g[0], own.g[1], own.g[2]
-    return _both_ways(plant, stage, u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0, found)
+    record = plant.element[e]
+    v0, v1, v2 = record.g[0], record.g[1], record.g[2]
+    return _both_ways(plant, stage, u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0, worst)
 
 
 @part
 def _scalar_worst(plant, stage, rank):
     """Worst direction where only scalar elements are stuck: facet normals of a zonotope of dimension `rank`."""
     element, work = plant.element, stage.work
-    found = 0.0
+    worst = 0.0
     for e in range(len(element)):
-        own = element[e]
+        record = element[e]
         if stage.each[e].sign != 0.0:
             continue
         if rank == 1:
-            found = _both_ways(plant, stage, own.g[0], own.g[1], own.g[2], found)
+            worst = _both_ways(plant, stage, record.g[0], record.g[1], record.g[2], worst)
         elif rank == 2:
-            found = _normal(plant, stage, work.basis[0, 0], work.basis[0, 1], work.basis[0, 2], e, found)
+            worst = _normal(plant, stage, work.basis[0, 0], work.basis[0, 1], work.basis[0, 2], e, worst)
         else:
             for f in range(e + 1, len(element)):
                 if stage.each[f].sign == 0.0:
-                    found = _normal(plant, stage, own.g[0], own.g[1], own.g[2], f, found)
-    return found
+                    worst = _normal(plant, stage, record.g[0], record.g[1], record.g[2], f, worst)
+    return worst
 
 
 @part
-def _arc(plant, stage, plane, lift_x, lift_y, cut, along, px, py, found):
-    """The arc of the unit circle that begins at p: element `cut` ends it and moves forward on it when `along`.
+def _arc(plant, stage, plane, lift_x, lift_y, plane_edge, along, px, py, worst):
+    """The arc of the unit circle that begins at p: element `plane_edge` ends it and moves forward on it when `along`.
 
     Tried are the direction p itself and p = -m/|m|, where phi = 1 + m . p is least if it lies on this arc.
     """
@@ -247,37 +247,37 @@ def _arc(plant, stage, plane, lift_x, lift_y, cut, along, px, py, found):
     mx = (work.residual[0] + lift_x * work.residual[2]) / sx
     my = (work.residual[1] + lift_y * work.residual[2]) / sy
     for f in range(len(element)):
-        own, at = element[f], stage.each[f]
+        record, at = element[f], stage.each[f]
         if at.sign == 0.0 and f != plane:
-            fx = (own.g[0] + lift_x * own.g[2]) / sx
-            fy = (own.g[1] + lift_y * own.g[2]) / sy
-            forward = fx * px + fy * py > 0.0 if f != cut else along
+            fx = (record.g[0] + lift_x * record.g[2]) / sx
+            fy = (record.g[1] + lift_y * record.g[2]) / sy
+            forward = fx * px + fy * py > 0.0 if f != plane_edge else along
             level = at.hold[0] + at.loss[0] if forward else -at.hold[1] - at.loss[1]
             mx, my = mx + level * fx, my + level * fy
     d0, d1 = px / sx, py / sy
-    found = _keep_worst(plant, stage, d0, d1, lift_x * d0 + lift_y * d1, found)
+    worst = _keep_worst(plant, stage, d0, d1, lift_x * d0 + lift_y * d1, worst)
     d0, d1 = -mx / sx, -my / sy
-    return _keep_worst(plant, stage, d0, d1, lift_x * d0 + lift_y * d1, found)
+    return _keep_worst(plant, stage, d0, d1, lift_x * d0 + lift_y * d1, worst)
 
 
 @part
-def _circle(plant, stage, plane, lift_x, lift_y, found):
+def _circle(plant, stage, plane, lift_x, lift_y, worst):
     """Worst direction d = (dx, dy, lift . d), (Sx dx, Sy dy) on the unit circle, cut into arcs by the other elements.
 
     `plane` is the element whose kink plane this is, -1 for none. All candidates are tried with phi itself.
     """
     element, work = plant.element, stage.work
     ex, ey = work.residual[1] + lift_y * work.residual[2], -(work.residual[0] + lift_x * work.residual[2])
-    found = _arc(plant, stage, plane, lift_x, lift_y, -1, False, ey, -ex, found)
+    worst = _arc(plant, stage, plane, lift_x, lift_y, -1, False, ey, -ex, worst)
     for e in range(len(element)):
-        own = element[e]
+        record = element[e]
         if stage.each[e].sign == 0.0 and e != plane:
-            ex = (own.g[0] + lift_x * own.g[2]) / stage.task.hold[0]
-            ey = (own.g[1] + lift_y * own.g[2]) / stage.task.hold[1]
+            ex = (record.g[0] + lift_x * record.g[2]) / stage.task.hold[0]
+            ey = (record.g[1] + lift_y * record.g[2]) / stage.task.hold[1]
             for side in range(4):
                 flip = 1.0 if side < 2 else -1.0
-                found = _arc(plant, stage, plane, lift_x, lift_y, e, side % 2 == 0, -flip * ey, flip * ex, found)
-    return found
+                worst = _arc(plant, stage, plane, lift_x, lift_y, e, side % 2 == 0, -flip * ey, flip * ex, worst)
+    return worst
 
 
 @part
@@ -286,12 +286,12 @@ def _ellipse_worst(plant, stage, rank):
     element = plant.element
     if rank == 2:
         return _circle(plant, stage, -1, 0.0, 0.0, 0.0)
-    found = _both_ways(plant, stage, 0.0, 0.0, 1.0, 0.0)
+    worst = _both_ways(plant, stage, 0.0, 0.0, 1.0, 0.0)
     for e in range(len(element)):
-        own = element[e]
-        if stage.each[e].sign == 0.0 and own.g[2] != 0.0:
-            found = _circle(plant, stage, e, -own.g[0] / own.g[2], -own.g[1] / own.g[2], found)
-    return found
+        record = element[e]
+        if stage.each[e].sign == 0.0 and record.g[2] != 0.0:
+            worst = _circle(plant, stage, e, -record.g[0] / record.g[2], -record.g[1] / record.g[2], worst)
+    return worst
 
 
 @part

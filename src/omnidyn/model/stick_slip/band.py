@@ -26,7 +26,7 @@ from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import solve
 
 FIRM = 1e3  # times all forces at work: what rests in its band is held with, whatever drives it
-NEAR = 1.0 - 1e-9  # of Dv: what moves as fast is not slower than it
+BAND_EDGE = 1.0 - 1e-9  # of Dv: what moves as fast is not slower than it
 YAW_SHARE = 0.1  # tol is in m/s; 10 tol in rad/s
 
 
@@ -36,9 +36,9 @@ def hold_in_band(plant, stage, firm):
     its breakaway."""
     body, task = plant.body, stage.task
     for e in range(len(plant.element)):
-        own = plant.element[e]
-        if own.band > 0.0:
-            stage.each[e].hold[0], stage.each[e].hold[1] = own.breakaway[0], own.breakaway[1]
+        record = plant.element[e]
+        if record.band > 0.0:
+            stage.each[e].hold[0], stage.each[e].hold[1] = record.breakaway[0], record.breakaway[1]
     if body.band > 0.0:
         task.hold[0], task.hold[1] = body.breakaway[0], body.breakaway[1]
     if firm == 0.0:
@@ -83,42 +83,45 @@ def gather(plant, stage, bare, rate, start, end, h, last):
 
 @part
 def _rests_in_band(plant, stage):
-    found = (plant.body.band > 0.0) & (stage.task.ellipse == 0.0)
+    rests = (plant.body.band > 0.0) & (stage.task.ellipse == 0.0)
     for e in range(len(plant.element)):
-        found |= (plant.element[e].band > 0.0) & (stage.each[e].sign == 0.0)
-    return found
+        rests |= (plant.element[e].band > 0.0) & (stage.each[e].sign == 0.0)
+    return rests
 
 
 @part
 def _rate(plant, stage, bare, residual, rate):
     """w' - v' of what rests, by its breakaway levels alone, where a residual has what drives it."""
-    own, stages = bare.plant, bare.stage
-    given, there = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
-    task, m = there.task, len(plant.element)
+    bare_plants, stages = bare.plant, bare.stage
+    bare_plant, bare_stage = (
+        Plant(bare_plants.body[0], bare_plants.element[0]),
+        Stage(stages.task[0], stages.each[0], stages.work[0]),
+    )
+    task, m = bare_stage.task, len(plant.element)
     for a in range(3):
         rate[a] = task.goal[a] = 0.0
         task.push[a] = -residual[a]
     for e in range(m):
-        one, now, at = plant.element[e], stage.each[e], there.each[e]
+        record, now, at = plant.element[e], stage.each[e], bare_stage.each[e]
         at.sign = 0.0 if now.sign == 0.0 else 2.0
-        given.element[e].viscous = 0.0
+        bare_plant.element[e].viscous = 0.0
         for side in range(2):
-            at.hold[side] = given.element[e].coulomb[side] = one.breakaway[side]
+            at.hold[side] = bare_plant.element[e].coulomb[side] = record.breakaway[side]
         if e >= N_AXES:  # its motor: a lossy gear holds by it
             at.aimed_current = now.current if now.sign == 0.0 else 0.0
             for a in range(3):
-                task.push[a] -= one.thrust * at.aimed_current * one.g[a]
-    given.body.turning, task.ellipse = 0.0, 0.0 if stage.task.ellipse == 0.0 else 2.0
+                task.push[a] -= record.thrust * at.aimed_current * record.g[a]
+    bare_plant.body.turning, task.ellipse = 0.0, 0.0 if stage.task.ellipse == 0.0 else 2.0
     for a in range(2):
-        task.hold[a] = given.body.coulomb[a] = plant.body.breakaway[a]
-    count = solve(given, there, rate)
+        task.hold[a] = bare_plant.body.coulomb[a] = plant.body.breakaway[a]
+    count = solve(bare_plant, bare_stage, rate)
     for e in range(m):
         if plant.element[e].fall == 0.0:
             for side in range(2):
-                given.element[e].coulomb[side] = plant.element[e].coulomb[side]
+                bare_plant.element[e].coulomb[side] = plant.element[e].coulomb[side]
     if plant.body.fall == 0.0:
         for a in range(2):
-            given.body.coulomb[a] = plant.body.coulomb[a]
+            bare_plant.body.coulomb[a] = plant.body.coulomb[a]
     return count
 
 
@@ -127,61 +130,61 @@ def cross_band(plant, stage, state):
     """Let elements enter and leave their bands, in place; `stage` is room to work in."""
     if not crosses(plant, stage, state):
         return
-    task, each, v = stage.task, state.each, stage.work.newton
+    task, element_states, v = stage.task, state.each, stage.work.newton
     for a in range(N_AXES):
-        w = state.x[a] + each[a].bend
+        w = state.x[a] + element_states[a].bend
         state.x[a] = v[a]
-        each[a].bend = w - v[a]
+        element_states[a].bend = w - v[a]
     for e in range(len(plant.element)):
         sign = stage.each[e].sign
         if sign == 1.0 or sign == -1.0:
             g = plant.element[e].g
             speed = g[0] * v[0] + g[1] * v[1] + g[2] * v[2]
             sign = math.copysign(1.0, speed) if speed != 0.0 else sign
-        each[e].sign = sign
-    each[len(plant.element)].sign = task.ellipse
+        element_states[e].sign = sign
+    element_states[len(plant.element)].sign = task.ellipse
 
 
 @part
 def crosses(plant, stage, state):
     """Whether any element of a state is to enter or to leave its band. Then `stage` has the signs of what will rest and
     move, and work.newton the velocities."""
-    task, each, m = stage.task, state.each, len(plant.element)
+    task, element_states, m = stage.task, state.each, len(plant.element)
     acts = _want(plant, stage, state)
     for _ in range(m + 1 if acts else 0):
         _velocities(plant, stage, state)
         if not _stop_slow(plant, stage, state):
             break
-    changed = False
+    differs = False
     for e in range(m if acts else 0):
-        changed |= (each[e].sign == 0.0) != (stage.each[e].sign == 0.0)
-    return changed | (acts and (each[m].sign == 0.0) != (task.ellipse == 0.0))
+        differs |= (element_states[e].sign == 0.0) != (stage.each[e].sign == 0.0)
+    return differs | (acts and (element_states[m].sign == 0.0) != (task.ellipse == 0.0))
 
 
 @part
 def _want(plant, stage, state):
     """Into a stage: what moves, and what rests and wants to move. Whether anything is to enter or to leave its band."""
-    body, task, each, x, m = plant.body, stage.task, state.each, state.x, len(plant.element)
-    w0, w1, w2 = x[0] + each[0].bend, x[1] + each[1].bend, x[2] + each[2].bend
+    body, task, element_states, x, m = plant.body, stage.task, state.each, state.x, len(plant.element)
+    w0, w1, w2 = x[0] + element_states[0].bend, x[1] + element_states[1].bend, x[2] + element_states[2].bend
     acts = False
     for e in range(m):
-        own, sign = plant.element[e], each[e].sign
-        g0, g1, g2 = own.g[0], own.g[1], own.g[2]
+        record, sign = plant.element[e], element_states[e].sign
+        g0, g1, g2 = record.g[0], record.g[1], record.g[2]
         if sign == 0.0:
             wants = moves_along(g0, g1, g2, w0, w1, w2)
-            if own.band > 0.0:
-                wants = abs(g0 * w0 + g1 * w1 + g2 * w2) >= own.band
+            if record.band > 0.0:
+                wants = abs(g0 * w0 + g1 * w1 + g2 * w2) >= record.band
                 acts |= wants
             sign = 1.0 if wants else 0.0
-        elif sign != 2.0 and own.band > 0.0:
-            acts |= abs(g0 * x[0] + g1 * x[1] + g2 * x[2]) < own.band * NEAR
+        elif sign != 2.0 and record.band > 0.0:
+            acts |= abs(g0 * x[0] + g1 * x[1] + g2 * x[2]) < record.band * BAND_EDGE
         stage.each[e].sign = sign
-    task.ellipse = each[m].sign
+    task.ellipse = element_states[m].sign
     if task.ellipse == 0.0 and math.hypot(w0, w1) >= body.band and (w0 != 0.0 or w1 != 0.0):
         task.ellipse = 1.0
         acts |= body.band > 0.0
     elif task.ellipse == 1.0:
-        acts |= math.hypot(x[0], x[1]) < body.band * NEAR
+        acts |= math.hypot(x[0], x[1]) < body.band * BAND_EDGE
     return acts
 
 
@@ -201,26 +204,26 @@ def _velocities(plant, stage, state):
 @part
 def _stop_slow(plant, stage, state):
     """Let rest in the stage what moves slower than its band, or not at all. Whether there was any."""
-    v, found = stage.work.newton, False
+    v, stopped_any = stage.work.newton, False
     for e in range(len(plant.element)):
-        own, at = plant.element[e], stage.each[e]
+        record, at = plant.element[e], stage.each[e]
         if at.sign == 1.0 or at.sign == -1.0:
-            g0, g1, g2 = own.g[0], own.g[1], own.g[2]
-            slow = abs(g0 * v[0] + g1 * v[1] + g2 * v[2]) < own.band * NEAR
+            g0, g1, g2 = record.g[0], record.g[1], record.g[2]
+            slow = abs(g0 * v[0] + g1 * v[1] + g2 * v[2]) < record.band * BAND_EDGE
             slow |= (state.each[e].sign == 0.0) & (not moves_along(g0, g1, g2, v[0], v[1], v[2]))
             if slow:
-                at.sign, found = 0.0, True
+                at.sign, stopped_any = 0.0, True
     speed, was = math.hypot(v[0], v[1]), state.each[len(plant.element)].sign
-    if stage.task.ellipse == 1.0 and (speed < plant.body.band * NEAR or (was == 0.0 and speed == 0.0)):
-        stage.task.ellipse, found = 0.0, True
-    return found
+    if stage.task.ellipse == 1.0 and (speed < plant.body.band * BAND_EDGE or (was == 0.0 and speed == 0.0)):
+        stage.task.ellipse, stopped_any = 0.0, True
+    return stopped_any
 
 
 @part
-def band_error(plant, one, two):
+def band_error(plant, first, second):
     """Difference of what has gathered in two states [m/s]."""
     worst = 0.0
     for a in range(N_AXES):
         share = 1.0 if a < 2 else max(1.0, YAW_SHARE / plant.body.length)
-        worst = max(worst, share * abs(one.each[a].bend - two.each[a].bend))
+        worst = max(worst, share * abs(first.each[a].bend - second.each[a].bend))
     return worst

@@ -12,24 +12,24 @@ from omnidyn.model.friction.bristle import bristle_force, levels_xy, plane_force
 from omnidyn.model.friction.stribeck import excess
 from omnidyn.model.layout import N_AXES, OPEN
 
-NONE = 3.0  # the branch on which no current flows against a voltage drop
+NO_CURRENT = 3.0  # the branch on which no current flows against a voltage drop
 
 
 @part
 def winding_branch(speed, voltage, now, tau, emf, resistance, inductance, drop, bound):
-    """The branch of `winding`: 1 and -1 a current flows forward and backward, 2 and -2 it is at its limit, or NONE."""
+    """The branch of `winding`: 1 and -1 a current flows forward and backward, 2 and -2 at its limit, or NO_CURRENT."""
     flux = inductance * now + tau * (voltage - emf * speed)
-    lost, below = tau * drop, inductance + tau * resistance
-    if abs(flux) <= lost and lost > 0.0:  # without a drop, no current is a point like any other
-        return NONE
+    drop_flux, below = tau * drop, inductance + tau * resistance
+    if abs(flux) <= drop_flux and drop_flux > 0.0:  # without a drop, no current is a point like any other
+        return NO_CURRENT
     side = math.copysign(1.0, flux)
-    return 2.0 * side if abs(flux - side * lost) >= bound * below else side
+    return 2.0 * side if abs(flux - side * drop_flux) >= bound * below else side
 
 
 @part
 def winding_answer(branch, speed, voltage, now, tau, emf, resistance, inductance, drop, bound):
     """`winding` on a branch, beyond its ends too."""
-    if branch == NONE:
+    if branch == NO_CURRENT:
         return 0.0, 0.0
     if abs(branch) == 2.0:
         return math.copysign(bound, branch), 0.0
@@ -51,16 +51,16 @@ def winding(speed, voltage, now, tau, emf, resistance, inductance, drop, bound):
 @part
 def motor_branch(plant, stage, e, speed, tau):
     """`winding_branch` of the motor of element e."""
-    own, at = plant.element[e], stage.each[e]
+    record, at = plant.element[e], stage.each[e]
     return winding_branch(
         speed,
         at.voltage,
         at.aimed_current,
         tau,
-        own.emf,
-        own.resistance,
-        own.inductance,
-        own.drop,
+        record.emf,
+        record.resistance,
+        record.inductance,
+        record.drop,
         at.bound,
     )
 
@@ -68,17 +68,17 @@ def motor_branch(plant, stage, e, speed, tau):
 @part
 def motor_current(plant, stage, e, branch, speed, tau):
     """`winding_answer` of the motor of element e."""
-    own, at = plant.element[e], stage.each[e]
+    record, at = plant.element[e], stage.each[e]
     return winding_answer(
         branch,
         speed,
         at.voltage,
         at.aimed_current,
         tau,
-        own.emf,
-        own.resistance,
-        own.inductance,
-        own.drop,
+        record.emf,
+        record.resistance,
+        record.inductance,
+        record.drop,
         at.bound,
     )
 
@@ -104,11 +104,11 @@ def set_losses(plant, stage):
     """What each gear takes at rest from a motion forward and backward [N]: dry friction with a level ~ |i|."""
     element = plant.element
     for e in range(N_AXES, len(element)):
-        own, at = element[e], stage.each[e]
+        record, at = element[e], stage.each[e]
         at.loss[0] = at.loss[1] = 0.0
-        if own.efficiency != 1.0:
+        if record.efficiency != 1.0:
             i = current_at_rest(plant, stage, e, stage.task.tau)
-            gain, efficiency = own.thrust, own.efficiency
+            gain, efficiency = record.thrust, record.efficiency
             at.loss[0] = i * (gain - gear(i, 1.0, gain, efficiency))
             at.loss[1] = i * (gear(i, -1.0, gain, efficiency) - gain)
 
@@ -161,21 +161,21 @@ def residual(plant, stage, x):
         r2 += s02 * d0 + s12 * d1 + s22 * d2
         j00, j11, j22, j01, j02, j12 = j00 + s00, j11 + s11, j22 + s22, s01, s02, s12
     for e in range(len(plant.element)):
-        own, at = plant.element[e], stage.each[e]
-        g0, g1, g2, sign = own.g[0], own.g[1], own.g[2], at.sign
+        record, at = plant.element[e], stage.each[e]
+        g0, g1, g2, sign = record.g[0], record.g[1], record.g[2], at.sign
         speed = g0 * x[0] + g1 * x[1] + g2 * x[2] if sign != 0.0 else 0.0
-        force, slope = -own.viscous * speed, -own.viscous
+        force, slope = -record.viscous * speed, -record.viscous
         if sign == 1.0:
-            force -= own.coulomb[0]
+            force -= record.coulomb[0]
         elif sign == -1.0:
-            force += own.coulomb[1]
+            force += record.coulomb[1]
         if e >= N_AXES:
             branch = at.branch
             if branch == OPEN:
                 branch = motor_branch(plant, stage, e, speed, task.tau)
             i, di = motor_current(plant, stage, e, branch, speed, task.tau)
             side = i if at.branch == OPEN else branch
-            gain = own.thrust if sign == 2.0 else gear(side, sign, own.thrust, own.efficiency)
+            gain = record.thrust if sign == 2.0 else gear(side, sign, record.thrust, record.efficiency)
             at.current = i
             force, slope = force + gain * i, slope + gain * di
         r0, r1, r2 = r0 - force * g0, r1 - force * g1, r2 - force * g2
@@ -216,8 +216,8 @@ def residual(plant, stage, x):
 @part
 def _along(plant, stage, e, force, slope):
     """Take a force along element e, and its slope, off residual and Jacobian."""
-    own, work = plant.element[e], stage.work
-    g0, g1, g2 = own.g[0], own.g[1], own.g[2]
+    record, work = plant.element[e], stage.work
+    g0, g1, g2 = record.g[0], record.g[1], record.g[2]
     work.residual[0] -= force * g0
     work.residual[1] -= force * g1
     work.residual[2] -= force * g2
@@ -231,8 +231,8 @@ def _along(plant, stage, e, force, slope):
 @part
 def speed_of(plant, stage, e, x):
     """Speed of element e [m/s]; exactly 0 while it is stuck."""
-    own = plant.element[e]
-    return own.g[0] * x[0] + own.g[1] * x[1] + own.g[2] * x[2] if stage.each[e].sign != 0.0 else 0.0
+    record = plant.element[e]
+    return record.g[0] * x[0] + record.g[1] * x[1] + record.g[2] * x[2] if stage.each[e].sign != 0.0 else 0.0
 
 
 @part
@@ -275,14 +275,14 @@ def _add_plane_bristle(plant, stage, x):
 def add_laws(plant, stage, x):
     """What laws beyond Coulomb's add to a residual and its Jacobian; what bends is left in `bend`."""
     for e in range(len(plant.element)):
-        own, at = plant.element[e], stage.each[e]
-        if own.stiffness > 0.0:
+        record, at = plant.element[e], stage.each[e]
+        if record.stiffness > 0.0:
             speed = speed_of(plant, stage, e, x)
-            force, slope, bent = bristle_force(own, speed, at.aimed_bend, stage.task.tau)
+            force, slope, bent = bristle_force(record, speed, at.aimed_bend, stage.task.tau)
             at.bend = bent
             _along(plant, stage, e, force, slope)
-        elif own.fall > 0.0 and (at.sign == 1.0 or at.sign == -1.0):
-            force, slope = excess(own, at, speed_of(plant, stage, e, x))
+        elif record.fall > 0.0 and (at.sign == 1.0 or at.sign == -1.0):
+            force, slope = excess(record, at, speed_of(plant, stage, e, x))
             _along(plant, stage, e, force, slope)
     if plant.body.stiffness > 0.0:
         _add_plane_bristle(plant, stage, x)
@@ -298,16 +298,16 @@ def push_of_laws(plant, stage, x, push):
     """
     body, task = plant.body, stage.task
     for e in range(len(plant.element)):
-        own, at = plant.element[e], stage.each[e]
+        record, at = plant.element[e], stage.each[e]
         speed, force = speed_of(plant, stage, e, x), 0.0
-        if own.stiffness > 0.0:
-            force = bristle_force(own, speed, at.aimed_bend, 0.0)[0]
-        elif own.fall > 0.0 and (at.sign == 1.0 or at.sign == -1.0):
+        if record.stiffness > 0.0:
+            force = bristle_force(record, speed, at.aimed_bend, 0.0)[0]
+        elif record.fall > 0.0 and (at.sign == 1.0 or at.sign == -1.0):
             sign, side = at.sign, 0 if at.sign > 0.0 else 1
-            force = excess(own, at, speed)[0] + sign * (at.hold[side] - own.coulomb[side])
-        push[0] += force * own.g[0]
-        push[1] += force * own.g[1]
-        push[2] += force * own.g[2]
+            force = excess(record, at, speed)[0] + sign * (at.hold[side] - record.coulomb[side])
+        push[0] += force * record.g[0]
+        push[1] += force * record.g[1]
+        push[2] += force * record.g[2]
     if body.stiffness > 0.0:
         force_x, force_y = plane_force(body, x[0], x[1], task.aimed_bend, 0.0)[0]
         push[0] += force_x
@@ -328,14 +328,14 @@ def aim_bristles(plant, stage, start, back):
     """
     body = plant.body
     for e in range(len(plant.element)):
-        own = plant.element[e]
-        if own.stiffness > 0.0:
+        record = plant.element[e]
+        if record.stiffness > 0.0:
             aimed = start.each[e].bend
             if back != 0.0:
                 aimed += back * (stage.each[e].bend - aimed)
                 forward, backward = (
-                    own.bristle_breakaway[0] / own.stiffness,
-                    own.bristle_breakaway[1] / own.stiffness,
+                    record.bristle_breakaway[0] / record.stiffness,
+                    record.bristle_breakaway[1] / record.stiffness,
                 )
                 aimed = min(max(aimed, -backward), forward)
             stage.each[e].aimed_bend = aimed
@@ -343,8 +343,8 @@ def aim_bristles(plant, stage, start, back):
         for a in range(2):
             aimed = start.each[len(plant.element) + a].bend
             if back != 0.0:
-                most = body.bristle_breakaway[a] / body.stiffness
-                aimed = min(max(aimed + back * (stage.task.bend[a] - aimed), -most), most)
+                largest_bend = body.bristle_breakaway[a] / body.stiffness
+                aimed = min(max(aimed + back * (stage.task.bend[a] - aimed), -largest_bend), largest_bend)
             stage.task.aimed_bend[a] = aimed
 
 

@@ -36,7 +36,7 @@ from omnidyn.model.stick_slip.forces import forces_at_work, residual, set_losses
 
 AFRESH = 40  # after so many, begin again from rest: the problem has one solution, whatever the first guess
 CAP = 80  # Newton steps, kinks and releases of one solve; a solve that hits it is reported
-TIGHT = 1e-13  # residual that counts as 0, relative to what it is the sum of
+RESIDUAL_TOLERANCE = 1e-13  # residual that counts as 0, relative to what it is the sum of
 TIE = 1e-12  # kinks as near as this are met together
 
 
@@ -49,8 +49,8 @@ def _slope(work):
 @part
 def _kink_of_element(plant, stage, e, x):
     """Step along the Newton direction after which a sliding element's speed is 0; inf where it never is."""
-    own, work = plant.element[e], stage.work
-    sign, g0, g1, g2 = stage.each[e].sign, own.g[0], own.g[1], own.g[2]
+    record, work = plant.element[e], stage.work
+    sign, g0, g1, g2 = stage.each[e].sign, record.g[0], record.g[1], record.g[2]
     speed = g0 * x[0] + g1 * x[1] + g2 * x[2]
     dw = g0 * work.newton[0] + g1 * work.newton[1] + g2 * work.newton[2]
     return max(-speed / dw, 0.0) if abs(sign) == 1.0 and sign * dw < 0.0 else np.inf
@@ -77,18 +77,18 @@ def _next_kink(plant, stage, x, t):
 
     Returns (step, whether the ellipse is met).
     """
-    each = stage.each
+    element_stages = stage.each
     nearest = _kink_of_ellipse(plant, stage, x)
     nearest = nearest if nearest >= t - TIE else np.inf
     for e in range(len(plant.element)):
-        when = _kink_of_element(plant, stage, e, x)
-        each[e].before = when
-        nearest = when if t - TIE <= when < nearest else nearest
+        kink = _kink_of_element(plant, stage, e, x)
+        element_stages[e].before = kink
+        nearest = kink if t - TIE <= kink < nearest else nearest
     if nearest > 1.0:
         return np.inf, False
     limit = nearest + TIE * max(1.0, nearest)
     for e in range(len(plant.element)):
-        each[e].found = 1.0 if t - TIE <= each[e].before <= limit else 0.0
+        element_stages[e].found = 1.0 if t - TIE <= element_stages[e].before <= limit else 0.0
     return nearest, t - TIE <= _kink_of_ellipse(plant, stage, x) <= limit
 
 
@@ -98,12 +98,12 @@ def _jump(plant, stage, met):
     element, work = plant.element, stage.work
     total = 0.0
     for e in range(len(element)):
-        own, at = element[e], stage.each[e]
+        record, at = element[e], stage.each[e]
         if at.found == 1.0:
-            dw = own.g[0] * work.newton[0] + own.g[1] * work.newton[1] + own.g[2] * work.newton[2]
+            dw = record.g[0] * work.newton[0] + record.g[1] * work.newton[1] + record.g[2] * work.newton[2]
             behind, ahead = (1, 0) if dw > 0.0 else (0, 1)
-            fallen = own.fall == 0.0  # what falls with the speed has not fallen yet
-            level = own.coulomb[behind] if fallen else at.hold[behind]
+            fallen = record.fall == 0.0  # what falls with the speed has not fallen yet
+            level = record.coulomb[behind] if fallen else at.hold[behind]
             total += (level + at.hold[ahead]) * abs(dw)
             total += (at.loss[0] + at.loss[1]) * abs(dw)
     if met:
@@ -120,8 +120,12 @@ def _holds_more(plant, stage):
     """
     element = plant.element
     for e in range(len(element)):
-        own, at = element[e], stage.each[e]
-        if at.found == 1.0 and own.fall == 0.0 and (at.hold[0] > own.coulomb[0] or at.hold[1] > own.coulomb[1]):
+        record, at = element[e], stage.each[e]
+        if (
+            at.found == 1.0
+            and record.fall == 0.0
+            and (at.hold[0] > record.coulomb[0] or at.hold[1] > record.coulomb[1])
+        ):
             return True
     return False
 
@@ -159,15 +163,15 @@ def _walk(plant, stage, x):
     Returns (whether an element got stuck, whether the residual is that at the new x).
     """
     body, task, work = plant.body, stage.task, stage.work
-    t, stuck, known, passed = 0.0, False, False, False
+    t, stuck, solution_is_known, past_kink = 0.0, False, False, False
     for _ in range(2 * len(plant.element)):
         kink, met = _next_kink(plant, stage, x, t)
         if kink > 1.0:
             if task.ellipse == 1.0 or body.laws != 0.0:
-                if passed:  # signs have changed: the residual is that of the other side
+                if past_kink:  # signs have changed: the residual is that of the other side
                     _at(x, work, t)
                     residual(plant, stage, work.trial[:])
-                t, known = _not_too_far(plant, stage, x, t, _slope(work))
+                t, solution_is_known = _not_too_far(plant, stage, x, t, _slope(work))
             else:
                 t = 1.0
             break
@@ -180,7 +184,7 @@ def _walk(plant, stage, x):
             below = min(_slope(work), 0.0)
             t += below / (below - slope) * (kink - t)
             break
-        t, stuck, passed = kink, met or _holds_more(plant, stage) or slope + _jump(plant, stage, met) >= 0.0, True
+        t, stuck, past_kink = kink, met or _holds_more(plant, stage) or slope + _jump(plant, stage, met) >= 0.0, True
         for e in range(len(plant.element)):
             at = stage.each[e]
             if at.found == 1.0:
@@ -194,7 +198,7 @@ def _walk(plant, stage, x):
         x[a] += t * work.newton[a]
     if task.ellipse == 1.0 and cx * before0 * x[0] + cy * before1 * x[1] <= 0.0:  # past the tip of its cone: stop there
         task.ellipse, stuck = 0.0, True
-    return stuck, known and not stuck
+    return stuck, solution_is_known and not stuck
 
 
 @part
@@ -210,36 +214,36 @@ def _rest(stage, x):
 def _stop_contradictions(plant, stage, x):
     """Hold every element whose sign is against its speed, which no solution may have. Returns whether there was one."""
     element = plant.element
-    found = False
+    contradicts = False
     for e in range(len(element)):
-        own = element[e]
+        record = element[e]
         sign = stage.each[e].sign
         if sign == 1.0 or sign == -1.0:
-            p0, p1, p2 = own.g[0] * x[0], own.g[1] * x[1], own.g[2] * x[2]
+            p0, p1, p2 = record.g[0] * x[0], record.g[1] * x[1], record.g[2] * x[2]
             if sign * (p0 + p1 + p2) < -FLAT * (abs(p0) + abs(p1) + abs(p2)):
-                stage.each[e].sign, found = 0.0, True
-    return found
+                stage.each[e].sign, contradicts = 0.0, True
+    return contradicts
 
 
 @part
 def _release(plant, stage, x, slope):
     """Let those stuck elements go that move along work.worst, and take the step that a quadratic would."""
-    element, each, work = plant.element, stage.each, stage.work
+    element, element_stages, work = plant.element, stage.each, stage.work
     d0, d1, d2, curvature = work.worst[0], work.worst[1], work.worst[2], 0.0
     for a in range(3):
         for b in range(3):
             curvature += work.worst[a] * work.jacobian[a, b] * work.worst[b]
     for e in range(len(element)):
-        own = element[e]
-        g0, g1, g2 = own.g[0], own.g[1], own.g[2]
-        if each[e].sign == 0.0 and moves_along(g0, g1, g2, d0, d1, d2):
-            each[e].sign = 1.0 if g0 * d0 + g1 * d1 + g2 * d2 > 0.0 else -1.0
+        record = element[e]
+        g0, g1, g2 = record.g[0], record.g[1], record.g[2]
+        if element_stages[e].sign == 0.0 and moves_along(g0, g1, g2, d0, d1, d2):
+            element_stages[e].sign = 1.0 if g0 * d0 + g1 * d1 + g2 * d2 > 0.0 else -1.0
     if stage.task.ellipse == 0.0 and (abs(d0) > FLAT or abs(d1) > FLAT):
         stage.task.ellipse = 1.0
     t = -slope / curvature
     for e in range(len(element)):  # not past a kink of what slides: its sign would be wrong from there on
-        own = element[e]
-        g0, g1, g2, sign = own.g[0], own.g[1], own.g[2], each[e].sign
+        record = element[e]
+        g0, g1, g2, sign = record.g[0], record.g[1], record.g[2], element_stages[e].sign
         speed, along = g0 * x[0] + g1 * x[1] + g2 * x[2], g0 * d0 + g1 * d1 + g2 * d2
         if (sign == 1.0 or sign == -1.0) and sign * along < 0.0 and sign * speed > 0.0:
             t = min(t, -0.9 * speed / along)
@@ -281,9 +285,9 @@ def _set_close(plant, stage):
     x, y, z = often * abs(task.goal[0]), often * abs(task.goal[1]), often * abs(task.goal[2])
     xx, yy, zz = body.mass + body.spin[0, 0], body.mass + body.spin[1, 1], body.mass + body.spin[2, 2]
     xy, xz, yz = abs(body.spin[0, 1]), abs(body.spin[0, 2]), abs(body.spin[1, 2])
-    work.close[0] = TIGHT * (xx * x + xy * y + xz * z + forces)
-    work.close[1] = TIGHT * (xy * x + yy * y + yz * z + forces)
-    work.close[2] = TIGHT * (xz * x + yz * y + zz * z + forces)
+    work.close[0] = RESIDUAL_TOLERANCE * (xx * x + xy * y + xz * z + forces)
+    work.close[1] = RESIDUAL_TOLERANCE * (xy * x + yy * y + yz * z + forces)
+    work.close[2] = RESIDUAL_TOLERANCE * (xz * x + yz * y + zz * z + forces)
 
 
 @part
@@ -300,7 +304,7 @@ def solve(plant, stage, x):
     """
     set_losses(plant, stage)
     _set_close(plant, stage)
-    stale, known, rank, freed = True, False, 0, False
+    stale, residual_is_known, rank, freed = True, False, 0, False
     for iteration in range(CAP):
         if iteration == AFRESH:
             _rest(stage, x)
@@ -310,13 +314,13 @@ def solve(plant, stage, x):
             while rank > 0 and absorb(plant, stage, rank):
                 rank = find_active_set(plant, stage)
             onto_active_set(x, stage.work, rank)
-            stale = known = False
-        if not known:
+            stale = residual_is_known = False
+        if not residual_is_known:
             residual(plant, stage, x)
         if is_solved(stage.work, rank):
-            found = worst_direction(plant, stage, rank) if rank > 0 else 0.0
-            if found < -_close_along_worst(stage.work):
-                _release(plant, stage, x, found)
+            worst = worst_direction(plant, stage, rank) if rank > 0 else 0.0
+            if worst < -_close_along_worst(stage.work):
+                _release(plant, stage, x, worst)
                 freed = plant.body.plain == 1.0
             elif not _stop_contradictions(plant, stage, x):
                 onto_active_set(x, stage.work, rank)
@@ -327,5 +331,5 @@ def solve(plant, stage, x):
             if freed and _passes_tip(stage, x):
                 _hold_size(plant.body, stage.work, x)
                 newton_direction(stage.work, rank)
-            stale, known = _walk(plant, stage, x)
+            stale, residual_is_known = _walk(plant, stage, x)
     return CAP

@@ -8,7 +8,7 @@ import numpy as np
 
 from omnidyn.compiled.kernel import part
 from omnidyn.model.friction.bristle import fade_of
-from omnidyn.model.friction.stribeck import BENDS, steepest_of, steepest_of_all
+from omnidyn.model.friction.stribeck import BRISTLE_STEEPNESS, steepest_of, steepest_of_all
 from omnidyn.model.layout import N_AXES, Plant, blank_plant
 from omnidyn.model.mass import added_mass, off_centre
 from omnidyn.model.motor import DYNAMIC
@@ -19,8 +19,8 @@ from omnidyn.model.wheels import per_wheel
 def plant(robot: Robot) -> Plant:
     """The numbers of a robot, all friction put together."""
     length = float(np.sqrt(robot.body.inertia / robot.body.mass))
-    own = blank_plant(robot.wheels.count)
-    body, element = own
+    numbers = blank_plant(robot.wheels.count)
+    body, element = numbers
     body.mass, body.length = robot.body.mass, length
     body.centre[:], body.off = np.array(robot.body.centre) / length, float(any(robot.body.centre))
     body.spin[:] = (off_centre(robot) + added_mass(robot)) / np.outer([1.0, 1.0, length], [1.0, 1.0, length])
@@ -31,16 +31,18 @@ def plant(robot: Robot) -> Plant:
     element["g"][N_AXES:] = robot.wheels.wrench_matrix.T * [1.0, 1.0, 1.0 / length]
     _fill_motors(robot, element[N_AXES:])
     for law in robot.friction.laws:
-        law.add_to(own, length)
-    lossy = element["efficiency"] < np.repeat([0.0, 1.0], [N_AXES, own.wheels])  # a lossy gear holds too
+        law.add_to(numbers, length)
+    lossy = element["efficiency"] < np.repeat([0.0, 1.0], [N_AXES, numbers.wheels])  # a lossy gear holds too
     body.active, element["active"] = body.breakaway[0] > 0.0, lossy | (element["breakaway"] > 0.0).any(axis=1)
     if body.band > 0.0 or np.any(element["band"] > 0.0):
-        others = np.any((element["active"] > 0.0) & (element["band"] == 0.0)) or (body.active and body.band == 0.0)
-        body.gathers = 2.0 if others else 1.0
+        without_band = np.any((element["active"] > 0.0) & (element["band"] == 0.0)) or (
+            body.active and body.band == 0.0
+        )
+        body.gathers = 2.0 if without_band else 1.0
     heaviest = float(body.mass + np.linalg.eigvalsh(body.spin)[-1])
-    _bound_laws(own)
+    _bound_laws(numbers)
     body.memory[:] = _memory(heaviest, element, True), _memory(heaviest, element, False)
-    return own
+    return numbers
 
 
 def _least(mass: float, off: float) -> float:
@@ -55,10 +57,12 @@ def _bound_laws(plant: Plant) -> None:
         row.steep = (steepest_of(row) + fade_of(row)) * float(row.g @ row.g) / body.least
     steep = fade_of(body)
     if body.fall > 0.0:
-        more = (body.breakaway - body.coulomb).max()
+        excess_level = (body.breakaway - body.coulomb).max()
         bends = float((body.bristle_breakaway - body.bristle_coulomb).max())
         round_ = body.coulomb[0] == body.coulomb[1] and body.breakaway[0] == body.breakaway[1]
-        rate = more * (1.0 if round_ else 2.0) + 2.0 * BENDS * bends  # an ellipse falls faster than its levels do
+        rate = (
+            excess_level * (1.0 if round_ else 2.0) + 2.0 * BRISTLE_STEEPNESS * bends
+        )  # an ellipse falls faster than its levels do
         steep += rate * body.fall * steepest_of_all(body.form, body.exponent)
     body.steep = steep / body.least
     body.steep_sum = body.steep + plant.element["steep"].sum()
@@ -71,8 +75,8 @@ def _memory(mass: float, element: Any, driven: bool) -> float:
     motors, damping, g = element[N_AXES:], element["viscous"].copy(), element["g"]
     if driven:
         damping[N_AXES:] += motors["thrust"] * motors["emf"] / motors["resistance"]
-    least = np.linalg.eigvalsh((g.T * damping) @ g)[0]
-    return float(mass / max(least, 1e-9 * mass) + (motors["inductance"] / motors["resistance"]).max())
+    least_damping = np.linalg.eigvalsh((g.T * damping) @ g)[0]
+    return float(mass / max(least_damping, 1e-9 * mass) + (motors["inductance"] / motors["resistance"]).max())
 
 
 def _fill_motors(robot: Robot, element: Any) -> None:

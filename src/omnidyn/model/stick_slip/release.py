@@ -10,13 +10,13 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import branching_kernel, part
-from omnidyn.model.layout import N_AXES, Plant, Problem, Stage, State, many, new_stage, new_states
+from omnidyn.model.layout import N_AXES, Plant, PlantStage, PlantState, Stage, many, new_stage, new_states
 from omnidyn.model.stick_slip.band import FIRM, hold_in_band
 from omnidyn.model.stick_slip.forces import aim_bristles, push_of_laws, residual, winding
 from omnidyn.model.stick_slip.inclusion import solve
 
 
-def with_given_currents(plant: Plant) -> Problem:
+def with_given_currents(plant: Plant) -> PlantStage:
     """The same plant, its currents given (i*) instead of following from voltages, and nothing that feels the speed.
 
     An array of this one plant, and of a stage of it, for `settle` to work in.
@@ -35,42 +35,42 @@ def with_given_currents(plant: Plant) -> Problem:
     plants = many([bare])
     stages = new_stage(plants)
     stages.task["tau"] = 1.0
-    return Problem(plants, stages)
+    return PlantStage(plants, stages)
 
 
 @part
-def put(stage, each):
+def put(stage, element_states):
     """Take the signs of a state into a stage."""
     for e in range(len(stage.each)):
-        stage.each[e].sign = each[e].sign
-    stage.task.ellipse = each[len(stage.each)].sign
+        stage.each[e].sign = element_states[e].sign
+    stage.task.ellipse = element_states[len(stage.each)].sign
 
 
 @part
-def take(stage, each):
+def take(stage, element_states):
     """Bring the signs of a stage back into a state."""
     for e in range(len(stage.each)):
-        each[e].sign = stage.each[e].sign
-    each[len(stage.each)].sign = stage.task.ellipse
+        element_states[e].sign = stage.each[e].sign
+    element_states[len(stage.each)].sign = stage.task.ellipse
 
 
 @part
 def sticks(state):
     """Whether anything is stuck in a state."""
-    found = False
+    any_stuck = False
     for e in range(len(state.each)):
-        found |= state.each[e].sign == 0.0
-    return found
+        any_stuck |= state.each[e].sign == 0.0
+    return any_stuck
 
 
-def start_state(plant: Plant, twist: FloatArray, current: FloatArray) -> State:
+def start_state(plant: Plant, twist: FloatArray, current: FloatArray) -> PlantState:
     """The state of a robot that moves with `twist` [m/s, m/s, rad/s] under `current` [A]."""
     state = moving_states(plant, twist[None]).at(0)
     state.each["current"][N_AXES : N_AXES + plant.wheels] = current
     return state
 
 
-def moving_states(plant: Plant, twists: FloatArray) -> State:
+def moving_states(plant: Plant, twists: FloatArray) -> PlantState:
     """The states of a robot that moves with each of `twists` (k, 3) [m/s, m/s, rad/s], no currents; k of them."""
     states = new_states(plant, len(twists))
     states.x[:] = twists * [1.0, 1.0, plant.body.length]
@@ -89,9 +89,9 @@ def settle_currents(plant, stage, state):
     element = plant.element
     m = len(element)
     for e in range(N_AXES, m):
-        own = element[e]
-        if own.inductance == 0.0:
-            g0, g1, g2 = own.g[0], own.g[1], own.g[2]
+        record = element[e]
+        if record.inductance == 0.0:
+            g0, g1, g2 = record.g[0], record.g[1], record.g[2]
             now = state.each[e]
             speed = g0 * state.x[0] + g1 * state.x[1] + g2 * state.x[2] if now.sign != 0.0 else 0.0
             now.current = winding(
@@ -99,10 +99,10 @@ def settle_currents(plant, stage, state):
                 stage.each[e].voltage,
                 0.0,
                 1.0,
-                own.emf,
-                own.resistance,
+                record.emf,
+                record.resistance,
                 0.0,
-                own.drop,
+                record.drop,
                 stage.each[e].bound,
             )[0]
 
@@ -139,8 +139,11 @@ def settle(plant, stage, bare, state, acceleration):
     settle_currents(plant, stage, state)
     if plant.body.gathers == 1.0:  # who leaves his band is told by what has gathered there
         return 0
-    own, stages = bare.plant, bare.stage
-    bare_plant, bare_stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
+    bare_plants, stages = bare.plant, bare.stage
+    bare_plant, bare_stage = (
+        Plant(bare_plants.body[0], bare_plants.element[0]),
+        Stage(stages.task[0], stages.each[0], stages.work[0]),
+    )
     _smooth_force(plant, stage, bare_plant, bare_stage, state)
     bare_plant.body.turning = 0.0
     for e in range(m):
@@ -164,20 +167,20 @@ def settle(plant, stage, bare, state, acceleration):
 
 
 @branching_kernel
-def _accelerations(own, stages, bare, states, voltage, out):
-    plant, stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
+def _accelerations(plants, stages, bare, states, voltage, out):
+    plant, stage = Plant(plants.body[0], plants.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
     for k in range(len(out)):
         for e in range(N_AXES, len(plant.element)):
             stage.each[e].voltage = voltage[k, e - N_AXES]
-        settle(plant, stage, bare, State(states.x[k], states.each[k]), out[k])
+        settle(plant, stage, bare, PlantState(states.x[k], states.each[k]), out[k])
 
 
-def accelerations(plant: Plant, states: State, voltage: FloatArray, bare: Problem | None = None) -> FloatArray:
+def accelerations(plant: Plant, states: PlantState, voltage: FloatArray, bare: PlantStage | None = None) -> FloatArray:
     """Acceleration of x [m/s^2] in each state under its voltages [V]. Of k states, (k, wheels) -> (k, 3).
 
     The signs in `states` are changed in place to those of what gives way. bare: `with_given_currents`, where many ask.
     """
-    out, given = np.zeros(states.x.shape), with_given_currents(plant) if bare is None else bare.copy()
-    own = many([plant])
-    _accelerations(own, new_stage(own), given, states, voltage, out)
+    out, problem = np.zeros(states.x.shape), with_given_currents(plant) if bare is None else bare.copy()
+    plants = many([plant])
+    _accelerations(plants, new_stage(plants), problem, states, voltage, out)
     return out

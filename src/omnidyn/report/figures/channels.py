@@ -69,8 +69,10 @@ def draw_channel(axes: Axes, t: FloatArray, values: FloatArray, name: str) -> No
     few = slice(None, None, max(1, len(t) // MAX_POINTS))
     for k, column in enumerate(values.T):
         if np.isfinite(column).any():
-            at, shown = _cut(*thinned(t, column, few), t)
-            axes.plot(at, shown, LINES[k % len(LINES)], color=COLOURS[k % len(COLOURS)], linewidth=1.1, label=names[k])
+            at, column_values = _cut(*thinned(t, column, few), t)
+            axes.plot(
+                at, column_values, LINES[k % len(LINES)], color=COLOURS[k % len(COLOURS)], linewidth=1.1, label=names[k]
+            )
     unit = ", ".join(dict.fromkeys(UNITS[name].split(", ")))
     axes.set_title(f"{name.replace('_', ' ')}, {'-1 to 1' if unit == '1' else unit}")
     axes.legend(
@@ -99,12 +101,12 @@ def thinned(t: FloatArray, values: FloatArray, few: slice) -> tuple[FloatArray, 
     return t[index], values[index]
 
 
-def _cut(t: FloatArray, values: FloatArray, every: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The same, with a break in each gap between all times `every`, so that no line is drawn across."""
-    good = every[np.isfinite(every)]
-    if (np.diff(good) < 0.0).any():
+def _cut(t: FloatArray, values: FloatArray, all_times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The same, with a break in each gap between all times `all_times`, so that no line is drawn across."""
+    finite_times = all_times[np.isfinite(all_times)]
+    if (np.diff(finite_times) < 0.0).any():
         return t, values
-    starts = np.array([good[piece.start] for piece in segments(good)[1:]])
+    starts = np.array([finite_times[piece.start] for piece in segments(finite_times)[1:]])
     places = np.searchsorted(t, starts)
     return np.insert(t, places, starts), np.insert(values, places, np.nan)
 

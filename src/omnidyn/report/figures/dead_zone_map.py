@@ -44,10 +44,10 @@ AROUND = {
 }
 
 
-def draw_dead_zone_map(robots: Mapping[str, Robot], found: Mapping[str, DeadZone] = NOTHING) -> Picture:
+def draw_dead_zone_map(robots: Mapping[str, Robot], zones: Mapping[str, DeadZone] = NOTHING) -> Picture:
     """One closed line per robot (name -> robot, at most four): voltage on the left, force on the right.
 
-    One robot alone is filled: inside it stays exactly at rest. found: name -> DeadZone, whose 95 % interval of the
+    One robot alone is filled: inside it stays exactly at rest. zones: name -> DeadZone, whose 95 % interval of the
     voltage is drawn as a band.
     """
     if not 1 <= len(robots) <= len(COLOURS):
@@ -61,15 +61,15 @@ def draw_dead_zone_map(robots: Mapping[str, Robot], found: Mapping[str, DeadZone
             volts, force = dead_zone_map(robot, directions)[0], dead_zone_force(robot, directions)
             for axes, level in ((left, volts), (right, force)):
                 _closed_line(axes, directions, level, colour, line, name, fill=len(robots) == 1)
-            if name in found:
-                _band(left, found[name], colour)
+            if name in zones:
+                _band(left, zones[name], colour)
         for axes, words in ((left, "voltage of the most loaded motor, V"), (right, "push of the motors, N")):
             axes.tick_params(axis="x", pad=4)
             around_robot(axes, axes.get_ylim()[1], AROUND, 1.06)
             figure.text(axes.get_position().x0 - 0.05, 0.94, words, fontsize=11.5)
         handles, names = left.get_legend_handles_labels()
         figure.legend(handles, names, loc="lower center", ncols=len(names), bbox_to_anchor=(0.5, 0.0))
-        return picture("dead_zone_map", "The dead zone over the direction of travel", _caption(robots, found), figure)
+        return picture("dead_zone_map", "The dead zone over the direction of travel", _caption(robots, zones), figure)
 
 
 def _closed_line(
@@ -82,20 +82,20 @@ def _closed_line(
     axes.plot(directions, level, color=colour, linestyle=line, label=name)  # type: ignore[arg-type]
 
 
-def _band(axes: PolarAxes, found: DeadZone, colour: str) -> None:
+def _band(axes: PolarAxes, zone: DeadZone, colour: str) -> None:
     """The 95 % interval of the voltage, all around; a gap where the robot may never move."""
-    if found.band is None:
+    if zone.band is None:
         return
-    around = np.append(found.directions, found.directions[0] + 2.0 * np.pi)
-    low, high = (np.append(end, end[0]) for end in found.band)
+    around = np.append(zone.directions, zone.directions[0] + 2.0 * np.pi)
+    low, high = (np.append(end, end[0]) for end in zone.band)
     axes.fill_between(
         around, low, high, where=np.isfinite(high).tolist(), color=colour, alpha=0.28, linewidth=0, label="95 %"
     )
 
 
-def _caption(robots: Mapping[str, Robot], found: Mapping[str, DeadZone]) -> str:
-    sure = any(each.band is not None for each in found.values())
-    band = " Band: 95 % interval, from the std of the robot file." if sure else ""
+def _caption(robots: Mapping[str, Robot], zones: Mapping[str, DeadZone]) -> str:
+    has_band = any(zone.band is not None for zone in zones.values())
+    band = " Band: 95 % interval, from the std of the robot file." if has_band else ""
     subject = next(iter(robots.values())).name if len(robots) == 1 else "each robot"
     return (
         f"How hard it is to set {subject} in motion from rest, over the direction of travel: the voltage of the most "
@@ -119,7 +119,7 @@ def dead_zone_section(robots: Mapping[str, Robot]) -> Section:
 def _one(group: str, robot: Robot) -> str:
     if robot.wheels.traction_mu is not None:
         return paragraph("Wheels may slip (traction_mu): at which voltage this robot starts to move is not worked out.")
-    found = dead_zone(robot)
-    drawn = draw_dead_zone_map({robot.name: robot}, {robot.name: found})
-    anchor = "".join(c if c.isalnum() or c in "-_." else "-" for c in f"{drawn.name}{group}")
-    return content(found.table(), Points(found.statements()), replace(drawn, name=anchor))
+    zone = dead_zone(robot)
+    zone_map = draw_dead_zone_map({robot.name: robot}, {robot.name: zone})
+    anchor = "".join(c if c.isalnum() or c in "-_." else "-" for c in f"{zone_map.name}{group}")
+    return content(zone.table(), Points(zone.statements()), replace(zone_map, name=anchor))

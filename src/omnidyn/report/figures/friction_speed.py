@@ -51,15 +51,15 @@ def draw_friction_speed(
 
     driven: the speeds that the logs hold, shaded, of each axis. banded: whether the curves have bands to speak of.
     """
-    shown = dict(list(curves.items())[: len(COLOURS)])
+    drawn_curves = dict(list(curves.items())[: len(COLOURS)])
     with look():
         figure, panels = axis_panels(4.1, top=0.9, bottom=0.27)
         for axis, panel in enumerate(panels):
-            of = [parts[axis] for parts in shown.values()]
-            _panel(panel, axis, dict(zip(shown, of, strict=True)), driven[axis] if driven else None)
+            of = [parts[axis] for parts in drawn_curves.values()]
+            _panel(panel, axis, dict(zip(drawn_curves, of, strict=True)), driven[axis] if driven else None)
         handles, names = panels[0].get_legend_handles_labels()
         figure.legend(handles, names, loc="lower left", bbox_to_anchor=(0.065, 0.0), ncols=3, columnspacing=1.5)
-        words = _caption(shown, bool(driven) and any(driven), banded)
+        words = _caption(drawn_curves, bool(driven) and any(driven), banded)
         return picture(name, "Friction against speed", words, figure)
 
 
@@ -94,28 +94,28 @@ def _panel(axes: Axes, axis: int, curves: Mapping[str, FrictionCurve], driven: t
 
 
 def _caption(curves: Mapping[str, Sequence[FrictionCurve]], driven: bool, banded: bool) -> str:
-    unknown = list(dict.fromkeys(name for parts in curves.values() for each in parts for name in each.unknown))
+    unknown = list(dict.fromkeys(name for parts in curves.values() for curve in parts for name in curve.unknown))
     band = (
         " The band is the 95 % interval that the errors of the fitted levels and their correlations leave, at each "
         "speed by itself."
         if banded
         else ""
     )
-    lost = f" Not determined by the data, and not in the band: {', '.join(unknown)}." if unknown else ""
-    guessed = [each.axis for parts in list(curves.values())[:1] for each in parts if not each.fitted]
+    remark = f" Not determined by the data, and not in the band: {', '.join(unknown)}." if unknown else ""
+    guessed = [curve.axis for parts in list(curves.values())[:1] for curve in parts if not curve.fitted]
     if guessed:
         verb = "was" if len(guessed) == 1 else "were"
-        lost += f" Dotted: {' and '.join(guessed)} {verb} not fitted, the line is that of the robot file."
+        remark += f" Dotted: {' and '.join(guessed)} {verb} not fitted, the line is that of the robot file."
     range_words = " Beyond the grey speeds the line is the law, not the data." if driven else ""
     return (
         f"What friction takes from a robot that moves along {AXES[0]}, along {AXES[1]}, or turns about {AXES[2]}; at "
-        f"speed 0 it holds anything up to the jump.{band}{lost}{range_words}"
+        f"speed 0 it holds anything up to the jump.{band}{remark}{range_words}"
     )
 
 
 # The friction of an estimate against speed, or of the groups of one identification
 
-WHOLE = "all"  # the name of the one group where there are no groups
+ONLY_GROUP = "all"  # the name of the one group where there are no groups
 
 
 def estimate_curves(estimate: Estimate) -> list[FrictionCurve]:
@@ -124,7 +124,9 @@ def estimate_curves(estimate: Estimate) -> list[FrictionCurve]:
     return [friction_curve(estimate, axis, speeds_up_to(float(top))) for axis, top in enumerate(tops)]
 
 
-def draw_estimates(estimates: Mapping[str, Estimate], **how: Any) -> Picture:
+def draw_estimates(estimates: Mapping[str, Estimate], **options: Any) -> Picture:
     """Friction against speed of one estimate, or of the groups of one identification."""
-    names = {name: estimate.robot.name if name == WHOLE else name for name, estimate in estimates.items()}
-    return draw_friction_speed({names[name]: estimate_curves(each) for name, each in estimates.items()}, **how)
+    names = {name: estimate.robot.name if name == ONLY_GROUP else name for name, estimate in estimates.items()}
+    return draw_friction_speed(
+        {names[name]: estimate_curves(estimate) for name, estimate in estimates.items()}, **options
+    )

@@ -14,7 +14,7 @@ from omnidyn.identification.motors.steady_curve import SteadyCurve
 from omnidyn.identification.motors.windows import MotorWindows
 from omnidyn.report.style import BLUE, GREY, INK, VERMILLION, WIDTH, Picture, look, new_figure, picture, thin_out
 
-MOST = 6  # motors that are drawn
+MOST_MOTORS = 6  # motors that are drawn
 LINE, STEADY, WINDOWS = "line", "steady speeds", "windows, inertia taken off"
 STARTS, BAND = "start from rest, 95 %", "dead band by the line, 95 %"
 
@@ -30,7 +30,7 @@ def draw_motor_lines(
     starts: of each direction, which has its own line then. Where none is known, the bar is the dead band of the line.
     curves: of motors whose speed is no line.
     """
-    lines = [line for line in motors if line.motor is not None][:MOST]
+    lines = [line for line in motors if line.motor is not None][:MOST_MOTORS]
     with look():
         columns = 2 if len(lines) in (2, 4) else min(len(lines), 3)
         rows = -(-len(lines) // columns)
@@ -41,8 +41,14 @@ def draw_motor_lines(
             left=0.1, right=0.98, top=1 - 0.35 / height, bottom=1.0 / height, wspace=0.34, hspace=0.45
         )
         for k, (panel, line) in enumerate(zip(panels, lines, strict=False)):
-            own = {each.side: each for each in starts if each.motor == line.motor}
-            _panel(panel, windows, line, own, next((curve for curve in curves if curve.motor == line.motor), None))
+            starts_of_motor = {start.side: start for start in starts if start.motor == line.motor}
+            _panel(
+                panel,
+                windows,
+                line,
+                starts_of_motor,
+                next((curve for curve in curves if curve.motor == line.motor), None),
+            )
             if k % columns == 0:
                 panel.set_ylabel(f"{windows.kind}, {windows.unit}")
         for panel in panels[len(lines) :]:
@@ -124,18 +130,18 @@ def _direction(
 
 
 def _words(windows: MotorWindows, names: Sequence[str]) -> str:
-    told = (
+    words = (
         f"Mean {windows.kind} over each window against the mean speed ({windows.speed_from}), with the "
         "standard error of the speed."
     )
     if STARTS in names:
-        told += (
+        words += (
             " The bar at speed 0 is the input at which the motor sets off from rest, with its 95 % interval: that is "
             "the dead band, and not where the line crosses."
         )
     if BAND in names:
-        told += (
+        words += (
             f" {'Where no start was seen, the' if STARTS in names else 'The'} bar is where the line meets speed 0, "
             "with its 95 % interval: where it contains 0, the data do not show a dead band."
         )
-    return told
+    return words

@@ -27,23 +27,23 @@ def draw_overlay(comparison: Comparison, log: int = 0, channels: Sequence[str] =
     log: which of the logs, from 0. channels: components to show, at most six; by default the first three compared.
     Lines break where nothing was integrated; such gaps are grey. Raises InputError for unknown or too many components.
     """
-    shown = tuple(channels) or _usual(comparison, log)
-    unknown = [name for name in shown if name not in comparison.channels]
-    if unknown or not 1 <= len(shown) <= MOST_PANELS:
+    drawn_names = tuple(channels) or _usual(comparison, log)
+    unknown = [name for name in drawn_names if name not in comparison.channels]
+    if unknown or not 1 <= len(drawn_names) <= MOST_PANELS:
         raise InputError(
             "cannot draw these components",
-            got=", ".join(unknown or shown) or "none",
+            got=", ".join(unknown or drawn_names) or "none",
             expected=f"up to {MOST_PANELS} of {', '.join(comparison.channels)}",
             where="channels",
         )
     segments = [segment for segment in comparison.segments if segment.log == log]
-    height = HEIGHT * len(shown) + EXTRA
+    height = HEIGHT * len(drawn_names) + EXTRA
     with look():
         figure = new_figure(WIDTH, height)
         grid = figure.add_gridspec(
-            3 * len(shown) - 1,
+            3 * len(drawn_names) - 1,
             1,
-            height_ratios=([2.0, 1.0, 0.14] * len(shown))[:-1],
+            height_ratios=([2.0, 1.0, 0.14] * len(drawn_names))[:-1],
             hspace=0.12,
             left=0.13,
             right=0.965,
@@ -51,12 +51,12 @@ def draw_overlay(comparison: Comparison, log: int = 0, channels: Sequence[str] =
             bottom=0.55 / height,
         )
         first = None
-        for k, name in enumerate(shown):
+        for k, name in enumerate(drawn_names):
             above = figure.add_subplot(grid[3 * k], sharex=first)
             below = figure.add_subplot(grid[3 * k + 1], sharex=above)
             first = first or above
             _values(above, comparison, segments, name)
-            _errors(below, comparison, segments, name, last=k == len(shown) - 1)
+            _errors(below, comparison, segments, name, last=k == len(drawn_names) - 1)
             for axes in (above, below):
                 _gaps(axes, segments)
         assert first is not None
@@ -71,9 +71,9 @@ def draw_overlay(comparison: Comparison, log: int = 0, channels: Sequence[str] =
 def _usual(comparison: Comparison, log: int) -> tuple[str, ...]:
     """The first components that this log holds."""
     indices = [k for k, segment in enumerate(comparison.segments) if segment.log == log]
-    found = comparison.by_segment[comparison.robots[0]]
-    there = [name for name in comparison.channels if any(found[name][k] is not None for k in indices)]
-    return tuple(there[:USUAL_PANELS])
+    scores = comparison.by_segment[comparison.robots[0]]
+    present = [name for name in comparison.channels if any(scores[name][k] is not None for k in indices)]
+    return tuple(present[:USUAL_PANELS])
 
 
 def _values(axes: Axes, comparison: Comparison, segments: Sequence[Segment], name: str) -> None:
@@ -144,15 +144,15 @@ def _caption(comparison: Comparison, log: int, count: int) -> str:
     source = comparison.measured[log].source or "one run"
     gaps = " Grey: gaps, after which every model starts anew from the measured state." if count > 1 else ""
     errors = "; ".join(
-        f"{robot}: rmse " + ", ".join(f"{name} {each.rmse:.3g} {unit(name)}" for name, each in found.items())
-        for robot, found in comparison.overall.items()
+        f"{robot}: rmse " + ", ".join(f"{name} {metrics.rmse:.3g} {unit(name)}" for name, metrics in scores.items())
+        for robot, scores in comparison.overall.items()
     )
     band = (
         " Bands: how far numbers that are off as the robot file says may bring it, 95 %; sensors add to that."
         if comparison.bands
         else ""
     )
-    if any(each.draws == 0 for own in comparison.bands.values() for each in own.values()):
+    if any(run_band.draws == 0 for run_bands in comparison.bands.values() for run_band in run_bands.values()):
         band += " They are to first order: where a model rests they have no width."
     return (
         f"{source}: measured, and what each model does under {comparison.applied_text(comparison.robots[0])}, as a "

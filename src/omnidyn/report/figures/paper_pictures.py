@@ -55,7 +55,7 @@ def paper_pictures(robot: Robot) -> Iterator[Picture]:
 
 # Fig. 5: a slow voltage ramp on each axis, through the dead zone
 
-EVERY = 10  # a ramp has far more samples than a page has dots
+SAMPLE_STRIDE = 10  # a ramp has far more samples than a page has dots
 
 
 def draw_dead_zone(ramps: Mapping[str, Ramp]) -> Picture:
@@ -69,10 +69,10 @@ def draw_dead_zone(ramps: Mapping[str, Ramp]) -> Picture:
 
 def _caption(ramps: Mapping[str, Ramp]) -> str:
     ours = ", ".join(f"{ramps[axis].breakaway_voltage:.3f}" for axis in AXES)
-    said = ", ".join(f"{ramps[axis].printed_voltage:g}" for axis in AXES)
+    printed = ", ".join(f"{ramps[axis].printed_voltage:g}" for axis in AXES)
     return (
         "A ramp of voltage along x, y and yaw, simulated. Shaded: the robot stays exactly at rest. "
-        f"The model moves beyond {ours} V; the paper says about {said} V."
+        f"The model moves beyond {ours} V; the paper says about {printed} V."
     )
 
 
@@ -80,12 +80,20 @@ def _panel(axes: Axes, axis: str, ramp: Ramp) -> None:
     twist = ramp.run.twist
     assert twist is not None
     speed = twist[:, AXES.index(axis)]
-    ours, said, top = ramp.breakaway_voltage, ramp.printed_voltage, float(speed.max())
+    ours, printed, top = ramp.breakaway_voltage, ramp.printed_voltage, float(speed.max())
     axes.axvspan(0.0, ours, color=PALE, linewidth=0)
-    axes.plot(ramp.scale[::EVERY], speed[::EVERY], color=AXIS_COLOUR[axis])
-    axes.axvline(said, color=INK, linestyle=":", linewidth=1.6)
+    axes.plot(ramp.scale[::SAMPLE_STRIDE], speed[::SAMPLE_STRIDE], color=AXIS_COLOUR[axis])
+    axes.axvline(printed, color=INK, linestyle=":", linewidth=1.6)
     note(axes, 0.5 * ours, 0.55 * top, f"at rest\nup to\n{ours:.3f} V", ha="center", va="center", bbox=None)
-    note(axes, said, 1.01, f"paper: about {said:g} V", ha="center", va="bottom", transform=axes.get_xaxis_transform())
+    note(
+        axes,
+        printed,
+        1.01,
+        f"paper: about {printed:g} V",
+        ha="center",
+        va="bottom",
+        transform=axes.get_xaxis_transform(),
+    )
     axes.set_ylim(-0.02 * top, 1.05 * top)
     title = f"{axis_title(axis)}: speed, {SPEED_UNIT[axis]}"
     dress_panel(axes, title, "voltage, V", float(ramp.scale.max()), steps=5, pad=22)
@@ -182,9 +190,9 @@ def _steps_panel(axes: Axes, axis: str, responses: Sequence[StepResponse]) -> No
     for k, response in enumerate(responses):
         twist = response.run.twist
         assert twist is not None
-        kept = response.run.t <= SHOWN_S
-        speed, colour = twist[kept, AXES.index(axis)], LEVEL_COLOURS[k]
-        axes.plot(response.run.t[kept], speed, LEVEL_LINES[k], color=colour)
+        rows = response.run.t <= SHOWN_S
+        speed, colour = twist[rows, AXES.index(axis)], LEVEL_COLOURS[k]
+        axes.plot(response.run.t[rows], speed, LEVEL_LINES[k], color=colour)
         note(axes, 0.62 * SHOWN_S, response.settled_speed, f"{response.level:g} V", ha="center", va="center")
         if response.measured_speed is not None:
             axes.plot(
@@ -221,23 +229,23 @@ NAMES = {
 
 def draw_reconciliation(trials: Sequence[Reconciliation]) -> Picture:
     """Mean error that is left, in per cent of the largest speed of each axis, and how many rows agree."""
-    shown = sorted((trial for trial in trials if trial.axes == AXES), key=lambda trial: trial.cost)
+    sorted_trials = sorted((trial for trial in trials if trial.axes == AXES), key=lambda trial: trial.cost)
     with look():
-        figure = new_figure(WIDTH, 0.6 + 0.36 * len(shown))
+        figure = new_figure(WIDTH, 0.6 + 0.36 * len(sorted_trials))
         axes = figure.add_axes((0.33, 0.15, 0.5, 0.76))
-        place = np.arange(len(shown))[::-1]
-        left = [100.0 * trial.cost for trial in shown]
-        axes.hlines(place, 0.0, left, color=PALE, linewidth=5)
-        axes.plot(left, place, "o", color=BLUE, markersize=9)
-        axes.set_yticks(place, [_name(trial) for trial in shown])
+        place = np.arange(len(sorted_trials))[::-1]
+        errors = [100.0 * trial.cost for trial in sorted_trials]
+        axes.hlines(place, 0.0, errors, color=PALE, linewidth=5)
+        axes.plot(errors, place, "o", color=BLUE, markersize=9)
+        axes.set_yticks(place, [_name(trial) for trial in sorted_trials])
         axes.tick_params(axis="y", length=0)
-        axes.set_xlim(0.0, 1.1 * max(left))
+        axes.set_xlim(0.0, 1.1 * max(errors))
         thin_out(axes, x=5)
-        axes.set_ylim(-0.7, len(shown) - 0.3)
+        axes.set_ylim(-0.7, len(sorted_trials) - 0.3)
         axes.grid(False, axis="y")
         axes.set_xlabel("error left (rms), % of the largest speed of the axis")
         axes.set_title("set free", color=GREY, x=-0.02, ha="right")
-        for k, trial in zip(place, shown, strict=True):
+        for k, trial in zip(place, sorted_trials, strict=True):
             words = f"{trial.explained} of {trial.rows}"
             axes.text(1.03, k, words, transform=axes.get_yaxis_transform(), va="center", color=INK)
         axes.text(1.03, 1.02, "rows within 5 %", transform=axes.transAxes, va="bottom", color=GREY)
@@ -286,9 +294,9 @@ def _traces_caption() -> str:
 def _speeds(axes: Axes, axis: str, runs: Sequence[Run]) -> None:
     for k, (run, row) in enumerate(zip(runs, TABLE_1[axis], strict=True)):
         assert run.twist is not None
-        kept = run.t <= TRACE_S
-        speed = run.twist[kept, AXES.index(axis)]
-        axes.plot(run.t[kept], speed, LEVEL_LINES[k], color=LEVEL_COLOURS[k])
+        rows = run.t <= TRACE_S
+        speed = run.twist[rows, AXES.index(axis)]
+        axes.plot(run.t[rows], speed, LEVEL_LINES[k], color=LEVEL_COLOURS[k])
         axes.plot([TRACE_S] * 2, [speed[-1], row.speed], color=LEVEL_COLOURS[k], linewidth=1.2, clip_on=False)
         axes.plot(
             [TRACE_S],
@@ -313,8 +321,8 @@ def _currents(axes: Axes, axis: str, runs: Sequence[Run]) -> None:
     wheel = int(np.argmax(np.abs(TABLE_1[axis][-1].voltage)))
     for k, run in enumerate(runs):
         assert run.current is not None
-        kept = run.t <= TRACE_S
-        axes.plot(run.t[kept], run.current[kept, wheel], LEVEL_LINES[k], color=LEVEL_COLOURS[k])
+        rows = run.t <= TRACE_S
+        axes.plot(run.t[rows], run.current[rows, wheel], LEVEL_LINES[k], color=LEVEL_COLOURS[k])
     axes.set_title(f"current of wheel {wheel + 1}, A")
     axes.set_xlabel("time, s")
     thin_out(axes, y=6)

@@ -49,12 +49,14 @@ def draw_path(paths: Sequence[BodyPath], name: str = "where_it_went", of: str = 
 
 
 def _path(axes: Axes, path: BodyPath, colour: str) -> None:
-    every = max(1, len(path.position) // MAX_POINTS)
-    x, y = path.position[::every].T
+    stride = max(1, len(path.position) // MAX_POINTS)
+    x, y = path.position[::stride].T
     axes.plot(x, y, color=colour, linewidth=1.1, alpha=0.9)
-    known = path.position[np.isfinite(path.position).all(axis=1)]
-    axes.plot(*known[0], "o", color="white", markeredgecolor=colour, markersize=8, markeredgewidth=1.6, zorder=4)
-    axes.plot(*known[-1], "o", color=colour, markersize=6, zorder=5)
+    finite_points = path.position[np.isfinite(path.position).all(axis=1)]
+    axes.plot(
+        *finite_points[0], "o", color="white", markeredgecolor=colour, markersize=8, markeredgewidth=1.6, zorder=4
+    )
+    axes.plot(*finite_points[-1], "o", color=colour, markersize=6, zorder=5)
 
 
 def _directions(axes: PolarAxes, paths: Sequence[BodyPath]) -> None:
@@ -72,9 +74,9 @@ def _caption(paths: Sequence[BodyPath]) -> str:
     origins = " or ".join(dict.fromkeys(path.origin for path in paths))
     total = sum(float(path.length.sum()) for path in paths)
     drift = "" if origins == "measured positions" else " Integrated speeds drift: only the shape of the path counts."
-    more = f" The first {len(COLOURS)} of {len(paths)} logs have a colour." if len(paths) > len(COLOURS) else ""
+    remark = f" The first {len(COLOURS)} of {len(paths)} logs have a colour." if len(paths) > len(COLOURS) else ""
     return (
         f"Left: the way of the robot from {origins}, {total:.3g} m in all; a ring is a start, a dot an end.{drift}"
-        f"{more} Right: how far it drove in which direction of its own frame (forward is up, left is left). Friction "
+        f"{remark} Right: how far it drove in which direction of its own frame (forward is up, left is left). Friction "
         "along directions that are missing there is not in the data."
     )

@@ -40,9 +40,9 @@ def draw_raw_log(log: Log, verdict: Verdict) -> Picture:
             draw_channel(axes, log.t, log.channels[name], name)
         for axes in panels:
             hatch_gaps(axes, log.t)
-        good = log.t[np.isfinite(log.t)]
-        if good.size > 1 and np.ptp(good) > 0.0:
-            panels[-1].set_xlim(float(good.min()), float(good.max()))
+        finite_times = log.t[np.isfinite(log.t)]
+        if finite_times.size > 1 and np.ptp(finite_times) > 0.0:
+            panels[-1].set_xlim(float(finite_times.min()), float(finite_times.max()))
         panels[-1].set_xlabel("time, s")
         return picture("raw_log", "The log as recorded", _caption(verdict), figure)
 
@@ -85,6 +85,8 @@ def _label(finding: Finding) -> str:
 
 def _caption(verdict: Verdict) -> str:
     words = "; ".join(
-        f"{each.severity}: {each.code} {each.subject}".rstrip() for each in verdict.findings if each.severity != NOTE
+        f"{finding.severity}: {finding.code} {finding.subject}".rstrip()
+        for finding in verdict.findings
+        if finding.severity != NOTE
     )
     return f"{verdict.headline()}. {words or 'no error, no warning'}. Hatched: gaps."

@@ -37,27 +37,27 @@ def draw_residuals(comparison: Comparison, noise: dict[str, float], name: str = 
     noise: component -> std; without one the errors are divided by their own. of: which logs, in words.
     """
     traces = _traces(comparison)
-    shown = comparison.channels[:MOST_CHANNELS]
-    height = HEIGHT * len(shown) + 0.75
+    names = comparison.channels[:MOST_CHANNELS]
+    height = HEIGHT * len(names) + 0.75
     with look():
         figure = new_figure(WIDTH, height)
-        panels = figure.subplots(len(shown), 2, squeeze=False)
+        panels = figure.subplots(len(names), 2, squeeze=False)
         figure.subplots_adjust(
             left=0.13, right=0.975, top=1.0 - 0.3 / height, bottom=0.5 / height, hspace=0.32, wspace=0.24
         )
-        for (left, right), key in zip(panels, shown, strict=True):
+        for (left, right), key in zip(panels, names, strict=True):
             errors = errors_for_whiteness(key, traces)
-            known = _known(errors)
-            std = noise.get(key) or float(np.std(known)) or 1.0
-            _histogram(left, known / std)
+            samples = _known(errors)
+            std = noise.get(key) or float(np.std(samples)) or 1.0
+            _histogram(left, samples / std)
             left.set_ylabel(key)
-            found = whiteness(errors, LAGS)
-            if found is not None:
-                lags = np.arange(1, len(found.correlation) + 1)
-                right.fill_between(lags, -found.bound, found.bound, color=PALE, linewidth=0.0)
-                right.bar(lags, found.correlation, width=0.5, color=BLUE)
-                most = 1.2 * max(float(np.abs(found.correlation).max()), float(found.bound.max()), 0.05)
-                right.set_ylim(-most, most)
+            test = whiteness(errors, LAGS)
+            if test is not None:
+                lags = np.arange(1, len(test.correlation) + 1)
+                right.fill_between(lags, -test.bound, test.bound, color=PALE, linewidth=0.0)
+                right.bar(lags, test.correlation, width=0.5, color=BLUE)
+                bound = 1.2 * max(float(np.abs(test.correlation).max()), float(test.bound.max()), 0.05)
+                right.set_ylim(-bound, bound)
             right.axhline(0.0, color=GREY, linewidth=0.8)
             right.set_xlim(0.2, LAGS + 0.8)
             thin_out(right, y=4)
@@ -65,13 +65,13 @@ def draw_residuals(comparison: Comparison, noise: dict[str, float], name: str = 
         panels[0][1].set_title("correlation with later rows")
         panels[-1][0].set_xlabel("standard deviations")
         panels[-1][1].set_xlabel("rows later")
-        sizes = ", ".join(f"{key} {noise[key]:.3g} {unit(key)}" for key in shown if key in noise)
+        sizes = ", ".join(f"{key} {noise[key]:.3g} {unit(key)}" for key in names if key in noise)
         caption = (
             f"Errors of the free run{of}. Left: their histogram (blue) and the normal curve that the intervals assume "
             "(dashed); wider shoulders mean outliers. Right: bars beyond the grey band mean that errors last: "
             f"noise with a memory, or what the model misses. Noise: {sizes or 'not known'}."
         )
-        if any(component_channel(key) == "wheel_angle" for key in shown):
+        if any(component_channel(key) == "wheel_angle" for key in names):
             caption += " Rounding by an encoder adds to that of an angle, and makes it flat."
         return picture(name, f"What the model leaves{of}", caption, figure)
 
@@ -87,7 +87,7 @@ def _traces(comparison: Comparison) -> dict[str, list[Trace]]:
 
 
 def _known(errors: list[FloatArray]) -> FloatArray:
-    return np.concatenate([each[np.isfinite(each)] for each in errors])
+    return np.concatenate([error[np.isfinite(error)] for error in errors])
 
 
 def _histogram(axes, scaled: FloatArray) -> None:
@@ -108,7 +108,7 @@ def _histogram(axes, scaled: FloatArray) -> None:
 
 MOST_NAMES = 16
 INCHES = 0.092  # of a letter, about
-CLEAR = 0.6  # beyond it the ground is dark, and the number on it white
+DARK_GROUND = 0.6  # beyond it the ground is dark, and the number on it white
 
 
 def draw_correlation(correlation: Correlation) -> Picture:
@@ -124,11 +124,11 @@ def draw_correlation(correlation: Correlation) -> Picture:
         figure = new_figure(width, height)
         left = (longest + 0.25) / width
         axes = figure.add_axes((left, foot / height, side / width, side / height))
-        shown = np.where(np.tril(np.ones((count, count), dtype=bool)), matrix, np.nan)
-        image = axes.imshow(shown, cmap="PuOr_r", vmin=-1.0, vmax=1.0, aspect="auto")
+        triangle = np.where(np.tril(np.ones((count, count), dtype=bool)), matrix, np.nan)
+        image = axes.imshow(triangle, cmap="PuOr_r", vmin=-1.0, vmax=1.0, aspect="auto")
         for i in range(count):
             for j in range(i + 1):
-                colour = "white" if abs(matrix[i, j]) > CLEAR else INK
+                colour = "white" if abs(matrix[i, j]) > DARK_GROUND else INK
                 axes.text(
                     j,
                     i,
@@ -144,15 +144,15 @@ def draw_correlation(correlation: Correlation) -> Picture:
         axes.tick_params(length=0)
         for spine in axes.spines.values():
             spine.set_visible(False)
-        beside = figure.add_axes((left + (side + 0.2) / width, foot / height, 0.16 / width, side / height))
-        bar = figure.colorbar(image, cax=beside, ticks=[-1.0, 0.0, 1.0])
+        bar_axes = figure.add_axes((left + (side + 0.2) / width, foot / height, 0.16 / width, side / height))
+        bar = figure.colorbar(image, cax=bar_axes, ticks=[-1.0, 0.0, 1.0])
         bar.outline.set_visible(False)  # type: ignore[operator]
-        more = "" if len(correlation.names) <= MOST_NAMES else f" The first {MOST_NAMES} of {len(correlation.names)}."
+        remark = "" if len(correlation.names) <= MOST_NAMES else f" The first {MOST_NAMES} of {len(correlation.names)}."
         return picture(
             "correlation",
             "Which numbers move together",
             "Correlation of the estimates. Near 1 or -1 the logs cannot tell two numbers apart, however narrow the "
-            f"interval of their sum.{more}",
+            f"interval of their sum.{remark}",
             figure,
         )
 

@@ -65,8 +65,8 @@ def wheel_places(wheels: Wheels) -> FloatArray:
     roller_sin, roller_cos = sin_cos_deg(per_wheel(wheels.roller_angle_deg, wheels.count))
     tan, shared = roller_sin / roller_cos, _shared(wheels)
     along = per_wheel(wheels.robot_radius, wheels.count) / np.where(shared, 1.0 + np.abs(tan), 1.0)
-    across = np.where(shared, np.sign(tan), 0.0) * along
-    places = np.stack([along * cos - across * sin, along * sin + across * cos], axis=1)
+    sideways = np.where(shared, np.sign(tan), 0.0) * along
+    places = np.stack([along * cos - sideways * sin, along * sin + sideways * cos], axis=1)
     for wheel in range(1, wheels.count):
         while (np.linalg.norm(places[:wheel] - places[wheel], axis=1) < 1e-9).any():
             places[wheel] += 2.2 * wheels.radii[wheel] * np.array([-sin[wheel], cos[wheel]])
@@ -120,8 +120,10 @@ def _wheel(axes: Axes, robot: Robot, wheel: int, place: FloatArray) -> None:
 
 
 def _arrow(axes: Axes, start: np.ndarray, end: np.ndarray, colour: str) -> None:
-    how = {"arrowstyle": "-|>,head_width=0.35,head_length=0.7", "color": colour, "linewidth": 2.2}
-    axes.annotate("", xy=_seen(end), xytext=_seen(start), arrowprops={**how, "shrinkA": 0, "shrinkB": 0}, zorder=4)
+    arrow_style = {"arrowstyle": "-|>,head_width=0.35,head_length=0.7", "color": colour, "linewidth": 2.2}
+    axes.annotate(
+        "", xy=_seen(end), xytext=_seen(start), arrowprops={**arrow_style, "shrinkA": 0, "shrinkB": 0}, zorder=4
+    )
 
 
 def _body_axes(axes: Axes, reach: float) -> None:

@@ -54,15 +54,15 @@ def draw_scores(study: SteadyStudy) -> Picture:
         height = 1.1 + 0.33 * len(scores)
         axes = figure.add_axes((0.27, 0.62 / height, 0.70, 1.0 - 0.72 / height))
         for row, score in enumerate(scores):
-            chosen = score.name == study.choice.chosen
-            colour = BLUE if chosen else INK if score.in_model else GREY
+            is_choice = score.name == study.choice.chosen
+            colour = BLUE if is_choice else INK if score.in_model else GREY
             axes.errorbar(
                 score.loo,
                 row,
                 xerr=2.0 * score.loo_std,
                 fmt="o" if score.in_model else "D",
                 color=colour,
-                markersize=8 if chosen else 6,
+                markersize=8 if is_choice else 6,
                 capsize=3,
                 markerfacecolor=colour if score.in_model else "white",
             )
@@ -99,11 +99,11 @@ def draw_polar(study: SteadyStudy) -> Picture:
         axes = cast(PolarAxes, figure.add_axes((0.06, 0.06, 0.56, 0.84), projection="polar"))
         top = 0.0
         for group, colour, mark, line in zip(groups, GROUP_COLOURS, GROUP_MARKS, LINES, strict=False):
-            own = _of(study.points, group)
+            group_points = _of(study.points, group)
             name = "measured" if group == "all" else group
             axes.plot(
-                np.arctan2(own.twist[:, 1], own.twist[:, 0]),
-                own.along,
+                np.arctan2(group_points.twist[:, 1], group_points.twist[:, 0]),
+                group_points.along,
                 mark,
                 color=colour,
                 markersize=3.5,
@@ -111,7 +111,7 @@ def draw_polar(study: SteadyStudy) -> Picture:
                 markeredgewidth=0,
                 label=name,
             )
-            way, curve = _curve(study, group, study.choice.of(group), own)
+            way, curve = _curve(study, group, study.choice.of(group), group_points)
             axes.plot(
                 np.radians(way),
                 _along(way, curve),
@@ -120,7 +120,7 @@ def draw_polar(study: SteadyStudy) -> Picture:
                 linewidth=2.2,  # type: ignore[arg-type]
                 label=study.choice.of(group) + ("" if group == "all" else f", {group}"),
             )
-            top = max(top, float(np.nanmax(own.along, initial=0.0)))
+            top = max(top, float(np.nanmax(group_points.along, initial=0.0)))
         _compared(study, axes, groups[0])
         around_robot(axes, top)
         figure.legend(*axes.get_legend_handles_labels(), loc="center left", bbox_to_anchor=(0.68, 0.5))
@@ -171,13 +171,13 @@ def draw_components(study: SteadyStudy) -> Picture:
 
 
 def _component(study: SteadyStudy, panel: Axes, component: int, group: str, number: int) -> None:
-    own = _of(study.points, group)
+    group_points = _of(study.points, group)
     colour = GROUP_COLOURS[number]
-    way = np.degrees(np.arctan2(own.twist[:, 1], own.twist[:, 0]))
+    way = np.degrees(np.arctan2(group_points.twist[:, 1], group_points.twist[:, 0]))
     name = "measured" if group == "all" else group
     panel.plot(
         way,
-        own.wrench[:, component],
+        group_points.wrench[:, component],
         GROUP_MARKS[number],
         color=colour,
         markersize=3.5,
@@ -185,29 +185,29 @@ def _component(study: SteadyStudy, panel: Axes, component: int, group: str, numb
         markeredgewidth=0,
         label=name,
     )
-    angles, curve = _curve(study, group, study.choice.of(group), own)
+    angles, curve = _curve(study, group, study.choice.of(group), group_points)
     label = study.choice.of(group) + ("" if group == "all" else f", {group}")
     panel.plot(angles, curve[:, component], color=colour, linestyle=LINES[number], label=label)  # type: ignore[arg-type]
     if number == 0 and "box" in study.choice.fits and study.choice.of(group) != "box":
-        angles, curve = _curve(study, group, "box", own)
+        angles, curve = _curve(study, group, "box", group_points)
         panel.plot(angles, curve[:, component], ":", color=ORANGE, linewidth=1.6, label="box (the paper)")
 
 
-def _curve(study: SteadyStudy, group: str, name: str, own: ForcePoints) -> tuple[FloatArray, FloatArray]:
+def _curve(study: SteadyStudy, group: str, name: str, group_points: ForcePoints) -> tuple[FloatArray, FloatArray]:
     """(direction [degree], driving wrench) of a fitted shape at the middle speed of the group, without turning."""
     fit = study.choice.fits[name][group]
     way = np.arange(-180.0, 180.0 + STEP_DEG, STEP_DEG) + 0.01  # beside the corners, not on them
-    speed = float(np.median(own.speed))
+    speed = float(np.median(group_points.speed))
     angle = np.radians(way)
     twist = speed * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
     empty = np.zeros(len(way))
     points = replace(
-        own,
+        group_points,
         twist=twist,
         still=empty,
         wrench=np.zeros((len(way), 3)),
         wrench_std=np.zeros((len(way), 3)),
-        traction=np.zeros((len(way), own.traction.shape[1])),
+        traction=np.zeros((len(way), group_points.traction.shape[1])),
         direction=way,
         travels=empty == 0.0,
         turns=empty > 0.0,
@@ -225,5 +225,5 @@ def _along(way: FloatArray, wrench: FloatArray) -> FloatArray:
 
 
 def _of(points: ForcePoints, group: str) -> ForcePoints:
-    own = np.array([name == group for name in points.group])
-    return points.chosen(own & points.travels if (own & points.travels).any() else own)
+    in_group = np.array([name == group for name in points.group])
+    return points.chosen(in_group & points.travels if (in_group & points.travels).any() else in_group)

@@ -33,21 +33,23 @@ MOST_POINTS = 4000
 MOST_PANELS = 4
 
 
-def draw_tracking(found: Tracking | Sequence[Tracking]) -> Picture:
+def draw_tracking(trackings: Tracking | Sequence[Tracking]) -> Picture:
     """Where they went, and how far off they were over time."""
-    every = [found] if isinstance(found, Tracking) else list(found)
+    tracking_list = [trackings] if isinstance(trackings, Tracking) else list(trackings)
     with look():
         figure = new_figure(WIDTH, 4.6)
         plane = figure.add_axes((0.08, 0.12, 0.4, 0.72))
-        far = figure.add_axes((0.59, 0.57, 0.4, 0.27))
+        distance_axes = figure.add_axes((0.59, 0.57, 0.4, 0.27))
         turned = figure.add_axes((0.59, 0.12, 0.4, 0.27))
-        _plane(plane, every)
-        _errors(far, every, lambda each: 1e3 * np.hypot(*each.error[:, :2].T), "off the path, mm")
-        _errors(turned, every, lambda each: 1e3 * each.error[:, 2], "heading off, mrad")
+        _plane(plane, tracking_list)
+        _errors(
+            distance_axes, tracking_list, lambda tracking: 1e3 * np.hypot(*tracking.error[:, :2].T), "off the path, mm"
+        )
+        _errors(turned, tracking_list, lambda tracking: 1e3 * tracking.error[:, 2], "heading off, mrad")
         turned.set_xlabel("time, s")
         handles, labels = plane.get_legend_handles_labels()
         figure.legend(handles, labels, loc="upper left", ncols=4, bbox_to_anchor=(0.06, 1.0))
-        first = every[0]
+        first = tracking_list[0]
         caption = (
             f"Left: the path {first.path} and where {first.plant} went, from above; a ring is the start. Right: "
             f"distance from the path and error of the heading; what is before {first.skip:g} s (grey) does not count."
@@ -55,54 +57,56 @@ def draw_tracking(found: Tracking | Sequence[Tracking]) -> Picture:
         return picture("tracking", f"{first.plant} along {first.path}", caption, figure)
 
 
-def _plane(axes: Axes, every: Sequence[Tracking]) -> None:
+def _plane(axes: Axes, trackings: Sequence[Tracking]) -> None:
     """The path and the ways of the robots."""
-    wanted = every[0].wanted[_kept(len(every[0].wanted))]
-    axes.plot(wanted[:, 0], wanted[:, 1], color=GREY, linewidth=4.0, alpha=0.45, label="path")
-    for k, each in enumerate(every):
-        assert each.run.pose is not None
-        pose = each.run.pose[_kept(len(each.run))]
-        axes.plot(pose[:, 0], pose[:, 1], linewidth=1.4, **_style(k), label=each.controller)
-    axes.plot(*wanted[0, :2], marker="o", markersize=8, markerfacecolor="none", color=INK)
+    path_points = trackings[0].wanted[_kept(len(trackings[0].wanted))]
+    axes.plot(path_points[:, 0], path_points[:, 1], color=GREY, linewidth=4.0, alpha=0.45, label="path")
+    for k, tracking in enumerate(trackings):
+        assert tracking.run.pose is not None
+        pose = tracking.run.pose[_kept(len(tracking.run))]
+        axes.plot(pose[:, 0], pose[:, 1], linewidth=1.4, **_style(k), label=tracking.controller)
+    axes.plot(*path_points[0, :2], marker="o", markersize=8, markerfacecolor="none", color=INK)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("x, m")
     axes.set_ylabel("y, m")
     thin_out(axes, 5, 5)
 
 
-def _errors(axes: Axes, every: Sequence[Tracking], of: Callable[[Tracking], FloatArray], words: str) -> None:
+def _errors(axes: Axes, trackings: Sequence[Tracking], of: Callable[[Tracking], FloatArray], words: str) -> None:
     """One error of all of them over time."""
-    for k, each in enumerate(every):
-        kept = _kept(len(each.run))
-        axes.plot(each.run.t[kept], of(each)[kept], linewidth=1.3, **_style(k))
-    axes.axvspan(0.0, every[0].skip, color=GREY, alpha=0.2, linewidth=0.0)
-    axes.set_xlim(0.0, float(every[0].run.t[-1]))
+    for k, tracking in enumerate(trackings):
+        rows = _kept(len(tracking.run))
+        axes.plot(tracking.run.t[rows], of(tracking)[rows], linewidth=1.3, **_style(k))
+    axes.axvspan(0.0, trackings[0].skip, color=GREY, alpha=0.2, linewidth=0.0)
+    axes.set_xlim(0.0, float(trackings[0].run.t[-1]))
     axes.set_title(words)
     thin_out(axes, 5, 4)
 
 
-def draw_voltages(found: Sequence[Tracking], limit: FloatArray) -> Picture:
+def draw_voltages(trackings: Sequence[Tracking], limit: FloatArray) -> Picture:
     """The voltages of each controller over time. limit [V]: of each motor, shape (wheels,)."""
-    shown = found[:MOST_PANELS]
+    panels_shown = trackings[:MOST_PANELS]
     with look():
-        figure = new_figure(WIDTH, 0.9 + 1.6 * len(shown))
-        panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
-        bottom, top = 0.55 / (0.9 + 1.6 * len(shown)), 1.0 - 0.35 / (0.9 + 1.6 * len(shown))
+        figure = new_figure(WIDTH, 0.9 + 1.6 * len(panels_shown))
+        panels = figure.subplots(len(panels_shown), 1, sharex=True, squeeze=False)[:, 0]
+        bottom, top = 0.55 / (0.9 + 1.6 * len(panels_shown)), 1.0 - 0.35 / (0.9 + 1.6 * len(panels_shown))
         figure.subplots_adjust(left=0.07, right=0.985, bottom=bottom, top=top, hspace=0.35)
-        for axes, each in zip(panels, shown, strict=True):
-            assert each.run.voltage is not None
-            for wheel, volts in enumerate(each.run.voltage.T):
-                axes.step(each.run.t, volts, where="post", linewidth=1.1, **_style(wheel), label=f"motor {wheel + 1}")
+        for axes, tracking in zip(panels, panels_shown, strict=True):
+            assert tracking.run.voltage is not None
+            for wheel, volts in enumerate(tracking.run.voltage.T):
+                axes.step(
+                    tracking.run.t, volts, where="post", linewidth=1.1, **_style(wheel), label=f"motor {wheel + 1}"
+                )
             for size in sorted(set(np.abs(limit).tolist())):
                 axes.axhline(size, color=GREY, linewidth=0.9, linestyle=":")
                 axes.axhline(-size, color=GREY, linewidth=0.9, linestyle=":")
-            axes.set_title(f"{each.controller}: voltage, V")
+            axes.set_title(f"{tracking.controller}: voltage, V")
             thin_out(axes, 8, 4)
         panels[0].legend(loc="lower right", ncols=6, bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
         panels[-1].set_xlabel("time, s")
-        panels[-1].set_xlim(0.0, float(shown[0].run.t[-1]))
-        more = f" The first {MOST_PANELS} of {len(found)} controllers." if len(found) > MOST_PANELS else ""
-        words = f"What the controllers asked of the motors; dotted: the limit of the voltage.{more}"
+        panels[-1].set_xlim(0.0, float(panels_shown[0].run.t[-1]))
+        remark = f" The first {MOST_PANELS} of {len(trackings)} controllers." if len(trackings) > MOST_PANELS else ""
+        words = f"What the controllers asked of the motors; dotted: the limit of the voltage.{remark}"
         return picture("voltages", "Voltages", words, figure)
 
 

@@ -28,7 +28,7 @@ from omnidyn.simulation.exact.inductance_step import (
     settled,
     slid,
 )
-from omnidyn.simulation.exact.march import SETTLED, drive_acceleration, put_next_pose, refuse_spin, rotated
+from omnidyn.simulation.exact.march import SETTLED_EXPONENT, drive_acceleration, put_next_pose, refuse_spin, rotated
 
 MAX_EVENTS = 100_000  # of one axis in one step: an axis that sticks and slips that often is chattering
 
@@ -95,20 +95,20 @@ def _currents(
     if robot.wheels.count > 3:
         internal = np.eye(robot.wheels.count) - inverse @ gain  # projects onto the currents that drive no axis
         resistance, inductance = _winding(robot)
-        gone = -np.expm1(-dt * (resistance / inductance))
-        currents += _settling(voltage @ internal / resistance, gone, internal @ start)
+        decayed = -np.expm1(-dt * (resistance / inductance))
+        currents += _settling(voltage @ internal / resistance, decayed, internal @ start)
     currents[0] = start
     return currents
 
 
 @kernel
-def _settling(end, gone, start):
+def _settling(end, decayed, start):
     """Each column settles towards its row of `end`: i + gone (end - i), gone = 1 - e^(-R dt/L) of the step."""
     out = np.empty((len(end) + 1, end.shape[1]))
     out[0] = start
     for k in range(len(end)):
         for column in range(end.shape[1]):
-            out[k + 1, column] = settled(out[k, column], end[k, column], gone[k])
+            out[k + 1, column] = settled(out[k, column], end[k, column], decayed[k])
     return out
 
 
@@ -121,13 +121,13 @@ def _twists(drive, dt, laws, twist, acceleration):
     for axis in range(3):
         law, v, f = law_of(laws, axis), twist[axis], acceleration[axis]
         twists[0, axis], accelerations[0, axis] = v, f
-        length, kick, phi, gone, swings = 0.0, 0.0, 0.0, 0.0, False
+        length, kick, phi, decayed, swings = 0.0, 0.0, 0.0, 0.0, False
         for k in range(count):
             if dt[k] != length:
                 length = dt[k]
                 kick, phi, _ = response(length, law)
-                gone, swings = -math.expm1(-law.lag * length), half_period(law) <= length
-            v, f, events = _step(v, f, drive[k, axis], length, kick, phi, gone, swings, law)
+                decayed, swings = -math.expm1(-law.lag * length), half_period(law) <= length
+            v, f, events = _step(v, f, drive[k, axis], length, kick, phi, decayed, swings, law)
             twists[k + 1, axis], accelerations[k + 1, axis] = v, f
             eventful[k] |= events > 0
             if events > MAX_EVENTS:
@@ -136,10 +136,10 @@ def _twists(drive, dt, laws, twist, acceleration):
 
 
 @part
-def _step(v, f, g, dt, kick, phi, gone, swings, law):
+def _step(v, f, g, dt, kick, phi, decayed, swings, law):
     """(v, f, number of events) after a step; kick, phi and gone belong to dt, `swings` if it may turn twice."""
     if (v == 0.0) & (abs(f) <= law.breakaway) & (abs(g) <= law.breakaway):
-        return 0.0, settled(f, g, gone), 0
+        return 0.0, settled(f, g, decayed), 0
     if (v != 0.0) & (not swings):
         s = math.copysign(1.0, v)
         v1, f1 = slid(v, f, g, s, law, kick, phi)
@@ -171,7 +171,7 @@ def step_by_segments(v, f, g, dt, law):
 
 COUNT, PIECE = 16, 16.0  # Gauss-Legendre nodes of the longest piece, and how long it is, over 1/(fastest rate)
 RULES = ((4, 0.25), (8, 3.0), (COUNT, PIECE))  # each integrates e^(-length t) over [0, 1] to 13 digits or more
-SAME = 2e-8  # relative difference of dt, such as times of a log have, that a plan for one serves with the other
+SAME_STEP = 2e-8  # relative difference of dt, such as times of a log have, that a plan for one serves with the other
 MAX_PIECES = 24  # of a step without events: 3 for each of the six rates of three axes, and what is left
 
 
@@ -242,21 +242,21 @@ def _rates(laws):
 
 
 @part
-def _piece_end(left, right, axes, rates, turning):
-    """(end, length over 1/(fastest rate)) of the piece that begins at `left`: what moves and has not settled counts."""
+def _piece_end(start, stop, axes, rates, turning):
+    """(end, length over 1/(fastest rate)) of the piece from `start` on: what moves and has not settled counts."""
     fastest = 0.0
     for axis in range(3):
         if axes.s[axis] != 0.0:
-            since = left - axes.begin[axis]
+            since = start - axes.begin[axis]
             for root in (0, 2):
-                if (rates[axis, root + 1] * since < SETTLED) & (rates[axis, root] > fastest):
+                if (rates[axis, root + 1] * since < SETTLED_EXPONENT) & (rates[axis, root] > fastest):
                     fastest = rates[axis, root]
     fastest += turning
-    length = fastest * (right - left)
+    length = fastest * (stop - start)
     if length <= PIECE:
-        return right, length
+        return stop, length
     # However small L/R, no piece is lost in the rounding of its time; one so short adds nothing.
-    return left + max(PIECE / fastest, 1e-14 * right), PIECE
+    return start + max(PIECE / fastest, 1e-14 * stop), PIECE
 
 
 @part
@@ -266,17 +266,17 @@ def _turning(axes, spin):
 
 
 @part
-def _fill(nodes, first, left, right, length, axes, laws, gauss):
+def _fill(nodes, first, start, stop, length, axes, laws, gauss):
     """Write the nodes of a piece into the columns from `first` on; returns where they end."""
     rule = 0
     while length > RULES[rule][1]:
         rule += 1
-    count, span = RULES[rule][0], right - left
+    count, span = RULES[rule][0], stop - start
     for i in range(count):
         nodes.weight[first + i] = span * gauss[1, rule, i]
-        nodes.time[first + i] = left + span * gauss[0, rule, i] - axes.begin[2]
+        nodes.time[first + i] = start + span * gauss[0, rule, i] - axes.begin[2]
     for axis in range(3):
-        law, since = law_of(laws, axis), left - axes.begin[axis]
+        law, since = law_of(laws, axis), start - axes.begin[axis]
         for i in range(first, first + count):
             kick, phi, total = 0.0, 0.0, 0.0
             if axes.s[axis] != 0.0:
@@ -324,7 +324,7 @@ def step_poses(twists, accelerations, eventful, drive, dt, laws, start, gauss):
     poses[0] = start
     axes, rates, yaw = _empty_axes(), _rates(laws), law_of(laws, 2)
     plan, piece = _empty_nodes(COUNT * MAX_PIECES), _empty_nodes(COUNT)
-    planned, allowed, columns, length, phi, total, lost = 0.0, 0.0, 0, 0.0, 0.0, 0.0, 0.0
+    planned, turning_bound, columns, length, phi, total, carry = 0.0, 0.0, 0, 0.0, 0.0, 0.0, 0.0
     for k in range(len(dt)):
         if (not eventful[k]) & (twists[k, 0] == 0.0) & (twists[k, 1] == 0.0) & (twists[k, 2] == 0.0):
             poses[k + 1] = poses[k]
@@ -333,9 +333,9 @@ def step_poses(twists, accelerations, eventful, drive, dt, laws, start, gauss):
         if not eventful[k]:
             _slide_all(axes, twists[k], accelerations[k], drive[k], laws)
             turning = _turning(axes, spin)
-            if (abs(dt[k] - planned) > SAME * planned) | (turning > allowed):
-                planned, allowed = dt[k], 2.0 * turning
-                columns = _plan(plan, planned, allowed, axes, laws, rates, gauss)
+            if (abs(dt[k] - planned) > SAME_STEP * planned) | (turning > turning_bound):
+                planned, turning_bound = dt[k], 2.0 * turning
+                columns = _plan(plan, planned, turning_bound, axes, laws, rates, gauss)
             if dt[k] != length:
                 length = dt[k]
                 _, phi, total = response(length, yaw)
@@ -346,7 +346,7 @@ def step_poses(twists, accelerations, eventful, drive, dt, laws, start, gauss):
             x, y = x + (length - planned) * dx, y + (length - planned) * dy
         else:
             x, y, turn = travel(piece, twists[k], accelerations[k], drive[k], dt[k], spin, axes, laws, rates, gauss)
-        lost = put_next_pose(poses, k, x, y, turn, lost)
+        carry = put_next_pose(poses, k, x, y, turn, carry)
     return poses
 
 
@@ -354,13 +354,13 @@ def step_poses(twists, accelerations, eventful, drive, dt, laws, start, gauss):
 def _plan(nodes, dt, turning, axes, laws, rates, gauss):
     """Write the nodes of a step without events; their number, or 0 where there is no room for them."""
     axes.s[:], axes.begin[:] = 1.0, 0.0
-    left, columns = 0.0, 0
-    while left < dt:
+    time, columns = 0.0, 0
+    while time < dt:
         if columns > COUNT * (MAX_PIECES - 1):
             return 0
-        right, length = _piece_end(left, dt, axes, rates, turning)
-        columns = _fill(nodes, columns, left, right, length, axes, laws, gauss)
-        left = right
+        stop, length = _piece_end(time, dt, axes, rates, turning)
+        columns = _fill(nodes, columns, time, stop, length, axes, laws, gauss)
+        time = stop
     return columns
 
 
@@ -381,18 +381,18 @@ def travel(nodes, twist, acceleration, drive, dt, spin, axes, laws, rates, gauss
     yaw = law_of(laws, 2)
     for axis in range(3):
         _begin(axes, axis, twist[axis], acceleration[axis], drive[axis], 0.0, dt, law_of(laws, axis))
-    left = x = y = turned = 0.0
-    while left < dt:
-        right, length = _piece_end(left, min(axes.end[0], axes.end[1], axes.end[2]), axes, rates, _turning(axes, spin))
-        columns = _fill(nodes, 0, left, right, length, axes, laws, gauss)
+    time = x = y = turned = 0.0
+    while time < dt:
+        stop, length = _piece_end(time, min(axes.end[0], axes.end[1], axes.end[2]), axes, rates, _turning(axes, spin))
+        columns = _fill(nodes, 0, time, stop, length, axes, laws, gauss)
         dx, dy = _displacement(nodes, columns, axes, turned, yaw.lag)
-        x, y, left = x + dx, y + dy, right
+        x, y, time = x + dx, y + dy, stop
         for axis in range(3):
-            while axes.end[axis] <= left < dt:
+            while axes.end[axis] <= time < dt:
                 if axis == 2:
                     turned += _turned_in_segment(axes, yaw)
                 v, f, g = axes.next_v[axis], axes.next_f[axis], drive[axis]
-                _begin(axes, axis, v, f, g, left, dt, law_of(laws, axis))
+                _begin(axes, axis, v, f, g, time, dt, law_of(laws, axis))
     return x, y, turned + _turned_in_segment(axes, yaw)
 
 

@@ -93,10 +93,10 @@ def _response_of_two_rates(t, mean, root, product, lag):
 
 
 @part
-def _second_order(z, gone):
-    """(e^z - 1 - z)/z^2, where `gone` = e^z - 1."""
+def _second_order(z, decayed):
+    """(e^z - 1 - z)/z^2, where `decayed` = e^z - 1."""
     if abs(z) > 0.5:
-        return (gone - z) / (z * z)
+        return (decayed - z) / (z * z)
     term, total = 0.5, 0.0
     for n in range(3, TERMS):
         total += term
@@ -156,9 +156,9 @@ def slid_for(t, v, f, g, s, law):
 
 
 @part
-def settled(f, g, gone):
-    """f of an axis at rest: g + (f - g) e^(-n t), where `gone` = 1 - e^(-n t)."""
-    return f + gone * (g - f)
+def settled(f, g, decayed):
+    """f of an axis at rest: g + (f - g) e^(-n t), where `decayed` = 1 - e^(-n t)."""
+    return f + decayed * (g - f)
 
 
 @part
@@ -213,11 +213,11 @@ def stop(v, f, g, law, low, high):
 
 
 @part
-def segment(v, f, g, left, law):
-    """The next stretch without an event, at most `left` long: (its length [s], direction s, v and f at its end).
+def segment(v, f, g, remaining, law):
+    """The next stretch without an event, at most `remaining` long: (its length [s], direction s, v and f at its end).
 
-    s is the direction of friction, 0 at rest. The stretch ends, before `left`, where the axis stops (v = 0, whatever
-    it does then) or is released (f = +-S), which for a robot at rest is a logarithm away.
+    s is the direction of friction, 0 at rest. The stretch ends, before `remaining`, where the axis stops (v = 0,
+    whatever it does then) or is released (f = +-S), which for a robot at rest is a logarithm away.
     """
     s = math.copysign(1.0, v) if v != 0.0 else (math.copysign(1.0, f) if abs(f) > law.breakaway else 0.0)
     if s == 0.0:
@@ -225,17 +225,17 @@ def segment(v, f, g, left, law):
         level, wait = s * law.breakaway, math.inf
         if abs(g) > law.breakaway:
             wait = math.log1p((level - f) / (g - level)) / law.lag
-        if wait >= left:
-            return left, 0.0, 0.0, settled(f, g, -math.expm1(-law.lag * left))
+        if wait >= remaining:
+            return remaining, 0.0, 0.0, settled(f, g, -math.expm1(-law.lag * remaining))
         if wait > 0.0:
             return wait, 0.0, 0.0, level
     x, p, q = s * v, s * f, s * g  # seen in the direction of motion
     top, bottom = top_and_bottom(x, p, q, law)
-    end = min(left, bottom)
+    end = min(remaining, bottom)
     x1, p1 = slid_for(end, x, p, q, 1.0, law)
     if x1 < 0.0:
         end, p1 = stop(x, p, q, law, top if top < end else 0.0, end)
         return end, s, 0.0, s * p1
-    if end < left:
-        x1, p1 = slid_for(left, x, p, q, 1.0, law)
-    return left, s, (s * x1 if x1 > 0.0 else 0.0), s * p1
+    if end < remaining:
+        x1, p1 = slid_for(remaining, x, p, q, 1.0, law)
+    return remaining, s, (s * x1 if x1 > 0.0 else 0.0), s * p1

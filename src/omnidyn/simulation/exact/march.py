@@ -26,7 +26,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 NODES, WEIGHTS = (_NODES + 1.0) / 2.0, _WEIGHTS / 2.0
 PIECE = 0.4
 SPIN_UP = 3.0  # weight of the yaw acceleration among the rates
-SETTLED = 40.0  # a t beyond which e^(-a t) is below the last bit
+SETTLED_EXPONENT = 40.0  # a t beyond which e^(-a t) is below the last bit
 MAX_TURN_PER_STEP = 1e5  # [rad]: more would be minutes of quadrature for one row
 
 
@@ -110,8 +110,8 @@ class ExactMarch:
     def _grid(self, dt: FloatArray) -> Grid:
         """The lengths of steps; of one row kept for the next call."""
         if len(dt) > 1:
-            steps, which = np.unique(dt, return_inverse=True)
-            return Grid(steps, which, discretise(self._system, steps))
+            steps, index = np.unique(dt, return_inverse=True)
+            return Grid(steps, index, discretise(self._system, steps))
         grid = self._grids.get(dt[0])
         if grid is None:
             grid = self._grids[dt[0]] = Grid(dt.copy(), np.zeros(1, np.intp), discretise(self._system, dt))
@@ -161,13 +161,13 @@ def _run(voltage, per_volt, levels, grid, twist, pose, rule):
 @maker
 def _twists(drive, levels, grid, start):
     """Twist after each step; axis by axis, which keeps the state in registers."""
-    phi, which = grid.phi, grid.which
+    phi, index = grid.phi, grid.which
     out = np.empty((len(drive) + 1, 3))
     for axis in range(3):
         speed, a, c, s = start[axis], levels.rate[axis], levels.coulomb[axis], levels.breakaway[axis]
         out[0, axis] = speed
         for k in range(len(drive)):
-            speed = exact_step(speed, drive[k, axis], c, s, a, phi[which[k], axis], 0.0)
+            speed = exact_step(speed, drive[k, axis], c, s, a, phi[index[k], axis], 0.0)
             out[k + 1, axis] = speed
     return out
 
@@ -182,13 +182,13 @@ def turning(start, end, before, after, rate):
 
 
 @part
-def next_cut(left, dt, event, rate, spin):
-    """Where the quadrature that begins at `left` [s] ends: at the next event, sooner where the motion is fast."""
-    right = dt
+def next_cut(start, dt, event, rate, spin):
+    """Where the quadrature that begins at `start` [s] ends: at the next event, sooner where the motion is fast."""
+    stop = dt
     for axis in range(3):
-        if left < event[axis] < right:
-            right = event[axis]
-    return min(right, left + PIECE / _fastest_rate(left, event, rate, spin))
+        if start < event[axis] < stop:
+            stop = event[axis]
+    return min(stop, start + PIECE / _fastest_rate(start, event, rate, spin))
 
 
 @part
@@ -197,36 +197,36 @@ def _fastest_rate(t, event, rate, spin):
     fastest = 0.0
     for axis in range(3):
         since = t - event[axis] if t >= event[axis] else t
-        if rate[axis] * since < SETTLED and rate[axis] > fastest:
+        if rate[axis] * since < SETTLED_EXPONENT and rate[axis] > fastest:
             fastest = rate[axis]
     return fastest + spin
 
 
 @maker
-def _displacement(start, event, before, after, rate, left, right, nodes, weights):
+def _displacement(start, event, before, after, rate, begin, stop, nodes, weights):
     """Displacement between two times of a step that no event separates, in the body frame at its start [m]."""
     x = y = 0.0
     now = np.empty(3)
     for node in range(len(nodes)):
-        t = left + (right - left) * nodes[node]
+        t = begin + (stop - begin) * nodes[node]
         for axis in range(3):
             now[axis] = speed_within(t, start[axis], event[axis], before[axis], after[axis], rate[axis])
         turned = turned_within(t, start[2], now[2], event[2], before[2], after[2], rate[2])
         dx, dy = rotated(turned, now[0], now[1])
-        x += (right - left) * weights[node] * dx
-        y += (right - left) * weights[node] * dy
+        x += (stop - begin) * weights[node] * dx
+        y += (stop - begin) * weights[node] * dy
     return x, y
 
 
 @maker
 def _travel(start, end, event, before, after, rate, dt, nodes, weights):
     """Displacement over a whole step in the body frame at its start: pieces between events, short where it is fast."""
-    x = y = left = 0.0
+    x = y = time = 0.0
     spin = turning(start[2], end[2], before[2], after[2], rate[2])
-    while left < dt:
-        right = next_cut(left, dt, event, rate, spin)
-        dx, dy = _displacement(start, event, before, after, rate, left, right, nodes, weights)
-        x, y, left = x + dx, y + dy, right
+    while time < dt:
+        stop = next_cut(time, dt, event, rate, spin)
+        dx, dy = _displacement(start, event, before, after, rate, time, stop, nodes, weights)
+        x, y, time = x + dx, y + dy, stop
     return x, y
 
 
@@ -234,18 +234,18 @@ def _travel(start, end, event, before, after, rate, dt, nodes, weights):
 def _poses(twists, drive, levels, grid, start, rule):
     """Pose after each step from the twists; the heading is a compensated sum of closed forms."""
     rate, coulomb, breakaway = levels
-    steps, which, phi = grid
+    steps, index, phi = grid
     nodes, weights = rule
     out = np.empty((len(drive) + 1, 3))
     for i in range(3):  # row by row, numba compiles the words of an error too: 1.2 s
         out[0, i] = start[i]
     event, before, after = np.empty(3), np.empty(3), np.empty(3)
-    lost = 0.0
+    carry = 0.0
     for k in range(len(drive)):
-        dt, moving = steps[which[k]], False
+        dt, moving = steps[index[k]], False
         for axis in range(3):
             event[axis], before[axis], after[axis] = pieces(
-                twists[k, axis], drive[k, axis], coulomb[axis], breakaway[axis], rate[axis], phi[which[k], axis], dt
+                twists[k, axis], drive[k, axis], coulomb[axis], breakaway[axis], rate[axis], phi[index[k], axis], dt
             )
             moving |= (twists[k, axis] != 0.0) | (before[axis] != 0.0)
         for i in range(3):
@@ -253,7 +253,7 @@ def _poses(twists, drive, levels, grid, start, rule):
         if moving:
             x, y = _travel(twists[k], twists[k + 1], event, before, after, rate, dt, nodes, weights)
             turn = turned_within(dt, twists[k, 2], twists[k + 1, 2], event[2], before[2], after[2], rate[2])
-            lost = put_next_pose(out, k, x, y, turn, lost)
+            carry = put_next_pose(out, k, x, y, turn, carry)
     return out
 
 
@@ -268,14 +268,14 @@ def rotated(angle, x, y):
 
 
 @part
-def put_next_pose(poses, k, x, y, turn, lost):
+def put_next_pose(poses, k, x, y, turn, carry):
     """Write row k + 1 of `poses`: row k moved by (x, y) in its own body frame [m], then turned by `turn` [rad].
 
-    Returns what rounding took from the heading; handed in again as `lost` it makes the headings a compensated sum.
+    Returns what rounding took from the heading; handed in again as `carry` it makes the headings a compensated sum.
     """
     east, north = rotated(poses[k, 2], x, y)
     poses[k + 1, 0] = poses[k, 0] + east
     poses[k + 1, 1] = poses[k, 1] + north
-    kept = turn - lost
-    poses[k + 1, 2] = poses[k, 2] + kept
-    return (poses[k + 1, 2] - poses[k, 2]) - kept
+    corrected_turn = turn - carry
+    poses[k + 1, 2] = poses[k, 2] + corrected_turn
+    return (poses[k + 1, 2] - poses[k, 2]) - corrected_turn

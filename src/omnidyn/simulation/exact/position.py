@@ -45,12 +45,12 @@ def put_displacement(place, pieces, speed, drive, law, dt):
     phi, dphi, _, _ = hold_slopes(law[0, 2], dt)
     end = step_slopes(speed[2], drive[2], law[1, 2], law[2, 2], law[0, 2], phi, dphi)[0]
     spin = turning(speed[2], end, pieces[BEFORE, 2], pieces[AFTER, 2], law[0, 2])
-    left = 0.0
-    while left < dt:
-        right = next_cut(left, dt, pieces[EVENT], law[0], spin)
+    time = 0.0
+    while time < dt:
+        stop = next_cut(time, dt, pieces[EVENT], law[0], spin)
         for node in range(len(_NODES)):
-            add_node(place, speed, drive, law, left + (right - left) * _NODES[node], (right - left) * _WEIGHTS[node])
-        left = right
+            add_node(place, speed, drive, law, time + (stop - time) * _NODES[node], (stop - time) * _WEIGHTS[node])
+        time = stop
 
 
 @part
@@ -65,9 +65,9 @@ def add_node(place, speed, drive, law, t, weight):
     for axis in range(2):
         phi, dphi, _, _ = hold_slopes(law[0, axis], t)
         v, kv, kg, kc, ka = step_slopes(speed[axis], drive[axis], law[1, axis], law[2, axis], law[0, axis], phi, dphi)
-        along, across = (cos, sin) if axis == 0 else (-sin, cos)
+        along, sideways = (cos, sin) if axis == 0 else (-sin, cos)
         vx, vy = (v, vy) if axis == 0 else (vx, v)
-        for row, way in ((X, along), (Y, across)):
+        for row, way in ((X, along), (Y, sideways)):
             place[row, VALUE] += way * v
             place[row, BY_SPEED + axis] += way * kv
             place[row, BY_DRIVE + axis] += way * kg

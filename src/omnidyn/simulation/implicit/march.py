@@ -15,7 +15,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import branching_kernel, part
 from omnidyn.errors import InputError
-from omnidyn.model.layout import N_AXES, Plant, Problem, Stage, State, many, new_stage, new_states
+from omnidyn.model.layout import N_AXES, Plant, PlantStage, PlantState, Stage, many, new_stage, new_states
 from omnidyn.model.stick_slip.band import band_error, cross_band, crosses, gather
 from omnidyn.model.stick_slip.forces import forces_at_work
 from omnidyn.model.stick_slip.inclusion import CAP
@@ -30,14 +30,17 @@ from omnidyn.model.stick_slip.step_bound import (
     longest_step,
 )
 from omnidyn.simulation.implicit.step import GAMMA, step
-from omnidyn.simulation.speed_loop import Loop, close_loop, passed
+from omnidyn.simulation.speed_loop import LoopCommands, close_loop, passed
 
-FORGETS = (0.15, 30.0)  # [s] a robot is taken to forget an error in its MEMORY, within these bounds
-SHORT = 1.5e-4  # [s] no step is given less than the share of tol of one so long
+MEMORY_BOUNDS = (0.15, 30.0)  # [s] a robot is taken to forget an error in its MEMORY, within these bounds
+SHORT_STEP = 1.5e-4  # [s] no step is given less than the share of tol of one so long
 ROUNDING = 1e-13  # [m/s] nor less than this
-SHORTEST = 1e-11  # [s]
-MOST = (3e6, 2e7)  # steps solved at tol 1e-6, and so many more per second simulated; then a run is given up
-MANY, AGAIN = 1000, 50  # steps tried in a row, an event in each, until the shortest doubles; and until it does again
+SHORTEST_STEP = 1e-11  # [s]
+MOST_STEPS = (3e6, 2e7)  # steps solved at tol 1e-6, and so many more per second simulated; then a run is given up
+MANY_TRIES, AGAIN = (
+    1000,
+    50,
+)  # steps tried in a row, each with an event, until the shortest doubles; until it does again
 YAW_SHARE = 0.1  # tol is in m/s; 10 tol in rad/s
 CURRENT_SHARE = 1e-2  # and 100 tol in A
 SIMPSON = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0, 5.0 / 24.0, 8.0 / 24.0, -1.0 / 24.0)
@@ -48,19 +51,19 @@ class Outcome(NamedTuple):
     """What a run of the kernel gives; row 0 is the start."""
 
     pose: FloatArray  # (rows + 1, 3)
-    state: State  # rows + 1 of them
+    state: PlantState  # rows + 1 of them
     iterations: IntArray  # (rows,) most solver iterations of a stage in the row
     steps: IntArray  # (rows,) steps solved
 
 
-def begun(rows: int, state: State, pose: FloatArray) -> Outcome:
+def empty_outcome(rows: int, state: PlantState, pose: FloatArray) -> Outcome:
     """An outcome of which only the start is filled in."""
     counts = np.zeros((2, rows), np.int64)
-    states = State(*(np.zeros((rows + 1, *own.shape), own.dtype) for own in state))
+    states = PlantState(*(np.zeros((rows + 1, *values.shape), values.dtype) for values in state))
     out = Outcome(np.zeros((rows + 1, 3)), states, counts[0], counts[1])
     out.pose[0] = pose
-    for kept, own in zip(states, state, strict=True):
-        kept[0] = own
+    for rows_of_state, values in zip(states, state, strict=True):
+        rows_of_state[0] = values
     return out
 
 
@@ -70,29 +73,31 @@ class Spare(NamedTuple):
     bare: the plant and a stage with their currents given.
     """
 
-    whole: State
-    middle: State
-    two: State
-    inner: State
-    settled: State
-    now: State
-    bare: Problem
+    whole: PlantState
+    middle: PlantState
+    two: PlantState
+    inner: PlantState
+    settled: PlantState
+    now: PlantState
+    bare: PlantStage
 
 
-class Room(NamedTuple):
+class MarchWorkspace(NamedTuple):
     """What a run works in; it may serve one run after another, not two at a time."""
 
-    own: Problem  # an array of one plant, and of a stage of it
-    bare: Problem  # the same, its currents given
+    own: PlantStage  # an array of one plant, and of a stage of it
+    bare: PlantStage  # the same, its currents given
     spare: Spare  # which has `bare`, too
 
 
-def room(plant: Plant) -> Room:
-    """Room for runs of a plant."""
-    own = many([plant])
+def march_workspace(plant: Plant) -> MarchWorkspace:
+    """The workspace of runs of a plant."""
+    plants = many([plant])
     count, bare = len(Spare._fields) - 1, with_given_currents(plant)
     states = new_states(plant, count)
-    return Room(Problem(own, new_stage(own)), bare, Spare(*(states.at(k) for k in range(count)), bare=bare))
+    return MarchWorkspace(
+        PlantStage(plants, new_stage(plants)), bare, Spare(*(states.at(k) for k in range(count)), bare=bare)
+    )
 
 
 def run_implicit(
@@ -100,25 +105,27 @@ def run_implicit(
     voltage: FloatArray,
     bound: FloatArray,
     dt: FloatArray,
-    state: State,
+    state: PlantState,
     pose: FloatArray,
-    loop: Loop,
+    loop: LoopCommands,
     tol: float,
-    work: Room | None = None,
+    work: MarchWorkspace | None = None,
 ) -> Outcome:
     """Simulate rows of held voltage (filled in place by a speed loop). tol 0: one fixed step per row.
 
-    voltage [V] and bound, the current limit in force [A]: shape (rows, n); dt [s]: (rows,); pose: (3,). work: `room` of
+    voltage [V] and bound, the current limit in force [A]: shape (rows, n); dt [s]: (rows,); pose: (3,). work: that of
     this plant, where it serves many runs.
     Raises InputError where motion is so fast beside its duration that no patience would do.
     """
-    out = begun(len(dt), state, pose)
-    most = (MOST[0] + MOST[1] * float(dt.sum())) * max(1.0, (1e-6 / tol) ** (1.0 / 3.0)) if tol else math.inf
-    row = _march(work or room(plant), voltage, bound, dt, loop, tol, most, out)
+    out = empty_outcome(len(dt), state, pose)
+    step_limit = (
+        (MOST_STEPS[0] + MOST_STEPS[1] * float(dt.sum())) * max(1.0, (1e-6 / tol) ** (1.0 / 3.0)) if tol else math.inf
+    )
+    row = _march(work or march_workspace(plant), voltage, bound, dt, loop, tol, step_limit, out)
     if row < len(dt):
         raise InputError(
             "this robot moves too fast to be followed",
-            got=f"more than {most:.2g} steps up to row {row}",
+            got=f"more than {step_limit:.2g} steps up to row {row}",
             expected=f"motion that tol = {tol:g} m/s can follow in steps of 20 ns",
             remedy="check mass, inertia, gear ratio, torque and EMF constant of the robot file; or take one step per "
             "row (tol=None)",
@@ -179,18 +186,18 @@ def _event(a, b):
 
 
 @part
-def _error(plant, one, two):
-    """Estimated error of `two`, half steps against one whole step, in m/s."""
+def _error(plant, whole_step, half_steps):
+    """Estimated error of `half_steps`, half steps against one whole step, in m/s."""
     body = plant.body
-    worst = max(abs(two.x[0] - one.x[0]), abs(two.x[1] - one.x[1]))
-    worst = max(worst, YAW_SHARE * abs(two.x[2] - one.x[2]) / body.length)
+    worst = max(abs(half_steps.x[0] - whole_step.x[0]), abs(half_steps.x[1] - whole_step.x[1]))
+    worst = max(worst, YAW_SHARE * abs(half_steps.x[2] - whole_step.x[2]) / body.length)
     for e in range(N_AXES, len(plant.element)):
         if plant.element[e].inductance > 0.0:
-            worst = max(worst, CURRENT_SHARE * abs(two.each[e].current - one.each[e].current))
+            worst = max(worst, CURRENT_SHARE * abs(half_steps.each[e].current - whole_step.each[e].current))
     if body.bristles > 0.0:
-        worst = max(worst, bristle_error(plant, one, two))
+        worst = max(worst, bristle_error(plant, whole_step, half_steps))
     if body.gathers > 0.0:
-        worst = max(worst, band_error(plant, one, two))
+        worst = max(worst, band_error(plant, whole_step, half_steps))
     return worst / 3.0
 
 
@@ -213,12 +220,12 @@ def _reverses(plant, a, b, h):
     """
     element, worst = plant.element, 0.0
     for e in range(N_AXES, len(element)):
-        own = element[e]
+        record = element[e]
         i, j = a.each[e].current, b.each[e].current
-        if own.drop > 0.0 and own.inductance > 0.0 and i * j <= 0.0 and i != j:
-            push = own.thrust / own.efficiency / own.resistance / plant.body.least
-            off = push * max(1.0, YAW_SHARE / plant.body.length) + CURRENT_SHARE / own.inductance
-            worst = max(worst, 2.0 * h * own.drop * off)
+        if record.drop > 0.0 and record.inductance > 0.0 and i * j <= 0.0 and i != j:
+            push = record.thrust / record.efficiency / record.resistance / plant.body.least
+            off = push * max(1.0, YAW_SHARE / plant.body.length) + CURRENT_SHARE / record.inductance
+            worst = max(worst, 2.0 * h * record.drop * off)
     return worst
 
 
@@ -233,7 +240,7 @@ def _share(plant, stage, state, tol):
         i = abs(state.each[e].current)
         if i >= stage.each[e].bound or (i == 0.0 and plant.element[e].drop > 0.0):
             memory = plant.body.memory[1]
-    return tol / min(max(memory, FORGETS[0]), FORGETS[1])
+    return tol / min(max(memory, MEMORY_BOUNDS[0]), MEMORY_BOUNDS[1])
 
 
 @part
@@ -260,27 +267,28 @@ def _gather(plant, stage, spare, start, end, h):
 
 
 @part
-def find_step(plant, stage, spare, state, h, left, dt, tol, counts):
-    """Find a step from `state` that is good enough, trying h first; `left` of the row's dt are left [s].
+def find_step(plant, stage, spare, state, h, remaining, dt, tol, counts):
+    """Find a step from `state` that is good enough, trying h first; `remaining` of the row's dt are left [s].
 
     spare.middle and .two receive the states in the middle and at the end. Returns its length and the one to try next.
     counts: most iterations, steps solved, and steps tried since the last one that was good and without an event. Where
     what holds and what drives differ by no more than rounding, something gives way and sticks again in every step, for
-    as long as that lasts: after MANY, such steps grow all the same. What moves there is slower than rounding, too.
+    as long as that lasts: after MANY_TRIES, such steps grow all the same. What moves there is slower than
+    rounding, too.
     """
     body = plant.body
-    one, middle, two, inner = spare.whole, spare.middle, spare.two, spare.inner.x
+    whole_step, middle, two, inner = spare.whole, spare.middle, spare.two, spare.inner.x
     rate = _share(plant, stage, state, tol)
     if body.steep_sum > 0.0:
         _unresolved(plant, stage, state, h)  # poses the problem whose forces bound the speeds of the step
         h = longest_step(plant, stage, state.x, h)
     while True:
-        if left - h < 1e-9 * dt:
-            h = left
+        if remaining - h < 1e-9 * dt:
+            h = remaining
         pull(plant, stage, _turned(plant, state, 0.5 * h))  # as in the middle of the step: second order, as the step is
-        first = step(plant, stage, state, one, inner, h)
+        first = step(plant, stage, state, whole_step, inner, h)
         if body.gathers > 0.0:
-            first = max(first, _gather(plant, stage, spare, state, one, h))
+            first = max(first, _gather(plant, stage, spare, state, whole_step, h))
         pull(plant, stage, _turned(plant, state, 0.25 * h))
         second = step(plant, stage, state, middle, inner, 0.5 * h)
         if body.gathers > 0.0:
@@ -290,11 +298,11 @@ def find_step(plant, stage, spare, state, h, left, dt, tol, counts):
         if body.gathers > 0.0:
             third = max(third, _gather(plant, stage, spare, middle, two, 0.5 * h))
         counts[0], counts[1] = max(counts[0], first, second, third), counts[1] + 3
-        ratio = _error(plant, one, two) / max(rate * max(h, SHORT), ROUNDING)
+        ratio = _error(plant, whole_step, two) / max(rate * max(h, SHORT_STEP), ROUNDING)
         if body.laws != 0.0:
             ratio = _beyond(plant, stage, state, two, h, tol, ratio)
         astray = max(_reverses(plant, state, middle, h), _reverses(plant, middle, two, h))
-        if _event(state, middle) or _event(state, two) or _event(state, one):
+        if _event(state, middle) or _event(state, two) or _event(state, whole_step):
             astray = max(astray, _unresolved(plant, stage, state, h))
             if body.steep_sum > 0.0 and not has_one_start(plant, stage, state.x, h):
                 astray = max(astray, 2.0 * tol)
@@ -302,33 +310,33 @@ def find_step(plant, stage, spare, state, h, left, dt, tol, counts):
             astray = max(astray, _unresolved(plant, stage, state, h))
         counts[2] += 1
         if astray > 0.0:
-            lasts = counts[2] > MANY and h <= SHORTEST * 2.0 ** ((counts[2] - MANY) // AGAIN)
+            lasts = counts[2] > MANY_TRIES and h <= SHORTEST_STEP * 2.0 ** ((counts[2] - MANY_TRIES) // AGAIN)
             ratio = 0.5 if astray <= tol else max(ratio, 0.5 if lasts else 64.0)
         elif ratio <= 1.0:
             counts[2] = 0
-        # The error goes with h^3, and so does the ratio where the share of tol is that of SHORT; else it goes with h^2.
-        fitting = 0.9 * (ratio + 1e-12) ** (-1.0 / 3.0 if h < SHORT else -0.5)
-        if ratio <= 1.0 or h <= SHORTEST:
+        # The error goes with h^3, and so does the ratio where the share of tol is that of SHORT_STEP; else with h^2.
+        fitting = 0.9 * (ratio + 1e-12) ** (-1.0 / 3.0 if h < SHORT_STEP else -0.5)
+        if ratio <= 1.0 or h <= SHORTEST_STEP:
             return h, h * min(4.0, max(1.0, fitting))
-        h = max(SHORTEST, h * (0.125 if astray > tol else max(0.125, fitting)))
+        h = max(SHORTEST_STEP, h * (0.125 if astray > tol else max(0.125, fitting)))
 
 
 @part
-def _row(plant, stage, bare, spare, state, dt, tol, most, h, pose, counts):
-    """Advance over one row of held voltage with adaptive steps, `most` of them at the most.
+def _row(plant, stage, bare, spare, state, dt, tol, step_limit, h, pose, counts):
+    """Advance over one row of held voltage with adaptive steps, `step_limit` of them at the most.
 
     Returns the step length to begin the next row with.
     """
     body = plant.body
-    middle, two, inner, left = spare.middle, spare.two, spare.inner.x, dt
+    middle, two, inner, remaining = spare.middle, spare.two, spare.inner.x, dt
     stage.task.facing = pose[2]
     pull(plant, stage, 0.0)
     if body.gathers > 0.0:
         cross_band(plant, stage, state)
     counts[0] = max(counts[0], settle(plant, stage, bare, state, inner))
-    while left > 0.0 and counts[1] <= most:
-        taken, h = find_step(plant, stage, spare, state, h, left, dt, tol, counts)
-        advance_pose(pose, state.x, middle.x, two.x, body.length, taken, SIMPSON)
+    while remaining > 0.0 and counts[1] <= step_limit:
+        length, h = find_step(plant, stage, spare, state, h, remaining, dt, tol, counts)
+        advance_pose(pose, state.x, middle.x, two.x, body.length, length, SIMPSON)
         copy_state(state, two)
         stage.task.facing = pose[2]
         if body.gathers > 0.0:
@@ -336,15 +344,15 @@ def _row(plant, stage, bare, spare, state, dt, tol, most, h, pose, counts):
         if sticks(state):  # a step so short sees no release within its rounding
             pull(plant, stage, 0.0)
             counts[0] = max(counts[0], settle(plant, stage, bare, state, inner))
-        left = left - taken if taken < left else 0.0
+        remaining = remaining - length if length < remaining else 0.0
     return h
 
 
 @branching_kernel
-def _march(room, voltage, bound, dt, loop, tol, most, out):
-    """All rows; see run_implicit. Returns how many of them were done before `most` steps were."""
-    own, stages, bare, spare = room.own.plant, room.own.stage, room.bare, room.spare
-    plant, stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
+def _march(room, voltage, bound, dt, loop, tol, step_limit, out):
+    """All rows; see run_implicit. Returns how many of them were done before `step_limit` steps were."""
+    plants, stages, bare, spare = room.own.plant, room.own.stage, room.bare, room.spare
+    plant, stage = Plant(plants.body[0], plants.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
     state, two, inner = spare.now, spare.two, spare.inner.x
     state_of_row(state, out.state, 0)
     pose, counts, h = out.pose[0].copy(), np.zeros(3, np.int64), dt[0]
@@ -358,9 +366,9 @@ def _march(room, voltage, bound, dt, loop, tol, most, out):
         for w in range(voltage.shape[1]):
             stage.each[N_AXES + w].voltage, stage.each[N_AXES + w].bound = passed(voltage[k, w], loop.dead), bound[k, w]
         if tol > 0.0:
-            h = _row(plant, stage, bare, spare, state, dt[k], tol, most, h, pose, counts)
-            most -= counts[1]
-            if most < 0.0:
+            h = _row(plant, stage, bare, spare, state, dt[k], tol, step_limit, h, pose, counts)
+            step_limit -= counts[1]
+            if step_limit < 0.0:
                 return k
         else:
             pieces = in_one_row(plant, dt[k])

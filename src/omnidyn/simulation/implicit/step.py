@@ -75,32 +75,32 @@ def _stage(plant, stage, start, end):
 
 
 @part
-def _slips_back(plant, stage, each):
-    """Whether an element that holds more than it slides with has stopped or reversed since it was as in `each`."""
+def _slips_back(plant, stage, element_states):
+    """Whether an element that holds more than it slides with has stopped or reversed since `element_states`."""
     body, task = plant.body, stage.task
     for e in range(len(plant.element)):
-        own, at = plant.element[e], stage.each[e]
-        gap = at.hold[0] > own.coulomb[0] or at.hold[1] > own.coulomb[1]
-        if gap and own.fall == 0.0:
-            before = each[e].sign
+        record, at = plant.element[e], stage.each[e]
+        gap = at.hold[0] > record.coulomb[0] or at.hold[1] > record.coulomb[1]
+        if gap and record.fall == 0.0:
+            before = element_states[e].sign
             if before != 0.0 and before != at.sign:
                 return True
-    before = each[len(plant.element)].sign
+    before = element_states[len(plant.element)].sign
     if body.fall > 0.0:
         return False
     return (task.hold[0] > body.coulomb[0] or task.hold[1] > body.coulomb[1]) and before == 1.0 and task.ellipse == 0.0
 
 
 @part
-def _torn_loose(plant, stage, each):
+def _torn_loose(plant, stage, element_states):
     """Whether something at rest gave way in a step so long, h R/L > 1 + sqrt 2, that its currents overshoot."""
     element = plant.element
-    m, stiff, released = len(element), False, each[len(element)].sign == 0.0 and stage.task.ellipse == 1.0
+    m, stiff, released = len(element), False, element_states[len(element)].sign == 0.0 and stage.task.ellipse == 1.0
     for e in range(m):
-        own = element[e]
-        released |= each[e].sign == 0.0 and stage.each[e].sign != 0.0
-        if e >= N_AXES and own.inductance > 0.0:
-            stiff |= stage.task.tau * own.resistance > STIFF * own.inductance
+        record = element[e]
+        released |= element_states[e].sign == 0.0 and stage.each[e].sign != 0.0
+        if e >= N_AXES and record.inductance > 0.0:
+            stiff |= stage.task.tau * record.resistance > STIFF * record.inductance
     return stiff and released
 
 

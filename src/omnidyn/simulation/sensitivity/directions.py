@@ -13,7 +13,7 @@ from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.model.dynamics import settled_currents
 from omnidyn.model.friction.kinds import KARNOPP
 from omnidyn.model.keys import CENTRE, ROTOR, WHEEL, Key
-from omnidyn.model.layout import N_AXES, Plant, Stage, State, many, new_stage, new_state
+from omnidyn.model.layout import N_AXES, Plant, PlantState, Stage, many, new_stage, new_state
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.surroundings import refuse_slope
@@ -37,8 +37,8 @@ class Directions(NamedTuple):
     middle: FloatArray  # (K, D) derivative at stage 1
     half: FloatArray  # (K, D) derivative after the first half step
     rate: FloatArray  # (D,) derivative by time
-    first: State  # ends of a piece of a half step
-    last: State
+    first: PlantState  # ends of a piece of a half step
+    last: PlantState
     gained: FloatArray  # (3,) acceleration
     carry: FloatArray  # (3, n) di/di*, the force per ampere of i*, and the branch of the current
     kept: FloatArray  # (K, D) derivative before a piece of a half step
@@ -75,14 +75,14 @@ def directions_of(numbers: Plant, plants: list[Plant], rates: FloatArray, push: 
 
     rates: derivatives of the applied voltages, shape (K, rows, n). push: on each plant, (2 K + 1, rows, 3) [N].
     """
-    own = many([*plants, numbers])
+    all_plants = many([*plants, numbers])
     push = np.zeros((len(plants) + 1, 0, N_AXES)) if push is None else np.ascontiguousarray(push)
     count, n = len(plants) // 2, numbers.wheels
-    arm = np.ascontiguousarray(np.swapaxes(difference(own.element["g"][:-1]), 0, 1))
+    arm = np.ascontiguousarray(np.swapaxes(difference(all_plants.element["g"][:-1]), 0, 1))
     work = np.zeros((4, count, width(numbers)))
     return Directions(
-        plants=own,
-        stages=new_stage(own),
+        plants=all_plants,
+        stages=new_stage(all_plants),
         arm=arm,
         voltage=rates,
         push=push,

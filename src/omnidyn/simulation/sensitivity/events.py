@@ -10,16 +10,16 @@ from omnidyn.model.stick_slip.active_set import find_active_set, newton_directio
 from omnidyn.model.stick_slip.forces import aim_bristles, forces_at_work, residual, set_losses, winding
 from omnidyn.model.stick_slip.plant import copy_state, copy_table, signs_differ
 from omnidyn.model.stick_slip.release import put, settle, sticks
-from omnidyn.simulation.implicit.march import SHORTEST
+from omnidyn.simulation.implicit.march import SHORTEST_STEP
 from omnidyn.simulation.implicit.step import step
 from omnidyn.simulation.sensitivity.directions import EPS
 from omnidyn.simulation.sensitivity.stage import stage_derivatives, step_with_derivatives
 
 DELAY = 1e-7  # [s] time step of differences in time
-NEAR = 2.0**-16  # of a half step: how near the instant is found at which a current meets its limit or 0
+EVENT_RESOLUTION = 2.0**-16  # of a half step: how near the instant is found at which a current meets its limit or 0
 PIECES = 16  # at most, into which such instants cut a half step
-MARGIN = 1e-3  # relative: how far beyond its hold a release is looked at
-SOON = 1e-6  # of L/R: a time in which a current hardly changes
+HOLD_MARGIN = 1e-3  # relative: how far beyond its hold a release is looked at
+SHORT_SHARE = 1e-6  # of L/R: a time in which a current hardly changes
 
 
 @part
@@ -37,11 +37,11 @@ def _at_instant(plant, stage, state, x, delay):
 @part
 def _acceleration(plant, stage, state, x, out):
     """Acceleration at x [m/s^2] with the signs that the plant has: what is stuck stays."""
-    _at_instant(plant, stage, state, x, SHORTEST)
+    _at_instant(plant, stage, state, x, SHORTEST_STEP)
     residual(plant, stage, x)
     newton_direction(stage.work, find_active_set(plant, stage))
     for a in range(3):
-        out[a] = stage.work.newton[a] / SHORTEST
+        out[a] = stage.work.newton[a] / SHORTEST_STEP
 
 
 @part
@@ -108,8 +108,8 @@ def _reverse(g, arms, start, before, after, d):
     Where nothing brings x there, as from an ellipse that has only just been released, there is no such instant.
     """
     speed = g[0] * before[0] + g[1] * before[1] + g[2] * before[2]
-    there = 0.0 < abs(speed) < np.inf
-    for k in range(len(d) if there else 0):
+    crosses = 0.0 < abs(speed) < np.inf
+    for k in range(len(d) if crosses else 0):
         shift = 0.0
         for c in range(3):
             shift -= (g[c] * d[k, c] + arms[k, c] * start[c]) / speed
@@ -122,15 +122,15 @@ def _reverse(g, arms, start, before, after, d):
 @part
 def _release_shift(plant, stage, along, start, end, before, after, d):
     """What a release between two states does to d; `before` becomes the acceleration after it."""
-    m, some, jump = len(plant.element), False, 0.0
+    m, any_released, jump = len(plant.element), False, 0.0
     for e in range(m + 1):
         if start.each[e].sign == 0.0 and end.each[e].sign != 0.0:
-            some = True
+            any_released = True
             if e < m:
                 stage.each[e].sign = end.each[e].sign
             else:
                 stage.task.ellipse = 1.0
-    if not some:
+    if not any_released:
         return
     _acceleration(plant, stage, start, end.x, after)
     for c in range(3):
@@ -138,8 +138,8 @@ def _release_shift(plant, stage, along, start, end, before, after, d):
     force = forces_at_work(plant, stage)
     if jump * plant.body.least > 1e-6 * force and _weakest(plant, stage, along, start, force):
         later = _later(plant, stage, along, start, before)
-        there = 0.0 < abs(later) < np.inf
-        for k in range(len(d) if there else 0):
+        crosses = 0.0 < abs(later) < np.inf
+        for k in range(len(d) if crosses else 0):
             shift = -(_gap_beside(along, 2 * k, start, d[k], EPS) - _gap_beside(along, 2 * k + 1, start, d[k], -EPS))
             shift /= 2.0 * EPS
             for c in range(3):
@@ -170,18 +170,21 @@ def _weakest(plant, stage, along, start, force):
 
     Found with levels that are a little too low. False where they hold all the same: there is no such direction.
     """
-    own, push = Stage(along.stages.task[-1], along.stages.each[-1], along.stages.work[-1]), along.point[4]
+    own_stage, push = Stage(along.stages.task[-1], along.stages.each[-1], along.stages.work[-1]), along.point[4]
     _copy_problem(along, stage)
-    put(own, start.each)
-    own.task.hold[0], own.task.hold[1] = own.task.hold[0] * (1.0 - MARGIN), own.task.hold[1] * (1.0 - MARGIN)
-    for e in range(len(own.each)):
-        hold = own.each[e].hold
-        hold[0], hold[1] = hold[0] * (1.0 - MARGIN), hold[1] * (1.0 - MARGIN)
-    _at_instant(plant, own, start, start.x, SHORTEST)
-    found = _least_gap(plant, own, start.x)
+    put(own_stage, start.each)
+    own_stage.task.hold[0], own_stage.task.hold[1] = (
+        own_stage.task.hold[0] * (1.0 - HOLD_MARGIN),
+        own_stage.task.hold[1] * (1.0 - HOLD_MARGIN),
+    )
+    for e in range(len(own_stage.each)):
+        hold = own_stage.each[e].hold
+        hold[0], hold[1] = hold[0] * (1.0 - HOLD_MARGIN), hold[1] * (1.0 - HOLD_MARGIN)
+    _at_instant(plant, own_stage, start, start.x, SHORTEST_STEP)
+    least_phi = _least_gap(plant, own_stage, start.x)
     for a in range(3):
-        push[a] = MARGIN * force * own.work.worst[a]
-    return found < 0.0
+        push[a] = HOLD_MARGIN * force * own_stage.work.worst[a]
+    return least_phi < 0.0
 
 
 @part
@@ -191,16 +194,16 @@ def _gap(plant, stage, along, start, d, eps):
     put(stage, start.each)
     for a in range(3):
         point[a] = start.x[a] + eps * d[a]
-    _at_instant(plant, stage, start, point, SHORTEST)
+    _at_instant(plant, stage, start, point, SHORTEST_STEP)
     for a in range(3):
         stage.task.push[a] = plant.body.push[a] + along.point[4, a]
     for w in range(m - N_AXES):
         stage.each[N_AXES + w].aimed_current += eps * d[3 + w]
         stage.each[N_AXES + w].branch = OPEN
-    found = _least_gap(plant, stage, point)
+    least_phi = _least_gap(plant, stage, point)
     for a in range(3):
         stage.task.push[a] = plant.body.push[a]
-    return found
+    return least_phi
 
 
 @part
@@ -213,22 +216,22 @@ def _gap_beside(along, j, start, d, eps):
 @part
 def _later(plant, stage, along, start, acceleration):
     """Time derivative of phi while what is stuck in `start` still holds."""
-    own, rate = Stage(along.stages.task[-1], along.stages.each[-1], along.stages.work[-1]), along.rate
-    m, each = len(plant.element), own.each
+    own_stage, rate = Stage(along.stages.task[-1], along.stages.each[-1], along.stages.work[-1]), along.rate
+    m, element_stages = len(plant.element), own_stage.each
     _copy_problem(along, stage)
-    put(own, start.each)
+    put(own_stage, start.each)
     for w in range(3 + m - N_AXES):
         rate[w] = acceleration[w] if w < 3 else 0.0
     for side in range(2):  # a stage back in time, too: the currents' slope to second order
         delay = DELAY * (1 - 2 * side)
-        _at_instant(plant, own, start, start.x, delay)
-        residual(plant, own, start.x)
+        _at_instant(plant, own_stage, start, start.x, delay)
+        residual(plant, own_stage, start.x)
         for w in range(m - N_AXES):
             e = N_AXES + w
             if plant.element[e].inductance > 0.0:
-                rate[3 + w] += 0.5 * (each[e].current - each[e].aimed_current) / delay
-    up = _gap(plant, own, along, start, rate, DELAY)
-    return (up - _gap(plant, own, along, start, rate, -DELAY)) / (2.0 * DELAY)
+                rate[3 + w] += 0.5 * (element_stages[e].current - element_stages[e].aimed_current) / delay
+    up = _gap(plant, own_stage, along, start, rate, DELAY)
+    return (up - _gap(plant, own_stage, along, start, rate, -DELAY)) / (2.0 * DELAY)
 
 
 @part
@@ -238,25 +241,25 @@ def bends(plant, stage, a, b):
     The derivative bends there.
     """
     for e in range(N_AXES, len(plant.element)):
-        i, j, own, bound = a.each[e].current, b.each[e].current, plant.element[e], stage.each[e].bound
+        i, j, record, bound = a.each[e].current, b.each[e].current, plant.element[e], stage.each[e].bound
         if (abs(i) >= bound) != (abs(j) >= bound):
             return True
-        if (np.sign(i) != np.sign(j)) & ((own.drop > 0.0) | (own.efficiency != 1.0)):
+        if (np.sign(i) != np.sign(j)) & ((record.drop > 0.0) | (record.efficiency != 1.0)):
             return True
     return False
 
 
 @part
-def _reach(plant, stage, first, last, middle, left, near):
-    """Length of the next piece from `first`, of the `left`: up to where a current bends, or else `near`, across that.
+def _reach(plant, stage, first, last, middle, remaining, resolution):
+    """Length of the next piece of the `remaining`: up to where a current bends, or else `resolution`, across that.
 
     `last` and `middle` are room to work in.
     """
-    step(plant, stage, first, last, middle, left)
-    if left <= near or not bends(plant, stage, first, last):
-        return left
-    low, high = 0.0, left
-    while high - low > near:
+    step(plant, stage, first, last, middle, remaining)
+    if remaining <= resolution or not bends(plant, stage, first, last):
+        return remaining
+    low, high = 0.0, remaining
+    while high - low > resolution:
         between = 0.5 * (low + high)
         step(plant, stage, first, last, middle, between)
         if bends(plant, stage, first, last):
@@ -274,16 +277,16 @@ def _pass_zero(plant, stage, along, start, end, first, last, at_end, d):
     """
     m = len(plant.element)
     for w in range(m - N_AXES):
-        e, own, volts = N_AXES + w, plant.element[N_AXES + w], stage.each[N_AXES + w].voltage
+        e, record, volts = N_AXES + w, plant.element[N_AXES + w], stage.each[N_AXES + w].voltage
         side = np.sign(start.each[e].current)
-        if own.inductance == 0.0 or own.drop == 0.0 or side == 0.0 or np.sign(end.each[e].current) == side:
+        if record.inductance == 0.0 or record.drop == 0.0 or side == 0.0 or np.sign(end.each[e].current) == side:
             continue
         if np.sign(first.each[e].current) != side or (np.sign(last.each[e].current) == side and not at_end):
             continue
         x = last.x
-        speed = own.g[0] * x[0] + own.g[1] * x[1] + own.g[2] * x[2] if last.each[e].sign != 0.0 else 0.0
-        tau = SOON * own.inductance / own.resistance
-        little = 4.0 * side * SOON * (abs(volts - own.emf * speed) + own.drop) / own.resistance
+        speed = record.g[0] * x[0] + record.g[1] * x[1] + record.g[2] * x[2] if last.each[e].sign != 0.0 else 0.0
+        tau = SHORT_SHARE * record.inductance / record.resistance
+        little = 4.0 * side * SHORT_SHARE * (abs(volts - record.emf * speed) + record.drop) / record.resistance
         after = _soon(plant, stage, e, speed, 0.0, tau)
         if after != 0.0:
             ratio = after / (_soon(plant, stage, e, speed, little, tau) - little)
@@ -294,9 +297,17 @@ def _pass_zero(plant, stage, along, start, end, first, last, at_end, d):
 @part
 def _soon(plant, stage, e, speed, now, tau):
     """Current of a motor a short time after it was `now`."""
-    own = plant.element[e]
+    record = plant.element[e]
     return winding(
-        speed, stage.each[e].voltage, now, tau, own.emf, own.resistance, own.inductance, own.drop, stage.each[e].bound
+        speed,
+        stage.each[e].voltage,
+        now,
+        tau,
+        record.emf,
+        record.resistance,
+        record.inductance,
+        record.drop,
+        stage.each[e].bound,
     )[0]
 
 
@@ -323,13 +334,17 @@ def half_derivatives(plant, stage, bare, along, start, end, middle, h, d0, d1):
         step_with_derivatives(plant, stage, along, start, last, middle, h, d1, d1)
         return
     copy_state(first, start)
-    left = h
+    remaining = h
     for piece in range(PIECES):
-        length = _reach(plant, stage, first, last, middle, left, NEAR * h) if piece < PIECES - 1 else left
-        left = left - length if length < left else 0.0
+        length = (
+            _reach(plant, stage, first, last, middle, remaining, EVENT_RESOLUTION * h)
+            if piece < PIECES - 1
+            else remaining
+        )
+        remaining = remaining - length if length < remaining else 0.0
         copy_table(along.kept, d1)
         step_with_derivatives(plant, stage, along, first, last, middle, length, d1, d1)
-        _pass_zero(plant, stage, along, start, end, first, last, left == 0.0, d1)
-        if left == 0.0:
+        _pass_zero(plant, stage, along, start, end, first, last, remaining == 0.0, d1)
+        if remaining == 0.0:
             return
         copy_state(first, last)

@@ -36,7 +36,7 @@ from omnidyn.simulation.engine import (
     implicit_motion,
     named,
 )
-from omnidyn.simulation.implicit.march import Outcome, begun, capped, room
+from omnidyn.simulation.implicit.march import Outcome, capped, empty_outcome, march_workspace
 from omnidyn.simulation.sensitivity.directions import (
     EPS,
     Directions,
@@ -50,11 +50,11 @@ from omnidyn.simulation.sensitivity.directions import (
     width,
 )
 from omnidyn.simulation.sensitivity.march import LoopRun, march_with_derivatives, run_loop_with_derivatives
-from omnidyn.simulation.sensitivity.sample import MEET, NO_SAMPLES, PATH, TURN, Samples, empty_samples
+from omnidyn.simulation.sensitivity.sample import NO_SAMPLES, PATH, SAME_TIME, TURN, Samples, empty_samples
 from omnidyn.simulation.simulate import as_run
 from omnidyn.simulation.view import seen_at_once
 
-PIECES, ROUGH = 16, 1e-3  # steps in a row, at most; [m/s] the tolerance where they were more
+PIECES, ROUGH_TOLERANCE = 16, 1e-3  # steps in a row, at most; [m/s] the tolerance where they were more
 PATH_AND_TURN = [1, 2, 0]  # of the way, in the order of a twist
 
 
@@ -75,7 +75,7 @@ class Direction:
     push: FloatArray | None = None
 
 
-class Program(NamedTuple):
+class VoltageProgram(NamedTuple):
     """Under what a run goes. t [s]: (rows,); voltage [V]: (rows - 1, n), as it arrives at the motors, or (rows, n): see
     `held`; start: (3,) twist; push: a wrench from outside over each of these rows (., 3) [N, N, N m], or None."""
 
@@ -124,13 +124,13 @@ class LateSample:
     def _at_wheels(self, motion: FloatArray, by: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What the wheels make of a motion of the body (rows, 3), and of its derivatives (rows, K, 3)."""
         wheels = self.robot.wheels
-        found = np.empty((*by.shape[:2], wheels.count))
-        for k, one in enumerate(self.directions):
-            found[:, k] = wheel_speed(wheels, by[:, k])
-            if one.up is not None and one.down is not None and one.up.wheels != one.down.wheels:
-                ends = (wheel_speed(end.wheels, motion) for end in (one.up, one.down))
-                found[:, k] += difference(np.array([*ends]))[0]
-        return wheel_speed(wheels, motion), found
+        wheel_derivatives = np.empty((*by.shape[:2], wheels.count))
+        for k, direction in enumerate(self.directions):
+            wheel_derivatives[:, k] = wheel_speed(wheels, by[:, k])
+            if direction.up is not None and direction.down is not None and direction.up.wheels != direction.down.wheels:
+                ends = (wheel_speed(end.wheels, motion) for end in (direction.up, direction.down))
+                wheel_derivatives[:, k] += difference(np.array([*ends]))[0]
+        return wheel_speed(wheels, motion), wheel_derivatives
 
     def position(self, facing: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(place since the start [m], its time derivative, its derivatives) of a robot that faced `facing` [rad] there.
@@ -148,8 +148,8 @@ class LateSample:
             assert self.dcurrent is not None
             return self.current, self.current_pace, self.dcurrent
         by = np.empty((*self.dtwist.shape[:2], self.voltage.shape[1]))
-        for k, one in enumerate(self.directions):
-            by[:, k] = self._change(one.up, one.down, self.dtwist[:, k], self.dvoltage[:, k])
+        for k, direction in enumerate(self.directions):
+            by[:, k] = self._change(direction.up, direction.down, self.dtwist[:, k], self.dvoltage[:, k])
         pace = self._change(None, None, self.pace, np.zeros_like(self.voltage))
         return settled_currents(self.robot, self.twist, self.voltage), pace, by
 
@@ -160,7 +160,7 @@ class LateSample:
 
 def late_samples(
     robot: Robot,
-    program: Program,
+    program: VoltageProgram,
     directions: Sequence[Direction],
     late: Sequence[float],
     tol: float | None,
@@ -168,7 +168,7 @@ def late_samples(
 ) -> tuple[list[LateSample], int]:
     """Simulate under held voltages and sample the run at t - late, one LateSample for every latency.
 
-    tol as for `simulate`, but ROUGH instead of None where friction falls so fast that a row took more than
+    tol as for `simulate`, but ROUGH_TOLERANCE instead of None where friction falls so fast that a row took more than
     PIECES steps; travel: what is wanted of the way, see sample.py. Also returns the number of rows in which the
     friction solver hit its cap. Raises InputError for a direction that changes friction or a gear loss which is off.
     """
@@ -176,28 +176,28 @@ def late_samples(
     rates = np.zeros((len(directions), *voltage.shape))
     first, length = np.zeros((len(directions), width(numbers))), numbers.body.length
     stretch = _stretch(plants)
-    for k, one in enumerate(directions):
-        rates[k] = 0.0 if one.voltage is None else one.voltage
-        first[k, :N_AXES] = 0.0 if one.start is None else one.start * [1.0, 1.0, length]
+    for k, direction in enumerate(directions):
+        rates[k] = 0.0 if direction.voltage is None else direction.voltage
+        first[k, :N_AXES] = 0.0 if direction.start is None else direction.start * [1.0, 1.0, length]
     first[:, 2] += start[2] * stretch
-    given = Commands(held(t, len(voltage), late), np.ascontiguousarray(voltage))
-    seen = _room(robot, t, late, len(directions), travel)
+    held_commands = Commands(held(t, len(voltage), late), np.ascontiguousarray(voltage))
+    samples = _room(robot, t, late, len(directions), travel)
     outcome, _, _ = run_with_derivatives(
         numbers,
         directions_of(numbers, plants, rates, _pushes(program.push, directions, [*plants, numbers])),
-        given,
-        current_bounds(robot, given, len(given.dt)),
+        held_commands,
+        current_bounds(robot, held_commands, len(held_commands.dt)),
         (np.asarray(start, dtype=float), np.zeros(3)),
         first,
-        _within(tol, numbers, given.dt),
-        seen,
+        _within(tol, numbers, held_commands.dt),
+        samples,
     )
-    return _looks(robot, directions, seen, (length, stretch), (seen.t, voltage, rates)), capped(outcome)
+    return _looks(robot, directions, samples, (length, stretch), (samples.t, voltage, rates)), capped(outcome)
 
 
 def _within(tol: float | None, numbers: Plant, dt: FloatArray) -> float:
     steep = float(np.median(dt)) * numbers.body.steep_sum > PIECES * MONOTONE
-    return ROUGH if tol is None and steep else as_tolerance(tol)
+    return ROUGH_TOLERANCE if tol is None and steep else as_tolerance(tol)
 
 
 def looped_samples(
@@ -214,28 +214,28 @@ def looped_samples(
 
     Before the run it has rested. Directions change the robot only. settled: see `run_loop_with_derivatives`.
     """
-    refuse_rate([one.name for one in directions])
+    refuse_rate([direction.name for direction in directions])
     numbers, plants = _plants(robot, directions)
-    robots = [each or robot for one in directions for each in (one.up, one.down)]
-    given = Commands(held(t, len(set_point), late), None, set_point=np.ascontiguousarray(set_point))
-    seen, count = _room(robot, t, late, len(directions), travel), len(directions)
-    found = run_loop_with_derivatives(
+    robots = [moved_robot or robot for direction in directions for moved_robot in (direction.up, direction.down)]
+    held_commands = Commands(held(t, len(set_point), late), None, set_point=np.ascontiguousarray(set_point))
+    samples, count = _room(robot, t, late, len(directions), travel), len(directions)
+    loop_run = run_loop_with_derivatives(
         robot,
         robots,
         numbers,
         directions_of(numbers, plants, np.zeros((count, *set_point.shape))),
-        given,
+        held_commands,
         (np.zeros(3), np.zeros(3)),
         np.zeros((count, width(numbers))),
         as_tolerance(tol),
         settled,
-        seen,
+        samples,
     )
-    for c, own in enumerate(seen.late):
-        rests = seen.t - own < -MEET
-        for part in (seen.state, seen.pace, seen.way, seen.dstate, seen.dway):
+    for c, delay in enumerate(samples.late):
+        rests = samples.t - delay < -SAME_TIME
+        for part in (samples.state, samples.pace, samples.way, samples.dstate, samples.dway):
             part[c, rests] = 0.0
-    return _looks(robot, directions, seen, (numbers.body.length, _stretch(plants)), _in_force(found))
+    return _looks(robot, directions, samples, (numbers.body.length, _stretch(plants)), _in_force(loop_run))
 
 
 def held(t: FloatArray, commands: int, late: Sequence[float]) -> FloatArray:
@@ -244,17 +244,17 @@ def held(t: FloatArray, commands: int, late: Sequence[float]) -> FloatArray:
     It then holds on for as long as any channel looks ahead. Otherwise these channels would show nothing in their last
     rows, and the likelihood would jump by those where a latency passes 0: no descent would get it across.
     """
-    held = np.ascontiguousarray(np.diff(t))
-    return held if commands < len(t) else np.append(held, max(-min(late, default=0.0), held[-1]))
+    lengths = np.ascontiguousarray(np.diff(t))
+    return lengths if commands < len(t) else np.append(lengths, max(-min(late, default=0.0), lengths[-1]))
 
 
-def _in_force(found: LoopRun) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _in_force(loop_run: LoopRun) -> tuple[FloatArray, FloatArray, FloatArray]:
     """[s] when each voltage of a loop comes into force, the voltages, derivatives: 0 before, unknown at the end."""
-    begins = np.concatenate([[-np.inf], found.edges])
-    voltage = np.zeros((len(begins), found.voltage.shape[1]))
-    voltage[1:-1], voltage[-1] = found.voltage, np.nan
-    by = np.zeros((len(found.dvoltage), *voltage.shape))
-    by[:, 1:-1] = found.dvoltage
+    begins = np.concatenate([[-np.inf], loop_run.edges])
+    voltage = np.zeros((len(begins), loop_run.voltage.shape[1]))
+    voltage[1:-1], voltage[-1] = loop_run.voltage, np.nan
+    by = np.zeros((len(loop_run.dvoltage), *voltage.shape))
+    by[:, 1:-1] = loop_run.dvoltage
     return begins, voltage, by
 
 
@@ -262,9 +262,9 @@ def _plants(robot: Robot, directions: Sequence[Direction]) -> tuple[Plant, list[
     """(the plant of the robot, those up and down each direction)."""
     refuse_band(robot)
     numbers = plant(robot)
-    plants = [numbers if r is None else plant(r) for one in directions for r in (one.up, one.down)]
-    for k, one in enumerate(directions):
-        refuse_switched_off(one.name, numbers, plants[2 * k])
+    plants = [numbers if r is None else plant(r) for direction in directions for r in (direction.up, direction.down)]
+    for k, direction in enumerate(directions):
+        refuse_switched_off(direction.name, numbers, plants[2 * k])
     return numbers, plants
 
 
@@ -273,13 +273,13 @@ def _pushes(push: FloatArray | None, directions: Sequence[Direction], plants: Se
     the robot's own. Shape (2 K + 1, rows, 3)."""
     if push is None:
         return None
-    found = np.tile(push, (len(plants), 1, 1))
-    for k, one in enumerate(directions):
-        if one.push is not None:
-            found[2 * k] += EPS * one.push
-            found[2 * k + 1] -= EPS * one.push
-    found[..., 2] /= np.array([each.body.length for each in plants])[:, None]
-    return found
+    pushes = np.tile(push, (len(plants), 1, 1))
+    for k, direction in enumerate(directions):
+        if direction.push is not None:
+            pushes[2 * k] += EPS * direction.push
+            pushes[2 * k + 1] -= EPS * direction.push
+    pushes[..., 2] /= np.array([numbers.body.length for numbers in plants])[:, None]
+    return pushes
 
 
 def _stretch(plants: Sequence[Plant]) -> FloatArray:
@@ -295,7 +295,7 @@ def _room(robot: Robot, t: FloatArray, late: Sequence[float], keys: int, travel:
 def _looks(
     robot: Robot,
     directions: Sequence[Direction],
-    seen: Samples,
+    samples: Samples,
     lengths: tuple[float, FloatArray],
     applied: tuple[FloatArray, FloatArray, FloatArray],
 ) -> list[LateSample]:
@@ -304,36 +304,40 @@ def _looks(
     applied: [s] when each voltage comes into force, and more; voltages (J, n); their derivatives (K, J, n).
     """
     (length, stretch), (begins, voltage, rates) = lengths, applied
-    found = []
-    for c, own in enumerate(seen.late):
-        at = np.clip(np.searchsorted(begins, seen.t - own + MEET, side="right") - 1, 0, len(voltage) - 1)
-        twist, pace, dtwist = seen.state[c, :, :N_AXES], seen.pace[c, :, :N_AXES], seen.dstate[c, :, :, :N_AXES]
+    looks = []
+    for c, delay in enumerate(samples.late):
+        at = np.clip(np.searchsorted(begins, samples.t - delay + SAME_TIME, side="right") - 1, 0, len(voltage) - 1)
+        twist, pace, dtwist = (
+            samples.state[c, :, :N_AXES],
+            samples.pace[c, :, :N_AXES],
+            samples.dstate[c, :, :, :N_AXES],
+        )
         twist[:, 2] /= length
         pace[:, 2] /= length
         dtwist[..., 2] = (dtwist[..., 2] - twist[:, 2, None] * stretch) / length
-        found.append(
+        looks.append(
             LateSample(
                 robot,
                 tuple(directions),
-                float(own),
+                float(delay),
                 twist,
                 pace,
-                seen.way[c],
+                samples.way[c],
                 voltage[at],
                 dtwist,
-                seen.dway[c],
+                samples.dway[c],
                 np.moveaxis(rates[:, at], 0, 1),
-                *_currents(seen, c),
+                *_currents(samples, c),
             )
         )
-    return found
+    return looks
 
 
-def _currents(seen: Samples, c: int) -> tuple[FloatArray | None, FloatArray | None, FloatArray | None]:
+def _currents(samples: Samples, c: int) -> tuple[FloatArray | None, FloatArray | None, FloatArray | None]:
     """Currents of windings with inductance: (value, time derivative, derivatives)."""
-    if seen.state.shape[2] == N_AXES:
+    if samples.state.shape[2] == N_AXES:
         return None, None, None
-    return seen.state[c, :, N_AXES:], seen.pace[c, :, N_AXES:], seen.dstate[c, :, :, N_AXES:]
+    return samples.state[c, :, N_AXES:], samples.pace[c, :, N_AXES:], samples.dstate[c, :, :, N_AXES:]
 
 
 # Derivatives of a simulated run with respect to numbers of the robot file, by the implicit function theorem
@@ -400,27 +404,30 @@ def derivatives(
         return commands(robot, voltage, dt, duty, wheel_speed_command, twist_command, supply)
 
     def applied(robot: Robot) -> Commands:
-        given = asked(robot)
-        return seen_at_once(robot, given).acting(robot, given)
+        requested = asked(robot)
+        return seen_at_once(robot, requested).acting(robot, requested)
 
-    ready, given = prepared(robot, keys), applied(robot)
-    rows = given.voltage if given.set_point is None else given.set_point
+    ready, held_commands = prepared(robot, keys), applied(robot)
+    rows = held_commands.voltage if held_commands.set_point is None else held_commands.set_point
     assert rows is not None
-    each = [one.voltage if given.set_point is None else one.set_point for one in map(applied, ready.robots)]
-    rates = difference(np.array(each, dtype=float).reshape(-1, *rows.shape))
-    found = differentiate(
-        ready, given, rates, (as_start("twist", twist, 3), as_start("pose", pose, 3)), as_tolerance(tol)
+    shifted_rows = [
+        shifted.voltage if held_commands.set_point is None else shifted.set_point
+        for shifted in map(applied, ready.robots)
+    ]
+    rates = difference(np.array(shifted_rows, dtype=float).reshape(-1, *rows.shape))
+    result = differentiate(
+        ready, held_commands, rates, (as_start("twist", twist, 3), as_start("pose", pose, 3)), as_tolerance(tol)
     )
-    if given.set_point is not None or not (robot.drive.dead_band or robot.drive.voltage_map):
-        return found
-    whole = asked(robot).voltage
-    assert whole is not None
-    return replace(found, run=found.run.replace(voltage=np.concatenate([whole, whole[-1:]])))
+    if held_commands.set_point is not None or not (robot.drive.dead_band or robot.drive.voltage_map):
+        return result
+    full_voltage = asked(robot).voltage
+    assert full_voltage is not None
+    return replace(result, run=result.run.replace(voltage=np.concatenate([full_voltage, full_voltage[-1:]])))
 
 
 def differentiate(
     ready: Prepared,
-    given: Commands,
+    held_commands: Commands,
     rates: FloatArray,
     start: tuple[FloatArray, FloatArray],
     tol: float,
@@ -433,24 +440,26 @@ def differentiate(
     `run_loop_with_derivatives`.
     """
     robot, keys, robots, numbers, plants = ready.robot, ready.keys, ready.robots, ready.numbers, ready.plants
-    if given.set_point is not None:
+    if held_commands.set_point is not None:
         refuse_rate(keys)
     directions, length = directions_of(numbers, plants, rates), numbers.body.length
     stretch = difference(np.array([p.body.length for p in plants]))
     first = np.zeros((len(keys), width(numbers)))
     first[:, 2] = start[0][2] * stretch
-    bound = current_bounds(robot, given, len(given.dt))
-    if given.set_point is None:
-        outcome, ds, dposes = run_with_derivatives(numbers, directions, given, bound, start, first, tol)
-        voltage, dvolts = given.voltage, rates
+    bound = current_bounds(robot, held_commands, len(held_commands.dt))
+    if held_commands.set_point is None:
+        outcome, ds, dposes = run_with_derivatives(numbers, directions, held_commands, bound, start, first, tol)
+        voltage, dvolts = held_commands.voltage, rates
     else:
-        found = run_loop_with_derivatives(robot, robots, numbers, directions, given, start, first, tol, settled)
-        outcome, ds, dposes, rows = found.outcome, found.dstate, found.dpose, found.keep[:-1]
-        voltage, dvolts = found.voltage[rows], found.dvoltage[:, rows]
+        loop_run = run_loop_with_derivatives(
+            robot, robots, numbers, directions, held_commands, start, first, tol, settled
+        )
+        outcome, ds, dposes, rows = loop_run.outcome, loop_run.dstate, loop_run.dpose, loop_run.keep[:-1]
+        voltage, dvolts = loop_run.voltage[rows], loop_run.dvoltage[:, rows]
     assert voltage is not None
     motion = implicit_motion(robot, np.array([1.0, 1.0, length]), outcome, voltage)
-    warnings = cap_warnings(capped(outcome), len(given.dt))
-    run = as_run(robot, given, given, motion, named(Implicit.kind, tol), warnings)
+    warnings = cap_warnings(capped(outcome), len(held_commands.dt))
+    run = as_run(robot, held_commands, held_commands, motion, named(Implicit.kind, tol), warnings)
     assert run.twist is not None
     dtwist = ds[..., :N_AXES].copy()
     dtwist[..., 2] = (dtwist[..., 2] - run.twist[:, 2, None] * stretch) / length
@@ -486,34 +495,37 @@ def refuse_rate(keys: Sequence[str]) -> None:
 def run_with_derivatives(
     numbers: Plant,
     directions: Directions,
-    given: Commands,
+    held_commands: Commands,
     bound: FloatArray,
     start: tuple[FloatArray, FloatArray],
     first: FloatArray,
     tol: float,
-    seen: Samples | None = None,
+    samples: Samples | None = None,
 ) -> tuple[Outcome, FloatArray, FloatArray]:
     """The run of `run_implicit`, with derivatives of state (rows + 1, K, D) and pose (rows + 1, K, 3).
 
-    With `seen`, the run is sampled there instead: the derivatives by row are left out, both arrays are empty.
+    With `samples`, the run is sampled there instead: the derivatives by row are left out, both arrays are empty.
     """
-    assert given.voltage is not None
+    assert held_commands.voltage is not None
     state = start_state(numbers, start[0], np.zeros(numbers.wheels))
-    out, kept = begun(len(given.dt), state, start[1]), len(given.dt) + 1 if seen is None else 0
-    ds, dposes = np.zeros((kept, *first.shape)), np.zeros((kept, len(first), 3))
+    out, row_count = (
+        empty_outcome(len(held_commands.dt), state, start[1]),
+        len(held_commands.dt) + 1 if samples is None else 0,
+    )
+    ds, dposes = np.zeros((row_count, *first.shape)), np.zeros((row_count, len(first), 3))
     ds[:1] = first
     march_with_derivatives(
-        room(numbers),
+        march_workspace(numbers),
         directions,
-        given.voltage,
+        held_commands.voltage,
         bound,
-        given.dt,
+        held_commands.dt,
         tol,
         out,
         first,
         ds,
         dposes,
-        seen or NO_SAMPLES,
+        samples or NO_SAMPLES,
     )
     return out, ds, dposes
 
@@ -522,9 +534,9 @@ def _settled(robots: list[Robot], run: Run, dtwist: FloatArray, dvolts: FloatArr
     """Derivatives of settled currents. Shape (samples, K, wheels)."""
     assert run.twist is not None
     assert run.voltage is not None
-    held = np.concatenate([dvolts, dvolts[:, -1:]], axis=1)
-    each = [
-        current_derivatives(robots[2 * k : 2 * k + 2], run.twist, run.voltage, dtwist[:, k], held[k])
-        for k in range(len(held))
+    held_dvolts = np.concatenate([dvolts, dvolts[:, -1:]], axis=1)
+    columns = [
+        current_derivatives(robots[2 * k : 2 * k + 2], run.twist, run.voltage, dtwist[:, k], held_dvolts[k])
+        for k in range(len(held_dvolts))
     ]
-    return np.stack(each, axis=1)
+    return np.stack(columns, axis=1)

@@ -10,12 +10,21 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import branching_kernel, part
-from omnidyn.model.layout import N_AXES, Plant, Stage, State, new_state
+from omnidyn.model.layout import N_AXES, Plant, PlantState, Stage, new_state
 from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import copy_row, copy_state, copy_table, row_of_state, state_of_row
 from omnidyn.model.stick_slip.release import settle, start_state, sticks
 from omnidyn.simulation.commands import Commands, current_bounds, loop_gains, on_ticks
-from omnidyn.simulation.implicit.march import SIMPSON, STAGES, Outcome, advance_pose, begun, find_step, in_one_row, room
+from omnidyn.simulation.implicit.march import (
+    SIMPSON,
+    STAGES,
+    Outcome,
+    advance_pose,
+    empty_outcome,
+    find_step,
+    in_one_row,
+    march_workspace,
+)
 from omnidyn.simulation.implicit.step import GAMMA
 from omnidyn.simulation.sensitivity.directions import EPS, Directions
 from omnidyn.simulation.sensitivity.events import bends, differ, half_derivatives
@@ -60,11 +69,11 @@ def _middle_currents(start, middle, end):
 
 
 @part
-def _is_smooth(plant, stage, start, one, middle, two, settled):
+def _is_smooth(plant, stage, start, whole_step, middle, half_steps, settled):
     """Whether nothing happens in a step: no stop, reversal or release, and no current meets or leaves its limit."""
-    if differ(start, one) or differ(start, middle) or differ(middle, two) or differ(two, settled):
+    if differ(start, whole_step) or differ(start, middle) or differ(middle, half_steps) or differ(half_steps, settled):
         return False
-    return not bends(plant, stage, start, middle) and not bends(plant, stage, middle, two)
+    return not bends(plant, stage, start, middle) and not bends(plant, stage, middle, half_steps)
 
 
 @part
@@ -83,13 +92,13 @@ def row_with_derivatives(
     dnext,
     dpose,
     counts,
-    kept,
-    seen,
+    keeps_rows,
+    samples,
     begin,
 ):
     """One row with derivatives, in place: adaptive steps, or for a tol of 0 one fixed step. Returns the next h.
 
-    kept: whether the derivatives are kept by row, those of the pose included; else they are sampled, and the pose
+    keeps_rows: whether the derivatives are kept by row, those of the pose included; else they are sampled, and the pose
     stays. There those of the step as a whole do where it is smooth: they are within the tolerance too. begin: of the
     row [s].
     """
@@ -110,14 +119,14 @@ def row_with_derivatives(
             dnext,
             dpose,
             counts,
-            kept,
-            seen,
+            keeps_rows,
+            samples,
             begin + dt,
         )
     pieces = in_one_row(plant, dt)
     for j in range(pieces):
         h, at = dt / pieces, begin + j * dt / pieces
-        count = _fixed(plant, stage, spare, along, state, h, pose, d, dnext, dpose, kept, seen, at)
+        count = _fixed(plant, stage, spare, along, state, h, pose, d, dnext, dpose, keeps_rows, samples, at)
         counts[0], counts[1] = max(counts[0], count), pieces
     return h
 
@@ -138,48 +147,48 @@ def _adaptive(
     dnext,
     dpose,
     counts,
-    kept,
-    seen,
+    keeps_rows,
+    samples,
     end,
 ):
     """`implicit._row` with derivatives: the half steps that count are done again with theirs. end: of the row [s]."""
-    one, middle, two, inner, settled = spare.whole, spare.middle, spare.two, spare.inner.x, spare.settled
-    left = dt
+    whole_step, middle, two, inner, settled = spare.whole, spare.middle, spare.two, spare.inner.x, spare.settled
+    remaining = dt
     counts[0] = max(counts[0], settle(plant, stage, bare, state, inner))
-    while left > 0.0:
-        taken, h = find_step(plant, stage, spare, state, h, left, dt, tol, counts)
+    while remaining > 0.0:
+        length, h = find_step(plant, stage, spare, state, h, remaining, dt, tol, counts)
         copy_state(settled, two)
         if sticks(settled):
             counts[0] = max(counts[0], settle(plant, stage, bare, settled, along.gained))
-        node, half, dhalf = 0.5, 0.5 * taken, along.half
-        if not kept and _is_smooth(plant, stage, state, one, middle, two, settled):
-            step_with_derivatives(plant, stage, along, state, one, inner, taken, d, dnext)
+        node, half, dhalf = 0.5, 0.5 * length, along.half
+        if not keeps_rows and _is_smooth(plant, stage, state, whole_step, middle, two, settled):
+            step_with_derivatives(plant, stage, along, state, whole_step, inner, length, d, dnext)
             node, dhalf = GAMMA, along.middle
         else:
             half_derivatives(plant, stage, bare, along, state, middle, inner, half, d, dhalf)
             half_derivatives(plant, stage, bare, along, middle, two, inner, half, dhalf, dnext)
-        if kept:
-            pose_derivatives(along, pose, dpose, state.x, middle.x, two.x, d, along.half, dnext, taken, SIMPSON)
-            advance_pose(pose, state.x, middle.x, two.x, plant.body.length, taken, SIMPSON)
+        if keeps_rows:
+            pose_derivatives(along, pose, dpose, state.x, middle.x, two.x, d, along.half, dnext, length, SIMPSON)
+            advance_pose(pose, state.x, middle.x, two.x, plant.body.length, length, SIMPSON)
         else:
-            take_samples(seen, along, end - left, taken, state, middle, two, 0.5, d, dhalf, dnext, node)
+            take_samples(samples, along, end - remaining, length, state, middle, two, 0.5, d, dhalf, dnext, node)
         copy_state(state, settled)
         copy_table(d, dnext)  # half_derivatives has moved d past a release that settle finds here
-        left = left - taken if taken < left else 0.0
+        remaining = remaining - length if length < remaining else 0.0
     return h
 
 
 @part
-def _fixed(plant, stage, spare, along, state, dt, pose, d, dnext, dpose, kept, seen, begin):
+def _fixed(plant, stage, spare, along, state, dt, pose, d, dnext, dpose, keeps_rows, samples, begin):
     """One fixed step with derivatives. Returns the iterations."""
     middle, end = spare.inner, spare.two
     count = step_with_derivatives(plant, stage, along, state, end, middle.x, dt, d, dnext)
     _middle_currents(state, middle, end)
-    if kept:
+    if keeps_rows:
         pose_derivatives(along, pose, dpose, state.x, middle.x, end.x, d, along.middle, dnext, dt, STAGES)
         advance_pose(pose, state.x, middle.x, end.x, plant.body.length, dt, STAGES)
     else:
-        take_samples(seen, along, begin, dt, state, middle, end, GAMMA, d, along.middle, dnext, GAMMA)
+        take_samples(samples, along, begin, dt, state, middle, end, GAMMA, d, along.middle, dnext, GAMMA)
     copy_state(state, end)
     copy_table(d, dnext)
     return count
@@ -209,14 +218,14 @@ def push_row(plant, stage, along, row):
 
 
 @branching_kernel
-def march_with_derivatives(room, along, voltage, bound, dt, tol, out, first, ds, dposes, seen):
-    """All rows; see run_with_derivatives. ds and dposes may be empty: the derivatives then are in `seen`."""
-    own, stages, bare, spare = room.own.plant, room.own.stage, room.bare, room.spare
-    plant, stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
+def march_with_derivatives(room, along, voltage, bound, dt, tol, out, first, ds, dposes, samples):
+    """All rows; see run_with_derivatives. ds and dposes may be empty: the derivatives then are in `samples`."""
+    plants, stages, bare, spare = room.own.plant, room.own.stage, room.bare, room.spare
+    plant, stage = Plant(plants.body[0], plants.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
     state, pose, counts = spare.now, out.pose[0].copy(), np.zeros(3, np.int64)
     state_of_row(state, out.state, 0)
     d, dnext, dpose, h = first.copy(), first.copy(), np.zeros((len(first), 3)), dt[0]
-    kept, begin = len(ds) > 0, 0.0
+    keeps_rows, begin = len(ds) > 0, 0.0
     for r in range(len(dt)):
         apply_row(stage, along, voltage[r], bound[r], along.voltage[:, r])
         push_row(plant, stage, along, r)
@@ -235,15 +244,15 @@ def march_with_derivatives(room, along, voltage, bound, dt, tol, out, first, ds,
             dnext,
             dpose,
             counts,
-            kept,
-            seen,
+            keeps_rows,
+            samples,
             begin,
         )
         begin += dt[r]
         out.iterations[r], out.steps[r] = counts[0], counts[1]
         row_of_state(out.state, r + 1, state)
         copy_row(out.pose[r + 1], pose)
-        if kept:
+        if keeps_rows:
             copy_table(ds[r + 1], d)
             copy_table(dposes[r + 1], dpose)
 
@@ -263,7 +272,7 @@ class LoopDirections(NamedTuple):
     command: FloatArray  # (K, rows, n) derivative of the set points, rows as commanded
     sum: FloatArray  # (K, n) derivative of the integral
     voltage: FloatArray  # (K, n) derivative of the voltage now
-    state: State  # at the last tick
+    state: PlantState  # at the last tick
     dstate: FloatArray  # (K, 3 + n) derivative there
     total: FloatArray  # (2, n) integral before this tick, and at the last one
 
@@ -289,25 +298,25 @@ def run_loop_with_derivatives(
     robots: Sequence[Robot],
     numbers: Plant,
     along: Directions,
-    given: Commands,
+    held_commands: Commands,
     start: tuple[FloatArray, FloatArray],
     first: FloatArray,
     tol: float,
     settled: float = 0.0,
-    seen: Samples | None = None,
+    samples: Samples | None = None,
 ) -> LoopRun:
     """The run of set points, with derivatives; see `derivatives`.
 
     robots: up (2k) and down (2k + 1) each of K parameters. along.voltage: derivatives of the set points; start: twist
     and pose; first (K, 3 + n): derivatives of the state there. settled: a run whose state and derivatives change by
-    less than this from tick to tick [m/s, A, V] stays as it is until the next command; 0: never. With `seen` the run is
-    sampled there, and derivatives by row are left out.
+    less than this from tick to tick [m/s, A, V] stays as it is until the next command; 0: never. With `samples` the run
+    is sampled there, and derivatives by row are left out.
     """
-    dt, _, tick, keep = on_ticks(robot, given)
-    assert given.set_point is not None
-    count, n, kept = len(first), numbers.wheels, len(given.dt) + 1 if seen is None else 0
-    state, bound = start_state(numbers, start[0], np.zeros(n)), current_bounds(robot, given, 1)[0]
-    loop = loop_of(robot, np.ascontiguousarray(given.set_point), tick)
+    dt, _, tick, keep = on_ticks(robot, held_commands)
+    assert held_commands.set_point is not None
+    count, n, row_count = len(first), numbers.wheels, len(held_commands.dt) + 1 if samples is None else 0
+    state, bound = start_state(numbers, start[0], np.zeros(n)), current_bounds(robot, held_commands, 1)[0]
+    loop = loop_of(robot, np.ascontiguousarray(held_commands.set_point), tick)
     gain = np.array([loop_gains(r) for r in robots]).reshape(-1, 4, n)
     extra = LoopDirections(
         gain,
@@ -318,19 +327,19 @@ def run_loop_with_derivatives(
         np.zeros_like(first),
         np.zeros((2, n)),
     )
-    found = LoopRun(
-        begun(len(given.dt), state, start[1]),
-        np.zeros((kept, *first.shape)),
-        np.zeros((kept, count, 3)),
+    loop_run = LoopRun(
+        empty_outcome(len(held_commands.dt), state, start[1]),
+        np.zeros((row_count, *first.shape)),
+        np.zeros((row_count, count, 3)),
         np.zeros((len(dt), n)),
         np.zeros((count, len(dt), n)),
         np.concatenate([[0.0], np.cumsum(dt)]),
         keep.astype(np.int64),
-        seen or NO_SAMPLES,
+        samples or NO_SAMPLES,
     )
-    found.dstate[:1] = first
+    loop_run.dstate[:1] = first
     march_loop(
-        room(numbers),
+        march_workspace(numbers),
         along,
         loop,
         extra,
@@ -339,9 +348,9 @@ def run_loop_with_derivatives(
         first,
         tol,
         settled,
-        found,
+        loop_run,
     )
-    return found
+    return loop_run
 
 
 @part
@@ -358,10 +367,10 @@ def _tick_derivatives(plant, along, loop, extra, state, d, row, w):
             sign, g = 1.0 - 2.0 * up, extra.gain[2 * k + up]
             for a in range(3):
                 point[a] = state.x[a] + sign * EPS * d[k, a]
-            seen = seen_speed(along.plants.element[2 * k + up, e].g, point, g[3, w], moves)
-            own = loop.command[row, w] + sign * EPS * extra.command[k, row, w] - seen
+            measured = seen_speed(along.plants.element[2 * k + up, e].g, point, g[3, w], moves)
+            speed_error = loop.command[row, w] + sign * EPS * extra.command[k, row, w] - measured
             before = total + sign * EPS * extra.sum[k, w]
-            u, after = tick_answer(g[0, w], g[1, w], g[2, w], period, own, before, takes, side)
+            u, after = tick_answer(g[0, w], g[1, w], g[2, w], period, speed_error, before, takes, side)
             volts, integral = volts + sign * u, integral + sign * after
         extra.voltage[k, w], extra.sum[k, w] = volts / (2.0 * EPS), integral / (2.0 * EPS)
 
@@ -405,30 +414,30 @@ def _as_before(loop, extra, state, d, settled):
 
 
 @branching_kernel
-def march_loop(room, along, loop, extra, bound, dt, first, tol, settled, found):
+def march_loop(room, along, loop, extra, bound, dt, first, tol, settled, loop_run):
     """All rows, cut at the ticks. See run_loop_with_derivatives."""
-    out, seen, keep, edges = found.outcome, found.seen, found.keep, found.edges
-    own, stages, bare, spare = room.own.plant, room.own.stage, room.bare, room.spare
-    plant, stage = Plant(own.body[0], own.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
+    out, samples, keep, edges = loop_run.outcome, loop_run.seen, loop_run.keep, loop_run.edges
+    plants, stages, bare, spare = room.own.plant, room.own.stage, room.bare, room.spare
+    plant, stage = Plant(plants.body[0], plants.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
     state, pose, counts = spare.now, out.pose[0].copy(), np.zeros(3, np.int64)
     state_of_row(state, out.state, 0)
     d, dnext, dpose, h = first.copy(), first.copy(), np.zeros((len(first), 3)), dt[0]
     motors, dmotors = np.zeros(len(bound)), np.zeros((len(first), len(bound)))
-    voltage, row, still, kept = np.zeros(len(bound)), 0, False, len(found.dstate) > 0
+    voltage, row, still, keeps_rows = np.zeros(len(bound)), 0, False, len(loop_run.dstate) > 0
     for j in range(len(dt)):
         if j == keep[row + 1]:
             row += 1
-            changed = False
+            is_new_command = False
             for w in range(len(bound)):
-                changed |= loop.command[row, w] != loop.command[row - 1, w]
-            still = still and not changed
+                is_new_command |= loop.command[row, w] != loop.command[row - 1, w]
+            still = still and not is_new_command
         if loop.tick[j] and not still:
             still = settled > 0.0 and j > keep[row] and _as_before(loop, extra, state, d, settled)
             _tick(plant, along, loop, extra, state, d, row, voltage)
         _pass_on(loop, voltage, extra.voltage, motors, dmotors)
-        copy_row(found.voltage[j], motors)
+        copy_row(loop_run.voltage[j], motors)
         for k in range(len(d)):
-            copy_row(found.dvoltage[k, j], dmotors[k])
+            copy_row(loop_run.dvoltage[k, j], dmotors[k])
         if not still:
             apply_row(stage, along, motors, bound, dmotors)
             h = row_with_derivatives(
@@ -446,20 +455,20 @@ def march_loop(room, along, loop, extra, bound, dt, first, tol, settled, found):
                 dnext,
                 dpose,
                 counts,
-                kept,
-                seen,
+                keeps_rows,
+                samples,
                 edges[j],
             )
             out.iterations[row] = max(out.iterations[row], counts[0])
             out.steps[row] += counts[1]
-        elif kept:
+        elif keeps_rows:
             pose_derivatives(along, pose, dpose, state.x, state.x, state.x, d, d, d, dt[j], SIMPSON)
             advance_pose(pose, state.x, state.x, state.x, plant.body.length, dt[j], SIMPSON)
         else:
-            take_samples(seen, along, edges[j], dt[j], state, state, state, 0.5, d, d, d, 0.5)
+            take_samples(samples, along, edges[j], dt[j], state, state, state, 0.5, d, d, d, 0.5)
         if j + 1 == keep[row + 1]:
             row_of_state(out.state, row + 1, state)
             copy_row(out.pose[row + 1], pose)
-            if kept:
-                copy_table(found.dstate[row + 1], d)
-                copy_table(found.dpose[row + 1], dpose)
+            if keeps_rows:
+                copy_table(loop_run.dstate[row + 1], d)
+                copy_table(loop_run.dpose[row + 1], dpose)

@@ -29,7 +29,7 @@ from omnidyn.model.stick_slip.plant import copy_row, copy_table
 from omnidyn.simulation.implicit.step import GAMMA
 from omnidyn.simulation.sensitivity.directions import EPS
 
-MEET = 1e-9  # [s] times that differ by less are one
+SAME_TIME = 1e-9  # [s] times that differ by less are one
 
 
 TURN, PATH, PLACE = 1, 3, 5  # numbers of the way: heading; path along x, y of the body; place along x, y at the start
@@ -159,20 +159,20 @@ def _go_places(way, dway, along, x0, xm, x1, node, d0, dm, d1, dnode, h, share):
 
 
 @part
-def take_samples(seen, along, begin, h, start, middle, end, node, d0, dm, d1, dnode):
+def take_samples(samples, along, begin, h, start, middle, end, node, d0, dm, d1, dnode):
     """Sample all rows whose t - late lies in a step of length h from `begin`, then go on to its end.
 
     node, dnode: where in the step the middle and dm are, GAMMA or 1/2.
     """
-    size, x0, xm, x1 = seen.state.shape[2], start.x, middle.x, end.x
-    for c in range(len(seen.late)):
-        while seen.next[c] < len(seen.t):
-            r = seen.next[c]
-            after = seen.t[r] - seen.late[c] - begin
-            if after > h + MEET:
+    size, x0, xm, x1 = samples.state.shape[2], start.x, middle.x, end.x
+    for c in range(len(samples.late)):
+        while samples.next[c] < len(samples.t):
+            r = samples.next[c]
+            after = samples.t[r] - samples.late[c] - begin
+            if after > h + SAME_TIME:
                 break
-            seen.next[c] += 1
-            if after < -MEET:
+            samples.next[c] += 1
+            if after < -SAME_TIME:
                 continue
             share = min(max(after / h, 0.0), 1.0)
             weight, rate, dweight = _weights(share, node), _rates(share, node), _weights(share, dnode)
@@ -181,11 +181,11 @@ def take_samples(seen, along, begin, h, start, middle, end, node, d0, dm, d1, dn
                     v0, vm, v1 = x0[a], xm[a], x1[a]
                 else:
                     v0, vm, v1 = start.each[a].current, middle.each[a].current, end.each[a].current
-                seen.state[c, r, a] = _mixed(weight, v0, vm, v1)
-                seen.pace[c, r, a] = _mixed(rate, v0, vm, v1) / h
+                samples.state[c, r, a] = _mixed(weight, v0, vm, v1)
+                samples.pace[c, r, a] = _mixed(rate, v0, vm, v1) / h
                 for k in range(len(d0)):
-                    seen.dstate[c, r, k, a] = _mixed(dweight, d0[k, a], dm[k, a], d1[k, a])
-            copy_row(seen.way[c, r], seen.gone)
-            copy_table(seen.dway[c, r], seen.dgone)
-            go_on(seen.way[c, r], seen.dway[c, r], along, x0, xm, x1, node, d0, dm, d1, dnode, h, share)
-    go_on(seen.gone, seen.dgone, along, x0, xm, x1, node, d0, dm, d1, dnode, h, 1.0)
+                    samples.dstate[c, r, k, a] = _mixed(dweight, d0[k, a], dm[k, a], d1[k, a])
+            copy_row(samples.way[c, r], samples.gone)
+            copy_table(samples.dway[c, r], samples.dgone)
+            go_on(samples.way[c, r], samples.dway[c, r], along, x0, xm, x1, node, d0, dm, d1, dnode, h, share)
+    go_on(samples.gone, samples.dgone, along, x0, xm, x1, node, d0, dm, d1, dnode, h, 1.0)

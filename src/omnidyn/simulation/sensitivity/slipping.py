@@ -20,7 +20,7 @@ from omnidyn.model.motor import DYNAMIC, settled_current
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.commands import Commands, current_bounds
 from omnidyn.simulation.sensitivity.directions import EPS, difference
-from omnidyn.simulation.sensitivity.late_sample import Direction, Program, held
+from omnidyn.simulation.sensitivity.late_sample import Direction, VoltageProgram, held
 from omnidyn.simulation.slip.march import rolling, run_slipping
 from omnidyn.simulation.slip.plant import slip_plant
 from omnidyn.simulation.speed_loop import no_loop
@@ -29,7 +29,7 @@ A_MOMENT = 1e-4  # [s]
 Values = tuple[FloatArray, FloatArray, FloatArray]  # (rows, m), time derivative (rows, m), derivatives (rows, K, m)
 
 
-class Look(NamedTuple):
+class SampledRun(NamedTuple):
     """What one run shows at some rows: twist (rows, 3), pose (rows, 3) from the start, turning [rad/s], turned [rad]
     and current [A] of the wheels (rows, n)."""
 
@@ -48,9 +48,9 @@ class SlipSample:
     turn.
     """
 
-    seen: Look
-    soon: tuple[Look, Look]
-    by: Sequence[Look]
+    seen: SampledRun
+    soon: tuple[SampledRun, SampledRun]
+    by: Sequence[SampledRun]
 
     @property
     def twist(self) -> FloatArray:
@@ -92,10 +92,10 @@ class SlipSample:
         return current, self._pace("current"), self._changes(lambda look: look.current)
 
     def _pace(self, name: str) -> FloatArray:
-        before, after = (getattr(each, name) for each in self.soon)
+        before, after = (getattr(look, name) for look in self.soon)
         return (after - before) / (2.0 * A_MOMENT)
 
-    def _changes(self, values: Callable[[Look], FloatArray]) -> FloatArray:
+    def _changes(self, values: Callable[[SampledRun], FloatArray]) -> FloatArray:
         """Derivatives (rows, K, m) of `values` (rows, m) along each direction; K may be 0."""
         shape = values(self.seen).shape
         if not self.by:
@@ -104,7 +104,12 @@ class SlipSample:
 
 
 def slipping_samples(
-    robot: Robot, program: Program, directions: Sequence[Direction], late: Sequence[float], steps: int, tol: float
+    robot: Robot,
+    program: VoltageProgram,
+    directions: Sequence[Direction],
+    late: Sequence[float],
+    steps: int,
+    tol: float,
 ) -> list[SlipSample]:
     """Simulate under held voltages, and sample at t - late: one SlipSample for every latency.
 
@@ -113,16 +118,19 @@ def slipping_samples(
     """
     t, voltage, start, _ = program
     ends = [(robot, voltage, start)]
-    for one in directions:
-        for end, side in ((one.up, EPS), (one.down, -EPS)):
-            moved = voltage if one.voltage is None else voltage + side * one.voltage
-            ends.append((end or robot, moved, start if one.start is None else start + side * one.start))
-    around = [own + side for own in late for side in (0.0, A_MOMENT, -A_MOMENT)]
+    for direction in directions:
+        for end, side in ((direction.up, EPS), (direction.down, -EPS)):
+            shifted_voltage = voltage if direction.voltage is None else voltage + side * direction.voltage
+            ends.append(
+                (end or robot, shifted_voltage, start if direction.start is None else start + side * direction.start)
+            )
+    around = [delay + side for delay in late for side in (0.0, A_MOMENT, -A_MOMENT)]
     first = partial(_looks, t=t, late=around, steps=1 if tol else steps, tol=tol)
-    others = partial(_looks, t=t, late=late, steps=steps, tol=0.0)
-    own, *found = side_by_side(lambda k: (others if k else first)(*ends[k]), range(len(ends)))
+    fixed_steps = partial(_looks, t=t, late=late, steps=steps, tol=0.0)
+    looks, *shifted_looks = side_by_side(lambda k: (fixed_steps if k else first)(*ends[k]), range(len(ends)))
     return [
-        SlipSample(own[3 * c], (own[3 * c + 1], own[3 * c + 2]), [each[c] for each in found]) for c in range(len(late))
+        SlipSample(looks[3 * c], (looks[3 * c + 1], looks[3 * c + 2]), [run_looks[c] for run_looks in shifted_looks])
+        for c in range(len(late))
     ]
 
 
@@ -134,22 +142,24 @@ def _looks(
     late: Sequence[float],
     steps: int,
     tol: float,
-) -> list[Look]:
+) -> list[SampledRun]:
     """One run, seen with each latency."""
     plant, n = slip_plant(robot), robot.wheels.count
     ends = np.append(t[0], t[0] + np.cumsum(held(t, len(voltage), late)))
-    seen = [t - own for own in late]
-    every = np.unique(np.concatenate([ends, *(each[(each > ends[0]) & (each < ends[-1])] for each in seen)]))
+    sample_times = [t - delay for delay in late]
+    all_times = np.unique(
+        np.concatenate([ends, *(moments[(moments > ends[0]) & (moments < ends[-1])] for moments in sample_times)])
+    )
     parts = np.arange(steps) / steps
-    grid = np.append((every[:-1, None] + np.diff(every)[:, None] * parts).ravel(), every[-1])
+    grid = np.append((all_times[:-1, None] + np.diff(all_times)[:, None] * parts).ravel(), all_times[-1])
     at = np.clip(np.searchsorted(ends, grid[:-1], side="right") - 1, 0, len(voltage) - 1)
-    given = Commands(np.diff(grid), np.ascontiguousarray(voltage[at]))
-    assert given.voltage is not None
+    held_commands = Commands(np.diff(grid), np.ascontiguousarray(voltage[at]))
+    assert held_commands.voltage is not None
     out = run_slipping(
         plant,
-        given.voltage,
-        current_bounds(robot, given, len(given.dt)),
-        given.dt,
+        held_commands.voltage,
+        current_bounds(robot, held_commands, len(held_commands.dt)),
+        held_commands.dt,
         rolling(plant, start),
         np.zeros(3),
         no_loop(n),
@@ -157,16 +167,16 @@ def _looks(
     )
     turning = out.rims / robot.wheels.radii
     with np.errstate(invalid="ignore"):  # a robot far from any that fits may run away: its residuals say so
-        middle = 0.5 * (turning[1:] + turning[:-1]) * given.dt[:, None]
+        middle = 0.5 * (turning[1:] + turning[:-1]) * held_commands.dt[:, None]
         turned = np.concatenate([np.zeros((1, n)), np.cumsum(middle, axis=0)])
-    held_on = np.concatenate([given.voltage, given.voltage[-1:]])
+    held_on = np.concatenate([held_commands.voltage, held_commands.voltage[-1:]])
     looks = []
-    for each in seen:
-        own = np.clip(np.searchsorted(grid, each), 0, len(grid) - 1)
-        outside = (each < grid[0]) | (each > grid[-1])
-        shown, current = turning[own], out.current[own]
+    for moments in sample_times:
+        rows = np.clip(np.searchsorted(grid, moments), 0, len(grid) - 1)
+        outside = (moments < grid[0]) | (moments > grid[-1])
+        rim_speed, current = turning[rows], out.current[rows]
         if robot.motor.electrical != DYNAMIC:
-            current = settled_current(robot.motor, held_on[own], shown)
-        parts_of = (out.twist[own], out.pose[own], shown, turned[own], current)
-        looks.append(Look(*(np.where(outside[:, None], np.nan, part) for part in parts_of)))
+            current = settled_current(robot.motor, held_on[rows], rim_speed)
+        parts_of = (out.twist[rows], out.pose[rows], rim_speed, turned[rows], current)
+        looks.append(SampledRun(*(np.where(outside[:, None], np.nan, part) for part in parts_of)))
     return looks

@@ -59,32 +59,32 @@ def _holders(plant, stage, along):
         rank = _hold(along, rank, 0, 1.0, 0.0, 0.0)
         rank = _hold(along, rank, 1, 0.0, 1.0, 0.0)
     for e in range(len(element)):
-        own = element[e]
+        record = element[e]
         if stage.each[e].sign == 0.0:
-            rank = _hold(along, rank, e, own.g[0], own.g[1], own.g[2])
+            rank = _hold(along, rank, e, record.g[0], record.g[1], record.g[2])
     return rank
 
 
 @part
 def _same_problem(plant, stage, along, k, aim):
     """Give the two stages of parameter k the problem at hand: signs, branches, i*; x* and z* with derivative `aim`."""
-    task, each, m = stage.task, stage.each, len(plant.element)
+    task, element_stages, m = stage.task, stage.each, len(plant.element)
     for side in range(2):
-        own, eps = along.stages.task[2 * k + side], EPS * (1 - 2 * side)
-        own.tau, own.ellipse = task.tau, task.ellipse
+        own_task, eps = along.stages.task[2 * k + side], EPS * (1 - 2 * side)
+        own_task.tau, own_task.ellipse = task.tau, task.ellipse
         for a in range(3):
-            own.goal[a], own.push[a] = task.goal[a] + eps * aim[a], along.plants.body[2 * k + side].push[a]
+            own_task.goal[a], own_task.push[a] = task.goal[a] + eps * aim[a], along.plants.body[2 * k + side].push[a]
         for e in range(m):
-            at = each[e]
-            one = along.stages.each[2 * k + side, e]
-            one.sign, one.aimed_current = at.sign, at.aimed_current
+            at = element_stages[e]
+            shifted = along.stages.each[2 * k + side, e]
+            shifted.sign, shifted.aimed_current = at.sign, at.aimed_current
             if e >= N_AXES:
-                one.branch = along.carry[2, e - N_AXES]
+                shifted.branch = along.carry[2, e - N_AXES]
             if plant.element[e].stiffness > 0.0:
-                one.aimed_bend = at.aimed_bend + eps * aim[m + e]
+                shifted.aimed_bend = at.aimed_bend + eps * aim[m + e]
         if plant.body.stiffness > 0.0:
             for a in range(2):
-                own.aimed_bend[a] = task.aimed_bend[a] + eps * aim[2 * m + a]
+                own_task.aimed_bend[a] = task.aimed_bend[a] + eps * aim[2 * m + a]
 
 
 @part
@@ -95,12 +95,12 @@ def _carry(plant, stage, along, x):
     """
     task = stage.task
     for e in range(N_AXES, len(plant.element)):
-        own, sign, w = plant.element[e], stage.each[e].sign, e - N_AXES
-        speed = own.g[0] * x[0] + own.g[1] * x[1] + own.g[2] * x[2] if sign != 0.0 else 0.0
+        record, sign, w = plant.element[e], stage.each[e].sign, e - N_AXES
+        speed = record.g[0] * x[0] + record.g[1] * x[1] + record.g[2] * x[2] if sign != 0.0 else 0.0
         branch = motor_branch(plant, stage, e, speed, task.tau)
         i, slope = motor_current(plant, stage, e, branch, speed, task.tau)
-        gain = own.thrust if sign == 2.0 else gear(i, sign, own.thrust, own.efficiency)
-        along.carry[0, w] = -slope * own.inductance / (task.tau * own.emf)
+        gain = record.thrust if sign == 2.0 else gear(i, sign, record.thrust, record.efficiency)
+        along.carry[0, w] = -slope * record.inductance / (task.tau * record.emf)
         along.carry[1, w], along.carry[2, w] = gain * along.carry[0, w], branch
 
 
@@ -111,10 +111,10 @@ def _active_set_shift(along, k, rank, x, r0, r1, r2, shift, force):
         shift[a] = force[a] = 0.0
     for c in range(rank):
         arm = along.arm[along.held[0, c], k]
-        moved, carried = arm[0] * x[0] + arm[1] * x[1] + arm[2] * x[2], 0.0
+        projected, carried = arm[0] * x[0] + arm[1] * x[1] + arm[2] * x[2], 0.0
         for j in range(rank):
             p = along.held[1, j]
-            shift[p] -= along.lift[j, 3 + c] * moved
+            shift[p] -= along.lift[j, 3 + c] * projected
             carried += along.lift[j, 3 + c] * (r0 if p == 0 else (r1 if p == 1 else r2))
         for a in range(3):
             force[a] -= arm[a] * carried
@@ -161,22 +161,22 @@ def stage_derivatives(plant, stage, along, x, aim, out):
 def _inner_derivatives(plant, along, k, x, aim, out):
     """Derivative of what is eliminated, at the solution: of currents with inductance (the others follow at once), and
     of what bends."""
-    some, m = plant.body.bristles > 0.0, len(plant.element)
+    has_memory, m = plant.body.bristles > 0.0, len(plant.element)
     for e in range(N_AXES, len(plant.element)):
-        some |= plant.element[e].inductance > 0.0
-    if not some:
+        has_memory |= plant.element[e].inductance > 0.0
+    if not has_memory:
         return
-    point, task, each = along.point[0], along.stages.task, along.stages.each
+    point, task, element_stages = along.point[0], along.stages.task, along.stages.each
     for side in range(2):
         for a in range(3):
             point[a] = x[a] + EPS * (1 - 2 * side) * out[a]
         _residual_beside(along, 2 * k + side, point)
     for e in range(N_AXES, len(plant.element)):
-        change = each[2 * k, e].current - each[2 * k + 1, e].current
+        change = element_stages[2 * k, e].current - element_stages[2 * k + 1, e].current
         out[3 + e - N_AXES] = change / (2.0 * EPS) + along.carry[0, e - N_AXES] * aim[3 + e - N_AXES]
     if plant.body.bristles > 0.0:
         for e in range(m):
-            out[m + e] = (each[2 * k, e].bend - each[2 * k + 1, e].bend) / (2.0 * EPS)
+            out[m + e] = (element_stages[2 * k, e].bend - element_stages[2 * k + 1, e].bend) / (2.0 * EPS)
         for a in range(2):
             out[2 * m + a] = (task[2 * k].bend[a] - task[2 * k + 1].bend[a]) / (2.0 * EPS)
 
@@ -187,18 +187,20 @@ def _aim_within(plant, stage, along, k, aim):
     body, element = plant.body, plant.element
     m, up, down = len(element), along.plants.element[2 * k], along.plants.element[2 * k + 1]
     for e in range(m):
-        own = element[e]
-        for side in range(2 if own.stiffness > 0.0 else 0):
+        record = element[e]
+        for side in range(2 if record.stiffness > 0.0 else 0):
             sign = 1.0 - 2.0 * side
-            if sign * stage.each[e].aimed_bend >= own.bristle_breakaway[side] / own.stiffness:
-                most = up[e].bristle_breakaway[side] / up[e].stiffness
-                most -= down[e].bristle_breakaway[side] / down[e].stiffness
-                aim[m + e] = sign * most / (2.0 * EPS)
+            if sign * stage.each[e].aimed_bend >= record.bristle_breakaway[side] / record.stiffness:
+                bend_change = up[e].bristle_breakaway[side] / up[e].stiffness
+                bend_change -= down[e].bristle_breakaway[side] / down[e].stiffness
+                aim[m + e] = sign * bend_change / (2.0 * EPS)
     for a in range(2 if body.stiffness > 0.0 else 0):
         if abs(stage.task.aimed_bend[a]) >= body.bristle_breakaway[a] / body.stiffness:
-            one, other = along.plants.body[2 * k], along.plants.body[2 * k + 1]
-            most = one.bristle_breakaway[a] / one.stiffness - other.bristle_breakaway[a] / other.stiffness
-            aim[2 * m + a] = (most if stage.task.aimed_bend[a] > 0.0 else -most) / (2.0 * EPS)
+            body_up, body_down = along.plants.body[2 * k], along.plants.body[2 * k + 1]
+            bend_change = (
+                body_up.bristle_breakaway[a] / body_up.stiffness - body_down.bristle_breakaway[a] / body_down.stiffness
+            )
+            aim[2 * m + a] = (bend_change if stage.task.aimed_bend[a] > 0.0 else -bend_change) / (2.0 * EPS)
 
 
 @part

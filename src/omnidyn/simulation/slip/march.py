@@ -21,7 +21,7 @@ from omnidyn.model.stick_slip.step_bound import MONOTONE
 from omnidyn.simulation.implicit.march import SIMPSON, advance_pose
 from omnidyn.simulation.slip.body import FREE, GRIPS, LINE
 from omnidyn.simulation.slip.bounds import (
-    SHARE,
+    ERROR_SHARE,
     bristle_turns,
     growth,
     longest_step,
@@ -31,12 +31,12 @@ from omnidyn.simulation.slip.bounds import (
 )
 from omnidyn.simulation.slip.plant import SlipPlant
 from omnidyn.simulation.slip.stage import SWEEPS, slip_step
-from omnidyn.simulation.speed_loop import Loop, passed, tick_answer, tick_branch
+from omnidyn.simulation.speed_loop import LoopCommands, passed, tick_answer, tick_branch
 
-SHORT, SHORTEST, ROUNDING = 1.5e-4, 1e-11, 1e-13  # as in implicit/march.py
-MOST = (1e6, 5e6)  # steps solved at tol 1e-6, and so many more per second
+SHORT_STEP, SHORTEST_STEP, ROUNDING = 1.5e-4, 1e-11, 1e-13  # as in implicit/march.py
+MOST_STEPS = (1e6, 5e6)  # steps solved at tol 1e-6, and so many more per second
 TURNS = 0.5  # [rad] by which travel may turn in a step
-MEET = 1e-12  # of the speeds: a difference that is rounding
+SAME_SPEED = 1e-12  # of the speeds: a difference that is rounding
 
 
 SLIP_EACH = record(
@@ -56,7 +56,7 @@ class SlipState(NamedTuple):
     each: Any
 
 
-class SlipRoom(NamedTuple):
+class SlipWorkspace(NamedTuple):
     """What a run works in: the state of now, those after a whole step, one and two half steps, and of a stage its parts
     as of model/layout.py, motors as `lines` (n,) of LINE, the wrench `pull` (3,), the goal x* (3 + n,), `space` (12,);
     counts: most sweeps, steps."""
@@ -109,7 +109,7 @@ def run_slipping(
     dt: FloatArray,
     state: FloatArray,
     pose: FloatArray,
-    loop: Loop,
+    loop: LoopCommands,
     tol: float,
 ) -> SlipOutcome:
     """Simulate rows of held voltage (filled in place by a speed loop). tol 0: a step a row.
@@ -121,12 +121,14 @@ def run_slipping(
     pose_, states, contact = (np.zeros((rows + 1, width)) for width in (3, 8 + 3 * n, n))
     out = SlipOutcome(pose_, states, contact, 0, np.zeros(n))
     out.pose[0], out.state[0] = pose, state
-    most = (MOST[0] + MOST[1] * float(dt.sum())) * max(1.0, (1e-6 / tol) ** (1.0 / 3.0)) if tol else math.inf
-    row, capped = _march(plant, voltage, bound, dt, loop, tol, most, out, _room(plant))
+    step_limit = (
+        (MOST_STEPS[0] + MOST_STEPS[1] * float(dt.sum())) * max(1.0, (1e-6 / tol) ** (1.0 / 3.0)) if tol else math.inf
+    )
+    row, capped = _march(plant, voltage, bound, dt, loop, tol, step_limit, out, _room(plant))
     if row < rows:
         raise InputError(
             "this robot moves too fast to be followed",
-            got=f"more than {most:.2g} steps up to row {row}",
+            got=f"more than {step_limit:.2g} steps up to row {row}",
             expected=f"motion that tol = {tol:g} m/s can follow",
             remedy="check masses and inertias of the robot file, those of its wheels too; or take one step per row "
             "(tol=None)",
@@ -134,12 +136,12 @@ def run_slipping(
     return out._replace(capped=int(capped))
 
 
-def _room(plant: SlipPlant) -> SlipRoom:
+def _room(plant: SlipPlant) -> SlipWorkspace:
     n = len(plant.spin)
-    now, whole, middle, two = (SlipState(np.zeros(3 + n), np.zeros(5 + n, SLIP_EACH)) for _ in range(4))
+    now, whole_step, middle, two = (SlipState(np.zeros(3 + n), np.zeros(5 + n, SLIP_EACH)) for _ in range(4))
     stage = new_stage(Plant(plant.body, plant.element[None]))
     space = np.zeros(3), np.zeros(3 + n), np.zeros(12), np.zeros(2, np.int64)
-    return SlipRoom(now, whole, middle, two, stage, np.zeros(n, LINE), *space)
+    return SlipWorkspace(now, whole_step, middle, two, stage, np.zeros(n, LINE), *space)
 
 
 def rolling(plant: SlipPlant, twist: FloatArray, current: FloatArray | None = None) -> FloatArray:
@@ -175,14 +177,14 @@ def _differ(a, b):
 
 
 @part
-def _error(plant, one, two):
-    """Estimated error of `two`, half steps against one whole step, in m/s."""
-    x, y = one.x, two.x
-    worst = max(abs(y[0] - x[0]), abs(y[1] - x[1]), SHARE * abs(y[2] - x[2]))
+def _error(plant, whole_step, half_steps):
+    """Estimated error of `half_steps`, half steps against one whole step, in m/s."""
+    x, y = whole_step.x, half_steps.x
+    worst = max(abs(y[0] - x[0]), abs(y[1] - x[1]), ERROR_SHARE * abs(y[2] - x[2]))
     for w in range(len(plant.spin)):
-        worst = max(worst, SHARE * abs(y[3 + w] - x[3 + w]))
+        worst = max(worst, ERROR_SHARE * abs(y[3 + w] - x[3 + w]))
     if plant.remembers != 0.0:
-        worst = max(worst, memory_error(plant, one, two))
+        worst = max(worst, memory_error(plant, whole_step, half_steps))
     return worst / 3.0
 
 
@@ -199,17 +201,17 @@ def _beyond(plant, room, h, error):
 
 
 @part
-def _find(plant, stage, pose, h, left, dt, tol, room):
+def _find(plant, stage, pose, h, remaining, dt, tol, room):
     """Find a step from `now` that is good enough. Returns its length and the one to try next."""
-    now, one, middle, two, pull, counts = room.now, room.whole, room.middle, room.two, room.pull, room.counts
+    now, whole_step, middle, two, pull, counts = room.now, room.whole, room.middle, room.two, room.pull, room.counts
     if plant.steep > 0.0:
         h = longest_step(plant, stage, now.x, h)
     while True:
-        if left - h < 1e-9 * dt:
-            h = left
-        copy_each(one.each, now.each)
+        if remaining - h < 1e-9 * dt:
+            h = remaining
+        copy_each(whole_step.each, now.each)
         _pulled(plant, pose[2] + 0.5 * h * now.x[2], pull)
-        first = slip_step(plant, stage, h, now, one, room)
+        first = slip_step(plant, stage, h, now, whole_step, room)
         copy_each(middle.each, now.each)
         _pulled(plant, pose[2] + 0.25 * h * now.x[2], pull)
         second = slip_step(plant, stage, 0.5 * h, now, middle, room)
@@ -217,20 +219,20 @@ def _find(plant, stage, pose, h, left, dt, tol, room):
         _pulled(plant, pose[2] + 0.25 * h * now.x[2] + 0.5 * h * middle.x[2], pull)
         third = slip_step(plant, stage, 0.5 * h, middle, two, room)
         counts[0], counts[1] = max(counts[0], first, second, third), counts[1] + 3
-        error, astray = _error(plant, one, two), 0.0
+        error, astray = _error(plant, whole_step, two), 0.0
         if plant.steep > 0.0 or plant.remembers != 0.0:
             error, astray = _beyond(plant, room, h, error)
-        ratio = error / max(tol / plant.memory * max(h, SHORT), ROUNDING)
+        ratio = error / max(tol / plant.memory * max(h, SHORT_STEP), ROUNDING)
         if plant.remembers != 0.0:
             ratio = max(ratio, bristle_turns(plant, now, two, h) / tol)
-        if _differ(now, middle) or _differ(middle, two) or _differ(now, one):
+        if _differ(now, middle) or _differ(middle, two) or _differ(now, whole_step):
             astray = max(astray, unresolved(plant, stage, h))
         if astray > 0.0:
             ratio = 0.5 if astray <= tol else max(ratio, 64.0)
-        fitting = 0.9 * (ratio + 1e-12) ** (-1.0 / 3.0 if h < SHORT else -0.5)
-        if ratio <= 1.0 or h <= SHORTEST:
+        fitting = 0.9 * (ratio + 1e-12) ** (-1.0 / 3.0 if h < SHORT_STEP else -0.5)
+        if ratio <= 1.0 or h <= SHORTEST_STEP:
             return h, h * min(4.0, max(1.0, fitting))
-        h = max(SHORTEST, h * max(0.125, fitting))
+        h = max(SHORTEST_STEP, h * max(0.125, fitting))
 
 
 @part
@@ -244,11 +246,11 @@ def _count_lifted(plant, state, lifted):
     """Count the wheels whose load would be negative under the forces of the floor, where loads shift."""
     if len(plant.shift) == 0:
         return
-    n, x, each = len(plant.spin), state.x, state.each
-    f0 = each[0].force + each[3 + n].force - plant.element[0].viscous * x[0]
-    f1 = each[1].force + each[4 + n].force - plant.element[1].viscous * x[1]
+    n, x, element_states = len(plant.spin), state.x, state.each
+    f0 = element_states[0].force + element_states[3 + n].force - plant.element[0].viscous * x[0]
+    f1 = element_states[1].force + element_states[4 + n].force - plant.element[1].viscous * x[1]
     for w in range(n):
-        f0, f1 = f0 + plant.g[w, 0] * each[3 + w].force, f1 + plant.g[w, 1] * each[3 + w].force
+        f0, f1 = f0 + plant.g[w, 0] * element_states[3 + w].force, f1 + plant.g[w, 1] * element_states[3 + w].force
     for w in range(len(plant.spin)):
         if plant.grip[w] > 0.0 and plant.grip[w] + plant.shift[w, 0] * f0 + plant.shift[w, 1] * f1 <= 0.0:
             lifted[w] += 1.0
@@ -257,15 +259,15 @@ def _count_lifted(plant, state, lifted):
 @part
 def _mark(plant, state):
     """The marks of a state: what rests is taken to hold, a rim as fast as the ground under it to grip."""
-    x, each = state.x, state.each
+    x, element_states = state.x, state.each
     for a in range(3):
-        each[a].sign = FREE if plant.element[a].active == 0.0 else _sign(x[a])
+        element_states[a].sign = FREE if plant.element[a].active == 0.0 else _sign(x[a])
     moves = x[0] != 0.0 or x[1] != 0.0
-    each[len(each) - 2].sign = FREE if plant.body[0].active == 0.0 else (1.0 if moves else 0.0)
+    element_states[len(element_states) - 2].sign = FREE if plant.body[0].active == 0.0 else (1.0 if moves else 0.0)
     for w in range(len(plant.spin)):
         s, p = x[3 + w], plant.g[w, 0] * x[0] + plant.g[w, 1] * x[1] + plant.g[w, 2] * x[2]
-        each[3 + w].sign = FREE if plant.element[3 + w].active == 0.0 else _sign(s)
-        each[3 + w].contact = GRIPS if abs(s - p) <= MEET * (abs(s) + abs(p)) else _sign(s - p)
+        element_states[3 + w].sign = FREE if plant.element[3 + w].active == 0.0 else _sign(s)
+        element_states[3 + w].contact = GRIPS if abs(s - p) <= SAME_SPEED * (abs(s) + abs(p)) else _sign(s - p)
 
 
 @part
@@ -312,8 +314,8 @@ def _command(plant, stage, voltage, bound, loop, k, now):
 
 
 @branching_kernel
-def _march(plant, voltage, bound, dt, loop, tol, most, out, room):
-    """All rows; see run_slipping. Returns (rows done before `most` steps were, rows capped)."""
+def _march(plant, voltage, bound, dt, loop, tol, step_limit, out, room):
+    """All rows; see run_slipping. Returns (rows done before `step_limit` steps were, rows capped)."""
     n, now, two, counts, pose = len(plant.spin), room.now, room.two, room.counts, out.pose[0].copy()
     stage, h, capped = Stage(room.stage.task[0], room.stage.each[0], room.stage.work[0]), dt[0], 0
     _load(now, out.state[0])
@@ -321,15 +323,15 @@ def _march(plant, voltage, bound, dt, loop, tol, most, out, room):
     for k in range(len(dt)):
         counts[0] = 0
         _command(plant, stage, voltage, bound, loop, k, now)
-        left = dt[k]
+        remaining = dt[k]
         if tol > 0.0:
-            while left > 0.0:
-                taken, h = _find(plant, stage, pose, h, left, dt[k], tol, room)
-                advance_pose(pose, now.x, room.middle.x, two.x, 1.0, taken, SIMPSON)
+            while remaining > 0.0:
+                length, h = _find(plant, stage, pose, h, remaining, dt[k], tol, room)
+                advance_pose(pose, now.x, room.middle.x, two.x, 1.0, length, SIMPSON)
                 copy_row(now.x, two.x)
                 copy_each(now.each, two.each)
-                left = left - taken if taken < left else 0.0
-                if counts[1] > most:
+                remaining = remaining - length if length < remaining else 0.0
+                if counts[1] > step_limit:
                     return k, capped
         else:
             pieces = max(1, math.ceil(dt[k] * plant.steep / MONOTONE))

@@ -21,7 +21,7 @@ from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.surroundings import GRAVITY
 from omnidyn.model.wheels import per_wheel, sin_cos_deg
 
-FORGETS = (0.15, 30.0)  # [s] in which a robot is taken to forget an error, at least and at most
+MEMORY_BOUNDS = (0.15, 30.0)  # [s] in which a robot is taken to forget an error, at least and at most
 POWERS = {
     "coulomb": 1,
     "breakaway": 1,
@@ -73,21 +73,21 @@ def slip_plant(robot: Robot) -> SlipPlant:
     """The numbers of a robot. Raises UnsupportedError for what has no law here yet, by name."""
     _refuse(robot)
     mass = np.diag(np.diag([robot.body.mass, robot.body.mass, robot.body.inertia]) + off_centre(robot)).copy()
-    alone = 1.0 - float(np.hypot(*robot.body.centre)) * float(np.sqrt(mass[0] / mass[2]))
+    uncoupled = 1.0 - float(np.hypot(*robot.body.centre)) * float(np.sqrt(mass[0] / mass[2]))
     spin, laws = mass_at_rim(robot.motor, robot.wheels), _in_radians(plant(robot))
     body, element = laws.body, laws.element
-    for own, mass_of in zip(element[N_AXES:], spin, strict=True):
-        own.steep = (steepest_of(own) + fade_of(own)) / mass_of
+    for record, mass_of in zip(element[N_AXES:], spin, strict=True):
+        record.steep = (steepest_of(record) + fade_of(record)) / mass_of
     steep = max(float(body.steep) + float(element["steep"][:N_AXES].sum()), float(element["steep"][N_AXES:].max()))
-    more = (element["breakaway"] > element["coulomb"]).any(axis=1) & (element["fall"] == 0.0)
-    gaps = more.any() or (body.fall == 0.0 and (body.breakaway > body.coulomb).any())
+    has_gap = (element["breakaway"] > element["coulomb"]).any(axis=1) & (element["fall"] == 0.0)
+    gaps = has_gap.any() or (body.fall == 0.0 and (body.breakaway > body.coulomb).any())
     bends = body.stiffness > 0.0 or (element["stiffness"] > 0.0).any()
     remembers = bends or (element["inductance"] > 0.0).any()
     slowest = float(np.max(mass / np.maximum(element["viscous"][:N_AXES], 1e-9 * mass)))
     return SlipPlant(
         mass,
         np.array(robot.body.centre),
-        alone,
+        uncoupled,
         robot.body.mass if robot.body.rotating_frame else 0.0,
         robot.floor.pull(robot.body.mass),
         np.array([body], BODY),
@@ -100,16 +100,16 @@ def slip_plant(robot: Robot) -> SlipPlant:
         grips(robot),
         _shift(robot),
         robot.wheels.radii,
-        min(max(slowest, FORGETS[0]), FORGETS[1]),
+        min(max(slowest, MEMORY_BOUNDS[0]), MEMORY_BOUNDS[1]),
     )
 
 
-def _in_radians(own: Plant) -> Plant:
+def _in_radians(numbers: Plant) -> Plant:
     """The same plant, what acts about yaw in N m and rad, not in N and m of the length by which yaw is measured."""
-    yaw, length = own.element[YAW], float(own.body.length)
+    yaw, length = numbers.element[YAW], float(numbers.body.length)
     for name, power in POWERS.items():
         yaw[name] *= length**power
-    return own
+    return numbers
 
 
 def grips(robot: Robot) -> FloatArray:
@@ -142,20 +142,20 @@ def _law(robot: Robot, place: str) -> str:
 
 def _refuse(robot: Robot) -> None:
     """Names what this engine cannot do about a robot."""
-    found = []
+    refusals = []
     if (mass_at_rim(robot.motor, robot.wheels) <= 0.0).any():
-        found.append("wheels that weigh nothing ([wheels] inertia_kg_m2 = 0)")
+        refusals.append("wheels that weigh nothing ([wheels] inertia_kg_m2 = 0)")
     places = (AXES, DIRECTION, WHEELS)
     bands = [place for place in places if _law(robot, place) == KARNOPP]
-    found += [f'law = "{KARNOPP}" of [friction.{place}]' for place in bands]
+    refusals += [f'law = "{KARNOPP}" of [friction.{place}]' for place in bands]
     if robot.friction.direction.ellipse == PLAIN:
-        found.append(f'ellipse = "{PLAIN}" of [friction.direction]: leave it out')
+        refusals.append(f'ellipse = "{PLAIN}" of [friction.direction]: leave it out')
     if robot.body.centre_height > 0.0 and robot.wheels.places is None:
-        found.append("the height of the centre of mass on mecanum wheels without wheelbase_m")
-    if found:
+        refusals.append("the height of the centre of mass on mecanum wheels without wheelbase_m")
+    if refusals:
         raise UnsupportedError(
             "wheels that slip are simulated without some of what this robot has",
-            got="; ".join(found),
+            got="; ".join(refusals),
             expected="wheels with an inertia; laws that stick, or bend",
             where="[wheels] traction_mu",
             remedy=f'take law = "{COULOMB}", which sticks with the same levels: "{KARNOPP}" stands in for it where a '

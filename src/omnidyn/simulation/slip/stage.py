@@ -23,7 +23,7 @@ from omnidyn.simulation.implicit.step import BACK, GAMMA, STIFF
 from omnidyn.simulation.slip.body import GRIPS, body_blocks, current_at, plane_block, set_line, wheel_answer
 
 SWEEPS = 4000
-TIGHT = 2e-15  # of the speeds at hand: a change that is rounding
+SPEED_TOLERANCE = 2e-15  # of the speeds at hand: a change that is rounding
 
 
 @part
@@ -43,11 +43,11 @@ def _frame(plant, tau, goal, v, total, frame):
 
 
 @part
-def solve_stage(plant, stage, start, room, x, each):
+def solve_stage(plant, stage, start, room, x, element_states):
     """Solve a stage in place. x (3 + n,): twist, rim speeds, at first a guess. start: x of before the step.
 
-    room: its goal is x*, its pull the wrench on the body. each: of a SlipState; its forces are a first guess too.
-    Returns the number of sweeps.
+    room: its goal is x*, its pull the wrench on the body. element_states: of a SlipState; its forces are a first guess
+    too. Returns the number of sweeps.
     """
     goal, pull, space, lines = room.goal, room.pull, room.space, room.lines
     n, heavy, total, frame, offset = len(plant.spin), space[:3], space[3:6], space[6:9], space[9:12]
@@ -55,22 +55,22 @@ def solve_stage(plant, stage, start, room, x, each):
     for a in range(3):
         heavy[a] = plant.mass[a] / tau + plant.element[a].viscous
         offset[a] = plant.mass[a] / tau * goal[a] + pull[a]
-        total[a] = offset[a] + each[a].force
+        total[a] = offset[a] + element_states[a].force
         frame[a] = 0.0
-    total[0], total[1] = total[0] + each[3 + n].force, total[1] + each[4 + n].force
+    total[0], total[1] = total[0] + element_states[3 + n].force, total[1] + element_states[4 + n].force
     for w in range(n):
         set_line(lines[w], plant.element[3 + w], stage.each[3 + w], tau)
         for a in range(3):
-            total[a] += plant.g[w, a] * each[3 + w].force
+            total[a] += plant.g[w, a] * element_states[3 + w].force
     for sweep in range(SWEEPS):
         worst, size, loads = 0.0, 0.0, 0.0  # loads: forces of which what is left is the rounding
         v0, v1, v2 = total[0] / heavy[0], total[1] / heavy[1], total[2] / heavy[2]
         _frame(plant, tau, goal, (v0, v1, v2), total, frame)
         for w in range(n):
-            free, give, own = 0.0, 0.0, each[3 + w]
+            free, give, wheel_state = 0.0, 0.0, element_states[3 + w]
             for a in range(3):
                 g = plant.g[w, a]
-                free += g * (total[a] - g * own.force) / heavy[a]
+                free += g * (total[a] - g * wheel_state.force) / heavy[a]
                 give += g * g / heavy[a]
             limit = plant.grip[w]
             if len(plant.shift) > 0:  # the floor's force on the body, as far as it is known by now
@@ -81,12 +81,12 @@ def solve_stage(plant, stage, start, room, x, each):
                 plant.element[3 + w], stage.each[3 + w], lines[w], tau, plant.spin[w], goal[3 + w], (free, give), limit
             )
             for a in range(3):
-                total[a] += plant.g[w, a] * (f - own.force)
-            own.force, x[3 + w], loads = f, s, loads + abs(f)
-            own.sign, own.contact = sign, contact
+                total[a] += plant.g[w, a] * (f - wheel_state.force)
+            wheel_state.force, x[3 + w], loads = f, s, loads + abs(f)
+            wheel_state.sign, wheel_state.contact = sign, contact
         if bends:
-            worst = plane_block(plant, stage, heavy, total, each)
-        body_blocks(plant, stage, heavy, total, each)
+            worst = plane_block(plant, stage, heavy, total, element_states)
+        body_blocks(plant, stage, heavy, total, element_states)
         for a in range(3):
             now, was = total[a] / heavy[a], (v0 if a == 0 else (v1 if a == 1 else v2))
             reach = math.sqrt(plant.mass[a] / plant.mass[0])  # yaw as a length
@@ -94,36 +94,36 @@ def solve_stage(plant, stage, start, room, x, each):
             x[a] = now
         size += loads / (heavy[0] + heavy[1])
         if falls:
-            worst = max(worst, follow_speeds(plant, stage, x, each) / (heavy[0] + heavy[1]))
-        solved = worst <= TIGHT * size or (worst == 0.0 and sweep > 0)
+            worst = max(worst, follow_speeds(plant, stage, x, element_states) / (heavy[0] + heavy[1]))
+        solved = worst <= SPEED_TOLERANCE * size or (worst == 0.0 and sweep > 0)
         if solved and (falls or plant.gaps != 0.0):
-            settle_rest(plant, stage, x, each)
-        if solved and (plant.gaps == 0.0 or not give_way(plant, stage, start, x, each)):
-            _finish(plant, stage, lines, x, each)
+            settle_rest(plant, stage, x, element_states)
+        if solved and (plant.gaps == 0.0 or not give_way(plant, stage, start, x, element_states)):
+            _finish(plant, stage, lines, x, element_states)
             return sweep + 1
-    _finish(plant, stage, lines, x, each)
+    _finish(plant, stage, lines, x, element_states)
     return SWEEPS
 
 
 @part
-def _finish(plant, stage, lines, x, each):
+def _finish(plant, stage, lines, x, element_states):
     """The rim speeds of what grips, currents and bristles; a body that every wheel holds is at rest to the last bit."""
-    n, held = len(plant.spin), True
+    n, body_holds = len(plant.spin), True
     for w in range(n):
-        held &= each[3 + w].sign == 0.0 and each[3 + w].contact == GRIPS
-    if held:
+        body_holds &= element_states[3 + w].sign == 0.0 and element_states[3 + w].contact == GRIPS
+    if body_holds:
         x[0] = x[1] = x[2] = 0.0
     for w in range(n):
-        if each[3 + w].contact == GRIPS:
+        if element_states[3 + w].contact == GRIPS:
             p = plant.g[w, 0] * x[0] + plant.g[w, 1] * x[1] + plant.g[w, 2] * x[2]
-            x[3 + w] = 0.0 if each[3 + w].sign == 0.0 else p
+            x[3 + w] = 0.0 if element_states[3 + w].sign == 0.0 else p
     if plant.remembers != 0.0:
         for e in range(3 + n):
-            own, at = plant.element[e], stage.each[e]
-            if own.inductance > 0.0:
+            record, at = plant.element[e], stage.each[e]
+            if record.inductance > 0.0:
                 at.current = current_at(lines[e - 3], x[e])[0]
-            if own.stiffness > 0.0:
-                at.bend = bristle_force(own, x[e], at.aimed_bend, stage.task.tau)[2]
+            if record.stiffness > 0.0:
+                at.bend = bristle_force(record, x[e], at.aimed_bend, stage.task.tau)[2]
 
 
 @part
@@ -142,8 +142,8 @@ def _aim(plant, stage, start, end, goal, back):
 def _torn_loose(plant, stage, start, end):
     """Whether a wheel at rest gave way in a step so long, h R/L > 1 + sqrt 2, that its current overshoots."""
     for e in range(3, len(plant.element)):
-        own = plant.element[e]
-        stiff = own.inductance > 0.0 and stage.task.tau * own.resistance > STIFF * own.inductance
+        record = plant.element[e]
+        stiff = record.inductance > 0.0 and stage.task.tau * record.resistance > STIFF * record.inductance
         if stiff and start.each[e].sign == 0.0 and end.each[e].sign != 0.0:
             return True
     return False
@@ -194,9 +194,9 @@ EXCESS = 1e-10  # of its level, by which a force must exceed it to move anything
 def begin_levels(plant, stage, start):
     """Set the levels with which a step from a state begins."""
     for e in range(len(plant.element)):
-        own, at, sign = plant.element[e], stage.each[e], start.each[e].sign
-        at.hold[0] = own.coulomb[0] if sign == 1.0 else own.breakaway[0]
-        at.hold[1] = own.coulomb[1] if sign == -1.0 else own.breakaway[1]
+        record, at, sign = plant.element[e], stage.each[e], start.each[e].sign
+        at.hold[0] = record.coulomb[0] if sign == 1.0 else record.breakaway[0]
+        at.hold[1] = record.coulomb[1] if sign == -1.0 else record.breakaway[1]
     slides = start.each[len(plant.element)].sign == 1.0
     stage.task.ellipse = 1.0 if slides else 0.0  # 1: it has not been at rest in this step
     _of_ellipse(plant.body[0], stage, slides)
@@ -209,23 +209,23 @@ def _of_ellipse(body, stage, slides):
 
 
 @part
-def follow_speeds(plant, stage, x, each):
+def follow_speeds(plant, stage, x, element_states):
     """Set the levels of what falls with the speed: x (3 + n,), twist and rims. Returns the largest change."""
     worst, m = 0.0, len(plant.element)
     for e in range(m):
-        own, at, sign = plant.element[e], stage.each[e], each[e].sign
-        if own.fall > 0.0 and (own.breakaway[0] > own.coulomb[0] or own.breakaway[1] > own.coulomb[1]):
+        record, at, sign = plant.element[e], stage.each[e], element_states[e].sign
+        if record.fall > 0.0 and (record.breakaway[0] > record.coulomb[0] or record.breakaway[1] > record.coulomb[1]):
             for a in range(2):
-                level = own.breakaway[a]
+                level = record.breakaway[a]
                 if sign == (1.0 if a == 0 else -1.0):
-                    level = level_at(x[e], own.coulomb[a], level, own.fall, own.form, own.exponent)[0]
+                    level = level_at(x[e], record.coulomb[a], level, record.fall, record.form, record.exponent)[0]
                 worst = max(worst, abs(level - at.hold[a]))
                 at.hold[a] = level
     body = plant.body[0]
     if body.fall > 0.0:
         for a in range(2):
             level = body.breakaway[a]
-            if each[m].sign == 1.0:
+            if element_states[m].sign == 1.0:
                 speed = math.hypot(x[0], x[1])
                 level = level_at(speed, body.coulomb[a], level, body.fall, body.form, body.exponent)[0]
             worst = max(worst, abs(level - stage.task.hold[a]))
@@ -234,41 +234,41 @@ def follow_speeds(plant, stage, x, each):
 
 
 @part
-def settle_rest(plant, stage, x, each):
+def settle_rest(plant, stage, x, element_states):
     """Let rest what moves by rounding alone: where others share its load it may stand at the edge of its levels."""
     tau, m = stage.task.tau, len(plant.element)
     for e in range(m):
-        at, sign = stage.each[e], each[e].sign
+        at, sign = stage.each[e], element_states[e].sign
         heavy = plant.mass[e] if e < 3 else plant.spin[e - 3]
         if (sign == 1.0 or sign == -1.0) and abs(x[e]) * heavy <= EXCESS * tau * max(at.hold[0], at.hold[1]):
-            x[e] = each[e].sign = 0.0
-    most = max(stage.task.hold[0], stage.task.hold[1])
-    if each[m].sign == 1.0 and math.hypot(x[0], x[1]) * plant.mass[0] <= EXCESS * tau * most:
-        x[0] = x[1] = each[m].sign = 0.0
+            x[e] = element_states[e].sign = 0.0
+    largest_hold = max(stage.task.hold[0], stage.task.hold[1])
+    if element_states[m].sign == 1.0 and math.hypot(x[0], x[1]) * plant.mass[0] <= EXCESS * tau * largest_hold:
+        x[0] = x[1] = element_states[m].sign = 0.0
 
 
 @part
-def give_way(plant, stage, start, x, each):
+def give_way(plant, stage, start, x, element_states):
     """Let what moved against its breakaway level slide. Returns whether anything changed: then the stage is solved
     anew. start: x of before the step."""
-    changed, m = False, len(plant.element)
+    has_changed, m = False, len(plant.element)
     for e in range(m):
-        own, at, sign = plant.element[e], stage.each[e], each[e].sign
-        if own.fall == 0.0 and (sign == 1.0 or sign == -1.0):
+        record, at, sign = plant.element[e], stage.each[e], element_states[e].sign
+        if record.fall == 0.0 and (sign == 1.0 or sign == -1.0):
             side = 0 if sign > 0.0 else 1
-            changed |= at.hold[side] != own.coulomb[side]
-            at.hold[side] = own.coulomb[side]
+            has_changed |= at.hold[side] != record.coulomb[side]
+            at.hold[side] = record.coulomb[side]
     body, task = plant.body[0], stage.task
-    if body.fall == 0.0 and each[m].sign == 1.0:
+    if body.fall == 0.0 and element_states[m].sign == 1.0:
         slides = task.hold[0] == body.coulomb[0] and task.hold[1] == body.coulomb[1]
         if not slides:
             _of_ellipse(body, stage, True)
-            changed = True
+            has_changed = True
         elif task.ellipse == 1.0 and x[0] * start[0] + x[1] * start[1] < 0.0:  # it went through rest
             _of_ellipse(body, stage, False)
             task.ellipse = 0.0
-            changed |= task.hold[0] != body.coulomb[0] or task.hold[1] != body.coulomb[1]
-    return changed
+            has_changed |= task.hold[0] != body.coulomb[0] or task.hold[1] != body.coulomb[1]
+    return has_changed
 
 
 @part
@@ -280,8 +280,10 @@ def stops(plant, start, end):
         if start.each[e].contact != end.each[e].contact:
             return True
     for e in range(m):
-        own, before = plant.element[e], start.each[e].sign
-        gap = own.fall == 0.0 and (own.breakaway[0] > own.coulomb[0] or own.breakaway[1] > own.coulomb[1])
+        record, before = plant.element[e], start.each[e].sign
+        gap = record.fall == 0.0 and (
+            record.breakaway[0] > record.coulomb[0] or record.breakaway[1] > record.coulomb[1]
+        )
         if gap and (before == 1.0 or before == -1.0) and before != end.each[e].sign:
             return True
     body = plant.body[0]

@@ -27,7 +27,7 @@ from omnidyn.model.known.told import holding
 from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.sensitivity.directions import EPS, difference
-from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, Program, late_samples
+from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, VoltageProgram, late_samples
 from omnidyn.simulation.sensitivity.sample import PATH, PLACE, TURN
 from omnidyn.simulation.sensitivity.slipping import slipping_samples
 
@@ -175,7 +175,7 @@ class ImplicitEngine(Engine[Problem]):
         t = piece.record.t[piece.first : piece.last + 1]
         voltage, directions, at, factors = self._directions(robot, moved, scales, piece, values)
         push, more, where = self._forces(robot, moved, piece, values, directions)
-        program, travel = Program(t, voltage, state[:N_AXES], push), travel_of(piece.record.columns)
+        program, travel = VoltageProgram(t, voltage, state[:N_AXES], push), travel_of(piece.record.columns)
         factors = np.concatenate([factors, np.ones(len(where))])
         return self._sampled(robot, program, more, late, travel), [*at, *where], factors
 
@@ -207,7 +207,7 @@ class ImplicitEngine(Engine[Problem]):
         return wrench(robot, force), own, list(known.values())
 
     def _sampled(
-        self, robot: Robot, program: Program, directions: Sequence[Direction], late: Sequence[float], travel: int
+        self, robot: Robot, program: VoltageProgram, directions: Sequence[Direction], late: Sequence[float], travel: int
     ) -> list[LateSample]:
         """The run of this program, seen with every latency."""
         return late_samples(robot, program, directions, late, self.tol, travel)[0]
@@ -261,7 +261,7 @@ class SlipEngine(ImplicitEngine):
     pushes = False
 
     def _sampled(
-        self, robot: Robot, program: Program, directions: Sequence[Direction], late: Sequence[float], travel: int
+        self, robot: Robot, program: VoltageProgram, directions: Sequence[Direction], late: Sequence[float], travel: int
     ) -> list[LateSample]:
         steps, tol = (1, 0.0) if self.tol is None else (STEPS, max(self.tol, LEAST_TOL))
         seen = slipping_samples(robot, program, directions, late, steps, tol)

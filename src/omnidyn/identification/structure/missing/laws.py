@@ -26,7 +26,7 @@ from omnidyn.model.dynamics import frame_wrench
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
 from omnidyn.model.friction.direction import DISSIPATION
 from omnidyn.model.friction.kinds import COULOMB, LUGRE
-from omnidyn.model.friction.stribeck import USUAL as EXPONENT
+from omnidyn.model.friction.stribeck import USUAL_EXPONENT as EXPONENT
 from omnidyn.model.friction.stribeck import fallen
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, WHEELS, find_key
 from omnidyn.model.layout import N_AXES, YAW

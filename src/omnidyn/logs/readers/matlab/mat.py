@@ -92,21 +92,21 @@ class _Hdf5Walk:
                 )
             if name in ("#refs#", "#subsystem#") or not isinstance(link, self.h5py.HardLink):
                 continue
-            item, here = group[name], f"{path}/{name}" if path else name
+            item, item_path = group[name], f"{path}/{name}" if path else name
             kind = item.attrs.get("MATLAB_class", b"")
             kind = kind.decode("utf-8", "replace") if isinstance(kind, bytes) else ""
             if isinstance(item, self.h5py.Group):
-                self.group(item, here, depth + 1)
+                self.group(item, item_path, depth + 1)
             elif isinstance(item, self.h5py.Dataset):
-                self.dataset(item, here, kind)
+                self.dataset(item, item_path, kind)
 
     def dataset(self, item: Any, name: str, kind: str) -> None:
         """One variable. Raises InputError before it is read, where it is too large."""
         if kind == "char" or "MATLAB_empty" in item.attrs or item.dtype.kind in "SU":
             return
         if item.dtype.kind not in "fiub" or item.ndim > 2 or (kind and kind not in NUMBERS) or item.is_virtual:
-            what = "an object" if kind not in ("", "cell", "struct", *NUMBERS) else kind or str(item.dtype)
-            self.variables.passed[name] = what
+            description = "an object" if kind not in ("", "cell", "struct", *NUMBERS) else kind or str(item.dtype)
+            self.variables.passed[name] = description
             return
         self.expanded += 8 * item.size
         if self.expanded > max(MAX_EXPANSION * self.size, MIN_EXPANDED_BYTES):

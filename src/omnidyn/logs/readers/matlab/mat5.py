@@ -47,7 +47,7 @@ def read_mat5(stream: BinaryIO, size: int, variables: Variables, max_bytes: int)
         raise damaged(
             variables.source, "a header that is cut short" if len(head) < HEADER else "no mark of the byte order"
         )
-    unpacker = _Unpacker(stream, size, variables.source, max_bytes)
+    unpacker = _MatUnpacker(stream, size, variables.source, max_bytes)
     try:
         while stream.tell() < size:
             content = unpacker.element(order)
@@ -68,7 +68,7 @@ def damaged(source: str, got: str) -> InputError:
     )
 
 
-class _Unpacker:
+class _MatUnpacker:
     """The variables of a file one by one, unpacked within bounds."""
 
     def __init__(self, stream: BinaryIO, size: int, source: str, max_bytes: int):
@@ -92,9 +92,9 @@ class _Unpacker:
             raise _Damaged(f"an element of kind {kind}")
         return memoryview(content) if kind == MATRIX else None
 
-    def _count(self, more: int) -> None:
+    def _count(self, size: int) -> None:
         """Raises InputError beyond what the file may grow to, before that is held."""
-        self.expanded += more
+        self.expanded += size
         if self.expanded > self.most:
             raise InputError(
                 "the file would grow too much",
@@ -138,8 +138,8 @@ class _Matrix:
             self.variables.passed[name or "a variable"] = "an object"
             return None
         shape = tuple(int(number) for number in self._numbers())
-        own = bytes(self._next().data).rstrip(b"\0").decode("latin-1")
-        name = name or own or "a variable"
+        matrix_name = bytes(self._next().data).rstrip(b"\0").decode("latin-1")
+        name = name or matrix_name or "a variable"
         if not shape or min(shape) < 0:
             raise _Damaged(f"{name} has no shape")
         if FIRST_NUMERIC <= kind <= LAST_NUMERIC:

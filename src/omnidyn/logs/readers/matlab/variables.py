@@ -55,18 +55,20 @@ class Variables:
         heads = [tuple(_below(array)) for array in self.arrays]
         for name in names:
             if not any(name in head for head in heads):
-                known = list(dict.fromkeys(part for head in heads for part in head))
-                close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+                known_names = list(dict.fromkeys(part for head in heads for part in head))
+                matches = difflib.get_close_matches(name, known_names, n=1, cutoff=0.5)
                 raise InputError(
                     "no such variable",
                     got=name,
-                    expected=shortened(", ".join(known), 300) or "a file with variables",
-                    remedy=f"did you mean {close[0]}?" if close else "",
+                    expected=shortened(", ".join(known_names), 300) or "a file with variables",
+                    remedy=f"did you mean {matches[0]}?" if matches else "",
                     where=self.source,
                 )
-        mine = {each: values for each, values in self.arrays.items() if set(_below(each)) & set(names)}
+        arrays = {variable: values for variable, values in self.arrays.items() if set(_below(variable)) & set(names)}
         return replace(
-            self, arrays=mine, passed={each: w for each, w in self.passed.items() if set(_below(each)) & set(names)}
+            self,
+            arrays=arrays,
+            passed={variable: w for variable, w in self.passed.items() if set(_below(variable)) & set(names)},
         )
 
     @property
@@ -74,10 +76,10 @@ class Variables:
         """Vectors, and the columns of matrices, whose rows are as many as the times of their file or struct."""
         times = [array for name, array in self.arrays.items() if _is_time(name)]
         lengths = {time_values.size for time_values in times if time_values.ndim == 1 or 1 in time_values.shape}
-        found: dict[str, FloatArray] = {}
+        columns: dict[str, FloatArray] = {}
         for name, values in self.arrays.items():
             if values.ndim == 1 or 1 in values.shape:
-                found[name] = values.reshape(-1)
+                columns[name] = values.reshape(-1)
                 continue
             turned = values.shape[0] not in lengths and values.shape[1] in lengths
             turned |= not lengths & set(values.shape) and values.shape[0] < values.shape[1]
@@ -85,13 +87,13 @@ class Variables:
             if table.shape[1] > WIDEST:
                 self.passed[name] = f"{' x '.join(map(str, values.shape))}: more than {WIDEST} columns"
                 continue
-            found |= {_numbered(name, k): column for k, column in enumerate(table.T, 1)}
-        return found
+            columns |= {_numbered(name, k): column for k, column in enumerate(table.T, 1)}
+        return columns
 
     @property
     def notes(self) -> tuple[str, ...]:
-        told = [f"{name} ({why})" for name, why in self.passed.items()]
-        return (*self.said, *((f"not read: {shortened(', '.join(told), 300)}",) if told else ()))
+        omissions = [f"{name} ({reason})" for name, reason in self.passed.items()]
+        return (*self.said, *((f"not read: {shortened(', '.join(omissions), 300)}",) if omissions else ()))
 
 
 def _below(name: str) -> Iterator[str]:
@@ -129,10 +131,10 @@ def tables_of(variables: Variables, rows: int) -> Iterator[Table]:
     if len(structs := {name.rpartition("/")[0] for name in columns}) == 1:
         columns = {name.removeprefix(f"{next(iter(structs))}/"): values for name, values in columns.items()}
     names, count = tuple(columns), len(next(iter(columns.values())))
-    most = max(1, min(rows, MAX_CELLS // len(names)))
-    for first in range(0, count, most):
-        part = {name: values[first : first + most].copy() for name, values in columns.items()}
-        lines = np.arange(first + 1, min(first + most, count) + 1)
+    block_rows = max(1, min(rows, MAX_CELLS // len(names)))
+    for first in range(0, count, block_rows):
+        part = {name: values[first : first + block_rows].copy() for name, values in columns.items()}
+        lines = np.arange(first + 1, min(first + block_rows, count) + 1)
         refuse_infinite(part, lines, variables.source)
         yield Table(names, part, lines, {}, variables.source, "", variables.notes)
     yield Table(names, {}, np.zeros(0, dtype=np.int64), {}, variables.source, variables.sha256, variables.notes)
@@ -144,27 +146,30 @@ def recording_of(variables: Variables) -> Recording:
     times = {name: values for name, values in columns.items() if _is_time(name)}
     members: dict[str, dict[str, FloatArray]] = {name: {} for name in times}
     topics, notes = [], list(variables.notes)
-    lost = []
+    timeless = []
     for name, values in columns.items():
         if name in times:
             continue
         owner = _clock(name, len(values), times)
         if owner is None:
-            lost.append(name)
+            timeless.append(name)
         else:
             members[owner][name] = values
-    if lost:
-        notes.append(f"no time of their length: {shortened(', '.join(lost), 300)} are not used")
+    if timeless:
+        notes.append(f"no time of their length: {shortened(', '.join(timeless), 300)} are not used")
     tracks = []
-    for name, mine in members.items():
+    for name, struct_columns in members.items():
         stamps = np.rint(times[name] * _second(name, times[name], variables.source) * 1e9)
-        known = np.abs(stamps) < LATEST_NS
-        kept = {each: values[known] for each, values in mine.items()}
-        track = Track(name, stamps[known].astype(np.int64), kept)
-        if kept:
+        valid = np.abs(stamps) < LATEST_NS
+        track_columns = {column_name: values[valid] for column_name, values in struct_columns.items()}
+        track = Track(name, stamps[valid].astype(np.int64), track_columns)
+        if track_columns:
             tracks.append(track)
-        topics.append(topic_of(name, "time", track.stamps, bool(kept)))
-        topics += [topic_of(each, "numbers", track.stamps[np.isfinite(values)], True) for each, values in kept.items()]
+        topics.append(topic_of(name, "time", track.stamps, bool(track_columns)))
+        topics += [
+            topic_of(column_name, "numbers", track.stamps[np.isfinite(values)], True)
+            for column_name, values in track_columns.items()
+        ]
     if not tracks:
         raise _nothing(variables)
     return Recording(tracks, topics, variables.source, variables.sha256, notes)
@@ -172,10 +177,10 @@ def recording_of(variables: Variables) -> Recording:
 
 def _clock(name: str, length: int, times: Mapping[str, FloatArray]) -> str | None:
     """The time of a column: in its own struct, else the only one of its length."""
-    fits = [each for each, values in times.items() if len(values) == length]
-    own = [fit for fit in fits if fit.rpartition("/")[0] == name.rpartition("/")[0]]
-    chosen = own or fits
-    return chosen[0] if len(chosen) == 1 else None
+    fits = [time_name for time_name, values in times.items() if len(values) == length]
+    siblings = [fit for fit in fits if fit.rpartition("/")[0] == name.rpartition("/")[0]]
+    candidates = siblings or fits
+    return candidates[0] if len(candidates) == 1 else None
 
 
 def _second(name: str, values: FloatArray, source: str) -> float:
@@ -197,11 +202,11 @@ def _second(name: str, values: FloatArray, source: str) -> float:
 
 
 def _nothing(variables: Variables) -> InputError:
-    told = ", ".join([*(f"{name}: {why}" for name, why in variables.passed.items()), *variables.arrays])
-    objects = any("object" in why for why in variables.passed.values())
+    contents = ", ".join([*(f"{name}: {reason}" for name, reason in variables.passed.items()), *variables.arrays])
+    objects = any("object" in reason for reason in variables.passed.values())
     return InputError(
         "the file holds no columns of numbers",
-        got=shortened(told, 300) or "no variables",
+        got=shortened(contents, 300) or "no variables",
         expected="vectors of one length, or structs of them, with a time among them",
         remedy=OBJECTS if objects else "save one vector per wheel, and the time: save('log.mat', 't_s', 'u1_V')",
         where=variables.source,

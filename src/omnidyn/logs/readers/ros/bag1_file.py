@@ -37,10 +37,10 @@ class Bag1File:
             while self.stream.tell() < self.size:
                 at = self.stream.tell()
                 fields = _fields(self._read())
-                data, whole = self._read_some()
-                if whole or (fields["op"][0] == CHUNK and fields["compression"] == b"none"):
-                    yield from self._record(fields, data, whole)
-                if not whole:
+                data, complete = self._read_some()
+                if complete or (fields["op"][0] == CHUNK and fields["compression"] == b"none"):
+                    yield from self._record(fields, data, complete)
+                if not complete:
                     raise DamagedError("it ends in the middle of a record")
                 self._count(fields, at)
                 self.told(self.stream.tell())
@@ -52,18 +52,18 @@ class Bag1File:
             self.damage = "a record is not what it says"
 
     def _read(self) -> bytes:
-        content, whole = self._read_some()
-        if not whole:
+        content, complete = self._read_some()
+        if not complete:
             raise DamagedError("it ends in the middle of a record")
         return content
 
     def _read_some(self) -> tuple[bytes, bool]:
         """The next content with a length in front, and whether all of it is there."""
-        length, left = self.stream.read(4), self.size - self.stream.tell()
+        length, remaining = self.stream.read(4), self.size - self.stream.tell()
         if len(length) < 4:
             return b"", False
         (count,) = _LENGTH.unpack(length)
-        return self.stream.read(min(count, left)), count <= left
+        return self.stream.read(min(count, remaining)), count <= remaining
 
     def _count(self, fields: dict[str, bytes], at: int) -> None:
         """Records of the index, of those that the head of the bag promises. at: where the record begins."""
@@ -74,26 +74,28 @@ class Bag1File:
         elif operation in (CONNECTION, CHUNK_INFO) and self.promised is not None:
             self.indexed += at >= self.promised[0]
 
-    def _record(self, fields: dict[str, bytes], data: bytes, whole: bool = True) -> Iterator[Message]:
-        """The messages of a record. Not `whole`: of a chunk that is not packed, up to where it ends."""
+    def _record(self, fields: dict[str, bytes], data: bytes, complete: bool = True) -> Iterator[Message]:
+        """The messages of a record. Not `complete`: of a chunk that is not packed, up to where it ends."""
         operation = fields["op"][0]
         if operation == CHUNK:
             kind, content = fields["compression"].decode(), data
-            if whole:
+            if complete:
                 content = self.unpacker.unpack(kind, data, _LENGTH.unpack(fields["size"])[0])
             at = 0
             while at < len(content):
                 head, at = _piece(content, at)
                 inner, at = _piece(content, at)
-                found = _fields(head)
-                if found["op"][0] == CHUNK:
+                inner_fields = _fields(head)
+                if inner_fields["op"][0] == CHUNK:
                     raise DamagedError("a chunk within a chunk")
-                yield from self._record(found, inner)
+                yield from self._record(inner_fields, inner)
         elif operation == CONNECTION:
-            more = _fields(data)
+            connection_fields = _fields(data)
             number = _LENGTH.unpack(fields["conn"])[0]
-            text = more["message_definition"].decode("utf-8", "replace")
-            self.connections[number] = Connection(fields["topic"].decode(), more["type"].decode(), text, "ros1")
+            text = connection_fields["message_definition"].decode("utf-8", "replace")
+            self.connections[number] = Connection(
+                fields["topic"].decode(), connection_fields["type"].decode(), text, "ros1"
+            )
         elif operation == MESSAGE:
             seconds, rest = _STAMP.unpack(fields["time"])
             connection = self.connections.get(_LENGTH.unpack(fields["conn"])[0])
@@ -113,9 +115,9 @@ def _piece(content: bytes, at: int) -> tuple[bytes, int]:
 
 def _fields(content: bytes) -> dict[str, bytes]:
     """name=value, each with its length in front."""
-    found, at = {}, 0
+    fields, at = {}, 0
     while at < len(content):
         field, at = _piece(content, at)
         name, _, value = field.partition(b"=")
-        found[name.decode()] = value
-    return found
+        fields[name.decode()] = value
+    return fields

@@ -35,10 +35,10 @@ def read_files(paths: Sequence[Path], source: str, options: ReadOptions) -> Reco
     """Files of one recording, in their order."""
     limit = options.max_bytes if options.max_bytes is not None else default_max_bytes()
     bag, digest, damage, grown = Bag(source, limit), hashlib.sha256(), [], []
-    total, done = sum(os.stat(path).st_size for path in paths if path.exists()), 0
+    total, bytes_before = sum(os.stat(path).st_size for path in paths if path.exists()), 0
     for path in paths:
 
-        def told(at: int, before: int = done) -> None:
+        def told(at: int, before: int = bytes_before) -> None:
             options.progress(Report("reading", before + at, total))
 
         with open_regular(path) as stream:
@@ -46,7 +46,7 @@ def read_files(paths: Sequence[Path], source: str, options: ReadOptions) -> Reco
             for block in pieces(stream, size):
                 digest.update(block)
             stream.seek(0)
-            done += size
+            bytes_before += size
             with _opened(stream, path, limit, told) as file:
                 bag.add(file.messages(bag.wants))
             damage += [file.damage] if file.damage else []
@@ -68,7 +68,7 @@ def read_files(paths: Sequence[Path], source: str, options: ReadOptions) -> Reco
 
 
 @contextlib.contextmanager
-def _opened(stream: BinaryIO, path: Path, limit: int, told: Callable[[int], None]) -> Iterator[Any]:
+def _opened(stream: BinaryIO, path: Path, limit: int, progress: Callable[[int], None]) -> Iterator[Any]:
     """The file by its first bytes; one that was packed whole is unpacked beside, within bounds."""
     size, start = os.fstat(stream.fileno()).st_size, stream.read(16)
     stream.seek(0)
@@ -77,14 +77,14 @@ def _opened(stream: BinaryIO, path: Path, limit: int, told: Callable[[int], None
             plain = Path(folder) / path.with_suffix("").name
             with open(plain, "wb") as unpacked:
                 unpack_file(stream, unpacked, str(path), max(MAX_EXPANSION * size, MIN_EXPANDED_BYTES))
-            with open_regular(plain) as inner, _opened(inner, plain, limit, told) as file:
+            with open_regular(plain) as inner, _opened(inner, plain, limit, progress) as file:
                 yield file
         return
     unpacker = Unpacker(str(path), size, limit)
     if start.startswith(SQLITE):
-        yield Db3File(path, size, unpacker, told)
+        yield Db3File(path, size, unpacker, progress)
     else:
-        yield (Bag1File if start.startswith(ROSBAG) else McapFile)(stream, size, unpacker, told)
+        yield (Bag1File if start.startswith(ROSBAG) else McapFile)(stream, size, unpacker, progress)
 
 
 def tables_of(read: Callable[[str | os.PathLike, ReadOptions], Recording]) -> Callable[..., Iterator[Table]]:
@@ -96,7 +96,7 @@ def tables_of(read: Callable[[str | os.PathLike, ReadOptions], Recording]) -> Ca
     return tables
 
 
-_HOW: tuple[Any, ...] = (tables_of(read_bag), "one message", read_bag, True)
-MCAP = Reader("mcap", "an MCAP recording", (".mcap",), *_HOW)
-ROS2 = Reader("sqlite", "a ROS 2 bag", (".db3",), *_HOW)
-ROS1 = Reader("bag", "a ROS 1 bag", (".bag",), *_HOW)
+_BAG_READER: tuple[Any, ...] = (tables_of(read_bag), "one message", read_bag, True)
+MCAP = Reader("mcap", "an MCAP recording", (".mcap",), *_BAG_READER)
+ROS2 = Reader("sqlite", "a ROS 2 bag", (".db3",), *_BAG_READER)
+ROS1 = Reader("bag", "a ROS 1 bag", (".bag",), *_BAG_READER)

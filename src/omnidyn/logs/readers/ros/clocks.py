@@ -21,7 +21,7 @@ MOST_RESETS = 20  # times: so often no clock is set back
 SEAM = SECOND  # what is put where the true time is not known: enough for a gap
 OTHER_CLOCK = SECOND  # two times of one message differ by less, where they are of one clock
 JUMP = SECOND // 2  # of a header against the time of reception
-OWN = "/omnidyn/"  # topics that are written with the time of the row as the time of reception
+OMNIDYN_TOPICS = "/omnidyn/"  # topics that are written with the time of the row as the time of reception
 YEAR_NS = 365 * 86_400 * SECOND
 
 
@@ -41,8 +41,8 @@ class Clocked:
     @property
     def offset(self) -> int:
         """How much the stamps lie behind the times of reception, as a median; 0 without stamps."""
-        mine = self.stamped
-        return int(np.median((self.header - self.receive)[mine])) if mine.any() else 0
+        rows = self.stamped
+        return int(np.median((self.header - self.receive)[rows])) if rows.any() else 0
 
 
 def trusted(topics: Sequence[Clocked]) -> tuple[dict[str, IntArray], list[str]]:
@@ -52,19 +52,21 @@ def trusted(topics: Sequence[Clocked]) -> tuple[dict[str, IntArray], list[str]]:
         return {}, notes
     topics = [_smoothed(topic, notes) for topic in _sewn(topics, notes)]
     stamped = [topic for topic in topics if topic.stamped.any()]
-    bare = [topic.topic for topic in topics if not topic.stamped.any() and OWN not in topic.topic]
+    bare = [topic.topic for topic in topics if not topic.stamped.any() and OMNIDYN_TOPICS not in topic.topic]
     if bare and stamped:
-        told = shortened(", ".join(bare), 200)
-        notes.append(f"{told}: no stamps, so the times of reception are taken, which lag behind by the way to it")
+        topic_words = shortened(", ".join(bare), 200)
+        notes.append(
+            f"{topic_words}: no stamps, so the times of reception are taken, which lag behind by the way to it"
+        )
     if not stamped and bare:
         notes.append("no message has a stamp of its own: the times of reception are taken")
     if not stamped:
         return {topic.topic: _from_1970(topic.receive, notes) for topic in topics}, list(dict.fromkeys(notes))
     reference = _reference(stamped)
-    found = {}
+    stamps_of = {}
     for topic in topics:
         if not topic.stamped.any():
-            found[topic.topic] = _as_reference(topic.receive, reference)
+            stamps_of[topic.topic] = _as_reference(topic.receive, reference)
             continue
         apart = topic.offset - reference.offset
         shift = 0
@@ -76,7 +78,7 @@ def trusted(topics: Sequence[Clocked]) -> tuple[dict[str, IntArray], list[str]]:
                 "by as much as its fastest message shows; what all of them take is not known"
             )
         late = topic.receive + (topic.offset if topic.stamped.any() else 0)
-        found[topic.topic] = np.where(topic.stamped, topic.header, late) - shift
+        stamps_of[topic.topic] = np.where(topic.stamped, topic.header, late) - shift
         bare = ~topic.stamped & (topic.receive != 0)
         if bare.any():
             notes.append(f"{topic.topic}: {int(bare.sum())} messages have no stamp: when received is taken")
@@ -86,24 +88,24 @@ def trusted(topics: Sequence[Clocked]) -> tuple[dict[str, IntArray], list[str]]:
             "that was played again; topics without stamps were moved by as much"
         )
     _from_1970(reference.header, notes)
-    return found, list(dict.fromkeys(notes))
+    return stamps_of, list(dict.fromkeys(notes))
 
 
 def _reference(stamped: Sequence[Clocked]) -> Clocked:
     """The topic whose clock counts: one that agrees with the recorder's, else the busiest."""
-    near = [topic for topic in stamped if abs(topic.offset) <= OTHER_CLOCK]
-    return max(near or stamped, key=lambda each: len(each.receive))
+    synchronous = [topic for topic in stamped if abs(topic.offset) <= OTHER_CLOCK]
+    return max(synchronous or stamped, key=lambda topic: len(topic.receive))
 
 
 def _as_reference(receive: IntArray, reference: Clocked) -> IntArray:
     """Times of reception on the clock of the stamps: as they are where the two agree, else as those of `reference`."""
     if abs(reference.offset) <= OTHER_CLOCK:
         return receive
-    mine = reference.stamped
-    known, stamps = reference.receive[mine], reference.header[mine]
-    order = np.argsort(known, kind="stable")
-    offsets = (stamps - known)[order].astype(float)
-    return receive + np.interp(receive.astype(float), known[order].astype(float), offsets).astype(np.int64)
+    rows = reference.stamped
+    receptions, stamps = reference.receive[rows], reference.header[rows]
+    order = np.argsort(receptions, kind="stable")
+    offsets = (stamps - receptions)[order].astype(float)
+    return receive + np.interp(receive.astype(float), receptions[order].astype(float), offsets).astype(np.int64)
 
 
 def _sewn(topics: Sequence[Clocked], notes: list[str]) -> list[Clocked]:
@@ -137,7 +139,7 @@ def _has_step(receive: IntArray) -> bool:
 def _are_shuffled(topics: Sequence[Clocked]) -> bool:
     """Whether times go back because messages were written out of order, not because a clock was set: what stands
     between jumps of the busiest topic does not overlap, or they are too many."""
-    busiest = max(topics, key=lambda each: len(each.receive)).receive
+    busiest = max(topics, key=lambda topic: len(topic.receive)).receive
     if any((np.diff(topic.receive) > SET_FORWARD).any() for topic in topics):
         return False
     return int((np.diff(busiest) < -SET_BACK).sum()) > MOST_RESETS or not _overlap(busiest)
@@ -165,14 +167,14 @@ def _moved(topic: Clocked, last: int, before: int, step: int) -> Clocked:
     shift = np.where(later, SEAM - step, 0)
     # A stamp goes with the clock that made it: the one before it was set, or the one after.
     old, new = np.abs(topic.header - before), np.abs(topic.header - before - step)
-    mine = topic.stamped & (np.minimum(old, new) < abs(step) / 2) & (new < old)
-    return replace(topic, receive=topic.receive + shift, header=topic.header + np.where(mine, SEAM - step, 0))
+    rows = topic.stamped & (np.minimum(old, new) < abs(step) / 2) & (new < old)
+    return replace(topic, receive=topic.receive + shift, header=topic.header + np.where(rows, SEAM - step, 0))
 
 
 def _smoothed(topic: Clocked, notes: list[str]) -> Clocked:
     """A topic whose stamps jump, while the times of reception do not: its clock was set."""
-    mine = np.flatnonzero(topic.stamped)
-    offset = (topic.header - topic.receive)[mine]
+    rows = np.flatnonzero(topic.stamped)
+    offset = (topic.header - topic.receive)[rows]
     jumps = np.flatnonzero(np.abs(np.diff(offset)) > JUMP)
     jumps = np.array([k for k in jumps.tolist() if _holds(offset, k)], dtype=np.int64)
     if not jumps.size or jumps.size > 20:
@@ -181,7 +183,7 @@ def _smoothed(topic: Clocked, notes: list[str]) -> Clocked:
     header = topic.header.copy()
     last = int(np.median(offset[edges[-2] :]))
     for a, b in itertools.pairwise(edges):
-        header[mine[a:b]] += last - int(np.median(offset[a:b]))
+        header[rows[a:b]] += last - int(np.median(offset[a:b]))
     largest = int(np.abs(np.diff(offset)).max())
     notes.append(
         f"{topic.topic}: its clock was set {jumps.size} time{'s' * (jumps.size > 1)}, by up to {largest / 1e9:.6g} s; "

@@ -53,19 +53,21 @@ class Db3File:
                 where=str(self.path),
             )
         texts = self._definitions(db) if "message_definitions" in tables else {}
-        known = {
+        connections = {
             number: Connection(str(name), str(kind), texts.get(str(kind), ""), str(form))
             for number, name, kind, form in db.execute("select id, name, type, serialization_format from topics")
             if isinstance(number, int)
         }
-        wanted = ", ".join(str(number) for number, each in known.items() if wants(each)) or "-1"
-        query = f"select topic_id, timestamp, case when topic_id in ({wanted}) then data end from messages order by id"
+        numbers = ", ".join(str(number) for number, connection in connections.items() if wants(connection)) or "-1"
+        query = f"select topic_id, timestamp, case when topic_id in ({numbers}) then data end from messages order by id"
         for count, (number, stamp, data) in enumerate(db.execute(query)):
-            if number not in known or not isinstance(stamp, int):
+            if number not in connections or not isinstance(stamp, int):
                 self.odd.add(f"a message of topic {number} at {stamp}, which is nowhere told or no time")
                 continue
             content = data if isinstance(data, bytes) else b""
-            yield Message(known[number], stamp, self.unpacker.message(content) if content[:1] == b"\x28" else content)
+            yield Message(
+                connections[number], stamp, self.unpacker.message(content) if content[:1] == b"\x28" else content
+            )
             if count % 20_000 == 0:
                 self.told(min(self.size, count * 200))
 

@@ -94,8 +94,8 @@ class _FieldWalk:
             raise BadMessageError(f"{name} is not defined")
         if not fields and not self.ros1:
             self.take(1)  # C++ has no empty structures: one byte stands for nothing
-        for each in fields:
-            self.field(each.type, each.length, f"{path}{each.name}", depth)
+        for member in fields:
+            self.field(member.type, member.length, f"{path}{member.name}", depth)
 
     def field(self, kind: str, length: int | None, path: str, depth: int) -> None:
         """A field: a value, an array of so many, or a sequence. Raises BadMessageError for too many."""
@@ -163,13 +163,13 @@ class _FieldWalk:
 
 def _merged(stretches: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Stretches that touch, but for padding, as one."""
-    found: list[tuple[int, int]] = []
+    merged: list[tuple[int, int]] = []
     for a, b in stretches:
-        if found and a == found[-1][1]:
-            found[-1] = (found[-1][0], b)
+        if merged and a == merged[-1][1]:
+            merged[-1] = (merged[-1][0], b)
         else:
-            found.append((a, b))
-    return found
+            merged.append((a, b))
+    return merged
 
 
 # Message definitions as bags carry them: text to fields. Nothing in them is ever run, and nothing grows by itself
@@ -229,19 +229,19 @@ def parse_definition(name: str, text: str) -> Types:
     """
     if len(text) > MAX_TEXT:
         raise BadDefinitionError(f"a definition of {len(text)} characters")
-    first, *others = _RULE.split(text)
+    first, *definitions = _RULE.split(text)
     types = {plain(name): _fields(plain(name), first)}
-    for part in others:
+    for part in definitions:
         head, _, body = part.strip("\n").partition("\n")
         if not head.startswith("MSG:"):
             raise BadDefinitionError(head[:60])
-        called = plain(head.removeprefix("MSG:").strip())
-        types.setdefault(called, _fields(called, body))
+        type_name = plain(head.removeprefix("MSG:").strip())
+        types.setdefault(type_name, _fields(type_name, body))
     return types
 
 
 def _fields(owner: str, text: str) -> tuple[Field, ...]:
-    found = []
+    fields = []
     for line in text.splitlines():
         words = line.partition("#")[0].split()
         if not words:
@@ -250,10 +250,10 @@ def _fields(owner: str, text: str) -> tuple[Field, ...]:
             raise BadDefinitionError(line.strip()[:60])
         if "=" in words[1] or (len(words) > 2 and words[2].startswith("=")):
             continue  # a constant
-        found.append(_field(owner, *words[:2]))
-        if len(found) > MAX_FIELDS:
+        fields.append(_field(owner, *words[:2]))
+        if len(fields) > MAX_FIELDS:
             raise BadDefinitionError(f"more than {MAX_FIELDS} fields")
-    return tuple(found)
+    return tuple(fields)
 
 
 def _field(owner: str, kind: str, name: str) -> Field:
@@ -311,16 +311,16 @@ _BASICS = {
 }
 
 # The usual messages of ROS 2, for bags that carry no definitions. Facts of its interfaces (common_interfaces).
-USUAL: Types = {name: _fields(name, text) for name, text in _BASICS.items()}
+USUAL_TYPES: Types = {name: _fields(name, text) for name, text in _BASICS.items()}
 
 
 def definition_of(name: str) -> str:
     """The whole definition of a usual message, with all that it is made of, as a bag carries it."""
-    called, done = plain(name), [plain(name)]
-    parts = [_BASICS[called]]
-    for each in done:
-        for part in USUAL[each]:
-            if part.type in _BASICS and part.type not in done:
-                done.append(part.type)
+    type_name, types = plain(name), [plain(name)]
+    parts = [_BASICS[type_name]]
+    for used_type in types:
+        for part in USUAL_TYPES[used_type]:
+            if part.type in _BASICS and part.type not in types:
+                types.append(part.type)
                 parts.append(f"{'=' * 80}\nMSG: {part.type}\n{_BASICS[part.type]}")
     return "\n".join(parts) + "\n"

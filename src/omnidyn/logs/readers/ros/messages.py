@@ -15,7 +15,7 @@ from omnidyn.logs.readers.claims import TopicClaim, TopicColumn, tracks_of
 from omnidyn.logs.readers.recording import Topic, Track, topic_of
 from omnidyn.logs.readers.ros.clocks import Clocked, trusted
 from omnidyn.logs.readers.ros.layout import (
-    USUAL,
+    USUAL_TYPES,
     BadDefinitionError,
     BadMessageError,
     MessageLayout,
@@ -83,8 +83,8 @@ class TopicReader:
                 self.types = parse_definition(kind, self.connection.definition)
             except BadDefinitionError as error:
                 self.why = f"its definition cannot be read: {printable(str(error))}"
-        elif kind in USUAL:
-            self.types = USUAL
+        elif kind in USUAL_TYPES:
+            self.types = USUAL_TYPES
         else:
             self.why = "the file holds no definition of its type"
 
@@ -99,11 +99,11 @@ class TopicReader:
         self.order.append(order)
         if self.why:
             return
-        found = self._layout(data)
-        if found is None or not found[1]:
+        layout_and_picks = self._layout(data)
+        if layout_and_picks is None or not layout_and_picks[1]:
             self.left_out.append(number)
             return
-        layout, picks = found
+        layout, picks = layout_and_picks
         waiting = self.waiting.get(id(layout))
         if waiting is None:
             waiting = self.waiting[id(layout)] = (layout, picks, [], [])
@@ -115,9 +115,9 @@ class TopicReader:
             self.flush()
 
     def _layout(self, data: bytes) -> tuple[MessageLayout, dict[str, str]] | None:
-        for known in reversed(self.layouts):
-            if known[0].fits(data):
-                return known
+        for entry in reversed(self.layouts):
+            if entry[0].fits(data):
+                return entry
         try:
             if len(data) > MAX_MESSAGE and self.rule is not None and self.rule.rank == 9:
                 raise BadMessageError(f"{len(data)} bytes are no plain numbers")
@@ -129,9 +129,9 @@ class TopicReader:
             return None
         assert self.rule is not None
         picks = dict(self.rule.picks(layout))
-        found = layout, picks if picks.keys() - {SECONDS, NANOSECONDS} else {}
-        self.layouts = [*self.layouts[1 - LAYOUTS :], found]
-        return found
+        new_entry = layout, picks if picks.keys() - {SECONDS, NANOSECONDS} else {}
+        self.layouts = [*self.layouts[1 - LAYOUTS :], new_entry]
+        return new_entry
 
     def flush(self) -> None:
         """Turn the waiting messages into numbers, in the order in which they came; NaN where one has no such number."""
@@ -169,10 +169,10 @@ class TopicReader:
         if not self.kept:
             return Clocked(self.connection.topic, nothing, nothing, nothing)
         receive, order, stamps = (
-            np.frombuffer(each, dtype=np.int64) for each in (self.receive, self.order, self.stamps)
+            np.frombuffer(values, dtype=np.int64) for values in (self.receive, self.order, self.stamps)
         )
         if self.left_out:
-            receive, order = (np.delete(each, self.left_out) for each in (receive, order))
+            receive, order = (np.delete(values, self.left_out) for values in (receive, order))
         self.order, self.stamps = array("q"), array("q")
         return Clocked(self.connection.topic, receive, order, stamps)
 
@@ -181,7 +181,7 @@ class TopicReader:
         assert self.rule is not None
         numbers = {key: np.frombuffer(number, dtype=float) for key, number in self.numbers.items()}
         self.numbers = {}
-        found, notes = [], []
+        columns, notes = [], []
         for out in self.rule.columns(self.connection.topic, numbers):
             infinite = np.isinf(out.values)
             if infinite.any() and out.component:
@@ -197,17 +197,17 @@ class TopicReader:
                 notes.append(f"{out.name}: {int(infinite.sum())} infinite numbers are taken as missing")
                 out = out._replace(values=np.where(infinite, np.nan, out.values))
             if out.component or not np.isnan(out.values).all():
-                found.append(out)
+                columns.append(out)
         if self.bad:
             notes.append(
                 f"{self.connection.topic}: {self.bad} of {len(self.receive)} messages cannot be read and were left "
                 f"out: {printable(self.last_fault)}"
             )
-        return found, notes
+        return columns, notes
 
-    def _place(self, kept: int) -> int:
+    def _place(self, index: int) -> int:
         """The place among all messages, from 0, of one of those that were kept."""
-        return int(np.delete(np.arange(len(self.receive)), self.left_out)[kept])
+        return int(np.delete(np.arange(len(self.receive)), self.left_out)[index])
 
 
 class Bag:
@@ -264,26 +264,34 @@ class Bag:
         del clocked
         claims: dict[str, TopicClaim] = {}
         topics = []
-        for each in readers:
-            topic = each.connection.topic
-            mine = read.get(topic) is each
-            if mine:
-                found, more = each.columns(self.source)
-                notes += more
-                if found and each.rule is not None:
-                    claims[topic] = TopicClaim(topic, stamps[topic], found, rank_of(topic, each.rule))
-            used = mine and topic in claims
-            seen = stamps[topic] if used else np.array(each.receive, dtype=np.int64)
-            topics.append(topic_of(topic, each.connection.type, seen, used, "" if used else _why(each, mine)))
-            each.receive = array("q")
+        for topic_reader in readers:
+            topic = topic_reader.connection.topic
+            is_chosen = read.get(topic) is topic_reader
+            if is_chosen:
+                columns, new_notes = topic_reader.columns(self.source)
+                notes += new_notes
+                if columns and topic_reader.rule is not None:
+                    claims[topic] = TopicClaim(topic, stamps[topic], columns, rank_of(topic, topic_reader.rule))
+            is_used = is_chosen and topic in claims
+            topic_stamps = stamps[topic] if is_used else np.array(topic_reader.receive, dtype=np.int64)
+            topics.append(
+                topic_of(
+                    topic,
+                    topic_reader.connection.type,
+                    topic_stamps,
+                    is_used,
+                    "" if is_used else _why(topic_reader, is_chosen),
+                )
+            )
+            topic_reader.receive = array("q")
         tracks = list(tracks_of(list(claims.values()), notes))
         return tracks, topics, notes
 
 
-def _why(reader: TopicReader, mine: bool) -> str:
-    """Why the messages of a topic are not used. mine: whether it is this type of them that the topic is read by."""
+def _why(reader: TopicReader, is_chosen: bool) -> str:
+    """Why the messages of a topic are not used. is_chosen: whether the topic is read by this type of them."""
     if reader.why:
         return reader.why
-    if reader.kept and not mine:
+    if reader.kept and not is_chosen:
         return "the topic has messages of another type too, and these are read"
     return f"its messages cannot be read: {printable(reader.last_fault)}" if reader.bad else "it holds no numbers"

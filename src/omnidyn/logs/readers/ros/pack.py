@@ -46,13 +46,13 @@ class Unpacker:
     def unpack(self, kind: str, data: bytes, size: int) -> bytes:
         """The bytes of a chunk. Raises DamagedError where they are not `size`, InputError for an unknown packing."""
         if kind in ("", "none"):
-            found = data
+            content = data
         else:
             self.declare(size)
-            found = self._unpacked(kind, data, size)
-        if len(found) != size:
-            raise DamagedError(f"a chunk holds {len(found)} bytes, and says {size}")
-        return found
+            content = self._unpacked(kind, data, size)
+        if len(content) != size:
+            raise DamagedError(f"a chunk holds {len(content)} bytes, and says {size}")
+        return content
 
     def _unpacked(self, kind: str, data: bytes, size: int) -> bytes:
         try:
@@ -93,12 +93,12 @@ class Unpacker:
 
 def unpack_file(packed: BinaryIO, into: BinaryIO, source: str, limit: int) -> None:
     """A file that was packed whole with Zstandard. Raises InputError beyond `limit` bytes."""
-    zstandard, done = _zstd(source), 0
+    zstandard, written_bytes = _zstd(source), 0
     try:
         with zstandard.ZstdDecompressor().stream_reader(packed, closefd=False) as reader:
             while block := reader.read(2**20):
-                done += len(block)
-                if done > limit:
+                written_bytes += len(block)
+                if written_bytes > limit:
                     raise InputError(
                         "the file would grow too much",
                         got=f"more than {limit} bytes",

@@ -75,8 +75,8 @@ def is_command(topic: str) -> bool:
 
 
 def _stamp(layout: MessageLayout, prefix: str = "header.stamp") -> dict[str, str]:
-    found = {SECONDS: f"{prefix}.sec", NANOSECONDS: f"{prefix}.nanosec"}
-    return found if all(path in layout.numbers for path in found.values()) else {}
+    paths = {SECONDS: f"{prefix}.sec", NANOSECONDS: f"{prefix}.nanosec"}
+    return paths if all(path in layout.numbers for path in paths.values()) else {}
 
 
 def _paths(**keys: str) -> Callable[[MessageLayout], Picks]:
@@ -111,14 +111,14 @@ def _all(layout: MessageLayout) -> Picks:
 
 def _joints(layout: MessageLayout) -> Picks:
     """The numbers of each joint by its name, whatever the order, and however many arrays are empty."""
-    found = dict(_stamp(layout))
+    paths = dict(_stamp(layout))
     names = {path: text for path, text in layout.words.items() if path.startswith("name[")}
     for path, joint in names.items():
         for array in ("position", "velocity"):
             number = array + path.removeprefix("name")
             if number in layout.numbers:
-                found[f"{joint}/{array}"] = number
-    return found
+                paths[f"{joint}/{array}"] = number
+    return paths
 
 
 def _transforms(layout: MessageLayout) -> Picks:
@@ -153,8 +153,8 @@ def heading_of(x: FloatArray, y: FloatArray, z: FloatArray, w: FloatArray) -> Fl
     flat = (x == 0.0) & (y == 0.0)
     yaw = np.where(flat, 2.0 * np.arctan2(z, w), np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
     yaw = np.where((z == 0.0) & (w == 0.0) & flat, np.nan, yaw)
-    known = np.flatnonzero(np.isfinite(yaw))
-    yaw[known] = _continued(yaw[known])
+    finite = np.flatnonzero(np.isfinite(yaw))
+    yaw[finite] = _continued(yaw[finite])
     return yaw
 
 
@@ -168,13 +168,13 @@ def _continued(yaw: FloatArray) -> FloatArray:
 
 
 def _pose(topic: str, numbers: Numbers) -> list[TopicColumn]:
-    found = [TopicColumn(f"{topic}/{key}", numbers[key], "m", key) for key in ("x", "y") if key in numbers]
+    columns = [TopicColumn(f"{topic}/{key}", numbers[key], "m", key) for key in ("x", "y") if key in numbers]
     if all(f"q{axis}" in numbers for axis in "xyzw"):
         heading = heading_of(*(numbers[f"q{axis}"] for axis in "xyzw"))
-        found.append(TopicColumn(f"{topic}/heading", heading, "rad", "heading"))
+        columns.append(TopicColumn(f"{topic}/heading", heading, "rad", "heading"))
     elif "theta" in numbers:
-        found.append(TopicColumn(f"{topic}/heading", _continued(numbers["theta"]), "rad", "heading"))
-    return found
+        columns.append(TopicColumn(f"{topic}/heading", _continued(numbers["theta"]), "rad", "heading"))
+    return columns
 
 
 _TWIST_UNITS = {"vx": "m/s", "vy": "m/s", "omega": "rad/s"}
@@ -210,7 +210,7 @@ def _joint_columns(topic: str, numbers: Numbers) -> list[TopicColumn]:
     """Each joint's angle and speed, wheel by number where the names of the joints have one for each wheel."""
     joints = list(dict.fromkeys(key.rpartition("/")[0] for key in numbers))
     wheels, command = wheel_numbers(joints), is_command(topic)
-    found = []
+    columns = []
     for key, values in numbers.items():
         joint, _, array = key.rpartition("/")
         of = wheels.get(joint)
@@ -219,8 +219,8 @@ def _joint_columns(topic: str, numbers: Numbers) -> list[TopicColumn]:
         component = f"w{of}{'_cmd' * command}" if speed else "" if command else f"a{of}"
         if of is None:
             component = "" if wheels else None
-        found.append(TopicColumn(f"{topic}/{joint}/{array}", values, unit, component))
-    return found
+        columns.append(TopicColumn(f"{topic}/{joint}/{array}", values, unit, component))
+    return columns
 
 
 def wheel_numbers(joints: list[str]) -> dict[str, int]:
@@ -231,9 +231,13 @@ def wheel_numbers(joints: list[str]) -> dict[str, int]:
     parts = {joint: read_name(joint) for joint in joints}
     wheels = [j for j, part in parts.items() if part.roles & {words.WHEEL, words.MOTOR}]
     numbers = {joint: parts[joint].number for joint in wheels or joints}
-    known = [number for number in numbers.values() if number is not None]
-    first = min(known, default=1)
-    if len(known) < len(numbers) or sorted(known) != list(range(first, first + len(known))) or first not in (0, 1):
+    counted = [number for number in numbers.values() if number is not None]
+    first = min(counted, default=1)
+    if (
+        len(counted) < len(numbers)
+        or sorted(counted) != list(range(first, first + len(counted)))
+        or first not in (0, 1)
+    ):
         return {}
     return {joint: number - first + 1 for joint, number in numbers.items() if number is not None}
 
@@ -251,12 +255,12 @@ def _volts(topic: str, numbers: Numbers) -> list[TopicColumn]:
     """An array of numbers; on .../omnidyn/voltage and its kin, which `omnidyn convert` writes, the wheels'."""
     name = topic.rstrip("/")
     kind = next((kind for kind in OWN_TOPICS if name.endswith(kind)), None)
-    found = _as_they_are(topic, numbers)
+    columns = _as_they_are(topic, numbers)
     if kind is None:
-        return found
+        return columns
     letter, unit, ending = OWN_TOPICS[kind]
-    wheels = ("",) if letter in ("supply", "heading") else range(1, len(found) + 1)
-    return [out._replace(unit=unit, component=f"{letter}{k}{ending}") for k, out in zip(wheels, found, strict=False)]
+    wheels = ("",) if letter in ("supply", "heading") else range(1, len(columns) + 1)
+    return [out._replace(unit=unit, component=f"{letter}{k}{ending}") for k, out in zip(wheels, columns, strict=False)]
 
 
 HEADING = "/omnidyn/heading"
