@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+from benchmarks.twins.worlds import WORLDS
 from omnidyn.errors import OmnidynError
 from omnidyn.identification.identification import Identification
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import Method, MotorFit, MotorLine
 from omnidyn.logs.read_log import read_log
 from omnidyn.model.robot import Robot
+from omnidyn.model.robot_file import parse_robot
 from omnidyn.run import Run
 
 BY_DEFAULT, WHOLE_LOGS = "by default", "whole logs"  # of the motors
@@ -78,9 +82,24 @@ def ask(runs: Sequence[Run], robot: Robot | None, method: Method | None = None, 
     return Answer(record, found, "", time.process_time() - begin)
 
 
-def motor_runs(paths: Sequence[Path]) -> list[Run]:
-    """Logs of a motor."""
-    return [read_log(path) for path in paths]
+@dataclass(frozen=True)
+class Examined:
+    """A twin's logs, the first of which was fitted, and the answer. robot: as a user has it, None for a motor."""
+
+    truth: Mapping[str, float]
+    robot: Robot | None
+    runs: Sequence[Run]
+    answer: Answer
+
+
+@cache
+def examined(name: str, seed: int, way: str = "") -> Examined:
+    """What `identify` says of the first log of a twin. way: of a motor."""
+    with tempfile.TemporaryDirectory() as folder:
+        twin = WORLDS[name](Path(folder), seed)
+        robot = parse_robot(twin.robot) if twin.robot else None
+        runs = [read_log(path, robot) for path in twin.logs]
+    return Examined(twin.truth, robot, runs, ask(runs[:1], robot, MOTOR_METHODS.get(way)))
 
 
 def dead_bands(answer: Answer) -> list[tuple[float, float]]:

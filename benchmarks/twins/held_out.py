@@ -12,8 +12,8 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, field
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,7 @@ from scipy.stats import trim_mean
 
 from benchmarks import real_nuisances, udea
 from benchmarks.table import Table
-from benchmarks.twins.answers import BY_DEFAULT, MOTOR_METHODS, Answer, ask, driver_map
+from benchmarks.twins.answers import BY_DEFAULT, MOTOR_METHODS, Answer, ask, driver_map, examined
 from benchmarks.twins.motor import HOLD, MEAN, TRIM, Drive, plain_fit
 from benchmarks.twins.worlds import WORLDS, Array
 from omnidyn.comparison.compare import compare
@@ -103,16 +103,16 @@ def cases(seeds: Sequence[int]) -> Iterator[Case]:
 
 
 def _radius(seed: int) -> Errors:
-    with tempfile.TemporaryDirectory() as folder:
-        twin = WORLDS["wrong_radius"](Path(folder), seed)
-        robot = parse_robot(twin.robot)
-        runs = [read_log(path, robot) for path in twin.logs]
-    return robot_errors(robot, runs[:1], runs[1:])
+    seen = examined("wrong_radius", seed)
+    assert seen.robot is not None
+    return robot_errors(seen.robot, seen.runs[:1], seen.runs[1:], answer=seen.answer)
 
 
-def robot_errors(robot: Robot, fitted: Sequence[Run], held: Sequence[Run], window: int = 1) -> Errors:
-    """Of the three robots, on runs that were not fitted."""
-    answers = {"written": ask(fitted, robot), "plain": ask(fitted, robot, PLAIN, quick=True)}
+def robot_errors(
+    robot: Robot, fitted: Sequence[Run], held: Sequence[Run], window: int = 1, answer: Answer | None = None
+) -> Errors:
+    """Of the three robots, on runs that were not fitted. answer: of the fitted, where it is there already."""
+    answers = {"written": answer or ask(fitted, robot), "plain": ask(fitted, robot, PLAIN, quick=True)}
     robots = {name: answer.found.estimate.robot for name, answer in answers.items() if answer.found} | {"given": robot}
     return {name: _free_runs(each, held, window) for name, each in robots.items()}
 
@@ -158,10 +158,12 @@ def _real_robots() -> Iterator[Case]:
 # ---- motors, by free runs of the integrator of `motor`
 
 
-def motor_errors(fitted: Sequence[Run], held: Sequence[Run], motor: int, way: str, kind: str, **how: object) -> Errors:
+def motor_errors(
+    fitted: Sequence[Run], held: Sequence[Run], motor: int, answer: Answer, kind: str, **how: object
+) -> Errors:
     """Of what one method says of a motor, and of the plain fit; `how` goes to `Drive`."""
     make = partial(_drive, motor=motor, kind=kind, how=how)
-    return _motor_errors(motor, ask(fitted, None, MOTOR_METHODS[way]), [*map(make, fitted)], [*map(make, held)])
+    return _motor_errors(motor, answer, [*map(make, fitted)], [*map(make, held)])
 
 
 def _motor_errors(motor: int, answer: Answer, fitted: Sequence[Drive], held: Sequence[Drive]) -> Errors:
@@ -190,45 +192,62 @@ def _drive(run: Run, *, motor: int, kind: str, how: Mapping[str, object]) -> Dri
 
 
 def _twin_motor(name: str, seed: int, way: str) -> Errors:
-    with tempfile.TemporaryDirectory() as folder:
-        runs = [read_log(path) for path in WORLDS[name](Path(folder), seed).logs]
+    seen = examined(name, seed, way)
     how = {"window": 10} if name == "offset_axis" else {}
-    return motor_errors(runs[:1], runs[1:], 0, way, "duty" if "bridge" in name else "voltage", **how)
+    kind = "duty" if seen.runs[0].duty is not None else "voltage"
+    return motor_errors(seen.runs[:1], seen.runs[1:], 0, seen.answer, kind, **how)
 
 
 def _real_motors() -> Iterator[Case]:
-    folder = real_logs.folder()
     for way in MOTOR_METHODS:
-        for name in ("step", "chirp"):
-            yield Case(f"odrive, {way}", f"{name}2 by {name}1", partial(_odrive, name, way))
-        for motor in range(3):
-            stairs = partial(real_logs.udea_stairs, folder)
-            yield Case(f"udea motors, {way}", f"motor {motor + 1}, stairs", partial(_spiky, stairs, 1, motor, way))
-            drives = partial(_spiky, udea.drive_runs, 3, motor, way)
-            yield Case(f"udea motors, {way}", f"motor {motor + 1}, drives", drives)
-            if way == BY_DEFAULT:  # whole logs take no current as input
-                yield Case("robotino motors, by default", f"motor {motor + 1}", partial(_bench, motor, way))
+        for name, real in REAL_MOTORS.items():
+            if way == BY_DEFAULT or real.kind != "current":  # whole logs take no current as input
+                for motor in range(real.motors):
+                    yield Case(f"{name}, {way}", f"motor {motor + 1}", partial(_real_motor, name, motor, way))
 
 
-def _odrive(name: str, way: str) -> Errors:
+@dataclass(frozen=True)
+class RealMotors:
+    """Logs of motors. runs: makes them. fitted: the number of those to fit. kind: of the input. how: for `Drive`."""
+
+    runs: Callable[[], Sequence[Run]]
+    fitted: int
+    kind: str
+    motors: int = 3
+    how: Mapping[str, object] = field(default_factory=dict)
+
+
+def _odrive(name: str) -> list[Run]:
     runs = real_logs.odrive(real_logs.folder(), [name])
     if name == "chirp":
         runs = [udea.part(run, slice(0, int(np.searchsorted(run.t, run.t[0] + CHIRP)))) for run in runs]
-    runs = [Run(t=r.t, voltage=r.voltage, wheel_speed=r.wheel_speed, source=r.source) for r in runs]
-    return motor_errors(runs[:1], runs[1:], 0, way, "voltage")
+    return runs
 
 
-def _spiky(make: Callable[[], Sequence[Run]], fitted: int, motor: int, way: str) -> Errors:
-    runs = [Run(t=r.t, duty=r.duty, wheel_speed=r.wheel_speed, source=r.source) for r in make()]
-    return motor_errors(runs[:fitted], runs[fitted:], motor, way, "duty", window=round(WINDOW / 0.01), spiky=True)
+SPIKY = {"window": round(WINDOW / 0.01), "spiky": True}
+REAL_MOTORS = {
+    "odrive step": RealMotors(partial(_odrive, "step"), 1, "voltage", 1),
+    "odrive chirp": RealMotors(partial(_odrive, "chirp"), 1, "voltage", 1),
+    "udea stairs": RealMotors(lambda: real_logs.udea_stairs(real_logs.folder()), 1, "duty", how=SPIKY),
+    "udea drives, motors": RealMotors(udea.drive_runs, 3, "duty", how=SPIKY),
+    "robotino motors": RealMotors(lambda: real_logs.robotino_motors(real_logs.folder()), 1, "current"),
+}
 
 
-def _bench(motor: int, way: str) -> Errors:
+@cache
+def _real_answer(name: str, way: str) -> tuple[list[Run], Answer]:
+    """(runs with the input and the speed alone, what one method says of those that are fitted)."""
+    real = REAL_MOTORS[name]
     runs = [
-        Run(t=r.t, current=r.current, wheel_speed=r.wheel_speed, source=r.source)
-        for r in real_logs.robotino_motors(real_logs.folder())
+        Run(t=r.t, wheel_speed=r.wheel_speed, source=r.source, **{real.kind: getattr(r, real.kind)})
+        for r in real.runs()
     ]
-    return motor_errors(runs[:1], runs[1:], motor, way, "current")
+    return runs, ask(runs[: real.fitted], None, MOTOR_METHODS[way])
+
+
+def _real_motor(name: str, motor: int, way: str) -> Errors:
+    real, (runs, answer) = REAL_MOTORS[name], _real_answer(name, way)
+    return motor_errors(runs[: real.fitted], runs[real.fitted :], motor, answer, real.kind, **real.how)
 
 
 # ---- floors, by the force at constant speed

@@ -19,7 +19,7 @@ from benchmarks.twins.answers import (
     ask,
     contradictions,
     driver_map,
-    motor_runs,
+    examined,
 )
 from benchmarks.twins.worlds import CURVE, WORLDS, Twin, two_floors
 from omnidyn.comparison.compare import compare
@@ -115,14 +115,12 @@ def freewheeling_bridge(lines: Lines, seeds: Sequence[int]) -> None:
 def wrong_radius(lines: Lines, seeds: Sequence[int]) -> None:
     ratio, late, seconds = [], [], []
     for seed in seeds:
-        with made("wrong_radius", seed) as twin:
-            robot = parse_robot(twin.robot)
-            runs = [read_log(path, robot) for path in twin.logs]
-            answer = ask(runs[:1], robot)
-            true = true_robot(robot, twin.truth)
-            ratio.append(_ratio(answer, true, runs[1]) if answer.found else None)
-            late.append(_latency(answer.numbers))
-            seconds.append(answer.seconds)
+        seen = examined("wrong_radius", seed)
+        assert seen.robot is not None
+        true = true_robot(seen.robot, seen.truth)
+        ratio.append(_ratio(seen.answer, true, seen.runs[1]) if seen.answer.found else None)
+        late.append(_latency(seen.answer.numbers))
+        seconds.append(seen.answer.seconds)
     share = [value is not None and value <= AS_GOOD for value in ratio]
     lines.share("free run of a second log <= 1.05 of the true robot's error", share)
     lines.at_most("... times the true robot's error, median", ratio, AS_GOOD, pick=np.median)
@@ -222,15 +220,10 @@ TWINS: dict[str, Callable[[Lines, Sequence[int]], None]] = {
 }  # fmt: skip
 
 
-def _motors(name: str, seeds: Sequence[int]) -> dict[str, list[tuple[Answer, dict[str, float]]]]:
+def _motors(name: str, seeds: Sequence[int]) -> dict[str, list[tuple[Answer, Mapping[str, float]]]]:
     """Way -> (answer, truth) of the first log of each seed."""
-    found: dict[str, list[tuple[Answer, dict[str, float]]]] = {way: [] for way in MOTOR_METHODS}
-    for seed in seeds:
-        with made(name, seed) as twin:
-            runs = motor_runs(twin.logs[:1])
-            for way, method in MOTOR_METHODS.items():
-                found[way].append((ask(runs, None, method), twin.truth))
-    return found
+    every = {way: [examined(name, seed, way) for seed in seeds] for way in MOTOR_METHODS}
+    return {way: [(one.answer, one.truth) for one in seen] for way, seen in every.items()}
 
 
 def _calm(lines: Lines, answers: Sequence[Answer], way: str) -> None:
