@@ -40,8 +40,12 @@ def clocks_of(log: Log) -> tuple[SensorClock, ...]:
     ordered = [groups[first], *(group for k, group in enumerate(groups) if k != first)]
     # An input that a Run holds in every row keeps no stamps of its own: it is judged where the wheels were sampled.
     continuous = {
-        name for rows, names in ordered[1:] if rows.all() for name in names if place(name)[0] in NEVER_MADE_UP
-    }  # type: ignore[index]
+        name
+        for rows, names in ordered[1:]
+        if rows.all()
+        for name in names
+        if (at := place(name)) is not None and at[0] in NEVER_MADE_UP
+    }
     ordered = [(rows, names | continuous if k == 0 else names - continuous) for k, (rows, names) in enumerate(ordered)]
     return tuple(SensorClock(np.flatnonzero(rows), frozenset(names)) for rows, names in ordered if names)
 
