@@ -179,6 +179,7 @@ def _blocks(text: str) -> list[str | list[str]]:
     """Paragraphs, and formulas as lists of lines: those are indented and stand between blank lines."""
     found: list[str | list[str]] = []
     for part in re.split(r"\n\s*\n", inspect.cleandoc(text)):
+        part = textwrap.dedent(part.removeprefix("Args:\n")) if part.startswith("Args:\n") else part
         lines = part.split("\n")
         formula = all(line.startswith("    ") for line in lines)
         found.append(textwrap.dedent(part).split("\n") if formula else part)

@@ -37,8 +37,9 @@ def test_arguments_are_told_from_the_prose_around_them():
     thing = omnidyn.simulate
     parts = MADE.told(inspect.getdoc(thing), [each.name for each in MADE.arguments_of(thing)])
     assert parts.lead[0] == "Simulate a robot under commands held from row to row, eqs (1)-(14)."
-    assert parts.words["dt"] == "length of the rows [s], a number or shape (n,)."
-    assert parts.words["twist"] == parts.words["pose"] == parts.words["current"]
+    assert parts.words["dt"] == "Length of the rows [s], a number or shape (n,)."
+    assert parts.words["pose"] == "At the start [m, m, rad], shape (3,)."
+    assert set(parts.words) == {each.name for each in MADE.arguments_of(thing)}
     assert [each.split()[0] for each in parts.outcome] == ["Returns", "Raises"]
 
 

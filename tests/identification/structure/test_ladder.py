@@ -137,7 +137,7 @@ def test_what_the_log_cannot_tell_apart_is_said_and_each_is_fitted():
 
 
 def test_a_pull_in_the_room_is_taken_as_one_of_these_logs():
-    estimate, _ = climbed("umbilical", 2.3)
+    estimate, _ = climbed("umbilical", 2.3, nuisances=("latency",))  # by default it is fitted from the start
     assert [rung.key for rung in estimate.ladder.taken] == ["tilt"]
     assert estimate.robot.log.tilt == pytest.approx((2.3, 0.0), abs=0.1)
 

@@ -44,4 +44,4 @@ def test_steps_are_few(monkeypatch):
     lack = identify(logged(case, seed), robot_of(case.told), OutputError(free=FRICTION)).lack_of_fit
     assert lack.found
     assert sum(steps == refits.MORE for steps in taken) <= refits.GO_ON
-    assert sum(steps == refits.STEPS for steps in taken) <= refits.BEST + 2 * len(refits.SHAPES)
+    assert sum(steps == refits.STEPS for steps in taken) <= refits.BEST + 2 * len(refits.ALWAYS)

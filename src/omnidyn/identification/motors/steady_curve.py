@@ -1,8 +1,8 @@
 """Whether the steady speed of a motor is a line of its input, and the curve where it is none.
 
-Levels of the input are held long enough for a steady speed, both directions together. Each level but the first and the
-last is predicted without it, by the line through the others and by the straight way between its neighbours. Noise makes
-the neighbours worse than the line; only a curve makes them better.
+Levels of the input are held long enough for a steady speed, both directions together unless each has a line of its own.
+Each level but the first and the last is predicted without it, by the line through the others and by the straight way
+between its neighbours. Noise makes the neighbours worse than the line; only a curve makes them better.
 """
 
 from __future__ import annotations
@@ -209,9 +209,12 @@ def _curve_of(
     if len(x) < LEAST_LEVELS:
         held = len(_by_level(level[level > 0.0], level[level > 0.0], std[level > 0.0])[0])
         return (len(x), held) if held >= LEAST_LEVELS and not steady.all() else None
+    way = np.sign(put_in[turns])
+    each_way = [_off_line(level[turns][way == side], size[turns][way == side]) for side in (1.0, -1.0)]
+    if max(each_way) < NOTABLE * top:
+        return None  # a line in each direction
     line, neighbours = _left_out(x, y)
-    residual = y - np.polyval(np.polyfit(x, y, 1), x)
-    if neighbours > CURVED * line or np.sqrt(np.mean(residual**2)) < NOTABLE * top:
+    if neighbours > CURVED * line or _off_line(x, y) < NOTABLE * top:
         return None
     below = level[~steady & (level > 0.0) & (level < (1.0 - SAME_LEVEL) * x[0])]
     return SteadyCurve(
@@ -226,6 +229,13 @@ def _curve_of(
         _straight(x, y, STRAIGHT * top),
         float(below.min()) if below.size else 0.0,
     )
+
+
+def _off_line(x: FloatArray, y: FloatArray) -> float:
+    """Root mean square of points (n,) off their line; infinite where there are too few of them."""
+    if len(x) <= PART:
+        return math.inf
+    return float(np.sqrt(np.mean((y - np.polyval(np.polyfit(x, y, 1), x)) ** 2)))
 
 
 def map_of(curves: Sequence[SteadyCurve], volts: float) -> tuple[tuple[float, float, float], ...]:
