@@ -10,9 +10,13 @@ from omnidyn.statement import ERROR, WARNING, quoted
 def result(headline, numbers, warnings):
     keys = [f"motor.resistance_ohm[{k}]" for k in range(numbers)]
     estimate = SimpleNamespace(
-        value=dict.fromkeys(keys, 1.0), ci95=dict.fromkeys(keys, (0.9, 1.1)), unidentifiable=(), warnings=warnings
+        fits={},
+        value=dict.fromkeys(keys, 1.0),
+        ci95=dict.fromkeys(keys, (0.9, 1.1)),
+        unidentifiable=(),
+        warnings=warnings,
     )
-    return SimpleNamespace(groups={"": estimate}, headline=headline, advice=(), study=None)
+    return SimpleNamespace(fits={}, groups={"": estimate}, headline=headline, advice=(), study=None)
 
 
 def test_the_gravest_warning_is_shown_whatever_the_room():
