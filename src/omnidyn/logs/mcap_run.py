@@ -4,7 +4,7 @@ of the robot, and reads back equal.
 /joint_states  sensor_msgs/JointState   wheel_1, ..: wheel_angle, wheel_speed (REP-103: SI)
 /odom          nav_msgs/Odometry        pose in odom, twist in base_link
 /cmd_vel       geometry_msgs/TwistStamped   twist_command
-/omnidyn/voltage, duty, current, wheel_speed_command, supply   std_msgs/Float64MultiArray, one number per wheel
+/omnidyn/voltage, duty, current, wheel_speed_command, supply, force   std_msgs/Float64MultiArray, one number per wheel
 
 /omnidyn/heading   std_msgs/Float64MultiArray   the heading as it is, where that in /odom has lost full turns
 

@@ -270,6 +270,7 @@ OWN_TOPICS = {
     "/omnidyn/duty": ("d", "duty", ""),
     "/omnidyn/current": ("i", "A", ""),
     "/omnidyn/wheel_speed_command": ("w", "rad/s", "_cmd"),
+    "/omnidyn/force": ("f", "N", ""),
     "/omnidyn/supply": ("supply", "V", ""),
     HEADING: ("heading", "rad", ""),
 }
