@@ -191,7 +191,8 @@ def test_the_dead_zone_of_the_stairs_is_not_identifiable(data):
     low, high = np.quantile(line.draws["dead_band"], [0.05, 0.95])
     assert low < -1.75 < high
     assert not any(each.dead_band_seen for each in study.motors)
-    assert all("dead band not identifiable here" in str(one) for one in study.statements)
+    for one in study.statements:  # of one motor held-out blocks are predicted as well without
+        assert "dead band not identifiable here" in str(one) or "no dead band is kept" in str(one)
 
 
 def test_the_motors_of_a_robot_that_turns_on_the_spot(data):
