@@ -11,7 +11,7 @@ The draws of w are a Latin hypercube (McKay, Beckman, Conover, Technometrics 21 
 hit once, which makes a hundred draws do for a 95 % interval. One seed gives the same robots, always.
 
 Scales: what must be positive has a logarithmic one, where 2 and 1/2 are equally far, as in a fit. So has a friction
-that is far from 0 (told.NEAR_ZERO): what a fit can tell is often a product of friction and motor constants, and products
+that is far from 0 (NEAR_ZERO): what a fit can tell is often a product of friction and motor constants, and products
 stay what they are on that scale alone. A friction that may be 0 is normal, next to 0 below that. An angle is normal.
 """
 
