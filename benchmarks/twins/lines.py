@@ -94,7 +94,7 @@ def late_motor(lines: Lines, seeds: Sequence[int]) -> None:
         seen = answers[way]
         lines.share(f"dead band in its interval, {way}", [a.holds("dead_band", t["dead_band"]) for a, t in seen])
         _calm(lines, [answer for answer, _ in seen], way)
-    late = [(_latency(answer.numbers), truth["latency"]) for answer, truth in answers["whole logs"]]
+    late = [(_latency(answer), truth["latency"]) for answer, truth in answers["whole logs"]]
     lines.told("latency off by, in ms, whole logs, largest", 1e3 * max(abs(x - y) for x, y in late), len(late))
 
 
@@ -119,7 +119,7 @@ def wrong_radius(lines: Lines, seeds: Sequence[int]) -> None:
         assert seen.robot is not None
         true = true_robot(seen.robot, seen.truth)
         ratio.append(_ratio(seen.answer, true, seen.runs[1]) if seen.answer.found else None)
-        late.append(_latency(seen.answer.numbers))
+        late.append(_latency(seen.answer))
         seconds.append(seen.answer.seconds)
     share = [value is not None and value <= AS_GOOD for value in ratio]
     lines.share("free run of a second log <= 1.05 of the true robot's error", share)
@@ -246,8 +246,9 @@ def _map_off(answer: Answer, truth: Mapping[str, float]) -> float | None:
     return float(np.max(np.abs(np.interp([100.0 * duty for duty in CURVE], x, y) - true)) / true.max())
 
 
-def _latency(numbers: Mapping[str, Any]) -> float:
+def _latency(answer: Answer) -> float:
     """The latency that was fitted [s], 0 where there is none."""
+    numbers = {**answer.numbers, **answer.record.get("nuisances", {})}
     return next((n["value"] for name, n in numbers.items() if "latency" in name and n["value"] is not None), 0.0)
 
 
