@@ -118,6 +118,7 @@ def _named(group: str, words: object, fits: Mapping[str, Any]) -> str:
 def _findings(fits: Fits, validations: Mapping[str, Validation]) -> list[str]:
     findings = [_named(group, validation.statement(), fits) for group, validation in validations.items()]
     for group, fit in fits.items():
+        findings += [_named(group, fit.held_out.statement(), fits)] if fit.held_out is not None else []
         for words, name, value, _, interval, unit, mark in number_table(fit).rows:
             if name in fit.nuisances:
                 continue  # of the log, not of the robot: they stand in the table
