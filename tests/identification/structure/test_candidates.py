@@ -115,14 +115,14 @@ def test_every_candidate_that_a_fit_can_hold_begins_to_be_fitted(layout):
     """Its numbers begin where its column has them, and what it shows there is finite."""
     solution, bench, every = begun(layout)
     problem, parts = bench.problem, solution.solver.engine.residuals(solution.state.point)
-    off = refits._by_coarse_steps(problem, parts, solution.state.point, ImplicitEngine)
+    off = {ImplicitEngine: refits._by_coarse_steps(problem, parts, solution.state.point, ImplicitEngine)}
     for one in every:
         if not one.offered or one.key == CHANGE:
             continue
         for trial in one.trials(bench)[:1]:
             remedy = Remedy(one.key, "", 0.0, 0.0, size=(0.02,) * trial.shown[0].shape[2], at=trial.at)
             for way in switches(remedy, problem.robot, refits._question(problem), solution):
-                start = refits._begun(one, way, problem, solution, off, ImplicitEngine)
+                start = refits._begun(one, way, problem, solution, off)
                 assert np.isfinite(start.state.objective), one.key
                 for own in refits._trial(start, problem, parts, solution).shown:
                     assert np.isfinite(own).all(), one.key
