@@ -48,6 +48,7 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("fit of speeds whose errors remember", partial(_fit, paper, "twist", memory=MEMORY)),
         ("errors that remember while the robot moves", _remember),
         ("fit of speeds, currents and poses", partial(_fit, paper, "twist", "current", "pose")),
+        ("fit of a force in the room", partial(_fit, paper, "twist", "current", "pose", nuisances=("tilt",))),
         ("fit of counted angles", partial(_fit, paper, "wheel_angle")),
         ("simulation, any friction", partial(_run, other)),
         ("acceleration, any friction", partial(acceleration, looped, np.zeros(3), np.ones(3))),
