@@ -12,16 +12,17 @@ from typing import Any
 
 from benchmarks.twins.worlds import WORLDS
 from omnidyn.errors import OmnidynError
+from omnidyn.identification.default_method import default_motor_method
 from omnidyn.identification.identification import Identification
 from omnidyn.identification.identify import identify
-from omnidyn.identification.methods import Method, MotorFit, MotorLine
+from omnidyn.identification.methods import Method, MotorLine
 from omnidyn.logs.read_log import read_log
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import parse_robot
+from omnidyn.progress import silent
 from omnidyn.run import Run
 
-BY_DEFAULT, WHOLE_LOGS = "by default", "whole logs"  # of the motors
-MOTOR_METHODS: Mapping[str, Method] = {BY_DEFAULT: MotorLine(), WHOLE_LOGS: MotorFit()}
+BY_DEFAULT, WINDOWS = MOTOR_METHODS = ("by default", "windows")
 NO_ANSWER = "no_motor_answers"
 NO_LINE = "speed_no_line"
 
@@ -99,7 +100,12 @@ def examined(name: str, seed: int, way: str = "") -> Examined:
         twin = WORLDS[name](Path(folder), seed)
         robot = parse_robot(twin.robot) if twin.robot else None
         runs = [read_log(path, robot) for path in twin.logs]
-    return Examined(twin.truth, robot, runs, ask(runs[:1], robot, MOTOR_METHODS.get(way)))
+    return Examined(twin.truth, robot, runs, ask(runs[:1], robot, motor_method(way, runs[:1]) if way else None))
+
+
+def motor_method(way: str, runs: Sequence[Run]) -> Method:
+    """The method that `omnidyn identify --what motors` takes by default for these logs, or the line of windows."""
+    return MotorLine() if way == WINDOWS else default_motor_method(runs, "", silent)
 
 
 def dead_bands(answer: Answer) -> list[tuple[float, float]]:

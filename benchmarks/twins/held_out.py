@@ -21,7 +21,7 @@ from scipy.stats import trim_mean
 
 from benchmarks import real_nuisances, udea
 from benchmarks.table import Table
-from benchmarks.twins.answers import BY_DEFAULT, MOTOR_METHODS, Answer, ask, driver_map, examined
+from benchmarks.twins.answers import BY_DEFAULT, MOTOR_METHODS, Answer, ask, driver_map, examined, motor_method
 from benchmarks.twins.motor import HOLD, MEAN, TRIM, Drive, plain_fit
 from benchmarks.twins.worlds import WORLDS, Array
 from omnidyn.comparison.compare import compare
@@ -201,7 +201,7 @@ def _twin_motor(name: str, seed: int, way: str) -> Errors:
 def _real_motors() -> Iterator[Case]:
     for way in MOTOR_METHODS:
         for name, real in REAL_MOTORS.items():
-            if way == BY_DEFAULT or real.kind != "current":  # whole logs take no current as input
+            if way == BY_DEFAULT or real.kind != "current":  # of which windows are the default
                 for motor in range(real.motors):
                     yield Case(f"{name}, {way}", f"motor {motor + 1}", partial(_real_motor, name, motor, way))
 
@@ -242,7 +242,7 @@ def _real_answer(name: str, way: str) -> tuple[list[Run], Answer]:
         Run(t=r.t, wheel_speed=r.wheel_speed, source=r.source, **{real.kind: getattr(r, real.kind)})
         for r in real.runs()
     ]
-    return runs, ask(runs[: real.fitted], None, MOTOR_METHODS[way])
+    return runs, ask(runs[: real.fitted], None, motor_method(way, runs[: real.fitted]))
 
 
 def _real_motor(name: str, motor: int, way: str) -> Errors:

@@ -4,6 +4,7 @@ import re
 from dataclasses import fields
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import omnidyn
@@ -11,6 +12,7 @@ from omnidyn.cli.terminal.flags import of_place, with_flags
 from omnidyn.cli.terminal.identify_options import default_of, options
 from omnidyn.cli.terminal.identify_options import identify_request as asked_of
 from omnidyn.errors import InputError
+from omnidyn.identification.default_method import default_motor_method
 from omnidyn.identification.grouping import names_of_groups
 from omnidyn.identification.methods import METHODS, MotorFit, MotorLine, OutputError, SteadyState, choices
 
@@ -97,14 +99,31 @@ def test_friction_needs_a_robot_and_a_ladder_the_diagnosis():
         ({"group": ["a=*"]}, SteadyState()),
         ({"quick": True}, None),
         ({"method": "steady-state"}, SteadyState()),
-        ({"what": "motors"}, MotorLine()),
-        ({"what": "motors", "input": "duty"}, MotorLine(input="duty")),
+        ({"what": "motors"}, None),
+        ({"what": "motors", "input": "duty"}, None),
+        ({"what": "motors", "window": "0.4,0.9"}, MotorLine(window=(0.4, 0.9))),
         ({"what": "motors", "method": "output-error", "input": "duty"}, MotorFit(input="duty")),
         ({"what": "motors", "between": "mean"}, MotorFit(between="mean")),
     ],
 )
 def test_options_of_one_method_choose_it(given, method):
     assert asked(**given).method == method
+
+
+@pytest.mark.parametrize(
+    "channel, step, input, method",
+    [
+        ("voltage", 0.01, "", MotorFit()),
+        ("duty", 0.01, "duty", MotorFit(input="duty")),
+        ("voltage", 1.0, "", MotorLine()),
+        ("current", 0.01, "", MotorLine()),
+    ],
+)
+def test_logs_of_motors_say_whether_whole_logs_are_fitted(channel, step, input, method):
+    run = omnidyn.Run(t=step * np.arange(50), wheel_speed=np.zeros((50, 1)), **{channel: np.zeros((50, 1))})
+    reports = []
+    assert default_motor_method([run], input, reports.append) == method
+    assert bool(reports) == isinstance(method, MotorLine)
 
 
 @pytest.mark.parametrize(

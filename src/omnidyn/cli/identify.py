@@ -151,9 +151,12 @@ def _identify(arguments: list[str], robot: str, request: IdentifyRequest, readin
 def run_motors(
     request: IdentifyRequest, loaded: Loaded, robot: Robot | None, record: dict[str, Any], to: Out, progress: Progress
 ) -> None:
-    """Fit; write robot file and report; show the result."""
+    """Choose the method, fit; write robot file and report; show the result."""
+    from omnidyn.identification.default_method import default_motor_method
+
+    method = request.method or default_motor_method(loaded.runs, request.input, progress)
     result = omnidyn.identify(
-        loaded.runs, robot, request.method, hold_out=request.hold_out, progress=progress, check=loaded.logs
+        loaded.runs, robot, method, hold_out=request.hold_out, progress=progress, check=loaded.logs
     )
     _tell(cast("MotorStudy", result.study), robot, record, to, progress)
 

@@ -6,8 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from omnidyn.findings.needs import why_no_inputs
-from omnidyn.identification.methods import OUTPUT_ERROR, STEADY_STATE, Method, OutputError, SteadyState
+from omnidyn.clocks import usual_step
+from omnidyn.findings.needs import MOTOR_INPUTS, motor_input, why_no_inputs
+from omnidyn.identification.methods import (
+    OUTPUT_ERROR,
+    STEADY_STATE,
+    Method,
+    MotorFit,
+    MotorLine,
+    OutputError,
+    SteadyState,
+)
 from omnidyn.identification.steady.operating_points import why_no_transient
 from omnidyn.model.motor import DUTY, SPEED, VOLTAGE
 from omnidyn.model.robot import MEASURED, Prior, Robot
@@ -46,3 +55,23 @@ def default_method(runs: Sequence[Run], robot: Robot, progress: Progress) -> tup
     if why:
         progress(Report(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {why}", urgent=True))
     return (SteadyState() if why else OutputError()), why
+
+
+def default_motor_method(runs: Sequence[Run], input: str, progress: Progress) -> MotorFit | MotorLine:
+    """Free runs of whole logs; the line of each motor for a current, and for rows too far apart for a free run.
+
+    input: "voltage", "duty", "current" or "force"; "" for the first that all runs have. `progress` hears why it is the
+    line.
+    """
+    from omnidyn.identification.motors.fit import FREE_RUN_INPUTS  # imported lazily: slow to load
+    from omnidyn.identification.motors.start import SLOW_ROW
+
+    kind = motor_input(runs, [input] if input else MOTOR_INPUTS)
+    step = max((usual_step(run.t) for run in runs), default=0.0)
+    why = f"rows are {step:.2g} s apart" if step > SLOW_ROW else ""
+    if kind and kind not in FREE_RUN_INPUTS:
+        why = f"the input is a {kind}"
+    if not why:
+        return MotorFit(input=input)
+    progress(Report(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {why}", urgent=True))
+    return MotorLine(input=input)

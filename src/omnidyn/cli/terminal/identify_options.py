@@ -19,7 +19,6 @@ from omnidyn.identification.methods import (
     QUICK,
     STEADY_STATE,
     Method,
-    MotorLine,
     OutputError,
     SteadyState,
     option,
@@ -36,7 +35,7 @@ class RunOptions:
     """What to identify, by which method, from which runs: arguments of `identify`, not options of a method."""
 
     method: str = option(AUTO, "output-error (whole logs; the default) or steady-state (the paper's).", first=True)
-    what: str = option(FRICTION, "friction, or motors: the line of each motor, wheels off the ground.", first=True)
+    what: str = option(FRICTION, "friction, or motors: slope, dead band, lag of each, off the ground.", first=True)
     hold_out: tuple[str, ...] = option((), "Do not fit these logs: predict them.", metavar="GLOB", first=True)
     per: tuple[str, ...] = option((), "A group with friction of its own.", metavar="NAME=GLOB", first=True)
     group: tuple[str, ...] = option((), "Logs of one floor or load.", metavar="NAME=GLOB")
@@ -46,10 +45,14 @@ class RunOptions:
 
 
 class IdentifyRequest(NamedTuple):
-    """What the command line asks for. method: None where robot and logs choose it. groups: NAME=GLOB each."""
+    """What the command line asks for. method: None where robot and logs choose it. groups: NAME=GLOB each.
+
+    input: of motors, where no method is asked for.
+    """
 
     method: Method | None
     what: str
+    input: str
     hold_out: tuple[str, ...]
     groups: tuple[str, ...]
     quick: bool
@@ -90,7 +93,7 @@ def identify_request(option_values: Mapping[str, Any]) -> IdentifyRequest:
     kind = _method(name, what, [*values])
     groups = values.pop("per", ()) or values.pop("group", ())
     about = {"hold_out": values.pop("hold_out", ()), "groups": groups, "quick": values.pop("quick", False)}
-    return IdentifyRequest(kind(**values) if kind else None, what, **about)
+    return IdentifyRequest(kind(**values) if kind else None, what, values.get("input", ""), **about)
 
 
 def _takes(kind: type[Method], name: str) -> bool:
@@ -116,7 +119,7 @@ def _method(name: str, what: str, option_names: Sequence[str]) -> type[Method] |
     if steady and name == OUTPUT_ERROR:
         raise _refusal(OUTPUT_ERROR, steady[0], "for groups use `per`" if steady[0] == "group" else "leave it out")
     name = OUTPUT_ERROR if fit else STEADY_STATE if steady else name
-    return {kind.name: kind for kind in kinds}.get(name, MotorLine if what == MOTORS else None)
+    return {kind.name: kind for kind in kinds}.get(name)
 
 
 def _refusal(method: str, refused: str, remedy: str) -> InputError:

@@ -16,6 +16,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.clocks import usual_step
@@ -85,7 +86,7 @@ def starts_and_stops(
         edges = edges[:: max(1, -(-len(edges) // MOST))]
         ends = [_span(edge, lag, RISK / len(edges)) for edge in edges]
         spans[stop].extend(span for span in ends if stop or span.high > 0.0)
-    bounds = [bound for column in columns for bound in _rested(column)]
+    bounds = [bound for column in columns for bound in _rested(column, lag)]
     if bounds:
         spans[0].append(Span(max(bounds), math.inf))
     return spans
@@ -238,19 +239,23 @@ def _lags(lag: float, row: float) -> list[float]:
     return [0.3 * row, *around] if around else [row * factor for factor in (0.3, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)]
 
 
-def _rested(column: _MotorRows) -> Iterator[float]:
-    """Inputs under which the motor rested for LEAST_REST rows, and did not set off forward afterwards."""
+def _rested(column: _MotorRows, lag: float) -> Iterator[float]:
+    """Inputs under which the motor rested for LEAST_REST rows and a lag [s], and did not set off forward afterwards.
+
+    One that has just set off moves less than shows until about a lag later.
+    """
     runs = _runs(column.moving)
+    least = max(LEAST_REST, math.ceil(LAGS_AT_REST * lag / usual_step(column.t))) if lag > 0.0 else LEAST_REST
     for k, (a, b, side) in enumerate(runs):
         before, after = runs[k - 1][2] if k else 0.0, runs[k + 1][2] if k + 1 < len(runs) else 0.0
         if side != 0.0 or after > 0.0 or column.rough[a:b].any() or not _rests(column, a, b):
             continue
         if before > 0.0:  # where it still ran out is no rest under that input: from the least input on
             a += int(np.argmin(column.put_in[a:b]))
-        if b - a < LEAST_REST:
+        if b - a < least:
             continue
         put_in, speed = column.put_in[a:b], column.speed[a:b]
-        held = float(np.min([put_in[n : len(put_in) - LEAST_REST + 1 + n] for n in range(LEAST_REST)], axis=0).max())
+        held = float(sliding_window_view(put_in, least).min(axis=1).max())
         under = speed[put_in >= held]
         if held > 0.0 and float(under.mean()) <= 3.0 * noise_of_rows(speed) / math.sqrt(len(under)):
             yield held
