@@ -69,6 +69,18 @@ def test_a_direction_in_which_it_never_sets_off_has_a_bound():
     assert back.statement().code == "never_sets_off"
 
 
+def test_a_slow_motor_that_has_just_set_off_does_not_rest():
+    """At 1 kHz a motor with a lag of 0.65 s moves for long before its speed shows: no rest under more is told."""
+    t = 1e-3 * np.arange(20_000)
+    phases = np.random.default_rng(4).uniform(0.0, 2.0 * np.pi, 9)
+    put_in = sum(np.sin(2.0 * np.pi * 0.1 * n * t + phase) / n**0.5 for n, phase in enumerate(phases, 1))
+    slow = BenchMotor(hold=(0.3, 0.3), slide=(0.3, 0.3), slope=5.0, inertia=3.25)
+    _, angle, *_ = slow.turn(t, put_in)
+    noisy = angle + 1e-5 * np.random.default_rng(0).standard_normal(len(t))
+    study = identify([Run(t=t, voltage=put_in[:, None], wheel_angle=noisy[:, None])], None, MotorLine()).study
+    assert all(not start.ci95["start"][0] > 0.3 for start in study.starts)
+
+
 def test_steps_alone_give_bounds():
     """From 0 to 2 V: it starts somewhere in between, and no number is made up."""
     t = DT * np.arange(800)

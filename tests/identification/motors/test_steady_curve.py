@@ -1,5 +1,7 @@
 """Motors whose steady speed is no line of their input, beside straight ones; speeds by the exact exponential."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from omnidyn.identification.methods import MotorFit, MotorLine
 from omnidyn.identification.motors.into_robot import motors_into_robot
 from omnidyn.identification.motors.log import motor_logs
 from omnidyn.identification.motors.steady_curve import curves_of_logs, curves_of_points, steady_speed
-from omnidyn.identification.motors.study import study_points
+from omnidyn.identification.motors.study import motors_verdict, study_points
 from omnidyn.logs.motor_table import MotorTable
 from omnidyn.model.friction import Friction
 from omnidyn.model.motor import Drive
@@ -74,6 +76,15 @@ def test_both_methods_tell_the_curve_of_a_log(method):
     assert "no dead band" not in str(study.verdict)
     assert not any(motor.dead_band_seen for motor in (*study.motors, *study.plain))
     assert all(np.isnan(start.value["offset"]) for start in study.starts)
+
+
+def test_a_motor_with_a_curve_answers_to_its_input():
+    study = identify([log(bent, levels(1))], None, MotorLine())
+    deaf = [replace(motor, answers=False) for motor in study.study.motors]
+    assert motors_verdict(deaf).code == "no_motor_answers"
+    assert [part.code for part in motors_verdict(deaf, curves=study.study.curves).numbers["parts"]] == [
+        "motors_no_line"
+    ]
 
 
 def test_the_map_is_within_five_percent_in_eight_of_ten():

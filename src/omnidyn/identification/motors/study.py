@@ -407,11 +407,11 @@ def motors_verdict(
     """
     lines = [motor for motor in motors if motor.motor is not None] or list(motors)  # else that of all together
     levels = {line.name: _levels(line, starts) for line in lines}
-    blind = [line.name for line in lines if not line.answers and not levels[line.name]]
+    bent = {curve.motor: curve.straight for curve in curves}
+    blind = [line.name for line in lines if not (line.answers or levels[line.name] or line.motor in bent)]
     if len(blind) == len(lines):
         return Statement("no_motor_answers", ERROR, numbers={"motors": blind})
     seen = [line for line in lines if levels[line.name]]
-    bent = {curve.motor: curve.straight for curve in curves}
     missed = [line.name for line in lines if "line_misses" in {warning.code for warning in line.warnings}]
     straight = [line.name for line in lines if line.motor not in bent and line.name not in missed]
     without = [name for name in straight if not levels[name] and name not in blind]
