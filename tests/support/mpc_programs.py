@@ -9,7 +9,7 @@ import numpy as np
 
 from omnidyn import load_robot
 from omnidyn.compiled.kernel import kernel
-from omnidyn.control.mpc.interior_point import ROOM_SIZE, QuadraticProgram, solve
+from omnidyn.control.mpc.interior_point import ROOM_SIZE, QuadraticProgram, is_inaccurate, solve
 from omnidyn.control.mpc.model import numbers, volts
 from omnidyn.control.mpc.observer import ESTIMATE_SIZE, SCALE
 from omnidyn.control.mpc.program import make_costs, make_stages
@@ -39,6 +39,11 @@ def _make(numbers, settings, estimate, program, preview):
 @kernel
 def _solve(program):
     return solve(program)
+
+
+@kernel
+def _is_inaccurate(program, stiff):
+    return is_inaccurate(program, stiff)
 
 
 @lru_cache
@@ -98,6 +103,18 @@ class Solver:
         self.x[0] = problem.start
         passes = _solve(self.program(problem, self.x))
         return self.u.copy(), passes
+
+    def is_inaccurate(self, problem: Problem, passes: int) -> bool:
+        """Whether the answer of the last `solve` says of itself that it may be off."""
+        return _is_inaccurate(self.program(problem, self.x), passes < 0)
+
+
+def reweighed(problem: Problem, factors: np.ndarray) -> Problem:
+    """The program with other weights. factors: of pose, twist and volts, shape (3,)."""
+    stage = problem.stage.copy()
+    for columns in (WEIGHT, PULL):
+        stage[:, columns : columns + 6] *= np.repeat(factors[:2], 3)
+    return problem._replace(stage=stage, weight=problem.weight * factors[2])
 
 
 def dense(program: Problem) -> tuple[np.ndarray, np.ndarray]:

@@ -41,6 +41,7 @@ OK, WAITING, PATH_ENDED = "ok", "no step yet", "path ended: holding its last pos
 BAD_TIME, BACKWARDS, TIME_STANDS_STILL = "time is no finite number", "time went backwards", "time stands still"
 BAD_POSE, BAD_TWIST, BAD_COMMAND = "pose missing", "twist missing", "command missing"
 BAD_PATH, FAILED = "no path", "no output found"
+INACCURATE = "inaccurate"  # the output is sent, but rounding may have moved it
 LARGEST_STATE = 1e9  # of any number of a state: what is beyond is no place, and no speed
 VOLTAGE, WHEEL_SPEED = "voltage", "wheel_speed"
 

@@ -291,3 +291,14 @@ def test_a_law_that_falls_is_followed_along_the_prediction(name):
     told, _, _ = drive(Mpc(plant), along, 300, plant=plant)
     untold, _, _ = drive(Mpc(ROBOT), along, 300, plant=plant)
     assert rmse(told, along) < 0.25 * rmse(untold, along)
+
+
+def test_weights_that_rounding_cannot_follow_are_said_and_the_output_is_sent():
+    settings = Settings(pose=(1e7, 1e7, 1e6), twist=(0.6, 0.6, 0.06), volts=9e-8, last=2e3)
+    controller, along = Mpc(ROBOT, observer=False, settings=settings), path("eight")
+    _, _, sent = drive(controller, along, 40, noise=0.05)
+    assert controller.info.status == "inaccurate"
+    assert not controller.info.ok
+    assert np.isfinite(sent).all()
+    assert (np.abs(sent) <= controller.limit).all()
+    assert np.any(sent[-1])

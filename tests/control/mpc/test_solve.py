@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from tests.support.mpc_programs import Solver, dense, random_program, residual
+from tests.support.mpc_programs import Solver, dense, random_program, residual, reweighed
 
 
 def by_scipy(program, hessian, slope):
@@ -67,3 +67,24 @@ def test_inputs_stay_within_their_bounds():
         program = random_program(rng, 5.0)
         u, _ = solver.solve(program)
         assert np.all(np.abs(u) <= 6.0 + 1e-9)
+
+
+def test_an_answer_that_rounding_moved_says_so():
+    """Weights apart by up to 1e18: whatever is not called inaccurate meets the conditions of an optimum."""
+    rng, solver, told, wrong = np.random.default_rng(12), Solver(20, 3), 0, 0
+    for _ in range(400):
+        program = reweighed(random_program(rng, 1.0), 10.0 ** rng.uniform(-6.0, 6.0, 3))
+        u, passes = solver.solve(program)
+        off = residual(program, *dense(program), u)
+        inaccurate = solver.is_inaccurate(program, passes)
+        assert inaccurate or off < 1e-6
+        told, wrong = told + inaccurate, wrong + (off >= 1e-6)
+    assert 0 < wrong <= told <= 100
+
+
+def test_ordinary_weights_are_never_called_inaccurate():
+    rng, solver = np.random.default_rng(13), Solver(20, 3)
+    for _ in range(100):
+        program = random_program(rng, 5.0)
+        _, passes = solver.solve(program)
+        assert not solver.is_inaccurate(program, passes)

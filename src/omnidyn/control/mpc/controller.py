@@ -24,6 +24,7 @@ from omnidyn.control.controller import (
     BAD_TIME,
     BAD_TWIST,
     FAILED,
+    INACCURATE,
     OK,
     PATH_ENDED,
     TIME_STANDS_STILL,
@@ -37,7 +38,7 @@ from omnidyn.control.controller import (
     without_slip,
 )
 from omnidyn.control.feedforward import DT, check_dt
-from omnidyn.control.mpc.loop import Batch, Memory, MpcWorkspace, control_step
+from omnidyn.control.mpc.loop import INACCURATE_STEP, NO_STATE, Batch, Memory, MpcWorkspace, control_step
 from omnidyn.control.mpc.model import numbers, volts
 from omnidyn.control.mpc.observer import PUSH, SCALE
 from omnidyn.control.mpc.settings import Preview, Settings
@@ -131,7 +132,7 @@ class Mpc:
     def info(self) -> Info:
         """What the last step did."""
         status, iterations, took = self._asked
-        if status not in (OK, PATH_ENDED):
+        if status not in (OK, PATH_ENDED, INACCURATE):
             return Info(status, iterations, took)
         return Info(status, iterations, took, self._memory.x[1:, :3].copy(), self._met())
 
@@ -180,7 +181,10 @@ class Mpc:
         if self._control is None:
             self._control = machine_code(control_step, *arguments)
         passes = self._control(*arguments)
-        if passes < 0:
+        inaccurate = passes <= INACCURATE_STEP
+        if inaccurate:
+            passes = INACCURATE_STEP - passes
+        elif passes < 0:
             return self._failed(t, passes, start)
         self._known = True
         sent = self._memory.u[0] * self._per_volt
@@ -189,12 +193,13 @@ class Mpc:
         elif self._per_volt != 1.0:
             sent = np.clip(sent, -self.limit, self.limit)
         self._last = sent
-        self._asked = (PATH_ENDED if t > preview.end else OK, passes, time.perf_counter() - start)
+        status = INACCURATE if inaccurate else PATH_ENDED if t > preview.end else OK
+        self._asked = (status, passes, time.perf_counter() - start)
         return sent.copy()
 
     def _failed(self, t: float, passes: int, start: float) -> FloatArray:
         """Zeros for a state that is none, and where no input was found: the memory may be why, and goes."""
-        if passes == -1:
+        if passes == NO_STATE:
             return self._other(BAD_POSE if _bad(self._state[:3]) else BAD_TWIST, start)
         self.reset()
         self._t = t

@@ -24,6 +24,7 @@ from omnidyn.control.mpc.riccati import (
     WEIGHT,
     E,
     V,
+    Y,
     advance,
     backward,
     column,
@@ -33,7 +34,7 @@ from omnidyn.control.mpc.riccati import (
     slope_of,
     vector_stage,
 )
-from omnidyn.control.mpc.small import dot, matrix, plus, put3, tv, vector
+from omnidyn.control.mpc.small import dot, matrix, plus, put3, sv, symmetric, tv, vector
 
 LOW, HIGH, DROP_LOW, DROP_HIGH, NEXT, SLOPE = 0, 1, 2, 3, 4, 5  # tables of the room to work in
 ROOM_SIZE = 6
@@ -350,6 +351,38 @@ def solve(program):
     return -total
 
 
+# Whether rounding leaves the answer right
+#
+# An input is u = uref - (1/r) b . g. Where the cost depends on the drive far more than on the volts, b . Y b >> r, the
+# two terms nearly cancel. Then, and where the passes did not do, the slopes of the cost at the answer tell: over the
+# curvature they are the error.
+
+STIFF = 1e6  # curvature of the cost by an input, over its weight: below it 1e-7 V is never lost
+INACCURATE = 1e-7  # [V]
+
+
+@part
+def is_inaccurate(program, stiff):
+    """Whether an input of the answer may be off by INACCURATE. stiff: look whatever the curvature is. Y of all steps
+    stands in `answer`; `room` [SLOPE] takes the slopes."""
+    push, weight, bounds, u = program.push, program.weight, program.bounds, program.u
+    for i in range(u.shape[1]):
+        b = column(push, i)
+        stiff |= dot(b, sv(symmetric(program.answer, 0, Y), b)) > STIFF * weight[i]
+    if not stiff:
+        return False
+    slopes(program, program.room[SLOPE])
+    for k in range(u.shape[0]):
+        for i in range(u.shape[1]):
+            b = column(push, i)
+            off = program.room[SLOPE, k, i] / (weight[i] + dot(b, sv(symmetric(program.answer, k, Y), b)))
+            off = min(off, 0.0) if u[k, i] <= bounds[0, k, i] + BOUND_TOLERANCE else off
+            off = max(off, 0.0) if u[k, i] >= bounds[1, k, i] - BOUND_TOLERANCE else off
+            if not abs(off) <= INACCURATE:
+                return True
+    return False
+
+
 # Optional limits: how fast the volts may change, the current of the motors, the speed of the robot
 #
 # slew      |u_k - u of the step before| <= (k + 1) slew dt      what can be reached by then
@@ -408,14 +441,14 @@ def too_fast(settings, x, fast):
 
 @part
 def solve_limited(settings, program, fast):
-    """`solve` with the limits of the speed. Returns passes."""
-    if settings[SPEED_WEIGHT] == 0.0:
-        return abs(solve(program))
-    total = 0
+    """`solve` with the limits of the speed. Returns passes; negative where the answer may be off by INACCURATE."""
+    total, inaccurate = 0, False
     for _ in range(TRIES):
         weigh_speeds(settings, program.stage, fast, 1.0)
-        total += abs(solve(program))
+        count = solve(program)
+        total += abs(count)
+        inaccurate = is_inaccurate(program, count < 0)
         weigh_speeds(settings, program.stage, fast, -1.0)
         if not too_fast(settings, program.x, fast):
             break
-    return total
+    return -total if inaccurate else total

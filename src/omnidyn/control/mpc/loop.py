@@ -53,6 +53,7 @@ from omnidyn.control.mpc.small import put3, vector
 from omnidyn.errors import InputError
 
 LARGEST_STATE = 1e9  # of any number of a state
+NO_STATE, NO_INPUT, INACCURATE_STEP = -1, -2, -3  # what a step returns in place of its passes
 
 
 # The arrays that a controller works in: what it remembers from step to step, and room that it does not
@@ -152,13 +153,14 @@ def control(numbers, tables, preview, start, state, consecutive, memory, room):
     """One step from a measured state (6,). Returns passes of the solver; u[0] is the answer, within bounds.
 
     -1 where the state is no number, or no place; -2 where no input was found: then nothing of the step is of use.
+    INACCURATE_STEP less the passes where the answer may be off by more than rounding.
     """
     settings, limit = tables.settings, tables.limit
     estimate, sent, x, u, fast = memory.estimate, memory.sent, memory.x, memory.u, memory.fast
     stage, bounds, before = room.stage, room.bounds, room.before
     for i in range(6):
         if not abs(state[i]) <= LARGEST_STATE:
-            return -1
+            return NO_STATE
     shift(memory, consecutive, preview, start)
     if settings[LEARN] != 0.0:
         if consecutive:
@@ -195,7 +197,7 @@ def control(numbers, tables, preview, start, state, consecutive, memory, room):
     if limited | (settings[SLEW] > 0.0):
         make_bounds(tables, program, sent)
     make_costs(numbers, settings, estimate, program, preview, start, add)
-    total = 0
+    total, inaccurate = 0, False
     for again in range(settings[AGAIN]):
         if again > 0:
             between(x, before)
@@ -205,18 +207,19 @@ def control(numbers, tables, preview, start, state, consecutive, memory, room):
         for k in range(len(x)):
             put3(before, k, 0, vector(x, k, 0))
             put3(before, k, 3, vector(x, k, 3))
-        total += solve_limited(settings, program, fast)
+        count = solve_limited(settings, program, fast)
+        total, inaccurate = total + abs(count), count < 0
         if not moved(numbers.levels, tables.emf, limited, x, before):
             break
     for i in range(u.shape[1]):
         if not abs(u[0, i]) <= LARGEST_STATE:
-            return -2
+            return NO_INPUT
         u[0, i] = min(max(u[0, i], bounds[0, 0, i]), bounds[1, 0, i])
         u[0, i] = min(max(u[0, i], -limit[0, i]), limit[0, i])  # bounds that leave no room are off by rounding
         for j in range(len(sent) - 1):
             sent[j, i] = sent[j + 1, i]
         sent[len(sent) - 1, i] = u[0, i]
-    return total
+    return INACCURATE_STEP - total if inaccurate else total
 
 
 @kernel
@@ -285,7 +288,7 @@ class Batch:
             start[:, 0] = np.arange(self.count)
         memory = self._memory
         passes = control_batch(self._numbers, self._tables, previews, start, state, self._known, memory, self._room)
-        self._known = passes >= 0
+        self._known = (passes >= 0) | (passes <= INACCURATE_STEP)
         sent = memory.u[:, 0].copy()
         sent[~self._known] = 0.0
         memory.sent[~self._known] = 0.0
