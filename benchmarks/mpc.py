@@ -25,7 +25,7 @@ from omnidyn.control.mpc.settings import Settings
 from omnidyn.control.paths.path import path
 from omnidyn.control.pid import Pid
 from omnidyn.simulation.live import LiveRobot
-from tests.support.mpc_programs import Solver, dense, random_program, residual
+from tests.support.mpc_programs import Solver, dense, random_program, residual, reweighed
 
 ROBOT = omnidyn.load_robot("axebot")
 PATHS = {
@@ -49,6 +49,7 @@ IPOPT = {"fast8": 11.21, "fsquare": 7.73, "fspin": 10.84}  # mm over the first 3
 NOISE = np.array([0.2, 0.2, 0.4, 1.0, 1.0, 4.0])
 REPEATS, DT = 3, 0.02
 COLD = scaled(100_000, 100)
+EDGES = scaled(20_000, 100)
 COLUMNS = ["what", "value", "unit", "more"]
 
 
@@ -228,6 +229,27 @@ def cold_rows(table: Table, count: int = COLD) -> None:
     table.add("<= 400", most <= 400.0, what="cold solve, worst", value=most, unit="us")
 
 
+def edge_rows(table: Table, count: int = EDGES) -> None:
+    """Far from the path, up to 1000 km, and with weights apart by up to 1e18: who is off says so."""
+    rng, wheels = np.random.default_rng(22), {"axebot": 3, "four-wheel": 4, "mecanum": 4}
+    solvers = {name: Solver(20, number) for name, number in wheels.items()}
+    off, told, worst = 0, 0, 0.0
+    for k in range(count):
+        robot, kind = [*wheels][k % 3], k // 3 % 4
+        scale = 10.0 ** rng.uniform(*((0.0, 0.0), (-1.0, 2.0), (2.0, 6.0), (-1.0, 1.0))[kind])
+        program = random_program(rng, scale, robot=robot)
+        if kind == 3:
+            program = reweighed(program, 10.0 ** rng.uniform(-6.0, 6.0, 3))
+        u, passes = solvers[robot].solve(program)
+        if not np.isfinite(u).all() or solvers[robot].is_inaccurate(program, passes):
+            told += 1
+            continue
+        error = residual(program, *dense(program), u)
+        off, worst = off + (error > 1e-6), max(worst, error)
+    more = f"{told} say that they are inaccurate; the others within {worst:.0e} V"
+    table.add("0", off == 0, what=f"wrong with status ok, of {count} at the edge", value=off, unit="", more=more)
+
+
 def tracking_rows(table: Table) -> None:
     """Errors over the eight references, and of those that saturate beside IPOPT's."""
     for words, (share, noise, push, goal) in CONDITIONS.items():
@@ -313,7 +335,7 @@ def measure() -> Table:
     """All figures, each with its goal."""
     table = Table("Model predictive control", COLUMNS, notes=[f"{machine()}. 20 steps of 20 ms unless said otherwise"])
     with one_core():
-        for rows in (time_rows, solver_rows, tracking_rows, rest_rows, delay_rows, araujo_rows, cold_rows):
+        for rows in (time_rows, solver_rows, tracking_rows, rest_rows, delay_rows, araujo_rows, cold_rows, edge_rows):
             rows(table)
         c_rows(table, ROBOT)
     return table
