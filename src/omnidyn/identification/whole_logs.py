@@ -73,7 +73,7 @@ def with_size(fit: Fit, found: Solution, runs: Sequence[Run], progress: FitProgr
     aside = progress.aside(f"once more with {' and '.join(map(in_words, more))}")
     try:
         other = Fit.of(runs, fit.began, replace(fit.question, free=(*names, *more), fixed=()), progress=aside)
-        wider = other.solve(aside)
+        wider = other.beside(found, problem.nuisances, aside)
     except OmnidynError:  # the logs do not tell these numbers
         return fit, found
     margins = margins_of([found, wider])

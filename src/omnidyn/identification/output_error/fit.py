@@ -282,7 +282,7 @@ class Fit:
         if trust(taken.solver, taken, AUTO).kind != SANDWICH:
             return taken
         names, aside = taken.solver.problem.nuisances, progress.aside("once more with a constant force")
-        forced = [self._beside(taken, [*names, force], aside) for force in (PUSH, TILT)]
+        forced = [self.beside(taken, [*names, force], aside) for force in (PUSH, TILT)]
         return best_with_force(taken, forced)
 
     def _plain(self, found: Solution, progress: FitProgress) -> Solution:
@@ -293,10 +293,10 @@ class Fit:
         if not lost or found.plain is not None:
             return found.plain or found
         kept = [name for name in names if name == GAIN]
-        return self._beside(found, kept, progress.aside(f"once more without {', '.join(lost)}"))
+        return self.beside(found, kept, progress.aside(f"once more without {', '.join(lost)}"))
 
-    def _beside(self, found: Solution, nuisances: Sequence[str], progress: FitProgress) -> Solution:
-        """The fit of the only group with other nuisances, in the same rows."""
+    def beside(self, found: Solution, nuisances: Sequence[str], progress: FitProgress) -> Solution:
+        """The fit of the only group with these nuisances, in the rows of another fit."""
         problem = replace(self.groups[0].problem(nuisances), pieces=found.solver.problem.pieces)
         return self._solve(self.groups[0], problem, progress, found)
 
