@@ -59,7 +59,7 @@ def _missing(fit: OutputErrorEstimate) -> Iterator[Statement]:
     lack = fit.lack_of_fit
     if lack is None or not lack.found or fit.not_followed:
         return
-    near = (each for each in lack.causes if each.confident and each.chi2 >= NEARLY * lack.causes[0].chi2)
+    near = (cause for cause in lack.causes if cause.confident and cause.chi2 >= NEARLY * lack.causes[0].chi2)
     remedy = next(near, None)
     if remedy is not None:
         numbers = {"cause": remedy.cause, "same_as": remedy.same_as, "alike": lack.alike(remedy), "way": way(remedy)}

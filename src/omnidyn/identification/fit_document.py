@@ -51,7 +51,7 @@ def fit_document(
     data = {
         "method": OUTPUT_ERROR,
         **(next(iter(groups.values())) if len(groups) == 1 else {"groups": groups}),
-        "differences": [{**vars(each), "differs": each.differs} for each in differences],
+        "differences": [{**vars(difference), "differs": difference.differs} for difference in differences],
         "next": advice,
         "check": checked(verdicts),
     }
@@ -75,24 +75,32 @@ def number_table(fit: OutputErrorEstimate) -> Table:
         mark = "at bound" if name in fit.at_bound else ""
         std, interval = f"{fit.std[name]:.2g}", interval_cell(fit.ci95[name])
         rows.append((words, name, f"{value:.5g}", std, interval, unit(name), mark))
-    for name, own in fit.nuisances.items():
+    for name, nuisance in fit.nuisances.items():
         if name in fit.unidentifiable:
-            rows.append(("", name, f"{own.value:.4g}", "", "", own.unit, NOT_DETERMINED))
+            rows.append(("", name, f"{nuisance.value:.4g}", "", "", nuisance.unit, NOT_DETERMINED))
         else:
             rows.append(
-                ("", name, f"{own.value:.4g}", f"{own.std:.2g}", interval_cell(own.ci95), own.unit, _whose(name))
+                (
+                    "",
+                    name,
+                    f"{nuisance.value:.4g}",
+                    f"{nuisance.std:.2g}",
+                    interval_cell(nuisance.ci95),
+                    nuisance.unit,
+                    _whose(name),
+                )
             )
     rows += [
         (
-            str(one.statement()),
-            one.name,
-            f"{one.value:.5g}",
-            f"{one.std:.2g}",
-            interval_cell(one.ci95),
-            one.unit,
+            str(combination.statement()),
+            combination.name,
+            f"{combination.value:.5g}",
+            f"{combination.std:.2g}",
+            interval_cell(combination.ci95),
+            combination.unit,
             "together",
         )
-        for one in fit.combinations
+        for combination in fit.combinations
     ]
     return Table(("number", "key", "value", "std error", "95 % interval", "unit", ""), rows, "<<>>><<")
 
@@ -154,7 +162,7 @@ def verdict_table(verdicts: Sequence[Verdict]) -> Table:
         )
     rest = len(verdicts) - len(shown)
     if rest:
-        fit = len(verdicts) - sum(each.counts[ERROR] + each.counts[WARNING] > 0 for each in verdicts)
+        fit = len(verdicts) - sum(verdict.counts[ERROR] + verdict.counts[WARNING] > 0 for verdict in verdicts)
         told = f"no worse than these; of all {len(verdicts)} logs, {fit} have no error or warning"
         rows.append((f"and {rest} more", "", "", "", "", "", told))
     return Table(("log", "rows", "length s", "rate Hz", "errors", "warnings", "what"), rows)

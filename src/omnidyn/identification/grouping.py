@@ -46,7 +46,7 @@ def group_names(sources: Sequence[str], patterns: Sequence[str], option: str) ->
     Raises InputError for a pattern that cannot be read or that no run matches, and for a run of two groups.
     """
     pairs = [_pair(text, option) for text in patterns]
-    found = []
+    names = []
     for source in sources:
         mine = list(dict.fromkeys(name for name, pattern in pairs if matches(source, pattern)))
         if len(mine) > 1:
@@ -56,16 +56,16 @@ def group_names(sources: Sequence[str], patterns: Sequence[str], option: str) ->
                 where=source,
                 remedy=f"make the patterns of `{option}` narrower",
             )
-        found.append(mine[0] if mine else "")
+        names.append(mine[0] if mine else "")
     for name, pattern in pairs:
-        if name not in found:
+        if name not in names:
             raise InputError(
                 "no log belongs to this group",
                 got=pattern,
                 expected="a glob or a folder of LOG...",
                 where=f"`{option}` {name}",
             )
-    return found
+    return names
 
 
 def names_of_groups(groups: str | Sequence[str] | None, sources: Sequence[str]) -> list[str] | None:

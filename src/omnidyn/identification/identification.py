@@ -209,11 +209,11 @@ class Identification(Displayable):
         data = {
             "ok": not self.failures,
             "shape": LINE,
-            "groups": {group: each.data for group, each in lines.items()},
+            "groups": {group: line.data for group, line in lines.items()},
             "check": checked(self.verdicts),
         }
         mend = [Points(self.advice, "next:", "next")] if self.advice else []
-        return Document(apart(*(each.parts for each in lines.values()), mend), data, ascii=True)
+        return Document(apart(*(line.parts for line in lines.values()), mend), data, ascii=True)
 
 
 def _sentences(found: Sequence[Statement]) -> str:

@@ -122,17 +122,18 @@ def identify(
         method, why = (OutputError(), "") if asked.hold_out else default_method(runs, asked.of_friction(), progress)
     asked.refuse(method)
     if isinstance(method, SteadyState):
-        found = _steady(runs, method, check, asked)
+        identification = _steady(runs, method, check, asked)
     else:
         assert isinstance(method, OutputError)
-        found = _fitted(runs, method, check, asked)
+        identification = _fitted(runs, method, check, asked)
     if not why:
-        return found
+        return identification
     chosen = Statement("method_chosen", NOTE, numbers={"method": method.name, "why": why})
     return replace(
-        found,
+        identification,
         groups={
-            name: replace(estimate, warnings=(chosen, *estimate.warnings)) for name, estimate in found.groups.items()
+            name: replace(estimate, warnings=(chosen, *estimate.warnings))
+            for name, estimate in identification.groups.items()
         },
     )
 
@@ -278,7 +279,7 @@ def _fitted(runs: Sequence[Run], method: OutputError, check: Sequence[Log], aske
     )
     asked = replace(asked, fit_time=process_time() - began)
     aside = {
-        name: [run for run, own, out in zip(runs, groups, held, strict=True) if out and own == name]
+        name: [run for run, group, out in zip(runs, groups, held, strict=True) if out and group == name]
         for name in answer.estimates
     }
     fits = {name: fit.beside(aside[name]) for name, fit in answer.estimates.items()}

@@ -193,14 +193,14 @@ class LackOfFit:
     @property
     def causes(self) -> tuple[Remedy, ...]:
         """The remedies of a misfit."""
-        return tuple(each for each in self.remedies if each.key != LOSS)
+        return tuple(remedy for remedy in self.remedies if remedy.key != LOSS)
 
     def statement(self) -> Statement | None:
         """What the model leaves out, and its likely cause; None for a model that fits."""
         if not self.found:
             return Statement("slow_errors", WARNING) if self.drifts else None
         worst = max(self.channels, key=lambda name: self.channels[name], default="")
-        follows = tuple(each.theme for each in self.follows[:2])
+        follows = tuple(follow.theme for follow in self.follows[:2])
         beyond = None if follows or self.causes else self._beyond_noise()
         numbers = {"share": self.channels.get(worst), "follows": follows, "beyond": beyond}
         if not self.causes:
@@ -226,7 +226,7 @@ class LackOfFit:
 
     def alike(self, remedy: Remedy) -> tuple[Statement, ...]:
         """What the log cannot tell from a remedy, those with values first: gain 0.94, torque constant -6 %."""
-        causes = {each.key: each.cause for each in self.remedies}
+        causes = {other.key: other.cause for other in self.remedies}
         keys = sorted(remedy.same_as, key=lambda key: key not in causes)
         more = [Statement("more", NOTE, numbers={"count": len(keys) - MOST_NAMED})] if len(keys) > MOST_NAMED else []
         return (*(causes.get(key, Statement("cause", NOTE, key)) for key in keys[:MOST_NAMED]), *more)
@@ -271,10 +271,10 @@ class LackOfFit:
                 noises = [*own.values()]
                 numbers = {
                     "outputs": tuple(own),
-                    "levels": tuple(each.level for each in noises),
-                    "units": tuple(each.unit for each in noises),
-                    "of_moves": max(each.of_moves for each in noises),
-                    "chi2": tuple(pick(each.chi2 for each in noises) for pick in (min, max)),
+                    "levels": tuple(noise.level for noise in noises),
+                    "units": tuple(noise.unit for noise in noises),
+                    "of_moves": max(noise.of_moves for noise in noises),
+                    "chi2": tuple(pick(noise.chi2 for noise in noises) for pick in (min, max)),
                 }
                 levels.append(Statement("noise_level", NOTE, source, numbers))
         return [*self._rounded(), *levels, *self._beyond_rest()]
@@ -314,7 +314,7 @@ class LackOfFit:
                 "found": self.found,
                 "channels": self.channels,
                 "sizes": self.sizes,
-                "follows": [asdict(each) for each in self.follows],
+                "follows": [asdict(follow) for follow in self.follows],
                 "remedies": self.remedies,
                 "statements": self.statements(),
                 "tested": self.tested,

@@ -73,13 +73,13 @@ class Ladder:
 
     def warnings(self) -> list[Statement]:
         """What a reader of the numbers must know: other robots that these logs do not tell from the one taken."""
-        found = []
+        statements = []
         for rung in self.taken:
             others = [r for r in self.rungs if r.step == rung.step and not r.taken and r.key in rung.same_as]
             if rung.same_as:
                 numbers = {"cause": rung.cause, "same_as": rung.same_as} | _spread([rung, *others])
-                found.append(Statement("ladder_alternatives", WARNING, rung.key, numbers))
-        return found
+                statements.append(Statement("ladder_alternatives", WARNING, rung.key, numbers))
+        return statements
 
     def table(self) -> Table:
         """Every model that was fitted, a row each."""

@@ -41,8 +41,8 @@ def judged_by_fit(
         return tuple(verdicts)
     progress(Report("judging by the fitted robot what rested on a guess"))
     found = [
-        judged_again(each, check_log(log, robot)) if rest_on_guesses(each) else each
-        for each, log in zip(verdicts, logs, strict=True)
+        judged_again(verdict, check_log(log, robot)) if rest_on_guesses(verdict) else verdict
+        for verdict, log in zip(verdicts, logs, strict=True)
     ]
     for source, finding in gone_by_fit(found):
         progress(Report(f"{source or 'the log'}: {finding.subject}: {finding}", urgent=True))
@@ -58,7 +58,9 @@ def told_why(verdicts: Sequence[Verdict], use: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        why = next((str(own.reason) for each in verdicts for own in each.uses if own.name == use and not own.good), "")
+        why = next(
+            (str(own.reason) for verdict in verdicts for own in verdict.uses if own.name == use and not own.good), ""
+        )
         if error.remedy or not why:
             raise
         raise InputError(
@@ -68,16 +70,16 @@ def told_why(verdicts: Sequence[Verdict], use: str) -> Iterator[None]:
 
 def of_motors(log: Log, *more: str) -> Log:
     """The log with what concerns motors alone, and channels `more`: on a bench, neither body nor heading need move."""
-    kept = {name: each for name, each in log.channels.items() if name in (*OF_MOTORS, *more)}
+    kept = {name: channel for name, channel in log.channels.items() if name in (*OF_MOTORS, *more)}
     return replace(log, channels=kept)
 
 
 def verdict_advice(verdicts: Sequence[Verdict]) -> list[Statement]:
     """What to mend in logs of which `check` says that they give wrong results as they stand."""
     alike: dict[tuple[str, str], list[tuple[str, Finding]]] = {}
-    for each in verdicts:
-        for finding in _errors(each):
-            alike.setdefault((finding.code, finding.remedy_text), []).append((each.source, finding))
+    for verdict in verdicts:
+        for finding in _errors(verdict):
+            alike.setdefault((finding.code, finding.remedy_text), []).append((verdict.source, finding))
     return [
         Statement(
             "mend_log",
@@ -92,9 +94,9 @@ def verdict_advice(verdicts: Sequence[Verdict]) -> list[Statement]:
 def unfit(verdicts: Sequence[Verdict]) -> list[Statement]:
     """Which logs are not usable as they stand, and why: those with the same faults together."""
     alike: dict[tuple[str, ...], list[Verdict]] = {}
-    for each in verdicts:
-        if each.has_errors:
-            alike.setdefault(tuple(finding.code for finding in _errors(each)), []).append(each)
+    for verdict in verdicts:
+        if verdict.has_errors:
+            alike.setdefault(tuple(finding.code for finding in _errors(verdict)), []).append(verdict)
     return [
         Statement(
             "log_not_usable",
@@ -108,7 +110,9 @@ def unfit(verdicts: Sequence[Verdict]) -> list[Statement]:
 
 def checked(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
     """The verdicts as JSON has them beside a fit."""
-    return [{"source": each.source, "has_errors": each.has_errors, "counts": each.counts} for each in verdicts]
+    return [
+        {"source": verdict.source, "has_errors": verdict.has_errors, "counts": verdict.counts} for verdict in verdicts
+    ]
 
 
 def _errors(verdict: Verdict) -> list[Finding]:

@@ -52,7 +52,7 @@ class Split:
 
     def statement(self) -> Statement:
         """What differs."""
-        keys: dict[str, Any] = {"keys": tuple(each.key for each in self.shifts)}
+        keys: dict[str, Any] = {"keys": tuple(shift.key for shift in self.shifts)}
         if self.by == LOGS:
             return Statement("differ_between_logs", WARNING, numbers=keys)
         when = {"at": self.at if self.at == self.at else None, "between": self.between, "share": self.share}
@@ -112,7 +112,7 @@ class Stability:
             {
                 "found": self.found,
                 "tested": self.tested,
-                "splits": [asdict(each) for each in self.splits],
+                "splits": [asdict(split) for split in self.splits],
                 "statements": self.statements(),
             }
         )

@@ -85,8 +85,8 @@ class Validation:
                 chance_cell(s.whiteness),
                 cell(s.lag, "+.3f"),
             )
-            for which, found in self.scores.items()
-            for name, s in found.items()
+            for which, score in self.scores.items()
+            for name, s in score.items()
         ]
         head = ("logs", "component", "unit", "samples", "rmse", "fit %", "chi2", "white p", "lag s")
         return Table(head, rows, "<<<>")

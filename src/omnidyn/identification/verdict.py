@@ -40,17 +40,17 @@ def fits_verdict(
     cut: bool = False,
 ) -> list[Statement]:
     """Fits of all groups. verdicts: of `check` on the logs. cut: whether an interrupt cut the fit off."""
-    found = [Statement("cut_short", WARNING)] if cut else []
-    faults = [finding for each in verdicts for finding in each.findings if finding.severity == ERROR]
+    statements = [Statement("cut_short", WARNING)] if cut else []
+    faults = [finding for verdict in verdicts for finding in verdict.findings if finding.severity == ERROR]
     if faults:
-        logs = {"logs": sum(each.has_errors for each in verdicts), "of": len(verdicts), "first": faults[0]}
-        found.append(Statement("logs_with_errors", ERROR, numbers=logs))
-    found += [fit.ladder.statement() for fit in [*fits.values()][:1] if fit.ladder]  # all have the same
+        logs = {"logs": sum(verdict.has_errors for verdict in verdicts), "of": len(verdicts), "first": faults[0]}
+        statements.append(Statement("logs_with_errors", ERROR, numbers=logs))
+    statements += [fit.ladder.statement() for fit in [*fits.values()][:1] if fit.ladder]  # all have the same
     for group, fit in fits.items():
         lack = fit.lack_of_fit.statement() if fit.lack_of_fit is not None and not fit.not_followed else None
         own = [*([lack] if lack else []), fit_verdict(fit, validations.get(group))]
-        found += own if len(fits) == 1 else [of_group(group, each) for each in own]
-    return found
+        statements += own if len(fits) == 1 else [of_group(group, each) for each in own]
+    return statements
 
 
 def of_group(group: str, statement: Statement) -> Statement:
@@ -112,17 +112,17 @@ def steady_verdict(study: SteadyStudy) -> list[Statement]:
             "share": share,
             "ties": tuple(each.name for each in study.choice.scores if not each.told_apart and each.name != score.name),
             "misfit": bool(lacks),
-            "cause": next((str(r.cause) for each in lacks for r in each.remedies), ""),
+            "cause": next((str(r.cause) for lack in lacks for r in lack.remedies), ""),
             "untested": bool(study.untested),
             "known": lines_verdict(study.estimates)[0],
         },
     )
-    changes = tuple(each.short() for each in study.moments)
+    changes = tuple(moment.short() for moment in study.moments)
     moved = [Statement("force_changes_in_run", WARNING, numbers={"changes": changes})] if changes else []
     return [*moved, friction]
 
 
 def lines_verdict(estimates: Mapping[str, Estimate]) -> list[Statement]:
     """The paper's line on each axis."""
-    known = tuple(each.numbers_known() for each in estimates.values())
+    known = tuple(estimate.numbers_known() for estimate in estimates.values())
     return [Statement("numbers_of_groups", NOTE, numbers={"groups": tuple(estimates), "known": known})]

@@ -46,8 +46,8 @@ def solved(
     best, solution, ladder = climb(fit, first, runs, progress, groups)
     answer = answered(best, solution, progress)
     estimates = {
-        name: replace(own, ladder=ladder, warnings=(*own.warnings, *ladder.warnings()))
-        for name, own in answer.estimates.items()
+        name: replace(estimate, ladder=ladder, warnings=(*estimate.warnings, *ladder.warnings()))
+        for name, estimate in answer.estimates.items()
     }
     return replace(answer, estimates=estimates)
 

@@ -164,16 +164,16 @@ class MotorEstimate:
 
     def late_statements(self, row: float) -> list[Statement]:
         """What to say of latencies beside the time of a row [s]: longer than LATE_ROWS; half a row of a speed."""
-        found = []
+        statements = []
         for name, late in self.late.items():
             if name in self.unidentifiable:
                 continue
             numbers, (low, high) = {"latency": late, "rows": late / row}, self.ci95[name]
             if late > LATE_ROWS * row:
-                found.append(Statement("late_by_rows", WARNING, name.partition(".")[2], numbers))
+                statements.append(Statement("late_by_rows", WARNING, name.partition(".")[2], numbers))
             elif self.between == "hold" and name == f"{LATENCY}.wheel_speed" and 0.0 < low <= 0.5 * row <= high:
-                found.append(Statement("late_by_half_a_row", NOTE, "wheel_speed", numbers))
-        return found
+                statements.append(Statement("late_by_half_a_row", NOTE, "wheel_speed", numbers))
+        return statements
 
     def _of_dead_band(self, started: bool) -> Statement:
         if BAND in self.rejected:

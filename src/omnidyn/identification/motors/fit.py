@@ -388,15 +388,15 @@ def _bent(t: FloatArray, speed: FloatArray, slope: float, lag: float) -> list[Fl
     """What the inputs that bend the line would add to the speed, from rest: a first-order lag, shape (rows,) each."""
     decay = np.exp(-np.diff(t) / lag).tolist()
     w = np.nan_to_num(speed / (np.nanmax(np.abs(speed), initial=0.0) or 1.0))
-    found = []
+    arrays = []
     for shape in (np.abs(w) * w, w**3, w * np.exp(-((w / LOW) ** 2))):
         target = (-0.5 / slope * (shape[1:] + shape[:-1])).tolist()
         now, values = 0.0, [0.0]
         for e, goal in zip(decay, target, strict=True):
             now = goal + (now - goal) * e
             values.append(now)
-        found.append(np.array(values))
-    return found
+        arrays.append(np.array(values))
+    return arrays
 
 
 def _sandwich(scores: FloatArray, inverse: FloatArray, number: IntArray) -> tuple[FloatArray, int]:

@@ -119,10 +119,13 @@ class OutputErrorEstimate(Estimate):
 
     def _parts(self) -> list[Part]:
         """The numbers of the log, the noise and what the data do not show, after the rest."""
-        sums = [f"{one.statement()}: {one.value:.4g} {interval_cell(one.ci95)} {one.unit}" for one in self.combinations]
+        sums = [
+            f"{combination.statement()}: {combination.value:.4g} {interval_cell(combination.ci95)} {combination.unit}"
+            for combination in self.combinations
+        ]
         logs = [
-            f"{name}: {NOT_DETERMINED if name in self.unidentifiable else self._of_log(own)}"
-            for name, own in self.nuisances.items()
+            f"{name}: {NOT_DETERMINED if name in self.unidentifiable else self._of_log(nuisance)}"
+            for name, nuisance in self.nuisances.items()
         ]
         noise = [f"noise of {name}: {std:.3g}" for name, std in self.noise.items()]
         left = [Points(self.blind, "not shown by the data:"), Points(self.unused, "not used:")]
@@ -139,7 +142,8 @@ class OutputErrorEstimate(Estimate):
     def to_dict(self) -> dict[str, Any]:
         """The estimate as JSON can hold it."""
         nuisances = {
-            name: asdict(own) | (UNKNOWN if name in self.unidentifiable else {}) for name, own in self.nuisances.items()
+            name: asdict(nuisance) | (UNKNOWN if name in self.unidentifiable else {})
+            for name, nuisance in self.nuisances.items()
         }
         return super().to_dict() | plain(
             {
@@ -153,7 +157,7 @@ class OutputErrorEstimate(Estimate):
                 "held_out_blocks": asdict(self.held_out) if self.held_out else None,
                 "converged": self.converged,
                 **({"ladder": self.ladder.to_dict()} if self.ladder else {}),
-                "directions": [asdict(one) for one in self.directions],
+                "directions": [asdict(direction) for direction in self.directions],
             }
         )
 

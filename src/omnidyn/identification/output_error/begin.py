@@ -70,7 +70,7 @@ def begun(
 
 
 def _refuse_profile(group: Group, question: OutputError) -> None:
-    levels = [each for each in asked_levels(group.robot, question.free or (), question.fixed) if group.tells(each)]
+    levels = [level for level in asked_levels(group.robot, question.free or (), question.fixed) if group.tells(level)]
     why = "a speed loop" if group.engine.looped else ""
     if group.robot.wheels.traction_mu is not None:
         why = "wheels that may slip"

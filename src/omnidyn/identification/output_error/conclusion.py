@@ -152,7 +152,7 @@ def unexplained(solver: Solver, solution: Solution) -> dict[str, float]:
     whole = [np.concatenate(parts) if parts else np.zeros(1) for parts in measured]
     own = [float(each.std()) if np.ptp(each) else 0.0 for each in whole]
     largest = {
-        name: max(s for s, other in zip(own, problem.columns, strict=True) if other[0] == name)
+        name: max(s for s, column in zip(own, problem.columns, strict=True) if column[0] == name)
         for name, _ in problem.columns
     }
     for c, (column, parts) in enumerate(zip(problem.columns, measured, strict=True)):
@@ -344,15 +344,15 @@ def _together(
 def _warnings(
     solver: Solver, solution: Solution, known: Trust, records: Sequence[Record], blind: Sequence[str]
 ) -> list[Statement]:
-    found = list(dict.fromkeys(note for record in records for note in record.notes))
+    statements = list(dict.fromkeys(note for record in records for note in record.notes))
     if not solution.converged:
-        found.append(Statement("iteration_limit", WARNING, numbers={"iterations": solution.iterations}))
-    found += [Statement("not_identifiable", WARNING, name) for name in blind]
-    found += [implausible(name, value) for name, value in too_early(solver, solution).items()]
+        statements.append(Statement("iteration_limit", WARNING, numbers={"iterations": solution.iterations}))
+    statements += [Statement("not_identifiable", WARNING, name) for name in blind]
+    statements += [implausible(name, value) for name, value in too_early(solver, solution).items()]
     values = solution.state.point.values
     ended = {p.name: p for p in at_the_end(solver.problem, values)}
     at = {name: float(values[solver.problem.where(name)]) for name in ended}
-    found += [
+    statements += [
         Statement("search_end", WARNING, name, {"value": value, "unit": _unit(name) or unit(name)})
         for name, value in at.items()
     ]
@@ -361,11 +361,11 @@ def _warnings(
             key = p.name.partition("@")[0]
             code = "bound_of_inertia" if Key.parse(key).name in (ROTOR, WHEEL) else "bound"
             code = "bound_of_breakaway" if falls(key, solver.problem.robot) else code
-            found.append(Statement(code, NOTE, p.name, {"value": values[j]}))
+            statements.append(Statement(code, NOTE, p.name, {"value": values[j]}))
     if known.kind == "sandwich":
         numbers = {"neighbours": np.abs(known.neighbours).max(), "runs": known.runs, "widening": known.widening}
-        found.append(Statement("not_white", NOTE, numbers=numbers))
-    return found
+        statements.append(Statement("not_white", NOTE, numbers=numbers))
+    return statements
 
 
 def _unused(records: Sequence[Record]) -> tuple[Statement, ...]:
@@ -429,7 +429,7 @@ def with_nuisances(
         return robot
     found = {p.name: float(v) for p, v in zip(problem.parameters, values, strict=True)}
     seconds, where = late_by(problem, values, problem.columns)
-    late = {name: each for (name, _), each in zip(problem.columns, seconds, strict=True)}
+    late = {name: second for (name, _), second in zip(problem.columns, seconds, strict=True)}
     own = max(0.0, min(late.values(), default=robot.drive.latency))
     change: dict[str, float] = {}
     told: dict[str, Prior] = {}
@@ -441,7 +441,7 @@ def with_nuisances(
         first = min(late, key=lambda name: late[name])
         told[keys.LATENCY] = _known(f"{LATENCY}.{first}", std, open_, data)
     drive = robot.drive.replace(**change) if change else robot.drive
-    priors = {name: each for name, each in robot.priors.items() if name not in told}
+    priors = {name: prior for name, prior in robot.priors.items() if name not in told}
     told = {name: each for name, each in told.items() if keys.Key.parse(name).get(robot.replace(drive=drive)) > 0.0}
     robot = robot.replace(drive=drive, priors=priors, log=_effects(found, late, own, records))
     return with_priors(robot, told)

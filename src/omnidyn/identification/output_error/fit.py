@@ -139,8 +139,10 @@ class Fit:
         return replace(
             answer,
             estimates={
-                name: replace(one, robot=with_band(one.robot, self.began), warnings=(*one.warnings, *note))
-                for name, one in estimates.items()
+                name: replace(
+                    estimate, robot=with_band(estimate.robot, self.began), warnings=(*estimate.warnings, *note)
+                )
+                for name, estimate in estimates.items()
             },
         )
 
@@ -163,7 +165,7 @@ class Fit:
         loss = loss_words(self.question.loss)
         if len(self.groups) == 1:
             group = self.groups[0]
-            moves = [one.moves for one in levels if one.moves is not None]
+            moves = [level.moves for level in levels if level.moves is not None]
             known = known.beside(np.concatenate(moves, axis=1)) if moves else known
             exact, held, told = without_a_fall(solution, known) if done else (known, {}, [])
             known = self._beside_what_is_held(exact, sure) if done else exact
@@ -249,20 +251,20 @@ class Fit:
 
     def _settled(self, group: Group, progress: FitProgress) -> Solution:
         """The fit of one group; automatic nuisances that the logs do not support are taken out again."""
-        found = self._solve(group, group.problem(), progress)
+        solution = self._solve(group, group.problem(), progress)
         if self.question.nuisances is not None:
-            return found
-        early = too_early(found.solver, found)
+            return solution
+        early = too_early(solution.solver, solution)
         if not group.engine.exact and not group.engine.looped:
-            kept = tuple(name for name in found.solver.problem.nuisances if name not in early)
+            kept = tuple(name for name in solution.solver.problem.nuisances if name not in early)
         else:
             progress.enter("which nuisances the logs support")
-            kept = supported(found.solver, found, (LATENCY,) if group.engine.looped else automatic(group.records))
-        harmful = rejected_nuisances(found) if not group.engine.looped else ()
+            kept = supported(solution.solver, solution, (LATENCY,) if group.engine.looped else automatic(group.records))
+        harmful = rejected_nuisances(solution) if not group.engine.looped else ()
         kept = tuple(name for name in kept if name not in harmful)
-        lost = [name for name in found.solver.problem.nuisances if name not in kept]
+        lost = [name for name in solution.solver.problem.nuisances if name not in kept]
         if not lost:
-            return self._chosen(found, progress)
+            return self._chosen(solution, progress)
         notes = tuple(implausible(name, value, fitted=False) for name, value in early.items())
         notes += tuple(Statement("harmful_nuisance", WARNING, name) for name in harmful if name not in early)
         if group.engine.looped:  # from its start on: until it is done, the fit with all of them is the best so far

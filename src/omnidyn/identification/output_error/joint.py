@@ -194,4 +194,4 @@ def joint_start(
         for k, value in zip(member.at, point.values, strict=True):
             values[k].append(float(value))
         states += point.states
-    return Point(np.array([float(np.median(each)) for each in values]), tuple(states))
+    return Point(np.array([float(np.median(value)) for value in values]), tuple(states))

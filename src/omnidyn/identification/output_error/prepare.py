@@ -179,16 +179,16 @@ def read_records(runs: Sequence[Run], robot: Robot, question: OutputError) -> li
         raise InputError("nothing to fit to", got="no runs", expected="one or more", where="runs")
     gains = any(Key.parse(key).name in GAINS for key in question.free or ())
     counted = None if question.tick_rad == 0.0 else differences(runs)
-    found = [record(run, robot, question.outputs, gains, question.tick_rad, counted) for run in runs]
-    if len({each.set_point is None for each in found}) > 1:
+    records = [record(run, robot, question.outputs, gains, question.tick_rad, counted) for run in runs]
+    if len({each.set_point is None for each in records}) > 1:
         raise InputError(
             "some logs have voltages, others set speeds only",
-            got=", ".join(each.source for each in found[:2]),
+            got=", ".join(each.source for each in records[:2]),
             expected="logs of one kind",
             remedy="free a gain of the loop, or fit them apart",
             where="runs",
         )
-    return found
+    return records
 
 
 def make_problem(

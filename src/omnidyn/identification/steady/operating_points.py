@@ -190,7 +190,7 @@ def steady_windows(
         run = on_clock_of_wheels(_with_voltage(run, robot) if origin == VOLTAGE else run)
         windows = pool(find_plateaus(run, start=window[0], end=window[1]) if window else find_plateaus(run))
         empty += [] if windows else [run.source]
-        found += [(number, run, each) for each in windows]
+        found += [(number, run, rows) for rows in windows]
     lacking = (
         [Statement("no_steady_window", subject=empty[0] or "run 0", numbers={"empty": len(empty), "runs": len(runs)})]
         if empty

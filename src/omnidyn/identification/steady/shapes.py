@@ -331,16 +331,16 @@ def fold_numbers(points: ForcePoints) -> IntArray:
     """What is left out together: points of one direction of travel, numbered in the order of the direction; with fewer
     than six directions each run and command for itself. Behind them each turn on the spot. Shape (points,).
     """
-    found, travel = np.zeros(len(points), dtype=np.int64), np.flatnonzero(points.travels)
+    indices, travel = np.zeros(len(points), dtype=np.int64), np.flatnonzero(points.travels)
     direction, spot = points.direction[travel], np.flatnonzero(~points.travels)
     folds = np.zeros(0, dtype=np.int64)
     if travel.size:
         _, folds = np.unique(np.round(direction / FOLD_DEG) % round(360.0 / FOLD_DEG), return_inverse=True)
         if folds.max() + 1 < FEW_FOLDS:
             folds = np.argsort(np.argsort(direction, kind="stable"), kind="stable")
-    found[travel] = folds
-    found[spot] = np.arange(spot.size) + (int(folds.max()) + 1 if travel.size else 0)
-    return found
+    indices[travel] = folds
+    indices[spot] = np.arange(spot.size) + (int(folds.max()) + 1 if travel.size else 0)
+    return indices
 
 
 def seen_components(points: ForcePoints, turning: bool) -> FloatArray:

@@ -210,8 +210,8 @@ def result_statements(
     within: Collection[str],
 ) -> list[Statement]:
     """What the data say. within: groups in which the force changes within a run."""
-    found = _shape_statements(choice)
-    found += [
+    statements = _shape_statements(choice)
+    statements += [
         _of(
             group,
             Statement("no_lack_of_fit", NOTE, numbers={"changes": group in within})
@@ -221,8 +221,10 @@ def result_statements(
         for group, one in lack.items()
         if not one.found
     ]
-    found += [_of(group, _viscous(level, choice.of(group))) for group, levels in viscous.items() for level in levels]
-    found += [
+    statements += [
+        _of(group, _viscous(level, choice.of(group))) for group, levels in viscous.items() for level in levels
+    ]
+    statements += [
         Statement(
             "group_difference",
             NOTE,
@@ -238,10 +240,10 @@ def result_statements(
         )
         for pair in differences
     ]
-    found += [
+    statements += [
         _of(group, Statement("internal_force", NOTE, numbers={"force": force})) for group, force in internal.items()
     ]
-    return found
+    return statements
 
 
 def _of(group: str, statement: Statement) -> Statement:
@@ -255,30 +257,30 @@ def _shape_statements(choice: ShapeChoice) -> list[Statement]:
     score, best = choice.score, choice.scores[0]
     box = next((other for other in choice.scores if other.name == "box" and other is not score), None)
     numbers = {"error": (score.loo, score.loo_std), "box": (box.loo, box.loo_std) if box else None}
-    found = [Statement("shape_chosen", NOTE, score.name, numbers)]
+    statements = [Statement("shape_chosen", NOTE, score.name, numbers)]
     for group, name in choice.own.items():
         scores = {score.name: score for score in choice.scored[group]}
         score, other = scores[name], scores[choice.chosen]
         numbers = {"shape": name, "error": (score.loo, score.loo_std), "other": None}
         if name != choice.chosen:
             numbers |= {"other": other.name, "other_error": (other.loo, other.loo_std)}
-        found.append(Statement("group_shape", NOTE, group, numbers))
+        statements.append(Statement("group_shape", NOTE, group, numbers))
     first, *ties = [score for score in choice.scores if not score.told_apart] or [choice.score]
     if ties:
         numbers = {"shapes": [tie.name for tie in ties], "behind": [(tie.behind, tie.behind_std) for tie in ties]}
-        found.append(Statement("shapes_tied", NOTE, first.name, numbers))
+        statements.append(Statement("shapes_tied", NOTE, first.name, numbers))
     if best.name != choice.chosen and score.told_apart:
         why = "not_in_model" if not best.in_model else "below_zero" if best.at_bound else "not_asked"
         numbers = {"behind": (score.behind, score.behind_std), "why": why}
-        found.append(Statement("better_shape_not_used", NOTE, best.name, numbers))
-    return found
+        statements.append(Statement("better_shape_not_used", NOTE, best.name, numbers))
+    return statements
 
 
 def lack_statements(
     lack: Mapping[str, LackOfFit], choice: ShapeChoice, within: Collection[str] = ()
 ) -> list[Statement]:
     """That no offered shape fits, and what would. within: groups in which the force changes within a run."""
-    found = []
+    statements = []
     for group, one in lack.items():
         numbers = {"changes": group in within, "share": one.channels["force"], "with": ""}
         if one.remedies and (best := one.remedies[0]).force:
@@ -289,8 +291,8 @@ def lack_statements(
                 "error_before": best.force.before,
                 "same": best.same_as,
             }
-        found += [_of(group, Statement("no_shape_fits", numbers=numbers))] if one.found else []
-    return found
+        statements += [_of(group, Statement("no_shape_fits", numbers=numbers))] if one.found else []
+    return statements
 
 
 def _viscous(level: Viscous, chosen: str) -> Statement:
@@ -307,36 +309,38 @@ def _viscous(level: Viscous, chosen: str) -> Statement:
 
 def point_statements(points: ForcePoints, choice: ShapeChoice, turning: bool) -> list[Statement]:
     """What is weak about the points or the comparison of shapes."""
-    found = []
+    statements = []
     along = points.along[np.isfinite(points.along)]
     wrong = int((along < 0.0).sum())
     if wrong > WRONG_WAY * max(len(along), 1):
-        found.append(Statement("against_motion", "warning", points.force_from, {"wrong": wrong, "points": len(along)}))
+        statements.append(
+            Statement("against_motion", "warning", points.force_from, {"wrong": wrong, "points": len(along)})
+        )
     if points.force_from == VOLTAGE:
-        found.append(Statement("forces_from_voltage", NOTE))
+        statements.append(Statement("forces_from_voltage", NOTE))
     if not turning:
-        found.append(Statement("not_turned"))
+        statements.append(Statement("not_turned"))
     for why in dict.fromkeys(choice.missing.values()):
         shapes = [name for name, reason in choice.missing.items() if reason == why]
-        found.append(Statement("shapes_not_compared", NOTE, numbers={"why": why, "shapes": shapes}))
-    return found
+        statements.append(Statement("shapes_not_compared", NOTE, numbers={"why": why, "shapes": shapes}))
+    return statements
 
 
 def fit_statements(fit: ShapeFit, robust: bool, kept: Mapping[str, float], guesses: Sequence[str]) -> list[Statement]:
     """What is weak about the levels of one group. kept: levels of the robot file; guesses: of the back-EMF."""
-    found = [
+    statements = [
         Statement("level_at_bound", subject=key, numbers={"free": free})
         for key, free in zip(fit.keys, fit.free.tolist(), strict=True)
         if free < 0.0
     ]
     far = int((fit.weight < LOW_WEIGHT).sum())
     if robust and far:
-        found.append(Statement("points_far_from_shape", NOTE, numbers={"far": far, "points": len(fit.weight)}))
-    found += [Statement("level_kept", NOTE, key, {"level": level}) for key, level in kept.items()]
+        statements.append(Statement("points_far_from_shape", NOTE, numbers={"far": far, "points": len(fit.weight)}))
+    statements += [Statement("level_kept", NOTE, key, {"level": level}) for key, level in kept.items()]
     levels = [key for key in fit.keys if Key.parse(key).level == VISCOUS]
     if levels and guesses:
-        found.append(Statement("rests_on_back_emf", numbers={"levels": levels, "guesses": guesses}))
-    return found
+        statements.append(Statement("rests_on_back_emf", numbers={"levels": levels, "guesses": guesses}))
+    return statements
 
 
 def advice(
@@ -347,23 +351,23 @@ def advice(
     force_from: str,
 ) -> list[Statement]:
     """What to measure next."""
-    found = []
+    statements = []
     if any(one.found for one in lack.values()):
         keys = {remedy.key for one in lack.values() for remedy in one.remedies}
-        found.append(Statement("drive_turned_around" if keys & TILTED_FLOOR else "look_beyond_shapes", NOTE))
+        statements.append(Statement("drive_turned_around" if keys & TILTED_FLOOR else "look_beyond_shapes", NOTE))
     if not turning:
-        found.append(Statement("turn_on_the_spot", NOTE))
+        statements.append(Statement("turn_on_the_spot", NOTE))
     if not any(viscous.values()):
-        found.append(Statement("drive_at_two_speeds", NOTE))
+        statements.append(Statement("drive_at_two_speeds", NOTE))
     elif not all(level.seen for levels in viscous.values() for level in levels):
-        found.append(Statement("drive_faster", NOTE))
+        statements.append(Statement("drive_faster", NOTE))
     tie = next((score for score in choice.scores[1:] if not score.told_apart and score.apart > 0.0), None)
     if tie is not None:
         numbers = {"best": choice.scores[0].name, "apart": tie.apart}
-        found.append(Statement("more_directions", NOTE, tie.name, numbers))
+        statements.append(Statement("more_directions", NOTE, tie.name, numbers))
     if force_from == CURRENT:
-        found.append(Statement("pull_once", NOTE))
-    return found
+        statements.append(Statement("pull_once", NOTE))
+    return statements
 
 
 # What a steady-state study says of one group, or of two: plain numbers with their uncertainty

@@ -179,4 +179,4 @@ def shown_by_themes(motion: Motion, top: FloatArray, themes: Sequence[Theme] = T
     ends = np.cumsum([force.shape[1] for force in forces])[:-1]
     pushed = iter(np.split(motion.shown_by(np.concatenate(forces, axis=1)), ends, axis=2) if forces else ())
     columns = [theme.directions(motion, top) if theme.sensed else next(pushed) for theme in themes]
-    return np.concatenate(columns, axis=2), [own.shape[2] for own in columns]
+    return np.concatenate(columns, axis=2), [column.shape[2] for column in columns]

@@ -63,24 +63,24 @@ def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEM
     both = [shown_by_themes(motion, top, themes) for motion in motions]
     shown, ends = [each for each, _ in both], np.cumsum([0, *both[0][1]])
     at = {theme.name: np.arange(a, b) for theme, a, b in zip(themes, ends, ends[1:], strict=False)}
-    found: list[Found] = []
+    founds: list[Found] = []
     first: dict[str, float] = {}
     taken = np.zeros(0, dtype=int)
     while True:
         linear, left = _whitened(rows, [each[:, :, taken] for each in shown])
         asked = _Asked.of(linear, shown, taken)
-        names = {each.theme for each in found}
+        names = {each.theme for each in founds}
         scores = {name: asked.score(own) for name, own in at.items() if name not in names}
         first = first or {name: p for name, (_, p, _) in scores.items()}
         best = _likeliest(scores)
-        if best and not found and scores[best][1] > FALSE / len(themes) and linear.degrees < TOLD:
+        if best and not founds and scores[best][1] > FALSE / len(themes) and linear.degrees < TOLD:
             # A memory as long as the log may be the misfit itself: once more, with that of what each theme would leave.
             scores = {name: _beside(rows, shown, taken, at[name]) for name in scores}
             best = _likeliest(scores)
         if not best or scores[best][1] > FALSE / len(themes):
             kept = [each[:, :, taken] for each in shown]
-            return Misfit(tuple(found), first, linear, kept, *_shares(linear, *left, bool(found)))
-        found.append(Found(best, *scores[best]))
+            return Misfit(tuple(founds), first, linear, kept, *_shares(linear, *left, bool(founds)))
+        founds.append(Found(best, *scores[best]))
         taken = np.concatenate([taken, at[best]])
 
 
@@ -235,7 +235,7 @@ def left_beside(
     both = [np.concatenate(each, axis=2) for each in zip(rows.slopes, kept, strict=True)]
     left = [r[:, :, None] - each @ by[:, None] for r, each in zip(rows.residual, both, strict=True)]
     off = [linear.rounded_off(k, each)[:, :, 0] for k, each in enumerate(left)]
-    found = [each[:, :, 0] for each in linear.without_starts(left)]
+    found = [start[:, :, 0] for start in linear.without_starts(left)]
     taken = linear.without_starts([each @ root for each in both])
     for k, own in enumerate(rows.own):
         if own.shape[2]:

@@ -84,9 +84,9 @@ class _Look:
         cuts = [self._moment(None)]
         if 1 < logs <= MOST_LOGS:
             cuts += [self._moment(log) for log in range(logs)]
-        tests = (len(self.told) + 1) * sum(len(found) for found in cuts)
-        moments = [split for log, found in enumerate(cuts, -1) if (split := self._split_at(found, log, tests))]
-        tested = {TIME: self._least([one for found in cuts for one in found.values()], tests)}
+        tests = (len(self.told) + 1) * sum(len(cut) for cut in cuts)
+        moments = [split for log, cut in enumerate(cuts, -1) if (split := self._split_at(cut, log, tests))]
+        tested = {TIME: self._least([one for cut in cuts for one in cut.values()], tests)}
         splits = sorted(moments, key=lambda split: split.p)[:1]
         if logs > 1:
             between = self._compared([self.blocks.log[:, None] == log for log in range(logs)])
@@ -388,11 +388,11 @@ def apart(
     information, gradient = np.zeros((wide, wide)), np.zeros(wide)
     common = np.arange(k * t, wide)
     information[common, common], gradient[common] = prior[shared], pull[shared]
-    for i, each in enumerate(parts):
+    for i, part in enumerate(parts):
         at = np.concatenate([np.arange(i * t, (i + 1) * t), common])
         own = np.concatenate([told, shared])
-        information[np.ix_(at, at)] += each[1:, 1:][np.ix_(own, own)]
-        gradient[at] += each[1:, 0][own]
+        information[np.ix_(at, at)] += part[1:, 1:][np.ix_(own, own)]
+        gradient[at] += part[1:, 0][own]
     step, covariance = _solved(information, gradient)
     return step[: k * t].reshape(k, t), covariance[: k * t, : k * t]
 

@@ -141,8 +141,8 @@ def as_counted(solution: Solution, problem: Problem, parts: Sequence[Parts]) -> 
         number[own] += there.sum(axis=1)
         pulled.append(np.where(there, pull, np.nan))
     mean = np.where(slope > 0.0, slope / np.maximum(number, 1.0), 1.0)
-    found = []
+    partses = []
     for piece, own, (_, slopes, at) in zip(problem.pieces, pulled, parts, strict=True):
         places = [every.index(column) for column in piece.record.columns]
-        found.append((own / mean[places][:, None], slopes, at))
-    return found
+        partses.append((own / mean[places][:, None], slopes, at))
+    return partses

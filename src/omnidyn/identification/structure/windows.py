@@ -132,7 +132,7 @@ def shown(rows: Rows, motions: Sequence[Motion]) -> list[Shown]:
     """The windows of each column of the problem."""
     constant = slowest(motions)
     commands = _commands(rows.pieces)
-    holds = [_holds(piece, own) for piece, own in zip(rows.pieces, commands, strict=True)]
+    holds = [_holds(piece, command) for piece, command in zip(rows.pieces, commands, strict=True)]
     repeats = _repeats(rows.pieces, commands, FORGOTTEN * constant)
     return [_of_column(rows, motions, c, SETTLED * constant, repeats, holds) for c in range(len(rows.problem.columns))]
 
@@ -150,20 +150,20 @@ def _of_column(
         for k, own in enumerate(rows.column)
         if c in own and rows.there[k][own.index(c)].sum() >= LEAST
     ]
-    step = float(np.median([each.step for each in parts])) if parts else 1.0
-    still = [each.runs((each.since >= settled) & each.moves, by_hold=True) for each in parts]
+    step = float(np.median([part.step for part in parts])) if parts else 1.0
+    still = [part.runs((part.since >= settled) & part.moves, by_hold=True) for part in parts]
     lengths = [b - a for own in still for a, b in own]
     length = max(LEAST, int(min(settled / step, float(np.median(lengths)) if lengths else 1e3)))
     held, busy, resting = list[Found](), list[Found](), list[Found]()
-    for each, own in zip(parts, still, strict=True):
-        used = np.zeros(len(each.rows), dtype=bool)
+    for part, own in zip(parts, still, strict=True):
+        used = np.zeros(len(part.rows), dtype=bool)
         for a, b in own:
             for first in range(b - length, a - 1, -length):
-                held.append((each.k, each.j, first, int(each.holds[first])))
+                held.append((part.k, part.j, first, int(part.holds[first])))
                 used[first : first + length] = True
-        for mask, into in ((each.moves & ~used, busy), (each.rests, resting)):
-            for a, b in each.runs(mask):
-                into += [(each.k, each.j, first, (each.k, first)) for first in range(a, b - length + 1, length)]
+        for mask, into in ((part.moves & ~used, busy), (part.rests, resting)):
+            for a, b in part.runs(mask):
+                into += [(part.k, part.j, first, (part.k, first)) for first in range(a, b - length + 1, length)]
     again, apart = _again(parts, repeats, length)
     return Shown(step, *(Windows.of(rows, found, length) for found in (held, busy, resting, again)), apart=apart)
 
@@ -179,17 +179,17 @@ def _column(rows: Rows, motion: Motion, k: int, j: int, settled: float, since: F
 
 def _again(parts: Sequence[_Column], repeats: Sequence[_Set], length: int) -> tuple[list[Found], int]:
     """(windows of what came again: piece, column in it, first known row, set; rows that they are apart, at least)."""
-    of, found, apart = {each.k: each for each in parts}, [], NEVER
-    for number, one in enumerate(repeats):
-        for first in range(0, one.length - length + 1, length):
+    of, found, apart = {part.k: part for part in parts}, [], NEVER
+    for number, repeat in enumerate(repeats):
+        for first in range(0, repeat.length - length + 1, length):
             own = [
                 (k, of[k].j, at, (number, first))
-                for k, row in zip(one.pieces.tolist(), one.rows.tolist(), strict=True)
+                for k, row in zip(repeat.pieces.tolist(), repeat.rows.tolist(), strict=True)
                 if k in of and (at := of[k].whole(row + first, length)) is not None
             ]
             if len(own) > 1:
                 found += own
-                apart = min(apart, one.apart)
+                apart = min(apart, repeat.apart)
     return found, apart
 
 
@@ -230,7 +230,7 @@ def _repeats(pieces: Sequence[Piece], commands: Sequence[FloatArray], forgotten:
     if not forgotten / usual < max(map(len, steps)):
         return []
     before = int(np.ceil(forgotten / usual))
-    if len({own.shape[1] for own in commands}) > 1:
+    if len({command.shape[1] for command in commands}) > 1:
         return []
     _, which = np.unique(np.concatenate(commands), axis=0, return_inverse=True)
     random = np.random.default_rng(0).integers(0, 2**63, size=int(which.max()) + 1, dtype=np.uint64)
@@ -257,7 +257,7 @@ def _joined(keys: NDArray[np.uint64], starts: IntArray) -> list[_Set]:
     order = np.argsort(which, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(which[order])) + 1)
     found: list[tuple[IntArray, int]] = []
-    for group in sorted((each for each in groups if len(each) > 1), key=lambda each: int(each[0])):
+    for group in sorted((group for group in groups if len(group) > 1), key=lambda each: int(each[0])):
         if found and len(found[-1][0]) == len(group) and (found[-1][0] + found[-1][1] == group).all():
             found[-1] = (found[-1][0], found[-1][1] + 1)
         else:

@@ -88,13 +88,13 @@ class ExactEngine(Engine[Problem]):
         robot = self.problem.robot_at(point.values)
         matrix = self.mapping.at(point.values[: self.problem.robot_count])[0].drive * axis_masses(robot)[:, None]
         driver, _ = driver_of(self.problem, point.values)
-        found = []
+        arrays = []
         for piece in self.problem.pieces:
             rows = slice(piece.first, piece.last)
             applied, _ = at_motors(piece.record.voltage[rows], piece.record.share[rows], driver)
             pull = in_the_body(headings(piece, robot)[:-1], self._forces(TILT, point.values))
-            found.append(applied @ matrix.T + self._forces(PUSH, point.values) + pull)
-        return found
+            arrays.append(applied @ matrix.T + self._forces(PUSH, point.values) + pull)
+        return arrays
 
     def _forces(self, names: Sequence[str], values: FloatArray) -> FloatArray:
         """Constant forces [N, N, N m], 0 for those that are not free. Shape (names,)."""
@@ -124,12 +124,12 @@ class ExactEngine(Engine[Problem]):
 
     def residuals(self, point: Point) -> list[Parts]:
         """(residuals (C, rows), slopes (C, rows, U), at (U,)) of the rows of every piece; see engines/engine.py."""
-        found, count = [], len(self.problem.parameters)
+        partses, count = [], len(self.problem.parameters)
         for piece, (value, slopes) in zip(self.problem.pieces, self.outputs(point), strict=True):
             rows, used = slice(piece.first, piece.last + 1), used_by(piece, count)
             by = np.moveaxis(slopes[rows], 1, 0)[:, :, used]
-            found.append(((piece.record.outputs[rows] - value[rows]).T, np.nan_to_num(by), used))
-        return found
+            partses.append(((piece.record.outputs[rows] - value[rows]).T, np.nan_to_num(by), used))
+        return partses
 
     def _axes(
         self, piece: Piece, state: FloatArray, now: Primitives, by: Primitives, weighting: Weighting

@@ -50,13 +50,13 @@ class LastPoints:
     def at(self, point: Point, find: Callable[[Point], list[Parts]]) -> list[Parts]:
         """What `find` says at a point, found anew unless it is one of the last."""
         key = (point.values.tobytes(), *(state.tobytes() for state in point.states))
-        found = self._found.get(key) or find(point)
+        partses = self._found.get(key) or find(point)
         with self._changing:
             self._found.pop(key, None)
             while len(self._found) >= self.KEPT:
                 del self._found[next(iter(self._found))]
-            self._found[key] = found
-        return found
+            self._found[key] = partses
+        return partses
 
 
 class ImplicitEngine(Engine[Problem]):

@@ -117,7 +117,7 @@ def information(variance: FloatArray, tick: FloatArray) -> FloatArray:
 
     variance [rad^2], tick [rad], shape (C,). Result: shape (2, C).
     """
-    found = np.tile([[1.0], [2.0]], (1, len(tick)))
+    values = np.tile([[1.0], [2.0]], (1, len(tick)))
     for c in np.flatnonzero(tick > 0.0):
-        found[:, c] = phase_means(0.5 * tick[c] / math.sqrt(variance[c]), _REACH, _STEPS)
-    return found
+        values[:, c] = phase_means(0.5 * tick[c] / math.sqrt(variance[c]), _REACH, _STEPS)
+    return values

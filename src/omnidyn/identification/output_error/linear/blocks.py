@@ -134,7 +134,7 @@ def _blocks(solution: Solution) -> Blocks:
     problem = bounded(whole)
     engine = solution.solver.engine.on(problem)
     rows = Rows.of(problem, solution.state.point, engine.residuals(solution.state.point))
-    slopes = [np.where(solution.held, 0.0, own) for own in rows.slopes]  # what a bound holds, holds in every block
+    slopes = [np.where(solution.held, 0.0, slope) for slope in rows.slopes]  # what a bound holds, holds in every block
     linear = Linear(replace(rows, slopes=slopes), noise_models(rows, rows.residual))
     return Blocks(linear, [np.zeros((*residual.shape, 0)) for residual in rows.residual])
 

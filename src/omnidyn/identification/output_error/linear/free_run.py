@@ -125,4 +125,4 @@ def _spread(rows: Rows) -> FloatArray:
         measured = piece.record.outputs[piece.first : piece.last + 1].T
         for j, c in enumerate(columns):
             values[c].append(measured[j, there[j]])
-    return np.array([np.concatenate(own).std() if own and np.concatenate(own).size else 0.0 for own in values])
+    return np.array([np.concatenate(value).std() if value and np.concatenate(value).size else 0.0 for value in values])

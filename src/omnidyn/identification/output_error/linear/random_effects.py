@@ -63,11 +63,11 @@ def drawn_together(root: FloatArray, count: int) -> FloatArray:
     The covariance is right on average over the signs: M. F. Hutchinson, Commun. Stat. Simul. 19, 433 (1990).
     """
     signs = np.random.default_rng(SEED).choice([-1.0, 1.0], root.shape[1])
-    found = np.zeros((len(root), count))
+    values = np.zeros((len(root), count))
     for first in range(0, root.shape[1], count):
         own = root[:, first : first + count] * signs[first : first + count]
-        found[:, : own.shape[1]] += own
-    return found
+        values[:, : own.shape[1]] += own
+    return values
 
 
 def share(seen: float, noise: float, apart: float, error: float) -> float:
@@ -88,15 +88,15 @@ def scaled(
     asked = [z.shape[1] - own for z, own in zip(shown, sure or [0] * len(shown), strict=True)]
     seen, noise, apart, both, first = 0.0, 0.0, 0.0, np.zeros(2 * fitted.shape[1:]), 0
     effects = [RandomEffects.of(z[:, :own]) for z, own in zip(shown, asked, strict=True)]
-    for one in effects:
-        own = slice(first, first := first + len(one.z))
-        taken = one.z.T @ fitted[own]
-        seen += float(((one.z.T @ left[own]) ** 2).sum())
-        noise += float(one.square.sum() - (taken**2).sum())
-        apart += float((one.square**2).sum() - 2.0 * ((one.z @ taken) ** 2).sum())
+    for effect in effects:
+        own = slice(first, first := first + len(effect.z))
+        taken = effect.z.T @ fitted[own]
+        seen += float(((effect.z.T @ left[own]) ** 2).sum())
+        noise += float(effect.square.sum() - (taken**2).sum())
+        apart += float((effect.square**2).sum() - 2.0 * ((effect.z @ taken) ** 2).sum())
         both += taken.T @ taken
     apart += float((both**2).sum())
-    square = np.concatenate([one.square for one in effects])
+    square = np.concatenate([effect.square for effect in effects])
     likely = share(seen, noise, apart, 0.0)
     error = 2.0 * (apart + 2.0 * likely * float((square**3).sum()) + likely**2 * float((square**4).sum()))
     part = share(seen, noise, apart, float(np.sqrt(max(error, 0.0))))

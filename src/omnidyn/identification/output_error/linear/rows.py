@@ -92,11 +92,11 @@ class Rows:
 
     def added(self, of: Callable[[int, int], FloatArray]) -> FloatArray:
         """What each piece k and its column j has, added up for each column of the problem. Shape (columns,)."""
-        found = np.zeros(len(self.problem.columns))
+        values = np.zeros(len(self.problem.columns))
         for k, columns in enumerate(self.column):
             for j, c in enumerate(columns):
-                found[c] += float(of(k, j).sum())
-        return found
+                values[c] += float(of(k, j).sum())
+        return values
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,10 +151,10 @@ class Linear:
         """[e, J, Z] of piece k in white rows, (N, 1 + P + K), Z of several (C, rows, K of its own): each is made white
         by itself, so that little more than what is returned is held."""
         every, first = [self.rows.residual[k][:, :, None], self.rows.slopes[k], *shown], 0
-        found = np.empty((self.length(k), sum(each.shape[2] for each in every)))
+        values = np.empty((self.length(k), sum(each.shape[2] for each in every)))
         for each in every:
-            found[:, first : (first := first + each.shape[2])] = self._white(k, each)
-        return found
+            values[:, first : (first := first + each.shape[2])] = self._white(k, each)
+        return values
 
     def length(self, k: int) -> int:
         """How many white rows a piece has, with those of what is known of its start."""
@@ -164,12 +164,12 @@ class Linear:
     def priors(self) -> FloatArray:
         """[e, J] (P, 1 + P) of what is known beforehand, a row of 0 of what is not."""
         parameters = self.rows.problem.parameters
-        found = np.zeros((len(parameters), 1 + len(parameters)))
+        values = np.zeros((len(parameters), 1 + len(parameters)))
         for i, (p, value) in enumerate(zip(parameters, self.rows.point.values, strict=True)):
             if p.known is not None:
                 mean, std = p.known
-                found[i, 0], found[i, 1 + i] = (mean - p.inner(float(value))) / std, 1.0 / std
-        return found
+                values[i, 0], values[i, 1 + i] = (mean - p.inner(float(value))) / std, 1.0 / std
+        return values
 
     def _without_start(self, k: int, values: FloatArray) -> FloatArray:
         """Columns of piece k made white, what its start explains projected out."""
@@ -241,15 +241,15 @@ class Linear:
     def without_starts(self, shown: Shown) -> list[FloatArray]:
         """What is shown, in rows as they are, without what the starts of pieces, and rounded inputs, explain of it.
         (C, rows, K) each."""
-        found = []
+        arrays = []
         for k, values in enumerate(shown):
             values = values - self.rounded_off(k, values)
             own = self.rows.own[k]
             if own.shape[2]:
                 white_own = self.of_piece(k, own)
                 values = values - own @ solved(white_own, self.of_piece(k, values))
-            found.append(values)
-        return found
+            arrays.append(values)
+        return arrays
 
     def rounded_off(self, k: int, values: FloatArray) -> FloatArray:
         """What rounded inputs make of values (C, rows, K) of piece k, as likely as can be, in rows as they are."""
@@ -346,7 +346,7 @@ def noise_models(
 ) -> list[AutoRegression]:
     """The memory of each column. taken: of each piece (C, rows, K), what a fit has taken out, as likely as it is. most:
     the highest order."""
-    found = []
+    auto_regressions = []
     for c in range(len(rows.problem.columns)):
         series, moves = list[FloatArray](), list[BoolArray]()
         for k, own in enumerate(rows.column):
@@ -358,8 +358,8 @@ def noise_models(
                     moves += without_gaps(rows.moves[k][j, there], rows.steps[k][j])
         plain, adds_up = autoregression(series, 0), rows.problem.columns[c][0] in TRAVEL
         is_white = most == 0 or rows.is_rounding(c, plain.variance)
-        found.append(plain if is_white else autoregression(series, may_add_up=adds_up, moves=moves))
-    return found
+        auto_regressions.append(plain if is_white else autoregression(series, may_add_up=adds_up, moves=moves))
+    return auto_regressions
 
 
 # What an encoder rounds off, as noise: a function of the angle, which goes round once a tick

@@ -197,12 +197,12 @@ def _shown(motion: Motion, volts: FloatArray) -> FloatArray:
     """What the columns show of other voltages (rows, K, W). Shape (C, rows, K)."""
     robot = linear_part(motion.robot)
     per_volt = drive_wrench(robot, np.zeros(N_AXES), np.eye(robot.wheels.count))
-    found = motion.shown_by(volts @ per_volt)
+    values = motion.shown_by(volts @ per_volt)
     ohm = per_wheel(robot.motor.resistance, robot.wheels.count)
     for c, (name, i) in enumerate(motion.piece.record.columns):
         if name == "current":
-            found[c] += volts[..., i] / ohm[i]
-    return found
+            values[c] += volts[..., i] / ohm[i]
+    return values
 
 
 def _rows(problem: Fitted) -> int:

@@ -181,10 +181,10 @@ class AutoRegression:
 
 def _steps(partial: FloatArray) -> list[FloatArray]:
     """Coefficients of the orders 0 to p that these partial correlations make."""
-    found = [np.zeros(0)]
+    arrays = [np.zeros(0)]
     for k in partial:
-        found.append(np.append(found[-1] - k * found[-1][::-1], k))
-    return found
+        arrays.append(np.append(arrays[-1] - k * arrays[-1][::-1], k))
+    return arrays
 
 
 def autoregression(
@@ -202,17 +202,19 @@ def autoregression(
     Without rows it has order 0 and variance 0.
     """
     stretches = _without_empty_axes(stretches)
-    found, cost = _fitted(stretches, most)
+    auto_regression, cost = _fitted(stretches, most)
     own = while_moving(stretches, moves) if moves and most is None else None
     if own is not None and own.cost < cost:
         return _of_motion(own, sum(int(each.sum()) for each in moves or ()))
-    if not may_add_up or not found.order:
-        return found
-    changes, own = _fitted([np.diff(each, axis=0) for each in stretches], most)
-    own += (found.rows - changes.rows) * _log_variance(stretches)  # a stretch may begin wherever the others are
+    if not may_add_up or not auto_regression.order:
+        return auto_regression
+    changes, own = _fitted([np.diff(stretch, axis=0) for stretch in stretches], most)
+    own += (auto_regression.rows - changes.rows) * _log_variance(
+        stretches
+    )  # a stretch may begin wherever the others are
     if own >= cost:
-        return found
-    moving = [each[(each != 0.0).any(axis=1)] for each in (np.diff(one, axis=0) for one in stretches)]
+        return auto_regression
+    moving = [each[(each != 0.0).any(axis=1)] for each in (np.diff(stretch, axis=0) for stretch in stretches)]
     return replace(_fitted(moving, most)[0], adds_up=True)
 
 
@@ -221,12 +223,12 @@ def _without_empty_axes(stretches: Sequence[FloatArray]) -> Sequence[FloatArray]
 
     What is fitted depends on squares and products of rows summed over columns, which no rotation of columns changes.
     """
-    if sum(each.size for each in stretches) < MANY:
+    if sum(stretch.size for stretch in stretches) < MANY:
         return stretches
-    products = np.sum([each.T @ each for each in stretches], axis=0)
+    products = np.sum([stretch.T @ stretch for stretch in stretches], axis=0)
     held, axes = np.linalg.eigh(products[1:, 1:])
     axes = axes[:, held > EMPTY * products[0, 0]]
-    return [np.column_stack([each[:, 0], each[:, 1:] @ axes]) for each in stretches]
+    return [np.column_stack([stretch[:, 0], stretch[:, 1:] @ axes]) for stretch in stretches]
 
 
 def _of_motion(found: Moving, rows: int) -> AutoRegression:
@@ -244,7 +246,7 @@ def _of_motion(found: Moving, rows: int) -> AutoRegression:
 
 def _fitted(stretches: Sequence[FloatArray], most: int | None) -> tuple[AutoRegression, float]:
     """(the autoregression of series as they are, its BIC); by two numbers where that says as much: moving.py."""
-    rows = sum(len(each) for each in stretches)
+    rows = sum(len(stretch) for stretch in stretches)
     if not rows:
         return AutoRegression(np.zeros(0), 0.0, 0), 0.0
     limit = int(min(ORDERS * np.log10(max(rows, 1)), SHARE * rows)) if most is None else most
@@ -261,7 +263,10 @@ def _fitted(stretches: Sequence[FloatArray], most: int | None) -> tuple[AutoRegr
 
 def _slow(stretches: Sequence[FloatArray]) -> bool:
     """Whether what is slow may have more power than white noise gives it: by sums of BLOCK rows, their squares."""
-    sums = [each[: len(each) // BLOCK * BLOCK].reshape(-1, BLOCK, each.shape[1]).sum(axis=1) for each in stretches]
+    sums = [
+        stretch[: len(stretch) // BLOCK * BLOCK].reshape(-1, BLOCK, stretch.shape[1]).sum(axis=1)
+        for stretch in stretches
+    ]
     blocks = sum(map(len, sums))
     expected = BLOCK * math.exp(_log_variance(stretches)) * blocks
     return blocks > 0 and sum(float((each**2).sum()) for each in sums) > expected * (
@@ -270,7 +275,7 @@ def _slow(stretches: Sequence[FloatArray]) -> bool:
 
 
 def _log_variance(stretches: Sequence[FloatArray]) -> float:
-    square = sum(float((each**2).sum()) for each in stretches)
+    square = sum(float((stretch**2).sum()) for stretch in stretches)
     return math.log(max(square / max(sum(map(len, stretches)), 1), 1e-300))
 
 

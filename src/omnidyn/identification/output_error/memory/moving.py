@@ -80,12 +80,12 @@ def while_moving(stretches: Sequence[FloatArray], moves: Sequence[BoolArray]) ->
 
     at, curved, size, cost = scored(looked, STARTS, LOW, HIGH)
     cost += 2.0 * math.log(rows)
-    found = Moving(float(at[0]), math.exp(at[1]), size, 0.5 * curved, cost)
+    moving = Moving(float(at[0]), math.exp(at[1]), size, 0.5 * curved, cost)
     steps = np.ones(rows, np.intp)
     steps[ends[:-1]] = 0
-    new = new_while_moving(series[:, :1].copy(), steps, there, found.phi, found.share)[:, 0]
+    new = new_while_moving(series[:, :1].copy(), steps, there, moving.phi, moving.share)[:, 0]
     coloured = abs(float(new[1:] @ new[:-1])) > COLOURED * math.sqrt(rows) * float((new**2).mean())
-    return found if cost < white and not coloured else None
+    return moving if cost < white and not coloured else None
 
 
 @kernel
@@ -243,13 +243,13 @@ def partials(at: FloatArray, count: int) -> FloatArray:
     phi, theta = at
     first = (1.0 - phi * theta) * (phi - theta) / (1.0 + theta * theta - 2.0 * phi * theta)
     lags = np.append(1.0, first * phi ** np.arange(count))
-    found, known, left = np.zeros(count), np.zeros(count), 1.0
+    values, known, left = np.zeros(count), np.zeros(count), 1.0
     for m in range(count):
-        found[m] = (lags[m + 1] - known[:m] @ lags[m:0:-1]) / left
-        known[:m] -= found[m] * known[:m][::-1]
-        known[m] = found[m]
-        left *= 1.0 - found[m] ** 2
-    return found
+        values[m] = (lags[m + 1] - known[:m] @ lags[m:0:-1]) / left
+        known[:m] -= values[m] * known[:m][::-1]
+        known[m] = values[m]
+        left *= 1.0 - values[m] ** 2
+    return values
 
 
 def coefficients(partial: FloatArray) -> FloatArray:

@@ -55,7 +55,7 @@ class WhitenedEngine(Engine[Problem]):
         """The same as `residuals`, one piece after the other: of sums no more than one is held."""
         pieces, parts = self.problem.pieces, self.engine.residuals(point)
         if self._moves is None:
-            self._moves = [moving_rows(piece, own[0]) for piece, own in zip(pieces, parts, strict=True)]
+            self._moves = [moving_rows(piece, part[0]) for piece, part in zip(pieces, parts, strict=True)]
         yield from (self._filtered(*each) for each in zip(pieces, parts, self._moves, strict=True))
 
     def _filtered(self, piece: Piece, parts: Parts, moves: BoolArray) -> Parts:
@@ -82,14 +82,14 @@ class TangentEngine(Engine[Problem]):
 
     def __init__(self, engine: Engine[Problem], point: Point):
         self.problem, self.point, self._parts = engine.problem, point, engine.residuals(point)
-        self.moves = [moving_rows(piece, own[0]) for piece, own in zip(self.problem.pieces, self._parts, strict=True)]
+        self.moves = [moving_rows(piece, part[0]) for piece, part in zip(self.problem.pieces, self._parts, strict=True)]
 
     def residuals(self, point: Point) -> list[Parts]:
         """Residuals and slopes of every piece, see engines/engine.py."""
-        found, moved = [], point.values - self.point.values
+        partses, moved = [], point.values - self.point.values
         for (residual, slopes, at), now, before in zip(self._parts, point.states, self.point.states, strict=True):
-            found.append((residual - slopes @ np.concatenate([moved, now - before])[at], slopes, at))
-        return found
+            partses.append((residual - slopes @ np.concatenate([moved, now - before])[at], slopes, at))
+        return partses
 
 
 class NearEngine(Engine[Problem]):

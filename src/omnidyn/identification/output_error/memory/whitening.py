@@ -201,7 +201,7 @@ def _columns(piece: Piece, parts: Parts) -> Iterator[tuple[Column, IntArray, Flo
 
 def _of_pieces(solution: Solution, covariance: FloatArray) -> list[FloatArray]:
     """Covariance of the parameters and the states of every piece, in the units of its slopes. (P + S, P + S) each."""
-    normal, count, found = Normal(solution.solver, solution.state), len(covariance), []
+    normal, count, arrays = Normal(solution.solver, solution.state), len(covariance), []
     for sums, (_, info) in zip(solution.state.sums, normal.pieces, strict=True):
         full = np.zeros((sums.grad.shape[1], sums.grad.shape[1]))
         full[:count, :count] = covariance
@@ -213,8 +213,8 @@ def _of_pieces(solution: Solution, covariance: FloatArray) -> list[FloatArray]:
                 of_states(info[count:, count:], np.eye(len(info) - count)) + lift @ covariance @ lift.T
             )
         size = np.concatenate([normal.scale, np.ones(len(full) - count)])
-        found.append(full * np.outer(size, size))
-    return found
+        arrays.append(full * np.outer(size, size))
+    return arrays
 
 
 def _inverse(information: FloatArray) -> FloatArray:
@@ -226,7 +226,7 @@ def _inverse(information: FloatArray) -> FloatArray:
 
 def _roots(covariances: Sequence[FloatArray]) -> list[FloatArray]:
     """The roots of several, of as many columns each: a piece whose start is seen has more that are open."""
-    roots = [_root(own) for own in covariances]
+    roots = [_root(covariance) for covariance in covariances]
     most = max((root.shape[1] for root in roots), default=0)
     return [np.pad(root, ((0, 0), (0, most - root.shape[1]))) for root in roots]
 

@@ -64,14 +64,14 @@ class Decimated:
         """What an engine shows of `all_rows` in the rows that are kept."""
         if not self.rows:
             return list(parts)
-        found = []
+        partses = []
         for (residual, slopes, at), piece, kept in zip(parts, self.whole.pieces, self.rows, strict=True):
             rows = kept[kept < piece.first + residual.shape[1]] - piece.first
             counts = np.array(piece.record.ticks) > 0.0
             few, by = _nearest(residual, rows), _nearest(slopes, rows)
             few[counts], by[counts] = residual[counts][:, rows], slopes[counts][:, rows]
-            found.append((few, by, at))
-        return found
+            partses.append((few, by, at))
+        return partses
 
 
 def _stride(record: Record, pieces: Sequence[Piece], time: float) -> int:

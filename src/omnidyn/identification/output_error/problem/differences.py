@@ -202,7 +202,7 @@ def _level(high: FloatArray) -> float:
 def _hindrance(logs: Sequence[Run], found: Differences) -> Statement | None:
     """Why such differences cannot be added up; None where they can."""
     steps = [np.diff(run.t) / _row(run) for run in logs if len(run) > 1]
-    whole = np.concatenate([each[each < LOST] for each in steps])
+    whole = np.concatenate([step[step < LOST] for step in steps])
     if not found.stamped and np.mean(np.abs(whole - 1.0) <= UNEVEN) < NEARLY:
         return Statement("uneven_stamps", NOTE)
     rows, missing = sum(map(len, logs)), [_turned(run, found)[1][1:] for run in logs]

@@ -129,7 +129,7 @@ def tables_with_band(robot: Robot) -> list[str]:
 
 def _changed(robot: Robot, speeds: Mapping[str, Mapping[str, Any]], law: str) -> Robot:
     """The robot with another law, and other bands, in some tables."""
-    own = {n: getattr(robot.friction, n).model_copy(update={"law": law, **each}) for n, each in speeds.items()}
+    own = {n: getattr(robot.friction, n).model_copy(update={"law": law, **speed}) for n, speed in speeds.items()}
     return robot.model_copy(update={"friction": robot.friction.model_copy(update=own)}) if own else robot
 
 

@@ -70,28 +70,28 @@ def nuisance_parameters(
     if unknown:
         raise InputError("no such nuisance", got=unknown[0], expected=", ".join(NUISANCES), where="nuisances")
     channels = measured_channels(records)
-    found: list[Parameter] = []
+    parameters: list[Parameter] = []
     for name in wanted:
         if name == LATENCY:
-            found += [_latency(channel, robot, from_) for channel in channels]
+            parameters += [_latency(channel, robot, from_) for channel in channels]
         elif name.startswith(f"{LATENCY}."):
             channel = _as_fitted(name.partition(".")[2], channels)
             if channel not in channels:
                 raise InputError("no such channel", got=name, expected=", ".join(channels), where="nuisances")
-            found.append(_latency(channel, robot))
+            parameters.append(_latency(channel, robot))
         elif name == GAIN:
             prior = (1.0, SUPPLY_STD) if any(record.supplied for record in records) else None
-            found.append(Parameter(GAIN, 1.0, 0.1, 10.0, True, prior))
+            parameters.append(Parameter(GAIN, 1.0, 0.1, 10.0, True, prior))
         elif name == DEAD_BAND:
             most = max(float(np.nanmax(np.abs(record.voltage))) for record in records)
             own, seen = robot.drive.dead_band, least_that_drove(records, robot)
             high = max(seen if np.isfinite(seen) else 0.5 * most, own)
-            found.append(Parameter(DEAD_BAND, own, 0.0, high, prior=_of_file(robot, KEY_DEAD, own)))
+            parameters.append(Parameter(DEAD_BAND, own, 0.0, high, prior=_of_file(robot, KEY_DEAD, own)))
         elif name.partition(".")[0] in (TILT, PUSH):
-            found += _forces(name, robot)
+            parameters += _forces(name, robot)
         else:
-            found.append(Parameter(FADE, 0.0, -MOST_FADE, MOST_FADE))
-    return list({p.name: p for p in found}.values())
+            parameters.append(Parameter(FADE, 0.0, -MOST_FADE, MOST_FADE))
+    return list({p.name: p for p in parameters}.values())
 
 
 def _latency(channel: str, robot: Robot, from_: float = EARLIEST) -> Parameter:
@@ -131,10 +131,10 @@ def _forces(name: str, robot: Robot) -> list[Parameter]:
     most = (weight, weight, weight * float(np.max(robot.wheels.robot_radius)))
     every = [Parameter(f"{kind}.{axis}", 0.0, -own, own) for axis, own in zip(AXES, most, strict=True)]
     every = every[:YAW] if kind == TILT else every
-    found = [p for p in every if name in (kind, p.name)]
-    if not found:
+    parameters = [p for p in every if name in (kind, p.name)]
+    if not parameters:
         raise InputError("no such axis", got=name, expected=", ".join(p.name for p in every), where="nuisances")
-    return found
+    return parameters
 
 
 def automatic(records: Sequence[Record], quick: bool = True) -> tuple[str, ...]:

@@ -102,7 +102,7 @@ def robot_parameter(robot: Robot, key: str, prior: tuple[float, float] | None, o
         return Parameter(key, value, LIGHT * value, value * SPAN, prior=prior)
     span = SPAN_OF_SPEED if place.part == FRICTION and place.field.endswith("_speed") else SPAN
     most = 1.0 if place.name == EFFICIENCY else value * span
-    also = tuple((str(each), float(each.get(robot)) / value) for each in _followers(robot, place, others))
+    also = tuple((str(follower), float(follower.get(robot)) / value) for follower in _followers(robot, place, others))
     return Parameter(key, value, value / span, most, True, prior, also)
 
 

@@ -85,12 +85,12 @@ def loop_pieces(records: Sequence[Record], robot: Robot, start: str) -> list[Pie
             expected=f"{REST} or auto",
             where="start",
         )
-    found = [
+    pieces = [
         _piece(record, *record.pieces[0])
         for record in records
         if start == REST or _begins_at_rest([*measured_twists(record, robot)], *record.pieces[0])
     ]
-    if not found:
+    if not pieces:
         raise InsufficientDataError(
             "no log begins at rest, so what the speed loop remembers is not known",
             got=f"{len(records)} logs in motion",
@@ -98,7 +98,7 @@ def loop_pieces(records: Sequence[Record], robot: Robot, start: str) -> list[Pie
             expected="one that begins at rest",
             remedy="cut the logs so that they begin before the robot sets off",
         )
-    return found
+    return pieces
 
 
 def left_out(records: Sequence[Record], pieces: Sequence[Piece]) -> list[Statement]:
@@ -230,12 +230,12 @@ def _tried(
     solver: Solver, which: Sequence[tuple[float, float, float]], what: str, progress: FitProgress
 ) -> list[State]:
     """The states at each (latency [s], factor of friction, factor of gains)."""
-    found = []
+    states = []
     for k, each in enumerate(which):
         progress.counted(f"looking for a start, {what}", k, len(which))
-        found.append(_moved(solver, *each))
-        progress.better(found[-1])
-    return found
+        states.append(_moved(solver, *each))
+        progress.better(states[-1])
+    return states
 
 
 def _moved(solver: Solver, late: float, level: float, gain: float) -> State:

@@ -163,7 +163,7 @@ def levels_of(solution: Solution) -> dict[str, float]:
     robot = problem.robot_at(solution.state.point.values)
     levels = {name: (level, slides_least(robot, name)) for name, level in found.items()}
     above = any(level > least for level, least in levels.values())
-    return {name: max(each) for name, each in levels.items()} if above else {}
+    return {name: max(level) for name, level in levels.items()} if above else {}
 
 
 def find_breakaway(

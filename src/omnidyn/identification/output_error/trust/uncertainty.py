@@ -122,7 +122,7 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     count = len(runs) if len(runs) >= MANY_RUNS else 0
     scores = normal.scores()
     if count:
-        scores = np.array([scores[own].sum(axis=0) for own in runs]) * np.sqrt(count / (count - 1.0))
+        scores = np.array([scores[run].sum(axis=0) for run in runs]) * np.sqrt(count / (count - 1.0))
     influence = scores @ plain  # what each block moves each parameter by
     coloured, neighbours = _coloured(solver, sums, runs if count else None)
     if kind == "auto":  # a loss that is not the likelihood of the noise says nothing by its curvature alone
@@ -214,7 +214,7 @@ def _coloured(
         drift[first : first + len(piece.drift), piece.columns] = piece.drift
         first += len(piece.drift)
     if runs is not None:
-        drift = np.array([drift[own].sum(axis=0) for own in runs])
+        drift = np.array([drift[run].sum(axis=0) for run in runs])
     slow, blocks = (drift**2).sum(axis=0), (drift != 0.0).sum(axis=0)
     fast = np.abs(neighbours) * np.sqrt(np.maximum(per_column(sums, columns, "number"), 1.0)) > COLOURED
     return bool((fast | (slow / square > 1.0 + COLOURED * np.sqrt(2.0 / np.maximum(blocks, 1.0)))).any()), neighbours

@@ -111,7 +111,7 @@ def _climbed(
     for asked in (quick, slow, moves_apart(first, stands), moves(far, stands)):
         if best is not None and after is not None and not _lacks(after):  # what rivals it, and no more
             asked = purse.rivals(asked, best) if asked is slow else []
-        more = [each for move in purse.pays(asked, stands) for each in fits(move, stands, None)]
+        more = [fit for move in purse.pays(asked, stands) for fit in fits(move, stands, None)]
         if not more:
             continue
         every += more
@@ -119,7 +119,7 @@ def _climbed(
         after = _examined(best) if best is not None else None
     if best is not None and best.move is not None and stands.before is not None:  # may the step before go?
         again = purse.pays([best.move], stands.before)
-        every += [each for move in again for each in fits(move, stands.before, stands.cause)]
+        every += [fit for move in again for fit in fits(move, stands.before, stands.cause)]
         found, best = judged(step, stands, every, seen)
         after = _examined(best) if best is not None and best.instead else after
     return found, best, after
@@ -180,8 +180,8 @@ def judged(
     count, memory = sum(each.tried for each in seen.values()), {group: each.memory for group, each in seen.items()}
     margins = margins_of([each.solution for each in (stands, *models)])
     before = errors(stands.solution, memory, margins, stands.numbers)
-    by = [errors(each.solution, memory, margins, each.numbers) for each in models]
-    why = [_why_not(each, own, before, count, _beyond(each, seen)) for each, own in zip(models, by, strict=True)]
+    by = [errors(model.solution, memory, margins, model.numbers) for model in models]
+    why = [_why_not(model, own, before, count, _beyond(model, seen)) for model, own in zip(models, by, strict=True)]
     paying = [k for k, reason in enumerate(why) if reason is None]
     best = max(paying, key=lambda k: by[k].gain(before)[0], default=None)
     alike = [k for k in paying if best is not None and (_is_alike(by[best], by[k]) or _is_same(by[best], by[k]))]
@@ -189,12 +189,12 @@ def judged(
         alike, key=lambda k: (by[k].numbers, models[k].shapes, not models[k].instead, by[k].bic(count)), default=None
     )
     rungs = []
-    for k, (each, own) in enumerate(zip(models, by, strict=True)):
+    for k, (model, own) in enumerate(zip(models, by, strict=True)):
         same = [o for o in paying if taken in (k, o) and o != k and k in paying and _is_same(by[k], by[o])]
         reason = why[k] or Statement(_why_other(k, taken, alike, same), NOTE)
-        others = [models[o].key for o in same] + _not_fitted(models, each, own, before, seen)
-        others += hidden_by(each.key, each.solution.solver.problem.columns)
-        rungs.append(_rung(step, each, own, before, count, k == taken, reason, others, stands))
+        others = [models[o].key for o in same] + _not_fitted(models, model, own, before, seen)
+        others += hidden_by(model.key, model.solution.solver.problem.columns)
+        rungs.append(_rung(step, model, own, before, count, k == taken, reason, others, stands))
     rungs.sort(key=lambda rung: (not rung.taken, -rung.gain))
     rungs = [*{_mark(rung): rung for rung in reversed(rungs)}.values()][::-1]  # a limit found twice is one
     rungs += [_untried(step, each) for each in every if isinstance(each, Untried)]
@@ -265,7 +265,7 @@ def _not_fitted(
 ) -> list[str]:
     """What the diagnosis could not tell from a model, was not fitted, and might explain as much as the model does."""
     assert model.move is not None
-    fitted, noise = {each.key for each in models}, own.left / max(own.rows, 1)
+    fitted, noise = {tried.key for tried in models}, own.left / max(own.rows, 1)
     enough = (1.0 - ROUGHLY) * (before.left - own.left) / noise - TOLD_APART
     return [
         r.key

@@ -86,14 +86,14 @@ def _blocks(
 ) -> tuple[Blocks, int]:
     """(blocks of one group, how many rows they have). told: parameters whose priors another group has already."""
     whole, point = solution.solver.problem, solution.state.point
-    pieces = [replace(piece, margin=own) for piece, own in zip(whole.pieces, margins, strict=True)]
+    pieces = [replace(piece, margin=margin) for piece, margin in zip(whole.pieces, margins, strict=True)]
     few = Decimated.of(replace(whole, pieces=tuple(pieces)))
     problem = bounded(few.problem)
     engine = solution.solver.engine.on(few.all_rows(problem))
     shows: Shows = lambda at: as_counted(solution, problem, few.kept(engine.residuals(at)))  # noqa: E731
     bare = [replace(p, prior=None) if k in told else p for k, p in enumerate(problem.parameters)]
     rows = Rows.of(replace(problem, parameters=tuple(bare)), point, shows(point))
-    slopes = [np.where(solution.held, 0.0, own) for own in rows.slopes]  # what a bound holds, holds in every block
+    slopes = [np.where(solution.held, 0.0, slope) for slope in rows.slopes]  # what a bound holds, holds in every block
     linear = Linear(replace(rows, slopes=slopes), memory)
     nothing = [np.zeros((*residual.shape, 0)) for residual in rows.residual]
     return _AsTheyAre(linear, nothing, shows), int(sum(there.sum() for there in rows.there))
@@ -110,12 +110,12 @@ class _AsTheyAre(Blocks):
         """The squared error of each block by a fit to all others, simulated where a linear step says far more than the
         fit to all leaves there: it follows numbers that hardly anything but this block tells to where no slope holds,
         and a fit would not."""
-        found, inside = self.held_out(at), self.fitted(self.total, at)
+        values, inside = self.held_out(at), self.fitted(self.total, at)
         for b, own in enumerate(self.matrix):
             left = own[0, 0] - 2.0 * inside @ own[at, 0] + inside @ own[np.ix_(at, at)] @ inside
-            if found[b] > FAR * left:
-                found[b] = self._simulated(self.fitted(self.total - own, at) / self.size[at], b)
-        return found
+            if values[b] > FAR * left:
+                values[b] = self._simulated(self.fitted(self.total - own, at) / self.size[at], b)
+        return values
 
     def _simulated(self, step: FloatArray, b: int) -> float:
         """The squared error of a block, the numbers as far along a step (P,) as the other blocks gain by it."""

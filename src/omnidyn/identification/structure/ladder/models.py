@@ -113,7 +113,7 @@ class Model:
 
     def _alone(self, solution: Solution) -> dict[str, Solution]:
         members = solution.solver.engine.members
-        return {one.name: one.alone(solution) for one in members} or {self.fit.groups[0].name: solution}
+        return {member.name: member.alone(solution) for member in members} or {self.fit.groups[0].name: solution}
 
     def robot(self, group: str) -> Robot:
         """The fitted robot of a group."""
@@ -252,7 +252,7 @@ def _fit(
         per_free=_own(stands, begins),
         nuisances=first.nuisances,
         loss=first.loss,
-        profile=tuple(name for name in asked.profile if all(name in own for own in profiles)),
+        profile=tuple(name for name in asked.profile if all(name in profile for profile in profiles)),
     )
     return Fit.of(runs, stands.fit.began, question, names, progress, begins)
 
@@ -312,8 +312,8 @@ class Purse:
 
     def told(self) -> list[Untried]:
         """What was not tried since it was told last."""
-        found, self._untried = self._untried, []
-        return found
+        untrieds, self._untried = self._untried, []
+        return untrieds
 
     def _leave(self, move: Move, why: Statement) -> None:
         self._untried.append(Untried(move, move.cause, why))

@@ -176,19 +176,19 @@ def _of_friction(bench: Workbench) -> Iterator[Candidate]:
 def other_laws(friction: Friction) -> list[str]:
     """The laws that tables of friction may take, each by the number that names it: a fall, where the level is the same
     at every speed, of Dahl's bristles by LuGre's law; bristles of either where it is, and the same both ways."""
-    found = []
+    names = []
     for table in FORCES:
         own = table_of(friction, table)
         one_way = getattr(own, "coulomb_backward", None) is not None
         if not np.any(own.coulomb) or getattr(own, "ellipse", DISSIPATION) != DISSIPATION:
             continue  # a plain ellipse takes no other law
         if own.stribeck_speed is None and own.law != DAHL:
-            found.append(f"{table}.{FALL}")
+            names.append(f"{table}.{FALL}")
         if own.law == COULOMB and own.breakaway is None and not one_way:
-            found.append(f"{table}.{BEND}")
+            names.append(f"{table}.{BEND}")
         if own.law in (COULOMB, DAHL) and not one_way:
-            found.append(f"{table}.{DAMPING}")
-    return found
+            names.append(f"{table}.{DAMPING}")
+    return names
 
 
 def may_break_away(friction: Friction) -> list[str]:

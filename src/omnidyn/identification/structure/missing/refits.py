@@ -91,7 +91,7 @@ def refits(
 def _asked(ranked: Sequence[Remedy], candidates: Sequence[Candidate]) -> Iterator[tuple[Candidate, Remedy]]:
     """What to fit: the best that a robot file or a fit can hold, a constant push and every shape: far from the best fit
     with them, columns near the one without tell little."""
-    known = {one.key: one for one in candidates}
+    known = {candidate.key: candidate for candidate in candidates}
     best = simpler_first([each for each in ranked if each.offered and each.key != CHANGE])[:BEST]
     yield from ((known[each.key], each) for each in best)
     for key in ALWAYS:
@@ -151,7 +151,7 @@ def _begun(
     begins = [values]
     if made.robot.wheels.traction_mu is not None:  # whose leaps lead the latency of wheels that roll astray
         begins.append(on_time(made.parameters, values))
-    states = [solver.state(Point(own, solution.state.point.states)) for own in begins]
+    states = [solver.state(Point(begin, solution.state.point.states)) for begin in begins]
     return _Refit(candidate, way, solver, min(states, key=lambda state: state.objective))
 
 

@@ -158,11 +158,11 @@ def hidden_by(key: str, columns: Iterable[tuple[str, int]]) -> list[str]:
 
 def with_odometry(remedies: Sequence[Remedy], columns: Sequence[tuple[str, int]]) -> tuple[Remedy, ...]:
     """The same; those that may be a radius name it, and the radius them."""
-    behind = {each.key: hidden_by(each.key, columns) for each in remedies}
+    behind = {remedy.key: hidden_by(remedy.key, columns) for remedy in remedies}
     found = []
-    for each in remedies:
-        looks = [key for key, radii in behind.items() if each.key in radii]
-        cause = Statement("if_odometry", NOTE, numbers={"cause": each.cause}) if looks else each.cause
-        same = tuple(dict.fromkeys((*each.same_as, *behind[each.key], *looks)))
-        found.append(replace(each, same_as=same, cause=cause))
+    for remedy in remedies:
+        looks = [key for key, radii in behind.items() if remedy.key in radii]
+        cause = Statement("if_odometry", NOTE, numbers={"cause": remedy.cause}) if looks else remedy.cause
+        same = tuple(dict.fromkeys((*remedy.same_as, *behind[remedy.key], *looks)))
+        found.append(replace(remedy, same_as=same, cause=cause))
     return tuple(found)

@@ -304,7 +304,7 @@ def _as_one(robot: Robot, key: str) -> Robot:
     part, fields = OF_ALL[key]
     table = getattr(robot, part)
     values = {name: per_wheel(getattr(table, name), robot.wheels.count) for name in fields}
-    if any(np.ptp(each) for each in values.values()):
+    if any(np.ptp(value) for value in values.values()):
         return robot
-    same = table.replace(**{name: float(each[0]) for name, each in values.items()})
+    same = table.replace(**{name: float(value[0]) for name, value in values.items()})
     return robot.replace(**{part: same})
