@@ -24,7 +24,7 @@ from omnidyn.run import Run
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import NOISE
 
-LOGS = scaled(100, 5)
+LOGS = scaled(100, 2)
 SECONDS, FINE, LATE = 20.0, 1e-3, 0.012  # [s]
 CURRENT_NOISE = 0.05  # [A]
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 
 SHARE = float(os.environ.get("OMNIDYN_BENCH_SHARE", "1"))
+SMALLEST = SHARE == 0.0  # also fewer robots and studies, of each kind one
 WHOLE = SHARE >= 1.0  # at full size the goals are what they are; below it counting errors are granted
 
 

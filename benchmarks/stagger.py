@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.size import SMALLEST
 from benchmarks.table import Table, machine
 from omnidyn.findings.check import check
 from omnidyn.identification.identify import identify
@@ -75,9 +76,9 @@ def measure() -> Table:
     with tempfile.TemporaryDirectory(prefix="omnidyn-stagger-") as name:
         folder = Path(name)
         robot = robot_of(folder)
-        for rates, number in product((False, True), NUMBERS):
+        for rates, number in product((False, True), NUMBERS[:1] if SMALLEST else NUMBERS):
             _sweep(table, folder, robot, number, rates)
-        for number, offset, jitter in FITTED:
+        for number, offset, jitter in FITTED[:1] if SMALLEST else FITTED:
             equal = Logged.of(topics(number, 0.0)).csv(folder / "equal.csv")
             off = apart(Logged.of(topics(number, offset, jitter)).csv(folder / "log.csv"), equal, robot)
             words = f"identify, {number} topics {1e6 * offset:g} us apart, jitter {1e6 * jitter:g} us"

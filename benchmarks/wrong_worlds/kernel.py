@@ -21,8 +21,10 @@ SHORTEST = 1e-6  # [s] within which an event is found
 CREEP = 3e-5  # [m/s] below it the plane rests where it can be held: an ellipse turns ever faster as it stops
 HEAT = 9  # where the heat of the windings begins in a state: twist, path, pose, heat
 
-# What kernels call: no way in from Python, which would take as long to compile as all the rest.
-part = numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True)  # pyright: ignore[reportCallIssue]
+# What kernels call: no way in from Python, which would take as long to compile as all the rest. A part makes no arrays;
+# to count who holds them, which numba does around every call, takes three times as long as the arithmetic.
+part = numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, _nrt=False)  # pyright: ignore[reportCallIssue]
+maker = numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True)  # pyright: ignore[reportCallIssue]
 
 
 class Physics(NamedTuple):
@@ -68,6 +70,19 @@ class Physics(NamedTuple):
     gap: float  # of the gear, either way [m] at the rim
     change: float  # [s]
     duration: float  # [s]
+
+
+class Scratch(NamedTuple):
+    """Room to work in. held (k + 2,): what holds the stuck elements, the plane last; rows, right, owner: equations of
+    what is stuck; at, end, slopes: states within a step and at its end, and their derivatives."""
+
+    held: np.ndarray
+    rows: np.ndarray  # (6, 6)
+    right: np.ndarray  # (6,)
+    owner: np.ndarray  # (6,)
+    at: np.ndarray
+    end: np.ndarray
+    slopes: np.ndarray  # (4, ...)
 
 
 @part
@@ -137,7 +152,7 @@ def _applied(p, y, u, t, gap, out):
         for a in range(3):
             out[a] += p.G[a, i] * f
         out[HEAT + i] = ((amps / p.load) ** 2 - y[HEAT + i]) / 10.0
-    warm = 1.0 - p.cooling * (1.0 - np.exp(-t / p.warm_up))
+    warm = 1.0 if p.cooling == 0.0 else 1.0 - p.cooling * (1.0 - np.exp(-t / p.warm_up))
     for k in range(len(p.d)):
         s = p.d[k, 0] * y[0] + p.d[k, 1] * y[1] + p.d[k, 2] * y[2]
         f = p.viscous[after, k] * warm * s + p.drag[k] * s * abs(s)
@@ -149,12 +164,14 @@ def _applied(p, y, u, t, gap, out):
 def _level(p, k, side, speed, t):
     """What a line element resists with while it slides to a side."""
     level = p.level[1 if t >= p.change else 0, k] * (1.0 + p.aside * side)
+    if p.stribeck == 0.0:
+        return level
     return level * (1.0 + p.stribeck * np.exp(-((speed / p.stribeck_speed[k]) ** 2)))
 
 
 @part
-def _slope(p, y, u, t, gap, stuck, sign, out, held):
-    """Derivative of a state into out; what holds the stuck elements into held (k + 2,), the plane last."""
+def _slope(p, y, u, t, gap, stuck, sign, out, room):
+    """Derivative of a state into out; what holds the stuck elements into room.held."""
     after, count = (1 if t >= p.change else 0), len(p.d)
     _applied(p, y, u, t, gap, out)
     for k in range(count):
@@ -174,22 +191,23 @@ def _slope(p, y, u, t, gap, stuck, sign, out, held):
             if load > 0.0:
                 out[0] -= out[0] / load
                 out[1] -= out[1] / load
-    _accelerate(p, after, stuck, out, held)
+    _accelerate(p, after, stuck, out, room)
     c, s = np.cos(y[8]), np.sin(y[8])
     out[3], out[4], out[5] = y[0], y[1], y[2]
     out[6], out[7], out[8] = c * y[0] - s * y[1], s * y[0] + c * y[1], y[2]
 
 
 @part
-def _accelerate(p, after, stuck, out, held):
+def _accelerate(p, after, stuck, out, room):
     """Acceleration from the forces in out[:3], in place, what is stuck held."""
     count, size = len(p.d), 3
-    rows = np.zeros((6, 6))
-    right = np.zeros(6)
-    owner = np.zeros(6, dtype=np.int64)
-    rows[:3, :3] = p.M[after]
-    right[:3] = out[:3]
-    held[:] = 0.0
+    rows, right, owner, held = room.rows, room.right, room.owner, room.held
+    for a in range(6):
+        right[a] = out[a] if a < 3 else 0.0
+        for b in range(6):
+            rows[a, b] = p.M[after, a, b] if a < 3 and b < 3 else 0.0
+    for k in range(count + 2):
+        held[k] = 0.0
     for k in range(count + 2):
         if stuck[min(k, count)] and (k < count or p.plane[after, 0] > 0.0) and size < 6:
             for a in range(3):
@@ -248,16 +266,16 @@ def _overload(p, held, stuck, t):
 
 
 @part
-def _release(p, y, u, t, gap, stuck, sign, out, held):
+def _release(p, y, u, t, gap, stuck, sign, out, room):
     """Let go of what is loaded beyond its level, one after another; hold what then would go against its own way."""
     count = len(p.d)
     for _ in range(12):
-        _slope(p, y, u, t, gap, stuck, sign, out, held)
-        over, which = _overload(p, held, stuck, t)
+        _slope(p, y, u, t, gap, stuck, sign, out, room)
+        over, which = _overload(p, room.held, stuck, t)
         if over > 1e-12:
             stuck[which] = False
             if which < count:
-                sign[which] = -np.sign(held[which])
+                sign[which] = -np.sign(room.held[which])
             continue
         back, least = -1, -1e-9
         for k in range(count):
@@ -271,14 +289,17 @@ def _release(p, y, u, t, gap, stuck, sign, out, held):
 
 
 @part
-def _rk4(p, y, u, t, h, gap, stuck, sign, held):
-    n = y.size
-    k1, k2, k3, k4 = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
-    _slope(p, y, u, t, gap, stuck, sign, k1, held)
-    _slope(p, y + 0.5 * h * k1, u, t, gap, stuck, sign, k2, held)
-    _slope(p, y + 0.5 * h * k2, u, t, gap, stuck, sign, k3, held)
-    _slope(p, y + h * k3, u, t, gap, stuck, sign, k4, held)
-    return y + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+def _rk4(p, y, u, t, h, gap, stuck, sign, room):
+    """The state after a step into room.end."""
+    at, k = room.at, room.slopes
+    _slope(p, y, u, t, gap, stuck, sign, k[0], room)
+    for stage in range(1, 4):
+        part = 1.0 if stage == 3 else 0.5
+        for i in range(y.size):
+            at[i] = y[i] + part * h * k[stage - 1, i]
+        _slope(p, at, u, t, gap, stuck, sign, k[stage], room)
+    for i in range(y.size):
+        room.end[i] = y[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
 
 
 @part
@@ -295,8 +316,8 @@ def _stops(p, y0, y1, stuck, sign, t, stop):
     return some or stop[count]
 
 
-@part
-def _settles(p, y, u, t, gap, stuck, sign, out, held):
+@maker
+def _settles(p, y, u, t, gap, stuck, sign, out, room):
     """Whether the plane creeps, and rests if it is held."""
     count = len(p.d)
     if p.plane[0, 0] == 0.0 or stuck[count] or not 0.0 < np.hypot(y[0], y[1]) < CREEP:
@@ -304,11 +325,11 @@ def _settles(p, y, u, t, gap, stuck, sign, out, held):
     rest, kept = y.copy(), stuck.copy()
     rest[0] = rest[1] = 0.0
     kept[count] = True
-    _slope(p, rest, u, t, gap, kept, sign, out, held)
-    return _overload(p, held, kept, t)[0] < 0.0
+    _slope(p, rest, u, t, gap, kept, sign, out, room)
+    return _overload(p, room.held, kept, t)[0] < 0.0
 
 
-@part
+@maker
 def _rest(p, y, stuck, stop):
     """Stop what stops: its speed becomes 0 by the least change of the twist, weighed by mass."""
     count = len(p.d)
@@ -341,20 +362,23 @@ def _turn_gap(p, y, u, t, h, gap):
             gap[i] = min(max(gap[i] + h * amps * p.R[i] / p.ke[i], -p.gap), p.gap)
 
 
-@part
+@maker
 def _advance(p, y, u, now, span, step, gap, stuck, sign):
     """Over a span of constant voltage."""
     count = len(p.d)
-    scrap, held, stop = np.zeros(y.size), np.zeros(count + 2), np.zeros(count + 1, dtype=np.bool_)
+    scrap, stop, n = np.zeros(y.size), np.zeros(count + 1, dtype=np.bool_), y.size
+    held, owner = np.zeros(count + 2), np.zeros(6, dtype=np.int64)
+    room = Scratch(held, np.zeros((6, 6)), np.zeros(6), owner, np.zeros(n), np.zeros(n), np.zeros((4, n)))
+    z = room.end
     h, left = min(step, span), span
-    _release(p, y, u, now, gap, stuck, sign, scrap, held)
+    _release(p, y, u, now, gap, stuck, sign, scrap, room)
     while left > 1e-12:
         t = now + span - left
         h = min(min(h, step), left)
-        z = _rk4(p, y, u, t, h, gap, stuck, sign, held)
+        _rk4(p, y, u, t, h, gap, stuck, sign, room)
         happens = _stops(p, y, z, stuck, sign, t, stop)
-        _slope(p, z, u, t + h, gap, stuck, sign, scrap, held)
-        happens = happens or _overload(p, held, stuck, t + h)[0] > 1e-12
+        _slope(p, z, u, t + h, gap, stuck, sign, scrap, room)
+        happens = happens or _overload(p, room.held, stuck, t + h)[0] > 1e-12
         turns = p.plane[0, 0] > 0.0 and not stuck[count]  # an ellipse turns fast where it is slow
         slow = turns and np.hypot(z[0], z[1]) < 8.0 * h
         if (happens or (slow and h > 2e-5)) and h > SHORTEST:
@@ -364,11 +388,11 @@ def _advance(p, y, u, now, span, step, gap, stuck, sign):
         left -= h
         if p.gap > 0.0:
             _turn_gap(p, y, u, t, h, gap)
-        if _settles(p, y, u, t + h, gap, stuck, sign, scrap, held):
+        if _settles(p, y, u, t + h, gap, stuck, sign, scrap, room):
             stop[count], happens = True, True
         if happens:
             _rest(p, y, stuck, stop)
-            _release(p, y, u, t + h, gap, stuck, sign, scrap, held)
+            _release(p, y, u, t + h, gap, stuck, sign, scrap, room)
         h = 2.0 * h
 
 

@@ -5,17 +5,21 @@ import json
 import pytest
 
 from benchmarks.wrong_worlds.kinds import by_name
-from benchmarks.wrong_worlds.write import write_logs
+from benchmarks.wrong_worlds.log import SPEEDS, logged, right_case, robot_of
 from omnidyn.cli import main
 from omnidyn.identification.structure.ladder import climb
-from omnidyn.model.robot_file import load_robot
+from omnidyn.logs.run_file import write_run
+from omnidyn.model.robot_file import load_robot, save_robot
 
 
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory):
     """A log of a robot in a turning frame, and the file of its owner, who left that out."""
     folder = tmp_path_factory.mktemp("logs")
-    write_logs(by_name("turning frame"), 1, folder)
+    case = right_case(91).setup_but(sensor=SPEEDS, memory=0.0, rate=50.0, seconds=20.0)
+    case = by_name("turning frame").make(case, 1.0)
+    write_run(logged(case, 91), folder / "log1.csv")
+    save_robot(robot_of(case.told), folder / "robot.toml")
     return folder
 
 
@@ -33,7 +37,7 @@ def call(logs, tmp_path, monkeypatch, capsys):
 
 def test_the_best_robot_is_written_and_all_that_was_fitted_told(call, tmp_path):
     out, page = tmp_path / "better.toml", tmp_path / "page.html"
-    code, told, _ = call("-o", str(out), "--report", str(page), "--json")
+    code, told, _ = call("--free", "friction", "-o", str(out), "--report", str(page), "--json")
     assert code == 0
     found = json.loads(told)
     taken = [rung["key"] for rung in found["ladder"]["rungs"] if rung["taken"]]
@@ -50,7 +54,7 @@ def test_an_interrupt_of_the_ladder_leaves_the_robot_as_it_was_given(call, tmp_p
 
     monkeypatch.setattr(climb, "judged", interrupted)
     out = tmp_path / "fit.toml"
-    code, _, err = call("-o", str(out))
+    code, _, err = call("--free", "friction", "-o", str(out))
     assert code == 130
     assert "interrupted" in err
     assert not load_robot(str(out)).body.rotating_frame

@@ -14,6 +14,7 @@ import re
 import shutil
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -84,13 +85,18 @@ def agrees_with_python(numbers):
     return True
 
 
-def test_an_edited_formula_is_compiled_anew(copy):
+@pytest.fixture(scope="module")
+def before(copy):
+    """The numbers of the copy as it is, with the cache that they leave behind."""
+    return fresh(copy, NUMBA_CACHE_DIR=str(copy / "cache"))
+
+
+def test_an_edited_formula_is_compiled_anew(copy, before):
     """exact/step.py is called by the kernel of exact/march.py, whose own file stays untouched."""
-    cache = {"NUMBA_CACHE_DIR": str(copy / "cache")}
-    before = fresh(copy, **cache)
+    folder = {"NUMBA_CACHE_DIR": str(copy / "cache")}
     assert agrees_with_python(before)
     assert before["hits"] == 0
-    again = fresh(copy, **cache)
+    again = fresh(copy, **folder)
     assert again["hits"] == 1, "the second process should find the machine code of the first"
     assert {**again, "hits": 0} == {**before, "hits": 0}
     formula = copy / "omnidyn" / "simulation" / "exact" / "step.py"
@@ -102,7 +108,7 @@ def test_an_edited_formula_is_compiled_anew(copy):
     assert edited.count("(1 + 1)") == edited.count("3 * (speed") == 1, "exact/step.py reads differently now"
     formula.write_text(edited)
     try:
-        after = fresh(copy, **cache)
+        after = fresh(copy, **folder)
     finally:
         formula.write_text(text)
     assert agrees_with_python(after)  # a stale _run would give the old numbers
@@ -126,24 +132,22 @@ def test_without_a_writable_folder_it_compiles_in_memory(copy, tmp_path):
     assert not [path for path in tmp_path.rglob("*") if path.suffix in (".nbi", ".nbc", ".kernel")]
 
 
-def test_a_numba_that_nobody_tried_gives_the_same_numbers(copy):
+def test_a_numba_that_nobody_tried_gives_the_same_numbers(copy, before):
     """To the last bit; it goes its own way, and takes longer."""
-    cache = {"NUMBA_CACHE_DIR": str(copy / "cache")}
-    before, file = fresh(copy, **cache), copy / "omnidyn" / "compiled" / "private.py"
+    file = copy / "omnidyn" / "compiled" / "private.py"
     text = file.read_text()
     assert text.count("range(61, 69)") == 1, "private.py reads differently now"
     file.write_text(text.replace("range(61, 69)", "range(0)"))
     try:
-        after = fresh(copy, **cache)
+        after = fresh(copy, NUMBA_CACHE_DIR=str(copy / "cache"))
     finally:
         file.write_text(text)
     assert after["hits"] == 0
     assert {**after, "hits": before["hits"]} == before
 
 
-def test_with_all_that_is_private_switched_off_the_numbers_are_the_same(copy):
+def test_with_all_that_is_private_switched_off_the_numbers_are_the_same(copy, before):
     """To the last bit, and nothing is kept on disk."""
-    before = fresh(copy, NUMBA_CACHE_DIR=str(copy / "cache"))
     after = fresh(copy, NUMBA_CACHE_DIR=str(copy / "other"), OMNIDYN_PLAIN_NUMBA="1")
     assert {**after, "hits": before["hits"]} == before
     assert after["hits"] == 0
@@ -160,6 +164,7 @@ def test_without_a_compiler_it_runs_as_plain_python(copy):
 # ---- every kernel of the package -------------------------------------------------------------------------
 
 
+@cache
 def dispatchers():
     """(where, compiled function) for everything numba has compiled in the package."""
     found = {}
@@ -174,16 +179,24 @@ def dispatchers():
     return found
 
 
-def decorated(decorator):
-    """Names of functions under `@decorator` in the sources, found without running them."""
-    found = set()
+@cache
+def functions():
+    """(name, syntax tree) of every function of the package."""
+    found = []
     for file in PACKAGE.rglob("*.py"):
         module = ".".join(("omnidyn", *file.relative_to(PACKAGE).with_suffix("").parts))
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.FunctionDef):
-                names = [getattr(mark, "id", getattr(mark, "attr", "")) for mark in node.decorator_list]
-                found |= {f"{module}.{node.name}"} if decorator in names else set()
+        nodes = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        found += [(f"{module}.{node.name}", node) for node in nodes if isinstance(node, ast.FunctionDef)]
     return found
+
+
+def decorated(decorator):
+    """Names of functions under `@decorator` in the sources, found without running them."""
+    return {
+        name
+        for name, node in functions()
+        if decorator in [getattr(mark, "id", getattr(mark, "attr", "")) for mark in node.decorator_list]
+    }
 
 
 def test_every_kernel_is_stamped_and_nothing_else_is_cached():
@@ -224,11 +237,7 @@ def test_no_part_makes_an_array(give):
 
 def sources_of(names):
     """(name, syntax tree) of the functions of the package that are called so."""
-    for file in PACKAGE.rglob("*.py"):
-        module = ".".join(("omnidyn", *file.relative_to(PACKAGE).with_suffix("").parts))
-        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.FunctionDef) and f"{module}.{node.name}" in names:
-                yield f"{module}.{node.name}", node
+    return [(name, node) for name, node in functions() if name in names]
 
 
 def given_away(function):

@@ -26,7 +26,7 @@ def test_what_comes_back_and_what_does_not(monkeypatch):
 def test_each_comes_back_in_its_place(monkeypatch):
     with Workers() as workers:
         workers.ask_each(abs, ((k,) for k in range(8)))  # to start a process takes a while on a busy machine
-        monkeypatch.setattr(module, "LONGEST", 5.0)
+        monkeypatch.setattr(module, "LONGEST", 1.5)
         assert workers.ask_each(_slow_or_own, ((k,) for k in range(5))) == [0, 1, None, 3, 4]
 
 

@@ -259,7 +259,7 @@ def stored(seed):
 
 @pytest.mark.parametrize("kind", range(len(PLACES)))
 def test_the_stepper_without_modes_arrives_at_the_same_motion(kind):
-    for seed in SEEDS[kind : kind + 7 * 3 : 7]:
+    for seed in SEEDS[kind : kind + 7 * 2 : 7]:
         robot, truth = random_robot(seed), stored(seed)
         voltage, dt = random_voltages(robot, seed)
         rows = 15

@@ -117,9 +117,12 @@ def test_no_absurd_column_ends_in_a_traceback(tmp_path, monkeypatch, capsys, log
         check(COMMANDS[name], capsys)
 
 
+EVERY = [(log, name) for log, names in LOGS.items() for name in ("time", *names)]
+TURNS = [(*EVERY[k], ("constant", "zero", "huge", "a huge cell")[k % 4]) for k in range(len(EVERY))]
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("kind", ["constant", "zero", "huge", "a huge cell"])
-@pytest.mark.parametrize("log, channel", [(log, name) for log, names in LOGS.items() for name in ("time", *names)])
+@pytest.mark.parametrize("log, channel, kind", TURNS)
 def test_so_it_is_of_every_column_and_command(tmp_path, monkeypatch, capsys, log, channel, kind):
     monkeypatch.chdir(tmp_path)
     write(tmp_path / "log.csv", log, channel, kind, wheels=1 if kind == "constant" else 3)

@@ -69,7 +69,8 @@ def test_a_shape_that_is_asked_for_is_that_of_all_floors():
     assert (study.choice.chosen, study.choice.own) == ("ellipse", {})
 
 
-def test_each_wheel_has_a_level_beside_an_ellipse():
+def test_each_wheel_has_a_level_beside_an_ellipse(monkeypatch):
+    monkeypatch.setattr(steady_shapes, "DIRECTIONS", 12)
     study, _ = study_of(EACH)
     assert [study.choice.of(floor) for floor in FLOORS] == ["ellipse+wheels"] * 2
     assert all(np.size(each.robot.friction.wheels.coulomb) == 3 for each in study.estimates.values())
@@ -78,6 +79,7 @@ def test_each_wheel_has_a_level_beside_an_ellipse():
 def test_clean_logs_give_the_level_of_each_wheel(monkeypatch):
     monkeypatch.setattr(steady_shapes, "OFF", 0.0)
     monkeypatch.setattr(steady_shapes, "NOISE", 0.0)
+    monkeypatch.setattr(steady_shapes, "DIRECTIONS", 8)
     study, worlds = study_of(EACH, shape="ellipse+wheels")
     for floor in FLOORS:
         true = truths(worlds[floor], ELLIPSE)

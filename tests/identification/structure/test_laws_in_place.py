@@ -13,8 +13,6 @@ from tests.support.laws_in_place import DIRECTION, NAMED, NOISE, WHEELS, climbed
     ("place", "law", "seed"),
     [
         (DIRECTION, "Dahl", 1),
-        (DIRECTION, "LuGre", 0),
-        (WHEELS, "Dahl", 0),
         (WHEELS, "LuGre", 1),
         (WHEELS, "Stribeck", 0),
     ],

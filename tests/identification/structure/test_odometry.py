@@ -23,7 +23,7 @@ WORLDS = {
 
 def log(wheels):
     """Odometry as the file has it."""
-    run = simulate(AXEBOT.replace(wheels=wheels), dt=0.02, voltage=excitation(20.0, 50.0, 1))
+    run = simulate(AXEBOT.replace(wheels=wheels), dt=0.02, voltage=excitation(10.0, 50.0, 1))
     seen = run.wheel_speed + 0.05 * np.random.default_rng(1).normal(size=run.wheel_speed.shape)
     return Run(t=run.t, voltage=run.voltage, twist=twist_from_wheel_speed(AXEBOT.wheels, seen), source="log")
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.wrong_worlds.log import AR, COUNTS, SPEEDS, TICKS, TWIST, logged, right_case, robot_of
+from benchmarks.wrong_worlds.log import AR, SPEEDS, TICKS, logged, right_case, robot_of
 from benchmarks.wrong_worlds.remedies import FRICTION, before
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
@@ -33,7 +33,7 @@ def after(run, t):
 
 @pytest.mark.parametrize(
     ("sensor", "memory", "seed"),
-    [(SPEEDS, 0.0, 7101), (TWIST, 0.0, 7102), (AR, 0.95, 7101), (COUNTS, 0.0, 7102), (TICKS, 0.0, 7101)],
+    [(SPEEDS, 0.0, 7101), (AR, 0.95, 7101), (TICKS, 0.0, 7101)],
 )
 def test_a_right_world_is_stable(sensor, memory, seed):
     case = right_case(seed).setup_but(sensor=sensor, memory=memory, rate=50.0)
@@ -42,7 +42,7 @@ def test_a_right_world_is_stable(sensor, memory, seed):
     assert not fit.stability.parts()
 
 
-@pytest.mark.parametrize("seed", [7201, 7204])
+@pytest.mark.parametrize("seed", [7204])
 def test_a_change_of_floor_is_found_with_its_time_and_both_levels(seed):
     case, run = floor(seed, 1.15)
     found = identify(run, robot_of(case.told), OutputError(free=FRICTION)).stability
@@ -87,7 +87,7 @@ def test_logs_of_two_floors_differ_and_the_log_is_named():
 
 
 def test_logs_of_one_floor_do_not_differ():
-    case = right_case(7401).setup_but(seconds=20.0)
+    case = right_case(7401).setup_but(seconds=15.0, rate=50.0)
     robot = robot_of(case.told)
     runs = [logged(case, seed).replace(source=f"log {seed}") for seed in (7401, 7402, 7403)]
     document = identify(runs, robot, OutputError(free=FRICTION)).document()

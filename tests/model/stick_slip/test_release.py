@@ -58,9 +58,9 @@ def holds(robot, voltage):
     return excess < 0.0 and abs(left[2]) < 1e-3, min(abs(excess), 1.0)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(0, 40, 2))
 def test_what_holds_is_what_the_program_says(seed):
-    """Voltages around the dead zone of 40 robots of every shape; a draw nearer than 1e-7 to an edge is not judged."""
+    """Voltages around the dead zone of 20 robots of every shape; a draw nearer than 1e-7 to an edge is not judged."""
     robot, random = random_robot(seed), np.random.default_rng(seed)
     judged = {True: 0, False: 0}
     for _ in range(30):
@@ -73,7 +73,7 @@ def test_what_holds_is_what_the_program_says(seed):
     assert min(judged.values()) >= 5
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(0, 40, 2))
 def test_the_edge_is_where_the_program_says(seed):
     """The breakaway voltage of random patterns, bisected on the program alone: to 1e-6 of it."""
     robot, random = random_robot(seed), np.random.default_rng(100 + seed)

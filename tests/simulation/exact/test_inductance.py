@@ -207,7 +207,7 @@ SWINGING = [(0.1, 1.3, 0.05), (0.1, 1.0, 0.9), (0.5, 1.3, 2.0)]  # complex roots
 def test_meets_dop853_with_stops_dips_and_releases_inside_the_step(inductance, ratio, h):
     robot, random = table_3(inductance, ratio), np.random.default_rng(int(1e6 * inductance + 10 * ratio + 1e4 * h))
     seen, worst = Counter(), np.zeros(3)
-    while min(seen["stop"], seen["dip"], seen["release"]) < 20:
+    while min(seen["stop"], seen["dip"], seen["release"]) < 10:
         twist, current, voltage = draw_state(random, robot, h)
         *want, reference = reference_run(robot, voltage[None], [h], twist, current)
         if reference.margin < 1e-9:

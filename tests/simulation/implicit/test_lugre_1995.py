@@ -52,16 +52,17 @@ def test_its_loop_before_it_slips():
         start_state(numbers, np.zeros(3), np.zeros(3)),
         np.zeros(3),
         no_loop(3),
-        1e-8,
+        1e-6,
     )
     way = out.pose[1:, 0]
     p, t = plant_of(ROBOT.rigid), np.arange(1, len(force) + 1) * step
+    corners, forces = np.array([0.0, 1.0, 3.0, 5.0]) * MOST / RATE, np.array([0.0, 1.0, -1.0, 1.0]) * MOST
     braking = float(p.K[1] * p.E[1] / p.R[1] * (p.G[0] @ p.G[0])) + SIGMA_2
 
     def rates(time, state):
         _, v, z = state
         bent = v - SIGMA_0 * abs(v) * z / (COULOMB + (BREAKAWAY - COULOMB) * math.exp(-((v / STRIBECK) ** 2)))
-        pull = float(np.interp(time, [0.0, *t], [0.0, *force]))
+        pull = float(np.interp(time, corners, forces))
         return [v, pull - braking * v - SIGMA_0 * z - SIGMA_1 * bent, bent]
 
     exact = solve_ivp(rates, (0.0, t[-1]), [0.0] * 3, "LSODA", t_eval=t, rtol=1e-8, atol=1e-13, max_step=10 * step)

@@ -32,7 +32,7 @@ def levels(robot, seed, rows=8, most=6.0):
 # --- the reference ----------------------------------------------------------------------------------------------------
 
 
-LONG = [pytest.param(seed, marks=pytest.mark.long) for seed in range(4, 20)]
+LONG = [pytest.param(seed, marks=pytest.mark.long) for seed in range(4, 8)]
 
 
 @pytest.mark.parametrize("seed", [*range(4), *LONG])
