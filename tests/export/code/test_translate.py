@@ -6,9 +6,9 @@ import subprocess
 
 import pytest
 
-from omnidyn.export.code.expressions import INT, REAL, Array, TranslationError
-from omnidyn.export.code.sources import Source, function
-from omnidyn.export.code.translate import CProgram
+from omnidyn.export.code.c_types import INT, REAL, Array, TranslationError
+from omnidyn.export.code.sources import Source, source_of
+from omnidyn.export.code.program import CProgram
 
 
 def source(text):
@@ -19,7 +19,7 @@ def source(text):
 @pytest.mark.parametrize(
     "text",
     [
-        "def f(x):\n    return x ** 3",
+        "def f(x):\n    return x @ 3",
         "def f(x):\n    return math.tan(x)",
         "def f(x):\n    with x:\n        pass",
         "def f(x):\n    return [x]",
@@ -57,7 +57,7 @@ def test_the_translated_formula_computes_the_same(tmp_path):
     from omnidyn.simulation.exact.step import exact_step
 
     program = CProgram()
-    found = function("omnidyn.simulation.exact.step", "exact_step")
+    found = source_of(exact_step)
     assert found is not None
     program.function(found, (REAL,) * 7)
     cases = [

@@ -1,8 +1,8 @@
-"""fmu: an FMI 2 co-simulation unit of the exact step, from the same C as c-model; no Python where it runs.
+"""fmu: an FMI 2 co-simulation unit of the step of a robot, from the same C as c-model; no Python where it runs.
 
 The archive holds the sources, and a library for this machine where a C compiler is found: other tools compile the
-sources themselves. The unit steps as far as it is told to with the volts it was given: held over the step, which is
-then exact whatever its length. Model exchange is not offered: at rest the derivative is set-valued.
+sources themselves. The unit steps as far as it is told to with the volts it was given, held over the step. Its state
+can be got, set and serialised. Model exchange is not offered: at rest the derivative is set-valued.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ import zipfile
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from omnidyn.export.code.step_c import STATUS, StepCode, step_code
+from omnidyn.export.code.c_model import engine_code
+from omnidyn.export.code.step_c import STATUS, StepCode
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.spelling import attribute, c_number, filled, identifier
@@ -39,14 +40,14 @@ SECONDS = 120  # for the compiler
 
 
 def fmu(robot: Robot, compiled: bool = True) -> Export:
-    """An FMI 2 co-simulation unit of a robot that has an exact step, winding inductance included.
+    """An FMI 2 co-simulation unit of a robot whose wheels roll, by the engine that `simulate` chooses.
 
     Inputs u1_V, u2_V, ...; outputs vx_m_s, vy_m_s, omega_rad_s, x_m, y_m, heading_rad; where it starts is a parameter
     of the same name with start_ before it. compiled: whether to add a library for this machine.
     Raises UnsupportedError for other robots.
     """
     refuse("fmu", robot)
-    code, name, omissions = step_code(robot), identifier(robot.name), left_out("fmu", robot)
+    code, name, omissions = engine_code(robot), identifier(robot.name), left_out("fmu", robot)
     guid = sha256(_source(code, ""))[:32]
     entries: dict[str, bytes] = {
         "modelDescription.xml": _description(robot, name, code, guid, omissions).encode("utf-8"),
@@ -54,7 +55,7 @@ def fmu(robot: Robot, compiled: bool = True) -> Export:
     }
     library, reason = _library(entries[f"sources/{name}.c"], name) if compiled else (None, "not asked for")
     notes = (
-        "the volts of a step are held all through it: the step is exact, however long",
+        "the volts of a step are held all through it",
         *(
             (f"a library for {_platform()} is in it; other systems compile sources/{name}.c",)
             if library
@@ -114,7 +115,8 @@ def _source(code: StepCode, guid: str) -> str:
         GUID=guid,
         TWIST=c_number(LARGEST_START["twist"]),
         POSE=c_number(LARGEST_START["pose"]),
-        FORCE="unit->force, " if code.inductance else "",
+        MEMORY=str(code.size + code.lost),
+        PASSED="unit->memory, unit->memory + 3" if code.state and code.lost else "unit->memory",
     ).lstrip()
 
 
@@ -138,13 +140,13 @@ def _description(robot: Robot, name: str, code: StepCode, guid: str, omissions: 
     units = "\n".join(f"  <Unit name={quoteattr(unit)}><BaseUnit {_BASE[unit]}/></Unit>" for unit in _BASE)
     # Each output hangs on nothing of the same moment: the step has gone by when it is read.
     outputs = [f'   <Unknown index="{code.wheels + k + 1}" dependencies=""/>' for k in range(len(OUTPUTS))]
-    words = f"{robot.name}: the exact step of omnidyn" + "".join(f"; not in it: {omission}" for omission in omissions)
+    words = f"{robot.name}: the step of omnidyn's simulation" + "".join(f"; not in it: {omission}" for omission in omissions)
     lines = "\n".join(_variables(code.wheels))
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName={attribute(robot.name)} guid="{guid}" description={attribute(words)}
  generationTool="omnidyn" variableNamingConvention="flat" numberOfEventIndicators="0">
- <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true" canGetAndSetFMUstate="false"
-  canNotUseMemoryManagementFunctions="true">
+ <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true" canGetAndSetFMUstate="true"
+  canSerializeFMUstate="true"  canNotUseMemoryManagementFunctions="true">
   <SourceFiles><File name="{name}.c"/></SourceFiles>
  </CoSimulation>
  <UnitDefinitions>
@@ -209,11 +211,11 @@ typedef struct {
 
 @STEP@
 
-enum { WHEELS = @WHEELS@, STATE = 6, VARIABLES = WHEELS + 2 * STATE };
+enum { WHEELS = @WHEELS@, STATE = 6, VARIABLES = WHEELS + 2 * STATE, MEMORY = @MEMORY@ };
 
-/* values: volts, then twist and pose, then where both start; force: what the currents do to each axis. */
+/* values: volts, then twist and pose, then where both start; memory: what a step leaves to the next one. */
 typedef struct {
-    double values[VARIABLES], force[3], lost, time;
+    double values[VARIABLES], memory[MEMORY], time;
 } Unit;
 
 static void begin(Unit *unit)
@@ -222,7 +224,7 @@ static void begin(Unit *unit)
     for (k = 0; k < STATE; k++) {
         unit->values[WHEELS + k] = unit->values[WHEELS + STATE + k];
     }
-    unit->force[0] = unit->force[1] = unit->force[2] = unit->lost = 0.0;
+    memset(unit->memory, 0, sizeof(unit->memory));
 }
 
 EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
@@ -316,7 +318,7 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real now, fmi2Real length, fmi
         return fmi2Error;
     }
     if (length > 0.0 && omnidyn_advance(unit->values, length, unit->values + WHEELS, unit->values + WHEELS + 3,
-                                        @FORCE@&unit->lost) != OMNIDYN_STEP_OK) {
+                                        @PASSED@) != OMNIDYN_STEP_OK) {
         return fmi2Error;
     }
     unit->time = now + length;
@@ -338,7 +340,57 @@ EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, 
     return fmi2OK;
 }
 
-/* What the unit does not have: other types of variables, copies of its state, derivatives. */
+EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    if (*state == NULL && (*state = malloc(sizeof(Unit))) == NULL) {
+        return fmi2Error;
+    }
+    memcpy(*state, c, sizeof(Unit));
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
+{
+    memcpy(c, state, sizeof(Unit));
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    (void)c;
+    free(*state);
+    *state = NULL;
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
+{
+    (void)c, (void)state;
+    *size = sizeof(Unit);
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+{
+    (void)c;
+    if (size < sizeof(Unit)) {
+        return fmi2Error;
+    }
+    memcpy(bytes, state, sizeof(Unit));
+    return fmi2OK;
+}
+
+/* A state that another unit has written is one of numbers: a step says whether they make sense. */
+EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+{
+    if (size != sizeof(Unit) || fmi2GetFMUstate(c, state) != fmi2OK) {
+        return fmi2Error;
+    }
+    memcpy(*state, bytes, sizeof(Unit));
+    return fmi2OK;
+}
+
+/* What the unit does not have: other types of variables, derivatives. */
 #define NONE(name, ...)                                                                                               \
     EXPORT fmi2Status name(__VA_ARGS__);                                                                              \
     EXPORT fmi2Status name(__VA_ARGS__)
@@ -368,35 +420,6 @@ STATUS(fmi2GetStatus, fmi2Status)
 STATUS(fmi2GetIntegerStatus, fmi2Integer)
 STATUS(fmi2GetBooleanStatus, fmi2Boolean)
 STATUS(fmi2GetStringStatus, fmi2String)
-
-#define STATE_OF(name, ...)                                                                                           \
-    NONE(name, __VA_ARGS__)                                                                                           \
-    {                                                                                                                 \
-        (void)c, (void)state;                                                                                         \
-        return fmi2Error;                                                                                             \
-    }
-
-STATE_OF(fmi2GetFMUstate, fmi2Component c, fmi2FMUstate *state)
-STATE_OF(fmi2SetFMUstate, fmi2Component c, fmi2FMUstate state)
-STATE_OF(fmi2FreeFMUstate, fmi2Component c, fmi2FMUstate *state)
-
-NONE(fmi2SerializedFMUstateSize, fmi2Component c, fmi2FMUstate state, size_t *size)
-{
-    (void)c, (void)state, (void)size;
-    return fmi2Error;
-}
-
-NONE(fmi2SerializeFMUstate, fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
-{
-    (void)c, (void)state, (void)bytes, (void)size;
-    return fmi2Error;
-}
-
-NONE(fmi2DeSerializeFMUstate, fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
-{
-    (void)c, (void)bytes, (void)size, (void)state;
-    return fmi2Error;
-}
 
 NONE(fmi2GetDirectionalDerivative, fmi2Component c, const fmi2ValueReference unknown[], size_t many,
      const fmi2ValueReference known[], size_t n, const fmi2Real change[], fmi2Real values[])
