@@ -38,8 +38,7 @@ from omnidyn.simulation.implicit.march import Spare
 
 MARCH = "omnidyn.simulation.implicit.march"
 CHANGING = frozenset(("viscous", "coulomb", "turning"))  # of a bare plant, which solvers change
-MOST_TURNS = 2_000  # of one while loop
-MOST_STEPS = 6_000  # solved in one call
+MOST_STEPS, MOST_FIXED_STEPS = 300_000, 1_000  # solved in one call, to a tolerance or not
 RECORDS = {
     "Body": BODY,
     "Element": ELEMENT,
@@ -56,7 +55,8 @@ def implicit_code(robot: Robot, tol: float) -> StepCode:
     numbers = plant(robot)
     bare = with_given_currents(numbers) if tol or numbers.body.gathers else None
     rows, stage = len(numbers.element), new_stage(numbers)
-    program = CProgram(most_turns=MOST_TURNS, known=_known(numbers, bare))
+    most = MOST_STEPS if tol else MOST_FIXED_STEPS
+    program = CProgram(most_turns=most, known=_known(numbers, bare))
     call = _translated(program, rows, bare is not None, tol)
     volts = volts_code(program, robot)
     for field in ("voltage", "sign"):
@@ -77,7 +77,7 @@ def implicit_code(robot: Robot, tol: float) -> StepCode:
         "MEMORY": str(size),
         "LENGTH": c_number(numbers.body.length),
         "LARGEST": c_number(np.finfo(float).max),
-        "MOST": str(MOST_STEPS),
+        "MOST": str(most),
     }
     text = filled(
         _ADVANCE,
@@ -206,6 +206,9 @@ static int omnidyn_advance(const @REAL@ u[], @REAL@ h, @REAL@ twist[3], @REAL@ p
             now.each[e].sign = g[0] * now.x[0] + g[1] * now.x[1] + g[2] * now.x[2];
         }
         now.each[@ROWS@].sign = now.x[0] != 0 || now.x[1] != 0;
+    }
+    for (e = 0; e < @STATES@; e++) {
+        each[e][@ROWS@ + 1].sign = 2.0; /* that nothing has */
     }
     for (e = 0; e < @ROWS@ + 2; e++) {
         const @REAL@ sign = now.each[e].sign;

@@ -51,6 +51,7 @@ class CProgram:
     texts: list[str] = field(default_factory=list)
     used: dict[Record, set[str]] = field(default_factory=dict)
     _kinds: dict[str, Struct] = field(default_factory=dict)
+    _names: set[str] = field(default_factory=set)
 
     @property
     def real(self) -> str:
@@ -64,10 +65,10 @@ class CProgram:
         if key not in self.functions:
             # A local name may be that of a private function without its underscore.
             name = c_name(source.name) + ("_of" if source.name.startswith("_") else "")
-            names = {function.name for function in self.functions.values()}
             name = next(
-                candidate for candidate in (name, *(f"{name}_{k}" for k in range(2, 99))) if candidate not in names
+                candidate for candidate in (name, *(f"{name}_{k}" for k in range(2, 99))) if candidate not in self._names
             )
+            self._names.add(name)
             body = FunctionBody(self, source, arguments, name)
             self.texts.append(body.text())
             self.functions[key] = Function(name, body.returns, frozenset(body.written))

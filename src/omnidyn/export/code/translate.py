@@ -198,7 +198,7 @@ class FunctionBody:
             name = self._temporary(kind)
             before, last = [f"{name} = {_bare(last)};"], name
         sign, change = ("<", "++") if by == 1 else (">", "--")
-        head = f"for ({counter} = {_bare(first)}; {counter} {sign} {_bare(last)}; {counter}{change}) {{"
+        head = f"for ({counter} = {_bare(first)}; {counter} {sign} {last}; {counter}{change}) {{"
         return [*before, head, *self._nest(node.body), "}"]
 
     def _may_change(self, bound: ast.expr, statements: list[ast.stmt]) -> bool:
@@ -271,13 +271,17 @@ class FunctionBody:
         return before + after
 
     def _unpack(self, targets: ast.Tuple, value: ast.expr) -> list[str]:
-        """a, b = f(...)."""
+        """a, b = f(...), or the first of what it gives: a, b = f(...)[:2]."""
+        count = None
+        if isinstance(value, ast.Subscript) and isinstance(value.slice, ast.Slice) and value.slice.lower is None:
+            value, count = value.value, self.expressions.known(value.slice.upper or ast.Constant(None))
         text, kind = self.expressions.of(value)
-        if not isinstance(kind, Many) or len(kind.items) != len(targets.elts):
+        items = kind.items[:count] if isinstance(kind, Many) else ()
+        if len(items) != len(targets.elts):
             raise TranslationError(f"{self.source.name}: cannot take apart {ast.unparse(value)}")
         name = self._temporary(kind)
         lines = [f"{name} = {_bare(text)};"]
-        for k, (target, item_kind) in enumerate(zip(targets.elts, kind.items, strict=True)):
+        for k, (target, item_kind) in enumerate(zip(targets.elts, items, strict=True)):
             lines += self._put(target, f"{name}.a{k}", item_kind)
         return lines
 
