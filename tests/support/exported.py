@@ -82,7 +82,11 @@ def init_robot(seed: int) -> Robot:
         wheels = Wheels(azimuth_deg=even_azimuths(count), wheel_radius=wheel_radius, robot_radius=robot_radius)
     shape = ("axes", DIRECTION, "ellipse", "plain", "breakaway")[seed * 3 % 5]
     robot = first_guess(
-        f"init {seed}", wheels, random.uniform(1.0, 20.0), random.choice((6.0, 12.0, 24.0)), "axes" if shape == "axes" else DIRECTION
+        f"init {seed}",
+        wheels,
+        random.uniform(1.0, 20.0),
+        random.choice((6.0, 12.0, 24.0)),
+        "axes" if shape == "axes" else DIRECTION,
     )
     along = robot.friction.direction
     levels = tuple(level * random.uniform(0.6, 1.4) for level in along.coulomb)
@@ -101,7 +105,7 @@ class Stepper:
     def __init__(self, robot: Robot, folder: Path, precision: str = "double", **options: Any) -> None:
         made = omnidyn.export.c_model(robot, precision=precision, **options)
         made.write(folder)
-        command = ["gcc", *STRICT, "-shared", "-fPIC", "-o", "step.so", "omnidyn_step.c", "-lm"]
+        command = ["gcc", *STRICT, "-O1", "-shared", "-fPIC", "-o", "step.so", "omnidyn_step.c", "-lm"]
         subprocess.run(command, cwd=folder, check=True, capture_output=True)
         self.real, real = (np.float32, ctypes.c_float) if precision == "single" else (np.float64, ctypes.c_double)
         self._step = ctypes.CDLL(str(folder / "step.so")).omnidyn_step

@@ -42,11 +42,13 @@ class Program:
         return Calls(**json.loads(said.stdout))
 
 
-def of_step(robot: Robot, folder: Path, precision: Any = "double") -> Program:
+def of_step(robot: Robot, folder: Path, **options: Any) -> Program:
     """`omnidyn_step` of a c-model."""
-    omnidyn.export.c_model(robot, precision=precision).write(folder)
-    force = ["-DFORCE"] if robot.motor.electrical == DYNAMIC else []
-    return Program(folder, ["omnidyn_step.c"], [*force, '-DHEADER="omnidyn_step.h"'])
+    made = omnidyn.export.c_model(robot, **options)
+    made.write(folder)
+    memory = "OMNIDYN_MEMORY" in made.files["omnidyn_step.h"]
+    more = ["-DMORE=OMNIDYN_MEMORY"] if memory else ["-DMORE=3"] if robot.motor.electrical == DYNAMIC else []
+    return Program(folder, ["omnidyn_step.c"], [*more, '-DHEADER="omnidyn_step.h"'])
 
 
 def of_fmu(robot: Robot, folder: Path) -> Program:
@@ -74,6 +76,11 @@ CALLS = r"""
 #ifdef FMU
 typedef double omnidyn_real;
 enum { OMNIDYN_WHEELS = WHEELS };
+#endif
+#ifdef MORE
+enum { NUMBERS = 6 + MORE };
+#else
+enum { NUMBERS = 6 };
 #endif
 
 static uint64_t state = 88172645463325252ULL;
@@ -116,7 +123,7 @@ int main(int argc, char **argv)
     }
 #endif
     for (k = 0; k < count; k++) {
-        omnidyn_real u[OMNIDYN_WHEELS], x[9], before[9], h;
+        omnidyn_real u[OMNIDYN_WHEELS], x[NUMBERS], before[NUMBERS], h;
         double begun, took;
         int status;
         for (i = 0; i < OMNIDYN_WHEELS; i++) {
@@ -125,7 +132,9 @@ int main(int argc, char **argv)
         for (i = 0; i < 3; i++) {
             x[i] = (omnidyn_real)(valid ? uniform(-1e3, 1e3) * (next() % 2 ? 1.0 : 1e-3) : any(-4.0, 3.2));
             x[3 + i] = (omnidyn_real)(valid ? uniform(-100.0, 100.0) : any(-4.0, 10.0));
-            x[6 + i] = (omnidyn_real)(valid ? uniform(-50.0, 50.0) : any(-4.0, 10.0));
+        }
+        for (i = 6; i < NUMBERS; i++) {
+            x[i] = (omnidyn_real)(valid ? uniform(-50.0, 50.0) : any(-4.0, 10.0));
         }
         h = (omnidyn_real)(valid ? (next() % 2 ? uniform(1e-6, 1.0) : 1.0) : any(-6.0, 5.0));
         h = next() % 10 || valid ? (omnidyn_real)fabs(h) : h;
@@ -144,7 +153,7 @@ int main(int argc, char **argv)
             status = fmi2SetReal(unit, which, WHEELS + STATE, values);
             status = status == fmi2OK ? fmi2DoStep(unit, 0.0, h, 0) : status;
         }
-#elif defined FORCE
+#elif defined MORE
         status = omnidyn_step(u, h, x, x + 3, x + 6);
 #else
         status = omnidyn_step(u, h, x, x + 3);

@@ -27,9 +27,7 @@ NOTES = (
 )
 
 
-def c_model(
-    robot: Robot, precision: Literal["double", "single"] = DOUBLE, tol: float | None = TOLERANCE
-) -> Export:
+def c_model(robot: Robot, precision: Literal["double", "single"] = DOUBLE, tol: float | None = TOLERANCE) -> Export:
     """The step of a robot in C99, by the engine that `simulate` chooses.
 
     precision: of its numbers, double (float64) or single (float32). tol: global error of the implicit engine [m/s];

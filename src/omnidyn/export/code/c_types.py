@@ -35,7 +35,9 @@ class Many:
     @property
     def name(self) -> str:
         """The name of the struct: a letter for each number, o and c around those of a tuple within it."""
-        letters = (f"o{item.name[5:]}c" if isinstance(item, Many) else "r" if item == REAL else "i" for item in self.items)
+        letters = (
+            f"o{item.name[5:]}c" if isinstance(item, Many) else "r" if item == REAL else "i" for item in self.items
+        )
         return f"many_{''.join(letters)}"
 
 

@@ -315,7 +315,9 @@ class Expressions:
         part = node.slice
         assert isinstance(part, ast.Slice)
         bounds = [None if bound is None else self.known(bound) for bound in (part.lower, part.upper)]
-        unknown = [bound for bound, value in zip((part.lower, part.upper), bounds, strict=True) if bound and value is None]
+        unknown = [
+            bound for bound, value in zip((part.lower, part.upper), bounds, strict=True) if bound and value is None
+        ]
         if not isinstance(kind, Array) or part.step is not None or unknown:
             raise self.refusal(node)
         first, end, _ = slice(*bounds).indices(kind.shape[0])

@@ -140,7 +140,9 @@ def _description(robot: Robot, name: str, code: StepCode, guid: str, omissions: 
     units = "\n".join(f"  <Unit name={quoteattr(unit)}><BaseUnit {_BASE[unit]}/></Unit>" for unit in _BASE)
     # Each output hangs on nothing of the same moment: the step has gone by when it is read.
     outputs = [f'   <Unknown index="{code.wheels + k + 1}" dependencies=""/>' for k in range(len(OUTPUTS))]
-    words = f"{robot.name}: the step of omnidyn's simulation" + "".join(f"; not in it: {omission}" for omission in omissions)
+    words = f"{robot.name}: the step of omnidyn's simulation" + "".join(
+        f"; not in it: {omission}" for omission in omissions
+    )
     lines = "\n".join(_variables(code.wheels))
     return f"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName={attribute(robot.name)} guid="{guid}" description={attribute(words)}

@@ -66,7 +66,9 @@ class CProgram:
             # A local name may be that of a private function without its underscore.
             name = c_name(source.name) + ("_of" if source.name.startswith("_") else "")
             name = next(
-                candidate for candidate in (name, *(f"{name}_{k}" for k in range(2, 99))) if candidate not in self._names
+                candidate
+                for candidate in (name, *(f"{name}_{k}" for k in range(2, 99)))
+                if candidate not in self._names
             )
             self._names.add(name)
             body = FunctionBody(self, source, arguments, name)
@@ -96,7 +98,9 @@ class CProgram:
     def records(self, kind: Record, name: str, values: np.ndarray) -> str:
         """A constant record, or a table of records, with the fields that the functions use."""
         shape = "".join(f"[{n}]" for n in values.shape)
-        texts = ["{" + ", ".join(self._numbers(row[field]) for field in self._fields(kind)) + "}" for row in values.flat]
+        texts = [
+            "{" + ", ".join(self._numbers(row[field]) for field in self._fields(kind)) + "}" for row in values.flat
+        ]
         rows = _nested(texts, values.shape, ",\n    ")
         return f"static const {kind.name} {name}{shape} = {rows};"
 
@@ -114,7 +118,9 @@ class CProgram:
             if self._kinds.setdefault(name, kind) == kind:
                 break
         if kind.name not in self.structs:
-            lines = [f"    {self.declared(field_kind, c_name(name), pointer=True)};" for name, field_kind in kind.fields]
+            lines = [
+                f"    {self.declared(field_kind, c_name(name), pointer=True)};" for name, field_kind in kind.fields
+            ]
             self.structs[kind.name] = "typedef struct {\n" + "\n".join(lines) + f"\n}} {kind.name};"
         return kind
 

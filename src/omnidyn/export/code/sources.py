@@ -69,4 +69,3 @@ def source_of(value: Any) -> Source | None:
     enclosed = inspect.getclosurevars(function).nonlocals if function.__closure__ else {}
     tree = _functions(function.__module__)[function.__code__.co_firstlineno]
     return Source(function.__module__, function.__name__, tree, enclosed)
-
