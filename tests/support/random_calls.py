@@ -18,21 +18,22 @@ VALID, ANY = 1, 0  # finite numbers of a size that robots have; anything
 
 
 class Calls(NamedTuple):
-    """returned: how often each status was returned. slowest: processor time of one call [ms]. kept: whether a call
-    that returned an error left its state alone."""
+    """returned: how often each status was returned. slowest, mean: processor time of one call [ms]. kept: whether a
+    call that returned an error left its state alone."""
 
     returned: list[int]
     slowest: float
+    mean: float
     kept: bool
 
 
 class Program:
-    """Exported C in a program that calls it, compiled with sanitizers."""
+    """Exported C in a program that calls it, compiled with sanitizers or other flags."""
 
-    def __init__(self, folder: Path, sources: list[str], defines: list[str]) -> None:
+    def __init__(self, folder: Path, sources: list[str], defines: list[str], flags: tuple[str, ...]) -> None:
         self.folder = folder
         (folder / "calls.c").write_text(CALLS)
-        command = ["gcc", *SANITIZERS, *defines, "-o", "calls", "calls.c", *sources, "-lm"]
+        command = ["gcc", *flags, *defines, "-o", "calls", "calls.c", *sources, "-lm"]
         subprocess.run(command, cwd=folder, check=True, capture_output=True)
 
     def run(self, count: int, kind: int) -> Calls:
@@ -42,13 +43,13 @@ class Program:
         return Calls(**json.loads(said.stdout))
 
 
-def of_step(robot: Robot, folder: Path, **options: Any) -> Program:
+def of_step(robot: Robot, folder: Path, flags: tuple[str, ...] = SANITIZERS, **options: Any) -> Program:
     """`omnidyn_step` of a c-model."""
     made = omnidyn.export.c_model(robot, **options)
     made.write(folder)
     memory = "OMNIDYN_MEMORY" in made.files["omnidyn_step.h"]
     more = ["-DMORE=OMNIDYN_MEMORY"] if memory else ["-DMORE=3"] if robot.motor.electrical == DYNAMIC else []
-    return Program(folder, ["omnidyn_step.c"], [*more, '-DHEADER="omnidyn_step.h"'])
+    return Program(folder, ["omnidyn_step.c"], [*more, '-DHEADER="omnidyn_step.h"'], flags)
 
 
 def of_fmu(robot: Robot, folder: Path) -> Program:
@@ -60,7 +61,7 @@ def of_fmu(robot: Robot, folder: Path) -> Program:
         source = archive.read(name)
         guid = archive.read("modelDescription.xml").decode().partition('guid="')[2].partition('"')[0]
     (folder / "unit.c").write_bytes(source)
-    return Program(folder, [], ["-DFMU", '-DHEADER="unit.c"', f'-DID="{guid}"'])
+    return Program(folder, [], ["-DFMU", '-DHEADER="unit.c"', f'-DID="{guid}"'], SANITIZERS)
 
 
 CALLS = r"""
@@ -114,7 +115,7 @@ int main(int argc, char **argv)
     const long count = argc > 2 ? atol(argv[1]) : 0;
     const int valid = argc > 2 && atoi(argv[2]);
     long returned[8] = {0}, k;
-    double slowest = 0.0;
+    double slowest = 0.0, sum = 0.0;
     int kept = 1, i;
 #ifdef FMU
     Unit *unit = fmi2Instantiate("unit", fmi2CoSimulation, ID, "", NULL, 0, 0);
@@ -160,13 +161,15 @@ int main(int argc, char **argv)
 #endif
         took = now() - begun;
         slowest = took > slowest ? took : slowest;
+        sum += took;
         returned[status]++;
         kept &= status == 0 || memcmp(before, x, sizeof(x)) == 0;
     }
 #ifdef FMU
     fmi2FreeInstance(unit);
 #endif
-    printf("{\"slowest\": %.3f, \"kept\": %s, \"returned\": [", slowest, kept ? "true" : "false");
+    printf("{\"slowest\": %.6f, \"mean\": %.6f, \"kept\": %s, \"returned\": [", slowest, sum / (double)count,
+           kept ? "true" : "false");
     for (i = 0; i < 8; i++) {
         printf("%s%ld", i ? ", " : "", returned[i]);
     }

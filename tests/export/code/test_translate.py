@@ -7,8 +7,8 @@ import subprocess
 import pytest
 
 from omnidyn.export.code.c_types import INT, REAL, Array, TranslationError
-from omnidyn.export.code.sources import Source, source_of
 from omnidyn.export.code.program import CProgram
+from omnidyn.export.code.sources import Source, source_of
 
 
 def source(text):

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+# Functions of <math.h> that Python calls by the same name.
 MATH = frozenset(
-    "exp expm1 log1p sqrt sin cos sinh cosh atan2 copysign hypot ceil pow".split()  # of <math.h>, as in Python
+    ("exp", "expm1", "log1p", "sqrt", "sin", "cos", "sinh", "cosh", "atan2", "copysign", "hypot", "ceil", "pow")
 )
-RESERVED = MATH | frozenset("double float int long short char auto register signed default fabs remainder".split())
+RESERVED = MATH | {"double", "float", "int", "long", "short", "char", "auto", "register", "signed", "default", "fabs"}
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ def joined(first: Type | None, second: Type) -> Type:
 def record_type(name: str, dtype: np.dtype) -> Record:
     """The type of a NumPy record."""
     assert dtype.fields is not None
-    shapes = {field: dtype.fields[field][0].shape for field in dtype.names or ()}
+    shapes = {field: parts[0].shape for field, parts in dtype.fields.items()}
     return Record(name, tuple((field, Array(shape) if shape else REAL) for field, shape in shapes.items()))
 
 

@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from types import ModuleType
 from typing import Any, Protocol
 
-
 from omnidyn.export.code.c_types import (
     BOOL,
     INT,
@@ -373,7 +372,7 @@ class Expressions:
         return f"({kind.name}){{{', '.join(texts)}}}", kind
 
     def _builtin(self, name: str, nodes: list[ast.expr]) -> Typed:
-        first, kind = self.of(nodes[0])
+        first = self.of(nodes[0])[0]
         if name == "int":
             return f"(int){first}", INT
         if name == "abs":

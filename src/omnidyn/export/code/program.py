@@ -113,10 +113,9 @@ class CProgram:
     def struct(self, cls: type, *kinds: Type) -> Struct:
         """A NamedTuple as a struct; kinds: of its fields, numbers where none are given."""
         fields = tuple(zip(cls._fields, kinds or [REAL] * len(cls._fields), strict=True))
-        for name in (cls.__name__, *(f"{cls.__name__}_{k}" for k in range(2, 99))):
-            kind = Struct(name, fields)
-            if self._kinds.setdefault(name, kind) == kind:
-                break
+        names = (cls.__name__, *(f"{cls.__name__}_{k}" for k in range(2, 99)))
+        candidates = (Struct(name, fields) for name in names)
+        kind = next(kind for kind in candidates if self._kinds.setdefault(kind.name, kind) == kind)
         if kind.name not in self.structs:
             lines = [
                 f"    {self.declared(field_kind, c_name(name), pointer=True)};" for name, field_kind in kind.fields

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from omnidyn.compiled.kernel import plain
-
 from omnidyn.export.code.c_types import INT, REAL, Array, Type
 from omnidyn.export.code.program import CProgram
 from omnidyn.export.spelling import SINGLE_MAX, c_number, filled
