@@ -276,13 +276,19 @@ class FunctionBody:
         if isinstance(value, ast.Subscript) and isinstance(value.slice, ast.Slice) and value.slice.lower is None:
             value, count = value.value, self.expressions.known(value.slice.upper or ast.Constant(None))
         text, kind = self.expressions.of(value)
-        items = kind.items[:count] if isinstance(kind, Many) else ()
-        if len(items) != len(targets.elts):
-            raise TranslationError(f"{self.source.name}: cannot take apart {ast.unparse(value)}")
         name = self._temporary(kind)
-        lines = [f"{name} = {_bare(text)};"]
-        for k, (target, item_kind) in enumerate(zip(targets.elts, items, strict=True)):
-            lines += self._put(target, f"{name}.a{k}", item_kind)
+        return [f"{name} = {_bare(text)};", *self._put_items(targets, name, kind, count)]
+
+    def _put_items(self, targets: ast.Tuple, name: str, kind: Type, count: int | None = None) -> list[str]:
+        """Give the items of several values, or the first of them, to targets."""
+        items, lines = kind.items[:count] if isinstance(kind, Many) else (), []
+        if len(items) != len(targets.elts):
+            raise TranslationError(f"{self.source.name}: cannot take apart {kind} into {ast.unparse(targets)}")
+        for k, (target, item) in enumerate(zip(targets.elts, items, strict=True)):
+            text = f"{name}.a{k}"
+            lines += (
+                self._put_items(target, text, item) if isinstance(target, ast.Tuple) else self._put(target, text, item)
+            )
         return lines
 
     def _temporary(self, kind: Type) -> str:
