@@ -175,6 +175,8 @@ def _description(robot: Robot, name: str, code: StepCode, guid: str, omissions: 
 # Written from the standard (FMI 2.0.4, modelica.org); no header of it is included, so that the file compiles alone.
 
 FMI2_C = r"""
+/* A library of it: gcc -std=c99 -O2 -shared -fPIC -o NAME.so NAME.c -lm, or cl /O2 /LD NAME.c on Windows. It belongs into
+   binaries/linux64, win64 or darwin64 of the FMU. */
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
