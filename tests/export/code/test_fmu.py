@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.errors import UnsupportedError
+from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.export.code.fmu import OUTPUTS, fmu
 from tests.support.exported import exact_robot, init_robot, program
 
@@ -143,6 +143,42 @@ def driven(unit, volts, first, dt):
         unit.setReal(list(range(wheels)), row.tolist())
         unit.doStep(currentCommunicationPoint=k * dt, communicationStepSize=dt)
     return np.array(unit.getReal(list(range(wheels, wheels + 6))))
+
+
+def test_fmi_3_is_the_engine_too(tmp_path):
+    """Valid, the same outputs, a state that goes back, time as a variable."""
+    from fmpy.fmi3 import FMU3Slave
+    from fmpy.validation import validate_fmu
+
+    path = str(fmu(ROBOT, fmi=3).write(tmp_path / "robot.fmu")[0])
+    assert validate_fmu(path) == []
+    about, place = fmpy.read_model_description(path), fmpy.extract(path, str(tmp_path / "unit"))
+    unit = FMU3Slave(
+        guid=about.guid,
+        unzipDirectory=place,
+        instanceName="unit",
+        modelIdentifier=about.coSimulation.modelIdentifier,
+    )
+    unit.instantiate()
+    unit.enterInitializationMode(startTime=0.0)
+    unit.setFloat64([9], [0.5])
+    unit.exitInitializationMode()
+    volts, dt = program(ROBOT, 5, 60), 2.0**-9
+    run = omnidyn.simulate(ROBOT, volts, dt, twist=(0.5, 0.0, 0.0))
+    state = None
+    for k, row in enumerate(volts):
+        if k == 50:
+            state = unit.serializeFMUState(unit.getFMUState())
+        unit.setFloat64([0, 1, 2], row.tolist())
+        unit.doStep(k * dt, dt)
+    np.testing.assert_allclose(unit.getFloat64(range(3, 6)), run.twist[-1], rtol=0, atol=1e-12)
+    assert unit.getFloat64([15]) == [60 * dt]
+    unit.setFMUState(unit.deserializeFMUState(state))
+    np.testing.assert_allclose(unit.getFloat64(range(3, 6)), run.twist[50], rtol=0, atol=1e-12)
+    with pytest.raises(Exception, match="fmi3GetInt32"):
+        unit.getInt32([0])
+    with pytest.raises(InputError, match="no such version of FMI; got 1"):
+        fmu(ROBOT, fmi=1)
 
 
 def test_other_robots_are_refused_by_name():
