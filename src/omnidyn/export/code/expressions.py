@@ -8,9 +8,8 @@ from __future__ import annotations
 import ast
 import math
 import operator
-from collections.abc import Mapping
 from types import ModuleType
-from typing import Any, Protocol
+from typing import Any
 
 from omnidyn.export.code.c_types import (
     BOOL,
@@ -31,6 +30,7 @@ from omnidyn.export.code.c_types import (
     joined,
     member,
 )
+from omnidyn.export.code.scope import Scope
 from omnidyn.export.code.sources import Source, source_of
 from omnidyn.export.spelling import c_number
 
@@ -44,46 +44,6 @@ _COMPARE: dict[type, tuple[str, Any]] = {
     ast.Eq: ("==", operator.eq),
     ast.NotEq: ("!=", operator.ne),
 }
-
-
-class Called(Protocol):
-    """A translated function, see translate.py."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def returns(self) -> Type: ...
-    @property
-    def writes(self) -> frozenset[int]: ...
-
-
-class Whole(Protocol):
-    """What expressions ask of the program that they belong to, see program.py."""
-
-    single: bool
-
-    @property
-    def real(self) -> str: ...
-    @property
-    def known(self) -> Mapping[tuple[str, str], Any]: ...
-    def function(self, source: Source, arguments: tuple[Type, ...]) -> Called: ...
-    def constant(self, name: str, value: Any) -> tuple[str, Type]: ...
-    def struct(self, cls: type, *kinds: Type) -> Struct: ...
-    def packed(self, kind: Many, items: list[str]) -> str: ...
-    def use(self, record: Record, name: str) -> None: ...
-
-
-class Scope(Protocol):
-    """The function that an expression stands in, see translate.py."""
-
-    source: Source
-    types: dict[str, Type]
-    read: set[str]
-    gathered: list[str]
-
-    @property
-    def program(self) -> Whole: ...
-    def writes_to(self, node: ast.expr) -> None: ...
 
 
 class Expressions:

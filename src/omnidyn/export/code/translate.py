@@ -28,7 +28,8 @@ from omnidyn.export.code.c_types import (
     c_name,
     joined,
 )
-from omnidyn.export.code.expressions import Expressions, Whole
+from omnidyn.export.code.expressions import Expressions
+from omnidyn.export.code.scope import Whole
 from omnidyn.export.code.sources import Source
 from omnidyn.export.spelling import c_number
 
