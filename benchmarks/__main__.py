@@ -45,6 +45,7 @@ NAMES = {
     "blind": "what a log cannot tell: 20 rank-deficient set-ups, 20 full-rank ones, 20 with equal causes (two minutes)",
     "exports": "the paper's robot in C, FMU, MuJoCo, python-control, WPILib: errors, drift at rest (a minute)",
     "exported_c": "exported C on a million random calls under sanitizers: findings, the slowest call (four minutes)",
+    "exported_robots": "20 robots of init and three presets in C and FMU: differences, sizes, stack (four minutes)",
     "stagger": "topics with clocks of their own: check, geometry and fits beside equal stamps (two minutes)",
     "studies": "intervals and false alarms over many draws: breakaway, laws, rounding, noise, motors (15 minutes)",
     "wrong_worlds": "forty kinds of wrong world, and right ones: what identify says of each (an hour)",

@@ -53,7 +53,7 @@ def _rows(folder: Path) -> Iterator[dict[str, Any]]:
     plain, wound = omnidyn.load_robot("axebot"), exact_robot(3)
     for name, robot in (("axebot", plain), ("with inductance", wound)):
         for precision in ("double", "single"):
-            program = of_step(robot, folder / f"{name}{precision}", precision)
+            program = of_step(robot, folder / f"{name}{precision}", precision=precision)
             main = robot is plain and precision == "double"
             yield _counted(f"c-model, {name}, {precision}", program, CALLS if main else FEWER)
         yield _counted(f"fmu, {name}, its sources", of_fmu(robot, folder / name), CALLS if robot is plain else FEWER)

@@ -18,21 +18,22 @@ VALID, ANY = 1, 0  # finite numbers of a size that robots have; anything
 
 
 class Calls(NamedTuple):
-    """returned: how often each status was returned. slowest: processor time of one call [ms]. kept: whether a call
-    that returned an error left its state alone."""
+    """returned: how often each status was returned. slowest, mean: processor time of one call [ms]. kept: whether a
+    call that returned an error left its state alone."""
 
     returned: list[int]
     slowest: float
+    mean: float
     kept: bool
 
 
 class Program:
-    """Exported C in a program that calls it, compiled with sanitizers."""
+    """Exported C in a program that calls it, compiled with sanitizers or other flags."""
 
-    def __init__(self, folder: Path, sources: list[str], defines: list[str]) -> None:
+    def __init__(self, folder: Path, sources: list[str], defines: list[str], flags: tuple[str, ...]) -> None:
         self.folder = folder
         (folder / "calls.c").write_text(CALLS)
-        command = ["gcc", *SANITIZERS, *defines, "-o", "calls", "calls.c", *sources, "-lm"]
+        command = ["gcc", *flags, *defines, "-o", "calls", "calls.c", *sources, "-lm"]
         subprocess.run(command, cwd=folder, check=True, capture_output=True)
 
     def run(self, count: int, kind: int) -> Calls:
@@ -42,11 +43,13 @@ class Program:
         return Calls(**json.loads(said.stdout))
 
 
-def of_step(robot: Robot, folder: Path, precision: Any = "double") -> Program:
+def of_step(robot: Robot, folder: Path, flags: tuple[str, ...] = SANITIZERS, **options: Any) -> Program:
     """`omnidyn_step` of a c-model."""
-    omnidyn.export.c_model(robot, precision=precision).write(folder)
-    force = ["-DFORCE"] if robot.motor.electrical == DYNAMIC else []
-    return Program(folder, ["omnidyn_step.c"], [*force, '-DHEADER="omnidyn_step.h"'])
+    made = omnidyn.export.c_model(robot, **options)
+    made.write(folder)
+    memory = "OMNIDYN_MEMORY" in made.files["omnidyn_step.h"]
+    more = ["-DMORE=OMNIDYN_MEMORY"] if memory else ["-DMORE=3"] if robot.motor.electrical == DYNAMIC else []
+    return Program(folder, ["omnidyn_step.c"], [*more, '-DHEADER="omnidyn_step.h"'], flags)
 
 
 def of_fmu(robot: Robot, folder: Path) -> Program:
@@ -58,7 +61,7 @@ def of_fmu(robot: Robot, folder: Path) -> Program:
         source = archive.read(name)
         guid = archive.read("modelDescription.xml").decode().partition('guid="')[2].partition('"')[0]
     (folder / "unit.c").write_bytes(source)
-    return Program(folder, [], ["-DFMU", '-DHEADER="unit.c"', f'-DID="{guid}"'])
+    return Program(folder, [], ["-DFMU", '-DHEADER="unit.c"', f'-DID="{guid}"'], SANITIZERS)
 
 
 CALLS = r"""
@@ -74,6 +77,11 @@ CALLS = r"""
 #ifdef FMU
 typedef double omnidyn_real;
 enum { OMNIDYN_WHEELS = WHEELS };
+#endif
+#ifdef MORE
+enum { NUMBERS = 6 + MORE };
+#else
+enum { NUMBERS = 6 };
 #endif
 
 static uint64_t state = 88172645463325252ULL;
@@ -107,7 +115,7 @@ int main(int argc, char **argv)
     const long count = argc > 2 ? atol(argv[1]) : 0;
     const int valid = argc > 2 && atoi(argv[2]);
     long returned[8] = {0}, k;
-    double slowest = 0.0;
+    double slowest = 0.0, sum = 0.0;
     int kept = 1, i;
 #ifdef FMU
     Unit *unit = fmi2Instantiate("unit", fmi2CoSimulation, ID, "", NULL, 0, 0);
@@ -116,7 +124,7 @@ int main(int argc, char **argv)
     }
 #endif
     for (k = 0; k < count; k++) {
-        omnidyn_real u[OMNIDYN_WHEELS], x[9], before[9], h;
+        omnidyn_real u[OMNIDYN_WHEELS], x[NUMBERS], before[NUMBERS], h;
         double begun, took;
         int status;
         for (i = 0; i < OMNIDYN_WHEELS; i++) {
@@ -125,7 +133,9 @@ int main(int argc, char **argv)
         for (i = 0; i < 3; i++) {
             x[i] = (omnidyn_real)(valid ? uniform(-1e3, 1e3) * (next() % 2 ? 1.0 : 1e-3) : any(-4.0, 3.2));
             x[3 + i] = (omnidyn_real)(valid ? uniform(-100.0, 100.0) : any(-4.0, 10.0));
-            x[6 + i] = (omnidyn_real)(valid ? uniform(-50.0, 50.0) : any(-4.0, 10.0));
+        }
+        for (i = 6; i < NUMBERS; i++) {
+            x[i] = (omnidyn_real)(valid ? uniform(-50.0, 50.0) : any(-4.0, 10.0));
         }
         h = (omnidyn_real)(valid ? (next() % 2 ? uniform(1e-6, 1.0) : 1.0) : any(-6.0, 5.0));
         h = next() % 10 || valid ? (omnidyn_real)fabs(h) : h;
@@ -144,20 +154,22 @@ int main(int argc, char **argv)
             status = fmi2SetReal(unit, which, WHEELS + STATE, values);
             status = status == fmi2OK ? fmi2DoStep(unit, 0.0, h, 0) : status;
         }
-#elif defined FORCE
+#elif defined MORE
         status = omnidyn_step(u, h, x, x + 3, x + 6);
 #else
         status = omnidyn_step(u, h, x, x + 3);
 #endif
         took = now() - begun;
         slowest = took > slowest ? took : slowest;
+        sum += took;
         returned[status]++;
         kept &= status == 0 || memcmp(before, x, sizeof(x)) == 0;
     }
 #ifdef FMU
     fmi2FreeInstance(unit);
 #endif
-    printf("{\"slowest\": %.3f, \"kept\": %s, \"returned\": [", slowest, kept ? "true" : "false");
+    printf("{\"slowest\": %.6f, \"mean\": %.6f, \"kept\": %s, \"returned\": [", slowest, sum / (double)count,
+           kept ? "true" : "false");
     for (i = 0; i < 8; i++) {
         printf("%s%ld", i ? ", " : "", returned[i]);
     }

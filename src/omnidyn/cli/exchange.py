@@ -71,6 +71,10 @@ def export(
     robot: str = typer.Argument(metavar="ROBOT", help="A preset (see: omnidyn robots) or a robot file."),
     out: str = typer.Option("", "-o", "--out", metavar="OUT", help="File or folder to write; - is stdout."),
     precision: str = typer.Option("", metavar="double|single", help="Of the numbers of c-model; double by default."),
+    tol: float | None = typer.Option(
+        None, metavar="M/S", help="Error of the implicit engine (c-model), 1e-6 by default; 0: one fixed step a call."
+    ),
+    fmi: int | None = typer.Option(None, metavar="2|3", help="Version of the standard (fmu); 2 by default."),
     height: float | None = typer.Option(
         None, metavar="M", help="Of the body [m], for its inertia about the other axes (mjcf, urdf, sdf)."
     ),
@@ -102,8 +106,10 @@ def export(
     make = maker(kind)
     if out == "-" and json:
         raise typer.BadParameter("-o - and --json both want stdout.")
-    values = {"precision": precision or None, "height": height, "horizon": horizon, "dt": dt}
+    values = {"precision": precision or None, "fmi": fmi, "height": height, "horizon": horizon, "dt": dt}
     options = _options(kind, make, {**values, "controller": controller or None})
+    if tol is not None:
+        options |= {name: tol or None for name in _options(kind, make, {"tol": tol})}
     loaded = omnidyn.load_robot(robot)
     if log:
         options |= _options(

@@ -2,7 +2,7 @@
 
 contract: the contract of a kind, and Export, what it gives. kinds: which there are. features: what a robot may have,
 and what each kind does with it. spelling: numbers and names as the formats want them.
-robot_json: the robot itself. code/: the exact step and controllers as C, an FMU. feedforward/: kS, kV, kA.
+robot_json: the robot itself. code/: steps and controllers as C, an FMU. feedforward/: kS, kV, kA.
 bodies/: MuJoCo, URDF, SDF. ros/: ROS 2.
 """
 

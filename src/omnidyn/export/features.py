@@ -160,26 +160,7 @@ _DUTY = Cell(
 )
 _MAP = Cell(REFUSES, "its volts are those at the motors, which a driver that is no line does not pass on as asked")
 _DRIVE = {"latency": _DELAY, "loop": _LOOP, "duty": _DUTY, "map": _MAP}
-_NOT_EXACT = dict.fromkeys(
-    (
-        "direction",
-        "plain",
-        "wheels",
-        "falls",
-        "bends",
-        "sides",
-        "frame",
-        "current",
-        "drop",
-        "gear",
-        "unequal",
-        "couples",
-        "slope",
-        "slip",
-        "centre",
-    ),
-    Cell(REFUSES, "it holds the exact step, and this robot has none"),
-)
+_STEP = {"slip": Cell(REFUSES, "it holds the steps of wheels that roll"), **_DRIVE}
 
 _LEVEL = Cell(LEAVES_OUT, "the floor is level")
 _ROLL = Cell(LEAVES_OUT, "its wheels roll, whatever they push with")
@@ -274,7 +255,7 @@ _ROS = {
 # kind -> feature -> what it does; a feature that is not named is said.
 TABLE: dict[str, dict[str, Cell]] = {
     "json": {},
-    "c-model": {**_NOT_EXACT, **_DRIVE},
+    "c-model": _STEP,
     "c-controller": {
         "plain": Cell(REFUSES, 'its formula has the ellipse of maximum dissipation only: leave ellipse = "plain" out'),
         "falls": Cell(REFUSES, "its formula has signs and sums only: leave stribeck_speed out"),
@@ -285,7 +266,7 @@ TABLE: dict[str, dict[str, Cell]] = {
         "slip": Cell(PARTLY, "it drives as if wheels rolled, with no more current than static loads let them"),
         "gear": Cell(REFUSES, "which gears drive is found by trying, and the C has no loops"),
     },
-    "fmu": {**_NOT_EXACT, **_DRIVE},
+    "fmu": _STEP,
     "wpilib": _GAINS,
     "road-runner": _GAINS,
     "gains": _GAINS,

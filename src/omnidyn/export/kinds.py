@@ -23,11 +23,13 @@ class ExportKind(NamedTuple):
 
 KINDS = {
     "json": ExportKind("omnidyn.export.robot_json", "robot_json", "the robot with what is known of its numbers"),
-    "c-model": ExportKind("omnidyn.export.code.c_model", "c_model", "the exact step as C99, for a microcontroller"),
+    "c-model": ExportKind(
+        "omnidyn.export.code.c_model", "c_model", "the step of the simulation as C99, for a microcontroller"
+    ),
     "c-controller": ExportKind(
         "omnidyn.export.code.c_controller", "c_controller", "a controller as C99, for a microcontroller"
     ),
-    "fmu": ExportKind("omnidyn.export.code.fmu", "fmu", "an FMI 2 co-simulation FMU, from the same C"),
+    "fmu": ExportKind("omnidyn.export.code.fmu", "fmu", "a co-simulation FMU (FMI 2 or 3), from the same C"),
     "wpilib": ExportKind(
         "omnidyn.export.feedforward.wpilib", "wpilib", "kS, kV, kA as constants in Java, C++ and Python"
     ),

@@ -1,4 +1,4 @@
-"""c-model: the exact step in C agrees with the engine; the same source, so the speeds are the same to the last bit."""
+"""c-model: the step in C agrees with the engine; the same source, so the speeds are the same to the last bits."""
 
 import shutil
 import subprocess
@@ -9,7 +9,8 @@ import pytest
 import omnidyn
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.export.code.c_model import c_model
-from tests.support.exported import STRICT, Stepper, exact_robot, program
+from tests.support.exported import STRICT, Stepper, exact_robot, init_robot, program
+from tests.support.mixed_robots import random_robot, with_band, with_bristles, with_stribeck
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here")
 ROBOT = omnidyn.load_robot("axebot")
@@ -76,11 +77,58 @@ def test_it_is_cpp_too(tmp_path):
         subprocess.run(command, cwd=tmp_path / "c", check=True)
 
 
-def test_robots_without_an_exact_step_are_refused_by_name():
-    turning = ROBOT.replace(body=ROBOT.body.replace(rotating_frame=True))
-    limited = turning.replace(motor=turning.motor.replace(current_limit=1.0))
-    with pytest.raises(UnsupportedError, match=r"exact step.*turning frame .*; a current limit"):
-        c_model(limited)
+@pytest.mark.parametrize("seed", [2, 3, 11])  # a disc and a dead band; a box behind a latency; an ellipse that holds
+def test_robots_of_init_are_the_engine_at_its_tolerance(seed, tmp_path):
+    """Reversals and rests. What a latency does is left out: the volts of the C act at once."""
+    robot, dt = init_robot(seed), 2.0**-9
+    volts = program(robot, seed, 300) * robot.motor.voltage_limit / 6.0
+    at_once = robot.replace(drive=robot.drive.replace(latency=0.0))
+    run = omnidyn.simulate(at_once, volts, dt)
+    assert "implicit engine, tol 1e-06" in run.source
+    assert 0.1 < np.mean(run.twist == 0.0) < 0.95
+    twist, pose = Stepper(robot, tmp_path / "c").run(volts, dt)
+    np.testing.assert_allclose(twist, run.twist, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(pose, run.pose, rtol=0, atol=1e-8)
+    assert np.array_equal(twist == 0.0, run.twist == 0.0)
+
+
+@pytest.mark.parametrize(
+    "robot",
+    [
+        random_robot(3),
+        with_stribeck(random_robot(5), 5),
+        with_bristles(random_robot(1), 1),
+        with_band(random_robot(4), 4),
+    ],
+    ids=["limits, losses and windings", "stribeck", "bristles", "karnopp"],
+)
+def test_fixed_steps_are_the_engine_whatever_the_law(robot, tmp_path):
+    volts = program(robot, 1, 200)
+    run = omnidyn.simulate(robot, volts, 2e-3, tol=None)
+    twist, pose = Stepper(robot, tmp_path / "c", tol=None).run(volts, 2e-3)
+    np.testing.assert_allclose(twist, run.twist, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(pose, run.pose, rtol=0, atol=1e-12)
+    assert np.array_equal(twist == 0.0, run.twist == 0.0)
+
+
+def test_an_observer_may_correct_the_twist_of_a_robot_of_init(tmp_path):
+    """What a call before did not leave is a start as `simulate` knows it: what moves slides, what does not is held."""
+    robot, volts = init_robot(2), np.zeros((1, 5))
+    step = Stepper(robot, tmp_path / "c", tol=None)
+    twist, pose, memory = (np.zeros(size) for size in step.sizes)
+    for start in ((0.0, 0.0, 0.0), (0.3, -0.1, 0.0), (0.0, 0.0, 2.0), (0.3, -0.1, 1.0)):
+        twist[:], pose[:] = start, 0.0
+        assert step._step(volts.ctypes.data, 2e-3, *(array.ctypes.data for array in (twist, pose, memory))) == 0
+        run = omnidyn.simulate(robot, volts, 2e-3, twist=start, tol=None)
+        np.testing.assert_allclose(twist, run.twist[-1], rtol=0, atol=1e-12)
+        assert np.array_equal(twist == 0.0, run.twist[-1] == 0.0)
+
+
+def test_robots_whose_wheels_slip_are_refused_by_name():
+    with pytest.raises(UnsupportedError, match=r"wheels that roll; got .*traction_mu"):
+        c_model(ROBOT.replace(wheels=ROBOT.wheels.replace(traction_mu=0.5)))
+    with pytest.raises(UnsupportedError, match=r"single precision.*converges in double; got rotating frame"):
+        c_model(init_robot(3), precision="single")
 
 
 def test_other_requests_are_refused():

@@ -9,7 +9,8 @@ import pytest
 
 import omnidyn
 from tests.support.cases import case
-from tests.support.exported import WARNINGS, Stepper, exact_robot
+from tests.support.exported import WARNINGS, Stepper, exact_robot, init_robot
+from tests.support.mixed_robots import random_robot, with_band, with_bristles
 from tests.support.random_calls import ANY, SLOWEST_MS, VALID, of_fmu, of_step
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here")
@@ -64,12 +65,31 @@ LONG = pytest.mark.long
     ],
 )
 def test_random_calls_under_sanitizers(robot, precision, count, tmp_path):
-    program = of_step(robot, tmp_path / "c", precision)
+    program = of_step(robot, tmp_path / "c", precision=precision)
     found, valid = program.run(count, ANY), program.run(1000, VALID)
     assert found.kept
     assert max(found.slowest, valid.slowest) < SLOWEST_MS
     assert all(found.returned[status] for status in (OK, BAD_VOLTS, BAD_TIME, BAD_TWIST, BAD_POSE, TOO_LONG))
     assert valid.returned[OK] == 1000
+
+
+@pytest.mark.parametrize(
+    "robot, tol",
+    [
+        (init_robot(11), None),
+        pytest.param(with_band(random_robot(4), 4), None, marks=LONG),
+        pytest.param(with_bristles(random_robot(1), 1), None, marks=LONG),
+        pytest.param(init_robot(11), 1e-6, marks=LONG),
+    ],
+)
+def test_random_calls_of_the_implicit_step_under_sanitizers(robot, tol, tmp_path):
+    """A fixed step takes no time, whatever it is given; to a tolerance a call may take a second."""
+    program, count = of_step(robot, tmp_path / "c", tol=tol), 100 if tol else 3000
+    found, valid = program.run(count, ANY), program.run(count, VALID)
+    assert found.kept
+    assert all(found.returned[status] for status in (OK, BAD_VOLTS, BAD_TIME, BAD_TWIST, BAD_POSE, BAD_FORCE))
+    assert valid.returned[OK] + valid.returned[TOO_LONG] == count
+    assert tol or max(found.slowest, valid.slowest) < SLOWEST_MS
 
 
 @pytest.mark.parametrize("electrical", ["quasi-static", "dynamic"])
@@ -125,6 +145,9 @@ def test_other_tools_have_nothing_to_say(command, tmp_path):
             folder = tmp_path / f"{name}-{precision}"
             omnidyn.export.c_model(robot, precision=precision).write(folder)
             sources.append(folder / "omnidyn_step.c")
+    for tol, robot in ((1e-6, init_robot(4)), (None, with_bristles(random_robot(1), 1))):
+        omnidyn.export.c_model(robot, tol=tol).write(tmp_path / robot.name)
+        sources.append(tmp_path / robot.name / "omnidyn_step.c")
     for controller in ("feedforward", "pid", "speed", "mpc"):
         omnidyn.export.ros2_node(ROBOT, controller=controller).write(tmp_path / controller)
         sources += [tmp_path / controller / "omnidyn_control.c", tmp_path / controller / "control_shared.c"]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from omnidyn.export.code.expressions import TranslationError
+from omnidyn.export.code.c_types import TranslationError
 from omnidyn.export.code.trace import inputs, statements
 
 

@@ -1,6 +1,7 @@
-"""The exact step and controllers as C, from the very functions that Python runs: no formula is written a second time.
+"""Steps of robots and controllers as C, from the very functions that Python runs: no formula is written a second time.
 
-sources: the functions of the package as syntax trees. expressions, translate:
-a kernel as C99. step_c: the step of one robot, state in, state out. c_model: that step as a folder for firmware.
-fmu: the same as a co-simulation FMU. trace: a function of arrays as C99. c_controller: so, a controller.
+sources: the functions of the package as syntax trees. c_types, scope, expressions, translate, program: kernels as C99.
+step_c: the exact step of one robot, state in, state out; implicit_c: that of every other robot whose wheels roll.
+c_model: that step as a folder for firmware. fmu, fmi3: the same as a co-simulation unit.
+trace: a function of arrays as C99. c_controller: so, a controller.
 """

@@ -1,65 +1,49 @@
-"""Expressions of a kernel as C: (text, type) of each. Names are looked up in the function, then in its module."""
+"""Expressions of a kernel as C: (text, type) of each. Names are looked up in the function, then in its module.
+
+What is known beforehand, numbers and the fields of `known`, is worked out here: a branch that it decides falls away.
+"""
 
 from __future__ import annotations
 
 import ast
 import math
-from dataclasses import dataclass
-from typing import Any, Protocol
+import operator
+from types import ModuleType
+from typing import Any
 
-import numpy as np
-
-from omnidyn.export.code import sources
+from omnidyn.export.code.c_types import (
+    BOOL,
+    INT,
+    MATH,
+    REAL,
+    Array,
+    ColumnTypes,
+    Many,
+    Record,
+    Scalar,
+    Struct,
+    TranslationError,
+    Type,
+    Typed,
+    address,
+    c_name,
+    joined,
+    member,
+)
+from omnidyn.export.code.scope import Scope
+from omnidyn.export.code.sources import Source, source_of
 from omnidyn.export.spelling import c_number
 
-_BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/"}
+_BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/", ast.Mod: "%"}
 _BITS = {ast.BitAnd: "&", ast.BitOr: "|"}
-_COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
-_MATH = ("exp", "expm1", "log1p", "sqrt", "sin", "cos", "sinh", "cosh", "atan2", "copysign")
-RESERVED = frozenset(
-    ("double", "float", "int", "long", "short", "char", "auto", "register", "signed", "default", "fabs", *_MATH)
-)
-
-
-def c_name(name: str) -> str:
-    """A name of Python in C."""
-    name = name.lstrip("_") or "unused"
-    return f"{name}_" if name in RESERVED else name
-
-
-class Called(Protocol):
-    """A translated function, see translate.py."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def returns(self) -> Type: ...
-    @property
-    def writes(self) -> frozenset[int]: ...
-
-
-class Whole(Protocol):
-    """What expressions ask of the program that they belong to, see translate.py."""
-
-    single: bool
-
-    @property
-    def real(self) -> str: ...
-    def function(self, source: sources.Source, arguments: tuple[Type, ...]) -> Called: ...
-    def constant(self, name: str, value: Any) -> tuple[str, Type]: ...
-    def struct(self, cls: type) -> Struct: ...
-    def packed(self, kind: Many, items: list[str]) -> str: ...
-
-
-class Scope(Protocol):
-    """The function that an expression stands in, see translate.py."""
-
-    source: sources.Source
-    types: dict[str, Type]
-
-    @property
-    def program(self) -> Whole: ...
-    def writes_to(self, node: ast.expr) -> None: ...
+_COMPARE: dict[type, tuple[str, Any]] = {
+    ast.Lt: ("<", operator.lt),
+    ast.LtE: ("<=", operator.le),
+    ast.Gt: (">", operator.gt),
+    ast.GtE: (">=", operator.ge),
+    ast.Eq: ("==", operator.eq),
+    ast.NotEq: ("!=", operator.ne),
+}
 
 
 class Expressions:
@@ -72,8 +56,12 @@ class Expressions:
         """An expression, in parentheses where it needs them."""
         method = getattr(self, f"_{type(node).__name__.lower()}", None)
         if method is None:
-            raise TranslationError(f"{self.body.source.name}: no C for {ast.unparse(node)}")
+            raise self.refusal(node)
         return method(node)
+
+    def refusal(self, node: ast.AST) -> TranslationError:
+        """That there is no C for something."""
+        return TranslationError(f"{self.body.source.name}: no C for {ast.unparse(node)}")
 
     def real(self, node: ast.expr) -> str:
         """An expression as a floating number."""
@@ -82,7 +70,81 @@ class Expressions:
 
     def number(self, value: float) -> str:
         """A literal."""
-        return f"({self.program.real})INFINITY" if value == math.inf else c_number(value, self.program.single)
+        if math.isinf(value):
+            return f"{'-' if value < 0.0 else ''}({self.program.real})INFINITY"
+        return c_number(value, self.program.single)
+
+    def as_kind(self, node: ast.expr, kind: Type) -> str:
+        """An expression as a value of a type that it is, or becomes where it meets others."""
+        if isinstance(kind, Many) and isinstance(node, ast.Tuple):
+            return self.program.packed(kind, list(map(self.as_kind, node.elts, kind.items)))
+        if isinstance(node, ast.IfExp) and self.known(node.test) is None:
+            return f"({self.of(node.test)[0]} ? {self.as_kind(node.body, kind)} : {self.as_kind(node.orelse, kind)})"
+        text, own_kind = self.of(node)
+        return self._as_real(text, own_kind) if kind == REAL else text
+
+    # What is known
+
+    def known(self, node: ast.expr) -> Any:
+        """What an expression is worth where that is known beforehand, else None."""
+        match node:
+            case ast.Constant(value=value):
+                return value
+            case ast.Name(id=name) if name not in self.body.types:
+                value = self.body.source.value(name)
+                return value if isinstance(value, int | float) else None
+            case ast.Attribute(value=ast.Name(id=name), attr=field) if self._module(name) is not None:
+                return getattr(self._module(name), field)
+            case ast.Attribute(value=record, attr=field):
+                kind = self.kind(record)
+                return self.program.known.get((kind.name, field)) if isinstance(kind, Record) else None
+            case ast.Subscript(value=table, slice=index):
+                values, place = self.known(table), self.known(index)
+                return None if values is None or place is None else float(values[place])
+            case ast.UnaryOp(op=sign, operand=operand):
+                value = self.known(operand)
+                return None if value is None else not value if isinstance(sign, ast.Not) else -value
+            case ast.Compare() | ast.BoolOp() | ast.Call():
+                return self._known_truth(node)
+        return None
+
+    def _known_truth(self, node: ast.Compare | ast.BoolOp | ast.Call) -> Any:
+        match node:
+            case ast.Compare(left=left, ops=[sign], comparators=[right]):
+                values = self.known(left), self.known(right)
+                return None if None in values else bool(_COMPARE[type(sign)][1](*values))
+            case ast.BoolOp(op=sign, values=parts):
+                decides = isinstance(sign, ast.Or)
+                values = [self.known(part) for part in parts]
+                if any(value is not None and bool(value) == decides for value in values):
+                    return decides
+                return None if None in values else not decides
+            case ast.Call(func=ast.Name(id="len"), args=[table]):
+                kind = self.kind(table)
+                return kind.shape[0] if isinstance(kind, Array) else None
+        return None
+
+    def kind(self, node: ast.expr) -> Type | None:
+        """The type of a name, or of a part of what it holds, without a word of C; None for other expressions."""
+        match node:
+            case ast.Name(id=name):
+                return self.body.types.get(name)
+            case ast.Attribute(value=value, attr=field):
+                kind = self.kind(value)
+                return kind.field(field) if isinstance(kind, Record | Struct) else None
+            case ast.Subscript(value=value):
+                kind = self.kind(value)
+                return kind.row if isinstance(kind, Array) else None
+        return None
+
+    def _module(self, name: str) -> ModuleType | None:
+        """The module that a name is, such as math."""
+        if name in self.body.types:
+            return None
+        value = self.body.source.value(name)
+        return value if isinstance(value, ModuleType) else None
+
+    # Expressions, one method for each kind of the syntax tree
 
     def _constant(self, node: ast.Constant) -> Typed:
         return self.plain(node.value)
@@ -99,8 +161,10 @@ class Expressions:
 
     def _name(self, node: ast.Name) -> Typed:
         if node.id in self.body.types:
-            return c_name(node.id), self.body.types[node.id]
-        value = sources.value(self.body.source.module, node.id)
+            kind, name = self.body.types[node.id], c_name(node.id)
+            self.body.read.add(node.id)
+            return (f"(*{name})" if isinstance(kind, Record) else name), kind
+        value = self.body.source.value(node.id)
         if isinstance(value, int | float):
             return self.plain(value)
         return self.program.constant(node.id, value)
@@ -112,14 +176,16 @@ class Expressions:
         return f"(-{text})", kind
 
     def _binop(self, node: ast.BinOp) -> Typed:
+        if isinstance(node.op, ast.Pow):
+            return self._power(node)
         (left_text, left_kind), (right_text, right_kind) = self.of(node.left), self.of(node.right)
         if type(node.op) in _BITS:
             return f"({left_text} {_BITS[type(node.op)]} {right_text})", BOOL
-        if isinstance(node.op, ast.Pow) and isinstance(node.right, ast.Constant) and node.right.value == 2:
-            return f"({left_text} * {left_text})", left_kind
         if type(node.op) not in _BINARY:
-            raise TranslationError(f"{self.body.source.name}: no C for {ast.unparse(node)}")
+            raise self.refusal(node)
         kind = joined(left_kind, right_kind) if BOOL not in (left_kind, right_kind) else REAL
+        if isinstance(node.op, ast.FloorDiv | ast.Mod) and kind != INT:
+            raise self.refusal(node)
         if kind == REAL or isinstance(node.op, ast.Div):
             left_text, right_text, kind = (
                 self._as_real(left_text, left_kind),
@@ -128,56 +194,93 @@ class Expressions:
             )
         return f"({left_text} {_BINARY[type(node.op)]} {right_text})", kind
 
+    def _power(self, node: ast.BinOp) -> Typed:
+        base, kind = self.of(node.left)
+        if self.known(node.right) == 2:
+            return f"({base} * {base})", kind
+        exponent = self._as_real(*self.of(node.right))
+        return f"pow{'f' if self.program.single else ''}({self._as_real(base, kind)}, {exponent})", REAL
+
     def _as_real(self, text: str, kind: Type) -> str:
         if kind == REAL:
             return text
         return self.number(float(text)) if text.isdigit() else f"({self.program.real}){text}"
 
     def _boolop(self, node: ast.BoolOp) -> Typed:
+        if (truth := self.known(node)) is not None:
+            return self.plain(truth)
         sign = " && " if isinstance(node.op, ast.And) else " || "
-        return f"({sign.join(self.of(value)[0] for value in node.values)})", BOOL
+        parts = [self.of(value)[0] for value in node.values if self.known(value) is None]
+        return (parts[0] if len(parts) == 1 else f"({sign.join(parts)})"), BOOL
 
     def _compare(self, node: ast.Compare) -> Typed:
+        if (truth := self.known(node)) is not None:
+            return self.plain(truth)
         sides = [node.left, *node.comparators]
         parts = []
-        for left_node, operator, right_node in zip(sides, node.ops, node.comparators, strict=False):
+        for left_node, sign, right_node in zip(sides, node.ops, node.comparators, strict=False):
             (a, kind_a), (b, kind_b) = self.of(left_node), self.of(right_node)
             if REAL in (kind_a, kind_b):
                 a, b = self._as_real(a, kind_a), self._as_real(b, kind_b)
-            parts.append(f"({a} {_COMPARE[type(operator)]} {b})")
+            parts.append(f"({a} {_COMPARE[type(sign)][0]} {b})")
         return (parts[0] if len(parts) == 1 else f"({' && '.join(parts)})"), BOOL
 
     def _ifexp(self, node: ast.IfExp) -> Typed:
-        test, (body, kind), (alternative, second) = self.of(node.test)[0], self.of(node.body), self.of(node.orelse)
-        common = joined(kind, second)
-        if common == REAL:
-            body, alternative = self._as_real(body, kind), self._as_real(alternative, second)
-        return f"({test} ? {body} : {alternative})", common
+        if (truth := self.known(node.test)) is not None:
+            return self.of(node.body if truth else node.orelse)
+        kind = joined(self.of(node.body)[1], self.of(node.orelse)[1])
+        test, body, alternative = self.of(node.test)[0], self.as_kind(node.body, kind), self.as_kind(node.orelse, kind)
+        return f"({test} ? {body} : {alternative})", kind
 
     def _tuple(self, node: ast.Tuple) -> Typed:
         items = [self.of(element) for element in node.elts]
-        kind = Many(tuple(item_kind if item_kind != INT else INT for _, item_kind in items))
+        kind = Many(tuple(item_kind for _, item_kind in items))
         return self.program.packed(kind, [text for text, _ in items]), kind
 
     def _attribute(self, node: ast.Attribute) -> Typed:
-        if isinstance(node.value, ast.Name) and sources.is_module(self.body.source.module, node.value.id):
-            return self.number(getattr(math, node.attr)), REAL
+        if isinstance(node.value, ast.Name) and (module := self._module(node.value.id)) is not None:
+            return self.plain(float(getattr(module, node.attr)))
+        value = self.known(node)
+        if isinstance(value, float):
+            if not isinstance(node.ctx, ast.Load):
+                raise TranslationError(f"{self.body.source.name}: {ast.unparse(node)} is not constant")
+            return self.number(value), REAL
         text, kind = self.of(node.value)
-        assert isinstance(kind, Struct)
-        return f"{text}{'->' if kind.by_address else '.'}{c_name(node.attr)}", kind.field(node.attr)
+        if isinstance(kind, Record):
+            self.program.use(kind, node.attr)
+        assert isinstance(kind, Struct | Record), ast.unparse(node)
+        text, part = member(text, node.attr), kind.field(node.attr)
+        return (f"(*{text})" if isinstance(part, Record) else text), part  # a named tuple has the address of a record
 
     def _subscript(self, node: ast.Subscript) -> Typed:
         if (column := self._column(node)) is not None:
             return column
         text, kind = self.of(node.value)
+        if isinstance(node.slice, ast.Slice):
+            return self._slice(node, text, kind)
         indices = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        if isinstance(kind, Many) and isinstance(place := self.known(node.slice), int):
+            return f"{text}.a{place}", kind.items[place]
         if isinstance(kind, ColumnTypes):
             return f"{text}[{self.of(indices[0])[0]}]", kind
-        assert isinstance(kind, Array), ast.unparse(node)
         for index in indices:
-            text += f"[{self.of(index)[0]}]"
-        rest = kind.shape[len(indices) :]
-        return text, Array(rest) if rest else REAL
+            if not isinstance(kind, Array):
+                raise self.refusal(node)
+            text, kind = f"{text}[{self.of(index)[0]}]", kind.row
+        return text, kind
+
+    def _slice(self, node: ast.Subscript, text: str, kind: Type) -> Typed:
+        """Rows of a table, from one that is known to another."""
+        part = node.slice
+        assert isinstance(part, ast.Slice)
+        bounds = [None if bound is None else self.known(bound) for bound in (part.lower, part.upper)]
+        unknown = [
+            bound for bound, value in zip((part.lower, part.upper), bounds, strict=True) if bound and value is None
+        ]
+        if not isinstance(kind, Array) or part.step is not None or unknown:
+            raise self.refusal(node)
+        first, end, _ = slice(*bounds).indices(kind.shape[0])
+        return (f"({text} + {first})" if first else text), Array((end - first, *kind.shape[1:]), kind.item)
 
     def _column(self, node: ast.Subscript) -> Typed | None:
         """An entry of a table with typed columns, `RULES[rule][0]`; None for another subscript."""
@@ -190,43 +293,60 @@ class Expressions:
         cast = "(int)" if column_kind == INT else ""
         return f"{cast}{text}[{node.slice.value}]", column_kind
 
-    def _call(self, node: ast.Call) -> Typed:
-        if isinstance(node.func, ast.Attribute):
-            return self._of_math(node)
-        assert isinstance(node.func, ast.Name)
-        name = node.func.id
-        if name in ("abs", "min", "max", "len"):
-            return self._builtin(name, node.args)
-        source = sources.function(self.body.source.module, name)
-        if source is not None:
-            return self._own(source, node.args)
-        value = sources.value(self.body.source.module, name)
-        if isinstance(value, type) and issubclass(value, tuple):
-            kind = self.program.struct(value)
-            return f"({kind.name}){{{', '.join(self.real(argument) for argument in node.args)}}}", kind
-        raise TranslationError(f"{self.body.source.name}: no C for {ast.unparse(node)}")
+    # Calls
 
-    def _of_math(self, node: ast.Call) -> Typed:
-        assert isinstance(node.func, ast.Attribute)
-        if node.func.attr not in _MATH:
-            raise TranslationError(f"{self.body.source.name}: no C for {ast.unparse(node)}")
+    def _call(self, node: ast.Call) -> Typed:
+        if (length := self.known(node)) is not None:
+            return self.plain(length)
+        callee = self._callee(node)
+        if (source := source_of(callee)) is not None:
+            return self._own(source, node.args)
+        if isinstance(callee, type) and issubclass(callee, tuple):
+            return self._made(callee, node.args)
+        name = callee.__name__
+        if name in ("abs", "min", "max", "int"):
+            return self._builtin(name, node.args)
+        if name not in MATH:
+            raise self.refusal(node)
         suffix = "f" if self.program.single else ""
-        return f"{node.func.attr}{suffix}({', '.join(map(self.real, node.args))})", REAL
+        text = f"{name}{suffix}({', '.join(map(self.real, node.args))})"
+        return (f"(int){text}", INT) if name == "ceil" else (text, REAL)
+
+    def _callee(self, node: ast.Call) -> Any:
+        """The function or class that is called."""
+        match node.func:
+            case ast.Name(id=name):
+                return self.body.source.value(name)
+            case ast.Attribute(value=ast.Name(id=name), attr=attr):
+                return getattr(self._module(name), attr)
+        raise self.refusal(node)
+
+    def _made(self, cls: type, nodes: list[ast.expr]) -> Typed:
+        """A named tuple."""
+        typed = [self.of(node) for node in nodes]
+        kind = self.program.struct(cls, *(REAL if isinstance(item, Scalar) else item for _, item in typed))
+        texts = [
+            address(text) if isinstance(item, Record) else self.real(node) if isinstance(item, Scalar) else text
+            for node, (text, item) in zip(nodes, typed, strict=True)
+        ]
+        return f"({kind.name}){{{', '.join(texts)}}}", kind
 
     def _builtin(self, name: str, nodes: list[ast.expr]) -> Typed:
-        first, kind = self.of(nodes[0])
-        if name == "len":
-            assert isinstance(kind, Array)
-            return str(kind.shape[0]), INT
+        first = self.of(nodes[0])[0]
+        if name == "int":
+            return f"(int){first}", INT
         if name == "abs":
             return f"fabs{'f' if self.program.single else ''}({first})", REAL
-        text = self.real(nodes[-1])
+        whole = all(self.of(node)[1] == INT for node in nodes)
+        as_number = (lambda node: self.of(node)[0]) if whole else (lambda node: self._as_real(*self.of(node)))
+        text = as_number(nodes[-1])
         for argument in reversed(nodes[:-1]):
-            text = f"{name}_of({self.real(argument)}, {text})"
-        return text, REAL
+            text = f"{name}_{'int' if whole else 'of'}({as_number(argument)}, {text})"
+        return text, INT if whole else REAL
 
-    def _own(self, source: sources.Source, nodes: list[ast.expr]) -> Typed:
+    def _own(self, source: Source, nodes: list[ast.expr]) -> Typed:
         """A call of another function of the package, translated for arguments of these types."""
+        nodes = [argument for node in nodes for argument in self._spread(node)]
         arguments = [self.of(node) for node in nodes]
         function = self.program.function(
             source, tuple(REAL if kind == INT and ("." in text) else kind for text, kind in arguments)
@@ -234,84 +354,11 @@ class Expressions:
         for position, node in enumerate(nodes):
             if position in function.writes:
                 self.body.writes_to(node)
-        return f"{function.name}({', '.join(text for text, _ in arguments)})", function.returns
+        texts = [address(text) if isinstance(kind, Record) else text for text, kind in arguments]
+        return f"{function.name}({', '.join(texts)})", function.returns
 
-
-def table_type(value: Any) -> Array | ColumnTypes:
-    """The type of a constant table."""
-    if isinstance(value, tuple) and value and isinstance(value[0], tuple):
-        kinds: list[Scalar] = [
-            INT if all(isinstance(row[k], int) for row in value) else REAL for k in range(len(value[0]))
-        ]
-        if INT in kinds:
-            return ColumnTypes(len(value), tuple(kinds))
-    return Array(np.shape(value))
-
-
-# What a value of a kernel is in C: a number, a truth value, several of them, a table, a named tuple
-
-
-@dataclass(frozen=True)
-class Scalar:
-    """real, int or bool. In C a bool is an int."""
-
-    name: str
-
-
-REAL, INT, BOOL = Scalar("real"), Scalar("int"), Scalar("bool")
-
-
-@dataclass(frozen=True)
-class Many:
-    """Several values that a function returns: a struct."""
-
-    items: tuple[Type, ...]
-
-
-@dataclass(frozen=True)
-class Array:
-    """A table of numbers of fixed shape."""
-
-    shape: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Struct:
-    """A NamedTuple. Where it holds tables it is handed on by its address, as Python does."""
-
-    name: str
-    fields: tuple[tuple[str, Type], ...]
-
-    @property
-    def by_address(self) -> bool:
-        """Whether it holds tables, into which functions write."""
-        return any(isinstance(kind, Array) for _, kind in self.fields)
-
-    def field(self, name: str) -> Type:
-        """The type of a field."""
-        return dict(self.fields)[name]
-
-
-@dataclass(frozen=True)
-class ColumnTypes:
-    """A constant table whose columns have types of their own, such as ((4, 0.25), (8, 3.0))."""
-
-    rows: int
-    columns: tuple[Scalar, ...]
-
-
-Type = Scalar | Many | Array | Struct | ColumnTypes
-Typed = tuple[str, Type]
-
-
-class TranslationError(Exception):
-    """A kernel uses what the translator does not know: a fault of ours, found by tests, never by a user."""
-
-
-def joined(first: Type | None, second: Type) -> Type:
-    """The type of a name that holds the one and the other."""
-    if first is None or first == second:
-        return second
-    if isinstance(first, Scalar) and isinstance(second, Scalar):
-        return REAL if REAL in (first, second) else INT
-    raise TranslationError(f"a name holds {first} and {second}")
+    def _spread(self, node: ast.expr) -> list[ast.expr]:
+        """An argument, or all that a star gathered."""
+        if not isinstance(node, ast.Starred):
+            return [node]
+        return [ast.Name(name, ast.Load()) for name in self.body.gathered]

@@ -1,8 +1,8 @@
-"""fmu: an FMI 2 co-simulation unit of the exact step, from the same C as c-model; no Python where it runs.
+"""fmu: a co-simulation unit (FMI 2 or 3) of the step of a robot, from the same C as c-model; no Python where it runs.
 
 The archive holds the sources, and a library for this machine where a C compiler is found: other tools compile the
-sources themselves. The unit steps as far as it is told to with the volts it was given: held over the step, which is
-then exact whatever its length. Model exchange is not offered: at rest the derivative is set-valued.
+sources themselves. The unit steps as far as it is told to with the volts it was given, held over the step. Its state
+can be got, set and serialised. Model exchange is not offered: at rest the derivative is set-valued.
 """
 
 from __future__ import annotations
@@ -14,9 +14,13 @@ import subprocess
 import tempfile
 import zipfile
 from pathlib import Path
+from typing import Literal
 from xml.sax.saxutils import quoteattr
 
-from omnidyn.export.code.step_c import STATUS, StepCode, step_code
+from omnidyn.errors import InputError
+from omnidyn.export.code.c_model import engine_code
+from omnidyn.export.code.fmi3 import BUILD, FMI3_C, description
+from omnidyn.export.code.step_c import STATUS, StepCode
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.spelling import attribute, c_number, filled, identifier
@@ -36,33 +40,40 @@ _BASE = {
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the first moment that an archive can hold: the same robot gives the same bytes
 COMPILERS = ("gcc", "clang", "cc")
 SECONDS = 120  # for the compiler
+PROCESSORS = {2: ("x86_64", "amd64"), 3: ("x86_64", "amd64", "aarch64", "arm64")}
 
 
-def fmu(robot: Robot, compiled: bool = True) -> Export:
-    """An FMI 2 co-simulation unit of a robot that has an exact step, winding inductance included.
+def fmu(robot: Robot, compiled: bool = True, fmi: Literal[2, 3] = 2) -> Export:
+    """A co-simulation unit of a robot whose wheels roll, by the engine that `simulate` chooses.
 
     Inputs u1_V, u2_V, ...; outputs vx_m_s, vy_m_s, omega_rad_s, x_m, y_m, heading_rad; where it starts is a parameter
-    of the same name with start_ before it. compiled: whether to add a library for this machine.
-    Raises UnsupportedError for other robots.
+    of the same name with start_ before it. compiled: whether to add a library for this machine. fmi: the version of
+    the standard. Raises UnsupportedError for other robots.
     """
+    if fmi not in (2, 3):
+        raise InputError("no such version of FMI", got=fmi, expected="2 or 3", where="fmi")
     refuse("fmu", robot)
-    code, name, omissions = step_code(robot), identifier(robot.name), left_out("fmu", robot)
-    guid = sha256(_source(code, ""))[:32]
-    entries: dict[str, bytes] = {
-        "modelDescription.xml": _description(robot, name, code, guid, omissions).encode("utf-8"),
-        f"sources/{name}.c": _source(code, guid).encode("utf-8"),
-    }
-    library, reason = _library(entries[f"sources/{name}.c"], name) if compiled else (None, "not asked for")
+    code, name, omissions = engine_code(robot), identifier(robot.name), left_out("fmu", robot)
+    guid = sha256(_source(code, "", fmi))[:32]
+    source = _source(code, guid, fmi).encode("utf-8")
+    words = "".join([f"{robot.name}: the step of omnidyn", *(f"; not in it: {omission}" for omission in omissions)])
+    describe = _description if fmi == 2 else description
+    about = describe(robot.name, words, name, guid, _units(), _variables(code.wheels))
+    entries = {"modelDescription.xml": about.encode("utf-8"), f"sources/{name}.c": source}
+    if fmi == 3:
+        entries["sources/buildDescription.xml"] = BUILD.format(name=name).encode("utf-8")
+    library, reason = _library(source, name, fmi) if compiled else (None, "not asked for")
+    place = _platform(fmi)
     notes = (
-        "the volts of a step are held all through it: the step is exact, however long",
+        "the volts of a step are held all through it",
         *(
-            (f"a library for {_platform()} is in it; other systems compile sources/{name}.c",)
+            (f"a library for {place} is in it; other systems compile sources/{name}.c",)
             if library
             else (f"sources only ({reason}): the tool that loads it compiles sources/{name}.c",)
         ),
     )
     if library is not None:
-        entries[f"binaries/{_platform()}/{name}{_suffix()}"] = library
+        entries[f"binaries/{place}/{name}{_suffix()}"] = library
     return Export("fmu", robot.name, {f"{name}.fmu": _archive(entries)}, omissions, notes)
 
 
@@ -77,23 +88,25 @@ def _archive(entries: dict[str, bytes]) -> bytes:
     return stream.getvalue()
 
 
-def _platform() -> str:
-    """The folder of this machine's libraries, by FMI 2."""
-    system = {"Linux": "linux", "Windows": "win", "Darwin": "darwin"}.get(platform.system(), "linux")
-    return f"{system}64"
+def _platform(fmi: int) -> str:
+    """The folder of this machine's libraries."""
+    machine = "aarch64" if platform.machine().lower() in ("aarch64", "arm64") else "x86_64"
+    folders = {"Windows": ("win64", "windows"), "Darwin": ("darwin64", "darwin")}
+    second, third = folders.get(platform.system(), ("linux64", "linux"))
+    return second if fmi == 2 else f"{machine}-{third}"
 
 
 def _suffix() -> str:
-    return {"win64": ".dll", "darwin64": ".dylib"}.get(_platform(), ".so")
+    return {"Windows": ".dll", "Darwin": ".dylib"}.get(platform.system(), ".so")
 
 
-def _library(source: bytes, name: str) -> tuple[bytes | None, str]:
-    """The compiled source, or None and why not. Only for the processor that FMI 2 has a folder for."""
+def _library(source: bytes, name: str, fmi: int) -> tuple[bytes | None, str]:
+    """The compiled source, or None and why not. Only for a processor that the standard has a folder for."""
     compiler = next((path for command in COMPILERS if (path := shutil.which(command))), None)
     if compiler is None:
         return None, "no C compiler here"
-    if platform.machine().lower() not in ("x86_64", "amd64"):
-        return None, f"FMI 2 knows no folder for {platform.machine()}"
+    if platform.machine().lower() not in PROCESSORS[fmi]:
+        return None, f"FMI {fmi} knows no folder for {platform.machine()}"
     with tempfile.TemporaryDirectory() as folder:
         path, out = Path(folder, f"{name}.c"), Path(folder, f"{name}{_suffix()}")
         path.write_bytes(source)
@@ -105,46 +118,56 @@ def _library(source: bytes, name: str) -> tuple[bytes | None, str]:
         return out.read_bytes(), ""
 
 
-def _source(code: StepCode, guid: str) -> str:
+def _source(code: StepCode, guid: str, fmi: int) -> str:
     return filled(
-        FMI2_C,
+        FMI2_C + (FMI3_C if fmi == 3 else ""),
         STATUS=STATUS,
         STEP=code.text,
         WHEELS=str(code.wheels),
         GUID=guid,
         TWIST=c_number(LARGEST_START["twist"]),
         POSE=c_number(LARGEST_START["pose"]),
-        FORCE="unit->force, " if code.inductance else "",
+        MEMORY=str(code.size + code.lost),
+        PASSED="unit->memory, unit->memory + 3" if code.state and code.lost else "unit->memory",
     ).lstrip()
 
 
-def _variables(wheels: int) -> list[str]:
-    """The variables in the order of their references: volts, outputs, where it starts."""
-    real = (
-        '  <ScalarVariable name="{}" valueReference="{}" causality="{}" variability="{}"{}>'
-        '<Real unit="{}"{}/></ScalarVariable>'
+def _units() -> str:
+    return "\n".join(f"  <Unit name={quoteattr(unit)}><BaseUnit {_BASE[unit]}/></Unit>" for unit in _BASE)
+
+
+def _variables(wheels: int) -> list[tuple[str, str, str]]:
+    """(name, causality, unit) of the variables in the order of their references: volts, outputs, where it starts."""
+    outputs = list(zip(OUTPUTS, _OUTPUT_UNITS, strict=True))
+    return [
+        *((f"u{k + 1}_V", "input", "V") for k in range(wheels)),
+        *((name, "output", unit) for name, unit in outputs),
+        *((f"start_{name}", "parameter", unit) for name, unit in outputs),
+    ]
+
+
+def _description(
+    title: str, words: str, name: str, guid: str, units: str, variables: list[tuple[str, str, str]]
+) -> str:
+    """modelDescription.xml, as `description` of fmi3.py."""
+    kinds = {
+        "input": ('variability="continuous"', ' start="0"'),
+        "output": ('variability="continuous" initial="calculated"', ""),
+        "parameter": ('variability="fixed"', ' start="0"'),
+    }
+    lines = "\n".join(
+        f'  <ScalarVariable name="{variable}" valueReference="{k}" causality="{kind}" {kinds[kind][0]}>'
+        f'<Real unit="{unit}"{kinds[kind][1]}/></ScalarVariable>'
+        for k, (variable, kind, unit) in enumerate(variables)
     )
-    lines = [real.format(f"u{k + 1}_V", k, "input", "continuous", "", "V", ' start="0"') for k in range(wheels)]
-    for k, (name, unit) in enumerate(zip(OUTPUTS, _OUTPUT_UNITS, strict=True)):
-        lines.append(real.format(name, wheels + k, "output", "continuous", ' initial="calculated"', unit, ""))
-    for k, (name, unit) in enumerate(zip(OUTPUTS, _OUTPUT_UNITS, strict=True)):
-        reference = wheels + len(OUTPUTS) + k
-        lines.append(real.format(f"start_{name}", reference, "parameter", "fixed", "", unit, ' start="0"'))
-    return lines
-
-
-def _description(robot: Robot, name: str, code: StepCode, guid: str, omissions: tuple[str, ...]) -> str:
-    """modelDescription.xml."""
-    units = "\n".join(f"  <Unit name={quoteattr(unit)}><BaseUnit {_BASE[unit]}/></Unit>" for unit in _BASE)
     # Each output hangs on nothing of the same moment: the step has gone by when it is read.
-    outputs = [f'   <Unknown index="{code.wheels + k + 1}" dependencies=""/>' for k in range(len(OUTPUTS))]
-    words = f"{robot.name}: the exact step of omnidyn" + "".join(f"; not in it: {omission}" for omission in omissions)
-    lines = "\n".join(_variables(code.wheels))
+    places = [k + 1 for k, (_, kind, _) in enumerate(variables) if kind == "output"]
+    outputs = "\n".join(f'   <Unknown index="{place}" dependencies=""/>' for place in places)
     return f"""<?xml version="1.0" encoding="UTF-8"?>
-<fmiModelDescription fmiVersion="2.0" modelName={attribute(robot.name)} guid="{guid}" description={attribute(words)}
+<fmiModelDescription fmiVersion="2.0" modelName={attribute(title)} guid="{guid}" description={attribute(words)}
  generationTool="omnidyn" variableNamingConvention="flat" numberOfEventIndicators="0">
- <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true" canGetAndSetFMUstate="false"
-  canNotUseMemoryManagementFunctions="true">
+ <CoSimulation modelIdentifier="{name}" canHandleVariableCommunicationStepSize="true" canGetAndSetFMUstate="true"
+  canSerializeFMUstate="true" canNotUseMemoryManagementFunctions="true">
   <SourceFiles><File name="{name}.c"/></SourceFiles>
  </CoSimulation>
  <UnitDefinitions>
@@ -156,10 +179,10 @@ def _description(robot: Robot, name: str, code: StepCode, guid: str, omissions: 
  </ModelVariables>
  <ModelStructure>
   <Outputs>
-{chr(10).join(outputs)}
+{outputs}
   </Outputs>
   <InitialUnknowns>
-{chr(10).join(outputs)}
+{outputs}
   </InitialUnknowns>
  </ModelStructure>
 </fmiModelDescription>
@@ -171,6 +194,8 @@ def _description(robot: Robot, name: str, code: StepCode, guid: str, omissions: 
 # Written from the standard (FMI 2.0.4, modelica.org); no header of it is included, so that the file compiles alone.
 
 FMI2_C = r"""
+/* A library of it: gcc -std=c99 -O2 -shared -fPIC -o NAME.so NAME.c -lm, or cl /O2 /LD NAME.c on Windows. It belongs
+   into binaries/linux64, win64 or darwin64 of the FMU; for FMI 3 into x86_64-linux, aarch64-linux and so on. */
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
@@ -209,11 +234,11 @@ typedef struct {
 
 @STEP@
 
-enum { WHEELS = @WHEELS@, STATE = 6, VARIABLES = WHEELS + 2 * STATE };
+enum { WHEELS = @WHEELS@, STATE = 6, VARIABLES = WHEELS + 2 * STATE, MEMORY = @MEMORY@ };
 
-/* values: volts, then twist and pose, then where both start; force: what the currents do to each axis. */
+/* values: volts, then twist and pose, then where both start; memory: what a step leaves to the next one. */
 typedef struct {
-    double values[VARIABLES], force[3], lost, time;
+    double values[VARIABLES], memory[MEMORY], time;
 } Unit;
 
 static void begin(Unit *unit)
@@ -222,7 +247,7 @@ static void begin(Unit *unit)
     for (k = 0; k < STATE; k++) {
         unit->values[WHEELS + k] = unit->values[WHEELS + STATE + k];
     }
-    unit->force[0] = unit->force[1] = unit->force[2] = unit->lost = 0.0;
+    memset(unit->memory, 0, sizeof(unit->memory));
 }
 
 EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
@@ -316,7 +341,7 @@ EXPORT fmi2Status fmi2DoStep(fmi2Component c, fmi2Real now, fmi2Real length, fmi
         return fmi2Error;
     }
     if (length > 0.0 && omnidyn_advance(unit->values, length, unit->values + WHEELS, unit->values + WHEELS + 3,
-                                        @FORCE@&unit->lost) != OMNIDYN_STEP_OK) {
+                                        @PASSED@) != OMNIDYN_STEP_OK) {
         return fmi2Error;
     }
     unit->time = now + length;
@@ -338,7 +363,57 @@ EXPORT fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, 
     return fmi2OK;
 }
 
-/* What the unit does not have: other types of variables, copies of its state, derivatives. */
+EXPORT fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    if (*state == NULL && (*state = malloc(sizeof(Unit))) == NULL) {
+        return fmi2Error;
+    }
+    memcpy(*state, c, sizeof(Unit));
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
+{
+    memcpy(c, state, sizeof(Unit));
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    (void)c;
+    free(*state);
+    *state = NULL;
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
+{
+    (void)c, (void)state;
+    *size = sizeof(Unit);
+    return fmi2OK;
+}
+
+EXPORT fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+{
+    (void)c;
+    if (size < sizeof(Unit)) {
+        return fmi2Error;
+    }
+    memcpy(bytes, state, sizeof(Unit));
+    return fmi2OK;
+}
+
+/* A state that another unit has written is one of numbers: a step says whether they make sense. */
+EXPORT fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+{
+    if (size != sizeof(Unit) || fmi2GetFMUstate(c, state) != fmi2OK) {
+        return fmi2Error;
+    }
+    memcpy(*state, bytes, sizeof(Unit));
+    return fmi2OK;
+}
+
+/* What the unit does not have: other types of variables, derivatives. */
 #define NONE(name, ...)                                                                                               \
     EXPORT fmi2Status name(__VA_ARGS__);                                                                              \
     EXPORT fmi2Status name(__VA_ARGS__)
@@ -368,35 +443,6 @@ STATUS(fmi2GetStatus, fmi2Status)
 STATUS(fmi2GetIntegerStatus, fmi2Integer)
 STATUS(fmi2GetBooleanStatus, fmi2Boolean)
 STATUS(fmi2GetStringStatus, fmi2String)
-
-#define STATE_OF(name, ...)                                                                                           \
-    NONE(name, __VA_ARGS__)                                                                                           \
-    {                                                                                                                 \
-        (void)c, (void)state;                                                                                         \
-        return fmi2Error;                                                                                             \
-    }
-
-STATE_OF(fmi2GetFMUstate, fmi2Component c, fmi2FMUstate *state)
-STATE_OF(fmi2SetFMUstate, fmi2Component c, fmi2FMUstate state)
-STATE_OF(fmi2FreeFMUstate, fmi2Component c, fmi2FMUstate *state)
-
-NONE(fmi2SerializedFMUstateSize, fmi2Component c, fmi2FMUstate state, size_t *size)
-{
-    (void)c, (void)state, (void)size;
-    return fmi2Error;
-}
-
-NONE(fmi2SerializeFMUstate, fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
-{
-    (void)c, (void)state, (void)bytes, (void)size;
-    return fmi2Error;
-}
-
-NONE(fmi2DeSerializeFMUstate, fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
-{
-    (void)c, (void)bytes, (void)size, (void)state;
-    return fmi2Error;
-}
 
 NONE(fmi2GetDirectionalDerivative, fmi2Component c, const fmi2ValueReference unknown[], size_t many,
      const fmi2ValueReference known[], size_t n, const fmi2Real change[], fmi2Real values[])

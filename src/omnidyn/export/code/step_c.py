@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from omnidyn.export.code import sources
-from omnidyn.export.code.expressions import INT, REAL, Array, Type
-from omnidyn.export.code.translate import CProgram
+from omnidyn.compiled.kernel import plain
+from omnidyn.export.code.c_types import INT, REAL, Array, Type
+from omnidyn.export.code.program import CProgram
 from omnidyn.export.spelling import SINGLE_MAX, c_number, filled
 from omnidyn.model.actuation import Driver
 from omnidyn.model.dynamics import state_space
@@ -24,7 +24,7 @@ from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.commands import MAX_DT
 from omnidyn.simulation.engine import LARGEST_START
 from omnidyn.simulation.exact import inductance, march
-from omnidyn.simulation.exact.inductance import COUNT, GAUSS, Axes, Nodes, axis_laws, current_gain
+from omnidyn.simulation.exact.inductance import COUNT, GAUSS, Axes, Nodes, axis_laws, axis_rates, current_gain
 from omnidyn.simulation.exact.inductance_step import AxisLaw
 from omnidyn.simulation.exact.march import NODES, WEIGHTS, axis_levels
 
@@ -40,49 +40,46 @@ enum {
     OMNIDYN_STEP_BAD_TIME,  /* not above 0 and at most 3600 s */
     OMNIDYN_STEP_BAD_TWIST, /* not finite, or beyond 1000 m/s or rad/s */
     OMNIDYN_STEP_BAD_POSE,  /* not finite, or beyond 1e9 m or rad */
-    OMNIDYN_STEP_BAD_FORCE, /* not finite, or beyond what 1e6 A do */
+    OMNIDYN_STEP_BAD_FORCE, /* force or memory: not finite, or beyond what 1e6 A do */
     OMNIDYN_STEP_TOO_LONG   /* too much happens in it: make it shorter */
 };"""
 
 
 @dataclass(frozen=True)
 class StepCode:
-    """A step in C. text: all of it; `arguments`: of `omnidyn_advance`, which moves the state and is static.
+    """A step in C. text: all of it; `omnidyn_advance`, which is static, moves the state and is its entry.
 
-    inductance: whether the state holds what the currents do to each axis.
+    state: the array that it takes besides twist and pose, "" for none, with `size` numbers. lost: whether it tells
+    what rounding takes from the heading, too.
     """
 
     text: str
     wheels: int
-    inductance: bool
+    state: str = ""
+    size: int = 0
+    lost: bool = True
 
 
 def step_code(robot: Robot, single: bool = False) -> StepCode:
-    """The step of a robot for which there is an exact one; `omnidyn_advance` is its entry."""
+    """The step of a robot for which there is an exact one."""
     dynamic = robot.motor.electrical == DYNAMIC
     program = CProgram(single, MOST_TURNS_WITH_INDUCTANCE if dynamic else MOST_TURNS)
     kernels = _with_inductance(program) if dynamic else _settled(program)
-    if robot.drive.dead_band:
-        _function(program, "omnidyn.model.actuation", "at_motor", REAL, REAL, program.struct(Driver))
     for name, shape in kernels.items():
-        _function(program, *name, *shape)
-    _function(program, MARCH, "put_next_pose", Array((2, 3)), INT, REAL, REAL, REAL, REAL)
-    tables = {**_common(robot), **(_tables_with_inductance(robot) if dynamic else _tables(robot))}
-    text = "\n\n".join(
-        [
-            "\n".join(program.table(name, np.asarray(values, dtype=float)) for name, values in tables.items()),
-            program.text(),
-            _drive(program, robot),
-            _advance(program, robot),
-        ]
-    )
-    return StepCode(text, robot.wheels.count, dynamic)
-
-
-def _function(program: CProgram, module: str, name: str, *arguments: Type) -> None:
-    source = sources.function(module, name)
-    assert source is not None, name
-    program.function(source, arguments)
+        program.translated(*name, *shape)
+    program.translated(MARCH, "put_next_pose", Array((2, 3)), INT, REAL, REAL, REAL, REAL)
+    volts = volts_code(program, robot)
+    tables = _tables_with_inductance(robot) if dynamic else _tables(robot)
+    tables = {"PER_VOLT": state_space(robot).B, **tables}
+    parts = [
+        "\n".join(program.table(name, np.asarray(values, dtype=float)) for name, values in tables.items()),
+        program.text(),
+        volts,
+        filled(_DRIVE, REAL=program.real, WHEELS=str(robot.wheels.count)).strip(),
+        filled(ALL_WITHIN, ABS="fabsf" if single else "fabs", REAL=program.real).strip(),
+        _advance(program, robot),
+    ]
+    return StepCode("\n\n".join(parts), robot.wheels.count, "force" if dynamic else "", 3 if dynamic else 0)
 
 
 def _settled(program: CProgram) -> dict[tuple[str, str], tuple[Type, ...]]:
@@ -99,28 +96,15 @@ def _settled(program: CProgram) -> dict[tuple[str, str], tuple[Type, ...]]:
 
 def _with_inductance(program: CProgram) -> dict[tuple[str, str], tuple[Type, ...]]:
     """The kernels of a robot with winding inductance, with the types of their arguments."""
-    program.shapes[Axes] = dict.fromkeys(Axes._fields, (3,))
-    program.shapes[Nodes] = {
-        "weight": (COUNT,),
-        "time": (COUNT,),
-        "kick": (3, COUNT),
-        "phi": (3, COUNT),
-        "total": (COUNT,),
-    }
+    row, rows = Array((COUNT,)), Array((3, COUNT))
     law = program.struct(AxisLaw)
-    nodes, axes = program.struct(Nodes), program.struct(Axes)
+    nodes, axes = program.struct(Nodes, row, row, rows, rows, row), program.struct(Axes, *[AXES] * len(Axes._fields))
     tables = Array((3, 5)), Array((3, 4)), Array(GAUSS.shape)
     return {
         (PLACE, "law_of"): (tables[0], INT),
         ("omnidyn.simulation.exact.inductance", "step_by_segments"): (REAL, REAL, REAL, REAL, law),
         (PLACE, "travel"): (nodes, AXES, AXES, AXES, REAL, REAL, axes, *tables),
     }
-
-
-def _common(robot: Robot) -> dict[str, np.ndarray]:
-    """Constants of every robot: what a volt of each motor gives each axis, and how many it may have."""
-    system = state_space(robot)
-    return {"PER_VOLT": system.B, "LIMIT": per_wheel(robot.motor.voltage_limit, robot.wheels.count)}
 
 
 def _tables(robot: Robot) -> dict[str, np.ndarray]:
@@ -131,69 +115,68 @@ def _tables(robot: Robot) -> dict[str, np.ndarray]:
 def _tables_with_inductance(robot: Robot) -> dict[str, np.ndarray]:
     laws = axis_laws(robot)
     largest_force = LARGEST_START["current"] * np.abs(current_gain(robot)).sum(axis=1)
-    return {"LAWS": laws, "RATES": np.array(_rates(laws)), "GAUSS": GAUSS, "MOST_FORCE": largest_force}
+    return {"LAWS": laws, "RATES": np.array(plain(axis_rates)(laws)), "GAUSS": GAUSS, "MOST_FORCE": largest_force}
 
 
-def _rates(laws: np.ndarray) -> np.ndarray:
-    """How fast the axes change: made inside kernels, called here as it stands."""
-    rates = sources.value(PLACE, "_rates")
-    return getattr(rates, "py_func", rates)(laws)
-
-
-def _drive(program: CProgram, robot: Robot) -> str:
-    """The drive of the axes from the volts: clipped, less the dead band, summed in the order of the wheels."""
+def volts_code(program: CProgram, robot: Robot) -> str:
+    """What reaches the motor of a wheel: volts within its limit, less the dead band of the driver."""
     band, single = robot.drive.dead_band, program.single
-    reach = "volts = at_motor(volts, ZERO, driver).a0;" if band else ""
-    driver = ", ".join(c_number(number, single) for number in (1.0, band, 0.0))
-    return _DRIVE.format(
-        real=program.real,
-        wheels=robot.wheels.count,
-        zero=c_number(0.0, single),
-        band=f"        const Driver driver = {{{driver}}};\n" if band else "",
-        reach=f"\n        {reach.replace('ZERO', c_number(0.0, single))}" if band else "",
-    ).strip()
+    limit = per_wheel(robot.motor.voltage_limit, robot.wheels.count)
+    text = filled(_VOLTS, REAL=program.real, RETURN="volts")
+    if band:
+        name = program.translated("omnidyn.model.actuation", "at_motor", REAL, REAL, program.struct(Driver))
+        numbers = ", ".join(c_number(number, single) for number in (1.0, band, 0.0))
+        text = filled(_VOLTS, REAL=program.real, RETURN=f"{name}(volts, 0, (Driver){{{numbers}}}).a0")
+    return f"{program.table('LIMIT', limit)}\n{text.rstrip()}"
+
+
+def refusals(robot: Robot, single: bool = False) -> str:
+    """What no step is made of."""
+    largest = SINGLE_MAX if single else sys.float_info.max
+    numbers = {"LARGEST": largest, "LONGEST": MAX_DT, "TWIST": LARGEST_START["twist"], "POSE": LARGEST_START["pose"]}
+    words = {name: c_number(value, single) for name, value in numbers.items()}
+    return filled(_REFUSE, WHEELS=str(robot.wheels.count), **words).strip("\n")
 
 
 def _advance(program: CProgram, robot: Robot) -> str:
     """The step with what it checks before and after."""
     dynamic, single = robot.motor.electrical == DYNAMIC, program.single
-    largest = SINGLE_MAX if single else sys.float_info.max
     piece = inductance.PIECE if dynamic else march.PIECE  # [rad] at the most that a turn of the loop takes
-    numbers = {
-        "LARGEST": largest,
-        "LONGEST": MAX_DT,
-        "TWIST": LARGEST_START["twist"],
-        "POSE": LARGEST_START["pose"],
-        "FULL_TURN": piece * program.most_turns,
-    }
-    words = {name: c_number(value, single) for name, value in numbers.items()}
-    text = filled(_CHECKED, ABS="fabsf" if single else "fabs", REAL=program.real)
-    text += filled(
+    return filled(
         _ADVANCE_WITH_INDUCTANCE if dynamic else _ADVANCE,
         REAL=program.real,
-        REFUSE=filled(_REFUSE, WHEELS=str(robot.wheels.count), **words).strip("\n"),
-        LARGEST=words["LARGEST"],
-    )
-    return text.strip()
+        REFUSE=refusals(robot, single) + filled(_SPIN, FULL_TURN=c_number(piece * program.most_turns, single)).rstrip(),
+        LARGEST=c_number(SINGLE_MAX if single else sys.float_info.max, single),
+        COUNT=str(COUNT),
+    ).strip()
 
 
-_DRIVE = """
-/* What the motors give each axis, divided by mass or inertia, of volts kept within their limits. */
-static void drive_of(const {real} u[{wheels}], {real} drive[3])
-{{
-    int wheel, axis;
-    drive[0] = drive[1] = drive[2] = {zero};
-    for (wheel = 0; wheel < {wheels}; wheel++) {{
-{band}        {real} volts = u[wheel] > LIMIT[wheel] ? LIMIT[wheel] : u[wheel];
-        volts = volts < -LIMIT[wheel] ? -LIMIT[wheel] : volts;{reach}
-        for (axis = 0; axis < 3; axis++) {{
-            drive[axis] += volts * PER_VOLT[axis][wheel];
-        }}
-    }}
-}}
+_VOLTS = """
+/* What reaches the motor of a wheel of volts that are asked for. */
+static @REAL@ reaching(@REAL@ u, int wheel)
+{
+    @REAL@ volts = u > LIMIT[wheel] ? LIMIT[wheel] : u;
+    volts = volts < -LIMIT[wheel] ? -LIMIT[wheel] : volts;
+    return @RETURN@;
+}
 """
 
-_CHECKED = """
+_DRIVE = """
+/* What the motors give each axis, divided by mass or inertia, of volts that are asked for. */
+static void drive_of(const @REAL@ u[@WHEELS@], @REAL@ drive[3])
+{
+    int wheel, axis;
+    drive[0] = drive[1] = drive[2] = 0;
+    for (wheel = 0; wheel < @WHEELS@; wheel++) {
+        const @REAL@ volts = reaching(u[wheel], wheel);
+        for (axis = 0; axis < 3; axis++) {
+            drive[axis] += volts * PER_VOLT[axis][wheel];
+        }
+    }
+}
+"""
+
+ALL_WITHIN = """
 /* Whether all of n numbers are numbers, none of them beyond `most`. */
 static int all_within(const @REAL@ values[], int n, @REAL@ most)
 {
@@ -220,6 +203,9 @@ _REFUSE = """
     if (!all_within(pose, 3, @POSE@)) {
         return OMNIDYN_STEP_BAD_POSE;
     }
+"""
+
+_SPIN = """
     if (!all_within(twist + 2, 1, @FULL_TURN@ / h)) {
         return OMNIDYN_STEP_TOO_LONG;
     }
@@ -265,9 +251,10 @@ _ADVANCE_WITH_INDUCTANCE = """
 static int omnidyn_advance(const @REAL@ u[], @REAL@ h, @REAL@ twist[3], @REAL@ pose[3], @REAL@ force[3], @REAL@ *lost)
 {
     @REAL@ drive[3], next[3], next_force[3], poses[2][3], spin, left = *lost;
+    @REAL@ rows[3][@COUNT@] = {{0}}, kick[3][@COUNT@] = {{0}}, phi[3][@COUNT@] = {{0}}, parts[8][3] = {{0}};
+    const Nodes nodes = {rows[0], rows[1], kick, phi, rows[2]};
+    const Axes axes = {parts[0], parts[1], parts[2], parts[3], parts[4], parts[5], parts[6], parts[7]};
     int axis, moving = 0;
-    Nodes nodes = {0};
-    Axes axes = {0};
 @REFUSE@
     for (axis = 0; axis < 3; axis++) {
         if (!all_within(force + axis, 1, MOST_FORCE[axis])) {
@@ -287,7 +274,7 @@ static int omnidyn_advance(const @REAL@ u[], @REAL@ h, @REAL@ twist[3], @REAL@ p
     }
     if (moving) {
         spin = max_of(twist[2] < 0 ? -twist[2] : twist[2], next[2] < 0 ? -next[2] : next[2]);
-        const many_rrr way = travel(&nodes, twist, force, drive, h, spin, &axes, LAWS, RATES, GAUSS);
+        const many_rrr way = travel(nodes, twist, force, drive, h, spin, axes, LAWS, RATES, GAUSS);
         left = put_next_pose(poses, 0, way.a0, way.a1, way.a2, *lost);
         if (!all_within(poses[1], 3, @LARGEST@)) {
             return OMNIDYN_STEP_TOO_LONG;

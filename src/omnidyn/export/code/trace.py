@@ -16,7 +16,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from omnidyn.export.code.expressions import TranslationError
+from omnidyn.export.code.c_types import TranslationError
 from omnidyn.export.spelling import c_number
 
 LONGEST = 100  # of an expression on a line of its own

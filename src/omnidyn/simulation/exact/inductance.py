@@ -226,7 +226,7 @@ def _empty_axes():
 
 
 @maker
-def _rates(laws):
+def axis_rates(laws):
     """How fast each axis changes, and forgets that it does [1/s]: (fast, its decay, slow, its decay). Shape (3, 4)."""
     out = np.empty((3, 4))
     for axis in range(3):
@@ -322,7 +322,7 @@ def step_poses(twists, accelerations, eventful, drive, dt, laws, start, gauss):
     """Pose after each step; the heading is a compensated sum of closed forms. Shape (n + 1, 3)."""
     poses = np.empty((len(dt) + 1, 3))
     poses[0] = start
-    axes, rates, yaw = _empty_axes(), _rates(laws), law_of(laws, 2)
+    axes, rates, yaw = _empty_axes(), axis_rates(laws), law_of(laws, 2)
     plan, piece = _empty_nodes(COUNT * MAX_PIECES), _empty_nodes(COUNT)
     planned, turning_bound, columns, length, phi, total, carry = 0.0, 0.0, 0, 0.0, 0.0, 0.0, 0.0
     for k in range(len(dt)):

@@ -348,12 +348,33 @@ def _row(plant, stage, bare, spare, state, dt, tol, step_limit, h, pose, counts)
     return h
 
 
+@part
+def _fixed_row(plant, stage, spare, state, dt, pose, counts):
+    """Advance over one row of held voltage by one step, or by as few as leave each of its stages one solution."""
+    body, two, inner = plant.body, spare.two, spare.inner.x
+    pieces = in_one_row(plant, dt)
+    h = dt / pieces
+    if body.gathers > 0.0:
+        cross_band(plant, stage, state)
+    for _ in range(pieces):
+        stage.task.facing = pose[2]
+        pull(plant, stage, _turned(plant, state, 0.5 * h))
+        count = step(plant, stage, state, two, inner, h)
+        if body.gathers > 0.0:
+            count = max(count, _gather(plant, stage, spare, state, two, h))
+        counts[0], counts[1] = max(counts[0], count), pieces
+        advance_pose(pose, state.x, inner, two.x, body.length, h, STAGES)
+        copy_state(state, two)
+        if body.gathers > 0.0:
+            cross_band(plant, stage, state)
+
+
 @branching_kernel
 def _march(room, voltage, bound, dt, loop, tol, step_limit, out):
     """All rows; see run_implicit. Returns how many of them were done before `step_limit` steps were."""
     plants, stages, bare, spare = room.own.plant, room.own.stage, room.bare, room.spare
     plant, stage = Plant(plants.body[0], plants.element[0]), Stage(stages.task[0], stages.each[0], stages.work[0])
-    state, two, inner = spare.now, spare.two, spare.inner.x
+    state = spare.now
     state_of_row(state, out.state, 0)
     pose, counts, h = out.pose[0].copy(), np.zeros(3, np.int64), dt[0]
     for k in range(len(dt)):
@@ -371,20 +392,7 @@ def _march(room, voltage, bound, dt, loop, tol, step_limit, out):
             if step_limit < 0.0:
                 return k
         else:
-            pieces = in_one_row(plant, dt[k])
-            if plant.body.gathers > 0.0:
-                cross_band(plant, stage, state)
-            for _ in range(pieces):
-                stage.task.facing = pose[2]
-                pull(plant, stage, _turned(plant, state, 0.5 * dt[k] / pieces))
-                count = step(plant, stage, state, two, inner, dt[k] / pieces)
-                if plant.body.gathers > 0.0:
-                    count = max(count, _gather(plant, stage, spare, state, two, dt[k] / pieces))
-                counts[0], counts[1] = max(counts[0], count), pieces
-                advance_pose(pose, state.x, inner, two.x, plant.body.length, dt[k] / pieces, STAGES)
-                copy_state(state, two)
-                if plant.body.gathers > 0.0:
-                    cross_band(plant, stage, state)
+            _fixed_row(plant, stage, spare, state, dt[k], pose, counts)
         out.iterations[k], out.steps[k] = counts[0], counts[1]
         row_of_state(out.state, k + 1, state)
         copy_row(out.pose[k + 1], pose)
