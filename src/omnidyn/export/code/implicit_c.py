@@ -156,16 +156,14 @@ _SHORT = """
     }"""
 
 _BARE = """
-    Body bare_body[1];
+    Body bare_body[1] = {BARE_BODY[0]};
     Element bare_element[1][@ROWS@];
-    Task bare_task[1];
+    Task bare_task[1] = {BARE_TASK[0]};
     ElementStage bare_each[1][@ROWS@];
     Work bare_work[1] = {0};
     const PlantStage bare = {{bare_body, bare_element}, {bare_task, bare_each, bare_work}};"""
 
 _BARE_ROW = """
-        bare_body[0] = BARE_BODY[0];
-        bare_task[0] = BARE_TASK[0];
         bare_element[0][e] = BARE_ELEMENT[e];
         bare_each[0][e] = BARE_EACH[e];"""
 
