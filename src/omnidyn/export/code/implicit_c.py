@@ -38,7 +38,8 @@ from omnidyn.simulation.implicit.march import Spare
 
 MARCH = "omnidyn.simulation.implicit.march"
 CHANGING = frozenset(("viscous", "coulomb", "turning"))  # of a bare plant, which solvers change
-MOST_STEPS, MOST_FIXED_STEPS = 300_000, 1_000  # solved in one call, to a tolerance or not
+MOST_STEPS = 300_000  # solved in one call to a tolerance
+MOST_PIECES = 100  # of a fixed step, which friction that falls with the speed cuts
 RECORDS = {
     "Body": BODY,
     "Element": ELEMENT,
@@ -55,7 +56,7 @@ def implicit_code(robot: Robot, tol: float) -> StepCode:
     numbers = plant(robot)
     bare = with_given_currents(numbers) if tol or numbers.body.gathers else None
     rows, stage = len(numbers.element), new_stage(numbers)
-    most = MOST_STEPS if tol else MOST_FIXED_STEPS
+    most = MOST_STEPS if tol else MOST_PIECES
     program = CProgram(most_turns=most, known=_known(numbers, bare))
     call = _translated(program, rows, bare is not None, tol)
     volts = volts_code(program, robot)
