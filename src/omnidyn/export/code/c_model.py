@@ -99,7 +99,7 @@ _WORDS = {
 }
 _LONG = {
     True: "up to 1 s a step is never too long",
-    False: "up to 20 ms a step is never too long for a robot that\n   a person can stand beside",
+    False: "it is meant for steps of up to 20 ms",
 }
 
 _HEADER = """
