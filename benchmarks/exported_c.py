@@ -22,7 +22,7 @@ import omnidyn
 from benchmarks.size import scaled
 from benchmarks.table import Table, machine
 from omnidyn.model.robot import Robot
-from tests.support.exported import exact_robot
+from tests.support.exported import exact_robot, init_robot
 from tests.support.random_calls import ANY, SLOWEST_MS, VALID, Program, of_fmu, of_step
 
 CALLS, FEWER, VALID_CALLS = (
@@ -57,6 +57,9 @@ def _rows(folder: Path) -> Iterator[dict[str, Any]]:
             main = robot is plain and precision == "double"
             yield _counted(f"c-model, {name}, {precision}", program, CALLS if main else FEWER)
         yield _counted(f"fmu, {name}, its sources", of_fmu(robot, folder / name), CALLS if robot is plain else FEWER)
+    for robot in (init_robot(11), init_robot(2)):
+        program = of_step(robot, folder / robot.name, tol=None)
+        yield _counted(f"c-model, {robot.name}, one implicit step", program, FEWER)
     if importlib.util.find_spec("fmpy") is not None:
         yield _by_fmpy(plain, folder / "robot.fmu")
 

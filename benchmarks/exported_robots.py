@@ -2,7 +2,7 @@
 
 Twenty robots drawn from fixed seeds (`init_robot`) under 600 rows of 2^-9 s with reversals, rests and volts beyond the
 limit. What a latency does is left out of both formats: the C gets the volts as late as the robot does. Sizes are those
-of clang -Oz for a Cortex-M4 without a unit for doubles: code and constants, less libm and the routines of doubles.
+of clang -Oz for a Cortex-M4: code and constants, less libm and the routines of doubles.
 The stack is that of the deepest chain of calls (gcc -Os -fcallgraph-info=su, x86-64).
 """
 
@@ -37,6 +37,8 @@ MATH_H = """#define INFINITY __builtin_inf()
 #define NAN __builtin_nan("")
 double sqrt(double), sin(double), cos(double), exp(double), pow(double, double), hypot(double, double), fabs(double);
 double copysign(double, double), ceil(double), expm1(double), log1p(double);
+float sqrtf(float), sinf(float), cosf(float), expf(float), powf(float, float), hypotf(float, float), fabsf(float);
+float copysignf(float, float), ceilf(float);
 """
 M4 = [
     "clang",
@@ -53,6 +55,7 @@ def measure() -> Table:
     """A row for each robot."""
     differences = ["C m/s", "C rad/s", "C m, rad", "FMU m/s, rad/s", "at rest"]
     costs = ["us/step", "M4 kB", "stack B", "fixed us/step", "fixed slowest us", "fixed M4 kB", "fixed stack B"]
+    costs += ["single m/s, rad/s", "single us/step", "single M4F kB", "single stack B"]
     table = Table(
         "exported robots: C and FMU beside the Python engine", ["robot", "engine", *differences, *costs, "tools"]
     )
@@ -65,6 +68,9 @@ def measure() -> Table:
             table.add(f"<= {NEAR:g} m/s, rest the same, tools silent", met, **row)
     table.notes.append("at rest: share of the samples of all axes; the C and the FMU are at rest in the same ones")
     table.notes.append("fixed: one step a call (tol None); slowest: of random calls up to 1000 m/s and 1 s, gcc -O2")
+    table.notes.append(
+        "single: the fixed step in float32 beside the fixed step of the engine; M4F: with a unit for floats"
+    )
     table.notes.append("tools: gcc and clang with all warnings, cppcheck, the sanitizers of gcc, fmpy's validation")
     return table
 
@@ -100,7 +106,7 @@ def _row(robot: Robot, seed: int, folder: Path) -> tuple[dict[str, Any], bool]:
         "tools": "; ".join(said) or "silent",
     }
     if not exact:
-        row |= _fixed(robot, folder)
+        row |= _fixed(robot, folder) | _single(robot, folder, plain, volts, acting)
     shares = np.array([1.0, 1.0, 10.0]) * NEAR
     return row, bool((off <= shares).all() and (unit_off <= shares).all() and same and not said)
 
@@ -137,13 +143,28 @@ def _fixed(robot: Robot, folder: Path) -> dict[str, Any]:
     return {"fixed us/step": 1e3 * found.mean, "fixed slowest us": 1e3 * found.slowest, **sizes}
 
 
-def _size(sources: Path) -> dict[str, Any]:
-    """Code and constants for a Cortex-M4 [kB], stack on x86-64 [bytes]."""
+def _single(robot: Robot, folder: Path, plain: Robot, volts: FloatArray, acting: FloatArray) -> dict[str, Any]:
+    """The fixed step in single precision beside that of the engine in double: difference, time, size, stack."""
+    run = omnidyn.simulate(plain, volts, DT, tol=None)
+    assert run.twist is not None
+    twist, _ = Stepper(robot, folder / "single", "single", tol=None).run(acting, DT)
+    calls = of_step(robot, folder / "float", flags=("-std=c99", "-O2"), precision="single", tol=None).run(CALLS, VALID)
+    size = _size(folder / "float", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
+    return {
+        "single m/s, rad/s": float(np.abs(twist - run.twist).max()),
+        "single us/step": 1e3 * calls.mean,
+        "single M4F kB": size.get("M4 kB", ""),
+        "single stack B": size["stack B"],
+    }
+
+
+def _size(sources: Path, *unit: str) -> dict[str, Any]:
+    """Code and constants for a Cortex-M4 [kB], stack on x86-64 [bytes]. unit: flags of one for float32."""
     found: dict[str, Any] = {"stack B": deepest(sources)}
     if shutil.which("clang") and shutil.which("size"):
         (sources / "m4").mkdir(exist_ok=True)
         (sources / "m4" / "math.h").write_text(MATH_H)
-        command = [*M4, "-ffreestanding", "-Im4", "-c", "omnidyn_step.c", "-o", "m4.o"]
+        command = [*M4, *unit, "-ffreestanding", "-Im4", "-c", "omnidyn_step.c", "-o", "m4.o"]
         if subprocess.run(command, cwd=sources, capture_output=True).returncode == 0:  # a clang that knows ARM
             said = subprocess.run(["size", "m4.o"], cwd=sources, capture_output=True, text=True, check=True).stdout
             found["M4 kB"] = int(said.split("\n")[1].split()[0]) / 1e3

@@ -150,3 +150,19 @@ def test_what_is_refused(call, arguments, code, words):
     ended, out, err = call(*arguments)
     assert (ended, out) == (code, "")
     assert re.search(words, err)
+
+
+def test_what_init_writes_is_exported_as_c_and_as_a_unit(call, here):
+    wheels = ["--azimuth", "36,108,180,252,324", "--wheel-radius", "0.03", "--robot-radius", "0.1", "--mass", "3"]
+    assert call("init", "bot", *wheels, "-o", "bot.toml")[0] == 0
+    assert call("export", "c-model", "bot.toml", "--tol", "0", "-o", "fixed")[0] == 0
+    assert call("export", "c-model", "bot.toml", "-o", "adaptive")[0] == 0
+    fixed, adaptive = ((here / folder / "omnidyn_step.c").read_text() for folder in ("fixed", "adaptive"))
+    assert ("fixed_row_of(plant" in fixed, "row_of(plant, stage, bare" in adaptive) == (True, True)
+    assert call("export", "fmu", "bot.toml", "--fmi", "3", "-o", "bot.fmu")[0] == 0
+    code, _, err = call("export", "fmu", "bot.toml", "--fmi", "1", "-o", "other.fmu")
+    assert (code, "no such version of FMI" in err) == (3, True)
+    code, _, err = call("export", "c-model", "bot.toml", "--tol", "5", "-o", "other")
+    assert (code, "tolerance out of range" in err) == (3, True)
+    code, _, err = call("export", "json", "bot.toml", "--tol", "0")
+    assert (code, "--tol is not for json" in err) == (2, True)

@@ -111,6 +111,15 @@ def test_fixed_steps_are_the_engine_whatever_the_law(robot, tmp_path):
     assert np.array_equal(twist == 0.0, run.twist == 0.0)
 
 
+@pytest.mark.parametrize("robot", [init_robot(11), with_stribeck(random_robot(5), 5)], ids=["of init", "stribeck"])
+def test_fixed_steps_in_single_precision_follow(robot, tmp_path):
+    volts = program(robot, 1, 200) * np.max(robot.motor.voltage_limit) / 6.0
+    run = omnidyn.simulate(robot, volts, 2e-3, tol=None)
+    twist, pose = Stepper(robot, tmp_path / "c", "single", tol=None).run(volts, 2e-3)
+    np.testing.assert_allclose(twist, run.twist, rtol=0, atol=2e-4)
+    np.testing.assert_allclose(pose, run.pose, rtol=0, atol=1e-4)
+
+
 def test_an_observer_may_correct_the_twist_of_a_robot_of_init(tmp_path):
     """What a call before did not leave is a start as `simulate` knows it: what moves slides, what does not is held."""
     robot, volts = init_robot(2), np.zeros((1, 5))
@@ -127,7 +136,7 @@ def test_an_observer_may_correct_the_twist_of_a_robot_of_init(tmp_path):
 def test_robots_whose_wheels_slip_are_refused_by_name():
     with pytest.raises(UnsupportedError, match=r"wheels that roll; got .*traction_mu"):
         c_model(ROBOT.replace(wheels=ROBOT.wheels.replace(traction_mu=0.5)))
-    with pytest.raises(UnsupportedError, match=r"single precision.*converges in double; got rotating frame"):
+    with pytest.raises(UnsupportedError, match=r"single precision to a tolerance.*; got rotating frame"):
         c_model(init_robot(3), precision="single")
 
 

@@ -32,7 +32,7 @@ def c_model(robot: Robot, precision: Literal["double", "single"] = DOUBLE, tol: 
 
     precision: of its numbers, double (float64) or single (float32). tol: global error of the implicit engine [m/s];
     None takes one fixed step a call, in a bounded time. Raises UnsupportedError for a robot that the table of features
-    refuses, or the implicit engine in single precision; InputError for a number that single precision cannot hold.
+    refuses, or a tolerance in single precision; InputError for a number that single precision cannot hold.
     """
     if precision not in (DOUBLE, SINGLE):
         raise InputError("no such precision", got=precision, expected=f"{DOUBLE} or {SINGLE}", where="precision")
@@ -48,14 +48,15 @@ def engine_code(robot: Robot, precision: str = DOUBLE, tol: float | None = TOLER
     tolerance, reasons = as_tolerance(tol), why_not_exact(robot)
     if not reasons:
         return step_code(robot, precision == SINGLE)
-    if precision == SINGLE:
+    if precision == SINGLE and tolerance:
         raise UnsupportedError(
-            f"c-model cannot be exported in single precision for {robot.name}: its implicit step converges in double",
+            f"c-model cannot be exported in single precision to a tolerance for {robot.name}",
             got="; ".join(reasons)[:300],
-            remedy="export double precision",
+            expected="one fixed step a call",
+            remedy="take one step a call (tol=None), or double precision",
             where="precision",
         )
-    return implicit_code(robot, tolerance)
+    return implicit_code(robot, tolerance, precision == SINGLE)
 
 
 def _header(code: StepCode, about: str, precision: str) -> str:
@@ -99,7 +100,7 @@ _WORDS = {
 }
 _LONG = {
     True: "up to 1 s a step is never too long",
-    False: "up to 20 ms a step is never too long for a robot that\n   a person can stand beside",
+    False: "it is meant for steps of up to 20 ms",
 }
 
 _HEADER = """

@@ -32,7 +32,7 @@ from omnidyn.export.code.c_types import (
 )
 from omnidyn.export.code.scope import Scope
 from omnidyn.export.code.sources import Source, source_of
-from omnidyn.export.spelling import c_number
+from omnidyn.export.spelling import SINGLE_MIN, c_number
 
 _BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "/", ast.Mod: "%"}
 _BITS = {ast.BitAnd: "&", ast.BitOr: "|"}
@@ -81,7 +81,7 @@ class Expressions:
         if isinstance(node, ast.IfExp) and self.known(node.test) is None:
             return f"({self.of(node.test)[0]} ? {self.as_kind(node.body, kind)} : {self.as_kind(node.orelse, kind)})"
         text, own_kind = self.of(node)
-        return self._as_real(text, own_kind) if kind == REAL else text
+        return self.as_real(text, own_kind) if kind == REAL else text
 
     # What is known
 
@@ -91,7 +91,7 @@ class Expressions:
             case ast.Constant(value=value):
                 return value
             case ast.Name(id=name) if name not in self.body.types:
-                value = self.body.source.value(name)
+                value = self._outer(name)
                 return value if isinstance(value, int | float) else None
             case ast.Attribute(value=ast.Name(id=name), attr=field) if self._module(name) is not None:
                 return getattr(self._module(name), field)
@@ -146,7 +146,15 @@ class Expressions:
 
     # Expressions, one method for each kind of the syntax tree
 
+    def _outer(self, name: str) -> Any:
+        """What a name stands for that is none of the function: in this program, or in its module."""
+        return self.program.constants.get(name, self.body.source.value(name))
+
     def _constant(self, node: ast.Constant) -> Typed:
+        if (
+            self.program.single and isinstance(node.value, float) and node.value > 0.0
+        ):  # 1e-300 keeps from dividing by 0
+            return self.plain(max(node.value, SINGLE_MIN))
         return self.plain(node.value)
 
     def plain(self, value: Any) -> Typed:
@@ -164,7 +172,7 @@ class Expressions:
             kind, name = self.body.types[node.id], c_name(node.id)
             self.body.read.add(node.id)
             return (f"(*{name})" if isinstance(kind, Record) else name), kind
-        value = self.body.source.value(node.id)
+        value = self._outer(node.id)
         if isinstance(value, int | float):
             return self.plain(value)
         return self.program.constant(node.id, value)
@@ -188,8 +196,8 @@ class Expressions:
             raise self.refusal(node)
         if kind == REAL or isinstance(node.op, ast.Div):
             left_text, right_text, kind = (
-                self._as_real(left_text, left_kind),
-                self._as_real(right_text, right_kind),
+                self.as_real(left_text, left_kind),
+                self.as_real(right_text, right_kind),
                 REAL,
             )
         return f"({left_text} {_BINARY[type(node.op)]} {right_text})", kind
@@ -198,10 +206,11 @@ class Expressions:
         base, kind = self.of(node.left)
         if self.known(node.right) == 2:
             return f"({base} * {base})", kind
-        exponent = self._as_real(*self.of(node.right))
-        return f"pow{'f' if self.program.single else ''}({self._as_real(base, kind)}, {exponent})", REAL
+        exponent = self.as_real(*self.of(node.right))
+        return f"pow{'f' if self.program.single else ''}({self.as_real(base, kind)}, {exponent})", REAL
 
-    def _as_real(self, text: str, kind: Type) -> str:
+    def as_real(self, text: str, kind: Type) -> str:
+        """A number as a floating one."""
         if kind == REAL:
             return text
         return self.number(float(text)) if text.isdigit() else f"({self.program.real}){text}"
@@ -221,7 +230,7 @@ class Expressions:
         for left_node, sign, right_node in zip(sides, node.ops, node.comparators, strict=False):
             (a, kind_a), (b, kind_b) = self.of(left_node), self.of(right_node)
             if REAL in (kind_a, kind_b):
-                a, b = self._as_real(a, kind_a), self._as_real(b, kind_b)
+                a, b = self.as_real(a, kind_a), self.as_real(b, kind_b)
             parts.append(f"({a} {_COMPARE[type(sign)][0]} {b})")
         return (parts[0] if len(parts) == 1 else f"({' && '.join(parts)})"), BOOL
 
@@ -338,7 +347,7 @@ class Expressions:
         if name == "abs":
             return f"fabs{'f' if self.program.single else ''}({first})", REAL
         whole = all(self.of(node)[1] == INT for node in nodes)
-        as_number = (lambda node: self.of(node)[0]) if whole else (lambda node: self._as_real(*self.of(node)))
+        as_number = (lambda node: self.of(node)[0]) if whole else (lambda node: self.as_real(*self.of(node)))
         text = as_number(nodes[-1])
         for argument in reversed(nodes[:-1]):
             text = f"{name}_{'int' if whole else 'of'}({as_number(argument)}, {text})"

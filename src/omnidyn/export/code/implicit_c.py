@@ -14,7 +14,7 @@ import numpy as np
 from omnidyn.export.code.c_types import INT, REAL, Array, Type, record_type
 from omnidyn.export.code.program import CProgram
 from omnidyn.export.code.step_c import ALL_WITHIN, StepCode, refusals, volts_code
-from omnidyn.export.spelling import c_number, filled
+from omnidyn.export.spelling import SINGLE_MAX, c_number, filled
 from omnidyn.model.layout import (
     BODY,
     ELEMENT,
@@ -38,7 +38,10 @@ from omnidyn.simulation.implicit.march import Spare
 
 MARCH = "omnidyn.simulation.implicit.march"
 CHANGING = frozenset(("viscous", "coulomb", "turning"))  # of a bare plant, which solvers change
-MOST_STEPS, MOST_FIXED_STEPS = 300_000, 1_000  # solved in one call, to a tolerance or not
+MOST_STEPS = 300_000  # solved in one call to a tolerance
+MOST_PIECES = 100  # of a fixed step, which friction that falls with the speed cuts
+# What is rounding in float32: of a residual, a step to a kink, a direction, a root; and an edge that it tells apart.
+ROUNDING = {"RESIDUAL_TOLERANCE": 4e-6, "TIE": 1e-5, "FLAT": 1e-5, "ROOT_TOLERANCE": 2e-7, "BAND_EDGE": 1.0 - 1e-6}
 RECORDS = {
     "Body": BODY,
     "Element": ELEMENT,
@@ -50,13 +53,16 @@ RECORDS = {
 KINDS = {name: record_type(name, dtype) for name, dtype in RECORDS.items()}
 
 
-def implicit_code(robot: Robot, tol: float) -> StepCode:
-    """The step of a robot by the implicit engine, to a tolerance [m/s], or for 0 one step; entry: `omnidyn_advance`."""
+def implicit_code(robot: Robot, tol: float, single: bool = False) -> StepCode:
+    """The step of a robot by the implicit engine; entry: `omnidyn_advance`.
+
+    tol: error [m/s], or 0 for one step a call. single: in float32, which no tolerance suits.
+    """
     numbers = plant(robot)
     bare = with_given_currents(numbers) if tol or numbers.body.gathers else None
     rows, stage = len(numbers.element), new_stage(numbers)
-    most = MOST_STEPS if tol else MOST_FIXED_STEPS
-    program = CProgram(most_turns=most, known=_known(numbers, bare))
+    most = MOST_STEPS if tol else MOST_PIECES
+    program = CProgram(single, most, ROUNDING if single else {}, _known(numbers, bare))
     call = _translated(program, rows, bare is not None, tol)
     volts = volts_code(program, robot)
     for field in ("voltage", "sign"):
@@ -75,15 +81,16 @@ def implicit_code(robot: Robot, tol: float) -> StepCode:
         "ROWS": str(rows),
         "STATES": str(max(states) + 1),
         "MEMORY": str(size),
-        "LENGTH": c_number(numbers.body.length),
-        "LARGEST": c_number(np.finfo(float).max),
+        "LENGTH": c_number(numbers.body.length, single),
+        "LARGEST": c_number(SINGLE_MAX if single else np.finfo(float).max, single),
+        "F": "f" if single else "",
         "MOST": str(most),
     }
     text = filled(
         _ADVANCE,
         **words,
-        REFUSE=refusals(robot),
-        SHORT=filled(_SHORT, STEEP=c_number(numbers.body.steep_sum / MONOTONE), **words) if steep else "",
+        REFUSE=refusals(robot, single),
+        SHORT=filled(_SHORT, STEEP=c_number(numbers.body.steep_sum / MONOTONE, single), **words) if steep else "",
         BARE=filled(_BARE, **words) if bare is not None else "",
         BARE_ROW=_BARE_ROW if bare is not None else "",
         SPARE=", ".join([*(f"{{x[{k}], each[{k}]}}" for k in states), "bare" if bare is not None else "0"]),
@@ -96,7 +103,7 @@ def implicit_code(robot: Robot, tol: float) -> StepCode:
         program.text(),
         *(program.records(KINDS[kind], name, np.array(values, RECORDS[kind])) for kind, name, values in constants),
         volts,
-        filled(ALL_WITHIN, ABS="fabs", REAL=program.real).strip(),
+        filled(ALL_WITHIN, ABS="fabsf" if single else "fabs", REAL=program.real).strip(),
         text.strip(),
     ]
     return StepCode("\n\n".join(parts), robot.wheels.count, "memory", size, lost=False)
@@ -156,16 +163,14 @@ _SHORT = """
     }"""
 
 _BARE = """
-    Body bare_body[1];
+    Body bare_body[1] = {BARE_BODY[0]};
     Element bare_element[1][@ROWS@];
-    Task bare_task[1];
+    Task bare_task[1] = {BARE_TASK[0]};
     ElementStage bare_each[1][@ROWS@];
     Work bare_work[1] = {0};
     const PlantStage bare = {{bare_body, bare_element}, {bare_task, bare_each, bare_work}};"""
 
 _BARE_ROW = """
-        bare_body[0] = BARE_BODY[0];
-        bare_task[0] = BARE_TASK[0];
         bare_element[0][e] = BARE_ELEMENT[e];
         bare_each[0][e] = BARE_EACH[e];"""
 
@@ -208,11 +213,11 @@ static int omnidyn_advance(const @REAL@ u[], @REAL@ h, @REAL@ twist[3], @REAL@ p
         now.each[@ROWS@].sign = now.x[0] != 0 || now.x[1] != 0;
     }
     for (e = 0; e < @STATES@; e++) {
-        each[e][@ROWS@ + 1].sign = 2.0; /* that nothing has */
+        each[e][@ROWS@ + 1].sign = 2; /* that nothing has */
     }
     for (e = 0; e < @ROWS@ + 2; e++) {
         const @REAL@ sign = now.each[e].sign;
-        now.each[e].sign = STICKS[e] == 0 ? 2.0 : sign == 0 ? 0.0 : copysign(1.0, sign);
+        now.each[e].sign = STICKS[e] == 0 ? 2 : sign == 0 ? 0 : copysign@F@(1, sign);
     }
     @CALL@;
     now.x[2] /= @LENGTH@;

@@ -39,11 +39,13 @@ class CProgram:
     """Translated functions and what they need, in an order that C can read. single: in float, not double.
 
     most_turns: of a while loop. One that is cut short makes its function return no number: NAN.
+    constants: of modules that are another number here.
     known: (record, field) -> what it is in all records, which no function changes: it stands in the code as a number.
     """
 
     single: bool = False
     most_turns: int = 16_000
+    constants: Mapping[str, float] = field(default_factory=dict)
     known: Mapping[tuple[str, str], Any] = field(default_factory=dict)
     structs: dict[str, str] = field(default_factory=dict)
     tables: dict[str, str] = field(default_factory=dict)

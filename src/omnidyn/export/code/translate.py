@@ -212,8 +212,9 @@ class FunctionBody:
         return calls or any(isinstance(part, ast.Name) and part.id in stored for part in ast.walk(bound))
 
     def _augassign(self, node: ast.AugAssign) -> list[str]:
-        target = self._target(node.target)
-        text, _ = self.expressions.of(node.value)
+        target, (text, kind) = self._target(node.target), self.expressions.of(node.value)
+        if self.expressions.kind(node.target) == REAL:
+            text = self.expressions.as_real(text, kind)
         return [f"{target} {_SIGNS[type(node.op)]}= {_bare(text)};"]
 
     def _assign(self, node: ast.Assign) -> list[str]:
@@ -240,11 +241,13 @@ class FunctionBody:
     def _put(self, target: ast.expr, text: str, kind: Type, value: ast.expr | None = None) -> list[str]:
         """Give a value to a name, or to a place of a table or of a record. Names share tables and records."""
         if not isinstance(target, ast.Name):
-            return [f"{self._target(target)} = {_bare(text)};"]
+            place, place_kind = self._target(target), self.expressions.kind(target)
+            return [f"{place} = {_bare(self.expressions.as_real(text, kind) if place_kind == REAL else text)};"]
         if target.id == "_":
             return []
-        kind = joined(self.types.get(target.id), kind)
+        value_kind, kind = kind, joined(self.types.get(target.id), kind)
         self.types[target.id] = kind
+        text = self.expressions.as_real(text, value_kind) if kind == REAL else text
         if isinstance(kind, Array):
             if not text:  # a table of its own, made once: nothing to do
                 self._made.add(target.id)
