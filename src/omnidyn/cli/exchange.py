@@ -102,6 +102,12 @@ def export(
     dt: float | None = typer.Option(
         None, metavar="S", help="Between two of its steps [s]; 0.02 by default (c-controller, ros2-node)."
     ),
+    ticks_per_turn: float | None = typer.Option(
+        None, metavar="N", help="Of the encoder, in a turn of the wheel: gains per tick (road-runner, gains)."
+    ),
+    force_guess: bool = typer.Option(
+        False, "--force-guess", help="Gains of a robot whose friction is a guess too (wpilib, road-runner)."
+    ),
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
     json: bool = typer.Option(False, "--json", help="What was written and left out, for machines."),
 ) -> None:
@@ -116,7 +122,8 @@ def export(
     if out == "-" and json:
         raise typer.BadParameter("-o - and --json both want stdout.")
     values = {"precision": precision or None, "fmi": fmi, "height": height, "horizon": horizon, "dt": dt}
-    options = _options(kind, make, {**values, "controller": controller or None})
+    values |= {"controller": controller or None, "ticks_per_turn": ticks_per_turn, "force_guess": force_guess or None}
+    options = _options(kind, make, values)
     if tol is not None:
         options |= {name: tol or None for name in _options(kind, make, {"tol": tol})}
     loaded = omnidyn.load_robot(robot)
@@ -167,7 +174,7 @@ def _options(kind: str, make: Any, values: dict[str, Any]) -> dict[str, Any]:
     options = {name: value for name, value in values.items() if value is not None}
     for name in options:
         if name not in parameters:
-            flag = {"runs": "log"}.get(name, name)
+            flag = {"runs": "log"}.get(name, name).replace("_", "-")
             raise typer.BadParameter(f"--{flag} is not for {kind}.")
     return options
 
