@@ -229,9 +229,11 @@ _MUJOCO = {
     "slope": _LEVEL,
     "slip": _ROLL,
     **_LAWS,
-    "axes": Cell(PARTLY, "dry friction of joints stands still in the world: it is that of the body at heading 0 only"),
-    "direction": Cell(PARTLY, "a box along x and y of the world, of the level along each: no disc, no ellipse"),
-    "wheels": Cell(PARTLY, "its dry part is a box along x and y of the world, of the level along each axis alone"),
+    "axes": Cell(
+        PARTLY, "viscous friction stands still in the world: levels along x and y that differ are those at heading 0"
+    ),
+    "wheels": Cell(PARTLY, "its dry part is a box along x and y of the body, of the level along each axis alone"),
+    "plain": Cell(LEAVES_OUT, "its ellipse is that of maximum dissipation"),
     "breakaway": Cell(LEAVES_OUT, "it breaks away at the Coulomb level"),
     "no-frame": _NEWTON,
     "inductance": Cell(LEAVES_OUT, "currents settle at once"),
