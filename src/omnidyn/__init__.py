@@ -108,6 +108,7 @@ _MAKERS = {
     shown.FRAME: ("omnidyn.interop.dataframe", "to_dataframe"),
     shown.DATASET: ("omnidyn.interop.runs", "to_xarray"),
     shown.RUN: ("omnidyn.interop.runs", "run_of"),
+    shown.SYSTEM: ("omnidyn.interop.systems", "linear_system"),
     shown.SENTENCE: ("omnidyn.telling.codes", "sentence"),
     shown.REMEDY: ("omnidyn.telling.codes", "remedy"),
     shown.DOCUMENT: ("omnidyn.telling.log_verdict", "document"),

@@ -80,7 +80,7 @@ def track(
 def track(
     robot: Robot, path: Any, controller: Sequence[Controller | ControllerFile | str], **options: Any
 ) -> Trackings: ...
-def track(
+def track(  # pyright: ignore[reportInconsistentOverload]  it has the options by name
     robot: Robot,
     path: Any,
     controller: Controller | ControllerFile | str | Sequence[Controller | ControllerFile | str] = "pid",

@@ -64,7 +64,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
 POSITIVE = ("size_m", "period_s", "radius_m", "side_m", "speed_m_s", "rounds")
 
 
-def path(what: str | os.PathLike | Run | Path | ArrayLike | Callable[[float], ArrayLike], **options: Any) -> Path:
+def path(what: Any, **options: Any) -> Path:
     """A path to follow.
 
     what: "eight", "circle", "square", "zigzag" or "goal"; the same with options in the text, as in
@@ -119,14 +119,15 @@ def _path_of_value(what: Any, options: Mapping[str, Any]) -> Path:
                 raise unknown_option("a function", option, ["duration_s"], "path")
         name = f"function {getattr(what, '__name__', type(what).__name__)}"
         end = _value("of a function", "period_s", options["duration_s"]) if "duration_s" in options else math.inf
-        found = FunctionPath(name, what, DURATION if end == math.inf else end, end)
+        function: Any = what
+        found = FunctionPath(name, function, DURATION if end == math.inf else end, end)
         found.at(0.0)  # what is no pose is said here
         return found
     _refuse_options(options, "an array")
     try:
         rows = np.asarray(what, dtype=float)
     except (TypeError, ValueError):
-        rows = np.empty(0)
+        rows: FloatArray = np.empty((0, 0))
     if rows.ndim != 2 or rows.shape[1] != len(COLUMNS):
         raise InputError(
             "no path",

@@ -62,7 +62,8 @@ def feet_of(robot: Robot) -> list[Foot]:
     travel = coulomb_along(bare)[:2]
     box = np.maximum(coulomb_along(robot)[:2] - travel, 0.0)
     box = np.where(box > ROUNDING * travel, box, 0.0)
-    feet = [Foot(float(level), 0.0, k == 1) for k, level in enumerate(box)] + [Foot(*travel.tolist(), False)]
+    feet = [Foot(float(level), 0.0, k == 1) for k, level in enumerate(box)]
+    feet.append(Foot(float(travel.max()), float(travel.min()), bool(travel[1] > travel[0])))
     return [foot for foot in feet if foot.level > 0.0]
 
 
