@@ -131,7 +131,7 @@ def _controller(robot: Robot) -> Iterator[dict[str, Any]]:
         variance = given(ros2_control(robot, _log(robot, 5000 + first)))["diagonal_covariance"]["twist"]
         std = np.sqrt(np.array(variance)[[0, 1, 5]])
         for seed in range(first, first + LOGS // FITTED):
-            error = odometry_error(robot, _log(robot, seed))
+            error = odometry_error(robot, _log(robot, seed))[1]
             inside, count = inside + (np.abs(error) < SIGMAS * std).sum(axis=0), count + len(error)
     share = inside / count
     told = " ".join(f"{each:.1%}" for each in share)

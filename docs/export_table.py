@@ -16,7 +16,8 @@ GROUPS = {
     "c-controller": ("c-controller",),
     "wpilib, road-runner, gains": ("wpilib", "road-runner", "gains"),
     "mjcf": ("mjcf",),
-    "urdf, sdf": ("urdf", "sdf"),
+    "urdf": ("urdf",),
+    "sdf": ("sdf",),
     "ros2-control": ("ros2-control",),
     "ros2-node": ("ros2-node",),
 }

@@ -30,6 +30,7 @@ _HOME = {
     "Run": "omnidyn.run",
     "SteadyState": "omnidyn.identification.methods",
     "Tracking": "omnidyn.control.tracking",
+    "Trackings": "omnidyn.control.tracking",
     "Tuned": "omnidyn.control.tune",
     "acceleration": "omnidyn.model.dynamics",
     "axis_patterns": "omnidyn.model.deadzone",
@@ -42,6 +43,7 @@ _HOME = {
     "drift": "omnidyn.comparison.drift",
     "feedforward_table": "omnidyn.control.table",
     "identify": "omnidyn.identification.identify",
+    "load_controller": "omnidyn.control.controllers",
     "load_log": "omnidyn.logs.read_log",
     "load_robot": "omnidyn.model.robot_file",
     "moving_axes": "omnidyn.model.deadzone",
@@ -70,11 +72,12 @@ if TYPE_CHECKING:
     from omnidyn.comparison.drift import drift
     from omnidyn.comparison.result import Comparison
     from omnidyn.control.closed_loop import track
+    from omnidyn.control.controllers import load_controller
     from omnidyn.control.demand import path_demand
     from omnidyn.control.feedforward import voltage_for
     from omnidyn.control.paths.path import path
     from omnidyn.control.table import feedforward_table
-    from omnidyn.control.tracking import Tracking
+    from omnidyn.control.tracking import Tracking, Trackings
     from omnidyn.control.tune import Tuned, tune
     from omnidyn.errors import OmnidynError
     from omnidyn.findings.check import check
@@ -105,6 +108,7 @@ _MAKERS = {
     shown.FRAME: ("omnidyn.interop.dataframe", "to_dataframe"),
     shown.DATASET: ("omnidyn.interop.runs", "to_xarray"),
     shown.RUN: ("omnidyn.interop.runs", "run_of"),
+    shown.SYSTEM: ("omnidyn.interop.systems", "linear_system"),
     shown.SENTENCE: ("omnidyn.telling.codes", "sentence"),
     shown.REMEDY: ("omnidyn.telling.codes", "remedy"),
     shown.DOCUMENT: ("omnidyn.telling.log_verdict", "document"),

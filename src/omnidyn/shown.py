@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from omnidyn.document import Document
 
 HTML, FIGURE, FRAME, DATASET, RUN = "html", "figure", "frame", "dataset", "run"
+SYSTEM = "system"
 SENTENCE, REMEDY, DOCUMENT = "sentence", "remedy", "document"
 
 _MAKERS: dict[str, Callable[..., Any]] = {}
@@ -22,7 +23,7 @@ _MAKERS: dict[str, Callable[..., Any]] = {}
 
 def made_by(**makers: Callable[..., Any]) -> None:
     """Who makes what: html(document), figure(result, **options), frame(result), dataset(run), run(table),
-    sentence(statement), remedy(statement), document(verdict)."""
+    sentence(statement), remedy(statement), document(verdict), system(state space)."""
     _MAKERS.update(makers)
 
 

@@ -132,6 +132,26 @@ def test_logs_give_the_covariances(call, here):
     assert (code, "--log is not for json" in err) == (2, True)
 
 
+def test_joints_are_called_as_asked_or_as_the_bag_has_them(call, here):
+    from tests.support.bags import BagMaker, drive, write_ros2
+
+    write_ros2(drive(BagMaker()), here / "bag")
+    for joints, names in (("bag", [f"wheel_{k}_joint" for k in (1, 2, 3)]), ("fl,fr,back", ["fl", "fr", "back"])):
+        for kind, file in (("urdf", "robot.urdf"), ("sdf", "robot.sdf"), ("ros2-control", ""), ("ros2-node", "")):
+            out = f"{kind}_{names[0]}{file}"
+            assert call("export", kind, "axebot", "--joints", joints, "-o", out)[0] == 0
+            paths = [here / out] if file else list((here / out).iterdir())
+            text = "".join(path.read_text() for path in paths)
+            assert all(f'"{name}"' in text for name in names)
+            assert "wheel1_joint" not in text
+    code, out, _ = call("export", "ros2-control", "axebot", "--log", "bag", "-o", "ros", "--json")
+    assert (code, json.loads(out)["provenance"]["inputs"][1]["name"]) == (0, "bag")
+    assert "wheel_3_joint" in (here / "ros" / "controllers.yaml").read_text()
+    (here / "log.csv").write_text("t_s,w1_rad_s,w2_rad_s,w3_rad_s\n0,1,2,3\n0.1,1,2,3\n")
+    code, _, err = call("export", "urdf", "axebot", "--joints", "log.csv")
+    assert (code, "does not say which joint is which wheel" in err) == (3, True)
+
+
 @pytest.mark.parametrize(
     "arguments, code, words",
     [

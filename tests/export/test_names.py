@@ -18,6 +18,7 @@ import omnidyn
 from omnidyn.control.controllers import ControllerFile
 from omnidyn.errors import InputError
 from omnidyn.export.kinds import KINDS, maker
+from omnidyn.export.ros.package import package_name
 from omnidyn.export.spelling import c_comment, filled, identifier, java_comment, python_comment
 from omnidyn.interop.robot_json import robot_of_json
 from omnidyn.interop.urdf import robot_of_urdf
@@ -57,6 +58,13 @@ def tree(text):
 def unchanged(file, text, plain):
     """Whether a file does what that of another name does."""
     kind = file.rpartition(".")[2]
+    if file == "package.xml":
+        own, other = (re.sub("<description>.*?</description>", "", each, flags=re.DOTALL) for each in (text, plain))
+        return ET.fromstring(text).findtext("description") and own == other
+    if file == "CMakeLists.txt":
+        return re.sub(r"^#.*\n", "", text) == re.sub(r"^#.*\n", "", plain)
+    if kind == "md":
+        return text.partition("\n")[2] == plain.partition("\n")[2]
     if kind in ("c", "h"):
         return text.partition("*/")[2] == plain.partition("*/")[2]
     if kind == "java":
@@ -91,6 +99,8 @@ def test_names_change_comments_and_names_alone(examples, tmp_path):
             assert len(files) == len(PLAIN[kind])
             for (file, text), plain in zip(files.items(), PLAIN[kind].values(), strict=True):
                 assert re.fullmatch(r"[A-Za-z][A-Za-z0-9_.]*", file)
+                for end in ("bringup", "node") if kind.startswith("ros2") else ():
+                    text = text.replace(package_name(robot.name, end), package_name("robot_x", end))
                 assert unchanged(file, text, plain), (kind, file)
         assert robot_of_json(files_of("json", robot)["robot.json"]).name == robot.name
         assert ET.fromstring(files_of("mjcf", robot)["robot.xml"]).get("model") == robot.name

@@ -23,8 +23,10 @@ def test_the_linear_system_is_the_robot_without_dry_friction():
     found = control.forced_response(system, t, np.tile(VOLTS, (101, 1)).T)
     run = omnidyn.simulate(FREE, np.tile(VOLTS, (100, 1)), 0.01)
     np.testing.assert_allclose(found.outputs.T, run.twist, rtol=1e-9, atol=1e-12)
-    same = omnidyn.interop.linear_system(omnidyn.state_space(ROBOT))
+    same = omnidyn.state_space(ROBOT).to_control()
     np.testing.assert_array_equal(same.A, system.A)
+    np.testing.assert_array_equal(same.D, np.zeros((3, 3)))
+    assert list(same.input_labels) == ["u1", "u2", "u3"]
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -39,8 +41,12 @@ def test_the_nonlinear_system_is_the_robot():
     assert not system.dynamics(0.0, np.zeros(6), np.array([0.0, 0.5, -0.5])).any()  # holds in its dead zone
 
 
+def to_control(robot):
+    return omnidyn.state_space(robot).to_control()
+
+
 def test_without_the_library_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "control", None)
-    for make in (omnidyn.interop.linear_system, omnidyn.interop.nonlinear_system):
+    for make in (omnidyn.interop.linear_system, omnidyn.interop.nonlinear_system, to_control):
         with pytest.raises(MissingExtraError, match=r"pip install .omnidyn\[control\]"):
             make(ROBOT)

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+import omnidyn
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import acceleration, discretise, drive_wrench, frame_wrench, is_decoupled, state_space
+from omnidyn.model.friction import Friction
 from tests.support.robots import random_robot, robot_of
 
 
@@ -156,3 +158,42 @@ def test_which_layouts_decouple(axebot, four_wheel):
     assert is_decoupled(state_space(four_wheel))
     skewed = axebot.replace(wheels=axebot.wheels.replace(azimuth_deg=(180.0, -60.0, 60.001)))
     assert not is_decoupled(state_space(skewed))
+
+
+MOVING = np.array([0.4, -0.2, 1.5])
+
+
+@pytest.mark.parametrize("name", ["axebot", "mecanum"])
+def test_at_an_operating_point_the_turning_frame_and_the_slopes_count(name):
+    """By hand: eqs (13) (14), and the derivatives of omega v_y and -omega v_x where the frame turns."""
+    robot = omnidyn.load_robot(name)
+    plain, found = omnidyn.state_space(robot), omnidyn.state_space(robot, twist=MOVING)
+    vx, vy, omega = MOVING
+    frame = np.array([[0.0, omega, vy], [-omega, 0.0, -vx], [0.0, 0.0, 0.0]]) * robot.body.rotating_frame
+    np.testing.assert_allclose(found.A, plain.A + frame, atol=1e-6)
+    np.testing.assert_allclose(found.B, plain.B, atol=1e-9)
+    for system in (plain, found):
+        np.testing.assert_array_equal(system.D, np.zeros((3, robot.wheels.count)))
+    np.testing.assert_array_equal(found.twist, MOVING)
+    assert not found.K.any()
+    assert not plain.voltage.any()
+    np.testing.assert_allclose(omnidyn.acceleration(robot, MOVING, found.voltage), 0.0, atol=1e-10)
+
+
+def test_a_disc_of_friction_turns_with_the_direction_of_travel():
+    """F = -C v/|v|: along the way it has no slope, across it -C/(M |v|); at rest it is left out."""
+    robot = omnidyn.load_robot("axebot")
+    disc = {"coulomb": (2.0, 2.0), "yaw_coulomb": 0.05, "viscous": 0.7, "yaw_viscous": 0.01}
+    bare = robot.replace(friction=Friction(direction=disc | {"coulomb": (0.0, 0.0), "yaw_coulomb": 0.0}))
+    robot = robot.replace(friction=Friction(direction=disc))
+    viscous = omnidyn.state_space(bare, twist=[0.5, 0.0, 0.0])
+    found = omnidyn.state_space(robot, twist=[0.5, 0.0, 0.0])
+    np.testing.assert_allclose(found.A - viscous.A, np.diag([0.0, -2.0 / 1.5 / 0.5, 0.0]), atol=1e-5)
+    np.testing.assert_allclose(
+        np.diag(viscous.A)[:2] - np.diag(omnidyn.state_space(robot).A)[:2], -0.7 / 1.5, atol=1e-6
+    )
+    resting = omnidyn.state_space(robot, twist=[0.0, 0.0, 0.0])
+    np.testing.assert_allclose(resting.A, viscous.A, atol=1e-5)
+    np.testing.assert_array_equal(resting.voltage, np.zeros(3))
+    with pytest.raises(InputError, match=r"no operating point; got shape \(1, 3\)"):
+        omnidyn.state_space(robot, twist=[[0.0, 0.0, 0.0]])

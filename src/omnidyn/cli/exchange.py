@@ -14,11 +14,14 @@ from omnidyn.cli.terminal.session import input_file, provenance, robot_input
 from omnidyn.cli.terminal.sizes import refuse_sizes
 from omnidyn.cli.terminal.streams import say, show
 from omnidyn.cli.terminal.telling import tell
+from omnidyn.errors import InputError
 from omnidyn.files import check_output, keep_apart, write_atomic
 from omnidyn.model.presets import robot_path
 
 if TYPE_CHECKING:
     from omnidyn.export.contract import Export
+    from omnidyn.logs.log import Log
+    from omnidyn.model.robot import Robot
 
 
 def bring(
@@ -84,6 +87,12 @@ def export(
     horizon: float | None = typer.Option(
         None, metavar="S", help="For which the covariance of the pose is given [s] (ros2-control)."
     ),
+    joints: str = typer.Option(
+        "",
+        metavar="NAME,NAME,..|BAG",
+        help="Joints of the wheels, in their order, or a bag whose joint states name them (ros2-control, ros2-node, "
+        "urdf, sdf); those of --log by default.",
+    ),
     max_bytes: int = MAX_BYTES,
     controller: str = typer.Option(
         "",
@@ -92,6 +101,12 @@ def export(
     ),
     dt: float | None = typer.Option(
         None, metavar="S", help="Between two of its steps [s]; 0.02 by default (c-controller, ros2-node)."
+    ),
+    ticks_per_turn: float | None = typer.Option(
+        None, metavar="N", help="Of the encoder, in a turn of the wheel: gains per tick (road-runner, gains)."
+    ),
+    force_guess: bool = typer.Option(
+        False, "--force-guess", help="Gains of a robot whose friction is a guess too (wpilib, road-runner)."
     ),
     force: bool = typer.Option(False, "--force", help="Replace files that exist."),
     json: bool = typer.Option(False, "--json", help="What was written and left out, for machines."),
@@ -107,21 +122,35 @@ def export(
     if out == "-" and json:
         raise typer.BadParameter("-o - and --json both want stdout.")
     values = {"precision": precision or None, "fmi": fmi, "height": height, "horizon": horizon, "dt": dt}
-    options = _options(kind, make, {**values, "controller": controller or None})
+    values |= {"controller": controller or None, "ticks_per_turn": ticks_per_turn, "force_guess": force_guess or None}
+    options = _options(kind, make, values)
     if tol is not None:
         options |= {name: tol or None for name in _options(kind, make, {"tol": tol})}
     loaded = omnidyn.load_robot(robot)
+    bag = joints if joints and Path(joints).exists() else ""
+    logs = {path: _read(path, loaded, max_bytes) for path in (*log, *([bag] if bag else []))}
     if log:
-        options |= _options(
-            kind, make, {"runs": [omnidyn.read_log(path, robot=loaded, max_bytes=max_bytes or None) for path in log]}
-        )
-    inputs = [robot_path(robot), *log, *([controller] if controller.endswith(".toml") else [])]
+        runs = [logs[path].to_run() for path in log]
+        options |= _options(kind, make, {"runs": runs, "joints": logs[log[0]].columns.joints})
+    if joints:
+        names = logs[bag].columns.joints if bag else tuple(joints.split(","))
+        if not names:
+            raise InputError(
+                "this log does not say which joint is which wheel",
+                got=joints,
+                expected="joint states whose names count the wheels",
+                remedy="give the names themselves, with a comma between them, in the order of the wheels",
+                where="--joints",
+            )
+        options |= _options(kind, make, {"joints": names})
+    inputs = [robot_path(robot), *logs, *([controller] if controller.endswith(".toml") else [])]
     if out not in ("", "-"):
         keep_apart([out], inputs)
     exported = make(loaded, **options)
     if exported.folder and out not in ("", "-"):
         keep_apart([Path(out, name) for name in exported.files], inputs)
-    record = provenance([robot_input(robot), *(input_file("log", path) for path in log)])
+    inputs_of_logs = [{"role": "log", "name": path, "sha256": read.sha256} for path, read in logs.items()]
+    record = provenance([robot_input(robot), *inputs_of_logs])
     if out == "-":
         show(exported.text.rstrip("\n"))
         _say_missing(exported)
@@ -132,13 +161,20 @@ def export(
         say(f"omnidyn: wrote {', '.join(written)}" if written else "omnidyn: nothing written; -o OUT writes it")
 
 
+def _read(path: str, robot: Robot, max_bytes: int) -> Log:
+    """A log with its columns."""
+    from omnidyn.logs.read_log import LogOptions
+
+    return omnidyn.load_log(path, robot, LogOptions(max_bytes=max_bytes or None))
+
+
 def _options(kind: str, make: Any, values: dict[str, Any]) -> dict[str, Any]:
     """The options that were given. Ends as wrong usage where the kind has none of that name."""
     parameters = inspect.signature(make).parameters
     options = {name: value for name, value in values.items() if value is not None}
     for name in options:
         if name not in parameters:
-            flag = {"runs": "log"}.get(name, name)
+            flag = {"runs": "log"}.get(name, name).replace("_", "-")
             raise typer.BadParameter(f"--{flag} is not for {kind}.")
     return options
 

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import os
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
 from omnidyn.control.controller import OK, Controller
-from omnidyn.control.controllers import ControllerFile, controller_named
+from omnidyn.control.controllers import ControllerFile, controller_named, told_apart
 from omnidyn.control.feedforward import DT, check_dt
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import path as path_named
-from omnidyn.control.tracking import Tracking
+from omnidyn.control.tracking import Tracking, Trackings
 from omnidyn.errors import InputError
 from omnidyn.model.motor import DUTY, SPEED
 from omnidyn.model.robot import Robot
@@ -70,10 +72,18 @@ class Circumstances:
         return count
 
 
+@overload
 def track(
+    robot: Robot, path: Any, controller: Controller | ControllerFile | str = "pid", **options: Any
+) -> Tracking: ...
+@overload
+def track(
+    robot: Robot, path: Any, controller: Sequence[Controller | ControllerFile | str], **options: Any
+) -> Trackings: ...
+def track(  # pyright: ignore[reportInconsistentOverload]  it has the options by name
     robot: Robot,
-    path: Path | Run | str,
-    controller: Controller | ControllerFile | str = "pid",
+    path: Any,
+    controller: Controller | ControllerFile | str | Sequence[Controller | ControllerFile | str] = "pid",
     *,
     plant: Robot | None = None,
     dt: float = DT,
@@ -84,8 +94,8 @@ def track(
     seed: int = 0,
     push: tuple[float, float, float] = (0.0, 0.0, 0.0),
     supply: float | None = None,
-) -> Tracking:
-    """Drive a simulated robot along a path with a controller, and see how near it comes.
+) -> Tracking | Trackings:
+    """Drive a simulated robot along a path with a controller, and see how near it comes; or with several, one by one.
 
     The robot starts on the path, at rest. A controller that can take a delay into account is told of it, and the loop
     begins as many steps before the path does: a path is known ahead, and who waits where it begins can be in motion on
@@ -93,9 +103,9 @@ def track(
 
     Args:
         robot: That the controller believes to drive.
-        path: A Path, or what `path` takes.
+        path: A Path, or what `omnidyn.path` takes: a name, a file, a Run, an array, a function, an object of your own.
         controller: A Controller, or the name of one ("feedforward", "speed", "pid", ..), or a controller file, by path
-            or as read.
+            or as `omnidyn.load_controller` reads it; or a list of these, for Trackings side by side.
         plant: The robot that is driven in truth; the same by default.
         dt: Time between two steps [s].
         duration: That is tracked [s]; that of the path by default.
@@ -109,24 +119,36 @@ def track(
 
     Raises InputError for what cannot be driven, or a number out of range.
     """
-    check_order("track(robot, path, controller)", (robot, Robot), (path, (Path, Run, str)), (controller, object))
+    kinds = (Path, Run, str) if isinstance(path, Robot) else object
+    check_order("track(robot, path, controller)", (robot, Robot), (path, kinds), (controller, object))
     if not 0 <= delay <= MOST_DELAY or delay != int(delay):
         raise InputError("no delay in steps", got=delay, expected=f"0 to {MOST_DELAY}", where="delay")
     around = Circumstances(dt, duration, skip, noise, int(delay), seed, push, supply)
-    follow = path if isinstance(path, Path) else path_named(path)
-    if isinstance(controller, str):
-        controller = controller_named(controller, robot, supply=supply, **told_of_loop(robot, around))
-    elif isinstance(controller, ControllerFile):
-        controller = controller.make(robot, supply=supply, **told_of_loop(robot, around))
-    elif not hasattr(controller, "step"):
+    follow = path_named(path)
+    wanted = list(controller) if isinstance(controller, list | tuple) else [controller]
+    if not wanted:
+        raise InputError("no controller", got="an empty list", expected="one controller or more", where="controller")
+    options = {"supply": supply, **told_of_loop(robot, around)}
+    controllers = told_apart([_controller(entry, robot, options) for entry in wanted])
+    trackings = [tracked(plant or robot, follow, follower, around) for follower in controllers]
+    return Trackings(tuple(trackings)) if isinstance(controller, list | tuple) else trackings[0]
+
+
+def _controller(wanted: Any, robot: Robot, options: Mapping[str, Any]) -> Controller:
+    """A controller for a robot, by name, from a file, or as it is."""
+    if isinstance(wanted, str | os.PathLike):
+        return controller_named(wanted, robot, **options)
+    if isinstance(wanted, ControllerFile):
+        return wanted.make(robot, **options)
+    if not hasattr(wanted, "step"):
         raise InputError(
             "no controller",
-            got=type(controller).__name__,
-            expected="a Controller, or the name of one",
+            got=type(wanted).__name__,
+            expected="a Controller, the name of one, or a list of them",
             remedy='controller="pid", or one made for the robot, such as Mpc(robot)',
             where="controller",
         )
-    return tracked(plant or robot, follow, controller, around)
+    return wanted
 
 
 def told_of_loop(robot: Robot, around: Circumstances) -> dict[str, Any]:

@@ -30,7 +30,8 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.errors import INTERRUPTS, told_by
+from omnidyn.control.paths.adapter import as_path
+from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.motor import DUTY, SPEED, no_load_speed
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings import refuse_slope
@@ -68,7 +69,7 @@ class Info:
 
 
 class Followed(Protocol):
-    """What a controller asks of a path; see Path of path.py."""
+    """What a controller asks of a path; a Path (paths/motion.py) has more, and `as_path` makes one of this."""
 
     @property
     def end(self) -> float:
@@ -76,7 +77,10 @@ class Followed(Protocol):
         ...
 
     def at(self, t: Any) -> Any:
-        """(pose, velocity, acceleration) in the world frame at times t [s], shapes (*t.shape, 3)."""
+        """(pose, velocity, acceleration) in the world frame at times t [s], shapes (*t.shape, 3): a plain tuple.
+
+        A controller asks for several times at once; where that raises, or gives other shapes, for one at a time.
+        """
         ...
 
 
@@ -189,7 +193,7 @@ class Safe:
             error = told_by(raised)
             if isinstance(error, INTERRUPTS):
                 raise error from raised
-            return self._safe(f"{FAILED}: {type(raised).__name__}", start)
+            return self._safe(failure(raised), start)
         if not fine:
             return self._safe(FAILED, start)
         self._last = sent
@@ -221,10 +225,12 @@ class Guarded(Safe, ABC):
         place, speed = vector(pose), vector(twist)
         if place is None or speed is None:
             return self._guarded(t, BAD_POSE if place is None else BAD_TWIST, "", None)
-        if not callable(getattr(path, "at", None)):
+        try:
+            follow = as_path(path)
+        except Exception:  # whatever stands in place of a path, it is none
             return self._guarded(t, BAD_PATH, "", None)
-        status = PATH_ENDED if _ended(path, t) else OK
-        return self._guarded(t, "", status, lambda dt: self._output(float(t), dt, place, speed, path))
+        status = PATH_ENDED if _ended(follow, t) else OK
+        return self._guarded(t, "", status, lambda dt: self._output(float(t), dt, place, speed, follow))
 
     @abstractmethod
     def _output(
@@ -251,6 +257,11 @@ def supply_of(robot: Robot, supply: float | None = None) -> float:
     """The volts that a duty of 1 is: as given, as in the file, else the least voltage limit of its motors [V]."""
     volts = supply if supply is not None else robot.drive.supply
     return float(volts if volts is not None else np.min(robot.motor.voltage_limit))
+
+
+def failure(error: Exception) -> str:
+    """Why a step found no output, in words: what a path does not say, else the kind of the error."""
+    return f"{FAILED}: {error.what if isinstance(error, InputError) else type(error).__name__}"
 
 
 def _number(value: Any) -> float:

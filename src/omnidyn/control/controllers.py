@@ -174,10 +174,14 @@ def several(
                 expected=f"one with the option {key}",
                 where=f"no_{key}" if key == "observer" else key,
             )
-    controllers = [spec.make(robot, **options) for spec in specs]
+    return told_apart([spec.make(robot, **options) for spec in specs])
+
+
+def told_apart(controllers: list[Controller]) -> list[Controller]:
+    """The controllers, two of one name told apart by a number."""
     for k, controller in enumerate(controllers):
         before = sum(earlier.name.partition(" ")[0] == controller.name for earlier in controllers[:k])
-        if before:
+        if before and controller not in controllers[:k]:
             controller.name = f"{controller.name} {before + 1}"  # pyright: ignore[reportAttributeAccessIssue]
     return controllers
 

@@ -87,14 +87,15 @@ class Demand(Displayable):
         return dict(self.document().data)
 
 
-def path_demand(robot: Robot, path: Path | Run | str) -> Demand:
+def path_demand(robot: Robot, path: Any) -> Demand:
     """What a path asks of a robot, and whether motors and floor can give that: by the inverse model, with friction.
 
     path: a Path, or what `omnidyn.path` takes. The start from rest is not counted: a robot that begins at rest is late
     by it. Corners are counted by themselves.
     """
-    check_order("path_demand(robot, path)", (robot, Robot), (path, (Path, Run, str)))
-    follow = path if isinstance(path, Path) else path_named(path)
+    kinds = (Path, Run, str) if isinstance(path, Robot) else object
+    check_order("path_demand(robot, path)", (robot, Robot), (path, kinds))
+    follow = path_named(path)
     t = np.linspace(0.0, follow.duration, SAMPLES)
     _, twist, change = follow.twist_at(t)
     rolls = without_slip(robot)

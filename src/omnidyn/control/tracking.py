@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -127,6 +127,42 @@ class Tracking(Displayable):
             "restlessness_V": self.restlessness,
             "statuses": dict(self.statuses),
         }
+
+    def plot(self) -> Figure:
+        """Path and robot from above, error over time, voltages, as a matplotlib Figure."""
+        return make(FIGURE, self)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Trackings(Displayable):
+    """What several controllers did on one path, in the order of the call: a sequence of Tracking."""
+
+    trackings: tuple[Tracking, ...]
+
+    def __iter__(self) -> Iterator[Tracking]:
+        return iter(self.trackings)
+
+    def __len__(self) -> int:
+        return len(self.trackings)
+
+    def __getitem__(self, index: int) -> Tracking:
+        return self.trackings[index]
+
+    def __repr__(self) -> str:
+        return f"<Trackings of {self[0].path} by {', '.join(tracking.controller for tracking in self)}>"
+
+    @property
+    def best(self) -> Tracking:
+        """The one whose position is nearest to the path."""
+        return min(self, key=lambda tracking: tracking.rmse_position)
+
+    def summary(self) -> str:
+        """The result as text."""
+        return self.document().to_text()
+
+    def document(self) -> Document:
+        """What they say, side by side."""
+        return trackings_document(self.trackings)
 
     def plot(self) -> Figure:
         """Path and robot from above, error over time, voltages, as a matplotlib Figure."""

@@ -23,6 +23,7 @@ from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
 from omnidyn.control.controllers import ControllerFile, controller_spec, options_of
 from omnidyn.control.feedforward import DT
 from omnidyn.control.paths.motion import Path
+from omnidyn.control.paths.path import is_several
 from omnidyn.control.paths.path import path as path_named
 from omnidyn.control.tracking import Tracking
 from omnidyn.document import Document, Part, Points, Table, all_of, plain
@@ -186,7 +187,7 @@ class Tuned(Displayable):
 
 def tune(
     robot: Robot,
-    path: Path | str | Sequence[Path | str],
+    path: Any,
     controller: str = "pid",
     *,
     draws: int = DRAWS,
@@ -204,7 +205,7 @@ def tune(
 
     Args:
         robot: The robot, its std with it.
-        path: A Path or what `path` takes; or several.
+        path: A Path or what `omnidyn.path` takes; or a list of several.
         controller: A name or a controller file: its options are where the search begins.
         draws: Robots that are driven.
         evaluations: Settings that are tried, at the most.
@@ -217,11 +218,12 @@ def tune(
 
     Raises InputError for a controller without gains, or a number out of range.
     """
-    paths: list[Any] = [path] if isinstance(path, Path | str) else list(path)
-    check_order("tune(robot, path, controller)", (robot, Robot), (paths, (Path, str)), (controller, str))
+    paths: list[Any] = list(path) if is_several(path) else [path]
+    kinds = (Path, str) if isinstance(path, Robot) else object
+    check_order("tune(robot, path, controller)", (robot, Robot), (paths, kinds), (controller, str))
     _check_counts(draws, evaluations, paths)
     around = Circumstances(dt, duration, noise=noise, delay=delay, seed=seed)
-    follow = [item if isinstance(item, Path) else path_named(item) for item in paths]
+    follow = [path_named(item) for item in paths]
     spec = controller_spec(controller)
     ranges = _ranges(spec)
     uncertain = bool(told(robot).keys)

@@ -87,6 +87,33 @@ def uneven(robot: Robot) -> bool:
     )
 
 
+# Place of a mecanum wheel -> the row of r w = (v_x, v_y, k omega) of its joint in
+# mecanum_drive_controller, and whether that is minus our row.
+PLACES = {
+    "front_left": ((1.0, -1.0, -1.0), True),
+    "front_right": ((1.0, 1.0, 1.0), False),
+    "rear_right": ((1.0, -1.0, 1.0), False),
+    "rear_left": ((1.0, 1.0, -1.0), True),
+}
+SAME = 1e-9  # of an entry of G
+
+
+def mecanum_places(robot: Robot) -> dict[str, int] | None:
+    """Place -> wheel, counted from 0, of four equal mecanum wheels in an X at 45 degrees; None for other wheels."""
+    wheels = robot.wheels
+    rows, b = wheels.wrench_matrix.T, float(np.mean(wheels.robot_radius))
+    if wheels.count != 4 or np.ptp(wheels.radii) > 0.0:
+        return None
+    found = {}
+    for place, (row, is_minus) in PLACES.items():
+        ours = np.array(row) * (-1.0 if is_minus else 1.0) * (1.0, 1.0, b)
+        alike = np.flatnonzero(np.abs(rows - ours).max(axis=1) < SAME * max(1.0, b))
+        if len(alike) != 1:
+            return None
+        found[place] = int(alike[0])
+    return found
+
+
 FEATURES = {
     "axes": Feature(
         "friction on the body axes ([friction.axes])",
@@ -143,7 +170,10 @@ FEATURES = {
     "rollers": Feature(
         "mecanum rollers ([wheels] roller_angle_deg)", lambda robot: _any(robot.wheels.roller_angle_deg)
     ),
-    "uneven": Feature("wheels that are not evenly spaced ([wheels])", uneven),
+    "uneven": Feature(
+        "neither even omni wheels nor four mecanum wheels in an X ([wheels])",
+        lambda robot: mecanum_places(robot) is None and (_any(robot.wheels.roller_angle_deg) or uneven(robot)),
+    ),
     "slip": Feature("wheels that may slip ([wheels] traction_mu)", lambda robot: robot.wheels.traction_mu is not None),
     "slope": Feature("a floor that is not level ([floor] tilt_deg)", lambda robot: robot.floor.tilt != 0.0),
     "band": Feature("a dead band of the driver ([drive] dead_band_V)", lambda robot: robot.drive.dead_band > 0.0),
@@ -199,9 +229,11 @@ _MUJOCO = {
     "slope": _LEVEL,
     "slip": _ROLL,
     **_LAWS,
-    "axes": Cell(PARTLY, "dry friction of joints stands still in the world: it is that of the body at heading 0 only"),
-    "direction": Cell(PARTLY, "a box along x and y of the world, of the level along each: no disc, no ellipse"),
-    "wheels": Cell(PARTLY, "its dry part is a box along x and y of the world, of the level along each axis alone"),
+    "axes": Cell(
+        PARTLY, "viscous friction stands still in the world: levels along x and y that differ are those at heading 0"
+    ),
+    "wheels": Cell(PARTLY, "its dry part is a box along x and y of the body, of the level along each axis alone"),
+    "plain": Cell(LEAVES_OUT, "its ellipse is that of maximum dissipation"),
     "breakaway": Cell(LEAVES_OUT, "it breaks away at the Coulomb level"),
     "no-frame": _NEWTON,
     "inductance": Cell(LEAVES_OUT, "currents settle at once"),
@@ -227,7 +259,7 @@ _LINKS = {
     "drop": Cell(PARTLY, "the effort of a joint: less by the drop"),
     "gear": Cell(LEAVES_OUT, "no gear takes anything"),
     "spin": Cell(PARTLY, "wheels spin about their axles; the format has no word for rotors"),
-    "rollers": Cell(LEAVES_OUT, "wheels are plain discs at b from the centre, their axles at the azimuth"),
+    "rollers": Cell(LEAVES_OUT, "wheels are plain discs: URDF has no direction of friction"),
     "band": Cell(LEAVES_OUT, "there are no motors in the file"),
     "map": Cell(LEAVES_OUT, "there are no motors in the file"),
     "latency": Cell(LEAVES_OUT, "commands act at once"),
@@ -242,9 +274,9 @@ _ROS = {
     **_LAWS,
     **dict.fromkeys(("axes", "direction", "wheels", "drop", "band", "map", "centre"), Cell(PARTLY, _KINEMATICS)),
     **dict.fromkeys(("breakaway", "frame", "inductance", "current", "gear"), Cell(LEAVES_OUT, "kinematics only")),
-    **dict.fromkeys(
-        ("rollers", "uneven"),
-        Cell(REFUSES, "omni_wheel_drive_controller takes omni wheels, evenly spaced, of one size"),
+    "uneven": Cell(
+        REFUSES,
+        "ROS has drive controllers for evenly spaced omni wheels, and for four mecanum wheels in an X, of one size",
     ),
     "spin": Cell(PARTLY, _KINEMATICS),
     "latency": Cell(LEAVES_OUT, "the controller waits for nothing"),
@@ -272,7 +304,11 @@ TABLE: dict[str, dict[str, Cell]] = {
     "gains": _GAINS,
     "mjcf": _MUJOCO,
     "urdf": _LINKS,
-    "sdf": _LINKS,
+    "sdf": {
+        **_LINKS,
+        "rollers": Cell(PARTLY, "discs whose friction acts along the axles of their rollers alone (fdir1)"),
+        "slip": Cell(PARTLY, "traction_mu is mu of the contact: what slips, and how, is Gazebo's"),
+    },
     "ros2-control": _ROS,
     "ros2-node": {
         **_GAINS,

@@ -39,10 +39,12 @@ KINDS = {
     "urdf": ExportKind("omnidyn.export.bodies.urdf", "urdf", "base and wheels as links and joints, for ROS"),
     "sdf": ExportKind("omnidyn.export.bodies.sdf", "sdf", "base and wheels as links and joints, for Gazebo"),
     "ros2-control": ExportKind(
-        "omnidyn.export.ros.ros2_control", "ros2_control", "omni_wheel_drive_controller for ROS 2"
+        "omnidyn.export.ros.ros2_control", "ros2_control", "a package for ROS 2: omni or mecanum drive controller"
     ),
     "ros2-node": ExportKind(
-        "omnidyn.export.ros.node", "ros2_node", "a node that drives by feed-forward or a controller, as text"
+        "omnidyn.export.ros.node",
+        "ros2_node",
+        "a package for ROS 2: a node that drives by feed-forward or a controller",
     ),
 }
 

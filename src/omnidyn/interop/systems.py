@@ -24,8 +24,7 @@ def linear_system(system: StateSpace | Robot) -> Any:
     control = _control()
     model = state_space(system) if isinstance(system, Robot) else system
     inputs = [f"u{k + 1}" for k in range(model.B.shape[1])]
-    zero = np.zeros((model.C.shape[0], model.B.shape[1]))
-    return control.ss(model.A, model.B, model.C, zero, inputs=inputs, states=list(STATES), outputs=list(STATES))
+    return control.ss(model.A, model.B, model.C, model.D, inputs=inputs, states=list(STATES), outputs=list(STATES))
 
 
 def nonlinear_system(robot: Robot) -> Any:

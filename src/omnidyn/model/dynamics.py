@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,6 +32,7 @@ from omnidyn.model.stick_slip.plant import plant
 from omnidyn.model.stick_slip.release import accelerations, moving_states, with_given_currents
 from omnidyn.model.surroundings import refuse_slope
 from omnidyn.model.wheels import Wheels, refuse_slip, wheel_speed, wrench_from_traction
+from omnidyn.shown import SYSTEM, make
 
 
 def settled_currents(robot: Robot, twist: ArrayLike, voltage: ArrayLike) -> FloatArray:
@@ -191,20 +192,34 @@ def axes_move_alone(robot: Robot) -> bool:
 
 @dataclass(frozen=True)
 class StateSpace:
-    """Matrices of eqs (13) (14): A [1/s], shape (3, 3); B, shape (3, wheels); K and C, shape (3, 3).
+    """Matrices of eqs (13) (14): A [1/s], shape (3, 3); B, shape (3, wheels); K and C, shape (3, 3); D, (3, wheels).
+
+        x' = A (x - x0) + B (u - u0) + K sgn(x),   y = C x + D u,   D = 0
 
     Units follow the axes: rows of B in m/s^2/V, m/s^2/V, rad/s^2/V; diagonal of K in m/s^2, m/s^2, rad/s^2.
+    twist x0 [m/s, m/s, rad/s], shape (3,), voltage u0 [V], shape (wheels,): the operating point, which holds itself;
+    zeros without one. At one K is 0: the friction there is in u0, its slope in A.
     """
 
     A: FloatArray
     B: FloatArray
     K: FloatArray
     C: FloatArray
+    D: FloatArray
+    twist: FloatArray
+    voltage: FloatArray
 
     @property
     def time_constants(self) -> FloatArray:
         """-1/diag(A) [s]: how fast each axis forgets. Shape (3,)."""
         return -1.0 / np.diag(self.A)
+
+    def to_control(self) -> Any:
+        """The linear part as a control.StateSpace: inputs u1, ... [V], states and outputs vx, vy, omega.
+
+        Of deviations from the operating point. Raises MissingExtraError where python-control is missing.
+        """
+        return make(SYSTEM, self)
 
 
 class MotorWrench(NamedTuple):
@@ -236,13 +251,18 @@ def _motor_wrench(motor: Motor, wheels: Wheels) -> MotorWrench:
     return wrench
 
 
-def state_space(robot: Robot, motors: MotorWrench | None = None) -> StateSpace:
-    """Eqs (13) (14) of a robot: what is linear, with the friction of the body axes as K.
+def state_space(robot: Robot, motors: MotorWrench | None = None, *, twist: ArrayLike | None = None) -> StateSpace:
+    """Eqs (13) (14) of a robot: what is linear, with the friction of the body axes as K; or its linear part elsewhere.
 
     Left out: inductance, drop and limit of the motors, terms of a turning frame, friction of other shapes.
     motors: its `motor_wrench`, where that is known.
+    twist: an operating point [m/s, m/s, rad/s], shape (3,); then the slopes of `acceleration` there, friction of every
+    shape and the turning frame included. Where it rests, dry friction is left out of A: it has no slope there.
+    Raises InputError for what is no twist.
     """
     check_order("state_space(robot)", (robot, Robot))
+    if twist is not None:
+        return _at_operating_point(robot, _vectors("twist", twist, N_AXES))
     motors = motors or motor_wrench(robot)
     viscous, coulomb, _ = robot.friction.axes.levels
     return StateSpace(
@@ -250,6 +270,39 @@ def state_space(robot: Robot, motors: MotorWrench | None = None) -> StateSpace:
         B=per_mass(robot, motors.driving).T + 0.0,
         K=per_mass(robot, np.diag(-coulomb)).T,
         C=np.eye(3),
+        D=np.zeros((3, robot.wheels.count)),
+        twist=np.zeros(3),
+        voltage=np.zeros(robot.wheels.count),
+    )
+
+
+ASIDE = 1e-6  # [m/s, rad/s] by which an axis at rest is moved, so that its friction has one sign
+
+
+def _at_operating_point(robot: Robot, twist: FloatArray) -> StateSpace:
+    """Central differences of `acceleration`, on one side of every jump; the voltage of least squares that holds it."""
+    if twist.shape != (3,):
+        raise InputError("no operating point", got=f"shape {twist.shape}", expected="(3,): vx, vy, omega")
+    friction, still = robot.friction, not twist[:2].any()
+    if still:  # its direction is open, and so is that of its friction
+        bare = friction.direction.replace(coulomb=(0.0, 0.0), breakaway=None)
+        friction = friction.replace(direction=bare)
+    moved = robot.replace(friction=friction)
+    point = np.where(twist == 0.0, ASIDE, twist)
+    count, step = robot.wheels.count, 0.1 * ASIDE
+    volts = np.zeros(count)
+    ends = np.concatenate([point + step * np.eye(3), point - step * np.eye(3)])
+    first, second = np.split(acceleration(moved, ends, volts), 2)
+    pushed = acceleration(moved, point, np.concatenate([np.eye(count), np.zeros((1, count))]))
+    B = (pushed[:-1] - pushed[-1]).T
+    return StateSpace(
+        A=(first - second).T / (2.0 * step),
+        B=B,
+        K=np.zeros((3, 3)),
+        C=np.eye(3),
+        D=np.zeros((3, count)),
+        twist=twist,
+        voltage=-np.linalg.pinv(B) @ acceleration(robot, twist, volts),
     )
 
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from omnidyn.comparison.drift import Drift
 from omnidyn.comparison.result import Comparison
-from omnidyn.control.tracking import Tracking
+from omnidyn.control.tracking import Tracking, Trackings
 from omnidyn.errors import InputError
 from omnidyn.findings.finding import Verdict
 from omnidyn.identification.estimate import Estimate
@@ -103,4 +103,5 @@ PICTURES: dict[type, Callable[..., Picture]] = {
     MotorStudy: _motors,
     SteadyStudy: draw_polar,
     Tracking: draw_tracking,
+    Trackings: draw_tracking,
 }

@@ -8,6 +8,7 @@ import pytest
 import omnidyn
 from omnidyn.export.bodies.sdf import sdf
 from omnidyn.export.bodies.urdf import urdf
+from omnidyn.model.wheels import wheel_speed
 from tests.support.mixed_robots import random_robot, with_centre, with_spin
 
 ROBOT = omnidyn.load_robot("axebot")
@@ -127,11 +128,63 @@ def test_limits_and_friction_of_joints(write, read):
         assert dry == pytest.approx((k + 1) * 0.035, rel=1e-12)
 
 
-def test_mujoco_reads_the_urdf():
-    mujoco = pytest.importorskip("mujoco")
-    model = mujoco.MjModel.from_xml_string(urdf(ROBOT).text)
-    assert model.njnt == 3
-    assert [model.joint(k).name for k in range(3)] == ["wheel1_joint", "wheel2_joint", "wheel3_joint"]
+@pytest.mark.parametrize("name", ["axebot", "mecanum", "robotino", "lekiwi", "four-wheel"])
+@pytest.mark.parametrize("height", [None, 0.4])
+def test_mujoco_reads_the_urdf_and_nothing_touches_but_the_wheels_the_floor(name, height):
+    """What collides is in it: base and wheels stand clear of each other, and the wheels alone reach the floor."""
+    mujoco, robot = pytest.importorskip("mujoco"), omnidyn.load_robot(name)
+    joints = [f"wheel{k + 1}" for k in range(robot.wheels.count)]
+    spec = mujoco.MjSpec.from_string(urdf(robot, height, joints).text)
+    floor = -float(robot.wheels.radii.max()) + 1e-4
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5, 5, 1], pos=[0, 0, floor], name="floor")
+    model = spec.compile()
+    assert [model.joint(k).name for k in range(model.njnt)] == joints
+    assert model.ngeom == 2 + robot.wheels.count
+    model.body_weldid[:] = np.arange(model.nbody)  # else the base, which stands still, would not be tested
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    touching = {tuple(sorted(contact.geom)) for contact in data.contact}
+    (plane,) = (k for k in range(model.ngeom) if model.geom_type[k] == mujoco.mjtGeom.mjGEOM_PLANE)
+    wheels = {k for k in range(model.ngeom) if model.body(model.geom_bodyid[k]).name.startswith("wheel")}
+    assert touching == {tuple(sorted((plane, wheel))) for wheel in wheels}
+
+
+def rolling(robot):
+    """By how much each wheel of its SDF slips at the floor in a twist: along fdir1, and across it [m/s].
+
+    Of the file: places, axes, radii and directions. Of the model: how fast each wheel turns for that twist.
+    """
+    model = ET.fromstring(sdf(robot).text).find("model")
+    twist = np.array([0.4, -0.7, 2.0])
+    links = {link.get("name"): link for link in model.findall("link")}
+    for joint, speed in zip(model.findall("joint"), wheel_speed(robot.wheels, twist), strict=True):
+        link = links[joint.findtext("child")]
+        pose, friction = numbers(link.findtext("pose")), link.find("collision/surface/friction/ode")
+        cos, sin = np.cos(pose[5]), np.sin(pose[5])
+        axle = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]]) @ numbers(joint.findtext("axis/xyz"))
+        radius = float(link.findtext("collision/geometry/cylinder/radius"))
+        hub = np.array([twist[0] - twist[2] * pose[1], twist[1] + twist[2] * pose[0], 0.0])
+        slip = hub + np.cross(speed * axle, [0.0, 0.0, -radius])
+        along = numbers(friction.findtext("fdir1"))
+        assert friction.find("fdir1").get("{http://gazebosim.org/schema}expressed_in") == "base_link"
+        assert float(friction.findtext("mu2")) == 0.0
+        assert float(friction.findtext("mu")) > 0.0
+        yield slip @ along, slip @ np.cross([0.0, 0.0, 1.0], along)
+
+
+@pytest.mark.parametrize("name", ["axebot", "mecanum", "four-wheel", "lekiwi"])
+@pytest.mark.parametrize("wheelbase", [None, 0.15])
+def test_wheels_of_the_sdf_roll_sideways(name, wheelbase):
+    """Whatever the twist, the floor slips across fdir1 alone, where there is no friction: a closed form."""
+    robot = omnidyn.load_robot(name)
+    if name == "mecanum":
+        robot = robot.replace(wheels=robot.wheels.replace(wheelbase=wheelbase))
+        places = {tuple(np.sign(place[:2])) for place, *_ in from_sdf(sdf(robot).text)[1]}
+        assert places == {(1, 1), (1, -1), (-1, 1), (-1, -1)}
+        assert any("wheelbase is a guess" in words for words in sdf(robot).missing) == (wheelbase is None)
+    slips = np.array(list(rolling(robot)))
+    np.testing.assert_allclose(slips[:, 0], 0.0, atol=1e-12)
+    assert (np.abs(slips[:, 1]) > 0.01).all()
 
 
 @pytest.mark.parametrize("write", [urdf, sdf])

@@ -8,6 +8,7 @@ from omnidyn.errors import InputError
 from omnidyn.export.bodies.mjcf import mjcf
 from omnidyn.model.actuation import clip_voltage
 from omnidyn.model.dynamics import drive_wrench
+from omnidyn.model.friction import Friction
 from omnidyn.model.mass import per_mass
 from omnidyn.model.sliding import coulomb_along
 from omnidyn.model.wheels import per_wheel
@@ -30,7 +31,7 @@ def simulated(robot, volts, dt=1e-3):
     for k, row in enumerate(volts):
         data.ctrl[:] = row
         mujoco.mj_step(model, data)
-        out[k + 1] = data.qvel, data.qpos
+        out[k + 1] = data.qvel[:3], data.qpos[:3]
     return out[:, 0], out[:, 1]
 
 
@@ -42,8 +43,9 @@ def test_motors_push_as_ours_do(seed):
     assert model.nu == robot.wheels.count
     model, data = loaded(robot)
     model.dof_frictionloss[:] = 0.0
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
     twist, volts = rng.normal(size=3), rng.uniform(-8.0, 8.0, model.nu)
-    data.qvel[:], data.ctrl[:] = twist, volts
+    data.qvel[:3], data.ctrl[:] = twist, volts
     mujoco.mj_forward(model, data)
     plain = robot.replace(
         motor=robot.motor.replace(voltage_drop=0.0, gear_efficiency=1.0, electrical="quasi-static"),
@@ -58,7 +60,7 @@ def test_motors_push_as_ours_do(seed):
         drive_wrench(plain, twist, clip_voltage(robot.motor, volts)) - viscous - robot.wheels.wrench_matrix @ wheels
     )
     if not (limited and np.any(wheels)):
-        np.testing.assert_allclose(data.qacc, per_mass(robot, wrench), rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(data.qacc[:3], per_mass(robot, wrench), rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(model.actuator_ctrlrange[:, 1], per_wheel(robot.motor.voltage_limit, model.nu))
 
 
@@ -67,7 +69,7 @@ def test_inertias_are_those_of_a_body():
         model = mujoco.MjModel.from_xml_string(mjcf(ROBOT, height=tall).text)
         x, y, z = sorted(model.body_inertia[1])
         assert x + y > z
-        assert model.body_mass[1] == 1.5
+        assert model.body_subtreemass[1] == pytest.approx(1.5, rel=1e-14)
     with pytest.raises(InputError, match="no body has this height; got 0"):
         mjcf(ROBOT, height=0.0)
 
@@ -107,11 +109,11 @@ def test_a_centre_of_mass_beside_the_wheels_moves_mujoco_as_us(centre):
     robot = ROBOT.replace(body=body, friction=type(ROBOT.friction)())
     model, data = loaded(robot)
     twist, volts = np.array([0.4, -0.3, 5.0]), np.array([1.5, 5.5, -2.5])
-    data.qvel[:], data.ctrl[:] = twist, volts
+    data.qvel[:3], data.ctrl[:] = twist, volts
     mujoco.mj_forward(model, data)
     # qvel is along the axes of the room, which at heading 0 are those of the body: v' there, and omega x v here
     turned = twist[2] * np.array([-twist[1], twist[0], 0.0])
-    np.testing.assert_allclose(data.qacc - turned, omnidyn.acceleration(robot, twist, volts), rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(data.qacc[:3] - turned, omnidyn.acceleration(robot, twist, volts), rtol=1e-9, atol=1e-9)
     rows = np.tile(volts, (10_000, 1))
     model.opt.timestep = 1e-4
     mujoco.mj_resetData(model, data)
@@ -119,7 +121,7 @@ def test_a_centre_of_mass_beside_the_wheels_moves_mujoco_as_us(centre):
     for row in rows:
         data.ctrl[:] = row
         mujoco.mj_step(model, data)
-        places.append(data.qpos.copy())
+        places.append(data.qpos[:3].copy())
     run = omnidyn.simulate(robot, rows[:100], 1e-2)
     assert run.pose is not None
     np.testing.assert_allclose(np.array(places)[99::100], run.pose[1:], atol=2e-3)
@@ -128,12 +130,49 @@ def test_a_centre_of_mass_beside_the_wheels_moves_mujoco_as_us(centre):
     assert np.abs(middle.pose - run.pose).max() > 0.02
 
 
+TURNING = ROBOT.replace(body=ROBOT.body.replace(rotating_frame=True))
+ELLIPSE = TURNING.replace(
+    name="ellipse", friction=Friction(direction={"coulomb": (2.6, 1.5), "viscous": 0.9, "yaw_coulomb": 0.1})
+)
+BOTH = ELLIPSE.replace(
+    name="both",
+    friction=ELLIPSE.friction.replace(axes={"coulomb": (0.8, 0.3, 0.05), "viscous": (0.1, 0.1, 0.01)}),
+)
+
+
+@pytest.mark.parametrize("robot", [TURNING, ELLIPSE, BOTH], ids=lambda robot: robot.name)
+def test_a_robot_that_drives_and_turns_takes_its_friction_along(robot):
+    """Against our engine, pushed one way and the other: 0.44 m/s off where friction stood still in the world."""
+    largest = np.zeros(3)
+    for volts in ([4.36, 0.5, -2.4], [0.52, 5.22, 3.79], [4.29, -5.6, 2.76]):
+        program = np.repeat([volts, np.zeros(3), np.negative(volts)], [800, 400, 400], axis=0)
+        speeds, places = simulated(robot, program)
+        cos, sin = np.cos(places[:, 2]), np.sin(places[:, 2])
+        twist = np.stack(
+            [cos * speeds[:, 0] + sin * speeds[:, 1], cos * speeds[:, 1] - sin * speeds[:, 0], speeds[:, 2]], axis=1
+        )
+        run = omnidyn.simulate(robot, program, 1e-3)
+        largest = np.maximum(largest, np.abs(twist - run.twist).max(axis=0))
+    assert (largest < [0.006, 0.006, 0.03]).all()
+
+
+def test_within_its_dead_zone_it_rests_at_any_heading():
+    model, data = loaded(TURNING)
+    data.qpos[2] = 0.7
+    data.ctrl[:] = 0.5 * omnidyn.breakaway_voltage(TURNING, [0.0, 1.0, -1.0]) * np.array([0.0, 1.0, -1.0])
+    mujoco.mj_step(model, data, 6000)
+    assert 10.0 * np.abs(data.qpos[:2]).max() < 1e-4  # as above
+
+
 def test_friction_of_other_shapes_is_its_level_along_each_axis():
     robot = omnidyn.load_robot("robotino")
     model, _ = loaded(robot)
-    np.testing.assert_allclose(model.dof_frictionloss, coulomb_along(robot), rtol=1e-12)
-    made = mjcf(robot)
-    assert any("no disc, no ellipse" in words for words in made.missing)
+    levels = coulomb_along(robot)
+    np.testing.assert_allclose(model.dof_frictionloss, [0.0, 0.0, levels[2], 0.0], rtol=1e-12)
+    pressure = model.jnt_stiffness[3] * model.qpos_spring[3]
+    np.testing.assert_allclose(pressure * model.pair_friction[0, :2], np.sort(levels[:2])[::-1], rtol=1e-12)
+    made = mjcf(omnidyn.load_robot("lekiwi").replace(friction=Friction(wheels={"coulomb": 1.0, "viscous": 0.1})))
+    assert any("a box along x and y of the body" in words for words in made.missing)
     assert all(words in made.text for words in made.missing)
 
 

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 import runpy
 import shutil
 import subprocess
@@ -10,14 +11,17 @@ import numpy as np
 import pytest
 
 import omnidyn
+from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.export.feedforward.gains import axis_gains, gains, gains_csv
 from omnidyn.export.feedforward.road_runner import road_runner
 from omnidyn.export.feedforward.wpilib import wpilib
 from omnidyn.model.deadzone import axis_patterns
+from omnidyn.model.first_guess import first_guess
 from omnidyn.model.keys import Key
 from omnidyn.model.known.told import with_correlation
 from omnidyn.model.motor import no_load_speed
 from omnidyn.model.robot import Prior
+from omnidyn.model.wheels import wheel_speed
 from tests.support.exported import exact_robot
 
 ROBOT = omnidyn.load_robot("axebot")
@@ -127,9 +131,62 @@ def test_java_and_cpp_compile(tmp_path, name):
         subprocess.run(["javac", "-encoding", "UTF-8", "RobotGains.java"], cwd=folder, check=True)
 
 
+@pytest.mark.parametrize("name", ["mecanum", "four-wheel"])
+def test_per_tick_they_are_what_road_runner_drives_with(name):
+    """Its MecanumKinematics (inverse, version 1.0) and MotorFeedforward, on our simulation, which settles there."""
+    robot, n = omnidyn.load_robot(name), 537.7
+    twist = np.array([0.4, -0.3, 2.0])
+    if name == "four-wheel":
+        azimuth = (45.0, -45.0, 135.0, -135.0)  # of an X-drive: front left, front right, rear left, rear right
+        robot = robot.replace(wheels=robot.wheels.replace(azimuth_deg=azimuth))
+    text = road_runner(robot, ticks_per_turn=n).text
+    found = {key: float(value) for key, value in re.findall(r"public double (\w+) = ([^;]+);", text)}
+    lateral = found["inPerTick"] / found["lateralInPerTick"]
+    track = found["inPerTick"] * found["trackWidthTicks"]
+    x, y, turn = twist[0] / 0.0254, twist[1] / 0.0254 * lateral, twist[2] * track  # inches
+    wheels = np.array([x - y - turn, x + y + turn, x + y - turn, x - y + turn])  # left front, right, left rear, right
+    forward = np.array([-1.0, 1.0, -1.0, 1.0])  # a motor that drives forward, in our sense
+    ticks = wheel_speed(robot.wheels, twist) * forward * n / (2.0 * np.pi)
+    np.testing.assert_allclose(wheels / found["inPerTick"], ticks, rtol=1e-12)
+    rate = 0.4 / 0.0254 / found["inPerTick"]
+    volts = (found["kS"] + found["kV"] * rate) * forward
+    run = omnidyn.simulate(robot, np.tile(volts, (400, 1)), 0.02)
+    np.testing.assert_allclose(run.twist[-1], [0.4, 0.0, 0.0], atol=1e-3)
+    first = omnidyn.simulate(
+        robot, [volts + found["kA"] * forward * 10.0 / 0.0254 / found["inPerTick"]], 1e-5, twist=run.twist[-1]
+    )
+    assert (first.twist[-1, 0] - 0.4) / 1e-5 == pytest.approx(10.0, rel=1e-3)
+
+
+def test_gains_of_wheels_per_tick():
+    per_rad, per_tick = (list(csv.DictReader(gains_csv(ROBOT, n).text.splitlines()[1:])) for n in (None, 360.0))
+    for row, other in zip(per_rad, per_tick, strict=True):
+        in_ticks = row["place"].startswith("wheel") and row["gain"] != "kS"
+        assert float(other["value"]) == pytest.approx(float(row["value"]) * (np.pi / 180.0 if in_ticks else 1.0))
+        assert other["unit"] == (row["unit"].replace("rad", "tick") if in_ticks else row["unit"])
+    with pytest.raises(InputError, match="no number of ticks in a turn of a wheel; got 0"):
+        gains_csv(ROBOT, 0.0)
+    with pytest.raises(UnsupportedError, match=r"do not turn alike.*got 3 wheels.*gains of each wheel"):
+        road_runner(ROBOT, ticks_per_turn=360.0)
+
+
+@pytest.mark.parametrize("make", [wpilib, road_runner])
+def test_a_robot_whose_friction_is_a_guess_is_refused(make):
+    wheels = omnidyn.load_robot("mecanum").wheels
+    robot = first_guess("new", wheels, 7.5)
+    with pytest.raises(InputError, match=r"gains are guesses.*coulomb.*identify LOG.*`force_guess`"):
+        make(robot)
+    made = make(robot, force_guess=True)
+    assert all("GUESSES, not measured" in text.partition("kS = ")[0] for text in made.files.values())
+    assert "GUESSES" in made.notes[0]
+    friction = {key: Prior(std=0.1, origin="identified") for key in robot.priors if key.startswith("friction.")}
+    fitted = robot.replace(priors={**robot.priors, **friction})
+    assert not any("GUESSES" in text for text in make(fitted).files.values())
+
+
 def test_what_gains_cannot_say_is_said():
     robot = omnidyn.load_robot("robotino")
-    made = wpilib(robot)
+    made = wpilib(robot, force_guess=True)
     assert made.missing
     for words in made.missing:
         assert all(words in text for text in made.files.values())

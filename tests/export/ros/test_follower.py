@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.errors import UnsupportedError
+from omnidyn.control.controllers import controller_named
+from omnidyn.control.paths.path import path as path_of
 from omnidyn.export.ros.node import ros2_node
 from omnidyn.model.motor import Drive
 from tests.export.ros.test_node import NO_NUMBERS, NO_SUPPLY, NO_TIME, ROBOT, Plant, loaded
@@ -178,7 +179,18 @@ def test_whatever_the_robot_is_called(name):
             compile(text, file, "exec")
 
 
-def test_a_drive_that_takes_speeds_of_wheels_is_refused():
-    robot = ROBOT.replace(drive=Drive.model_validate({"kind": "speed", "rate_Hz": 200.0, "kp_V_s_rad": 0.1}))
-    with pytest.raises(UnsupportedError, match=r"gives duties.*got speed; .*ros2-control drives such a robot"):
-        ros2_node(robot, "pid")
+def test_a_drive_that_takes_speeds_of_wheels_gets_them(tmp_path):
+    """The set points that the controller of Python gives, on the way along the circle."""
+    drive = Drive.model_validate({"kind": "speed", "rate_Hz": 100.0, "kp_V_s_rad": 0.3, "ki_V_rad": 6.0})
+    robot = ROBOT.replace(name="looped", drive=drive)
+    module = built(tmp_path / "node", robot, "pid")
+    loop, law = module.PathLoop(), controller_named("pid", robot, dt=DT)
+    course, times = path_of("circle:radius_m=0.4,speed_m_s=0.4,heading=along"), np.arange(2000) * 1e-3
+    loop.measured(0.0, [0.0] * 3, [0.0] * 3)
+    loop.follow(0.0, [[t, *course.at(t).pose] for t in times])
+    for k in range(60):
+        place, twist = np.add(course.at(k * DT).pose, 0.01), [0.3, 0.0, 1.0]
+        loop.measured(k * DT, place, twist)
+        expected = law.step(k * DT, place, twist, course)
+        np.testing.assert_allclose(loop.step(k * DT), expected, atol=0.02)
+    assert np.abs(expected).max() > 5.0

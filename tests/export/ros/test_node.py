@@ -1,6 +1,8 @@
 """ros2-node: the loop drives our simulated robot, and the node does so over a bus that is none: stubs of rclpy."""
 
 import importlib.util
+import re
+import shutil
 import sys
 from decimal import Decimal
 from types import ModuleType, SimpleNamespace
@@ -11,7 +13,9 @@ import pytest
 import omnidyn
 from omnidyn.errors import InputError
 from omnidyn.export.ros.node import ros2_node
-from omnidyn.model.wheels import wheel_speed
+from omnidyn.model.motor import Drive
+from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed
+from tests.export.ros.test_ros2_control import checked_package, installed, started
 from tests.support.exported import exact_robot
 
 ROBOT = omnidyn.load_robot("axebot")
@@ -275,8 +279,59 @@ def test_the_node_on_a_bus(bus, tmp_path, monkeypatch, stamped):
 
 @pytest.mark.parametrize("name", ['"""', "\\", "速度\u202e", "a\nimport os"])
 def test_whatever_the_robot_is_called(name):
-    for text in ros2_node(ROBOT.replace(name=name)).files.values():
-        compile(text, "file.py", "exec")
+    for file, text in ros2_node(ROBOT.replace(name=name)).files.items():
+        if file.endswith(".py"):
+            compile(text, file, "exec")
+
+
+@pytest.fixture
+def looped():
+    """A robot whose firmware holds speeds of the wheels."""
+    drive = Drive.model_validate({"kind": "speed", "rate_Hz": 100.0, "kp_V_s_rad": 0.3, "ki_V_rad": 6.0})
+    return omnidyn.load_robot("mecanum").replace(name="looped", drive=drive)
+
+
+def test_a_speed_loop_gets_set_points_of_the_wheels(drive, looped):
+    """A simulation with friction follows them: to 1 % once the loop has settled; without a command it rests."""
+    module, goal = drive(looped), np.array([0.3, -0.2, 0.8])
+    loop, rows = module.DriveLoop(), []
+    for k in range(300):
+        if k < 160:
+            loop.command(k * DT, goal.tolist())
+        rows.append(loop.step(k * DT))
+    np.testing.assert_allclose(rows[150], wheel_speed(looped.wheels, goal), rtol=1e-12)
+    run = omnidyn.simulate(looped, wheel_speed_command=rows, dt=DT)
+    np.testing.assert_allclose(run.twist[155], goal, rtol=1e-2)
+    assert np.abs(run.twist[-1]).max() < 1e-6
+    loop.command(3.0, [50.0, 0.0, 0.0])
+    for k in range(3000):
+        loop.command(3.0 + k * DT, [50.0, 0.0, 0.0])
+        row = np.array(loop.step(3.0 + k * DT))
+    assert loop.status == module.LIMITED
+    assert np.abs(row).max() == pytest.approx(0.8 * 6.0 / (0.0059 * 19.0), rel=1e-9)  # 0.8 of the speed without load
+    np.testing.assert_allclose(twist_from_wheel_speed(looped.wheels, row)[1:], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("controller", ["", "pid"])
+def test_the_package_installs_what_it_starts(tmp_path, controller):
+    made = ros2_node(ROBOT, controller, joints=["fl", "fr", "back"])
+    name, needs = checked_package(made, tmp_path / "bot")
+    (node,) = started(made.files["omnidyn_node.launch.py"], tmp_path / "bot")
+    assert node["package"] == name
+    assert made.files["omnidyn_node.py"].startswith("#!/usr/bin/env python3\n")
+    text = "".join(made.files[file] for file in made.files if file.endswith(".py") and "launch" not in file)
+    imported = {
+        line.split()[1].split(".")[0] for line in text.splitlines() if re.match(r"(from|import) [a-z_.]+", line)
+    }
+    standard = set(sys.stdlib_module_names) | {"drive_loop", "path_loop"}
+    assert imported - standard <= needs
+    assert "`fl`, `fr`, `back`" in made.files["README.md"]
+    if shutil.which("cmake"):
+        loop = "path_loop.py" if controller else "drive_loop.py"
+        library = {"lib/N/libomnidyn_control.so"} if controller else set()
+        files = {f"lib/N/{loop}", "lib/N/omnidyn_node.py", "share/N/omnidyn_node.launch.py"} | library
+        found = installed(tmp_path / "bot", tmp_path / "build")
+        assert {file.replace(f"/{name}/", "/N/") for file in found} == files
 
 
 @pytest.mark.parametrize("options", [{"dt": 0.0}, {"timeout": -1.0}, {"dt": float("nan")}])

@@ -1,7 +1,12 @@
 """ros2-control: what the controller makes of our files is our kinematics; covariances hold on other logs."""
 
 import ast
+import re
+import shutil
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -14,9 +19,12 @@ from omnidyn.model.deadzone import axis_patterns
 from omnidyn.model.robot import Prior
 from omnidyn.model.wheels import wheel_speed
 from tests.support.exported import exact_robot
+from tests.support.ros_parameters import check_parameters
 
 yaml = pytest.importorskip("yaml")
-ROBOT = omnidyn.load_robot("axebot")
+ROBOT, MECANUM = omnidyn.load_robot("axebot"), omnidyn.load_robot("mecanum")
+SUM = "sum_of_robot_center_projection_on_X_Y_axis"
+LAUNCH = ("launch", "launch_ros", "launch_ros.actions", "launch_ros.parameter_descriptions")
 
 
 def parameters(made):
@@ -36,11 +44,9 @@ def odometry(given, joints):
 def test_the_controller_finds_the_twist_of_the_model(robot):
     """Joints of the URDF turn about their axes; by w about ours is by -w about an outward one."""
     made, twist = ros2_control(robot), np.array([0.4, -0.7, 2.0])
-    axes = {}
-    for joint in ET.fromstring(made.files["robot.urdf"]).findall("joint"):
-        axes[joint.get("name")] = float(joint.find("axis").get("xyz").split()[0])
-    own = wheel_speed(robot.wheels, twist)
-    joints = {f"wheel{k + 1}_joint": -axes[f"wheel{k + 1}_joint"] * w for k, w in enumerate(own)}
+    axes = axes_of(made)
+    speeds = wheel_speed(robot.wheels, twist)
+    joints = {f"wheel{k + 1}_joint": -axes[f"wheel{k + 1}_joint"] * w for k, w in enumerate(speeds)}
     np.testing.assert_allclose(odometry(parameters(made), joints), twist, rtol=1e-9)
 
 
@@ -83,7 +89,7 @@ def test_covariances_hold_on_two_hundred_logs():
             np.array(parameters(ros2_control(ROBOT, noisy_log(1000 + seed)))["diagonal_covariance"]["twist"])[[0, 1, 5]]
         )
         for other in range(seed, seed + 10):
-            error = odometry_error(ROBOT, noisy_log(other))
+            error = odometry_error(ROBOT, noisy_log(other))[1]
             inside += (np.abs(error) < 1.96 * std).sum(axis=0)
             count += len(error)
     assert ((inside / count > 0.93) & (inside / count < 0.97)).all()
@@ -94,6 +100,20 @@ def test_the_variance_of_the_twist_is_that_of_the_noise():
     twist = parameters(ros2_control(ROBOT, [noisy_log(seed) for seed in range(20)]))["diagonal_covariance"]["twist"]
     expected = 0.035 * 0.5 * np.array([np.sqrt(2 / 3), np.sqrt(2 / 3), 1 / (np.sqrt(3) * 0.1)])
     np.testing.assert_allclose(np.sqrt(np.array(twist)[[0, 1, 5]]), expected, rtol=0.03)
+
+
+def test_sensors_with_clocks_of_their_own_are_brought_to_one_time():
+    """A wheel that is 1 % larger than the robot file has it: the error of a twist is 1 % of it, at any stamps."""
+    t = np.arange(0.0, 4.0, 0.005)
+    twist = np.stack([0.3 + 0.1 * np.sin(t), 0.2 * np.cos(t), np.ones_like(t)], axis=1)
+    speeds = 1.01 * wheel_speed(ROBOT.wheels, twist)
+    speeds[1::2], twist[::2] = np.nan, np.nan
+    at, error = odometry_error(ROBOT, omnidyn.Run(t=t, wheel_speed=speeds, twist=twist))
+    np.testing.assert_array_equal(at, t[1::2])
+    np.testing.assert_allclose(error[1:-1], 0.01 * twist[1::2][1:-1], atol=1e-5)
+    long = ros2_control(ROBOT, omnidyn.Run(t=t, wheel_speed=speeds, twist=twist), horizon=1.0)
+    variance = parameters(long)["diagonal_covariance"]["pose"]
+    np.testing.assert_allclose(variance[5], 1e-4, rtol=0.05)
 
 
 def test_the_pose_after_the_horizon_is_as_uncertain_as_sums_of_the_errors():
@@ -114,8 +134,14 @@ def test_what_is_known_of_the_radii_counts_where_there_are_no_logs():
 
 
 def test_what_cannot_be_said_is_refused():
-    with pytest.raises(UnsupportedError, match=r"evenly spaced.*mecanum rollers"):
-        ros2_control(omnidyn.load_robot("mecanum"))
+    plain = omnidyn.load_robot("mecanum")
+    for wheels in (
+        plain.wheels.replace(roller_angle_deg=(-40.0, 40.0, 40.0, -40.0)),
+        plain.wheels.replace(wheel_radius=(0.03, 0.03, 0.03, 0.031)),
+        ROBOT.wheels.replace(azimuth_deg=(0.0, 90.0, 200.0)),
+    ):
+        with pytest.raises(UnsupportedError, match=r"evenly spaced.*nor four mecanum wheels in an X"):
+            ros2_control(plain.replace(wheels=wheels, drive=plain.drive, friction=plain.friction))
     log = noisy_log(1)
     with pytest.raises(InputError, match="cannot compare odometry with this run"):
         ros2_control(ROBOT, log.replace(twist=None))
@@ -132,29 +158,6 @@ def test_whatever_the_robot_is_called(name):
     ET.fromstring(made.files["robot.urdf"])
     ast.parse(made.files["bringup.launch.py"])
     assert parameters(made)["wheel_radius"] == 0.035
-
-
-# Types of the parameters, as the controllers declare them (generate_parameter_library of omni_wheel_drive_controller,
-# declare_parameter of nav2's velocity_smoother): ROS 2 takes no integer for a double, and no array of both.
-DOUBLES = {"wheel_offset", "robot_radius", "wheel_radius", "cmd_vel_timeout", "smoothing_frequency", "velocity_timeout"}
-ARRAYS = {"pose", "twist", "max_velocity", "min_velocity", "max_accel", "max_decel", "deadband_velocity"}
-WORDS = {"odom_frame_id", "base_frame_id", "feedback", "type"}
-TRUTHS = {"position_feedback", "scale_velocities"}
-
-
-def typed(tree):
-    """Every parameter of a file has the type that its controller declares; all of them are known."""
-    for name, value in tree.items():
-        if isinstance(value, dict):
-            typed(value)
-        elif name in ARRAYS:
-            assert all(type(each) is float for each in value), (name, value)
-            assert len(value) in (3, 6)
-        elif name == "wheel_names":
-            assert all(type(each) is str for each in value)
-        else:
-            kinds = {**dict.fromkeys(DOUBLES, float), **dict.fromkeys(WORDS, str), **dict.fromkeys(TRUTHS, bool)}
-            assert type(value) is {**kinds, "update_rate": int}[name], (name, value)
 
 
 def round_robot(radius):
@@ -174,12 +177,129 @@ def test_a_number_is_a_float_to_yaml(value):
 
 @pytest.mark.parametrize(
     "robot",
-    [ROBOT, round_robot(1.0), round_robot(0.001), *(exact_robot(seed) for seed in range(30))],
+    [ROBOT, MECANUM, round_robot(1.0), round_robot(0.001), *(exact_robot(seed) for seed in range(6))],
     ids=lambda robot: robot.name,
 )
-def test_every_parameter_has_the_type_that_its_controller_declares(robot):
+def test_every_parameter_is_one_that_its_controller_declares(robot):
     made = ros2_control(robot)
-    for name in ("controllers.yaml", "velocity_smoother.yaml"):
-        tree = yaml.safe_load(made.files[name])
-        typed(tree)
-        assert all("ros__parameters" in each for each in tree.values())
+    controllers = yaml.safe_load(made.files["controllers.yaml"])
+    manager = controllers.pop("controller_manager")["ros__parameters"]
+    assert type(manager.pop("update_rate")) is int
+    for name, tree in (controllers | yaml.safe_load(made.files["velocity_smoother.yaml"])).items():
+        check_parameters(name, tree)
+    (name,) = controllers
+    assert manager.pop("joint_state_broadcaster") == {"type": "joint_state_broadcaster/JointStateBroadcaster"}
+    assert set(manager) == {name}
+    assert manager[name]["type"].startswith(f"{name}/")  # a plugin's library is its package's
+
+
+def axes_of(made):
+    """Joint -> 1 where its axis points outwards, -1 inwards."""
+    joints = ET.fromstring(made.files["robot.urdf"]).findall("joint")
+    return {joint.get("name"): float(joint.find("axis").get("xyz").split()[0]) for joint in joints}
+
+
+@pytest.mark.parametrize("wheel_order", [(0, 1, 2, 3), (2, 0, 3, 1)])
+def test_mecanum_drive_controller_finds_the_twist_of_the_model(wheel_order):
+    """Its odometry.cpp on the joints of the URDF, for wheels in any order; all of them forward drive forward."""
+    wheels, order = MECANUM.wheels, list(wheel_order)
+    turned = wheels.replace(
+        azimuth_deg=tuple(np.array(wheels.azimuth_deg)[order]),
+        roller_angle_deg=tuple(np.array(wheels.roller_angle_deg)[order]),
+    )
+    robot = MECANUM.replace(wheels=turned)
+    names = ["a/fl", "b_1", "C-c", "d.d"]
+    made, twist = ros2_control(robot, joints=names), np.array([0.4, -0.7, 2.0])
+    given = yaml.safe_load(made.files["controllers.yaml"])["mecanum_drive_controller"]["ros__parameters"]
+    axes = axes_of(made)
+    assert list(axes) == names
+
+    def found(twist):
+        speeds = dict(zip(names, wheel_speed(robot.wheels, twist), strict=True))
+        places = ("front_left", "rear_left", "rear_right", "front_right")
+        joints = [given[f"{place}_wheel_command_joint_name"] for place in places]
+        fl, rl, rr, fr = (-axes[joint] * speeds[joint] for joint in joints)
+        r, k = given["kinematics"]["wheels_radius"], given["kinematics"][SUM]
+        odometry = [
+            0.25 * r * (fl + rl + rr + fr),
+            0.25 * r * (-fl + rl - rr + fr),
+            0.25 * r / k * (-fl - rl + rr + fr),
+        ]
+        return odometry, (fl, rl, rr, fr)
+
+    np.testing.assert_allclose(found(twist)[0], twist, rtol=1e-12)
+    assert all(speed > 0.0 for speed in found(np.array([1.0, 0.0, 0.0]))[1])
+
+
+@pytest.mark.parametrize(
+    "names", [["a", "b"], ["a", "b", "a"], ["a", "b", 'c"'], ["a", "b", "base_link"], ["", "a", "b"]]
+)
+def test_names_that_are_none_are_refused(names):
+    with pytest.raises(InputError, match="name"):
+        ros2_control(ROBOT, joints=names)
+
+
+def started(text, folder):
+    """What a launch file starts, by stubs of launch: the keyword arguments of its nodes."""
+    nodes, stubs = [], {name: ModuleType(name) for name in LAUNCH}
+    stubs["launch"].LaunchDescription = list
+    stubs["launch_ros.actions"].Node = lambda **options: nodes.append(options)
+    stubs["launch_ros.parameter_descriptions"].ParameterValue = lambda value, value_type: value
+    path = folder / "started.launch.py"
+    path.write_text(text)
+    scope = {"__file__": str(path), "__name__": "launched"}
+    with pytest.MonkeyPatch.context() as patch:
+        for name, module in stubs.items():
+            patch.setitem(sys.modules, name, module)
+        exec(compile(text, str(path), "exec"), scope)
+        scope["generate_launch_description"]()
+    return nodes
+
+
+def checked_package(made, folder):
+    """The name of the package and what it needs, where package.xml has what REP 149 asks for."""
+    made.write(folder)
+    root = ET.parse(folder / "package.xml").getroot()
+    assert (root.tag, root.get("format")) == ("package", "3")
+    for tag in ("name", "version", "description", "maintainer", "license", "buildtool_depend"):
+        assert root.findtext(tag), tag
+    assert re.fullmatch(r"\d+\.\d+\.\d+", root.findtext("version"))
+    assert re.fullmatch(r"[a-z][a-z0-9_]*[a-z0-9]", root.findtext("name"))
+    assert "@" in root.find("maintainer").get("email")
+    assert root.findtext("export/build_type") == "ament_cmake"
+    return root.findtext("name"), {need.text for need in root.findall("exec_depend")}
+
+
+def installed(folder, build):
+    """What cmake installs of a package, with an ament_cmake that does nothing."""
+    stub = build / "ament"
+    stub.mkdir(parents=True)
+    (stub / "ament_cmakeConfig.cmake").write_text("macro(ament_package)\nendmacro()\n")
+    quiet = {"check": True, "capture_output": True}
+    prefix = f"-DCMAKE_INSTALL_PREFIX={build / 'install'}"
+    subprocess.run(["cmake", "-S", folder, "-B", build / "b", f"-Dament_cmake_DIR={stub}", prefix], **quiet)
+    subprocess.run(["cmake", "--build", build / "b", "--target", "install"], **quiet)
+    return {path.relative_to(build / "install").as_posix() for path in (build / "install").rglob("*") if path.is_file()}
+
+
+@pytest.mark.parametrize("robot", [ROBOT, MECANUM], ids=lambda robot: robot.name)
+def test_the_package_starts_what_it_names(robot, tmp_path):
+    made = ros2_control(robot)
+    name, needs = checked_package(made, tmp_path / "bot")
+    nodes = started(made.files["bringup.launch.py"], tmp_path / "bot")
+    assert {node["package"] for node in nodes} <= needs
+    manager = yaml.safe_load(made.files["controllers.yaml"])["controller_manager"]["ros__parameters"]
+    spawned = [node["arguments"] for node in nodes if node["executable"] == "spawner"]
+    assert {arguments[0] for arguments in spawned} == set(manager) - {"update_rate"}
+    controller = spawned[1][0]
+    assert controller in needs  # the plugin is in the package of its name
+    assert all(arguments[1:3] == ["--param-file", str(tmp_path / "bot" / "controllers.yaml")] for arguments in spawned)
+    (smoother,) = (node for node in nodes if node["executable"] == "velocity_smoother")
+    topic = {"omni_wheel_drive_controller": "cmd_vel", "mecanum_drive_controller": "reference"}[controller]
+    assert smoother["remappings"] == [("cmd_vel_smoothed", f"/{controller}/{topic}")]
+    assert f"/{controller}/{topic}" in made.files["README.md"]
+    for joint in axes_of(made):
+        assert f"`{joint}`" in made.files["README.md"]
+    if shutil.which("cmake"):
+        here = ("controllers.yaml", "velocity_smoother.yaml", "robot.urdf", "bringup.launch.py")
+        assert installed(tmp_path / "bot", tmp_path / "build") == {f"share/{name}/{file}" for file in here}

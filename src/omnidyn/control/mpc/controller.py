@@ -31,6 +31,7 @@ from omnidyn.control.controller import (
     WAITING,
     WHEEL_SPEED,
     Info,
+    failure,
     output_kind,
     output_limit,
     supply_of,
@@ -249,7 +250,7 @@ class Mpc:
         elif not callable(getattr(path, "at", None)):
             word = BAD_PATH
         else:
-            word = f"{FAILED}: {type(error).__name__}"
+            word = failure(error)
         return self._other(word, start)
 
 

@@ -22,6 +22,7 @@ from omnidyn.control.mpc.program import (
     SPEED_WEIGHT,
     TWIST_WEIGHT,
 )
+from omnidyn.control.paths.adapter import as_path
 from omnidyn.errors import InputError
 from omnidyn.model.frames import world_to_body
 from omnidyn.model.robot import Robot
@@ -144,7 +145,7 @@ class Preview:
 
 def sampled(path: Any, t: FloatArray) -> FloatArray:
     """Pose in the world, and twist in the body frame, of a path at times t [s]. Shape (n, 6)."""
-    pose, velocity = path.at(t)[:2]
+    pose, velocity = as_path(path).at(t)[:2]
     twist = np.einsum("...ij,...j->...i", world_to_body(pose[..., 2]), velocity)
     rows = np.ascontiguousarray(np.concatenate([pose, twist], axis=-1), dtype=float)
     if rows.shape != (len(t), 6) or not np.isfinite(rows).all():

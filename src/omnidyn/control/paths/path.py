@@ -15,11 +15,14 @@ from numpy.typing import ArrayLike
 
 from omnidyn.arguments import unknown_option
 from omnidyn.arrays import FloatArray
+from omnidyn.control.paths.adapter import DURATION, FunctionPath, as_path
 from omnidyn.control.paths.curve import (
+    COLUMNS,
     Curve,
     Polyline,
     circle,
     eight,
+    lines,
     path_of_file,
     path_of_run,
     square,
@@ -61,22 +64,27 @@ OPTIONS: dict[str, dict[str, Any]] = {
 POSITIVE = ("size_m", "period_s", "radius_m", "side_m", "speed_m_s", "rounds")
 
 
-def path(what: str | os.PathLike | Run, **options: Any) -> Path:
+def path(what: Any, **options: Any) -> Path:
     """A path to follow.
 
     what: "eight", "circle", "square", "zigzag" or "goal"; the same with options in the text, as in
     "eight:period_s=3.2,heading=along"; a CSV file with t_s, x_m, y_m, heading_rad, its rows joined by straight lines;
-    or a Run, whose poses are the path.
+    an array of such rows, shape (rows, 4); a Run, whose poses are the path; a function of the time [s] that gives
+    (x, y, heading) [m, m, rad], smooth, its heading not wrapped; or an object with `at(t)`, which gives (pose,
+    velocity, acceleration) in the world frame, shapes (*t.shape, 3), and `end` [s], from when on it stands still.
     options: of eight size_m, period_s; of circle radius_m, speed_m_s or period_s; of square side_m, speed_m_s or
     period_s; of zigzag speed_m_s, sideways_m_s, turn_rad_s, period_s, lag_s; of goal x_m, y_m, heading_rad, travel_s,
     hold_s and from_x_m, from_y_m, from_heading_rad. Of the first three also heading ("held", "turning", "along"),
-    heading_rad at the start, turn_rad_s, and rounds to follow it for.
+    heading_rad at the start, turn_rad_s, and rounds to follow it for. Of a function duration_s, when it ends; without
+    it the function goes on, and is followed for 10 s.
     Returns a Path: `at(t)` is where to be, how fast and how that changes, in the world frame.
     Raises InputError for an unknown name or option, or a value out of range.
     """
     if isinstance(what, Run):
         _refuse_options(options, "a run")
         return path_of_run(what)
+    if not isinstance(what, str | os.PathLike):
+        return _path_of_value(what, options)
     text = os.fspath(what)
     name, _, rest = text.partition(":")
     if name in OPTIONS:
@@ -92,6 +100,42 @@ def path(what: str | os.PathLike | Run, **options: Any) -> Path:
         remedy=f"did you mean {matches[0]}?" if matches else "",
         where="path",
     )
+
+
+def is_several(what: Any) -> bool:
+    """Whether a list holds paths, and not the rows of one."""
+    rows = (list, tuple, int, float)
+    return isinstance(what, list | tuple) and not any(isinstance(item, rows) or np.ndim(item) == 1 for item in what)
+
+
+def _path_of_value(what: Any, options: Mapping[str, Any]) -> Path:
+    """A path from an object that has `at`, a function, or an array of rows."""
+    if hasattr(what, "at"):
+        _refuse_options(options, "an object that is a path")
+        return as_path(what)
+    if callable(what):
+        for option in options:
+            if option != "duration_s":
+                raise unknown_option("a function", option, ["duration_s"], "path")
+        name = f"function {getattr(what, '__name__', type(what).__name__)}"
+        end = _value("of a function", "period_s", options["duration_s"]) if "duration_s" in options else math.inf
+        function: Any = what
+        found = FunctionPath(name, function, DURATION if end == math.inf else end, end)
+        found.at(0.0)  # what is no pose is said here
+        return found
+    _refuse_options(options, "an array")
+    try:
+        rows = np.asarray(what, dtype=float)
+    except (TypeError, ValueError):
+        rows: FloatArray = np.empty((0, 0))
+    if rows.ndim != 2 or rows.shape[1] != len(COLUMNS):
+        raise InputError(
+            "no path",
+            got=f"{type(what).__name__}{f' of shape {rows.shape}' if rows.size else ''}",
+            expected=f"a name, a file, a Run, a function, an object with at(t), or rows of {', '.join(COLUMNS)}",
+            where="path",
+        )
+    return lines(rows[:, 0], rows[:, 1:], f"array of {len(rows)} rows")
 
 
 def _refuse_options(options: Mapping[str, Any], what: str) -> None:

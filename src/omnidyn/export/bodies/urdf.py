@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from omnidyn.export.bodies.links import Links, WheelLink, height_of, links, several
 from omnidyn.export.contract import Export
@@ -11,27 +12,38 @@ from omnidyn.export.spelling import attribute, number, xml_comment
 from omnidyn.model.robot import Robot
 
 NOTES = (
-    "a wheel is one disc: rollers are not in it, so that it does not slide sideways in a simulator by itself",
+    "a wheel is one disc, and URDF has no word for rollers: in a simulator it does not roll sideways. For Gazebo take "
+    "the export sdf, whose wheels do",
     "the plugin of <ros2_control> is a mock: put in that of your hardware",
 )
 
 
-def urdf(robot: Robot, height: float | None = None) -> Export:
-    """A robot as URDF. height [m]: of the base, for its inertia about the other axes."""
+def urdf(robot: Robot, height: float | None = None, joints: Sequence[str] = ()) -> Export:
+    """A robot as URDF. height [m]: of the base, for its inertia about the other axes. joints: names, wheel by wheel."""
     refuse("urdf", robot)
     tall = height_of(robot, height)
-    parts = links(robot, tall)
+    parts = links(robot, tall, joints)
     omissions = (*left_out("urdf", robot), *parts.notes)
     return Export("urdf", robot.name, {"robot.urdf": description(robot.name, parts, omissions)}, omissions, NOTES)
 
 
-def description(name: str, parts: Links, omissions: tuple[str, ...], outward: bool = False) -> str:
-    """The parts of a robot as URDF. outward: axes of joints point outwards, as some controllers of ROS have it."""
+def description(
+    name: str, parts: Links, omissions: tuple[str, ...], outward: frozenset[int] = frozenset(), words: str = ""
+) -> str:
+    """The parts of a robot as URDF.
+
+    Args:
+        name: Of the robot.
+        parts: Its links.
+        omissions: What the file cannot say.
+        outward: Wheels, counted from 0, whose joints turn about an axis that points outwards, not inwards.
+        words: Why, for the comment.
+    """
     about = [
         f"{name}, by omnidyn. SI units.",
         *(f"Not as in omnidyn: {words}" for words in omissions),
         f"Height of the base {parts.tall:g} m, for its inertia about x and y: a guess.",
-        *(["Joints turn the other way than the wheels of omnidyn: their axes point outwards."] if outward else []),
+        *([words] if words else []),
     ]
     return "\n".join(
         [
@@ -39,7 +51,11 @@ def description(name: str, parts: Links, omissions: tuple[str, ...], outward: bo
             f"<robot name={attribute(name)}>",
             xml_comment(about),
             *_base(parts),
-            *(line for wheel in parts.wheels for line in _wheel(wheel, "1 0 0" if outward else "-1 0 0")),
+            *(
+                line
+                for k, wheel in enumerate(parts.wheels)
+                for line in _wheel(wheel, "1 0 0" if k in outward else "-1 0 0")
+            ),
             *control(parts),
             "</robot>\n",
         ]
@@ -58,12 +74,13 @@ def inertial(mass: float, about: tuple[float, float, float], centre: tuple[float
 
 
 def _base(parts: Links) -> list[str]:
-    radius = max(math.hypot(wheel.place.x, wheel.place.y) for wheel in parts.wheels)
-    shape = f'<geometry><cylinder radius="{number(radius)}" length="{number(parts.tall)}"/></geometry>'
+    shape = f'<geometry><cylinder radius="{number(parts.radius)}" length="{number(parts.tall)}"/></geometry>'
+    shape = f'<origin xyz="{several(0.0, 0.0, parts.middle)}"/>{shape}'
     return [
         '  <link name="base_link">',
         *inertial(parts.mass, parts.inertia, parts.centre),
         f"    <visual>{shape}</visual>",
+        f"    <collision>{shape}</collision>",
         "  </link>",
     ]
 
@@ -77,8 +94,9 @@ def _wheel(wheel: WheelLink, axis: str) -> list[str]:
         f'  <link name="{wheel.name}">',
         *inertial(wheel.mass, (axle, radial, radial)),
         f"    <visual>{turned}<geometry>{shape}</geometry></visual>",
+        f"    <collision>{turned}<geometry>{shape}</geometry></collision>",
         "  </link>",
-        f'  <joint name="{wheel.name}_joint" type="continuous">',
+        f'  <joint name="{wheel.joint}" type="continuous">',
         '    <parent link="base_link"/>',
         f'    <child link="{wheel.name}"/>',
         f'    <origin xyz="{several(place.x, place.y, 0.0)}" rpy="{several(0.0, 0.0, place.azimuth)}"/>',
@@ -97,7 +115,7 @@ def control(parts: Links) -> list[str]:
     ]
     for wheel in parts.wheels:
         lines += [
-            f'    <joint name="{wheel.name}_joint">',
+            f'    <joint name="{wheel.joint}">',
             f'      <command_interface name="velocity"><param name="min">-{number(wheel.speed)}</param>'
             f'<param name="max">{number(wheel.speed)}</param></command_interface>',
             '      <state_interface name="position"/><state_interface name="velocity"/>',

@@ -1,42 +1,89 @@
-"""road-runner: kS, kV, kA of driving forward, per inch, as Road Runner's quickstart wants them.
+"""road-runner: kS, kV, kA of driving forward, as the PARAMS of Road Runner's quickstart want them, or per inch.
 
 Road Runner has one set of gains for all wheels, in volts per inch of the robot's way forward; on a mecanum or an
-omnidirectional robot going sideways and turning take others, which stand beside it.
+omnidirectional robot going sideways and turning take others, which stand beside it. Its wheels turn by
+
+    (v_x -+ v_y inPerTick/lateralInPerTick -+ trackWidthTicks inPerTick omega)/inPerTick   [ticks/s]
+
+(MecanumKinematics, version 1.0), so that with N ticks in a turn of a wheel, and the row g of G^T of any wheel,
+
+    inPerTick = 2 pi r/(N |g_x|)   lateralInPerTick = 2 pi r/(N |g_y|)   trackWidthTicks = N |g_omega|/(2 pi r)
 """
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
+
+from omnidyn.errors import UnsupportedError
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
-from omnidyn.export.feedforward.gains import AXES, NAMES, rows, spread
+from omnidyn.export.feedforward.gains import AXES, NAMES, GainRow, check_ticks, guessed_gains, rows, spread
 from omnidyn.export.spelling import java_comment, number
 from omnidyn.model.robot import Robot
 
 INCH = 0.0254  # [m]
-NOTES = ("per inch of the robot's way: times inPerTick they are PARAMS.kV and PARAMS.kA of the quickstart",)
+PER_INCH = "per inch of the robot's way: times inPerTick they are PARAMS.kV and PARAMS.kA of the quickstart"
+PER_TICK = "kV and kA are per tick of a wheel, as PARAMS of the quickstart has them; of turning, per rad of the robot"
 AXIS_NAMES = {"x": "forward", "y": "lateral", "yaw": "heading"}
+ALIKE = 1e-9  # of what the wheels turn: Road Runner has one number for all of them
 
 
-def road_runner(robot: Robot) -> Export:
-    """kS [V], kV [V s/in], kA [V s^2/in] of driving forward and sideways, of turning per rad."""
+def road_runner(robot: Robot, ticks_per_turn: float | None = None, force_guess: bool = False) -> Export:
+    """kS [V], kV, kA of driving forward and sideways, of turning per rad, as fields of Java.
+
+    ticks_per_turn: of the encoder, in a turn of the wheel: gains are then per tick, with inPerTick, lateralInPerTick
+    and trackWidthTicks beside them; else per inch. force_guess: also of a robot whose friction is a guess. Raises
+    InputError for one without it, UnsupportedError for ticks of wheels that do not turn alike.
+    """
     refuse("road-runner", robot)
-    omissions = left_out("road-runner", robot)
-    lines = []
+    check_ticks(ticks_per_turn)
+    omissions, guess = left_out("road-runner", robot), guessed_gains(robot, force_guess)
+    lines, inches = [], {"x": INCH, "y": INCH, "yaw": 1.0}
+    note = PER_INCH
+    if ticks_per_turn is not None:
+        note, way = PER_TICK, ways_per_tick(robot, ticks_per_turn)
+        lines += [
+            f"public double inPerTick = {number(way['x'] / INCH)};",
+            f"public double lateralInPerTick = {number(way['y'] / INCH)};",
+            f"public double trackWidthTicks = {number(1.0 / way['yaw'])};",
+        ]
+        inches = {"x": way["x"], "y": way["y"], "yaw": 1.0}
+    unit = "tick" if ticks_per_turn is not None else "in"
     for row in rows(robot):
         if row.place in AXES:
-            inches = 1.0 if row.name == NAMES[0] or row.place == "yaw" else INCH
-            row_in_inches = row._replace(
-                value=row.value * inches,
-                std=row.std * inches,
-                unit=(row.unit.replace("/m", "/in") if inches != 1.0 else row.unit),
-            )
-            name = f"{AXIS_NAMES[row.place]}{row.name.upper()}" if row.place != "x" else row.name
-            lines.append(f"public double {name} = {number(row_in_inches.value)}; // {spread(row_in_inches)}")
+            size = 1.0 if row.name == NAMES[0] else inches[row.place]
+            scaled = row._replace(value=row.value * size, std=row.std * size, unit=row.unit.replace("/m", f"/{unit}"))
+            lines.append(f"public double {_name(row)} = {number(scaled.value)}; // {spread(scaled)}")
     about = java_comment(
         [
-            f"{robot.name}: feed-forward gains by omnidyn, volts and inches.",
-            *NOTES,
+            f"{robot.name}: feed-forward gains by omnidyn, volts and {'ticks' if unit == 'tick' else 'inches'}.",
+            *guess,
+            note,
             *[f"Not in it: {words}" for words in omissions],
         ]
     )
-    return Export("road-runner", robot.name, {"gains.java": about + "\n".join(lines) + "\n"}, omissions, NOTES)
+    files = {"gains.java": about + "\n".join(lines) + "\n"}
+    return Export("road-runner", robot.name, files, omissions, (*guess, note))
+
+
+def _name(row: GainRow) -> str:
+    return row.name if row.place == "x" else f"{AXIS_NAMES[row.place]}{row.name.upper()}"
+
+
+def ways_per_tick(robot: Robot, ticks_per_turn: float) -> dict[str, float]:
+    """How far the robot goes in a tick of its wheels, by axis: [m], [m], [rad].
+
+    Raises UnsupportedError where wheels do not all turn alike on an axis.
+    """
+    turns = np.abs(robot.wheels.wrench_matrix / robot.wheels.radii)  # [rad/m, rad/m, 1]
+    if (np.ptp(turns, axis=1) > ALIKE * turns.max(axis=1)).any():
+        raise UnsupportedError(
+            "Road Runner has one number of ticks for all wheels, and these do not turn alike",
+            got=f"{robot.wheels.count} wheels at {', '.join(f'{a:g}' for a in robot.wheels.azimuth_deg)} degrees",
+            expected="four mecanum wheels, or omni wheels at 45 degrees",
+            remedy="leave `ticks_per_turn` out, or export gains with it: gains of each wheel, per tick",
+            where="ticks_per_turn",
+        )
+    return dict(zip(AXES, (2.0 * math.pi / ticks_per_turn / turns[:, 0]).tolist(), strict=True))

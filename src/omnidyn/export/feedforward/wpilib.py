@@ -12,7 +12,7 @@ import numpy as np
 
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
-from omnidyn.export.feedforward.gains import AXES, GainRow, gains, rows, spread
+from omnidyn.export.feedforward.gains import AXES, GainRow, gains, guessed_gains, rows, spread
 from omnidyn.export.spelling import c_comment, java_comment, number, python_comment
 from omnidyn.model.robot import Robot
 
@@ -25,12 +25,16 @@ USAGE = (
 )
 
 
-def wpilib(robot: Robot) -> Export:
-    """kS, kV and kA with standard errors as constants in Java, C++ and Python."""
+def wpilib(robot: Robot, force_guess: bool = False) -> Export:
+    """kS, kV and kA with standard errors as constants in Java, C++ and Python.
+
+    force_guess: also of a robot whose friction is a guess. Raises InputError for one without it.
+    """
     refuse("wpilib", robot)
-    omissions = left_out("wpilib", robot)
+    omissions, guess = left_out("wpilib", robot), guessed_gains(robot, force_guess)
     about = [
         f"{robot.name}: feed-forward gains by omnidyn, SI units, volts.",
+        *guess,
         USAGE,
         *(f"Not in it: {m}" for m in omissions),
     ]
@@ -41,7 +45,7 @@ def wpilib(robot: Robot) -> Export:
         "robot_gains.h": _cpp(about, constants, pattern),
         "robot_gains.py": _python(about, constants, pattern),
     }
-    return Export("wpilib", robot.name, files, omissions, NOTES, folder=True)
+    return Export("wpilib", robot.name, files, omissions, (*guess, *NOTES), folder=True)
 
 
 def _constant(row: GainRow) -> str:

@@ -1,14 +1,16 @@
-"""ros2-node: a node that drives the robot, as text: feed-forward with friction, feedback, a dead-man stop.
+"""ros2-node: a package with a node that drives the robot: feed-forward with friction, feedback, a dead-man stop.
 
 No omnidyn runs on the robot: drive_loop.py is plain Python without imports beyond the standard library: also for a
-robot without ROS. omnidyn_node.py puts it on /cmd_vel and /joint_states, and gives duties. Constants come from the
-robot: gains of feedforward/gains.py, the twist from the wheels by the pseudo-inverse of G^T. Checked without ROS:
-against stubs of rclpy, with our simulation as the robot. With a controller: see follower.py.
+robot without ROS. omnidyn_node.py puts it on /cmd_vel and /joint_states, and gives duties; set points of the wheels
+[rad/s] where the drive is a speed loop. Constants come from the robot: gains of feedforward/gains.py, the twist from
+the wheels by the pseudo-inverse of G^T, their set points by G^T. Checked without ROS: against stubs of rclpy, with our
+simulation as the robot. With a controller: see `follower`.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,36 +18,49 @@ import numpy as np
 from omnidyn.control.controllers import controller_spec
 from omnidyn.control.feedforward import DT
 from omnidyn.control.mpc.controller import Mpc
-from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.errors import InputError
+from omnidyn.export.bodies.links import joint_names
 from omnidyn.export.code.c_controller import c_controller
 from omnidyn.export.contract import Content, Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.feedforward.gains import gains
-from omnidyn.export.ros.ros2_control import limits
-from omnidyn.export.spelling import number, python_comment
+from omnidyn.export.ros.package import package, package_name, read_me
+from omnidyn.export.ros.ros2_control import HEADROOM, limits
+from omnidyn.export.spelling import filled, number, python_comment
 from omnidyn.model.deadzone import HIGHEST, axis_patterns, breakaway_voltage
+from omnidyn.model.motor import SPEED, no_load_speed
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import twist_from_wheel_speed
+from omnidyn.model.wheels import per_wheel, twist_from_wheel_speed
 
 KIND = "ros2-node"
 RATE = 100.0  # [Hz]
+SHEBANG = "#!/usr/bin/env python3\n"
 TIMEOUT = 0.3  # [s]
 NOTES = (
     "made and checked without ROS: syntax, and its logic over stubs of rclpy with a simulated robot; try it on blocks",
-    "duties are of the supply: give its voltage as the parameter supply_V where it is measured",
 )
+OF_SUPPLY = "duties are of the supply: give its voltage as the parameter supply_V where it is measured"
+OF_LOOP = "set points are speeds of the wheels [rad/s], all forward turn the robot counter-clockwise"
+DEPENDS = ("geometry_msgs", "nav_msgs", "rclpy", "sensor_msgs", "std_msgs")
 
 
 def ros2_node(
-    robot: Robot, controller: str | os.PathLike = "", dt: float | None = None, timeout: float = TIMEOUT
+    robot: Robot,
+    controller: str | os.PathLike = "",
+    dt: float | None = None,
+    timeout: float = TIMEOUT,
+    joints: Sequence[str] = (),
 ) -> Export:
-    """A node for /cmd_vel and /joint_states that gives duties, and the loop in it as plain Python.
+    """A package with a node for /cmd_vel and /joint_states that gives duties, and the loop in it as plain Python.
+
+    For a robot whose drive is a speed loop it gives set points of the wheels [rad/s].
 
     Args:
         robot: The robot.
         controller: By name or file; then the node takes a path or /cmd_vel, and /odom, and steers by its C.
         dt: Between two steps [s]; 0.01, or 0.02 with a controller.
         timeout: Without a command for so long the robot stops [s].
+        joints: Names of the joints, in the order of the wheels; wheel1_joint, ... by default.
 
     Raises InputError, and UnsupportedError for a robot or a controller that cannot be exported.
     """
@@ -56,7 +71,7 @@ def ros2_node(
             raise InputError("out of range", got=value, expected=f"more than 0 and at most {largest:g}", where=name)
     kind = "c-controller" if controller else KIND
     refuse(kind, robot)
-    omissions = left_out(kind, robot)
+    omissions, names = left_out(kind, robot), joint_names(robot, joints)
     about = python_comment(
         [
             f"{robot.name}, by omnidyn. SI units.",
@@ -64,23 +79,65 @@ def ros2_node(
             "Checked without ROS, see docs/exports.md: try it on blocks first.",
         ]
     )
+    is_loop = robot.drive.kind == SPEED
+    topic, notes = ("wheel_speed", (*NOTES, OF_LOOP)) if is_loop else ("duty", (*NOTES, OF_SUPPLY))
+    sources = ()
     if controller:
-        files = follower(robot, controller, dt, timeout, about)
-        return Export(KIND, robot.name, files, omissions, (*NOTES, BUILD), folder=True)
-    files = {
-        "drive_loop.py": about + _constants(robot, 1.0 / dt, timeout) + NUMBERS + _LOOP,
-        "omnidyn_node.py": about + _NODE + NODE_END,
-    }
-    return Export(KIND, robot.name, files, omissions, NOTES, folder=True)
+        files, sources = follower(robot, controller, dt, timeout, about), ("omnidyn_control.c", "control_shared.c")
+        notes = (*notes, BUILD)
+    else:
+        loop = _LOOP + (_TO_SPEEDS if is_loop else _TO_DUTIES)
+        files = {"drive_loop.py": about + _constants(robot, 1.0 / dt, timeout) + NUMBERS + loop}
+    quoted = ", ".join(f'"{name}"' for name in names)
+    node = filled((_SETUP if controller else _NODE) + NODE_END, JOINTS=f"[{quoted}]", TOPIC=topic)
+    files["omnidyn_node.py"] = SHEBANG + about + node
+    name = package_name(robot.name, "node")
+    files["omnidyn_node.launch.py"] = about + filled(_LAUNCH, NAME=name)
+    programs = ["omnidyn_node.py", "path_loop.py" if controller else "drive_loop.py"]
+    words = f"A node that drives {robot.name}, by omnidyn"
+    files |= package(name, words, DEPENDS, ["omnidyn_node.launch.py"], programs, sources)
+    files["README.md"] = read_me(robot.name, (*omissions, *notes), _sections(name, topic, names, bool(controller)))
+    return Export(KIND, robot.name, files, omissions, notes, folder=True)
+
+
+def _sections(name: str, topic: str, joints: Sequence[str], follows: bool) -> list[str]:
+    """The paragraphs of README.md."""
+    heard = "`/path` or `/cmd_vel`, and `/odom`" if follows else "`/cmd_vel` and `/joint_states`"
+    listed = ", ".join(f"`{joint}`" for joint in joints)
+    return [
+        f"Put the folder into the `src` of a workspace of ROS 2, as `{name}`, then:",
+        f"    rosdep install --from-paths src --ignore-src\n    colcon build --packages-select {name}\n"
+        f"    . install/setup.bash\n    ros2 launch {name} omnidyn_node.launch.py",
+        f"It takes {heard}, and publishes `/{topic}` (std_msgs/Float64MultiArray): a number for each wheel, in the "
+        f"order {listed}. A controller of ROS that takes these, such as JointGroupVelocityController, listens on "
+        f"`/CONTROLLER/commands`: remap `{topic}` to it in the launch file.",
+    ]
+
+
+_LAUNCH = '''\
+"""Start the node of this package."""
+
+from launch import LaunchDescription
+from launch_ros.actions import Node
+
+
+def generate_launch_description():
+    return LaunchDescription([
+        Node(package="@NAME@", executable="omnidyn_node.py", output="screen", parameters=[{"stamped": True}]),
+    ])
+'''
 
 
 def _constants(robot: Robot, rate: float, timeout: float) -> str:
     """What the loop knows of the robot."""
     robot_gains, (_, acceleration) = gains(robot), limits(robot)
-    to_twist = twist_from_wheel_speed(robot.wheels, np.eye(robot.wheels.count)).T
-    supply = robot.drive.supply or float(np.max(robot.motor.voltage_limit))
+    n, radii = robot.wheels.count, robot.wheels.radii
+    to_twist = twist_from_wheel_speed(robot.wheels, np.eye(n)).T
+    volts = per_wheel(robot.motor.voltage_limit, n)
+    supply = robot.drive.supply or float(np.max(volts))
     holding = np.minimum(breakaway_voltage(robot, axis_patterns(robot)), HIGHEST)
-    return f'''"""The loop: a twist that is wanted and speeds of wheels in, duties out. No ROS, no omnidyn."""
+    given = "set points of the wheels" if robot.drive.kind == SPEED else "duties"
+    return f'''"""The loop: a twist that is wanted and speeds of wheels in, {given} out. No ROS, no omnidyn."""
 
 import math
 
@@ -99,6 +156,8 @@ KA = {_row(robot_gains.value[:, 2])}
 START = {_row(holding)}  # [V] from rest
 PATTERN = {_table(robot_gains.pattern)}  # [axis][motor]
 TO_TWIST = {_table(to_twist)}  # [axis][wheel]: twist from the speeds of the wheels [rad/s]
+TO_WHEELS = {_table((robot.wheels.wrench_matrix / radii).T)}  # [wheel][axis]: speeds of the wheels [rad/s] from a twist
+FASTEST = {number(HEADROOM * float(np.min(no_load_speed(robot.motor, volts))))}  # [rad/s] that every wheel can keep
 ACCELERATION = {_row(acceleration)}  # [m/s^2, m/s^2, rad/s^2] that the motors can keep
 '''
 
@@ -145,7 +204,7 @@ class DriveLoop:
         return self.asked_at is not None and 0.0 <= now - self.asked_at <= TIMEOUT
 
     def step(self, now, dt=1.0 / RATE, supply=SUPPLY):
-        """Duties of the motors, -1 to 1. All 0 where `status` is below 0: the dead-man stop is STOPPED."""
+        """What the drive takes, of each wheel. All 0 where `status` is below 0: the dead-man stop is STOPPED."""
         now, dt, supply = number(now), number(dt), number(supply)
         self.status = OK if is_within(supply, SUPPLIES) else BAD_SUPPLY
         if not is_within(dt, STEPS):
@@ -155,14 +214,21 @@ class DriveLoop:
         if self.status < 0:
             self.set_point = [0.0, 0.0, 0.0]
             return [0.0] * WHEELS
+        before, self.set_point = self.set_point, []
+        for axis in range(3):
+            most = ACCELERATION[axis] * dt
+            self.set_point.append(before[axis] + max(-most, min(most, self.goal[axis] - before[axis])))
+        return self.outputs(now, dt, supply, before)
+'''
+
+_TO_DUTIES = '''
+    def outputs(self, now, dt, supply, before):
+        """Duties of the motors, -1 to 1. before: the set point of the step before."""
         volts = [0.0] * WHEELS
         known = self.twist is not None and 0.0 <= now - self.told_at <= TIMEOUT
         for axis in range(3):
-            before = self.set_point[axis]
-            most = ACCELERATION[axis] * dt
-            after = before + max(-most, min(most, self.goal[axis] - before))
-            self.set_point[axis] = after
-            u = KV[axis] * after + KA[axis] * (after - before) / dt
+            after = self.set_point[axis]
+            u = KV[axis] * after + KA[axis] * (after - before[axis]) / dt
             error = after - self.twist[axis] if known else 0.0
             u += KV[axis] * error  # halves the time constant: KA/(2 KV)
             if after != 0.0:
@@ -176,7 +242,17 @@ class DriveLoop:
         return [max(-1.0, min(1.0, share * each / supply)) for each in volts]
 '''
 
-_NODE = '''"""/cmd_vel (or a path follower that publishes it) and /joint_states in, duties out, with a dead-man stop."""
+_TO_SPEEDS = '''
+    def outputs(self, now, dt, supply, before):
+        """Set points of the wheels [rad/s], for the loop in the firmware, which makes up for friction."""
+        speeds = [sum(a * b for a, b in zip(row, self.set_point)) for row in TO_WHEELS]
+        largest = max(abs(speed) for speed in speeds)
+        share = FASTEST / largest if largest > FASTEST else 1.0  # all by the same share: the direction stays
+        self.status = LIMITED if largest > FASTEST else OK
+        return [share * speed for speed in speeds]
+'''
+
+_NODE = '''"""/cmd_vel (or a follower that publishes it) and /joint_states in, @TOPIC@ out, with a dead-man stop."""
 
 import rclpy
 from drive_loop import RATE, SUPPLY, WHEELS, DriveLoop
@@ -192,11 +268,10 @@ class OmnidynNode(Node):
     def __init__(self):
         super().__init__("omnidyn_node")
         self.loop = DriveLoop()
-        names = [f"wheel{k + 1}_joint" for k in range(WHEELS)]
-        self.joints = list(self.declare_parameter("joints", names).value)
+        self.joints = list(self.declare_parameter("joints", @JOINTS@).value)
         self.supply = float(self.declare_parameter("supply_V", SUPPLY).value)
         stamped = bool(self.declare_parameter("stamped", True).value)
-        self.duty = self.create_publisher(Float64MultiArray, "duty", 10)
+        self.output = self.create_publisher(Float64MultiArray, "@TOPIC@", 10)
         kind = TwistStamped if stamped else Twist
         self.create_subscription(kind, "cmd_vel", self.on_command, 10)
         self.create_subscription(JointState, "joint_states", self.on_joints, 10)
@@ -236,27 +311,17 @@ def follower(robot: Robot, controller: str | os.PathLike, dt: float, timeout: fl
     """
     code = c_controller(robot, controller, dt)
     law: Any = controller_spec(controller).make(robot, dt=dt)
-    if law.output == "wheel_speed":
-        raise UnsupportedError(
-            "a node gives duties, and this drive takes speeds of wheels",
-            got=robot.drive.kind,
-            expected="a drive of volts or duty",
-            remedy="ros2-control drives such a robot",
-            where="drive.kind",
-        )
     if isinstance(law, Mpc):
         ahead = [law.steps_late * dt + k * dt for k in range(law.horizon + 1)]
     else:
         ahead = [0.0, law.late, law.late + dt]
-    constants = f'''"""The loop: a path or a twist that is wanted and the pose in, duties out. No ROS, no omnidyn."""
+    constants = f'''"""The loop: a path or a twist that is wanted and the pose in, outputs out. No ROS, no omnidyn."""
 
 import bisect
 import ctypes
 import math
 import os
-from typing import Any
-
-import numpy as np
+import sys
 
 SUPPLIES = 1e-3, 1e5  # [V] that a battery may have
 STOPPED, BAD_SUPPLY = -1, -2  # what a step says of itself, beside what the controller says: see omnidyn_control.h
@@ -265,7 +330,7 @@ WHEELS = {robot.wheels.count}
 DT = {number(dt)}  # [s] between two steps
 TIMEOUT = {number(timeout)}  # [s] without a pose, or without a command, after which the robot stops
 SUPPLY = {number(robot.drive.supply or float(np.min(robot.motor.voltage_limit)))}  # [V], where none is given
-IN_VOLTS = {law.output == "voltage"}  # what the controller gives; else duties
+OUTPUT = "{law.output}"  # what the controller gives: voltage, duty, or wheel_speed
 # [s] from now: when it wants to know the path.
 AHEAD = ({", ".join(number(time) for time in ahead)})
 '''
@@ -273,7 +338,6 @@ AHEAD = ({", ".join(number(time) for time in ahead)})
         **code.files,
         "control_shared.c": _SHARED,
         "path_loop.py": about + constants + NUMBERS + _STEP,
-        "omnidyn_node.py": about + _SETUP + NODE_END,
     }
 
 
@@ -307,13 +371,13 @@ NODE_END = '''    def on_timer(self):
         """One step of the loop."""
         message = Float64MultiArray()
         message.data = self.loop.step(self.now(), supply=self.supply)
-        self.duty.publish(message)
+        self.output.publish(message)
 
     def stop(self):
-        """Duties of 0, the last word of the node."""
+        """Zeros, the last word of the node."""
         message = Float64MultiArray()
         message.data = [0.0] * WHEELS
-        self.duty.publish(message)
+        self.output.publish(message)
 
 
 def main():
@@ -352,7 +416,10 @@ int control_step(float elapsed, const float *pose, const float *twist, const flo
 """
 
 _STEP = '''LEAD = (0.05, 0.05, 0.2)  # [m, m, rad] by which what is asked for may be ahead of a robot that cannot follow
-LIBRARY = os.path.join(os.path.dirname(os.path.abspath(__file__)), "libomnidyn_control.so")
+# Beside this file, or beside the program where colcon has made links to the sources.
+FOLDERS = [os.path.dirname(os.path.abspath(path)) for path in (__file__, sys.argv[0])]
+PLACES = [os.path.join(folder, "libomnidyn_control.so") for folder in FOLDERS]
+LIBRARY = next((place for place in PLACES if os.path.exists(place)), PLACES[0])
 
 
 def nearest_turn(angle, to):
@@ -451,7 +518,7 @@ class PathLoop:
         return known and self.course is not None and now <= self.until
 
     def step(self, now, supply=SUPPLY):
-        """Duties of the motors, -1 to 1. All 0 where `status` is below 0: the dead-man stop is STOPPED."""
+        """What the drive takes, of each wheel. All 0 where `status` is below 0: the dead-man stop is STOPPED."""
         now, supply = number(now), number(supply)
         self.status = 0 if is_within(supply, SUPPLIES) else BAD_SUPPLY
         if not self.alive(now):
@@ -466,11 +533,13 @@ class PathLoop:
         path, output = (ctypes.c_float * len(rows))(*rows), (ctypes.c_float * WHEELS)()
         pose, twist = (ctypes.c_float * 3)(*self.pose), (ctypes.c_float * 3)(*self.twist)
         self.status = self.code.control_step(elapsed, pose, twist, path, output)
-        scale = 1.0 / supply if IN_VOLTS else 1.0
+        if OUTPUT == "wheel_speed":
+            return list(output)
+        scale = 1.0 / supply if OUTPUT == "voltage" else 1.0
         return [max(-1.0, min(1.0, scale * each)) for each in output]
 '''
 
-_SETUP = '''"""path or /cmd_vel, and /odom in, duties out, with a dead-man stop."""
+_SETUP = '''"""path or /cmd_vel, and /odom in, @TOPIC@ out, with a dead-man stop."""
 
 import math
 
@@ -497,7 +566,7 @@ class OmnidynNode(Node):
         speed = float(self.declare_parameter("speed_m_s", 0.2).value)
         self.speed = speed if speed > 1e-3 else 0.2
         stamped = bool(self.declare_parameter("stamped", True).value)
-        self.duty = self.create_publisher(Float64MultiArray, "duty", 10)
+        self.output = self.create_publisher(Float64MultiArray, "@TOPIC@", 10)
         self.create_subscription(TwistStamped if stamped else Twist, "cmd_vel", self.on_command, 10)
         self.create_subscription(Path, "path", self.on_path, 10)
         self.create_subscription(Odometry, "odom", self.on_odometry, 10)

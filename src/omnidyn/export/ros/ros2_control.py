@@ -1,8 +1,7 @@
-"""ros2-control: omni_wheel_drive_controller for this robot: parameters, URDF, velocity smoother, launch file.
+"""ros2-control: a package for ros2_control: parameters of the drive controller, URDF, velocity smoother, launch file.
 
-That controller numbers the wheels counter-clockwise from `wheel_offset`; its joints turn the other way than ours:
-r w = v_x sin theta - v_y cos theta - b omega, minus the row of G^T (odometry.cpp of ros2_controllers). So wheels are
-named in the order of their azimuth, and the joints of this URDF turn outwards: the same wheel turns the same way.
+Evenly spaced omni wheels are driven by omni_wheel_drive_controller, four mecanum wheels by mecanum_drive_controller:
+see drive_controller.py. Joints of the URDF turn the way that the controller has it.
 """
 
 from __future__ import annotations
@@ -14,12 +13,14 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
-from omnidyn.export.bodies.links import height_of, links
+from omnidyn.export.bodies.links import height_of, joint_names, links
 from omnidyn.export.bodies.urdf import description
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse
 from omnidyn.export.feedforward.gains import axis_gains
-from omnidyn.export.spelling import hash_comment, python_comment, yaml_number
+from omnidyn.export.ros.drive_controller import DriveController, drive_controller
+from omnidyn.export.ros.package import package, package_name, read_me
+from omnidyn.export.spelling import filled, hash_comment, python_comment, yaml_number
 from omnidyn.model.known.told import numbers_told
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import top_speeds
@@ -30,49 +31,56 @@ HEADROOM = 0.8  # of what the motors can keep: the rest is for friction that is 
 HORIZON = 10.0  # [s]
 RATE = 100  # [Hz]
 NOTES = (
-    "omni_wheel_drive_controller knows kinematics only: no friction, no motor, no slip; its covariance is constant, "
-    "however fast or far the robot has gone",
-    "the joints of this URDF turn outwards, as that controller has it: opposite to the wheels of omnidyn",
+    "the controller knows kinematics only: no friction, no motor, no slip; its covariance is constant, however fast or "
+    "far the robot has gone",
     "limits of velocity and acceleration are those of one axis alone: on a diagonal, or turning, motors have less left",
+    "made and checked without ROS: parameters by those that the controllers declare, files by their parsers",
+)
+DEPENDS = (
+    "controller_manager",
+    "joint_state_broadcaster",
+    "nav2_lifecycle_manager",
+    "nav2_velocity_smoother",
+    "robot_state_publisher",
 )
 
 
 def ros2_control(
-    robot: Robot, runs: Run | Sequence[Run] = (), horizon: float = HORIZON, height: float | None = None
+    robot: Robot,
+    runs: Run | Sequence[Run] = (),
+    horizon: float = HORIZON,
+    height: float | None = None,
+    joints: Sequence[str] = (),
 ) -> Export:
-    """The files of a robot with evenly spaced omni wheels for ros2_control.
+    """The package of a robot with evenly spaced omni wheels, or four mecanum wheels in an X, for ros2_control.
 
     Args:
         robot: The robot.
         runs: Logs with wheel speeds and a measured twist, for the covariances.
         horizon: Of the covariance of the pose [s].
         height: Of the base [m].
+        joints: Names of the joints, in the order of the wheels; wheel1_joint, ... by default.
 
-    Raises UnsupportedError for other wheels, InputError for runs that cannot tell.
+    Raises UnsupportedError for other wheels, InputError for runs that cannot tell, or names that are none.
     """
     refuse("ros2-control", robot)
-    covariances, omissions = covariance(robot, as_list(runs), horizon), left_out("ros2-control", robot)
-    about = [f"{robot.name}, by omnidyn.", *(f"Not in it: {words}" for words in omissions), *NOTES]
-    parts = links(robot, height_of(robot, height))
+    covariances, names = covariance(robot, as_list(runs), horizon), joint_names(robot, joints)
+    controller = drive_controller(robot, names, covariances.twist, covariances.pose)
+    parts = links(robot, height_of(robot, height), names)
+    omissions, notes = (*left_out("ros2-control", robot), *parts.notes), (*NOTES, controller.words)
+    name = package_name(robot.name, "bringup")
+    head = [f"{robot.name}, by omnidyn.", *(f"Not in it: {words}" for words in omissions), *notes]
     files = {
-        "controllers.yaml": hash_comment(about) + _controllers(robot, covariances, horizon),
-        "velocity_smoother.yaml": hash_comment(about[:1]) + _smoother(robot),
-        "robot.urdf": description(robot.name, parts, omissions, outward=True),
-        "bringup.launch.py": python_comment(about[:1]) + _LAUNCH,
+        "controllers.yaml": hash_comment(head) + _controllers(controller, covariances, horizon),
+        "velocity_smoother.yaml": hash_comment(head[:1]) + _smoother(robot),
+        "robot.urdf": description(robot.name, parts, omissions, controller.outward, f"{controller.words}."),
+        "bringup.launch.py": python_comment(head[:1]) + _launch(controller),
     }
-    return Export(
-        "ros2-control", robot.name, files, omissions, (f"covariances: {covariances.words}", *NOTES), folder=True
-    )
-
-
-def order(robot: Robot) -> list[int]:
-    """The wheels counter-clockwise from forward, counted from 0."""
-    return [int(k) for k in np.argsort(np.mod(robot.wheels.azimuth_deg, 360.0))]
-
-
-def offset(robot: Robot) -> float:
-    """The azimuth of the first of them [rad]."""
-    return float(np.radians(np.mod(robot.wheels.azimuth_deg, 360.0)[order(robot)[0]]))
+    words = f"{robot.name} with {controller.name}, by omnidyn"
+    files |= package(name, words, (*DEPENDS, controller.name), list(files))
+    files["README.md"] = read_me(robot.name, head[1:], _sections(robot, name, controller, names))
+    notes = (f"covariances: {covariances.words}", *notes)
+    return Export("ros2-control", robot.name, files, omissions, notes, folder=True)
 
 
 def limits(robot: Robot) -> tuple[FloatArray, FloatArray]:
@@ -85,39 +93,20 @@ def limits(robot: Robot) -> tuple[FloatArray, FloatArray]:
     return HEADROOM * volts_left / axis_gains(robot)[:, 1], HEADROOM * volts_left / axis_gains(robot)[:, 2]
 
 
-def _controllers(robot: Robot, covariances: Covariance, horizon: float) -> str:
-    names = ", ".join(f'"wheel{k + 1}_joint"' for k in order(robot))
+def _controllers(controller: DriveController, covariances: Covariance, horizon: float) -> str:
     return f"""\
-# Covariances: {covariances.words}.
+# Covariances: {covariances.words}. That of the pose is the one after {horizon:g} s.
 controller_manager:
   ros__parameters:
     update_rate: {RATE}
     joint_state_broadcaster:
       type: joint_state_broadcaster/JointStateBroadcaster
-    omni_wheel_drive_controller:
-      type: omni_wheel_drive_controller/OmniWheelDriveController
+    {controller.name}:
+      type: {controller.type}
 
-omni_wheel_drive_controller:
+{controller.name}:
   ros__parameters:
-    wheel_names: [{names}]
-    wheel_offset: {yaml_number(offset(robot))}
-    robot_radius: {yaml_number(float(np.mean(robot.wheels.robot_radius)))}
-    wheel_radius: {yaml_number(float(robot.wheels.radii.mean()))}
-    odom_frame_id: odom
-    base_frame_id: base_link
-    position_feedback: false
-    cmd_vel_timeout: 0.5
-    diagonal_covariance:
-      # of the pose after {horizon:g} s
-      pose: {_diagonal(covariances.pose)}
-      twist: {_diagonal(covariances.twist)}
-"""
-
-
-def _diagonal(variance: FloatArray) -> str:
-    """x, y, z, roll, pitch, yaw: what the robot cannot do is certain to be 0, and said with a tiny variance."""
-    x, y, yaw = (f"{value:.6e}" for value in np.maximum(variance, 1e-12))
-    return f"[{x}, {y}, 1.0e-12, 1.0e-12, 1.0e-12, {yaw}]"
+{controller.parameters}"""
 
 
 def _smoother(robot: Robot) -> str:
@@ -139,11 +128,14 @@ velocity_smoother:
     max_decel: {row(-acceleration)}
     deadband_velocity: [0.0, 0.0, 0.0]
     velocity_timeout: 0.5
+    enable_stamped_cmd_vel: true
 """
 
 
+# Since Jazzy a controller reads its parameters from the file that the spawner names, and the manager reads the robot
+# from the topic of robot_state_publisher.
 _LAUNCH = '''\
-"""Start ros2_control with the controller of this folder."""
+"""Start the robot: its joints, its controller, and the velocity smoother on /cmd_vel before it."""
 
 from pathlib import Path
 
@@ -152,19 +144,51 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
 HERE = Path(__file__).resolve().parent
+CONTROLLER = "@CONTROLLER@"
 
 
 def generate_launch_description():
     text = (HERE / "robot.urdf").read_text("utf-8")
     description = {"robot_description": ParameterValue(text, value_type=str)}
-    controllers = str(HERE / "controllers.yaml")
+    controllers, smoother = str(HERE / "controllers.yaml"), str(HERE / "velocity_smoother.yaml")
     return LaunchDescription([
         Node(package="robot_state_publisher", executable="robot_state_publisher", parameters=[description]),
-        Node(package="controller_manager", executable="ros2_control_node", parameters=[description, controllers]),
+        Node(package="controller_manager", executable="ros2_control_node", parameters=[controllers]),
         Node(package="controller_manager", executable="spawner",
-             arguments=["joint_state_broadcaster", "omni_wheel_drive_controller"]),
+             arguments=["joint_state_broadcaster", "--param-file", controllers]),
+        Node(package="controller_manager", executable="spawner",
+             arguments=[CONTROLLER, "--param-file", controllers@REMAPPED@]),
+        Node(package="nav2_velocity_smoother", executable="velocity_smoother", name="velocity_smoother",
+             parameters=[smoother], remappings=[("cmd_vel_smoothed", "@COMMAND@")]),
+        Node(package="nav2_lifecycle_manager", executable="lifecycle_manager", name="lifecycle_manager_smoother",
+             parameters=[{"autostart": True, "node_names": ["velocity_smoother"]}]),
     ])
 '''
+
+
+def _launch(controller: DriveController) -> str:
+    moved = f', "--controller-ros-args", "-r {controller.transform}:=/tf"' if controller.transform else ""
+    return filled(_LAUNCH, CONTROLLER=controller.name, REMAPPED=moved, COMMAND=controller.command)
+
+
+def _sections(robot: Robot, name: str, controller: DriveController, joints: Sequence[str]) -> list[str]:
+    """The paragraphs of README.md."""
+    rows = "\n".join(
+        f"| {k + 1} | `{joint}` | {float(robot.wheels.azimuth_deg[k]):g} | "
+        f"{'outwards' if k in controller.outward else 'inwards'} |"
+        for k, joint in enumerate(joints)
+    )
+    return [
+        f"Put the folder into the `src` of a workspace of ROS 2 Jazzy or newer, as `{name}`, then:",
+        f"    rosdep install --from-paths src --ignore-src\n    colcon build --packages-select {name}\n"
+        f"    . install/setup.bash\n    ros2 launch {name} bringup.launch.py",
+        "Drive it by stamped twists on `/cmd_vel`:",
+        "    ros2 topic pub -r 20 /cmd_vel geometry_msgs/msg/TwistStamped '{twist: {linear: {x: 0.2}}}'",
+        f"The smoother sends them on to `{controller.command}`; odometry comes on `{controller.odometry}`.",
+        "The plugin in `robot.urdf` is `mock_components/GenericSystem`: joints do what they are told. Put in that of "
+        "your hardware. It takes and gives speeds of the joints [rad/s], positive about these axes:",
+        f"| wheel | joint | azimuth [degree] | axis of the joint points |\n| --- | --- | --- | --- |\n{rows}",
+    ]
 
 
 # How far the odometry of wheels is off: the constant diagonal covariance that a ROS controller publishes
@@ -198,8 +222,11 @@ def covariance(robot: Robot, runs: Sequence[Run], horizon: float) -> Covariance:
     return _from_runs(robot, runs, horizon) if runs else _from_robot(robot, horizon)
 
 
-def odometry_error(robot: Robot, run: Run) -> FloatArray:
-    """Twist from the wheels minus the measured one, NaN where either is missing. Shape (samples, 3)."""
+def odometry_error(robot: Robot, run: Run) -> tuple[FloatArray, FloatArray]:
+    """(times [s], twist from the wheels minus the measured one), NaN where either is missing. Shape (samples, 3).
+
+    Where sensors have clocks of their own: at the times of the twist, wheel speeds on straight lines between theirs.
+    """
     if run.wheel_speed is None or run.twist is None:
         raise InputError(
             "cannot compare odometry with this run",
@@ -207,12 +234,16 @@ def odometry_error(robot: Robot, run: Run) -> FloatArray:
             expected="wheel_speed and twist",
             remedy="give logs that measured both, such as by motion capture",
         )
-    return twist_from_wheel_speed(robot.wheels, run.wheel_speed) - run.twist
+    if not run.staggered:
+        return run.t, twist_from_wheel_speed(robot.wheels, run.wheel_speed) - run.twist
+    (at, speeds), (t, twist) = run.samples("wheel_speed"), run.samples("twist")
+    lines = [np.interp(t, at, speed, left=np.nan, right=np.nan) for speed in speeds.T]
+    return t, twist_from_wheel_speed(robot.wheels, np.stack(lines, axis=1)) - twist
 
 
 def _from_runs(robot: Robot, runs: Sequence[Run], horizon: float) -> Covariance:
     errors = [odometry_error(robot, run) for run in runs]
-    samples = np.concatenate([error[np.isfinite(error).all(axis=1)] for error in errors])
+    samples = np.concatenate([error[np.isfinite(error).all(axis=1)] for _, error in errors])
     if len(samples) < LEAST_SAMPLES:
         raise InputError(
             "too few samples for a covariance",
@@ -221,12 +252,12 @@ def _from_runs(robot: Robot, runs: Sequence[Run], horizon: float) -> Covariance:
             remedy="give longer logs",
         )
     twist = np.mean(samples**2, axis=0)
-    ways = [_windows(error, run.t, horizon) for error, run in zip(errors, runs, strict=True)]
+    ways = [_windows(error, t, horizon) for t, error in errors]
     windows = np.concatenate(ways)
     words = f"from {len(runs)} log{'s' * (len(runs) > 1)}, {len(samples)} samples of odometry and measured twist"
     if len(windows):
         return Covariance(twist, np.mean(windows**2, axis=0), f"{words}, {len(windows)} windows of {horizon:g} s")
-    steps = np.concatenate([np.diff(run.t) for run in runs])
+    steps = np.concatenate([np.diff(t) for t, _ in errors])
     # No log is that long: errors that do not last, summed as often as there are samples in the horizon.
     pose = twist * float(np.median(steps)) * horizon
     return Covariance(twist, pose, f"{words}; no log lasts {horizon:g} s: the pose as if errors did not last")

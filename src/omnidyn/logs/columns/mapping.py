@@ -15,6 +15,7 @@ from omnidyn.logs.channels import TIME, place, si_suffix
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE, Column
 from omnidyn.logs.columns.guessed import Doubt
 from omnidyn.model.robot_file import toml_literal
+from omnidyn.model.wheels import MAX_WHEELS
 from omnidyn.statement import Statement
 from omnidyn.units import ANGLE, CURRENT, DUTY, FORCE, LENGTH, SPEED, TURN_RATE, VOLTAGE, Unit, parse_unit
 from omnidyn.units import TIME as TIME_QUANTITY
@@ -35,6 +36,7 @@ _QUANTITIES = {
     "N": FORCE,
 }
 _RIM = {TURN_RATE: SPEED, ANGLE: LENGTH}  # what a wheel does -> what its rim does
+_JOINT = re.compile(r"(?:.*?joint_states/)(.+)/(?:velocity|position)", re.DOTALL)
 _SPEC = re.compile(r"(?P<invert>-)?(?P<name>.+?)(?::(?P<unit>[^:@]*))?(?:@(?P<side>wheel|motor))?", re.DOTALL)
 
 
@@ -68,6 +70,17 @@ class ColumnMap:
                     got=f"{component}: {column}",
                     expected=f"no frame, or one of {', '.join(FRAMED)}",
                 )
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joints of the wheels as joint states name them, in the order of the wheels; () where these do not say."""
+        for letter in ("w", "a"):
+            wheels = (f"{letter}{k + 1}" for k in range(MAX_WHEELS))
+            names = [_JOINT.fullmatch(self.columns[wheel].name) for wheel in wheels if wheel in self.columns]
+            joints = tuple(match[1] for match in names if match)
+            if joints and len(joints) == len(names):
+                return joints
+        return ()
 
     def with_columns(self, overrides: Mapping[str, Column]) -> ColumnMap:
         """The same with some columns set, and no longer unused."""

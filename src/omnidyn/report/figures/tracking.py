@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ MOST_POINTS = 4000
 MOST_PANELS = 4
 
 
-def draw_tracking(trackings: Tracking | Sequence[Tracking]) -> Picture:
+def draw_tracking(trackings: Tracking | Iterable[Tracking]) -> Picture:
     """Where they went, and how far off they were over time."""
     tracking_list = [trackings] if isinstance(trackings, Tracking) else list(trackings)
     with look():
