@@ -27,18 +27,18 @@ def march_axis(t, u, y, axis, first, last, drive, rate, coulomb, hold, start, va
     """
     final, wheels = (mode & FINAL) != 0, u.shape[1]
     v, va, vc, vs = start, 0.0, 0.0, 1.0
-    phi = dphi = length = before = 0.0
+    phi = dphi = length = value_before = 0.0
     count = square = total = lag = ga = gc = gs = 0.0
     aa = ac = as_ = cc = cs = ss = 0.0
     for k in range(first, last + 1):
         residual = y[k, axis] - v
         if residual == residual:
-            pull, more, curvature, rho = loss_terms(residual, variance, nu, final)
+            pull, pull_change, curvature, rho = loss_terms(residual, variance, nu, final)
             count += 1.0
-            square += more
+            square += pull_change
             total += rho
-            lag += pull * before
-            before = pull
+            lag += pull * value_before
+            value_before = pull
             ga += pull * va
             gc += pull * vc
             gs += pull * vs
@@ -56,19 +56,21 @@ def march_axis(t, u, y, axis, first, last, drive, rate, coulomb, hold, start, va
                 score[2] += pull / variance * vs
                 score[3] += pull
         else:
-            before = 0.0
+            value_before = 0.0
         if k == last:
             break
         g = 0.0
         for w in range(wheels):
             g += drive[w] * u[k, w]
         dt = t[k + 1] - t[k]
-        off = dt - length
-        if abs(off) * rate > SAME or length == 0.0:
+        dt_error = dt - length
+        if abs(dt_error) * rate > SAME or length == 0.0:
             phi, dphi, _, _ = hold_slopes(rate, dt)
-            length, off = dt, 0.0
+            length, dt_error = dt, 0.0
         decay = 1.0 - rate * phi
-        v, kv, _, kc, ka = step_slopes(v, g, coulomb, hold, rate, phi + off * decay, dphi - off * (phi + rate * dphi))
+        v, kv, _, kc, ka = step_slopes(
+            v, g, coulomb, hold, rate, phi + dt_error * decay, dphi - dt_error * (phi + rate * dphi)
+        )
         va = kv * va + ka
         vc = kv * vc + kc
         vs = kv * vs

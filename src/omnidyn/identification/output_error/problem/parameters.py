@@ -50,9 +50,9 @@ class Parameter:
         """The number that the solver sees."""
         return math.log(value) if self.log else value
 
-    def outer(self, inner: float) -> float:
+    def outer(self, inner_value: float) -> float:
         """The value behind the number that the solver sees."""
-        return math.exp(min(inner, LARGEST)) if self.log else inner
+        return math.exp(min(inner_value, LARGEST)) if self.log else inner_value
 
     def slope(self, value: float) -> float:
         """d value / d inner."""
@@ -81,8 +81,10 @@ def robot_at(robot: Robot, parameters: Sequence[Parameter], values: Sequence[flo
     return robot
 
 
-def robot_parameter(robot: Robot, key: str, prior: tuple[float, float] | None, others: Sequence[str] = ()) -> Parameter:
-    """A number of the robot file as a free parameter; `others` are free beside it.
+def robot_parameter(
+    robot: Robot, key: str, prior: tuple[float, float] | None, free_names: Sequence[str] = ()
+) -> Parameter:
+    """A number of the robot file as a free parameter; `free_names` are free beside it.
 
     Friction may be 0: it has a linear scale and a bound at 0. So may what rotors and wheels weigh beside the body: on
     a logarithmic scale 0 is infinitely far off, and a robot without rotors keeps some of the guess as mass. A centre of
@@ -94,30 +96,32 @@ def robot_parameter(robot: Robot, key: str, prior: tuple[float, float] | None, o
     if place.level:
         return Parameter(key, value, 0.0, FRICTION_LIMIT, prior=prior)
     if place.name == CENTRE:
-        widest = WITHIN * max(np.atleast_1d(robot.wheels.robot_radius).tolist())
-        return Parameter(key, value, -widest, widest, prior=prior)
+        widest_offset = WITHIN * max(np.atleast_1d(robot.wheels.robot_radius).tolist())
+        return Parameter(key, value, -widest_offset, widest_offset, prior=prior)
     if value <= 0.0:
         raise InputError("cannot be free", got=f"{key} = {value:g}", expected="a number above 0", where="free")
     if place.name in (ROTOR, WHEEL):
         return Parameter(key, value, LIGHT * value, value * SPAN, prior=prior)
     span = SPAN_OF_SPEED if place.part == FRICTION and place.field.endswith("_speed") else SPAN
-    most = 1.0 if place.name == EFFICIENCY else value * span
-    also = tuple((str(follower), float(follower.get(robot)) / value) for follower in _followers(robot, place, others))
-    return Parameter(key, value, value / span, most, True, prior, also)
+    upper_limit = 1.0 if place.name == EFFICIENCY else value * span
+    tied_numbers = tuple(
+        (str(follower), float(follower.get(robot)) / value) for follower in _followers(robot, place, free_names)
+    )
+    return Parameter(key, value, value / span, upper_limit, True, prior, tied_numbers)
 
 
-def _followers(robot: Robot, key: Key, others: Sequence[str]) -> list[Key]:
+def _followers(robot: Robot, key: Key, free_names: Sequence[str]) -> list[Key]:
     """The EMF constants that keep their ratio to this torque constant, for both are one number of the magnet.
 
     Wheel by wheel where either stands once for each; those that are free themselves do not follow.
     """
-    asked = [each for each in map(Key.parse, others) if each.name == EMF]
-    if key.name != TORQUE or Key(EMF) in asked:
+    free_emf_keys = [free_key for free_key in map(Key.parse, free_names) if free_key.name == EMF]
+    if key.name != TORQUE or Key(EMF) in free_emf_keys:
         return []
-    if key.index is None and not asked:
-        return [Key.parse(each) for each in expand(EMF, robot)]
+    if key.index is None and not free_emf_keys:
+        return [Key.parse(emf_name) for emf_name in expand(EMF, robot)]
     wheels = range(robot.wheels.count) if key.index is None else [key.index]
-    return [each for wheel in wheels if (each := Key(EMF, wheel)) not in asked]
+    return [emf_key for wheel in wheels if (emf_key := Key(EMF, wheel)) not in free_emf_keys]
 
 
 def names_of(names: str | Sequence[str]) -> tuple[str, ...]:
@@ -127,9 +131,9 @@ def names_of(names: str | Sequence[str]) -> tuple[str, ...]:
 
 def refuse_repeated(names: Sequence[str]) -> None:
     """Raises InputError for a name that is asked for twice."""
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise InputError("asked for twice", got=", ".join(twice), expected="every key once", where="free")
+    repeated_names = sorted({name for name in names if names.count(name) > 1})
+    if repeated_names:
+        raise InputError("asked for twice", got=", ".join(repeated_names), expected="every key once", where="free")
 
 
 def refuse_unknown(keys: Sequence[str], robot: Robot) -> None:
