@@ -15,8 +15,8 @@ from omnidyn.model.robot import GUESSES
 from omnidyn.statement import NOTE, Statement
 
 LIMIT = "motor.current_limit_A"
-NEARLY = 0.7  # of what the first remedy explains, from which one behind it is worth a word
-WIDE, GOAL = 0.2, 0.1  # half width of the 95 % interval over the value: worth a word, and what it could be
+SIMILAR_SHARE = 0.7  # of what the first remedy explains, from which one behind it is worth a word
+WIDE_SHARE, GOAL_SHARE = 0.2, 0.1  # half width of the 95 % interval over the value: worth a word, and what it could be
 CORRELATED = 0.95  # two numbers that move together
 # Guesses worth a fit, where a log has voltages. Of K_t, the EMF constant and the gear only one number shows.
 GOES_WITH_TORQUE = (EMF, "motor.gear_ratio")
@@ -59,7 +59,9 @@ def _missing(fit: OutputErrorEstimate) -> Iterator[Statement]:
     lack = fit.lack_of_fit
     if lack is None or not lack.found or fit.not_followed:
         return
-    near_causes = (cause for cause in lack.causes if cause.confident and cause.chi2 >= NEARLY * lack.causes[0].chi2)
+    near_causes = (
+        cause for cause in lack.causes if cause.confident and cause.chi2 >= SIMILAR_SHARE * lack.causes[0].chi2
+    )
     remedy = next(near_causes, None)
     if remedy is not None:
         numbers = {"cause": remedy.cause, "same_as": remedy.same_as, "alike": lack.alike(remedy), "way": way(remedy)}
@@ -105,7 +107,7 @@ def _together(fit: OutputErrorEstimate) -> Iterator[Statement]:
         for j in range(i + 1, len(names))
         if abs(matrix[i, j]) > CORRELATED
         and not {first, names[j]} & set(fit.unidentifiable)
-        and max(fit.half_width(name) if name in fit.value else 0.0 for name in (first, names[j])) > GOAL
+        and max(fit.half_width(name) if name in fit.value else 0.0 for name in (first, names[j])) > GOAL_SHARE
     ]
     if pairs:
         first, second, correlations = zip(*pairs, strict=True)
@@ -118,14 +120,14 @@ def _wide(fit: OutputErrorEstimate) -> Iterator[Statement]:
     shares = {
         name: fit.half_width(name) for name in fit.value if name not in fit.unidentifiable and name not in fit.at_bound
     }
-    wide_shares = {name: share for name, share in shares.items() if share > WIDE}
+    wide_shares = {name: share for name, share in shares.items() if share > WIDE_SHARE}
     if wide_shares:
         numbers = {
             "keys": tuple(wide_shares),
             "shares": tuple(wide_shares.values()),
             "known": tuple(fit.is_known(name) for name in wide_shares),
-            "longer": (max(wide_shares.values()) / GOAL) ** 2,
-            "goal": GOAL,
+            "longer": (max(wide_shares.values()) / GOAL_SHARE) ** 2,
+            "goal": GOAL_SHARE,
         }
         yield Statement("wide_by_misfit" if _misses(fit) else "wide_intervals", NOTE, numbers=numbers)
 

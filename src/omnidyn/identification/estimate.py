@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 NOT_DETERMINED = "not determined"  # in the place of an interval: the data do not give one
 UNKNOWN = {"std": None, "ci95": [None, None]}  # the same for machines
-WORTH = 0.1  # by which an interval must be wider for that to be worth a table
+WIDENING_SHARE = 0.1  # by which an interval must be wider for that to be worth a table
 SOURCE_LENGTH = 300  # a robot file takes 400 characters
 
 
@@ -171,7 +171,9 @@ class Estimate(Displayable):
         rows = []
         for name, (low, high) in self.log_alone.items():
             whole_interval = self._whole(name)
-            if whole_interval is not None and whole_interval[1] - whole_interval[0] > (1.0 + WORTH) * (high - low):
+            if whole_interval is not None and whole_interval[1] - whole_interval[0] > (1.0 + WIDENING_SHARE) * (
+                high - low
+            ):
                 rows.append((name, interval_cell((low, high)), interval_cell(whole_interval)))
         return (
             Table(("95 % intervals", "from the log alone", "with what is known of the robot"), rows) if rows else None

@@ -17,7 +17,7 @@ from omnidyn.model.actuation import DEAD_BAND
 from omnidyn.model.keys import in_words, unit
 from omnidyn.statement import ERROR, WARNING, Statement
 
-SHOWN = 6  # findings of a log that are named
+SHOWN_FINDINGS = 6  # findings of a log that are named
 MOST_LOGS = 20  # that are shown, one by one
 
 
@@ -151,18 +151,20 @@ def verdict_table(verdicts: Sequence[Verdict]) -> Table:
         listed_verdicts = sorted(
             listed_verdicts, key=lambda verdict: (-verdict.counts[ERROR], -verdict.counts[WARNING])
         )[: MOST_LOGS - 1]
-    for each in listed_verdicts:
-        grave_findings = [f for f in each.findings if f.severity in (ERROR, WARNING) or f.code == "judged_again"]
+    for listed_verdict in listed_verdicts:
+        grave_findings = [
+            f for f in listed_verdict.findings if f.severity in (ERROR, WARNING) or f.code == "judged_again"
+        ]
         finding_names = [f"{f.code} {f.subject}".rstrip() for f in grave_findings]
-        words = ", ".join(finding_names[:SHOWN]) + (", ..." if len(finding_names) > SHOWN else "")
+        words = ", ".join(finding_names[:SHOWN_FINDINGS]) + (", ..." if len(finding_names) > SHOWN_FINDINGS else "")
         rows.append(
             (
-                each.source,
-                str(each.rows),
-                f"{each.duration:.4g}",
-                f"{each.rate:.4g}",
-                str(each.counts[ERROR]),
-                str(each.counts[WARNING]),
+                listed_verdict.source,
+                str(listed_verdict.rows),
+                f"{listed_verdict.duration:.4g}",
+                f"{listed_verdict.rate:.4g}",
+                str(listed_verdict.counts[ERROR]),
+                str(listed_verdict.counts[WARNING]),
                 words or "fit for use",
             )
         )

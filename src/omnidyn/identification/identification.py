@@ -20,7 +20,7 @@ from omnidyn.identification.methods import (
     OutputError,
 )
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.output_error.fit import WHOLE
+from omnidyn.identification.output_error.fit import ALL_LOGS
 from omnidyn.identification.steady.study_table import Difference, SteadyStudy
 from omnidyn.identification.validation import Validation
 from omnidyn.identification.verdict import (
@@ -121,7 +121,7 @@ class Identification(Displayable):
     @property
     def validation(self) -> Validation | None:
         """The same of the only group; None where there is none. Raises InputError where there are several groups."""
-        return self.validations.get(WHOLE) if self.estimate else None
+        return self.validations.get(ALL_LOGS) if self.estimate else None
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:

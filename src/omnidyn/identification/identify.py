@@ -35,7 +35,7 @@ from omnidyn.identification.methods import (
     refuse_unless_method,
 )
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
-from omnidyn.identification.output_error.fit import WHOLE, Fit
+from omnidyn.identification.output_error.fit import ALL_LOGS, Fit
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.steady.steady_state import fit_steady_state, identify_lines
 from omnidyn.identification.steady.study import diagnosed, fit_steady, undiagnosed
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 
 Logs = Run | Log | Sequence[Run | Log] | SteadyTable | MotorTable
 Save = Callable[[Mapping[str, Estimate]], object]
-DEAR, NOTICED = 5.0, 2.0  # times the fit; [s]: a diagnosis that takes longer than both is worth a word
+SLOW_RATIO, SLOW_SECONDS = 5.0, 2.0  # times the fit; [s]: a diagnosis that takes longer than both is worth a word
 
 
 def identify(
@@ -210,8 +210,8 @@ def _of_steady_table(table: SteadyTable, method: Method, request: _Asked) -> Ide
     options = {"rest_use": method.rest, "rest_speed": method.rest_speed, "absolute_std": method.absolute_std}
     estimate = fit_steady_state(request.of_friction(), table, **options)
     estimate = replace(estimate, warnings=(*table.notes, *estimate.warnings))
-    request.save({WHOLE: estimate})
-    return Identification(method, {WHOLE: estimate}, request.without_more())
+    request.save({ALL_LOGS: estimate})
+    return Identification(method, {ALL_LOGS: estimate}, request.without_more())
 
 
 def _of_motors(
@@ -269,7 +269,7 @@ def _fitted(runs: Sequence[Run], method: OutputError, check: Sequence[Log], requ
         request.progress(Report(words, urgent=True))
     sources = [run.source for run in runs]
     named_groups = names_of_groups(request.groups, sources)
-    groups = named_groups or [WHOLE] * len(runs)
+    groups = named_groups or [ALL_LOGS] * len(runs)
     held_mask = held_out(sources, request.hold_out)
     fitted_runs = [
         (run, group)
@@ -348,7 +348,7 @@ def _diagnosed(fits: Mapping[str, OutputErrorEstimate], request: _Asked) -> dict
         diagnosis = request.attempts.make(f"{DIAGNOSIS}{label}", lambda fit=fit: fit.diagnosis)
         diagnosed_fits[name] = fit if diagnosis is not None else replace(fit, study=None)
     time_spent = process_time() - start_time
-    if time_spent > max(DEAR * request.fit_time, NOTICED):
+    if time_spent > max(SLOW_RATIO * request.fit_time, SLOW_SECONDS):
         ratio = time_spent / request.fit_time
         words = f"the diagnosis took {time_spent:.0f} s, {ratio:.0f} times the fit; `quick` leaves it out"
         request.progress(Report(words, urgent=True))

@@ -14,15 +14,21 @@ from omnidyn.model.keys import in_words
 from omnidyn.statement import NOTE, WARNING, Statement, statements
 
 LOSS = "loss"  # the key of a remedy for wild samples, which is no cause of a misfit
-MOST = 0.7  # of all that residuals hold beside noise, that a remedy must explain to be the one
+MAIN_SHARE = 0.7  # of all that residuals hold beside noise, that a remedy must explain to be the one
 CHANGE = "change"  # the key of friction that is another one from some time of the log on
 # What robots do that no law holds yet: keys.
-UNOFFERED = ("friction one way", "drag", "turns of the wheels", "sag", "heat", "filter")
+UNOFFERED_CAUSES = ("friction one way", "drag", "turns of the wheels", "sag", "heat", "filter")
 REPEATS, HOLDS, NEIGHBOURS, REST, ROUNDING = "repeats", "holds", "neighbours", "rest", "rounding"  # sources of a level
-FAR = 0.001, 0.1  # chance, and share, from which on it is said that a robot in motion leaves more than one at rest
-WORTH = 0.01  # share of the variance of a residual that is worth a line
-CHANGED, SEEN = 2, 0.02  # numbers that a remedy would change that are named; relative change that is worth it
-MOVES, MOST_NAMED = 0.001, 5  # relative change by a percent of what a number rests on; so many are named
+UNREST_LIMITS = (
+    0.001,
+    0.1,
+)  # chance, and share, from which on it is said that a robot in motion leaves more than one at rest
+LINE_SHARE = 0.01  # share of the variance of a residual that is worth a line
+CHANGED_NUMBERS, SEEN_CHANGE = (
+    2,
+    0.02,
+)  # numbers that a remedy would change that are named; relative change that is worth it
+MOVES, NAMED_KEYS = 0.001, 5  # relative change by a percent of what a number rests on; so many are named
 
 
 @dataclass(frozen=True)
@@ -123,25 +129,25 @@ class Remedy:
     @property
     def confident(self) -> bool:
         """Whether it explains most of what is to be explained, and nothing that nobody offers explains the same."""
-        return self.offered and self.share >= MOST and not self.rivals
+        return self.offered and self.share >= MAIN_SHARE and not self.rivals
 
-    def largest_changes(self, name_count: int = CHANGED) -> dict[str, tuple[Any, ...]]:
+    def largest_changes(self, name_count: int = CHANGED_NUMBERS) -> dict[str, tuple[Any, ...]]:
         """The numbers that it would change name_count: changed, before, after; empty where none would be seen to
         change."""
         shares = {
-            name: abs(after - value_now) / abs(value_now) if value_now else math.inf
-            for name, (value_now, after) in self.changes.items()
+            name: abs(value_then - value_now) / abs(value_now) if value_now else math.inf
+            for name, (value_now, value_then) in self.changes.items()
         }
-        largest_names = sorted((name for name in shares if shares[name] >= SEEN), key=lambda name: -shares[name])[
-            :name_count
-        ]
+        largest_names = sorted(
+            (name for name in shares if shares[name] >= SEEN_CHANGE), key=lambda name: -shares[name]
+        )[:name_count]
         values_before, values_after = (tuple(self.changes[name][k] for name in largest_names) for k in (0, 1))
         return {"changed": tuple(largest_names), "before": values_before, "after": values_after}
 
     @property
     def rivals(self) -> tuple[str, ...]:
         """Those of `same_as` that no robot file holds."""
-        return tuple(key for key in self.same_as if key in UNOFFERED)
+        return tuple(key for key in self.same_as if key in UNOFFERED_CAUSES)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
@@ -235,9 +241,9 @@ class LackOfFit:
         causes = {candidate_remedy.key: candidate_remedy.cause for candidate_remedy in self.remedies}
         keys = sorted(remedy.same_as, key=lambda key: key not in causes)
         more_statements = (
-            [Statement("more", NOTE, numbers={"count": len(keys) - MOST_NAMED})] if len(keys) > MOST_NAMED else []
+            [Statement("more", NOTE, numbers={"count": len(keys) - NAMED_KEYS})] if len(keys) > NAMED_KEYS else []
         )
-        return (*(causes.get(key, Statement("cause", NOTE, key)) for key in keys[:MOST_NAMED]), *more_statements)
+        return (*(causes.get(key, Statement("cause", NOTE, key)) for key in keys[:NAMED_KEYS]), *more_statements)
 
     def table(self) -> Table:
         """The remedies, a row each."""
@@ -263,7 +269,7 @@ class LackOfFit:
         shares = [
             Statement("misfit_of_output", WARNING, name, {"size": self.sizes[name], "percent": 100.0 * share})
             for name, share in self.channels.items()
-            if share >= WORTH
+            if share >= LINE_SHARE
         ]
         return [*([summary] if summary else []), *shares, *self._levels(), *self._tails()]
 
@@ -292,7 +298,9 @@ class LackOfFit:
         worst_channel = max(self.rounded, key=lambda name: self.rounded[name], default="")
         share = self.rounded.get(worst_channel, 0.0)
         return (
-            [Statement("rounding_may_hide", NOTE, worst_channel, {"percent": 100.0 * share})] if share >= WORTH else []
+            [Statement("rounding_may_hide", NOTE, worst_channel, {"percent": 100.0 * share})]
+            if share >= LINE_SHARE
+            else []
         )
 
     def _beyond_rest(self) -> list[Statement]:
@@ -300,7 +308,7 @@ class LackOfFit:
         beyond_rest = {
             name: noise
             for name, noise in self.at_rest.items()
-            if noise.p * len(self.at_rest) < FAR[0] and noise.share > FAR[1]
+            if noise.p * len(self.at_rest) < UNREST_LIMITS[0] and noise.share > UNREST_LIMITS[1]
         }
         worst_channel = min(beyond_rest, key=lambda name: beyond_rest[name].p, default="")
         return [beyond_rest[worst_channel].beyond(worst_channel)] if worst_channel else []
@@ -360,5 +368,5 @@ class Diagnosis:
                 if abs(share) >= MOVES
             ]
             if moves:
-                rows.append((in_words(name), name, ", ".join(moves[:MOST_NAMED])))
+                rows.append((in_words(name), name, ", ".join(moves[:NAMED_KEYS])))
         return Table(("number", "key", "moves, for +1 % of"), rows, "<<<") if rows else None

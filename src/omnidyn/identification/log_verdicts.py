@@ -15,13 +15,13 @@ from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
 from omnidyn.statement import ERROR, Statement
 
-CHECKED = 1_000_000  # rows that are checked on the way
+CHECKED_ROWS = 1_000_000  # rows that are checked on the way
 OF_MOTORS = ("voltage", "duty", "current", "force", "supply", "wheel_speed", "wheel_angle")
 
 
 def log_verdicts(logs: Sequence[Log], robot: Robot | None, progress: Progress) -> tuple[Verdict, ...]:
     """What check says of each log, where they are not too long; `progress` hears of errors at once."""
-    if sum(len(log) for log in logs) > CHECKED:
+    if sum(len(log) for log in logs) > CHECKED_ROWS:
         progress(Report("the logs are long: not checked on the way (omnidyn check does)", urgent=True))
         return ()
     verdicts = []
@@ -108,7 +108,7 @@ def unfit(verdicts: Sequence[Verdict]) -> list[Statement]:
         Statement(
             "log_not_usable",
             ERROR,
-            _first(each.source for each in alike_verdicts),
+            _first(unfit_verdict.source for unfit_verdict in alike_verdicts),
             {"logs": len(alike_verdicts), "findings": tuple(_errors(alike_verdicts[0]))},
         )
         for alike_verdicts in verdicts_by_fault.values()

@@ -24,7 +24,7 @@ LINE = "line"  # a shape: the paper's line on each axis
 HOLD_OUT, GROUPS, QUICK = "hold_out", "groups", "quick"  # what `identify` takes for some of the methods
 
 # What is wrong with a word that is none of the choices of an option, where "unknown NAME" does not say it.
-WRONG = {
+WRONG_WORDS = {
     "method": "no such method",
     "what": "nothing of that name",
     "speed": "no such speed",
@@ -62,7 +62,7 @@ def refuse_word(name: str, value: str, known_words: tuple[str, ...]) -> None:
     """Refuse a value that is none of the known words. Raises InputError."""
     if value not in known_words:
         *first, last = filter(None, known_words)
-        words = WRONG.get(name, f"unknown {name}")
+        words = WRONG_WORDS.get(name, f"unknown {name}")
         raise InputError(words, got=value, expected=f"{', '.join(first)} or {last}", where=name)
 
 

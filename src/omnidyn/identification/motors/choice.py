@@ -41,7 +41,7 @@ def run_motor(fit: MotorEstimate, runs: Run | Sequence[Run]) -> list[FloatArray]
         rows = slice(piece.first, piece.last + 1)
         speeds_by_record[id(piece.record)][rows] = predicted[rows, 0]
     step = SUB if fit.between == CURVE else 1
-    return [speed[int(r.rest) :: step] for r, speed in zip(records, speeds_by_record.values(), strict=True)]
+    return [speed[int(r.begins_at_rest) :: step] for r, speed in zip(records, speeds_by_record.values(), strict=True)]
 
 
 def fit_rmse(fit: MotorEstimate, runs: Run | Sequence[Run]) -> float:
@@ -52,7 +52,7 @@ def fit_rmse(fit: MotorEstimate, runs: Run | Sequence[Run]) -> float:
     logs = as_list(runs)
     errors = [
         (predicted_speed - (log.motion if log.speed is None else log.speed)[:, fit.motor])[
-            ~unresolved_rows(log.put_in[:, fit.motor])
+            ~unresolved_rows(log.input_values[:, fit.motor])
         ]
         for predicted_speed, log in zip(run_motor(fit, logs), logs_of_free_runs(logs, fit.kind), strict=True)
     ]

@@ -141,7 +141,7 @@ def _trusted(solver: Solver[MotorProblem], solution: Solution, kind: str, restin
     values = point.values.copy()
     values[band_index] = resting_input / EDGE
     edge_uncertainty = trust(solver, replace(solution, state=solver.state(replace(point, values=values))), kind)
-    return edge_uncertainty if edge_uncertainty.blind[band_index] else uncertainty
+    return edge_uncertainty if edge_uncertainty.blind_parameters[band_index] else uncertainty
 
 
 def logs_of_free_runs(runs: Run | Sequence[Run], kind: str) -> list[MotorLog]:
@@ -152,7 +152,7 @@ def logs_of_free_runs(runs: Run | Sequence[Run], kind: str) -> list[MotorLog]:
     """
     logs = as_list(runs)
     count_differences = differences(logs)
-    if count_differences is not None and count_differences.why is None:
+    if count_differences is not None and count_differences.reason is None:
         angles = [added_up(run, count_differences) for run in logs]
         if not any(lost[1:].any() for _, lost in angles):
             logs = [run.replace(wheel_angle=a, wheel_speed=None) for run, (a, _) in zip(logs, angles, strict=True)]
@@ -164,7 +164,7 @@ def _with_bend(fit: MotorEstimate, bent_line: BentLine | None) -> MotorEstimate:
 
     The slope goes with the dead band, as the two are correlated.
     """
-    if bent_line is None or not bent_line.needed:
+    if bent_line is None or not bent_line.needs_bends:
         return fit
     std = float(np.hypot(max(fit.std[BAND], bent_line.std), fit.value[BAND] - bent_line.value))
     slope_of_band = fit.correlation * fit.std[SLOPE] / fit.std[BAND]
@@ -222,7 +222,7 @@ def _answer(
             "the logs say nothing about this motor", got=f"motor {motor + 1}", expected="motion"
         )
     std, ci95 = intervals(problem, values, uncertainty)
-    blind_names = {name for name, b in zip(problem.names, uncertainty.blind, strict=True) if b}
+    blind_names = {name for name, b in zip(problem.names, uncertainty.blind_parameters, strict=True) if b}
     value = {name: float(v) for name, v in zip(problem.names, values, strict=True)}
     band_index = problem.where(BAND)
     if band_index >= 0:
@@ -259,13 +259,16 @@ def _answer(
         rmse=rmse,
         count=rows,
         source=named([log.run.source for log in logs]),
-        at_bound=tuple(name for name, is_held in zip(problem.names, uncertainty.held, strict=True) if is_held),
+        at_bound=tuple(
+            name for name, is_held in zip(problem.names, uncertainty.held_parameters, strict=True) if is_held
+        ),
         unidentifiable=tuple(name for name in problem.names if name in blind_names),
-        left_out=sum(int(unresolved_rows(log.put_in[:, motor]).sum()) for log in logs),
+        left_out=sum(int(unresolved_rows(log.input_values[:, motor]).sum()) for log in logs),
         noise={c[0]: float(np.sqrt(v)) for c, v in zip(problem.columns, solution.state.variance, strict=True)},
         covariance=uncertainty.kind,
         converged=solution.converged,
-        answers=follows([(log.put_in[:, motor], log.motion[:, motor]) for log in logs], logs[0].step) is not False,
+        answers=follows([(log.input_values[:, motor], log.motion[:, motor]) for log in logs], logs[0].step)
+        is not False,
         one_way=not turns_both_ways(logs, motor),
         travel=logs[0].travel,
     )
@@ -305,7 +308,7 @@ def _speed_errors(engine: MotorEngine, point: Point) -> tuple[int, float]:
 # the interval of a fit without them is not about what it says. The last one is a drag at low speed, with no step at 0.
 
 BLOCKS, LEAST_BLOCK = 60, 8  # blocks of rows in all, rows of one at least
-SURE = 0.95
+BEND_CONFIDENCE = 0.95
 MOST_NUMBERS = 20_000_000  # what is longer is not looked at: every row has all its slopes in memory
 BENDS, LOW = 3, 0.25  # how many; w0 over the highest speed
 
@@ -320,7 +323,7 @@ class BentLine:
     value: float
     std: float
     ci95: tuple[float, float]
-    needed: bool
+    needs_bends: bool
     left: float
 
 
@@ -365,7 +368,7 @@ def bend(solver: Solver[MotorProblem], state: State) -> BentLine | None:
         max(value, 0.0),
         std,
         (max(value - half, 0.0), max(value + half, 0.0)),
-        bool(bends > fdtri(BENDS, degrees, SURE)),
+        bool(bends > fdtri(BENDS, degrees, BEND_CONFIDENCE)),
         share,
     )
 

@@ -29,9 +29,9 @@ from omnidyn.identification.output_error.solve.solver import Solution, Solver
 
 NUMBERS = (BAND, OFFSET, LATENCY)
 FOLDS, BLOCKS, LEAST_BLOCK = 5, 20, 8  # rows of a block at least
-FEW = 12  # iterations of a fit without some blocks, which begins at that to all
-CLEAR = 2.0  # standard errors of its gain by which a number must pay
-WILD = 5.0  # scales of the noise that an error counts at most, where it is that of Student's t
+BLOCK_ITERATIONS = 12  # iterations of a fit without some blocks, which begins at that to all
+GAIN_ERRORS = 2.0  # standard errors of its gain by which a number must pay
+ERROR_LIMIT = 5.0  # scales of the noise that an error counts at most, where it is that of Student's t
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,15 +51,15 @@ class MotorModel:
     def pays(self, smaller_model: MotorModel) -> bool:
         """Whether it predicts held-out rows better than a model with fewer numbers, by more than chance."""
         gain = smaller_model.errors - self.errors
-        return float(gain.sum()) > CLEAR * float(gain.std(ddof=1)) * np.sqrt(len(gain))
+        return float(gain.sum()) > GAIN_ERRORS * float(gain.std(ddof=1)) * np.sqrt(len(gain))
 
 
 @dataclass(frozen=True, eq=False)
 class ModelChoice:
-    """model: with the numbers that pay; plain: with none of NUMBERS; rejected: those that do not pay."""
+    """model: with the numbers that pay; plain_model: with none of NUMBERS; rejected: those that do not pay."""
 
     model: MotorModel
-    plain: MotorModel
+    plain_model: MotorModel
     rejected: tuple[str, ...]
 
 
@@ -127,7 +127,10 @@ class _HeldOut:
         records = self._records[way]
         problem = _problem(records, names)
         full_fit = solved(problem, self.degrees, near_values or self.line, near_values is None)
-        block, error_limit = _blocks(records), WILD * np.sqrt(full_fit.state.variance) if self.degrees else np.inf
+        block, error_limit = (
+            _blocks(records),
+            ERROR_LIMIT * np.sqrt(full_fit.state.variance) if self.degrees else np.inf,
+        )
         squares, rows = np.zeros((2, BLOCKS, len(problem.columns)))
         for fold in range(FOLDS):
             point = self._without(records, [record_blocks % FOLDS == fold for record_blocks in block], names, full_fit)
@@ -171,7 +174,7 @@ class _HeldOut:
         problem = _problem(kept_records, names)
         solver = Solver(problem, MotorEngine(problem), self.degrees)
         scales = full_fit.state.variance if self.degrees else None
-        return solver.minimise(full_fit.state.point, FEW, scales=scales).state.point
+        return solver.minimise(full_fit.state.point, BLOCK_ITERATIONS, scales=scales).state.point
 
 
 def _problem(records: Sequence[MotorRecord], names: Sequence[str]) -> MotorProblem:
@@ -224,7 +227,7 @@ def written_and_plain(logs: Sequence[MotorLog], motor: int, method: MotorFit) ->
 
     if choice is None:
         return fit(wanted_names or (BAND,), None), fit((), None)
-    model, plain_model = choice.model, choice.plain
+    model, plain_model = choice.model, choice.plain_model
     written_fit = fit(model.names, model)
     intervals = {name: _interval(fit((*model.names, name), model), name) for name in choice.rejected}
     blocks = HeldOut(model.size, plain_model.size)

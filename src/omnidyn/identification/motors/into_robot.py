@@ -45,7 +45,7 @@ from omnidyn.statement import NOTE, WARNING, Statement
 COULOMB, VISCOUS = "friction.wheels.coulomb", "friction.wheels.viscous"
 MAP = "drive.voltage_map_V"
 BACKWARD = "friction.wheels.coulomb_backward"
-ALONG = {  # levels that go along with another one
+LINKED_LEVELS = {  # levels that go along with another one
     COULOMB: ("coulomb_backward", "breakaway", "breakaway_backward"),
     BACKWARD: ("breakaway_backward",),
 }
@@ -283,7 +283,7 @@ class _Wheel:
             wheels = wheels.replace(coulomb_backward=wheels.coulomb)
             robot = robot.replace(friction=robot.friction.replace(wheels=wheels))
         robot = Key.parse(key).set(robot, number, checked=False)
-        tied_names = ALONG.get(key.partition("[")[0], ())
+        tied_names = LINKED_LEVELS.get(key.partition("[")[0], ())
         for name in (name for name in tied_names if getattr(wheels, name) is not None):
             tied_key = Key.parse(self.key(f"friction.wheels.{name}"))
             least_level = tied_key.get(robot) if name.startswith("breakaway") else 0.0

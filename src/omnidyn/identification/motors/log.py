@@ -39,23 +39,24 @@ HEADING = "heading, the robot turning on the spot"
 class MotorLog:
     """One run. Arrays of shape (rows, motors).
 
-    put_in: in `unit`, of `kind` (INPUTS). speed [rad/s] and angle [rad], as measured; one of them may be None.
+    input_values: in `unit`, of `kind` (INPUTS). speed [rad/s] and angle [rad], as measured; one of them may be None.
     motion [rad/s]: by the angle where there is one. motion_from: its origin in words. pieces: rows between gaps.
-    averaged: per motor, over how many rows its motion is a mean; 1 where it is none.
-    given: the input as it held, at the times of all sensors, where they share no stamps: rows are those of the motion.
+    mean_rows: per motor, over how many rows its motion is a mean; 1 where it is none.
+    stamped_input: the input as it held, at the times of all sensors, where they share no stamps: rows are those of the
+    motion.
     travel: unit of the angle, ANGLE; LENGTH of a linear axis, whose speed is in m/s.
     """
 
     run: Run
     kind: str
-    put_in: FloatArray
+    input_values: FloatArray
     speed: FloatArray | None
     angle: FloatArray | None
     motion: FloatArray
     motion_from: str
     pieces: tuple[slice, ...]
-    averaged: tuple[int, ...]
-    given: tuple[FloatArray, FloatArray] | None = None
+    mean_rows: tuple[int, ...]
+    stamped_input: tuple[FloatArray, FloatArray] | None = None
     travel: str = ANGLE
 
     @property
@@ -166,7 +167,7 @@ def averaged_statements(logs: Sequence[MotorLog], is_allowed: bool = True) -> li
     """Of which motors the speed is a mean over rows. is_allowed: whether the fit takes that into account."""
     logs_by_motor: dict[int, list[str]] = {}
     for motor in range(max((log.motors for log in logs), default=0)):
-        rows = {log.averaged[motor] for log in logs if motor < log.motors} - {1}
+        rows = {log.mean_rows[motor] for log in logs if motor < log.motors} - {1}
         for row in rows:
             logs_by_motor.setdefault(row, []).append(str(motor + 1))
     return [
@@ -182,12 +183,12 @@ def orientation(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> float:
 
 def orientation_of(logs: Sequence[MotorLog], motor: int) -> float:
     """The same of a motor of some logs."""
-    return orientation([(log.put_in[:, motor], log.motion[:, motor]) for log in logs])
+    return orientation([(log.input_values[:, motor], log.motion[:, motor]) for log in logs])
 
 
 BLOCKS, LEAST_BLOCKS = 20, 8
 MEMORIES = (0.0, 0.05, 0.5)  # [s] over which an input may act
-CERTAIN = 0.998  # quantile of a covariance that is no chance, of which several are tried
+COVARIANCE_QUANTILE = 0.998  # quantile of a covariance that is no chance, of which several are tried
 
 
 def follows(pairs: Sequence[tuple[FloatArray, FloatArray]], step: float = 0.0) -> bool | None:
@@ -208,7 +209,7 @@ def follows(pairs: Sequence[tuple[FloatArray, FloatArray]], step: float = 0.0) -
             return None
         sums = np.array([float(part.sum()) for part in np.array_split(u * (w - w.mean()), count)])
         correlations.append(
-            abs(float(sums.mean())) > t_quantile(count - 1, CERTAIN) * float(sums.std(ddof=1)) / count**0.5
+            abs(float(sums.mean())) > t_quantile(count - 1, COVARIANCE_QUANTILE) * float(sums.std(ddof=1)) / count**0.5
         )
     return any(correlations)
 

@@ -14,7 +14,13 @@ from omnidyn.identification.motors.log import CURVE, MEAN, SUB, MotorLog, refine
 from omnidyn.identification.output_error.engines.engine import Engine, Weighting
 from omnidyn.identification.output_error.engines.exact import march_piece, padded, used_by
 from omnidyn.identification.output_error.kernel.march import KEEP, PATH, Physics, PhysicsSlopes
-from omnidyn.identification.output_error.problem.nuisances import CLEAR, EARLIEST, LATEST, SILENT, errors_from_rest
+from omnidyn.identification.output_error.problem.nuisances import (
+    LEAST_LATENCY,
+    MOST_LATENCY,
+    MOTION_ERRORS,
+    SILENT_ROWS,
+    errors_from_rest,
+)
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Piece, PieceSums, Point
 from omnidyn.identification.output_error.problem.record import SHORTEST, Record
@@ -25,10 +31,11 @@ from omnidyn.model.layout import N_AXES, YAW
 
 @dataclass(frozen=True, eq=False)
 class MotorRecord(Record):
-    """rest: whether the log begins at rest under an input that is held. It then has one row more, LATEST before the
+    """begins_at_rest: whether the log begins at rest under an input that is held. It then has one row more,
+    MOST_LATENCY before the
     others: a latency shows what was before the log, and that is known."""
 
-    rest: bool = False
+    begins_at_rest: bool = False
 
 
 def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> MotorRecord:
@@ -36,8 +43,10 @@ def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> MotorR
 
     Raises InputError for a motor that the log does not have, InsufficientDataError where no piece is long enough.
     """
-    if motor >= log.put_in.shape[1]:
-        raise InputError("no such motor", got=motor + 1, expected=f"1 to {log.put_in.shape[1]}", where=log.run.source)
+    if motor >= log.input_values.shape[1]:
+        raise InputError(
+            "no such motor", got=motor + 1, expected=f"1 to {log.input_values.shape[1]}", where=log.run.source
+        )
     measured = {SPEED: log.speed, ANGLE: log.angle if angle or log.speed is None else None}
     outputs = {
         name: column[:, motor]
@@ -51,7 +60,7 @@ def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> MotorR
             expected="wheel_speed or wheel_angle",
             where=log.run.source,
         )
-    t, u = log.t, log.put_in[:, motor]
+    t, u = log.t, log.input_values[:, motor]
     values = np.stack([*outputs.values()], axis=1)
     values[unresolved_rows(u)] = np.nan
     if between == MEAN:
@@ -64,12 +73,14 @@ def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> MotorR
             expected=f"{SHORTEST} rows in a row",
             where=log.run.source,
         )
-    begins_at_rest = pieces[0][0] == 0 and _begins_at_rest(log.put_in[:, motor], values[:, 0], SPEED not in outputs)
+    begins_at_rest = pieces[0][0] == 0 and _begins_at_rest(
+        log.input_values[:, motor], values[:, 0], SPEED not in outputs
+    )
     if between == CURVE:
         t, u, values = refined(t, u, values, pieces)
         pieces = [(SUB * first, SUB * last) for first, last in pieces]
     if begins_at_rest:
-        t, u = np.append(t[0] - LATEST, t), np.append(log.put_in[0, motor], u)
+        t, u = np.append(t[0] - MOST_LATENCY, t), np.append(log.input_values[0, motor], u)
         values = np.concatenate([np.full((1, len(outputs)), np.nan), values])
         pieces = [(first + (first > 0), last + 1) for first, last in pieces]
     return MotorRecord(
@@ -82,7 +93,7 @@ def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> MotorR
         log.run.source,
         False,
         (),
-        rest=begins_at_rest,
+        begins_at_rest=begins_at_rest,
     )
 
 
@@ -91,13 +102,13 @@ def _begins_at_rest(u: FloatArray, measured: FloatArray, travels: bool) -> bool:
 
     An input that is not 0 may also turn a motor round: that takes more rows. travels: an angle is measured.
     """
-    change_rows = np.flatnonzero(u[: 10 * SILENT] != u[0])
-    rows = int(change_rows[0]) if change_rows.size else min(10 * SILENT, len(u))
+    change_rows = np.flatnonzero(u[: 10 * SILENT_ROWS] != u[0])
+    rows = int(change_rows[0]) if change_rows.size else min(10 * SILENT_ROWS, len(u))
     first_speeds = np.diff(measured[:rows]) if travels else measured[:rows]
     first_speeds = first_speeds[np.isfinite(first_speeds)]
-    if rows < (4 * SILENT if u[0] else SILENT) or len(first_speeds) < 2:
+    if rows < (4 * SILENT_ROWS if u[0] else SILENT_ROWS) or len(first_speeds) < 2:
         return False
-    return errors_from_rest(first_speeds, bool(u[0])) <= CLEAR
+    return errors_from_rest(first_speeds, bool(u[0])) <= MOTION_ERRORS
 
 
 def motor_problem(
@@ -115,7 +126,7 @@ def motor_problem(
     if offset:
         numbers.append(Parameter(OFFSET, 0.0, -0.5 * largest_input, 0.5 * largest_input))
     columns = dict.fromkeys(name for r in records for name, _ in r.columns) if latency else ()
-    latencies = [Parameter(f"{LATENCY}.{name}", 0.0, EARLIEST, LATEST) for name in columns]
+    latencies = [Parameter(f"{LATENCY}.{name}", 0.0, LEAST_LATENCY, MOST_LATENCY) for name in columns]
     return MotorProblem(
         (*numbers, *latencies),
         tuple(_piece(r, first, last, latency or margin) for r in records for first, last in r.pieces),
@@ -123,7 +134,7 @@ def motor_problem(
 
 
 def _piece(record: MotorRecord, first: int, last: int, has_latency: bool) -> Piece:
-    is_at_rest = record.rest and first == 0
+    is_at_rest = record.begins_at_rest and first == 0
     start, offset = np.zeros(N_AXES), np.zeros(len(record.columns))
     for c, name in enumerate(record.columns):
         column = record.outputs[first : last + 1, c]
@@ -134,7 +145,7 @@ def _piece(record: MotorRecord, first: int, last: int, has_latency: bool) -> Pie
         elif not is_at_rest:
             start[YAW] = first_value
     free = np.array([False, False, not is_at_rest, *(name == ANGLE for name in record.columns)])
-    margin = min(LATEST, 0.1 * float(record.t[last] - record.t[first])) if has_latency and not is_at_rest else 0.0
+    margin = min(MOST_LATENCY, 0.1 * float(record.t[last] - record.t[first])) if has_latency and not is_at_rest else 0.0
     return Piece(record, first, last, start, offset, free, np.full(len(record.columns), margin))
 
 

@@ -26,18 +26,18 @@ from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.statistics import MAD_TO_STD, robust_mean, sensor_step, stretches, t_quantile
 
 RISK = 0.05
-AROUND = 40  # rows on either side of a start or stop that tell of it
+EDGE_ROWS = 40  # rows on either side of a start or stop that tell of it
 LEAST_REST, LEAST_MOTION = 5, 3  # rows in a row
 SIGNS = 5.0  # standard deviations of the noise, from which a speed is motion
 SLOW = 0.01  # of the largest speed: what is slower may be the noise of a sensor that reads in steps
-MOST = 40  # starts of one motor that are looked at, evenly among all
-LOST = 0.25  # of the largest speed: where only faster motion can be told from noise, rest cannot
+MOST_EDGES = 40  # starts of one motor that are looked at, evenly among all
+NOISE_SHARE = 0.25  # of the largest speed: where only faster motion can be told from noise, rest cannot
 BLOCK = 0.25  # [s]
 BOTH_WAYS = 0.05  # of the largest speed that lasts: as fast a motor turns the other way, too
 LAGS_AT_REST = 1.0
 CURRENT = "current"
-SURE = 5.0  # standard errors of a steady speed, from which the motor turns
-FALLING = 3.0  # standard errors of the mean of a half: a motor that slows down more may be running out
+TURNING_ERRORS = 5.0  # standard errors of a steady speed, from which the motor turns
+SLOWING_ERRORS = 3.0  # standard errors of the mean of a half: a motor that slows down more may be running out
 NOISE = 2.0  # standard errors of the input
 
 
@@ -52,11 +52,11 @@ class _MotorRows(NamedTuple):
     """One motor between two gaps, signed so that the direction looked at is forward."""
 
     t: FloatArray
-    put_in: FloatArray
+    input_values: FloatArray
     speed: FloatArray
     moving: FloatArray  # +1.0, 0.0, -1.0 by row
     tick: float  # of a sensor that reads in steps, 0 where it does not
-    rough: BoolArray  # rows whose input changes faster than the log tells
+    rough_rows: BoolArray  # rows whose input changes faster than the log tells
 
 
 class _Edge(NamedTuple):
@@ -76,14 +76,16 @@ def starts_and_stops(
     if logs[0].kind == CURRENT:
         return [], []
     columns = [
-        column._replace(put_in=way * side * column.put_in, speed=side * column.speed, moving=side * column.moving)
+        column._replace(
+            input_values=way * side * column.input_values, speed=side * column.speed, moving=side * column.moving
+        )
         for column in _columns(logs, motor)
     ]
     all_edges = [edge for column in columns for edge in _edges_of(column) if _is_slow_enough(edge, lag)]
     spans: tuple[list[Span], list[Span]] = [], []
     for stop in (False, True):
         edges = [edge for edge in all_edges if edge.stop is stop]
-        edges = edges[:: max(1, -(-len(edges) // MOST))]
+        edges = edges[:: max(1, -(-len(edges) // MOST_EDGES))]
         ends = [_span(edge, lag, RISK / len(edges)) for edge in edges]
         spans[stop].extend(span for span in ends if stop or span.high > 0.0)
     bounds = [bound for column in columns for bound in _rested(column, lag)]
@@ -96,8 +98,8 @@ def _columns(logs: Sequence[MotorLog], motor: int) -> Iterator[_MotorRows]:
     """The pieces of all logs in which input and speed of a motor are known, and which way it turns in each row."""
     largest = max((_largest(log, motor) for log in logs), default=0.0)
     for log in logs:
-        known_rows = np.isfinite(log.put_in[:, motor]) & np.isfinite(log.motion[:, motor])
-        rough_rows = unresolved_rows(log.put_in[:, motor])
+        known_rows = np.isfinite(log.input_values[:, motor]) & np.isfinite(log.motion[:, motor])
+        rough_rows = unresolved_rows(log.input_values[:, motor])
         for piece in log.pieces:
             for a, b in stretches(known_rows[piece]).tolist():
                 rows = slice(piece.start + a, piece.start + b)
@@ -139,10 +141,10 @@ def _column(log: MotorLog, motor: int, rows: slice, largest: float, rough_rows: 
     padded_speed = np.pad(speed, (count // 2, count - 1 - count // 2), mode="edge")
     smooth = np.convolve(padded_speed, np.full(count, 1.0 / count), "valid")
     level = max(SIGNS * noise / math.sqrt(count), SLOW * largest)
-    if level > LOST * largest:
+    if level > NOISE_SHARE * largest:
         return None
     moving = _without_flicker(np.where(np.abs(smooth) > level, np.sign(smooth), 0.0))
-    return _MotorRows(t, log.put_in[rows, motor], speed, moving, tick, rough_rows)
+    return _MotorRows(t, log.input_values[rows, motor], speed, moving, tick, rough_rows)
 
 
 def _without_flicker(moving: FloatArray) -> FloatArray:
@@ -176,15 +178,15 @@ def _edges_of(column: _MotorRows) -> Iterator[_Edge]:
     runs = _runs(column.moving)
     for (a, b, side_before), (c, d, side_after) in pairwise(runs):
         if side_before == 0.0 and side_after > 0.0 and _rests(column, a, b) and d - c >= LEAST_MOTION:
-            yield _Edge(column, c, max(a, c - AROUND), min(d, c + AROUND), False)
+            yield _Edge(column, c, max(a, c - EDGE_ROWS), min(d, c + EDGE_ROWS), False)
         if side_before > 0.0 and side_after == 0.0 and _rests(column, c, d) and b - a >= LEAST_MOTION:
-            yield _Edge(column, c, max(a, c - AROUND), min(d, c + AROUND), True)
+            yield _Edge(column, c, max(a, c - EDGE_ROWS), min(d, c + EDGE_ROWS), True)
 
 
 def _is_slow_enough(edge: _Edge, lag: float) -> bool:
     """Whether the log tells the input around an edge, and the rest lasts longer than the motor remembers."""
     column = edge.column
-    if column.rough[edge.first : edge.last].any():
+    if column.rough_rows[edge.first : edge.last].any():
         return False
     rest_time = column.t[edge.last - 1] - column.t[edge.row] if edge.stop else column.t[edge.row] - column.t[edge.first]
     return not lag > 0.0 or bool(rest_time >= LAGS_AT_REST * lag)
@@ -212,7 +214,7 @@ def _rests(column: _MotorRows, first: int, last: int) -> bool:
 def _span(edge: _Edge, lag: float, risk: float) -> Span:
     """The inputs between which a start, or a stop, lies."""
     column, rows = edge.column, slice(edge.first, edge.last)
-    t, input_values = column.t[rows], column.put_in[rows]
+    t, input_values = column.t[rows], column.input_values[rows]
     tries = np.sort(np.concatenate([t, 0.5 * (t[1:] + t[:-1])]))
     first, last = edge_interval(
         t,
@@ -227,9 +229,9 @@ def _span(edge: _Edge, lag: float, risk: float) -> Span:
     # a row on either side: loggers write an input in the row in which it is set, or in which it is answered
     first_row = edge.first + max(int(np.searchsorted(t, first, "right")) - 2, 0)
     end = min(edge.first + int(np.searchsorted(t, last, "right")), len(column.t) - 1)
-    other_rows = np.flatnonzero(column.put_in[:first_row] != column.put_in[first_row])
+    other_rows = np.flatnonzero(column.input_values[:first_row] != column.input_values[first_row])
     change_row = int(other_rows[-1]) + 1 if other_rows.size else 0  # the last change of the input
-    input_values = column.put_in[max(change_row - 1, 0) : end + 1]
+    input_values = column.input_values[max(change_row - 1, 0) : end + 1]
     return Span(float(input_values.min()) + 0.0, float(input_values.max()) + 0.0)  # no -0
 
 
@@ -250,13 +252,13 @@ def _rested(column: _MotorRows, lag: float) -> Iterator[float]:
     least_rows = max(LEAST_REST, math.ceil(LAGS_AT_REST * lag / usual_step(column.t))) if lag > 0.0 else LEAST_REST
     for k, (a, b, side) in enumerate(runs):
         side_before, side_after = runs[k - 1][2] if k else 0.0, runs[k + 1][2] if k + 1 < len(runs) else 0.0
-        if side != 0.0 or side_after > 0.0 or column.rough[a:b].any() or not _rests(column, a, b):
+        if side != 0.0 or side_after > 0.0 or column.rough_rows[a:b].any() or not _rests(column, a, b):
             continue
         if side_before > 0.0:  # where it still ran out is no rest under that input: from the least input on
-            a += int(np.argmin(column.put_in[a:b]))
+            a += int(np.argmin(column.input_values[a:b]))
         if b - a < least_rows:
             continue
-        input_values, speed = column.put_in[a:b], column.speed[a:b]
+        input_values, speed = column.input_values[a:b], column.speed[a:b]
         held_input = float(sliding_window_view(input_values, least_rows).min(axis=1).max())
         speed_under = speed[input_values >= held_input]
         if held_input > 0.0 and float(speed_under.mean()) <= 3.0 * noise_of_rows(speed) / math.sqrt(len(speed_under)):
@@ -272,7 +274,7 @@ def turned_under(logs: Sequence[MotorLog], motor: int, side: float = 0.0, way: f
     side: +1.0 or -1.0: of its speed, 0.0: either. way: +1.0 where a positive input turns it forward, else -1.0.
     """
     turning_inputs = (
-        way * float(np.sign(window.speed)) * window.put_in + window.error
+        way * float(np.sign(window.speed)) * window.input_value + window.error
         for window in _steady(logs, motor)
         if window.turns and side * window.speed >= 0.0
     )
@@ -281,17 +283,19 @@ def turned_under(logs: Sequence[MotorLog], motor: int, side: float = 0.0, way: f
 
 def rested_under(logs: Sequence[MotorLog], motor: int) -> float:
     """The largest input, as a size, under which a motor rested; 0 where none shows."""
-    return max((abs(window.put_in) - window.error for window in _steady(logs, motor) if window.rests), default=0.0)
+    return max(
+        (abs(window.input_value) - window.error for window in _steady(logs, motor) if window.is_resting), default=0.0
+    )
 
 
 class _Window(NamedTuple):
     """One in which a motor turns and does not slow down, or rests. error: by how much the input may be another."""
 
-    put_in: float
+    input_value: float
     speed: float
     error: float
     turns: bool
-    rests: bool
+    is_resting: bool
 
 
 def _steady(logs: Sequence[MotorLog], motor: int) -> list[_Window]:
@@ -299,7 +303,7 @@ def _steady(logs: Sequence[MotorLog], motor: int) -> list[_Window]:
     slow = SLOW * max((abs(window.speed) for window in windows), default=0.0)
     return [
         window._replace(
-            turns=window.turns and abs(window.speed) > slow, rests=window.rests and abs(window.speed) <= slow
+            turns=window.turns and abs(window.speed) > slow, is_resting=window.is_resting and abs(window.speed) <= slow
         )
         for window in windows
     ]
@@ -307,15 +311,21 @@ def _steady(logs: Sequence[MotorLog], motor: int) -> list[_Window]:
 
 def _windows_of(log: MotorLog, motor: int) -> Iterator[_Window]:
     for plateau in find_plateaus(log.run):
-        input_values, speed = log.put_in[plateau.rows, motor], log.motion[plateau.rows, motor]
+        input_values, speed = log.input_values[plateau.rows, motor], log.motion[plateau.rows, motor]
         if not np.isfinite(input_values).all() or np.isfinite(speed).sum() < 2:
             continue
         half = len(speed) // 2
         (early_speed, early_std), (late_speed, late_std) = (robust_mean(part) for part in (speed[:half], speed[half:]))
         mean, std = (float(part) for part in robust_mean(speed))
-        is_slower = np.sign(mean) * (early_speed - late_speed) > FALLING * np.hypot(early_std, late_std)
+        is_slower = np.sign(mean) * (early_speed - late_speed) > SLOWING_ERRORS * np.hypot(early_std, late_std)
         middle, error = (float(part) for part in robust_mean(input_values))
-        yield _Window(middle, mean, NOISE * error, abs(mean) > SURE * std and not is_slower, abs(mean) <= SURE * std)
+        yield _Window(
+            middle,
+            mean,
+            NOISE * error,
+            abs(mean) > TURNING_ERRORS * std and not is_slower,
+            abs(mean) <= TURNING_ERRORS * std,
+        )
 
 
 # When a motor leaves rest, or comes to rest: the instants t0 that its speed, noise and lag allow
@@ -397,7 +407,8 @@ def _stop_left(
 
 
 def _lagged(instants: FloatArray, t: FloatArray, start_time: float, lag: float) -> FloatArray:
-    """What each row of a held input adds to a first-order lag from `start_time` on. Shape (len(instants), len(t) - 1)."""
+    """What each row of a held input adds to a first-order lag from `start_time` on. Shape (len(instants), len(t) -
+    1)."""
     first = np.minimum(np.maximum(t[:-1], start_time), instants[:, None])
     last = np.minimum(np.maximum(t[1:], start_time), instants[:, None])
     return np.exp(-(instants[:, None] - last) / lag) - np.exp(-(instants[:, None] - first) / lag)

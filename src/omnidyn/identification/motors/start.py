@@ -53,8 +53,8 @@ NO_LINE: dict[str, tuple[float, tuple[float, float]]] = {
     name: (math.nan, (math.nan, math.nan)) for name in (SLOPE, OFFSET, LAG)
 }
 SHARP = 0.5  # a start whose interval is narrower than this share of it is one that a sentence can name
-HIDDEN = 0.02  # of the change of speed over a window: noise by which the inertia may come out too small
-ALIKE = 0.05  # relative difference of slopes by direction that matters to nobody
+NOISE_SHARE = 0.02  # of the change of speed over a window: noise by which the inertia may come out too small
+SLOPE_TOLERANCE = 0.05  # relative difference of slopes by direction that matters to nobody
 ONE_WAY = 0.98  # of the sides of a window, so that it belongs to one direction
 
 
@@ -166,10 +166,11 @@ def motor_starts(
 
 
 def slopes_by_direction(starts: Sequence[MotorStart], travel: str) -> Iterator[Statement]:
-    """Which motors have a slope of their own in each direction, beyond their intervals and by more than ALIKE."""
+    """Which motors have a slope of their own in each direction, beyond their intervals and by more than
+    SLOPE_TOLERANCE."""
     for forward, backward in pairwise(starts):
         (low, high), (other_low, other_high) = forward.ci95[SLOPE], backward.ci95[SLOPE]
-        is_different = abs(forward.value[SLOPE] - backward.value[SLOPE]) > ALIKE * abs(forward.value[SLOPE])
+        is_different = abs(forward.value[SLOPE] - backward.value[SLOPE]) > SLOPE_TOLERANCE * abs(forward.value[SLOPE])
         if forward.motor == backward.motor and is_different and (high < other_low or other_high < low):
             numbers = {
                 "slopes": (forward.value[SLOPE], backward.value[SLOPE]),
@@ -245,7 +246,7 @@ def windows_for_a_lag(logs: Sequence[MotorLog], windows: MotorWindows | None, mo
             break
         windows, change = windows_found, windows_found.change[windows_found.motor == motor]
         rows = 2 * max(1, round(0.5 * EDGE_SHARE * windows_found.length / row)) + 1  # that tell the speed at an end
-        if not change.size or 2.0 * noise**2 / rows / windows_found.length**2 <= HIDDEN * float(np.var(change)):
+        if not change.size or 2.0 * noise**2 / rows / windows_found.length**2 <= NOISE_SHARE * float(np.var(change)):
             break
     return windows
 
@@ -265,7 +266,7 @@ def line_one_way(windows: MotorWindows | None, motor: int, side: float) -> Motor
     if windows is None:
         return None
     mask = (windows.motor == motor) & (windows.side * side > ONE_WAY)
-    names = ("put_in", "speed", "speed_std", "side", "change", "motor", "block")
+    names = ("input_values", "speed", "speed_std", "side", "change", "motor", "block")
     try:
         return fit_line(replace(windows, **{name: getattr(windows, name)[mask] for name in names}), motor, "")
     except InsufficientDataError:
@@ -298,7 +299,9 @@ def _numbers(line: MotorEstimate | None, way: float, row: float) -> dict[str, tu
 
 SLOW_ROW = 0.1  # [s] rows further apart are points: a window of half a second has no five of them
 SLOW = 0.01  # of the largest speed: slower is at rest
-LATER = 0.8  # share of the error by which the row after must fit better, to be the one that an input is answered in
+LATER_SHARE = (
+    0.8  # share of the error by which the row after must fit better, to be the one that an input is answered in
+)
 LEAST_POINTS = 3  # of a line with intervals
 
 
@@ -330,7 +333,7 @@ def points_of_logs(logs: Sequence[MotorLog]) -> MotorTable:
 def _points(log: MotorLog, motor: int, is_later: bool) -> Iterator[tuple[FloatArray, ...]]:
     """(input, speed, motor, number of the piece) of each piece of a log."""
     for number, piece in enumerate(log.pieces):
-        input_values, speed = log.put_in[piece, motor], log.motion[piece, motor]
+        input_values, speed = log.input_values[piece, motor], log.motion[piece, motor]
         if log.angle is not None and len(input_values) > 1:  # over the row that ends here
             steps = np.diff(log.angle[piece, motor]) / np.diff(log.t[piece])
             speed = np.concatenate([[np.nan], steps])
@@ -345,7 +348,7 @@ def _points(log: MotorLog, motor: int, is_later: bool) -> Iterator[tuple[FloatAr
 def _answered_later(logs: Sequence[MotorLog]) -> bool:
     """Whether speeds answer the input of the row before them."""
     misfit_now, misfit_later = (_misfit(logs, is_later) for is_later in (False, True))
-    return misfit_later < LATER * misfit_now
+    return misfit_later < LATER_SHARE * misfit_now
 
 
 def _misfit(logs: Sequence[MotorLog], is_later: bool) -> float:

@@ -30,13 +30,13 @@ CURVES_HEAD = ("motor", "input", "unit", "steady speed rad/s", "+-", "effective 
 LEAST_LEVELS, MOST_LEVELS = 5, 16
 SAME_LEVEL = 0.01  # of the largest input: inputs that are nearer are one level
 AT_REST = 0.02  # of the largest speed: slower is at rest
-SETTLED = 0.02  # of the largest speed: a steady speed that is known worse is no point
+STEADY_SHARE = 0.02  # of the largest speed: a steady speed that is known worse is no point
 LEAST_ROWS = 12  # of the second half of a hold
-WILD = 5.0  # scales from the median beyond which a speed is not believed
+OUTLIER_SCALES = 5.0  # scales from the median beyond which a speed is not believed
 TIMES = np.geomspace(0.05, 1.0, 30)  # of the second half of a hold, over which a speed may still settle
-UNSEEN = 0.25  # of what is yet to come of a speed: how wrong an exponential may be about it
-CURVED = 0.6  # of the error of the line: that of the neighbours, which noise alone reaches once in 50 times
-NOTABLE = 0.03  # of the largest speed: a line that misses by less is one
+EXTRAPOLATION_SHARE = 0.25  # of what is yet to come of a speed: how wrong an exponential may be about it
+CURVE_SHARE = 0.6  # of the error of the line: that of the neighbours, which noise alone reaches once in 50 times
+NOTABLE_SHARE = 0.03  # of the largest speed: a line that misses by less is one
 STRAIGHT = 0.02  # of the largest speed: within this a line holds over a part of the range
 PART = 3  # levels of such a part, at least
 
@@ -166,7 +166,7 @@ def _steady(log: MotorLog) -> Iterator[tuple[float, ...]]:
             if rows.stop - rows.start < LEAST_ROWS:
                 continue
             for motor in range(log.motors):
-                input_values, speed = log.put_in[rows, motor], log.motion[rows, motor]
+                input_values, speed = log.input_values[rows, motor], log.motion[rows, motor]
                 known_rows = np.isfinite(speed)
                 if known_rows.sum() >= LEAST_ROWS and np.isfinite(input_values).all():
                     yield (
@@ -184,7 +184,7 @@ def steady_speed(t: FloatArray, speed: FloatArray) -> tuple[float, float]:
     """
     elapsed = (t - t[0]) / (t[-1] - t[0])
     middle = np.median(speed)
-    reach = WILD * MAD_TO_STD * float(np.median(np.abs(speed - middle))) + sensor_step(speed)
+    reach = OUTLIER_SCALES * MAD_TO_STD * float(np.median(np.abs(speed - middle))) + sensor_step(speed)
     y, fits = np.clip(speed, middle - reach, middle + reach), []
     for tau in TIMES:
         table = np.stack([np.ones(len(y)), np.exp(-elapsed / tau)], axis=1)
@@ -199,7 +199,7 @@ def steady_speed(t: FloatArray, speed: FloatArray) -> tuple[float, float]:
     variance = squares[best] / (len(y) - 3)
     likely_fits = squares <= squares[best] + 4.0 * variance
     spread = float(np.abs(steady[likely_fits] - steady[best]).max()) + float(np.sqrt(variance * share[best]))
-    unseen = UNSEEN if best < len(TIMES) - 1 else 1.0  # it may settle over longer than that
+    unseen = EXTRAPOLATION_SHARE if best < len(TIMES) - 1 else 1.0  # it may settle over longer than that
     return float(steady[best]), float(np.hypot(spread, unseen * (steady[best] - end[best])))
 
 
@@ -211,7 +211,7 @@ def _curve_of(
     """
     size, level = orientation([(input_values, speed)]) * np.sign(input_values) * speed, np.abs(input_values)
     top = float(size.max(initial=0.0))
-    steady = std <= SETTLED * top
+    steady = std <= STEADY_SHARE * top
     turns = steady & (size > AT_REST * top) & (level > 0.0)
     rest_level = float(level[steady & ~turns].max(initial=0.0))
     x, y, error = _by_level(level[turns], size[turns], std[turns])
@@ -220,10 +220,10 @@ def _curve_of(
         return (len(x), held_count) if held_count >= LEAST_LEVELS and not steady.all() else None
     way = np.sign(input_values[turns])
     errors_by_side = [_off_line(level[turns][way == side], size[turns][way == side]) for side in (1.0, -1.0)]
-    if max(errors_by_side) < NOTABLE * top:
+    if max(errors_by_side) < NOTABLE_SHARE * top:
         return None  # a line in each direction
     line, neighbours = _left_out(x, y)
-    if neighbours > CURVED * line or _off_line(x, y) < NOTABLE * top:
+    if neighbours > CURVE_SHARE * line or _off_line(x, y) < NOTABLE_SHARE * top:
         return None
     low_levels = level[~steady & (level > 0.0) & (level < (1.0 - SAME_LEVEL) * x[0])]
     return SteadyCurve(
@@ -254,7 +254,7 @@ def map_of(curves: Sequence[SteadyCurve], volts: float) -> tuple[tuple[float, fl
     pooled = np.stack(_by_level(*points[points[:, 1] > 0.0].T), axis=1)
     zero_points = [(float(rest_points[:, 0].max()), 0.0, 0.0)] if len(rest_points) == len(curves) else []
     return tuple(
-        (requested * volts, passed * volts, std * volts) for requested, passed, std in [*zero_points, *pooled.tolist()]
+        (requested * volts, output * volts, std * volts) for requested, output, std in [*zero_points, *pooled.tolist()]
     )
 
 

@@ -65,7 +65,7 @@ from omnidyn.identification.motors.estimate import BAND, OFFSET
 from omnidyn.identification.motors.start import START
 
 MISSES = 0.1  # of the largest speed: error of a line that describes no motor
-CLEAR = 5.0  # errors of the mean speeds, from which such an error is no noise
+SPEED_ERRORS = 5.0  # errors of the mean speeds, from which such an error is no noise
 SAME_SPEED = 1e-9  # spread of speeds over the largest, below which they are one
 
 
@@ -282,7 +282,7 @@ def _with_misses(line: MotorEstimate, windows: MotorWindows) -> MotorEstimate:
     """The line, with a warning where it misses mean speeds that are known; a current makes a torque, no speed."""
     _, speed, error, *_ = windows.of(line.motor)
     share = line.rmse / float(np.abs(speed).max())
-    if windows.kind == CURRENT or share <= MISSES or line.rmse <= CLEAR * float(np.median(error)):
+    if windows.kind == CURRENT or share <= MISSES or line.rmse <= SPEED_ERRORS * float(np.median(error)):
         return line
     numbers = {"rmse": line.rmse, "share": share}
     return replace(line, warnings=(*line.warnings, Statement("line_misses", WARNING, numbers=numbers)))
@@ -332,7 +332,9 @@ def _free_runs(runs: Sequence[Run], method: MotorFit, hold_out: Sequence[str], p
         [run for run, is_held_out in zip(runs, held_mask, strict=True) if not is_held_out], method.input
     )
     motors = [
-        m for m in range(min(log.motors for log in logs)) if all(np.isfinite(log.put_in[:, m]).any() for log in logs)
+        m
+        for m in range(min(log.motors for log in logs))
+        if all(np.isfinite(log.input_values[:, m]).any() for log in logs)
     ] or [0]
     pairs = []
     for motor in motors:

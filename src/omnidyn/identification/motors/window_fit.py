@@ -32,11 +32,11 @@ from omnidyn.statistics import (
 
 DRAWS, SEED, BLOCK = 1000, 20121, 3
 FOLDS = 5  # shares of the windows, in time, that are left out in turn
-ITERATIONS, SETTLED = 200, 1e-8
+ITERATIONS, STEP_TOLERANCE = 200, 1e-8
 HUBER = 2.5
 MIDDLE = 0.6827  # of the draws: a few wild ones, of a line that is hardly determined, do not count in a std
 MIN_WINDOWS = 6
-ALIKE = 1e-3  # share of a column that the others leave over: below it they say the same
+COLUMN_TOLERANCE = 1e-3  # share of a column that the others leave over: below it they say the same
 
 
 def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEstimate:
@@ -122,7 +122,7 @@ def _columns(design: FloatArray, is_settled: bool) -> list[int]:
     other_columns = [0] if is_settled or size[2] <= 1e-9 * size[0] else [0, 2]
     side, other_design = design[:, 1], design[:, other_columns]
     side_residual = side - other_design @ np.linalg.lstsq(other_design, side, rcond=None)[0]
-    is_told = float(side_residual @ side_residual) > ALIKE * float(side @ side)
+    is_told = float(side_residual @ side_residual) > COLUMN_TOLERANCE * float(side @ side)
     return sorted([*other_columns, 1]) if is_told else other_columns
 
 
@@ -137,7 +137,7 @@ def _fit(design: FloatArray, input_values: FloatArray, speed_std: FloatArray) ->
         size = np.abs(residual) / np.sqrt(extra + error + 1e-300)
         weight = huber_weight(size, HUBER)
         new = _york(design[None], input_values[None], speed_std[None], extra, weight[None])[0]
-        if np.abs(new - parameters).max() <= SETTLED * np.abs(new).max():
+        if np.abs(new - parameters).max() <= STEP_TOLERANCE * np.abs(new).max():
             break
         parameters = new
     return _Fit(parameters, extra, weight)
@@ -176,7 +176,7 @@ def _york(
         return np.linalg.solve(matrix, (right / scale)[:, :, None])[:, :, 0] / scale
 
     return errors_in_variables(
-        design, input_values, extra, speed_std**2, solve, weight=weight, tolerance=SETTLED, most=ITERATIONS
+        design, input_values, extra, speed_std**2, solve, weight=weight, tolerance=STEP_TOLERANCE, most=ITERATIONS
     ).parameters
 
 

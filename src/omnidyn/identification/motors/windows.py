@@ -29,7 +29,7 @@ from omnidyn.statistics import (
 LENGTHS = (0.05, 0.1, 0.2, 0.5)  # [s] the shortest whose mean speed is sharp enough is taken
 SHARP = 0.02  # of the spread of the speeds: a mean speed with this error needs no longer window
 MIN_ROWS, MAX_WINDOWS = 5, 3000
-WILD = 5.0  # scales from the median beyond which a speed is not believed
+OUTLIER_SCALES = 5.0  # scales from the median beyond which a speed is not believed
 SETTLED_SHARE = (1.0 / 3.0, 1.0)  # of each command's rows, where speeds are too noisy to correct for a start-up
 EDGE_SHARE = 0.2  # of a window, around each end: where the speed at the end is taken from
 SIGN_NOISE = 0.2  # of the usual speed: noise that a sign can bear
@@ -42,8 +42,8 @@ REST_SHARE = 0.1  # of the rows of a window at rest from which it says nothing a
 class MotorWindows:
     """Windows of all motors. One row per window and motor; arrays of shape (rows,).
 
-    put_in: mean input, in `unit`. speed: mean speed [rad/s], and its standard error. side: mean of sgn w. change: of
-    the speed, over the length of the window [rad/s^2]. motor: its number from 0. block: number of the window.
+    input_values: mean input, in `unit`. speed: mean speed [rad/s], and its standard error. side: mean of sgn w. change:
+    of the speed, over the length of the window [rad/s^2]. motor: its number from 0. block: number of the window.
     rest: per motor the largest mean input [unit] under which it stayed at rest, NaN where it never rested.
     unresolved, resting: windows left out because the log does not resolve their input, or because the motor rested.
     settled: start-ups were left out, so that nothing is known of the inertia. every: of a very long log, only every so
@@ -51,7 +51,7 @@ class MotorWindows:
     comes out too short. NaN where nothing is known of the inertia. travel: of `MotorLog`.
     """
 
-    put_in: FloatArray
+    input_values: FloatArray
     speed: FloatArray
     speed_std: FloatArray
     side: FloatArray
@@ -71,9 +71,11 @@ class MotorWindows:
     travel: str = "rad"
 
     def of(self, motor: int | None) -> tuple[FloatArray, ...]:
-        """(put_in, speed, speed_std, side, change, block) of one motor, or of all."""
+        """(input_values, speed, speed_std, side, change, block) of one motor, or of all."""
         mask = slice(None) if motor is None else self.motor == motor
-        return tuple(getattr(self, name)[mask] for name in ("put_in", "speed", "speed_std", "side", "change", "block"))
+        return tuple(
+            getattr(self, name)[mask] for name in ("input_values", "speed", "speed_std", "side", "change", "block")
+        )
 
     def turned_under(self, motor: int) -> float:
         """The least input, as a size, under which a motor turns steadily; infinite where no window is steady."""
@@ -98,7 +100,7 @@ def motor_windows(
     usual_speed = _usual_speed(logs)
     length, is_sharp = _length(logs, usual_speed, least_length)
     # the input stands still most of the time
-    in_steps = all(np.mean((np.diff(log.put_in, axis=0) != 0.0).any(axis=1)) <= STEPWISE for log in logs)
+    in_steps = all(np.mean((np.diff(log.input_values, axis=0) != 0.0).any(axis=1)) <= STEPWISE for log in logs)
     if in_steps and not (is_sharp or steady or share):
         share = SETTLED_SHARE if all(_windows(log, length, False, SETTLED_SHARE) for log in logs) else None
     windows = [_windows(log, length, steady, share) for log in logs]
@@ -228,7 +230,7 @@ def _mean_of_noisy(t: FloatArray, speed: FloatArray) -> tuple[float, float]:
         return np.nan, np.nan
     x, y = 2.0 * (t[known_rows] - t[0]) / (t[-1] - t[0]) - 1.0, speed[known_rows]
     middle = np.median(y)
-    reach = WILD * MAD_TO_STD * np.median(np.abs(y - middle)) + sensor_step(y)
+    reach = OUTLIER_SCALES * MAD_TO_STD * np.median(np.abs(y - middle)) + sensor_step(y)
     table = np.polynomial.legendre.legvander(x, min(3, len(x) // 6))
     smooth = table @ np.linalg.lstsq(table, np.clip(y, middle - reach, middle + reach), rcond=None)[0]
     mean_residual, error = robust_mean(y - smooth)
@@ -242,14 +244,14 @@ class _Reader:
         self.log, self.usual = log, usual_speed
         self.unresolved = self.resting = 0
         self.rest = np.full(log.motors, np.nan)
-        self._largest = np.nanmax(np.abs(log.put_in), axis=0, initial=0.0)
+        self._largest = np.nanmax(np.abs(log.input_values), axis=0, initial=0.0)
         self._put_in = [
             InputIntegral(
                 log.t,
-                log.put_in[:, m],
-                rows_with(np.isfinite(log.put_in[:, m]), log.pieces),
-                log.averaged[m],
-                None if log.given is None else (log.given[0], log.given[1][:, m]),
+                log.input_values[:, m],
+                rows_with(np.isfinite(log.input_values[:, m]), log.pieces),
+                log.mean_rows[m],
+                None if log.stamped_input is None else (log.stamped_input[0], log.stamped_input[1][:, m]),
             )
             for m in range(log.motors)
         ]
@@ -260,9 +262,9 @@ class _Reader:
         mean, error = _mean_speed(log, window)
         window_rows = []
         for motor in range(log.motors):
-            if not np.isfinite(log.put_in[window, motor]).all() or not np.isfinite(mean[motor]):
+            if not np.isfinite(log.input_values[window, motor]).all() or not np.isfinite(mean[motor]):
                 continue
-            if unresolved_input(log.put_in[:, motor], window, float(self._largest[motor])):
+            if unresolved_input(log.input_values[:, motor], window, float(self._largest[motor])):
                 self.unresolved += 1
                 continue
             mean_input = self._put_in[motor].over(window) / span
@@ -284,8 +286,8 @@ class _Reader:
 
     def _wide(self, window: slice, motor: int) -> slice:
         """The window with as many rows on either side as the mean of its sides reaches, where there are so many."""
-        rows_before, piece = self.log.averaged[motor] // 2, self.log.piece(window.start)
-        rows_after = self.log.averaged[motor] - 1 - rows_before
+        rows_before, piece = self.log.mean_rows[motor] // 2, self.log.piece(window.start)
+        rows_after = self.log.mean_rows[motor] - 1 - rows_before
         return slice(max(piece.start, window.start - rows_before), min(piece.stop, window.stop + rows_after))
 
     def _mean_sides(self, sides: FloatArray, motor: int) -> FloatArray:
@@ -293,7 +295,7 @@ class _Reader:
 
         A mean changes sign about half its rows later than what it is of: its own signs half as far to either side.
         """
-        rows = min(self.log.averaged[motor], len(sides))
+        rows = min(self.log.mean_rows[motor], len(sides))
         return sides if rows == 1 else np.convolve(sides, np.full(rows, 1.0 / rows), mode="valid")
 
     def _sides(self, window: slice, motor: int, error: float, mean_input: float) -> FloatArray:

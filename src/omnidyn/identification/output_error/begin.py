@@ -24,7 +24,7 @@ from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
-WHOLE = "all"  # the name of the group where there are none
+ALL_LOGS = "all"  # the name of the group where there are none
 
 
 def group_names(runs: Sequence[Run], question: OutputError, groups: Sequence[str] | None) -> list[str]:
@@ -34,7 +34,7 @@ def group_names(runs: Sequence[Run], question: OutputError, groups: Sequence[str
             raise InputError(
                 "there are no groups", got=question.per_free[0], expected="with `groups`", where="per_free"
             )
-        return [WHOLE] * len(runs)
+        return [ALL_LOGS] * len(runs)
     if len(groups) != len(runs) or len(set(groups)) < 2:
         received = f"{len(groups)} names, {len(set(groups))} of them different, for {len(runs)} runs"
         raise InputError(
@@ -73,7 +73,7 @@ def begun(
 
 def _refuse_profile(group: Group, question: OutputError) -> None:
     levels = [level for level in asked_levels(group.robot, question.free or (), question.fixed) if group.tells(level)]
-    reason = "a speed loop" if group.engine.looped else ""
+    reason = "a speed loop" if group.engine.has_loop else ""
     if group.robot.wheels.traction_mu is not None:
         reason = "wheels that may slip"
     if reason and levels:

@@ -24,7 +24,7 @@ from omnidyn.identification.output_error.trust.uncertainty import trust
 from omnidyn.model.robot import Robot
 from omnidyn.statement import NOTE, WARNING, Statement
 
-SURE = 3.0  # standard errors by which a constant force is one
+FORCE_ERRORS = 3.0  # standard errors by which a constant force is one
 
 
 def better_of(solution: Solution, plain_solution: Solution) -> Solution:
@@ -34,7 +34,7 @@ def better_of(solution: Solution, plain_solution: Solution) -> Solution:
     margins = margins_of([solution, plain_solution])
     own_run, plain_run = free_run(solution, margins), free_run(plain_solution, margins)
     if not plain_run.is_better(own_run):
-        return replace(solution, plain=plain_solution)
+        return replace(solution, plain_solution=plain_solution)
     lost = tuple(
         name.partition(AT)[0]
         for name in solution.solver.problem.names
@@ -63,7 +63,7 @@ def best_with_force(solution: Solution, forced_solutions: Sequence[Solution]) ->
     if (
         run_without_force.adds_up
         or not runs[k].is_better(run_without_force)
-        or not (np.abs(values[force_indices]) > SURE * std[force_indices]).any()
+        or not (np.abs(values[force_indices]) > FORCE_ERRORS * std[force_indices]).any()
     ):
         return solution
     names = tuple(problem.names[j] for j in force_indices)
@@ -74,7 +74,7 @@ def best_with_force(solution: Solution, forced_solutions: Sequence[Solution]) ->
         "with": runs[k].error,
     }
     notes = (*solution.notes, Statement("constant_force", WARNING, numbers=numbers))
-    return replace(forced_solutions[k], plain=solution.plain, notes=notes)
+    return replace(forced_solutions[k], plain_solution=solution.plain_solution, notes=notes)
 
 
 def why_white(white: Solution, weighed_fit: Weighed) -> Statement | None:
@@ -107,7 +107,7 @@ def beside_given(
     def runs() -> tuple[FreeRun, FreeRun, FreeRun]:
         """Those of the fit, of the plain one, of the robot as it was given."""
         plain_solution = solve_plain()
-        margins = margins_of([weighed_fit.plain, plain_solution])
+        margins = margins_of([weighed_fit.plain_solution, plain_solution])
         given_run = free_run(
             plain_solution, margins, values=np.array([p.value for p in plain_solution.solver.problem.parameters])
         )

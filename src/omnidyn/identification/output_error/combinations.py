@@ -17,7 +17,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.answer import Combination
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.problem import Problem
-from omnidyn.identification.output_error.trust.uncertainty import BLIND, Trust
+from omnidyn.identification.output_error.trust.uncertainty import BLIND_EIGENVALUE, Trust
 from omnidyn.model.actuation import DEAD_BAND, without_map
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, push_lost_per_volt, push_per_volt
 from omnidyn.model.dynamics import damping
@@ -27,8 +27,8 @@ from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 
 STEP = 1e-4  # of a number or its logarithm: rounding and curvature below 1e-8
-LOST = 1e-3  # share of a lost direction that a combination may have
-VAGUE = 0.5  # of its value: a std beyond it determines no combination either
+LOST_SHARE = 1e-3  # share of a lost direction that a combination may have
+VAGUE_SHARE = 0.5  # of its value: a std beyond it determines no combination either
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class _Kind:
     """A function of the robot along each axis (3,), and its units."""
 
     name: str
-    of: Callable[[Robot], FloatArray]
+    function: Callable[[Robot], FloatArray]
     units: tuple[str, str, str]
 
 
@@ -55,10 +55,10 @@ def combinations(
         return ()
     results = []
     for kind in KINDS:
-        values_now, slopes = kind.of(problem.robot_at(values)), slopes_of(problem, values, kind.of)
+        values_now, slopes = kind.function(problem.robot_at(values)), slopes_of(problem, values, kind.function)
         for axis in np.flatnonzero(moving_axes).tolist():
             std = std_of(slopes[axis], uncertainty)
-            if values_now[axis] > 0.0 and std < VAGUE * values_now[axis]:
+            if values_now[axis] > 0.0 and std < VAGUE_SHARE * values_now[axis]:
                 value, half = float(values_now[axis]), uncertainty.quantile * std
                 results.append(
                     Combination(
@@ -90,11 +90,11 @@ def slopes_of(problem: Problem, values: FloatArray, function: Callable[[Robot], 
 
 def std_of(slope: FloatArray, uncertainty: Trust) -> float:
     """Standard error of a combination (P,); infinite where it moves with what is lost."""
-    lost = np.flatnonzero(uncertainty.blind)
-    if any(value < BLIND and _share(slope, way, lost) > LOST for value, way in uncertainty.directions):
+    lost = np.flatnonzero(uncertainty.blind_parameters)
+    if any(value < BLIND_EIGENVALUE and _share(slope, way, lost) > LOST_SHARE for value, way in uncertainty.directions):
         return np.inf
     finite = np.isfinite(np.diag(uncertainty.covariance))
-    covariance = np.where(np.outer(finite, finite), uncertainty.covariance, uncertainty.plain)
+    covariance = np.where(np.outer(finite, finite), uncertainty.covariance, uncertainty.plain_covariance)
     return float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
 
 
@@ -126,7 +126,7 @@ class _Trade:
     unit: str
 
 
-OFF, LATE_BY = _Trade("sets_off", "V"), _Trade("follows", "s")
+SETOFF_TRADE, DELAY_TRADE = _Trade("sets_off", "V"), _Trade("follows", "s")
 
 
 def trades(problem: Problem, values: FloatArray, uncertainty: Trust, moving_axes: BoolArray) -> tuple[Combination, ...]:
@@ -136,19 +136,19 @@ def trades(problem: Problem, values: FloatArray, uncertainty: Trust, moving_axes
         if uncertainty.unseen[j]:
             continue
         if p.name == DEAD_BAND:
-            results += _sums(problem, values, uncertainty, moving_axes, j, OFF)
-        elif p.part == LATENCY and not any(combination.name.startswith(LATE_BY.name) for combination in results):
-            results += _sums(problem, values, uncertainty, moving_axes, j, LATE_BY)
+            results += _sums(problem, values, uncertainty, moving_axes, j, SETOFF_TRADE)
+        elif p.part == LATENCY and not any(combination.name.startswith(DELAY_TRADE.name) for combination in results):
+            results += _sums(problem, values, uncertainty, moving_axes, j, DELAY_TRADE)
     return tuple(results)
 
 
 def _sums(
     problem: Problem, values: FloatArray, uncertainty: Trust, moving_axes: BoolArray, j: int, trade: _Trade
 ) -> Iterator[Combination]:
-    function = _friction if trade is OFF else _lag
+    function = _friction if trade is SETOFF_TRADE else _lag
     values_now, slopes = function(problem.robot_at(values)), slopes_of(problem, values, function)
     robot, share, least_values = problem.robot_at(values), np.ones(3), np.ones(3)
-    if trade is OFF:
+    if trade is SETOFF_TRADE:
         share = push_lost_per_volt(robot) / push_per_volt(robot)
         patterns = np.abs(axis_patterns(robot))
         least_values = np.where(patterns > 0.0, patterns, np.inf).min(
@@ -164,7 +164,7 @@ def _sums(
         if (
             not np.isfinite(std_of_sum)
             or not 0.0 < std_of_sum < value
-            or (trade is OFF and value * least_values[axis] < values[j])
+            or (trade is SETOFF_TRADE and value * least_values[axis] < values[j])
         ):
             continue
         correlation = -1.0

@@ -67,7 +67,7 @@ def conclude(
     Raises InsufficientDataError where the logs say nothing about any of the robot's numbers, or of two together.
     """
     problem, values = solver.problem, solution.state.point.values.copy()
-    blind_names = tuple(p.name for p, b in zip(problem.parameters, uncertainty.blind, strict=True) if b)
+    blind_names = tuple(p.name for p, b in zip(problem.parameters, uncertainty.blind_parameters, strict=True) if b)
     names_at_bound = tuple(p.name for p in at_the_end(problem, values))
     open_names = tuple(
         p.name for p, b in zip(problem.parameters, uncertainty.open, strict=True) if b or p.name in names_at_bound
@@ -97,7 +97,9 @@ def conclude(
         ci95={name: ci95[name] for name in names[:robot_count]} | {k: i for k, (_, i) in own_levels.items()},
         correlation=correlation,
         degrees_of_freedom={name: uncertainty.degrees for name in (*names[:robot_count], *own_levels)},
-        at_bound=tuple(name for name, is_held in zip(names[:robot_count], uncertainty.held, strict=False) if is_held),
+        at_bound=tuple(
+            name for name, is_held in zip(names[:robot_count], uncertainty.held_parameters, strict=False) if is_held
+        ),
         warnings=(
             *_warnings(solver, solution, uncertainty, records, blind_names),
             *_not_followed(missed_outputs),
@@ -257,7 +259,7 @@ def intervals(
             ci95[p.name] = (p.low, math.inf)
             continue
         low, high = inner_value - half, inner_value + half
-        if uncertainty.held[j]:
+        if uncertainty.held_parameters[j]:
             free_step = float(uncertainty.free_step[j])
             is_below_middle = 2.0 * value <= p.low + p.high  # or at Coulomb friction, which breakaway never is below
             low = inner_value if is_below_middle else inner_value + min(-half, free_step - half)
@@ -283,7 +285,7 @@ def _robot(
     robot, numbers = problem.robot, {}
     for p, value in zip(problem.parameters[: problem.robot_count], values, strict=False):
         robot = p.on(robot, float(value))
-        for key, factor in ((p.name, 1.0), *p.also):
+        for key, factor in ((p.name, 1.0), *p.tied_numbers):
             if p.name not in open_names:
                 numbers[key] = identified(std[p.name] * factor, f"output error, {data}")
             elif (prior_before := prior_of(problem.robot, key)) and prior_before.std is not None:
@@ -307,8 +309,8 @@ def _levels(
     levels = {}
     for profile in profiles:
         coulomb = ci95.get(coulomb_below(profile.name, robot), (profile.low, profile.low))
-        low = coulomb[0] if profile.tied else profile.low
-        high = max(profile.high, coulomb[1]) if profile.tied else profile.high
+        low = coulomb[0] if profile.is_tied else profile.low
+        high = max(profile.high, coulomb[1]) if profile.is_tied else profile.high
         levels[profile.name] = (profile.value, (low, high))
     return levels
 
@@ -348,7 +350,7 @@ def _together(
         (j, key, std[p.name] * factor)
         for j, p in enumerate(fitted)
         if 0.0 < std[p.name] < LARGEST_STD and 0.0 < uncertainty.std[j] < math.inf
-        for key, factor in ((key_of(p.name, robot), 1.0), *p.also)
+        for key, factor in ((key_of(p.name, robot), 1.0), *p.tied_numbers)
         if key
     ]
     indices = [j for j, _, _ in tied_numbers]
@@ -372,7 +374,7 @@ def _warnings(
         for name, value in values_at_bound.items()
     ]
     for j, p in enumerate(solver.problem.parameters[: solver.problem.robot_count]):
-        if uncertainty.held[j] and p.name not in parameters_at_bound:
+        if uncertainty.held_parameters[j] and p.name not in parameters_at_bound:
             key = p.name.partition("@")[0]
             code = "bound_of_inertia" if Key.parse(key).name in (ROTOR, WHEEL) else "bound"
             code = "bound_of_breakaway" if falls(key, solver.problem.robot) else code
@@ -391,7 +393,7 @@ def _unused(records: Sequence[Record]) -> tuple[Statement, ...]:
     """What the logs hold and the fit does not use: each reason once, with the logs it is true of where not of all."""
     logs_by_reason: dict[Statement, list[str]] = {}
     for record in records:
-        for reason in record.unused:
+        for reason in record.unused_notes:
             logs_by_reason.setdefault(reason, []).append(record.source or "a log")
     return tuple(
         reason_given
@@ -495,7 +497,7 @@ def _effects(
     """What the logs did; None where they did nothing."""
     runs = [record.run for record in records if record.run is not None]
     latency = Lateness(
-        **{name: each for name, each in latency_by_channel.items() if each != drive_latency},
+        **{name: other_latency for name, other_latency in latency_by_channel.items() if other_latency != drive_latency},
         averaged=any(_added_up(run, latency_by_channel) for run in runs),
     )
     tilt, push = ([value_by_name.get(f"{kind}.{axis}", 0.0) for axis in AXES] for kind in (TILT, PUSH))

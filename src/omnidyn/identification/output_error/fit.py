@@ -18,7 +18,7 @@ from omnidyn.errors import InsufficientDataError, UnsupportedError
 from omnidyn.identification.grouping import count_once
 from omnidyn.identification.methods import AUTO, OutputError, degrees
 from omnidyn.identification.output_error.answer import Answer
-from omnidyn.identification.output_error.begin import WHOLE, begun, group_names
+from omnidyn.identification.output_error.begin import ALL_LOGS, begun, group_names
 from omnidyn.identification.output_error.choice import beside_given, best_with_force, better_of, why_white
 from omnidyn.identification.output_error.conclusion import conclude, loss_words, unexplained
 from omnidyn.identification.output_error.joint import join, joint_start, own_names
@@ -26,7 +26,7 @@ from omnidyn.identification.output_error.linear.blocks import rejected_nuisances
 from omnidyn.identification.output_error.linear.sensitivity import beside_rounding, moved_by_the_file
 from omnidyn.identification.output_error.memory.whitening import Weighed, whitened, why_not
 from omnidyn.identification.output_error.prepare import (
-    FINE,
+    FINE_TOLERANCE,
     Group,
     guesses,
 )
@@ -35,10 +35,10 @@ from omnidyn.identification.output_error.problem.nuisances import LATENCY, PUSH,
 from omnidyn.identification.output_error.problem.parameters import AT, refuse_repeated
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.solve.first_point import coarse_point, first_point
-from omnidyn.identification.output_error.solve.loop import FINE as LOOP_FINE
+from omnidyn.identification.output_error.solve.loop import FINE_TOLERANCE as LOOP_FINE
 from omnidyn.identification.output_error.solve.loop import beyond_jumps, left_out, retimed, solve_loop
 from omnidyn.identification.output_error.solve.progress import Best, FitProgress
-from omnidyn.identification.output_error.solve.solver import ENOUGH, Normal, Solution, Solver
+from omnidyn.identification.output_error.solve.solver import KINK_PRECISION, Normal, Solution, Solver
 from omnidyn.identification.output_error.trust.breakaway import Breakaway, asked_levels, find_breakaway
 from omnidyn.identification.output_error.trust.no_fall import without_a_fall
 from omnidyn.identification.output_error.trust.resampling import beside, differences, refuse_bootstrap, resampled
@@ -51,8 +51,10 @@ from omnidyn.progress import silent
 from omnidyn.run import Run, as_list
 from omnidyn.statement import WARNING, Statement
 
-HALFWAY = 3e-4  # [m/s] tolerance of the implicit engine on the way there
-CLOSE = 1e-4  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
+HALFWAY_TOLERANCE = 3e-4  # [m/s] tolerance of the implicit engine on the way there
+FIT_PRECISION = (
+    1e-4  # squared distance to the best point, in standard errors, at which a fit by the implicit engine ends
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +62,14 @@ class Fit:
     """A fit of whole logs, ready to be solved.
 
     `solve` finds the best point, `answer` says what it means. After an interrupt, `answer` takes the `best` of the
-    FitProgress that `solve` was given. began: the robot as it was given. twice: which runs were given twice.
+    FitProgress that `solve` was given. given_robot: the robot as it was given. repeat_notes: which runs were given
+    twice.
     """
 
     question: OutputError
     groups: tuple[Group, ...]
-    began: Robot
-    twice: tuple[Statement, ...] = ()
+    given_robot: Robot
+    repeat_notes: tuple[Statement, ...] = ()
 
     @classmethod
     def of(
@@ -94,7 +97,7 @@ class Fit:
         if question.bootstrap:
             refuse_bootstrap(question.bootstrap, Counter(names if joint else [""] * len(names)))
         starts = {
-            name: (start_by_group or {}).get(name, (robot, question)) for name in (dict.fromkeys(names) or [WHOLE])
+            name: (start_by_group or {}).get(name, (robot, question)) for name in (dict.fromkeys(names) or [ALL_LOGS])
         }
         (progress or FitProgress()).enter("looking for what moved")
         groups_and_questions = [
@@ -139,12 +142,12 @@ class Fit:
             if simpler_solution is None:
                 raise
             answer = self._answer(simpler_solution, progress)
-        note, estimates = band_note(self.began), answer.estimates
+        note, estimates = band_note(self.given_robot), answer.estimates
         return replace(
             answer,
             estimates={
                 name: replace(
-                    estimate, robot=with_band(estimate.robot, self.began), warnings=(*estimate.warnings, *note)
+                    estimate, robot=with_band(estimate.robot, self.given_robot), warnings=(*estimate.warnings, *note)
                 )
                 for name, estimate in estimates.items()
             },
@@ -154,20 +157,20 @@ class Fit:
         """The same, of the robot that was fitted."""
         is_final = isinstance(result, Solution)
         solution, warnings = (result, []) if isinstance(result, Solution) else self._so_far(result)
-        warnings, hints = [*self.twice, *warnings], [*solution.notes, *self._hints(solution)]
+        warnings, hints = [*self.repeat_notes, *warnings], [*solution.notes, *self._hints(solution)]
         solution, levels = self.with_levels(solution, progress) if is_final else (solution, [])
         progress.enter("finding how sure the numbers are")
         weighed_fit = self.weighed(solution, progress, may_refit=is_final)
         records = [record for group in self.groups for record in group.records]
-        uncertainty, rounded = beside_rounding(weighed_fit, records) if is_final else (weighed_fit.known, [])
+        uncertainty, rounded = beside_rounding(weighed_fit, records) if is_final else (weighed_fit.uncertainty, [])
         weighed_solution, warnings = weighed_fit.solution, [*warnings, *weighed_fit.warnings, *rounded]
         strata = {id(record): group.name for group in self.groups for record in group.records}
         profile, draws = (self.question.profile, self.question.bootstrap) if is_final else ((), 0)
         names = _in_each_group(profile, weighed_solution.solver.problem)
         resampled_fit = resampled(
-            weighed_solution.solver, weighed_solution, weighed_fit.known, names, draws, strata, progress
+            weighed_solution.solver, weighed_solution, weighed_fit.uncertainty, names, draws, strata, progress
         )
-        solution, solver = weighed_fit.plain, weighed_fit.plain.solver
+        solution, solver = weighed_fit.plain_solution, weighed_fit.plain_solution.solver
         loss = loss_words(self.question.loss)
         if len(self.groups) == 1:
             group = self.groups[0]
@@ -179,7 +182,7 @@ class Fit:
             uncertainty = self._beside_what_is_held(exact, weighed_fit) if is_final else exact
             words, better_intervals = (
                 [*warnings, *level_notes, *group.warnings, *hints],
-                beside(resampled_fit, weighed_solution, weighed_fit.known, uncertainty).intervals,
+                beside(resampled_fit, weighed_solution, weighed_fit.uncertainty, uncertainty).intervals,
             )
             estimate = conclude(
                 solver,
@@ -189,14 +192,16 @@ class Fit:
                 loss,
                 words,
                 group.bounds,
-                group.moved,
+                group.moving_axes,
                 levels,
                 held_levels | dict(better_intervals),
                 exact,
             )
             if is_final and self._chooses:
                 solve_plain = partial(self._plain, result, FitProgress())
-                estimate = beside_given(estimate, weighed_fit, solve_plain, self.began, self.question.nuisances is None)
+                estimate = beside_given(
+                    estimate, weighed_fit, solve_plain, self.given_robot, self.question.nuisances is None
+                )
             return Answer({group.name: estimate}, (), solver.problem.names, (), (solution,))
         exact, uncertainty = (
             uncertainty,
@@ -206,7 +211,7 @@ class Fit:
             solver.engine,
             {},
             [],
-            beside(resampled_fit, weighed_solution, weighed_fit.known, uncertainty).intervals,
+            beside(resampled_fit, weighed_solution, weighed_fit.uncertainty, uncertainty).intervals,
         )
         for member in engine.members:
             words = [*warnings, *member.group.warnings]
@@ -224,7 +229,7 @@ class Fit:
                 loss,
                 words,
                 {},
-                member.group.moved,
+                member.group.moving_axes,
                 (),
                 better_intervals,
                 member_exact,
@@ -241,14 +246,16 @@ class Fit:
 
     def _beside_what_is_held(self, uncertainty: Trust, weighed_fit: Weighed) -> Trust:
         """The same trust, with what the file knows only so far; the same number moves all groups at once."""
-        partly_known = self.known_so_far(weighed_fit.plain.solver.problem)
+        partly_known = self.known_so_far(weighed_fit.plain_solution.solver.problem)
         return uncertainty.beside(moved_by_the_file(weighed_fit, partly_known)) if partly_known else uncertainty
 
     def known_so_far(self, problem: Problem) -> dict[str, float]:
         """Key -> std of what the robot file knows only so far, and the fit took as it stands."""
         free_names = {*(name.partition(AT)[0] for name in problem.names), *(self.question.free or ())}
-        priors, group = known_priors(self.began), self.groups[0]
-        return {key: priors[key][1] for key in guesses(self.began, group.engine.looped) if key not in free_names}
+        priors, group = known_priors(self.given_robot), self.groups[0]
+        return {
+            key: priors[key][1] for key in guesses(self.given_robot, group.engine.has_loop) if key not in free_names
+        }
 
     def weighed(self, solution: Solution, progress: FitProgress | None = None, may_refit: bool = True) -> Weighed:
         """The trust in a solution; where its errors remember, that in the fit made anew for it, and its point.
@@ -270,7 +277,8 @@ class Fit:
         missed_outputs = unexplained(solution.solver, solution)
         if (
             whitened_fit is None
-            or unexplained(whitened_fit.plain.solver, whitened_fit.plain).keys() - missed_outputs.keys()
+            or unexplained(whitened_fit.plain_solution.solver, whitened_fit.plain_solution).keys()
+            - missed_outputs.keys()
         ):
             return unchanged_fit  # a memory that explains a whole output leaves nothing to the model
         white_note = None if is_asked or not self._chooses else why_white(solution, whitened_fit)
@@ -282,28 +290,28 @@ class Fit:
         if self.question.nuisances is not None:
             return solution
         early = too_early(solution.solver, solution)
-        if not group.engine.exact and not group.engine.looped:
+        if not group.engine.exact and not group.engine.has_loop:
             kept_names = tuple(name for name in solution.solver.problem.nuisances if name not in early)
         else:
             progress.enter("which nuisances the logs support")
             kept_names = supported(
-                solution.solver, solution, (LATENCY,) if group.engine.looped else automatic(group.records)
+                solution.solver, solution, (LATENCY,) if group.engine.has_loop else automatic(group.records)
             )
-        rejected_names = rejected_nuisances(solution) if not group.engine.looped else ()
+        rejected_names = rejected_nuisances(solution) if not group.engine.has_loop else ()
         kept_names = tuple(name for name in kept_names if name not in rejected_names)
         lost = [name for name in solution.solver.problem.nuisances if name not in kept_names]
         if not lost:
             return self._chosen(solution, progress)
         notes = tuple(implausible(name, value, fitted=False) for name, value in early.items())
         notes += tuple(Statement("harmful_nuisance", WARNING, name) for name in rejected_names if name not in early)
-        if group.engine.looped:  # from its start on: until it is done, the fit with all of them is the best so far
+        if group.engine.has_loop:  # from its start on: until it is done, the fit with all of them is the best so far
             progress = progress.aside(f"once more without {', '.join(lost)}")
         return self._chosen(replace(self._solve(group, group.problem(kept_names), progress), notes=notes), progress)
 
     @property
     def _chooses(self) -> bool:
         """Whether free runs on held-out blocks are compared: of one group, without a speed loop, by least squares."""
-        return len(self.groups) == 1 and not self.groups[0].engine.looped and not self.nu
+        return len(self.groups) == 1 and not self.groups[0].engine.has_loop and not self.nu
 
     def _chosen(self, solution: Solution, progress: FitProgress) -> Solution:
         """The fit of the only group, or the plain one; with a constant force where errors are not white and it pays."""
@@ -324,8 +332,8 @@ class Fit:
         has none."""
         names = solution.solver.problem.nuisances
         lost = [name for name in names if name != GAIN]
-        if not lost or solution.plain is not None:
-            return solution.plain or solution
+        if not lost or solution.plain_solution is not None:
+            return solution.plain_solution or solution
         kept_names = [name for name in names if name == GAIN]
         return self.beside(solution, kept_names, progress.aside(f"once more without {', '.join(lost)}"))
 
@@ -353,23 +361,23 @@ class Fit:
     ) -> Solution:
         """The best point of one group alone. base_solution: a fit of it with other nuisances, near which an engine that
         marches by steps begins."""
-        if group.engine.looped:
+        if group.engine.has_loop:
             return solve_loop(problem, self.nu, progress)
-        engine = group.engine.of(problem, FINE)
+        engine = group.engine.of(problem, FINE_TOLERANCE)
         if group.engine.exact:
             progress.enter("looking for a start")
             solver = Solver(problem, engine, self.nu)
             return solver.minimise(first_point(solver, group.records), progress=progress)
         coarse_state = coarse_point(problem, self.nu, progress, base_solution)
-        coarse_solver = Solver(problem, group.engine.of(problem, HALFWAY), self.nu, ENOUGH)
+        coarse_solver = Solver(problem, group.engine.of(problem, HALFWAY_TOLERANCE), self.nu, KINK_PRECISION)
         scales = (
             coarse_state.variance if self.nu else None
         )  # counts find theirs anew: a step a row is too coarse for them
         nearer_solution = coarse_solver.minimise(coarse_state.point, progress=progress, scales=scales)
-        return Solver(problem, engine, self.nu, CLOSE).minimise(
+        return Solver(problem, engine, self.nu, FIT_PRECISION).minimise(
             nearer_solution.state.point,
             progress=progress,
-            blocked_parameters=nearer_solution.blocked,
+            blocked_parameters=nearer_solution.blocked_parameters,
             scales=nearer_solution.state.variance,
         )
 
@@ -403,7 +411,7 @@ class Fit:
         """The best point of all groups together."""
         solver = self._solver(nuisances)
         engine = solver.engine
-        start, loop = joint_start(engine, self.nu, progress), self.groups[0].engine.looped
+        start, loop = joint_start(engine, self.nu, progress), self.groups[0].engine.has_loop
         if any(not group.engine.exact for group in self.groups):  # first a step a row
             coarse_solver = self._solver(nuisances, is_coarse=True)
             inner_progress = progress.aside("all groups, first a step a row")
@@ -417,10 +425,10 @@ class Fit:
 
     def _solver(self, nuisances: Sequence[str] | None, is_coarse: bool = False) -> Solver:
         """The solver of all that is fitted, as exact as at the end of a fit, or `is_coarse`: by a step a row."""
-        problems, tol = [group.problem(nuisances) for group in self.groups], None if is_coarse else FINE
+        problems, tol = [group.problem(nuisances) for group in self.groups], None if is_coarse else FINE_TOLERANCE
         if len(problems) == 1:
             kind = self.groups[0].engine
-            return Solver(problems[0], kind.of(problems[0], LOOP_FINE if kind.looped else tol), self.nu)
+            return Solver(problems[0], kind.of(problems[0], LOOP_FINE if kind.has_loop else tol), self.nu)
         engine = join(self.groups, problems, own_names(self.question.per_free, problems), tol)
         return Solver(engine.problem, engine, self.nu)
 
@@ -433,15 +441,17 @@ class Fit:
             state = solver.state(state.point, state.variance if solver.scaled.any() else None)
         else:
             solver = self._solver(None)
-            state = solver.minimise(joint_start(solver.engine, self.nu, FitProgress(), best.alone), limit=0).state
-            unfinished_groups = [group.name for group in self.groups if group.name not in best.alone]
+            state = solver.minimise(
+                joint_start(solver.engine, self.nu, FitProgress(), best.states_by_group), limit=0
+            ).state
+            unfinished_groups = [group.name for group in self.groups if group.name not in best.states_by_group]
             warnings += [Statement("group_not_fitted", WARNING, name) for name in unfinished_groups]
         return Solution(state, Normal(solver, state).held, 0, True, solver), warnings
 
     def _hints(self, solution: Solution) -> list[Statement]:
         """Which logs of a speed loop are not used."""
         group = self.groups[0]
-        is_single_loop = len(self.groups) == 1 and group.engine.looped
+        is_single_loop = len(self.groups) == 1 and group.engine.has_loop
         return left_out(group.records, solution.solver.problem.pieces) if is_single_loop else []
 
     def with_levels(self, solution: Solution, progress: FitProgress | None = None) -> tuple[Solution, list[Breakaway]]:

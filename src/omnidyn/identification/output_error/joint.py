@@ -11,7 +11,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.errors import InputError
 from omnidyn.identification.output_error.engines.engine import Engine, Weighting
-from omnidyn.identification.output_error.prepare import FINE, Group
+from omnidyn.identification.output_error.prepare import FINE_TOLERANCE, Group
 from omnidyn.identification.output_error.problem.parameters import AT, Parameter
 from omnidyn.identification.output_error.problem.problem import Parts, PieceSums, Point, Problem
 from omnidyn.identification.output_error.solve.first_point import first_point, moving_start
@@ -58,7 +58,9 @@ class Member:
             variance,
         )
         member_solver = Solver(self.problem, self.engine, solver.nu, counts_ticks=solver.counted)
-        return Solution(state, solution.held[indices], solution.iterations, solution.converged, member_solver)
+        return Solution(
+            state, solution.held_parameters[indices], solution.iterations, solution.converged, member_solver
+        )
 
     def trust_alone(self, joint: Problem, uncertainty: Trust) -> Trust:
         """What the trust in a solution of all groups is for this one."""
@@ -66,13 +68,13 @@ class Member:
         return replace(
             uncertainty,
             covariance=uncertainty.covariance[np.ix_(indices, indices)],
-            held=uncertainty.held[indices],
-            blind=uncertainty.blind[indices],
+            held_parameters=uncertainty.held_parameters[indices],
+            blind_parameters=uncertainty.blind_parameters[indices],
             unseen=uncertainty.unseen[indices],
             free_step=uncertainty.free_step[indices],
             neighbours=uncertainty.neighbours[columns],
-            plain=uncertainty.plain[np.ix_(indices, indices)],
-            guessed=uncertainty.guessed[indices],
+            plain_covariance=uncertainty.plain_covariance[np.ix_(indices, indices)],
+            guessed_parameters=uncertainty.guessed_parameters[indices],
             directions=tuple(
                 (v, way[indices]) for v, way in uncertainty.directions if np.abs(way[indices]).max() > SHARE
             ),
@@ -173,7 +175,7 @@ def own_names(requested_keys: Sequence[str], problems: Sequence[Problem]) -> tup
 
 
 def join(
-    groups: Sequence[Group], problems: Sequence[Problem], own_keys: Sequence[str], tol: float | None = FINE
+    groups: Sequence[Group], problems: Sequence[Problem], own_keys: Sequence[str], tol: float | None = FINE_TOLERANCE
 ) -> JointEngine:
     """One problem over the problems of all groups, in its engine. tol [m/s]: of implicit ones; None: a step a row."""
     robots: dict[str, Parameter] = {}
@@ -211,7 +213,7 @@ def joint_start(
             point = states_by_group[member.name].point
         elif member.engine.exact:
             point = first_point(Solver(member.problem, member.engine, nu), member.group.records).point
-        elif member.engine.looped:
+        elif member.engine.has_loop:
             point = loop_start(member.problem, nu, progress.aside(words))
         else:
             point = moving_start(member.problem, nu, progress)

@@ -64,9 +64,9 @@ from omnidyn.statement import WARNING, Statement
 from omnidyn.statistics import difference_noise
 
 Kind = type[Engine[Problem]]  # of an engine
-FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
-ASIDE = 0.01  # by how much numbers are moved apart to see which engine knows the robots that they may make
-BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
+FINE_TOLERANCE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
+PROBE_CHANGE = 0.01  # by how much numbers are moved apart to see which engine knows the robots that they may make
+DRIVE_FACTOR = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
 START_STD = np.array([0.5, 0.5, 5.0])  # [m/s, m/s, rad/s] of the twist of the first rows from that at the start
 LIMIT = "motor.voltage_limit_V"
 # A drawing, a setting of the firmware, a battery and Karnopp's band: their std is for the reader. A nominal supply has
@@ -80,14 +80,15 @@ NEVER_FREE = (
     DRIVE_LATENCY,
     *BANDS,
 )
-LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
+LEVEL_SHARE = 1e-6  # of its start, that a level stays above where 0 would switch it off
 
 
 @dataclass(frozen=True, eq=False)
 class Group:
     """The logs of one group, alone: the robot they begin from, what is free of it there, and the engine for that.
 
-    usual: what is free by default. moved (3,): which axes did. bounds: key -> what an axis that never moved has held.
+    default_keys: what is free by default. moving_axes (3,): which axes did. bounds: key -> what an axis that never
+    moved has held.
     warnings: what is to be said of such axes.
     """
 
@@ -96,20 +97,20 @@ class Group:
     robot: Robot
     question: OutputError
     engine: Kind
-    usual: tuple[str, ...]
-    moved: BoolArray
+    default_keys: tuple[str, ...]
+    moving_axes: BoolArray
     bounds: dict[str, float]
     warnings: tuple[Statement, ...]
 
     def tells(self, name: str) -> bool:
         """Whether these logs may tell of a level, by its key: of an axis that never moved they do not."""
         axis = Key.parse(name).axis
-        return axis is None or bool(self.moved[axis])
+        return axis is None or bool(self.moving_axes[axis])
 
     def problem(self, nuisances: Sequence[str] | None = None) -> Problem:
         """What is to be fitted. nuisances: those that were settled; None: those that are asked for."""
         group_question = self.question if nuisances is None else replace(self.question, nuisances=tuple(nuisances))
-        return make_problem(self.records, self.robot, group_question, self.engine, self.usual)
+        return make_problem(self.records, self.robot, group_question, self.engine, self.default_keys)
 
 
 def make_group(
@@ -129,27 +130,27 @@ def make_group(
     axis_motion = motion(records, robot)
     if looped(records):
         question = _loop_question(question, axis_motion, records, robot)
-        return Group(name, records, robot, question, LoopEngine, default_keys, axis_motion.moved, {}, ())
+        return Group(name, records, robot, question, LoopEngine, default_keys, axis_motion.moving_axes, {}, ())
     engine, bounds, warnings = ExactEngine if exact else ImplicitEngine, {}, []
     free_keys = question.free if question.free is not None else (*dict.fromkeys((*default_keys, *guesses(robot))),)
     fixed = set(question.fixed)
-    for axis in np.flatnonzero(~axis_motion.moved).tolist():
+    for axis in np.flatnonzero(~axis_motion.moving_axes).tolist():
         axis_keys = {key for key in (*free_keys, *default_keys) if Key.parse(key).axis == axis}
         fixed |= axis_keys
         if not axis_keys or (is_single and not exact and not axis_keys & set(free_keys)):
             continue  # friction along the direction of travel: no axis has its own
-        held_force, key = float(axis_motion.held[axis]), f"friction.axes.breakaway[{axis}]"
+        held_force, key = float(axis_motion.held_forces[axis]), f"friction.axes.breakaway[{axis}]"
         warnings.append(axis_motion.unfitted(axis, None if is_single else name))
         if not is_single:
             continue
-        bounds |= {key: held_force} if held_force > NOTHING and not axis_motion.dead[axis] else {}
+        bounds |= {key: held_force} if held_force > NO_DRIVE and not axis_motion.dead[axis] else {}
         if exact and robot.friction.axes.levels[2][axis] < held_force:
             robot = Key.parse(f"friction.axes.coulomb[{axis}]").set(robot, held_force)
-    if is_single and not axis_motion.moved.any():
+    if is_single and not axis_motion.moving_axes.any():
         raise _never_moved(axis_motion, records[0].source)
     if warnings:
         question = replace(question, free=tuple(key for key in free_keys if key not in fixed), fixed=())
-    return Group(name, records, robot, question, engine, default_keys, axis_motion.moved, bounds, tuple(warnings))
+    return Group(name, records, robot, question, engine, default_keys, axis_motion.moving_axes, bounds, tuple(warnings))
 
 
 def _never_moved(axis_motion: Motion, source: str) -> InsufficientDataError:
@@ -157,7 +158,9 @@ def _never_moved(axis_motion: Motion, source: str) -> InsufficientDataError:
         "the robot never visibly moved: its friction is only bounded from below",
         got="; ".join(
             f"{AXES[axis]} held {held_force:.3g}" if is_seen else f"{AXES[axis]} was not measured"
-            for axis, (held_force, is_seen) in enumerate(zip(axis_motion.held, axis_motion.seen, strict=True))
+            for axis, (held_force, is_seen) in enumerate(
+                zip(axis_motion.held_forces, axis_motion.seen_axes, strict=True)
+            )
         ),
         expected="motion",
         remedy="drive it beyond its dead zone",
@@ -167,9 +170,9 @@ def _never_moved(axis_motion: Motion, source: str) -> InsufficientDataError:
 
 def _loop_question(question: OutputError, axis_motion: Motion, records: Sequence[Record], robot: Robot) -> OutputError:
     """By default friction of what moved, guesses and gains. Raises InsufficientDataError where nothing moved."""
-    still_axes = np.flatnonzero(~axis_motion.moved).tolist()
+    still_axes = np.flatnonzero(~axis_motion.moving_axes).tolist()
     guessed_keys = [key for key in guesses(robot, has_loop=True) if Key.parse(key).axis not in still_axes]
-    keys = dict.fromkeys((*loop_keys(robot, axis_motion.moved, records[0].source), *guessed_keys))
+    keys = dict.fromkeys((*loop_keys(robot, axis_motion.moving_axes, records[0].source), *guessed_keys))
     free = tuple(key for key in keys if key not in question.fixed)
     return question if question.free is not None else replace(question, free=free, fixed=())
 
@@ -231,7 +234,7 @@ def make_problem(
     start = question.start
     parts = (
         loop_pieces(records, robot, start)
-        if engine.looped
+        if engine.has_loop
         else pieces(records, robot, start, has_latency, None if engine.exact else START_STD)
     )
     rows = sum(int(np.isfinite(p.record.outputs[p.first : p.last + 1]).sum()) for p in parts)
@@ -259,7 +262,7 @@ def stays_exact(robot: Robot, keys: Sequence[str]) -> bool:
     other_keys = [Key.parse(key) for key in keys if key not in BOX]
     other_keys = [key for key in other_keys if (key.table, key.field) != (BODY_AXES, BREAKAWAY)]
     for k, key in enumerate(other_keys):
-        value, share = key.get(robot), ASIDE * (k + 1)
+        value, share = key.get(robot), PROBE_CHANGE * (k + 1)
         robot = key.set(robot, value * (1.0 + share) or share, checked=False)
     return not other_keys or is_exact(robot)
 
@@ -273,10 +276,10 @@ def _drive(records: Sequence[Record], robot: Robot) -> float:
 
 def _within_reach(p: Parameter, drive: float) -> Parameter:
     """Bounds within which a number shows: above 0, where it is off, and no level far beyond what drives the robot."""
-    low = LEAST * p.value if p.low == 0.0 else p.low
+    low = LEVEL_SHARE * p.value if p.low == 0.0 else p.low
     if Key.parse(p.name).level not in (COULOMB, BREAKAWAY) or drive == 0.0:
         return replace(p, low=low)
-    return replace(p, low=low, high=min(p.high, max(BEYOND * drive, 2.0 * p.value)))
+    return replace(p, low=low, high=min(p.high, max(DRIVE_FACTOR * drive, 2.0 * p.value)))
 
 
 def free_by_default(robot: Robot, exact: bool | None = None) -> tuple[str, ...]:
@@ -321,31 +324,31 @@ def expand_keys(names: str | Sequence[str], robot: Robot, default_keys: Sequence
 
 # Which axes visibly moved in a log, and what drive those that did not have held
 
-NOTHING = 1e-9  # [N, N m] a drive that is only rounding
-CLEAR = 6.0  # standard errors of a short mean that noise does not reach in any log
+NO_DRIVE = 1e-9  # [N, N m] a drive that is only rounding
+MOTION_ERRORS = 6.0  # standard errors of a short mean that noise does not reach in any log
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """moved (3,): whether an axis visibly moved; True where no twist is known.
+    """moving_axes (3,): whether an axis visibly moved; True where no twist is known.
 
-    held (3,): largest drive [N, N, N m] of the axes that were measured; 0 where all have moved, and nothing was held.
-    seen (3,): whether anything tells of an axis; what was not measured has held nothing. dead (3,): whether no row of
-    an axis differs from another, where others moved: it stood still, or its sensor is dead.
+    held_forces (3,): largest drive [N, N, N m] of the axes that were measured; 0 where all have moved, and nothing was
+    held. seen_axes (3,): whether anything tells of an axis; what was not measured has held nothing. dead (3,): whether
+    no row of an axis differs from another, where others moved: it stood still, or its sensor is dead.
     """
 
-    moved: BoolArray
-    held: FloatArray
-    seen: BoolArray
+    moving_axes: BoolArray
+    held_forces: FloatArray
+    seen_axes: BoolArray
     dead: BoolArray
 
     def unfitted(self, axis: int, group: str | None = None) -> Statement:
         """Why the friction of an axis that did not move is not fitted. group: that of several; None: the only one."""
-        if not self.seen[axis]:
+        if not self.seen_axes[axis]:
             return Statement("axis_not_measured", WARNING, AXES[axis], {} if group is None else {"group": group})
         if group is not None:
             return Statement("axis_not_moved", WARNING, AXES[axis], {"group": group})
-        held_force = float(self.held[axis]) if self.held[axis] > NOTHING else 0.0
+        held_force = float(self.held_forces[axis]) if self.held_forces[axis] > NO_DRIVE else 0.0
         return Statement("axis_not_moved", WARNING, AXES[axis], {"held": held_force, "dead": bool(self.dead[axis])})
 
 
@@ -388,5 +391,5 @@ def _most_drive(records: Sequence[Record], measured: Sequence[BoolArray], robot:
 def _moved(twist: FloatArray, axis: int, first: int, last: int, rows: int) -> bool:
     """Whether the mean over so many rows is beyond what noise makes of it, in as many rows."""
     axis_speed = twist[first : last + 1, axis]
-    clear_mean = CLEAR * difference_noise(axis_speed) / np.sqrt(measured_rows(axis_speed, rows))
+    clear_mean = MOTION_ERRORS * difference_noise(axis_speed) / np.sqrt(measured_rows(axis_speed, rows))
     return int(count_far(twist, axis, first, last, rows, clear_mean)) >= rows

@@ -36,7 +36,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.statistics import huber_loss
 
 AUTO = "auto"
-APART = 2.0  # standard errors from which two shapes are told apart
+SHAPE_ERRORS = 2.0  # standard errors from which two shapes are told apart
 NOT_COMPARED = {
     "one_speed": "the points of a group have nearly one speed",
     "not_determined": "the directions do not determine all of its levels",
@@ -158,7 +158,7 @@ def _of_groups(
             errors = _LeftOutErrors(fits_of_group[group], robust)
             scores_by_group[group] = _scores(fits_of_group[group], errors)
             usable_names = [score.name for score in scores_by_group[group] if score.in_model and not score.at_bound]
-            if usable_names and errors.apart(shared_shape, usable_names[0]) > APART:
+            if usable_names and errors.apart(shared_shape, usable_names[0]) > SHAPE_ERRORS:
                 new_shapes[group] = _choice(scores_by_group[group], errors)
         if not new_shapes:
             break
@@ -239,7 +239,7 @@ def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], errors: _LeftOutErrors) 
                 *rms_and_error(squares_by_shape[name], fold),
                 *_difference(squares[name], squares[order[0]], fold),
                 distance,
-                distance > APART,
+                distance > SHAPE_ERRORS,
                 SHAPES[name].in_model,
                 any((fit.free <= 0.0).any() for fit in groups),
             )
@@ -265,7 +265,7 @@ def _choice(scores: Sequence[ShapeScore], errors: _LeftOutErrors) -> str:
             expected="forces that point along the motion",
             remedy="check the sign of the currents, and which wheel is which",
         )
-    equal = [score for score in usable_scores if errors.apart(score.name, usable_scores[0].name) <= APART]
+    equal = [score for score in usable_scores if errors.apart(score.name, usable_scores[0].name) <= SHAPE_ERRORS]
     return min(equal, key=lambda score: (score.levels, score.loo)).name
 
 

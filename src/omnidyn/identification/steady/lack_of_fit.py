@@ -18,7 +18,7 @@ from scipy.special import fdtrc, stdtr
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Force, LackOfFit, Remedy
-from omnidyn.identification.steady.choice import APART
+from omnidyn.identification.steady.choice import SHAPE_ERRORS
 from omnidyn.identification.steady.operating_points import ForcePoints
 from omnidyn.identification.steady.shapes import (
     HUBER,
@@ -37,10 +37,10 @@ from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import huber_weight
 
 FALSE_ALARM = 0.002  # of all tests of a group together, by Student's t: few directions have longer tails
-MATTERS = 0.02  # of the force: what is missing and smaller does not matter
+FORCE_SHARE = 0.02  # of the force: what is missing and smaller does not matter
 SLOW_SHARE = 0.02  # of the fastest rim: a part of the shape that moves less may be at rest
 STILL_TIMES = 2.0  # as sure as that: what is not known to move is left out, and what hardly is
-SPARE = 6  # folds beyond the levels that a test needs
+SPARE_FOLDS = 6  # folds beyond the levels that a test needs
 ROUNDS = 10  # of robust weights
 TURNED_DEG = (15.0, 30.0, 45.0, 60.0, 75.0)
 REPEATS = "repeats"
@@ -56,7 +56,7 @@ def lack_of_fit(robot: Robot, points: ForcePoints, fit: ShapeFit) -> LackOfFit:
     moving = all_moving(robot, points, fit)
     has_yaw = is_turning(robot, points) and bool(moving.turns.any())
     untested_lack = LackOfFit(False, {"force": 0.0}, {"force": 0.0}, (), (), {})
-    if not len(moving) or int(fold_numbers(moving).max()) + 1 < len(fit.keys) + SPARE:
+    if not len(moving) or int(fold_numbers(moving).max()) + 1 < len(fit.keys) + SPARE_FOLDS:
         return untested_lack
     problem = LinearShape(robot, moving, fit, has_yaw)
     plain_fit = problem.solve(np.zeros((*problem.target.shape, 0)))
@@ -73,7 +73,7 @@ def lack_of_fit(robot: Robot, points: ForcePoints, fit: ShapeFit) -> LackOfFit:
     better_keys = sorted((key for key in forces if _matters(forces[key], size)), key=lambda key: forces[key].after)
     repeat_test = _repeated(plain_fit, problem, len(fit.keys))
     is_lacking = bool(better_keys) or (
-        repeat_test.probability * tests < FALSE_ALARM and repeat_test.size > MATTERS * size
+        repeat_test.probability * tests < FALSE_ALARM and repeat_test.size > FORCE_SHARE * size
     )
     share = repeat_test.share if is_lacking else 0.0
     if better_keys:
@@ -85,13 +85,13 @@ def lack_of_fit(robot: Robot, points: ForcePoints, fit: ShapeFit) -> LackOfFit:
         (),
         tuple(_remedy(key, forces, better_keys) for key in better_keys),
         {},
-        tried=(*fit_by_key, *([REPEATS] if repeat_test.tested else [])),
+        tried=(*fit_by_key, *([REPEATS] if repeat_test.is_tested else [])),
     )
 
 
 def _matters(force: Force, size: float) -> bool:
     """Whether a gain is no chance, tells more of what was left out, and is large. size [N]: rms of all forces."""
-    return force.p < FALSE_ALARM and force.gain > APART * force.gain_std and force.size > MATTERS * size
+    return force.p < FALSE_ALARM and force.gain > SHAPE_ERRORS * force.gain_std and force.size > FORCE_SHARE * size
 
 
 def _remedy(key: str, forces: Mapping[str, Force], better_keys: Sequence[str]) -> Remedy:
@@ -206,7 +206,7 @@ class _Repeated:
     probability: float = 1.0
     size: float = 0.0
     share: float = 0.0
-    tested: bool = False
+    is_tested: bool = False
 
 
 def _repeated(plain_fit: _Solved, problem: LinearShape, levels: int) -> _Repeated:
@@ -216,7 +216,7 @@ def _repeated(plain_fit: _Solved, problem: LinearShape, levels: int) -> _Repeate
     folds, n = int((counts > 1).sum()), int(repeated_rows.sum())
     dimensions = plain_fit.residual.shape[1]
     between_degrees, within_degrees = dimensions * folds - levels, dimensions * (n - folds)
-    if folds < SPARE or between_degrees < 1:
+    if folds < SPARE_FOLDS or between_degrees < 1:
         return _Repeated()
     mean = np.zeros((problem.count, dimensions))
     np.add.at(mean, problem.fold, plain_fit.residual)

@@ -166,7 +166,7 @@ def confidence_band(estimate: Estimate, axis: int, speed: FloatArray) -> tuple[F
 
 FEW_DEGREES = 2
 AGREEMENT = 0.05  # forces that differ by less than this share of their size agree
-UNLIKELY = 0.01  # probability below which the scatter contradicts the std given
+LEAST_PROBABILITY = 0.01  # probability below which the scatter contradicts the std given
 ORIGINS = ("table", "current", "voltage")  # of forces
 
 
@@ -190,7 +190,7 @@ def line_statements(axis: int, line: Line, weighted: bool) -> list[Statement]:
     degrees = line.degrees_of_freedom
     if weighted and degrees >= 1:
         share = chdtr(degrees, line.reduced_chi2 * degrees)
-        if not UNLIKELY / 2 <= share <= 1.0 - UNLIKELY / 2:
+        if not LEAST_PROBABILITY / 2 <= share <= 1.0 - LEAST_PROBABILITY / 2:
             numbers = {"times": np.sqrt(line.reduced_chi2), "absolute_std": line.absolute_std}
             weak_points.append(Statement("scatter_contradicts_std", subject=head, numbers=numbers))
     return weak_points

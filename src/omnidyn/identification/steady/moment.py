@@ -25,12 +25,12 @@ from omnidyn.run import Run
 from omnidyn.statement import Statement
 from omnidyn.statistics import autocorrelation_time, huber_weight, t_quantile
 
-FALSE = 0.002  # of right runs for which a change is told where commands come again; by the shape, of right logs:
+FALSE_SHARE = 0.002  # of right runs for which a change is told where commands come again; by the shape, of right logs:
 FALSE_BY_SHAPE = 0.01
-SPARE = 4  # degrees of freedom that a test needs
-LEAST = 3  # pieces, or windows, on either side of a cut
-AS_GOOD = 6.0  # of t squared, by which another cut, or a drift, must be worse than the best to be ruled out
-MATTERS = 0.02  # of the force: a smaller change does not matter
+SPARE_DEGREES = 4  # degrees of freedom that a test needs
+LEAST_PIECES = 3  # pieces, or windows, on either side of a cut
+RIVAL_MARGIN = 6.0  # of t squared, by which another cut, or a drift, must be worse than the best to be ruled out
+FORCE_SHARE = 0.02  # of the force: a smaller change does not matter
 
 
 @dataclass(frozen=True)
@@ -105,26 +105,26 @@ def moments(
 def _cuts(held_pieces: HeldForces) -> list[int]:
     """Pieces before which there may be a change: some command must come on both sides, and pieces to spare."""
     n, command = len(held_pieces.command), held_pieces.command.tolist()
-    if n - len(set(command)) - 1 < SPARE:
+    if n - len(set(command)) - 1 < SPARE_DEGREES:
         return []
-    return [cut for cut in range(LEAST, n - LEAST + 1) if set(command[:cut]) & set(command[cut:])]
+    return [cut for cut in range(LEAST_PIECES, n - LEAST_PIECES + 1) if set(command[:cut]) & set(command[cut:])]
 
 
 @dataclass(frozen=True, eq=False)
 class _Shift:
     """d of a cut and its standard error, along the force and across it (2,). size: Hotelling's T squared; degrees: of
-    freedom, both with the memory of what is left. rest (n, 2): what is left."""
+    freedom, both with the memory of what is left. residual (n, 2): what is left."""
 
     value: FloatArray
     std: FloatArray
     size: float
     degrees: float
-    rest: FloatArray
+    residual: FloatArray
 
     @property
     def chance(self) -> float:
         """Of as much by noise alone: F = T^2 (m - 1) / (2 m) with 2 and m - 1 degrees of freedom."""
-        if self.degrees < SPARE:
+        if self.degrees < SPARE_DEGREES:
             return 1.0
         return float(fdtrc(2.0, self.degrees - 1.0, self.size * (self.degrees - 1.0) / (2.0 * self.degrees)))
 
@@ -134,12 +134,12 @@ def _moment(held_pieces: HeldForces, cuts: Sequence[int], source: str) -> Moment
     shift_by_cut = {cut: _shift(y, held_pieces.command, cut) for cut in cuts}
     best = max(cuts, key=lambda cut: shift_by_cut[cut].size)
     shift = shift_by_cut[best]
-    memory = max(autocorrelation_time(column) for column in shift.rest.T)
+    memory = max(autocorrelation_time(column) for column in shift.residual.T)
     shift = replace(shift, std=shift.std * np.sqrt(memory), size=shift.size / memory, degrees=shift.degrees / memory)
     p = min(1.0, len(cuts) * shift.chance)
-    if p > FALSE or abs(shift.value[0]) < MATTERS or _drifts(y, held_pieces, shift):
+    if p > FALSE_SHARE or abs(shift.value[0]) < FORCE_SHARE or _drifts(y, held_pieces, shift):
         return None
-    near_cuts = [cut for cut in cuts if shift_by_cut[cut].size / memory > shift.size - AS_GOOD]
+    near_cuts = [cut for cut in cuts if shift_by_cut[cut].size / memory > shift.size - RIVAL_MARGIN]
     common_commands = np.isin(
         held_pieces.command, np.intersect1d(held_pieces.command[:best], held_pieces.command[best:])
     )
@@ -204,8 +204,8 @@ def _drifts(y: FloatArray, held_pieces: HeldForces, shift: _Shift) -> bool:
     slow = _without_commands(np.stack([t, t**2], axis=1), held_pieces.command)
     remaining = _without_commands(y, held_pieces.command)
     drift = remaining - slow @ np.linalg.lstsq(slow, remaining, rcond=None)[0]
-    (_, by_step), (_, by_drift) = (np.linalg.slogdet(residual.T @ residual) for residual in (shift.rest, drift))
-    return bool(shift.degrees * (by_drift - by_step) < AS_GOOD)
+    (_, by_step), (_, by_drift) = (np.linalg.slogdet(residual.T @ residual) for residual in (shift.residual, drift))
+    return bool(shift.degrees * (by_drift - by_step) < RIVAL_MARGIN)
 
 
 # A change inside a run where no command comes again: the fitted shape of friction is the yardstick
@@ -220,8 +220,8 @@ def _drifts(y: FloatArray, held_pieces: HeldForces, shift: _Shift) -> bool:
 
 SPARE_NUMBERS = 6  # numbers beyond those that are fitted
 ROUNDS = 10  # of robust weights
-WORST = 1e4  # condition of what determines levels
-SEEN = 0.05  # the chance of as much beside another part, above which that may be it
+MOST_CONDITION = 1e4  # condition of what determines levels
+RIVAL_CHANCE = 0.05  # the chance of as much beside another part, above which that may be it
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +236,7 @@ class _Run:
 
     @property
     def cuts(self) -> range:
-        return range(LEAST, len(self.span) - LEAST + 1)
+        return range(LEAST_PIECES, len(self.span) - LEAST_PIECES + 1)
 
 
 @dataclass(frozen=True)
@@ -286,7 +286,7 @@ def _run(robot: Robot, points: ForcePoints, fit_of: Callable[[str], ShapeFit], n
     fit = fit_of(run_points.group[0])
     run_points = all_moving(robot, run_points, fit)
     run_points = run_points.chosen(np.argsort(run_points.span[:, 0], kind="stable"))
-    if len(run_points) < 2 * LEAST:
+    if len(run_points) < 2 * LEAST_PIECES:
         return None
     has_yaw = is_turning(robot, run_points)
     problem = LinearShape(robot, run_points, fit, has_yaw)
@@ -306,7 +306,7 @@ def _determined(design: FloatArray, count: int) -> bool:
     norm = np.linalg.norm(design, axis=(0, 1))
     if (norm == 0.0).any() or count - len(norm) < SPARE_NUMBERS:
         return False
-    return bool(np.linalg.cond((design / norm).reshape(-1, len(norm))) <= WORST)
+    return bool(np.linalg.cond((design / norm).reshape(-1, len(norm))) <= MOST_CONDITION)
 
 
 def _change_by_shape(run: _Run, tests: int) -> Moment | None:
@@ -316,14 +316,14 @@ def _change_by_shape(run: _Run, tests: int) -> Moment | None:
     best = max(step_by_cut, key=lambda cut: step_by_cut[cut].size)
     step = step_by_cut[best]
     p = step.chance(tests)
-    if p > FALSE_BY_SHAPE or abs(step.value) < MATTERS:
+    if p > FALSE_BY_SHAPE or abs(step.value) < FORCE_SHARE:
         return None
     if any(
-        (rival_step := _step(run, best, extra_columns)) is None or rival_step.chance(1) > SEEN
+        (rival_step := _step(run, best, extra_columns)) is None or rival_step.chance(1) > RIVAL_CHANCE
         for extra_columns in run.rivals
     ):
         return None
-    near_cuts = [cut for cut in step_by_cut if step_by_cut[cut].size ** 2 > step.size**2 - AS_GOOD]
+    near_cuts = [cut for cut in step_by_cut if step_by_cut[cut].size ** 2 > step.size**2 - RIVAL_MARGIN]
     level_before, level_after = _levels(run, best)
     # The shape was fitted to both sides: d is a share of what it has on average.
     share = float(np.linalg.norm(run.problem.force[:, :, 0], axis=1).mean()) / level_before[0]

@@ -481,7 +481,7 @@ def _moving(points: ForcePoints, robot: Robot) -> ForcePoints:
 #
 # A loop that settles within a row shows no transient: whole logs then say no more than their steady stretches do.
 
-SETTLED = 2.0  # time constants: what is left of a transient then is a seventh
+SETTLING_CONSTANTS = 2.0  # time constants: what is left of a transient then is a seventh
 
 
 def settling_time(robot: Robot) -> float:
@@ -508,7 +508,7 @@ def why_no_transient(runs: Sequence[Run], robot: Robot) -> str:
     """
     if any(run.current is None or (run.wheel_speed is None and run.wheel_angle is None) for run in runs):
         return ""
-    settled_time = SETTLED * settling_time(robot)
+    settled_time = SETTLING_CONSTANTS * settling_time(robot)
     row = min(run.step for run in runs)
     if settled_time > row:
         return ""

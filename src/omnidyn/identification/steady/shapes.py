@@ -246,10 +246,10 @@ def friction_of(shape: Shape, robot: Robot, level: dict[str, float]) -> Friction
 # std        delete-one jackknife over the same folds: it needs no assumption on how the errors within one direction
 #            hang together. B. Efron, C. Stein, Ann. Stat. 9, 586 (1981)
 
-VECTOR, ALONG = "vector", "along"
+VECTOR, ALONG_TRAVEL = "vector", "along"
 HUBER = 2.0  # scales of a two-dimensional residual
 RAYLEIGH = 1.1774  # median length of a two-dimensional normal residual, in its standard deviations
-ITERATIONS, SETTLED, WEIGHTS_SETTLED = 30, 1e-10, 1e-6
+ITERATIONS, LEVEL_TOLERANCE, WEIGHT_TOLERANCE = 30, 1e-10, 1e-6
 MAX_CONDITION = 1e7
 FEW_FOLDS = 6
 FEW_TURNS = 4  # both ways at two speeds
@@ -412,7 +412,7 @@ class _Problem:
             if step is None:
                 return None
             level = level + step
-            if self.shape.linear or np.abs(step).max() <= SETTLED * max(np.abs(level).max(), 1e-12):
+            if self.shape.linear or np.abs(step).max() <= LEVEL_TOLERANCE * max(np.abs(level).max(), 1e-12):
                 break
         return level
 
@@ -442,7 +442,7 @@ class _Problem:
             new = self.solve(weight, level)
             if new is None:
                 break
-            is_settled = np.abs(new - level).max() <= WEIGHTS_SETTLED * max(np.abs(new).max(), 1e-12)
+            is_settled = np.abs(new - level).max() <= WEIGHT_TOLERANCE * max(np.abs(new).max(), 1e-12)
             level = new
             if is_settled:
                 break

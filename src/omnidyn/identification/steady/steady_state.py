@@ -51,7 +51,7 @@ class _Findings:
     lines: dict[int, Line] = field(default_factory=dict)
     bounds: dict[int, float] = field(default_factory=dict)
     warnings: list[Statement] = field(default_factory=list)
-    unfitted: list[Statement] = field(default_factory=list)
+    unfitted_notes: list[Statement] = field(default_factory=list)
 
 
 def fit_steady_state(
@@ -96,11 +96,11 @@ def fit_steady_state(
             for axis, bound in findings.bounds.items()
         ]
         raise InsufficientDataError(
-            "; ".join(map(str, ["no axis can be fitted", *findings.unfitted, *bound_notes])),
+            "; ".join(map(str, ["no axis can be fitted", *findings.unfitted_notes, *bound_notes])),
             expected="three rows in motion or more, at two speeds or more, per axis",
             where=data.source,
         )
-    findings.warnings += findings.unfitted
+    findings.warnings += findings.unfitted_notes
     if data.force_from == "voltage":
         findings.warnings.append(Statement("forces_from_voltage", NOTE))
     friction = _friction(robot.friction.axes, findings)
@@ -149,7 +149,7 @@ def _study(axis: int, data: SteadyTable, rest_use: str, limit: float, absolute_s
     moving = axis_rows & (np.abs(data.speed) > limit)
     resting = axis_rows & ~moving
     if not axis_rows.any():
-        findings.unfitted.append(Statement("axis_without_data", NOTE, AXES[axis]))
+        findings.unfitted_notes.append(Statement("axis_without_data", NOTE, AXES[axis]))
         return
     findings.warnings += rest_statements(axis, int(resting.sum()), rest_use)
     if rest_use == "bound" and resting.any():
@@ -163,7 +163,7 @@ def _study(axis: int, data: SteadyTable, rest_use: str, limit: float, absolute_s
     line = fit_line(speed, data.force[used_rows], *spreads, absolute_std=absolute_std, keys=keys)
     if (line.level > MAX_FRICTION).any():
         excess_level = {"level": line.level.max()}
-        findings.unfitted.append(Statement("axis_beyond_any_robot", subject=AXES[axis], numbers=excess_level))
+        findings.unfitted_notes.append(Statement("axis_beyond_any_robot", subject=AXES[axis], numbers=excess_level))
         return
     findings.lines[axis] = line
     findings.warnings += line_statements(axis, line, data.force_std is not None)
@@ -178,7 +178,7 @@ def _identifiable(
     """
     size = np.abs(speed)
     if not size.any():
-        findings.unfitted.append(Statement("axis_never_moved", subject=AXES[axis]))
+        findings.unfitted_notes.append(Statement("axis_never_moved", subject=AXES[axis]))
         return False
     needed_rows = PARAMETERS if absolute_std else PARAMETERS + 1
     if len(speed) < needed_rows:
@@ -193,7 +193,7 @@ def _identifiable(
         return True
     total = float(np.mean(force * np.sign(speed)))
     numbers = {"speed": size.max(), "sum": total}
-    findings.unfitted.append(Statement("axis_at_one_speed", subject=AXES[axis], numbers=numbers))
+    findings.unfitted_notes.append(Statement("axis_at_one_speed", subject=AXES[axis], numbers=numbers))
     return False
 
 

@@ -54,17 +54,17 @@ LASTING = Stability({}, ())  # whether levels last, `moments` says
 
 @dataclass(frozen=True, eq=False)
 class SteadyFit:
-    """The levels of friction before their diagnosis. parts: group -> its points; anew: group -> its levels were the
-    robot another one. The rest as in SteadyStudy."""
+    """The levels of friction before their diagnosis. parts: group -> its points; refit_by_group: group -> its levels
+    were the robot another one. The rest as in SteadyStudy."""
 
     runs: Sequence[Run]
     robot: Robot
-    asked: SteadyState
+    method: SteadyState
     windows: SteadyWindows
     points: ForcePoints
     choice: ShapeChoice
     parts: Mapping[str, ForcePoints]
-    anew: Mapping[str, Callable[[Robot], dict[str, float]]]
+    refit_by_group: Mapping[str, Callable[[Robot], dict[str, float]]]
     estimates: Mapping[str, Estimate]
 
 
@@ -116,18 +116,18 @@ def undiagnosed(fit: SteadyFit) -> SteadyStudy:
 def diagnosed(fit: SteadyFit) -> SteadyStudy:
     """The study of a fit: what its shape leaves out, what changes inside a run, and what its levels rest on."""
     points, choice, robot = fit.points, fit.choice, fit.robot
-    changes, tested = moments(fit.runs, robot, points.force_from, fit.asked.window)
+    changes, tested_runs = moments(fit.runs, robot, points.force_from, fit.method.window)
     sources = {number: run.source for number, run, _ in fit.windows.found}
     by_shape, tested_by_shape = moments_by_shape(robot, points, choice.fit, sources, changes)
     changes += by_shape
-    untested_runs = tuple(name for name in sources.values() if name not in tested | tested_by_shape)
+    untested_runs = tuple(name for name in sources.values() if name not in tested_runs | tested_by_shape)
     lack = {
-        group: _lack(robot, part, choice, group, changes, sources, fit.asked.robust)
+        group: _lack(robot, part, choice, group, changes, sources, fit.method.robust)
         for group, part in fit.parts.items()
     }
     changed_groups = {group for group, part in fit.parts.items() if _changed(part, changes, sources)}
     diagnosis_by_group = {
-        group: Diagnosis(lack[group], rests_on(robot, estimate.value, fit.anew[group]), LASTING)
+        group: Diagnosis(lack[group], rests_on(robot, estimate.value, fit.refit_by_group[group]), LASTING)
         for group, estimate in fit.estimates.items()
     }  # whether the levels last, `moments` says
     estimates = {
@@ -153,7 +153,7 @@ def _study(
         changed_groups: groups with a change inside a run.
         untested_runs: runs that could not be tested for one.
     """
-    robot, points, choice, robust = fit.robot, fit.points, fit.choice, fit.asked.robust
+    robot, points, choice, robust = fit.robot, fit.points, fit.choice, fit.method.robust
     travel = {group: _travel(part) for group, part in fit.parts.items()}
     viscous = {
         group: _viscous(robot, fit.windows, choice, group, part, travel[group], robust)

@@ -198,7 +198,7 @@ def _level_table(study: SteadyStudy) -> Table:
 
 LOW_WEIGHT = 0.5
 WRONG_WAY = 0.05  # share of points whose force points against the motion from which a sign is doubted
-MATTERS = 0.02  # of the force: a viscous part below this does not matter in the speeds driven
+FORCE_SHARE = 0.02  # of the force: a viscous part below this does not matter in the speeds driven
 
 
 def result_statements(
@@ -302,7 +302,7 @@ def _viscous(level: Viscous, shape_name: str) -> Statement:
     if level.guesses:
         return Statement("viscous_with_back_emf", NOTE, level.key, numbers)
     if not level.seen:
-        matters = level.effect > MATTERS * level.level
+        matters = level.effect > FORCE_SHARE * level.level
         return Statement("viscous_not_identifiable", NOTE, level.key, numbers | {"matters": matters})
     if level.value < 0.0:
         return Statement("force_falls_with_speed", NOTE, level.key, numbers)

@@ -22,7 +22,7 @@ from omnidyn.identification.output_error.problem.friction_laws import bending_ke
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem, bounded
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import levels_of
-from omnidyn.identification.structure.misfit import FALSE, Misfit, chance, memory_beside, misfit, with_cause
+from omnidyn.identification.structure.misfit import FALSE_SHARE, Misfit, chance, memory_beside, misfit, with_cause
 from omnidyn.identification.structure.missing.candidates import Candidate, Trial, unoffered
 from omnidyn.identification.structure.missing.laws import candidates
 from omnidyn.identification.structure.missing.refits import refits
@@ -33,18 +33,18 @@ from omnidyn.identification.structure.tails import as_counted, calmer, wild_samp
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
 from omnidyn.model.known.told import holding
 
-SURE = 2.0  # degrees of freedom with which the power of the slowest errors is known within its own size
-SHOWN = 400  # columns: about what themes and candidates show
+SLOW_DEGREES = 2.0  # degrees of freedom with which the power of the slowest errors is known within its own size
+SHOWN_COLUMNS = 400  # columns: about what themes and candidates show
 
 
 @dataclass(frozen=True, eq=False)
 class Examined:
     """A diagnosis, and what it was made with. memory: of each column, of what is left beside all that residuals follow;
-    tried: how many causes were looked at; rows: how many numbers of the logs."""
+    cause_count: how many causes were looked at; rows: how many numbers of the logs."""
 
     diagnosis: Diagnosis
     memory: Sequence[AutoRegression]
-    tried: int
+    cause_count: int
     rows: int
 
 
@@ -57,14 +57,14 @@ def diagnose(solution: Solution) -> Diagnosis:
 def examine(solution: Solution) -> Examined:
     """The diagnosis of a fit at its best point, and what it was made with.
 
-    A cause that is clear by itself is found where its chance, times their number, is below FALSE (Bonferroni). Sizes,
-    and causes that are alike, make that no stricter: of 39 causes at 86 sizes noise passes the best as often as of 35
-    to 60 that have nothing in common, by draws from their scalar products.
+    A cause that is clear by itself is found where its chance, times their number, is below FALSE_SHARE (Bonferroni).
+    Sizes, and causes that are alike, make that no stricter: of 39 causes at 86 sizes noise passes the best as often as
+    of 35 to 60 that have nothing in common, by draws from their scalar products.
     """
     solver, point = solution.solver, solution.state.point
     full_problem = with_levels(solver.problem, point, levels_of(solution))
     decimated = Decimated.of(full_problem)
-    problem = bounded(decimated.problem, SHOWN, effects(decimated.problem))
+    problem = bounded(decimated.problem, SHOWN_COLUMNS, effects(decimated.problem))
     engine = solver.engine.on(decimated.all_rows(problem))
     parts = decimated.kept(engine.residuals(point))
     piece_motions = motions(problem, point)
@@ -73,23 +73,23 @@ def examine(solution: Solution) -> Examined:
     stable = stability(misfit_result.linear)
     bench = Workbench(problem, point, type(engine), piece_motions, stable.likely)
     causes = [*candidates(bench), *unoffered(bench)]
-    candidate_trials = _tried(bench, [candidate for candidate in causes if not candidate.late])
-    ranking = remedies(misfit_result.linear, candidate_trials, misfit_result.shown)
-    count = int(sum(mask.sum() for mask in rows.there))
-    has_cause = bool(misfit_result.found) or any(
-        _chance(misfit_result.linear, candidate_trials, r) * len(candidate_trials) < FALSE for r in ranking
+    candidate_trials = _tried(bench, [candidate for candidate in causes if not candidate.is_late])
+    ranking = remedies(misfit_result.linear, candidate_trials, misfit_result.columns_by_piece)
+    count = int(sum(mask.sum() for mask in rows.masks))
+    has_cause = bool(misfit_result.found_themes) or any(
+        _chance(misfit_result.linear, candidate_trials, r) * len(candidate_trials) < FALSE_SHARE for r in ranking
     )
     if has_cause:
-        candidate_trials += _tried(bench, [candidate for candidate in causes if candidate.late])
-        ranking = remedies(misfit_result.linear, candidate_trials, misfit_result.shown)
+        candidate_trials += _tried(bench, [candidate for candidate in causes if candidate.is_late])
+        ranking = remedies(misfit_result.linear, candidate_trials, misfit_result.columns_by_piece)
     fitted_remedies, cause = (
         _fitted(solution, problem, parts, misfit_result, candidate_trials, ranking) if has_cause else ((), None)
     )
-    memory = memory_beside(rows, cause) if cause and not misfit_result.found else misfit_result.linear.memory
+    memory = memory_beside(rows, cause) if cause and not misfit_result.found_themes else misfit_result.linear.memory
     misfit_result = with_cause(misfit_result, cause) if cause else misfit_result
     names = [f"{name}[{i}]" for name, i in problem.columns]
     levels = noise_levels(misfit_result.linear, piece_motions, solver.nu > 0.0)
-    has_cause = has_cause or bool(levels.beyond)
+    has_cause = has_cause or bool(levels.beyond_names)
     channels = levels.channels(dict(zip(names, misfit_result.shares.tolist(), strict=True)))
     outliers = {} if solver.nu else wild_samples(misfit_result, piece_motions)
     pictures = binned(rows, piece_motions, int(np.argmax([*channels.values()]))) if has_cause else ()
@@ -97,16 +97,16 @@ def examine(solution: Solution) -> Examined:
         has_cause,
         channels,
         _sizes(rows, channels),
-        misfit_result.found,
+        misfit_result.found_themes,
         (*fitted_remedies, *calmer(misfit_result, outliers)),
-        misfit_result.tested,
+        misfit_result.p_by_theme,
         pictures,
         outliers,
         levels.noise,
-        levels.beyond,
-        levels.at_rest,
+        levels.beyond_names,
+        levels.noise_at_rest,
         dict(zip(names, misfit_result.rounded.tolist(), strict=True)) if rows.rounding else {},
-        misfit_result.linear.degrees < SURE,
+        misfit_result.linear.degrees < SLOW_DEGREES,
     )
     diagnosis = Diagnosis(lack, rests_on(misfit_result.linear.plain, bench), stable)
     return Examined(diagnosis, memory, len(candidate_trials), count)
@@ -121,7 +121,7 @@ def _tried(bench: Workbench, causes: Sequence[Candidate]) -> list[tuple[Candidat
 def _chance(linear: Linear, candidate_trials: Sequence[tuple[Candidate, list[Trial]]], best: Remedy) -> float:
     """The chance that noise alone lets a remedy explain as much, by how well it is known along what that shows."""
     columns_by_trial = [
-        trial.shown
+        trial.columns_by_piece
         for candidate, trials in candidate_trials
         if candidate.key == best.key
         for trial in trials
@@ -145,12 +145,14 @@ def _fitted(
     remedy_by_key = {remedy.key: remedy for remedy in ranking}
     refit_by_key = refits(solution, problem, parts, ranking, [candidate for candidate, _ in candidate_trials])
     candidate_trials = [refit_by_key.get(candidate.key, (candidate, trials)) for candidate, trials in candidate_trials]
-    next_ranking = remedies(misfit_result.linear, candidate_trials, misfit_result.shown) or ranking
+    next_ranking = remedies(misfit_result.linear, candidate_trials, misfit_result.columns_by_piece) or ranking
     columns_by_trial = [
-        trial.shown
-        for one, trials in candidate_trials
+        trial.columns_by_piece
+        for trial_candidate, trials in candidate_trials
         for trial in trials
-        if next_ranking and one.key == next_ranking[0].key and (trial.fitted or trial.at == next_ranking[0].at)
+        if next_ranking
+        and trial_candidate.key == next_ranking[0].key
+        and (trial.fitted or trial.at == next_ranking[0].at)
     ]
     fitted_remedies = tuple(
         _with_first_step(remedy, remedy_by_key[remedy.key], refit_by_key) if remedy.key in remedy_by_key else remedy
@@ -175,14 +177,14 @@ def with_levels(problem: Problem, point: Point, levels: dict[str, float]) -> Pro
 
 def _sizes(rows: Rows, channels: Mapping[str, float]) -> dict[str, float]:
     """How large a share of the residual of each column is, root mean square."""
-    mean = rows.squares(rows.residual) / np.maximum(rows.added(lambda k, j: rows.there[k][j]), 1.0)
+    mean = rows.squares(rows.residual) / np.maximum(rows.added(lambda k, j: rows.masks[k][j]), 1.0)
     return dict(zip(channels, np.sqrt(np.array([*channels.values()]) * mean).tolist(), strict=True))
 
 
 # What each fitted number rests on: how far it would move if a number that was taken as it stands were another one
 
 PERCENT = 0.01
-TRIED = 0.01  # relative change of a fixed number, either way is alike
+TRIAL_CHANGE = 0.01  # relative change of a fixed number, either way is alike
 FIXED = (
     "body.mass_kg",
     "body.inertia_kg_m2",
@@ -215,7 +217,7 @@ def rests_on(linear: Linear, bench: Workbench) -> dict[str, dict[str, float]]:
     values = bench.point.values
     changes_by_number: dict[str, dict[str, float]] = {p.name: {} for p in problem.robot_parameters}
     parameter_names = {Key.parse(p.name).name for p in problem.robot_parameters}
-    fixed = [(name, TRIED) for name in FIXED if Key.parse(name).name not in parameter_names]
+    fixed = [(name, TRIAL_CHANGE) for name in FIXED if Key.parse(name).name not in parameter_names]
     for name, relative_change in [*fixed, *((name, TRIED_FALL) for name in _of_laws(bench))]:
         robot = scaled(bench.robot, name, 1.0 + relative_change)
         if robot is None:

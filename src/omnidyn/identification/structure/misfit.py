@@ -17,7 +17,7 @@ from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Found
 from omnidyn.identification.output_error.linear.motion import Motion
 from omnidyn.identification.output_error.linear.rows import (
-    SAME,
+    EIGEN_TOLERANCE,
     TINY,
     Linear,
     Rows,
@@ -32,29 +32,31 @@ from omnidyn.identification.output_error.linear.rows import (
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.structure.disturbances import THEMES, Theme, shown_by_themes
 
-FALSE = 0.02  # of right models for which something is found, all tests together
-BENT = 0.01  # of what rounded inputs show: what their first order is off by is no evidence
+FALSE_SHARE = 0.02  # of right models for which something is found, all tests together
+BEND_SHARE = 0.01  # of what rounded inputs show: what their first order is off by is no evidence
 ROUNDS = 2  # of memory and fit in turn
-TOLD = 10.0  # degrees of freedom with which the noise along a direction must be known for it to be tested
-NEW = 1e-4  # share of a direction that no parameter explains, from which it is one to test
+LEAST_DEGREES = 10.0  # degrees of freedom with which the noise along a direction must be known for it to be tested
+NEW_SHARE = 1e-4  # share of a direction that no parameter explains, from which it is one to test
 
 
 @dataclass(frozen=True, eq=False)
 class Misfit:
-    """What the residuals follow. found: themes, first the one that explains most. tested: every theme, p of each.
+    """What the residuals follow. found_themes: themes, first the one that explains most. p_by_theme: every theme, p of
+    each.
 
-    linear: the fit with the memory of what is left. shown: of each piece (C, rows, K), the directions that were found.
+    linear: the fit with the memory of what is left. columns_by_piece: of each piece (C, rows, K), the directions that
+    were found.
     shares: of each column of the problem, of the variance of its residuals that is no noise; rounded: that its inputs
-    were rounded by. explained: of each piece (C, rows), what the themes make of the residuals.
+    were rounded by. explained_by_piece: of each piece (C, rows), what the themes make of the residuals.
     """
 
-    found: tuple[Found, ...]
-    tested: dict[str, float]
+    found_themes: tuple[Found, ...]
+    p_by_theme: dict[str, float]
     linear: Linear
-    shown: list[FloatArray]
+    columns_by_piece: list[FloatArray]
     shares: FloatArray
     rounded: FloatArray
-    explained: list[FloatArray]
+    explained_by_piece: list[FloatArray]
 
 
 def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEMES) -> Misfit:
@@ -75,11 +77,11 @@ def misfit(rows: Rows, motions: Sequence[Motion], themes: Sequence[Theme] = THEM
         }
         first = first or {name: p for name, (_, p, _) in scores.items()}
         best = _likeliest(scores)
-        if best and not found_themes and scores[best][1] > FALSE / len(themes) and linear.degrees < TOLD:
+        if best and not found_themes and scores[best][1] > FALSE_SHARE / len(themes) and linear.degrees < LEAST_DEGREES:
             # A memory as long as the log may be the misfit itself: once more, with that of what each theme would leave.
             scores = {name: _beside(rows, columns_by_piece, found_columns, columns_by_theme[name]) for name in scores}
             best = _likeliest(scores)
-        if not best or scores[best][1] > FALSE / len(themes):
+        if not best or scores[best][1] > FALSE_SHARE / len(themes):
             found_by_piece = [columns[:, :, found_columns] for columns in columns_by_piece]
             return Misfit(
                 tuple(found_themes), first, linear, found_by_piece, *_shares(linear, *residuals, bool(found_themes))
@@ -94,12 +96,12 @@ def with_cause(misfit_result: Misfit, cause: Sequence[FloatArray]) -> Misfit:
     residuals, rounded_parts, _ = left_beside(
         rows,
         misfit_result.linear,
-        [np.concatenate(arrays, axis=2) for arrays in zip(misfit_result.shown, cause, strict=True)],
+        [np.concatenate(arrays, axis=2) for arrays in zip(misfit_result.columns_by_piece, cause, strict=True)],
     )
     shares, rounded, explained_by_piece = _shares(misfit_result.linear, residuals, rounded_parts, True)
     explains_more = shares.sum() > misfit_result.shares.sum()
     return (
-        replace(misfit_result, shares=shares, rounded=rounded, explained=explained_by_piece)
+        replace(misfit_result, shares=shares, rounded=rounded, explained_by_piece=explained_by_piece)
         if explains_more
         else misfit_result
     )
@@ -163,7 +165,7 @@ class Gram:
     def left(self, known_columns: IntArray) -> tuple[Gram, int]:
         """(what is left of all columns once those `known_columns` explain them, how many directions these are)."""
         values, vectors = np.linalg.eigh(self.matrix[np.ix_(known_columns, known_columns)])
-        kept_values = values > SAME * max(float(values.max(initial=0.0)), 1e-300)
+        kept_values = values > EIGEN_TOLERANCE * max(float(values.max(initial=0.0)), 1e-300)
         half = (vectors[:, kept_values] / np.sqrt(values[kept_values])).T @ self.matrix[known_columns]
         return replace(self, matrix=self.matrix - half.T @ half, rows=self.rows - int(kept_values.sum())), int(
             kept_values.sum()
@@ -191,13 +193,13 @@ class Gram:
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """What is left of a fit, and of the columns that may explain it. known: which columns explain already; shown: those
-    columns (C, rows, K) of each piece."""
+    """What is left of a fit, and of the columns that may explain it. known_columns: which columns explain already;
+    columns_by_piece: those columns (C, rows, K) of each piece."""
 
     linear: Linear
     gram: Gram
-    known: IntArray
-    shown: Sequence[FloatArray]
+    known_columns: IntArray
+    columns_by_piece: Sequence[FloatArray]
 
     @classmethod
     def of(cls, linear: Linear, columns_by_piece: Sequence[FloatArray], found_columns: IntArray) -> _Asked:
@@ -207,24 +209,29 @@ class _Asked:
     def score(self, theme_columns: IntArray) -> tuple[float, float, int]:
         """(F, p, directions) of what some columns of what is shown explain of what is left.
 
-        Along directions in which the noise is known to TOLD degrees of freedom: slow errors may be anything in a log
-        that is not many times as long as they remember, and what follows them is no evidence. Of rounded inputs the
-        first order is known: where it is thousands of times the noise, as in counted angles, what it is off by is not.
+        Along directions in which the noise is known to LEAST_DEGREES degrees of freedom: slow errors may be anything in
+        a log that is not many times as long as they remember, and what follows them is no evidence. Of rounded inputs
+        the first order is known: where it is thousands of times the noise, as in counted angles, what it is off by is
+        not.
         """
-        explained_squares, weights = self.gram.directions(self.known, 1 + self.gram.count + theme_columns, NEW)
+        explained_squares, weights = self.gram.directions(
+            self.known_columns, 1 + self.gram.count + theme_columns, NEW_SHARE
+        )
         if not len(explained_squares):
             return 0.0, 1.0, 0
-        remaining, _ = self.gram.left(self.known)
+        remaining, _ = self.gram.left(self.known_columns)
         rows = max(remaining.rows - len(explained_squares), 1)
         noise = max(float(remaining.matrix[0, 0]) - float(explained_squares.sum()), 1e-300) / rows
         count, slopes = self.gram.count, self.linear.rows.slopes
-        direction_columns = [j @ weights[:count] + z @ weights[count:] for j, z in zip(slopes, self.shown, strict=True)]
+        direction_columns = [
+            j @ weights[:count] + z @ weights[count:] for j, z in zip(slopes, self.columns_by_piece, strict=True)
+        ]
         ways = self.linear.without_starts(direction_columns)
         degrees, explained_squares = self.linear.known(ways), explained_squares / self.linear.rounded(ways)
-        known_directions = degrees >= TOLD
+        known_directions = degrees >= LEAST_DEGREES
         if not known_directions.any():
             return 0.0, 1.0, 0
-        k, curvature_square = int(known_directions.sum()), BENT**2 * self.linear.rounded_square
+        k, curvature_square = int(known_directions.sum()), BEND_SHARE**2 * self.linear.rounded_square
         f = max(float(explained_squares[known_directions].sum()) - curvature_square, 0.0) / k / noise
         mean_degrees = float(np.mean(degrees[known_directions] ** -0.5) ** -2.0)  # all may be off the same way
         return f, float(fdtrc(k, min(mean_degrees, rows), f)), k
@@ -263,7 +270,7 @@ def left_beside(
     rounded_parts = [linear.rounded_off(k, residual)[:, :, 0] for k, residual in enumerate(residuals)]
     without_starts = [start[:, :, 0] for start in linear.without_starts(residuals)]
     start_columns = linear.without_starts([regressor @ root for regressor in regressors])
-    for k, start_slopes in enumerate(rows.own):
+    for k, start_slopes in enumerate(rows.start_slopes):
         if start_slopes.shape[2]:
             start_columns[k] = np.concatenate(
                 [start_columns[k], start_slopes @ root_of_covariance(linear.of_piece(k, start_slopes))], axis=2
@@ -276,7 +283,10 @@ def left_beside(
     return (
         without_starts,
         rounded_parts,
-        [np.pad(each, ((0, 0), (0, 0), (0, most_columns - each.shape[2]))) for each in start_columns],
+        [
+            np.pad(start_column, ((0, 0), (0, 0), (0, most_columns - start_column.shape[2])))
+            for start_column in start_columns
+        ],
     )
 
 

@@ -33,32 +33,32 @@ from omnidyn.identification.structure.windows import Shown, Windows, shown
 from omnidyn.run import UNITS
 from omnidyn.statistics import sensor_step, stretches
 
-FALSE = 0.002  # of right models in which the fit leaves more than the noise, all tests together
+FALSE_SHARE = 0.002  # of right models in which the fit leaves more than the noise, all tests together
 MARGIN = 0.1  # share of the residual, below which noise may be a little more in some rows than in others
-PARABOLA, NOTHING = 2, -1  # degree of what is taken out of a window
-FEW_HOLDS, FEW_SETS, TOLD = 6, 3, 10.0  # groups, and degrees of freedom, without which nothing is told
-FORGOTTEN = 0.05  # correlation of repeats below which slow errors differ in them
-ENOUGH = 50.0  # degrees of freedom of errors as they are, slow ones too, below which slow ones are left out
-FOLLOWED, LEAST_ROWS = 1000, 200  # rows by which errors have forgotten; differences without which nothing is told
-COARSE = 0.5  # of a step of the sensor: less noise leaves rounding that repeats itself
-FAR = 2.0  # times the sum of squares of residuals, which a step within a straight model hardly changes
-KNOWN = 1e9  # degrees of freedom of what is known
+PARABOLA, NO_TREND = 2, -1  # degree of what is taken out of a window
+FEW_HOLDS, FEW_SETS, LEAST_DEGREES = 6, 3, 10.0  # groups, and degrees of freedom, without which nothing is told
+FORGOTTEN_CORRELATION = 0.05  # correlation of repeats below which slow errors differ in them
+SLOW_DEGREES = 50.0  # degrees of freedom of errors as they are, slow ones too, below which slow ones are left out
+FOLLOWED_ROWS, LEAST_ROWS = 1000, 200  # rows by which errors have forgotten; differences without which nothing is told
+COARSE_STEP = 0.5  # of a step of the sensor: less noise leaves rounding that repeats itself
+PULL_RATIO = 2.0  # times the sum of squares of residuals, which a step within a straight model hardly changes
+KNOWN_DEGREES = 1e9  # degrees of freedom of what is known
 THIRD = np.array([1.0, -3.0, 3.0, -1.0])
 WHITE = 0.1  # relative difference of the variance by second and by fourth differences up to which noise is white
 
 
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """noise: output -> its level by the best source that tells it; at_rest: where the robot rests; beyond: outputs in
-    which the fit leaves more than the noise, by a source that decides."""
+    """noise: output -> its level by the best source that tells it; noise_at_rest: where the robot rests; beyond_names:
+    outputs in which the fit leaves more than the noise, by a source that decides."""
 
     noise: dict[str, Noise]
-    at_rest: dict[str, Noise]
-    beyond: tuple[str, ...]
+    noise_at_rest: dict[str, Noise]
+    beyond_names: tuple[str, ...]
 
     def channels(self, shares: Mapping[str, float]) -> dict[str, float]:
         """Shares of the variance of residuals that are no noise, by what they follow or by the level of the noise."""
-        return dict(shares) | {name: max(shares[name], self.noise[name].share) for name in self.beyond}
+        return dict(shares) | {name: max(shares[name], self.noise[name].share) for name in self.beyond_names}
 
 
 def noise_levels(linear: Linear, motions: Sequence[Motion], is_pulled_in: bool = False) -> Levels:
@@ -71,7 +71,9 @@ def noise_levels(linear: Linear, motions: Sequence[Motion], is_pulled_in: bool =
         f"{column[0]}[{column[1]}]": _of_column(rows, c, windows, linear.memory[c], is_pulled_in)
         for c, (windows, column) in enumerate(zip(shown(rows, motions), rows.problem.columns, strict=True))
     }
-    p_limit = FALSE / max(sum(test.decides for column_list in tests_by_column.values() for test in column_list), 1)
+    p_limit = FALSE_SHARE / max(
+        sum(test.decides for column_list in tests_by_column.values() for test in column_list), 1
+    )
     noise, beyond_names = dict[str, Noise](), list[str]()
     for name, column_tests in tests_by_column.items():
         clear_tests = [test for test in column_tests if test.decides and test.p < p_limit and test.most >= MARGIN]
@@ -88,15 +90,15 @@ def noise_levels(linear: Linear, motions: Sequence[Motion], is_pulled_in: bool =
 def _without_pull(linear: Linear) -> list[FloatArray]:
     """Residuals without what the parameters make of them in white rows: errors with a memory may have pulled them off.
 
-    A step that makes a column FAR larger leads beyond where the model is straight: such a one stays as it is.
+    A step that makes a column PULL_RATIO larger leads beyond where the model is straight: such a one stays as it is.
     """
     rows, no_columns = linear.rows, [np.zeros((*residual.shape, 0)) for residual in linear.rows.residual]
     residuals = left_beside(rows, linear, no_columns)[0]
-    is_pulled = rows.squares(residuals) > FAR * rows.squares(rows.residual)
+    is_pulled = rows.squares(residuals) > PULL_RATIO * rows.squares(rows.residual)
     is_pulled_by_piece = [is_pulled[columns][:, None] for columns in rows.column]
     return [
-        np.where(is_far, before, after)
-        for is_far, before, after in zip(is_pulled_by_piece, rows.residual, residuals, strict=True)
+        np.where(is_far, raw_residual, white_residual)
+        for is_far, raw_residual, white_residual in zip(is_pulled_by_piece, rows.residual, residuals, strict=True)
     ]
 
 
@@ -110,7 +112,7 @@ def _of_column(rows: Rows, c: int, windows: Shown, memory: AutoRegression, is_pu
         (REST, _rested(windows)),
     ]
     coarse_tests = [
-        (source, test) for source, test in tests if test is not None and test.level > COARSE * _step(rows, c)
+        (source, test) for source, test in tests if test is not None and test.level > COARSE_STEP * _step(rows, c)
     ]
     if not is_pulled_in and not any(source != REST for source, _ in coarse_tests):
         other_tests = [(ROUNDING, _rounded(rows, c)), (NEIGHBOURS, _neighbours(rows, c, memory))]
@@ -125,7 +127,7 @@ class _Power:
     squares: FloatArray
     counts: FloatArray
     numbers: int
-    each: float
+    window_degrees: float
 
     @property
     def mean(self) -> float:
@@ -138,13 +140,13 @@ class _Power:
         group_count, total = len(self.squares), float(self.counts.sum())
         deviations = self.squares - self.counts * self.squares.sum() / total
         scatter = group_count / max(group_count - 1, 1) * float((deviations**2).sum())
-        return min(self.each * total, 2.0 * float(self.squares.sum()) ** 2 / max(scatter, TINY))
+        return min(self.window_degrees * total, 2.0 * float(self.squares.sum()) ** 2 / max(scatter, TINY))
 
 
 @dataclass(frozen=True)
 class _Test:
-    """level, residual: in their unit; p; degrees: of the level; share: of the residual that is no noise; rows, removed:
-    of a window. new: the share in rows made white."""
+    """level, residual: in their unit; p; degrees: of the level; share: of the residual that is no noise; rows,
+    removed_degrees: of a window. new: the share in rows made white."""
 
     level: float
     residual: float
@@ -152,14 +154,14 @@ class _Test:
     degrees: float
     share: float
     rows: int
-    removed: int
+    removed_degrees: int
     new: float = 0.0
 
     def noise(self, source: str, taken_factor: float, moves: float, step: float, unit: str) -> Noise:
         """As people read it. taken_factor: what a fit leaves is smaller by, for it has taken some; moves: of the
         output."""
         residual = self.residual * np.sqrt(taken_factor)
-        slowest = self.removed / (2.0 * self.rows * step)
+        slowest = self.removed_degrees / (2.0 * self.rows * step)
         return Noise(
             source,
             self.level,
@@ -177,7 +179,7 @@ class _Test:
 
 def _test(noise: _Power, residual_power: _Power, mean_square: float, rows: int, removed_degrees: int) -> _Test | None:
     """Of what is left beside the noise. mean_square: mean square of all residuals."""
-    if noise.degrees < TOLD or residual_power.degrees < TOLD or noise.mean <= 0.0:
+    if noise.degrees < LEAST_DEGREES or residual_power.degrees < LEAST_DEGREES or noise.mean <= 0.0:
         return None
     p = float(fdtrc(residual_power.degrees, noise.degrees, residual_power.mean / noise.mean))
     share = max(1.0 - noise.mean / max(mean_square, TINY), 0.0)
@@ -194,59 +196,62 @@ def _both_ways(plain_test: _Test | None, white: _Test | None) -> _Test | None:
 
 
 def _held(windows: Shown, memory: AutoRegression) -> _Test | None:
-    if windows.held.several < FEW_HOLDS or windows.busy.several < FEW_HOLDS:
+    if windows.held_windows.several < FEW_HOLDS or windows.busy.several < FEW_HOLDS:
         return None
-    way = _Way.of(windows.held.values.shape[1], PARABOLA, memory)
+    way = _Way.of(windows.held_windows.values.shape[1], PARABOLA, memory)
 
     def test(way: _Way) -> _Test | None:
         """What is left in motion beside the scatter of holds, both seen this way."""
-        held_power, busy = way.power(windows.held), way.power(windows.busy)
+        held_power, busy = way.power(windows.held_windows), way.power(windows.busy)
         mean_square = (held_power.squares.sum() + busy.squares.sum()) / (
             (held_power.counts.sum() + busy.counts.sum()) * held_power.numbers
         )
-        return _test(held_power, busy, float(mean_square), way.rows, way.removed)
+        return _test(held_power, busy, float(mean_square), way.rows, way.removed_degrees)
 
     return _both_ways(test(way), test(way.white(memory)) if memory.remembers else None)
 
 
 def _rested(windows: Shown) -> _Test | None:
-    moving, resting = windows.held + windows.busy, windows.resting
+    moving, resting = windows.held_windows + windows.busy, windows.resting
     if not len(resting.values) or not len(moving.values):
         return None
     way = _Way.of(moving.values.shape[1], PARABOLA, None)
     rest_power, motion_power = way.power(resting), way.power(moving)
-    rest_test = _test(rest_power, motion_power, motion_power.mean, way.rows, way.removed)
+    rest_test = _test(rest_power, motion_power, motion_power.mean, way.rows, way.removed_degrees)
     sensor_steps = max(sensor_step(window) for window in (*resting.values, resting.values.ravel()))
     return None if rest_test is None or sensor_steps > rest_test.level else rest_test
 
 
 def _repeated(windows: Shown, memory: AutoRegression, counts_on: bool) -> _Test | None:
     """counts_on: whether what is logged counts from a start, which differs between repeats."""
-    if windows.again.several < FEW_SETS:
+    if windows.repeat_windows.several < FEW_SETS:
         return None
-    lags = memory.autocovariance(min(windows.apart, FOLLOWED) + 1)
-    is_forgotten = abs(lags[-1]) < FORGOTTEN * lags[0] and not memory.adds_up and not counts_on
-    way = _Way.of(windows.again.values.shape[1], NOTHING if is_forgotten else PARABOLA, memory)
+    lags = memory.autocovariance(min(windows.row_gap, FOLLOWED_ROWS) + 1)
+    is_forgotten = abs(lags[-1]) < FORGOTTEN_CORRELATION * lags[0] and not memory.adds_up and not counts_on
+    way = _Way.of(windows.repeat_windows.values.shape[1], NO_TREND if is_forgotten else PARABOLA, memory)
     if (
-        is_forgotten and way.each * (len(windows.again.groups) - windows.again.several) < ENOUGH
+        is_forgotten
+        and way.window_degrees * (len(windows.repeat_windows.groups) - windows.repeat_windows.several) < SLOW_DEGREES
     ):  # too few to know slow errors
         way = _Way.of(way.rows, PARABOLA, memory)
 
     def test(way: _Way) -> _Test | None:
         """What repeats have in common beside what they differ by, both seen this way."""
-        repeat_values, groups = way.seen(windows.again.values), windows.again.groups
+        repeat_values, groups = way.seen(windows.repeat_windows.values), windows.repeat_windows.groups
         repeat_counts = _summed(groups, np.ones(len(groups)))
         mean = np.stack([_summed(groups, column) for column in repeat_values.T], axis=1) / repeat_counts[:, None]
         common_squares = repeat_counts * (mean**2).sum(axis=1)
         all_squares = _summed(groups, (repeat_values**2).sum(axis=1))
         apart_power, alike_power = (
-            _Power(squares, count, repeat_values.shape[1], way.each)
+            _Power(squares, count, repeat_values.shape[1], way.window_degrees)
             for squares, count in (
                 (all_squares - common_squares, repeat_counts - 1.0),
                 (common_squares, np.ones_like(repeat_counts)),
             )
         )
-        return _test(apart_power, alike_power, float(all_squares.sum() / repeat_values.size), way.rows, way.removed)
+        return _test(
+            apart_power, alike_power, float(all_squares.sum() / repeat_values.size), way.rows, way.removed_degrees
+        )
 
     return _both_ways(test(way), test(way.white(memory)) if memory.remembers else None)
 
@@ -274,12 +279,12 @@ def _neighbours(rows: Rows, c: int, memory: AutoRegression) -> _Test | None:
 def _rounded(rows: Rows, c: int) -> _Test | None:
     """Of outputs that an encoder counts, whose noise is little more than what it rounds: tick^2/12."""
     tick = float(rows.problem.tick[c])
-    return _beside_all(rows, c, tick**2 / 12.0, KNOWN) if tick > 0.0 else None
+    return _beside_all(rows, c, tick**2 / 12.0, KNOWN_DEGREES) if tick > 0.0 else None
 
 
 def _beside_all(rows: Rows, c: int, noise: float, degrees: float) -> _Test:
     """A variance of noise beside all residuals of a column."""
-    residuals = np.concatenate([rows.residual[k][j][rows.there[k][j]] for k, j in _where(rows, c)])
+    residuals = np.concatenate([rows.residual[k][j][rows.masks[k][j]] for k, j in _where(rows, c)])
     mean_square = float(np.mean(residuals**2))
     p = float(fdtrc(len(residuals), degrees, mean_square / max(noise, TINY)))
     return _Test(
@@ -290,12 +295,12 @@ def _beside_all(rows: Rows, c: int, noise: float, degrees: float) -> _Test:
 def _where(rows: Rows, c: int) -> list[tuple[int, int]]:
     """Pieces that have a column and known rows of it, and which of theirs it is."""
     piece_columns = [(k, columns.index(c)) for k, columns in enumerate(rows.column) if c in columns]
-    return [(k, j) for k, j in piece_columns if rows.there[k][j].any()]
+    return [(k, j) for k, j in piece_columns if rows.masks[k][j].any()]
 
 
 def _shown(rows: Rows, c: int) -> list[FloatArray]:
     """What the log shows of a column in the known rows of each of these pieces."""
-    column_pieces = [(rows.pieces[k], rows.there[k][j], j) for k, j in _where(rows, c)]
+    column_pieces = [(rows.pieces[k], rows.masks[k][j], j) for k, j in _where(rows, c)]
     return [piece.record.outputs[piece.first : piece.last + 1, j][mask] for piece, mask, j in column_pieces]
 
 
@@ -314,19 +319,19 @@ def _moves(rows: Rows, c: int) -> float:
 
 def _taken(rows: Rows) -> float:
     """Rows over those that are left once the fit has taken some for its numbers and starts."""
-    total = sum(int(mask.sum()) for mask in rows.there)
+    total = sum(int(mask.sum()) for mask in rows.masks)
     free = len(rows.problem.parameters) + sum(int(piece.free.sum()) for piece in rows.pieces)
     return total / max(total - free, 1)
 
 
 @dataclass(frozen=True, eq=False)
 class _Way:
-    """How windows are looked at: along `ways` (L, d), orthonormal, with polynomials taken out, `removed` of them, once
-    `memory` has made the rows white. each: degrees of freedom of a window."""
+    """How windows are looked at: along `ways` (L, d), orthonormal, with polynomials taken out, `removed_degrees` of
+    them, once `memory` has made the rows white. window_degrees: degrees of freedom of a window."""
 
     ways: FloatArray
-    removed: int
-    each: float
+    removed_degrees: int
+    window_degrees: float
     memory: AutoRegression | None = None
 
     @property
@@ -340,8 +345,8 @@ class _Way:
         numbers = float(ways.shape[1])
         if memory is None or not memory.remembers:
             return cls(ways, degree + 1, numbers)
-        if degree == NOTHING:  # windows side by side are not independent
-            lags = memory.autocovariance(FOLLOWED)
+        if degree == NO_TREND:  # windows side by side are not independent
+            lags = memory.autocovariance(FOLLOWED_ROWS)
             return cls(ways, 0, rows / (2.0 * float(((lags / lags[0]) ** 2).sum()) - 1.0))
         covariance = toeplitz(memory.autocovariance(rows))
         if memory.adds_up:
@@ -351,8 +356,8 @@ class _Way:
 
     def white(self, memory: AutoRegression) -> _Way:
         """The same of rows made white."""
-        ways = _beside(_through(memory, _polynomials(self.rows, self.removed - 1)))
-        return _Way(ways, self.removed, float(ways.shape[1]), memory)
+        ways = _beside(_through(memory, _polynomials(self.rows, self.removed_degrees - 1)))
+        return _Way(ways, self.removed_degrees, float(ways.shape[1]), memory)
 
     def seen(self, values: FloatArray) -> FloatArray:
         """Windows (m, L) along these ways, (m, d)."""
@@ -361,7 +366,9 @@ class _Way:
     def power(self, windows: Windows) -> _Power:
         """By groups."""
         squares = _summed(windows.groups, (self.seen(windows.values) ** 2).sum(axis=1))
-        return _Power(squares, _summed(windows.groups, np.ones(len(windows.groups))), self.ways.shape[1], self.each)
+        return _Power(
+            squares, _summed(windows.groups, np.ones(len(windows.groups))), self.ways.shape[1], self.window_degrees
+        )
 
 
 def _summed(groups: IntArray, values: FloatArray) -> FloatArray:
@@ -389,7 +396,7 @@ def _through(memory: AutoRegression, columns: FloatArray) -> FloatArray:
 
 # Residuals in bins, for the eye: against the speed, the acceleration, the time in the log, the heading
 
-BINS, LEAST = 16, 5  # of a picture; rows of a bin that is shown
+BINS, LEAST_BIN_ROWS = 16, 5  # of a picture; rows of a bin that is shown
 
 
 def binned(rows: Rows, motions: Sequence[Motion], column: int) -> tuple[Binned, ...]:
@@ -400,7 +407,7 @@ def binned(rows: Rows, motions: Sequence[Motion], column: int) -> tuple[Binned, 
         if column not in rows.column[k]:
             continue
         c = rows.column[k].index(column)
-        mask = rows.there[k][c]
+        mask = rows.masks[k][c]
         level = motion.shown(motion.twist[:, None, :])[c, :, 0]
         residual.append(rows.residual[k][c][mask])
         values_by_name = {
@@ -422,7 +429,7 @@ def binned(rows: Rows, motions: Sequence[Motion], column: int) -> tuple[Binned, 
 def _bins(error: FloatArray, values: FloatArray, output: str, unit: str, label: str) -> Binned:
     """Bins of as many rows each."""
     order = np.array_split(np.argsort(values, kind="stable"), BINS)
-    bin_rows = [rows for rows in order if len(rows) >= LEAST]
+    bin_rows = [rows for rows in order if len(rows) >= LEAST_BIN_ROWS]
     mean = np.array([error[rows].mean() for rows in bin_rows])
     std = np.array([2.0 * error[rows].std(ddof=1) / np.sqrt(len(rows)) for rows in bin_rows])
     return Binned(output, unit, label, np.array([values[rows].mean() for rows in bin_rows]), mean, std)

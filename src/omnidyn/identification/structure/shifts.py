@@ -15,22 +15,22 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
-from omnidyn.identification.output_error.linear.rows import SAME, Linear, Rows
+from omnidyn.identification.output_error.linear.rows import EIGEN_TOLERANCE, Linear, Rows
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.stability import LOGS, TIME, Level, Shift, Split, Stability
-from omnidyn.identification.structure.misfit import TOLD as KNOWN
+from omnidyn.identification.structure.misfit import LEAST_DEGREES as KNOWN
 from omnidyn.identification.structure.misfit import memory_beside
 from omnidyn.statistics import homogeneity, t_quantile
 
 BLOCKS = 40  # of each log, the same share of its time each
-FIRM = 50.0  # rows that the noise of an output in a part is worth beforehand: that of all logs
-FALSE = 0.01  # of right logs in which some moment is found; the same between logs
+PRIOR_ROWS = 50.0  # rows that the noise of an output in a part is worth beforehand: that of all logs
+FALSE_SHARE = 0.01  # of right logs in which some moment is found; the same between logs
 FIRST = BLOCKS // 10  # blocks before the first moment, and after the last
 MOST_LOGS = 30  # logs that are each looked through for a moment
-AS_GOOD = 6.0  # of chi squared, by which a moment must be worse than the best to be ruled out
+RIVAL_MARGIN = 6.0  # of chi squared, by which a moment must be worse than the best to be ruled out
 CHANCE = 2.0  # standard errors of the scatter over blocks, from which it is more than the noise makes
-TOLD = 0.5  # std over that of the prior, beyond which the prior holds a number: it is the same in all parts
+PRIOR_SHARE = 0.5  # std over that of the prior, beyond which the prior holds a number: it is the same in all parts
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +63,7 @@ def _after(rows: Rows, share: float) -> list[FloatArray]:
         >= share * (piece.record.t[-1] - piece.record.t[0])
         for piece in rows.pieces
     ]
-    return [slopes * late[:, None] for slopes, late in zip(rows.slopes, late_rows, strict=True)]
+    return [slopes * is_late[:, None] for slopes, is_late in zip(rows.slopes, late_rows, strict=True)]
 
 
 class _Look:
@@ -120,8 +120,8 @@ class _Look:
             parts_of_number = np.flatnonzero(~unknown_numbers[:, j])
             if parts_of_number.size > 1:
                 indices = parts_of_number * t + j
-                chi2, of = homogeneity(steps[parts_of_number, j], covariance[np.ix_(indices, indices)])
-                p[j] = self._chance(chi2, of, ratio[j], degrees[j])
+                chi2, chi2_degrees = homogeneity(steps[parts_of_number, j], covariance[np.ix_(indices, indices)])
+                p[j] = self._chance(chi2, chi2_degrees, ratio[j], degrees[j])
         return _Compared(
             steps,
             covariance * np.outer(*2 * [np.tile(np.sqrt(ratio), k)]),
@@ -194,15 +194,17 @@ class _Look:
 
     def _split_at(self, comparison_by_cut: dict[int, _Compared], log: int, tests: int) -> Split | None:
         """The moment at which numbers of a log (-1: of all) change most, None where they do not."""
-        if self._least(list(comparison_by_cut.values()), tests) > FALSE:
+        if self._least(list(comparison_by_cut.values()), tests) > FALSE_SHARE:
             return None
         best = max(comparison_by_cut, key=lambda cut: comparison_by_cut[cut].joint[1])
-        if self._least([comparison_by_cut[best]], tests) > FALSE:  # one number alone, at another moment
+        if self._least([comparison_by_cut[best]], tests) > FALSE_SHARE:  # one number alone, at another moment
             best = min(comparison_by_cut, key=lambda cut: float(comparison_by_cut[cut].p.min()))
         records = self.blocks.records if log < 0 else [self.blocks.records[log]]
         _, largest_chi2, ratio = comparison_by_cut[best].joint
         near_cuts = [
-            cut for cut, comparison in comparison_by_cut.items() if comparison.joint[1] > largest_chi2 - AS_GOOD * ratio
+            cut
+            for cut, comparison in comparison_by_cut.items()
+            if comparison.joint[1] > largest_chi2 - RIVAL_MARGIN * ratio
         ] or [best]
         share = best / BLOCKS
         span, shortest_span = max(r.span for r in records), min(r.span for r in records)
@@ -230,14 +232,14 @@ class _Look:
         moment: tuple[float, tuple[float, float]],
         share: float,
     ) -> Split | None:
-        if self._least([comparison], tests) > FALSE:
+        if self._least([comparison], tests) > FALSE_SHARE:
             return None
         shifts = [
             Shift(
                 self.problem.parameters[self.told[j]].name, tuple(self._levels(comparison, j, names)), float(tests * p)
             )
             for j, p in enumerate(comparison.p.tolist())
-            if tests * p <= FALSE
+            if tests * p <= FALSE_SHARE
         ]
         # A level that no friction can have is another one than any friction: it is no change of that.
         bounds = dict(zip(self.problem.names, self.problem.parameters, strict=True))
@@ -294,7 +296,7 @@ def _told(
     prior_shares[free_indices] = np.sqrt(
         np.diag((vectors[:, seen_parts] / size[seen_parts]) @ vectors[:, seen_parts].T) * prior[free_indices]
     )
-    told_mask = (np.arange(len(prior)) < problem.robot_count) & free & ~(prior_shares > TOLD)
+    told_mask = (np.arange(len(prior)) < problem.robot_count) & free & ~(prior_shares > PRIOR_SHARE)
     return np.flatnonzero(told_mask), np.flatnonzero(free & ~told_mask)
 
 
@@ -376,8 +378,8 @@ class Blocks:
 
     def _noise(self, mask: BoolArray) -> FloatArray:
         """Variance of the white rows of each output in a part. Shape (outputs,)."""
-        outputs = 1 + max(int(each.max(initial=0)) for each in self.column)
-        square, number = np.full(outputs, FIRM), np.full(outputs, FIRM)
+        outputs = 1 + max(int(piece_columns.max(initial=0)) for piece_columns in self.column)
+        square, number = np.full(outputs, PRIOR_ROWS), np.full(outputs, PRIOR_ROWS)
         for k, piece_mask in enumerate(mask):
             np.add.at(square, self.column[k], self.products[k][piece_mask][:, :, 0, 0].sum(axis=0))
             np.add.at(number, self.column[k], self.number[k][piece_mask].sum(axis=0))
@@ -387,11 +389,11 @@ class Blocks:
 def _white(linear: Linear, k: int) -> tuple[FloatArray, IntArray, IntArray]:
     """(white [e, J, Z] (N, 1 + P + S), the block of each row (N,), its output (N,)) of a piece."""
     rows, piece = linear.rows, linear.rows.pieces[k]
-    columns = np.concatenate([rows.residual[k][:, :, None], rows.slopes[k], rows.own[k]], axis=2)
+    columns = np.concatenate([rows.residual[k][:, :, None], rows.slopes[k], rows.start_slopes[k]], axis=2)
     x = linear.with_start(k, columns)
     share = piece.record.share[piece.first : piece.last + 1]
     number = np.minimum((share * BLOCKS).astype(int), BLOCKS - 1)
-    mask = rows.there[k]
+    mask = rows.masks[k]
     block = np.concatenate([number[row_mask] for row_mask in mask])
     column = np.concatenate([np.full(int(row_mask.sum()), c) for c, row_mask in enumerate(mask)])
     return x, block, column
@@ -407,7 +409,7 @@ def _without(x: FloatArray, kept_count: int, known_information: FloatArray) -> F
         return x[:kept_count, :kept_count]
     size = size[positive_rows]
     values, vectors = np.linalg.eigh(nuisance_products[np.ix_(positive_rows, positive_rows)] / np.outer(size, size))
-    seen_values = values > SAME * values[-1]
+    seen_values = values > EIGEN_TOLERANCE * values[-1]
     half = (vectors[:, seen_values] / np.sqrt(values[seen_values])).T @ (
         x[kept_count:, :kept_count][positive_rows] / size[:, None]
     )

@@ -30,10 +30,10 @@ from omnidyn.model.mass import mass_matrix
 from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import HUBER_CLIP, huber_loss, robust_std
 
-BEYOND = 5.0  # robust standard deviations: of normal noise one sample in two million is so far out
-LEAST, HELD = 3, 0.1  # samples, and their share of the squares, from which they are worth a word
-ONE, NEAR = 2, 0.5  # rows within which samples far out are one; [s] in which an error of the motion dies away
-AFTER = 0.05  # [s] in which a change of the motion shows in a sample
+OUTLIER_SCALES = 5.0  # robust standard deviations: of normal noise one sample in two million is so far out
+LEAST_OUTLIERS, ENERGY_SHARE = 3, 0.1  # samples, and their share of the squares, from which they are worth a word
+ONE, NEAR_TIME = 2, 0.5  # rows within which samples far out are one; [s] in which an error of the motion dies away
+CHANGE_TIME = 0.05  # [s] in which a change of the motion shows in a sample
 SPRINKLED = 0.01  # chance of so many of them near each other, or where it changes so much, from which they are random
 ROUNDS = 20  # of weights and fit in turn
 
@@ -51,17 +51,17 @@ def wild_samples(misfit_result: Misfit, piece_motions: Sequence[Motion]) -> dict
     )
     series: dict[int, list[tuple[FloatArray, FloatArray]]] = {}
     for k, columns in enumerate(rows.column):
-        residuals = rows.residual[k] - misfit_result.explained[k]
+        residuals = rows.residual[k] - misfit_result.explained_by_piece[k]
         for j, c in enumerate(columns):
             new = linear.of_column(k, j, residuals[j][:, None])[:, 0]
-            series.setdefault(c, []).append((new, change[k][rows.there[k][j]]))
-    outliers_by_output, near_rows = {}, NEAR / float(np.median([motion.piece.step for motion in piece_motions]))
+            series.setdefault(c, []).append((new, change[k][rows.masks[k][j]]))
+    outliers_by_output, near_rows = {}, NEAR_TIME / float(np.median([motion.piece.step for motion in piece_motions]))
     for c, pieces in series.items():
         new, changes = (np.concatenate(arrays) for arrays in zip(*pieces, strict=True))
         scale = float(robust_std(new, 0.0)) if new.size else 0.0
-        outlier_mask = np.abs(new) > BEYOND * scale
+        outlier_mask = np.abs(new) > OUTLIER_SCALES * scale
         energy_share = float((new[outlier_mask] ** 2).sum() / max((new**2).sum(), 1e-300))
-        if scale > 0.0 and outlier_mask.sum() >= LEAST and energy_share > HELD:
+        if scale > 0.0 and outlier_mask.sum() >= LEAST_OUTLIERS and energy_share > ENERGY_SHARE:
             if not sprinkled(outlier_mask, changes, near_rows):
                 return {}
             name, i = rows.problem.columns[c]
@@ -73,7 +73,7 @@ def _change(motion: Motion) -> FloatArray:
     """How much the motion changes about each row (n,): the largest change over a row, in kinetic energy."""
     step = np.diff(motion.twist, axis=0, prepend=motion.twist[:1])
     energy = np.einsum("ni,ij,nj->n", step, mass_matrix(motion.robot), step)
-    width = 1 + 2 * round(AFTER / time_of_row(motion.t, motion.piece.record.staggered))
+    width = 1 + 2 * round(CHANGE_TIME / time_of_row(motion.t, motion.piece.record.staggered))
     return np.asarray(maximum_filter1d(energy, width, mode="nearest"))
 
 
@@ -86,7 +86,7 @@ def sprinkled(outlier_mask: BoolArray, change: FloatArray, near_rows: float) -> 
     outlier_rows = np.flatnonzero(outlier_mask)
     gaps = np.diff(outlier_rows)
     burst_starts, gaps = outlier_rows[np.append(True, gaps > ONE)], gaps[gaps > ONE]
-    if len(burst_starts) < LEAST:
+    if len(burst_starts) < LEAST_OUTLIERS:
         return False
     by_chance = 1.0 - (1.0 - len(burst_starts) / len(outlier_mask)) ** (near_rows - ONE)
     close_count = int((gaps <= near_rows).sum())
@@ -103,10 +103,12 @@ def calmer(misfit_result: Misfit, outliers_by_output: Mapping[str, Wild]) -> tup
         return ()
     linear = misfit_result.linear
     e, j = linear.whole()
-    columns = np.column_stack([j, linear.white(misfit_result.shown)])
+    columns = np.column_stack([j, linear.white(misfit_result.columns_by_piece)])
     plain_losses, robust = list[float](), list[float]()
     scale = float(robust_std(e[e != 0.0], 0.0))
-    for block_rows in Blocks(linear, [columns_by_piece[:, :, :0] for columns_by_piece in misfit_result.shown]).block:
+    for block_rows in Blocks(
+        linear, [columns_by_piece[:, :, :0] for columns_by_piece in misfit_result.columns_by_piece]
+    ).block:
         other_rows, bound = np.delete(np.arange(len(e)), block_rows), HUBER_CLIP * scale
         first = solved(columns[other_rows], e[other_rows])
         ways = first, _students(columns[other_rows], e[other_rows], first, scale)

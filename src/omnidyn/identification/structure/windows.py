@@ -22,12 +22,15 @@ from omnidyn.identification.output_error.problem.problem import Piece
 from omnidyn.logs.plateaus import COMMANDS, command_changes
 from omnidyn.statistics import stretches
 
-FORGOTTEN, SETTLED = 5.0, 3.0  # time constants after which nothing is left of a start, and what is left is modelled
-LEAST = 12  # rows of a window
-EQUAL = 1e-3  # of the largest command: commands that differ by less are the same
-EVEN = 0.2  # of a row: rows that are longer or shorter are not as long
-MOST = 0.5  # of the rows of a window in which it moves
-NEVER = 10**9  # rows
+FORGETTING_CONSTANTS, SETTLING_CONSTANTS = (
+    5.0,
+    3.0,
+)  # time constants after which nothing is left of a start, and what is left is modelled
+LEAST_ROWS = 12  # rows of a window
+COMMAND_TOLERANCE = 1e-3  # of the largest command: commands that differ by less are the same
+STEP_TOLERANCE = 0.2  # of a row: rows that are longer or shorter are not as long
+MOVING_SHARE = 0.5  # of the rows of a window in which it moves
+ENDLESS_ROWS = 10**9  # rows
 MIX = np.uint64(0x9E3779B97F4A7C15)  # odd, so that no power of it is 0 in 64 bits
 Found = tuple[int, int, int, Hashable]  # piece, column in it, first known row, group
 
@@ -48,7 +51,7 @@ class Windows:
     def of(cls, rows: Rows, places: Sequence[Found], length: int) -> Windows:
         """Of (piece, column in it, first known row, group)."""
         names = {name: i for i, name in enumerate(dict.fromkeys(name for *_, name in places))}
-        values = [rows.residual[k][j][rows.there[k][j]][first : first + length] for k, j, first, _ in places]
+        values = [rows.residual[k][j][rows.masks[k][j]][first : first + length] for k, j, first, _ in places]
         return cls(np.array(values).reshape(-1, length), np.array([names[name] for *_, name in places], dtype=int))
 
     @property
@@ -59,41 +62,41 @@ class Windows:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """The windows of one column. step [s]: of its rows. again: those with repeats, by sets."""
+    """The windows of one column. step [s]: of its rows. repeat_windows: those with repeats, by sets."""
 
     step: float
-    held: Windows
+    held_windows: Windows
     busy: Windows
     resting: Windows
-    again: Windows
-    apart: int  # rows that repeats are from each other, at least
+    repeat_windows: Windows
+    row_gap: int  # rows that repeats are from each other, at least
 
 
 @dataclass(frozen=True, eq=False)
 class _Set:
-    """Stretches of `length` rows with the same commands: pieces (m,), rows (m,) that they begin at there; apart: rows
+    """Stretches of `length` rows with the same commands: pieces (m,), rows (m,) that they begin at there; row_gap: rows
     from one to the next, at least."""
 
     pieces: IntArray
     rows: IntArray
     length: int
-    apart: int
+    row_gap: int
 
 
 @dataclass(frozen=True, eq=False)
 class _Column:
     """A column in a piece, by its known rows: k, j; rows (n,) of the piece; joined (n,): whether the row before is
-    known, too; moves, rests (n,); since (n,) [s] the last change of command, 0 where none comes in steps; holds (n,):
-    which hold, by its command; step [s]."""
+    known, too; moves, resting_rows (n,); time_since_change (n,) [s] the last change of command, 0 where none comes in
+    steps; hold_numbers (n,): which hold, by its command; step [s]."""
 
     k: int
     j: int
     rows: IntArray
     joined: BoolArray
     moves: BoolArray
-    rests: BoolArray
-    since: FloatArray
-    holds: IntArray
+    resting_rows: BoolArray
+    time_since_change: FloatArray
+    hold_numbers: IntArray
     step: float
 
     def whole(self, row: int, length: int) -> int | None:
@@ -105,7 +108,7 @@ class _Column:
             if len(stretch_rows) == length
             and stretch_rows[0] == row
             and stretch_rows[-1] == row + length - 1
-            and (self.moves[first_index : first_index + length].mean() >= MOST)
+            and (self.moves[first_index : first_index + length].mean() >= MOVING_SHARE)
             else None
         )
 
@@ -113,12 +116,12 @@ class _Column:
         """Stretches of joined rows in which a mask holds, (first, behind the last); each within one hold."""
         cut = ~self.joined
         if by_hold:
-            cut = cut | (np.diff(self.holds, prepend=self.holds[:1]) != 0)
-        found = []
+            cut = cut | (np.diff(self.hold_numbers, prepend=self.hold_numbers[:1]) != 0)
+        joined_runs = []
         for a, b in stretches(mask).tolist():
             edges = [a, *(np.flatnonzero(cut[a + 1 : b]) + a + 1).tolist(), b]
-            found += [(x, y) for x, y in pairwise(edges) if y - x >= LEAST]
-        return found
+            joined_runs += [(x, y) for x, y in pairwise(edges) if y - x >= LEAST_ROWS]
+        return joined_runs
 
 
 def slowest(motions: Sequence[Motion]) -> float:
@@ -133,9 +136,9 @@ def shown(rows: Rows, motions: Sequence[Motion]) -> list[Shown]:
     constant = slowest(motions)
     commands = _commands(rows.pieces)
     holds_by_piece = [_holds(piece, command) for piece, command in zip(rows.pieces, commands, strict=True)]
-    repeats = _repeats(rows.pieces, commands, FORGOTTEN * constant)
+    repeats = _repeats(rows.pieces, commands, FORGETTING_CONSTANTS * constant)
     return [
-        _of_column(rows, motions, c, SETTLED * constant, repeats, holds_by_piece)
+        _of_column(rows, motions, c, SETTLING_CONSTANTS * constant, repeats, holds_by_piece)
         for c in range(len(rows.problem.columns))
     ]
 
@@ -151,27 +154,27 @@ def _of_column(
     parts = [
         _column(rows, motions[k], k, columns.index(c), settling_time, *holds_by_piece[k])
         for k, columns in enumerate(rows.column)
-        if c in columns and rows.there[k][columns.index(c)].sum() >= LEAST
+        if c in columns and rows.masks[k][columns.index(c)].sum() >= LEAST_ROWS
     ]
     step = float(np.median([part.step for part in parts])) if parts else 1.0
-    still_runs = [part.runs((part.since >= settling_time) & part.moves, by_hold=True) for part in parts]
+    still_runs = [part.runs((part.time_since_change >= settling_time) & part.moves, by_hold=True) for part in parts]
     lengths = [b - a for runs in still_runs for a, b in runs]
-    length = max(LEAST, int(min(settling_time / step, float(np.median(lengths)) if lengths else 1e3)))
+    length = max(LEAST_ROWS, int(min(settling_time / step, float(np.median(lengths)) if lengths else 1e3)))
     held_windows, busy_windows, rest_windows = list[Found](), list[Found](), list[Found]()
     for part, part_runs in zip(parts, still_runs, strict=True):
         used_rows = np.zeros(len(part.rows), dtype=bool)
         for a, b in part_runs:
             for first in range(b - length, a - 1, -length):
-                held_windows.append((part.k, part.j, first, int(part.holds[first])))
+                held_windows.append((part.k, part.j, first, int(part.hold_numbers[first])))
                 used_rows[first : first + length] = True
-        for mask, windows in ((part.moves & ~used_rows, busy_windows), (part.rests, rest_windows)):
+        for mask, windows in ((part.moves & ~used_rows, busy_windows), (part.resting_rows, rest_windows)):
             for a, b in part.runs(mask):
                 windows += [(part.k, part.j, first, (part.k, first)) for first in range(a, b - length + 1, length)]
     repeat_windows, row_gap = _again(parts, repeats, length)
     return Shown(
         step,
         *(Windows.of(rows, places, length) for places in (held_windows, busy_windows, rest_windows, repeat_windows)),
-        apart=row_gap,
+        row_gap=row_gap,
     )
 
 
@@ -184,7 +187,7 @@ def _column(
     time_since_change: FloatArray,
     hold_numbers: IntArray,
 ) -> _Column:
-    known_rows, row_numbers = np.flatnonzero(rows.there[k][j]), np.arange(len(motion.t))
+    known_rows, row_numbers = np.flatnonzero(rows.masks[k][j]), np.arange(len(motion.t))
     still_rows = (motion.twist == 0.0).all(axis=1)
     last_moving_rows = np.maximum.accumulate(np.where(still_rows, 0, row_numbers))
     resting_rows = still_rows & (motion.t - motion.t[last_moving_rows] >= settling_time)
@@ -204,7 +207,7 @@ def _column(
 
 def _again(parts: Sequence[_Column], repeats: Sequence[_Set], length: int) -> tuple[list[Found], int]:
     """(windows of what came again: piece, column in it, first known row, set; rows that they are apart, at least)."""
-    part_by_piece, places, row_gap = {part.k: part for part in parts}, [], NEVER
+    part_by_piece, places, row_gap = {part.k: part for part in parts}, [], ENDLESS_ROWS
     for number, repeat in enumerate(repeats):
         for first in range(0, repeat.length - length + 1, length):
             repeat_places = [
@@ -214,12 +217,13 @@ def _again(parts: Sequence[_Column], repeats: Sequence[_Set], length: int) -> tu
             ]
             if len(repeat_places) > 1:
                 places += repeat_places
-                row_gap = min(row_gap, repeat.apart)
+                row_gap = min(row_gap, repeat.row_gap)
     return places, row_gap
 
 
 def _commands(pieces: Sequence[Piece]) -> list[FloatArray]:
-    """What is commanded in the rows of each piece, in steps of EQUAL of the largest command, (rows, any)."""
+    """What is commanded in the rows of each piece, in steps of COMMAND_TOLERANCE of the largest command, (rows,
+    any)."""
     commands_by_piece = []
     for piece in pieces:
         record, rows = piece.record, slice(piece.first, piece.last + 1)
@@ -229,7 +233,7 @@ def _commands(pieces: Sequence[Piece]) -> list[FloatArray]:
             command = record.voltage if record.set_point is None else record.set_point
         commands_by_piece.append(np.nan_to_num(command[rows]))
     top = max(float(np.abs(commands).max()) for commands in commands_by_piece)
-    return [np.round(commands / (EQUAL * max(top, TINY))) for commands in commands_by_piece]
+    return [np.round(commands / (COMMAND_TOLERANCE * max(top, TINY))) for commands in commands_by_piece]
 
 
 def _holds(piece: Piece, commands: FloatArray) -> tuple[FloatArray, IntArray]:
@@ -272,7 +276,7 @@ def _repeats(pieces: Sequence[Piece], commands: Sequence[FloatArray], memory_tim
             row_numbers[:-1] - np.maximum.accumulate(np.where(change_mask, row_numbers, 0))[:-1]
         )  # of the command that led to a row
         past_hash = sliding_window_view(random[piece_numbers[:-1]], memory_rows) @ power[:memory_rows]
-        uneven = np.cumsum([0, *(np.abs(step / usual_time - 1.0) > EVEN)])
+        uneven = np.cumsum([0, *(np.abs(step / usual_time - 1.0) > STEP_TOLERANCE)])
         same_steps = uneven[memory_rows:] == uneven[: end - start - memory_rows]
         keys[start + memory_rows : end][same_steps] = (
             past_hash + rows_since_change[memory_rows - 1 :].astype(np.uint64) * power[memory_rows]
@@ -285,15 +289,19 @@ def _joined(keys: NDArray[np.uint64], starts: IntArray) -> list[_Set]:
     _, key_numbers = np.unique(keys, return_inverse=True)
     order = np.argsort(key_numbers, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(key_numbers[order])) + 1)
-    found: list[tuple[IntArray, int]] = []
-    for group in sorted((group for group in groups if len(group) > 1), key=lambda each: int(each[0])):
-        if found and len(found[-1][0]) == len(group) and (found[-1][0] + found[-1][1] == group).all():
-            found[-1] = (found[-1][0], found[-1][1] + 1)
+    joined_groups: list[tuple[IntArray, int]] = []
+    for group in sorted((group for group in groups if len(group) > 1), key=lambda joined_group: int(joined_group[0])):
+        if (
+            joined_groups
+            and len(joined_groups[-1][0]) == len(group)
+            and (joined_groups[-1][0] + joined_groups[-1][1] == group).all()
+        ):
+            joined_groups[-1] = (joined_groups[-1][0], joined_groups[-1][1] + 1)
         else:
-            found.append((group, 1))
-    pieces = [np.searchsorted(starts, group, side="right") - 1 for group, _ in found]
+            joined_groups.append((group, 1))
+    pieces = [np.searchsorted(starts, group, side="right") - 1 for group, _ in joined_groups]
     return [
         _Set(piece, group - starts[piece], length, int(np.diff(group).min()))
-        for piece, (group, length) in zip(pieces, found, strict=True)
-        if length >= LEAST
+        for piece, (group, length) in zip(pieces, joined_groups, strict=True)
+        if length >= LEAST_ROWS
     ]

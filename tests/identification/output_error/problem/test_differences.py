@@ -47,7 +47,7 @@ def test_counts_and_their_tick_are_found(log):
     found = differences([log])
     assert found is not None
     assert found.ticks == pytest.approx(TICK)
-    assert not found.why
+    assert not found.reason
     angle, lost = added_up(log, found)
     assert np.diff(angle, axis=0) == pytest.approx(log.wheel_speed[1:] / RATE)
     assert not lost.any()
@@ -78,7 +78,7 @@ def test_speeds_over_uneven_rows_of_their_own_stamps(log):
     speed = log.wheel_speed * 0.01 / dt[:, None]
     found = differences([Run(np.cumsum(dt), voltage=log.voltage, wheel_speed=speed)])
     assert found is not None
-    assert found.stamped
+    assert found.has_stamps
     assert found.ticks == pytest.approx(TICK)
 
 

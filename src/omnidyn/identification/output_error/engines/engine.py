@@ -25,14 +25,14 @@ P = TypeVar("P", bound=Fitted)
 class Weighting:
     """variance (columns,) by Problem.columns; nu of Student's t, 0 for Gauss; mode and block as in kernel/march.py.
 
-    counted: whether counts are taken as such, or like any other output.
+    counts_ticks: whether counts are taken as such, or like any other output.
     """
 
     variance: FloatArray
     nu: float = 0.0
     mode: int = 0
     block: int = 1
-    counted: bool = False
+    counts_ticks: bool = False
 
 
 class Engine(Generic[P]):
@@ -42,14 +42,14 @@ class Engine(Generic[P]):
     2. says in attributes what it is: a fit asks these, and never for its name;
     3. gives what only some have (`with_levels`, `drives`, `meets_limit`, `of`) where its attributes promise it.
 
-    exact: takes each row in one step without error, and has `drives`. looped: a speed loop makes its voltages.
+    exact: takes each row in one step without error, and has `drives`. has_loop: a speed loop makes its voltages.
     tol [m/s]: tolerance of its steps, None for one a row. levels: key -> level of breakaway that it holds. members: its
     groups.
     """
 
     problem: P
     exact: bool = False
-    looped: bool = False
+    has_loop: bool = False
     tol: float | None = None
     levels: Mapping[str, float] = MappingProxyType({})
     members: Sequence[Any] = ()
@@ -112,7 +112,7 @@ def added(piece: Piece, all_columns: tuple[Column, ...], parts: Parts, weighting
     if not mask.all():
         r, j = np.where(mask, residual, np.nan), np.where(mask[:, :, None], slopes, 0.0)
     variance, final = weighting.variance[column_indices], bool(weighting.mode & FINAL)
-    tick = np.array(piece.record.ticks) if weighting.counted and any(piece.record.ticks) else None
+    tick = np.array(piece.record.ticks) if weighting.counts_ticks and any(piece.record.ticks) else None
     share = np.ones(len(column_indices)) if tick is None else information(variance, tick)[0]
     pull, square, curvature, rho = row_terms(r, variance, weighting.nu, tick, share, final)
     grad, info = np.zeros((len(r), width)), np.zeros((len(r), width, width))
@@ -147,7 +147,7 @@ def added(piece: Piece, all_columns: tuple[Column, ...], parts: Parts, weighting
 
 # The driver of a problem: what is free of it and what is not
 
-LATE = "latency."
+LATENCY_PREFIX = "latency."
 
 
 def driver_of(problem: Problem, values: FloatArray) -> tuple[Driver, list[int]]:
@@ -164,7 +164,7 @@ def driver_of(problem: Problem, values: FloatArray) -> tuple[Driver, list[int]]:
 
 def late_by(problem: Problem, values: FloatArray, columns: Sequence[Column]) -> tuple[list[float], list[int]]:
     """(by how much each column is late [s], index of that among the parameters or -1: as late as the robot's drive)."""
-    indices = [problem.where(LATE + name) for name, _ in columns]
+    indices = [problem.where(LATENCY_PREFIX + name) for name, _ in columns]
     return [float(values[k]) if k >= 0 else problem.robot.drive.latency for k in indices], indices
 
 

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification.output_error.engines.engine import LATE as LATE
 from omnidyn.identification.output_error.engines.engine import Engine, Weighting, driver_of, late_by
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
 from omnidyn.identification.output_error.kernel.march import (
@@ -23,12 +22,12 @@ from omnidyn.identification.output_error.kernel.march import (
     march,
 )
 from omnidyn.identification.output_error.kernel.march_axis import (
-    BY,
     GRAD,
     LAG,
     LOSS,
     NUMBER,
     SIZE,
+    SLOPE_COUNT,
     SQUARE,
     march_axis,
     spread,
@@ -142,7 +141,7 @@ class ExactEngine(Engine[Problem]):
         rows, grad, info = np.zeros((N_AXES, SIZE)), np.zeros((N_AXES, width)), np.zeros((N_AXES, width, width))
         blocks = _blocks(piece, weighting)
         score, drift = np.zeros((blocks, width)), np.zeros((blocks, N_AXES))
-        scores = np.zeros((N_AXES, blocks, BY + 1))
+        scores = np.zeros((N_AXES, blocks, SLOPE_COUNT + 1))
         for axis in range(N_AXES):
             march_axis(
                 record.t,
@@ -163,13 +162,13 @@ class ExactEngine(Engine[Problem]):
                 rows[axis],
                 scores[axis],
             )
-            slopes = np.zeros((BY, width))
+            slopes = np.zeros((SLOPE_COUNT, width))
             slopes[0, :count], slopes[1, :count] = slopes_now.rate[axis], slopes_now.coulomb[axis]
             slopes[2, count + axis] = piece.free[axis]
-            grad[axis], info[axis] = rows[axis, GRAD : GRAD + BY] @ slopes, spread(rows[axis], slopes)
+            grad[axis], info[axis] = rows[axis, GRAD : GRAD + SLOPE_COUNT] @ slopes, spread(rows[axis], slopes)
             if blocks:
-                score += scores[axis, :, :BY] @ slopes
-                drift[:, axis] = scores[axis, :, BY]
+                score += scores[axis, :, :SLOPE_COUNT] @ slopes
+                drift[:, axis] = scores[axis, :, SLOPE_COUNT]
         number, square, loss, lag = (rows[:, index] for index in (NUMBER, SQUARE, LOSS, LAG))
         return PieceSums(np.arange(N_AXES), number, square, loss, lag, grad, info, score, drift)
 
@@ -307,7 +306,7 @@ def march_piece(
     """
     columns, used_indices, (physics, slopes, groups) = piece.record.columns, used_by(piece, count), numbers
     column_indices, total = np.array([all_columns.index(column) for column in columns]), count + N_AXES + len(columns)
-    counts_ticks = weighting.counted and any(piece.record.ticks)
+    counts_ticks = weighting.counts_ticks and any(piece.record.ticks)
     tick = np.array(piece.record.ticks) if counts_ticks else None
     share = np.ones(len(column_indices)) if tick is None else information(weighting.variance[column_indices], tick)[0]
     loss = Loss(weighting.variance[column_indices], weighting.nu, weighting.block, weighting.mode, share)

@@ -17,8 +17,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import side_by_side
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.engine import Engine, driver_of, late_by
-from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, PUSH, TILT
+from omnidyn.identification.output_error.engines.engine import LATENCY_PREFIX, Engine, driver_of, late_by
+from omnidyn.identification.output_error.engines.exact import HEADING, POSITION, PUSH, TILT
 from omnidyn.identification.output_error.problem.heading import headings, in_the_body
 from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
@@ -31,7 +31,7 @@ from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, Vo
 from omnidyn.simulation.sensitivity.sample import PATH, PLACE, TURN
 from omnidyn.simulation.sensitivity.slipping import slipping_samples
 
-FINER = 1e-6  # [m/s] where a path is fitted: what a speed is off by adds up, to a tick of an encoder in 10 s
+PATH_TOLERANCE = 1e-6  # [m/s] where a path is fitted: what a speed is off by adds up, to a tick of an encoder in 10 s
 STEPS = 2  # a row, of derivatives at the end of a fit; it begins with one
 LEAST_TOL = 1e-5  # [m/s] of the run itself
 Shown = tuple[FloatArray, FloatArray, FloatArray]  # value (rows, m), its time derivative (rows, m), (rows, K, m)
@@ -73,13 +73,13 @@ class ImplicitEngine(Engine[Problem]):
         """The engine of wheels that roll, or of wheels that may slip. tol [m/s]: finer where a path is fitted."""
         travels = any(name in TRAVELS for name, _ in problem.columns)
         kind = ImplicitEngine if problem.robot.wheels.traction_mu is None else SlipEngine
-        return kind(problem, tol if tol is None or not travels else min(tol, FINER))
+        return kind(problem, tol if tol is None or not travels else min(tol, PATH_TOLERANCE))
 
     def __init__(self, problem: Problem, tol: float | None = None):
         self.problem, self.tol = problem, tol
         nuisances = [p.name for p in problem.parameters[problem.robot_count :]]
         known_names = (*Driver._fields, *((*TILT, *PUSH) if self.pushes else ()))
-        other_names = [name for name in nuisances if not name.startswith(LATE) and name not in known_names]
+        other_names = [name for name in nuisances if not name.startswith(LATENCY_PREFIX) and name not in known_names]
         if other_names:
             raise UnsupportedError(
                 "this robot is fitted by an engine which does not know all that is asked for",

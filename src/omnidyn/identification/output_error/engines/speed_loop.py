@@ -10,7 +10,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.exact import LATE
+from omnidyn.identification.output_error.engines.engine import LATENCY_PREFIX
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, Shown, through_the_end, travel_of
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
 from omnidyn.model.motor import DYNAMIC
@@ -19,10 +19,10 @@ from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, looped_samples
 from omnidyn.simulation.simulate import simulate
 
-SETTLED = 1e-10  # [m/s, A, V] a run that changes less from tick to tick stays as it is until the next command
+STEADY_CHANGE = 1e-10  # [m/s, A, V] a run that changes less from tick to tick stays as it is until the next command
 SLOW_LOOP = 0.5  # periods in a row, beyond which a current is seen between its ticks
 NEAR_LIMIT = 0.9  # of the voltage limit
-STEEPEST = 1e8  # a loop that swings has derivatives that grow without bound: they are cut, for they mean nothing
+SLOPE_LIMIT = 1e8  # a loop that swings has derivatives that grow without bound: they are cut, for they mean nothing
 
 
 class LoopEngine(ImplicitEngine):
@@ -31,7 +31,7 @@ class LoopEngine(ImplicitEngine):
     Raises UnsupportedError for nuisances other than latencies.
     """
 
-    looped = True
+    has_loop = True
 
     @classmethod
     def of(cls, problem: Problem, tol: float | None = None) -> LoopEngine:
@@ -39,7 +39,9 @@ class LoopEngine(ImplicitEngine):
         return cls(problem, tol)
 
     def __init__(self, problem: Problem, tol: float | None = None):
-        other_names = [p.name for p in problem.parameters[problem.robot_count :] if not p.name.startswith(LATE)]
+        other_names = [
+            p.name for p in problem.parameters[problem.robot_count :] if not p.name.startswith(LATENCY_PREFIX)
+        ]
         if other_names:
             raise UnsupportedError(
                 "a log of set speeds has no voltage that could be changed on its way",
@@ -70,7 +72,7 @@ class LoopEngine(ImplicitEngine):
         values: FloatArray,
     ) -> Parts:
         residual, slopes, indices = super()._piece(robot, moved_robots, scales, piece, state, values)
-        return residual, np.clip(np.nan_to_num(slopes), -STEEPEST, STEEPEST), indices
+        return residual, np.clip(np.nan_to_num(slopes), -SLOPE_LIMIT, SLOPE_LIMIT), indices
 
     def _run(
         self,
@@ -88,7 +90,7 @@ class LoopEngine(ImplicitEngine):
             Direction(p.name, upper, lower)
             for p, (upper, lower) in zip(self.problem.robot_parameters, moved_robots, strict=True)
         ]
-        current_index = self.problem.where(f"{LATE}current")
+        current_index = self.problem.where(f"{LATENCY_PREFIX}current")
         earlier_times = (
             [float(values[current_index]) - self._period] if current_index >= 0 and self._jumps(piece) else []
         )
@@ -100,7 +102,7 @@ class LoopEngine(ImplicitEngine):
             [*latencies, *earlier_times],
             self.tol,
             travel_of(piece.record.columns),
-            SETTLED,
+            STEADY_CHANGE,
         )
         return samples, list(range(count)), 1.0 / np.array(scales[:count])
 

@@ -30,7 +30,9 @@ from omnidyn.simulation.exact.position import move_on, put_displacement
 from omnidyn.simulation.exact.slopes import acceleration_at_end, hold_slopes, step_slopes, travel_slopes
 
 PATH = 5  # integrals of the twist, then x and y of the displacement
-SAME = 1e-7  # times 1/a [s]: steps that differ by less share one exponential, to first order, which leaves 1e-15
+STEP_TOLERANCE = (
+    1e-7  # times 1/a [s]: steps that differ by less share one exponential, to first order, which leaves 1e-15
+)
 FINAL, KEEP, WAVES = 1, 2, 4  # what a march is for, beside the sums
 
 
@@ -49,7 +51,7 @@ class Physics(NamedTuple):
     travel_map: FloatArray  # (C, 5) Q
     input_map: FloatArray  # (C,) E
     input_wheel: IntArray  # (C,) w
-    late: FloatArray  # (C,) latency [s]
+    latencies: FloatArray  # (C,) latency [s]
     driver: Driver
     travels: bool  # whether Q has an entry
 
@@ -66,7 +68,7 @@ class PhysicsSlopes(NamedTuple):
     maps_vary: bool
     travel_varies: BoolArray  # (C,)
     at_late: IntArray  # (C,)
-    at_driver: IntArray  # (3,)
+    driver_indices: IntArray  # (3,)
     at_start: IntArray  # (3,)
     at_offset: IntArray  # (C,)
 
@@ -140,7 +142,7 @@ def held(cache, rates, dt):
     """Refresh `cache` (row 3: dt; rows 0..2: phi, dphi, psi, dpsi of the axes) for a step of dt."""
     dt_error = dt - cache[3, 0]
     for axis in range(3):
-        if abs(dt_error) * rates[axis] > SAME or cache[3, 1] == 0.0:
+        if abs(dt_error) * rates[axis] > STEP_TOLERANCE or cache[3, 1] == 0.0:
             for k in range(3):
                 cache[k, 0], cache[k, 1], cache[k, 2], cache[k, 3] = hold_slopes(rates[k], dt)
             cache[3, 0], cache[3, 1] = dt, 1.0
@@ -330,7 +332,7 @@ def march(
     """
     law, dlaw, size = physics.law, slopes.law, slopes.law.shape[2]
     speed_map, travel_map, d_speed, vary = physics.speed_map, physics.travel_map, slopes.speed_map, slopes.maps_vary
-    final, keep, travels = (loss.mode & FINAL) != 0, (loss.mode & KEEP) != 0, physics.travels
+    final, keeps_rows, travels = (loss.mode & FINAL) != 0, (loss.mode & KEEP) != 0, physics.travels
     v, s, g, v_now, s_now = start.copy(), np.zeros(PATH), np.zeros(3), np.zeros(3), np.zeros(PATH)
     dv, ds, dg, dv_now, ds_now = (
         np.zeros((3, size)),
@@ -344,8 +346,8 @@ def march(
             dv[axis, slopes.at_start[axis]] = 1.0
     volts, row, value_before = np.zeros((4, u.shape[1])), np.zeros(size), np.zeros(len(offset))
     pointer, steps, parts = np.full(len(groups) - 1, first), np.zeros((4, 4)), np.zeros((len(groups) - 1, 4, 4))
-    drive, d_drive, driver, driver_indices = physics.drive, slopes.drive, physics.driver, slopes.at_driver
-    lates, wheels, input_map, d_input = physics.late, physics.input_wheel, physics.input_map, slopes.input_map
+    drive, d_drive, driver, driver_indices = physics.drive, slopes.drive, physics.driver, slopes.driver_indices
+    lates, wheels, input_map, d_input = physics.latencies, physics.input_wheel, physics.input_map, slopes.input_map
     at_late, at_offset, variance, nu, block = slopes.at_late, slopes.at_offset, loss.variance, loss.nu, loss.block
     d_travel, travel_varies, share = slopes.travel_map, slopes.travel_varies, loss.share
     number, square, total, lag, grad, info = sums.number, sums.square, sums.loss, sums.lag, sums.grad, sums.info
@@ -410,7 +412,7 @@ def march(
                         add_latency(row, c, at_late[c], v_now, s_now, g, law, speed_map, travel_map, place)
                     if at_offset[c] >= 0:
                         row[at_offset[c]] += 1.0
-                    if keep:
+                    if keeps_rows:
                         predicted[sample, c] = value
                         for i in range(kept_slopes.shape[2]):  # a slice compiles the words of its error too: 1.5 s
                             kept_slopes[sample, c, i] = row[i]

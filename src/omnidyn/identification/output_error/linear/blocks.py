@@ -20,14 +20,21 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification.output_error.linear.rows import SAME, Linear, Rows, lengths, noise_models, with_priors
+from omnidyn.identification.output_error.linear.rows import (
+    EIGEN_TOLERANCE,
+    Linear,
+    Rows,
+    lengths,
+    noise_models,
+    with_priors,
+)
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.problem import Problem, bounded
 from omnidyn.identification.output_error.solve.solver import Normal, Solution
 from omnidyn.model.actuation import DEAD_BAND
 
 BLOCKS = 10  # of the log, each held out once
-SURE = 10.8  # what a likelihood that is sure of a nuisance gains by it: 2 F, by chance once in a thousand logs
+NUISANCE_GAIN = 10.8  # what a likelihood that is sure of a nuisance gains by it: 2 F, by chance once in a thousand logs
 
 
 class Blocks:
@@ -64,7 +71,7 @@ class Blocks:
         times, pieces = [], linear.rows
         row_count = sum(r.shape[1] for r in pieces.residual)
         rows_before = 0
-        for k, mask in enumerate(pieces.there):
+        for k, mask in enumerate(pieces.masks):
             parts = [rows_before + np.flatnonzero(row_masks) for row_masks in mask]
             row_mask = np.concatenate(parts) if parts else np.zeros(0, int)
             times.append(np.concatenate([row_mask, np.full(linear.length(k) - len(row_mask), rows_before)]))
@@ -76,7 +83,7 @@ class Blocks:
     def fitted(self, matrix: FloatArray, indices: IntArray) -> FloatArray:
         """What the columns `indices` are fitted by."""
         values, vectors = np.linalg.eigh(matrix[np.ix_(indices, indices)])
-        kept_values = values > SAME * values[-1]
+        kept_values = values > EIGEN_TOLERANCE * values[-1]
         return vectors[:, kept_values] @ ((vectors[:, kept_values].T @ matrix[indices, 0]) / values[kept_values])
 
     def left(self, indices: IntArray) -> float:
@@ -107,7 +114,7 @@ def rejected_nuisances(solution: Solution) -> tuple[str, ...]:
     if not steps:
         return ()
     blocks, problem = _blocks(solution), solution.solver.problem
-    indices = 1 + np.flatnonzero(~solution.held)
+    indices = 1 + np.flatnonzero(~solution.held_parameters)
     lost: list[int] = []
     while steps:
         harm_by_number = {j: _harm(blocks, indices, j, step) for j, step in steps.items()}
@@ -126,7 +133,11 @@ def _steps(solution: Solution) -> dict[int, float]:
     steps_by_number = {}
     for j, p in enumerate(problem.parameters):
         step = p.inner(p.value) - float(normal.inner[j])
-        if p.part in (LATENCY, DEAD_BAND) and not solution.held[j] and step**2 > SURE * variance[j] > 0.0:
+        if (
+            p.part in (LATENCY, DEAD_BAND)
+            and not solution.held_parameters[j]
+            and step**2 > NUISANCE_GAIN * variance[j] > 0.0
+        ):
             steps_by_number[j] = step
     return steps_by_number
 
@@ -138,7 +149,9 @@ def _blocks(solution: Solution) -> Blocks:
     problem = bounded(full_problem)
     engine = solution.solver.engine.on(problem)
     rows = Rows.of(problem, solution.state.point, engine.residuals(solution.state.point))
-    slopes = [np.where(solution.held, 0.0, slope) for slope in rows.slopes]  # what a bound holds, holds in every block
+    slopes = [
+        np.where(solution.held_parameters, 0.0, slope) for slope in rows.slopes
+    ]  # what a bound holds, holds in every block
     linear = Linear(replace(rows, slopes=slopes), noise_models(rows, rows.residual))
     return Blocks(linear, [np.zeros((*residual.shape, 0)) for residual in rows.residual])
 

@@ -21,7 +21,7 @@ from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import Column, Point, Problem, bounded
 from omnidyn.identification.output_error.solve.solver import Solution
 
-CLEAR = 1.0  # standard errors of the difference by which one fit must predict better to be taken for another
+BETTER_ERRORS = 1.0  # standard errors of the difference by which one fit must predict better to be taken for another
 LEAST_GAIN = 0.1  # of the squared error, the same: 5 % of the error
 TINY = 1e-300
 
@@ -49,11 +49,11 @@ class FreeRun:
 
     def is_better(self, reference: FreeRun) -> bool:
         """Whether it predicts blocks clearly better than another: by the share of the squared error that it takes away,
-        the mean of all outputs, beyond CLEAR standard errors of it."""
+        the mean of all outputs, beyond BETTER_ERRORS standard errors of it."""
         reference_squares = np.maximum(reference.square.sum(axis=0), TINY)
         gain = ((reference.square - self.square) / reference_squares)[:, self.rows > 0.0].mean(axis=1)
         spread = float(gain.std(ddof=1)) * np.sqrt(len(gain))
-        return bool(gain.sum() > max(CLEAR * spread, LEAST_GAIN))
+        return bool(gain.sum() > max(BETTER_ERRORS * spread, LEAST_GAIN))
 
 
 def free_run(
@@ -76,7 +76,7 @@ def free_run(
     problem = bounded(replace(full_problem, pieces=tuple(pieces)))
     point = solution.state.point if values is None else Point(values, solution.state.point.states)
     rows = Rows.of(problem, point, solution.solver.engine.unfiltered.on(problem).residuals(point))
-    held_parameters = solution.held if values is None else np.ones(len(solution.held), bool)
+    held_parameters = solution.held_parameters if values is None else np.ones(len(solution.held_parameters), bool)
     rows = replace(rows, slopes=[np.where(held_parameters, 0.0, slopes) for slopes in rows.slopes])
     white = noise_models(rows, rows.residual, order_limit=0)
     models = white
@@ -99,7 +99,7 @@ def free_run(
         block_residual = residual[block] - slopes[block] @ steps[b]
         square[b] = np.bincount(column[block], block_residual**2, len(white)) * variance
     travels = np.array([name in TRAVELS for name, _ in problem.columns])
-    count = np.where(travels & ~travels.all(), 0.0, rows.added(lambda k, j: rows.there[k][j]))
+    count = np.where(travels & ~travels.all(), 0.0, rows.added(lambda k, j: rows.masks[k][j]))
     return FreeRun(square, count, _spread(rows), bool(travels.all()))
 
 
@@ -112,7 +112,7 @@ def margins_of(solutions: Sequence[Solution]) -> list[FloatArray]:
 def _places(linear: Linear) -> tuple[IntArray, IntArray]:
     """(block of each white row, its column), (N,) each; -1 where it is none of a log."""
     rows, column = linear.rows, list[IntArray]()
-    for k, mask in enumerate(rows.there):
+    for k, mask in enumerate(rows.masks):
         of_rows = np.repeat(rows.column[k], mask.sum(axis=1))
         column.append(np.concatenate([of_rows, np.full(linear.length(k) - len(of_rows), -1)]))
     column.append(np.full(len(rows.problem.parameters), -1))
@@ -123,7 +123,7 @@ def _places(linear: Linear) -> tuple[IntArray, IntArray]:
 def _spread(rows: Rows) -> FloatArray:
     """Standard deviation of what was measured of each column in the rows that count. Shape (C,)."""
     values: list[list[FloatArray]] = [[] for _ in rows.problem.columns]
-    for piece, mask, columns in zip(rows.pieces, rows.there, rows.column, strict=True):
+    for piece, mask, columns in zip(rows.pieces, rows.masks, rows.column, strict=True):
         measured = piece.record.outputs[piece.first : piece.last + 1].T
         for j, c in enumerate(columns):
             values[c].append(measured[j, mask[j]])

@@ -196,7 +196,8 @@ def _answers(
 def _with_integral(
     rate: FloatArray, per_force: FloatArray, resting_axes: BoolArray, integral_gain: FloatArray
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """The same with the way p of the change d beside it: d' = rate d - integral_gain p + f/M, p' = d. At rest both are 0."""
+    """The same with the way p of the change d beside it: d' = rate d - integral_gain p + f/M, p' = d. At rest both are
+    0."""
     n = len(rate)
     block_rate = np.zeros((n, 2 * N_AXES, 2 * N_AXES))
     block_rate[:, :N_AXES, :N_AXES], block_rate[:, :N_AXES, N_AXES:] = rate, -integral_gain

@@ -16,7 +16,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 
 SEED = 20_13
-SURE = 2.0  # standard errors beyond what is seen of a share
+SHARE_ERRORS = 2.0  # standard errors beyond what is seen of a share
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +71,13 @@ def drawn_together(root: FloatArray, count: int) -> FloatArray:
 
 
 def share(observed: float, noise: float, spread_square: float, error: float) -> float:
-    """How much of a variance there is: what is seen beyond the noise and `SURE` errors over what there would be."""
-    return float(np.clip((observed - noise + SURE * error) / spread_square, 0.0, 1.0)) if spread_square > 0.0 else 0.0
+    """How much of a variance there is: what is seen beyond the noise and `SHARE_ERRORS` errors over what there would
+    be."""
+    return (
+        float(np.clip((observed - noise + SHARE_ERRORS * error) / spread_square, 0.0, 1.0))
+        if spread_square > 0.0
+        else 0.0
+    )
 
 
 def scaled(

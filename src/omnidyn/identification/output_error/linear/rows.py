@@ -25,10 +25,13 @@ from omnidyn.identification.output_error.problem.outputs import TRAVEL
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
 
 TINY = 1e-300
-SAME = 1e-10  # of the largest eigenvalue of columns of length 1: below it directions are one
-BARE = 0.32  # of a tick: rounding alone has 1/sqrt(12)
+EIGEN_TOLERANCE = 1e-10  # of the largest eigenvalue of columns of length 1: below it directions are one
+ROUNDING_NOISE = 0.32  # of a tick: rounding alone has 1/sqrt(12)
 SIMULATED = 0.3  # of what the first order is off by: what a motion that is simulated anew is
-OPEN, FEWEST = 2_000_000, 40  # numbers of a piece that what rounding may be off by is held in; columns, at least
+MOST_NUMBERS, LEAST_COLUMNS = (
+    2_000_000,
+    40,
+)  # numbers of a piece that what rounding may be off by is held in; columns, at least
 Shown = Sequence[FloatArray]  # of each piece: (C, rows, K)
 
 
@@ -36,7 +39,7 @@ Shown = Sequence[FloatArray]  # of each piece: (C, rows, K)
 class Rows:
     """The rows of a fit as they are: of each piece residuals (C, rows), and slopes (C, rows, P), (C, rows, S) of it.
 
-    there: of each piece (C, rows), which rows count; steps: of each column of each piece, rows since the one before.
+    masks: of each piece (C, rows), which rows count; steps: of each column of each piece, rows since the one before.
     column: of each piece (C,), which column of the problem it is. moves: of each piece (C, rows), see `moving_rows`.
     rounding: of each piece (C, rows, M), what is shown by what its inputs were rounded by, and last, in as many columns
     as `losses` has of it, by what they did while rows are missing; none where there is neither.
@@ -46,8 +49,8 @@ class Rows:
     point: Point
     residual: list[FloatArray]
     slopes: list[FloatArray]
-    own: list[FloatArray]
-    there: list[BoolArray]
+    start_slopes: list[FloatArray]
+    masks: list[BoolArray]
     steps: list[list[IntArray]]
     column: list[list[int]]
     moves: list[BoolArray]
@@ -67,12 +70,12 @@ class Rows:
             all_slopes[:, :, indices[is_parameter]] = slopes[:, :, is_parameter]
             rows.residual.append(residual)
             rows.slopes.append(all_slopes * scale)
-            rows.own.append(slopes[:, :, ~is_parameter])
+            rows.start_slopes.append(slopes[:, :, ~is_parameter])
             known_masks = [
                 known_rows(piece, column_residual, column_slopes)
                 for column_residual, column_slopes in zip(residual, slopes, strict=True)
             ]
-            rows.there.append(np.array([np.isin(np.arange(residual.shape[1]), at_rows) for at_rows, _ in known_masks]))
+            rows.masks.append(np.array([np.isin(np.arange(residual.shape[1]), at_rows) for at_rows, _ in known_masks]))
             rows.steps.append([steps for _, steps in known_masks])
             rows.column.append([all_columns.index(column) for column in piece.record.columns])
             rows.moves.append(moving_rows(piece, every_residual))
@@ -85,7 +88,7 @@ class Rows:
             for piece, columns in zip(self.pieces, self.column, strict=True)
             if c in columns
         ]
-        return bool(ticks) and variance < (BARE * min(ticks)) ** 2
+        return bool(ticks) and variance < (ROUNDING_NOISE * min(ticks)) ** 2
 
     @property
     def pieces(self) -> tuple[Piece, ...]:
@@ -93,7 +96,7 @@ class Rows:
 
     def squares(self, values: Sequence[FloatArray]) -> FloatArray:
         """Squares of values (C, rows) of each piece in the rows that count, added up for each column of the problem."""
-        return self.added(lambda k, j: values[k][j][self.there[k][j]] ** 2)
+        return self.added(lambda k, j: values[k][j][self.masks[k][j]] ** 2)
 
     def added(self, value_of: Callable[[int, int], FloatArray]) -> FloatArray:
         """What each piece k and its column j has, added up for each column of the problem. Shape (columns,)."""
@@ -163,7 +166,7 @@ class Linear:
 
     def length(self, k: int) -> int:
         """How many white rows a piece has, with those of what is known of its start."""
-        return len(self._starts[k]) if self.rows.own[k].shape[2] else int(self.rows.there[k].sum())
+        return len(self._starts[k]) if self.rows.start_slopes[k].shape[2] else int(self.rows.masks[k].sum())
 
     @property
     def priors(self) -> FloatArray:
@@ -179,7 +182,7 @@ class Linear:
     def _without_start(self, k: int, values: FloatArray) -> FloatArray:
         """Columns of piece k made white, what its start explains projected out."""
         white_columns, start = self.of_piece(k, values), self._starts[k]
-        if not self.rows.own[k].shape[2]:
+        if not self.rows.start_slopes[k].shape[2]:
             return white_columns
         white_columns = np.concatenate(
             [white_columns, np.zeros((len(start) - len(white_columns), white_columns.shape[1]))]
@@ -193,7 +196,7 @@ class Linear:
         return [self._start(k) for k in range(len(self.rows.pieces))]
 
     def _start(self, k: int) -> FloatArray:
-        piece, start_columns = self.rows.pieces[k], self.of_piece(k, self.rows.own[k])
+        piece, start_columns = self.rows.pieces[k], self.of_piece(k, self.rows.start_slopes[k])
         if not start_columns.shape[1]:
             return start_columns
         _, start_information = piece.start_prior(self.rows.point.states[k])
@@ -216,7 +219,7 @@ class Linear:
 
     def of_piece(self, k: int, values: FloatArray) -> FloatArray:
         """Columns of piece k made white, its start, and what its inputs were rounded by, still in them."""
-        ends = np.cumsum([0, *(int(row_mask.sum()) for row_mask in self.rows.there[k])])
+        ends = np.cumsum([0, *(int(row_mask.sum()) for row_mask in self.rows.masks[k])])
         white_rows = np.empty((int(ends[-1]), values.shape[2]))
         for j in range(len(self.rows.column[k])):
             white_rows[ends[j] : ends[j + 1]] = self.of_column(k, j, values[j])
@@ -225,7 +228,7 @@ class Linear:
     def of_column(self, k: int, j: int, values: FloatArray) -> FloatArray:
         """Values (rows, K) of column j of piece k made white, in the rows that count."""
         rows, memory = self.rows, self.memory[self.rows.column[k][j]]
-        row_mask = rows.there[k][j]
+        row_mask = rows.masks[k][j]
         return self._new(k, j, np.ascontiguousarray(values[row_mask])) / np.sqrt(max(memory.variance, TINY))
 
     def _new(self, k: int, j: int, known_gains: FloatArray) -> FloatArray:
@@ -234,7 +237,7 @@ class Linear:
         steps = rows.steps[k][j]
         if memory.remembers and memory.moving is None and (k, j) not in self._gains:
             self._gains[k, j] = memory.gains(steps)
-        return memory.new(known_gains, steps, rows.moves[k][j, rows.there[k][j]], self._gains.get((k, j)))
+        return memory.new(known_gains, steps, rows.moves[k][j, rows.masks[k][j]], self._gains.get((k, j)))
 
     @cached_property
     def _gains(self) -> dict[tuple[int, int], Gains]:
@@ -251,7 +254,7 @@ class Linear:
         arrays = []
         for k, values in enumerate(columns_by_piece):
             values = values - self.rounded_off(k, values)
-            start_slopes = self.rows.own[k]
+            start_slopes = self.rows.start_slopes[k]
             if start_slopes.shape[2]:
                 white_own = self.of_piece(k, start_slopes)
                 values = values - start_slopes @ solved(white_own, self.of_piece(k, values))
@@ -265,9 +268,9 @@ class Linear:
         return self.rows.rounding[k] @ self.rounding[k].predicted(self._without_start(k, values))
 
     def open(self, k: int) -> FloatArray:
-        """What that may be off by, (C, rows, M) of variance 1 each; of many, as few as OPEN leaves room for."""
+        """What that may be off by, (C, rows, M) of variance 1 each; of many, as few as MOST_NUMBERS leaves room for."""
         rounding_columns, root = self.rows.rounding[k], self.rounding[k].open
-        column_limit = max(OPEN // max(rounding_columns[:, :, 0].size, 1), FEWEST)
+        column_limit = max(MOST_NUMBERS // max(rounding_columns[:, :, 0].size, 1), LEAST_COLUMNS)
         return rounding_columns @ (root if root.shape[1] <= column_limit else drawn_together(root, column_limit))
 
     def known(self, columns_by_piece: Shown) -> FloatArray:
@@ -281,7 +284,7 @@ class Linear:
             memory_slopes = np.zeros((1 + memory.order, len(scatter)))
             for k, columns in enumerate(self.rows.column):
                 for j in (j for j, column in enumerate(columns) if column == c):
-                    row_mask, steps = self.rows.there[k][j], self.rows.steps[k][j]
+                    row_mask, steps = self.rows.masks[k][j], self.rows.steps[k][j]
                     column_values = np.ascontiguousarray(columns_by_piece[k][j][row_mask])
                     memory_slopes += memory.leaning(column_values, self._new(k, j, column_values), steps)
             scatter += memory.scatter(memory_slopes / max(memory.variance, TINY))
@@ -298,7 +301,7 @@ class Linear:
                 variance = max(self.memory[c].variance, TINY)
                 if tick <= 0.0 or self.memory[c].remembers:
                     continue
-                row_mask = self.rows.there[k][j]
+                row_mask = self.rows.masks[k][j]
                 angle = (piece.record.outputs[piece.first : piece.last + 1, j] - self.rows.residual[k][j])[row_mask]
                 share = tick**2 / 12.0 / variance
                 noise_square = max(1.0 / share - 1.0, 0.0) / 12.0
@@ -337,7 +340,7 @@ def solved(columns: FloatArray, right: FloatArray) -> FloatArray:
 def solved_by(matrix: FloatArray, right: FloatArray) -> FloatArray:
     """The shortest x with matrix x = right, the matrix (K, K) one of scalar products of columns of length 1."""
     values, vectors = np.linalg.eigh(matrix)
-    kept_values = values > SAME * max(float(values.max(initial=0.0)), TINY)
+    kept_values = values > EIGEN_TOLERANCE * max(float(values.max(initial=0.0)), TINY)
     return vectors[:, kept_values] @ ((vectors[:, kept_values].T @ right).T / values[kept_values]).T
 
 
@@ -347,7 +350,7 @@ def root_of_covariance(columns: FloatArray) -> FloatArray:
     size[size == 0.0] = 1.0
     columns = columns / size
     values, vectors = np.linalg.eigh(columns.T @ columns)
-    kept_values = values > SAME * max(float(values.max(initial=0.0)), TINY)
+    kept_values = values > EIGEN_TOLERANCE * max(float(values.max(initial=0.0)), TINY)
     return vectors[:, kept_values] / np.sqrt(values[kept_values]) / size[:, None]
 
 
@@ -365,13 +368,15 @@ def noise_models(
         for k, columns in enumerate(rows.column):
             for j, column in enumerate(columns):
                 if column == c:
-                    row_mask = rows.there[k][j]
-                    removed = [] if removed_columns is None else [removed_columns[k][j][row_mask]]
-                    series += without_gaps(np.column_stack([residuals[k][j][row_mask], *removed]), rows.steps[k][j])
+                    row_mask = rows.masks[k][j]
+                    removed_list = [] if removed_columns is None else [removed_columns[k][j][row_mask]]
+                    series += without_gaps(
+                        np.column_stack([residuals[k][j][row_mask], *removed_list]), rows.steps[k][j]
+                    )
                     moves += without_gaps(rows.moves[k][j, row_mask], rows.steps[k][j])
-        white_model, adds_up = autoregression(series, 0), rows.problem.columns[c][0] in TRAVEL
+        white_model, is_travel = autoregression(series, 0), rows.problem.columns[c][0] in TRAVEL
         is_white = order_limit == 0 or rows.is_rounding(c, white_model.variance)
-        auto_regressions.append(white_model if is_white else autoregression(series, may_add_up=adds_up, moves=moves))
+        auto_regressions.append(white_model if is_white else autoregression(series, may_add_up=is_travel, moves=moves))
     return auto_regressions
 
 
@@ -384,7 +389,7 @@ def noise_models(
 # Source: B. Widrow, I. Kollar, Quantization Noise (2008).
 
 HARMONICS = 24  # beyond them rounding is as good as white
-APART = 0.2  # of a tick: from there on two rows have no positive correlation
+ROUNDING_DISTANCE = 0.2  # of a tick: from there on two rows have no positive correlation
 
 
 def of_rounding(angle: FloatArray, tick: float, ways: FloatArray, noise_ratio: float = 0.0) -> FloatArray:
@@ -412,6 +417,8 @@ def anew(piece: Piece, residual: FloatArray) -> FloatArray:
             continue
         model = np.nan_to_num(piece.record.outputs[piece.first : piece.last + 1, c] - residual[c]) / tick
         level_distance = np.abs(np.diff(model) - np.round(np.diff(model)))
-        round_ = np.concatenate([[0.0], np.cumsum(np.where(level_distance < APART, level_distance, 1.0))]) // 1.0
+        round_ = (
+            np.concatenate([[0.0], np.cumsum(np.where(level_distance < ROUNDING_DISTANCE, level_distance, 1.0))]) // 1.0
+        )
         new_residual[c, 1:][round_[1:] == round_[:-1]] = np.nan
     return new_residual

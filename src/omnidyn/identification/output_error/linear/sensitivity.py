@@ -18,7 +18,7 @@ from omnidyn.identification.output_error.linear.rows import Linear, Rows, length
 from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.memory.whitening import Weighed
-from omnidyn.identification.output_error.problem.differences import JUMP, LOST, NEARLY, UNEVEN
+from omnidyn.identification.output_error.problem.differences import COUNT_SHARE, GAP_ROWS, JUMP, UNEVEN
 from omnidyn.identification.output_error.problem.parameters import robot_parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Piece, Point, Problem, bounded
 from omnidyn.identification.output_error.problem.record import Record
@@ -28,7 +28,7 @@ from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import per_wheel
 from omnidyn.statement import WARNING, Statement
 
-TRIED = 0.01  # relative change of a fixed number, either way is alike
+TRIAL_CHANGE = 0.01  # relative change of a fixed number, either way is alike
 
 
 def moved_by_the_file(weighed_fit: Weighed, stds_by_key: Mapping[str, float]) -> FloatArray:
@@ -51,7 +51,7 @@ def moved_by_the_file(weighed_fit: Weighed, stds_by_key: Mapping[str, float]) ->
         try:
             for bench, places in benches:
                 number = robot_parameter(bench.robot, key, None, tuple(stds_by_key))
-                step = TRIED * (abs(number.value) or std)
+                step = TRIAL_CHANGE * (abs(number.value) or std)
                 changes = bench.change(number.on(bench.robot, number.value + step))
                 for place, change in zip(places, changes, strict=True):
                     columns_by_piece[place] = change / step
@@ -63,9 +63,9 @@ def moved_by_the_file(weighed_fit: Weighed, stds_by_key: Mapping[str, float]) ->
 
 def as_weighed(weighed_fit: Weighed) -> tuple[Linear, Engine, Point]:
     """(the rows of a fit made white by the memory that it was weighed with, what simulates them, its best point)."""
-    solver, point = weighed_fit.plain.solver, weighed_fit.plain.state.point
+    solver, point = weighed_fit.plain_solution.solver, weighed_fit.plain_solution.state.point
     assert isinstance(solver.problem, Problem)
-    problem, variance = bounded(solver.problem, 1), weighed_fit.plain.state.variance
+    problem, variance = bounded(solver.problem, 1), weighed_fit.plain_solution.state.variance
     engine = solver.engine.on(problem)
     rows = Rows.of(problem, point, engine.residuals(point))
     memory = [
@@ -98,10 +98,10 @@ def members_of(engine: Engine, problem: Problem, point: Point) -> list[tuple[Pro
 #
 # In the tests of a fit all u are random effects, as many as there are stretches (`with_rounding`), and so is what rows
 # that are missing hide: what they may explain is a known cause, and no lack of fit. Inputs that are held
-# for less than HELD leave what the memory of the noise knows.
+# for less than HOLD_TIME leave what the memory of the noise knows.
 
-HELD = 0.1  # [s]
-WIDER = 1.1  # times an interval, from which on what widens it is said
+HOLD_TIME = 0.1  # [s]
+WIDENING_RATIO = 1.1  # times an interval, from which on what widens it is said
 DRAWS = 60  # a variance within a fifth; always the same ones
 SEED = 20_12
 
@@ -110,12 +110,12 @@ def beside_rounding(weighed_fit: Weighed, records: Sequence[Record]) -> tuple[Tr
     """(the trust in a fit, with what inputs in steps may have been rounded by; what is to be said of that)."""
     steps = max(float(input_steps(record).max()) for record in records)
     if not steps:
-        return weighed_fit.known, []
-    uncertainty = weighed_fit.known.beside(moved_by_rounding(weighed_fit))
+        return weighed_fit.uncertainty, []
+    uncertainty = weighed_fit.uncertainty.beside(moved_by_rounding(weighed_fit))
     with np.errstate(divide="ignore", invalid="ignore"):
-        largest_ratio = float(np.nanmax(uncertainty.std / weighed_fit.known.std, initial=1.0))
+        largest_ratio = float(np.nanmax(uncertainty.std / weighed_fit.uncertainty.std, initial=1.0))
     rounded = Statement("rounded_inputs", WARNING, numbers={"step": steps, "wider": largest_ratio})
-    return uncertainty, [rounded] if largest_ratio > WIDER else []
+    return uncertainty, [rounded] if largest_ratio > WIDENING_RATIO else []
 
 
 def moved_by_rounding(weighed_fit: Weighed) -> FloatArray:
@@ -138,7 +138,7 @@ def moved_by_rounding(weighed_fit: Weighed) -> FloatArray:
         gram[np.ix_(other_indices, other_indices)] - coefficients.T @ gram[np.ix_(j, other_indices)]
     ) * np.outer(size[other_indices], size[other_indices])
     rows, white_columns = (
-        _rows(row_problem) for row_problem in (linear.rows.problem, weighed_fit.plain.solver.problem)
+        _rows(row_problem) for row_problem in (linear.rows.problem, weighed_fit.plain_solution.solver.problem)
     )
     return (coefficients * size[other_indices] / size[j, None])[:, 1:] * np.sqrt(
         _share(remaining) / DRAWS * rows / white_columns
@@ -175,7 +175,7 @@ def _stretches(piece: Piece) -> list[tuple[int, int, int, float]]:
         stretches += [
             (w, a, b, float(steps[w]))
             for a, b in pairwise(edges)
-            if inputs[a].any() and t[b - 1] - t[a] >= HELD  # what is off is off
+            if inputs[a].any() and t[b - 1] - t[a] >= HOLD_TIME  # what is off is off
         ]
     return stretches
 
@@ -231,7 +231,7 @@ def _share(products: FloatArray) -> float:
 # beside that, by simulation. Of z there is a share u, even between 0 and 1 and another one at each loss: random effects
 # in the tests of a fit, as inputs that are rounded are, but all of their variance is there.
 
-LASTS = 3.0  # [s] that a change of speed may be seen
+LOSS_TIME = 3.0  # [s] that a change of speed may be seen
 
 
 def losses(piece: Piece) -> IntArray:
@@ -241,11 +241,11 @@ def losses(piece: Piece) -> IntArray:
     """
     record, rows = piece.record, slice(piece.first, piece.last + 1)
     row = np.diff(record.t[rows]) / usual_step(record.t[rows])
-    if record.staggered or record.set_point is not None or np.mean(np.abs(row - np.round(row)) <= UNEVEN) < NEARLY:
+    if record.staggered or record.set_point is not None or np.mean(np.abs(row - np.round(row)) <= UNEVEN) < COUNT_SHARE:
         return np.zeros(0, dtype=int)
     voltage = np.nan_to_num(record.voltage[rows])
     jumps = (np.abs(np.diff(voltage, axis=0)) > JUMP * np.ptp(voltage, axis=0).max()).any(axis=1)
-    return np.flatnonzero(jumps & (row > LOST))
+    return np.flatnonzero(jumps & (row > GAP_ROWS))
 
 
 def shown_by_losses(motion: Motion) -> FloatArray:
@@ -256,7 +256,7 @@ def shown_by_losses(motion: Motion) -> FloatArray:
     voltage[-1] += np.nan_to_num(end - voltage_before)  # it drives no row
     change = np.zeros((len(motion.t), 2 * len(loss_rows), N_AXES))
     for k, row in enumerate(loss_rows.tolist()):
-        last = int(np.searchsorted(motion.t[:-1], motion.t[row + 1] + LASTS))
+        last = int(np.searchsorted(motion.t[:-1], motion.t[row + 1] + LOSS_TIME))
         dt = np.diff(motion.t[row : last + 1])
         dt = np.concatenate([[0.5 * dt[0]] * 2, dt[1:]])
         ways = [
@@ -272,10 +272,10 @@ def shown_by_losses(motion: Motion) -> FloatArray:
 
 LEVELS = 12  # of different size, from which on it is no chance that all are whole steps
 PARTS = 4  # of the least difference of two levels, of which the step may be one
-WHOLE = 0.02  # of a step, by which a level may be beside it: the text of a log is rounded, too
-LEAST = 1e-3  # of the largest input, below which a step does not matter
-SAME = 1e-6  # of the largest input: what is nearer is the same, written otherwise
-FEW = 200  # inputs, which tell soon of most logs that theirs are in no steps
+STEP_TOLERANCE = 0.02  # of a step, by which a level may be beside it: the text of a log is rounded, too
+LEAST_STEP = 1e-3  # of the largest input, below which a step does not matter
+LEVEL_TOLERANCE = 1e-6  # of the largest input: what is nearer is the same, written otherwise
+SAMPLE_INPUTS = 200  # inputs, which tell soon of most logs that theirs are in no steps
 
 
 def as_logged(record: Record) -> FloatArray:
@@ -315,7 +315,7 @@ def _step(column: FloatArray) -> float:
     held_levels = held_levels[np.isfinite(held_levels)]
     largest = float(held_levels.max(initial=0.0))
     if (
-        _apart(held_levels[:FEW], largest).min(initial=largest) < LEAST * largest
+        _apart(held_levels[:SAMPLE_INPUTS], largest).min(initial=largest) < LEAST_STEP * largest
     ):  # nor are those of all of them further apart
         return 0.0
     levels, level_steps = np.unique(np.concatenate([[0.0], held_levels])), _apart(held_levels, largest)
@@ -323,10 +323,10 @@ def _step(column: FloatArray) -> float:
         return 0.0
     for parts in range(1, PARTS + 1):
         step = float(level_steps.min()) / parts
-        if step < LEAST * largest:
+        if step < LEAST_STEP * largest:
             return 0.0
         distance = np.abs(levels / step - np.round(levels / step))
-        if distance.max() <= WHOLE:
+        if distance.max() <= STEP_TOLERANCE:
             return step
     return 0.0
 
@@ -334,4 +334,4 @@ def _step(column: FloatArray) -> float:
 def _apart(held_levels: FloatArray, largest: float) -> FloatArray:
     """The differences of levels, 0 among them."""
     level_steps = np.diff(np.sort(np.concatenate([[0.0], held_levels])))
-    return level_steps[level_steps > SAME * largest]
+    return level_steps[level_steps > LEVEL_TOLERANCE * largest]

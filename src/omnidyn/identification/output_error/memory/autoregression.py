@@ -35,12 +35,12 @@ from omnidyn.identification.output_error.memory.moving import (
 ORDERS = 10.0  # times log10 of the number of rows: the highest order that is tried
 SHARE = 0.1  # of the rows that may be coefficients
 PATIENCE = 15  # orders without a better one, after which none is looked for
-FOLLOWED = 20_000  # rows after which a memory is as good as endless
-MIXED = 2  # order from which on white noise beside errors that remember is asked for
-BLOCK, MORE = 50, 1.5  # rows; standard errors above the power of white noise from which on the same is asked
-MANY = 300_000  # numbers of series, from which it pays to look for columns that say nothing new
+MEMORY_ROWS = 20_000  # rows after which a memory is as good as endless
+MIXED_ORDER = 2  # order from which on white noise beside errors that remember is asked for
+BLOCK, POWER_ERRORS = 50, 1.5  # rows; standard errors above the power of white noise from which on the same is asked
+MANY_NUMBERS = 300_000  # numbers of series, from which it pays to look for columns that say nothing new
 EMPTY = 1e-9  # of the squares of the errors themselves
-ANYWHERE = 1e8  # times the variance of what is new: where errors that add up may begin
+START_VARIANCE = 1e8  # times the variance of what is new: where errors that add up may begin
 
 
 Gains = tuple[FloatArray, FloatArray]  # of innovations.py
@@ -85,7 +85,7 @@ class AutoRegression:
         lower_triangle = np.tri(
             self.order + 1, self.order, -1
         )  # from the last row to those before, by the changes between
-        start = lower_triangle @ self.covariance @ lower_triangle.T + ANYWHERE
+        start = lower_triangle @ self.covariance @ lower_triangle.T + START_VARIANCE
         return np.append(self.coefficients, 0.0) + np.append(1.0, -self.coefficients), start
 
     def gains(self, steps: IntArray) -> Gains:
@@ -147,7 +147,7 @@ class AutoRegression:
         """
         if not self.order:
             return 1.0
-        slowest = min(float(np.abs(np.roots([1.0, *-self.coefficients])).max()), 1.0 - 1.0 / FOLLOWED)
+        slowest = min(float(np.abs(np.roots([1.0, *-self.coefficients])).max()), 1.0 - 1.0 / MEMORY_ROWS)
         return (1.0 + slowest) / (1.0 - slowest)
 
     def leaning(self, ways: FloatArray, new: FloatArray, steps: IntArray) -> FloatArray:
@@ -235,7 +235,7 @@ def _without_empty_axes(stretches: Sequence[FloatArray]) -> Sequence[FloatArray]
 
     What is fitted depends on squares and products of rows summed over columns, which no rotation of columns changes.
     """
-    if sum(stretch.size for stretch in stretches) < MANY:
+    if sum(stretch.size for stretch in stretches) < MANY_NUMBERS:
         return stretches
     products = np.sum([stretch.T @ stretch for stretch in stretches], axis=0)
     eigenvalues, axes = np.linalg.eigh(products[1:, 1:])
@@ -266,7 +266,7 @@ def _fitted(stretches: Sequence[FloatArray], order_limit: int | None) -> tuple[A
     forward_errors = np.ascontiguousarray(np.concatenate(stretches), dtype=float)
     partial, order, variance, cost = _burg(forward_errors, forward_errors.copy(), ends, limit, PATIENCE)
     cost += rows * _log_variance(stretches)
-    if order_limit is None and (order >= MIXED or _slow(stretches)):
+    if order_limit is None and (order >= MIXED_ORDER or _slow(stretches)):
         mixed_partials, slopes, new, mixed_criterion = mixed(stretches)
         if mixed_criterion < cost:
             return AutoRegression(mixed_partials, new, rows, slopes=slopes), mixed_criterion
@@ -282,7 +282,7 @@ def _slow(stretches: Sequence[FloatArray]) -> bool:
     blocks = sum(map(len, sums))
     expected = BLOCK * math.exp(_log_variance(stretches)) * blocks
     return blocks > 0 and sum(float((block_sum**2).sum()) for block_sum in sums) > expected * (
-        1.0 + MORE * math.sqrt(2.0 / blocks)
+        1.0 + POWER_ERRORS * math.sqrt(2.0 / blocks)
     )
 
 

@@ -22,8 +22,8 @@ from omnidyn.compiled.kernel import kernel, part
 
 STARTS = ((0.95, -4.0), (0.8, -3.0), (0.8, 0.0))  # of phi, and of the logarithm of lambda
 LOW, HIGH = (0.0, -16.0), (0.9999, 16.0)
-COLOURED = 3.0  # standard errors of the correlation of neighbours, beyond which what is left is not white
-LEAST = 0.02  # share of the rows that move, and that rest, for the two to be told apart
+WHITE_ERRORS = 3.0  # standard errors of the correlation of neighbours, beyond which what is left is not white
+LEAST_SHARE = 0.02  # share of the rows that move, and that rest, for the two to be told apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ def while_moving(stretches: Sequence[FloatArray], moves: Sequence[BoolArray]) ->
     series, ends = np.ascontiguousarray(np.concatenate(stretches)), np.cumsum([0, *map(len, stretches)])
     moving_mask = np.concatenate(moves)
     rows = len(series)
-    if not LEAST < moving_mask.mean() < 1.0 - LEAST:
+    if not LEAST_SHARE < moving_mask.mean() < 1.0 - LEAST_SHARE:
         return None
     white = rows * math.log(max(float((series**2).sum()) / rows, 1e-300))
 
@@ -84,7 +84,7 @@ def while_moving(stretches: Sequence[FloatArray], moves: Sequence[BoolArray]) ->
     steps = np.ones(rows, np.intp)
     steps[ends[:-1]] = 0
     new = new_while_moving(series[:, :1].copy(), steps, moving_mask, moving.phi, moving.share)[:, 0]
-    is_coloured = abs(float(new[1:] @ new[:-1])) > COLOURED * math.sqrt(rows) * float((new**2).mean())
+    is_coloured = abs(float(new[1:] @ new[:-1])) > WHITE_ERRORS * math.sqrt(rows) * float((new**2).mean())
     return moving if cost < white and not is_coloured else None
 
 
@@ -179,8 +179,8 @@ def _learn(value, x, dx, j, spread, row_variance, spread_slopes, g, h):
 MIXED_STARTS = ((0.95, 0.8), (0.7, 0.4), (0.0, 0.5))  # of phi and theta
 LONGEST = 60  # rows that an autoregression takes to tell the same
 TAIL = 0.05  # of theta^rows: what is left out there
-MOST = 0.9999, TAIL ** (1.0 / LONGEST)  # of phi and theta
-ROUNDS, CLOSE = 40, 0.05  # of Gauss-Newton; of the log likelihood: near enough to its best
+NUMBER_LIMITS = 0.9999, TAIL ** (1.0 / LONGEST)  # of phi and theta
+ROUNDS, LIKELIHOOD_TOLERANCE = 40, 0.05  # of Gauss-Newton; of the log likelihood: near enough to its best
 Look = tuple[float, FloatArray, FloatArray, float]
 STEP = 1e-4  # of the differences that tell how an autoregression moves with the two
 
@@ -196,7 +196,7 @@ def mixed(stretches: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray, floa
         size = max(square / rows, 1e-300)
         return rows * math.log(size) + logs, gradient / size, curvature / size, size
 
-    numbers, _, size, cost = scored(looked, MIXED_STARTS, (-MOST[0], -MOST[1]), MOST)
+    numbers, _, size, cost = scored(looked, MIXED_STARTS, (-NUMBER_LIMITS[0], -NUMBER_LIMITS[1]), NUMBER_LIMITS)
     return *told_by_many(numbers), size, cost + 2.0 * math.log(rows)
 
 
@@ -224,7 +224,7 @@ def scored(
             continue
         gain, numbers, damping = cost - new[0], trial, 0.1 * damping
         cost, gradient, curvature, size = new
-        if gain < CLOSE:
+        if gain < LIKELIHOOD_TOLERANCE:
             break
     return numbers, curvature, size, cost
 

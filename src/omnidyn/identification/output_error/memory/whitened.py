@@ -18,7 +18,7 @@ from omnidyn.identification.output_error.memory.autoregression import AutoRegres
 from omnidyn.identification.output_error.problem.outputs import SPEEDS
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
 
-FORGOTTEN = 1000  # rows missing in a row after which a stretch begins anew
+FORGETTING_ROWS = 1000  # rows missing in a row after which a stretch begins anew
 Rows = tuple[NDArray[np.intp], IntArray]  # which rows of a piece are known, rows since the one before (0: at a start)
 
 
@@ -114,8 +114,8 @@ class NearEngine(Engine[Problem]):
         """Residuals and slopes of every piece, see engines/engine.py."""
         parts = zip(self._cheap.residuals(point), self._off, strict=True)
         return [
-            (residual + off, slopes + extra_slopes, indices)
-            for (residual, slopes, indices), (off, extra_slopes) in parts
+            (residual + residual_change, slopes + extra_slopes, indices)
+            for (residual, slopes, indices), (residual_change, extra_slopes) in parts
         ]
 
 
@@ -144,7 +144,7 @@ def known_rows(piece: Piece, residual: FloatArray, slopes: FloatArray) -> Rows:
     time_steps = np.diff(piece.record.t[piece.first : piece.last + 1][rows])
     usual_time = float(np.median(time_steps)) if time_steps.size else 1.0
     steps = np.concatenate([[0], np.maximum(np.round(time_steps / usual_time), 1.0)]).astype(np.intp)
-    steps[steps > FORGOTTEN] = 0
+    steps[steps > FORGETTING_ROWS] = 0
     return rows, steps
 
 

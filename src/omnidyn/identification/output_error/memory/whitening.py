@@ -52,27 +52,30 @@ from omnidyn.statistics import t_quantile
 
 ROUNDS, TURNS = 6, 20  # of simulations; of memory and numbers in turn between them
 FEW_STEPS = 4  # of one: what the next memory moves is near
-NEARBY = 10.0  # standard errors: after a round that has moved a number further, the next one is no last one either
+NEARBY_ERRORS = (
+    10.0  # standard errors: after a round that has moved a number further, the next one is no last one either
+)
 # Squared distance to the best point, in standard errors, at which a round ends: far from the last one, and near it.
-FAR_OFF, CLOSE_BY = 1.0, 1e-2
-SETTLED = 0.1  # standard errors: a round that moves no number further is the last one
+EARLY_PRECISION, LATE_PRECISION = 1.0, 1e-2
+SETTLED_ERRORS = 0.1  # standard errors: a round that moves no number further is the last one
 LARGEST = 20_000_000  # slopes that are held at once; a log with more keeps the sandwich
 ONE_RATE = 1.1  # greatest over least time between the rows of a column, beyond which rows are no measure of memory
 UNEVEN = 0.05  # share of rows off an even grid that is worth a word
-BENT = 0.25  # of the information expected: less, or four times as much, is a bend that no parabola tells
-COARSE = 0.3  # of a tick: errors of a counted angle that pass what rounding has, 1/sqrt(12), spread it evenly
-FEW = 10.0  # memories in a log, below which the memory itself is hardly known
+BEND_SHARE = 0.25  # of the information expected: less, or four times as much, is a bend that no parabola tells
+COARSE_TICK = 0.3  # of a tick: errors of a counted angle that pass what rounding has, 1/sqrt(12), spread it evenly
+FEW_MEMORIES = 10.0  # memories in a log, below which the memory itself is hardly known
 
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
     """A point and how far it can be trusted. solution: by filtered rows where errors remember, its solver has a
-    WhitenedEngine then. plain: the same point with residuals as they are. known: the trust in `solution`. models: the
-    memory of each column, none where rows are not filtered. warnings: what a reader must know of that."""
+    WhitenedEngine then. plain_solution: the same point with residuals as they are. uncertainty: the trust in
+    `solution`. models: the memory of each column, none where rows are not filtered. warnings: what a reader must know
+    of that."""
 
     solution: Solution
-    plain: Solution
-    known: Trust
+    plain_solution: Solution
+    uncertainty: Trust
     models: Mapping[Column, AutoRegression] = field(default_factory=dict)
     warnings: tuple[Statement, ...] = ()
 
@@ -82,7 +85,7 @@ def why_not(solution: Solution) -> str:
     solver, problem = solution.solver, solution.solver.problem
     if solver.nu:
         return "Student's t has no autoregression here"
-    if (solution.state.variance < (COARSE * solver.tick) ** 2).any():
+    if (solution.state.variance < (COARSE_TICK * solver.tick) ** 2).any():
         return "counts whose rounding is the noise have no autoregression here"
     slopes = sum(
         (p.last - p.first + 1) * len(p.record.columns) * (len(problem.parameters) + len(p.free)) for p in problem.pieces
@@ -90,8 +93,8 @@ def why_not(solution: Solution) -> str:
     if slopes > LARGEST:
         return "the logs are too long for an autoregression"
     for column in problem.columns:
-        least_time, greatest, _ = spacing(problem.pieces, column)
-        if greatest > ONE_RATE * least_time:
+        least_time, greatest_time, _ = spacing(problem.pieces, column)
+        if greatest_time > ONE_RATE * least_time:
             return f"the logs have {column[0]} at several rates"
     return ""
 
@@ -109,19 +112,19 @@ def whitened(solution: Solution, uncertainty_before: Trust, progress: Progress =
     point, movement, blocked_parameters = solution.state.point, np.inf, None
     for iteration in range(ROUNDS):
         progress(Report(f"errors with a memory, round {iteration + 1}"))
-        models, is_far = _straight(solver, point, models), movement > NEARBY
+        models, is_far = _straight(solver, point, models), movement > NEARBY_ERRORS
         engine = near(solver.engine.unfiltered, point) if is_far else solver.engine.unfiltered
-        precision = CLOSE_BY if engine is solver.engine.unfiltered else FAR_OFF
+        precision = LATE_PRECISION if engine is solver.engine.unfiltered else EARLY_PRECISION
         new_solution = _filtered(solver, engine, models, precision).minimise(
             point, FEW_STEPS, blocked_parameters=None if is_far else blocked_parameters
         )
         movement, point, blocked_parameters = (
             _moved(new_solution, point),
             new_solution.state.point,
-            new_solution.blocked,
+            new_solution.blocked_parameters,
         )
         models = _memory(new_solution, _inverse(Normal(new_solution.solver, new_solution.state).information))
-        if not is_far and movement <= SETTLED:
+        if not is_far and movement <= SETTLED_ERRORS:
             break
     filtered_solver = _filtered(solver, solver.engine.unfiltered, models, solver.close)
     new_solution = replace(filtered_solver.minimise(point, blocked_parameters=blocked_parameters), notes=solution.notes)
@@ -152,7 +155,7 @@ def _straight(
             new_solution, _inverse(Normal(new_solution.solver, new_solution.state).information), tangent.moves
         )
         movement, point = _moved(new_solution, point), new_solution.state.point
-        if movement <= SETTLED:
+        if movement <= SETTLED_ERRORS:
             break
     return models
 
@@ -200,8 +203,8 @@ def _memory(
         piece = solver.problem.pieces[k]
         masks = moving_rows(piece, parts[0]) if moves is None else moves[k]
         for column, rows, residual, slopes, steps in _columns(piece, parts):
-            removed = [] if roots_by_piece is None else [slopes @ roots_by_piece[k][parts[2]]]
-            series[column] += without_gaps(np.column_stack([residual, *removed]), steps)
+            removed_list = [] if roots_by_piece is None else [slopes @ roots_by_piece[k][parts[2]]]
+            series[column] += without_gaps(np.column_stack([residual, *removed_list]), steps)
             moving[column] += without_gaps(masks[piece.record.columns.index(column), rows], steps)
     return {
         column: autoregression(stretches, moves=moving[column]) for column, stretches in series.items() if stretches
@@ -263,13 +266,16 @@ def _trusted(new_solution: Solution, uncertainty_before: Trust, models: Mapping[
     degrees = _degrees(new_solution, uncertainty, models)
     filtered_parts = WhitenedEngine(solver.engine.unfiltered, models).residuals(new_solution.state.point)
     widening_factors = widening(
-        solver.problem, filtered_parts, new_solution.state.variance, _of_pieces(new_solution, uncertainty.plain)
+        solver.problem,
+        filtered_parts,
+        new_solution.state.variance,
+        _of_pieces(new_solution, uncertainty.plain_covariance),
     )
     uncertainty = replace(
         uncertainty, covariance=_observed(new_solution, uncertainty) * np.outer(widening_factors, widening_factors)
     )
     compared_numbers = ~uncertainty.open & ~uncertainty_before.open
-    plain_std = np.sqrt(np.diag(uncertainty_before.plain))
+    plain_std = np.sqrt(np.diag(uncertainty_before.plain_covariance))
     ratio = uncertainty.std[compared_numbers] / np.where(
         plain_std[compared_numbers] > 0.0, plain_std[compared_numbers], 1.0
     )
@@ -289,7 +295,7 @@ def _observed(new_solution: Solution, uncertainty: Trust) -> FloatArray:
     Shape (P, P). Where a number is not told or stands at a bound, nothing leads to the ends: it stays as expected.
     """
     solver, point = new_solution.solver, new_solution.state.point
-    if (uncertainty.open | uncertainty.held | ~(uncertainty.std > 0.0)).any():
+    if (uncertainty.open | uncertainty.held_parameters | ~(uncertainty.std > 0.0)).any():
         return uncertainty.covariance
     axes = _root(uncertainty.covariance / np.outer(uncertainty.std, uncertainty.std)) * uncertainty.std[:, None]
     inner_values = solver.inner(point.values)
@@ -302,7 +308,7 @@ def _observed(new_solution: Solution, uncertainty: Trust) -> FloatArray:
     end_distances = np.linalg.norm(np.array(ends[0::2]) - np.array(ends[1::2]), axis=1) / np.linalg.norm(axes, axis=0)
     curvature = (gradients[1::2] - gradients[0::2]) @ axes / end_distances[:, None]
     values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
-    scaled_axes = (axes @ vectors) / np.sqrt(np.clip(values, BENT, 1.0 / BENT))
+    scaled_axes = (axes @ vectors) / np.sqrt(np.clip(values, BEND_SHARE, 1.0 / BEND_SHARE))
     return scaled_axes @ scaled_axes.T
 
 
@@ -313,7 +319,7 @@ def _degrees(new_solution: Solution, uncertainty: Trust, models: Mapping[Column,
         return float(max(uncertainty.degrees, 1))
     solver = new_solution.solver
     memory_slopes = {column: np.zeros((1 + model.order, int(open_numbers.sum()))) for column, model in models.items()}
-    of_pieces = _of_pieces(new_solution, uncertainty.plain)
+    of_pieces = _of_pieces(new_solution, uncertainty.plain_covariance)
     scale = Normal(solver, new_solution.state).scale[open_numbers]
     pieces = zip(
         solver.problem.pieces, solver.engine.unfiltered.residuals(new_solution.state.point), of_pieces, strict=True
@@ -327,7 +333,7 @@ def _degrees(new_solution: Solution, uncertainty: Trust, models: Mapping[Column,
             column_ways = slopes @ ways[parts[2]]
             new = models[column].new(column_ways, steps, moves[piece.record.columns.index(column), rows])
             memory_slopes[column] += models[column].leaning(column_ways, new, steps)
-    variance, scatter = np.diag(uncertainty.plain)[open_numbers], np.zeros(int(open_numbers.sum()))
+    variance, scatter = np.diag(uncertainty.plain_covariance)[open_numbers], np.zeros(int(open_numbers.sum()))
     for column, model in models.items():
         scatter += model.scatter(
             memory_slopes[column] / new_solution.state.variance[solver.problem.columns.index(column)]
@@ -353,8 +359,8 @@ def _statements(
         "widening": uncertainty.widening,
     }
     yield Statement("autocorrelated_noise", NOTE, numbers=numbers)
-    if model.rows < FEW * model.memory:
-        numbers = {"memory": lasts, "times": model.rows / model.memory, "enough": FEW * lasts}
+    if model.rows < FEW_MEMORIES * model.memory:
+        numbers = {"memory": lasts, "times": model.rows / model.memory, "enough": FEW_MEMORIES * lasts}
         yield Statement("short_for_memory", WARNING, f"{longest[0]}[{longest[1]}]", numbers)
     uneven = max(spacing(pieces, column)[2] for column in models)
     if uneven > UNEVEN:
@@ -374,8 +380,8 @@ def _statements(
 # better; this says how sure the one at hand is.
 
 BLOCK = 50  # rows whose errors are summed
-FALSE = 0.01  # of logs in which channels seem to go together and do not
-LEAST = 0.25  # of a variance: a correlation is not known so well that it could take away more
+FALSE_SHARE = 0.01  # of logs in which channels seem to go together and do not
+LEAST_VARIANCE = 0.25  # of a variance: a correlation is not known so well that it could take away more
 
 
 def correlation(problem: Problem, parts: Sequence[Parts]) -> FloatArray | None:
@@ -399,7 +405,7 @@ def correlation(problem: Problem, parts: Sequence[Parts]) -> FloatArray | None:
     pairs = np.triu_indices(count, 1)
     score = float((pair_counts[pairs] * correlations[pairs] ** 2).sum())
     np.fill_diagonal(correlations, 1.0)
-    return correlations if len(pairs[0]) and score > chdtri(len(pairs[0]), FALSE) else None
+    return correlations if len(pairs[0]) and score > chdtri(len(pairs[0]), FALSE_SHARE) else None
 
 
 def widening(
@@ -423,5 +429,5 @@ def widening(
             for d, own_d in enumerate(columns[:c]):
                 cross_terms += 2.0 * rho[own_c, own_d] * (ways[c] * ways[d]).sum(axis=0)
     positive = plain_variances > 0.0
-    variances[positive] = np.sqrt(np.maximum(1.0 + cross_terms[positive] / plain_variances[positive], LEAST))
+    variances[positive] = np.sqrt(np.maximum(1.0 + cross_terms[positive] / plain_variances[positive], LEAST_VARIANCE))
     return variances

@@ -12,33 +12,33 @@ from omnidyn.identification.output_error.problem.problem import ROWS, Parts, Pie
 from omnidyn.identification.output_error.problem.record import SHORTEST, Record
 
 LONGEST = 0.02  # [s] of a row that is made of several: most robots answer more slowly
-KEPT = 3000  # rows of all logs together, which are left at least: as many as `bench wrong_worlds` finds causes in
-WHOLE = 0.9  # of the rows of an output that must hold a number: others have a rate of their own
-FINE = 10  # times as many rows as are looked at, that are simulated for them
+KEPT_ROWS = 3000  # rows of all logs together, which are left at least: as many as `bench wrong_worlds` finds causes in
+WHOLE_SHARE = 0.9  # of the rows of an output that must hold a number: others have a rate of their own
+ROW_FACTOR = 10  # times as many rows as are looked at, that are simulated for them
 
 
 @dataclass(frozen=True, eq=False)
 class Decimated:
-    """problem: with the rows that are kept. whole: with all of them; it is the same one where none is left out.
+    """problem: with the rows that are kept. whole_problem: with all of them; it is the same one where none is left out.
 
     rows: of each piece, which rows of its record are kept. Inputs are means over what is between them, outputs over
     what is nearest to each: noise of all rows is averaged, as a fit to all does. Counts are as measured.
     """
 
     problem: Problem
-    whole: Problem
+    whole_problem: Problem
     rows: Sequence[IntArray]
 
     @classmethod
     def of(cls, problem: Problem) -> Decimated:
-        """As few rows as KEPT and LONGEST allow; all where that is none, of a speed loop, whose ticks count, and where
-        outputs have clocks of their own."""
+        """As few rows as KEPT_ROWS and LONGEST allow; all where that is none, of a speed loop, whose ticks count, and
+        where outputs have clocks of their own."""
         records = {id(piece.record): piece.record for piece in problem.pieces}
         time = sum(float(np.ptp(piece.record.t[[piece.first, piece.last]])) for piece in problem.pieces)
         stride_by_record = {key: _stride(record, problem.pieces, time) for key, record in records.items()}
         if max(stride_by_record.values()) == 1:
             return cls(problem, problem, ())
-        bounded_problem = bounded(problem, row_limit=FINE * ROWS)
+        bounded_problem = bounded(problem, row_limit=ROW_FACTOR * ROWS)
         rows = [_rows(piece, stride_by_record[id(piece.record)]) for piece in bounded_problem.pieces]
         pieces = list[Piece]()
         for key, record in records.items():
@@ -48,9 +48,9 @@ class Decimated:
                 if piece.record is record
             ]
             records[key] = _of_record(record, rows_of_record)
-        for piece, kept in zip(bounded_problem.pieces, rows, strict=True):
+        for piece, piece_rows in zip(bounded_problem.pieces, rows, strict=True):
             record = records[id(piece.record)]
-            first, last = np.searchsorted(record.t, piece.record.t[kept[[0, -1]]]).tolist()
+            first, last = np.searchsorted(record.t, piece.record.t[piece_rows[[0, -1]]]).tolist()
             pieces.append(replace(piece, record=record, first=first, last=last))
         return cls(replace(bounded_problem, pieces=tuple(pieces)), bounded_problem, rows)
 
@@ -60,16 +60,18 @@ class Decimated:
             return problem
         pieces = [
             replace(piece, last=int(kept_rows[piece_here.last - piece_here.first]))
-            for piece, piece_here, kept_rows in zip(self.whole.pieces, problem.pieces, self.rows, strict=True)
+            for piece, piece_here, kept_rows in zip(self.whole_problem.pieces, problem.pieces, self.rows, strict=True)
         ]
-        return replace(self.whole, pieces=tuple(pieces))
+        return replace(self.whole_problem, pieces=tuple(pieces))
 
     def kept(self, parts: Sequence[Parts]) -> list[Parts]:
         """What an engine shows of `all_rows` in the rows that are kept."""
         if not self.rows:
             return list(parts)
         parts_by_piece = []
-        for (residual, slopes, indices), piece, kept_rows in zip(parts, self.whole.pieces, self.rows, strict=True):
+        for (residual, slopes, indices), piece, kept_rows in zip(
+            parts, self.whole_problem.pieces, self.rows, strict=True
+        ):
             rows = kept_rows[kept_rows < piece.first + residual.shape[1]] - piece.first
             counts = np.array(piece.record.ticks) > 0.0
             few_residuals, few_slopes = _nearest(residual, rows), _nearest(slopes, rows)
@@ -82,12 +84,12 @@ def _stride(record: Record, pieces: Sequence[Piece], time: float) -> int:
     """Of how many rows of a record one is kept. time [s]: of all pieces."""
     record_pieces = [piece for piece in pieces if piece.record is record]
     measured = np.concatenate([np.isfinite(record.outputs[piece.first : piece.last + 1]) for piece in record_pieces])
-    if record.set_point is not None or record.staggered or measured.mean(axis=0).min(initial=1.0) < WHOLE:
+    if record.set_point is not None or record.staggered or measured.mean(axis=0).min(initial=1.0) < WHOLE_SHARE:
         return 1
     step = float(
         np.median(np.concatenate([np.diff(record.t[piece.first : piece.last + 1]) for piece in record_pieces]))
     )
-    return max(int(1.001 * min(LONGEST, time / KEPT) / step), 1)
+    return max(int(1.001 * min(LONGEST, time / KEPT_ROWS) / step), 1)
 
 
 def _rows(piece: Piece, stride: int) -> IntArray:

@@ -26,27 +26,30 @@ from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import MAD_TO_STD, TEXT, find_tick, stretches
 
 ORDER = 5  # of the differences: an acceleration that dies away within ten rows is gone from them
-MANY = (2, 3, 4)  # rows at a time, at which errors of each row scatter so many times as much; most of them decide
-LEAST, MOST = 0.7, 10.0  # of the spread of rounding: less is no such difference, more is not coarse beside its noise
-ENOUGH = 100  # differences over moving rows, without which nothing is told
+ROW_SPANS = (2, 3, 4)  # rows at a time, at which errors of each row scatter so many times as much; most of them decide
+LEAST_SPREAD, MOST_SPREAD = (
+    0.7,
+    10.0,
+)  # of the spread of rounding: less is no such difference, more is not coarse beside its noise
+LEAST_DIFFERENCES = 100  # differences over moving rows, without which nothing is told
 JUMP = 0.05  # of the range of an input: after a greater change the acceleration jumps
-LOST = 1.5  # rows of time between two rows, from which on a row is missing and its counts with it
+GAP_ROWS = 1.5  # rows of time between two rows, from which on a row is missing and its counts with it
 UNEVEN = 0.25  # of a row that stamps may be off
-NEARLY = 0.95  # of the rows are such
+COUNT_SHARE = 0.95  # of the rows are such
 SHORT = 20  # rows between two losses, on average; at 25 intervals still hold, and speeds as they are show a misfit
 WANDER = 0.618034  # a share that no small number of rows brings back to where it was
 
 
 @dataclass(frozen=True, eq=False)
 class Differences:
-    """ticks (W,) of the wheels [rad]. stamped: whether each speed is over the time between its own stamps.
+    """ticks (W,) of the wheels [rad]. has_stamps: whether each speed is over the time between its own stamps.
 
-    why: what keeps differences from being added up; None for nothing.
+    reason: what keeps differences from being added up; None for nothing.
     """
 
     ticks: FloatArray
-    stamped: bool
-    why: Statement | None = None
+    has_stamps: bool
+    reason: Statement | None = None
 
 
 def differences(runs: Sequence[Run]) -> Differences | None:
@@ -98,7 +101,7 @@ def _known(values: FloatArray | None) -> bool:
 def _row(run: Run) -> float:
     """The mean time of a row that lacks none [s]: stamps of a coarse clock are right on average only."""
     steps = np.diff(run.t)
-    return float(steps[steps < LOST * np.median(steps)].mean()) if len(steps) else 0.0
+    return float(steps[steps < GAP_ROWS * np.median(steps)].mean()) if len(steps) else 0.0
 
 
 def _way(run: Run, has_stamps: bool) -> FloatArray:
@@ -126,12 +129,12 @@ def _ticks(logs: Sequence[Run], has_stamps: bool) -> FloatArray | None:
 
 def _turned(run: Run, differences_found: Differences) -> tuple[FloatArray, BoolArray]:
     """(ticks of each row (rows, W), NaN where missing; whether a row lacks a wheel, or a row before it, (rows,))."""
-    share = _way(run, differences_found.stamped) / differences_found.ticks
+    share = _way(run, differences_found.has_stamps) / differences_found.ticks
     turned_ticks = np.round(share)
     turned_ticks[np.abs(share - turned_ticks) > 2.0 * TEXT] = np.nan
     measured = np.isfinite(share).any(axis=0)
     lost = np.asarray(np.isnan(turned_ticks[:, measured]).any(axis=1))
-    lost[1:] |= np.diff(run.t) > LOST * _row(run)
+    lost[1:] |= np.diff(run.t) > GAP_ROWS * _row(run)
     return turned_ticks, lost
 
 
@@ -150,14 +153,15 @@ def _adds_up(logs: Sequence[Run], differences_found: Differences) -> bool:
                     ),
                 ]
             )
-            for rows in (1, *MANY)
+            for rows in (1, *ROW_SPANS)
         )
-        if min(map(len, (one_row_steps, *many_row_steps))) >= ENOUGH:
+        if min(map(len, (one_row_steps, *many_row_steps))) >= LEAST_DIFFERENCES:
             level = _level(one_row_steps)
             steady = sum(
-                _level(row_steps) <= rows**0.5 * level for rows, row_steps in zip(MANY, many_row_steps, strict=True)
+                _level(row_steps) <= rows**0.5 * level
+                for rows, row_steps in zip(ROW_SPANS, many_row_steps, strict=True)
             )
-            return LEAST <= level <= MOST and 2 * steady > len(MANY)
+            return LEAST_SPREAD <= level <= MOST_SPREAD and 2 * steady > len(ROW_SPANS)
     return False
 
 
@@ -210,8 +214,8 @@ def _level(high: FloatArray) -> float:
 def _hindrance(logs: Sequence[Run], differences_found: Differences) -> Statement | None:
     """Why such differences cannot be added up; None where they can."""
     steps = [np.diff(run.t) / _row(run) for run in logs if len(run) > 1]
-    whole_steps = np.concatenate([step[step < LOST] for step in steps])
-    if not differences_found.stamped and np.mean(np.abs(whole_steps - 1.0) <= UNEVEN) < NEARLY:
+    whole_steps = np.concatenate([step[step < GAP_ROWS] for step in steps])
+    if not differences_found.has_stamps and np.mean(np.abs(whole_steps - 1.0) <= UNEVEN) < COUNT_SHARE:
         return Statement("uneven_stamps", NOTE)
     rows, missing = sum(map(len, logs)), [_turned(run, differences_found)[1][1:] for run in logs]
     if sum(len(stretches(lost)) for lost in missing) * SHORT > rows:

@@ -22,7 +22,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.statement import NOTE, Statement
 
-APART = 1.001  # S over C at least
+LEVEL_RATIO = 1.001  # S over C at least
 
 
 def falls(name: str, robot: Robot) -> bool:
@@ -67,12 +67,12 @@ def speed_of(name: str, names: Sequence[str]) -> str:
 def kept_in_order(p: Parameter, robot: Robot, names: Sequence[str]) -> Parameter:
     """The parameter with the bound that the other level is, where that one is not free (`names`) and they fall."""
     if falls(p.name, robot) and coulomb_below(p.name, robot) not in names:
-        least_level = APART * float(Key.parse(coulomb_below(p.name, robot)).get(robot))
+        least_level = LEVEL_RATIO * float(Key.parse(coulomb_below(p.name, robot)).get(robot))
         return replace(p, low=max(p.low, least_level), value=max(p.value, least_level))
     breakaway_name = p.name.replace(COULOMB, BREAKAWAY)
     if Key.parse(p.name).level == COULOMB and breakaway_name not in names and falls(breakaway_name, robot):
         hold = _level(breakaway_name, robot)
-        most_level = p.high if hold is None else hold / APART
+        most_level = p.high if hold is None else hold / LEVEL_RATIO
         return replace(p, high=min(p.high, most_level), value=min(p.value, most_level))
     return p
 

@@ -37,14 +37,14 @@ from omnidyn.statistics import difference_noise
 LATENCY, TILT, PUSH = "latency", "tilt", "push"
 NUISANCES = (LATENCY, GAIN, DEAD_BAND, FADE, TILT, PUSH)
 TRAVELS = ("heading", "position", "wheel_angle")  # outputs that count from an unknown start
-EARLIEST, LATEST = -0.1, 0.3  # [s]
+LEAST_LATENCY, MOST_LATENCY = -0.1, 0.3  # [s]
 FILTER = (
     0.03  # [s] of a speed that was smoothed forwards and backwards: so early it shows what the voltage is yet to do
 )
 SUPPLY_STD = 0.1  # of a nominal supply: a battery is full or it is not
 MOST_FADE = 0.9
-SILENT = 5  # rows without voltage that show a robot at rest
-CLEAR = 4.0  # standard errors from 0 that count as motion
+SILENT_ROWS = 5  # rows without voltage that show a robot at rest
+MOTION_ERRORS = 4.0  # standard errors from 0 that count as motion
 LEAD = 5  # rows whose mean is where a free start begins
 
 
@@ -60,7 +60,7 @@ def implausible(name: str, latency: float, fitted: bool = True) -> Statement:
 
 
 def nuisance_parameters(
-    wanted_names: Sequence[str], records: Sequence[Record], robot: Robot, from_: float = EARLIEST
+    wanted_names: Sequence[str], records: Sequence[Record], robot: Robot, from_: float = LEAST_LATENCY
 ) -> list[Parameter]:
     """The nuisances asked for as free parameters; latencies begin at `from_` [s].
 
@@ -80,7 +80,7 @@ def nuisance_parameters(
                 raise InputError("no such channel", got=name, expected=", ".join(channels), where="nuisances")
             parameters.append(_latency(channel, robot))
         elif name == GAIN:
-            prior = (1.0, SUPPLY_STD) if any(record.supplied for record in records) else None
+            prior = (1.0, SUPPLY_STD) if any(record.is_nominal_supply for record in records) else None
             parameters.append(Parameter(GAIN, 1.0, 0.1, 10.0, True, prior))
         elif name == DEAD_BAND:
             largest_voltage = max(float(np.nanmax(np.abs(record.voltage))) for record in records)
@@ -96,12 +96,16 @@ def nuisance_parameters(
     return list({p.name: p for p in parameters}.values())
 
 
-def _latency(channel: str, robot: Robot, from_: float = EARLIEST) -> Parameter:
+def _latency(channel: str, robot: Robot, from_: float = LEAST_LATENCY) -> Parameter:
     """How late a channel is, that of the robot's own drive included, with which it begins."""
     file_latency = robot.drive.latency
     prior = _of_file(robot, KEY_LATE, file_latency)
     return Parameter(
-        f"{LATENCY}.{channel}", file_latency, min(from_, file_latency), max(LATEST, 2.0 * file_latency), prior=prior
+        f"{LATENCY}.{channel}",
+        file_latency,
+        min(from_, file_latency),
+        max(MOST_LATENCY, 2.0 * file_latency),
+        prior=prior,
     )
 
 
@@ -157,7 +161,7 @@ def automatic(records: Sequence[Record], quick: bool = True) -> tuple[str, ...]:
     in the intervals of every fit.
     """
     candidate_names = (LATENCY, DEAD_BAND) if quick else (LATENCY,)
-    return (*candidate_names, GAIN) if any(record.supplied for record in records) else candidate_names
+    return (*candidate_names, GAIN) if any(record.is_nominal_supply for record in records) else candidate_names
 
 
 def pieces(
@@ -192,7 +196,7 @@ def _piece(
         is_at_rest = _begins_at_rest(record, twist, first, last)
     offset = np.array([_mean(record.outputs[rows, c]) if travels[c] else 0.0 for c in range(len(columns))])
     duration = float(record.t[last] - record.t[first])
-    margin = min(LATEST, 0.1 * duration) if has_latency and not is_at_rest else 0.0
+    margin = min(MOST_LATENCY, 0.1 * duration) if has_latency and not is_at_rest else 0.0
     return Piece(
         record,
         first,
@@ -210,10 +214,10 @@ def _begins_at_rest(record: Record, twist: FloatArray | None, first: int, last: 
     Of a voltage that breakaway holds, too: a start that is next to rest would slide away under it. Such a voltage may
     also turn a moving robot round: that takes more rows, and no trend either.
     """
-    stop = min(first + 10 * SILENT, last + 1)
+    stop = min(first + 10 * SILENT_ROWS, last + 1)
     change_rows = np.flatnonzero((record.voltage[first:stop] != record.voltage[first]).any(axis=1))
     rows, is_driven = int(change_rows[0]) if change_rows.size else stop - first, bool(record.voltage[first].any())
-    if rows < (4 * SILENT if is_driven else SILENT) or twist is None:
+    if rows < (4 * SILENT_ROWS if is_driven else SILENT_ROWS) or twist is None:
         return False
     first_speeds = twist[first : first + rows]
     known_speeds = [
@@ -221,7 +225,7 @@ def _begins_at_rest(record: Record, twist: FloatArray | None, first: int, last: 
         for axis in range(first_speeds.shape[1])
         if (finite_rows := np.isfinite(first_speeds[:, axis])).any()
     ]
-    return bool(known_speeds) and all(errors_from_rest(speeds, is_driven) <= CLEAR for speeds in known_speeds)
+    return bool(known_speeds) and all(errors_from_rest(speeds, is_driven) <= MOTION_ERRORS for speeds in known_speeds)
 
 
 def errors_from_rest(speed: FloatArray, trend: bool) -> float:
@@ -245,10 +249,10 @@ def _mean(values: FloatArray) -> float:
 # the
 # dead band. Where the robot visibly became faster, the greatest voltage of the rows before is above the dead band.
 
-FASTER = 5.0  # standard errors by which a robot is faster, of windows by the hundred
+GAIN_ERRORS = 5.0  # standard errors by which a robot is faster, of windows by the hundred
 WINDOWS, LEAST_ROWS = (0.1, 0.3, 0.6), 5  # [s], and at least so many rows, over which a speed is found
 SHARE = 0.1  # of the fastest: less may be noise with a memory
-LASTS = 2  # windows for which it is faster, at least
+LASTING_WINDOWS = 2  # windows for which it is faster, at least
 TOP, OF_MEDIAN = 0.95, 1.2533  # a quantile that stands for the fastest; std error of a median over that of a mean
 
 
@@ -276,7 +280,7 @@ def _of_record(record: Record, robot: Robot) -> float:
                 means.append(_of_speeds(twist[rows] * [1.0, 1.0, reach], width))
             if "heading" in names:
                 means.append(_of_angle(reach * record.outputs[rows, names.index("heading")], t, width))
-            least_voltages = (_least(fast, noise, voltage, width, round(LATEST / step)) for fast, noise in means)
+            least_voltages = (_least(fast, noise, voltage, width, round(MOST_LATENCY / step)) for fast, noise in means)
             least_voltage = min([least_voltage, *least_voltages])
     return least_voltage
 
@@ -306,10 +310,10 @@ def _of_angle(path: FloatArray, t: FloatArray, width: int) -> tuple[FloatArray, 
 
 def _least(fast: FloatArray, noise: float, voltage: FloatArray, width: int, row_shift: int) -> float:
     """The least voltage in force where windows of rows show a robot that became faster, and stayed so."""
-    if len(fast) < LASTS + 2 or not fast.any():
+    if len(fast) < LASTING_WINDOWS + 2 or not fast.any():
         return np.inf
-    clear_gain = max(FASTER * np.sqrt(2.0) * noise, SHARE * float(np.quantile(fast, TOP)))
-    lasting_speed = np.lib.stride_tricks.sliding_window_view(fast[1:], LASTS).min(axis=1)
+    clear_gain = max(GAIN_ERRORS * np.sqrt(2.0) * noise, SHARE * float(np.quantile(fast, TOP)))
+    lasting_speed = np.lib.stride_tricks.sliding_window_view(fast[1:], LASTING_WINDOWS).min(axis=1)
     faster_windows = np.flatnonzero(lasting_speed - fast[: len(lasting_speed)] > clear_gain)
     return min(
         (float(voltage[max(k * width - row_shift, 0) : (k + 2) * width].max()) for k in faster_windows), default=np.inf

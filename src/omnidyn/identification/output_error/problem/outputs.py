@@ -31,7 +31,7 @@ class Outputs:
 
     notes: what was decided on the way.
 
-    unused: what was measured and is not fitted, and why. lost (rows,): rows before which a wheel may have
+    unused_notes: what was measured and is not fitted, and why. lost (rows,): rows before which a wheel may have
     turned by any angle, None where nothing was added up.
     """
 
@@ -39,7 +39,7 @@ class Outputs:
     values: FloatArray
     ticks: tuple[float, ...]
     notes: tuple[Statement, ...]
-    unused: tuple[Statement, ...]
+    unused_notes: tuple[Statement, ...]
     lost: BoolArray | None = None
 
 
@@ -139,8 +139,8 @@ def _counted(
     if count_differences is None or "wheel_speed" not in values_by_output or "wheel_angle" in values_by_output:
         return values_by_output, None, None
     tick = {"tick": float(np.median(count_differences.ticks))}
-    if count_differences.why is not None:
-        notes.append(Statement("counts_as_readings", NOTE, run.source or LOG, tick | {"why": count_differences.why}))
+    if count_differences.reason is not None:
+        notes.append(Statement("counts_as_readings", NOTE, run.source or LOG, tick | {"why": count_differences.reason}))
         return values_by_output, None, None
     angle, lost = added_up(run, count_differences)
     notes.append(Statement("counts_added_up", NOTE, run.source or LOG, tick))
@@ -162,15 +162,15 @@ def _tick(values: FloatArray, given_tick: float | None) -> float:
 # part
 # by the noise of the rate, sqrt(N) sigma dt.
 
-NEAR = 0.2  # of what independent measurements part by
+NOISE_SHARE = 0.2  # of what independent measurements part by
 WINDOWS = (1, 16, 256)  # rows
-ENOUGH, LEAST = 50_000, 30  # rows looked at; windows needed
-SPARSE = 0.2  # of the rows: a channel that is blank in more has a clock of its own
+MOST_ROWS, LEAST_WINDOWS = 50_000, 30  # rows looked at; windows needed
+BLANK_SHARE = 0.2  # of the rows: a channel that is blank in more has a clock of its own
 MEANS, SHIFTS = (1, 2, 3, 4, 5, 8, 10, 16, 20), (0, 1)  # rows of wheels that an odometry averages, and is late by
 GAINS = 0.5, 2.0  # its radius and the robot file's may differ
-POLES, MOST_APART = 2, 20  # of a filter that an odometry comes through, and how many rows of wheels between two of it
+POLES, MOST_TAPS = 2, 20  # of a filter that an odometry comes through, and how many rows of wheels between two of it
 WHITE = 1.5  # third differences of mere noise are 1.8 times the second ones, of a smooth speed less
-TO_STD = MAD_TO_STD / np.sqrt(20.0)  # from the median size of third differences to the noise of a row
+STD_FACTOR = MAD_TO_STD / np.sqrt(20.0)  # from the median size of third differences to the noise of a row
 
 
 def redundant(run: Run, robot: Robot) -> dict[str, str]:
@@ -200,9 +200,9 @@ def _together(
     t: FloatArray, left_values: FloatArray, right_values: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Two channels and their times: only the rows that hold both, where a clock of their own leaves others blank."""
-    t, left_values, right_values = t[:ENOUGH], left_values[:ENOUGH], right_values[:ENOUGH]
+    t, left_values, right_values = t[:MOST_ROWS], left_values[:MOST_ROWS], right_values[:MOST_ROWS]
     known_rows = np.isfinite(left_values).any(axis=1) & np.isfinite(right_values).any(axis=1)
-    rows = np.flatnonzero(known_rows) if known_rows.mean() < 1.0 - SPARSE else slice(None)
+    rows = np.flatnonzero(known_rows) if known_rows.mean() < 1.0 - BLANK_SHARE else slice(None)
     return t[rows], left_values[rows], right_values[rows]
 
 
@@ -215,9 +215,9 @@ def is_wheel_odometry(run: Run, robot: Robot) -> bool:
     """
     if run.twist is None or run.wheel_speed is None or run.wheel_speed.shape[1] != robot.wheels.count:
         return False
-    speed, twist = run.wheel_speed[:ENOUGH], run.twist[:ENOUGH]
+    speed, twist = run.wheel_speed[:MOST_ROWS], run.twist[:MOST_ROWS]
     wheels, rows = (np.flatnonzero(np.isfinite(channel).all(axis=1)) for channel in (speed, twist))
-    if len(wheels) < LEAST + max(MEANS) or len(rows) < LEAST:
+    if len(wheels) < LEAST_WINDOWS + max(MEANS) or len(rows) < LEAST_WINDOWS:
         return False
     body = twist_from_wheel_speed(robot.wheels, speed[wheels])
     third, second = (np.median(np.abs(np.diff(body, order, axis=0)), axis=0) for order in (3, 2))
@@ -227,14 +227,14 @@ def is_wheel_odometry(run: Run, robot: Robot) -> bool:
     last = np.searchsorted(wheels, rows, side="right")
     usable_rows = last >= max(MEANS) + max(SHIFTS)
     last, logged_twist = last[usable_rows], twist[rows[usable_rows]]
-    if len(last) < LEAST:
+    if len(last) < LEAST_WINDOWS:
         return False
     for count in MEANS:
         for shift in SHIFTS:
             mean = (sums[last - shift] - sums[last - shift - count]) / count
-            if _is_same(logged_twist, mean, TO_STD * third / np.sqrt(count)):
+            if _is_same(logged_twist, mean, STD_FACTOR * third / np.sqrt(count)):
                 return True
-    return _is_filtered(twist[rows], body, np.searchsorted(wheels, rows, side="right") - 1, TO_STD * third, second)
+    return _is_filtered(twist[rows], body, np.searchsorted(wheels, rows, side="right") - 1, STD_FACTOR * third, second)
 
 
 def _is_filtered(
@@ -252,9 +252,9 @@ def _is_filtered(
     usable_rows = np.flatnonzero(last >= taps)
     usable_rows = usable_rows[usable_rows >= POLES]
     if (
-        not 0 < row_spacing <= MOST_APART
-        or len(usable_rows) < LEAST + 3 * (taps + POLES)
-        or not (noise / TO_STD > WHITE * second).all()
+        not 0 < row_spacing <= MOST_TAPS
+        or len(usable_rows) < LEAST_WINDOWS + 3 * (taps + POLES)
+        or not (noise / STD_FACTOR > WHITE * second).all()
     ):
         return False
     for axis in range(logged_twist.shape[1]):
@@ -263,7 +263,7 @@ def _is_filtered(
         table = np.column_stack([*past_outputs, *past_inputs])
         coefficients, *_ = np.linalg.lstsq(table, logged_twist[usable_rows, axis])
         rms_error = np.sqrt(np.mean((logged_twist[usable_rows, axis] - table @ coefficients) ** 2))
-        if not rms_error <= NEAR * noise[axis] * float(np.linalg.norm(coefficients[POLES:])):
+        if not rms_error <= NOISE_SHARE * noise[axis] * float(np.linalg.norm(coefficients[POLES:])):
             return False
     return True
 
@@ -273,7 +273,7 @@ def _is_same(logged_twist: FloatArray, mean: FloatArray, noise: FloatArray) -> b
     power = (mean**2).sum(axis=0)
     gain = np.where(power > 0.0, (logged_twist * mean).sum(axis=0) / np.where(power > 0.0, power, 1.0), 1.0)
     rms_error = np.sqrt(np.mean((logged_twist - gain * mean) ** 2, axis=0))
-    return bool(((gain > GAINS[0]) & (gain < GAINS[1]) & (rms_error <= NEAR * noise)).all())
+    return bool(((gain > GAINS[0]) & (gain < GAINS[1]) & (rms_error <= NOISE_SHARE * noise)).all())
 
 
 def goes_along(change: FloatArray, trial_changes: Iterator[FloatArray], rate: FloatArray, t: FloatArray) -> bool:
@@ -281,19 +281,19 @@ def goes_along(change: FloatArray, trial_changes: Iterator[FloatArray], rate: Fl
     K)."""
     third = np.abs(np.diff(rate, 3, axis=0))
     third = third[np.isfinite(third).all(axis=1)]
-    if len(third) < LEAST:
+    if len(third) < LEAST_WINDOWS:
         return False
-    noise = TO_STD * np.median(third, axis=0)
-    noise = np.where(noise > 0.0, noise, TO_STD * third.mean(axis=0)) * usual_step(t)
+    noise = STD_FACTOR * np.median(third, axis=0)
+    noise = np.where(noise > 0.0, noise, STD_FACTOR * third.mean(axis=0)) * usual_step(t)
     for trial_change in trial_changes:
         deviation = change - trial_change
         deviation = deviation[np.isfinite(deviation).all(axis=1)]
         for rows in WINDOWS:
             count = len(deviation) // rows
-            if count < LEAST:
+            if count < LEAST_WINDOWS:
                 break
             block_sums = deviation[: count * rows].reshape(count, rows, -1).sum(axis=1)
-            if (np.sqrt(np.mean(block_sums**2, axis=0)) <= NEAR * np.sqrt(rows) * noise).all():
+            if (np.sqrt(np.mean(block_sums**2, axis=0)) <= NOISE_SHARE * np.sqrt(rows) * noise).all():
                 return True
     return False
 

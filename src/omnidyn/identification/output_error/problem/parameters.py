@@ -20,7 +20,7 @@ SPAN = 1e4  # a number that must be positive stays within so many times its star
 SPAN_OF_SPEED = 30.0  # the same of a speed at which friction changes: far beyond, it changes nothing, or in no time
 LIGHT = 1e-3  # of its start, that what spins stays above: it has no place where it would be off, but slopes need a size
 
-WITHIN = 0.95  # of the distance of the wheels: as far as a centre of mass may be ahead, or aside
+OFFSET_SHARE = 0.95  # of the distance of the wheels: as far as a centre of mass may be ahead, or aside
 LARGEST = 700.0  # e^709 is the last float
 
 
@@ -30,7 +30,8 @@ class Parameter:
 
     name: key of the robot file, or of a nuisance. value: where it starts. low, high: bounds. prior: (mean, std) of what
     is known beforehand, in the unit of the value; of a `log` number std over mean is that of its logarithm, so that
-    half and twice of a rough guess are equally far from it. also: other keys of the robot file, tied by a factor.
+    half and twice of a rough guess are equally far from it. tied_numbers: other keys of the robot file, tied by a
+    factor.
     """
 
     name: str
@@ -39,7 +40,7 @@ class Parameter:
     high: float
     log: bool = False
     prior: tuple[float, float] | None = None
-    also: tuple[tuple[str, float], ...] = ()
+    tied_numbers: tuple[tuple[str, float], ...] = ()
 
     @property
     def part(self) -> str:
@@ -69,7 +70,7 @@ class Parameter:
     def on(self, robot: Robot, value: float) -> Robot:
         """The robot with this number and those tied to it; not checked, for speed."""
         robot = Key.parse(self.name).set(robot, value, checked=False)
-        for key, factor in self.also:
+        for key, factor in self.tied_numbers:
             robot = Key.parse(key).set(robot, factor * value, checked=False)
         return robot
 
@@ -96,7 +97,7 @@ def robot_parameter(
     if place.level:
         return Parameter(key, value, 0.0, FRICTION_LIMIT, prior=prior)
     if place.name == CENTRE:
-        widest_offset = WITHIN * max(np.atleast_1d(robot.wheels.robot_radius).tolist())
+        widest_offset = OFFSET_SHARE * max(np.atleast_1d(robot.wheels.robot_radius).tolist())
         return Parameter(key, value, -widest_offset, widest_offset, prior=prior)
     if value <= 0.0:
         raise InputError("cannot be free", got=f"{key} = {value:g}", expected="a number above 0", where="free")

@@ -32,8 +32,9 @@ class Record:
     """One run. t (rows,); voltage (rows, W); outputs (rows, C), columns named by (channel, index).
 
     ticks (C,): of columns that are counts [rad], 0 for the others. pieces: (first, last) rows of what has no gap.
-    supplied: whether the voltage is a duty times a supply that was not logged. notes: what was decided on the way.
-    unused: what the log holds and a fit does not use, and why.
+    is_nominal_supply: whether the voltage is a duty times a supply that was not logged. notes: what was decided on the
+    way.
+    unused_notes: what the log holds and a fit does not use, and why.
     set_point (rows, W): set speeds of the wheels [rad/s] where the loop in the firmware makes the voltage, which is 0
     here then; else None. run: what it was read from.
 
@@ -47,10 +48,10 @@ class Record:
     ticks: tuple[float, ...]
     pieces: tuple[tuple[int, int], ...]
     source: str
-    supplied: bool
+    is_nominal_supply: bool
     notes: tuple[Statement, ...]
     set_point: FloatArray | None = None
-    unused: tuple[Statement, ...] = ()
+    unused_notes: tuple[Statement, ...] = ()
     run: Run | None = None
 
     def __post_init__(self) -> None:
@@ -153,7 +154,7 @@ def record(
         is_nominal_supply,
         (*notes, *log_outputs.notes),
         set_point,
-        (*_unused_inputs(run, set_point is not None), *log_outputs.unused),
+        (*_unused_inputs(run, set_point is not None), *log_outputs.unused_notes),
         run,
     )
 

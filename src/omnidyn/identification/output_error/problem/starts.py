@@ -30,20 +30,21 @@ if TYPE_CHECKING:
 
 WINDOW = 0.15  # [s], and at least so many rows:
 LEAST_ROWS, EDGE = 6, 3  # of a window; averaged at each of its ends
-CLEAR = 4.0  # standard errors of the noise that a speed must be away from 0
+MOTION_ERRORS = 4.0  # standard errors of the noise that a speed must be away from 0
 LEAST_WINDOWS = 8
 SLOPE = 0.05  # [s] over which an angle or a position is differentiated
-ENOUGH = 200_000  # rows of a piece that are looked at
+MOST_ROWS = 200_000  # rows of a piece that are looked at
 SAMPLE = 1500  # rows for a median
 
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """One axis: rows (windows, 3) of int g, int v, int sgn v, and the change of v. most: largest |g| in motion."""
+    """One axis: rows (windows, 3) of int g, int v, int sgn v, and the change of v. largest_drive: largest |g| in
+    motion."""
 
     design: FloatArray
     change: FloatArray
-    most: float
+    largest_drive: float
 
 
 def measured_twist(record: Record, robot: Robot) -> FloatArray | None:
@@ -116,7 +117,7 @@ def integral_start(mapping: PrimitiveMap, values: FloatArray, records: Sequence[
         change = np.concatenate([part.change for part in parts])
         if len(change) >= LEAST_WINDOWS:
             rate, level = np.linalg.lstsq(design[:, 1:], design[:, 0] - change, rcond=None)[0]
-            largest_drive = max(part.most for part in parts)
+            largest_drive = max(part.largest_drive for part in parts)
             rates_and_levels[:, axis] = max(rate, 0.05), min(max(level, 0.0), largest_drive)
     return rates_and_levels
 
@@ -137,7 +138,7 @@ def friction_values(mapping: PrimitiveMap, values: FloatArray, rates_and_levels:
 
 def _parts(record: Record) -> list[tuple[int, int, int]]:
     """(first, last, rows of a window) of what is looked at of each piece."""
-    ends = [(first, min(last, first + ENOUGH)) for first, last in record.pieces]
+    ends = [(first, min(last, first + MOST_ROWS)) for first, last in record.pieces]
     return [(first, last, window_rows(record, first, last)) for first, last in ends]
 
 
@@ -150,7 +151,7 @@ def _windows(
         if last - first < 2 * rows or np.isfinite(twist[first : last + 1, axis]).sum() < 2 * LEAST_ROWS:
             continue
         noise = difference_noise(twist[first : last + 1, axis])
-        clear_speed = CLEAR * noise / np.sqrt(measured_rows(twist[first : last + 1, axis], max(rows // 2, 1)))
+        clear_speed = MOTION_ERRORS * noise / np.sqrt(measured_rows(twist[first : last + 1, axis], max(rows // 2, 1)))
         design, change, window_drive = window_sums(
             record.t, record.voltage, twist, axis, first, last, drive, rows, clear_speed
         )
@@ -204,11 +205,11 @@ def window_sums(t, u, y, axis, first, last, drive, rows, clear_speed):
     v, mean = _smoothed(y, axis, first, last, max(rows // 2, 1))
     count, largest_drive = last - first + 1, 0.0
     side, total = np.empty(count), np.zeros((4, count + 1))
-    sums, same = np.zeros(3), np.ones(count, np.int64)
+    sums, side_rows = np.zeros(3), np.ones(count, np.int64)
     for k in range(count):
         side[k] = 0.0 if abs(mean[k]) <= clear_speed else (1.0 if mean[k] > 0.0 else -1.0)
         if k > 0:
-            same[k] = same[k - 1] + 1 if side[k] == side[k - 1] else 1
+            side_rows[k] = side_rows[k - 1] + 1 if side[k] == side[k - 1] else 1
             dt, g = t[first + k] - t[first + k - 1], 0.0
             for w in range(len(drive)):
                 g += drive[w] * u[first + k - 1, w]
@@ -222,16 +223,16 @@ def window_sums(t, u, y, axis, first, last, drive, rows, clear_speed):
         total[3, k + 1] = total[3, k] + v[k]
     step = max(rows // 2, 1)
     size = max((count - rows) // step + 1, 0)
-    design, change, used = np.empty((size, 3)), np.empty(size), 0
-    for begin in range(0, count - rows + 1, step):
-        stop = begin + rows
-        if side[stop - 1] == 0.0 or same[stop - 1] < rows:
+    design, change, window_count = np.empty((size, 3)), np.empty(size), 0
+    for first_row in range(0, count - rows + 1, step):
+        stop = first_row + rows
+        if side[stop - 1] == 0.0 or side_rows[stop - 1] < rows:
             continue
         for i in range(4):
-            ends = total[i, stop] - total[i, stop - EDGE] - total[i, begin + EDGE] + total[i, begin]
+            ends = total[i, stop] - total[i, stop - EDGE] - total[i, first_row + EDGE] + total[i, first_row]
             if i < 3:
-                design[used, i] = ends / EDGE
+                design[window_count, i] = ends / EDGE
             else:
-                change[used] = ends / EDGE
-        used += 1
-    return design[:used], change[:used], largest_drive
+                change[window_count] = ends / EDGE
+        window_count += 1
+    return design[:window_count], change[:window_count], largest_drive

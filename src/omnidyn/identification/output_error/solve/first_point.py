@@ -23,11 +23,11 @@ from omnidyn.model.keys import FRICTION, find_key
 from omnidyn.model.robot import Robot
 
 CURRENTS, MOTOR = f"{LATENCY}.current", "motor"
-MANY = 100_000  # rows to which a long log is first fitted
-FEW = 1500  # the same for the implicit engine
+MANY_ROWS = 100_000  # rows to which a long log is first fitted
+FEW_ROWS = 1500  # the same for the implicit engine
 LATENCIES = 500  # steps for their median
-LESS = (0.3, 0.1, 0.03)  # shares of its friction with which a robot may move as the log does
-NEAR = 0.1  # squared distance to the best point, in standard errors, that is near
+FRICTION_SHARES = (0.3, 0.1, 0.03)  # shares of its friction with which a robot may move as the log does
+NEAR_PRECISION = 0.1  # squared distance to the best point, in standard errors, that is near
 BIAS = 1e-4  # the same per row: what a step a row is off by does not shrink with the rows
 
 
@@ -43,7 +43,7 @@ def first_point(solver: Solver, records: Sequence[Record]) -> State:
     integral_point = integral_start(mapping, start_point.values[:count], records)
     values = start_point.values.copy()
     values[:count] = friction_values(mapping, start_point.values[:count], integral_point)
-    short = problem.shortened(MANY)
+    short = problem.shortened(MANY_ROWS)
     trial = solver if short is problem else Solver(short, ExactEngine(short))
     states = [trial.state(start_point), trial.state(Point(values, start_point.states))]
     best = _with_latencies(trial, min(states, key=lambda state: state.objective))
@@ -86,18 +86,18 @@ def coarse_point(problem: Problem, nu: float, progress: FitProgress, base_soluti
     same pieces with other nuisances, near which it begins."""
     progress.enter("looking for a start")
     rows = sum(piece.last - piece.first for piece in problem.pieces)
-    solver = Solver(problem, ImplicitEngine.of(problem), nu, max(NEAR, BIAS * rows))
+    solver = Solver(problem, ImplicitEngine.of(problem), nu, max(NEAR_PRECISION, BIAS * rows))
     if base_solution is not None:
         values = dict(zip(base_solution.solver.problem.names, base_solution.state.point.values.tolist(), strict=True))
         near_point = Point(
             np.array([values.get(p.name, p.value) for p in problem.parameters]), base_solution.state.point.states
         )
         return solver.minimise(near_point, progress=progress).state
-    short, start_point = problem.shortened(FEW), moving_start(problem, nu, progress)
+    short, start_point = problem.shortened(FEW_ROWS), moving_start(problem, nu, progress)
     if short is problem:
         return solver.minimise(start_point, progress=progress).state
     short_point = (
-        Solver(short, ImplicitEngine.of(short), nu, NEAR)
+        Solver(short, ImplicitEngine.of(short), nu, NEAR_PRECISION)
         .minimise(start_point, progress=progress.aside("a part of the log first"))
         .state.point
     )
@@ -116,7 +116,7 @@ def _timed(problem: Problem, point: Point, nu: float, progress: FitProgress) -> 
     if LATENCY not in parts or (MOTOR not in parts and problem.where(CURRENTS) < 0):
         return point
     held_problem = _on_time(problem)
-    first = Solver(held_problem, ImplicitEngine.of(held_problem), nu, NEAR).minimise(
+    first = Solver(held_problem, ImplicitEngine.of(held_problem), nu, NEAR_PRECISION).minimise(
         point, progress=progress.aside("motors first")
     )
     return _with_latencies(Solver(problem, ImplicitEngine.of(problem), nu), first.state).point
@@ -163,7 +163,7 @@ def _by_rates(problem: Problem, point: Point, nu: float, progress: FitProgress) 
     than their path, so that the better one of both is taken.
     """
     held_problem = _on_time(problem)
-    solver = Solver(held_problem, RateEngine(held_problem), nu, NEAR, counts_ticks=False)
+    solver = Solver(held_problem, RateEngine(held_problem), nu, NEAR_PRECISION, counts_ticks=False)
     rate_point = solver.minimise(point, progress=progress.aside("rates before paths")).state.point
     return Point(rate_point.values, point.states)
 
@@ -183,7 +183,9 @@ def _levels_first(problem: Problem, point: Point, nu: float, progress: FitProgre
     )
     first = replace(problem, parameters=held_parameters)
     inner_progress = progress.aside("levels of friction first")
-    return Solver(first, ImplicitEngine.of(first), nu, NEAR).minimise(point, progress=inner_progress).state.point
+    return (
+        Solver(first, ImplicitEngine.of(first), nu, NEAR_PRECISION).minimise(point, progress=inner_progress).state.point
+    )
 
 
 def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
@@ -191,14 +193,14 @@ def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
 
     With the latencies that go with it. Where outputs add up, the better one of that and what their rates say.
     """
-    start_point, short = problem.start(), problem.shortened(FEW)
+    start_point, short = problem.start(), problem.shortened(FEW_ROWS)
     solver = Solver(short, ImplicitEngine.of(short), nu)
     friction = np.array([p.part == FRICTION for p in problem.parameters], bool)
     points = [
         start_point,
         *(
             Point(np.where(friction, share * start_point.values, start_point.values), start_point.states)
-            for share in LESS
+            for share in FRICTION_SHARES
         ),
     ]
     costs = side_by_side(lambda point: solver.state(point).objective, points)

@@ -16,7 +16,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InsufficientDataError, UnsupportedError
 from omnidyn.identification.methods import FREE, REST
 from omnidyn.identification.output_error.engines.speed_loop import SLOW_LOOP, LoopEngine
-from omnidyn.identification.output_error.problem.nuisances import EARLIEST, LATEST, TRAVELS
+from omnidyn.identification.output_error.problem.nuisances import LEAST_LATENCY, MOST_LATENCY, TRAVELS
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
@@ -28,19 +28,19 @@ from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import GIVEN, Robot
 from omnidyn.statement import WARNING, Statement
 
-FINE = 1e-3  # [m/s] tolerance at the end of a fit; it begins with a step a tick
+FINE_TOLERANCE = 1e-3  # [m/s] tolerance at the end of a fit; it begins with a step a tick
 SETTING_OFF = 60  # rows of each log on which starts are tried
-STILL = 3  # rows at the beginning in which nothing may move
-CLEAR = 6.0  # standard errors, of the scatter of these rows, that count as motion
+STILL_ROWS = 3  # rows at the beginning in which nothing may move
+MOTION_ERRORS = 6.0  # standard errors, of the scatter of these rows, that count as motion
 LATENCY, CURRENTS = "latency", "latency.current"
 DRIVE, MOTOR = "drive", "motor"
-AROUND = 3  # periods of the loop, each way, in which a latency of the currents is tried
+LATENCY_PERIODS = 3  # periods of the loop, each way, in which a latency of the currents is tried
 GAIN_FACTORS, LEVEL_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0), (0.3, 1.0, 3.0)
-LATE = (0.0, 0.02, 0.05, 0.1, 0.15)  # [s]
+TRIAL_LATENCIES = (0.0, 0.02, 0.05, 0.1, 0.15)  # [s]
 BEST = 2  # of the starts from which the fit is carried on
-FAR = (1.0, -1.0, 3.0, -3.0, 6.0, -6.0)  # standard errors by which a gain is moved
-LESS, ROUNDS = 1.0, 10  # of -log likelihood that counts as another branch; how often
-FEW = 8  # iterations of each before the better one is taken
+GAIN_MOVES = (1.0, -1.0, 3.0, -3.0, 6.0, -6.0)  # standard errors by which a gain is moved
+BRANCH_GAIN, ROUNDS = 1.0, 10  # of -log likelihood that counts as another branch; how often
+FEW_ITERATIONS = 8  # iterations of each before the better one is taken
 SHARES = (0.25, 0.5)  # of the longest log, from its start on, that are fitted before all of it
 
 
@@ -103,14 +103,14 @@ def loop_pieces(records: Sequence[Record], robot: Robot, start: str) -> list[Pie
 
 def left_out(records: Sequence[Record], pieces: Sequence[Piece]) -> list[Statement]:
     """Which logs and pieces are not used."""
-    used_records, unused = {id(piece.record) for piece in pieces}, []
+    used_records, unused_notes = {id(piece.record) for piece in pieces}, []
     moving = sum(id(record) not in used_records for record in records)
     later_count = sum(len(record.pieces) > 1 for record in records if id(record) in used_records)
     if moving:
-        unused.append(Statement("begins_in_motion", WARNING, numbers={"logs": moving, "of": len(records)}))
+        unused_notes.append(Statement("begins_in_motion", WARNING, numbers={"logs": moving, "of": len(records)}))
     if later_count:
-        unused.append(Statement("used_to_first_gap", WARNING, numbers={"logs": later_count}))
-    return unused
+        unused_notes.append(Statement("used_to_first_gap", WARNING, numbers={"logs": later_count}))
+    return unused_notes
 
 
 def _begins_at_rest(twists: Sequence[FloatArray], first: int, last: int) -> bool:
@@ -123,9 +123,9 @@ def _begins_at_rest(twists: Sequence[FloatArray], first: int, last: int) -> bool
             axis_speeds[np.isfinite(axis_speeds)] for axis_speeds in (twist[first : last + 1, axis] for twist in twists)
         ]
         speed = max(speeds, key=len, default=np.zeros(0))
-        first_speeds = speed[:STILL]
+        first_speeds = speed[:STILL_ROWS]
         scatter = float(np.std(np.diff(speed))) / np.sqrt(2.0 * len(first_speeds)) if len(speed) > 1 else 0.0
-        if len(first_speeds) and not abs(float(first_speeds.mean())) <= CLEAR * scatter:
+        if len(first_speeds) and not abs(float(first_speeds.mean())) <= MOTION_ERRORS * scatter:
             return False
     return True
 
@@ -148,10 +148,12 @@ def _piece(record: Record, first: int, last: int) -> Piece:
 def solve_loop(problem: Problem, nu: float, progress: FitProgress) -> Solution:
     """Several starts with a step a tick, on what sets off; then all of it, as well as it must be."""
     first = Solver(problem, LoopEngine(problem), nu)
-    coarse_solution = _motors_first(first, first.minimise(loop_start(problem, nu, progress), FEW, progress), progress)
+    coarse_solution = _motors_first(
+        first, first.minimise(loop_start(problem, nu, progress), FEW_ITERATIONS, progress), progress
+    )
     coarse_solution = first.minimise(retimed(first, coarse_solution.state.point, progress), progress=progress)
     progress.enter("the same as exactly as it must be")
-    fine_solver = Solver(problem, LoopEngine(problem, FINE), nu)
+    fine_solver = Solver(problem, LoopEngine(problem, FINE_TOLERANCE), nu)
     return beyond_jumps(fine_solver.minimise(coarse_solution.state.point, progress=progress), progress)
 
 
@@ -171,7 +173,7 @@ def _motors_first(solver: Solver, coarse_solution: Solution, progress: FitProgre
     first = Solver(held_problem, solver.engine.on(held_problem), solver.nu).minimise(
         problem.start(), progress=inner_progress
     )
-    motor_solution = solver.minimise(first.state.point, FEW, progress.below(coarse_solution.state.objective))
+    motor_solution = solver.minimise(first.state.point, FEW_ITERATIONS, progress.below(coarse_solution.state.objective))
     return min(coarse_solution, motor_solution, key=lambda solution: solution.state.objective)
 
 
@@ -196,14 +198,16 @@ def retimed(solver: Solver, point: Point, progress: FitProgress) -> Point:
     row = min(p.step for p in short.pieces)
     if not current_indices or not period:
         return point
-    reach = range(-AROUND, AROUND + 1) if period >= SLOW_LOOP * row else (-1, 0)  # a fast loop settles between rows
+    reach = (
+        range(-LATENCY_PERIODS, LATENCY_PERIODS + 1) if period >= SLOW_LOOP * row else (-1, 0)
+    )  # a fast loop settles between rows
     places = (0.0, *(float(point.values[j]) for j in latency_indices))
     near_latencies = sorted({int(np.floor(place / period)) + k for place in places for k in reach})
     middles = (np.array(near_latencies) + 0.5) * period
     trial = Solver(short, solver.engine.on(short), nu)
     for j in current_indices:
         latency, states = float(point.values[j]), []
-        trials = (latency, *middles[(middles > EARLIEST) & (middles < LATEST)])
+        trials = (latency, *middles[(middles > LEAST_LATENCY) & (middles < MOST_LATENCY)])
         for k, trial_latency in enumerate(trials):
             progress.counted(f"trying {problem.names[j]},", k, len(trials))
             values = point.values.copy()
@@ -221,13 +225,13 @@ def shortened(problem: Problem, rows: int) -> Problem:
 def best_start(solver: Solver, progress: FitProgress) -> Point:
     """The best of several starts: all gains, all friction and all latencies by factors, then a few steps of each."""
     problem, below_progress = solver.problem, progress.below()
-    delays = _if_any(problem, LATENCY, LATE, 0.0)
+    delays = _if_any(problem, LATENCY, TRIAL_LATENCIES, 0.0)
     by_delay = _tried(solver, [(trial_delay, 1.0, 1.0) for trial_delay in delays], "latencies", below_progress)
     delay = delays[int(np.argmin([state.objective for state in by_delay]))]
     levels, gains = _if_any(problem, FRICTION, LEVEL_FACTORS), _if_any(problem, DRIVE, GAIN_FACTORS)
     factors = [(delay, *pair) for pair in itertools.product(levels, gains)]
     states = sorted(_tried(solver, factors, "friction and gains", below_progress), key=lambda state: state.objective)
-    solutions = [solver.minimise(state.point, FEW, below_progress) for state in states[:BEST]]
+    solutions = [solver.minimise(state.point, FEW_ITERATIONS, below_progress) for state in states[:BEST]]
     return min(solutions, key=lambda solution: solution.state.objective).state.point
 
 
@@ -268,13 +272,15 @@ def beyond_jumps(solution: Solution, progress: FitProgress) -> Solution:
     progress.enter("looking for a better branch, beyond jumps of the likelihood")
     if not np.any(solver.problem.robot.drive.ki) or not solver.engine.meets_limit(solution.state.point):
         return solution
-    grown_solution = solver.minimise(_grown(solver, solution.state.point), FEW, below_progress)
+    grown_solution = solver.minimise(_grown(solver, solution.state.point), FEW_ITERATIONS, below_progress)
     solution = min(solution, grown_solution, key=lambda candidate: candidate.state.objective)
     gains = [j for j, p in enumerate(solver.problem.parameters) if p.part == DRIVE]
     for _ in range(ROUNDS):
         better_state = next(_branches(solver, solution, gains, progress), None)
-        new_solution = None if better_state is None else solver.minimise(better_state.point, FEW, below_progress)
-        if new_solution is None or new_solution.state.objective >= solution.state.objective - LESS:
+        new_solution = (
+            None if better_state is None else solver.minimise(better_state.point, FEW_ITERATIONS, below_progress)
+        )
+        if new_solution is None or new_solution.state.objective >= solution.state.objective - BRANCH_GAIN:
             break
         solution = new_solution
     return solver.minimise(solution.state.point, progress=below_progress)
@@ -289,7 +295,7 @@ def _grown(solver: Solver, point: Point) -> Point:
     longest = max(p.last - p.first for p in solver.problem.pieces)
     for share in SHARES:
         short = shortened(solver.problem, max(int(share * longest), SETTING_OFF))
-        short_solution = Solver(short, solver.engine.on(short), solver.nu, solver.close).minimise(point, FEW)
+        short_solution = Solver(short, solver.engine.on(short), solver.nu, solver.close).minimise(point, FEW_ITERATIONS)
         point = Point(short_solution.state.point.values, point.states)
     return point
 
@@ -298,13 +304,13 @@ def _branches(solver: Solver, solution: Solution, gains: Sequence[int], progress
     """States at some standard errors in a gain where F has risen by less than it should have, nearest first."""
     normal = Normal(solver, solution.state)
     covariance = np.linalg.pinv(normal.information, hermitian=True)
-    ways = [*itertools.product(FAR, gains)]
+    ways = [*itertools.product(GAIN_MOVES, gains)]
     for k, (distance, j) in enumerate(ways):
         progress.counted("looking for a better branch, beyond jumps of the likelihood,", k, len(ways))
         step = distance * covariance[:, j] / np.sqrt(max(covariance[j, j], 1e-300))
         values = solver.outer(solver.clipped(normal.inner + step))
         state = solver.state(Point(values, solution.state.point.states), _scale(solver, solution))
-        if state.objective < solution.state.objective + 0.5 * distance * distance - LESS:
+        if state.objective < solution.state.objective + 0.5 * distance * distance - BRANCH_GAIN:
             yield state
 
 

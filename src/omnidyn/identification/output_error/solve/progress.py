@@ -11,7 +11,7 @@ import numpy as np
 from omnidyn.identification.output_error.solve.solver import State
 from omnidyn.progress import Progress, Report, silent
 
-WORTH = 2.0  # [s] of a search that are told
+LEAST_SECONDS = 2.0  # [s] of a search that are told
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Best:
     """The best of a fit so far: a state of all that is fitted, or, before there is one, of each group alone."""
 
     state: State | None
-    alone: Mapping[str, State]
+    states_by_group: Mapping[str, State]
 
 
 class FitProgress:
@@ -60,7 +60,9 @@ class FitProgress:
         time_now = monotonic()
         self._begun = time_now if k == 0 else self._begun
         time_left = (time_now - self._begun) / k * (total - k) if k else 0.0
-        self.enter(f"{words} {k + 1} of {total}" + (f", about {time_left:.0f} s left" if time_left >= WORTH else ""))
+        self.enter(
+            f"{words} {k + 1} of {total}" + (f", about {time_left:.0f} s left" if time_left >= LEAST_SECONDS else "")
+        )
 
     def below(self, objective: float = np.inf) -> FitProgress:
         """The same, of a search that goes several ways: sees only states below all before, and below `objective`."""

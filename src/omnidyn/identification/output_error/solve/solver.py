@@ -22,18 +22,23 @@ from omnidyn.progress import Progress, Report
 from omnidyn.statement import Statement
 
 MAX_ITERATIONS = 60
-CLOSE = 1e-5  # squared distance to the best point, in standard errors, at which it ends
-ENOUGH = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
+END_PRECISION = 1e-5  # squared distance to the best point, in standard errors, at which it ends
+KINK_PRECISION = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
 CREEP, STEPS = 3.0, 2  # times `close`, that so many steps in a row each lower F by less than: they creep along a kink
-FAR = 100.0  # squared distance to the best point, in standard errors, beyond which a bend is not that of the end
+BEND_DISTANCE = (
+    100.0  # squared distance to the best point, in standard errors, beyond which a bend is not that of the end
+)
 DAMPING, LEAST_DAMPING = 1e-4, 1e-10
-FIRM, SHORT = 1e-2, 10.0  # least damping after a step that failed; that of a step with what was blocked at an edge
+FIRM_DAMPING, SHORT_DAMPING = (
+    1e-2,
+    10.0,
+)  # least damping after a step that failed; that of a step with what was blocked at an edge
 PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
-UNSEEN = 1e-100  # information on the start of a piece that is none: divided by it, nothing is finite
+NO_INFORMATION = 1e-100  # information on the start of a piece that is none: divided by it, nothing is finite
 SCALE_CHANGE = 1e-3  # of a variance, relative, at which it counts as found
 
 
-FASTEST = np.array([30.0, 30.0, 300.0])  # [m/s, m/s, rad/s] no robot sets off faster; a step astray would not end
+SPEED_LIMITS = np.array([30.0, 30.0, 300.0])  # [m/s, m/s, rad/s] no robot sets off faster; a step astray would not end
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,20 +54,22 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where the minimisation ended. held: parameters at a bound that they push against. converged: or cut short.
+    """Where the minimisation ended. held_parameters: parameters at a bound that they push against. converged: or cut
+    short.
 
-    solver: which found it. blocked: latencies that stand at an edge. notes: what is to be said of the way there.
-    plain: the fit without nuisances that it was chosen beside.
+    solver: which found it. blocked_parameters: latencies that stand at an edge. notes: what is to be said of the way
+    there.
+    plain_solution: the fit without nuisances that it was chosen beside.
     """
 
     state: State
-    held: BoolArray
+    held_parameters: BoolArray
     iterations: int
     converged: bool
     solver: Solver[Any]
-    blocked: BoolArray | None = None
+    blocked_parameters: BoolArray | None = None
     notes: tuple[Statement, ...] = ()
-    plain: Solution | None = None
+    plain_solution: Solution | None = None
 
 
 class Solver(Generic[P]):
@@ -73,11 +80,16 @@ class Solver(Generic[P]):
     """
 
     def __init__(
-        self, problem: P, engine: Engine[P], nu: float = 0.0, precision: float = CLOSE, counts_ticks: bool = True
+        self,
+        problem: P,
+        engine: Engine[P],
+        nu: float = 0.0,
+        precision: float = END_PRECISION,
+        counts_ticks: bool = True,
     ):
         self.problem, self.engine, self.nu, self.close, self.counted = problem, engine, nu, precision, counts_ticks
         self.creep = (
-            CREEP * precision if precision > CLOSE else 0.0
+            CREEP * precision if precision > END_PRECISION else 0.0
         )  # a speed loop may creep for long, and yet find its way
         self.tick = problem.tick if counts_ticks else np.zeros(len(problem.columns))
         self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)
@@ -90,7 +102,7 @@ class Solver(Generic[P]):
         given_variance = np.ones(len(self.problem.columns)) if variance is None else variance
         scaled = self.scaled & (bool(self.nu) or variance is not None)
         sums = self.engine.sums(
-            point, Weighting(given_variance, self.nu, counted=bool(self.tick.any()) and variance is not None)
+            point, Weighting(given_variance, self.nu, counts_ticks=bool(self.tick.any()) and variance is not None)
         )
         count = per_column(sums, len(given_variance), "number")
         mean = per_column(sums, len(given_variance), "square") / np.maximum(count, 1.0)
@@ -152,9 +164,9 @@ class Solver(Generic[P]):
                 bend.learn(normal.inner, normal.gradient, normal.information)
             still_parameters, shift = held_parameters | blocked_parameters, np.zeros(len(held_parameters))
             while not is_better and (distance := normal.distance_without(still_parameters)) / (1.0 + damping) > (
-                self.close if damping < FIRM else max(ENOUGH, self.close)
+                self.close if damping < FIRM_DAMPING else max(KINK_PRECISION, self.close)
             ):
-                if distance > FAR:
+                if distance > BEND_DISTANCE:
                     bend.forget()
                 moved_point = normal.moved(
                     damping, still_parameters, bend.beside(normal.information, still_parameters), shift
@@ -173,7 +185,7 @@ class Solver(Generic[P]):
                 if not is_better and bend.known:
                     bend.forget()
                     continue
-                damping = max(damping / 10.0, LEAST_DAMPING) if is_better else max(damping * 10.0, FIRM)
+                damping = max(damping / 10.0, LEAST_DAMPING) if is_better else max(damping * 10.0, FIRM_DAMPING)
                 state = trial if is_better else state
             slow_steps = slow_steps + 1 if is_better and objective_before - state.objective < self.creep else 0
             if self.scaled.any():
@@ -185,7 +197,7 @@ class Solver(Generic[P]):
             if (
                 not is_better and blocked_parameters.any() and not is_released
             ):  # a shorter step may stay this side of the edge
-                blocked_parameters, is_released, damping = np.zeros_like(blocked_parameters), True, SHORT
+                blocked_parameters, is_released, damping = np.zeros_like(blocked_parameters), True, SHORT_DAMPING
             elif not is_better and change < SCALE_CHANGE:  # close enough, or no way down: a kink
                 return Solution(state, held_parameters, iteration + 1, True, self, blocked_parameters)
         return Solution(state, held_parameters, limit, False, self, blocked_parameters)
@@ -329,7 +341,7 @@ class Normal:
             if grad.shape[0] > k:
                 damped_information = _damped(info, damping)
                 new += of_states(damped_information[k:, k:], grad[k:] - damped_information[k:, :k] @ step)
-                new[: len(FASTEST)] = np.clip(new[: len(FASTEST)], -FASTEST, FASTEST)
+                new[: len(SPEED_LIMITS)] = np.clip(new[: len(SPEED_LIMITS)], -SPEED_LIMITS, SPEED_LIMITS)
             states.append(new)
         return Point(self.solver.outer(inner_values), tuple(states))
 
@@ -366,12 +378,12 @@ def _weighted(
     grad[start] += start_prior[0]
     info[start, start] += start_prior[1]
     state_information = info.diagonal()[count:]
-    if not state_information.max(initial=0.0) > UNSEEN:
+    if not state_information.max(initial=0.0) > NO_INFORMATION:
         return grad[:count], info[:count, :count]
-    unseen_states = state_information <= UNSEEN
-    unseen_states[: len(FASTEST)] |= state_information[: len(FASTEST)] < FASTEST**-2
-    speeds, pull = states[: len(FASTEST)], grad[count : count + len(FASTEST)]
-    unseen_states[: len(FASTEST)] |= (np.abs(speeds) >= FASTEST) & (np.sign(speeds) * pull > 0.0)
+    unseen_states = state_information <= NO_INFORMATION
+    unseen_states[: len(SPEED_LIMITS)] |= state_information[: len(SPEED_LIMITS)] < SPEED_LIMITS**-2
+    speeds, pull = states[: len(SPEED_LIMITS)], grad[count : count + len(SPEED_LIMITS)]
+    unseen_states[: len(SPEED_LIMITS)] |= (np.abs(speeds) >= SPEED_LIMITS) & (np.sign(speeds) * pull > 0.0)
     state_indices = np.flatnonzero(unseen_states) + count
     grad[state_indices], info[state_indices, :], info[:, state_indices] = 0.0, 0.0, 0.0
     info[state_indices, state_indices] = 1.0

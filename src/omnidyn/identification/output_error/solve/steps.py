@@ -8,17 +8,17 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import BoolArray, FloatArray
-from omnidyn.identification.output_error.engines.engine import LATE
-from omnidyn.identification.output_error.problem.friction_laws import APART, coulomb_below
+from omnidyn.identification.output_error.engines.engine import LATENCY_PREFIX
+from omnidyn.identification.output_error.problem.friction_laws import LEVEL_RATIO, coulomb_below
 from omnidyn.identification.output_error.problem.parameters import AT
 from omnidyn.identification.output_error.problem.problem import Fitted
 from omnidyn.model.keys import BREAKAWAY, find_key
 
-MEET = 1e-12  # relative: nearer than this, S stands at its bound
+BOUND_TOLERANCE = 1e-12  # relative: nearer than this, S stands at its bound
 
 
 class Order:
-    """Pairs (S, C) of the parameters of a problem: S >= APART C."""
+    """Pairs (S, C) of the parameters of a problem: S >= LEVEL_RATIO C."""
 
     def __init__(self, problem: Fitted):
         names = [p.name for p in problem.parameters]
@@ -34,22 +34,24 @@ class Order:
     def kept(self, inner_values: FloatArray) -> FloatArray:
         """The same numbers (P,), S raised where it is below C; in place."""
         for s, c in self.pairs:
-            inner_values[s] = max(inner_values[s], APART * inner_values[c])
+            inner_values[s] = max(inner_values[s], LEVEL_RATIO * inner_values[c])
         return inner_values
 
     def at_bound(self, inner_values: FloatArray, gradient: FloatArray) -> BoolArray:
         """Which S stand at C and are pushed against it."""
         held_parameters = np.zeros(len(inner_values), bool)
         for s, c in self.pairs:
-            held_parameters[s] = inner_values[s] <= APART * inner_values[c] * (1.0 + MEET) and gradient[s] < 0.0
+            held_parameters[s] = (
+                inner_values[s] <= LEVEL_RATIO * inner_values[c] * (1.0 + BOUND_TOLERANCE) and gradient[s] < 0.0
+            )
         return held_parameters
 
     def together(self, inner_values: FloatArray, still_parameters: BoolArray) -> FloatArray:
         """T (P, P): the step is T times that of what is not still, so that S goes with C; else the identity."""
         fold = np.eye(len(inner_values))
         for s, c in self.pairs:
-            if still_parameters[s] and inner_values[s] <= APART * inner_values[c] * (1.0 + MEET):
-                fold[s, c] = APART
+            if still_parameters[s] and inner_values[s] <= LEVEL_RATIO * inner_values[c] * (1.0 + BOUND_TOLERANCE):
+                fold[s, c] = LEVEL_RATIO
         return fold
 
 
@@ -58,7 +60,7 @@ class Order:
 # A current follows the voltage at once, so that its latency meets a jump at every row. What follows the current meets a
 # kink there: where the log has no latency, the floor of a valley.
 
-CURRENT = f"{LATE}current"
+CURRENT = f"{LATENCY_PREFIX}current"
 ENOUGH_ROWS = 500  # for their median
 
 
@@ -68,7 +70,7 @@ class Edges:
     def __init__(self, problem: Fitted):
         names = [p.name.partition("@")[0] for p in problem.parameters]
         jumps, latency_mask = (
-            np.array([name.startswith(prefix) for name in names], bool) for prefix in (CURRENT, LATE)
+            np.array([name.startswith(prefix) for name in names], bool) for prefix in (CURRENT, LATENCY_PREFIX)
         )
         self._kinds, self._kinks = (jumps, latency_mask), latency_mask & ~jumps
         self._row = _row(problem) if latency_mask.any() else 0.0
@@ -108,8 +110,8 @@ def _row(problem: Fitted) -> float:
 # that of Gauss-Newton; the update is that of A. R. Conn, N. I. M. Gould, P. L. Toint, Math. Program. 50, 177 (1991)).
 
 FLAT, STEEP = -0.8, 3.0  # times the information along any way: what a step is told of a bend lies between
-ALONG = 1e-6  # a change of the gradient that has less than this share along the step says nothing
-UNSEEN = 1e-13  # of the largest information: ways with less are none
+CURVATURE_SHARE = 1e-6  # a change of the gradient that has less than this share along the step says nothing
+INFORMATION_SHARE = 1e-13  # of the largest information: ways with less are none
 
 
 class Bend:
@@ -128,7 +130,7 @@ class Bend:
         step = inner_values - last[0]
         missing = np.where(step != 0.0, last[1] - gradient - (information + self._matrix) @ step, 0.0)
         curvature, size = float(missing @ step), _size(information)
-        if abs(curvature) > ALONG * float(np.linalg.norm(missing / size) * np.linalg.norm(step * size)):
+        if abs(curvature) > CURVATURE_SHARE * float(np.linalg.norm(missing / size) * np.linalg.norm(step * size)):
             self._matrix += np.outer(missing, missing) / curvature
             self.known = True
 
@@ -147,7 +149,7 @@ class Bend:
         free_block = np.ix_(free, free)
         size = _size(information)[free]
         values, ways = np.linalg.eigh(information[free_block] / np.outer(size, size))
-        seen_values = values > UNSEEN * max(float(values.max()), 0.0)
+        seen_values = values > INFORMATION_SHARE * max(float(values.max()), 0.0)
         root, inverse_root = (
             ways[:, seen_values] * np.sqrt(values[seen_values]),
             ways[:, seen_values] / np.sqrt(values[seen_values]),

@@ -36,19 +36,23 @@ from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report, silent
 
 LIMIT = 7.35 / 2.0
-COARSE, NARROWER = 24, 0.2  # levels tried in a round, and the share of the range that the next one looks at
+ROUND_LEVELS, ROUND_SHARE = 24, 0.2  # levels tried in a round, and the share of the range that the next one looks at
 HIGHEST = 3.0  # S/C is 1.1 to 1.6 in the literature
 REFIT = 8  # iterations at each level
-FAR = 12  # plateaus without a likely one after which the interval ends
-GRID, ANEW = 20, 7  # levels that the implicit engine begins with, and once more
-WIDER = 1.07  # how far that reaches beyond the first ends
-FEW, NEAR, TOL = 4, 0.1, 1e-3  # iterations of it at each; squared standard errors to its best point; [m/s]
+UNLIKELY_PLATEAUS = 12  # plateaus without a likely one after which the interval ends
+GRID, NEW_LEVELS = 20, 7  # levels that the implicit engine begins with, and once more
+RANGE_FACTOR = 1.07  # how far that reaches beyond the first ends
+FEW_ITERATIONS, NEAR_PRECISION, TOL = (
+    4,
+    0.1,
+    1e-3,
+)  # iterations of it at each; squared standard errors to its best point; [m/s]
 LEVEL = 1.0  # of F above the least, within which the middle of the likely levels is as good as the best
 
 
 @dataclass(frozen=True)
 class Breakaway:
-    """A level S by its key, and its 95 % interval [N, N m]; it is at least coulomb. tied: S = coulomb is as likely.
+    """A level S by its key, and its 95 % interval [N, N m]; it is at least coulomb. is_tied: S = coulomb is as likely.
 
     moves (P, K): what S being known only so far moves the others by, in the numbers that the solver sees: their
     covariance is moves moves^T; None where that is not looked for.
@@ -58,7 +62,7 @@ class Breakaway:
     value: float
     low: float
     high: float
-    tied: bool
+    is_tied: bool
     moves: FloatArray | None = None
 
 
@@ -187,7 +191,7 @@ def find_breakaway(
             else:
                 axis_profile = _by_a_grid(solution, levels, name, limit, profile_by_name.get(name), progress)
             levels = levels | {
-                name: 0.0 if axis_profile.tied and axis_profile.value <= axis_profile.low else axis_profile.value
+                name: 0.0 if axis_profile.is_tied and axis_profile.value <= axis_profile.low else axis_profile.value
             }
             solution = with_levels(solver, levels).minimise(solution.state.point)
             profiles.append(axis_profile)
@@ -275,15 +279,15 @@ def _traded(
     lowest = min(map(profile.cost, profile.known))
     for name in group:
         edge_levels, first_profile = [at(place)[name] for place in walk.edges], profile_by_name[name]
-        falls = [place for place in walk.gone if at(place)[name] < least_levels[name]]
+        falls = [place for place in walk.lost_places if at(place)[name] < least_levels[name]]
         slides = any(profile.beside(levels | at(place) | {name: 0.0}, place) <= lowest + limit for place in falls)
-        is_tied, low, high = first_profile.tied or slides, max(min(edge_levels), coulomb[name]), max(edge_levels)
+        is_tied, low, high = first_profile.is_tied or slides, max(min(edge_levels), coulomb[name]), max(edge_levels)
         high = high if high < HIGHEST * coulomb[name] else np.inf
         profile_by_name[name] = replace(
             first_profile,
             low=0.0 if is_tied else min(low, first_profile.low),
             high=max(high, first_profile.high),
-            tied=is_tied,
+            is_tied=is_tied,
         )
 
 
@@ -292,18 +296,20 @@ def _by_the_engine(
 ) -> _Profile:
     """A profile by the implicit engine, at a tolerance that is enough to tell levels apart."""
     engine_solver, listener = solution.solver, progress or silent
-    solver = Solver(engine_solver.problem, engine_solver.engine.of(engine_solver.problem, TOL), engine_solver.nu, NEAR)
+    solver = Solver(
+        engine_solver.problem, engine_solver.engine.of(engine_solver.problem, TOL), engine_solver.nu, NEAR_PRECISION
+    )
 
     def listen(report: Report) -> None:
         listener(report._replace(phase=f"{in_words(name)}, {report.phase}"))
 
-    return _Profile(solver, ways, solution.state.point, FEW, True, listen)
+    return _Profile(solver, ways, solution.state.point, FEW_ITERATIONS, True, listen)
 
 
 def _steeper(solver: Solver, uncertainty: Trust, name: str) -> float:
     """What the likelihood is too steep by where residuals are not white, as for coulomb; 1 where they are."""
     key = coulomb_below(name, solver.problem.robot)
-    if key in solver.problem.names and not uncertainty.blind[j := solver.problem.names.index(key)]:
+    if key in solver.problem.names and not uncertainty.blind_parameters[j := solver.problem.names.index(key)]:
         return uncertainty.rise(np.eye(len(uncertainty.std))[j]) / RISE
     return uncertainty.widening**2 if uncertainty.kind == SANDWICH else 1.0
 
@@ -353,8 +359,12 @@ def _by_a_grid(
         return Breakaway(name, 0.0, 0.0, np.inf, True)
     lowest_level, highest_level, count = coulomb, HIGHEST * coulomb, GRID
     if profile_before is not None and np.isfinite(profile_before.high):
-        lowest_level, highest_level, count = max(profile_before.low / WIDER, coulomb), WIDER * profile_before.high, ANEW
-    grid = np.geomspace(lowest_level, max(highest_level, WIDER * lowest_level), count).tolist()
+        lowest_level, highest_level, count = (
+            max(profile_before.low / RANGE_FACTOR, coulomb),
+            RANGE_FACTOR * profile_before.high,
+            NEW_LEVELS,
+        )
+    grid = np.geomspace(lowest_level, max(highest_level, RANGE_FACTOR * lowest_level), count).tolist()
     best, low, high = likely_levels(profile.cost, grid, limit)
     middle = float(np.sqrt(low * high)) if np.isfinite(high) else best
     value = middle if profile.cost(middle) <= profile.cost(best) + LEVEL else best
@@ -383,12 +393,12 @@ def _search(profile: _Profile, middles: FloatArray) -> tuple[int, int]:
     """Index of the best plateau, by ever finer rounds; and half the width of the last round."""
     low, high = 0, len(middles) - 1
     while True:
-        trial_indices = np.unique(np.linspace(low, high, COARSE).round().astype(int))
+        trial_indices = np.unique(np.linspace(low, high, ROUND_LEVELS).round().astype(int))
         costs = [profile.cost(float(middles[k])) for k in trial_indices]
         best = int(trial_indices[int(np.argmin(costs))])
         if len(trial_indices) == high - low + 1:
             return best, max(high - low, 1)
-        half = max(int(NARROWER * (high - low) / 2.0), COARSE // 2 - 1)
+        half = max(int(ROUND_SHARE * (high - low) / 2.0), ROUND_LEVELS // 2 - 1)
         low, high = max(best - half, 0), min(best + half, len(middles) - 1)
         if high - low >= len(trial_indices) * 4 and half == 0:
             return best, 1
@@ -396,14 +406,16 @@ def _search(profile: _Profile, middles: FloatArray) -> tuple[int, int]:
 
 def _descend(profile: _Profile, middles: FloatArray, best: int, reach: int) -> int:
     """The best plateau near `best`, the other numbers now fitted from there."""
-    near_indices = range(max(best - min(reach, FAR), 0), min(best + min(reach, FAR), len(middles) - 1) + 1)
+    near_indices = range(
+        max(best - min(reach, UNLIKELY_PLATEAUS), 0), min(best + min(reach, UNLIKELY_PLATEAUS), len(middles) - 1) + 1
+    )
     return min(near_indices, key=lambda k: profile.cost(float(middles[k])))
 
 
 def _walk(profile: _Profile, middles: FloatArray, best: int, way: int, limit: float) -> int:
     """Index of the last likely plateau from `best` in one direction."""
     last, k, unlikely_count = best, best, 0
-    while 0 <= k + way < len(middles) and unlikely_count < FAR:
+    while 0 <= k + way < len(middles) and unlikely_count < UNLIKELY_PLATEAUS:
         k += way
         if profile.cost(float(middles[k])) <= limit:
             last, unlikely_count = k, 0

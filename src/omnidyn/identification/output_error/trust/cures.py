@@ -30,10 +30,13 @@ from omnidyn.simulation.simulate import simulate
 from omnidyn.statement import NOTE, Statement
 
 EXACT = 30.0  # times its numbers that a direction may go: the same to the log, and not only nearly
-TRIED, SEEN = 1e-3, 0.01  # size of the change that is tried; share of it in a channel from which that shows it
+TRIAL_CHANGE, SEEN_SHARE = (
+    1e-3,
+    0.01,
+)  # size of the change that is tried; share of it in a channel from which that shows it
 ROWS, STEP, HOLD = 1000, 0.01, 50  # of an experiment: rows, their length [s], rows of one level
-MOST = 5  # cures that are named
-MEASURABLE = (
+MOST_CURES = 5  # cures that are named
+MEASURABLE_KEYS = (
     "body.mass_kg",
     "wheels.wheel_radius_m",
     "wheels.robot_radius_m",
@@ -88,7 +91,7 @@ def _direction(
     indices = np.flatnonzero(way.step)
     names = [problem.names[j].partition("@")[0] for j in indices]
     changes = {name: 0.01 * _relative(problem, values, way, int(j)) for name, j in zip(names, indices, strict=True)}
-    cures = tuple(dict.fromkeys(_cures(problem, values, way, names, moving_axes, drives)))[:MOST]
+    cures = tuple(dict.fromkeys(_cures(problem, values, way, names, moving_axes, drives)))[:MOST_CURES]
     return Blind(changes, way.reach > EXACT, cures)
 
 
@@ -101,7 +104,7 @@ def _relative(problem: Problem, values: FloatArray, way: Way, j: int) -> float:
 def _cures(
     problem: Problem, values: FloatArray, way: Way, names: list[str], moving_axes: BoolArray, drives: Sequence[_Drive]
 ) -> Iterator[str]:
-    yield from (measurable for measurable in MEASURABLE if any(_is(name, measurable) for name in names))
+    yield from (measurable for measurable in MEASURABLE_KEYS if any(_is(name, measurable) for name in names))
     if not drives:
         return
     of_the_log, of_all_axes = drives
@@ -137,7 +140,7 @@ class _Drive:
     volts: FloatArray
     dt: FloatArray
     start: FloatArray
-    before: Mapping[str, FloatArray]
+    channels_before: Mapping[str, FloatArray]
 
     @classmethod
     def of(cls, problem: Problem, values: FloatArray, volts: FloatArray, dt: FloatArray, start: FloatArray) -> _Drive:
@@ -148,13 +151,13 @@ class _Drive:
         other_values = values.copy()
         for j in np.flatnonzero(way.step):
             p = problem.parameters[j]
-            other_values[j] = p.outer(p.inner(float(values[j])) + TRIED * float(way.step[j]))
+            other_values[j] = p.outer(p.inner(float(values[j])) + TRIAL_CHANGE * float(way.step[j]))
         channels_after, differs_by_channel = _channels(problem, other_values, self.volts, self.dt, self.start), {}
-        for name, channel_values in self.before.items():
+        for name, channel_values in self.channels_before.items():
             size = np.sqrt((channel_values**2).mean(axis=0))
             change = np.sqrt(((channels_after[name] - channel_values) ** 2).mean(axis=0))
             differs_by_channel[name] = bool(
-                (change > SEEN * TRIED * np.maximum(size, 1e-3 * size.max(initial=1e-9))).any()
+                (change > SEEN_SHARE * TRIAL_CHANGE * np.maximum(size, 1e-3 * size.max(initial=1e-9))).any()
             )
         return differs_by_channel
 
@@ -208,17 +211,19 @@ def _channels(
 #
 # D I D = V diag(1/s^2) V',   I: what the rows tell, without priors;   D: what a change of 1 is for each number
 #
-# A direction is blind where s, how far it may go within a standard error, is LOST or more. D is the number itself, so
-# that 0.5 is half of it; of a friction it is at least a tenth of what the motors can push: one near 0 is not lost
-# because
-# it may as well be twice as large. Where several directions are blind, any mixture of them is: they are told apart so
-# that each holds as few numbers as possible (row echelon form, the largest pivot first).
+# A direction is blind where s, how far it may go within a standard error, is LOST_DISTANCE or more. D is the number
+# itself, so that 0.5 is half of it; of a friction it is at least a tenth of what the motors can push: one near 0 is not
+# lost because it may as well be twice as large. Where several directions are blind, any mixture of them is: they are
+# told apart so that each holds as few numbers as possible (row echelon form, the largest pivot first).
 
-LOST = 0.5  # how far a blind direction may go within a standard error, over the size of its numbers
-SAME = 1e-13  # of the largest eigenvalue: below it there is only rounding
+LOST_DISTANCE = 0.5  # how far a blind direction may go within a standard error, over the size of its numbers
+EIGEN_TOLERANCE = 1e-13  # of the largest eigenvalue: below it there is only rounding
 SMALL = 0.1  # of what the motors push with, that a friction counts as, at least
-LATE = 0.05  # [s] that a latency counts as
-SHARE, VISIBLE = 0.05, 3.0  # of the largest; standard errors: less of both, and a number has no part in a direction
+LATENCY_SIZE = 0.05  # [s] that a latency counts as
+SHARE, VISIBLE_ERRORS = (
+    0.05,
+    3.0,
+)  # of the largest; standard errors: less of both, and a number has no part in a direction
 
 
 @dataclass(frozen=True)
@@ -240,7 +245,7 @@ def blind_ways(problem: Fitted, values: FloatArray, information: FloatArray) -> 
     scaled, lost, vectors = _lost(information, size)
     for way in _sparse(vectors[:, lost].T):
         way_information = float(way @ scaled @ way)
-        named_numbers = (np.abs(way) > SHARE) | (way**2 * np.diag(scaled) > VISIBLE**2)
+        named_numbers = (np.abs(way) > SHARE) | (way**2 * np.diag(scaled) > VISIBLE_ERRORS**2)
         reach = way_information**-0.5 if way_information > 0.0 else np.inf
         blind_list.append(Way(reach, np.where(named_numbers, way, 0.0) * size, size))
     return tuple(blind_list)
@@ -250,7 +255,7 @@ def _lost(information: FloatArray, size: FloatArray) -> tuple[FloatArray, BoolAr
     """(scaled information (P, P), which of its eigenvectors are blind (P,), these in columns)."""
     scaled = information * np.outer(size, size)
     eigen, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
-    return scaled, eigen < max(LOST**-2.0, SAME * float(eigen.max(initial=0.0))), vectors
+    return scaled, eigen < max(LOST_DISTANCE**-2.0, EIGEN_TOLERANCE * float(eigen.max(initial=0.0))), vectors
 
 
 def sizes(problem: Fitted, values: FloatArray) -> FloatArray:
@@ -281,7 +286,7 @@ def _size(p: Parameter, value: float, push: FloatArray, top: FloatArray) -> floa
         )
         return max(abs(value), SMALL * float(limits_by_level)) or 1.0
     if p.part == LATENCY:
-        return LATE
+        return LATENCY_SIZE
     if p.part == DEAD_BAND:
         return max(abs(value), 0.1)
     return max(SMALL * float(push.max()), 1e-9) if p.part in (TILT, PUSH) else 1.0

@@ -15,10 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 FIRST = (0.94, 0.97, 0.99, 0.997, 1.0, 1.003, 1.01, 1.03, 1.06)  # s to begin with, at q = 1
-LEAST, MOST = 0.005, 0.08  # steps of the logarithm of q
+LEAST_STEP, MOST_STEP = 0.005, 0.08  # steps of the logarithm of q
 ROW = 9  # values of s at each q
-NARROW, WIDER = 0.003, 1.5  # how far they reach at least, and in shares of how far the last likely ones did
-ANEW = 0.02  # steps of q that are so small try twice as many, twice as far, before the ridge ends there
+NARROW_WIDTH, WIDTH_FACTOR = (
+    0.003,
+    1.5,
+)  # how far they reach at least, and in shares of how far the last likely ones did
+RETRY_STEP = 0.02  # steps of q that are so small try twice as many, twice as far, before the ridge ends there
 
 
 class Place(NamedTuple):
@@ -32,7 +35,7 @@ class Walk(NamedTuple):
     """Where likely levels lie between, and the last ones of a direction in which they went out of bounds."""
 
     edges: list[Place]
-    gone: list[Place]
+    lost_places: list[Place]
 
 
 def trade(cost: Callable[[Place], float], limit: float, is_inside: Callable[[Place], bool]) -> Walk:
@@ -76,23 +79,23 @@ def _outwards(
     way: float,
     walk: Walk,
 ) -> None:
-    rows, step, cost_limit = [start], LEAST, min(start.cost) + limit
+    rows, step, cost_limit = [start], LEAST_STEP, min(start.cost) + limit
     outer_places: list[Place] = []
-    while step >= LEAST:
+    while step >= LEAST_STEP:
         q = float(rows[-1].q * np.exp(way * step))
         s, reach = _next(rows, q, cost_limit)
         row = _row(cost, q, s, reach, ROW)
         cost_limit = min(cost_limit, min(row.cost) + limit)
-        if row.likely(cost_limit) is None and step <= ANEW:
+        if row.likely(cost_limit) is None and step <= RETRY_STEP:
             row = _row(cost, q, s, 2.0 * reach, 2 * ROW)
             cost_limit = min(cost_limit, min(row.cost) + limit)
         if row.likely(cost_limit) is None:
             outer_places, step = [Place(q, row.s[0]), Place(q, row.s[-1])], 0.5 * step
             continue
-        outer_places, step = [], min(2.0 * step, MOST)
+        outer_places, step = [], min(2.0 * step, MOST_STEP)
         rows.append(row)
         if not is_inside(place := Place(q, row.middle(cost_limit)[0])):
-            walk.gone.append(place)
+            walk.lost_places.append(place)
             break
     walk.edges.extend(outer_places)
     for row in rows:
@@ -109,7 +112,7 @@ def _next(rows: list[_Row], q: float, cost_limit: float) -> tuple[float, float]:
     """(s at the next q, as the ellipse through the first and the last row has it; how far to look from it)."""
     likely_rows = [row for row in rows if row.likely(cost_limit)] or rows[:1]
     (first, _), (last, last_width) = likely_rows[0].middle(cost_limit), likely_rows[-1].middle(cost_limit)
-    reach = max(NARROW, WIDER * last_width)
+    reach = max(NARROW_WIDTH, WIDTH_FACTOR * last_width)
     if len(likely_rows) == 1:
         return first, reach + abs(float(np.log(q / likely_rows[0].q)))
     sides = np.array([[row.q**-2.0, row.q**2.0] for row in (likely_rows[0], likely_rows[-1])])
@@ -123,9 +126,12 @@ def _next(rows: list[_Row], q: float, cost_limit: float) -> tuple[float, float]:
 # Each level costs a fit, so none is tried twice: first a grid, until it gets hopeless; then between the best and its
 # neighbours; then where likely ends, either way. What is returned as an end is a level that was found unlikely.
 
-HOPELESS, IN_A_ROW = 50.0, 4  # beyond the least cost, times the limit, that so many levels of a grid in a row are
+HOPELESS_COST, HOPELESS_LEVELS = (
+    50.0,
+    4,
+)  # beyond the least cost, times the limit, that so many levels of a grid in a row are
 ROUNDS = 3  # in which the gaps beside the best level are halved
-FINEST = 0.005  # relative width of the gap in which likely ends, at which it is found
+GAP_WIDTH = 0.005  # relative width of the gap in which likely ends, at which it is found
 HALVINGS = 12  # times that gaps are halved, of up to four levels each
 
 
@@ -138,12 +144,12 @@ def likely_levels(cost: Callable[[float], float], grid: Sequence[float], limit: 
     cost_by_level: dict[float, float] = {}
     for level in grid:
         cost_by_level[level] = cost(level)
-        last_costs = list(cost_by_level.values())[-IN_A_ROW:]
-        if len(last_costs) == IN_A_ROW and min(last_costs) > min(cost_by_level.values()) + HOPELESS * limit:
+        last_costs = list(cost_by_level.values())[-HOPELESS_LEVELS:]
+        if len(last_costs) == HOPELESS_LEVELS and min(last_costs) > min(cost_by_level.values()) + HOPELESS_COST * limit:
             break
     for k in range(HALVINGS):
         best, likely_range = _likely(cost_by_level, limit)
-        gaps = [(a, b) for a, b in pairwise(sorted(cost_by_level)) if b / a > 1.0 + FINEST]
+        gaps = [(a, b) for a, b in pairwise(sorted(cost_by_level)) if b / a > 1.0 + GAP_WIDTH]
         wide_gaps = [
             (a, b) for a, b in gaps if a == likely_range[-1] or b == likely_range[0] or (best in (a, b) and k < ROUNDS)
         ]

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.problem.friction_laws import APART, speed_of
+from omnidyn.identification.output_error.problem.friction_laws import LEVEL_RATIO, speed_of
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.solve.steps import Order
@@ -22,12 +22,12 @@ from omnidyn.identification.output_error.trust.support import at_the_end
 from omnidyn.identification.output_error.trust.uncertainty import RISE, Trust
 from omnidyn.statement import WARNING, Statement
 
-AT_ONCE = 0.3  # of the least speed that is looked for: a fall that hardly shows
+SUDDEN_SHARE = 0.3  # of the least speed that is looked for: a fall that hardly shows
 STEP, HALVINGS = (
     0.05,
     3,
 )  # relative, of the first step outward, each twice as long as the one before; then halvings of the last
-REFIT, NEAR, TOL = 3, 0.1, 1e-3  # iterations at each level; squared standard errors to its best point; [m/s]
+REFIT, NEAR_PRECISION, TOL = 3, 0.1, 1e-3  # iterations at each level; squared standard errors to its best point; [m/s]
 
 Intervals = dict[str, tuple[float | None, tuple[float, float]]]
 
@@ -41,7 +41,7 @@ def without_a_fall(solution: Solution, uncertainty: Trust) -> tuple[Trust, Inter
     warnings = list[Statement]()
     for s, c, v in _not_seen(solution, uncertainty):
         uncertainty = _without(uncertainty, v)
-        steepness = 1.0 if uncertainty.blind[c] else uncertainty.rise(np.eye(len(uncertainty.std))[c]) / RISE
+        steepness = 1.0 if uncertainty.blind_parameters[c] else uncertainty.rise(np.eye(len(uncertainty.std))[c]) / RISE
         low, high = _likely(solution, s, v, float(values[c]), LIMIT * steepness)
         low = max(min(low, float(values[c] - uncertainty.quantile * uncertainty.std[c])), 0.0)
         level_intervals[problem.names[s]] = (
@@ -72,9 +72,9 @@ def _not_seen(solution: Solution, uncertainty: Trust) -> list[tuple[int, int, in
 
 
 def _without(uncertainty: Trust, index: int) -> Trust:
-    blind_mask, covariance = uncertainty.blind.copy(), uncertainty.covariance.copy()
+    blind_mask, covariance = uncertainty.blind_parameters.copy(), uncertainty.covariance.copy()
     blind_mask[index], covariance[index, index] = True, np.inf
-    return replace(uncertainty, blind=blind_mask, covariance=covariance)
+    return replace(uncertainty, blind_parameters=blind_mask, covariance=covariance)
 
 
 def _likely(solution: Solution, s: int, v: int, coulomb: float, limit: float) -> tuple[float, float]:
@@ -83,13 +83,15 @@ def _likely(solution: Solution, s: int, v: int, coulomb: float, limit: float) ->
 
     def cost(level: float) -> float:
         values, parameters = point.values.copy(), list(problem.parameters)
-        for k, value in ((s, level), (v, AT_ONCE * parameters[v].low)):
+        for k, value in ((s, level), (v, SUDDEN_SHARE * parameters[v].low)):
             values[k], parameters[k] = value, replace(parameters[k], value=value, low=value, high=value)
         held_problem = replace(problem, parameters=tuple(parameters))
-        solver = Solver(held_problem, ImplicitEngine(held_problem, TOL), solution.solver.nu, NEAR)
+        solver = Solver(held_problem, ImplicitEngine(held_problem, TOL), solution.solver.nu, NEAR_PRECISION)
         return solver.minimise(Point(values, point.states), REFIT).state.objective
 
-    cost_by_level = {level: cost(level) for level in (APART * coulomb, max(APART * coulomb, float(point.values[s])))}
+    cost_by_level = {
+        level: cost(level) for level in (LEVEL_RATIO * coulomb, max(LEVEL_RATIO * coulomb, float(point.values[s])))
+    }
     best, cost_limit = min(cost_by_level, key=lambda level: cost_by_level[level]), min(cost_by_level.values()) + limit
 
     def end(way: int, last: float) -> float:
@@ -104,5 +106,5 @@ def _likely(solution: Solution, s: int, v: int, coulomb: float, limit: float) ->
             inner_level, outer_level = (middle, outer_level) if cost(middle) <= cost_limit else (inner_level, middle)
         return outer_level
 
-    low = coulomb if cost_by_level[APART * coulomb] <= cost_limit else end(-1, APART * coulomb)
+    low = coulomb if cost_by_level[LEVEL_RATIO * coulomb] <= cost_limit else end(-1, LEVEL_RATIO * coulomb)
     return low, end(1, HIGHEST * coulomb)

@@ -19,7 +19,7 @@ from omnidyn.identification.output_error.trust.uncertainty import Trust
 from omnidyn.identification.steady.study_table import Difference
 from omnidyn.statistics import central_interval, t_quantile
 
-OUTWARD, HALVINGS = 12, 12  # steps of 1.5 standard errors out, then halvings
+OUTWARD_STEPS, HALVINGS = 12, 12  # steps of 1.5 standard errors out, then halvings
 LEAST_RUNS, LEAST_DRAWS = 5, 20
 SEED = 20120101
 
@@ -62,7 +62,7 @@ def resampled(
         bootstrap_draws = bootstrap(solver, solution, draws, strata=strata, progress=progress)
         widening = small_sample(least_runs(solver, strata))
         for j, p in enumerate(solver.problem.parameters):
-            if uncertainty.blind[j]:
+            if uncertainty.blind_parameters[j]:
                 continue
             inner_draws = np.array([p.inner(float(v)) for v in bootstrap_draws[:, j]])
             low, high = draw_interval(p.inner(float(values[j])), inner_draws, widening)
@@ -70,7 +70,7 @@ def resampled(
             spread = widening_of_std(least_runs(solver, strata)) * float(bootstrap_draws[:, j].std(ddof=1))
             interval_by_name[p.name] = (spread, (p.outer(low), p.outer(high)))
     for name in profile:
-        if not uncertainty.blind[j := names.index(name)]:
+        if not uncertainty.blind_parameters[j := names.index(name)]:
             (progress or FitProgress()).enter(f"the profile of {name}")
             interval_by_name[name] = (None, profile_interval(solver, solution, uncertainty, j))
     return Resampled(interval_by_name, bootstrap_draws, widening)
@@ -176,7 +176,7 @@ def _crossing(
 ) -> float:
     """Where 2 (F - least F) passes `limit` on the way from `best` by steps of 1.5 `step`, or the bound before it."""
     inner_value, outer_value = best, best
-    for _ in range(OUTWARD):
+    for _ in range(OUTWARD_STEPS):
         outer_value = min(outer_value + 1.5 * step, bound) if step > 0.0 else max(outer_value + 1.5 * step, bound)
         rise_here, point = rise(outer_value, point)
         if rise_here > limit:
@@ -335,7 +335,7 @@ def differences(
         groups_with_key = [group for group in groups if f"{key}{AT}{group}" in names]
         for first, second in combinations(groups_with_key, 2):
             a, b = names.index(f"{key}{AT}{first}"), names.index(f"{key}{AT}{second}")
-            if uncertainty.blind[a] or uncertainty.blind[b]:
+            if uncertainty.blind_parameters[a] or uncertainty.blind_parameters[b]:
                 continue
             pair = float(solution.state.point.values[a]), float(solution.state.point.values[b])
             std, low, high = _interval(solution, uncertainty, resampled_fit, a, b, strata, key in profile)

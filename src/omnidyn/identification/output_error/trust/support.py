@@ -46,7 +46,7 @@ def too_early(solver: Solver, solution: Solution) -> dict[str, float]:
 
 # Numbers that ended where their search ends: they are no estimates
 
-NEAR = 0.01  # of the range: a descent that is on its way out is stopped by the last rows that it would lose
+BOUND_SHARE = 0.01  # of the range: a descent that is on its way out is stopped by the last rows that it would lose
 
 
 def at_the_end(problem: Fitted, values: FloatArray) -> Iterator[Parameter]:
@@ -58,5 +58,5 @@ def at_the_end(problem: Fitted, values: FloatArray) -> Iterator[Parameter]:
         low, high = (p.inner(p.low), p.inner(p.high)) if p.log else (p.low, p.high)
         share = (p.inner(value) - low) / (high - low) if high > low else 0.5
         lossless = p.name.startswith(EFFICIENCY)
-        if (share >= 1.0 - NEAR and not lossless) or (share <= NEAR and (p.log or p.low < 0.0)):
+        if (share >= 1.0 - BOUND_SHARE and not lossless) or (share <= BOUND_SHARE and (p.log or p.low < 0.0)):
             yield p

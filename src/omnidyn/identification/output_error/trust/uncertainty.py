@@ -34,20 +34,20 @@ from omnidyn.statistics import t_quantile
 
 BLOCKS, LEAST_BLOCK = 100, 8  # blocks in all; rows of one, at least
 MANY_RUNS = 20  # from so many on each run is a block
-COLOURED = 4.0  # standard errors of a correlation of neighbours, and of a variance ratio
-BLIND = 1e-9  # eigenvalue of the information, its diagonal scaled to 1, below which a direction is not seen
-UNTOLD = 3.0  # std of a logarithm beyond which a number is not told: 95 % of it lie between 1/360 and 360 times
-WEAK = 1e-4  # below it, is hardly seen
+COLOUR_ERRORS = 4.0  # standard errors of a correlation of neighbours, and of a variance ratio
+BLIND_EIGENVALUE = 1e-9  # eigenvalue of the information, its diagonal scaled to 1, below which a direction is not seen
+LOST_STD = 3.0  # std of a logarithm beyond which a number is not told: 95 % of it lie between 1/360 and 360 times
+WEAK_EIGENVALUE = 1e-4  # below it, is hardly seen
 SHARE = 0.05  # of a blind direction that a parameter must have to be named
-WIDER = 1.05  # times as wide, below which it is not worth a word
+WIDENING_RATIO = 1.05  # times as wide, below which it is not worth a word
 WHITE, SANDWICH, AUTOREGRESSIVE = "white", "sandwich", "autoregressive"
 # Std over that of the prior from which on the logs say too little of a number. Of two guesses of which only the product
 # shows each keeps 0.71 of its own, of three 0.82, however long the log.
-TOLD = 0.5
+PRIOR_SHARE = 0.5
 # The same where more than half of the variance is what priors, of any number, leave open: the logs must then have said
 # most of it. Viscous friction beside the back-EMF of motors that are guesses keeps 0.3 to 0.7; Coulomb friction beside
 # rotors that may weigh 0.1 of the robot keeps 0.08 to 0.15, which its interval tells.
-TOLD_BY_OTHERS, MOST = 0.25, 0.5
+OTHERS_SHARE, MOST_SHARE = 0.25, 0.5
 PRECISION = 1e-14  # of the largest eigenvalue of a matrix whose diagonal is 1: below it there is only rounding
 RISE = float(chdtri(1, 0.05))  # of 2 F at the ends of a 95 % interval: 3.84
 
@@ -56,20 +56,21 @@ RISE = float(chdtri(1, 0.05))  # of 2 F at the ends of a 95 % interval: 3.84
 class Trust:
     """Covariance of the parameters in the numbers that the solver sees, and what is behind it.
 
-    covariance (P, P): infinite variances where the data are blind. held: at a bound. blind: not determined by the data,
-    alone or only together with others, and no prior holds it; unseen: not even together, prior or none. guessed: what a
-    prior holds more than the data do, see TOLD; its covariance is the posterior's. free_step (P,): from a bound to
-    where the fit would go without it. kind: white, sandwich or autoregressive (memory/whitening.py). widening: largest
-    ratio of the std to that for white residuals. quantile: standard errors in half a 95 % interval. degrees: of freedom
-    behind it. neighbours (columns,): correlation of successive residuals. directions: blind or weak ones no prior
+    covariance (P, P): infinite variances where the data are blind. held_parameters: at a bound. blind_parameters: not
+    determined by the data, alone or only together with others, and no prior holds it; unseen: not even together, prior
+    or none. guessed_parameters: what a prior holds more than the data do, see PRIOR_SHARE; its covariance is the
+    posterior's. free_step (P,): from a bound to where the fit would go without it. kind: white, sandwich or
+    autoregressive (memory/whitening.py). widening: largest ratio of the std to that for white residuals. quantile:
+    standard errors in half a 95 % interval. degrees: of freedom behind it. neighbours (columns,): correlation of
+    successive residuals. directions: blind or weak ones no prior
     holds: (eigenvalue, relative change of each parameter). runs: that were the blocks, 0 where these were shorter than
-    a run. plain (P, P): inverse of the information, which is what the likelihood itself curves by; the covariance where
-    the noise is white. ways: what the rows do not tell, priors or none (cures.py).
+    a run. plain_covariance (P, P): inverse of the information, which is what the likelihood itself curves by; the
+    covariance where the noise is white. ways: what the rows do not tell, priors or none (cures.py).
     """
 
     covariance: FloatArray
-    held: BoolArray
-    blind: BoolArray
+    held_parameters: BoolArray
+    blind_parameters: BoolArray
     unseen: BoolArray
     free_step: FloatArray
     kind: str
@@ -79,14 +80,14 @@ class Trust:
     neighbours: FloatArray
     directions: tuple[tuple[float, FloatArray], ...]
     runs: int
-    plain: FloatArray
-    guessed: BoolArray
+    plain_covariance: FloatArray
+    guessed_parameters: BoolArray
     ways: tuple[Way, ...] = ()
 
     @property
     def open(self) -> BoolArray:
         """What the data do not determine, whether a prior holds it or not."""
-        return self.blind | self.guessed
+        return self.blind_parameters | self.guessed_parameters
 
     @cached_property
     def std(self) -> FloatArray:
@@ -102,7 +103,7 @@ class Trust:
         3.84 where noise is white. Elsewhere the likelihood is too steep, and as much more of it as the variance is
         larger than its curvature tells: Kent, Biometrika 69 (1982); Royall, Tsou, J. R. Stat. Soc. B 65 (2003).
         """
-        slope_square = float(way @ self.plain @ way)
+        slope_square = float(way @ self.plain_covariance @ way)
         if self.kind == WHITE or slope_square <= 0.0:
             return RISE
         finite_covariance = np.where(np.isfinite(self.covariance), self.covariance, 0.0)
@@ -149,7 +150,7 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     )
     widening = float(np.sqrt(_ratio(np.diag(wide_covariance), np.diag(plain_covariance), told_numbers)))
     logs = np.array([p.log for p in solver.problem.parameters], bool)
-    seen_numbers = seen_numbers & ~(logs & (np.sqrt(np.diag(covariance)) > UNTOLD))
+    seen_numbers = seen_numbers & ~(logs & (np.sqrt(np.diag(covariance)) > LOST_STD))
     covariance[~seen_numbers, ~seen_numbers] = np.inf
     return Trust(
         covariance,
@@ -183,8 +184,8 @@ def _guessed(plain_covariance: FloatArray, prior: FloatArray) -> BoolArray:
     """
     variance = np.diag(plain_covariance)
     prior_shares = np.sqrt(variance * prior)  # std over that of its own prior, 0 without one
-    by_priors = np.einsum("ij,j,ij->i", plain_covariance, prior, plain_covariance) > MOST * variance
-    return (prior_shares > TOLD) | ((prior_shares > TOLD_BY_OTHERS) & by_priors)
+    by_priors = np.einsum("ij,j,ij->i", plain_covariance, prior, plain_covariance) > MOST_SHARE * variance
+    return (prior_shares > PRIOR_SHARE) | ((prior_shares > OTHERS_SHARE) & by_priors)
 
 
 def final_weighting(solver: Solver, variance: FloatArray) -> Weighting:
@@ -230,8 +231,10 @@ def _coloured(
     if runs is not None:
         drift = np.array([drift[run].sum(axis=0) for run in runs])
     slow, blocks = (drift**2).sum(axis=0), (drift != 0.0).sum(axis=0)
-    fast = np.abs(neighbours) * np.sqrt(np.maximum(per_column(sums, columns, "number"), 1.0)) > COLOURED
-    return bool((fast | (slow / square > 1.0 + COLOURED * np.sqrt(2.0 / np.maximum(blocks, 1.0)))).any()), neighbours
+    fast = np.abs(neighbours) * np.sqrt(np.maximum(per_column(sums, columns, "number"), 1.0)) > COLOUR_ERRORS
+    return bool(
+        (fast | (slow / square > 1.0 + COLOUR_ERRORS * np.sqrt(2.0 / np.maximum(blocks, 1.0)))).any()
+    ), neighbours
 
 
 def _degrees(influence: FloatArray, seen_numbers: BoolArray) -> float:
@@ -271,18 +274,18 @@ def _seen(
     if seen_indices.size:
         size = np.sqrt(diagonal[seen_indices])
         values, vectors = np.linalg.eigh(information[np.ix_(seen_indices, seen_indices)] / np.outer(size, size))
-        open_variance = (vectors[:, values >= BLIND] ** 2 / values[values >= BLIND]).sum(axis=1)
+        open_variance = (vectors[:, values >= BLIND_EIGENVALUE] ** 2 / values[values >= BLIND_EIGENVALUE]).sum(axis=1)
         for value, vector in zip(values, vectors.T, strict=True):
             held_share = float(vector**2 @ (prior[seen_indices] / size**2))
-            if value < WEAK and not (held_share > 0.0 and held_share > 0.5 * value):
+            if value < WEAK_EIGENVALUE and not (held_share > 0.0 and held_share > 0.5 * value):
                 way = np.zeros(len(diagonal))
                 way[seen_indices] = vector / size / relative[seen_indices]
                 way /= np.abs(way).max()
                 directions.append((float(value), way))
-                if value < BLIND:
+                if value < BLIND_EIGENVALUE:
                     lost.append(np.zeros(len(diagonal)))
                     lost[-1][seen_indices] = vector
-                    seen_numbers[seen_indices[vector**2 / BLIND > open_variance]] = False
+                    seen_numbers[seen_indices[vector**2 / BLIND_EIGENVALUE > open_variance]] = False
     return seen_numbers, tuple(directions), np.array(lost).reshape(-1, len(diagonal)).T
 
 
@@ -329,8 +332,9 @@ def _at_least(wide_covariance: FloatArray, least_covariance: FloatArray, scatter
     """The sandwich, with no variance below `least_covariance`, of any sum of parameters: few blocks may also err to the
     good side.
 
-    With least_covariance = L L' and wide_covariance = L (V diag(l) V') L': L (V diag(max(l, 1)) V') L', where l up to `scatter_limit` count
-    as 1. To stretch the std of each parameter alone would not do: that of a product is all in their correlation.
+    With least_covariance = L L' and wide_covariance = L (V diag(l) V') L': L (V diag(max(l, 1)) V') L', where l up to
+    `scatter_limit` count as 1. To stretch the std of each parameter alone would not do: that of a product is all in
+    their correlation.
     scatter_limit: where `least_covariance` is what the noise makes, the edge of the ratios that K numbers and n blocks
     show by chance, which is (1 + sqrt(K/n))^2 (Marchenko, Pastur, Math. USSR Sb. 1 (1967)); else 1. Shapes (K, K), see
     `_root_of_inverse`.
@@ -395,12 +399,12 @@ def from_the_log_alone(problem: Problem, uncertainty: Trust) -> Trust | None:
 # least.
 
 STEPS = 4096  # of the integrals over a tick
-CLOSE = 1e-6  # relative, to the least variance: the noise does not show
+NOISE_TOLERANCE = 1e-6  # relative, to the least variance: the noise does not show
 
 
 def silent(solver: Solver, solution: Solution) -> BoolArray:
     """Columns of counts whose noise does not show. Shape (columns,)."""
-    return (solver.tick > 0.0) & (solution.state.variance <= (1.0 + CLOSE) * (LEAST_SHARE * solver.tick) ** 2)
+    return (solver.tick > 0.0) & (solution.state.variance <= (1.0 + NOISE_TOLERANCE) * (LEAST_SHARE * solver.tick) ** 2)
 
 
 def rounding_scatter(solver: Solver, solution: Solution) -> tuple[FloatArray, FloatArray]:
@@ -411,7 +415,7 @@ def rounding_scatter(solver: Solver, solution: Solution) -> tuple[FloatArray, Fl
     state, is_quiet = solution.state, silent(solver, solution)
     ones = np.ones(len(state.variance))
     sums = solver.engine.sums(state.point, Weighting(ones))  # sum of J J'
-    waves = solver.engine.sums(state.point, Weighting(state.variance, mode=WAVES, counted=True))
+    waves = solver.engine.sums(state.point, Weighting(state.variance, mode=WAVES, counts_ticks=True))
     usual_curvature = information(state.variance, solver.tick)[0]
     if solver.nu:
         usual_curvature = np.where(solver.tick > 0.0, usual_curvature, (solver.nu + 1.0) / (solver.nu + 3.0))

@@ -20,7 +20,7 @@ import numpy as np
 
 from omnidyn.identification.lack_of_fit import CHANGE, LOSS, LackOfFit, Remedy
 from omnidyn.identification.ladder import STANDS, Ladder, Rung
-from omnidyn.identification.output_error.begin import WHOLE
+from omnidyn.identification.output_error.begin import ALL_LOGS
 from omnidyn.identification.output_error.conclusion import unexplained
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.linear.free_run import margins_of
@@ -28,7 +28,7 @@ from omnidyn.identification.output_error.linear.motion import motions
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.structure.diagnosis import Examined, examine
-from omnidyn.identification.structure.ladder.held_out import CLEAR, Errors, errors
+from omnidyn.identification.structure.ladder.held_out import GAIN_ERRORS, Errors, errors
 from omnidyn.identification.structure.ladder.models import (
     Model,
     Move,
@@ -50,11 +50,13 @@ from omnidyn.run import Run
 from omnidyn.statement import NOTE, Statement
 
 STEPS = 4  # at most
-TRIED = 3  # remedies that are fitted in a step
-TOLD_APART = 10.0  # of BIC, from which one of two models is the better one: very strong (Kass & Raftery, 1995)
-ROUGHLY = 0.05  # of a first step's chi squared, which is that rough
+TRIED_REMEDIES = 3  # remedies that are fitted in a step
+BIC_MARGIN = 10.0  # of BIC, from which one of two models is the better one: very strong (Kass & Raftery, 1995)
+ROUGH_SHARE = 0.05  # of a first step's chi squared, which is that rough
 LIMITS = (0.5, 0.9)  # quantiles of the largest current, from which a limit is looked for
-BY_FAR = 50.0  # of BIC, from which a richer model is the better one though a few blocks scatter more than it gains
+CLEAR_BIC_MARGIN = (
+    50.0  # of BIC, from which a richer model is the better one though a few blocks scatter more than it gains
+)
 Fits = Callable[
     [Move, Model, Statement | None], list[Model | Untried]
 ]  # of a move from a model, and in the place of which step
@@ -128,11 +130,11 @@ def _climbed(
         tried_models += new_models
         new_rungs, best = judged(step, base_model, tried_models, examinations)
         next_examinations = _examined(best) if best is not None else None
-    if best is not None and best.move is not None and base_model.before is not None:  # may the step before go?
-        repeated_moves = purse.pays([best.move], base_model.before)
-        tried_models += [fit for move in repeated_moves for fit in fits(move, base_model.before, base_model.cause)]
+    if best is not None and best.move is not None and base_model.base_model is not None:  # may the step before go?
+        repeated_moves = purse.pays([best.move], base_model.base_model)
+        tried_models += [fit for move in repeated_moves for fit in fits(move, base_model.base_model, base_model.cause)]
         new_rungs, best = judged(step, base_model, tried_models, examinations)
-        next_examinations = _examined(best) if best is not None and best.instead else next_examinations
+        next_examinations = _examined(best) if best is not None and best.replaced_step else next_examinations
     return new_rungs, best, next_examinations
 
 
@@ -159,8 +161,8 @@ def offered(lack: LackOfFit) -> list[Remedy]:
     usable_remedies = simpler_first(
         [r for r in lack.remedies if r.offered and r.key not in (CHANGE, LOSS) and not r.rivals]
     )
-    rival_remedies = [r for r in usable_remedies[TRIED:] if r.key in usable_remedies[0].same_as]
-    return [*usable_remedies[:TRIED], *rival_remedies[: TRIED - 1]]
+    rival_remedies = [r for r in usable_remedies[TRIED_REMEDIES:] if r.key in usable_remedies[0].same_as]
+    return [*usable_remedies[:TRIED_REMEDIES], *rival_remedies[: TRIED_REMEDIES - 1]]
 
 
 def unseen(lack: LackOfFit, base_model: Model, group: str) -> list[Remedy]:
@@ -183,7 +185,7 @@ def unseen(lack: LackOfFit, base_model: Model, group: str) -> list[Remedy]:
         extra_remedies += [
             Remedy(
                 LIMIT,
-                sized("current_limit_from", "", limit=lambda _, at: at)(0.0, limit_value),
+                sized("current_limit_from", "", limit=lambda _, at_value: at_value)(0.0, limit_value),
                 0.0,
                 0.0,
                 at=limit_value,
@@ -203,10 +205,10 @@ def judged(
     """
     models = [tried_model for tried_model in tried_models if isinstance(tried_model, Model)]
     count, memory = (
-        sum(examination.tried for examination in examinations.values()),
+        sum(examination.cause_count for examination in examinations.values()),
         {group: examination.memory for group, examination in examinations.items()},
     )
-    margins = margins_of([each.solution for each in (base_model, *models)])
+    margins = margins_of([model_here.solution for model_here in (base_model, *models)])
     base_errors = errors(base_model.solution, memory, margins, base_model.numbers)
     errors_by_model = [errors(model.solution, memory, margins, model.numbers) for model in models]
     reasons = [
@@ -228,7 +230,7 @@ def judged(
         key=lambda k: (
             errors_by_model[k].numbers,
             models[k].shapes,
-            not models[k].instead,
+            not models[k].replaced_step,
             errors_by_model[k].bic(count),
         ),
         default=None,
@@ -285,7 +287,7 @@ def _untried(step: int, untried_model: Untried) -> Rung:
         no_number,
         no_number,
         no_number,
-        why=untried_model.why,
+        why=untried_model.reason,
         groups=move.groups,
     )
 
@@ -295,13 +297,13 @@ def _why_not(
 ) -> Statement | None:
     """Why a model is no step up, None where it is one."""
     gain, std = model_errors.gain(base_errors)
-    if not gain > CLEAR * std:
+    if not gain > GAIN_ERRORS * std:
         return Statement("predicts_no_better", NOTE)
     if model_errors.bic(count) >= base_errors.bic():
         return Statement("costs_more_than_it_explains", NOTE)
     at_least, untaken_cause = untaken_gain
-    noise = model_errors.left / max(model_errors.rows, 1)
-    if (base_errors.left - model_errors.left) / noise - np.log(max(model_errors.rows, 2)) * (
+    noise = model_errors.square / max(model_errors.rows, 1)
+    if (base_errors.square - model_errors.square) / noise - np.log(max(model_errors.rows, 2)) * (
         model_errors.numbers - base_errors.numbers
     ) < at_least:
         return Statement("other_explains_more", NOTE, numbers={"cause": untaken_cause})
@@ -322,12 +324,12 @@ def _why_other(k: int, best_index: int | None, similar_models: Sequence[int], eq
 def _is_alike(best: Errors, best_errors: Errors) -> bool:
     """Whether another model predicts as well as the best one, within a standard error, and is about as likely."""
     gain, std = best.gain(best_errors)
-    return best is best_errors or (gain <= CLEAR * std and best_errors.bic() - best.bic() < BY_FAR)
+    return best is best_errors or (gain <= GAIN_ERRORS * std and best_errors.bic() - best.bic() < CLEAR_BIC_MARGIN)
 
 
 def _is_same(left_errors: Errors, right_errors: Errors) -> bool:
     """Whether the logs cannot tell two apart: as likely, with as many numbers."""
-    return abs(left_errors.bic() - right_errors.bic()) < TOLD_APART
+    return abs(left_errors.bic() - right_errors.bic()) < BIC_MARGIN
 
 
 def _not_fitted(
@@ -339,8 +341,8 @@ def _not_fitted(
 ) -> list[str]:
     """What the diagnosis could not tell from a model, was not fitted, and might explain as much as the model does."""
     assert model.move is not None
-    fitted, noise = {model_k.key for model_k in models}, model_errors.left / max(model_errors.rows, 1)
-    least_chi2 = (1.0 - ROUGHLY) * (base_errors.left - model_errors.left) / noise - TOLD_APART
+    fitted, noise = {model_k.key for model_k in models}, model_errors.square / max(model_errors.rows, 1)
+    least_chi2 = (1.0 - ROUGH_SHARE) * (base_errors.square - model_errors.square) / noise - BIC_MARGIN
     return [
         r.key
         for group, remedy in model.move.remedies.items()
@@ -362,13 +364,13 @@ def _rung(
 ) -> Rung:
     gain, std = model_errors.gain(base_errors)
     rival_keys = dict.fromkeys(key for key in equal_keys if is_taken and key != model.key)
-    found = as_fitted(model.cause, base_model.value, model.value)
-    if model.instead is not None:
-        found = Statement("instead_of", NOTE, numbers={"cause": found, "step": model.instead})
+    shown_cause = as_fitted(model.cause, base_model.value, model.value)
+    if model.replaced_step is not None:
+        shown_cause = Statement("instead_of", NOTE, numbers={"cause": shown_cause, "step": model.replaced_step})
     return Rung(
         step,
         model.key,
-        found,
+        shown_cause,
         model_errors.numbers,
         model_errors.size,
         gain,
@@ -377,7 +379,7 @@ def _rung(
         is_taken,
         reason,
         tuple(rival_keys),
-        model.instead is not None,
+        model.replaced_step is not None,
         model.value,
         model.move.groups if model.move else (),
     )
@@ -405,7 +407,7 @@ def _untaken(lack_by_group: Mapping[str, LackOfFit]) -> dict[str, Any]:
     untaken_by_group = {
         group: statement for group, lack in lack_by_group.items() if (statement := _looks_like(lack)) is not None
     }
-    groups = ("" if group == WHOLE else group for group in untaken_by_group)
+    groups = ("" if group == ALL_LOGS else group for group in untaken_by_group)
     return {"groups": tuple(groups), "causes": tuple(untaken_by_group.values())}
 
 
@@ -457,7 +459,7 @@ def calmed(
     if isinstance(calm_model, Model) and unexplained(calm_model.solution.solver, calm_model.solution):
         return base_model, []
     if not isinstance(calm_model, Model):
-        return base_model, [*first, replace(rung, why=calm_model.why)]
+        return base_model, [*first, replace(rung, why=calm_model.reason)]
     if not best.gain > best.gain_std:
         return base_model, [*first, replace(rung, why=Statement("predicts_no_better", NOTE), value=calm_model.value)]
     taken_rung = replace(rung, why=Statement("pays", NOTE), value=calm_model.value, taken=True)

@@ -22,18 +22,20 @@ from omnidyn.identification.structure.tails import as_counted
 
 Shows = Callable[[Point], list[Parts]]
 Memories = Sequence[AutoRegression] | Mapping[str, Sequence[AutoRegression]]
-FAR = 1.5  # times what a fit to all leaves of a block, from which the error by a fit to all others is simulated
+SIMULATION_RATIO = (
+    1.5  # times what a fit to all leaves of a block, from which the error by a fit to all others is simulated
+)
 SHARES = (1.0, 0.5, 0.25, 0.125)  # of a step that are tried
-CLEAR = 1.0  # standard errors of its gain by which a step must pay
+GAIN_ERRORS = 1.0  # standard errors of its gain by which a step must pay
 
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Of a model. held_out (B,): the squared error of each block by a fit to all others; left: of all, by the fit to
+    """Of a model. held_out (B,): the squared error of each block by a fit to all others; square: of all, by the fit to
     all; rows: how many there are. numbers: how many are fitted."""
 
     held_out: FloatArray
-    left: float
+    square: float
     rows: int
     numbers: int
 
@@ -46,7 +48,7 @@ class Errors:
         """n log(S/n) + k log n, and 2 log of the number of models that it is the best of."""
         n = max(self.rows, 2)
         return float(
-            n * np.log(max(self.left, 1e-300) / n) + self.numbers * np.log(n) + 2.0 * np.log(max(model_count, 1))
+            n * np.log(max(self.square, 1e-300) / n) + self.numbers * np.log(n) + 2.0 * np.log(max(model_count, 1))
         )
 
     def gain(self, base_errors: Errors) -> tuple[float, float]:
@@ -98,13 +100,15 @@ def _blocks(
     decimated = Decimated.of(replace(full_problem, pieces=tuple(pieces)))
     problem = bounded(decimated.problem)
     engine = solution.solver.engine.on(decimated.all_rows(problem))
-    shows: Shows = lambda at: as_counted(solution, problem, decimated.kept(engine.residuals(at)))  # noqa: E731
+    shows: Shows = lambda columns: as_counted(solution, problem, decimated.kept(engine.residuals(columns)))  # noqa: E731
     parameters = [replace(p, prior=None) if k in counted_priors else p for k, p in enumerate(problem.parameters)]
     rows = Rows.of(replace(problem, parameters=tuple(parameters)), point, shows(point))
-    slopes = [np.where(solution.held, 0.0, slope) for slope in rows.slopes]  # what a bound holds, holds in every block
+    slopes = [
+        np.where(solution.held_parameters, 0.0, slope) for slope in rows.slopes
+    ]  # what a bound holds, holds in every block
     linear = Linear(replace(rows, slopes=slopes), memory)
     no_columns = [np.zeros((*residual.shape, 0)) for residual in rows.residual]
-    return _AsTheyAre(linear, no_columns, shows), int(sum(mask.sum() for mask in rows.there))
+    return _AsTheyAre(linear, no_columns, shows), int(sum(mask.sum() for mask in rows.masks))
 
 
 class _AsTheyAre(Blocks):
@@ -125,7 +129,7 @@ class _AsTheyAre(Blocks):
                 - 2.0 * fitted_inside @ block_matrix[indices, 0]
                 + fitted_inside @ block_matrix[np.ix_(indices, indices)] @ fitted_inside
             )
-            if values[b] > FAR * block_error:
+            if values[b] > SIMULATION_RATIO * block_error:
                 values[b] = self._simulated(self.fitted(self.total - block_matrix, indices) / self.size[indices], b)
         return values
 

@@ -41,10 +41,10 @@ from omnidyn.statement import NOTE, Statement
 
 @dataclass(frozen=True)
 class Move:
-    """group -> the remedy that is switched on there, the same in all. all: whether these are all groups."""
+    """group -> the remedy that is switched on there, the same in all. is_everywhere: whether these are all groups."""
 
     remedies: Mapping[str, Remedy]
-    all: bool = True
+    is_everywhere: bool = True
 
     @property
     def key(self) -> str:
@@ -64,7 +64,7 @@ class Move:
     @property
     def groups(self) -> tuple[str, ...]:
         """In which groups it is switched on, where not in all."""
-        return () if self.all else tuple(self.remedies)
+        return () if self.is_everywhere else tuple(self.remedies)
 
     def at(self, cause: Statement) -> Statement:
         """A cause with the groups in which it is switched on, where not in all."""
@@ -75,7 +75,7 @@ class Move:
 @dataclass(frozen=True, eq=False)
 class Model:
     """A fit, and what it came to. begins: group -> the robot and the question it began from. numbers: see `Switch`.
-    before: what stood when it was tried; instead: of which step it is in the place."""
+    base_model: what stood when it was tried; replaced_step: of which step it is in the place."""
 
     fit: Fit
     solution: Solution
@@ -83,8 +83,8 @@ class Model:
     move: Move | None = None
     cause: Statement = STANDS
     numbers: int = 0
-    before: Model | None = None
-    instead: Statement | None = None
+    base_model: Model | None = None
+    replaced_step: Statement | None = None
 
     @classmethod
     def first(cls, fit: Fit, solution: Solution) -> Model:
@@ -109,7 +109,7 @@ class Model:
 
     def answered(self) -> dict[str, Solution]:
         """The same where an answer has it: fitted once more where errors remember."""
-        return self._alone(self.fit.weighed(self.solution).plain)
+        return self._alone(self.fit.weighed(self.solution).plain_solution)
 
     def _alone(self, solution: Solution) -> dict[str, Solution]:
         members = solution.solver.engine.members
@@ -133,7 +133,7 @@ class Untried:
 
     move: Move
     cause: Statement
-    why: Statement
+    reason: Statement
 
 
 def moves(remedies_by_group: Mapping[str, Sequence[Remedy]], base_model: Model) -> list[Move]:
@@ -155,7 +155,7 @@ def moves(remedies_by_group: Mapping[str, Sequence[Remedy]], base_model: Model) 
 def moves_apart(remedies_by_group: Mapping[str, Sequence[Remedy]], base_model: Model) -> list[Move]:
     """The same in each group alone, where several ask for it."""
     return [
-        Move({group: remedy}, all=False)
+        Move({group: remedy}, is_everywhere=False)
         for key, remedy_by_group in _of_groups(remedies_by_group)
         if len(remedy_by_group) > 1 and is_own(key, base_model.fit.question)
         for group, remedy in remedy_by_group.items()
@@ -260,7 +260,7 @@ def _fit(
         loss=first.loss,
         profile=tuple(name for name in group_keys.profile if all(name in profile for profile in profiles)),
     )
-    return Fit.of(runs, base_model.fit.began, question, names, progress, begin_by_group)
+    return Fit.of(runs, base_model.fit.given_robot, question, names, progress, begin_by_group)
 
 
 def _own(base_model: Model, begin_by_group: Mapping[str, tuple[Robot, OutputError]]) -> tuple[str, ...]:
@@ -283,9 +283,9 @@ def _own(base_model: Model, begin_by_group: Mapping[str, tuple[Robot, OutputErro
 # the same on every machine. What is not tried for that is in the answer, by name.
 
 FITS = 4  # of wheels that slip, in all steps together
-CLEARLY = 6.0  # of chi squared, by which one remedy explains more than another
-NOT_NEEDED = Statement("slow_and_not_needed", NOTE)
-BEYOND = Statement("slow_fits_spent", NOTE, numbers={"fits": FITS})
+CHI2_MARGIN = 6.0  # of chi squared, by which one remedy explains more than another
+NOT_NEEDED_NOTE = Statement("slow_and_not_needed", NOTE)
+SPENT_NOTE = Statement("slow_fits_spent", NOTE, numbers={"fits": FITS})
 
 
 class Purse:
@@ -300,7 +300,7 @@ class Purse:
         for move in moves:
             slow = is_slow(move, base_model)
             if slow and not self.left:
-                self._leave(move, BEYOND)
+                self._leave(move, SPENT_NOTE)
                 continue
             self.left -= slow
             paid_moves.append(move)
@@ -310,10 +310,10 @@ class Purse:
         """Those of some slow moves that promised about as much as one that leaves nothing but noise; the others are
         noted. Both by the diagnosis of what stood before."""
         assert best.move is not None
-        least_promise = best.move.promise - CLEARLY
+        least_promise = best.move.promise - CHI2_MARGIN
         for move in moves:
             if move.promise < least_promise:
-                self._leave(move, NOT_NEEDED)
+                self._leave(move, NOT_NEEDED_NOTE)
         return [move for move in moves if move.promise >= least_promise]
 
     def told(self) -> list[Untried]:

@@ -26,9 +26,9 @@ from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.statement import NOTE, Statement
 
-LEAST = -0.9  # relative change of a number that is above 0: what goes further is no explanation
+LEAST_CHANGE = -0.9  # relative change of a number that is above 0: what goes further is no explanation
 STEP = 0.02  # relative change that a smooth number is tried with
-WHEN = np.linspace(0.1, 0.9, 9)  # shares of the run at which it may change
+CHANGE_SHARES = np.linspace(0.1, 0.9, 9)  # shares of the run at which it may change
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Trial:
     """What a change by 1 would change in the log, of each piece (C, rows, K), K numbers. at: where it is tried, such as
     the level of a limit. fitted: of one that was, and is shown whole by its one column."""
 
-    shown: list[FloatArray]
+    columns_by_piece: list[FloatArray]
     at: float = 0.0
     fitted: Fitted | None = None
 
@@ -53,15 +53,16 @@ class Trial:
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """key: of the robot file, a nuisance, or CHANGE. trials: one or more. cause: what it is, of its fitted change and
-    where it was tried. least: a change below it makes no sense. offered: whether a robot file or a fit can hold it.
-    late: whether it has an engine of its own, and is asked only where something is left out."""
+    where it was tried. least_change: a change below it makes no sense. is_offered: whether a robot file or a fit can
+    hold it.
+    is_late: whether it has an engine of its own, and is asked only where something is left out."""
 
     key: str
     trials: Callable[[Workbench], list[Trial]]
     cause: Callable[[float, float], Statement]
-    least: float = -np.inf
-    offered: bool = True
-    late: bool = False
+    least_change: float = -np.inf
+    is_offered: bool = True
+    is_late: bool = False
 
     def tried(self, bench: Workbench) -> list[Trial]:
         """Its trials; none where the engine cannot simulate them."""
@@ -110,12 +111,12 @@ def _number(robot: Robot, key: str, tied_key: str = "") -> Iterator[Candidate]:
     def trials(bench: Workbench) -> list[Trial]:
         return [Trial([columns / STEP for columns in bench.change(new_robot)])]
 
-    yield Candidate(key, trials, sized("number_off", key, change=lambda change, _: change), LEAST)
+    yield Candidate(key, trials, sized("number_off", key, change=lambda change, _: change), LEAST_CHANGE)
 
 
 def of_the_log(bench: Workbench) -> Iterator[Candidate]:
     """What a log does to a right model: nuisances that are not fitted, and a change on the way."""
-    if not bench.kind.looped:
+    if not bench.kind.has_loop:
         gain, fade, band = Driver(gain=1.0 + STEP), Driver(fade=STEP), Driver(dead_band=0.1)
         yield Candidate(GAIN, _driver(GAIN, gain, STEP), sized("gain", "", gain=lambda change, _: 1.0 + change))
         yield Candidate(
@@ -175,7 +176,7 @@ def _later(force: Callable[[Motion], FloatArray]) -> Callable[[Workbench], list[
     """Forces that begin at some time of the log, at several times."""
 
     def trials(bench: Workbench) -> list[Trial]:
-        shares = [*WHEN.tolist(), *bench.moments]
+        shares = [*CHANGE_SHARES.tolist(), *bench.moments]
         columns_by_share = bench.by_forces(
             [lambda m, start_share=share: force(m) * (m.share >= start_share)[:, None, None] for share in shares]
         )
@@ -223,8 +224,8 @@ def unoffered(bench: Workbench) -> Iterator[Candidate]:
         ("sag", _sag, (0.0,)),
         ("heat", _heat, (0.0,)),
     ):
-        yield Candidate(key, _tried(force, sizes), as_it_is("cause", key), offered=False)
-    yield Candidate("filter", _filtered, as_it_is("cause", "filter"), offered=False)
+        yield Candidate(key, _tried(force, sizes), as_it_is("cause", key), is_offered=False)
+    yield Candidate("filter", _filtered, as_it_is("cause", "filter"), is_offered=False)
 
 
 def _tried(force: Force, sizes: tuple[float, ...]) -> Callable[[Workbench], list[Trial]]:

@@ -35,14 +35,17 @@ from omnidyn.model.motor import mass_at_rim, per_wheel, settled_current, tractio
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.slip.plant import grips
 
-NEARBY = 1e-4  # [m] of a centre of mass
+CENTRE_STEP = 1e-4  # [m] of a centre of mass
 LOSS, SHARE = 0.05, 0.03  # of a gear; of the robot's mass that rotors may be, each a small one to try
 LIMITS = (0.5, 0.7, 0.85, 0.95, 0.99)  # quantiles of the largest current, at which a limit is tried
-ABOVE = (0.1, 0.25, 0.5, 1.0)  # shares by which breakaway may exceed Coulomb friction
+EXCESS_SHARES = (0.1, 0.25, 0.5, 1.0)  # shares by which breakaway may exceed Coulomb friction
 SPEEDS = (0.01, 0.03, 0.1, 0.3)  # of the fastest speed, over which the level may fall
 BENDS = (2e-4, 1e-3, 5e-3)  # [m] by which bristles may bend before they slip
 USUAL_FALL, USUAL_SPEED = 1.3, 0.05  # breakaway over Coulomb friction, and [m/s] over which it falls to it
-LIGHT, AMPLE = 0.02, 1e6  # wheels, as a share of the robot's mass at their rims; a grip that no motor overcomes
+LIGHT_SHARE, AMPLE_GRIP = (
+    0.02,
+    1e6,
+)  # wheels, as a share of the robot's mass at their rims; a grip that no motor overcomes
 TRACTION = "wheels.traction_mu"
 FALL, BEND, DAMPING = "stribeck_speed", "stiffness", "damping"  # numbers by which laws are named: Stribeck, Dahl, LuGre
 DAHL = "dahl"
@@ -73,7 +76,7 @@ def _of_the_body(bench: Workbench) -> Iterator[Candidate]:
 def _off_centre(motion: Motion) -> FloatArray:
     """What a centre of mass a metre ahead, and one a metre aside, does to the body as it moves. Shape (n, 2, 3)."""
     body, wrenches = motion.robot.body, []
-    for way in np.eye(2) * NEARBY:
+    for way in np.eye(2) * CENTRE_STEP:
         upper, lower = (
             motion.robot.model_copy(
                 update={"body": body.model_copy(update={"centre": tuple(body.centre + side * way)})}
@@ -81,7 +84,7 @@ def _off_centre(motion: Motion) -> FloatArray:
             for side in (1.0, -1.0)
         )
         wrench_change = frame_wrench(upper, motion.twist) - frame_wrench(lower, motion.twist)
-        wrenches.append((wrench_change - motion.pace @ (mass_matrix(upper) - mass_matrix(lower))) / (2.0 * NEARBY))
+        wrenches.append((wrench_change - motion.pace @ (mass_matrix(upper) - mass_matrix(lower))) / (2.0 * CENTRE_STEP))
     return np.stack(wrenches, axis=1)
 
 
@@ -104,8 +107,8 @@ def _of_motors(bench: Workbench) -> Iterator[Candidate]:
             sized("gear_efficiency", "", efficiency=lambda change, _: 1.0 - change),
             0.0,
         )
-    if bench.robot.wheels.traction_mu is None and not bench.kind.looped:
-        yield Candidate(TRACTION, _grips, sized("slipping_wheels", "", share=lambda _, place: place), late=True)
+    if bench.robot.wheels.traction_mu is None and not bench.kind.has_loop:
+        yield Candidate(TRACTION, _grips, sized("slipping_wheels", "", share=lambda _, place: place), is_late=True)
 
 
 def _switched_on(robot: Robot, key: str, field: str, size: float) -> Candidate:
@@ -140,7 +143,7 @@ def _grips(bench: Workbench) -> list[Trial]:
     levels = (
         np.unique(np.quantile(largest_shares[largest_shares > 0.0], LIMITS)).tolist() if largest_shares.any() else []
     )
-    wide_grip, low = slippery(robot, AMPLE), [slippery(robot, mu) for mu in levels]
+    wide_grip, low = slippery(robot, AMPLE_GRIP), [slippery(robot, mu) for mu in levels]
     columns_by_grip = [*bench.changes(wide_grip, low), *bench.on_time().changes(wide_grip, low)]
     return [Trial(share, mu) for share, mu in zip(columns_by_grip, 2 * levels, strict=True)]
 
@@ -150,7 +153,7 @@ def slippery(robot: Robot, mu: float) -> Robot:
     slip at no speed that is known, get that of light ones."""
     changes: dict[str, Any] = {"traction_mu": mu}
     if (mass_at_rim(robot.motor, robot.wheels) <= 0.0).any():
-        share = LIGHT * robot.body.mass / robot.wheels.count
+        share = LIGHT_SHARE * robot.body.mass / robot.wheels.count
         changes["wheel_inertia"] = float(share * np.mean(robot.wheels.radii**2))
     return robot.model_copy(update={"wheels": robot.wheels.model_copy(update=changes)})
 
@@ -369,7 +372,7 @@ def _breaking(table: str, bench: Workbench) -> list[Trial]:
     trials, robot = [], bench.robot
     # Levels that hold for themselves: each axis; travel, and turning where friction resists it; all wheels.
     parts = {BODY_AXES: N_AXES, DIRECTION: 1 + (robot.friction.direction.yaw_coulomb > 0.0), WHEELS: 1}[table]
-    for share in ABOVE:
+    for share in EXCESS_SHARES:
         columns = [
             bench.change(robot.model_copy(update={"friction": breaking(robot, table, excess_row)}))
             for excess_row in 1.0 + share * np.eye(parts)

@@ -35,9 +35,14 @@ from omnidyn.identification.structure.missing.switches import Switch, as_fitted,
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 
 BEST = 3  # candidates that are fitted beside the shapes
-CLOSE = 0.1  # squared standard errors to the best point that are enough to compare
-STEPS, MORE, GO_ON = 5, 10, 2  # of every fit; of the best of them; how many those are
-ALWAYS = (PUSH, DIRECTION, BODY_AXES, WHEELS)  # a constant force; friction of another shape in the place of what is
+FIT_PRECISION = 0.1  # squared standard errors to the best point that are enough to compare
+STEPS, MORE_STEPS, MORE_FITS = 5, 10, 2  # of every fit; of the best of them; how many those are
+ALWAYS_TRIED = (
+    PUSH,
+    DIRECTION,
+    BODY_AXES,
+    WHEELS,
+)  # a constant force; friction of another shape in the place of what is
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +78,7 @@ def refits(
         problem.pieces[0].record is not solution.solver.problem.pieces[0].record,
     )
     kinds = [
-        type(engine) if engine.looped else ImplicitEngine,
+        type(engine) if engine.has_loop else ImplicitEngine,
         *([ExactEngine] if is_decimated and engine.exact else []),
     ]
     try:
@@ -89,7 +94,7 @@ def refits(
     begun_fits.sort(key=lambda begun_fit: begun_fit.state.objective)
     trials_by_key: dict[str, tuple[Candidate, list[Trial]]] = {}
     for k, next_fit in enumerate(begun_fits):
-        trial = _trial(next_fit.gone_on(MORE) if k < GO_ON else next_fit, problem, parts, solution)
+        trial = _trial(next_fit.gone_on(MORE_STEPS) if k < MORE_FITS else next_fit, problem, parts, solution)
         trials_by_key.setdefault(next_fit.candidate.key, (next_fit.candidate, []))[1].append(trial)
     return trials_by_key
 
@@ -100,7 +105,7 @@ def _asked(ranking: Sequence[Remedy], candidates: Sequence[Candidate]) -> Iterat
     candidate_by_key = {candidate.key: candidate for candidate in candidates}
     best = simpler_first([remedy for remedy in ranking if remedy.offered and remedy.key != CHANGE])[:BEST]
     yield from ((candidate_by_key[remedy.key], remedy) for remedy in best)
-    for key in ALWAYS:
+    for key in ALWAYS_TRIED:
         if key in candidate_by_key and key not in {remedy.key for remedy in best}:
             yield candidate_by_key[key], Remedy(key, candidate_by_key[key].cause(0.0, 0.0), 0.0, 0.0)
 
@@ -120,7 +125,9 @@ class _Coarse(Engine[Problem]):
     def residuals(self, point: Point) -> list[Parts]:
         """Residuals and slopes of every piece, see engines/engine.py."""
         parts_and_errors = zip(self._engine.residuals(point), self._off, strict=True)
-        return [(residual + off, slopes, indices) for (residual, slopes, indices), off in parts_and_errors]
+        return [
+            (residual + coarse_error, slopes, indices) for (residual, slopes, indices), coarse_error in parts_and_errors
+        ]
 
     def on(self, problem: Problem) -> _Coarse:
         """The same engine on other pieces, of which nothing is known."""
@@ -157,7 +164,7 @@ def _begun(
         next(iter(errors_by_kind)),
         problem.pieces[0].record is not solution.solver.problem.pieces[0].record,
     )
-    exact = not coarse_kind.looped and is_exact(way.robot) and stays_exact(way.robot, keys)
+    exact = not coarse_kind.has_loop and is_exact(way.robot) and stays_exact(way.robot, keys)
     kind = ExactEngine if exact and (not is_decimated or ExactEngine in errors_by_kind) else coarse_kind
     new_problem = make_problem(records, way.robot, replace(way.question, free=keys), kind)
     new_problem = replace(new_problem, pieces=problem.pieces)
@@ -165,7 +172,7 @@ def _begun(
     for k, name in enumerate(new_problem.names[new_problem.robot_count :], new_problem.robot_count):
         values[k] = values_before.get(name, values[k])  # numbers of the robot stand in it where they were found
     engine = _Coarse(new_problem, kind, errors_by_kind[kind]) if kind in errors_by_kind else kind.of(new_problem)
-    solver = Solver(new_problem, engine, solution.solver.nu, CLOSE, counts_ticks=False)
+    solver = Solver(new_problem, engine, solution.solver.nu, FIT_PRECISION, counts_ticks=False)
     start_values = [values]
     if new_problem.robot.wheels.traction_mu is not None:  # whose leaps lead the latency of wheels that roll astray
         start_values.append(on_time(new_problem.parameters, values))

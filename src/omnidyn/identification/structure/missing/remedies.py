@@ -21,10 +21,10 @@ from omnidyn.model.actuation import GAIN
 from omnidyn.model.keys import BODY_AXES, DIRECTION
 from omnidyn.statement import NOTE, Statement
 
-CLEAR = 2.0  # standard errors by which a remedy may seem worse on blocks it was not fitted to
-NOTHING = 1e-4  # of where a number began, below which there is none of it
+LOSS_ERRORS = 2.0  # standard errors by which a remedy may seem worse on blocks it was not fitted to
+ZERO_SHARE = 1e-4  # of where a number began, below which there is none of it
 RIVAL = 0.3  # of what the best explains, from which another explanation is worth a look
-TOLD_APART, ROUGHLY = 6.0, 0.05  # of chi squared, or its share, by which one must be better than the other
+CHI2_MARGIN, CHI2_SHARE = 6.0, 0.05  # of chi squared, or its share, by which one must be better than the other
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Tried:
 
     candidate: Candidate
     trial: Trial
-    at: IntArray
+    column_indices: IntArray
     shows: int
     chi2: float
     size: FloatArray
@@ -57,7 +57,7 @@ def remedies(
     flat = [(candidate, trial) for candidate, trials in candidate_trials for trial in trials]
     if not flat:
         return ()
-    blocks = Blocks(linear, *(trial.shown for _, trial in flat), theme_columns)
+    blocks = Blocks(linear, *(trial.columns_by_piece for _, trial in flat), theme_columns)
     themes = np.arange(len(blocks.size) - theme_columns[0].shape[2], len(blocks.size))
     parameter_indices = np.arange(1, 1 + blocks.count)
     base, first, best = blocks.left(parameter_indices), 1 + blocks.count, {}
@@ -65,14 +65,14 @@ def remedies(
     penalty = np.log(max(blocks.rows, 2))
     noise = base / max(blocks.rows - blocks.count, 1)
     for trial_candidate, trial in flat:
-        k = trial.shown[0].shape[2]
+        k = trial.columns_by_piece[0].shape[2]
         column_indices = np.arange(first, first + k)
         first += k
         chi2 = (base - blocks.left(np.concatenate([parameter_indices, column_indices]))) / noise
         joint_indices = np.concatenate([parameter_indices, column_indices])
         fitted = blocks.fitted(blocks.total, joint_indices) / blocks.size[joint_indices]
         size, step = fitted[len(parameter_indices) :], fitted[: len(parameter_indices)]
-        if size.max() < trial_candidate.least:
+        if size.max() < trial_candidate.least_change:
             continue
         candidate_result = Tried(
             trial_candidate, trial, column_indices, int(blocks.shows[column_indices].sum()), float(chi2), size, step
@@ -89,7 +89,7 @@ def remedies(
     ]
     ranking = []
     for t in worthy_results:
-        errors_after = blocks.held_out(np.concatenate([parameter_indices, t.at]))
+        errors_after = blocks.held_out(np.concatenate([parameter_indices, t.column_indices]))
         change = (errors_before - errors_after) / max(float(errors_before.sum()), 1e-300)
         gain, std = float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change)))
         equal_keys = tuple(
@@ -99,7 +99,7 @@ def remedies(
         )
         fitted = t.trial.fitted
         cause = fitted.cause if fitted else t.candidate.cause(float(t.size[0]), t.trial.at)
-        gain_with_themes = (base - blocks.left(np.concatenate([parameter_indices, t.at, themes]))) / noise
+        gain_with_themes = (base - blocks.left(np.concatenate([parameter_indices, t.column_indices, themes]))) / noise
         share = (t.chi2 - t.numbers) / max(gain_with_themes - t.numbers - len(themes), t.chi2 - t.numbers, 1e-300)
         ranking.append(
             Remedy(
@@ -109,7 +109,7 @@ def remedies(
                 std,
                 equal_keys,
                 share,
-                t.candidate.offered,
+                t.candidate.is_offered,
                 t.chi2,
                 t.numbers,
                 tuple(t.size.tolist()),
@@ -117,7 +117,9 @@ def remedies(
                 fitted.changes if fitted else _changes(linear.rows, t),
             )
         )
-    kept_remedies = [r for r in ranking if r.gain > -CLEAR * r.gain_std and r.chi2 > RIVAL * worthy_results[0].chi2]
+    kept_remedies = [
+        r for r in ranking if r.gain > -LOSS_ERRORS * r.gain_std and r.chi2 > RIVAL * worthy_results[0].chi2
+    ]
     return tuple(_best_first(kept_remedies)[:remedy_limit])
 
 
@@ -141,7 +143,7 @@ def _changes(rows: Rows, result: Tried) -> dict[str, tuple[float, float]]:
     changes = {}
     for p, value, step in zip(rows.problem.robot_parameters, rows.point.values.tolist(), result.step, strict=False):
         value_after = min(max(p.outer(p.inner(value) + float(step)), p.low), p.high)
-        if max(abs(value), abs(value_after)) > NOTHING * abs(p.value):  # else it is 0, and stays so
+        if max(abs(value), abs(value_after)) > ZERO_SHARE * abs(p.value):  # else it is 0, and stays so
             changes[p.name] = value, value_after
     return changes
 
@@ -150,9 +152,11 @@ def _same(
     blocks: Blocks, parameter_indices: IntArray, base: float, noise: float, left_result: Tried, right_result: Tried
 ) -> bool:
     """Whether the log cannot tell two apart: as good as each other, and both hardly better than one."""
-    joint_gain = (base - blocks.left(np.concatenate([parameter_indices, left_result.at, right_result.at]))) / noise
+    joint_gain = (
+        base - blocks.left(np.concatenate([parameter_indices, left_result.column_indices, right_result.column_indices]))
+    ) / noise
     least_gain = max(
-        TOLD_APART, ROUGHLY * max(left_result.chi2, right_result.chi2)
+        CHI2_MARGIN, CHI2_SHARE * max(left_result.chi2, right_result.chi2)
     )  # to first order, for either is a larger change
     return (
         abs(left_result.chi2 - right_result.chi2) < least_gain
@@ -167,7 +171,7 @@ def _same(
 # like
 # a body of I/s^2. No fit to such a log can tell.
 
-HIDDEN = {
+HIDDEN_KEYS = {
     "motor.resistance_ohm": "wheels.wheel_radius_m",
     GAIN: "wheels.wheel_radius_m",
     "body.inertia_kg_m2": "wheels.robot_radius_m",
@@ -176,7 +180,7 @@ HIDDEN = {
 
 def hidden_by(key: str, columns: Iterable[tuple[str, int]]) -> list[str]:
     """The radius that looks like a change of a number, to logs of these columns: none, or one."""
-    return [HIDDEN[key]] if key in HIDDEN and {name for name, _ in columns} == {"twist"} else []
+    return [HIDDEN_KEYS[key]] if key in HIDDEN_KEYS and {name for name, _ in columns} == {"twist"} else []
 
 
 def with_odometry(remedies: Sequence[Remedy], columns: Sequence[tuple[str, int]]) -> tuple[Remedy, ...]:

@@ -19,7 +19,7 @@ from omnidyn.identification.methods import STUDENT, OutputError
 from omnidyn.identification.output_error.prepare import expand_keys, guesses
 from omnidyn.identification.output_error.problem.friction_laws import with_damping
 from omnidyn.identification.output_error.problem.nuisances import NUISANCES, PUSH, TILT
-from omnidyn.identification.output_error.problem.parameters import EFFICIENCY, WITHIN
+from omnidyn.identification.output_error.problem.parameters import EFFICIENCY, OFFSET_SHARE
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import HIGHEST, is_profiled, levels_of
 from omnidyn.identification.structure.missing.laws import (
@@ -52,16 +52,16 @@ BREAKS, FALLS, BENDS, DAMPS = (
 )
 LAWS = (*FALLS, *BENDS, *DAMPS)  # Stribeck's, Dahl's, LuGre's, of every table
 OF_GEAR = 0.01  # lost by a gear, from which its fit begins at least
-UNSURE = 2.0  # std of the logarithm of a speed, or of a bristle's numbers, before a fit tells more
+SPEED_STD = 2.0  # std of the logarithm of a speed, or of a bristle's numbers, before a fit tells more
 NUMBERS = {FALL: (BREAKAWAY, FALL), BEND: (BEND,), DAMPING: (BREAKAWAY, FALL, BEND, DAMPING)}  # of laws
-ABOVE = 1.1, HIGHEST  # breakaway over Coulomb friction, between which the fit of a fall begins
+LEVEL_RATIOS = 1.1, HIGHEST  # breakaway over Coulomb friction, between which the fit of a fall begins
 # Numbers of each wheel that change together, and what stands for them in a robot.
 OF_ALL = {
     "wheels.wheel_radius_m": ("wheels", ("wheel_radius",)),
     "motor.resistance_ohm": ("motor", ("resistance",)),
     "motor.torque_constant_Nm_A": ("motor", ("torque_constant", "emf_constant")),
 }
-OFF = {"motor.voltage_drop_V": "voltage_drop", "motor.rotor_inertia_kg_m2": "rotor_inertia"}
+SWITCHED_OFF = {"motor.voltage_drop_V": "voltage_drop", "motor.rotor_inertia_kg_m2": "rotor_inertia"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +122,7 @@ def _ways(remedy: Remedy, robot: Robot, question: OutputError) -> Iterator[Switc
         body = robot.body.replace(rotating_frame=not robot.body.rotating_frame)
         yield Switch(robot.replace(body=body), question, cause)
     elif key == CENTRE:
-        offset_limit = 0.7 * WITHIN * float(np.min(robot.wheels.robot_radius))  # well within the wheels
+        offset_limit = 0.7 * OFFSET_SHARE * float(np.min(robot.wheels.robot_radius))  # well within the wheels
         centre = np.clip(np.add(robot.body.centre, remedy.size), -offset_limit, offset_limit)
         yield Switch(robot.replace(body=robot.body.replace(centre=centre)), _free(question, key), cause)
     elif key in BREAKS:
@@ -144,8 +144,8 @@ def _ways(remedy: Remedy, robot: Robot, question: OutputError) -> Iterator[Switc
         slips, spins = slippery(robot, remedy.at), "wheels.inertia_kg_m2"
         guessed_keys = [spins] if slips.wheels.wheel_inertia != robot.wheels.wheel_inertia else []
         yield _rough(slips, _free(question, key), guessed_keys, cause)
-    elif key in OFF:
-        on = robot.replace(motor=robot.motor.replace(**{OFF[key]: remedy.size[0]}))
+    elif key in SWITCHED_OFF:
+        on = robot.replace(motor=robot.motor.replace(**{SWITCHED_OFF[key]: remedy.size[0]}))
         yield Switch(on, _free(question, key), cause)
     elif key == EFFICIENCY:
         lossy_robot = robot.replace(motor=robot.motor.replace(gear_efficiency=1.0 - max(remedy.size[0], OF_GEAR)))
@@ -158,7 +158,7 @@ def _where_it_ended(robot: Robot, solution: Solution) -> Robot:
     """The robot with what was fitted, but for numbers with a prior, and what a wrong model drove to a bound."""
     problem = solution.solver.problem
     for p, value, is_held in zip(
-        problem.robot_parameters, solution.state.point.values.tolist(), solution.held, strict=False
+        problem.robot_parameters, solution.state.point.values.tolist(), solution.held_parameters, strict=False
     ):
         if p.prior is None and not is_held:
             robot = p.on(robot, value)
@@ -180,7 +180,7 @@ def _free(question: OutputError, *keys: str) -> OutputError:
 
 def _as_far_as_profiled(way: Switch, solution: Solution) -> Switch:
     """The same; where no engine looks for levels of breakaway, of a speed loop or wheels that slip, they stay."""
-    if way.robot.wheels.traction_mu is None and not solution.solver.engine.looped:
+    if way.robot.wheels.traction_mu is None and not solution.solver.engine.has_loop:
         return way
     return with_levels_as_they_are(way)
 
@@ -213,7 +213,7 @@ def _of_another_law(remedy: Remedy, robot: Robot, question: OutputError) -> Swit
     the critical damping to begin from."""
     table, _, law = remedy.key.rpartition(".")
     if law == FALL:
-        friction = falling(robot, table, np.clip(1.0 + np.asarray(remedy.size), *ABOVE), remedy.at)
+        friction = falling(robot, table, np.clip(1.0 + np.asarray(remedy.size), *LEVEL_RATIOS), remedy.at)
     else:
         friction = BRISTLES[law][0](robot, table, remedy.at)
     law_table, law_keys = table_of(friction, table), [f"{yaw}{name}" for yaw in ("", "yaw_") for name in NUMBERS[law]]
@@ -228,7 +228,7 @@ def _rough(robot: Robot, question: OutputError, names: Sequence[str], cause: Sta
     free_axes = {Key.parse(key).axis for key in question.free or ()}  # of an axis that never moved nothing is asked
     keys = [key for name in names for key in expand_keys(name, robot) if Key.parse(key).axis in free_axes | {None}]
     rough_priors = {
-        key: Prior(std=UNSURE * float(Key.parse(key).get(robot)), source="where the search began", origin="guess")
+        key: Prior(std=SPEED_STD * float(Key.parse(key).get(robot)), source="where the search began", origin="guess")
         for key in keys
         if not Key.parse(key).level
     }
