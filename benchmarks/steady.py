@@ -68,7 +68,7 @@ def _robotino(table: Table, data: Path) -> None:
     for shape, told in LOO.items():
         _left_out(table, robot, fixed, shape, told)
     for group, told in (("gray 0.1", (42.5, 36.1)), ("green 0.1", (36.0, 35.1))):
-        level = fit_shape(SHAPES["ellipse-plain"], robot, fixed[group], turning=False, robust=False)
+        level = fit_shape(SHAPES["ellipse-plain"], robot, fixed[group], has_yaw=False, robust=False)
         assert level is not None
         table.add(
             "0.15 N",
@@ -123,7 +123,7 @@ def _left_out(table: Table, robot: Robot, points: dict[str, ForcePoints], shape:
     for how, still in (("sign of 4e-9 m/s, as README", 0.0), ("4e-9 m/s is no motion", 1.0)):
         ours = []
         for own in points.values():
-            fit = fit_shape(SHAPES[shape], robot, replace(own, still=still * own.still), turning=False, robust=False)
+            fit = fit_shape(SHAPES[shape], robot, replace(own, still=still * own.still), has_yaw=False, robust=False)
             assert fit is not None
             ours.append(rms_and_error((fit.error**2).sum(axis=1), fit.fold)[0])
         gap = np.array(ours) - told

@@ -17,7 +17,7 @@ SPEED = np.array([-1.5, -0.2, 0.1, 0.7, 1.4])
 
 @pytest.fixture(scope="module")
 def estimate():
-    return fit_steady_state(load_robot("axebot"), table_1_points(), rest="line")
+    return fit_steady_state(load_robot("axebot"), table_1_points(), rest_use="line")
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])

@@ -77,14 +77,14 @@ def test_windows_found_by_themselves_agree(runs, group):
 def test_left_out_errors_as_in_the_readme(points, shape):
     """The README takes sgn of set speeds of 4e-9 m/s, the rounding of its file; so here the same is taken as motion."""
     for k, own in enumerate(points.values()):
-        fit = fit_shape(SHAPES[shape], ROBOTINO, replace(own, still=0.0 * own.still), turning=False, robust=False)
+        fit = fit_shape(SHAPES[shape], ROBOTINO, replace(own, still=0.0 * own.still), has_yaw=False, robust=False)
         assert rms_and_error((fit.error**2).sum(axis=1), fit.fold)[0] == pytest.approx(LOO[shape][k], abs=0.06)
 
 
 @pytest.mark.parametrize("shape", [*ALONG])
 def test_left_out_errors_along_travel_as_in_the_readme(points, shape):
     for k, own in enumerate(points.values()):
-        fit = fit_shape(SHAPES[shape], ROBOTINO, own, turning=False, robust=False, aim="along")
+        fit = fit_shape(SHAPES[shape], ROBOTINO, own, has_yaw=False, robust=False, aim="along")
         assert rms_and_error(fit.along_error**2, fit.fold)[0] == pytest.approx(ALONG[shape][k], abs=0.015)
 
 
@@ -92,7 +92,7 @@ def test_left_out_errors_along_travel_as_in_the_readme(points, shape):
 def test_speeds_that_are_none_make_every_shape_better_or_no_worse(points, shape):
     """What 4e-9 m/s is not taken for motion gains."""
     for k, own in enumerate(points.values()):
-        fit = fit_shape(SHAPES[shape], ROBOTINO, own, turning=False, robust=False)
+        fit = fit_shape(SHAPES[shape], ROBOTINO, own, has_yaw=False, robust=False)
         assert rms_and_error((fit.error**2).sum(axis=1), fit.fold)[0] < LOO[shape][k] + 0.025
 
 
@@ -107,7 +107,7 @@ def test_levels_at_the_wheels_beside_the_plain_ellipse_are_no_worse_and_better_o
     """Beside the README's best shape, which has no levels at the wheels."""
     ours = []
     for own in points.values():
-        fit = fit_shape(SHAPES[shape], ROBOTINO, own, turning=False, robust=False)
+        fit = fit_shape(SHAPES[shape], ROBOTINO, own, has_yaw=False, robust=False)
         ours.append(rms_and_error((fit.error**2).sum(axis=1), fit.fold)[0])
     assert (np.array(ours) < np.array(LOO["ellipse-plain"]) + 0.025).all()
     assert ours[-1] < LOO["ellipse-plain"][-1] - 0.05
@@ -115,7 +115,7 @@ def test_levels_at_the_wheels_beside_the_plain_ellipse_are_no_worse_and_better_o
 
 def test_the_ellipse_of_each_floor(points):
     for group, values in (("gray 0.1", (42.5, 36.1)), ("green 0.1", (36.0, 35.1))):
-        fit = fit_shape(SHAPES["ellipse-plain"], ROBOTINO, points[group], turning=False, robust=False)
+        fit = fit_shape(SHAPES["ellipse-plain"], ROBOTINO, points[group], has_yaw=False, robust=False)
         assert fit.level == pytest.approx(values, abs=0.15)
 
 

@@ -195,7 +195,7 @@ def test_a_picture_keeps_its_words():
 def test_the_confidence_band_is_that_of_a_shifted_fit(robot, axis):
     """With speeds counted from v0 the constant of a straight line is the force at v0, and its error the band's."""
     points = table_1_points()
-    estimate = fit_steady_state(robot, points, rest="line")
+    estimate = fit_steady_state(robot, points, rest_use="line")
     mine = points.axis_index == axis
     speed, force = points.speed[mine], points.force[mine]
     for centre in (0.0, 0.4, 1.1 * speed.max()):

@@ -15,8 +15,8 @@ from omnidyn.model.robot import GUESSES
 from omnidyn.statement import NOTE, Statement
 
 LIMIT = "motor.current_limit_A"
-NEARLY = 0.7  # of what the first remedy explains, from which one behind it is worth a word
-WIDE, GOAL = 0.2, 0.1  # half width of the 95 % interval over the value: worth a word, and what it could be
+SIMILAR_SHARE = 0.7  # of what the first remedy explains, from which one behind it is worth a word
+WIDE_SHARE, GOAL_SHARE = 0.2, 0.1  # half width of the 95 % interval over the value: worth a word, and what it could be
 CORRELATED = 0.95  # two numbers that move together
 # Guesses worth a fit, where a log has voltages. Of K_t, the EMF constant and the gear only one number shows.
 GOES_WITH_TORQUE = (EMF, "motor.gear_ratio")
@@ -25,10 +25,10 @@ FREEABLE = (TORQUE, "motor.resistance_ohm", "body.inertia_kg_m2")
 
 def advice(fit: OutputErrorEstimate, validation: Validation | None) -> list[Statement]:
     """What to measure or to ask for next, gravest first."""
-    found = [*_not_seen(fit), *_missing(fit), *_guesses(fit), *_together(fit), *_wide(fit)]
+    statements = [*_not_seen(fit), *_missing(fit), *_guesses(fit), *_together(fit), *_wide(fit)]
     if validation is not None and validation.held_out is None:
-        found.append(Statement("hold_out_log", NOTE))
-    return list(dict.fromkeys(found))
+        statements.append(Statement("hold_out_log", NOTE))
+    return list(dict.fromkeys(statements))
 
 
 def _not_seen(fit: OutputErrorEstimate) -> Iterator[Statement]:
@@ -37,9 +37,9 @@ def _not_seen(fit: OutputErrorEstimate) -> Iterator[Statement]:
     for name in fit.unidentifiable:
         if math.isinf(fit.std.get(name, 0.0)):
             yield Statement("number_not_told", NOTE, name, {"axis": _axis(name) if name in BOX else ""})
-    known = tuple(name for name in fit.unidentifiable if math.isfinite(fit.std.get(name, math.inf)))
-    if known:
-        yield Statement("known_by_file_only", NOTE, numbers={"keys": known})
+    known_names = tuple(name for name in fit.unidentifiable if math.isfinite(fit.std.get(name, math.inf)))
+    if known_names:
+        yield Statement("known_by_file_only", NOTE, numbers={"keys": known_names})
     for direction in fit.blind:
         yield Statement("measure_or_fix", NOTE, numbers={"direction": direction})
 
@@ -59,8 +59,10 @@ def _missing(fit: OutputErrorEstimate) -> Iterator[Statement]:
     lack = fit.lack_of_fit
     if lack is None or not lack.found or fit.not_followed:
         return
-    near = (cause for cause in lack.causes if cause.confident and cause.chi2 >= NEARLY * lack.causes[0].chi2)
-    remedy = next(near, None)
+    near_causes = (
+        cause for cause in lack.causes if cause.confident and cause.chi2 >= SIMILAR_SHARE * lack.causes[0].chi2
+    )
+    remedy = next(near_causes, None)
     if remedy is not None:
         numbers = {"cause": remedy.cause, "same_as": remedy.same_as, "alike": lack.alike(remedy), "way": way(remedy)}
         yield Statement("missing_cause", NOTE, remedy.key, numbers | remedy.largest_changes())
@@ -84,16 +86,16 @@ def way(remedy: Remedy) -> str:
 
 def _guesses(fit: OutputErrorEstimate) -> Iterator[Statement]:
     """What the robot file only guesses, where the model misses something: no friction makes up for a wrong motor."""
-    guessed = [
+    guessed_keys = [
         key
         for key, prior in fit.robot.priors.items()
         if prior.origin in GUESSES and key not in fit.value and Key.parse(key).part in ("motor", "body")
     ]
     if FREEABLE[0] in fit.value:
-        guessed = [key for key in guessed if key not in GOES_WITH_TORQUE]
-    freeable = tuple(key for key in FREEABLE if key in guessed)
-    if guessed and _misses(fit):
-        yield Statement("guessed_numbers", NOTE, numbers={"keys": tuple(guessed), "freeable": freeable})
+        guessed_keys = [key for key in guessed_keys if key not in GOES_WITH_TORQUE]
+    freeable = tuple(key for key in FREEABLE if key in guessed_keys)
+    if guessed_keys and _misses(fit):
+        yield Statement("guessed_numbers", NOTE, numbers={"keys": tuple(guessed_keys), "freeable": freeable})
 
 
 def _together(fit: OutputErrorEstimate) -> Iterator[Statement]:
@@ -105,11 +107,11 @@ def _together(fit: OutputErrorEstimate) -> Iterator[Statement]:
         for j in range(i + 1, len(names))
         if abs(matrix[i, j]) > CORRELATED
         and not {first, names[j]} & set(fit.unidentifiable)
-        and max(fit.half_width(name) if name in fit.value else 0.0 for name in (first, names[j])) > GOAL
+        and max(fit.half_width(name) if name in fit.value else 0.0 for name in (first, names[j])) > GOAL_SHARE
     ]
     if pairs:
-        first, second, between = zip(*pairs, strict=True)
-        numbers = {"first": first, "second": second, "correlation": between}
+        first, second, correlations = zip(*pairs, strict=True)
+        numbers = {"first": first, "second": second, "correlation": correlations}
         yield Statement("correlated_numbers", NOTE, numbers=numbers)
 
 
@@ -118,14 +120,14 @@ def _wide(fit: OutputErrorEstimate) -> Iterator[Statement]:
     shares = {
         name: fit.half_width(name) for name in fit.value if name not in fit.unidentifiable and name not in fit.at_bound
     }
-    wide = {name: share for name, share in shares.items() if share > WIDE}
-    if wide:
+    wide_shares = {name: share for name, share in shares.items() if share > WIDE_SHARE}
+    if wide_shares:
         numbers = {
-            "keys": tuple(wide),
-            "shares": tuple(wide.values()),
-            "known": tuple(fit.is_known(name) for name in wide),
-            "longer": (max(wide.values()) / GOAL) ** 2,
-            "goal": GOAL,
+            "keys": tuple(wide_shares),
+            "shares": tuple(wide_shares.values()),
+            "known": tuple(fit.is_known(name) for name in wide_shares),
+            "longer": (max(wide_shares.values()) / GOAL_SHARE) ** 2,
+            "goal": GOAL_SHARE,
         }
         yield Statement("wide_by_misfit" if _misses(fit) else "wide_intervals", NOTE, numbers=numbers)
 

@@ -43,18 +43,18 @@ def as_driven(robot: Robot, runs: Sequence[Run]) -> Robot:
 
 def why_not_output_error(runs: Sequence[Run], robot: Robot) -> str:
     """Why whole logs are not fitted by output error unless it is asked for, in words; "" where they are."""
-    why = why_no_inputs(runs, robot)
-    if why or robot.drive.kind != SPEED or any(run.voltage is not None or run.duty is not None for run in runs):
-        return why
+    reason = why_no_inputs(runs, robot)
+    if reason or robot.drive.kind != SPEED or any(run.voltage is not None or run.duty is not None for run in runs):
+        return reason
     return why_no_transient(runs, robot)
 
 
 def default_method(runs: Sequence[Run], robot: Robot, progress: Progress) -> tuple[Method, str]:
     """(the method that robot and logs support, why it is not output error, "" where it is); `progress` hears why."""
-    why = why_not_output_error(runs, robot)
-    if why:
-        progress(Report(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {why}", urgent=True))
-    return (SteadyState() if why else OutputError()), why
+    reason = why_not_output_error(runs, robot)
+    if reason:
+        progress(Report(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {reason}", urgent=True))
+    return (SteadyState() if reason else OutputError()), reason
 
 
 def default_motor_method(runs: Sequence[Run], input: str, progress: Progress) -> MotorFit | MotorLine:
@@ -68,10 +68,10 @@ def default_motor_method(runs: Sequence[Run], input: str, progress: Progress) ->
 
     kind = motor_input(runs, [input] if input else MOTOR_INPUTS)
     step = max((usual_step(run.t) for run in runs), default=0.0)
-    why = f"rows are {step:.2g} s apart" if step > SLOW_ROW else ""
+    reason = f"rows are {step:.2g} s apart" if step > SLOW_ROW else ""
     if kind and kind not in FREE_RUN_INPUTS:
-        why = f"the input is a {kind}"
-    if not why:
+        reason = f"the input is a {kind}"
+    if not reason:
         return MotorFit(input=input)
-    progress(Report(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {why}", urgent=True))
+    progress(Report(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {reason}", urgent=True))
     return MotorLine(input=input)

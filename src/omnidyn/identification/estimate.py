@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 NOT_DETERMINED = "not determined"  # in the place of an interval: the data do not give one
 UNKNOWN = {"std": None, "ci95": [None, None]}  # the same for machines
-WORTH = 0.1  # by which an interval must be wider for that to be worth a table
+WIDENING_SHARE = 0.1  # by which an interval must be wider for that to be worth a table
 SOURCE_LENGTH = 300  # a robot file takes 400 characters
 
 
@@ -115,10 +115,15 @@ class Estimate(Displayable):
     def numbers_known(self) -> Statement:
         """How many numbers are known, the widest of them, and what is not known."""
         share = {name: self.half_width(name) for name in self.value}
-        known = {name: each for name, each in share.items() if self.is_known(name)}
-        widest = max(known, key=lambda name: known[name], default="")
-        missing = tuple(name for name in share if name not in known)
-        numbers = {"count": len(share), "missing": missing, "widest": widest, "share": known.get(widest)}
+        known_shares = {name: share_of_number for name, share_of_number in share.items() if self.is_known(name)}
+        widest_number = max(known_shares, key=lambda name: known_shares[name], default="")
+        missing = tuple(name for name in share if name not in known_shares)
+        numbers = {
+            "count": len(share),
+            "missing": missing,
+            "widest": widest_number,
+            "share": known_shares.get(widest_number),
+        }
         return Statement("numbers_known", NOTE, numbers=numbers)
 
     def half_width(self, name: str) -> float:
@@ -145,9 +150,9 @@ class Estimate(Displayable):
         bounds = [f"{name} is at least {bound:.4g} {unit(name)}" for name, bound in self.lower_bound.items()]
         head = [f"{self.robot.name}: {self.method}", f"data: {self.data}", ""]
         scale = [self.scale] if self.scale else []
-        held = [words] if (words := rests_on_guesses(self.robot)) else []
-        alone = [table] if (table := self.alone_table()) else []
-        return [*head, self._table(), *alone, *bounds, *scale, *held, by_severity(self.warnings)]
+        guess_lines = [words] if (words := rests_on_guesses(self.robot)) else []
+        alone_tables = [table] if (table := self.alone_table()) else []
+        return [*head, self._table(), *alone_tables, *bounds, *scale, *guess_lines, by_severity(self.warnings)]
 
     def _table(self) -> Table:
         rows = []
@@ -165,9 +170,11 @@ class Estimate(Displayable):
         """What the intervals owe to what the robot file gives with a std; None where that is not worth a word."""
         rows = []
         for name, (low, high) in self.log_alone.items():
-            whole = self._whole(name)
-            if whole is not None and whole[1] - whole[0] > (1.0 + WORTH) * (high - low):
-                rows.append((name, interval_cell((low, high)), interval_cell(whole)))
+            whole_interval = self._whole(name)
+            if whole_interval is not None and whole_interval[1] - whole_interval[0] > (1.0 + WIDENING_SHARE) * (
+                high - low
+            ):
+                rows.append((name, interval_cell((low, high)), interval_cell(whole_interval)))
         return (
             Table(("95 % intervals", "from the log alone", "with what is known of the robot"), rows) if rows else None
         )
@@ -209,8 +216,8 @@ class Estimate(Displayable):
 
 def identified(std: float | None, source: str) -> Prior:
     """The prior of an identified number: its standard error, where it is one, and from what it was identified."""
-    known = std is not None and 0.0 < std <= 1e9
-    return Prior(std=float(std) if known else None, source=printable(source), origin=IDENTIFIED)  # type: ignore[arg-type]
+    has_std = std is not None and 0.0 < std <= 1e9
+    return Prior(std=float(std) if has_std else None, source=printable(source), origin=IDENTIFIED)  # type: ignore[arg-type]
 
 
 def printable(source: str) -> str:

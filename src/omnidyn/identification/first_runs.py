@@ -35,11 +35,11 @@ TICK = 2.0 * np.pi / 200.0  # of a counted angle [rad]
 
 def first_runs() -> list[tuple[str, Callable[[], object]]]:
     """(what it stands for, how to make it), in the order in which they are wanted. Compiled, each takes below 1 s."""
-    paper, four, other, looped = (load_robot(name) for name in ("axebot", "four-wheel", "mecanum", "robotino"))
+    paper, four, mecanum, loop_robot = (load_robot(name) for name in ("axebot", "four-wheel", "mecanum", "robotino"))
     slips = paper.replace(wheels=paper.wheels.replace(traction_mu=0.4, wheel_inertia=2e-5))
     axes = paper.friction.axes
     falls = axes.replace(breakaway=tuple(2.0 * level for level in axes.coulomb), stribeck_speed=(0.05, 0.05, 0.5))
-    falling = paper.replace(friction=paper.friction.replace(axes=falls))
+    falling_robot = paper.replace(friction=paper.friction.replace(axes=falls))
     winding = four.replace(motor=four.motor.replace(electrical=DYNAMIC, inductance=1e-3))
     return [
         ("simulation, friction of the axes", partial(_run, paper)),
@@ -50,13 +50,13 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("fit of speeds, currents and poses", partial(_fit, paper, "twist", "current", "pose")),
         ("fit of a force in the room", partial(_fit, paper, "twist", "current", "pose", nuisances=("tilt",))),
         ("fit of counted angles", partial(_fit, paper, "wheel_angle")),
-        ("simulation, any friction", partial(_run, other)),
-        ("acceleration, any friction", partial(acceleration, looped, np.zeros(3), np.ones(3))),
-        ("fit, any friction", partial(_fit, other, "twist")),
-        ("fit of counted angles, any friction", partial(_fit, other, "wheel_angle")),
-        ("fit in a speed loop", partial(_fit, looped, "twist")),
+        ("simulation, any friction", partial(_run, mecanum)),
+        ("acceleration, any friction", partial(acceleration, loop_robot, np.zeros(3), np.ones(3))),
+        ("fit, any friction", partial(_fit, mecanum, "twist")),
+        ("fit of counted angles, any friction", partial(_fit, mecanum, "wheel_angle")),
+        ("fit in a speed loop", partial(_fit, loop_robot, "twist")),
         ("simulation, inductance", partial(_run, winding)),
-        ("simulation, friction that falls with speed", partial(_run, falling)),
+        ("simulation, friction that falls with speed", partial(_run, falling_robot)),
         ("simulation, wheels that slip", partial(_run, slips)),
     ]
 
@@ -88,24 +88,26 @@ def _remember() -> None:
 
 def _run(robot: Robot) -> Run:
     """From rest, with reversals: under voltages, or under set points where the drive takes those."""
-    looped = robot.drive.kind == SPEED
-    steps = np.random.default_rng(0).uniform(-1.0, 1.0, (ROWS // HOLD, 3 if looped else robot.wheels.count))
+    has_loop = robot.drive.kind == SPEED
+    steps = np.random.default_rng(0).uniform(-1.0, 1.0, (ROWS // HOLD, 3 if has_loop else robot.wheels.count))
     steps[0] = 0.0
-    given = np.repeat(steps, HOLD, axis=0)
-    return simulate(robot, dt=DT, twist_command=given * TWIST) if looped else simulate(robot, given * VOLTAGE, DT)
+    inputs = np.repeat(steps, HOLD, axis=0)
+    return simulate(robot, dt=DT, twist_command=inputs * TWIST) if has_loop else simulate(robot, inputs * VOLTAGE, DT)
 
 
 def _fit(robot: Robot, *sensors: str, memory: FloatArray = MEMORY[:1], **options: Any) -> Estimate:
     """A fit to what these sensors show of that run, with errors of that memory."""
     random, run = np.random.default_rng(1), _run(robot)
-    seen = {
+    measured_channels = {
         name: value + NOISE[name] * _remembered(random.standard_normal(value.shape), memory)
         for name, value in run.channels.items()
         if name in NOISE
     }
-    seen["wheel_angle"] = np.round(np.cumsum(run.channels["wheel_speed"], axis=0) * DT / TICK) * TICK
-    given = Run(t=run.t, voltage=None if robot.drive.kind == SPEED else run.voltage, twist_command=run.twist_command)
-    log = given.replace(**{name: seen[name] for name in sensors})
+    measured_channels["wheel_angle"] = np.round(np.cumsum(run.channels["wheel_speed"], axis=0) * DT / TICK) * TICK
+    logged_run = Run(
+        t=run.t, voltage=None if robot.drive.kind == SPEED else run.voltage, twist_command=run.twist_command
+    )
+    log = logged_run.replace(**{name: measured_channels[name] for name in sensors})
     return identify(log, robot, OutputError(**options)).estimate
 
 

@@ -17,7 +17,7 @@ from omnidyn.model.actuation import DEAD_BAND
 from omnidyn.model.keys import in_words, unit
 from omnidyn.statement import ERROR, WARNING, Statement
 
-SHOWN = 6  # findings of a log that are named
+SHOWN_FINDINGS = 6  # findings of a log that are named
 MOST_LOGS = 20  # that are shown, one by one
 
 
@@ -32,19 +32,19 @@ def fit_document(
     blocks: list[Sequence[Part]] = []
     groups, last = {}, [*fits][-1:]  # all have the same ladder
     for group, fit in fits.items():
-        beside = [validations[group].document()] if group in validations else []
-        told = [fit.document(), *beside]
-        found = fit.diagnosis
-        blocks += [[f"group {group}"] if len(fits) > 1 else [], *(each.parts for each in told)]
+        validation_documents = [validations[group].document()] if group in validations else []
+        documents = [fit.document(), *validation_documents]
+        diagnosis = fit.diagnosis
+        blocks += [[f"group {group}"] if len(fits) > 1 else [], *(document.parts for document in documents)]
         blocks += [[Points([fit.held_out.statement()])]] if fit.held_out else []
         blocks += [fit.ladder.parts()] if fit.ladder and group in last else []
-        blocks += _found(found) if found and not fit.not_followed else []
+        blocks += _found(diagnosis) if diagnosis and not fit.not_followed else []
         groups[group] = {
             **fit.to_dict(),
-            "validation": beside[0].data if beside else None,
-            "lack_of_fit": found.lack_of_fit.to_dict() if found else None,
+            "validation": validation_documents[0].data if validation_documents else None,
+            "lack_of_fit": diagnosis.lack_of_fit.to_dict() if diagnosis else None,
             "rests_on": fit.rests_on,
-            "stability": found.stability.to_dict() if found else None,
+            "stability": diagnosis.stability.to_dict() if diagnosis else None,
         }
     blocks.append([difference_table(differences)] if differences else [])
     blocks.append(["next:", Points(advice, name="next")] if advice else [])
@@ -60,8 +60,12 @@ def fit_document(
 
 def _found(diagnosis: Diagnosis) -> list[Sequence[Part]]:
     """What the model leaves out, what is not the same throughout the logs, and what the numbers rest on."""
-    rests, stability = diagnosis.table(), diagnosis.stability
-    return [diagnosis.lack_of_fit.parts(), stability.parts(), ["what each number rests on:", rests] if rests else []]
+    sensitivity_table, stability = diagnosis.table(), diagnosis.stability
+    return [
+        diagnosis.lack_of_fit.parts(),
+        stability.parts(),
+        ["what each number rests on:", sensitivity_table] if sensitivity_table else [],
+    ]
 
 
 def number_table(fit: OutputErrorEstimate) -> Table:
@@ -142,27 +146,31 @@ def difference_table(differences: Sequence[Difference]) -> Table:
 
 def verdict_table(verdicts: Sequence[Verdict]) -> Table:
     """What `check` says of each log; of many logs the gravest, then a line for the rest."""
-    rows, shown = [], list(verdicts)
-    if len(shown) > MOST_LOGS:
-        shown = sorted(shown, key=lambda each: (-each.counts[ERROR], -each.counts[WARNING]))[: MOST_LOGS - 1]
-    for each in shown:
-        heard = [f for f in each.findings if f.severity in (ERROR, WARNING) or f.code == "judged_again"]
-        what = [f"{f.code} {f.subject}".rstrip() for f in heard]
-        words = ", ".join(what[:SHOWN]) + (", ..." if len(what) > SHOWN else "")
+    rows, listed_verdicts = [], list(verdicts)
+    if len(listed_verdicts) > MOST_LOGS:
+        listed_verdicts = sorted(
+            listed_verdicts, key=lambda verdict: (-verdict.counts[ERROR], -verdict.counts[WARNING])
+        )[: MOST_LOGS - 1]
+    for listed_verdict in listed_verdicts:
+        grave_findings = [
+            f for f in listed_verdict.findings if f.severity in (ERROR, WARNING) or f.code == "judged_again"
+        ]
+        finding_names = [f"{f.code} {f.subject}".rstrip() for f in grave_findings]
+        words = ", ".join(finding_names[:SHOWN_FINDINGS]) + (", ..." if len(finding_names) > SHOWN_FINDINGS else "")
         rows.append(
             (
-                each.source,
-                str(each.rows),
-                f"{each.duration:.4g}",
-                f"{each.rate:.4g}",
-                str(each.counts[ERROR]),
-                str(each.counts[WARNING]),
+                listed_verdict.source,
+                str(listed_verdict.rows),
+                f"{listed_verdict.duration:.4g}",
+                f"{listed_verdict.rate:.4g}",
+                str(listed_verdict.counts[ERROR]),
+                str(listed_verdict.counts[WARNING]),
                 words or "fit for use",
             )
         )
-    rest = len(verdicts) - len(shown)
-    if rest:
+    omitted_count = len(verdicts) - len(listed_verdicts)
+    if omitted_count:
         fit = len(verdicts) - sum(verdict.counts[ERROR] + verdict.counts[WARNING] > 0 for verdict in verdicts)
-        told = f"no worse than these; of all {len(verdicts)} logs, {fit} have no error or warning"
-        rows.append((f"and {rest} more", "", "", "", "", "", told))
+        ending = f"no worse than these; of all {len(verdicts)} logs, {fit} have no error or warning"
+        rows.append((f"and {omitted_count} more", "", "", "", "", "", ending))
     return Table(("log", "rows", "length s", "rate Hz", "errors", "warnings", "what"), rows)

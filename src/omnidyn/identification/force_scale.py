@@ -43,12 +43,12 @@ def scale_of_motion(robot: Robot, free: Collection[str], current: bool, metres: 
     )
     if not open_motors and TORQUE in names:
         motors.append(RATIO)
-    held = [*masses, *motors]
-    if not held:
+    held_keys = [*masses, *motors]
+    if not held_keys:
         priors = [key for key in (MASS, TORQUE, RESISTANCE) if key in names]
         return f"the scale of all forces is that of the priors of {_listed(priors)}: all of them are free"
     radius = [] if metres or RADIUS in names else [RADIUS]
-    return _sentence(robot, [*held, *radius], names)
+    return _sentence(robot, [*held_keys, *radius], names)
 
 
 def scale_of_traction(robot: Robot, from_current: bool) -> str:
@@ -67,14 +67,14 @@ def _behind(robot: Robot) -> str:
     )
 
 
-def _sentence(robot: Robot, held: Collection[str], free: Collection[str] = ()) -> str:
-    named = [f"{key} ({_known(robot, key)}{_spin(robot, free) if key == MASS else ''})" for key in held]
-    return f"all forces scale with {_listed(named)}"
+def _sentence(robot: Robot, held_keys: Collection[str], free: Collection[str] = ()) -> str:
+    key_texts = [f"{key} ({_known(robot, key)}{_spin(robot, free) if key == MASS else ''})" for key in held_keys]
+    return f"all forces scale with {_listed(key_texts)}"
 
 
 def _listed(words: Collection[str]) -> str:
-    *before, last = words
-    return f"{', '.join(before)} and {last}" if before else last
+    *first_words, last = words
+    return f"{', '.join(first_words)} and {last}" if first_words else last
 
 
 def _spin(robot: Robot, free: Collection[str]) -> str:
@@ -85,8 +85,8 @@ def _spin(robot: Robot, free: Collection[str]) -> str:
         if np.any(value) and key not in free
     ]
     if keys:
-        added = float(np.diag(added_mass(robot))[:2].mean())
-        return f"; {_listed([f'{key}, {_known(robot, key)},' for key in keys])} adds {added:.3g} kg"
+        spin_mass = float(np.diag(added_mass(robot))[:2].mean())
+        return f"; {_listed([f'{key}, {_known(robot, key)},' for key in keys])} adds {spin_mass:.3g} kg"
     return "" if {ROTOR, WHEEL} & set(free) else "; no rotor is in the robot file"
 
 
@@ -107,5 +107,5 @@ def _known(robot: Robot, key: str) -> str:
 
 def _priors(robot: Robot, key: str) -> Iterator[Prior]:
     """What is known of a number, or of the entries of its list."""
-    found = [prior for name, prior in robot.priors.items() if name_of(name) == key]
-    yield from found or [Prior(origin=GIVEN)]
+    priors = [prior for name, prior in robot.priors.items() if name_of(name) == key]
+    yield from priors or [Prior(origin=GIVEN)]

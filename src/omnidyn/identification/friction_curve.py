@@ -43,18 +43,25 @@ def friction_curve(estimate: Estimate, axis: int, speed: FloatArray) -> Friction
     names = [name for name in estimate.correlation.names if _is_level(name) and name in estimate.std]
     force = sliding_force(estimate.robot, axis, speed)
     slopes = {name: _slope(estimate.robot, name, axis, speed) for name in names}
-    felt = [name for name in names if slopes[name].any()]
-    known = [name for name in felt if np.isfinite(estimate.std[name])]
+    names_with_slope = [name for name in names if slopes[name].any()]
+    determined_names = [name for name in names_with_slope if np.isfinite(estimate.std[name])]
     half = np.zeros_like(force)
-    if known:
-        place = [estimate.correlation.names.index(name) for name in known]
-        std = np.array([estimate.std[name] for name in known])
+    if determined_names:
+        place = [estimate.correlation.names.index(name) for name in determined_names]
+        std = np.array([estimate.std[name] for name in determined_names])
         covariance = np.nan_to_num(estimate.correlation.matrix[np.ix_(place, place)]) * np.outer(std, std)
-        jacobian = np.stack([slopes[name] for name in known])
+        jacobian = np.stack([slopes[name] for name in determined_names])
         variance = np.einsum("in,ij,jn->n", jacobian, covariance, jacobian)
-        freedom = min(estimate.degrees_of_freedom[name] for name in known)
+        freedom = min(estimate.degrees_of_freedom[name] for name in determined_names)
         half = t_quantile(max(freedom, 1)) * np.sqrt(np.maximum(variance, 0.0))
-    return FrictionCurve(AXES[axis], speed, force, half, tuple(n for n in felt if n not in known), bool(felt))
+    return FrictionCurve(
+        AXES[axis],
+        speed,
+        force,
+        half,
+        tuple(n for n in names_with_slope if n not in determined_names),
+        bool(names_with_slope),
+    )
 
 
 def sliding_force(robot: Robot, axis: int, speed: FloatArray) -> FloatArray:
@@ -71,12 +78,12 @@ def _is_level(name: str) -> bool:
 
 def _slope(robot: Robot, name: str, axis: int, speed: FloatArray) -> FloatArray:
     """Derivative of the force by a level, from both sides; a list that is one number, as of a disc, moves as one."""
-    up, down = (sliding_force(_moved(robot, name, way * STEP), axis, speed) for way in (1.0, -1.0))
-    return (up - down) / (2.0 * STEP)
+    upper_force, lower_force = (sliding_force(_moved(robot, name, way * STEP), axis, speed) for way in (1.0, -1.0))
+    return (upper_force - lower_force) / (2.0 * STEP)
 
 
-def _moved(robot: Robot, name: str, by: float) -> Robot:
+def _moved(robot: Robot, name: str, change: float) -> Robot:
     """The robot with a level, or every entry of a list of levels, changed by so much."""
     for key in map(Key.parse, expand(name, robot)):
-        robot = key.set(robot, key.get(robot) + by, checked=False)
+        robot = key.set(robot, key.get(robot) + change, checked=False)
     return robot

@@ -17,11 +17,11 @@ from omnidyn.statement import NOTE, WARNING, Statement
 
 def matches(path: str, pattern: str) -> bool:
     """Whether a file belongs to a group: its path matches the glob, or lies in the folder of that name."""
-    plain = os.path.normpath(path)
+    plain_path = os.path.normpath(path)
     folder = os.path.normpath(pattern)
-    if fnmatch.fnmatch(plain, folder) or fnmatch.fnmatch(os.path.basename(plain), pattern):
+    if fnmatch.fnmatch(plain_path, folder) or fnmatch.fnmatch(os.path.basename(plain_path), pattern):
         return True
-    parents = [str(parent) for parent in Path(plain).parents]
+    parents = [str(parent) for parent in Path(plain_path).parents]
     return any(fnmatch.fnmatch(parent, folder) or os.path.basename(parent) == folder for parent in parents)
 
 
@@ -32,12 +32,12 @@ def held_out(sources: Sequence[str], patterns: Sequence[str]) -> list[bool]:
             raise InputError(
                 "no log to hold out", got=pattern, expected="a glob or a folder of LOG...", where="hold_out"
             )
-    held = [any(matches(source, pattern) for pattern in patterns) for source in sources]
-    if patterns and all(held):
+    held_out_mask = [any(matches(source, pattern) for pattern in patterns) for source in sources]
+    if patterns and all(held_out_mask):
         raise InputError(
             "every log is held out", got=", ".join(patterns), expected="one or more to fit", where="hold_out"
         )
-    return held
+    return held_out_mask
 
 
 def group_names(sources: Sequence[str], patterns: Sequence[str], option: str) -> list[str]:
@@ -48,15 +48,15 @@ def group_names(sources: Sequence[str], patterns: Sequence[str], option: str) ->
     pairs = [_pair(text, option) for text in patterns]
     names = []
     for source in sources:
-        mine = list(dict.fromkeys(name for name, pattern in pairs if matches(source, pattern)))
-        if len(mine) > 1:
+        names_of_source = list(dict.fromkeys(name for name, pattern in pairs if matches(source, pattern)))
+        if len(names_of_source) > 1:
             raise InputError(
                 "a log belongs to two groups",
-                got=" and ".join(mine),
+                got=" and ".join(names_of_source),
                 where=source,
                 remedy=f"make the patterns of `{option}` narrower",
             )
-        names.append(mine[0] if mine else "")
+        names.append(names_of_source[0] if names_of_source else "")
     for name, pattern in pairs:
         if name not in names:
             raise InputError(
@@ -115,29 +115,29 @@ def count_once(runs: Sequence[Run], groups: Sequence[str]) -> tuple[list[int], t
     """
     if len(runs) == 1:
         return [0], ()
-    seen: dict[str, int] = {}
-    kept, repeated = [], list[Statement]()
+    first_place: dict[str, int] = {}
+    kept_places, repeat_notes = [], list[Statement]()
     for place, run in enumerate(runs):
-        first = seen.setdefault(fingerprint(run), place)
+        first = first_place.setdefault(fingerprint(run), place)
         if first == place:
-            kept.append(place)
+            kept_places.append(place)
         elif groups[first] == groups[place]:
             first_name = {"first": _name(runs[first], first)}
-            repeated.append(Statement("counted_once", NOTE, _name(run, place), first_name))
+            repeat_notes.append(Statement("counted_once", NOTE, _name(run, place), first_name))
         else:
-            kept.append(place)
+            kept_places.append(place)
             names = {"group": groups[place], "first": _name(runs[first], first), "other": groups[first]}
-            repeated.append(Statement("in_two_groups", WARNING, _name(run, place), names))
-    return kept, tuple(repeated)
+            repeat_notes.append(Statement("in_two_groups", WARNING, _name(run, place), names))
+    return kept_places, tuple(repeat_notes)
 
 
 def fingerprint(run: Run) -> str:
     """SHA-256 of all channels of a run and its times since the first row."""
-    found = hashlib.sha256(np.round(run.t - run.t[0], SAME_TIME).tobytes())
+    digest = hashlib.sha256(np.round(run.t - run.t[0], SAME_TIME).tobytes())
     for name, values in run.channels.items():
-        found.update(name.encode())
-        found.update((np.ascontiguousarray(values) + 0.0).tobytes())  # 0 and -0 are one number
-    return found.hexdigest()
+        digest.update(name.encode())
+        digest.update((np.ascontiguousarray(values) + 0.0).tobytes())  # 0 and -0 are one number
+    return digest.hexdigest()
 
 
 def _name(run: Run, place: int) -> str:

@@ -20,7 +20,7 @@ from omnidyn.identification.methods import (
     OutputError,
 )
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.identification.output_error.fit import WHOLE
+from omnidyn.identification.output_error.fit import ALL_LOGS
 from omnidyn.identification.steady.study_table import Difference, SteadyStudy
 from omnidyn.identification.validation import Validation
 from omnidyn.identification.verdict import (
@@ -121,7 +121,7 @@ class Identification(Displayable):
     @property
     def validation(self) -> Validation | None:
         """The same of the only group; None where there is none. Raises InputError where there are several groups."""
-        return self.validations.get(WHOLE) if self.estimate else None
+        return self.validations.get(ALL_LOGS) if self.estimate else None
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
@@ -160,11 +160,11 @@ class Identification(Displayable):
         errors that `check` found; empty for a fit that stands."""
         if self._motors is not None:
             return (self._motors.verdict,) if self._motors.failed else ()
-        found = [steady_failure(self._steady)] if self._steady else []
+        failures = [steady_failure(self._steady)] if self._steady else []
         for group, fit in self.fits.items():
-            missed = fit_failure(fit, self.validations.get(group))
-            found.append(of_group(group, missed) if missed and len(self.groups) > 1 else missed)
-        return (*filter(None, found), *unfit(self.verdicts))
+            fit_statement = fit_failure(fit, self.validations.get(group))
+            failures.append(of_group(group, fit_statement) if fit_statement and len(self.groups) > 1 else fit_statement)
+        return (*filter(None, failures), *unfit(self.verdicts))
 
     @property
     def verdict(self) -> str:
@@ -175,9 +175,9 @@ class Identification(Displayable):
     @property
     def headline(self) -> str:
         """The verdict in few sentences: the gravest statement, how well the numbers are known, what was not made."""
-        found = self.outcome()
-        gravest = min(found, key=lambda each: SEVERITIES.index(each.severity))
-        return _sentences(list(dict.fromkeys([gravest, found[-1], *not_made(self.missing)])))
+        statements = self.outcome()
+        gravest = min(statements, key=lambda statement: SEVERITIES.index(statement.severity))
+        return _sentences(list(dict.fromkeys([gravest, statements[-1], *not_made(self.missing)])))
 
     def outcome(self) -> list[Statement]:
         """What it came to, as statements."""
@@ -193,18 +193,18 @@ class Identification(Displayable):
 
     def document(self) -> Document:
         """All of it, as text, page and machines have it."""
-        told = self._told()
-        return replace(told, verdict=self.verdict, data={**told.data, "missing": [*map(asdict, self.missing)]})
+        document = self._told()
+        return replace(document, verdict=self.verdict, data={**document.data, "missing": [*map(asdict, self.missing)]})
 
     def _told(self) -> Document:
         if self._motors is not None:
             return self._motors.document()
         if self.study is not None:
-            told = self.study.document()
-            return replace(told, data={"ok": not self.failures, **told.data, "check": checked(self.verdicts)})
+            document = self.study.document()
+            return replace(document, data={"ok": not self.failures, **document.data, "check": checked(self.verdicts)})
         if isinstance(self.method, OutputError):
-            told = fit_document(self.fits, self.validations, self.differences, self.verdicts, self.advice)
-            return replace(told, data={"ok": not self.failures, **told.data})
+            document = fit_document(self.fits, self.validations, self.differences, self.verdicts, self.advice)
+            return replace(document, data={"ok": not self.failures, **document.data})
         lines = {group: estimate.document() for group, estimate in self.groups.items()}
         data = {
             "ok": not self.failures,
@@ -216,6 +216,6 @@ class Identification(Displayable):
         return Document(apart(*(line.parts for line in lines.values()), mend), data, ascii=True)
 
 
-def _sentences(found: Sequence[Statement]) -> str:
+def _sentences(statements: Sequence[Statement]) -> str:
     """Statements as sentences."""
-    return " ".join(sentence(str(each)) for each in found)
+    return " ".join(sentence(str(statement)) for statement in statements)

@@ -35,7 +35,7 @@ from omnidyn.identification.methods import (
     refuse_unless_method,
 )
 from omnidyn.identification.output_error.answer import Answer, OutputErrorEstimate
-from omnidyn.identification.output_error.fit import WHOLE, Fit
+from omnidyn.identification.output_error.fit import ALL_LOGS, Fit
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.steady.steady_state import fit_steady_state, identify_lines
 from omnidyn.identification.steady.study import diagnosed, fit_steady, undiagnosed
@@ -58,7 +58,7 @@ if TYPE_CHECKING:
 
 Logs = Run | Log | Sequence[Run | Log] | SteadyTable | MotorTable
 Save = Callable[[Mapping[str, Estimate]], object]
-DEAR, NOTICED = 5.0, 2.0  # times the fit; [s]: a diagnosis that takes longer than both is worth a word
+SLOW_RATIO, SLOW_SECONDS = 5.0, 2.0  # times the fit; [s]: a diagnosis that takes longer than both is worth a word
 
 
 def identify(
@@ -98,7 +98,7 @@ def identify(
     """
     check_order("identify(logs, robot)", (logs, (Run, Log, SteadyTable, MotorTable)), (robot, (Robot, type(None))))
     refuse_unless_method(method)
-    asked = _Asked(
+    request = _Asked(
         robot,
         groups,
         (hold_out,) if isinstance(hold_out, str) else tuple(hold_out),
@@ -108,31 +108,33 @@ def identify(
         Attempts(keep=keep_best),
     )
     if isinstance(logs, SteadyTable):
-        return _of_steady_table(logs, method or SteadyState(), asked)
+        return _of_steady_table(logs, method or SteadyState(), request)
     if isinstance(logs, MotorTable):
-        return _of_motors(logs, method or MotorLine(), (), asked)
-    given: list[Any] = [logs] if isinstance(logs, Run | Log) or is_frame(logs) else list(logs)
-    runs = as_list([log.to_run() if isinstance(log, Log) else log for log in given])
-    check = check or [log for log in given if isinstance(log, Log)]
+        return _of_motors(logs, method or MotorLine(), (), request)
+    given_logs: list[Any] = [logs] if isinstance(logs, Run | Log) or is_frame(logs) else list(logs)
+    runs = as_list([log.to_run() if isinstance(log, Log) else log for log in given_logs])
+    check = check or [log for log in given_logs if isinstance(log, Log)]
     if isinstance(method, MOTOR_METHODS):
-        return _of_motors(runs, method, check, asked)
-    why = ""
-    asked = replace(asked, robot=as_driven(asked.of_friction(), runs))
+        return _of_motors(runs, method, check, request)
+    reason = ""
+    request = replace(request, robot=as_driven(request.of_friction(), runs))
     if method is None:
-        method, why = (OutputError(), "") if asked.hold_out else default_method(runs, asked.of_friction(), progress)
-    asked.refuse(method)
+        method, reason = (
+            (OutputError(), "") if request.hold_out else default_method(runs, request.of_friction(), progress)
+        )
+    request.refuse(method)
     if isinstance(method, SteadyState):
-        identification = _steady(runs, method, check, asked)
+        identification = _steady(runs, method, check, request)
     else:
         assert isinstance(method, OutputError)
-        identification = _fitted(runs, method, check, asked)
-    if not why:
+        identification = _fitted(runs, method, check, request)
+    if not reason:
         return identification
-    chosen = Statement("method_chosen", NOTE, numbers={"method": method.name, "why": why})
+    choice_note = Statement("method_chosen", NOTE, numbers={"method": method.name, "why": reason})
     return replace(
         identification,
         groups={
-            name: replace(estimate, warnings=(chosen, *estimate.warnings))
+            name: replace(estimate, warnings=(choice_note, *estimate.warnings))
             for name, estimate in identification.groups.items()
         },
     )
@@ -168,14 +170,14 @@ class _Asked:
 
     def refuse(self, method: Method) -> None:
         """Refuse what the method does not take. Raises InputError."""
-        given = {HOLD_OUT: self.hold_out, GROUPS: self.groups, QUICK: self.quick}
-        for name, value in given.items():
+        given_options = {HOLD_OUT: self.hold_out, GROUPS: self.groups, QUICK: self.quick}
+        for name, value in given_options.items():
             if value and name not in method.takes:
-                takers = " or ".join(kind.__name__ for kind in METHODS if name in kind.takes)
+                method_names = " or ".join(kind.__name__ for kind in METHODS if name in kind.takes)
                 raise InputError(
                     f"{type(method).__name__} does not take it",
                     got=f"`{name}`",
-                    expected=f"with {takers}",
+                    expected=f"with {method_names}",
                     where=name,
                     remedy="leave it out",
                 )
@@ -191,11 +193,11 @@ class _Asked:
         return lambda: After({}, {}, verdicts, mend, self.attempts)
 
 
-def _discard(told: object) -> None:
+def _discard(message: object) -> None:
     """Discards what is told."""
 
 
-def _of_steady_table(table: SteadyTable, method: Method, asked: _Asked) -> Identification:
+def _of_steady_table(table: SteadyTable, method: Method, request: _Asked) -> Identification:
     """The paper's line on each axis."""
     if not isinstance(method, SteadyState):
         raise InputError(
@@ -204,22 +206,24 @@ def _of_steady_table(table: SteadyTable, method: Method, asked: _Asked) -> Ident
             expected="logs, or `method` steady-state",
             where="method",
         )
-    asked.refuse(method)
-    how = {"rest": method.rest, "rest_speed": method.rest_speed, "absolute_std": method.absolute_std}
-    estimate = fit_steady_state(asked.of_friction(), table, **how)
+    request.refuse(method)
+    options = {"rest_use": method.rest, "rest_speed": method.rest_speed, "absolute_std": method.absolute_std}
+    estimate = fit_steady_state(request.of_friction(), table, **options)
     estimate = replace(estimate, warnings=(*table.notes, *estimate.warnings))
-    asked.save({WHOLE: estimate})
-    return Identification(method, {WHOLE: estimate}, asked.without_more())
+    request.save({ALL_LOGS: estimate})
+    return Identification(method, {ALL_LOGS: estimate}, request.without_more())
 
 
-def _of_motors(runs: Sequence[Run] | MotorTable, method: Method, check: Sequence[Log], asked: _Asked) -> Identification:
+def _of_motors(
+    runs: Sequence[Run] | MotorTable, method: Method, check: Sequence[Log], request: _Asked
+) -> Identification:
     """Every motor of some logs, or of a table."""
     from omnidyn.identification.motors.study import study_motors, study_points  # imported lazily: slow to load
 
-    asked.refuse(method)
+    request.refuse(method)
     if not isinstance(runs, MotorTable):
         assert isinstance(method, MotorLine | MotorFit)
-        study = study_motors(runs, asked.robot, method, asked.hold_out, check, asked.progress)
+        study = study_motors(runs, request.robot, method, request.hold_out, check, request.progress)
     elif isinstance(method, MotorLine):
         study = study_points(runs)
     else:
@@ -230,114 +234,125 @@ def _of_motors(runs: Sequence[Run] | MotorTable, method: Method, check: Sequence
             where="method",
             remedy="leave out the method",
         )
-    return Identification(method, {}, asked.without_more(study.verdicts, study.advice), study=study)
+    return Identification(method, {}, request.without_more(study.verdicts, study.advice), study=study)
 
 
-def _steady(runs: Sequence[Run], method: SteadyState, check: Sequence[Log], asked: _Asked) -> Identification:
-    robot = asked.of_friction()
-    verdicts = log_verdicts(check, robot, asked.progress)
-    names = names_of_groups(asked.groups, [run.source for run in runs])
-    used = runs if names is None else [run for run, name in zip(runs, names, strict=True) if name]
+def _steady(runs: Sequence[Run], method: SteadyState, check: Sequence[Log], request: _Asked) -> Identification:
+    robot = request.of_friction()
+    verdicts = log_verdicts(check, robot, request.progress)
+    names = names_of_groups(request.groups, [run.source for run in runs])
+    used_runs = runs if names is None else [run for run, name in zip(runs, names, strict=True) if name]
     groups = None if names is None else [name for name in names if name]
     mend = tuple(verdict_advice(verdicts))
-    asked.progress(Report("fitting"))
+    request.progress(Report("fitting"))
     if method.shape == LINE:
-        lines = identify_lines(used, robot, method, groups)
-        asked.save(lines)
-        return Identification(method, lines, asked.without_more(verdicts, mend))
+        lines = identify_lines(used_runs, robot, method, groups)
+        request.save(lines)
+        return Identification(method, lines, request.without_more(verdicts, mend))
     with told_why(verdicts, STEADY_USE):
-        fit = fit_steady(used, robot, method, groups)
-    asked.save(fit.estimates)
-    asked.progress(Report("diagnosing"))
-    if asked.quick:
-        asked.attempts.leave_out(DIAGNOSIS, BY_QUICK)
-    found = None if asked.quick else asked.attempts.make(DIAGNOSIS, partial(diagnosed, fit))
-    study = found or undiagnosed(fit)
+        fit = fit_steady(used_runs, robot, method, groups)
+    request.save(fit.estimates)
+    request.progress(Report("diagnosing"))
+    if request.quick:
+        request.attempts.leave_out(DIAGNOSIS, BY_QUICK)
+    diagnosed_study = None if request.quick else request.attempts.make(DIAGNOSIS, partial(diagnosed, fit))
+    study = diagnosed_study or undiagnosed(fit)
     study = replace(study, advice=(*map(str, mend), *study.advice))
-    follow = asked.without_more(verdicts, statements(study.advice))
-    return Identification(method, study.estimates, follow, study.differences, study)
+    follow_up = request.without_more(verdicts, statements(study.advice))
+    return Identification(method, study.estimates, follow_up, study.differences, study)
 
 
-def _fitted(runs: Sequence[Run], method: OutputError, check: Sequence[Log], asked: _Asked) -> Identification:
-    robot = asked.of_friction()
-    if robot.drive.kind == SPEED and (why := why_not_output_error(runs, robot)):
-        words = f"{why}; `method` {STEADY_STATE} answers in seconds"
-        asked.progress(Report(words, urgent=True))
+def _fitted(runs: Sequence[Run], method: OutputError, check: Sequence[Log], request: _Asked) -> Identification:
+    robot = request.of_friction()
+    if robot.drive.kind == SPEED and (reason := why_not_output_error(runs, robot)):
+        words = f"{reason}; `method` {STEADY_STATE} answers in seconds"
+        request.progress(Report(words, urgent=True))
     sources = [run.source for run in runs]
-    named = names_of_groups(asked.groups, sources)
-    groups = named or [WHOLE] * len(runs)
-    held = held_out(sources, asked.hold_out)
-    chosen = [(run, group) for run, group, out in zip(runs, groups, held, strict=True) if group and not out]
-    names = list(dict.fromkeys(group for _, group in chosen))
-    if named and len(names) == 1:
+    named_groups = names_of_groups(request.groups, sources)
+    groups = named_groups or [ALL_LOGS] * len(runs)
+    held_mask = held_out(sources, request.hold_out)
+    fitted_runs = [
+        (run, group)
+        for run, group, is_held_out in zip(runs, groups, held_mask, strict=True)
+        if group and not is_held_out
+    ]
+    names = list(dict.fromkeys(group for _, group in fitted_runs))
+    if named_groups and len(names) == 1:
         raise InputError("the logs have only one group", got=names[0], expected="two or more", where="groups")
-    verdicts = log_verdicts(check, robot, asked.progress)
-    asked.progress(Report("fitting: loading"))
-    began = process_time()
+    verdicts = log_verdicts(check, robot, request.progress)
+    request.progress(Report("fitting: loading"))
+    start_time = process_time()
     answer, cut = _answered(
-        [run for run, _ in chosen], method, [group for _, group in chosen] if named else None, asked
+        [run for run, _ in fitted_runs], method, [group for _, group in fitted_runs] if named_groups else None, request
     )
-    asked = replace(asked, fit_time=process_time() - began)
-    aside = {
-        name: [run for run, group, out in zip(runs, groups, held, strict=True) if out and group == name]
+    request = replace(request, fit_time=process_time() - start_time)
+    held_out_runs = {
+        name: [
+            run
+            for run, group, is_held_out in zip(runs, groups, held_mask, strict=True)
+            if is_held_out and group == name
+        ]
         for name in answer.estimates
     }
-    fits = {name: fit.beside(aside[name]) for name, fit in answer.estimates.items()}
-    asked.save(fits)
-    own = {name: [run for run, group in chosen if group == name] for name in fits}
+    fits = {name: fit.beside(held_out_runs[name]) for name, fit in answer.estimates.items()}
+    request.save(fits)
+    runs_of_group = {name: [run for run, group in fitted_runs if group == name] for name in fits}
 
     def follow() -> After:
-        return _after(fits, own, aside, verdicts, check, _not_independent(runs, held), asked)
+        return _after(fits, runs_of_group, held_out_runs, verdicts, check, _not_independent(runs, held_mask), request)
 
     return Identification(method, fits, follow, answer.differences, interrupted=cut)
 
 
 def _after(
     fits: Mapping[str, OutputErrorEstimate],
-    own: Mapping[str, list[Run]],
-    aside: Mapping[str, list[Run]],
+    runs_of_group: Mapping[str, list[Run]],
+    held_out_runs: Mapping[str, list[Run]],
     verdicts: tuple[Verdict, ...],
     check: Sequence[Log],
-    repeated: Sequence[Statement],
-    asked: _Asked,
+    repeat_notes: Sequence[Statement],
+    request: _Asked,
 ) -> After:
-    """What follows fits to whole logs. own, aside: group -> the runs it was fitted to, and those held out of it.
-    repeated: what is said of logs that are both."""
-    attempts, progress = asked.attempts, asked.progress
-    fits = _diagnosed(fits, asked)
-    compared = {
+    """What follows fits to whole logs. runs_of_group, held_out_runs: group -> the runs it was fitted to, and those held
+    out of it.
+    repeat_notes: what is said of logs that are both."""
+    attempts, progress = request.attempts, request.progress
+    fits = _diagnosed(fits, request)
+    comparisons = {
         name: attempts.make(
-            f"{COMPARISON}{_of_group(name, fits)}", partial(validate, fit, own[name], aside[name], progress)
+            f"{COMPARISON}{_of_group(name, fits)}",
+            partial(validate, fit, runs_of_group[name], held_out_runs[name], progress),
         )
         for name, fit in fits.items()
     }
-    validations = {name: found for name, found in compared.items() if found is not None}
+    validations = {name: validation for name, validation in comparisons.items() if validation is not None}
     if any(map(rest_on_guesses, verdicts)):
         first = next(iter(fits.values())).robot
         verdicts = attempts.make(JUDGEMENT, partial(judged_by_fit, verdicts, check, first, progress)) or verdicts
-    steps = [*verdict_advice(verdicts), *repeated]
+    steps = [*verdict_advice(verdicts), *repeat_notes]
     for group, fit in fits.items():
-        mine = advice(fit, validations.get(group))
-        steps += mine if len(fits) == 1 else [of_group(group, step) for step in mine]
+        group_advice = advice(fit, validations.get(group))
+        steps += group_advice if len(fits) == 1 else [of_group(group, step) for step in group_advice]
     return After(fits, validations, verdicts, tuple(steps), attempts)
 
 
-def _diagnosed(fits: Mapping[str, OutputErrorEstimate], asked: _Asked) -> dict[str, OutputErrorEstimate]:
+def _diagnosed(fits: Mapping[str, OutputErrorEstimate], request: _Asked) -> dict[str, OutputErrorEstimate]:
     """The fits with their diagnosis; without one where it fails, or is not asked for."""
-    if asked.quick:
-        asked.attempts.leave_out(DIAGNOSIS, BY_QUICK)
+    if request.quick:
+        request.attempts.leave_out(DIAGNOSIS, BY_QUICK)
         return dict(fits)
-    found, began = {}, process_time()
+    diagnosed_fits, start_time = {}, process_time()
     for name, fit in fits.items():
-        of = _of_group(name, fits)
-        asked.progress(Report(f"diagnosing{of}"))
-        made = asked.attempts.make(f"{DIAGNOSIS}{of}", lambda fit=fit: fit.diagnosis)
-        found[name] = fit if made is not None else replace(fit, study=None)
-    spent = process_time() - began
-    if spent > max(DEAR * asked.fit_time, NOTICED):
-        words = f"the diagnosis took {spent:.0f} s, {spent / asked.fit_time:.0f} times the fit; `quick` leaves it out"
-        asked.progress(Report(words, urgent=True))
-    return found
+        label = _of_group(name, fits)
+        request.progress(Report(f"diagnosing{label}"))
+        diagnosis = request.attempts.make(f"{DIAGNOSIS}{label}", lambda fit=fit: fit.diagnosis)
+        diagnosed_fits[name] = fit if diagnosis is not None else replace(fit, study=None)
+    time_spent = process_time() - start_time
+    if time_spent > max(SLOW_RATIO * request.fit_time, SLOW_SECONDS):
+        ratio = time_spent / request.fit_time
+        words = f"the diagnosis took {time_spent:.0f} s, {ratio:.0f} times the fit; `quick` leaves it out"
+        request.progress(Report(words, urgent=True))
+    return diagnosed_fits
 
 
 def _of_group(name: str, groups: Collection[str]) -> str:
@@ -345,19 +360,21 @@ def _of_group(name: str, groups: Collection[str]) -> str:
     return f" of {name}" if len(groups) > 1 else ""
 
 
-def _not_independent(runs: Sequence[Run], held: Sequence[bool]) -> list[Statement]:
+def _not_independent(runs: Sequence[Run], held_mask: Sequence[bool]) -> list[Statement]:
     """Held-out logs that are fitted too, under another name: they prove nothing."""
-    marks = [fingerprint(run) for run in runs] if any(held) else []
-    fitted = {mark: run.source for mark, run, out in zip(marks, runs, held, strict=False) if not out}
+    marks = [fingerprint(run) for run in runs] if any(held_mask) else []
+    fitted = {
+        mark: run.source for mark, run, is_held_out in zip(marks, runs, held_mask, strict=False) if not is_held_out
+    }
     return [
         Statement("held_out_is_fitted", WARNING, run.source, {"fitted": fitted[mark]})
-        for mark, run, out in zip(marks, runs, held, strict=False)
-        if out and mark in fitted
+        for mark, run, is_held_out in zip(marks, runs, held_mask, strict=False)
+        if is_held_out and mark in fitted
     ]
 
 
 def _answered(
-    runs: Sequence[Run], method: OutputError, groups: Sequence[str] | None, asked: _Asked
+    runs: Sequence[Run], method: OutputError, groups: Sequence[str] | None, request: _Asked
 ) -> tuple[Answer, bool]:
     """(answer, whether an interrupt cut the fit off)."""
     steps = 0
@@ -366,26 +383,26 @@ def _answered(
         nonlocal steps
         steps += report.state is not None
         words = f", step {steps}, -log likelihood {report.state.objective:.6g}" if report.state else f": {report.phase}"
-        asked.progress(Report(f"fitting{words}", state=report.state))
+        request.progress(Report(f"fitting{words}", state=report.state))
 
-    plain: list[Answer] = []
+    plain_answers: list[Answer] = []
 
     def keep(answer: Answer) -> None:
-        plain.append(answer)
-        asked.save(answer.estimates)
+        plain_answers.append(answer)
+        request.save(answer.estimates)
 
     progress = FitProgress(listen)
-    fit = Fit.of(runs, asked.of_friction(), method, groups, progress)
+    fit = Fit.of(runs, request.of_friction(), method, groups, progress)
     try:
-        return solved(fit, runs, progress, groups, keep, asked.quick), False
+        return solved(fit, runs, progress, groups, keep, request.quick), False
     except (*INTERRUPTS, Exception) as raised:
         error = told_by(raised)
-        if plain and (asked.attempts.keep or isinstance(error, Exception)):
-            asked.attempts.give_up(LADDER, error)
-            return plain[0], False
-        if isinstance(error, Exception) or not asked.attempts.keep or progress.best is None:
+        if plain_answers and (request.attempts.keep or isinstance(error, Exception)):
+            request.attempts.give_up(LADDER, error)
+            return plain_answers[0], False
+        if isinstance(error, Exception) or not request.attempts.keep or progress.best is None:
             raise
-        asked.attempts.interrupt = error
-        asked.progress(Report("finishing with the best so far"))
-        asked.progress(Report("interrupted: finishing with the best so far (again: give up)", urgent=True))
+        request.attempts.interrupt = error
+        request.progress(Report("finishing with the best so far"))
+        request.progress(Report("interrupted: finishing with the best so far (again: give up)", urgent=True))
         return fit.answer(progress.best), True

@@ -14,15 +14,21 @@ from omnidyn.model.keys import in_words
 from omnidyn.statement import NOTE, WARNING, Statement, statements
 
 LOSS = "loss"  # the key of a remedy for wild samples, which is no cause of a misfit
-MOST = 0.7  # of all that residuals hold beside noise, that a remedy must explain to be the one
+MAIN_SHARE = 0.7  # of all that residuals hold beside noise, that a remedy must explain to be the one
 CHANGE = "change"  # the key of friction that is another one from some time of the log on
 # What robots do that no law holds yet: keys.
-UNOFFERED = ("friction one way", "drag", "turns of the wheels", "sag", "heat", "filter")
+UNOFFERED_CAUSES = ("friction one way", "drag", "turns of the wheels", "sag", "heat", "filter")
 REPEATS, HOLDS, NEIGHBOURS, REST, ROUNDING = "repeats", "holds", "neighbours", "rest", "rounding"  # sources of a level
-FAR = 0.001, 0.1  # chance, and share, from which on it is said that a robot in motion leaves more than one at rest
-WORTH = 0.01  # share of the variance of a residual that is worth a line
-CHANGED, SEEN = 2, 0.02  # numbers that a remedy would change that are named; relative change that is worth it
-MOVES, MOST_NAMED = 0.001, 5  # relative change by a percent of what a number rests on; so many are named
+UNREST_LIMITS = (
+    0.001,
+    0.1,
+)  # chance, and share, from which on it is said that a robot in motion leaves more than one at rest
+LINE_SHARE = 0.01  # share of the variance of a residual that is worth a line
+CHANGED_NUMBERS, SEEN_CHANGE = (
+    2,
+    0.02,
+)  # numbers that a remedy would change that are named; relative change that is worth it
+MOVES, NAMED_KEYS = 0.001, 5  # relative change by a percent of what a number rests on; so many are named
 
 
 @dataclass(frozen=True)
@@ -123,19 +129,25 @@ class Remedy:
     @property
     def confident(self) -> bool:
         """Whether it explains most of what is to be explained, and nothing that nobody offers explains the same."""
-        return self.offered and self.share >= MOST and not self.rivals
+        return self.offered and self.share >= MAIN_SHARE and not self.rivals
 
-    def largest_changes(self, most: int = CHANGED) -> dict[str, tuple[Any, ...]]:
-        """The numbers that it would change most: changed, before, after; empty where none would be seen to change."""
-        shares = {name: abs(after - now) / abs(now) if now else math.inf for name, (now, after) in self.changes.items()}
-        worst = sorted((name for name in shares if shares[name] >= SEEN), key=lambda name: -shares[name])[:most]
-        before, after = (tuple(self.changes[name][k] for name in worst) for k in (0, 1))
-        return {"changed": tuple(worst), "before": before, "after": after}
+    def largest_changes(self, name_count: int = CHANGED_NUMBERS) -> dict[str, tuple[Any, ...]]:
+        """The numbers that it would change name_count: changed, before, after; empty where none would be seen to
+        change."""
+        shares = {
+            name: abs(value_then - value_now) / abs(value_now) if value_now else math.inf
+            for name, (value_now, value_then) in self.changes.items()
+        }
+        largest_names = sorted(
+            (name for name in shares if shares[name] >= SEEN_CHANGE), key=lambda name: -shares[name]
+        )[:name_count]
+        values_before, values_after = (tuple(self.changes[name][k] for name in largest_names) for k in (0, 1))
+        return {"changed": tuple(largest_names), "before": values_before, "after": values_after}
 
     @property
     def rivals(self) -> tuple[str, ...]:
         """Those of `same_as` that no robot file holds."""
-        return tuple(key for key in self.same_as if key in UNOFFERED)
+        return tuple(key for key in self.same_as if key in UNOFFERED_CAUSES)
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
@@ -199,12 +211,12 @@ class LackOfFit:
         """What the model leaves out, and its likely cause; None for a model that fits."""
         if not self.found:
             return Statement("slow_errors", WARNING) if self.drifts else None
-        worst = max(self.channels, key=lambda name: self.channels[name], default="")
-        follows = tuple(follow.theme for follow in self.follows[:2])
-        beyond = None if follows or self.causes else self._beyond_noise()
-        numbers = {"share": self.channels.get(worst), "follows": follows, "beyond": beyond}
+        worst_channel = max(self.channels, key=lambda name: self.channels[name], default="")
+        themes = tuple(theme.theme for theme in self.follows[:2])
+        beyond_channel = None if themes or self.causes else self._beyond_noise()
+        numbers = {"share": self.channels.get(worst_channel), "follows": themes, "beyond": beyond_channel}
         if not self.causes:
-            return Statement("misfit_unexplained", WARNING, worst, numbers)
+            return Statement("misfit_unexplained", WARNING, worst_channel, numbers)
         best = self.causes[0]
         code = (
             "misfit_likely_cause"
@@ -216,20 +228,22 @@ class LackOfFit:
             else "misfit_nearest_cause"
         )
         numbers |= {"cause": best.cause, "explains": best.share, "rivals": best.rivals, "alike": self.alike(best)}
-        return Statement(code, WARNING, worst, numbers)
+        return Statement(code, WARNING, worst_channel, numbers)
 
     def _beyond_noise(self) -> Statement | None:
         """The output whose residual is most surely beyond its noise; None where none is."""
         noise = {name: (self.noise or {})[name] for name in self.beyond}
-        worst = min(noise, key=lambda name: noise[name].p, default="")
-        return noise[worst].beyond(worst) if worst else None
+        worst_channel = min(noise, key=lambda name: noise[name].p, default="")
+        return noise[worst_channel].beyond(worst_channel) if worst_channel else None
 
     def alike(self, remedy: Remedy) -> tuple[Statement, ...]:
         """What the log cannot tell from a remedy, those with values first: gain 0.94, torque constant -6 %."""
-        causes = {other.key: other.cause for other in self.remedies}
+        causes = {candidate_remedy.key: candidate_remedy.cause for candidate_remedy in self.remedies}
         keys = sorted(remedy.same_as, key=lambda key: key not in causes)
-        more = [Statement("more", NOTE, numbers={"count": len(keys) - MOST_NAMED})] if len(keys) > MOST_NAMED else []
-        return (*(causes.get(key, Statement("cause", NOTE, key)) for key in keys[:MOST_NAMED]), *more)
+        more_statements = (
+            [Statement("more", NOTE, numbers={"count": len(keys) - NAMED_KEYS})] if len(keys) > NAMED_KEYS else []
+        )
+        return (*(causes.get(key, Statement("cause", NOTE, key)) for key in keys[:NAMED_KEYS]), *more_statements)
 
     def table(self) -> Table:
         """The remedies, a row each."""
@@ -248,16 +262,16 @@ class LackOfFit:
 
     def statements(self) -> list[Statement]:
         """What was found, the gravest first."""
-        whole = self.statement()
+        summary = self.statement()
         if not self.found:
-            calm = Statement("unrelated_residuals" if self._beyond_rest() else "only_noise", NOTE)
-            return [whole or calm, *self._levels(), *self._tails()]
+            calm_statement = Statement("unrelated_residuals" if self._beyond_rest() else "only_noise", NOTE)
+            return [summary or calm_statement, *self._levels(), *self._tails()]
         shares = [
             Statement("misfit_of_output", WARNING, name, {"size": self.sizes[name], "percent": 100.0 * share})
             for name, share in self.channels.items()
-            if share >= WORTH
+            if share >= LINE_SHARE
         ]
-        return [*([whole] if whole else []), *shares, *self._levels(), *self._tails()]
+        return [*([summary] if summary else []), *shares, *self._levels(), *self._tails()]
 
     def _levels(self) -> list[Statement]:
         """What rounded inputs explain, the noise by each source, and where the robot in motion leaves more than at
@@ -266,11 +280,11 @@ class LackOfFit:
             return self._rounded()
         levels = [] if self.noise else [Statement("noise_unknown", NOTE)]
         for source in (REPEATS, HOLDS, NEIGHBOURS, ROUNDING, REST):
-            own = {name: each for name, each in self.noise.items() if each.source == source}
-            if own:
-                noises = [*own.values()]
+            noise_of_source = {name: noise for name, noise in self.noise.items() if noise.source == source}
+            if noise_of_source:
+                noises = [*noise_of_source.values()]
                 numbers = {
-                    "outputs": tuple(own),
+                    "outputs": tuple(noise_of_source),
                     "levels": tuple(noise.level for noise in noises),
                     "units": tuple(noise.unit for noise in noises),
                     "of_moves": max(noise.of_moves for noise in noises),
@@ -281,27 +295,35 @@ class LackOfFit:
 
     def _rounded(self) -> list[Statement]:
         """Of the output that shows most of what the log does not tell of its inputs; none where none does."""
-        worst = max(self.rounded, key=lambda name: self.rounded[name], default="")
-        share = self.rounded.get(worst, 0.0)
-        return [Statement("rounding_may_hide", NOTE, worst, {"percent": 100.0 * share})] if share >= WORTH else []
+        worst_channel = max(self.rounded, key=lambda name: self.rounded[name], default="")
+        share = self.rounded.get(worst_channel, 0.0)
+        return (
+            [Statement("rounding_may_hide", NOTE, worst_channel, {"percent": 100.0 * share})]
+            if share >= LINE_SHARE
+            else []
+        )
 
     def _beyond_rest(self) -> list[Statement]:
         """Of the output that most surely leaves more in motion than at rest; nothing where none does."""
-        beyond = {
-            name: each
-            for name, each in self.at_rest.items()
-            if each.p * len(self.at_rest) < FAR[0] and each.share > FAR[1]
+        beyond_rest = {
+            name: noise
+            for name, noise in self.at_rest.items()
+            if noise.p * len(self.at_rest) < UNREST_LIMITS[0] and noise.share > UNREST_LIMITS[1]
         }
-        worst = min(beyond, key=lambda name: beyond[name].p, default="")
-        return [beyond[worst].beyond(worst)] if worst else []
+        worst_channel = min(beyond_rest, key=lambda name: beyond_rest[name].p, default="")
+        return [beyond_rest[worst_channel].beyond(worst_channel)] if worst_channel else []
 
     def _tails(self) -> list[Statement]:
         """What is to be said of outliers: nothing, or one statement."""
         if not self.wild:
             return []
-        worst = max(self.wild, key=lambda name: self.wild[name].held)
-        numbers = {"share": self.wild[worst].share, "held": self.wild[worst].held, "others": len(self.wild) - 1}
-        return [Statement("heavy_tails", NOTE, worst, numbers)]
+        worst_channel = max(self.wild, key=lambda name: self.wild[name].held)
+        numbers = {
+            "share": self.wild[worst_channel].share,
+            "held": self.wild[worst_channel].held,
+            "others": len(self.wild) - 1,
+        }
+        return [Statement("heavy_tails", NOTE, worst_channel, numbers)]
 
     def parts(self) -> list[Part]:
         """As points and a table."""
@@ -314,14 +336,14 @@ class LackOfFit:
                 "found": self.found,
                 "channels": self.channels,
                 "sizes": self.sizes,
-                "follows": [asdict(follow) for follow in self.follows],
+                "follows": [asdict(finding) for finding in self.follows],
                 "remedies": self.remedies,
                 "statements": self.statements(),
                 "tested": self.tested,
-                "wild": {name: asdict(each) for name, each in self.wild.items()},
-                "noise": {name: asdict(each) for name, each in (self.noise or {}).items()},
+                "wild": {name: asdict(outlier) for name, outlier in self.wild.items()},
+                "noise": {name: asdict(noise) for name, noise in (self.noise or {}).items()},
                 "beyond_noise": self.beyond,
-                "at_rest": {name: asdict(each) for name, each in self.at_rest.items()},
+                "at_rest": {name: asdict(noise) for name, noise in self.at_rest.items()},
                 "rounded_inputs": self.rounded,
                 "drifts": self.drifts,
             }
@@ -339,10 +361,12 @@ class Diagnosis:
     def table(self) -> Table | None:
         """What each number rests on, a row each; None where nothing moves any."""
         rows = []
-        for name, by in self.rests_on.items():
+        for name, change_by_key in self.rests_on.items():
             moves = [
-                f"{in_words(key)} {short(100.0 * share, '+.2g')} %" for key, share in by.items() if abs(share) >= MOVES
+                f"{in_words(key)} {short(100.0 * share, '+.2g')} %"
+                for key, share in change_by_key.items()
+                if abs(share) >= MOVES
             ]
             if moves:
-                rows.append((in_words(name), name, ", ".join(moves[:MOST_NAMED])))
+                rows.append((in_words(name), name, ", ".join(moves[:NAMED_KEYS])))
         return Table(("number", "key", "moves, for +1 % of"), rows, "<<<") if rows else None

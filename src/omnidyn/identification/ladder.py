@@ -63,8 +63,8 @@ class Ladder:
     def taken(self) -> tuple[Rung, ...]:
         """The steps that paid, and are still there at the end."""
         steps = [rung for rung in self.rungs if rung.taken and rung.step]
-        gone = {rung.step - 1 for rung in steps if rung.instead}
-        return tuple(rung for rung in steps if rung.step not in gone)
+        replaced_steps = {rung.step - 1 for rung in steps if rung.instead}
+        return tuple(rung for rung in steps if rung.step not in replaced_steps)
 
     def statement(self) -> Statement:
         """What it came to."""
@@ -75,9 +75,9 @@ class Ladder:
         """What a reader of the numbers must know: other robots that these logs do not tell from the one taken."""
         statements = []
         for rung in self.taken:
-            others = [r for r in self.rungs if r.step == rung.step and not r.taken and r.key in rung.same_as]
+            rival_rungs = [r for r in self.rungs if r.step == rung.step and not r.taken and r.key in rung.same_as]
             if rung.same_as:
-                numbers = {"cause": rung.cause, "same_as": rung.same_as} | _spread([rung, *others])
+                numbers = {"cause": rung.cause, "same_as": rung.same_as} | _spread([rung, *rival_rungs])
                 statements.append(Statement("ladder_alternatives", WARNING, rung.key, numbers))
         return statements
 
@@ -115,9 +115,16 @@ def _cell(value: float, form: str) -> str:
 
 def _spread(rungs: Sequence[Rung]) -> dict[str, Any]:
     """The friction that differs most between models, and from where to where; "" where none is in all of them."""
-    kept = [name for name in rungs[0].value if name.startswith(FRICTION) and all(name in r.value for r in rungs)]
-    if len(rungs) < 2 or not kept:
+    shared_names = [
+        name for name in rungs[0].value if name.startswith(FRICTION) and all(name in r.value for r in rungs)
+    ]
+    if len(rungs) < 2 or not shared_names:
         return {"number": ""}
-    values = {name: [rung.value[name] for rung in rungs] for name in kept}
-    name = max(kept, key=lambda each: (max(values[each]) - min(values[each])) / (abs(values[each][0]) or 1.0))
+    values = {name: [rung.value[name] for rung in rungs] for name in shared_names}
+    name = max(
+        shared_names,
+        key=lambda level_name: (
+            (max(values[level_name]) - min(values[level_name])) / (abs(values[level_name][0]) or 1.0)
+        ),
+    )
     return {"number": name, "between": (min(values[name]), max(values[name]))}

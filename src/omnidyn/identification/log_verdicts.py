@@ -15,22 +15,22 @@ from omnidyn.model.robot import Robot
 from omnidyn.progress import Progress, Report
 from omnidyn.statement import ERROR, Statement
 
-CHECKED = 1_000_000  # rows that are checked on the way
+CHECKED_ROWS = 1_000_000  # rows that are checked on the way
 OF_MOTORS = ("voltage", "duty", "current", "force", "supply", "wheel_speed", "wheel_angle")
 
 
 def log_verdicts(logs: Sequence[Log], robot: Robot | None, progress: Progress) -> tuple[Verdict, ...]:
     """What check says of each log, where they are not too long; `progress` hears of errors at once."""
-    if sum(len(log) for log in logs) > CHECKED:
+    if sum(len(log) for log in logs) > CHECKED_ROWS:
         progress(Report("the logs are long: not checked on the way (omnidyn check does)", urgent=True))
         return ()
-    found = []
+    verdicts = []
     for k, log in enumerate(logs):
         progress(Report(f"checking {k + 1} of {len(logs)}"))
-        found.append(check_log(log, robot))
-    for mend in verdict_advice(found):
+        verdicts.append(check_log(log, robot))
+    for mend in verdict_advice(verdicts):
         progress(Report(f"{mend.severity}: {mend}", urgent=True))
-    return tuple(found)
+    return tuple(verdicts)
 
 
 def judged_by_fit(
@@ -40,13 +40,13 @@ def judged_by_fit(
     if not any(map(rest_on_guesses, verdicts)):
         return tuple(verdicts)
     progress(Report("judging by the fitted robot what rested on a guess"))
-    found = [
+    new_verdicts = [
         judged_again(verdict, check_log(log, robot)) if rest_on_guesses(verdict) else verdict
         for verdict, log in zip(verdicts, logs, strict=True)
     ]
-    for source, finding in gone_by_fit(found):
+    for source, finding in gone_by_fit(new_verdicts):
         progress(Report(f"{source or 'the log'}: {finding.subject}: {finding}", urgent=True))
-    return tuple(found)
+    return tuple(new_verdicts)
 
 
 @contextmanager
@@ -58,53 +58,60 @@ def told_why(verdicts: Sequence[Verdict], use: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        why = next(
-            (str(own.reason) for verdict in verdicts for own in verdict.uses if own.name == use and not own.good), ""
+        reason = next(
+            (
+                str(log_use.reason)
+                for verdict in verdicts
+                for log_use in verdict.uses
+                if log_use.name == use and not log_use.good
+            ),
+            "",
         )
-        if error.remedy or not why:
+        if error.remedy or not reason:
             raise
         raise InputError(
-            error.what, got=error.got or None, expected=error.expected, remedy=why, where=error.where
+            error.what, got=error.got or None, expected=error.expected, remedy=reason, where=error.where
         ) from None
 
 
-def of_motors(log: Log, *more: str) -> Log:
-    """The log with what concerns motors alone, and channels `more`: on a bench, neither body nor heading need move."""
-    kept = {name: channel for name, channel in log.channels.items() if name in (*OF_MOTORS, *more)}
-    return replace(log, channels=kept)
+def of_motors(log: Log, *extra_channels: str) -> Log:
+    """The log with what concerns motors alone, and channels `extra_channels`: on a bench, neither body nor heading need
+    move."""
+    kept_channels = {name: channel for name, channel in log.channels.items() if name in (*OF_MOTORS, *extra_channels)}
+    return replace(log, channels=kept_channels)
 
 
 def verdict_advice(verdicts: Sequence[Verdict]) -> list[Statement]:
     """What to mend in logs of which `check` says that they give wrong results as they stand."""
-    alike: dict[tuple[str, str], list[tuple[str, Finding]]] = {}
+    findings_by_remedy: dict[tuple[str, str], list[tuple[str, Finding]]] = {}
     for verdict in verdicts:
         for finding in _errors(verdict):
-            alike.setdefault((finding.code, finding.remedy_text), []).append((verdict.source, finding))
+            findings_by_remedy.setdefault((finding.code, finding.remedy_text), []).append((verdict.source, finding))
     return [
         Statement(
             "mend_log",
             ERROR,
-            _first(source for source, _ in found),
-            {"finding": found[0][1], "what": remedy or "see omnidyn check"},
+            _first(source for source, _ in findings),
+            {"finding": findings[0][1], "what": remedy or "see omnidyn check"},
         )
-        for (_, remedy), found in alike.items()
+        for (_, remedy), findings in findings_by_remedy.items()
     ]
 
 
 def unfit(verdicts: Sequence[Verdict]) -> list[Statement]:
     """Which logs are not usable as they stand, and why: those with the same faults together."""
-    alike: dict[tuple[str, ...], list[Verdict]] = {}
+    verdicts_by_fault: dict[tuple[str, ...], list[Verdict]] = {}
     for verdict in verdicts:
         if verdict.has_errors:
-            alike.setdefault(tuple(finding.code for finding in _errors(verdict)), []).append(verdict)
+            verdicts_by_fault.setdefault(tuple(finding.code for finding in _errors(verdict)), []).append(verdict)
     return [
         Statement(
             "log_not_usable",
             ERROR,
-            _first(each.source for each in found),
-            {"logs": len(found), "findings": tuple(_errors(found[0]))},
+            _first(unfit_verdict.source for unfit_verdict in alike_verdicts),
+            {"logs": len(alike_verdicts), "findings": tuple(_errors(alike_verdicts[0]))},
         )
-        for found in alike.values()
+        for alike_verdicts in verdicts_by_fault.values()
     ]
 
 

@@ -24,7 +24,7 @@ LINE = "line"  # a shape: the paper's line on each axis
 HOLD_OUT, GROUPS, QUICK = "hold_out", "groups", "quick"  # what `identify` takes for some of the methods
 
 # What is wrong with a word that is none of the choices of an option, where "unknown NAME" does not say it.
-WRONG = {
+WRONG_WORDS = {
     "method": "no such method",
     "what": "nothing of that name",
     "speed": "no such speed",
@@ -34,16 +34,17 @@ WRONG = {
 
 
 def option(
-    default: Any, words: str, more: str = "", *, metavar: str = "", flag: str | None = "", first: bool = False
+    default: Any, words: str, python_words: str = "", *, metavar: str = "", flag: str | None = "", first: bool = False
 ) -> Any:
-    """A field: `words` say what it does, `more` what only Python need know.
+    """A field: `words` say what it does, `python_words` what only Python need know.
 
     Args:
         metavar, flag: on the command line; "" for the name of the field, None for an option that it does not have.
         first: whether a user needs it first, in the help of the command line.
     """
     return field(
-        default=default, metadata={"words": words, "more": more, "metavar": metavar, "flag": flag, "first": first}
+        default=default,
+        metadata={"words": words, "more": python_words, "metavar": metavar, "flag": flag, "first": first},
     )
 
 
@@ -57,11 +58,11 @@ def _words(hint: Any) -> tuple[str, ...]:
     return get_args(hint) if getattr(hint, "__origin__", None) is Literal else ()
 
 
-def refuse_word(name: str, value: str, known: tuple[str, ...]) -> None:
+def refuse_word(name: str, value: str, known_words: tuple[str, ...]) -> None:
     """Refuse a value that is none of the known words. Raises InputError."""
-    if value not in known:
-        *first, last = filter(None, known)
-        words = WRONG.get(name, f"unknown {name}")
+    if value not in known_words:
+        *first, last = filter(None, known_words)
+        words = WRONG_WORDS.get(name, f"unknown {name}")
         raise InputError(words, got=value, expected=f"{', '.join(first)} or {last}", where=name)
 
 
@@ -77,13 +78,13 @@ class Method:
     takes: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
-        known = choices(type(self))
+        choices_by_name = choices(type(self))
         for spec in fields(self):
             value = getattr(self, spec.name)
             if takes_names(spec):
                 value = _names(spec.name, value)
-            elif spec.name in known:
-                refuse_word(spec.name, value, known[spec.name])
+            elif spec.name in choices_by_name:
+                refuse_word(spec.name, value, choices_by_name[spec.name])
             value = ADAPTED[spec.name](value) if spec.name in ADAPTED else value
             object.__setattr__(self, spec.name, value)
 
@@ -129,8 +130,8 @@ def _shares(window: Any) -> tuple[float, float] | None:
     except (TypeError, ValueError):  # neither two, nor numbers
         low, high = math.nan, math.nan
     if not 0.0 <= low < high <= 1.0:
-        got = ",".join(map(str, window)) if isinstance(window, tuple | list) else window
-        raise InputError("not two shares", got=got, expected="such as 0.4,0.95", where="window")
+        received = ",".join(map(str, window)) if isinstance(window, tuple | list) else window
+        raise InputError("not two shares", got=received, expected="such as 0.4,0.95", where="window")
     return low, high
 
 
@@ -295,10 +296,10 @@ def refuse_unless_method(method: object) -> None:
     """Refuse what is neither a method nor None, such as its name. Raises InputError."""
     if method is not None and not isinstance(method, Method):
         spellings = ", ".join(f"omnidyn.{kind.__name__}()" for kind in METHODS)
-        got = method if isinstance(method, str) else getattr(method, "__name__", type(method).__name__)
+        received = method if isinstance(method, str) else getattr(method, "__name__", type(method).__name__)
         raise InputError(
             "a method is a value with its options, not a name",
-            got=got,
+            got=received,
             expected="one of the four methods",
             where="method",
             remedy=f"say one of {spellings}",

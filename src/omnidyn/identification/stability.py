@@ -55,8 +55,8 @@ class Split:
         keys: dict[str, Any] = {"keys": tuple(shift.key for shift in self.shifts)}
         if self.by == LOGS:
             return Statement("differ_between_logs", WARNING, numbers=keys)
-        when = {"at": self.at if self.at == self.at else None, "between": self.between, "share": self.share}
-        return Statement("differ_in_time", WARNING, self.where, keys | when)
+        moment = {"at": self.at if self.at == self.at else None, "between": self.between, "share": self.share}
+        return Statement("differ_in_time", WARNING, self.where, keys | moment)
 
 
 @dataclass(frozen=True)

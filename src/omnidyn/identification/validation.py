@@ -29,8 +29,8 @@ from omnidyn.statistics import difference_noise, find_tick, robust_std
 
 FITTED, HELD_OUT = "fitted", "held out"
 POSE = {"x": "position[0]", "y": "position[1]", "heading": "heading[0]"}
-FAR = 1.5  # chi2 of held-out logs beyond which the model misses something there
-NOT_WHITE = 0.01
+CHI2_LIMIT = 1.5  # chi2 of held-out logs beyond which the model misses something there
+WHITENESS_LIMIT = 0.01
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Score:
 
 def coloured(scores: Mapping[str, Score]) -> list[str]:
     """Components whose errors are not white; one white log in a hundred has any, however many components it has."""
-    level = NOT_WHITE / max(len(scores), 1)
+    level = WHITENESS_LIMIT / max(len(scores), 1)
     return [name for name, score in scores.items() if score.whiteness is not None and score.whiteness < level]
 
 
@@ -75,7 +75,7 @@ class Validation:
         """The scores, a row per component."""
         rows = [
             (
-                which,
+                logs_key,
                 name,
                 unit(name),
                 str(s.samples),
@@ -85,7 +85,7 @@ class Validation:
                 chance_cell(s.whiteness),
                 cell(s.lag, "+.3f"),
             )
-            for which, score in self.scores.items()
+            for logs_key, score in self.scores.items()
             for name, s in score.items()
         ]
         head = ("logs", "component", "unit", "samples", "rmse", "fit %", "chi2", "white p", "lag s")
@@ -93,16 +93,16 @@ class Validation:
 
     def statement(self) -> Statement:
         """What they say of logs held out."""
-        found = self.scores.get(HELD_OUT)
-        if found is None:
+        held_out_scores = self.scores.get(HELD_OUT)
+        if held_out_scores is None:
             return Statement("nothing_held_out", NOTE)
-        far = [name for name, s in found.items() if s.chi2 is not None and s.chi2 > FAR]
-        if far:
-            worst, fitted = max(found[name].chi2 or 0.0 for name in far), self.scores[FITTED]
-            too = all(name in fitted and (fitted[name].chi2 or 0.0) > FAR for name in far)
-            numbers = {"components": tuple(far), "chi2": worst, "fitted_too": too}
+        far_names = [name for name, s in held_out_scores.items() if s.chi2 is not None and s.chi2 > CHI2_LIMIT]
+        if far_names:
+            worst_chi2, fitted = max(held_out_scores[name].chi2 or 0.0 for name in far_names), self.scores[FITTED]
+            is_far_when_fitted = all(name in fitted and (fitted[name].chi2 or 0.0) > CHI2_LIMIT for name in far_names)
+            numbers = {"components": tuple(far_names), "chi2": worst_chi2, "fitted_too": is_far_when_fitted}
             return Statement("held_out_misfit", WARNING, numbers=numbers)
-        names = coloured(found)
+        names = coloured(held_out_scores)
         if not names:
             return Statement("held_out_noise", NOTE)
         share = None if self.misfit is None else max((self.misfit.get(name, 0.0) for name in names), default=0.0)
@@ -111,16 +111,16 @@ class Validation:
 
     def not_followed(self, fitted: Collection[str]) -> dict[str, float]:
         """Component -> fit [%] of what the model does not follow, by the rule above. fitted: names of outputs."""
-        which = FITTED if self.held_out is None else HELD_OUT
-        found = {}
+        logs_key = FITTED if self.held_out is None else HELD_OUT
+        missed_outputs = {}
         for name in self.scores[FITTED]:
-            score = self.scores[FITTED if name in POSE else which].get(name)
+            score = self.scores[FITTED if name in POSE else logs_key].get(name)
             if score is None or score.fit_percent is None or output_name(name) not in fitted:
                 continue
             comparison = self.fitted if name in POSE or self.held_out is None else self.held_out
             if is_missed(1.0 - score.fit_percent / 100.0, score.rmse, _scatter(comparison, name)):
-                found[name] = score.fit_percent
-        return found
+                missed_outputs[name] = score.fit_percent
+        return missed_outputs
 
     def summary(self) -> str:
         """A plain table, for reading."""
@@ -133,18 +133,20 @@ class Validation:
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
         return {
-            which.replace(" ", "_"): {
+            logs_key.replace(" ", "_"): {
                 "logs": [run.source for run in comparison.measured],
-                "components": {name: asdict(s) | {"unit": unit(name)} for name, s in self.scores[which].items()},
+                "components": {name: asdict(s) | {"unit": unit(name)} for name, s in self.scores[logs_key].items()},
             }
-            for which, comparison in ((FITTED, self.fitted), (HELD_OUT, self.held_out))
+            for logs_key, comparison in ((FITTED, self.fitted), (HELD_OUT, self.held_out))
             if comparison is not None
         }
 
 
-def _scatter(found: Comparison, name: str) -> float:
+def _scatter(comparison: Comparison, name: str) -> float:
     """What the measured signal scatters by from row to row, in its unit."""
-    return difference_noise(*(found.trace(found.robots[0], name, segment).measured for segment in found.segments))
+    return difference_noise(
+        *(comparison.trace(comparison.robots[0], name, segment).measured for segment in comparison.segments)
+    )
 
 
 def validate(
@@ -165,11 +167,11 @@ def validate(
         progress(Report("diagnosing"))
     lack = fit.lack_of_fit
     fitted = _compared(fit, runs, progress)
-    other = _compared(fit, held_out, progress) if held_out else None
+    held_out_comparison = _compared(fit, held_out, progress) if held_out else None
     scores = {FITTED: _scores(fit, lack, fitted, runs)}
-    if other is not None:
-        scores[HELD_OUT] = _scores(fit, lack, other, held_out)
-    return Validation(fitted, other, scores, _misfit(lack, scores[FITTED]))
+    if held_out_comparison is not None:
+        scores[HELD_OUT] = _scores(fit, lack, held_out_comparison, held_out)
+    return Validation(fitted, held_out_comparison, scores, _misfit(lack, scores[FITTED]))
 
 
 def _misfit(lack: LackOfFit | None, components: Collection[str]) -> dict[str, float] | None:
@@ -184,27 +186,29 @@ def _compared(fit: OutputErrorEstimate, runs: Sequence[Run], progress: Progress)
 
 
 def _scores(
-    fit: OutputErrorEstimate, lack: LackOfFit | None, found: Comparison, logged: Sequence[Run]
+    fit: OutputErrorEstimate, lack: LackOfFit | None, comparison: Comparison, logged: Sequence[Run]
 ) -> dict[str, Score]:
     """The score of each component. What was not fitted has no noise, and no chi2.
 
     An encoder at rest repeats what it rounds off: of a counted angle nothing tells whether errors are white.
     """
     scores = {}
-    for name, each in found.overall[found.robots[0]].items():
+    for name, channel_errors in comparison.overall[comparison.robots[0]].items():
         tick = _tick(logged, name)
-        chi2, white = _chi2(fit, lack, found, name, tick), None if tick else each.whiteness
-        scores[name] = Score(each.samples, each.rmse, each.fit_percent, chi2, white, each.lag)
+        chi2, white = _chi2(fit, lack, comparison, name, tick), None if tick else channel_errors.whiteness
+        scores[name] = Score(
+            channel_errors.samples, channel_errors.rmse, channel_errors.fit_percent, chi2, white, channel_errors.lag
+        )
     return scores
 
 
-def _errors(found: Comparison, name: str) -> list[FloatArray]:
+def _errors(comparison: Comparison, name: str) -> list[FloatArray]:
     """Errors of each free run; of what counts from the start, without what the start was off by."""
-    near = PATH if name in PATH else (name,)
+    path_names = PATH if name in PATH else (name,)
     traces = {
-        key: [found.trace(found.robots[0], key, segment) for segment in found.segments]
-        for key in near
-        if key in found.channels
+        key: [comparison.trace(comparison.robots[0], key, segment) for segment in comparison.segments]
+        for key in path_names
+        if key in comparison.channels
     }
     if counts_from_start(name):
         return errors_for_whiteness(name, traces)
@@ -223,7 +227,9 @@ def _tick(logged: Sequence[Run], name: str) -> float:
     return max((find_tick(angle[:, column]) for angle in angles), default=0.0)
 
 
-def _chi2(fit: OutputErrorEstimate, lack: LackOfFit | None, found: Comparison, name: str, tick: float) -> float | None:
+def _chi2(
+    fit: OutputErrorEstimate, lack: LackOfFit | None, comparison: Comparison, name: str, tick: float
+) -> float | None:
     output = output_name(name)
     noise = fit.noise.get(output)
     if not noise:
@@ -231,7 +237,7 @@ def _chi2(fit: OutputErrorEstimate, lack: LackOfFit | None, found: Comparison, n
     by_students_t = fit.robust
     if lack is not None and lack.noise and output in lack.beyond and not (tick or by_students_t):
         noise /= max(lack.noise[output].chi2, 1.0) ** 0.5
-    errors = np.concatenate(_errors(found, name))
+    errors = np.concatenate(_errors(comparison, name))
     errors = errors[np.isfinite(errors)]
     if not errors.size:
         return None
@@ -243,5 +249,5 @@ def output_name(component: str) -> str:
     """A component by the name that a fit gives its output: "w2" is "wheel_speed[1]"."""
     if component in POSE:
         return POSE[component]
-    found = place(component)
-    return f"{found[0]}[{found[1]}]" if found else component
+    channel_place = place(component)
+    return f"{channel_place[0]}[{channel_place[1]}]" if channel_place else component

@@ -23,12 +23,12 @@ def fit_verdict(fit: OutputErrorEstimate, validation: Validation | None = None) 
     """A fit to whole logs. Where logs were held out, these say whether the model follows."""
     if validation is None:
         return Statement("not_compared", NOTE, numbers={"known": fit.numbers_known()})
-    which = HELD_OUT if HELD_OUT in validation.scores else FITTED
-    found = followed(validation.scores[which])
-    numbers = {"logs": which, "follows": follows("the model", found)}
-    if fit.not_followed or nothing_followed(found):
+    logs_key = HELD_OUT if HELD_OUT in validation.scores else FITTED
+    followed_outputs = followed(validation.scores[logs_key])
+    numbers = {"logs": logs_key, "follows": follows("the model", followed_outputs)}
+    if fit.not_followed or nothing_followed(followed_outputs):
         return Statement("model_outcome", ERROR, numbers=numbers | {"known": None})
-    if which == HELD_OUT:
+    if logs_key == HELD_OUT:
         numbers["held_out"] = validation.statement()
     return Statement("model_outcome", NOTE, numbers=numbers | {"known": fit.numbers_known()})
 
@@ -48,8 +48,10 @@ def fits_verdict(
     statements += [fit.ladder.statement() for fit in [*fits.values()][:1] if fit.ladder]  # all have the same
     for group, fit in fits.items():
         lack = fit.lack_of_fit.statement() if fit.lack_of_fit is not None and not fit.not_followed else None
-        own = [*([lack] if lack else []), fit_verdict(fit, validations.get(group))]
-        statements += own if len(fits) == 1 else [of_group(group, each) for each in own]
+        group_statements = [*([lack] if lack else []), fit_verdict(fit, validations.get(group))]
+        statements += (
+            group_statements if len(fits) == 1 else [of_group(group, statement) for statement in group_statements]
+        )
     return statements
 
 
@@ -60,14 +62,14 @@ def of_group(group: str, statement: Statement) -> Statement:
 
 def fit_failure(fit: OutputErrorEstimate, validation: Validation | None = None) -> Statement | None:
     """What a fit misses; None where it follows what it was fitted to."""
-    missed = {} if validation is None else validation.not_followed(fit.noise)
-    named = {output_name(name) for name in missed}
-    names = missed | dict.fromkeys(name for name in fit.not_followed if name not in named)
+    missed_outputs = {} if validation is None else validation.not_followed(fit.noise)
+    missed_names = {output_name(name) for name in missed_outputs}
+    names = missed_outputs | dict.fromkeys(name for name in fit.not_followed if name not in missed_names)
     if names:
         return Statement("outputs_missed", ERROR, numbers={"names": tuple(names), "percents": tuple(names.values())})
-    found = followed(_judged(validation)) if validation is not None else []
-    nothing = Statement("nothing_followed", ERROR, numbers={"follows": follows("the model", found)})
-    return nothing if nothing_followed(found) else None
+    followed_outputs = followed(_judged(validation)) if validation is not None else []
+    failure = Statement("nothing_followed", ERROR, numbers={"follows": follows("the model", followed_outputs)})
+    return failure if nothing_followed(followed_outputs) else None
 
 
 def _judged(validation: Validation) -> Mapping[str, Score]:
@@ -96,33 +98,37 @@ def steady_verdict(study: SteadyStudy) -> list[Statement]:
     if failure := steady_failure(study):
         return [failure]
     score, _, share = _best_shape(study)
-    lacks = [each for each in study.lack_of_fit.values() if each.found]
-    own = [*study.estimates] if study.choice.own else []
+    lacks_found = [group_lack for group_lack in study.lack_of_fit.values() if group_lack.found]
+    own_groups = [*study.estimates] if study.choice.own else []
     shapes = {
-        "names": tuple(study.choice.of(group) for group in own) or (study.choice.chosen,),
-        "groups": tuple(own) or ("",),
+        "names": tuple(study.choice.of(group) for group in own_groups) or (study.choice.chosen,),
+        "groups": tuple(own_groups) or ("",),
     }
     friction = Statement(
         "steady_friction",
-        WARNING if lacks else NOTE,
+        WARNING if lacks_found else NOTE,
         numbers={
-            "levels": tuple(each.mean for each in study.travel.values()),
+            "levels": tuple(travel.mean for travel in study.travel.values()),
             "groups": tuple(study.travel),
             "shapes": Statement("shapes", NOTE, numbers=shapes),
             "share": share,
-            "ties": tuple(each.name for each in study.choice.scores if not each.told_apart and each.name != score.name),
-            "misfit": bool(lacks),
-            "cause": next((str(r.cause) for lack in lacks for r in lack.remedies), ""),
+            "ties": tuple(
+                other_score.name
+                for other_score in study.choice.scores
+                if not other_score.told_apart and other_score.name != score.name
+            ),
+            "misfit": bool(lacks_found),
+            "cause": next((str(r.cause) for lack in lacks_found for r in lack.remedies), ""),
             "untested": bool(study.untested),
             "known": lines_verdict(study.estimates)[0],
         },
     )
     changes = tuple(moment.short() for moment in study.moments)
-    moved = [Statement("force_changes_in_run", WARNING, numbers={"changes": changes})] if changes else []
-    return [*moved, friction]
+    change_notes = [Statement("force_changes_in_run", WARNING, numbers={"changes": changes})] if changes else []
+    return [*change_notes, friction]
 
 
 def lines_verdict(estimates: Mapping[str, Estimate]) -> list[Statement]:
     """The paper's line on each axis."""
-    known = tuple(estimate.numbers_known() for estimate in estimates.values())
-    return [Statement("numbers_of_groups", NOTE, numbers={"groups": tuple(estimates), "known": known})]
+    known_counts = tuple(estimate.numbers_known() for estimate in estimates.values())
+    return [Statement("numbers_of_groups", NOTE, numbers={"groups": tuple(estimates), "known": known_counts})]

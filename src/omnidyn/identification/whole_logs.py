@@ -52,52 +52,60 @@ def solved(
     return replace(answer, estimates=estimates)
 
 
-def with_size(fit: Fit, found: Solution, runs: Sequence[Run], progress: FitProgress) -> tuple[Fit, Solution]:
+def with_size(fit: Fit, solution: Solution, runs: Sequence[Run], progress: FitProgress) -> tuple[Fit, Solution]:
     """The fit and its solution, or those with wheel radius and inertia fitted too.
 
     A robot that is heavier to move than its file says follows late, and a latency stands in for that. So a latency of
     more than LATE_ROWS rows, by default, is tried beside these numbers too: the fit that predicts held-out blocks
     better is taken, and a latency that stays is named.
     """
-    problem = found.solver.problem
+    problem = solution.solver.problem
     assert isinstance(problem, Problem)
-    late = _late(found)
-    if not late or fit.question.nuisances is not None:
-        return fit, found
-    found = replace(found, notes=(*found.notes, *late))
-    more = [key for key in SIZE if key not in problem.names and key not in fit.question.fixed]
-    group, *others = fit.groups
-    if fit.question.free is not None or others or group.engine.looped or fit.nu or not more:
-        return fit, found
+    late_notes = _late(solution)
+    if not late_notes or fit.question.nuisances is not None:
+        return fit, solution
+    solution = replace(solution, notes=(*solution.notes, *late_notes))
+    size_keys = [key for key in SIZE if key not in problem.names and key not in fit.question.fixed]
+    group, *other_groups = fit.groups
+    if fit.question.free is not None or other_groups or group.engine.has_loop or fit.nu or not size_keys:
+        return fit, solution
     names = [parameter.name for parameter in problem.robot_parameters]
-    aside = progress.aside(f"once more with {' and '.join(map(in_words, more))}")
+    inner_progress = progress.aside(f"once more with {' and '.join(map(in_words, size_keys))}")
     try:
-        other = Fit.of(runs, fit.began, replace(fit.question, free=(*names, *more), fixed=()), progress=aside)
-        wider = other.beside(found, problem.nuisances, aside)
+        wider_fit = Fit.of(
+            runs, fit.given_robot, replace(fit.question, free=(*names, *size_keys), fixed=()), progress=inner_progress
+        )
+        wider_solution = wider_fit.beside(solution, problem.nuisances, inner_progress)
     except OmnidynError:  # the logs do not tell these numbers
-        return fit, found
-    margins = margins_of([found, wider])
-    before, after = free_run(found, margins), free_run(wider, margins)
-    if not after.is_better(before):
-        return fit, found
+        return fit, solution
+    margins = margins_of([solution, wider_solution])
+    narrow_run, wide_run = free_run(solution, margins), free_run(wider_solution, margins)
+    if not wide_run.is_better(narrow_run):
+        return fit, solution
     numbers = {
-        "latency": late[0].numbers["latency"],
-        "keys": tuple(more),
-        "error": before.error,
-        "with": after.error,
+        "latency": late_notes[0].numbers["latency"],
+        "keys": tuple(size_keys),
+        "error": narrow_run.error,
+        "with": wide_run.error,
     }
-    told = Statement("size_fitted", WARNING, numbers=numbers)
-    return other, replace(wider, plain=found.plain, notes=(told, *wider.notes, *_late(wider)))
+    size_note = Statement("size_fitted", WARNING, numbers=numbers)
+    return wider_fit, replace(
+        wider_solution,
+        plain_solution=solution.plain_solution,
+        notes=(size_note, *wider_solution.notes, *_late(wider_solution)),
+    )
 
 
-def _late(found: Solution) -> list[Statement]:
+def _late(solution: Solution) -> list[Statement]:
     """The latencies that are more than LATE_ROWS rows above that of the drive."""
-    problem = found.solver.problem
+    problem = solution.solver.problem
     assert isinstance(problem, Problem)
     step, count = max(piece.step for piece in problem.pieces), problem.robot_count
     return [
         Statement("late_by_rows", WARNING, parameter.name.partition(".")[2], {"latency": value, "rows": value / step})
-        for parameter, value in zip(problem.parameters[count:], found.state.point.values[count:].tolist(), strict=True)
+        for parameter, value in zip(
+            problem.parameters[count:], solution.state.point.values[count:].tolist(), strict=True
+        )
         if parameter.part == LATENCY and value - problem.robot.drive.latency > LATE_ROWS * step
     ]
 
@@ -108,11 +116,11 @@ def answered(fit: Fit, solution: Solution, progress: FitProgress, quick: bool = 
     answer = fit.answer(solution, progress)
     if quick:
         return answer
-    found = {
-        group: replace(estimate, study=_study(seen))
-        for (group, estimate), seen in zip(answer.estimates.items(), answer.solutions, strict=True)
+    studied_estimates = {
+        group: replace(estimate, study=_study(group_solution))
+        for (group, estimate), group_solution in zip(answer.estimates.items(), answer.solutions, strict=True)
     }
-    return replace(answer, estimates=found)
+    return replace(answer, estimates=studied_estimates)
 
 
 def _study(solution: Solution) -> Callable[[], Diagnosis]:

@@ -30,7 +30,7 @@ UNIT = {"viscous": ("N s/m", "N s/m", "N m s"), "coulomb": ("N", "N", "N m")}
 def friction_claims(robot: Robot) -> tuple[Claim, ...]:
     """The claims of this file."""
     data = table_1_points()
-    line, bound = (fit_steady_state(robot, data, rest=rest) for rest in ("line", "bound"))
+    line, bound = (fit_steady_state(robot, data, rest_use=rest) for rest in ("line", "bound"))
     table_2 = [_table_2(kind, axis, line, bound) for axis in range(len(AXES)) for kind in ("viscous", "coulomb")]
     return (_steady_law(robot), *table_2, _rows_at_rest(line, bound), _unit_of_b_w(robot, line))
 

@@ -157,7 +157,7 @@ def test_half_and_twice_of_a_guess_are_equally_far_from_it():
 def test_a_setting_or_a_drawing_is_not_free_by_default(robot):
     known = {"wheels.azimuth_deg": Prior(std=1.0), "motor.voltage_limit_V": Prior(std=1.0)}
     assert guesses(robot.replace(priors=known)) == ()
-    assert guesses(robot.replace(priors=known), looped=True) == ("motor.voltage_limit_V",)
+    assert guesses(robot.replace(priors=known), has_loop=True) == ("motor.voltage_limit_V",)
     magnet = {f"motor.{name}": Prior(std=1e-3) for name in ("torque_constant_Nm_A", "emf_constant_Vs_rad")}
     assert guesses(robot.replace(priors=magnet)) == ("motor.torque_constant_Nm_A",)  # the other one follows
 

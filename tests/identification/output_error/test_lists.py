@@ -33,7 +33,7 @@ def driven(robot, seconds=8.0, seed=3):
 
 def also_of(robot, *keys):
     """Key -> keys that follow it and their ratios, where these keys are free."""
-    return {p.name: dict(p.also) for p in robot_parameters(robot, keys, {})}
+    return {p.name: dict(p.tied_numbers) for p in robot_parameters(robot, keys, {})}
 
 
 def test_a_motor_that_is_weaker_is_found(axebot):

@@ -9,7 +9,7 @@ from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, SlipEngine
 from omnidyn.identification.output_error.linear.motion import motions
-from omnidyn.identification.output_error.prepare import FINE, make_problem, motion, read_records
+from omnidyn.identification.output_error.prepare import FINE_TOLERANCE, make_problem, motion, read_records
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.structure.missing import laws
 from omnidyn.model.keys import Key
@@ -111,7 +111,7 @@ def test_derivatives_are_those_of_the_runs_themselves():
     keys = ("friction.axes.coulomb[0]", "friction.axes.viscous[1]", "wheels.traction_mu")
     question = OutputError(free=keys, outputs=("twist", "wheel_speed"), nuisances=(), start="rest")
     problem = make_problem(read_records([run], ROBOT, question), ROBOT, question)
-    engine, point = ImplicitEngine.of(problem, FINE), problem.start()
+    engine, point = ImplicitEngine.of(problem, FINE_TOLERANCE), problem.start()
     assert isinstance(engine, SlipEngine)
     ((residual, slopes, at),) = engine.residuals(point)
     assert np.nanmax(np.abs(residual[:3])) < 2e-5
@@ -138,10 +138,10 @@ def test_what_an_axis_has_held_is_no_more_than_the_floor_takes():
     turning[100:200, 2] += 1.0
     run = Run(t=DT * np.arange(300), voltage=np.tile(volts, (300, 1)), twist=turning)
     (free,) = read_records([run], AXEBOT, OutputError(outputs=("twist",)))
-    drive = motion([free], AXEBOT).held
+    drive = motion([free], AXEBOT).held_forces
     assert np.isfinite(drive).all()
     (slips,) = read_records([run], ROBOT, OutputError(outputs=("twist",)))
-    held = motion([slips], ROBOT).held
+    held = motion([slips], ROBOT).held_forces
     assert held[0] <= MU * ROBOT.body.mass * GRAVITY
     assert held[0] < drive[0]
 

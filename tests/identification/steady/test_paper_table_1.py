@@ -55,7 +55,7 @@ def keys(axis):
 
 @pytest.mark.parametrize("axis", AXES)
 def test_the_papers_way_gives_table_2(robot, axis):
-    fit = fit_steady_state(robot, table_1(), rest="line")
+    fit = fit_steady_state(robot, table_1(), rest_use="line")
     viscous, coulomb = keys(axis)
     b, c, half_b, half_c = ALL_ROWS[axis]
     assert float(f"{fit.value[viscous]:.4g}") == b
@@ -69,7 +69,7 @@ def test_the_papers_way_gives_table_2(robot, axis):
 @pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("rest, first", [("line", 0), ("bound", 1), ("ignore", 1)])
 def test_it_agrees_with_linregress_and_lstsq(robot, axis, rest, first):
-    fit = fit_steady_state(robot, table_1(), rest=rest)
+    fit = fit_steady_state(robot, table_1(), rest_use=rest)
     speed, force = np.array(SPEED[axis][first:]), np.array(FORCE[axis][first:])
     line = stats.linregress(speed, force)
     t = stats.t.ppf(0.975, len(speed) - 2)
@@ -96,7 +96,7 @@ def test_mirrored_points_give_the_same_line(robot):
     side = np.array([1, -1, 1, -1] * 3)
     mirrored = points.replace(speed=points.speed * side, force=points.force * side)
     for rest in ("line", "bound"):
-        one, other = (fit_steady_state(robot, each, rest=rest) for each in (points, mirrored))
+        one, other = (fit_steady_state(robot, each, rest_use=rest) for each in (points, mirrored))
         assert dict(one.value) == pytest.approx(dict(other.value), rel=1e-12)
         assert dict(one.std) == pytest.approx(dict(other.std), rel=1e-9)
 
@@ -112,7 +112,7 @@ def test_rest_bounds_breakaway_and_raises_it_only_above_coulomb(robot):
     assert friction.breakaway == (2.25, friction.coulomb[1], 0.10)
     assert codes(fit.warnings).count("breakaway_from_rest") == 2
     for rest in ("line", "ignore"):
-        other = fit_steady_state(robot, table_1(), rest=rest)
+        other = fit_steady_state(robot, table_1(), rest_use=rest)
         assert other.robot.friction.axes.breakaway is None
         assert not other.lower_bound
 
@@ -140,13 +140,13 @@ def test_the_robot_carries_the_numbers_their_errors_and_their_origin(robot, tmp_
 
 def test_the_rows_of_w_are_faster_than_the_motor_can_turn(robot):
     """EVIDENCE: the three w rows turn 25-29 % faster than the no-load speed; v and v_n do not."""
-    fit = fit_steady_state(robot, table_1(with_voltage=True), rest="line")
+    fit = fit_steady_state(robot, table_1(with_voltage=True), rest_use="line")
     (warning,) = [warning for warning in fit.warnings if warning.code == "beyond_no_load"]
     assert str(warning).startswith("axis yaw: 3 of 3 moving rows are faster than the no-load speed (25 to 29 % faster)")
 
 
 def test_force_from_voltage_disagrees_with_the_table(robot):
-    fit = fit_steady_state(robot, table_1(with_voltage=True), rest="line")
+    fit = fit_steady_state(robot, table_1(with_voltage=True), rest_use="line")
     found = [one for one in fit.warnings if one.code == "forces_disagree" and f"{one.numbers['ratio']:.3g}" == "1.22"]
     assert len(found) == 1
     assert found[0].subject == "x"
@@ -154,7 +154,7 @@ def test_force_from_voltage_disagrees_with_the_table(robot):
 
 
 def test_summary_and_dict(robot):
-    fit = fit_steady_state(robot, table_1(), rest="line")
+    fit = fit_steady_state(robot, table_1(), rest_use="line")
     text = fit.summary()
     assert text.isascii()
     rows = [re.split(r"  +", line) for line in text.splitlines()]

@@ -85,8 +85,8 @@ def test_a_negative_estimate_is_at_bound_not_silently_clamped():  # BAD_INPUTS 3
 
 def test_a_row_at_rest_used_as_a_sliding_point():
     points = both(line(speed=SPEED[:4]), SteadyTable("x", [0.0], [2.3]))
-    assert warned(fit_steady_state(ROBOT, points, rest="line"), "rest_as_sliding").numbers == {"rows": 1}
-    assert warned(fit_steady_state(ROBOT, points, rest="ignore"), "rest_not_used").numbers == {"rows": 1}
+    assert warned(fit_steady_state(ROBOT, points, rest_use="line"), "rest_as_sliding").numbers == {"rows": 1}
+    assert warned(fit_steady_state(ROBOT, points, rest_use="ignore"), "rest_not_used").numbers == {"rows": 1}
 
 
 def test_one_speed_only_is_no_line():

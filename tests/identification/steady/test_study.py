@@ -193,7 +193,7 @@ def test_one_wild_run_hardly_moves_the_answer():
 def test_leaving_one_out_is_what_it_says():
     """Every direction by hand: a disc fitted to the other points by a plain mean along travel."""
     points = force_points(noisy("disc"), AXEBOT, speed="set")
-    fit = fit_shape(SHAPES["disc"], AXEBOT, points, turning=False, robust=False)
+    fit = fit_shape(SHAPES["disc"], AXEBOT, points, has_yaw=False, robust=False)
     way = points.twist[:, :2] / np.linalg.norm(points.twist[:, :2], axis=1)[:, None]
     along = (points.wrench[:, :2] * way).sum(axis=1)
     for k in range(len(points)):

@@ -102,10 +102,12 @@ def check_simulated(solution, bench, every):
     shapes = [residual.shape for residual, _, _ in solution.solver.engine.residuals(solution.state.point)]
     for one in every:
         trials = one.trials(bench)
-        for own, shape in [(own, shape) for trial in trials for own, shape in zip(trial.shown, shapes, strict=True)]:
+        for own, shape in [
+            (own, shape) for trial in trials for own, shape in zip(trial.columns_by_piece, shapes, strict=True)
+        ]:
             assert own.shape[:2] == shape, one.key
             assert np.isfinite(own).all(), one.key
-        shows = any(own.any() for trial in trials for own in trial.shown)
+        shows = any(own.any() for trial in trials for own in trial.columns_by_piece)
         assert shows or one.key == "filter", one.key  # which speeds show, and counts do not
 
 
@@ -120,9 +122,9 @@ def test_every_candidate_that_a_fit_can_hold_begins_to_be_fitted(layout):
         if not one.offered or one.key == CHANGE:
             continue
         for trial in one.trials(bench)[:1]:
-            remedy = Remedy(one.key, "", 0.0, 0.0, size=(0.02,) * trial.shown[0].shape[2], at=trial.at)
+            remedy = Remedy(one.key, "", 0.0, 0.0, size=(0.02,) * trial.columns_by_piece[0].shape[2], at=trial.at)
             for way in switches(remedy, problem.robot, refits._question(problem), solution):
                 start = refits._begun(one, way, problem, solution, off)
                 assert np.isfinite(start.state.objective), one.key
-                for own in refits._trial(start, problem, parts, solution).shown:
+                for own in refits._trial(start, problem, parts, solution).columns_by_piece:
                     assert np.isfinite(own).all(), one.key

@@ -9,7 +9,15 @@ from omnidyn.identification.lack_of_fit import Remedy
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.implicit import SlipEngine
 from omnidyn.identification.output_error.fit import Fit
-from omnidyn.identification.structure.ladder.models import BEYOND, FITS, NOT_NEEDED, Model, Move, Purse, quick_first
+from omnidyn.identification.structure.ladder.models import (
+    FITS,
+    NOT_NEEDED_NOTE,
+    SPENT_NOTE,
+    Model,
+    Move,
+    Purse,
+    quick_first,
+)
 from tests.identification.structure.test_tails import AXEBOT, log, spoiled
 
 GRIP, MASS = "wheels.traction_mu", "body.mass_kg"
@@ -39,7 +47,7 @@ def test_so_many_fits_with_wheels_that_slip_are_made_and_the_others_named(rolls)
     assert purse.pays(asked[:2], slips) == asked[:2]
     assert purse.pays(asked[2:], slips) == asked[2:FITS]
     assert purse.pays(asked, rolls) == asked  # others are as many as there are
-    assert [(each.move, each.why) for each in purse.told()] == [(own, BEYOND) for own in asked[FITS:]]
+    assert [(each.move, each.why) for each in purse.told()] == [(own, SPENT_NOTE) for own in asked[FITS:]]
     assert purse.told() == []
 
 
@@ -48,7 +56,7 @@ def test_behind_what_leaves_only_noise_rivals_alone_are_tried(rolls):
     near, far = move(GRIP, 95.0), move(GRIP, 90.0)
     purse = Purse()
     assert purse.rivals([near, far], best) == [near]
-    assert [(each.move, each.why) for each in purse.told()] == [(far, NOT_NEEDED)]
+    assert [(each.move, each.why) for each in purse.told()] == [(far, NOT_NEEDED_NOTE)]
 
 
 def test_a_wrong_mass_under_wild_samples_needs_no_fit_of_wheels_that_slip(monkeypatch):
@@ -62,7 +70,7 @@ def test_a_wrong_mass_under_wild_samples_needs_no_fit_of_wheels_that_slip(monkey
     assert abs(estimate.value[MASS] / AXEBOT.body.mass - 1.0) < 3e-3
     assert 3 <= len(made) <= 8
     assert not any(robot.wheels.traction_mu for robot in made)
-    assert [rung.why for rung in estimate.ladder.rungs if rung.key == GRIP] == [NOT_NEEDED]
+    assert [rung.why for rung in estimate.ladder.rungs if rung.key == GRIP] == [NOT_NEEDED_NOTE]
 
 
 def test_a_fit_by_students_t_goes_on_from_the_scales_that_it_has(monkeypatch):

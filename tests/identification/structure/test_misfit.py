@@ -88,7 +88,7 @@ def test_how_well_the_power_of_slow_errors_is_known_follows_from_the_memory():
     power, degrees = [], []
     for _ in range(300):
         series = lfilter([1.0], [1.0, -rho], rng.normal(size=rows + 300))[300:]
-        model = autoregression([series[:, None]], most=1)
+        model = autoregression([series[:, None]], order_limit=1)
         power.append(model.variance / (1.0 - model.coefficients.sum()) ** 2)
         degrees.append(model.degrees)
     scatter = np.std(power) / np.mean(power)

@@ -40,5 +40,5 @@ def test_steps_are_few(monkeypatch):
     case, seed, _ = drawn(by_name("resistance"), 61)
     lack = identify(logged(case, seed), robot_of(case.told), OutputError(free=FRICTION)).lack_of_fit
     assert lack.found
-    assert sum(steps == refits.MORE for steps in taken) <= refits.GO_ON
-    assert sum(steps == refits.STEPS for steps in taken) <= refits.BEST + 2 * len(refits.ALWAYS)
+    assert sum(steps == refits.MORE_STEPS for steps in taken) <= refits.MORE_FITS
+    assert sum(steps == refits.STEPS for steps in taken) <= refits.BEST + 2 * len(refits.ALWAYS_TRIED)

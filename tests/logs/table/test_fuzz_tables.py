@@ -170,7 +170,7 @@ def test_read_voltages(path, content, duration):
 def test_read_steady_table_and_fit(path, content, rest):
     path.write_bytes(content)
     try:
-        estimate = fit_steady_state(ROBOT, read_steady_table(path), rest=rest)
+        estimate = fit_steady_state(ROBOT, read_steady_table(path), rest_use=rest)
     except OmnidynError:
         return
     for name, value in estimate.value.items():

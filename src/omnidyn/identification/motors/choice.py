@@ -33,15 +33,15 @@ def run_motor(fit: MotorEstimate, runs: Run | Sequence[Run]) -> list[FloatArray]
     ]
     records = [motor_record(log, fit.motor, fit.between, angle=False) for log in logs]
     problem = motor_problem(records, BAND in fit.value, bool(fit.late), OFFSET in fit.value)
-    late = fit.value.get(f"latency.{SPEED[0]}", next(iter(fit.late.values()), 0.0))
-    values = [fit.value.get(name, late) for name in problem.names]
+    latency = fit.value.get(f"latency.{SPEED[0]}", next(iter(fit.late.values()), 0.0))
+    values = [fit.value.get(name, latency) for name in problem.names]
     point = replace(problem.start(), values=np.array(values))
-    found = {id(r): np.full(len(r.t), np.nan) for r in records}
+    speeds_by_record = {id(r): np.full(len(r.t), np.nan) for r in records}
     for piece, (predicted, _) in zip(problem.pieces, MotorEngine(problem).outputs(point), strict=True):
         rows = slice(piece.first, piece.last + 1)
-        found[id(piece.record)][rows] = predicted[rows, 0]
+        speeds_by_record[id(piece.record)][rows] = predicted[rows, 0]
     step = SUB if fit.between == CURVE else 1
-    return [speed[int(r.rest) :: step] for r, speed in zip(records, found.values(), strict=True)]
+    return [speed[int(r.begins_at_rest) :: step] for r, speed in zip(records, speeds_by_record.values(), strict=True)]
 
 
 def fit_rmse(fit: MotorEstimate, runs: Run | Sequence[Run]) -> float:
@@ -49,16 +49,16 @@ def fit_rmse(fit: MotorEstimate, runs: Run | Sequence[Run]) -> float:
 
     Rows whose input the log does not resolve do not count.
     """
-    every = as_list(runs)
+    logs = as_list(runs)
     errors = [
-        (ours - (log.motion if log.speed is None else log.speed)[:, fit.motor])[
-            ~unresolved_rows(log.put_in[:, fit.motor])
+        (predicted_speed - (log.motion if log.speed is None else log.speed)[:, fit.motor])[
+            ~unresolved_rows(log.input_values[:, fit.motor])
         ]
-        for ours, log in zip(run_motor(fit, every), logs_of_free_runs(every, fit.kind), strict=True)
+        for predicted_speed, log in zip(run_motor(fit, logs), logs_of_free_runs(logs, fit.kind), strict=True)
     ]
-    known = np.concatenate(errors)
-    known = known[np.isfinite(known)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
+    all_errors = np.concatenate(errors)
+    all_errors = all_errors[np.isfinite(all_errors)]
+    return float(np.sqrt(np.mean(all_errors**2))) if len(all_errors) else float("nan")
 
 
 # ---- the way that best predicts logs left out
@@ -95,24 +95,24 @@ def choose_motor(
     default of the speed [rad/s]; combined as root mean square. shared: options that all ways have.
     Raises InsufficientDataError where no way could be tried, and what `fit_motor` raises.
     """
-    every = as_list(runs)
-    errors = tuple((way, _left_out(every, motor, score, {**shared, **way})) for way in ways)
+    logs = as_list(runs)
+    errors = tuple((way, _left_out(logs, motor, score, {**shared, **way})) for way in ways)
     best: tuple[Way, float] | None = None
     for way, error in errors:
         if np.isfinite(error) and (best is None or error < (1.0 - TIE) * best[1]):
             best = way, error
     if best is None:
         raise InsufficientDataError(
-            "no log can be predicted from the others", got=f"{len(every)} logs", expected="more, or longer ones"
+            "no log can be predicted from the others", got=f"{len(logs)} logs", expected="more, or longer ones"
         )
-    return MotorChoice(best[0], fit_motor(every, motor, **{**shared, **best[0]}), errors)
+    return MotorChoice(best[0], fit_motor(logs, motor, **{**shared, **best[0]}), errors)
 
 
-def _left_out(runs: Sequence[Run], motor: int, score: Score, how: Mapping[str, Any]) -> float:
+def _left_out(runs: Sequence[Run], motor: int, score: Score, fit_options: Mapping[str, Any]) -> float:
     errors = []
-    for kept, out in _folds(runs):
+    for fitted_runs, left_out_run in _folds(runs):
         try:
-            errors.append(score(fit_motor(kept, motor, **how), [out]))
+            errors.append(score(fit_motor(fitted_runs, motor, **fit_options), [left_out_run]))
         except OmnidynError:
             return float("inf")
     return float(np.sqrt(np.mean(np.square(errors))))
@@ -127,5 +127,5 @@ def _folds(runs: Sequence[Run]) -> Iterator[tuple[list[Run], Run]]:
             runs[0].replace(t=runs[0].t[a:b], **{name: values[a:b] for name, values in runs[0].channels.items()})
             for a, b in pairwise(edges.tolist())
         ]
-    for k, out in enumerate(parts):
-        yield [*parts[:k], *parts[k + 1 :]], out
+    for k, left_out_run in enumerate(parts):
+        yield [*parts[:k], *parts[k + 1 :]], left_out_run

@@ -93,40 +93,42 @@ class MotorEstimate:
         """Whether held-out blocks improve by the dead band, its interval lies above 0, and that of the slope too: else
         there is no line.
         """
-        known = BAND in self.value and BAND not in self.unidentifiable and BAND not in self.rejected
-        return known and self.ci95[BAND][0] > 0.0 and self.ci95[SLOPE][0] > 0.0
+        is_determined = BAND in self.value and BAND not in self.unidentifiable and BAND not in self.rejected
+        return is_determined and self.ci95[BAND][0] > 0.0 and self.ci95[SLOPE][0] > 0.0
 
     @property
     def offset_seen(self) -> bool:
         """Whether the interval of the offset lies on one side of 0."""
         return OFFSET in self.value and OFFSET not in self.unidentifiable and not _holds_zero(self.ci95[OFFSET])
 
-    def bounded(self, turned: float, rested: float = math.nan) -> MotorEstimate:
-        """The same with a dead band that is not above an input under which the motor turned steadily, `turned`.
+    def bounded(self, turning_input: float, resting_input: float = math.nan) -> MotorEstimate:
+        """The same with a dead band that is not above an input under which the motor turned steadily, `turning_input`.
 
-        A value above that is none. Where there is none, it lies between that and `rested`, the largest input under
-        which the motor rested.
+        A value above that is none. Where there is none, it lies between that and `resting_input`, the largest input
+        under which the motor rested.
         """
-        if BAND not in self.value or not math.isfinite(turned):
+        if BAND not in self.value or not math.isfinite(turning_input):
             return self
         low, high = self.ci95[BAND]
-        lost = BAND in self.unidentifiable or not self.value[BAND] <= turned
+        lost = BAND in self.unidentifiable or not self.value[BAND] <= turning_input
         if not lost:
-            return replace(self, ci95={**self.ci95, BAND: (low, min(high, turned))})
-        blind = tuple(dict.fromkeys((*self.unidentifiable, BAND)))
-        ends = (rested if rested < turned else 0.0, turned)
-        return replace(self, std={**self.std, BAND: math.nan}, ci95={**self.ci95, BAND: ends}, unidentifiable=blind)
+            return replace(self, ci95={**self.ci95, BAND: (low, min(high, turning_input))})
+        undetermined_names = tuple(dict.fromkeys((*self.unidentifiable, BAND)))
+        ends = (resting_input if resting_input < turning_input else 0.0, turning_input)
+        return replace(
+            self, std={**self.std, BAND: math.nan}, ci95={**self.ci95, BAND: ends}, unidentifiable=undetermined_names
+        )
 
     @property
     def late(self) -> dict[str, float]:
         """The latencies that were fitted [s]."""
         return {name: value for name, value in self.value.items() if name.startswith(LATENCY)}
 
-    def statement(self, *, started: bool = False) -> Statement:
-        """The line of the motor. started: its starts from rest were seen, so that they are its dead band, and not where
-        the line meets speed 0.
+    def statement(self, *, has_start: bool = False) -> Statement:
+        """The line of the motor. has_start: its starts from rest were seen, so that they are its dead band, and not
+        where the line meets speed 0.
         """
-        late = [
+        latencies = [
             (name.partition(".")[2], value, None if name in self.unidentifiable else self.std[name])
             for name, value in self.late.items()
         ]
@@ -138,9 +140,9 @@ class MotorEstimate:
             "lag": self.value[LAG],
             "lag_known": LAG not in self.unidentifiable,
             "lag_seen": self.ci95[LAG][0] > 0.0,
-            "late": late,
+            "late": latencies,
             "left_out": self.left_out,
-            "dead_band": self._of_dead_band(started),
+            "dead_band": self._of_dead_band(has_start),
             "offset": self._of_offset(),
         }
         return Statement("motor_line", NOTE, self.name, numbers)
@@ -152,8 +154,8 @@ class MotorEstimate:
         band, value = self.value.get(BAND, 0.0), self.value[OFFSET]
         numbers = {"value": value, "std": self.std[OFFSET], "unit": self.unit, "ci95": self.ci95[OFFSET]}
         levels = {"forward": band + value, "backward": band - value}
-        seen = self.offset_seen and abs(value) <= band
-        return Statement("offset_as_friction" if seen else "offset_of_input", NOTE, numbers=numbers | levels)
+        is_seen = self.offset_seen and abs(value) <= band
+        return Statement("offset_as_friction" if is_seen else "offset_of_input", NOTE, numbers=numbers | levels)
 
     def of_blocks(self) -> Statement | None:
         """How free runs predict held-out blocks, and those of a plain fit; None where none were held out."""
@@ -165,17 +167,17 @@ class MotorEstimate:
     def late_statements(self, row: float) -> list[Statement]:
         """What to say of latencies beside the time of a row [s]: longer than LATE_ROWS; half a row of a speed."""
         statements = []
-        for name, late in self.late.items():
+        for name, latency in self.late.items():
             if name in self.unidentifiable:
                 continue
-            numbers, (low, high) = {"latency": late, "rows": late / row}, self.ci95[name]
-            if late > LATE_ROWS * row:
+            numbers, (low, high) = {"latency": latency, "rows": latency / row}, self.ci95[name]
+            if latency > LATE_ROWS * row:
                 statements.append(Statement("late_by_rows", WARNING, name.partition(".")[2], numbers))
             elif self.between == "hold" and name == f"{LATENCY}.wheel_speed" and 0.0 < low <= 0.5 * row <= high:
                 statements.append(Statement("late_by_half_a_row", NOTE, "wheel_speed", numbers))
         return statements
 
-    def _of_dead_band(self, started: bool) -> Statement:
+    def _of_dead_band(self, has_start: bool) -> Statement:
         if BAND in self.rejected:
             return Statement("dead_band_rejected", NOTE, numbers={"high": self.rejected[BAND][1], "unit": self.unit})
         if BAND not in self.value:
@@ -184,7 +186,7 @@ class MotorEstimate:
         numbers = {"value": self.value[BAND], "std": self.std[BAND], "unit": self.unit, "ci95": (low, high)}
         one_way = {"one_way": self.one_way}
         if self.dead_band_seen:
-            return Statement("line_meets_zero" if started else "dead_band_seen", NOTE, numbers=numbers | one_way)
+            return Statement("line_meets_zero" if has_start else "dead_band_seen", NOTE, numbers=numbers | one_way)
         if BAND in self.unidentifiable:
             return Statement("dead_band_bounded", NOTE, numbers=numbers)
         if high < 0.0:
@@ -211,8 +213,8 @@ class MotorEstimate:
                 else ("-", "-")
             ),
             *(
-                f"{1e3 * each:{form}}" if math.isfinite(each) and LAG not in self.unidentifiable else "-"
-                for each, form in ((self.value[LAG], ".3g"), (self.std[LAG], ".2g"))
+                f"{1e3 * number:{form}}" if math.isfinite(number) and LAG not in self.unidentifiable else "-"
+                for number, form in ((self.value[LAG], ".3g"), (self.std[LAG], ".2g"))
             ),
             f"{self.unit}, s/{self.travel}",
             f"{self.rmse:.4g}" if math.isfinite(self.rmse) else "-",

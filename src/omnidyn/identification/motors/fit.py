@@ -91,52 +91,57 @@ def fit_motor(
     if loss not in (GAUSS, STUDENT):
         raise InputError("unknown loss", got=loss, expected=f"{GAUSS} or {STUDENT}", where="loss")
     logs = logs_of_free_runs(runs, kind)
-    found: dict[str, tuple[Solver[MotorProblem], Solution]] = {}
+    fit_by_way: dict[str, tuple[Solver[MotorProblem], Solution]] = {}
     line = line_numbers(logs, motor) if start is None else start
     for way in WORDS:
         problem = motor_problem([motor_record(log, motor, way, angle) for log in logs], dead_band, latency, offset)
         solution = solved(problem, degrees(loss), line, start is None)
-        found[way] = solution.solver, solution
-    cost = {way: end.state.objective for way, (_, end) in found.items()}
-    chosen = between if between != AUTO else min(cost, key=lambda way: cost[way])
+        fit_by_way[way] = solution.solver, solution
+    cost = {way: end.state.objective for way, (_, end) in fit_by_way.items()}
+    best_way = between if between != AUTO else min(cost, key=lambda way: cost[way])
     # rows of a refined log have no measured neighbours, so that auto would not see whether these resemble
-    rested = rested_under(logs, motor)
-    known = {way: _trusted(*pair, SANDWICH if way == CURVE else AUTO, rested) for way, pair in found.items()}
-    answers = {way: _answer(*pair, known[way], logs, motor, way) for way, pair in found.items()}
-    fit = answers[chosen]
-    rise = RISE * max(known[chosen].widening, 1.0) ** 2  # coloured residuals make every likelihood too steep
+    resting_input = rested_under(logs, motor)
+    trust_by_way = {
+        way: _trusted(*pair, SANDWICH if way == CURVE else AUTO, resting_input) for way, pair in fit_by_way.items()
+    }
+    answers = {way: _answer(*pair, trust_by_way[way], logs, motor, way) for way, pair in fit_by_way.items()}
+    fit = answers[best_way]
+    rise = RISE * max(trust_by_way[best_way].widening, 1.0) ** 2  # coloured residuals make every likelihood too steep
     for way in cost:
-        if way != chosen and 2.0 * (cost[way] - cost[chosen]) <= rise:
+        if way != best_way and 2.0 * (cost[way] - cost[best_way]) <= rise:
             fit = _with_rival(fit, answers[way])
     if fit.dead_band_seen:
-        fit = _with_bend(fit, bend(found[chosen][0], found[chosen][1].state))
-    return fit.bounded(turned_under(logs, motor, way=orientation_of(logs, motor)), rested)
+        fit = _with_bend(fit, bend(fit_by_way[best_way][0], fit_by_way[best_way][1].state))
+    return fit.bounded(turned_under(logs, motor, way=orientation_of(logs, motor)), resting_input)
 
 
-def solved(problem: MotorProblem, degrees: float, near: Mapping[str, float] | None, anywhere: bool = True) -> Solution:
-    """The best end of descents from numbers `near` the best ones, where there are any, and from LAGS `anywhere`.
+def solved(
+    problem: MotorProblem, degrees: float, near_values: Mapping[str, float] | None, is_global: bool = True
+) -> Solution:
+    """The best end of descents from numbers `near_values` the best ones, where there are any, and from LAGS
+    `is_global`.
 
     degrees: of Student's t, 0 for Gauss.
     """
     solver = Solver(problem, MotorEngine(problem), degrees)
-    starts = [] if near is None else [begin_at(problem, near)]
-    starts += [begin(problem, lag) for lag in LAGS] if anywhere or near is None else []
+    starts = [] if near_values is None else [begin_at(problem, near_values)]
+    starts += [begin(problem, lag) for lag in LAGS] if is_global or near_values is None else []
     return min((solver.minimise(start) for start in starts), key=lambda end: end.state.objective)
 
 
-def _trusted(solver: Solver[MotorProblem], solution: Solution, kind: str, rested: float) -> Trust:
+def _trusted(solver: Solver[MotorProblem], solution: Solution, kind: str, resting_input: float) -> Trust:
     """How far a fit can be trusted, and where only an edge tells of the dead band, how far beyond that.
 
-    rested: the largest input under which the motor rested. Just below it rows at rest would turn, which looks like
-    information; above it, where they rest, no row of a run at one speed tells of the dead band.
+    resting_input: the largest input under which the motor rested. Just below it rows at rest would turn, which looks
+    like information; above it, where they rest, no row of a run at one speed tells of the dead band.
     """
-    known, point, at = trust(solver, solution, kind), solution.state.point, solver.problem.where(BAND)
-    if at < 0 or not EDGE * rested < point.values[at] <= rested:
-        return known
+    uncertainty, point, band_index = trust(solver, solution, kind), solution.state.point, solver.problem.where(BAND)
+    if band_index < 0 or not EDGE * resting_input < point.values[band_index] <= resting_input:
+        return uncertainty
     values = point.values.copy()
-    values[at] = rested / EDGE
-    beyond = trust(solver, replace(solution, state=solver.state(replace(point, values=values))), kind)
-    return beyond if beyond.blind[at] else known
+    values[band_index] = resting_input / EDGE
+    edge_uncertainty = trust(solver, replace(solution, state=solver.state(replace(point, values=values))), kind)
+    return edge_uncertainty if edge_uncertainty.blind_parameters[band_index] else uncertainty
 
 
 def logs_of_free_runs(runs: Run | Sequence[Run], kind: str) -> list[MotorLog]:
@@ -145,29 +150,29 @@ def logs_of_free_runs(runs: Run | Sequence[Run], kind: str) -> list[MotorLog]:
     Speeds that are differences of counts become the angles that they are of: such a speed is the mean over the row
     before, half a row late by its sensor, and the angle is not.
     """
-    every = as_list(runs)
-    counted = differences(every)
-    if counted is not None and counted.why is None:
-        angles = [added_up(run, counted) for run in every]
+    logs = as_list(runs)
+    count_differences = differences(logs)
+    if count_differences is not None and count_differences.reason is None:
+        angles = [added_up(run, count_differences) for run in logs]
         if not any(lost[1:].any() for _, lost in angles):
-            every = [run.replace(wheel_angle=a, wheel_speed=None) for run, (a, _) in zip(every, angles, strict=True)]
-    return motor_logs(every, kind, kinds=FREE_RUN_INPUTS)
+            logs = [run.replace(wheel_angle=a, wheel_speed=None) for run, (a, _) in zip(logs, angles, strict=True)]
+    return motor_logs(logs, kind, kinds=FREE_RUN_INPUTS)
 
 
-def _with_bend(fit: MotorEstimate, bent: BentLine | None) -> MotorEstimate:
+def _with_bend(fit: MotorEstimate, bent_line: BentLine | None) -> MotorEstimate:
     """The fit with an interval of the dead band that holds the one with a smooth bend of the line fitted too.
 
     The slope goes with the dead band, as the two are correlated.
     """
-    if bent is None or not bent.needed:
+    if bent_line is None or not bent_line.needs_bends:
         return fit
-    std = float(np.hypot(max(fit.std[BAND], bent.std), fit.value[BAND] - bent.value))
-    along = fit.correlation * fit.std[SLOPE] / fit.std[BAND]
-    slope = float(np.hypot(fit.std[SLOPE], along * np.sqrt(std**2 - fit.std[BAND] ** 2)))
-    ends = sorted(fit.value[SLOPE] + along * (end - fit.value[BAND]) for end in bent.ci95)
-    bends = {"left": bent.left, "value": bent.value, "std": bent.std, "unit": fit.unit}
+    std = float(np.hypot(max(fit.std[BAND], bent_line.std), fit.value[BAND] - bent_line.value))
+    slope_of_band = fit.correlation * fit.std[SLOPE] / fit.std[BAND]
+    slope = float(np.hypot(fit.std[SLOPE], slope_of_band * np.sqrt(std**2 - fit.std[BAND] ** 2)))
+    ends = sorted(fit.value[SLOPE] + slope_of_band * (end - fit.value[BAND]) for end in bent_line.ci95)
+    bends = {"left": bent_line.left, "value": bent_line.value, "std": bent_line.std, "unit": fit.unit}
     warning = Statement("line_bends", numbers=bends)
-    return _widened(fit, {BAND: std, SLOPE: slope}, {BAND: bent.ci95, SLOPE: (ends[0], ends[1])}, warning)
+    return _widened(fit, {BAND: std, SLOPE: slope}, {BAND: bent_line.ci95, SLOPE: (ends[0], ends[1])}, warning)
 
 
 def _with_rival(fit: MotorEstimate, rival: MotorEstimate) -> MotorEstimate:
@@ -177,8 +182,8 @@ def _with_rival(fit: MotorEstimate, rival: MotorEstimate) -> MotorEstimate:
     Its 95 % region by likelihood holds all ways that fit worse by no more than RISE, so the intervals do too; the
     difference of the values joins the variance.
     """
-    own = [name for name in (SLOPE, BAND, OFFSET, LAG, INERTIA) if name in fit.value]
-    std = {name: float(np.hypot(fit.std[name], fit.value[name] - rival.value[name])) for name in own}
+    names = [name for name in (SLOPE, BAND, OFFSET, LAG, INERTIA) if name in fit.value]
+    std = {name: float(np.hypot(fit.std[name], fit.value[name] - rival.value[name])) for name in names}
     warning = Statement(
         "other_reading",
         numbers={
@@ -197,39 +202,50 @@ def _widened(
     fit: MotorEstimate, std: dict[str, float], ci95: dict[str, tuple[float, float]], warning: Statement
 ) -> MotorEstimate:
     """The fit with other standard errors, intervals that hold these too, and a warning more."""
-    both = {name: (min(fit.ci95[name][0], low), max(fit.ci95[name][1], high)) for name, (low, high) in ci95.items()}
-    return replace(fit, std={**fit.std, **std}, ci95={**fit.ci95, **both}, warnings=(*fit.warnings, warning))
+    joint_intervals = {
+        name: (min(fit.ci95[name][0], low), max(fit.ci95[name][1], high)) for name, (low, high) in ci95.items()
+    }
+    return replace(fit, std={**fit.std, **std}, ci95={**fit.ci95, **joint_intervals}, warnings=(*fit.warnings, warning))
 
 
 def _answer(
-    solver: Solver[MotorProblem], solution: Solution, known: Trust, logs: Sequence[MotorLog], motor: int, between: str
+    solver: Solver[MotorProblem],
+    solution: Solution,
+    uncertainty: Trust,
+    logs: Sequence[MotorLog],
+    motor: int,
+    between: str,
 ) -> MotorEstimate:
     problem, values = solver.problem, solution.state.point.values
-    if known.unseen[0]:
+    if uncertainty.unseen[0]:
         raise InsufficientDataError(
             "the logs say nothing about this motor", got=f"motor {motor + 1}", expected="motion"
         )
-    std, ci95 = intervals(problem, values, known)
-    blind = {name for name, b in zip(problem.names, known.blind, strict=True) if b}
+    std, ci95 = intervals(problem, values, uncertainty)
+    blind_names = {name for name, b in zip(problem.names, uncertainty.blind_parameters, strict=True) if b}
     value = {name: float(v) for name, v in zip(problem.names, values, strict=True)}
-    at = problem.where(BAND)
-    if at >= 0:
-        high = problem.parameters[at].high
+    band_index = problem.where(BAND)
+    if band_index >= 0:
+        high = problem.parameters[band_index].high
         if value[BAND] >= 0.99 * high or std[BAND] > high:
-            blind |= {BAND}
-            std[BAND], ci95[BAND] = float("nan"), (problem.parameters[at].low, high)
-    ended = {p.name: p for p in at_the_end(problem, values) if p.name != BAND}  # which is no estimate
-    blind |= ended.keys()
-    for name, p in ended.items():
+            blind_names |= {BAND}
+            std[BAND], ci95[BAND] = float("nan"), (problem.parameters[band_index].low, high)
+    parameters_at_bound = {p.name: p for p in at_the_end(problem, values) if p.name != BAND}  # which is no estimate
+    blind_names |= parameters_at_bound.keys()
+    for name, p in parameters_at_bound.items():
         std[name], ci95[name] = float("nan"), (p.low, p.high)
     value[INERTIA] = value[SLOPE] * value[LAG]
-    std[INERTIA], ci95[INERTIA] = _of_product(problem, known, value[INERTIA])
-    if ended.keys() & {SLOPE, LAG}:
+    std[INERTIA], ci95[INERTIA] = _of_product(problem, uncertainty, value[INERTIA])
+    if parameters_at_bound.keys() & {SLOPE, LAG}:
         std[INERTIA], ci95[INERTIA] = float("nan"), (0.0, float("inf"))
     names = [name for name in (SLOPE, BAND, OFFSET, LAG, INERTIA, *problem.names) if name in value]
     rows, rmse = _speed_errors(MotorEngine(problem), solution.state.point)
-    size = known.std[0] * known.std[at]
-    correlation = float(known.covariance[0, at] / size) if at >= 0 and np.isfinite(size) and size > 0.0 else 0.0
+    size = uncertainty.std[0] * uncertainty.std[band_index]
+    correlation = (
+        float(uncertainty.covariance[0, band_index] / size)
+        if band_index >= 0 and np.isfinite(size) and size > 0.0
+        else 0.0
+    )
     return MotorEstimate(
         motor=motor,
         kind=logs[0].kind,
@@ -243,25 +259,28 @@ def _answer(
         rmse=rmse,
         count=rows,
         source=named([log.run.source for log in logs]),
-        at_bound=tuple(name for name, held in zip(problem.names, known.held, strict=True) if held),
-        unidentifiable=tuple(name for name in problem.names if name in blind),
-        left_out=sum(int(unresolved_rows(log.put_in[:, motor]).sum()) for log in logs),
+        at_bound=tuple(
+            name for name, is_held in zip(problem.names, uncertainty.held_parameters, strict=True) if is_held
+        ),
+        unidentifiable=tuple(name for name in problem.names if name in blind_names),
+        left_out=sum(int(unresolved_rows(log.input_values[:, motor]).sum()) for log in logs),
         noise={c[0]: float(np.sqrt(v)) for c, v in zip(problem.columns, solution.state.variance, strict=True)},
-        covariance=known.kind,
+        covariance=uncertainty.kind,
         converged=solution.converged,
-        answers=follows([(log.put_in[:, motor], log.motion[:, motor]) for log in logs], logs[0].step) is not False,
+        answers=follows([(log.input_values[:, motor], log.motion[:, motor]) for log in logs], logs[0].step)
+        is not False,
         one_way=not turns_both_ways(logs, motor),
         travel=logs[0].travel,
     )
 
 
-def _of_product(problem: MotorProblem, known: Trust, inertia: float) -> tuple[float, tuple[float, float]]:
+def _of_product(problem: MotorProblem, uncertainty: Trust, inertia: float) -> tuple[float, tuple[float, float]]:
     """Standard error and interval of slope times lag, both of which the solver sees as logarithms."""
     pair = [problem.where(SLOPE), problem.where(LAG)]
-    spread = float(np.sqrt(max(known.covariance[np.ix_(pair, pair)].sum(), 0.0)))
+    spread = float(np.sqrt(max(uncertainty.covariance[np.ix_(pair, pair)].sum(), 0.0)))
     if not np.isfinite(spread):
         return float("inf"), (0.0, float("inf"))
-    half = min(known.quantile * spread, 700.0)
+    half = min(uncertainty.quantile * spread, 700.0)
     return inertia * spread, (inertia * float(np.exp(-half)), inertia * float(np.exp(half)))
 
 
@@ -273,9 +292,9 @@ def _speed_errors(engine: MotorEngine, point: Point) -> tuple[int, float]:
         if SPEED in piece.record.columns:
             error = (predicted - piece.record.outputs)[rows, piece.record.columns.index(SPEED)]
         else:  # of the steps of the angle
-            off = (predicted - piece.record.outputs)[rows, 0]
-            known = np.isfinite(off)
-            error = np.diff(off[known]) / np.diff(piece.record.t[rows][known])
+            errors = (predicted - piece.record.outputs)[rows, 0]
+            known_errors = np.isfinite(errors)
+            error = np.diff(errors[known_errors]) / np.diff(piece.record.t[rows][known_errors])
         squares, count = squares + float(np.nansum(error**2)), count + int(np.isfinite(error).sum())
     return count, float(np.sqrt(squares / count)) if count else float("nan")
 
@@ -289,7 +308,7 @@ def _speed_errors(engine: MotorEngine, point: Point) -> tuple[int, float]:
 # the interval of a fit without them is not about what it says. The last one is a drag at low speed, with no step at 0.
 
 BLOCKS, LEAST_BLOCK = 60, 8  # blocks of rows in all, rows of one at least
-SURE = 0.95
+BEND_CONFIDENCE = 0.95
 MOST_NUMBERS = 20_000_000  # what is longer is not looked at: every row has all its slopes in memory
 BENDS, LOW = 3, 0.25  # how many; w0 over the highest speed
 
@@ -304,7 +323,7 @@ class BentLine:
     value: float
     std: float
     ci95: tuple[float, float]
-    needed: bool
+    needs_bends: bool
     left: float
 
 
@@ -312,44 +331,44 @@ def bend(solver: Solver[MotorProblem], state: State) -> BentLine | None:
     """None without a dead band or a speed, or where there are too few rows, or too many."""
     problem, name = solver.problem, BAND
     rows = sum(piece.last - piece.first + 1 for piece in problem.pieces)
-    wide = len(problem.parameters) + len(problem.pieces) + BENDS
-    if problem.where(name) < 0 or SPEED not in problem.columns or rows * wide > MOST_NUMBERS:
+    column_count = len(problem.parameters) + len(problem.pieces) + BENDS
+    if problem.where(name) < 0 or SPEED not in problem.columns or rows * column_count > MOST_NUMBERS:
         return None
     residual, slopes, number = _regression(solver, state.point)
     size = np.sqrt((slopes**2).sum(axis=0))
-    used = size > 0.0
+    used_columns = size > 0.0
     if (
-        len(residual) < 3 * int(used.sum()) + 2 * LEAST_BLOCK
-        or not used[[problem.where(name), *range(-BENDS, 0)]].all()
+        len(residual) < 3 * int(used_columns.sum()) + 2 * LEAST_BLOCK
+        or not used_columns[[problem.where(name), *range(-BENDS, 0)]].all()
     ):
         return None
     variance = float(np.mean(residual**2))
     weight = (solver.nu + 1.0) / (solver.nu + residual**2 / variance) if solver.nu else np.ones(len(residual))
-    scaled = slopes[:, used] / size[used]
+    scaled = slopes[:, used_columns] / size[used_columns]
     information = scaled.T @ (scaled * weight[:, None])
     inverse = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
     step = inverse @ (scaled.T @ (weight * residual))
-    left = residual - scaled @ step
-    covariance, blocks = _sandwich(scaled * (weight * left)[:, None], inverse, number)
-    degrees = blocks - int(used.sum())
+    remaining = residual - scaled @ step
+    covariance, blocks = _sandwich(scaled * (weight * remaining)[:, None], inverse, number)
+    degrees = blocks - int(used_columns.sum())
     if degrees < LEAST_BLOCK:
         return None
-    plain = inverse * float(np.mean(weight * left**2))
-    widest = np.sqrt(np.maximum(np.diag(plain), 1e-300))
-    grow = np.sqrt(np.maximum(np.diag(covariance), widest**2) / np.maximum(np.diag(covariance), 1e-300))
+    plain_covariance = inverse * float(np.mean(weight * remaining**2))
+    largest_std = np.sqrt(np.maximum(np.diag(plain_covariance), 1e-300))
+    grow = np.sqrt(np.maximum(np.diag(covariance), largest_std**2) / np.maximum(np.diag(covariance), 1e-300))
     covariance *= np.outer(grow, grow)
     last = slice(-BENDS, None)
     bends = step[last] @ np.linalg.pinv(covariance[last, last], hermitian=True) @ step[last] / BENDS
-    at = int(used[: problem.where(name)].sum())
-    value = float(state.point.values[problem.where(name)] + step[at] / size[problem.where(name)])
-    std = float(np.sqrt(covariance[at, at]) / size[problem.where(name)])
+    band_column = int(used_columns[: problem.where(name)].sum())
+    value = float(state.point.values[problem.where(name)] + step[band_column] / size[problem.where(name)])
+    std = float(np.sqrt(covariance[band_column, band_column]) / size[problem.where(name)])
     half = t_quantile(degrees) * std
-    share = float(np.sqrt(np.mean(weight * left**2) / np.mean(weight * residual**2)))
+    share = float(np.sqrt(np.mean(weight * remaining**2) / np.mean(weight * residual**2)))
     return BentLine(
         max(value, 0.0),
         std,
         (max(value - half, 0.0), max(value + half, 0.0)),
-        bool(bends > fdtri(BENDS, degrees, SURE)),
+        bool(bends > fdtri(BENDS, degrees, BEND_CONFIDENCE)),
         share,
     )
 
@@ -364,24 +383,28 @@ def _regression(solver: Solver[MotorProblem], point: Point) -> tuple[FloatArray,
     count, pieces = len(problem.parameters), problem.pieces
     slope, lag = (float(point.values[problem.where(key)]) for key in (SLOPE, LAG))
     k = problem.where(f"{LATENCY}.{SPEED[0]}")
-    late = float(point.values[k]) if k >= 0 else 0.0
-    residuals, found, numbers = [], [], []
-    for n, (piece, (predicted, by)) in enumerate(zip(pieces, engine.outputs(point), strict=True)):
+    latency = float(point.values[k]) if k >= 0 else 0.0
+    residuals, slope_rows, numbers = [], [], []
+    for n, (piece, (predicted, output_slopes)) in enumerate(zip(pieces, engine.outputs(point), strict=True)):
         if SPEED not in piece.record.columns:
             continue
         c = piece.record.columns.index(SPEED)
         rows = slice(piece.first, piece.last + 1)
-        t, own = piece.record.t[rows], predicted[rows, c]
-        known = np.isfinite(own) & np.isfinite(piece.record.outputs[rows, c])
-        known[: int(np.searchsorted(t, t[0] + piece.margin[c]))] = False
-        starts = np.zeros((int(known.sum()), len(pieces)))
+        t, outputs_here = piece.record.t[rows], predicted[rows, c]
+        known_rows = np.isfinite(outputs_here) & np.isfinite(piece.record.outputs[rows, c])
+        known_rows[: int(np.searchsorted(t, t[0] + piece.margin[c]))] = False
+        starts = np.zeros((int(known_rows.sum()), len(pieces)))
         if piece.free[YAW]:
-            starts[:, n] = by[rows, c, count + YAW][known]  # by the speed at the start
-        bent = np.stack([np.interp(t - late, t, b) for b in _bent(t, own, slope, lag)], axis=1)
-        residuals.append((piece.record.outputs[rows, c] - own)[known])
-        found.append(np.concatenate([np.nan_to_num(by[rows, c, :count][known]), starts, bent[known]], axis=1))
-        numbers.append(np.full(int(known.sum()), n))
-    return np.concatenate(residuals), np.concatenate(found), np.concatenate(numbers)
+            starts[:, n] = output_slopes[rows, c, count + YAW][known_rows]  # by the speed at the start
+        bend_columns = np.stack([np.interp(t - latency, t, b) for b in _bent(t, outputs_here, slope, lag)], axis=1)
+        residuals.append((piece.record.outputs[rows, c] - outputs_here)[known_rows])
+        slope_rows.append(
+            np.concatenate(
+                [np.nan_to_num(output_slopes[rows, c, :count][known_rows]), starts, bend_columns[known_rows]], axis=1
+            )
+        )
+        numbers.append(np.full(int(known_rows.sum()), n))
+    return np.concatenate(residuals), np.concatenate(slope_rows), np.concatenate(numbers)
 
 
 def _bent(t: FloatArray, speed: FloatArray, slope: float, lag: float) -> list[FloatArray]:
@@ -391,10 +414,10 @@ def _bent(t: FloatArray, speed: FloatArray, slope: float, lag: float) -> list[Fl
     arrays = []
     for shape in (np.abs(w) * w, w**3, w * np.exp(-((w / LOW) ** 2))):
         target = (-0.5 / slope * (shape[1:] + shape[:-1])).tolist()
-        now, values = 0.0, [0.0]
+        value_now, values = 0.0, [0.0]
         for e, goal in zip(decay, target, strict=True):
-            now = goal + (now - goal) * e
-            values.append(now)
+            value_now = goal + (value_now - goal) * e
+            values.append(value_now)
         arrays.append(np.array(values))
     return arrays
 
@@ -403,9 +426,9 @@ def _sandwich(scores: FloatArray, inverse: FloatArray, number: IntArray) -> tupl
     """(covariance, blocks): scores summed over blocks of rows, none of which reaches over the end of a piece."""
     length = max(LEAST_BLOCK, -(-len(scores) // BLOCKS))
     first = [
-        begin
+        block_start
         for n in np.unique(number)
-        for begin in range(int(np.searchsorted(number, n)), int(np.searchsorted(number, n, "right")), length)
+        for block_start in range(int(np.searchsorted(number, n)), int(np.searchsorted(number, n, "right")), length)
     ]
     influence = np.add.reduceat(scores, first, axis=0) @ inverse
     return influence.T @ influence, len(first)

@@ -29,9 +29,9 @@ from omnidyn.identification.output_error.solve.solver import Solution, Solver
 
 NUMBERS = (BAND, OFFSET, LATENCY)
 FOLDS, BLOCKS, LEAST_BLOCK = 5, 20, 8  # rows of a block at least
-FEW = 12  # iterations of a fit without some blocks, which begins at that to all
-CLEAR = 2.0  # standard errors of its gain by which a number must pay
-WILD = 5.0  # scales of the noise that an error counts at most, where it is that of Student's t
+BLOCK_ITERATIONS = 12  # iterations of a fit without some blocks, which begins at that to all
+GAIN_ERRORS = 2.0  # standard errors of its gain by which a number must pay
+ERROR_LIMIT = 5.0  # scales of the noise that an error counts at most, where it is that of Student's t
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,57 +48,61 @@ class MotorModel:
     errors: FloatArray
     size: float
 
-    def pays(self, smaller: MotorModel) -> bool:
+    def pays(self, smaller_model: MotorModel) -> bool:
         """Whether it predicts held-out rows better than a model with fewer numbers, by more than chance."""
-        gain = smaller.errors - self.errors
-        return float(gain.sum()) > CLEAR * float(gain.std(ddof=1)) * np.sqrt(len(gain))
+        gain = smaller_model.errors - self.errors
+        return float(gain.sum()) > GAIN_ERRORS * float(gain.std(ddof=1)) * np.sqrt(len(gain))
 
 
 @dataclass(frozen=True, eq=False)
 class ModelChoice:
-    """model: with the numbers that pay; plain: with none of NUMBERS; rejected: those that do not pay."""
+    """model: with the numbers that pay; plain_model: with none of NUMBERS; rejected: those that do not pay."""
 
     model: MotorModel
-    plain: MotorModel
+    plain_model: MotorModel
     rejected: tuple[str, ...]
 
 
 def choose_model(
-    logs: Sequence[MotorLog], motor: int, between: str, loss: str, wanted: Sequence[str] | None = None
+    logs: Sequence[MotorLog], motor: int, between: str, loss: str, wanted_names: Sequence[str] | None = None
 ) -> ModelChoice | None:
     """What a motor needs; None where the logs are too short to hold any block out.
 
-    wanted: of NUMBERS, all of which are taken; None: those that pay. between, loss: as `fit_motor` has them.
+    wanted_names: of NUMBERS, all of which are taken; None: those that pay. between, loss: as `fit_motor` has them.
     """
-    every = tuple(name for name in NUMBERS if wanted is None or name in wanted)
+    candidate_names = tuple(name for name in NUMBERS if wanted_names is None or name in wanted_names)
     if not turns_both_ways(logs, motor):
-        every = tuple(name for name in every if name != OFFSET)
+        candidate_names = tuple(name for name in candidate_names if name != OFFSET)
     held_out = _HeldOut(logs, motor, degrees_of(loss))
     if not held_out.long_enough:
         return None
     ways = [between] if between != AUTO else list(WORDS)
-    plain = min((held_out.model(way, ()) for way in ways), key=lambda model: model.size)
-    model = min((held_out.model(way, every) for way in ways), key=lambda model: model.size) if every else plain
-    while wanted is None and model.names:
-        if useless := [name for name in model.names if not held_out.is_plausible(model, name)]:
-            model = held_out.model(model.between, _without(model.names, *useless), model.values)
+    plain_model = min((held_out.model(way, ()) for way in ways), key=lambda model: model.size)
+    model = (
+        min((held_out.model(way, candidate_names) for way in ways), key=lambda model: model.size)
+        if candidate_names
+        else plain_model
+    )
+    while wanted_names is None and model.names:
+        if implausible_names := [name for name in model.names if not held_out.is_plausible(model, name)]:
+            model = held_out.model(model.between, _without(model.names, *implausible_names), model.values)
             continue
-        smaller = [
+        smaller_models = [
             held_out.model(way, _without(model.names, name), model.values)
             for name in model.names
             for way in (ways if name == LATENCY else [model.between])  # another reading may be as late
         ]
-        least = min(smaller, key=lambda other: other.size)
-        if model.pays(least):
+        best_model = min(smaller_models, key=lambda model_here: model_here.size)
+        if model.pays(best_model):
             break
-        model = least
-    if wanted is None and plain.size <= model.size:
-        model = plain
-    return ModelChoice(model, plain, _without(every, *model.names))
+        model = best_model
+    if wanted_names is None and plain_model.size <= model.size:
+        model = plain_model
+    return ModelChoice(model, plain_model, _without(candidate_names, *model.names))
 
 
-def _without(names: Sequence[str], *away: str) -> tuple[str, ...]:
-    return tuple(name for name in names if name not in away)
+def _without(names: Sequence[str], *removed_name: str) -> tuple[str, ...]:
+    return tuple(name for name in names if name not in removed_name)
 
 
 class _HeldOut:
@@ -116,50 +120,61 @@ class _HeldOut:
         values = [value for key, value in model.values.items() if key.partition(".")[0] == name]
         return all(value > 0.0 if name == BAND else value > self.earliest or name == OFFSET for value in values)
 
-    def model(self, way: str, names: Sequence[str], near: Mapping[str, float] | None = None) -> MotorModel:
-        """The model with these numbers, and how well it predicts what it was not fitted to. near: where its fit
+    def model(self, way: str, names: Sequence[str], near_values: Mapping[str, float] | None = None) -> MotorModel:
+        """The model with these numbers, and how well it predicts what it was not fitted to. near_values: where its fit
         begins, None: where every fit does.
         """
         records = self._records[way]
         problem = _problem(records, names)
-        whole = solved(problem, self.degrees, near or self.line, near is None)
-        block, most = _blocks(records), WILD * np.sqrt(whole.state.variance) if self.degrees else np.inf
+        full_fit = solved(problem, self.degrees, near_values or self.line, near_values is None)
+        block, error_limit = (
+            _blocks(records),
+            ERROR_LIMIT * np.sqrt(full_fit.state.variance) if self.degrees else np.inf,
+        )
         squares, rows = np.zeros((2, BLOCKS, len(problem.columns)))
         for fold in range(FOLDS):
-            point = self._without(records, [own % FOLDS == fold for own in block], names, whole)
+            point = self._without(records, [record_blocks % FOLDS == fold for record_blocks in block], names, full_fit)
             outputs = MotorEngine(problem).outputs(point)
             for piece, (predicted, _) in zip(problem.pieces, outputs, strict=True):
-                at = [problem.columns.index(column) for column in piece.record.columns]
-                own = block[next(k for k, record in enumerate(records) if record is piece.record)]
-                error = np.clip(piece.record.outputs - predicted, -np.broadcast_to(most, len(at)), most)
-                there = np.isfinite(error) & (own % FOLDS == fold)[:, None]
-                there[: piece.first] = there[piece.last + 1 :] = False
-                for c, column in enumerate(at):
-                    known = there[:, c]
-                    squares[:, column] += np.bincount(own[known], error[known, c] ** 2, BLOCKS)
-                    rows[:, column] += np.bincount(own[known], minlength=BLOCKS)
+                column_indices = [problem.columns.index(column) for column in piece.record.columns]
+                piece_blocks = block[next(k for k, record in enumerate(records) if record is piece.record)]
+                error = np.clip(
+                    piece.record.outputs - predicted, -np.broadcast_to(error_limit, len(column_indices)), error_limit
+                )
+                counted_rows = np.isfinite(error) & (piece_blocks % FOLDS == fold)[:, None]
+                counted_rows[: piece.first] = counted_rows[piece.last + 1 :] = False
+                for c, column in enumerate(column_indices):
+                    counted_column = counted_rows[:, c]
+                    squares[:, column] += np.bincount(
+                        piece_blocks[counted_column], error[counted_column, c] ** 2, BLOCKS
+                    )
+                    rows[:, column] += np.bincount(piece_blocks[counted_column], minlength=BLOCKS)
         spread = _spread(records, problem)
         mean = squares.sum(axis=0) / np.maximum(rows.sum(axis=0), 1.0) / spread
         return MotorModel(
             tuple(names),
             way,
-            dict(zip(problem.names, whole.state.point.values.tolist(), strict=True)),
+            dict(zip(problem.names, full_fit.state.point.values.tolist(), strict=True)),
             (squares / np.maximum(rows, 1.0) / spread).mean(axis=1),
             float(np.exp(0.5 * np.log(np.maximum(mean, 1e-300)).mean())),
         )
 
     def _without(
-        self, records: Sequence[MotorRecord], away: Sequence[FloatArray], names: Sequence[str], whole: Solution
+        self,
+        records: Sequence[MotorRecord],
+        held_out_rows: Sequence[FloatArray],
+        names: Sequence[str],
+        full_fit: Solution,
     ) -> Point:
-        """The fit without the outputs of the rows `away` of each record, near that to all."""
-        kept = [
-            replace(record, outputs=np.where(out[:, None], np.nan, record.outputs))
-            for record, out in zip(records, away, strict=True)
+        """The fit without the outputs of the rows `held_out_rows` of each record, near that to all."""
+        kept_records = [
+            replace(record, outputs=np.where(record_mask[:, None], np.nan, record.outputs))
+            for record, record_mask in zip(records, held_out_rows, strict=True)
         ]
-        problem = _problem(kept, names)
+        problem = _problem(kept_records, names)
         solver = Solver(problem, MotorEngine(problem), self.degrees)
-        scales = whole.state.variance if self.degrees else None
-        return solver.minimise(whole.state.point, FEW, scales=scales).state.point
+        scales = full_fit.state.variance if self.degrees else None
+        return solver.minimise(full_fit.state.point, BLOCK_ITERATIONS, scales=scales).state.point
 
 
 def _problem(records: Sequence[MotorRecord], names: Sequence[str]) -> MotorProblem:
@@ -181,20 +196,20 @@ def _blocks(records: Sequence[MotorRecord]) -> list[IntArray]:
 
 def _spread(records: Sequence[MotorRecord], problem: MotorProblem) -> FloatArray:
     """Variance of each output over all records. Shape (columns,)."""
-    found = []
+    squares = []
     for column in problem.columns:
         parts = [r.outputs[:, r.columns.index(column)] for r in records if column in r.columns]
-        found.append(float(np.nanvar(np.concatenate(parts))) or 1.0)
-    return np.array(found)
+        squares.append(float(np.nanvar(np.concatenate(parts))) or 1.0)
+    return np.array(squares)
 
 
-def written_and_plain(logs: Sequence[MotorLog], motor: int, asked: MotorFit) -> tuple[MotorEstimate, MotorEstimate]:
+def written_and_plain(logs: Sequence[MotorLog], motor: int, method: MotorFit) -> tuple[MotorEstimate, MotorEstimate]:
     """(a motor by the numbers that improve held-out blocks, or those that are asked for; by slope and lag alone).
 
     Raises InputError for a nuisance that motors do not have, and what `fit_motor` raises.
     """
-    wanted = None if asked.nuisances is None else _wanted(asked.nuisances)
-    choice = choose_model(logs, motor, asked.between, asked.loss, wanted)
+    wanted_names = None if method.nuisances is None else _wanted(method.nuisances)
+    choice = choose_model(logs, motor, method.between, method.loss, wanted_names)
     runs = [log.run for log in logs]
 
     def fit(names: Sequence[str], model: MotorModel | None) -> MotorEstimate:
@@ -205,19 +220,21 @@ def written_and_plain(logs: Sequence[MotorLog], motor: int, asked: MotorFit) -> 
             offset=OFFSET in names,
             latency=LATENCY in names,
             kind=logs[0].kind,
-            between=model.between if model else asked.between,
-            loss=asked.loss,
+            between=model.between if model else method.between,
+            loss=method.loss,
             start=model.values if model else None,
         )
 
     if choice is None:
-        return fit(wanted or (BAND,), None), fit((), None)
-    model, plain = choice.model, choice.plain
-    written = fit(model.names, model)
+        return fit(wanted_names or (BAND,), None), fit((), None)
+    model, plain_model = choice.model, choice.plain_model
+    written_fit = fit(model.names, model)
     intervals = {name: _interval(fit((*model.names, name), model), name) for name in choice.rejected}
-    blocks = HeldOut(model.size, plain.size)
-    late = tuple(written.late_statements(min(log.step for log in logs)))
-    return replace(written, blocks=blocks, rejected=intervals, warnings=(*written.warnings, *late)), fit((), plain)
+    blocks = HeldOut(model.size, plain_model.size)
+    latency_notes = tuple(written_fit.late_statements(min(log.step for log in logs)))
+    return replace(
+        written_fit, blocks=blocks, rejected=intervals, warnings=(*written_fit.warnings, *latency_notes)
+    ), fit((), plain_model)
 
 
 def _interval(fit: MotorEstimate, name: str) -> tuple[float, float]:

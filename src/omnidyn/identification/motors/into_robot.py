@@ -45,7 +45,7 @@ from omnidyn.statement import NOTE, WARNING, Statement
 COULOMB, VISCOUS = "friction.wheels.coulomb", "friction.wheels.viscous"
 MAP = "drive.voltage_map_V"
 BACKWARD = "friction.wheels.coulomb_backward"
-ALONG = {  # levels that go along with another one
+LINKED_LEVELS = {  # levels that go along with another one
     COULOMB: ("coulomb_backward", "breakaway", "breakaway_backward"),
     BACKWARD: ("breakaway_backward",),
 }
@@ -82,11 +82,11 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
     Raises InputError where the logs have more motors than the robot has wheels.
     """
     motors = [motor for motor in study.motors if motor.motor is not None]
-    most = max((motor.motor or 0) + 1 for motor in motors)
-    if most > robot.wheels.count:
+    wheel_count = max((motor.motor or 0) + 1 for motor in motors)
+    if wheel_count > robot.wheels.count:
         raise InputError(
             "the logs have more motors than the robot has wheels",
-            got=most,
+            got=wheel_count,
             expected=f"{robot.wheels.count} or fewer, as {robot.name} has",
         )
     if study.speed_from == HEADING:
@@ -94,21 +94,23 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
     if study.kind == "force" or motors[0].travel == LENGTH:
         return MotorNumbers(robot, {}, {}, (Statement("axis_not_wheel"),))
     supply, remarks = _supply(study, robot)
-    bent = [curve.motor for curve in study.curves]
+    bent_motors = [curve.motor for curve in study.curves]
     value: dict[str, float] = {}
     std: dict[str, float] = {}
     priors: dict[str, Prior] = {}
-    for each in motors if supply else ():
-        wheel = _Wheel(robot, each.motor or 0, study.kind)
-        if each.motor in bent:
-            found, notes = wheel.behind_map(each, supply)
+    for estimate in motors if supply else ():
+        wheel = _Wheel(robot, estimate.motor or 0, study.kind)
+        if estimate.motor in bent_motors:
+            wheel_numbers, notes = wheel.behind_map(estimate, supply)
         else:
-            found, notes = wheel.numbers(each, supply, 0.0 if study.windows is None else study.windows.smear)
-        remarks += [remark.of(each.name) for remark in notes]
-        for key, (number, spread) in found.items():
+            wheel_numbers, notes = wheel.numbers(
+                estimate, supply, 0.0 if study.windows is None else study.windows.smear
+            )
+        remarks += [remark.of(estimate.name) for remark in notes]
+        for key, (number, spread) in wheel_numbers.items():
             robot = wheel.put(robot, key, number)
             value[key], std[key] = number, spread
-            priors[key] = identified(spread, f"motors by {each.way}, {each.source}")
+            priors[key] = identified(spread, f"motors by {estimate.way}, {estimate.source}")
     if value:
         robot, notes = _with_map(robot, study, supply)
         remarks += notes
@@ -116,8 +118,8 @@ def motors_into_robot(study: MotorStudy, robot: Robot) -> MotorNumbers:
     if any(key.startswith(COULOMB) for key in value) and any(np.any(f.coulomb) or np.any(f.viscous) for f in floor):
         remarks.append(Statement("floor_friction_kept", NOTE))
     # Motors that were measured anew, each by itself, are no longer off together with what an earlier fit found.
-    told = with_correlation(with_priors(robot, priors), [*priors], np.eye(len(priors)))
-    return MotorNumbers(told, value, std, tuple(remarks))
+    full_robot = with_correlation(with_priors(robot, priors), [*priors], np.eye(len(priors)))
+    return MotorNumbers(full_robot, value, std, tuple(remarks))
 
 
 def _with_map(robot: Robot, study: MotorStudy, supply: float) -> tuple[Robot, list[Statement]]:
@@ -127,17 +129,19 @@ def _with_map(robot: Robot, study: MotorStudy, supply: float) -> tuple[Robot, li
     """
     drive, wheels = robot.drive, robot.friction.wheels
     if not study.curves:
-        removed = [Statement("map_removed", NOTE, MAP)] if drive.voltage_map else []
-        return robot.replace(drive=drive.replace(voltage_map=())), removed
-    why = "loop" if drive.kind == SPEED else ""
-    why = why or ("straight" if len(study.curves) < sum(motor.motor is not None for motor in study.motors) else "")
-    why = why or ("unsettled" if any(curve.unsettled for curve in study.curves) else "")
-    if why:
-        return robot, [Statement("not_written", WARNING, MAP, {"why": why})]
+        removal_notes = [Statement("map_removed", NOTE, MAP)] if drive.voltage_map else []
+        return robot.replace(drive=drive.replace(voltage_map=())), removal_notes
+    reason = "loop" if drive.kind == SPEED else ""
+    reason = reason or (
+        "straight" if len(study.curves) < sum(motor.motor is not None for motor in study.motors) else ""
+    )
+    reason = reason or ("unsettled" if any(curve.unsettled for curve in study.curves) else "")
+    if reason:
+        return robot, [Statement("not_written", WARNING, MAP, {"why": reason})]
     points = map_of(study.curves, supply)
-    inside = np.any(wheels.coulomb) or drive.dead_band > 0.0
+    has_inner_band = np.any(wheels.coulomb) or drive.dead_band > 0.0
     remarks = [Statement("map_written", NOTE, MAP, {"points": len(points)})]
-    remarks += [Statement("map_holds_friction", NOTE, MAP)] if inside else []
+    remarks += [Statement("map_holds_friction", NOTE, MAP)] if has_inner_band else []
     friction = robot.friction.replace(wheels=type(wheels)(viscous=wheels.viscous))
     return robot.replace(drive=drive.replace(voltage_map=points, dead_band=0.0), friction=friction), remarks
 
@@ -182,32 +186,34 @@ class _Wheel:
         """
         if BAND in line.unidentifiable or SLOPE in line.unidentifiable or not line.ci95[SLOPE][0] > 0.0:
             return {}, [Statement("line_not_determined")]
-        at = np.array([line.value[SLOPE], line.value.get(BAND, 0.0)]) * scale
+        values = np.array([line.value[SLOPE], line.value.get(BAND, 0.0)]) * scale
         offset = scale * line.value[OFFSET] if line.offset_seen else 0.0
         spread = np.array([line.std[SLOPE], line.std.get(BAND, 0.0)]) * scale
         covariance = np.outer(spread, spread) * np.array([[1.0, line.correlation], [line.correlation, 1.0]])
-        found: dict[str, tuple[float, float]] = {}
+        key_values: dict[str, tuple[float, float]] = {}
         remarks: list[Statement] = []
-        middle = at.copy()
-        for name, of, why in self._laws(line.dead_band_seen, line.offset_seen):
-            if name in (COULOMB, BACKWARD) and not found:  # how hard a volt pushes is not known either
+        middle = values.copy()
+        for name, number_of, reason in self._laws(line.dead_band_seen, line.offset_seen):
+            if name in (COULOMB, BACKWARD) and not key_values:  # how hard a volt pushes is not known either
                 continue
-            at = middle + np.array([0.0, offset * {COULOMB: 1.0, BACKWARD: -1.0}.get(name, 0.0)])
-            number = float(of(*at))
+            values = middle + np.array([0.0, offset * {COULOMB: 1.0, BACKWARD: -1.0}.get(name, 0.0)])
+            number = float(number_of(*values))
             if number > 0.0:
                 slopes = np.array(
                     [
-                        (of(*(at + step)) - of(*(at - step))) / (2.0 * step[k]) if step[k] > 0.0 else 0.0
+                        (number_of(*(values + step)) - number_of(*(values - step))) / (2.0 * step[k])
+                        if step[k] > 0.0
+                        else 0.0
                         for k, step in enumerate(np.diag(STEP * spread))
                     ]
                 )
-                found[self.key(name)] = number, float(np.sqrt(slopes @ covariance @ slopes))
+                key_values[self.key(name)] = number, float(np.sqrt(slopes @ covariance @ slopes))
             else:
-                remarks.append(Statement("not_written", subject=name, numbers={"why": why}))
+                remarks.append(Statement("not_written", subject=name, numbers={"why": reason}))
         if not line.dead_band_seen:
             remarks.append(Statement("not_written", NOTE, COULOMB, {"why": "no_dead_band"}))
-        inertia, more = self._of_inertia(line, at[0], scale, smear) if found else ({}, [])
-        return found | inertia, remarks + more
+        inertia, inertia_notes = self._of_inertia(line, values[0], scale, smear) if key_values else ({}, [])
+        return key_values | inertia, remarks + inertia_notes
 
     def behind_map(self, line: MotorEstimate, scale: float) -> tuple[dict[str, tuple[float, float]], list[Statement]]:
         """The same of a motor behind the map of its driver: its back-EMF, by the slope."""
@@ -226,22 +232,22 @@ class _Wheel:
         if self.kind == "current":
             yield VISCOUS, lambda slope, _: self._push(self.torque) * slope / self.radius, "negative"
         else:
-            why = "viscous_explains_slope"
+            reason = "viscous_explains_slope"
             for name in (EMF, TORQUE) if self.tied else (EMF,):
-                yield name, lambda slope, _: self._emf(slope), why
+                yield name, lambda slope, _: self._emf(slope), reason
         if with_band:
             drop = 0.0 if self.kind == "current" else self.drop
-            why = "drop_explains_dead_band"
+            reason = "drop_explains_dead_band"
             for name in (COULOMB, BACKWARD) if offset_seen else (COULOMB,):
-                yield name, lambda slope, level: self._push(self._torque(slope)) * (level - drop), why
+                yield name, lambda slope, level: self._push(self._torque(slope)) * (level - drop), reason
 
     def _emf(self, slope: float) -> float:
         """K_v [V s/rad] from the slope [V s/rad]; 0 where the viscous friction of the file leaves none."""
         lost = self.viscous * self.resistance * self.radius**2 / (self.gear * self.efficiency)  # times 1/K_t
         if not self.tied:
             return (slope - lost / self.torque) / self.gear
-        rest = slope**2 - 4.0 * self.gear * lost
-        return 0.5 * (slope + math.sqrt(rest)) / self.gear if rest >= 0.0 else 0.0
+        discriminant = slope**2 - 4.0 * self.gear * lost
+        return 0.5 * (slope + math.sqrt(discriminant)) / self.gear if discriminant >= 0.0 else 0.0
 
     def _torque(self, slope: float) -> float:
         return self._emf(slope) if self.tied and self.kind != "current" else self.torque
@@ -277,9 +283,9 @@ class _Wheel:
             wheels = wheels.replace(coulomb_backward=wheels.coulomb)
             robot = robot.replace(friction=robot.friction.replace(wheels=wheels))
         robot = Key.parse(key).set(robot, number, checked=False)
-        others = ALONG.get(key.partition("[")[0], ())
-        for name in (name for name in others if getattr(wheels, name) is not None):
-            other = Key.parse(self.key(f"friction.wheels.{name}"))
-            least = other.get(robot) if name.startswith("breakaway") else 0.0
-            robot = other.set(robot, max(number, least), checked=False)
+        tied_names = LINKED_LEVELS.get(key.partition("[")[0], ())
+        for name in (name for name in tied_names if getattr(wheels, name) is not None):
+            tied_key = Key.parse(self.key(f"friction.wheels.{name}"))
+            least_level = tied_key.get(robot) if name.startswith("breakaway") else 0.0
+            robot = tied_key.set(robot, max(number, least_level), checked=False)
         return robot

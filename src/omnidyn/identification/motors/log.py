@@ -39,23 +39,24 @@ HEADING = "heading, the robot turning on the spot"
 class MotorLog:
     """One run. Arrays of shape (rows, motors).
 
-    put_in: in `unit`, of `kind` (INPUTS). speed [rad/s] and angle [rad], as measured; one of them may be None.
+    input_values: in `unit`, of `kind` (INPUTS). speed [rad/s] and angle [rad], as measured; one of them may be None.
     motion [rad/s]: by the angle where there is one. motion_from: its origin in words. pieces: rows between gaps.
-    averaged: per motor, over how many rows its motion is a mean; 1 where it is none.
-    given: the input as it held, at the times of all sensors, where they share no stamps: rows are those of the motion.
+    mean_rows: per motor, over how many rows its motion is a mean; 1 where it is none.
+    stamped_input: the input as it held, at the times of all sensors, where they share no stamps: rows are those of the
+    motion.
     travel: unit of the angle, ANGLE; LENGTH of a linear axis, whose speed is in m/s.
     """
 
     run: Run
     kind: str
-    put_in: FloatArray
+    input_values: FloatArray
     speed: FloatArray | None
     angle: FloatArray | None
     motion: FloatArray
     motion_from: str
     pieces: tuple[slice, ...]
-    averaged: tuple[int, ...]
-    given: tuple[FloatArray, FloatArray] | None = None
+    mean_rows: tuple[int, ...]
+    stamped_input: tuple[FloatArray, FloatArray] | None = None
     travel: str = ANGLE
 
     @property
@@ -94,27 +95,27 @@ def motor_logs(
     """
     if kind and kind not in kinds:
         raise InputError("no such input", got=kind, expected=", ".join(kinds), where="input")
-    wanted = [kind] if kind else kinds
-    if found := motor_input(runs, wanted):
-        return [_motor_log(run, found, speed, robot) for run in runs]
-    lacking = next((run for run in runs if all(getattr(run, name) is None for name in wanted)), None)
-    lacking = lacking or (runs[0] if runs else None)
+    wanted_kinds = [kind] if kind else kinds
+    if logs_found := motor_input(runs, wanted_kinds):
+        return [_motor_log(run, logs_found, speed, robot) for run in runs]
+    run_without_input = next((run for run in runs if all(getattr(run, name) is None for name in wanted_kinds)), None)
+    run_without_input = run_without_input or (runs[0] if runs else None)
     raise InputError(
         "the motors' input is not in the log",
-        got=", ".join(lacking.channels) if lacking else "no runs",
-        expected=", ".join(wanted),
-        where=lacking.source if lacking else "",
+        got=", ".join(run_without_input.channels) if run_without_input else "no runs",
+        expected=", ".join(wanted_kinds),
+        where=run_without_input.source if run_without_input else "",
     )
 
 
 def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog:
     axis = speed == WHEEL and is_axis(run)
-    moved = "pose" if speed == GROUND else "wheel_speed" if live_angle(run) is None else "wheel_angle"
+    motion_channel = "pose" if speed == GROUND else "wheel_speed" if live_angle(run) is None else "wheel_angle"
     if axis:
-        moved = "pose" if _along_x(run.pose) is not None else "twist"
-    given = (run.t, getattr(run, kind) * INPUTS[kind][1]) if run.staggered and kind not in SENSORS else None
-    run = on_clock_of(run, moved)
-    put_in, pieces = getattr(run, kind) * INPUTS[kind][1], tuple(segments(run.t))
+        motion_channel = "pose" if _along_x(run.pose) is not None else "twist"
+    stamped_input = (run.t, getattr(run, kind) * INPUTS[kind][1]) if run.staggered and kind not in SENSORS else None
+    run = on_clock_of(run, motion_channel)
+    input_values, pieces = getattr(run, kind) * INPUTS[kind][1], tuple(segments(run.t))
     if speed == GROUND:
         if run.pose is None or robot is None or not np.isfinite(run.pose[:, 2]).any():
             raise InputError(
@@ -126,7 +127,11 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
         angle, measured = run.pose[:, 2:] * wheel_speed(robot.wheels, [0.0, 0.0, 1.0]), None
         origin = HEADING
     elif axis:
-        angle, measured, origin = _along_x(run.pose), _along_x(run.twist), "x of an axis" if moved == "pose" else "vx"
+        angle, measured, origin = (
+            _along_x(run.pose),
+            _along_x(run.twist),
+            "x of an axis" if motion_channel == "pose" else "vx",
+        )
     elif speed == WHEEL:
         angle, measured = live_angle(run), run.wheel_speed
         origin = "wheel_speed" if angle is None else "wheel_angle"
@@ -140,15 +145,17 @@ def _motor_log(run: Run, kind: str, speed: str, robot: Robot | None) -> MotorLog
             expected="wheel_angle or wheel_speed; x or vx of a linear axis",
             where=run.source,
         )
-    averaged = [rows_of_mean(np.asarray(column)) or 1 if angle is None else 1 for column in motion.T]
+    mean_rows = [rows_of_mean(np.asarray(column)) or 1 if angle is None else 1 for column in motion.T]
     travel = LENGTH if axis else ANGLE
-    return MotorLog(run, kind, put_in, measured, angle, motion, origin, pieces, tuple(averaged), given, travel)
+    return MotorLog(
+        run, kind, input_values, measured, angle, motion, origin, pieces, tuple(mean_rows), stamped_input, travel
+    )
 
 
 def is_axis(run: Run) -> bool:
     """Whether a log is of a linear axis: one motor, no speed and no angle of a wheel, but x or vx."""
-    one = run.wheels == 1 and not turns_known(run)
-    return one and (_along_x(run.pose) is not None or _along_x(run.twist) is not None)
+    is_single_motor = run.wheels == 1 and not turns_known(run)
+    return is_single_motor and (_along_x(run.pose) is not None or _along_x(run.twist) is not None)
 
 
 def _along_x(values: FloatArray | None) -> FloatArray | None:
@@ -156,32 +163,32 @@ def _along_x(values: FloatArray | None) -> FloatArray | None:
     return None if values is None or not np.isfinite(values[:, 0]).any() else values[:, :1]
 
 
-def averaged_statements(logs: Sequence[MotorLog], allowed: bool = True) -> list[Statement]:
-    """Of which motors the speed is a mean over rows. allowed: whether the fit takes that into account."""
-    found: dict[int, list[str]] = {}
+def averaged_statements(logs: Sequence[MotorLog], is_allowed: bool = True) -> list[Statement]:
+    """Of which motors the speed is a mean over rows. is_allowed: whether the fit takes that into account."""
+    logs_by_motor: dict[int, list[str]] = {}
     for motor in range(max((log.motors for log in logs), default=0)):
-        rows = {log.averaged[motor] for log in logs if motor < log.motors} - {1}
+        rows = {log.mean_rows[motor] for log in logs if motor < log.motors} - {1}
         for row in rows:
-            found.setdefault(row, []).append(str(motor + 1))
+            logs_by_motor.setdefault(row, []).append(str(motor + 1))
     return [
-        Statement("speed_is_mean", numbers={"motors": names, "rows": rows, "allowed": allowed})
-        for rows, names in found.items()
+        Statement("speed_is_mean", numbers={"motors": names, "rows": rows, "allowed": is_allowed})
+        for rows, names in logs_by_motor.items()
     ]
 
 
 def orientation(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> float:
     """+1.0 where a positive input turns a motor forward, -1.0 where it turns it backward. pairs: (input, speed)."""
-    return -1.0 if sum(float(np.nansum(put_in * speed)) for put_in, speed in pairs) < 0.0 else 1.0
+    return -1.0 if sum(float(np.nansum(input_values * speed)) for input_values, speed in pairs) < 0.0 else 1.0
 
 
 def orientation_of(logs: Sequence[MotorLog], motor: int) -> float:
     """The same of a motor of some logs."""
-    return orientation([(log.put_in[:, motor], log.motion[:, motor]) for log in logs])
+    return orientation([(log.input_values[:, motor], log.motion[:, motor]) for log in logs])
 
 
 BLOCKS, LEAST_BLOCKS = 20, 8
 MEMORIES = (0.0, 0.05, 0.5)  # [s] over which an input may act
-CERTAIN = 0.998  # quantile of a covariance that is no chance, of which several are tried
+COVARIANCE_QUANTILE = 0.998  # quantile of a covariance that is no chance, of which several are tried
 
 
 def follows(pairs: Sequence[tuple[FloatArray, FloatArray]], step: float = 0.0) -> bool | None:
@@ -191,32 +198,34 @@ def follows(pairs: Sequence[tuple[FloatArray, FloatArray]], step: float = 0.0) -
     input was up to the row before counts, smoothed over each of MEMORIES.
     The covariance of both in each of BLOCKS blocks is one number, and their mean is told from 0 by their scatter.
     """
-    found = []
+    correlations = []
     for memory in MEMORIES if step > 0.0 else MEMORIES[:1]:
-        smooth = [_smoothed(put_in, memory / step) if step > 0.0 else put_in for put_in, _ in pairs]
+        smooth = [_smoothed(input_values, memory / step) if step > 0.0 else input_values for input_values, _ in pairs]
         u, w = np.concatenate(smooth), np.concatenate([speed for _, speed in pairs])
-        known = np.isfinite(u) & np.isfinite(w)
-        u, w = u[known] - u[known].mean() if known.any() else u[known], w[known]
+        known_rows = np.isfinite(u) & np.isfinite(w)
+        u, w = u[known_rows] - u[known_rows].mean() if known_rows.any() else u[known_rows], w[known_rows]
         count = min(BLOCKS, len(w) // 2)
         if count < LEAST_BLOCKS:
             return None
         sums = np.array([float(part.sum()) for part in np.array_split(u * (w - w.mean()), count)])
-        found.append(abs(float(sums.mean())) > t_quantile(count - 1, CERTAIN) * float(sums.std(ddof=1)) / count**0.5)
-    return any(found)
+        correlations.append(
+            abs(float(sums.mean())) > t_quantile(count - 1, COVARIANCE_QUANTILE) * float(sums.std(ddof=1)) / count**0.5
+        )
+    return any(correlations)
 
 
-def _smoothed(put_in: FloatArray, rows: float) -> FloatArray:
+def _smoothed(input_values: FloatArray, rows: float) -> FloatArray:
     """The input up to the row before each, its mean by a memory of so many rows. Shape (rows,)."""
-    share, now, found = 1.0 / (1.0 + rows), 0.0, []
-    for value in np.nan_to_num(put_in).tolist():
-        found.append(now)
-        now += share * (value - now)
-    return np.array(found)
+    share, mean_now, means = 1.0 / (1.0 + rows), 0.0, []
+    for value in np.nan_to_num(input_values).tolist():
+        means.append(mean_now)
+        mean_now += share * (value - mean_now)
+    return np.array(means)
 
 
-def rows_with(known: BoolArray, pieces: Sequence[slice]) -> list[tuple[int, int]]:
-    """(first, last) rows between gaps throughout which `known` (rows,) holds."""
-    return [(p.start + a, p.start + b - 1) for p in pieces for a, b in stretches(known[p]).tolist()]
+def rows_with(mask: BoolArray, pieces: Sequence[slice]) -> list[tuple[int, int]]:
+    """(first, last) rows between gaps throughout which `mask` (rows,) holds."""
+    return [(p.start + a, p.start + b - 1) for p in pieces for a, b in stretches(mask[p]).tolist()]
 
 
 # The input of a motor between the rows of its log: held, the mean of both rows, or a curve through the rows
@@ -237,11 +246,11 @@ def _curves(t: FloatArray, u: FloatArray, pieces: Rows) -> Iterator[tuple[int, i
 
     for first, last in pieces:
         step = np.abs(np.diff(u[first : last + 1]))
-        near = np.maximum(np.append(step[1:], 0.0), np.append(0.0, step[:-1]))
-        edges = [first, *(first + 1 + np.flatnonzero(step > JUMP * near)), last + 1]
-        for begin, end in pairwise(edges):
-            if end - begin >= CUBIC_ROWS:
-                yield begin, end, CubicSpline(t[begin:end], u[begin:end])
+        neighbour_step = np.maximum(np.append(step[1:], 0.0), np.append(0.0, step[:-1]))
+        edges = [first, *(first + 1 + np.flatnonzero(step > JUMP * neighbour_step)), last + 1]
+        for first_row, end in pairwise(edges):
+            if end - first_row >= CUBIC_ROWS:
+                yield first_row, end, CubicSpline(t[first_row:end], u[first_row:end])
 
 
 def refined(
@@ -253,35 +262,37 @@ def refined(
     knows when: on a line, which is what the motor got on the average over all times when it may have come.
     """
     share = np.arange(SUB) / SUB
-    fine = np.append((t[:-1, None] + share * np.diff(t)[:, None]).ravel(), t[-1])
-    middle = np.append(0.5 * (fine[1:] + fine[:-1]), t[-1])
-    known = np.isfinite(u)
-    put_in = np.interp(middle, t[known], u[known])
-    for begin, end, curve in _curves(t, u, pieces):
-        rows = slice(SUB * begin, SUB * (end - 1))
-        put_in[rows] = curve(middle[rows])
-    wide = np.full((len(fine), outputs.shape[1]), np.nan)
-    wide[::SUB] = outputs
-    return fine, put_in, wide
+    fine_times = np.append((t[:-1, None] + share * np.diff(t)[:, None]).ravel(), t[-1])
+    middle = np.append(0.5 * (fine_times[1:] + fine_times[:-1]), t[-1])
+    known_rows = np.isfinite(u)
+    fine_input = np.interp(middle, t[known_rows], u[known_rows])
+    for first_row, end, curve in _curves(t, u, pieces):
+        rows = slice(SUB * first_row, SUB * (end - 1))
+        fine_input[rows] = curve(middle[rows])
+    fine_outputs = np.full((len(fine_times), outputs.shape[1]), np.nan)
+    fine_outputs[::SUB] = outputs
+    return fine_times, fine_input, fine_outputs
 
 
 def _integrals(t: FloatArray, u: FloatArray, pieces: Rows) -> tuple[FloatArray, FloatArray]:
     """The integral of an input up to each row, of held values and of the curve. Shapes (rows,)."""
     steps = np.diff(t)
-    held, curved = u[:-1] * steps, 0.5 * (u[1:] + u[:-1]) * steps
-    for begin, end, curve in _curves(t, u, pieces):
-        curved[begin : end - 1] = np.diff(curve.antiderivative()(t[begin:end]))
-    one, other = (np.append(0.0, np.cumsum(np.nan_to_num(each))) for each in (held, curved))
-    return one, other
+    held_areas, curve_areas = u[:-1] * steps, 0.5 * (u[1:] + u[:-1]) * steps
+    for first_row, end, curve in _curves(t, u, pieces):
+        curve_areas[first_row : end - 1] = np.diff(curve.antiderivative()(t[first_row:end]))
+    held_integral, curve_integral = (
+        np.append(0.0, np.cumsum(np.nan_to_num(areas))) for areas in (held_areas, curve_areas)
+    )
+    return held_integral, curve_integral
 
 
-def _integrals_at(t: FloatArray, own: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _integrals_at(t: FloatArray, stamps: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """As `_integrals`, up to each of the times t, of an input with stamps of its own."""
     new = np.append(True, (values[1:] != values[:-1]) & np.isfinite(values[:-1]))
-    held, _ = _integrals(own, values, ())
-    whole = [(int(a), int(b) - 1) for a, b in stretches(np.isfinite(values[new]))]
-    _, curved = _integrals(own[new], values[new], whole)
-    return np.interp(t, own, held), np.interp(t, own[new], curved)
+    held_integral, _ = _integrals(stamps, values, ())
+    finite_pieces = [(int(a), int(b) - 1) for a, b in stretches(np.isfinite(values[new]))]
+    _, curve_integral = _integrals(stamps[new], values[new], finite_pieces)
+    return np.interp(t, stamps, held_integral), np.interp(t, stamps[new], curve_integral)
 
 
 class InputIntegral:
@@ -295,21 +306,21 @@ class InputIntegral:
         t: FloatArray,
         u: FloatArray,
         pieces: Rows,
-        averaged: int = 1,
-        given: tuple[FloatArray, FloatArray] | None = None,
+        mean_rows: int = 1,
+        stamped_input: tuple[FloatArray, FloatArray] | None = None,
     ):
-        """averaged: of the integrals over the same rows and those up to so many rows before, their mean: what holds of
+        """mean_rows: of the integrals over the same rows and those up to so many rows before, their mean: what holds of
         a speed that is a mean over as many rows. NaN where there are not so many rows before.
-        given: times and values of the input where it has stamps of its own; u is then what held in each row.
+        stamped_input: times and values of the input where it has stamps of its own; u is then what held in each row.
         """
         self._u = u
-        found = _integrals(t, u, pieces) if given is None else _integrals_at(t, *given)
-        self._held, self._curved = (_trailing_mean(each, pieces, averaged) for each in found)
+        integrals = _integrals(t, u, pieces) if stamped_input is None else _integrals_at(t, *stamped_input)
+        self._held, self._curved = (_trailing_mean(integral, pieces, mean_rows) for integral in integrals)
 
     def over(self, window: slice) -> float:
         """From the first row of a window to its last, in units of the input times seconds."""
-        own = self._u[window]
-        in_steps = np.mean(np.diff(own) != 0.0) <= max(STEPWISE, 2.0 / len(own))
+        window_input = self._u[window]
+        in_steps = np.mean(np.diff(window_input) != 0.0) <= max(STEPWISE, 2.0 / len(window_input))
         total = self._held if in_steps else self._curved
         return float(total[window.stop - 1] - total[window.start])
 

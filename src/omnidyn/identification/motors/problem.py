@@ -14,7 +14,13 @@ from omnidyn.identification.motors.log import CURVE, MEAN, SUB, MotorLog, refine
 from omnidyn.identification.output_error.engines.engine import Engine, Weighting
 from omnidyn.identification.output_error.engines.exact import march_piece, padded, used_by
 from omnidyn.identification.output_error.kernel.march import KEEP, PATH, Physics, PhysicsSlopes
-from omnidyn.identification.output_error.problem.nuisances import CLEAR, EARLIEST, LATEST, SILENT, errors_from_rest
+from omnidyn.identification.output_error.problem.nuisances import (
+    LEAST_LATENCY,
+    MOST_LATENCY,
+    MOTION_ERRORS,
+    SILENT_ROWS,
+    errors_from_rest,
+)
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Piece, PieceSums, Point
 from omnidyn.identification.output_error.problem.record import SHORTEST, Record
@@ -25,10 +31,11 @@ from omnidyn.model.layout import N_AXES, YAW
 
 @dataclass(frozen=True, eq=False)
 class MotorRecord(Record):
-    """rest: whether the log begins at rest under an input that is held. It then has one row more, LATEST before the
+    """begins_at_rest: whether the log begins at rest under an input that is held. It then has one row more,
+    MOST_LATENCY before the
     others: a latency shows what was before the log, and that is known."""
 
-    rest: bool = False
+    begins_at_rest: bool = False
 
 
 def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> MotorRecord:
@@ -36,8 +43,10 @@ def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> MotorR
 
     Raises InputError for a motor that the log does not have, InsufficientDataError where no piece is long enough.
     """
-    if motor >= log.put_in.shape[1]:
-        raise InputError("no such motor", got=motor + 1, expected=f"1 to {log.put_in.shape[1]}", where=log.run.source)
+    if motor >= log.input_values.shape[1]:
+        raise InputError(
+            "no such motor", got=motor + 1, expected=f"1 to {log.input_values.shape[1]}", where=log.run.source
+        )
     measured = {SPEED: log.speed, ANGLE: log.angle if angle or log.speed is None else None}
     outputs = {
         name: column[:, motor]
@@ -51,7 +60,7 @@ def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> MotorR
             expected="wheel_speed or wheel_angle",
             where=log.run.source,
         )
-    t, u = log.t, log.put_in[:, motor]
+    t, u = log.t, log.input_values[:, motor]
     values = np.stack([*outputs.values()], axis=1)
     values[unresolved_rows(u)] = np.nan
     if between == MEAN:
@@ -64,12 +73,14 @@ def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> MotorR
             expected=f"{SHORTEST} rows in a row",
             where=log.run.source,
         )
-    rest = pieces[0][0] == 0 and _begins_at_rest(log.put_in[:, motor], values[:, 0], SPEED not in outputs)
+    begins_at_rest = pieces[0][0] == 0 and _begins_at_rest(
+        log.input_values[:, motor], values[:, 0], SPEED not in outputs
+    )
     if between == CURVE:
         t, u, values = refined(t, u, values, pieces)
         pieces = [(SUB * first, SUB * last) for first, last in pieces]
-    if rest:
-        t, u = np.append(t[0] - LATEST, t), np.append(log.put_in[0, motor], u)
+    if begins_at_rest:
+        t, u = np.append(t[0] - MOST_LATENCY, t), np.append(log.input_values[0, motor], u)
         values = np.concatenate([np.full((1, len(outputs)), np.nan), values])
         pieces = [(first + (first > 0), last + 1) for first, last in pieces]
     return MotorRecord(
@@ -82,7 +93,7 @@ def motor_record(log: MotorLog, motor: int, between: str, angle: bool) -> MotorR
         log.run.source,
         False,
         (),
-        rest=rest,
+        begins_at_rest=begins_at_rest,
     )
 
 
@@ -91,13 +102,13 @@ def _begins_at_rest(u: FloatArray, measured: FloatArray, travels: bool) -> bool:
 
     An input that is not 0 may also turn a motor round: that takes more rows. travels: an angle is measured.
     """
-    changed = np.flatnonzero(u[: 10 * SILENT] != u[0])
-    rows = int(changed[0]) if changed.size else min(10 * SILENT, len(u))
-    seen = np.diff(measured[:rows]) if travels else measured[:rows]
-    seen = seen[np.isfinite(seen)]
-    if rows < (4 * SILENT if u[0] else SILENT) or len(seen) < 2:
+    change_rows = np.flatnonzero(u[: 10 * SILENT_ROWS] != u[0])
+    rows = int(change_rows[0]) if change_rows.size else min(10 * SILENT_ROWS, len(u))
+    first_speeds = np.diff(measured[:rows]) if travels else measured[:rows]
+    first_speeds = first_speeds[np.isfinite(first_speeds)]
+    if rows < (4 * SILENT_ROWS if u[0] else SILENT_ROWS) or len(first_speeds) < 2:
         return False
-    return errors_from_rest(seen, bool(u[0])) <= CLEAR
+    return errors_from_rest(first_speeds, bool(u[0])) <= MOTION_ERRORS
 
 
 def motor_problem(
@@ -106,55 +117,56 @@ def motor_problem(
     """Free numbers and pieces; each piece starts at a fitted speed, and its angle at a fitted one; a log that begins at
     rest starts there. margin: leave out the rows that a latency would leave out, whether one is free or not.
     """
-    most = max(float(np.abs(r.voltage).max()) for r in records)
-    if most == 0.0:
+    largest_input = max(float(np.abs(r.voltage).max()) for r in records)
+    if largest_input == 0.0:
         raise InsufficientDataError("the motor was never driven", got="an input of 0 throughout", expected="an input")
     numbers = [Parameter(SLOPE, 1.0, 1e-9, 1e9, True), Parameter(LAG, 0.1, 1e-5, 1e3, True)]
     if dead_band:
-        numbers.append(Parameter(BAND, 0.0, 0.0, 0.5 * most))
+        numbers.append(Parameter(BAND, 0.0, 0.0, 0.5 * largest_input))
     if offset:
-        numbers.append(Parameter(OFFSET, 0.0, -0.5 * most, 0.5 * most))
+        numbers.append(Parameter(OFFSET, 0.0, -0.5 * largest_input, 0.5 * largest_input))
     columns = dict.fromkeys(name for r in records for name, _ in r.columns) if latency else ()
-    late = [Parameter(f"{LATENCY}.{name}", 0.0, EARLIEST, LATEST) for name in columns]
+    latencies = [Parameter(f"{LATENCY}.{name}", 0.0, LEAST_LATENCY, MOST_LATENCY) for name in columns]
     return MotorProblem(
-        (*numbers, *late), tuple(_piece(r, first, last, latency or margin) for r in records for first, last in r.pieces)
+        (*numbers, *latencies),
+        tuple(_piece(r, first, last, latency or margin) for r in records for first, last in r.pieces),
     )
 
 
-def _piece(record: MotorRecord, first: int, last: int, late: bool) -> Piece:
-    rest = record.rest and first == 0
+def _piece(record: MotorRecord, first: int, last: int, has_latency: bool) -> Piece:
+    is_at_rest = record.begins_at_rest and first == 0
     start, offset = np.zeros(N_AXES), np.zeros(len(record.columns))
     for c, name in enumerate(record.columns):
         column = record.outputs[first : last + 1, c]
-        known = column[np.isfinite(column)]
-        begin = float(known[0]) if known.size else 0.0
+        known_values = column[np.isfinite(column)]
+        first_value = float(known_values[0]) if known_values.size else 0.0
         if name == ANGLE:
-            offset[c] = begin
-        elif not rest:
-            start[YAW] = begin
-    free = np.array([False, False, not rest, *(name == ANGLE for name in record.columns)])
-    margin = min(LATEST, 0.1 * float(record.t[last] - record.t[first])) if late and not rest else 0.0
+            offset[c] = first_value
+        elif not is_at_rest:
+            start[YAW] = first_value
+    free = np.array([False, False, not is_at_rest, *(name == ANGLE for name in record.columns)])
+    margin = min(MOST_LATENCY, 0.1 * float(record.t[last] - record.t[first])) if has_latency and not is_at_rest else 0.0
     return Piece(record, first, last, start, offset, free, np.full(len(record.columns), margin))
 
 
 def begin(problem: MotorProblem, lag: float) -> Point:
     """Slope by the regression of the input on the speed that it would bring about without a dead band."""
-    up = low = 0.0
+    input_sum = low = 0.0
     for r in {id(piece.record): piece.record for piece in problem.pieces}.values():
-        known = np.isfinite(r.outputs[:, 0])
-        speed = r.outputs[known, 0]
+        known_rows = np.isfinite(r.outputs[:, 0])
+        speed = r.outputs[known_rows, 0]
         if SPEED not in r.columns:
-            speed = np.gradient(speed, r.t[known]) if len(speed) > 1 else np.zeros_like(speed)
-        up += float(np.abs(r.voltage[known, 0]).sum())
+            speed = np.gradient(speed, r.t[known_rows]) if len(speed) > 1 else np.zeros_like(speed)
+        input_sum += float(np.abs(r.voltage[known_rows, 0]).sum())
         low += float(np.abs(speed).sum())
-    return begin_at(problem, {SLOPE: up / low if low > 0.0 else 1.0, LAG: lag})
+    return begin_at(problem, {SLOPE: input_sum / low if low > 0.0 else 1.0, LAG: lag})
 
 
 def begin_at(problem: MotorProblem, values: Mapping[str, float]) -> Point:
     """The start of a problem with these values of its numbers by name."""
     point = problem.start()
-    known = [values.get(p.name, p.value) for p in problem.parameters]
-    return replace(point, values=np.array(known))
+    known_values = [values.get(p.name, p.value) for p in problem.parameters]
+    return replace(point, values=np.array(known_values))
 
 
 # The exact step of one motor, with its derivatives: slope, dead band and lag as numbers of the kernel
@@ -190,8 +202,8 @@ class MotorEngine(Engine[MotorProblem]):
 
     def outputs(self, point: Point) -> list[tuple[FloatArray, FloatArray]]:
         """(outputs, slopes) of every piece, rows of its record, NaN outside: (rows, C) and (rows, C, P + 3 + C)."""
-        plain = Weighting(np.ones(len(self.problem.columns)), mode=KEEP)
-        return [kept for _, kept in self._march(point, plain)]
+        keep_weighting = Weighting(np.ones(len(self.problem.columns)), mode=KEEP)
+        return [kept_outputs for _, kept_outputs in self._march(point, keep_weighting)]
 
     def _march(self, point: Point, weighting: Weighting) -> list[tuple[PieceSums, tuple[FloatArray, FloatArray]]]:
         columns, count = self.problem.columns, len(self.problem.parameters)
@@ -212,8 +224,8 @@ class MotorEngine(Engine[MotorProblem]):
         speed_map, travel_map = np.zeros((width, N_AXES)), np.zeros((width, PATH))
         speed_map[:, YAW] = [column == SPEED for column in columns]
         travel_map[:, YAW] = [column == ANGLE for column in columns]
-        late = [problem.where(f"{LATENCY}.{name}") for name, _ in columns]
-        at = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)
+        latency_indices = [problem.where(f"{LATENCY}.{name}") for name, _ in columns]
+        free_indices = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)
         physics = Physics(
             law,
             drive,
@@ -222,7 +234,7 @@ class MotorEngine(Engine[MotorProblem]):
             travel_map,
             np.zeros(width),
             np.full(width, -1),
-            np.array([values[k] if k >= 0 else 0.0 for k in late]),
+            np.array([values[k] if k >= 0 else 0.0 for k in latency_indices]),
             Driver(),
             bool(travel_map.any()),
         )
@@ -235,10 +247,10 @@ class MotorEngine(Engine[MotorProblem]):
             np.zeros((width, room)),
             True,
             np.zeros(width, bool),
-            np.array(late),
+            np.array(latency_indices),
             np.full(3, -1),
-            at[:N_AXES],
-            at[N_AXES:],
+            free_indices[:N_AXES],
+            free_indices[N_AXES:],
         )
         return physics, slopes, np.arange(width + 1)
 

@@ -26,18 +26,18 @@ from omnidyn.logs.resolved import unresolved_rows
 from omnidyn.statistics import MAD_TO_STD, robust_mean, sensor_step, stretches, t_quantile
 
 RISK = 0.05
-AROUND = 40  # rows on either side of a start or stop that tell of it
+EDGE_ROWS = 40  # rows on either side of a start or stop that tell of it
 LEAST_REST, LEAST_MOTION = 5, 3  # rows in a row
 SIGNS = 5.0  # standard deviations of the noise, from which a speed is motion
 SLOW = 0.01  # of the largest speed: what is slower may be the noise of a sensor that reads in steps
-MOST = 40  # starts of one motor that are looked at, evenly among all
-LOST = 0.25  # of the largest speed: where only faster motion can be told from noise, rest cannot
+MOST_EDGES = 40  # starts of one motor that are looked at, evenly among all
+NOISE_SHARE = 0.25  # of the largest speed: where only faster motion can be told from noise, rest cannot
 BLOCK = 0.25  # [s]
 BOTH_WAYS = 0.05  # of the largest speed that lasts: as fast a motor turns the other way, too
 LAGS_AT_REST = 1.0
 CURRENT = "current"
-SURE = 5.0  # standard errors of a steady speed, from which the motor turns
-FALLING = 3.0  # standard errors of the mean of a half: a motor that slows down more may be running out
+TURNING_ERRORS = 5.0  # standard errors of a steady speed, from which the motor turns
+SLOWING_ERRORS = 3.0  # standard errors of the mean of a half: a motor that slows down more may be running out
 NOISE = 2.0  # standard errors of the input
 
 
@@ -52,11 +52,11 @@ class _MotorRows(NamedTuple):
     """One motor between two gaps, signed so that the direction looked at is forward."""
 
     t: FloatArray
-    put_in: FloatArray
+    input_values: FloatArray
     speed: FloatArray
     moving: FloatArray  # +1.0, 0.0, -1.0 by row
     tick: float  # of a sensor that reads in steps, 0 where it does not
-    rough: BoolArray  # rows whose input changes faster than the log tells
+    rough_rows: BoolArray  # rows whose input changes faster than the log tells
 
 
 class _Edge(NamedTuple):
@@ -76,14 +76,16 @@ def starts_and_stops(
     if logs[0].kind == CURRENT:
         return [], []
     columns = [
-        column._replace(put_in=way * side * column.put_in, speed=side * column.speed, moving=side * column.moving)
+        column._replace(
+            input_values=way * side * column.input_values, speed=side * column.speed, moving=side * column.moving
+        )
         for column in _columns(logs, motor)
     ]
-    found = [edge for column in columns for edge in _edges_of(column) if _is_slow_enough(edge, lag)]
+    all_edges = [edge for column in columns for edge in _edges_of(column) if _is_slow_enough(edge, lag)]
     spans: tuple[list[Span], list[Span]] = [], []
     for stop in (False, True):
-        edges = [edge for edge in found if edge.stop is stop]
-        edges = edges[:: max(1, -(-len(edges) // MOST))]
+        edges = [edge for edge in all_edges if edge.stop is stop]
+        edges = edges[:: max(1, -(-len(edges) // MOST_EDGES))]
         ends = [_span(edge, lag, RISK / len(edges)) for edge in edges]
         spans[stop].extend(span for span in ends if stop or span.high > 0.0)
     bounds = [bound for column in columns for bound in _rested(column, lag)]
@@ -96,13 +98,13 @@ def _columns(logs: Sequence[MotorLog], motor: int) -> Iterator[_MotorRows]:
     """The pieces of all logs in which input and speed of a motor are known, and which way it turns in each row."""
     largest = max((_largest(log, motor) for log in logs), default=0.0)
     for log in logs:
-        known = np.isfinite(log.put_in[:, motor]) & np.isfinite(log.motion[:, motor])
-        rough = unresolved_rows(log.put_in[:, motor])
+        known_rows = np.isfinite(log.input_values[:, motor]) & np.isfinite(log.motion[:, motor])
+        rough_rows = unresolved_rows(log.input_values[:, motor])
         for piece in log.pieces:
-            for a, b in stretches(known[piece]).tolist():
+            for a, b in stretches(known_rows[piece]).tolist():
                 rows = slice(piece.start + a, piece.start + b)
                 if b - a >= LEAST_REST + LEAST_MOTION:
-                    column = _column(log, motor, rows, largest, rough[rows])
+                    column = _column(log, motor, rows, largest, rough_rows[rows])
                     if column is not None:
                         yield column
 
@@ -110,8 +112,8 @@ def _columns(logs: Sequence[MotorLog], motor: int) -> Iterator[_MotorRows]:
 def turns_both_ways(logs: Sequence[MotorLog], motor: int) -> bool:
     """Whether a motor turns both ways for long: else an offset of its input and a dead band are one number."""
     speeds = np.concatenate([_lasting(log, motor) for log in logs])
-    least = BOTH_WAYS * float(np.abs(speeds).max(initial=0.0))
-    return bool((speeds > least).any() and (speeds < -least).any())
+    least_speed = BOTH_WAYS * float(np.abs(speeds).max(initial=0.0))
+    return bool((speeds > least_speed).any() and (speeds < -least_speed).any())
 
 
 def _largest(log: MotorLog, motor: int) -> float:
@@ -121,13 +123,13 @@ def _largest(log: MotorLog, motor: int) -> float:
 
 def _lasting(log: MotorLog, motor: int) -> FloatArray:
     """Speeds that last [rad/s]: medians over BLOCK seconds, which spikes do not move."""
-    known = log.motion[np.isfinite(log.motion[:, motor]), motor]
+    known_speeds = log.motion[np.isfinite(log.motion[:, motor]), motor]
     rows = max(1, round(BLOCK / log.step)) if len(log.t) > 1 else 1
-    whole = len(known) - len(known) % rows
-    return np.median(known[:whole].reshape(-1, rows), axis=1) if whole else known
+    whole_rows = len(known_speeds) - len(known_speeds) % rows
+    return np.median(known_speeds[:whole_rows].reshape(-1, rows), axis=1) if whole_rows else known_speeds
 
 
-def _column(log: MotorLog, motor: int, rows: slice, largest: float, rough: BoolArray) -> _MotorRows | None:
+def _column(log: MotorLog, motor: int, rows: slice, largest: float, rough_rows: BoolArray) -> _MotorRows | None:
     """None where the speed is lost in noise."""
     t, speed = log.t[rows], log.motion[rows, motor]
     if log.angle is not None:  # of the row before, not of both sides: else a start would show a row early
@@ -136,13 +138,13 @@ def _column(log: MotorLog, motor: int, rows: slice, largest: float, rough: BoolA
     tick = sensor_step(speed)
     noise = noise_of_rows(speed)
     count = _averaged(noise, tick, largest, len(speed))
-    padded = np.pad(speed, (count // 2, count - 1 - count // 2), mode="edge")
-    smooth = np.convolve(padded, np.full(count, 1.0 / count), "valid")
+    padded_speed = np.pad(speed, (count // 2, count - 1 - count // 2), mode="edge")
+    smooth = np.convolve(padded_speed, np.full(count, 1.0 / count), "valid")
     level = max(SIGNS * noise / math.sqrt(count), SLOW * largest)
-    if level > LOST * largest:
+    if level > NOISE_SHARE * largest:
         return None
     moving = _without_flicker(np.where(np.abs(smooth) > level, np.sign(smooth), 0.0))
-    return _MotorRows(t, log.put_in[rows, motor], speed, moving, tick, rough)
+    return _MotorRows(t, log.input_values[rows, motor], speed, moving, tick, rough_rows)
 
 
 def _without_flicker(moving: FloatArray) -> FloatArray:
@@ -152,9 +154,9 @@ def _without_flicker(moving: FloatArray) -> FloatArray:
         if side != 0.0 and b - a < LEAST_MOTION:
             moving[a:b] = 0.0
     runs = _runs(moving)
-    for before, (a, b, side), after in zip(runs, runs[1:], runs[2:], strict=False):
-        if side == 0.0 and b - a < LEAST_REST and before[2] == after[2]:
-            moving[a:b] = before[2]
+    for previous_run, (a, b, side), next_run in zip(runs, runs[1:], runs[2:], strict=False):
+        if side == 0.0 and b - a < LEAST_REST and previous_run[2] == next_run[2]:
+            moving[a:b] = previous_run[2]
     return moving
 
 
@@ -165,29 +167,29 @@ def noise_of_rows(speed: FloatArray) -> float:
 
 def _averaged(noise: float, tick: float, largest: float, rows: int) -> int:
     """Over how many rows a speed is averaged, so that its noise is no motion: an odd number."""
-    wanted = 5.0 * SLOW * largest  # motion is told from a twentieth of the largest speed on
+    wanted_rows = 5.0 * SLOW * largest  # motion is told from a twentieth of the largest speed on
     size = max(noise, 0.5 * tick)
-    count = math.ceil((SIGNS * size / wanted) ** 2) if wanted > 0.0 else 1
+    count = math.ceil((SIGNS * size / wanted_rows) ** 2) if wanted_rows > 0.0 else 1
     return min(count, max(1, rows // 20)) | 1
 
 
 def _edges_of(column: _MotorRows) -> Iterator[_Edge]:
     """Starts and stops of the forward direction."""
     runs = _runs(column.moving)
-    for (a, b, one), (c, d, other) in pairwise(runs):
-        if one == 0.0 and other > 0.0 and _rests(column, a, b) and d - c >= LEAST_MOTION:
-            yield _Edge(column, c, max(a, c - AROUND), min(d, c + AROUND), False)
-        if one > 0.0 and other == 0.0 and _rests(column, c, d) and b - a >= LEAST_MOTION:
-            yield _Edge(column, c, max(a, c - AROUND), min(d, c + AROUND), True)
+    for (a, b, side_before), (c, d, side_after) in pairwise(runs):
+        if side_before == 0.0 and side_after > 0.0 and _rests(column, a, b) and d - c >= LEAST_MOTION:
+            yield _Edge(column, c, max(a, c - EDGE_ROWS), min(d, c + EDGE_ROWS), False)
+        if side_before > 0.0 and side_after == 0.0 and _rests(column, c, d) and b - a >= LEAST_MOTION:
+            yield _Edge(column, c, max(a, c - EDGE_ROWS), min(d, c + EDGE_ROWS), True)
 
 
 def _is_slow_enough(edge: _Edge, lag: float) -> bool:
     """Whether the log tells the input around an edge, and the rest lasts longer than the motor remembers."""
     column = edge.column
-    if column.rough[edge.first : edge.last].any():
+    if column.rough_rows[edge.first : edge.last].any():
         return False
-    rest = column.t[edge.last - 1] - column.t[edge.row] if edge.stop else column.t[edge.row] - column.t[edge.first]
-    return not lag > 0.0 or bool(rest >= LAGS_AT_REST * lag)
+    rest_time = column.t[edge.last - 1] - column.t[edge.row] if edge.stop else column.t[edge.row] - column.t[edge.first]
+    return not lag > 0.0 or bool(rest_time >= LAGS_AT_REST * lag)
 
 
 def _runs(moving: FloatArray) -> list[tuple[int, int, float]]:
@@ -202,21 +204,21 @@ def _rests(column: _MotorRows, first: int, last: int) -> bool:
     if len(speed) < LEAST_REST:
         return False
     third = max(len(speed) // 3, 1)
-    early, late = speed[:third], speed[-third:]
+    early_speeds, late_speeds = speed[:third], speed[-third:]
     middle = speed[third:-third] if len(speed) > 2 * third else speed
     reach = max(float(np.abs(middle).max()), column.tick)
     error = (noise_of_rows(speed) if len(speed) > LEAST_REST else reach) * math.sqrt(2.0 / third)
-    return abs(float(np.median(late) - np.median(early))) <= max(SIGNS * error, column.tick, 1e-9 * reach)
+    return abs(float(np.median(late_speeds) - np.median(early_speeds))) <= max(SIGNS * error, column.tick, 1e-9 * reach)
 
 
 def _span(edge: _Edge, lag: float, risk: float) -> Span:
     """The inputs between which a start, or a stop, lies."""
     column, rows = edge.column, slice(edge.first, edge.last)
-    t, put_in = column.t[rows], column.put_in[rows]
+    t, input_values = column.t[rows], column.input_values[rows]
     tries = np.sort(np.concatenate([t, 0.5 * (t[1:] + t[:-1])]))
     first, last = edge_interval(
         t,
-        put_in,
+        input_values,
         column.speed[rows],
         tries,
         lags=_lags(lag, usual_step(t)),
@@ -225,18 +227,20 @@ def _span(edge: _Edge, lag: float, risk: float) -> Span:
         risk=risk,
     )
     # a row on either side: loggers write an input in the row in which it is set, or in which it is answered
-    begin = edge.first + max(int(np.searchsorted(t, first, "right")) - 2, 0)
+    first_row = edge.first + max(int(np.searchsorted(t, first, "right")) - 2, 0)
     end = min(edge.first + int(np.searchsorted(t, last, "right")), len(column.t) - 1)
-    other = np.flatnonzero(column.put_in[:begin] != column.put_in[begin])
-    changed = int(other[-1]) + 1 if other.size else 0  # the last change of the input
-    put_in = column.put_in[max(changed - 1, 0) : end + 1]
-    return Span(float(put_in.min()) + 0.0, float(put_in.max()) + 0.0)  # no -0
+    other_rows = np.flatnonzero(column.input_values[:first_row] != column.input_values[first_row])
+    change_row = int(other_rows[-1]) + 1 if other_rows.size else 0  # the last change of the input
+    input_values = column.input_values[max(change_row - 1, 0) : end + 1]
+    return Span(float(input_values.min()) + 0.0, float(input_values.max()) + 0.0)  # no -0
 
 
 def _lags(lag: float, row: float) -> list[float]:
     """Lags that are tried [s]: around that of the line, and from a part of a row up."""
-    around = [lag * factor for factor in (0.5, 0.7, 1.0, 1.4, 2.0)] if lag > 0.0 else []
-    return [0.3 * row, *around] if around else [row * factor for factor in (0.3, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)]
+    nearby_lags = [lag * factor for factor in (0.5, 0.7, 1.0, 1.4, 2.0)] if lag > 0.0 else []
+    return (
+        [0.3 * row, *nearby_lags] if nearby_lags else [row * factor for factor in (0.3, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)]
+    )
 
 
 def _rested(column: _MotorRows, lag: float) -> Iterator[float]:
@@ -245,20 +249,20 @@ def _rested(column: _MotorRows, lag: float) -> Iterator[float]:
     One that has just set off moves less than shows until about a lag later.
     """
     runs = _runs(column.moving)
-    least = max(LEAST_REST, math.ceil(LAGS_AT_REST * lag / usual_step(column.t))) if lag > 0.0 else LEAST_REST
+    least_rows = max(LEAST_REST, math.ceil(LAGS_AT_REST * lag / usual_step(column.t))) if lag > 0.0 else LEAST_REST
     for k, (a, b, side) in enumerate(runs):
-        before, after = runs[k - 1][2] if k else 0.0, runs[k + 1][2] if k + 1 < len(runs) else 0.0
-        if side != 0.0 or after > 0.0 or column.rough[a:b].any() or not _rests(column, a, b):
+        side_before, side_after = runs[k - 1][2] if k else 0.0, runs[k + 1][2] if k + 1 < len(runs) else 0.0
+        if side != 0.0 or side_after > 0.0 or column.rough_rows[a:b].any() or not _rests(column, a, b):
             continue
-        if before > 0.0:  # where it still ran out is no rest under that input: from the least input on
-            a += int(np.argmin(column.put_in[a:b]))
-        if b - a < least:
+        if side_before > 0.0:  # where it still ran out is no rest under that input: from the least input on
+            a += int(np.argmin(column.input_values[a:b]))
+        if b - a < least_rows:
             continue
-        put_in, speed = column.put_in[a:b], column.speed[a:b]
-        held = float(sliding_window_view(put_in, least).min(axis=1).max())
-        under = speed[put_in >= held]
-        if held > 0.0 and float(under.mean()) <= 3.0 * noise_of_rows(speed) / math.sqrt(len(under)):
-            yield held
+        input_values, speed = column.input_values[a:b], column.speed[a:b]
+        held_input = float(sliding_window_view(input_values, least_rows).min(axis=1).max())
+        speed_under = speed[input_values >= held_input]
+        if held_input > 0.0 and float(speed_under.mean()) <= 3.0 * noise_of_rows(speed) / math.sqrt(len(speed_under)):
+            yield held_input
 
 
 # ---- steady turning, and steady rest ------------------------------------------------------------------------
@@ -269,49 +273,59 @@ def turned_under(logs: Sequence[MotorLog], motor: int, side: float = 0.0, way: f
 
     side: +1.0 or -1.0: of its speed, 0.0: either. way: +1.0 where a positive input turns it forward, else -1.0.
     """
-    turned = (
-        way * float(np.sign(each.speed)) * each.put_in + each.error
-        for each in _steady(logs, motor)
-        if each.turns and side * each.speed >= 0.0
+    turning_inputs = (
+        way * float(np.sign(window.speed)) * window.input_value + window.error
+        for window in _steady(logs, motor)
+        if window.turns and side * window.speed >= 0.0
     )
-    return min((each for each in turned if each > 0.0), default=math.inf)
+    return min((level for level in turning_inputs if level > 0.0), default=math.inf)
 
 
 def rested_under(logs: Sequence[MotorLog], motor: int) -> float:
     """The largest input, as a size, under which a motor rested; 0 where none shows."""
-    return max((abs(each.put_in) - each.error for each in _steady(logs, motor) if each.rests), default=0.0)
+    return max(
+        (abs(window.input_value) - window.error for window in _steady(logs, motor) if window.is_resting), default=0.0
+    )
 
 
 class _Window(NamedTuple):
     """One in which a motor turns and does not slow down, or rests. error: by how much the input may be another."""
 
-    put_in: float
+    input_value: float
     speed: float
     error: float
     turns: bool
-    rests: bool
+    is_resting: bool
 
 
 def _steady(logs: Sequence[MotorLog], motor: int) -> list[_Window]:
-    found = [each for log in logs for each in _windows_of(log, motor)]
-    slow = SLOW * max((abs(each.speed) for each in found), default=0.0)
+    windows = [window for log in logs for window in _windows_of(log, motor)]
+    slow = SLOW * max((abs(window.speed) for window in windows), default=0.0)
     return [
-        each._replace(turns=each.turns and abs(each.speed) > slow, rests=each.rests and abs(each.speed) <= slow)
-        for each in found
+        window._replace(
+            turns=window.turns and abs(window.speed) > slow, is_resting=window.is_resting and abs(window.speed) <= slow
+        )
+        for window in windows
     ]
 
 
 def _windows_of(log: MotorLog, motor: int) -> Iterator[_Window]:
     for plateau in find_plateaus(log.run):
-        put_in, speed = log.put_in[plateau.rows, motor], log.motion[plateau.rows, motor]
-        if not np.isfinite(put_in).all() or np.isfinite(speed).sum() < 2:
+        input_values, speed = log.input_values[plateau.rows, motor], log.motion[plateau.rows, motor]
+        if not np.isfinite(input_values).all() or np.isfinite(speed).sum() < 2:
             continue
         half = len(speed) // 2
-        (early, early_std), (late, late_std) = (robust_mean(part) for part in (speed[:half], speed[half:]))
+        (early_speed, early_std), (late_speed, late_std) = (robust_mean(part) for part in (speed[:half], speed[half:]))
         mean, std = (float(part) for part in robust_mean(speed))
-        slower = np.sign(mean) * (early - late) > FALLING * np.hypot(early_std, late_std)
-        middle, error = (float(part) for part in robust_mean(put_in))
-        yield _Window(middle, mean, NOISE * error, abs(mean) > SURE * std and not slower, abs(mean) <= SURE * std)
+        is_slower = np.sign(mean) * (early_speed - late_speed) > SLOWING_ERRORS * np.hypot(early_std, late_std)
+        middle, error = (float(part) for part in robust_mean(input_values))
+        yield _Window(
+            middle,
+            mean,
+            NOISE * error,
+            abs(mean) > TURNING_ERRORS * std and not is_slower,
+            abs(mean) <= TURNING_ERRORS * std,
+        )
 
 
 # When a motor leaves rest, or comes to rest: the instants t0 that its speed, noise and lag allow
@@ -334,7 +348,7 @@ NUMBERS = 3  # fitted beside t0, the lag among them
 
 def edge_interval(
     t: FloatArray,
-    put_in: FloatArray,
+    input_values: FloatArray,
     speed: FloatArray,
     tries: FloatArray,
     *,
@@ -345,65 +359,70 @@ def edge_interval(
 ) -> tuple[float, float]:
     """(first, last) instant [s] at which the motor may have started, or stopped, but for a share `risk`.
 
-    t [s], put_in, speed [rad/s]: the rows around it, signed so that the motion is forward. Shape (rows,).
+    t [s], input_values, speed [rad/s]: the rows around it, signed so that the motion is forward. Shape (rows,).
     tries [s]: instants that are tried, shape (n,). lags [s]: tried. least_std [rad/s]: of the speed, as a sensor that
     reads in steps has it at least.
     """
-    left = np.array([min(_left(t, put_in, speed, at, lag, stop) for lag in lags) for at in tries])
+    squares_left = np.array(
+        [min(_left(t, input_values, speed, instant, lag, stop) for lag in lags) for instant in tries]
+    )
     freedom = max(len(t) - NUMBERS - 1, 1)
-    variance = max(float(left.min()) / freedom, least_std**2)
-    allowed = tries[left <= left.min() + t_quantile(freedom, 1.0 - 0.5 * risk) ** 2 * variance]
-    return float(allowed[0]), float(allowed[-1])
+    variance = max(float(squares_left.min()) / freedom, least_std**2)
+    allowed_instants = tries[squares_left <= squares_left.min() + t_quantile(freedom, 1.0 - 0.5 * risk) ** 2 * variance]
+    return float(allowed_instants[0]), float(allowed_instants[-1])
 
 
-def _left(t: FloatArray, put_in: FloatArray, speed: FloatArray, at: float, lag: float, stop: bool) -> float:
+def _left(t: FloatArray, input_values: FloatArray, speed: FloatArray, instant: float, lag: float, stop: bool) -> float:
     """Least sum of squares with the edge at one instant."""
-    moving = t < at if stop else t > at
+    moving = t < instant if stop else t > instant
     resting = float(speed[~moving] @ speed[~moving])
     if not moving.any():
         return resting
-    return resting + (_stop_left if stop else _start_left)(t, put_in, speed, at, lag, moving)
+    return resting + (_stop_left if stop else _start_left)(t, input_values, speed, instant, lag, moving)
 
 
 def _start_left(
-    t: FloatArray, put_in: FloatArray, speed: FloatArray, at: float, lag: float, moving: BoolArray
+    t: FloatArray, input_values: FloatArray, speed: FloatArray, instant: float, lag: float, moving: BoolArray
 ) -> float:
     """Least sum of squares of the rows after a start."""
-    above = put_in - put_in[max(int(np.searchsorted(t, at, "right")) - 1, 0)]
-    weight = _lagged(t[moving], t, at, lag)
-    return _not_negative(np.stack([weight @ above[:-1], weight.sum(axis=1)], axis=1), speed[moving])
+    input_change = input_values - input_values[max(int(np.searchsorted(t, instant, "right")) - 1, 0)]
+    weight = _lagged(t[moving], t, instant, lag)
+    return _not_negative(np.stack([weight @ input_change[:-1], weight.sum(axis=1)], axis=1), speed[moving])
 
 
-def _stop_left(t: FloatArray, put_in: FloatArray, speed: FloatArray, at: float, lag: float, moving: BoolArray) -> float:
+def _stop_left(
+    t: FloatArray, input_values: FloatArray, speed: FloatArray, instant: float, lag: float, moving: BoolArray
+) -> float:
     """Least sum of squares of the rows before a stop."""
-    weight = _lagged(np.append(t[moving], at), t, float(t[0]), lag)
-    decay = np.exp(-(np.append(t[moving], at) - t[0]) / lag)
-    table = np.stack([weight @ put_in[:-1], weight.sum(axis=1), decay], axis=1)
+    weight = _lagged(np.append(t[moving], instant), t, float(t[0]), lag)
+    decay = np.exp(-(np.append(t[moving], instant) - t[0]) / lag)
+    table = np.stack([weight @ input_values[:-1], weight.sum(axis=1), decay], axis=1)
     size = np.sqrt((table**2).sum(axis=0)) + 1e-300
     table = table / size
     # two directions in which the speed at the stop stays 0
     free = np.linalg.svd(table[-1:])[2][1:].T
     design, measured = table[:-1] @ free, speed[moving]
-    rest = measured - design @ np.linalg.lstsq(design, measured, rcond=1e-9)[0]
-    return float(rest @ rest)
+    remaining = measured - design @ np.linalg.lstsq(design, measured, rcond=1e-9)[0]
+    return float(remaining @ remaining)
 
 
-def _lagged(at: FloatArray, t: FloatArray, begin: float, lag: float) -> FloatArray:
-    """What each row of a held input adds to a first-order lag from `begin` on. Shape (len(at), len(t) - 1)."""
-    first = np.minimum(np.maximum(t[:-1], begin), at[:, None])
-    last = np.minimum(np.maximum(t[1:], begin), at[:, None])
-    return np.exp(-(at[:, None] - last) / lag) - np.exp(-(at[:, None] - first) / lag)
+def _lagged(instants: FloatArray, t: FloatArray, start_time: float, lag: float) -> FloatArray:
+    """What each row of a held input adds to a first-order lag from `start_time` on. Shape (len(instants), len(t) -
+    1)."""
+    first = np.minimum(np.maximum(t[:-1], start_time), instants[:, None])
+    last = np.minimum(np.maximum(t[1:], start_time), instants[:, None])
+    return np.exp(-(instants[:, None] - last) / lag) - np.exp(-(instants[:, None] - first) / lag)
 
 
 def _not_negative(design: FloatArray, speed: FloatArray) -> float:
     """Least sum of squares with two numbers, neither below 0."""
-    inner, right = design.T @ design, design.T @ speed
+    products, right = design.T @ design, design.T @ speed
     total = float(speed @ speed)
-    best = min(total - max(right[k], 0.0) ** 2 / inner[k, k] if inner[k, k] > 0.0 else total for k in (0, 1))
-    determinant = inner[0, 0] * inner[1, 1] - inner[0, 1] ** 2
-    if determinant > 1e-12 * inner[0, 0] * inner[1, 1]:
-        one = (inner[1, 1] * right[0] - inner[0, 1] * right[1]) / determinant
-        other = (inner[0, 0] * right[1] - inner[0, 1] * right[0]) / determinant
-        if one >= 0.0 and other >= 0.0:
-            best = total - one * right[0] - other * right[1]
+    best = min(total - max(right[k], 0.0) ** 2 / products[k, k] if products[k, k] > 0.0 else total for k in (0, 1))
+    determinant = products[0, 0] * products[1, 1] - products[0, 1] ** 2
+    if determinant > 1e-12 * products[0, 0] * products[1, 1]:
+        first_number = (products[1, 1] * right[0] - products[0, 1] * right[1]) / determinant
+        second_number = (products[0, 0] * right[1] - products[0, 1] * right[0]) / determinant
+        if first_number >= 0.0 and second_number >= 0.0:
+            best = total - first_number * right[0] - second_number * right[1]
     return max(float(best), 0.0)

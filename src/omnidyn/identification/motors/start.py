@@ -53,8 +53,8 @@ NO_LINE: dict[str, tuple[float, tuple[float, float]]] = {
     name: (math.nan, (math.nan, math.nan)) for name in (SLOPE, OFFSET, LAG)
 }
 SHARP = 0.5  # a start whose interval is narrower than this share of it is one that a sentence can name
-HIDDEN = 0.02  # of the change of speed over a window: noise by which the inertia may come out too small
-ALIKE = 0.05  # relative difference of slopes by direction that matters to nobody
+NOISE_SHARE = 0.02  # of the change of speed over a window: noise by which the inertia may come out too small
+SLOPE_TOLERANCE = 0.05  # relative difference of slopes by direction that matters to nobody
 ONE_WAY = 0.98  # of the sides of a window, so that it belongs to one direction
 
 
@@ -93,10 +93,14 @@ class MotorStart:
     def statement(self) -> Statement:
         """The start, which is the dead band of this direction."""
         low, high = self.ci95[START]
-        left, right = self.ci95[OFFSET]
-        numbers: dict[str, Any] = {"unit": self.unit, "offset": self.value[OFFSET], "offset_ci95": (left, right)}
+        low_offset, high_offset = self.ci95[OFFSET]
+        numbers: dict[str, Any] = {
+            "unit": self.unit,
+            "offset": self.value[OFFSET],
+            "offset_ci95": (low_offset, high_offset),
+        }
         if math.isnan(low) or (low <= 0.0 and not math.isfinite(high)):
-            numbers |= {"offset_known": left > 0.0 and math.isfinite(right)}
+            numbers |= {"offset_known": low_offset > 0.0 and math.isfinite(high_offset)}
             return Statement("start_not_seen", NOTE, self.name, numbers)
         if not math.isfinite(high):
             return Statement("never_sets_off", NOTE, self.name, {"low": low, "unit": self.unit})
@@ -108,7 +112,7 @@ class MotorStart:
             "sharp": self.sharp,
             "stop": self.value[STOP],
             "stop_ci95": self.ci95[STOP],
-            "line_elsewhere": self.sharp and (left > high or right < low),
+            "line_elsewhere": self.sharp and (low_offset > high or high_offset < low),
         }
         return Statement("start_seen", NOTE, self.name, numbers)
 
@@ -143,61 +147,69 @@ def motor_starts(
     logs: Sequence[MotorLog], windows: MotorWindows | None, motors: Sequence[int]
 ) -> tuple[MotorStart, ...]:
     """Both directions of each motor, as far as the logs show it to turn or to rest there."""
-    found, row = [], max(log.step for log in logs if len(log.t) > 1)
+    starts, row = [], max(log.step for log in logs if len(log.t) > 1)
     for motor in motors:
         way = orientation_of(logs, motor)
-        chosen = windows_for_a_lag(logs, windows, motor)
-        lines = {side: line_one_way(chosen, motor, side) for side in (1.0, -1.0)}
+        lag_windows = windows_for_a_lag(logs, windows, motor)
+        lines = {side: line_one_way(lag_windows, motor, side) for side in (1.0, -1.0)}
         for side, line in lines.items():
             lag = line.value[LAG] if line is not None else math.nan
-            up, down = starts_and_stops(logs, motor, side, way, lag)
-            if up or down or line is not None:
-                turned = turned_under(logs, motor, side, way)
-                found.append(direction_of(motor, side, logs[0].unit, up, down, _numbers(line, way, row), turned))
-    return tuple(found)
+            start_spans, stop_spans = starts_and_stops(logs, motor, side, way, lag)
+            if start_spans or stop_spans or line is not None:
+                turning_input = turned_under(logs, motor, side, way)
+                starts.append(
+                    direction_of(
+                        motor, side, logs[0].unit, start_spans, stop_spans, _numbers(line, way, row), turning_input
+                    )
+                )
+    return tuple(starts)
 
 
 def slopes_by_direction(starts: Sequence[MotorStart], travel: str) -> Iterator[Statement]:
-    """Which motors have a slope of their own in each direction, beyond their intervals and by more than ALIKE."""
-    for one, other in pairwise(starts):
-        (low, high), (least, most) = one.ci95[SLOPE], other.ci95[SLOPE]
-        apart = abs(one.value[SLOPE] - other.value[SLOPE]) > ALIKE * abs(one.value[SLOPE])
-        if one.motor == other.motor and apart and (high < least or most < low):
-            numbers = {"slopes": (one.value[SLOPE], other.value[SLOPE]), "ci95": (one.ci95[SLOPE], other.ci95[SLOPE])}
-            directions = {"directions": (one.direction, other.direction), "unit": f"{one.unit} s/{travel}"}
-            yield Statement("slopes_differ_by_direction", WARNING, f"motor {one.motor + 1}", numbers | directions)
+    """Which motors have a slope of their own in each direction, beyond their intervals and by more than
+    SLOPE_TOLERANCE."""
+    for forward, backward in pairwise(starts):
+        (low, high), (other_low, other_high) = forward.ci95[SLOPE], backward.ci95[SLOPE]
+        is_different = abs(forward.value[SLOPE] - backward.value[SLOPE]) > SLOPE_TOLERANCE * abs(forward.value[SLOPE])
+        if forward.motor == backward.motor and is_different and (high < other_low or other_high < low):
+            numbers = {
+                "slopes": (forward.value[SLOPE], backward.value[SLOPE]),
+                "ci95": (forward.ci95[SLOPE], backward.ci95[SLOPE]),
+            }
+            directions = {"directions": (forward.direction, backward.direction), "unit": f"{forward.unit} s/{travel}"}
+            yield Statement("slopes_differ_by_direction", WARNING, f"motor {forward.motor + 1}", numbers | directions)
 
 
 def direction_of(
     motor: int,
     side: float,
     unit: str,
-    up: Sequence[Span],
-    down: Sequence[Span],
+    start_spans: Sequence[Span],
+    stop_spans: Sequence[Span],
     numbers: Mapping[str, tuple[float, tuple[float, float]]],
-    turned: float = math.inf,
+    turning_input: float = math.inf,
 ) -> MotorStart:
-    """One direction from its starts, its stops and its line. numbers: name -> (value, interval). turned: the least
-    input under which it turned steadily, which bounds a start that was not seen: it set off somewhere.
+    """One direction from its starts, its stops and its line. numbers: name -> (value, interval). turning_input: the
+    least input under which it turned steadily, which bounds a start that was not seen: it set off somewhere.
     """
-    known = {START: common(up), STOP: common(down)}
-    rest = known[START][0]
-    if up and rest.high == math.inf and turned > rest.low:
-        known[START] = rest._replace(high=turned), True
-    warnings = [Statement("starts_scatter", subject=name) for name, (_, agree) in known.items() if not agree]
+    edges = {START: common(start_spans), STOP: common(stop_spans)}
+    rest_interval = edges[START][0]
+    if start_spans and rest_interval.high == math.inf and turning_input > rest_interval.low:
+        edges[START] = rest_interval._replace(high=turning_input), True
+    warnings = [Statement("starts_scatter", subject=name) for name, (_, agree) in edges.items() if not agree]
     value = {
         name: 0.5 * (span.low + span.high) if math.isfinite(span.high) and span.low > 0.0 else math.nan
-        for name, (span, _) in known.items()
+        for name, (span, _) in edges.items()
     }
-    ci95 = {name: (span.low, span.high) for name, (span, _) in known.items()}
+    ci95 = {name: (span.low, span.high) for name, (span, _) in edges.items()}
     return MotorStart(
         motor,
         side,
         unit,
         value | {name: number for name, (number, _) in numbers.items()},
         ci95 | {name: ends for name, (_, ends) in numbers.items()},
-        sum(math.isfinite(span.high) for span in up),
-        len(down),
+        sum(math.isfinite(span.high) for span in start_spans),
+        len(stop_spans),
         tuple(warnings),
     )
 
@@ -227,32 +239,36 @@ def windows_for_a_lag(logs: Sequence[MotorLog], windows: MotorWindows | None, mo
         return windows
     noise = max(_noise_of(log.motion[:, motor]) for log in logs)
     row = max(log.step for log in logs if len(log.t) > 1)
-    for least in (length for length in LENGTHS if length >= windows.length):
+    for least_length in (length for length in LENGTHS if length >= windows.length):
         try:
-            found = motor_windows(logs, least=least) if least > windows.length else windows
+            windows_found = motor_windows(logs, least_length=least_length) if least_length > windows.length else windows
         except InsufficientDataError:
             break
-        windows, change = found, found.change[found.motor == motor]
-        rows = 2 * max(1, round(0.5 * EDGE_SHARE * found.length / row)) + 1  # that tell the speed at an end
-        if not change.size or 2.0 * noise**2 / rows / found.length**2 <= HIDDEN * float(np.var(change)):
+        windows, change = windows_found, windows_found.change[windows_found.motor == motor]
+        rows = 2 * max(1, round(0.5 * EDGE_SHARE * windows_found.length / row)) + 1  # that tell the speed at an end
+        if not change.size or 2.0 * noise**2 / rows / windows_found.length**2 <= NOISE_SHARE * float(np.var(change)):
             break
     return windows
 
 
 def _noise_of(speed: FloatArray) -> float:
     """Standard deviation of the noise of a speed, or of the steps in which it is read [rad/s]."""
-    known = speed[np.isfinite(speed)]
-    return max(noise_of_rows(known), sensor_step(known) / math.sqrt(6.0)) if len(known) > LEAST_REST else 0.0
+    known_speeds = speed[np.isfinite(speed)]
+    return (
+        max(noise_of_rows(known_speeds), sensor_step(known_speeds) / math.sqrt(6.0))
+        if len(known_speeds) > LEAST_REST
+        else 0.0
+    )
 
 
 def line_one_way(windows: MotorWindows | None, motor: int, side: float) -> MotorEstimate | None:
     """The line through the windows in which a motor turns one way; None where there are too few."""
     if windows is None:
         return None
-    keep = (windows.motor == motor) & (windows.side * side > ONE_WAY)
-    names = ("put_in", "speed", "speed_std", "side", "change", "motor", "block")
+    mask = (windows.motor == motor) & (windows.side * side > ONE_WAY)
+    names = ("input_values", "speed", "speed_std", "side", "change", "motor", "block")
     try:
-        return fit_line(replace(windows, **{name: getattr(windows, name)[keep] for name in names}), motor, "")
+        return fit_line(replace(windows, **{name: getattr(windows, name)[mask] for name in names}), motor, "")
     except InsufficientDataError:
         return None
 
@@ -265,11 +281,11 @@ def _numbers(line: MotorEstimate | None, way: float, row: float) -> dict[str, tu
     """
     if line is None:
         return dict(NO_LINE)
-    early, late = line.ci95[LAG]
+    lag_low, lag_high = line.ci95[LAG]
     return {
         SLOPE: (line.value[SLOPE], line.ci95[SLOPE]),
         OFFSET: (way * line.value[BAND], _turned(line.ci95[BAND], way)),
-        LAG: (line.value[LAG], (early - row, late + row)),
+        LAG: (line.value[LAG], (lag_low - row, lag_high + row)),
     }
 
 
@@ -283,7 +299,9 @@ def _numbers(line: MotorEstimate | None, way: float, row: float) -> dict[str, tu
 
 SLOW_ROW = 0.1  # [s] rows further apart are points: a window of half a second has no five of them
 SLOW = 0.01  # of the largest speed: slower is at rest
-LATER = 0.8  # share of the error by which the row after must fit better, to be the one that an input is answered in
+LATER_SHARE = (
+    0.8  # share of the error by which the row after must fit better, to be the one that an input is answered in
+)
 LEAST_POINTS = 3  # of a line with intervals
 
 
@@ -298,11 +316,11 @@ def points_of_logs(logs: Sequence[MotorLog]) -> MotorTable:
     Where an input changes with every row, it is answered in its own row, or in the next, whichever gives the better
     line: loggers write both.
     """
-    later = _answered_later(logs)
-    parts = [part for log in logs for m in range(log.motors) for part in _points(log, m, later)]
-    put_in, speed, motor, run = (np.concatenate(each) for each in zip(*parts, strict=True))
+    is_later = _answered_later(logs)
+    parts = [part for log in logs for m in range(log.motors) for part in _points(log, m, is_later)]
+    input_values, speed, motor, run = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return MotorTable(
-        put_in,
+        input_values,
         speed,
         motor.astype(np.int64),
         logs[0].kind,
@@ -312,38 +330,38 @@ def points_of_logs(logs: Sequence[MotorLog]) -> MotorTable:
     )
 
 
-def _points(log: MotorLog, motor: int, later: bool) -> Iterator[tuple[FloatArray, ...]]:
+def _points(log: MotorLog, motor: int, is_later: bool) -> Iterator[tuple[FloatArray, ...]]:
     """(input, speed, motor, number of the piece) of each piece of a log."""
     for number, piece in enumerate(log.pieces):
-        put_in, speed = log.put_in[piece, motor], log.motion[piece, motor]
-        if log.angle is not None and len(put_in) > 1:  # over the row that ends here
+        input_values, speed = log.input_values[piece, motor], log.motion[piece, motor]
+        if log.angle is not None and len(input_values) > 1:  # over the row that ends here
             steps = np.diff(log.angle[piece, motor]) / np.diff(log.t[piece])
             speed = np.concatenate([[np.nan], steps])
-        if later:
-            put_in, speed = put_in[:-1], speed[1:]
-        known = np.isfinite(put_in) & np.isfinite(speed)
-        known[1:][(np.diff(put_in) != 0.0) & np.append(np.diff(put_in)[1:] == 0.0, False)] = False
-        count = int(known.sum())
-        yield put_in[known], speed[known], np.full(count, motor), np.full(count, number)
+        if is_later:
+            input_values, speed = input_values[:-1], speed[1:]
+        known_rows = np.isfinite(input_values) & np.isfinite(speed)
+        known_rows[1:][(np.diff(input_values) != 0.0) & np.append(np.diff(input_values)[1:] == 0.0, False)] = False
+        count = int(known_rows.sum())
+        yield input_values[known_rows], speed[known_rows], np.full(count, motor), np.full(count, number)
 
 
 def _answered_later(logs: Sequence[MotorLog]) -> bool:
     """Whether speeds answer the input of the row before them."""
-    now, after = (_misfit(logs, later) for later in (False, True))
-    return after < LATER * now
+    misfit_now, misfit_later = (_misfit(logs, is_later) for is_later in (False, True))
+    return misfit_later < LATER_SHARE * misfit_now
 
 
-def _misfit(logs: Sequence[MotorLog], later: bool) -> float:
+def _misfit(logs: Sequence[MotorLog], is_later: bool) -> float:
     """Root mean square of what lines through the points of each motor leave over, over those that turn."""
     squares = count = 0.0
     for motor in range(logs[0].motors):
-        parts = [part for log in logs for part in _points(log, motor, later)]
-        put_in, speed = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
+        parts = [part for log in logs for part in _points(log, motor, is_later)]
+        input_values, speed = (np.concatenate([part[k] for part in parts]) for k in (0, 1))
         turns = np.abs(speed) > SLOW * np.abs(speed).max(initial=0.0)
         if turns.sum() > LEAST_POINTS:
-            table = np.stack([put_in, np.sign(speed), np.ones(len(speed))], axis=1)[turns]
-            rest = speed[turns] - table @ np.linalg.lstsq(table, speed[turns], rcond=None)[0]
-            squares, count = squares + float(rest @ rest), count + len(rest)
+            table = np.stack([input_values, np.sign(speed), np.ones(len(speed))], axis=1)[turns]
+            remaining = speed[turns] - table @ np.linalg.lstsq(table, speed[turns], rcond=None)[0]
+            squares, count = squares + float(remaining @ remaining), count + len(remaining)
     return math.sqrt(squares / count) if count else math.inf
 
 
@@ -358,15 +376,15 @@ def windows_of_points(points: MotorTable, speed_from: str) -> MotorWindows:
             expected="a motor that turns",
             where=points.source,
         )
-    count, nothing = int(turns.sum()), np.zeros(int(turns.sum()))
+    count, zeros = int(turns.sum()), np.zeros(int(turns.sum()))
     motors = int(points.motor.max()) + 1
     resting = [np.abs(points.put_in[(points.motor == m) & ~turns]) for m in range(motors)]
     return MotorWindows(
         points.put_in[turns],
         points.speed[turns],
-        nothing,
+        zeros,
         side[turns],
-        nothing,
+        zeros,
         motor=points.motor[turns],
         block=np.arange(count),
         unit=points.unit,
@@ -387,80 +405,82 @@ def _sides(points: MotorTable) -> FloatArray:
     for motor in np.unique(points.motor):
         rows = points.motor == motor
         speed = points.speed[rows]
-        off = np.abs(speed[points.put_in[rows] == 0.0])
-        level = max(SLOW * float(np.abs(speed).max()), 2.0 * float(off.max(initial=0.0)))
+        speeds_at_zero = np.abs(speed[points.put_in[rows] == 0.0])
+        level = max(SLOW * float(np.abs(speed).max()), 2.0 * float(speeds_at_zero.max(initial=0.0)))
         side[rows] = np.where(np.abs(speed) > level, np.sign(speed), 0.0)
     return side
 
 
 def starts_of_points(points: MotorTable) -> tuple[MotorStart, ...]:
     """Both directions of each motor, as far as the points show it to turn or to rest there."""
-    found, sides = [], _sides(points)
+    starts, sides = [], _sides(points)
     for motor in np.unique(points.motor).tolist():
         rows = points.motor == motor
-        put_in, speed = points.put_in[rows], points.speed[rows]
-        way = orientation([(put_in, speed)])
+        input_values, speed = points.put_in[rows], points.speed[rows]
+        way = orientation([(input_values, speed)])
         for side in (1.0, -1.0):
-            level, turns = way * side * put_in, side * sides[rows]
-            up, down = _in_order(level, turns, points.run[rows]) if points.run is not None else _in_table(level, turns)
+            level, turns = way * side * input_values, side * sides[rows]
+            start_spans, stop_spans = (
+                _in_order(level, turns, points.run[rows]) if points.run is not None else _in_table(level, turns)
+            )
             forward = turns > 0.0
-            if up or down or forward.any():
+            if start_spans or stop_spans or forward.any():
                 numbers = dict(NO_LINE)
                 if forward.sum() >= LEAST_POINTS:
                     slope, offset = line_of_speed(level[forward], side * speed[forward])
                     numbers |= {SLOPE: (way * slope[0], _turned(slope[1], way)), OFFSET: offset}
-                turned = float(level[forward].min(initial=math.inf))
-                found.append(direction_of(motor, side, points.unit, up, down, numbers, turned))
-    return tuple(found)
+                turning_input = float(level[forward].min(initial=math.inf))
+                starts.append(direction_of(motor, side, points.unit, start_spans, stop_spans, numbers, turning_input))
+    return tuple(starts)
 
 
 def _in_table(level: FloatArray, turns: FloatArray) -> tuple[list[Span], list[Span]]:
     """(starts, stops) of points in no order: none of the latter."""
-    rest, moves = level[turns == 0.0].max(initial=0.0), level[turns > 0.0].min(initial=math.inf)
-    if rest <= 0.0 and not math.isfinite(moves):
+    rest_level, moves = level[turns == 0.0].max(initial=0.0), level[turns > 0.0].min(initial=math.inf)
+    if rest_level <= 0.0 and not math.isfinite(moves):
         return [], []
-    if rest > moves:  # it turned under less than it rested under: two starts that do not agree
-        return [Span(float(moves), float(moves)), Span(float(rest), float(rest))], []
-    return [Span(float(rest), float(moves))], []
+    if rest_level > moves:  # it turned under less than it rested under: two starts that do not agree
+        return [Span(float(moves), float(moves)), Span(float(rest_level), float(rest_level))], []
+    return [Span(float(rest_level), float(moves))], []
 
 
 def _in_order(level: FloatArray, turns: FloatArray, run: IntArray) -> tuple[list[Span], list[Span]]:
     """(starts, stops) from each row to the next one."""
-    up, down = [], []
+    start_spans, stop_spans = [], []
     for k, j in pairwise(range(len(level))):
         if run[k] != run[j]:
             continue
         ends = sorted((float(level[k]), float(level[j])))
         if turns[k] == 0.0 and turns[j] > 0.0:
-            up.append(Span(*ends))
+            start_spans.append(Span(*ends))
         if turns[k] > 0.0 and turns[j] == 0.0:
-            down.append(Span(*ends))
-    rest = float(level[turns == 0.0].max(initial=0.0))
-    if not up and rest > 0.0 and not down:
-        up.append(Span(rest, math.inf))
-    return up, down
+            stop_spans.append(Span(*ends))
+    rest_level = float(level[turns == 0.0].max(initial=0.0))
+    if not start_spans and rest_level > 0.0 and not stop_spans:
+        start_spans.append(Span(rest_level, math.inf))
+    return start_spans, stop_spans
 
 
 def line_of_speed(
-    put_in: FloatArray, speed: FloatArray
+    input_values: FloatArray, speed: FloatArray
 ) -> tuple[tuple[float, tuple[float, float]], tuple[float, tuple[float, float]]]:
     """(slope, interval) and (offset, interval) of u = slope w + offset, whose error is in w. Shape (points,)."""
-    middle, count = float(put_in.mean()), len(put_in)
-    spread = float(((put_in - middle) ** 2).sum())
+    middle, count = float(input_values.mean()), len(input_values)
+    spread = float(((input_values - middle) ** 2).sum())
     if spread <= 0.0:
         return (math.nan, (math.nan, math.nan)), (math.nan, (math.nan, math.nan))
     mean = float(speed.mean())
-    b = float((put_in - middle) @ (speed - mean)) / spread
-    rest = speed - mean - b * (put_in - middle)
-    variance = float(rest @ rest) / (count - 2)
+    b = float((input_values - middle) @ (speed - mean)) / spread
+    remaining = speed - mean - b * (input_values - middle)
+    variance = float(remaining @ remaining) / (count - 2)
     half = t_quantile(count - 2) ** 2 * variance
     # mean + b (offset - middle) = 0: the x for which the line there is 0 within its error
     square, product, constant = b**2 - half / spread, b * mean, mean**2 - half / count
     if square <= 0.0 or b == 0.0:
-        everywhere = (-math.inf, math.inf)
-        return (1.0 / b if b else math.nan, everywhere), (middle - mean / b if b else math.nan, everywhere)
+        whole_axis = (-math.inf, math.inf)
+        return (1.0 / b if b else math.nan, whole_axis), (middle - mean / b if b else math.nan, whole_axis)
     root = math.sqrt(max(product**2 - square * constant, 0.0))
     ends = sorted(middle + (-product + sign * root) / square for sign in (-1.0, 1.0))
-    wide = math.sqrt(half / spread)
-    slopes = sorted(1.0 / (b + sign * wide) for sign in (-1.0, 1.0))
+    half_angle = math.sqrt(half / spread)
+    slopes = sorted(1.0 / (b + sign * half_angle) for sign in (-1.0, 1.0))
     return (1.0 / b, (slopes[0], slopes[1])), (middle - mean / b, (ends[0], ends[1]))

@@ -30,13 +30,13 @@ CURVES_HEAD = ("motor", "input", "unit", "steady speed rad/s", "+-", "effective 
 LEAST_LEVELS, MOST_LEVELS = 5, 16
 SAME_LEVEL = 0.01  # of the largest input: inputs that are nearer are one level
 AT_REST = 0.02  # of the largest speed: slower is at rest
-SETTLED = 0.02  # of the largest speed: a steady speed that is known worse is no point
+STEADY_SHARE = 0.02  # of the largest speed: a steady speed that is known worse is no point
 LEAST_ROWS = 12  # of the second half of a hold
-WILD = 5.0  # scales from the median beyond which a speed is not believed
+OUTLIER_SCALES = 5.0  # scales from the median beyond which a speed is not believed
 TIMES = np.geomspace(0.05, 1.0, 30)  # of the second half of a hold, over which a speed may still settle
-UNSEEN = 0.25  # of what is yet to come of a speed: how wrong an exponential may be about it
-CURVED = 0.6  # of the error of the line: that of the neighbours, which noise alone reaches once in 50 times
-NOTABLE = 0.03  # of the largest speed: a line that misses by less is one
+EXTRAPOLATION_SHARE = 0.25  # of what is yet to come of a speed: how wrong an exponential may be about it
+CURVE_SHARE = 0.6  # of the error of the line: that of the neighbours, which noise alone reaches once in 50 times
+NOTABLE_SHARE = 0.03  # of the largest speed: a line that misses by less is one
 STRAIGHT = 0.02  # of the largest speed: within this a line holds over a part of the range
 PART = 3  # levels of such a part, at least
 
@@ -66,16 +66,17 @@ class SteadyCurve:
     def points(self) -> tuple[tuple[float, float, float], ...]:
         """(input, effective input, std) [unit]: of the latter, speed is a line through 0 and the last point."""
         scale = float(self.level[-1] / self.speed[-1])
-        rest = [(self.rest, 0.0, 0.0)] if self.rest > 0.0 else []
+        rest_points = [(self.rest, 0.0, 0.0)] if self.rest > 0.0 else []
         measured = np.stack([self.level, scale * self.speed, scale * self.std], axis=1)
-        return (*rest, *map(tuple, measured.tolist()))
+        return (*rest_points, *map(tuple, measured.tolist()))
 
     def rows(self) -> list[tuple[str, ...]]:
         """Cells under CURVES_HEAD."""
-        every = zip(self.level, self.speed, self.std, self.points[-len(self.level) :], strict=True)
+        levels_and_points = zip(self.level, self.speed, self.std, self.points[-len(self.level) :], strict=True)
         name = f"{self.motor + 1}"
         return [
-            (name, f"{u:.4g}", self.unit, f"{w:.4g}", f"{std:.2g}", f"{point[1]:.4g}") for u, w, std, point in every
+            (name, f"{u:.4g}", self.unit, f"{w:.4g}", f"{std:.2g}", f"{point[1]:.4g}")
+            for u, w, std, point in levels_and_points
         ]
 
     def statement(self) -> Statement:
@@ -93,15 +94,15 @@ class SteadyCurve:
         """An estimate of the motor by the line through 0 and the last point, behind the curve: no dead band, no lag."""
         slope = float(self.level[-1] / self.speed[-1])
         std = slope * float(self.std[-1] / self.speed[-1])
-        nothing = dict.fromkeys((BAND, LAG, INERTIA), math.nan)
+        no_numbers = dict.fromkeys((BAND, LAG, INERTIA), math.nan)
         return replace(
             line,
-            value={SLOPE: slope, **nothing},
-            std={SLOPE: std, **nothing},
-            ci95={SLOPE: (slope - 2.0 * std, slope + 2.0 * std), **dict.fromkeys(nothing, (math.nan, math.nan))},
+            value={SLOPE: slope, **no_numbers},
+            std={SLOPE: std, **no_numbers},
+            ci95={SLOPE: (slope - 2.0 * std, slope + 2.0 * std), **dict.fromkeys(no_numbers, (math.nan, math.nan))},
             correlation=0.0,
             rmse=self.neighbours,
-            unidentifiable=tuple(nothing),
+            unidentifiable=tuple(no_numbers),
             warnings=(),
         )
 
@@ -131,8 +132,8 @@ def curves_of_logs(logs: Sequence[MotorLog]) -> Curves:
 
 def curves_of_points(points: MotorTable) -> Curves:
     """The same of points of steady speed."""
-    nothing, motor = np.zeros(len(points)), points.motor.astype(np.float64)
-    rows = np.stack([points.put_in, points.speed, nothing, motor], axis=1)
+    zeros, motor = np.zeros(len(points)), points.motor.astype(np.float64)
+    rows = np.stack([points.put_in, points.speed, zeros, motor], axis=1)
     return _curves(rows, points.unit) if points.kind != CURRENT else ((), ())
 
 
@@ -140,16 +141,18 @@ def _curves(rows: FloatArray, unit: str) -> Curves:
     """rows: (input, speed, its error, motor), shape (n, 4)."""
     rows = rows[np.isfinite(rows).all(axis=1)]
     motors = [int(motor) for motor in np.unique(rows[:, 3])]
-    found = [_curve_of(motor, unit, *rows[rows[:, 3] == motor, :3].T) for motor in motors]
-    few = {
-        f"motor {motor + 1}": levels for motor, levels in zip(motors, found, strict=True) if isinstance(levels, tuple)
+    curves_found = [_curve_of(motor, unit, *rows[rows[:, 3] == motor, :3].T) for motor in motors]
+    counts_by_motor = {
+        f"motor {motor + 1}": levels
+        for motor, levels in zip(motors, curves_found, strict=True)
+        if isinstance(levels, tuple)
     }
     notes: list[Statement] = []
-    if few:
-        steady, held = map(max, zip(*few.values(), strict=True))
-        numbers = {"motors": tuple(few), "steady": steady, "held": held}
+    if counts_by_motor:
+        steady, held_count = map(max, zip(*counts_by_motor.values(), strict=True))
+        numbers = {"motors": tuple(counts_by_motor), "steady": steady, "held": held_count}
         notes.append(Statement("straightness_not_tested", NOTE, numbers=numbers))
-    return tuple(curve for curve in found if isinstance(curve, SteadyCurve)), tuple(notes)
+    return tuple(curve for curve in curves_found if isinstance(curve, SteadyCurve)), tuple(notes)
 
 
 def _steady(log: MotorLog) -> Iterator[tuple[float, ...]]:
@@ -163,10 +166,14 @@ def _steady(log: MotorLog) -> Iterator[tuple[float, ...]]:
             if rows.stop - rows.start < LEAST_ROWS:
                 continue
             for motor in range(log.motors):
-                put_in, speed = log.put_in[rows, motor], log.motion[rows, motor]
-                known = np.isfinite(speed)
-                if known.sum() >= LEAST_ROWS and np.isfinite(put_in).all():
-                    yield float(put_in.mean()), *steady_speed(log.t[rows][known], speed[known]), float(motor)
+                input_values, speed = log.input_values[rows, motor], log.motion[rows, motor]
+                known_rows = np.isfinite(speed)
+                if known_rows.sum() >= LEAST_ROWS and np.isfinite(input_values).all():
+                    yield (
+                        float(input_values.mean()),
+                        *steady_speed(log.t[rows][known_rows], speed[known_rows]),
+                        float(motor),
+                    )
 
 
 def steady_speed(t: FloatArray, speed: FloatArray) -> tuple[float, float]:
@@ -177,57 +184,59 @@ def steady_speed(t: FloatArray, speed: FloatArray) -> tuple[float, float]:
     """
     elapsed = (t - t[0]) / (t[-1] - t[0])
     middle = np.median(speed)
-    reach = WILD * MAD_TO_STD * float(np.median(np.abs(speed - middle))) + sensor_step(speed)
-    y, found = np.clip(speed, middle - reach, middle + reach), []
+    reach = OUTLIER_SCALES * MAD_TO_STD * float(np.median(np.abs(speed - middle))) + sensor_step(speed)
+    y, fits = np.clip(speed, middle - reach, middle + reach), []
     for tau in TIMES:
         table = np.stack([np.ones(len(y)), np.exp(-elapsed / tau)], axis=1)
         inverse = np.linalg.inv(table.T @ table)
         parameters = inverse @ table.T @ y
-        rest = y - table @ parameters
-        found.append((float(rest @ rest), float(parameters[0]), float(inverse[0, 0]), float(y[-1] - rest[-1])))
-    squares, steady, share, end = np.array(found).T
+        remaining = y - table @ parameters
+        fits.append(
+            (float(remaining @ remaining), float(parameters[0]), float(inverse[0, 0]), float(y[-1] - remaining[-1]))
+        )
+    squares, steady, share, end = np.array(fits).T
     best = int(squares.argmin())
     variance = squares[best] / (len(y) - 3)
-    good = squares <= squares[best] + 4.0 * variance
-    spread = float(np.abs(steady[good] - steady[best]).max()) + float(np.sqrt(variance * share[best]))
-    unseen = UNSEEN if best < len(TIMES) - 1 else 1.0  # it may settle over longer than that
+    likely_fits = squares <= squares[best] + 4.0 * variance
+    spread = float(np.abs(steady[likely_fits] - steady[best]).max()) + float(np.sqrt(variance * share[best]))
+    unseen = EXTRAPOLATION_SHARE if best < len(TIMES) - 1 else 1.0  # it may settle over longer than that
     return float(steady[best]), float(np.hypot(spread, unseen * (steady[best] - end[best])))
 
 
 def _curve_of(
-    motor: int, unit: str, put_in: FloatArray, speed: FloatArray, std: FloatArray
+    motor: int, unit: str, input_values: FloatArray, speed: FloatArray, std: FloatArray
 ) -> SteadyCurve | tuple[int, int] | None:
     """The curve of one motor, None where a line does; (levels that are steady, levels that were held) where these are
     too few. Shape (n,) each.
     """
-    size, level = orientation([(put_in, speed)]) * np.sign(put_in) * speed, np.abs(put_in)
+    size, level = orientation([(input_values, speed)]) * np.sign(input_values) * speed, np.abs(input_values)
     top = float(size.max(initial=0.0))
-    steady = std <= SETTLED * top
+    steady = std <= STEADY_SHARE * top
     turns = steady & (size > AT_REST * top) & (level > 0.0)
-    rest = float(level[steady & ~turns].max(initial=0.0))
+    rest_level = float(level[steady & ~turns].max(initial=0.0))
     x, y, error = _by_level(level[turns], size[turns], std[turns])
     if len(x) < LEAST_LEVELS:
-        held = len(_by_level(level[level > 0.0], level[level > 0.0], std[level > 0.0])[0])
-        return (len(x), held) if held >= LEAST_LEVELS and not steady.all() else None
-    way = np.sign(put_in[turns])
-    each_way = [_off_line(level[turns][way == side], size[turns][way == side]) for side in (1.0, -1.0)]
-    if max(each_way) < NOTABLE * top:
+        held_count = len(_by_level(level[level > 0.0], level[level > 0.0], std[level > 0.0])[0])
+        return (len(x), held_count) if held_count >= LEAST_LEVELS and not steady.all() else None
+    way = np.sign(input_values[turns])
+    errors_by_side = [_off_line(level[turns][way == side], size[turns][way == side]) for side in (1.0, -1.0)]
+    if max(errors_by_side) < NOTABLE_SHARE * top:
         return None  # a line in each direction
     line, neighbours = _left_out(x, y)
-    if neighbours > CURVED * line or _off_line(x, y) < NOTABLE * top:
+    if neighbours > CURVE_SHARE * line or _off_line(x, y) < NOTABLE_SHARE * top:
         return None
-    below = level[~steady & (level > 0.0) & (level < (1.0 - SAME_LEVEL) * x[0])]
+    low_levels = level[~steady & (level > 0.0) & (level < (1.0 - SAME_LEVEL) * x[0])]
     return SteadyCurve(
         motor,
         unit,
         x,
         y,
         error,
-        rest if rest < x[0] else 0.0,
+        rest_level if rest_level < x[0] else 0.0,
         line,
         neighbours,
         _straight(x, y, STRAIGHT * top),
-        float(below.min()) if below.size else 0.0,
+        float(low_levels.min()) if low_levels.size else 0.0,
     )
 
 
@@ -241,18 +250,20 @@ def _off_line(x: FloatArray, y: FloatArray) -> float:
 def map_of(curves: Sequence[SteadyCurve], volts: float) -> tuple[tuple[float, float, float], ...]:
     """The map of a driver, (asked, passed on, std) [V], that some motors have together. volts: in one unit of input."""
     points = np.array([point for curve in curves for point in curve.points])
-    rest = points[points[:, 1] == 0.0]
+    rest_points = points[points[:, 1] == 0.0]
     pooled = np.stack(_by_level(*points[points[:, 1] > 0.0].T), axis=1)
-    every = [(float(rest[:, 0].max()), 0.0, 0.0)] if len(rest) == len(curves) else []
-    return tuple((asked * volts, passed * volts, std * volts) for asked, passed, std in [*every, *pooled.tolist()])
+    zero_points = [(float(rest_points[:, 0].max()), 0.0, 0.0)] if len(rest_points) == len(curves) else []
+    return tuple(
+        (requested * volts, output * volts, std * volts) for requested, output, std in [*zero_points, *pooled.tolist()]
+    )
 
 
 def _by_level(level: FloatArray, size: FloatArray, std: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """(level, speed, its error) of each level, at most so many and rising; what falls is one with its neighbour."""
     order = np.argsort(level)
     level, size, std = level[order], size[order], std[order]
-    apart = np.diff(level, prepend=-np.inf) > SAME_LEVEL * level.max(initial=0.0)
-    groups = [[*range(a, b)] for a, b in pairwise([*np.flatnonzero(apart).tolist(), len(level)])]
+    is_new_level = np.diff(level, prepend=-np.inf) > SAME_LEVEL * level.max(initial=0.0)
+    groups = [[*range(a, b)] for a, b in pairwise([*np.flatnonzero(is_new_level).tolist(), len(level)])]
     while len(groups) > MOST_LEVELS:
         k = int(np.argmin([level[b[-1]] - level[a[0]] for a, b in pairwise(groups)]))
         groups[k : k + 2] = [groups[k] + groups[k + 1]]
@@ -274,20 +285,20 @@ def _left_out(x: FloatArray, y: FloatArray) -> tuple[float, float]:
     """Root mean square errors at levels left out: of the line through the others, of the way between neighbours."""
     errors = []
     for k in range(1, len(x) - 1):
-        kept = np.arange(len(x)) != k
-        line = np.polyval(np.polyfit(x[kept], y[kept], 1), x[k])
-        errors.append((y[k] - line, y[k] - np.interp(x[k], x[kept], y[kept])))
+        kept_levels = np.arange(len(x)) != k
+        line = np.polyval(np.polyfit(x[kept_levels], y[kept_levels], 1), x[k])
+        errors.append((y[k] - line, y[k] - np.interp(x[k], x[kept_levels], y[kept_levels])))
     line, neighbours = np.sqrt(np.mean(np.square(errors), axis=0)).tolist()
     return line, neighbours
 
 
-def _straight(x: FloatArray, y: FloatArray, allowed: float) -> tuple[float, float]:
+def _straight(x: FloatArray, y: FloatArray, error_limit: float) -> tuple[float, float]:
     """The widest range of levels over which a line misses no speed by more than is allowed."""
     best = 0.0, 0.0
     for a in range(len(x)):
         for b in range(a + PART, len(x) + 1):
             part = slice(a, b)
             line = np.polyval(np.polyfit(x[part], y[part], 1), x[part])
-            if x[b - 1] - x[a] > best[1] - best[0] and np.abs(y[part] - line).max() <= allowed:
+            if x[b - 1] - x[a] > best[1] - best[0] and np.abs(y[part] - line).max() <= error_limit:
                 best = float(x[a]), float(x[b - 1])
     return best

@@ -65,7 +65,7 @@ from omnidyn.identification.motors.estimate import BAND, OFFSET
 from omnidyn.identification.motors.start import START
 
 MISSES = 0.1  # of the largest speed: error of a line that describes no motor
-CLEAR = 5.0  # errors of the mean speeds, from which such an error is no noise
+SPEED_ERRORS = 5.0  # errors of the mean speeds, from which such an error is no noise
 SAME_SPEED = 1e-9  # spread of speeds over the largest, below which they are one
 
 
@@ -107,18 +107,18 @@ class MotorStudy(Displayable):
     @property
     def statements(self) -> tuple[Statement, ...]:
         """What the logs say of each motor, and whether its dead band is any use on held-out logs."""
-        known = {start.motor for start in self.starts if start.sharp}
-        bent = {curve.motor for curve in self.curves}
-        lines = [motor for motor in self.motors if motor.motor not in bent]
-        found = [motor.statement(started=motor.motor in known) for motor in lines]
-        found += [curve.statement() for curve in self.curves]
-        found += [statement for motor in self.motors if (statement := motor.of_blocks())]
-        for written, plain in zip(self.motors, self.plain, strict=False):
-            if written.dead_band_seen and written.held_out > (1.0 - PAYS) * plain.held_out:
-                errors = {"written": written.held_out, "plain": plain.held_out, "travel": written.travel}
-                found.append(Statement("held_out_no_better", WARNING, written.name, errors))
+        motors_with_start = {start.motor for start in self.starts if start.sharp}
+        bent_motors = {curve.motor for curve in self.curves}
+        lines = [motor for motor in self.motors if motor.motor not in bent_motors]
+        motor_statements = [motor.statement(has_start=motor.motor in motors_with_start) for motor in lines]
+        motor_statements += [curve.statement() for curve in self.curves]
+        motor_statements += [statement for motor in self.motors if (statement := motor.of_blocks())]
+        for estimate, plain_motor in zip(self.motors, self.plain, strict=False):
+            if estimate.dead_band_seen and estimate.held_out > (1.0 - PAYS) * plain_motor.held_out:
+                errors = {"written": estimate.held_out, "plain": plain_motor.held_out, "travel": estimate.travel}
+                motor_statements.append(Statement("held_out_no_better", WARNING, estimate.name, errors))
         return (
-            *found,
+            *motor_statements,
             *(start.statement() for start in self.starts),
             *slopes_by_direction(self.starts, self.motors[0].travel),
         )
@@ -143,26 +143,26 @@ class MotorStudy(Displayable):
     @property
     def warnings(self) -> tuple[Statement, ...]:
         """Of the logs, then of each motor."""
-        found = list(self.log_warnings)
+        all_warnings = list(self.log_warnings)
         for motor in self.motors:
             warnings = [*motor.warnings, *(Statement("at_its_bound", subject=name) for name in motor.at_bound)]
             warnings += [Statement("errors_with_memory", NOTE)] if motor.covariance == "sandwich" else []
             warnings += [] if motor.converged else [Statement("motor_fit_cut_short")]
-            found += [warning.of(motor.name) for warning in warnings]
-        return (*found, *(warning.of(start.name) for start in self.starts for warning in start.warnings))
+            all_warnings += [warning.of(motor.name) for warning in warnings]
+        return (*all_warnings, *(warning.of(start.name) for start in self.starts for warning in start.warnings))
 
     def document(self) -> Document:
         """What the study says: a row per motor, with a dead band and without, then words."""
-        how = "free runs of whole logs"
+        method_words = "free runs of whole logs"
         if self.windows is not None:
-            how = f"windows of {self.windows.length:g} s in integral form"
+            method_words = f"windows of {self.windows.length:g} s in integral form"
             if self.windows.settled:
-                how = "steady windows" if math.isfinite(self.windows.length) else "a point per row"
+                method_words = "steady windows" if math.isfinite(self.windows.length) else "a point per row"
         pairs = zip(self.motors, self.plain, strict=True) if self.plain else ((motor,) for motor in self.motors)
         parts = [
-            f"motors: {self.kind} [{self.unit}] against speed from {self.speed_from}, {how}",
+            f"motors: {self.kind} [{self.unit}] against speed from {self.speed_from}, {method_words}",
             "",
-            Table(HEAD, [each.row() for several in pairs for each in several], name="motors"),
+            Table(HEAD, [estimate.row() for estimates in pairs for estimate in estimates], name="motors"),
             "",
             *([Table(STARTS_HEAD, [start.row() for start in self.starts], name="starts"), ""] if self.starts else []),
             *(
@@ -179,8 +179,8 @@ class MotorStudy(Displayable):
     def to_dict(self) -> dict[str, Any]:
         """The study as JSON can hold it."""
         motors = [motor.to_dict() for motor in self.motors]
-        for record, plain in zip(motors, self.plain, strict=False):
-            record["plain"] = plain.to_dict()
+        for record, plain_motor in zip(motors, self.plain, strict=False):
+            record["plain"] = plain_motor.to_dict()
         return {
             **as_verdict(self.verdict),
             "ok": not self.failed,
@@ -202,7 +202,7 @@ class MotorStudy(Displayable):
 def study_motors(
     runs: Sequence[Run],
     robot: Robot | None,
-    asked: MotorLine | MotorFit,
+    method: MotorLine | MotorFit,
     hold_out: Sequence[str] = (),
     logs: Sequence[Log] = (),
     progress: Progress = silent,
@@ -214,28 +214,28 @@ def study_motors(
 
     Args:
         robot: whose heading is the speed, where that is "ground".
-        asked: windows in integral form, with the line of all motors together; or free runs of whole logs.
+        method: windows in integral form, with the line of all motors together; or free runs of whole logs.
         hold_out: globs of the sources of runs that are predicted, by free runs only.
         logs: where the runs come from, to be checked as well.
     Raises InputError for a run without the channels, InsufficientDataError where the motors say nothing.
     """
-    more = ["pose"] if isinstance(asked, MotorLine) and asked.speed == GROUND else []
-    more += ["pose", "twist"] if any(is_axis(run) for run in runs) else []
-    verdicts = log_verdicts([of_motors(log, *more) for log in logs], robot, progress)
+    extra_channels = ["pose"] if isinstance(method, MotorLine) and method.speed == GROUND else []
+    extra_channels += ["pose", "twist"] if any(is_axis(run) for run in runs) else []
+    verdicts = log_verdicts([of_motors(log, *extra_channels) for log in logs], robot, progress)
     with told_why(verdicts, MOTORS_USE):
-        if isinstance(asked, MotorFit):
-            study = _free_runs(runs, asked, hold_out, progress)
+        if isinstance(method, MotorFit):
+            study = _free_runs(runs, method, hold_out, progress)
         else:
-            study = _lines(motor_logs(runs, asked.input, asked.speed, robot), asked)
+            study = _lines(motor_logs(runs, method.input, method.speed, robot), method)
     return replace(study, verdicts=verdicts)
 
 
-def _lines(logs: Sequence[MotorLog], asked: MotorLine) -> MotorStudy:
+def _lines(logs: Sequence[MotorLog], method: MotorLine) -> MotorStudy:
     if is_slow(logs):
         points = points_of_logs(logs)
         study = study_points(points, logs[0].motion_from, [Statement("rows_as_points")])
         return replace(study, supply=_supply(logs))
-    windows = motor_windows(logs, steady=asked.steady, share=asked.window)
+    windows = motor_windows(logs, steady=method.steady, share=method.window)
     source = named([log.run.source for log in logs])
     motors, lines = _of_each(windows, source)
     lines = tuple(
@@ -259,26 +259,30 @@ def _lines(logs: Sequence[MotorLog], asked: MotorLine) -> MotorStudy:
     return _along(study, curves_of_logs(logs))
 
 
-def _along(study: MotorStudy, found: Curves) -> MotorStudy:
+def _along(study: MotorStudy, curves_found: Curves) -> MotorStudy:
     """The study with what is left of the lines of motors whose speed is none."""
-    curves, notes = found
+    curves, notes = curves_found
     study = replace(study, log_warnings=(*study.log_warnings, *notes))
-    bent = {curve.motor: curve for curve in curves}
-    if not bent:
+    curve_by_motor = {curve.motor: curve for curve in curves}
+    if not curve_by_motor:
         return study
-    motors, plain = (
-        tuple(bent[m.motor].estimate(m) if m.motor in bent else m for m in several if m.motor is not None)
-        for several in (study.motors, study.plain)
+    motors, plain_estimates = (
+        tuple(
+            curve_by_motor[m.motor].estimate(m) if m.motor in curve_by_motor else m
+            for m in estimates
+            if m.motor is not None
+        )
+        for estimates in (study.motors, study.plain)
     )
-    starts = tuple(bent[s.motor].start(s) if s.motor in bent else s for s in study.starts)
-    return replace(study, motors=motors, plain=plain, starts=starts, curves=curves)
+    starts = tuple(curve_by_motor[s.motor].start(s) if s.motor in curve_by_motor else s for s in study.starts)
+    return replace(study, motors=motors, plain=plain_estimates, starts=starts, curves=curves)
 
 
 def _with_misses(line: MotorEstimate, windows: MotorWindows) -> MotorEstimate:
     """The line, with a warning where it misses mean speeds that are known; a current makes a torque, no speed."""
     _, speed, error, *_ = windows.of(line.motor)
     share = line.rmse / float(np.abs(speed).max())
-    if windows.kind == CURRENT or share <= MISSES or line.rmse <= CLEAR * float(np.median(error)):
+    if windows.kind == CURRENT or share <= MISSES or line.rmse <= SPEED_ERRORS * float(np.median(error)):
         return line
     numbers = {"rmse": line.rmse, "share": share}
     return replace(line, warnings=(*line.warnings, Statement("line_misses", WARNING, numbers=numbers)))
@@ -321,47 +325,51 @@ def study_points(points: MotorTable, origin: str = "a table", remarks: Sequence[
     return _along(study, curves_of_points(points))
 
 
-def _free_runs(runs: Sequence[Run], asked: MotorFit, hold_out: Sequence[str], progress: Progress) -> MotorStudy:
-    away = held_out([run.source for run in runs], hold_out)
-    kept = [run for run, out in zip(runs, away, strict=True) if out]
-    logs = logs_of_free_runs([run for run, out in zip(runs, away, strict=True) if not out], asked.input)
+def _free_runs(runs: Sequence[Run], method: MotorFit, hold_out: Sequence[str], progress: Progress) -> MotorStudy:
+    held_mask = held_out([run.source for run in runs], hold_out)
+    held_out_runs = [run for run, is_held_out in zip(runs, held_mask, strict=True) if is_held_out]
+    logs = logs_of_free_runs(
+        [run for run, is_held_out in zip(runs, held_mask, strict=True) if not is_held_out], method.input
+    )
     motors = [
-        m for m in range(min(log.motors for log in logs)) if all(np.isfinite(log.put_in[:, m]).any() for log in logs)
+        m
+        for m in range(min(log.motors for log in logs))
+        if all(np.isfinite(log.input_values[:, m]).any() for log in logs)
     ] or [0]
     pairs = []
     for motor in motors:
         progress(Report(f"fitting motor {motor + 1} of {len(motors)}"))
-        fits = written_and_plain(logs, motor, asked)
-        pairs.append([replace(fit, held_out=fit_rmse(fit, kept)) if kept else fit for fit in fits])
-    bands, plain = zip(*pairs, strict=True)
+        fits = written_and_plain(logs, motor, method)
+        pairs.append([replace(fit, held_out=fit_rmse(fit, held_out_runs)) if held_out_runs else fit for fit in fits])
+    bands, plain_motors = zip(*pairs, strict=True)
     origin = logs[0].motion_from if logs[0].speed is None else "wheel_speed"
     slow = is_slow(logs)
     try:
-        seen = None if slow else motor_windows(logs)
+        windows_seen = None if slow else motor_windows(logs)
     except InsufficientDataError:  # no window for the line of a direction
-        seen = None
-    starts = starts_of_points(points_of_logs(logs)) if slow else motor_starts(logs, seen, motors)
+        windows_seen = None
+    starts = starts_of_points(points_of_logs(logs)) if slow else motor_starts(logs, windows_seen, motors)
     study = MotorStudy(
         OUTPUT_ERROR,
         logs[0].kind,
         logs[0].unit,
         origin,
         bands,
-        plain,
+        plain_motors,
         starts=starts,
         supply=_supply(logs),
-        drawn=seen,
+        drawn=windows_seen,
         log_warnings=tuple(averaged_statements(logs, False)) + _of_counts(runs, logs),
     )
-    if seen is not None:
-        study = replace(study, log_warnings=(*study.log_warnings, *dead_bands_apart(bands, seen)))
+    if windows_seen is not None:
+        study = replace(study, log_warnings=(*study.log_warnings, *dead_bands_apart(bands, windows_seen)))
     return _along(study, curves_of_points(points_of_logs(logs)) if slow else curves_of_logs(logs))
 
 
 def _of_counts(runs: Sequence[Run], logs: Sequence[MotorLog]) -> tuple[Statement, ...]:
     """Whether speeds were taken for the angles of which they are differences."""
-    added = any(run.wheel_speed is not None for run in runs) and all(log.speed is None for log in logs)
-    return (Statement("speeds_added_up", NOTE),) if added and logs[0].travel == ANGLE else ()
+    has_angles = any(run.wheel_speed is not None for run in runs) and all(log.speed is None for log in logs)
+    return (Statement("speeds_added_up", NOTE),) if has_angles and logs[0].travel == ANGLE else ()
 
 
 def dead_bands_apart(motors: Sequence[MotorEstimate], windows: MotorWindows) -> Iterator[Statement]:
@@ -372,9 +380,9 @@ def dead_bands_apart(motors: Sequence[MotorEstimate], windows: MotorWindows) -> 
         except InsufficientDataError:
             continue
         ends = motor.rejected.get(BAND, motor.ci95.get(BAND, (math.nan, math.nan)))
-        (low, high), (least, most) = ends, line.ci95[BAND]
-        if (motor.dead_band_seen or line.dead_band_seen) and (high < least or most < low):
-            numbers = {"free_run": ends, "windows": (least, most), "unit": motor.unit}
+        (low, high), (free_low, free_high) = ends, line.ci95[BAND]
+        if (motor.dead_band_seen or line.dead_band_seen) and (high < free_low or free_high < low):
+            numbers = {"free_run": ends, "windows": (free_low, free_high), "unit": motor.unit}
             yield Statement("dead_bands_apart", WARNING, motor.name, numbers)
 
 
@@ -407,50 +415,57 @@ def motors_verdict(
     """
     lines = [motor for motor in motors if motor.motor is not None] or list(motors)  # else that of all together
     levels = {line.name: _levels(line, starts) for line in lines}
-    bent = {curve.motor: curve.straight for curve in curves}
-    blind = [line.name for line in lines if not (line.answers or levels[line.name] or line.motor in bent)]
-    if len(blind) == len(lines):
-        return Statement("no_motor_answers", ERROR, numbers={"motors": blind})
-    seen = [line for line in lines if levels[line.name]]
-    missed = [line.name for line in lines if "line_misses" in {warning.code for warning in line.warnings}]
-    straight = [line.name for line in lines if line.motor not in bent and line.name not in missed]
-    without = [name for name in straight if not levels[name] and name not in blind]
-    parts = [_starts(seen, levels, starts, len(lines))] if seen else []
-    if without:
-        numbers = {"motors": without, "too": bool(seen), "total": len(lines)}
+    curve_by_motor = {curve.motor: curve.straight for curve in curves}
+    blind_names = [
+        line.name for line in lines if not (line.answers or levels[line.name] or line.motor in curve_by_motor)
+    ]
+    if len(blind_names) == len(lines):
+        return Statement("no_motor_answers", ERROR, numbers={"motors": blind_names})
+    started_motors = [line for line in lines if levels[line.name]]
+    missed_names = [line.name for line in lines if "line_misses" in {warning.code for warning in line.warnings}]
+    straight = [line.name for line in lines if line.motor not in curve_by_motor and line.name not in missed_names]
+    names_without_start = [name for name in straight if not levels[name] and name not in blind_names]
+    parts = [_starts(started_motors, levels, starts, len(lines))] if started_motors else []
+    if names_without_start:
+        numbers = {"motors": names_without_start, "too": bool(started_motors), "total": len(lines)}
         parts.append(Statement("motors_without_dead_band", NOTE, numbers=numbers))
-    if bent:
-        numbers = {"motors": [line.name for line in lines if line.motor in bent], "unit": lines[0].unit}
-        low, high = curves[0].straight if len(bent) == 1 else (0.0, 0.0)
+    if curve_by_motor:
+        numbers = {"motors": [line.name for line in lines if line.motor in curve_by_motor], "unit": lines[0].unit}
+        low, high = curves[0].straight if len(curve_by_motor) == 1 else (0.0, 0.0)
         parts.append(Statement("motors_no_line", WARNING, numbers=numbers | {"low": low, "high": high}))
-    if missed := [name for name in missed if name not in blind]:
-        parts.append(Statement("motors_line_misses", WARNING, numbers={"motors": missed}))
-    if blind:
-        parts.append(Statement("motors_not_answering", WARNING, numbers={"motors": blind}))
-    return Statement("motors_answer", WARNING if blind or bent or missed else NOTE, numbers={"parts": parts})
+    if missed_names := [name for name in missed_names if name not in blind_names]:
+        parts.append(Statement("motors_line_misses", WARNING, numbers={"motors": missed_names}))
+    if blind_names:
+        parts.append(Statement("motors_not_answering", WARNING, numbers={"motors": blind_names}))
+    return Statement(
+        "motors_answer", WARNING if blind_names or curve_by_motor or missed_names else NOTE, numbers={"parts": parts}
+    )
 
 
 def _levels(motor: MotorEstimate, starts: Sequence[MotorStart]) -> list[float]:
     """The inputs at which a motor starts; none where that is not known."""
-    sharp = [start.value[START] for start in starts if start.motor == motor.motor and start.sharp]
-    if sharp or not motor.dead_band_seen:
-        return sharp
+    start_levels = [start.value[START] for start in starts if start.motor == motor.motor and start.sharp]
+    if start_levels or not motor.dead_band_seen:
+        return start_levels
     offset = motor.value[OFFSET] if motor.offset_seen else 0.0
     return list(dict.fromkeys([motor.value[BAND] + offset, motor.value[BAND] - offset]))
 
 
 def _starts(
-    seen: Sequence[MotorEstimate], levels: dict[str, list[float]], starts: Sequence[MotorStart], total: int
+    started_motors: Sequence[MotorEstimate], levels: dict[str, list[float]], starts: Sequence[MotorStart], total: int
 ) -> Statement:
     """At which inputs motors start; of a motor alone, in each direction."""
-    both = [start for start in starts if start.sharp]
-    unit = {"unit": seen[0].unit}
-    if total == 1 and len(both) == 2 and both[0].motor == seen[0].motor:
-        ways = {"levels": [start.value[START] for start in both], "directions": [start.direction for start in both]}
-        return Statement("starts_both_ways", NOTE, seen[0].name, ways | unit)
+    sharp_starts = [start for start in starts if start.sharp]
+    unit = {"unit": started_motors[0].unit}
+    if total == 1 and len(sharp_starts) == 2 and sharp_starts[0].motor == started_motors[0].motor:
+        ways = {
+            "levels": [start.value[START] for start in sharp_starts],
+            "directions": [start.direction for start in sharp_starts],
+        }
+        return Statement("starts_both_ways", NOTE, started_motors[0].name, ways | unit)
     numbers = {
-        "motors": [line.name for line in seen],
+        "motors": [line.name for line in started_motors],
         "total": total,
-        "levels": [level for line in seen for level in levels[line.name]],
+        "levels": [level for line in started_motors for level in levels[line.name]],
     }
     return Statement("motors_start", NOTE, numbers=numbers | unit)

@@ -32,16 +32,16 @@ from omnidyn.statistics import (
 
 DRAWS, SEED, BLOCK = 1000, 20121, 3
 FOLDS = 5  # shares of the windows, in time, that are left out in turn
-ITERATIONS, SETTLED = 200, 1e-8
+ITERATIONS, STEP_TOLERANCE = 200, 1e-8
 HUBER = 2.5
 MIDDLE = 0.6827  # of the draws: a few wild ones, of a line that is hardly determined, do not count in a std
 MIN_WINDOWS = 6
-ALIKE = 1e-3  # share of a column that the others leave over: below it they say the same
+COLUMN_TOLERANCE = 1e-3  # share of a column that the others leave over: below it they say the same
 
 
 def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEstimate:
     """The line of one motor (its number from 0), or of all. Raises InsufficientDataError below six windows."""
-    put_in, speed, speed_std, side, change, block = windows.of(motor)
+    input_values, speed, speed_std, side, change, block = windows.of(motor)
     block = block.astype(np.int64)
     count = len(np.unique(block))
     if count < MIN_WINDOWS:
@@ -52,18 +52,24 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
             remedy="record longer",
         )
     design = np.stack([speed, side, change], axis=1)
-    used = _columns(design, windows.settled)
-    fit = _fit(design[:, used], put_in, speed_std)
-    drawn = np.full((DRAWS + 1, 3), np.nan)  # the fit itself first
-    drawn[0, used] = fit.parameters
-    drawn[1:, used] = _bootstrap(design[:, used], put_in, speed_std, fit, block, windows.settled)
+    used_columns = _columns(design, windows.settled)
+    fit = _fit(design[:, used_columns], input_values, speed_std)
+    draw_values = np.full((DRAWS + 1, 3), np.nan)  # the fit itself first
+    draw_values[0, used_columns] = fit.parameters
+    draw_values[1:, used_columns] = _bootstrap(
+        design[:, used_columns], input_values, speed_std, fit, block, windows.settled
+    )
     with np.errstate(invalid="ignore", divide="ignore"):  # a draw without a slope has no lag
-        numbers = dict(zip((SLOPE, BAND, INERTIA), drawn.T, strict=True)) | {LAG: drawn[:, 2] / drawn[:, 0]}
-    needless = 1 in used and not _pays(design[:, used], put_in, fit.weight, used.index(1))
-    residual = put_in - design[:, used] @ fit.parameters
+        numbers = dict(zip((SLOPE, BAND, INERTIA), draw_values.T, strict=True)) | {
+            LAG: draw_values[:, 2] / draw_values[:, 0]
+        }
+    is_needless = 1 in used_columns and not _pays(
+        design[:, used_columns], input_values, fit.weight, used_columns.index(1)
+    )
+    residual = input_values - design[:, used_columns] @ fit.parameters
     slope, error = float(fit.parameters[0]), float(np.sqrt(np.mean(residual**2)))
     with np.errstate(invalid="ignore", divide="ignore"):  # of draws that are all alike there is none
-        correlation = float(np.corrcoef(drawn[1:, :2].T)[0, 1])
+        correlation = float(np.corrcoef(draw_values[1:, :2].T)[0, 1])
     return MotorEstimate(
         motor=motor,
         kind=windows.kind,
@@ -74,28 +80,30 @@ def fit_line(windows: MotorWindows, motor: int | None, source: str) -> MotorEsti
         value={name: float(draws[0]) for name, draws in numbers.items()},
         std={name: 0.5 * float(np.diff(central_interval(draws[1:], MIDDLE))[0]) for name, draws in numbers.items()},
         ci95={name: central_interval(draws[1:]) for name, draws in numbers.items()},
-        rejected={BAND: central_interval(numbers[BAND][1:])} if needless else {},
+        rejected={BAND: central_interval(numbers[BAND][1:])} if is_needless else {},
         correlation=correlation,
         rmse=error / abs(slope) if slope else math.inf,
         unidentifiable=tuple(name for name, draws in numbers.items() if np.isnan(draws[0])),
         one_way=bool(np.abs(side.sum()) > 0.98 * np.abs(side).sum()),
-        answers=follows([(put_in, speed)]) is not False,
+        answers=follows([(input_values, speed)]) is not False,
         travel=windows.travel,
         rest=float(np.fmax.reduce(windows.rest if motor is None else windows.rest[[motor]])),
         draws={name: draws[1:] for name, draws in numbers.items()},
     )
 
 
-def _pays(design: FloatArray, put_in: FloatArray, weight: FloatArray, column: int) -> bool:
+def _pays(design: FloatArray, input_values: FloatArray, weight: FloatArray, column: int) -> bool:
     """Whether windows left out, a share in turn, are predicted better with a column, by PAYS of the error."""
-    errors, fold = np.zeros(2), np.arange(len(put_in)) * FOLDS // len(put_in)
+    errors, fold = np.zeros(2), np.arange(len(input_values)) * FOLDS // len(input_values)
     for k, table in enumerate((design, np.delete(design, column, axis=1))):
         root = np.sqrt(weight)
         for part in range(FOLDS):
-            kept, out = fold != part, fold == part
-            rows = root[kept, None] * table[kept]
-            parameters = np.linalg.lstsq(rows, root[kept] * put_in[kept], rcond=None)[0]
-            errors[k] += float(weight[out] @ (put_in[out] - table[out] @ parameters) ** 2)
+            kept_rows, left_out_rows = fold != part, fold == part
+            rows = root[kept_rows, None] * table[kept_rows]
+            parameters = np.linalg.lstsq(rows, root[kept_rows] * input_values[kept_rows], rcond=None)[0]
+            errors[k] += float(
+                weight[left_out_rows] @ (input_values[left_out_rows] - table[left_out_rows] @ parameters) ** 2
+            )
     return bool(np.sqrt(errors[0]) < (1.0 - PAYS) * np.sqrt(errors[1]))
 
 
@@ -106,30 +114,30 @@ class _Fit:
     weight: FloatArray
 
 
-def _columns(design: FloatArray, settled: bool) -> list[int]:
+def _columns(design: FloatArray, is_settled: bool) -> list[int]:
     """The columns that can be told: no inertia where the speed never changes or start-ups were left out; no dead band
     where the others say as much as it, at one speed or under one input (then k w + m w' is constant).
     """
     size = np.abs(design).max(axis=0)
-    others = [0] if settled or size[2] <= 1e-9 * size[0] else [0, 2]
-    side, rest = design[:, 1], design[:, others]
-    left = side - rest @ np.linalg.lstsq(rest, side, rcond=None)[0]
-    told = float(left @ left) > ALIKE * float(side @ side)
-    return sorted([*others, 1]) if told else others
+    other_columns = [0] if is_settled or size[2] <= 1e-9 * size[0] else [0, 2]
+    side, other_design = design[:, 1], design[:, other_columns]
+    side_residual = side - other_design @ np.linalg.lstsq(other_design, side, rcond=None)[0]
+    is_told = float(side_residual @ side_residual) > COLUMN_TOLERANCE * float(side @ side)
+    return sorted([*other_columns, 1]) if is_told else other_columns
 
 
-def _fit(design: FloatArray, put_in: FloatArray, speed_std: FloatArray) -> _Fit:
+def _fit(design: FloatArray, input_values: FloatArray, speed_std: FloatArray) -> _Fit:
     """The line, the extra variance (Mandel and Paule 1982), and Huber's weights, in turn until they settle."""
-    weight, extra = np.ones(len(put_in)), float(np.var(put_in)) + 1e-30
-    parameters = _york(design[None], put_in[None], speed_std[None], extra, weight[None])[0]
+    weight, extra = np.ones(len(input_values)), float(np.var(input_values)) + 1e-30
+    parameters = _york(design[None], input_values[None], speed_std[None], extra, weight[None])[0]
     for _ in range(20):
-        residual = put_in - design @ parameters
+        residual = input_values - design @ parameters
         error = (parameters[0] * speed_std) ** 2
         extra = _extra_variance(residual, error, weight, design.shape[1])
         size = np.abs(residual) / np.sqrt(extra + error + 1e-300)
         weight = huber_weight(size, HUBER)
-        new = _york(design[None], put_in[None], speed_std[None], extra, weight[None])[0]
-        if np.abs(new - parameters).max() <= SETTLED * np.abs(new).max():
+        new = _york(design[None], input_values[None], speed_std[None], extra, weight[None])[0]
+        if np.abs(new - parameters).max() <= STEP_TOLERANCE * np.abs(new).max():
             break
         parameters = new
     return _Fit(parameters, extra, weight)
@@ -152,7 +160,7 @@ def _extra_variance(residual: FloatArray, error: FloatArray, weight: FloatArray,
 
 
 def _york(
-    design: FloatArray, put_in: FloatArray, speed_std: FloatArray, extra: float, weight: FloatArray
+    design: FloatArray, input_values: FloatArray, speed_std: FloatArray, extra: float, weight: FloatArray
 ) -> FloatArray:
     """Least sum of w r^2 / (s^2 + k^2 speed_std^2), for many draws at once. design: (draws, n, p). Returns (draws, p).
 
@@ -168,37 +176,37 @@ def _york(
         return np.linalg.solve(matrix, (right / scale)[:, :, None])[:, :, 0] / scale
 
     return errors_in_variables(
-        design, put_in, extra, speed_std**2, solve, weight=weight, tolerance=SETTLED, most=ITERATIONS
+        design, input_values, extra, speed_std**2, solve, weight=weight, tolerance=STEP_TOLERANCE, most=ITERATIONS
     ).parameters
 
 
 def _bootstrap(
-    design: FloatArray, put_in: FloatArray, speed_std: FloatArray, fit: _Fit, block: IntArray, settled: bool
+    design: FloatArray, input_values: FloatArray, speed_std: FloatArray, fit: _Fit, block: IntArray, is_settled: bool
 ) -> FloatArray:
     """Parameters of fits to windows drawn anew, in blocks of neighbours. Shape (DRAWS, p).
 
     A block is twice as long as the residuals remember, and three windows at least, one where each is a step of its own.
     The draws are widened as Student's t is, for a bootstrap of few blocks is too narrow.
     """
-    blocks, own = np.unique(block, return_inverse=True)
-    residual = np.bincount(own, put_in - design @ fit.parameters) / np.bincount(own)
+    blocks, block_of_row = np.unique(block, return_inverse=True)
+    residual = np.bincount(block_of_row, input_values - design @ fit.parameters) / np.bincount(block_of_row)
     memory = int(np.ceil(2.0 * autocorrelation_time(residual)))
-    length = min(max(1 if settled else BLOCK, memory), max(1, len(blocks) // 2))
+    length = min(max(1 if is_settled else BLOCK, memory), max(1, len(blocks) // 2))
     times = drawn_times(len(blocks), length, DRAWS, np.random.default_rng(SEED))
-    found = []
-    for part in np.array_split(times, max(1, DRAWS * len(put_in) // 100_000)):
-        weight = fit.weight * part[:, own]
+    draw_list = []
+    for part in np.array_split(times, max(1, DRAWS * len(input_values) // 100_000)):
+        weight = fit.weight * part[:, block_of_row]
         shape = (len(part), *design.shape)
-        found.append(
+        draw_list.append(
             _york(
                 np.broadcast_to(design, shape),
-                np.broadcast_to(put_in, shape[:2]),
+                np.broadcast_to(input_values, shape[:2]),
                 np.broadcast_to(speed_std, shape[:2]),
                 fit.extra,
                 weight,
             )
         )
-    drawn = np.concatenate(found)
+    draws = np.concatenate(draw_list)
     freedom = max(len(blocks) / length - design.shape[1], 1.0)
-    wider = np.sqrt(1.0 + design.shape[1] / freedom) * t_quantile(int(max(freedom, 1))) / t_quantile(10**6)
-    return fit.parameters + wider * (drawn - fit.parameters)
+    widening = np.sqrt(1.0 + design.shape[1] / freedom) * t_quantile(int(max(freedom, 1))) / t_quantile(10**6)
+    return fit.parameters + widening * (draws - fit.parameters)

@@ -29,7 +29,7 @@ from omnidyn.statistics import (
 LENGTHS = (0.05, 0.1, 0.2, 0.5)  # [s] the shortest whose mean speed is sharp enough is taken
 SHARP = 0.02  # of the spread of the speeds: a mean speed with this error needs no longer window
 MIN_ROWS, MAX_WINDOWS = 5, 3000
-WILD = 5.0  # scales from the median beyond which a speed is not believed
+OUTLIER_SCALES = 5.0  # scales from the median beyond which a speed is not believed
 SETTLED_SHARE = (1.0 / 3.0, 1.0)  # of each command's rows, where speeds are too noisy to correct for a start-up
 EDGE_SHARE = 0.2  # of a window, around each end: where the speed at the end is taken from
 SIGN_NOISE = 0.2  # of the usual speed: noise that a sign can bear
@@ -42,8 +42,8 @@ REST_SHARE = 0.1  # of the rows of a window at rest from which it says nothing a
 class MotorWindows:
     """Windows of all motors. One row per window and motor; arrays of shape (rows,).
 
-    put_in: mean input, in `unit`. speed: mean speed [rad/s], and its standard error. side: mean of sgn w. change: of
-    the speed, over the length of the window [rad/s^2]. motor: its number from 0. block: number of the window.
+    input_values: mean input, in `unit`. speed: mean speed [rad/s], and its standard error. side: mean of sgn w. change:
+    of the speed, over the length of the window [rad/s^2]. motor: its number from 0. block: number of the window.
     rest: per motor the largest mean input [unit] under which it stayed at rest, NaN where it never rested.
     unresolved, resting: windows left out because the log does not resolve their input, or because the motor rested.
     settled: start-ups were left out, so that nothing is known of the inertia. every: of a very long log, only every so
@@ -51,7 +51,7 @@ class MotorWindows:
     comes out too short. NaN where nothing is known of the inertia. travel: of `MotorLog`.
     """
 
-    put_in: FloatArray
+    input_values: FloatArray
     speed: FloatArray
     speed_std: FloatArray
     side: FloatArray
@@ -71,40 +71,46 @@ class MotorWindows:
     travel: str = "rad"
 
     def of(self, motor: int | None) -> tuple[FloatArray, ...]:
-        """(put_in, speed, speed_std, side, change, block) of one motor, or of all."""
-        keep = slice(None) if motor is None else self.motor == motor
-        return tuple(getattr(self, name)[keep] for name in ("put_in", "speed", "speed_std", "side", "change", "block"))
+        """(input_values, speed, speed_std, side, change, block) of one motor, or of all."""
+        mask = slice(None) if motor is None else self.motor == motor
+        return tuple(
+            getattr(self, name)[mask] for name in ("input_values", "speed", "speed_std", "side", "change", "block")
+        )
 
     def turned_under(self, motor: int) -> float:
         """The least input, as a size, under which a motor turns steadily; infinite where no window is steady."""
-        put_in, speed, speed_std, *_ = self.of(motor)
-        turns = (np.abs(speed) > TURNS * speed_std) & (put_in != 0.0)
-        return float(np.abs(put_in[turns]).min(initial=np.inf)) if self.settled else np.inf
+        input_values, speed, speed_std, *_ = self.of(motor)
+        turns = (np.abs(speed) > TURNS * speed_std) & (input_values != 0.0)
+        return float(np.abs(input_values[turns]).min(initial=np.inf)) if self.settled else np.inf
 
 
 def motor_windows(
-    logs: Sequence[MotorLog], *, steady: bool = False, share: tuple[float, float] | None = None, least: float = 0.0
+    logs: Sequence[MotorLog],
+    *,
+    steady: bool = False,
+    share: tuple[float, float] | None = None,
+    least_length: float = 0.0,
 ) -> MotorWindows:
     """Windows of the motors in logs.
 
     They are as short as gives a sharp mean speed; where nothing does and the input comes in steps, a window is the last
     two thirds of each step. steady: take the steady windows of `find_plateaus` instead; share: with these shares of
-    each command's rows. least [s]: no window is shorter. Raises InsufficientDataError where no window is left.
+    each command's rows. least_length [s]: no window is shorter. Raises InsufficientDataError where no window is left.
     """
-    usual = _usual_speed(logs)
-    length, sharp = _length(logs, usual, least)
+    usual_speed = _usual_speed(logs)
+    length, is_sharp = _length(logs, usual_speed, least_length)
     # the input stands still most of the time
-    in_steps = all(np.mean((np.diff(log.put_in, axis=0) != 0.0).any(axis=1)) <= STEPWISE for log in logs)
-    if in_steps and not (sharp or steady or share):
+    in_steps = all(np.mean((np.diff(log.input_values, axis=0) != 0.0).any(axis=1)) <= STEPWISE for log in logs)
+    if in_steps and not (is_sharp or steady or share):
         share = SETTLED_SHARE if all(_windows(log, length, False, SETTLED_SHARE) for log in logs) else None
     windows = [_windows(log, length, steady, share) for log in logs]
-    every = max(1, -(-sum(map(len, windows)) // MAX_WINDOWS))
+    row_stride = max(1, -(-sum(map(len, windows)) // MAX_WINDOWS))
     block, readers = 0, []
     rows: list[tuple[float, ...]] = []
-    for log, several in zip(logs, windows, strict=True):
-        reader = _Reader(log, usual)
+    for log, log_windows in zip(logs, windows, strict=True):
+        reader = _Reader(log, usual_speed)
         readers.append(reader)
-        for window in several[::every]:
+        for window in log_windows[::row_stride]:
             rows += [(*row, block) for row in reader.rows_of(window)]
             block += 1
         block += 1  # no block of the bootstrap reaches over the end of a run
@@ -128,7 +134,7 @@ def motor_windows(
         resting=resting,
         rest=np.fmax.reduce([reader.rest for reader in readers]),
         settled=steady or share is not None,
-        every=every,
+        every=row_stride,
         smear=max(_smear(log, length) for log in logs),
         travel=first.travel,
     )
@@ -142,11 +148,11 @@ def line_numbers(logs: Sequence[MotorLog], motor: int) -> dict[str, float] | Non
     """
     try:
         long = [log for log in logs if len(log.t) > MIN_ROWS]
-        put_in, speed, _, side, change, _ = motor_windows(long).of(motor)
+        input_values, speed, _, side, change, _ = motor_windows(long).of(motor)
     except InsufficientDataError:
         return None
     table = np.stack([speed, side, np.ones(len(speed)), change], axis=1)
-    numbers, _, rank, _ = np.linalg.lstsq(table, put_in, rcond=1e-9)
+    numbers, _, rank, _ = np.linalg.lstsq(table, input_values, rcond=1e-9)
     slope, band, offset, inertia = numbers.tolist()
     if rank < table.shape[1] or slope <= 0.0 or inertia <= 0.0:
         return None
@@ -160,9 +166,9 @@ def _usual_speed(logs: Sequence[MotorLog]) -> float:
         for log in logs
         for window in _windows(log, LENGTHS[-1])[:: max(1, len(log.t) // 20_000)]
     ]
-    known = np.concatenate(means) if means else np.zeros(0)
-    known = known[np.isfinite(known)]
-    return float(np.quantile(known, 0.75)) if known.size else 0.0
+    known_means = np.concatenate(means) if means else np.zeros(0)
+    known_means = known_means[np.isfinite(known_means)]
+    return float(np.quantile(known_means, 0.75)) if known_means.size else 0.0
 
 
 def _smear(log: MotorLog, length: float) -> float:
@@ -171,17 +177,17 @@ def _smear(log: MotorLog, length: float) -> float:
     return 2.0 * row * max(1, round(EDGE_SHARE * length / row / 2.0)) if row > 0.0 else 0.0
 
 
-def _length(logs: Sequence[MotorLog], usual: float, least: float) -> tuple[float, bool]:
+def _length(logs: Sequence[MotorLog], usual_speed: float, least_length: float) -> tuple[float, bool]:
     """The shortest length of a window whose mean speed is sharp and that has rows enough; whether there is one."""
-    for length in (length for length in LENGTHS if length >= least):
+    for length in (length for length in LENGTHS if length >= least_length):
         errors, rows = [], []
         for log in logs:
             for window in _windows(log, length)[:: max(1, len(log.t) // 500)]:
                 error = _mean_speed(log, window)[1]
-                known = np.isfinite(error)  # a robot may have more wheels than the log has motors
-                errors += [float(error[known].max())] if known.any() else []
+                known_errors = np.isfinite(error)  # a robot may have more wheels than the log has motors
+                errors += [float(error[known_errors].max())] if known_errors.any() else []
                 rows.append(window.stop - window.start)
-        if errors and np.median(errors) <= SHARP * usual and np.median(rows) >= 2 * MIN_ROWS:
+        if errors and np.median(errors) <= SHARP * usual_speed and np.median(rows) >= 2 * MIN_ROWS:
             return length, True
     return LENGTHS[-1], False
 
@@ -193,14 +199,14 @@ def _windows(
     if steady or share:
         plateaus = find_plateaus(log.run, start=share[0], end=share[1]) if share else find_plateaus(log.run)
         return [plateau.rows for plateau in plateaus]
-    found = []
+    windows_found = []
     for piece in log.pieces:
         t = log.t[piece]
         count = int((t[-1] - t[0]) / length + 1e-9)
         edges = np.searchsorted(t, t[0] + length * np.arange(count + 1) - 1e-9)
         ends = [min(int(edge), len(t) - 1) for edge in edges]
-        found += [slice(piece.start + a, piece.start + b + 1) for a, b in pairwise(ends)]
-    return [window for window in found if window.stop - window.start > MIN_ROWS]
+        windows_found += [slice(piece.start + a, piece.start + b + 1) for a, b in pairwise(ends)]
+    return [window for window in windows_found if window.stop - window.start > MIN_ROWS]
 
 
 def _mean_speed(log: MotorLog, window: slice) -> tuple[FloatArray, FloatArray]:
@@ -219,33 +225,33 @@ def _mean_speed(log: MotorLog, window: slice) -> tuple[FloatArray, FloatArray]:
 
 def _mean_of_noisy(t: FloatArray, speed: FloatArray) -> tuple[float, float]:
     """Mean of a noisy speed and its error: of what is left beside a cubic, for a start-up is no noise."""
-    known = np.isfinite(speed)
-    if known.sum() < MIN_ROWS:
+    known_rows = np.isfinite(speed)
+    if known_rows.sum() < MIN_ROWS:
         return np.nan, np.nan
-    x, y = 2.0 * (t[known] - t[0]) / (t[-1] - t[0]) - 1.0, speed[known]
+    x, y = 2.0 * (t[known_rows] - t[0]) / (t[-1] - t[0]) - 1.0, speed[known_rows]
     middle = np.median(y)
-    reach = WILD * MAD_TO_STD * np.median(np.abs(y - middle)) + sensor_step(y)
+    reach = OUTLIER_SCALES * MAD_TO_STD * np.median(np.abs(y - middle)) + sensor_step(y)
     table = np.polynomial.legendre.legvander(x, min(3, len(x) // 6))
     smooth = table @ np.linalg.lstsq(table, np.clip(y, middle - reach, middle + reach), rcond=None)[0]
-    rest, error = robust_mean(y - smooth)
-    return float(np.mean(smooth) + rest), float(error)
+    mean_residual, error = robust_mean(y - smooth)
+    return float(np.mean(smooth) + mean_residual), float(error)
 
 
 class _Reader:
     """Reads the rows of windows off one log, and keeps what was left out."""
 
-    def __init__(self, log: MotorLog, usual: float):
-        self.log, self.usual = log, usual
+    def __init__(self, log: MotorLog, usual_speed: float):
+        self.log, self.usual = log, usual_speed
         self.unresolved = self.resting = 0
         self.rest = np.full(log.motors, np.nan)
-        self._largest = np.nanmax(np.abs(log.put_in), axis=0, initial=0.0)
+        self._largest = np.nanmax(np.abs(log.input_values), axis=0, initial=0.0)
         self._put_in = [
             InputIntegral(
                 log.t,
-                log.put_in[:, m],
-                rows_with(np.isfinite(log.put_in[:, m]), log.pieces),
-                log.averaged[m],
-                None if log.given is None else (log.given[0], log.given[1][:, m]),
+                log.input_values[:, m],
+                rows_with(np.isfinite(log.input_values[:, m]), log.pieces),
+                log.mean_rows[m],
+                None if log.stamped_input is None else (log.stamped_input[0], log.stamped_input[1][:, m]),
             )
             for m in range(log.motors)
         ]
@@ -254,45 +260,45 @@ class _Reader:
         """The rows of one window, a motor each: (input, speed, its error, side, change, motor)."""
         log, span = self.log, float(np.ptp(self.log.t[window]))
         mean, error = _mean_speed(log, window)
-        found = []
+        window_rows = []
         for motor in range(log.motors):
-            if not np.isfinite(log.put_in[window, motor]).all() or not np.isfinite(mean[motor]):
+            if not np.isfinite(log.input_values[window, motor]).all() or not np.isfinite(mean[motor]):
                 continue
-            if unresolved_input(log.put_in[:, motor], window, float(self._largest[motor])):
+            if unresolved_input(log.input_values[:, motor], window, float(self._largest[motor])):
                 self.unresolved += 1
                 continue
-            put_in = self._put_in[motor].over(window) / span
-            if not np.isfinite(put_in):
+            mean_input = self._put_in[motor].over(window) / span
+            if not np.isfinite(mean_input):
                 continue
-            wide = self._wide(window, motor)
-            sides = self._sides(wide, motor, float(error[motor]), put_in)
+            wide_window = self._wide(window, motor)
+            sides = self._sides(wide_window, motor, float(error[motor]), mean_input)
             if np.mean(sides == 0.0) > REST_SHARE:
                 self.resting += 1
                 if not sides.any():
-                    self.rest[motor] = np.nanmax([self.rest[motor], abs(put_in)])
+                    self.rest[motor] = np.nanmax([self.rest[motor], abs(mean_input)])
                 continue
             sides = self._mean_sides(sides, motor)
             change = (
                 self._speed_at(window, motor, window.stop - 1) - self._speed_at(window, motor, window.start)
             ) / span
-            found.append((put_in, mean[motor], error[motor], float(np.mean(sides)), change, motor))
-        return found
+            window_rows.append((mean_input, mean[motor], error[motor], float(np.mean(sides)), change, motor))
+        return window_rows
 
     def _wide(self, window: slice, motor: int) -> slice:
         """The window with as many rows on either side as the mean of its sides reaches, where there are so many."""
-        before, piece = self.log.averaged[motor] // 2, self.log.piece(window.start)
-        after = self.log.averaged[motor] - 1 - before
-        return slice(max(piece.start, window.start - before), min(piece.stop, window.stop + after))
+        rows_before, piece = self.log.mean_rows[motor] // 2, self.log.piece(window.start)
+        rows_after = self.log.mean_rows[motor] - 1 - rows_before
+        return slice(max(piece.start, window.start - rows_before), min(piece.stop, window.stop + rows_after))
 
     def _mean_sides(self, sides: FloatArray, motor: int) -> FloatArray:
         """The mean of sgn w over the rows over which the speed is one.
 
         A mean changes sign about half its rows later than what it is of: its own signs half as far to either side.
         """
-        rows = min(self.log.averaged[motor], len(sides))
+        rows = min(self.log.mean_rows[motor], len(sides))
         return sides if rows == 1 else np.convolve(sides, np.full(rows, 1.0 / rows), mode="valid")
 
-    def _sides(self, window: slice, motor: int, error: float, put_in: float) -> FloatArray:
+    def _sides(self, window: slice, motor: int, error: float, mean_input: float) -> FloatArray:
         """Which way the motor turns, row by row: of the speed averaged until its noise no longer turns the sign. Where
         the mean over the whole window is too noisy for a sign, the input tells.
         """
@@ -302,18 +308,18 @@ class _Reader:
         noise = max(float(np.median(np.abs(np.diff(speed)))) * MAD_TO_STD / np.sqrt(2.0), error * np.sqrt(rows))
         count = int(np.ceil((noise / (SIGN_NOISE * self.usual)) ** 2)) if self.usual > 0.0 else rows
         if count >= rows:
-            return np.full(rows, np.sign(put_in))
+            return np.full(rows, np.sign(mean_input))
         if count > 1:
-            padded = np.pad(speed, (count // 2, count - 1 - count // 2), mode="edge")
-            speed = np.convolve(padded, np.full(count, 1.0 / count), mode="valid")
+            padded_speed = np.pad(speed, (count // 2, count - 1 - count // 2), mode="edge")
+            speed = np.convolve(padded_speed, np.full(count, 1.0 / count), mode="valid")
         return np.where(np.abs(speed) > SLOW * self.usual, np.sign(speed), 0.0)
 
     def _speed_at(self, window: slice, motor: int, row: int) -> float:
         """Speed at an end of a window, from the rows around it [rad/s]."""
         log, piece = self.log, self.log.piece(row)
         half = max(1, round(EDGE_SHARE * (window.stop - window.start) / 2))
-        near = slice(max(piece.start, row - half), min(piece.stop, row + half + 1))
+        nearby_rows = slice(max(piece.start, row - half), min(piece.stop, row + half + 1))
         if log.angle is None:
-            return float(robust_mean(log.motion[near, motor])[0])
-        angle, t = log.angle[near, motor], log.t[near]
+            return float(robust_mean(log.motion[nearby_rows, motor])[0])
+        angle, t = log.angle[nearby_rows, motor], log.t[nearby_rows]
         return float((angle[-1] - angle[0]) / (t[-1] - t[0]))

@@ -102,8 +102,8 @@ class OutputErrorEstimate(Estimate):
         log = self.robot.log
         if log is None or not runs:
             return self
-        of = dict.fromkeys((*log.of, *map(log_mark, runs)))
-        return replace(self, robot=self.robot.replace(log=log.replace(of=tuple(of))))
+        log_marks = dict.fromkeys((*log.of, *map(log_mark, runs)))
+        return replace(self, robot=self.robot.replace(log=log.replace(of=tuple(log_marks))))
 
     @property
     def stability(self) -> Stability | None:
@@ -128,16 +128,16 @@ class OutputErrorEstimate(Estimate):
             for name, nuisance in self.nuisances.items()
         ]
         noise = [f"noise of {name}: {std:.3g}" for name, std in self.noise.items()]
-        left = [Points(self.blind, "not shown by the data:"), Points(self.unused, "not used:")]
-        return [*super()._parts(), *sums, *logs, *noise, *left]
+        point_lists = [Points(self.blind, "not shown by the data:"), Points(self.unused, "not used:")]
+        return [*super()._parts(), *sums, *logs, *noise, *point_lists]
 
     def _whole(self, name: str) -> tuple[float, float] | None:
         """The interval of a number of the robot or of the log."""
         return self.nuisances[name].ci95 if name in self.nuisances else super()._whole(name)
 
     @staticmethod
-    def _of_log(own: Nuisance) -> str:
-        return f"{own.value:.4g} {interval_cell(own.ci95)} {own.unit}".rstrip()
+    def _of_log(nuisance: Nuisance) -> str:
+        return f"{nuisance.value:.4g} {interval_cell(nuisance.ci95)} {nuisance.unit}".rstrip()
 
     def to_dict(self) -> dict[str, Any]:
         """The estimate as JSON can hold it."""

@@ -24,7 +24,7 @@ from omnidyn.model.keys import Key
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
 
-WHOLE = "all"  # the name of the group where there are none
+ALL_LOGS = "all"  # the name of the group where there are none
 
 
 def group_names(runs: Sequence[Run], question: OutputError, groups: Sequence[str] | None) -> list[str]:
@@ -34,10 +34,12 @@ def group_names(runs: Sequence[Run], question: OutputError, groups: Sequence[str
             raise InputError(
                 "there are no groups", got=question.per_free[0], expected="with `groups`", where="per_free"
             )
-        return [WHOLE] * len(runs)
+        return [ALL_LOGS] * len(runs)
     if len(groups) != len(runs) or len(set(groups)) < 2:
-        got = f"{len(groups)} names, {len(set(groups))} of them different, for {len(runs)} runs"
-        raise InputError("groups need a name for every run", got=got, expected="two groups or more", where="groups")
+        received = f"{len(groups)} names, {len(set(groups))} of them different, for {len(runs)} runs"
+        raise InputError(
+            "groups need a name for every run", got=received, expected="two groups or more", where="groups"
+        )
     return list(groups)
 
 
@@ -52,32 +54,32 @@ def begun(
     """
     rigid = without_band(robot, ())
     exact = is_exact(rigid)
-    usual = free_by_default(rigid, exact)
-    asked = _written_out(question, robot, usual)
-    free = asked.free or ()
+    default_keys = free_by_default(rigid, exact)
+    full_question = _written_out(question, robot, default_keys)
+    free = full_question.free or ()
     robot = with_damping(without_band(robot, free), free)
     if joint:
-        _refuse_joint(runs, robot, asked)
-    records = read_records(runs, robot, asked)
-    refuse_unknown(asked.fixed, robot)
-    for level in asked_levels(robot, free, asked.fixed):
+        _refuse_joint(runs, robot, full_question)
+    records = read_records(runs, robot, full_question)
+    refuse_unknown(full_question.fixed, robot)
+    for level in asked_levels(robot, free, full_question.fixed):
         refuse_level(level, robot, free)
-    keys = asked.free if asked.free is not None else guesses(robot)
-    exact = exact and stays_exact(robot, [key for key in keys if key not in asked.fixed])
-    group = make_group(name, records, robot, asked, exact, usual, alone=not joint)
-    _refuse_profile(group, asked)
-    return group, asked
+    keys = full_question.free if full_question.free is not None else guesses(robot)
+    exact = exact and stays_exact(robot, [key for key in keys if key not in full_question.fixed])
+    group = make_group(name, records, robot, full_question, exact, default_keys, is_single=not joint)
+    _refuse_profile(group, full_question)
+    return group, full_question
 
 
 def _refuse_profile(group: Group, question: OutputError) -> None:
     levels = [level for level in asked_levels(group.robot, question.free or (), question.fixed) if group.tells(level)]
-    why = "a speed loop" if group.engine.looped else ""
+    reason = "a speed loop" if group.engine.has_loop else ""
     if group.robot.wheels.traction_mu is not None:
-        why = "wheels that may slip"
-    if why and levels:
+        reason = "wheels that may slip"
+    if reason and levels:
         raise UnsupportedError(
             "breakaway is profiled over voltages that are known, of wheels that roll",
-            got=why,
+            got=reason,
             expected="neither a speed loop nor a traction limit",
             where="free",
             remedy=f"give {Key.parse(levels[0]).table} a stribeck_speed and free it too: what falls with the speed is "
@@ -85,11 +87,11 @@ def _refuse_profile(group: Group, question: OutputError) -> None:
         )
 
 
-def _written_out(question: OutputError, robot: Robot, usual: Sequence[str]) -> OutputError:
+def _written_out(question: OutputError, robot: Robot, default_keys: Sequence[str]) -> OutputError:
     """The question with every key written out, as this robot has them."""
 
     def every(keys: Iterable[str]) -> tuple[str, ...]:
-        return expand_keys(tuple(keys), robot, usual)
+        return expand_keys(tuple(keys), robot, default_keys)
 
     free = question.free
     return replace(
@@ -111,6 +113,6 @@ def _refuse_joint(runs: Sequence[Run], robot: Robot, question: OutputError) -> N
             remedy="fit each group alone",
             where="free",
         )
-    why = why_no_inputs(runs, robot)
-    if why:
-        raise UnsupportedError("groups are fitted by output error only", got=why, where="groups")
+    reason = why_no_inputs(runs, robot)
+    if reason:
+        raise UnsupportedError("groups are fitted by output error only", got=reason, where="groups")

@@ -24,80 +24,108 @@ from omnidyn.identification.output_error.trust.uncertainty import trust
 from omnidyn.model.robot import Robot
 from omnidyn.statement import NOTE, WARNING, Statement
 
-SURE = 3.0  # standard errors by which a constant force is one
+FORCE_ERRORS = 3.0  # standard errors by which a constant force is one
 
 
-def better_of(found: Solution, plain: Solution) -> Solution:
+def better_of(solution: Solution, plain_solution: Solution) -> Solution:
     """A fit with nuisances, with the plain one beside it; the plain one where that predicts clearly better."""
-    if plain is found:
-        return found
-    margins = margins_of([found, plain])
-    ours, plains = free_run(found, margins), free_run(plain, margins)
-    if not plains.is_better(ours):
-        return replace(found, plain=plain)
-    lost = tuple(name.partition(AT)[0] for name in found.solver.problem.names if name not in plain.solver.problem.names)
-    numbers = {"nuisances": lost, "error": ours.error, "plain": plains.error}
-    return replace(plain, notes=(*found.notes, Statement("plain_predicts_better", WARNING, numbers=numbers)))
+    if plain_solution is solution:
+        return solution
+    margins = margins_of([solution, plain_solution])
+    own_run, plain_run = free_run(solution, margins), free_run(plain_solution, margins)
+    if not plain_run.is_better(own_run):
+        return replace(solution, plain_solution=plain_solution)
+    lost = tuple(
+        name.partition(AT)[0]
+        for name in solution.solver.problem.names
+        if name not in plain_solution.solver.problem.names
+    )
+    numbers = {"nuisances": lost, "error": own_run.error, "plain": plain_run.error}
+    return replace(
+        plain_solution, notes=(*solution.notes, Statement("plain_predicts_better", WARNING, numbers=numbers))
+    )
 
 
-def best_with_force(found: Solution, forced: Sequence[Solution]) -> Solution:
-    """A fit, or the one of `forced`, which have a constant force each, that predicts best and clearly better.
+def best_with_force(solution: Solution, forced_solutions: Sequence[Solution]) -> Solution:
+    """A fit, or the one of `forced_solutions`, which have a constant force each, that predicts best and clearly better.
 
     A step from the fit without does not see it: dry friction takes up to as much, and the numbers have gone elsewhere.
     """
-    margins = margins_of([found, *forced])
-    before, runs = free_run(found, margins), [free_run(one, margins) for one in forced]
+    margins = margins_of([solution, *forced_solutions])
+    run_without_force, runs = (
+        free_run(solution, margins),
+        [free_run(forced_solution, margins) for forced_solution in forced_solutions],
+    )
     k = int(np.argmin([run.error for run in runs]))
-    problem, values = forced[k].solver.problem, forced[k].state.point.values
-    std = trust(forced[k].solver, forced[k], AUTO).std
-    at = [problem.where(name) for name in problem.names if name not in found.solver.problem.names]
-    if before.adds_up or not runs[k].is_better(before) or not (np.abs(values[at]) > SURE * std[at]).any():
-        return found
-    names = tuple(problem.names[j] for j in at)
-    numbers = {"keys": names, "values": tuple(values[at].tolist()), "error": before.error, "with": runs[k].error}
-    notes = (*found.notes, Statement("constant_force", WARNING, numbers=numbers))
-    return replace(forced[k], plain=found.plain, notes=notes)
+    problem, values = forced_solutions[k].solver.problem, forced_solutions[k].state.point.values
+    std = trust(forced_solutions[k].solver, forced_solutions[k], AUTO).std
+    force_indices = [problem.where(name) for name in problem.names if name not in solution.solver.problem.names]
+    if (
+        run_without_force.adds_up
+        or not runs[k].is_better(run_without_force)
+        or not (np.abs(values[force_indices]) > FORCE_ERRORS * std[force_indices]).any()
+    ):
+        return solution
+    names = tuple(problem.names[j] for j in force_indices)
+    numbers = {
+        "keys": names,
+        "values": tuple(values[force_indices].tolist()),
+        "error": run_without_force.error,
+        "with": runs[k].error,
+    }
+    notes = (*solution.notes, Statement("constant_force", WARNING, numbers=numbers))
+    return replace(forced_solutions[k], plain_solution=solution.plain_solution, notes=notes)
 
 
-def why_white(white: Solution, found: Weighed) -> Statement | None:
+def why_white(white: Solution, weighed_fit: Weighed) -> Statement | None:
     """Why least squares are taken in the place of a fit whose errors remember; None where they are not."""
     margins = margins_of([white])
-    plains, ours = free_run(white, margins), free_run(found.solution, margins, found.models)
-    if plains.adds_up or not plains.is_better(ours):
+    plain_run, own_run = free_run(white, margins), free_run(weighed_fit.solution, margins, weighed_fit.models)
+    if plain_run.adds_up or not plain_run.is_better(own_run):
         return None
-    return Statement("white_predicts_better", NOTE, numbers={"error": ours.error, "white": plains.error})
+    return Statement("white_predicts_better", NOTE, numbers={"error": own_run.error, "white": plain_run.error})
 
 
 def beside_given(
-    estimate: OutputErrorEstimate, sure: Weighed, plain: Callable[[], Solution], began: Robot, takes_given: bool
+    estimate: OutputErrorEstimate,
+    weighed_fit: Weighed,
+    solve_plain: Callable[[], Solution],
+    given_robot: Robot,
+    may_take_given: bool,
 ) -> OutputErrorEstimate:
     """An estimate with what free runs on held-out blocks say of it.
 
     Args:
         estimate: of the only group.
-        sure: the point that it is of.
-        plain: makes the plain fit of the same logs.
-        began: the robot as it was given.
-        takes_given: whether that takes the place of the fitted one where it predicts clearly better.
+        weighed_fit: the point that it is of.
+        solve_plain: makes the plain fit of the same logs.
+        given_robot: the robot as it was given.
+        may_take_given: whether that takes the place of the fitted one where it predicts clearly better.
     """
 
     @cache
     def runs() -> tuple[FreeRun, FreeRun, FreeRun]:
         """Those of the fit, of the plain one, of the robot as it was given."""
-        other = plain()
-        margins = margins_of([sure.plain, other])
-        given = free_run(other, margins, values=np.array([p.value for p in other.solver.problem.parameters]))
-        fitted = free_run(sure.solution, margins, sure.models)
-        return fitted, fitted if other is sure.solution else free_run(other, margins), given
+        plain_solution = solve_plain()
+        margins = margins_of([weighed_fit.plain_solution, plain_solution])
+        given_run = free_run(
+            plain_solution, margins, values=np.array([p.value for p in plain_solution.solver.problem.parameters])
+        )
+        fitted = free_run(weighed_fit.solution, margins, weighed_fit.models)
+        return (
+            fitted,
+            fitted if plain_solution is weighed_fit.solution else free_run(plain_solution, margins),
+            given_run,
+        )
 
     def reference() -> HeldOut:
-        fitted, plains, given = runs()
-        return HeldOut((given if taken else fitted).error, plains.error, given.error)
+        fitted, plain_run, given_run = runs()
+        return HeldOut((given_run if is_given_better else fitted).error, plain_run.error, given_run.error)
 
-    taken = takes_given and runs()[2].is_better(runs()[0])
+    is_given_better = may_take_given and runs()[2].is_better(runs()[0])
     estimate = replace(estimate, reference=reference)
-    if not taken:
+    if not is_given_better:
         return estimate
     numbers = {"error": runs()[0].error, "given": runs()[2].error}
-    told = Statement("given_predicts_better", WARNING, numbers=numbers)
-    return replace(estimate, robot=began, warnings=(told, *estimate.warnings))
+    statement = Statement("given_predicts_better", WARNING, numbers=numbers)
+    return replace(estimate, robot=given_robot, warnings=(statement, *estimate.warnings))

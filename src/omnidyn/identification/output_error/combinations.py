@@ -17,7 +17,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.identification.output_error.answer import Combination
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.problem import Problem
-from omnidyn.identification.output_error.trust.uncertainty import BLIND, Trust
+from omnidyn.identification.output_error.trust.uncertainty import BLIND_EIGENVALUE, Trust
 from omnidyn.model.actuation import DEAD_BAND, without_map
 from omnidyn.model.deadzone import axis_patterns, breakaway_voltage, push_lost_per_volt, push_per_volt
 from omnidyn.model.dynamics import damping
@@ -27,8 +27,8 @@ from omnidyn.model.mass import axis_masses
 from omnidyn.model.robot import Robot
 
 STEP = 1e-4  # of a number or its logarithm: rounding and curvature below 1e-8
-LOST = 1e-3  # share of a lost direction that a combination may have
-VAGUE = 0.5  # of its value: a std beyond it determines no combination either
+LOST_SHARE = 1e-3  # share of a lost direction that a combination may have
+VAGUE_SHARE = 0.5  # of its value: a std beyond it determines no combination either
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class _Kind:
     """A function of the robot along each axis (3,), and its units."""
 
     name: str
-    of: Callable[[Robot], FloatArray]
+    function: Callable[[Robot], FloatArray]
     units: tuple[str, str, str]
 
 
@@ -46,19 +46,21 @@ KINDS = (
 )
 
 
-def combinations(problem: Problem, values: FloatArray, known: Trust, moved: BoolArray) -> tuple[Combination, ...]:
+def combinations(
+    problem: Problem, values: FloatArray, uncertainty: Trust, moving_axes: BoolArray
+) -> tuple[Combination, ...]:
     """Damping and drive gain along the axes that moved, where a motor or viscous friction alone is not determined."""
-    own = [p for p, is_open in zip(problem.robot_parameters, known.open, strict=False) if is_open]
-    if not any(p.part == "motor" or Key.parse(p.name).level == VISCOUS for p in own):
+    open_parameters = [p for p, is_open in zip(problem.robot_parameters, uncertainty.open, strict=False) if is_open]
+    if not any(p.part == "motor" or Key.parse(p.name).level == VISCOUS for p in open_parameters):
         return ()
-    found = []
+    results = []
     for kind in KINDS:
-        now, slopes = kind.of(problem.robot_at(values)), slopes_of(problem, values, kind.of)
-        for axis in np.flatnonzero(moved).tolist():
-            std = std_of(slopes[axis], known)
-            if now[axis] > 0.0 and std < VAGUE * now[axis]:
-                value, half = float(now[axis]), known.quantile * std
-                found.append(
+        values_now, slopes = kind.function(problem.robot_at(values)), slopes_of(problem, values, kind.function)
+        for axis in np.flatnonzero(moving_axes).tolist():
+            std = std_of(slopes[axis], uncertainty)
+            if values_now[axis] > 0.0 and std < VAGUE_SHARE * values_now[axis]:
+                value, half = float(values_now[axis]), uncertainty.quantile * std
+                results.append(
                     Combination(
                         f"{kind.name}.{AXES[axis]}",
                         value,
@@ -68,31 +70,31 @@ def combinations(problem: Problem, values: FloatArray, known: Trust, moved: Bool
                         AXES[axis],
                     )
                 )
-    return tuple(found)
+    return tuple(results)
 
 
-def slopes_of(problem: Problem, values: FloatArray, of: Callable[[Robot], FloatArray]) -> FloatArray:
+def slopes_of(problem: Problem, values: FloatArray, function: Callable[[Robot], FloatArray]) -> FloatArray:
     """Derivatives by the numbers that the solver sees. Shape (3, P); nuisances have none."""
     slopes = np.zeros((3, len(values)))
     for j, p in enumerate(problem.robot_parameters):
-        inner = p.inner(float(values[j]))
-        step = STEP * (1.0 if p.log else max(abs(inner), STEP))
+        inner_value = p.inner(float(values[j]))
+        step = STEP * (1.0 if p.log else max(abs(inner_value), STEP))
         ends = []
         for side in (1.0, -1.0):
-            there = values.copy()
-            there[j] = p.outer(inner + side * step)
-            ends.append(of(problem.robot_at(there)))
+            shifted_values = values.copy()
+            shifted_values[j] = p.outer(inner_value + side * step)
+            ends.append(function(problem.robot_at(shifted_values)))
         slopes[:, j] = (ends[0] - ends[1]) / (2.0 * step)
     return slopes
 
 
-def std_of(slope: FloatArray, known: Trust) -> float:
+def std_of(slope: FloatArray, uncertainty: Trust) -> float:
     """Standard error of a combination (P,); infinite where it moves with what is lost."""
-    lost = np.flatnonzero(known.blind)
-    if any(value < BLIND and _share(slope, way, lost) > LOST for value, way in known.directions):
+    lost = np.flatnonzero(uncertainty.blind_parameters)
+    if any(value < BLIND_EIGENVALUE and _share(slope, way, lost) > LOST_SHARE for value, way in uncertainty.directions):
         return np.inf
-    finite = np.isfinite(np.diag(known.covariance))
-    covariance = np.where(np.outer(finite, finite), known.covariance, known.plain)
+    finite = np.isfinite(np.diag(uncertainty.covariance))
+    covariance = np.where(np.outer(finite, finite), uncertainty.covariance, uncertainty.plain_covariance)
     return float(np.sqrt(max(slope @ covariance @ slope, 0.0)))
 
 
@@ -124,45 +126,55 @@ class _Trade:
     unit: str
 
 
-OFF, LATE_BY = _Trade("sets_off", "V"), _Trade("follows", "s")
+SETOFF_TRADE, DELAY_TRADE = _Trade("sets_off", "V"), _Trade("follows", "s")
 
 
-def trades(problem: Problem, values: FloatArray, known: Trust, moved: BoolArray) -> tuple[Combination, ...]:
+def trades(problem: Problem, values: FloatArray, uncertainty: Trust, moving_axes: BoolArray) -> tuple[Combination, ...]:
     """The sums of what trades, along the axes that moved."""
-    found: list[Combination] = []
+    results: list[Combination] = []
     for j, p in enumerate(problem.parameters[problem.robot_count :], problem.robot_count):
-        if known.unseen[j]:
+        if uncertainty.unseen[j]:
             continue
         if p.name == DEAD_BAND:
-            found += _sums(problem, values, known, moved, j, OFF)
-        elif p.part == LATENCY and not any(one.name.startswith(LATE_BY.name) for one in found):
-            found += _sums(problem, values, known, moved, j, LATE_BY)
-    return tuple(found)
+            results += _sums(problem, values, uncertainty, moving_axes, j, SETOFF_TRADE)
+        elif p.part == LATENCY and not any(combination.name.startswith(DELAY_TRADE.name) for combination in results):
+            results += _sums(problem, values, uncertainty, moving_axes, j, DELAY_TRADE)
+    return tuple(results)
 
 
 def _sums(
-    problem: Problem, values: FloatArray, known: Trust, moved: BoolArray, j: int, trade: _Trade
+    problem: Problem, values: FloatArray, uncertainty: Trust, moving_axes: BoolArray, j: int, trade: _Trade
 ) -> Iterator[Combination]:
-    of = _friction if trade is OFF else _lag
-    now, slopes = of(problem.robot_at(values)), slopes_of(problem, values, of)
-    robot, share, least = problem.robot_at(values), np.ones(3), np.ones(3)
-    if trade is OFF:
+    function = _friction if trade is SETOFF_TRADE else _lag
+    values_now, slopes = function(problem.robot_at(values)), slopes_of(problem, values, function)
+    robot, share, least_values = problem.robot_at(values), np.ones(3), np.ones(3)
+    if trade is SETOFF_TRADE:
         share = push_lost_per_volt(robot) / push_per_volt(robot)
         patterns = np.abs(axis_patterns(robot))
-        least = np.where(patterns > 0.0, patterns, np.inf).min(axis=1)  # all that push are beyond the dead band then
-    own = np.zeros(len(values))
-    for axis in np.flatnonzero(moved & np.isfinite(now) & slopes.any(axis=1)).tolist():
-        own[j] = share[axis] * problem.parameters[j].slope(float(values[j]))
-        alone, single, both = (std_of(each, known) for each in (slopes[axis], own, slopes[axis] + own))
-        value, half = float(now[axis] + share[axis] * values[j]), known.quantile * both
-        if not np.isfinite(both) or not 0.0 < both < value or (trade is OFF and value * least[axis] < values[j]):
+        least_values = np.where(patterns > 0.0, patterns, np.inf).min(
+            axis=1
+        )  # all that push are beyond the dead band then
+    unit_slope = np.zeros(len(values))
+    for axis in np.flatnonzero(moving_axes & np.isfinite(values_now) & slopes.any(axis=1)).tolist():
+        unit_slope[j] = share[axis] * problem.parameters[j].slope(float(values[j]))
+        std_alone, single, std_of_sum = (
+            std_of(slope, uncertainty) for slope in (slopes[axis], unit_slope, slopes[axis] + unit_slope)
+        )
+        value, half = float(values_now[axis] + share[axis] * values[j]), uncertainty.quantile * std_of_sum
+        if (
+            not np.isfinite(std_of_sum)
+            or not 0.0 < std_of_sum < value
+            or (trade is SETOFF_TRADE and value * least_values[axis] < values[j])
+        ):
             continue
-        between = -1.0
-        if np.isfinite(alone) and np.isfinite(single):
-            between = float((both**2 - alone**2 - single**2) / max(2.0 * alone * single, 1e-300))
-        if between < -TRADE:
+        correlation = -1.0
+        if np.isfinite(std_alone) and np.isfinite(single):
+            correlation = float((std_of_sum**2 - std_alone**2 - single**2) / max(2.0 * std_alone * single, 1e-300))
+        if correlation < -TRADE:
             ends = max(value - half, 0.0), value + half
-            yield Combination(f"{trade.name}.{AXES[axis]}", value, both, ends, trade.unit, AXES[axis], between)
+            yield Combination(
+                f"{trade.name}.{AXES[axis]}", value, std_of_sum, ends, trade.unit, AXES[axis], correlation
+            )
 
 
 def _friction(robot: Robot) -> FloatArray:

@@ -49,88 +49,99 @@ SCALE_OF_T = 0.8310  # scale of Student's t with four degrees of freedom, fitted
 def conclude(
     solver: Solver,
     solution: Solution,
-    known: Trust,
+    uncertainty: Trust,
     records: Sequence[Record],
     loss: str,
-    more: Sequence[Statement],
+    more_statements: Sequence[Statement],
     lower_bound: Mapping[str, float],
-    moved: BoolArray,
+    moving_axes: BoolArray,
     levels: Sequence[Breakaway] = (),
-    better: Mapping[str, tuple[float | None, tuple[float, float]]] | None = None,
+    better_intervals: Mapping[str, tuple[float | None, tuple[float, float]]] | None = None,
     exact: Trust | None = None,
 ) -> OutputErrorEstimate:
-    """The Estimate of a solution. loss: of the fit, in words; more: warnings to join; lower_bound: for the Estimate;
-    moved (3,): which axes did; levels: of breakaway that were asked for; better: name -> (std, interval) that replace
-    those of the covariance; exact: the trust were all that was taken as it stands exact, where `known` has more.
+    """The Estimate of a solution. loss: of the fit, in words; more_statements: warnings to join; lower_bound: for the
+    Estimate; moving_axes (3,): which axes did; levels: of breakaway that were asked for; better_intervals: name ->
+    (std, interval) that replace those of the covariance; exact: the trust were all that was taken as it stands exact,
+    where `uncertainty` has more.
 
     Raises InsufficientDataError where the logs say nothing about any of the robot's numbers, or of two together.
     """
     problem, values = solver.problem, solution.state.point.values.copy()
-    blind = tuple(p.name for p, b in zip(problem.parameters, known.blind, strict=True) if b)
-    ended = tuple(p.name for p in at_the_end(problem, values))
-    open_ = tuple(p.name for p, b in zip(problem.parameters, known.open, strict=True) if b or p.name in ended)
-    own, missed = problem.robot_count, unexplained(solver, solution)
-    directions = () if missed else blind_directions(problem, values, known.ways, moved)
-    joint = combinations(problem, values, known, moved)
-    if known.open[:own].all() and (missed or not joint):
-        _refuse_blind(problem.names[:own], missed, records[0].source, known.unseen[:own], directions)
+    blind_names = tuple(p.name for p, b in zip(problem.parameters, uncertainty.blind_parameters, strict=True) if b)
+    names_at_bound = tuple(p.name for p in at_the_end(problem, values))
+    open_names = tuple(
+        p.name for p, b in zip(problem.parameters, uncertainty.open, strict=True) if b or p.name in names_at_bound
+    )
+    robot_count, missed_outputs = problem.robot_count, unexplained(solver, solution)
+    directions = () if missed_outputs else blind_directions(problem, values, uncertainty.ways, moving_axes)
+    joint = combinations(problem, values, uncertainty, moving_axes)
+    if uncertainty.open[:robot_count].all() and (missed_outputs or not joint):
+        _refuse_blind(
+            problem.names[:robot_count], missed_outputs, records[0].source, uncertainty.unseen[:robot_count], directions
+        )
     as_they_were = [p.value if p.prior is None else p.prior[0] for p in problem.parameters]
-    values = np.where(known.unseen, as_they_were, values)
-    std, ci95 = intervals(problem, values, known)
-    for name, (spread, interval) in (better or {}).items():
+    values = np.where(uncertainty.unseen, as_they_were, values)
+    std, ci95 = intervals(problem, values, uncertainty)
+    for name, (spread, interval) in (better_intervals or {}).items():
         std[name], ci95[name] = std[name] if spread is None else spread, interval
     data, names, own_levels = _data(records), list(problem.names), _levels(problem.robot, levels, ci95)
     endless = [name for name, (_, (_, high)) in own_levels.items() if high == math.inf]
-    fitted, correlation = problem.parameters[:own], _correlation(names, known)
-    robot = _with_levels(_robot(problem, values, std, open_, data, bool(joint)), own_levels)
-    robot = with_nuisances(robot, problem, values, std, open_, records, data)
+    fitted, correlation = problem.parameters[:robot_count], _correlation(names, uncertainty)
+    robot = _with_levels(_robot(problem, values, std, open_names, data, bool(joint)), own_levels)
+    robot = with_nuisances(robot, problem, values, std, open_names, records, data)
     return OutputErrorEstimate(
-        robot=_together(robot, problem.parameters, std, known, correlation.matrix),
+        robot=_together(robot, problem.parameters, std, uncertainty, correlation.matrix),
         value={p.name: float(v) for p, v in zip(fitted, values, strict=False)}
         | {k: v for k, (v, _) in own_levels.items()},
-        std={name: std[name] for name in names[:own]} | {k: _spread(i) for k, (_, i) in own_levels.items()},
-        ci95={name: ci95[name] for name in names[:own]} | {k: i for k, (_, i) in own_levels.items()},
+        std={name: std[name] for name in names[:robot_count]} | {k: _spread(i) for k, (_, i) in own_levels.items()},
+        ci95={name: ci95[name] for name in names[:robot_count]} | {k: i for k, (_, i) in own_levels.items()},
         correlation=correlation,
-        degrees_of_freedom={name: known.degrees for name in (*names[:own], *own_levels)},
-        at_bound=tuple(name for name, held in zip(names[:own], known.held, strict=False) if held),
-        warnings=(*_warnings(solver, solution, known, records, blind), *_not_followed(missed), *more),
-        method=f"output error, maximum likelihood, {loss}, {known.kind} covariance",
+        degrees_of_freedom={name: uncertainty.degrees for name in (*names[:robot_count], *own_levels)},
+        at_bound=tuple(
+            name for name, is_held in zip(names[:robot_count], uncertainty.held_parameters, strict=False) if is_held
+        ),
+        warnings=(
+            *_warnings(solver, solution, uncertainty, records, blind_names),
+            *_not_followed(missed_outputs),
+            *more_statements,
+        ),
+        method=f"output error, maximum likelihood, {loss}, {uncertainty.kind} covariance",
         lower_bound={**lower_bound, **{name: own_levels[name][1][0] for name in endless}},
         data=data,
         scale=_scale(problem),
         nuisances={
-            name: Nuisance(float(values[own + j]), std[name], ci95[name], _unit(name))
-            for j, name in enumerate(names[own:])
+            name: Nuisance(float(values[robot_count + j]), std[name], ci95[name], _unit(name))
+            for j, name in enumerate(names[robot_count:])
         },
         noise=noise_of(solver, solution),
-        unidentifiable=(*open_, *endless),
-        combinations=(*joint, *trades(problem, values, known, moved)),
-        log_alone=_log_alone(problem, values, exact or known, open_, exact not in (None, known)),
+        unidentifiable=(*open_names, *endless),
+        combinations=(*joint, *trades(problem, values, uncertainty, moving_axes)),
+        log_alone=_log_alone(problem, values, exact or uncertainty, open_names, exact not in (None, uncertainty)),
         directions=directions,
-        covariance=known.kind,
+        covariance=uncertainty.kind,
         unused=_unused(records),
         iterations=solution.iterations,
         converged=solution.converged,
-        not_followed=tuple(missed),
+        not_followed=tuple(missed_outputs),
         robust=bool(solver.nu),
     )
 
 
 def _log_alone(
-    problem: Problem, values: FloatArray, known: Trust, open_: Sequence[str], held: bool
+    problem: Problem, values: FloatArray, uncertainty: Trust, open_names: Sequence[str], is_held: bool
 ) -> dict[str, tuple[float, float]]:
     """Name -> 95 % interval were what the robot file knows with a std exact; empty where it knows nothing so.
 
-    held: whether it knows so what was not fitted.
+    is_held: whether it knows so what was not fitted.
     """
-    alone = from_the_log_alone(problem, known) or (known if held else None)
-    if alone is None:
+    log_uncertainty = from_the_log_alone(problem, uncertainty) or (uncertainty if is_held else None)
+    if log_uncertainty is None:
         return {}
-    found, of_file = intervals(problem, values, alone)[1], given(problem)
+    log_intervals, of_file = intervals(problem, values, log_uncertainty)[1], given(problem)
     return {
-        p.name: found[p.name]
+        p.name: log_intervals[p.name]
         for p, yes in zip(problem.parameters, of_file, strict=True)
-        if not yes and p.name not in open_
+        if not yes and p.name not in open_names
     }
 
 
@@ -147,22 +158,24 @@ def unexplained(solver: Solver, solution: Solution) -> dict[str, float]:
     It has a wrong sign or unit. Left out: what is counted. What never changes, as of a dead sensor, has the largest
     spread of its channel; the share is then infinite.
     """
-    found, problem, noise = {}, solver.problem, noise_of(solver, solution)
+    unexplained_shares, problem, noise = {}, solver.problem, noise_of(solver, solution)
     measured = [_measured(problem, column) for column in problem.columns]
-    whole = [np.concatenate(parts) if parts else np.zeros(1) for parts in measured]
-    own = [float(each.std()) if np.ptp(each) else 0.0 for each in whole]
+    measured_values = [np.concatenate(parts) if parts else np.zeros(1) for parts in measured]
+    spreads = [float(values.std()) if np.ptp(values) else 0.0 for values in measured_values]
     largest = {
-        name: max(s for s, column in zip(own, problem.columns, strict=True) if column[0] == name)
+        name: max(s for s, column in zip(spreads, problem.columns, strict=True) if column[0] == name)
         for name, _ in problem.columns
     }
     for c, (column, parts) in enumerate(zip(problem.columns, measured, strict=True)):
-        left, spread = noise.get(_column(column), 0.0), own[c] or largest[column[0]]
+        noise_std, spread = noise.get(_column(column), 0.0), spreads[c] or largest[column[0]]
         if solver.tick[c] or not spread or not parts:
             continue
-        share = left / spread
-        if is_missed(share, left) and is_missed(share, left, difference_noise(*parts)):  # the noise takes time to find
-            found[_column(column)] = share if own[c] else math.inf
-    return found
+        share = noise_std / spread
+        if is_missed(share, noise_std) and is_missed(
+            share, noise_std, difference_noise(*parts)
+        ):  # the noise takes time to find
+            unexplained_shares[_column(column)] = share if spreads[c] else math.inf
+    return unexplained_shares
 
 
 def _measured(problem: Fitted, column: Column) -> list[FloatArray]:
@@ -173,36 +186,38 @@ def _measured(problem: Fitted, column: Column) -> list[FloatArray]:
     return [part - part.mean() if column[0] in TRAVELS else part for part in parts if part.size]
 
 
-def _not_followed(missed: Mapping[str, float]) -> list[Statement]:
-    if not missed:
+def _not_followed(missed_outputs: Mapping[str, float]) -> list[Statement]:
+    if not missed_outputs:
         return []
-    shares = tuple(share if math.isfinite(share) else None for share in missed.values())
-    return [Statement("not_followed", ERROR, numbers={"outputs": tuple(missed), "shares": shares})]
+    shares = tuple(share if math.isfinite(share) else None for share in missed_outputs.values())
+    return [Statement("not_followed", ERROR, numbers={"outputs": tuple(missed_outputs), "shares": shares})]
 
 
 def _refuse_blind(
-    free: Sequence[str], missed: Mapping[str, float], where: str, unseen: BoolArray, directions: Sequence[Blind]
+    free: Sequence[str], missed_outputs: Mapping[str, float], place: str, unseen: BoolArray, directions: Sequence[Blind]
 ) -> NoReturn:
     """Raises InsufficientDataError: nothing moved, or all that is free can be traded, or the model does other things.
 
     unseen: for each of `free`, whether the outputs do not change with it at all. directions: that they do not show.
     """
-    if missed:
+    if missed_outputs:
         raise InsufficientDataError(
             "the robot moved, but with no value of what is free does the model move like it",
-            got=f"{', '.join(missed)} that the voltages do not explain",
+            got=f"{', '.join(missed_outputs)} that the voltages do not explain",
             expected="a model that follows the log",
-            where=where,
+            where=place,
             remedy="check signs, units and the order of the wheels, and the voltages (omnidyn check)",
         )
     if not unseen.all():
-        what = [str(replace(direction, cures=()).statement()) for direction in directions]
+        sentences = [str(replace(direction, cures=()).statement()) for direction in directions]
         ways = "; ".join(str(direction.how_to_show()) for direction in directions if direction.cures)
         raise InsufficientDataError(
-            "; ".join(["of what is free each number can be made up for by others, so that none can be told", *what]),
+            "; ".join(
+                ["of what is free each number can be made up for by others, so that none can be told", *sentences]
+            ),
             got=", ".join(free),
             expected="fewer numbers",
-            where=where,
+            where=place,
             remedy=": ".join(["leave out one that is known", *([ways] if ways else [])]),
         )
     raise InsufficientDataError(
@@ -210,7 +225,7 @@ def _refuse_blind(
         got=", ".join(free),
         expected="motion",
         remedy="drive the robot faster than its dead zone",
-        where=where,
+        where=place,
     )
 
 
@@ -228,7 +243,7 @@ def noise_of(solver: Solver, solution: Solution) -> dict[str, float]:
 
 
 def intervals(
-    problem: Fitted, values: FloatArray, known: Trust
+    problem: Fitted, values: FloatArray, uncertainty: Trust
 ) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
     """Standard errors and 95 % intervals, on the scale on which the solver works; at a bound as for a friction line.
 
@@ -237,49 +252,49 @@ def intervals(
     std: dict[str, float] = {}
     ci95: dict[str, tuple[float, float]] = {}
     for j, p in enumerate(problem.parameters):
-        value, own = float(values[j]), float(known.std[j])
-        std[p.name] = own * p.slope(value)
-        half, inner = known.quantile * own, p.inner(value) if value > 0.0 or not p.log else -math.inf
-        if not math.isfinite(own):
+        value, std_here = float(values[j]), float(uncertainty.std[j])
+        std[p.name] = std_here * p.slope(value)
+        half, inner_value = uncertainty.quantile * std_here, p.inner(value) if value > 0.0 or not p.log else -math.inf
+        if not math.isfinite(std_here):
             ci95[p.name] = (p.low, math.inf)
             continue
-        low, high = inner - half, inner + half
-        if known.held[j]:
-            pushed = float(known.free_step[j])
-            below = 2.0 * value <= p.low + p.high  # or at Coulomb friction, which breakaway never is below
-            low = inner if below else inner + min(-half, pushed - half)
-            high = inner + max(half, pushed + half) if below else inner
-        low, high = (max(low, p.low), min(high, max(p.high, inner))) if not p.log else (low, high)
+        low, high = inner_value - half, inner_value + half
+        if uncertainty.held_parameters[j]:
+            free_step = float(uncertainty.free_step[j])
+            is_below_middle = 2.0 * value <= p.low + p.high  # or at Coulomb friction, which breakaway never is below
+            low = inner_value if is_below_middle else inner_value + min(-half, free_step - half)
+            high = inner_value + max(half, free_step + half) if is_below_middle else inner_value
+        low, high = (max(low, p.low), min(high, max(p.high, inner_value))) if not p.log else (low, high)
         ci95[p.name] = (p.outer(low), p.outer(high))
     for s, c in Order(problem).pairs:
-        name, least = problem.parameters[s].name, ci95[problem.parameters[c].name][0]
-        ci95[name] = max(ci95[name][0], least), ci95[name][1]  # breakaway is never below Coulomb friction
+        name, least_level = problem.parameters[s].name, ci95[problem.parameters[c].name][0]
+        ci95[name] = max(ci95[name][0], least_level), ci95[name][1]  # breakaway is never below Coulomb friction
     return std, ci95
 
 
 def _robot(
-    problem: Problem, values: FloatArray, std: Mapping[str, float], open_: Sequence[str], data: str, together: bool
+    problem: Problem, values: FloatArray, std: Mapping[str, float], open_names: Sequence[str], data: str, is_joint: bool
 ) -> Robot:
     """The robot with the fitted numbers, and where they come from.
 
     What the data do not determine has the value that goes with the others: the robot must move as the log does, for
     which a product is enough. Its origin and std stay: a narrower std, written and read again, would count the log
-    twice. Of a number with a logarithmic scale the std is a share, and stays that share. together: whether the data
+    twice. Of a number with a logarithmic scale the std is a share, and stays that share. is_joint: whether the data
     determine what motors and viscous friction do together.
     """
-    robot, found = problem.robot, {}
+    robot, numbers = problem.robot, {}
     for p, value in zip(problem.parameters[: problem.robot_count], values, strict=False):
         robot = p.on(robot, float(value))
-        for key, factor in ((p.name, 1.0), *p.also):
-            if p.name not in open_:
-                found[key] = identified(std[p.name] * factor, f"output error, {data}")
-            elif (before := prior_of(problem.robot, key)) and before.std is not None:
+        for key, factor in ((p.name, 1.0), *p.tied_numbers):
+            if p.name not in open_names:
+                numbers[key] = identified(std[p.name] * factor, f"output error, {data}")
+            elif (prior_before := prior_of(problem.robot, key)) and prior_before.std is not None:
                 share = value / float(Key.parse(p.name).get(problem.robot)) if p.log else 1.0
-                joint = together and (p.part == "motor" or Key.parse(key).level == VISCOUS)
-                source = printable(f"{WITH_THE_FIT}, {data}") if joint else before.source
-                origin = JOINT if joint and before.guessed else before.origin
-                found[key] = before.replace(std=float(before.std * share), source=source, origin=origin)
-    return with_priors(holding(robot), found)
+                joint = is_joint and (p.part == "motor" or Key.parse(key).level == VISCOUS)
+                source = printable(f"{WITH_THE_FIT}, {data}") if joint else prior_before.source
+                origin = JOINT if joint and prior_before.guessed else prior_before.origin
+                numbers[key] = prior_before.replace(std=float(prior_before.std * share), source=source, origin=origin)
+    return with_priors(holding(robot), numbers)
 
 
 def prior_of(robot: Robot, key: str) -> Prior | None:
@@ -288,15 +303,15 @@ def prior_of(robot: Robot, key: str) -> Prior | None:
 
 
 def _levels(
-    robot: Robot, found: Sequence[Breakaway], ci95: Mapping[str, tuple[float, float]]
+    robot: Robot, profiles: Sequence[Breakaway], ci95: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, tuple[float, float]]]:
     """Key -> (level, interval) of breakaway. Where it may be coulomb itself, it is as uncertain as coulomb is."""
     levels = {}
-    for one in found:
-        coulomb = ci95.get(coulomb_below(one.name, robot), (one.low, one.low))
-        low = coulomb[0] if one.tied else one.low
-        high = max(one.high, coulomb[1]) if one.tied else one.high
-        levels[one.name] = (one.value, (low, high))
+    for profile in profiles:
+        coulomb = ci95.get(coulomb_below(profile.name, robot), (profile.low, profile.low))
+        low = coulomb[0] if profile.is_tied else profile.low
+        high = max(profile.high, coulomb[1]) if profile.is_tied else profile.high
+        levels[profile.name] = (profile.value, (low, high))
     return levels
 
 
@@ -307,83 +322,89 @@ def _spread(interval: tuple[float, float]) -> float:
 
 def _with_levels(robot: Robot, levels: Mapping[str, tuple[float, tuple[float, float]]]) -> Robot:
     """The robot with the levels of breakaway, by key; others of their lists stay, or follow coulomb."""
-    found = {
+    priors = {
         name: identified(_spread(interval), "output error, profile over the drives of the log")
         for name, (_, interval) in levels.items()
     }
-    return with_priors(holding(robot, {name: level for name, (level, _) in levels.items()}), found) if found else robot
+    return (
+        with_priors(holding(robot, {name: level for name, (level, _) in levels.items()}), priors) if priors else robot
+    )
 
 
-def _correlation(names: Sequence[str], known: Trust) -> Correlation:
-    finite = np.isfinite(np.diag(known.covariance))
-    size = np.where(finite & (known.std > 0.0), known.std, 1.0)
-    matrix = np.where(np.outer(finite, finite), known.covariance, 0.0) / np.outer(size, size)
+def _correlation(names: Sequence[str], uncertainty: Trust) -> Correlation:
+    finite = np.isfinite(np.diag(uncertainty.covariance))
+    size = np.where(finite & (uncertainty.std > 0.0), uncertainty.std, 1.0)
+    matrix = np.where(np.outer(finite, finite), uncertainty.covariance, 0.0) / np.outer(size, size)
     np.fill_diagonal(matrix, 1.0)
     return Correlation(tuple(names), matrix)
 
 
 def _together(
-    robot: Robot, fitted: Sequence[Parameter], std: Mapping[str, float], known: Trust, correlation: FloatArray
+    robot: Robot, fitted: Sequence[Parameter], std: Mapping[str, float], uncertainty: Trust, correlation: FloatArray
 ) -> Robot:
     """The robot with what the fit knows of how its numbers are off together; what is tied to a number goes with it.
 
     correlation (P, P): of `fitted`. Numbers without a std of this fit have no part in it, nor have those of the logs.
     """
-    tied = [
+    tied_numbers = [
         (j, key, std[p.name] * factor)
         for j, p in enumerate(fitted)
-        if 0.0 < std[p.name] < LARGEST_STD and 0.0 < known.std[j] < math.inf
-        for key, factor in ((key_of(p.name, robot), 1.0), *p.also)
+        if 0.0 < std[p.name] < LARGEST_STD and 0.0 < uncertainty.std[j] < math.inf
+        for key, factor in ((key_of(p.name, robot), 1.0), *p.tied_numbers)
         if key
     ]
-    at = [j for j, _, _ in tied]
-    matrix = correlation[np.ix_(at, at)]
-    return with_correlation(robot, [key for _, key, _ in tied], matrix, [spread for *_, spread in tied])
+    indices = [j for j, _, _ in tied_numbers]
+    matrix = correlation[np.ix_(indices, indices)]
+    return with_correlation(robot, [key for _, key, _ in tied_numbers], matrix, [spread for *_, spread in tied_numbers])
 
 
 def _warnings(
-    solver: Solver, solution: Solution, known: Trust, records: Sequence[Record], blind: Sequence[str]
+    solver: Solver, solution: Solution, uncertainty: Trust, records: Sequence[Record], blind_names: Sequence[str]
 ) -> list[Statement]:
     statements = list(dict.fromkeys(note for record in records for note in record.notes))
     if not solution.converged:
         statements.append(Statement("iteration_limit", WARNING, numbers={"iterations": solution.iterations}))
-    statements += [Statement("not_identifiable", WARNING, name) for name in blind]
+    statements += [Statement("not_identifiable", WARNING, name) for name in blind_names]
     statements += [implausible(name, value) for name, value in too_early(solver, solution).items()]
     values = solution.state.point.values
-    ended = {p.name: p for p in at_the_end(solver.problem, values)}
-    at = {name: float(values[solver.problem.where(name)]) for name in ended}
+    parameters_at_bound = {p.name: p for p in at_the_end(solver.problem, values)}
+    values_at_bound = {name: float(values[solver.problem.where(name)]) for name in parameters_at_bound}
     statements += [
         Statement("search_end", WARNING, name, {"value": value, "unit": _unit(name) or unit(name)})
-        for name, value in at.items()
+        for name, value in values_at_bound.items()
     ]
     for j, p in enumerate(solver.problem.parameters[: solver.problem.robot_count]):
-        if known.held[j] and p.name not in ended:
+        if uncertainty.held_parameters[j] and p.name not in parameters_at_bound:
             key = p.name.partition("@")[0]
             code = "bound_of_inertia" if Key.parse(key).name in (ROTOR, WHEEL) else "bound"
             code = "bound_of_breakaway" if falls(key, solver.problem.robot) else code
             statements.append(Statement(code, NOTE, p.name, {"value": values[j]}))
-    if known.kind == "sandwich":
-        numbers = {"neighbours": np.abs(known.neighbours).max(), "runs": known.runs, "widening": known.widening}
+    if uncertainty.kind == "sandwich":
+        numbers = {
+            "neighbours": np.abs(uncertainty.neighbours).max(),
+            "runs": uncertainty.runs,
+            "widening": uncertainty.widening,
+        }
         statements.append(Statement("not_white", NOTE, numbers=numbers))
     return statements
 
 
 def _unused(records: Sequence[Record]) -> tuple[Statement, ...]:
     """What the logs hold and the fit does not use: each reason once, with the logs it is true of where not of all."""
-    where: dict[Statement, list[str]] = {}
+    logs_by_reason: dict[Statement, list[str]] = {}
     for record in records:
-        for unused in record.unused:
-            where.setdefault(unused, []).append(record.source or "a log")
+        for reason in record.unused_notes:
+            logs_by_reason.setdefault(reason, []).append(record.source or "a log")
     return tuple(
-        unused
+        reason_given
         if len(logs) == len(records)
         else Statement(
             "unused_in_some_logs",
             NOTE,
-            unused.subject,
-            {"unused": unused, "logs": len(logs), "of": len(records), "first": logs[0]},
+            reason_given.subject,
+            {"unused": reason_given, "logs": len(logs), "of": len(records), "first": logs[0]},
         )
-        for unused, logs in where.items()
+        for reason_given, logs in logs_by_reason.items()
     )
 
 
@@ -416,35 +437,41 @@ def with_nuisances(
     problem: Problem,
     values: FloatArray,
     std: Mapping[str, float],
-    open_: Sequence[str],
+    open_names: Sequence[str],
     records: Sequence[Record],
     data: str,
 ) -> Robot:
     """The fitted robot with the dead band and the latency that were fitted beside it, and with what its logs did.
 
-    std: of the parameters by name; open_: those that the data do not determine, which only go with the others.
+    std: of the parameters by name; open_names: those that the data do not determine, which only go with the others.
     """
     angles = any(name == "wheel_angle" for name, _ in problem.columns)
     if problem.robot_count == len(problem.parameters) and not angles and robot.log is None:
         return robot
-    found = {p.name: float(v) for p, v in zip(problem.parameters, values, strict=True)}
-    seconds, where = late_by(problem, values, problem.columns)
-    late = {name: second for (name, _), second in zip(problem.columns, seconds, strict=True)}
-    own = max(0.0, min(late.values(), default=robot.drive.latency))
+    value_by_name = {p.name: float(v) for p, v in zip(problem.parameters, values, strict=True)}
+    seconds, slopes_of_latency = late_by(problem, values, problem.columns)
+    latency_by_channel = {name: second for (name, _), second in zip(problem.columns, seconds, strict=True)}
+    drive_latency = max(0.0, min(latency_by_channel.values(), default=robot.drive.latency))
     change: dict[str, float] = {}
-    told: dict[str, Prior] = {}
-    if DEAD_BAND in found:
-        change["dead_band"] = found[DEAD_BAND]
-        told[keys.DEAD_BAND] = _known(DEAD_BAND, std, open_, data)
-    if any(k >= 0 for k in where):
-        change["latency"] = own
-        first = min(late, key=lambda name: late[name])
-        told[keys.LATENCY] = _known(f"{LATENCY}.{first}", std, open_, data)
+    prior_by_key: dict[str, Prior] = {}
+    if DEAD_BAND in value_by_name:
+        change["dead_band"] = value_by_name[DEAD_BAND]
+        prior_by_key[keys.DEAD_BAND] = _known(DEAD_BAND, std, open_names, data)
+    if any(k >= 0 for k in slopes_of_latency):
+        change["latency"] = drive_latency
+        first = min(latency_by_channel, key=lambda name: latency_by_channel[name])
+        prior_by_key[keys.LATENCY] = _known(f"{LATENCY}.{first}", std, open_names, data)
     drive = robot.drive.replace(**change) if change else robot.drive
-    priors = {name: prior for name, prior in robot.priors.items() if name not in told}
-    told = {name: each for name, each in told.items() if keys.Key.parse(name).get(robot.replace(drive=drive)) > 0.0}
-    robot = robot.replace(drive=drive, priors=priors, log=_effects(found, late, own, records))
-    return with_priors(robot, told)
+    priors = {name: prior for name, prior in robot.priors.items() if name not in prior_by_key}
+    prior_by_key = {
+        name: prior
+        for name, prior in prior_by_key.items()
+        if keys.Key.parse(name).get(robot.replace(drive=drive)) > 0.0
+    }
+    robot = robot.replace(
+        drive=drive, priors=priors, log=_effects(value_by_name, latency_by_channel, drive_latency, records)
+    )
+    return with_priors(robot, prior_by_key)
 
 
 def key_of(name: str, robot: Robot) -> str:
@@ -455,25 +482,28 @@ def key_of(name: str, robot: Robot) -> str:
     return key if key in robot.priors and robot.priors[key].std is not None else ""
 
 
-def _known(name: str, std: Mapping[str, float], open_: Sequence[str], data: str) -> Prior:
-    if name not in std or name in open_:
+def _known(name: str, std: Mapping[str, float], open_names: Sequence[str], data: str) -> Prior:
+    if name not in std or name in open_names:
         return Prior(source=printable(f"{WITH_THE_FIT}, {data}"), origin=JOINT)
     return identified(std[name], f"output error, {data}")
 
 
 def _effects(
-    found: Mapping[str, float], late: Mapping[str, float], own: float, records: Sequence[Record]
+    value_by_name: Mapping[str, float],
+    latency_by_channel: Mapping[str, float],
+    drive_latency: float,
+    records: Sequence[Record],
 ) -> LogEffects | None:
     """What the logs did; None where they did nothing."""
     runs = [record.run for record in records if record.run is not None]
     latency = Lateness(
-        **{name: each for name, each in late.items() if each != own},
-        averaged=any(_added_up(run, late) for run in runs),
+        **{name: other_latency for name, other_latency in latency_by_channel.items() if other_latency != drive_latency},
+        averaged=any(_added_up(run, latency_by_channel) for run in runs),
     )
-    tilt, push = ([found.get(f"{kind}.{axis}", 0.0) for axis in AXES] for kind in (TILT, PUSH))
+    tilt, push = ([value_by_name.get(f"{kind}.{axis}", 0.0) for axis in AXES] for kind in (TILT, PUSH))
     effects = LogEffects(
-        gain=found.get(GAIN, 1.0),
-        fade=found.get(FADE, 0.0),
+        gain=value_by_name.get(GAIN, 1.0),
+        fade=value_by_name.get(FADE, 0.0),
         latency=latency,
         tilt=(tilt[0], tilt[1]),
         push=(push[0], push[1], push[2]),
@@ -481,9 +511,11 @@ def _effects(
     return None if effects == LogEffects() else effects.replace(of=tuple(log_mark(run) for run in runs))
 
 
-def _added_up(run: Run, late: Mapping[str, float]) -> bool:
+def _added_up(run: Run, latency_by_channel: Mapping[str, float]) -> bool:
     """Whether the wheel speeds of a run were fitted as the angles that they add up to."""
-    return "wheel_angle" in late and run.wheel_angle is None and run.wheel_speed is not None and len(run) > 1
+    return (
+        "wheel_angle" in latency_by_channel and run.wheel_angle is None and run.wheel_speed is not None and len(run) > 1
+    )
 
 
 def loss_words(loss: str) -> str:

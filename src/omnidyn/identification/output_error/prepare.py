@@ -64,9 +64,9 @@ from omnidyn.statement import WARNING, Statement
 from omnidyn.statistics import difference_noise
 
 Kind = type[Engine[Problem]]  # of an engine
-FINE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
-ASIDE = 0.01  # by how much numbers are moved apart to see which engine knows the robots that they may make
-BEYOND = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
+FINE_TOLERANCE = 1e-5  # [m/s] tolerance of the implicit engine at the end of a fit; it begins with a step a row
+PROBE_CHANGE = 0.01  # by how much numbers are moved apart to see which engine knows the robots that they may make
+DRIVE_FACTOR = 10.0  # times what drives the robot: a greater level of Coulomb friction says no more than rest does
 START_STD = np.array([0.5, 0.5, 5.0])  # [m/s, m/s, rad/s] of the twist of the first rows from that at the start
 LIMIT = "motor.voltage_limit_V"
 # A drawing, a setting of the firmware, a battery and Karnopp's band: their std is for the reader. A nominal supply has
@@ -80,14 +80,15 @@ NEVER_FREE = (
     DRIVE_LATENCY,
     *BANDS,
 )
-LEAST = 1e-6  # of its start, that a level stays above where 0 would switch it off
+LEVEL_SHARE = 1e-6  # of its start, that a level stays above where 0 would switch it off
 
 
 @dataclass(frozen=True, eq=False)
 class Group:
     """The logs of one group, alone: the robot they begin from, what is free of it there, and the engine for that.
 
-    usual: what is free by default. moved (3,): which axes did. bounds: key -> what an axis that never moved has held.
+    default_keys: what is free by default. moving_axes (3,): which axes did. bounds: key -> what an axis that never
+    moved has held.
     warnings: what is to be said of such axes.
     """
 
@@ -96,20 +97,20 @@ class Group:
     robot: Robot
     question: OutputError
     engine: Kind
-    usual: tuple[str, ...]
-    moved: BoolArray
+    default_keys: tuple[str, ...]
+    moving_axes: BoolArray
     bounds: dict[str, float]
     warnings: tuple[Statement, ...]
 
     def tells(self, name: str) -> bool:
         """Whether these logs may tell of a level, by its key: of an axis that never moved they do not."""
         axis = Key.parse(name).axis
-        return axis is None or bool(self.moved[axis])
+        return axis is None or bool(self.moving_axes[axis])
 
     def problem(self, nuisances: Sequence[str] | None = None) -> Problem:
         """What is to be fitted. nuisances: those that were settled; None: those that are asked for."""
-        asked = self.question if nuisances is None else replace(self.question, nuisances=tuple(nuisances))
-        return make_problem(self.records, self.robot, asked, self.engine, self.usual)
+        group_question = self.question if nuisances is None else replace(self.question, nuisances=tuple(nuisances))
+        return make_problem(self.records, self.robot, group_question, self.engine, self.default_keys)
 
 
 def make_group(
@@ -118,45 +119,48 @@ def make_group(
     robot: Robot,
     question: OutputError,
     exact: bool,
-    usual: tuple[str, ...],
-    alone: bool,
+    default_keys: tuple[str, ...],
+    is_single: bool,
 ) -> Group:
-    """The group of these records. exact: whether the exact engine fits them; usual: what is free by default.
+    """The group of these records. exact: whether the exact engine fits them; default_keys: what is free by default.
 
-    alone: there are no other groups, which may tell what is shared: raises InsufficientDataError where no axis moved.
+    is_single: there are no other groups, which may tell what is shared: raises InsufficientDataError where no axis
+    moved.
     """
-    found = motion(records, robot)
+    axis_motion = motion(records, robot)
     if looped(records):
-        question = _loop_question(question, found, records, robot)
-        return Group(name, records, robot, question, LoopEngine, usual, found.moved, {}, ())
+        question = _loop_question(question, axis_motion, records, robot)
+        return Group(name, records, robot, question, LoopEngine, default_keys, axis_motion.moving_axes, {}, ())
     engine, bounds, warnings = ExactEngine if exact else ImplicitEngine, {}, []
-    asked = question.free if question.free is not None else (*dict.fromkeys((*usual, *guesses(robot))),)
+    free_keys = question.free if question.free is not None else (*dict.fromkeys((*default_keys, *guesses(robot))),)
     fixed = set(question.fixed)
-    for axis in np.flatnonzero(~found.moved).tolist():
-        own = {key for key in (*asked, *usual) if Key.parse(key).axis == axis}
-        fixed |= own
-        if not own or (alone and not exact and not own & set(asked)):
+    for axis in np.flatnonzero(~axis_motion.moving_axes).tolist():
+        axis_keys = {key for key in (*free_keys, *default_keys) if Key.parse(key).axis == axis}
+        fixed |= axis_keys
+        if not axis_keys or (is_single and not exact and not axis_keys & set(free_keys)):
             continue  # friction along the direction of travel: no axis has its own
-        held, key = float(found.held[axis]), f"friction.axes.breakaway[{axis}]"
-        warnings.append(found.unfitted(axis, None if alone else name))
-        if not alone:
+        held_force, key = float(axis_motion.held_forces[axis]), f"friction.axes.breakaway[{axis}]"
+        warnings.append(axis_motion.unfitted(axis, None if is_single else name))
+        if not is_single:
             continue
-        bounds |= {key: held} if held > NOTHING and not found.dead[axis] else {}
-        if exact and robot.friction.axes.levels[2][axis] < held:
-            robot = Key.parse(f"friction.axes.coulomb[{axis}]").set(robot, held)
-    if alone and not found.moved.any():
-        raise _never_moved(found, records[0].source)
+        bounds |= {key: held_force} if held_force > NO_DRIVE and not axis_motion.dead[axis] else {}
+        if exact and robot.friction.axes.levels[2][axis] < held_force:
+            robot = Key.parse(f"friction.axes.coulomb[{axis}]").set(robot, held_force)
+    if is_single and not axis_motion.moving_axes.any():
+        raise _never_moved(axis_motion, records[0].source)
     if warnings:
-        question = replace(question, free=tuple(key for key in asked if key not in fixed), fixed=())
-    return Group(name, records, robot, question, engine, usual, found.moved, bounds, tuple(warnings))
+        question = replace(question, free=tuple(key for key in free_keys if key not in fixed), fixed=())
+    return Group(name, records, robot, question, engine, default_keys, axis_motion.moving_axes, bounds, tuple(warnings))
 
 
-def _never_moved(found: Motion, source: str) -> InsufficientDataError:
+def _never_moved(axis_motion: Motion, source: str) -> InsufficientDataError:
     return InsufficientDataError(
         "the robot never visibly moved: its friction is only bounded from below",
         got="; ".join(
-            f"{AXES[axis]} held {held:.3g}" if seen else f"{AXES[axis]} was not measured"
-            for axis, (held, seen) in enumerate(zip(found.held, found.seen, strict=True))
+            f"{AXES[axis]} held {held_force:.3g}" if is_seen else f"{AXES[axis]} was not measured"
+            for axis, (held_force, is_seen) in enumerate(
+                zip(axis_motion.held_forces, axis_motion.seen_axes, strict=True)
+            )
         ),
         expected="motion",
         remedy="drive it beyond its dead zone",
@@ -164,11 +168,11 @@ def _never_moved(found: Motion, source: str) -> InsufficientDataError:
     )
 
 
-def _loop_question(question: OutputError, found: Motion, records: Sequence[Record], robot: Robot) -> OutputError:
+def _loop_question(question: OutputError, axis_motion: Motion, records: Sequence[Record], robot: Robot) -> OutputError:
     """By default friction of what moved, guesses and gains. Raises InsufficientDataError where nothing moved."""
-    still = np.flatnonzero(~found.moved).tolist()
-    own = [key for key in guesses(robot, looped=True) if Key.parse(key).axis not in still]
-    keys = dict.fromkeys((*loop_keys(robot, found.moved, records[0].source), *own))
+    still_axes = np.flatnonzero(~axis_motion.moving_axes).tolist()
+    guessed_keys = [key for key in guesses(robot, has_loop=True) if Key.parse(key).axis not in still_axes]
+    keys = dict.fromkeys((*loop_keys(robot, axis_motion.moving_axes, records[0].source), *guessed_keys))
     free = tuple(key for key in keys if key not in question.fixed)
     return question if question.free is not None else replace(question, free=free, fixed=())
 
@@ -178,12 +182,12 @@ def read_records(runs: Sequence[Run], robot: Robot, question: OutputError) -> li
     if not runs:
         raise InputError("nothing to fit to", got="no runs", expected="one or more", where="runs")
     gains = any(Key.parse(key).name in GAINS for key in question.free or ())
-    counted = None if question.tick_rad == 0.0 else differences(runs)
-    records = [record(run, robot, question.outputs, gains, question.tick_rad, counted) for run in runs]
-    if len({each.set_point is None for each in records}) > 1:
+    tick = None if question.tick_rad == 0.0 else differences(runs)
+    records = [record(run, robot, question.outputs, gains, question.tick_rad, tick) for run in runs]
+    if len({run_record.set_point is None for run_record in records}) > 1:
         raise InputError(
             "some logs have voltages, others set speeds only",
-            got=", ".join(each.source for each in records[:2]),
+            got=", ".join(run_record.source for run_record in records[:2]),
             expected="logs of one kind",
             remedy="free a gain of the loop, or fit them apart",
             where="runs",
@@ -196,9 +200,9 @@ def make_problem(
     robot: Robot,
     question: OutputError,
     engine: Kind | None = None,
-    usual: Sequence[str] = (),
+    default_keys: Sequence[str] = (),
 ) -> Problem:
-    """What is free, and how the pieces start. engine, usual: of `engine_for` and `free_by_default`, where known.
+    """What is free, and how the pieces start. engine, default_keys: of `engine_for` and `free_by_default`, where known.
 
     Raises InputError for unknown keys, or where nothing is left free.
     """
@@ -206,39 +210,41 @@ def make_problem(
     keys = (
         [*question.free]
         if question.free is not None
-        else [*dict.fromkeys((*(usual or free_by_default(robot)), *guesses(robot)))]
+        else [*dict.fromkeys((*(default_keys or free_by_default(robot)), *guesses(robot)))]
     )
     unknown = [key for key in question.fixed if key not in keys]
     if unknown and question.free is not None:
         raise InputError("fixed, but not free", got=unknown[0], expected=", ".join(keys), where="fixed")
     keys = [key for key in keys if key not in question.fixed and not is_profiled(key, robot)]
     if not keys:
-        got = ", ".join(question.free or ()) or "no key"
-        raise InputError("nothing is free", got=got, expected="at least one beside breakaway", where="free")
-    own = robot_parameters(robot, keys, priors)
+        received = ", ".join(question.free or ()) or "no key"
+        raise InputError("nothing is free", got=received, expected="at least one beside breakaway", where="free")
+    robot_numbers = robot_parameters(robot, keys, priors)
     engine = engine or engine_for(records, robot, keys)
     if not engine.exact:
         drive = _drive(records, robot)
-        own = [kept_in_order(_within_reach(p, drive), robot, keys) for p in own]
+        robot_numbers = [kept_in_order(_within_reach(p, drive), robot, keys) for p in robot_numbers]
     auto = automatic(records, engine.exact)
-    more = (
+    nuisance_numbers = (
         nuisance_parameters(auto, records, robot, earliest(records))
         if question.nuisances is None
         else nuisance_parameters(question.nuisances, records, robot)
     )
-    late = any(p.name.startswith(LATENCY) for p in more) or robot.drive.latency > 0.0
+    has_latency = any(p.name.startswith(LATENCY) for p in nuisance_numbers) or robot.drive.latency > 0.0
     start = question.start
     parts = (
         loop_pieces(records, robot, start)
-        if engine.looped
-        else pieces(records, robot, start, late, None if engine.exact else START_STD)
+        if engine.has_loop
+        else pieces(records, robot, start, has_latency, None if engine.exact else START_STD)
     )
     rows = sum(int(np.isfinite(p.record.outputs[p.first : p.last + 1]).sum()) for p in parts)
-    if rows <= len(own) + len(more):
+    if rows <= len(robot_numbers) + len(nuisance_numbers):
         raise InsufficientDataError(
-            "too few measurements", got=f"{rows}", expected=f"more than {len(own) + len(more)}, one for each number"
+            "too few measurements",
+            got=f"{rows}",
+            expected=f"more than {len(robot_numbers) + len(nuisance_numbers)}, one for each number",
         )
-    return Problem(robot, (*own, *more), len(own), tuple(parts))
+    return Problem(robot, (*robot_numbers, *nuisance_numbers), len(robot_numbers), tuple(parts))
 
 
 def engine_for(records: Sequence[Record], robot: Robot, keys: Sequence[str]) -> Kind:
@@ -253,12 +259,12 @@ def stays_exact(robot: Robot, keys: Sequence[str]) -> bool:
 
     A number of one wheel makes equal motors unequal, and the axes couple; friction that was off may come up.
     """
-    other = [Key.parse(key) for key in keys if key not in BOX]
-    other = [key for key in other if (key.table, key.field) != (BODY_AXES, BREAKAWAY)]
-    for k, key in enumerate(other):
-        value, share = key.get(robot), ASIDE * (k + 1)
+    other_keys = [Key.parse(key) for key in keys if key not in BOX]
+    other_keys = [key for key in other_keys if (key.table, key.field) != (BODY_AXES, BREAKAWAY)]
+    for k, key in enumerate(other_keys):
+        value, share = key.get(robot), PROBE_CHANGE * (k + 1)
         robot = key.set(robot, value * (1.0 + share) or share, checked=False)
-    return not other or is_exact(robot)
+    return not other_keys or is_exact(robot)
 
 
 def _drive(records: Sequence[Record], robot: Robot) -> float:
@@ -270,10 +276,10 @@ def _drive(records: Sequence[Record], robot: Robot) -> float:
 
 def _within_reach(p: Parameter, drive: float) -> Parameter:
     """Bounds within which a number shows: above 0, where it is off, and no level far beyond what drives the robot."""
-    low = LEAST * p.value if p.low == 0.0 else p.low
+    low = LEVEL_SHARE * p.value if p.low == 0.0 else p.low
     if Key.parse(p.name).level not in (COULOMB, BREAKAWAY) or drive == 0.0:
         return replace(p, low=low)
-    return replace(p, low=low, high=min(p.high, max(BEYOND * drive, 2.0 * p.value)))
+    return replace(p, low=low, high=min(p.high, max(DRIVE_FACTOR * drive, 2.0 * p.value)))
 
 
 def free_by_default(robot: Robot, exact: bool | None = None) -> tuple[str, ...]:
@@ -283,102 +289,107 @@ def free_by_default(robot: Robot, exact: bool | None = None) -> tuple[str, ...]:
     """
     if is_exact(robot) if exact is None else exact:
         return BOX
-    has = {key: Key.parse(key) for key in friction_keys(robot)}
-    return tuple(name for name, key in has.items() if key.level == VISCOUS or key.get(robot) > 0.0)
+    keys_by_name = {key: Key.parse(key) for key in friction_keys(robot)}
+    return tuple(name for name, key in keys_by_name.items() if key.level == VISCOUS or key.get(robot) > 0.0)
 
 
-def guesses(robot: Robot, looped: bool = False) -> tuple[str, ...]:
+def guesses(robot: Robot, has_loop: bool = False) -> tuple[str, ...]:
     """What is free by default beside friction: every number whose std no fit has written, and that a fit can move.
 
-    The EMF constant follows the torque constant, and breakaway coulomb where it does not fall to it. looped: whether a
-    speed loop makes the voltage; where it is logged, a limit on it says nothing.
+    The EMF constant follows the torque constant, and breakaway coulomb where it does not fall to it. has_loop: whether
+    a speed loop makes the voltage; where it is logged, a limit on it says nothing.
     """
-    found = {name: Key.parse(name) for name in known_priors(robot)}
-    magnet = any(key.name == TORQUE for key in found.values())
-    kept = []
-    for name, key in found.items():
-        tied = (magnet and key.name == EMF) or (key.level == BREAKAWAY and not falls(name, robot))
-        held = key.name in NEVER_FREE or (key.name == LIMIT and not looped)
-        if not tied and not held and (key.level or key.name == CENTRE or key.get(robot) > 0.0):
-            kept.append(name)
-    return tuple(kept)
+    keys_by_name = {name: Key.parse(name) for name in known_priors(robot)}
+    magnet = any(key.name == TORQUE for key in keys_by_name.values())
+    kept_names = []
+    for name, key in keys_by_name.items():
+        is_tied = (magnet and key.name == EMF) or (key.level == BREAKAWAY and not falls(name, robot))
+        is_held = key.name in NEVER_FREE or (key.name == LIMIT and not has_loop)
+        if not is_tied and not is_held and (key.level or key.name == CENTRE or key.get(robot) > 0.0):
+            kept_names.append(name)
+    return tuple(kept_names)
 
 
-def expand_keys(names: str | Sequence[str], robot: Robot, usual: Sequence[str] = ()) -> tuple[str, ...]:
+def expand_keys(names: str | Sequence[str], robot: Robot, default_keys: Sequence[str] = ()) -> tuple[str, ...]:
     """The keys that names stand for: "friction" for what is free by default, a list for its entries; others as is.
 
-    usual: what is free by default, where that is known.
+    default_keys: what is free by default, where that is known.
     """
-    each = ((usual or free_by_default(robot)) if name == FRICTION else expand(name, robot) for name in names_of(names))
-    return tuple(dict.fromkeys(key for keys in each for key in keys))
+    keys_by_name = (
+        (default_keys or free_by_default(robot)) if name == FRICTION else expand(name, robot)
+        for name in names_of(names)
+    )
+    return tuple(dict.fromkeys(key for keys in keys_by_name for key in keys))
 
 
 # Which axes visibly moved in a log, and what drive those that did not have held
 
-NOTHING = 1e-9  # [N, N m] a drive that is only rounding
-CLEAR = 6.0  # standard errors of a short mean that noise does not reach in any log
+NO_DRIVE = 1e-9  # [N, N m] a drive that is only rounding
+MOTION_ERRORS = 6.0  # standard errors of a short mean that noise does not reach in any log
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """moved (3,): whether an axis visibly moved; True where no twist is known.
+    """moving_axes (3,): whether an axis visibly moved; True where no twist is known.
 
-    held (3,): largest drive [N, N, N m] of the axes that were measured; 0 where all have moved, and nothing was held.
-    seen (3,): whether anything tells of an axis; what was not measured has held nothing. dead (3,): whether no row of
-    an axis differs from another, where others moved: it stood still, or its sensor is dead.
+    held_forces (3,): largest drive [N, N, N m] of the axes that were measured; 0 where all have moved, and nothing was
+    held. seen_axes (3,): whether anything tells of an axis; what was not measured has held nothing. dead (3,): whether
+    no row of an axis differs from another, where others moved: it stood still, or its sensor is dead.
     """
 
-    moved: BoolArray
-    held: FloatArray
-    seen: BoolArray
+    moving_axes: BoolArray
+    held_forces: FloatArray
+    seen_axes: BoolArray
     dead: BoolArray
 
     def unfitted(self, axis: int, group: str | None = None) -> Statement:
         """Why the friction of an axis that did not move is not fitted. group: that of several; None: the only one."""
-        if not self.seen[axis]:
+        if not self.seen_axes[axis]:
             return Statement("axis_not_measured", WARNING, AXES[axis], {} if group is None else {"group": group})
         if group is not None:
             return Statement("axis_not_moved", WARNING, AXES[axis], {"group": group})
-        held = float(self.held[axis]) if self.held[axis] > NOTHING else 0.0
-        return Statement("axis_not_moved", WARNING, AXES[axis], {"held": held, "dead": bool(self.dead[axis])})
+        held_force = float(self.held_forces[axis]) if self.held_forces[axis] > NO_DRIVE else 0.0
+        return Statement("axis_not_moved", WARNING, AXES[axis], {"held": held_force, "dead": bool(self.dead[axis])})
 
 
 def motion(records: Sequence[Record], robot: Robot) -> Motion:
     """What all logs together show."""
-    moved, seen, dead = np.zeros(3, bool), np.zeros(3, bool), np.ones(3, bool)
+    moving_axes, seen_axes, still_axes = np.zeros(3, bool), np.zeros(3, bool), np.ones(3, bool)
     measured = []
     for log in records:
         twist = measured_twist(log, robot)
         if twist is None:
             return Motion(np.ones(3, bool), np.zeros(3), np.ones(3, bool), np.zeros(3, bool))
-        known = np.array([np.isfinite(twist[:, axis]).any() for axis in range(3)])
-        measured.append(known)
-        others = any(name != "twist" for name, _ in log.columns)  # which may tell of an axis without a speed
-        seen |= known | others
-        moved |= others & ~known
-        dead &= known & [not np.any(np.diff(own[np.isfinite(own)])) for own in twist.T]
+        measured_axes = np.array([np.isfinite(twist[:, axis]).any() for axis in range(3)])
+        measured.append(measured_axes)
+        has_other_columns = any(name != "twist" for name, _ in log.columns)  # which may tell of an axis without a speed
+        seen_axes |= measured_axes | has_other_columns
+        moving_axes |= has_other_columns & ~measured_axes
+        still_axes &= measured_axes & [
+            not np.any(np.diff(axis_speeds[np.isfinite(axis_speeds)])) for axis_speeds in twist.T
+        ]
         for first, last in log.pieces:
             rows = max(window_rows(log, first, last) // 2, 1)
-            for axis in np.flatnonzero(known).tolist():
-                moved[axis] |= _moved(twist, axis, first, last, rows)
-    held = np.zeros(3) if moved.all() else _most_drive(records, measured, robot)
-    return Motion(moved, held, seen, dead & bool(moved.any()))
+            for axis in np.flatnonzero(measured_axes).tolist():
+                moving_axes[axis] |= _moved(twist, axis, first, last, rows)
+    held_forces = np.zeros(3) if moving_axes.all() else _most_drive(records, measured, robot)
+    return Motion(moving_axes, held_forces, seen_axes, still_axes & bool(moving_axes.any()))
 
 
 def _most_drive(records: Sequence[Record], measured: Sequence[BoolArray], robot: Robot) -> FloatArray:
     """The largest drive of each axis [N, N, N m] in logs that have measured it, each (3,). Shape (3,)."""
-    drive, mass, most = state_space(robot).B, mass_matrix(robot), np.zeros(3)
-    for log, known in zip(records, measured, strict=True):
+    drive, mass, largest_drive = state_space(robot).B, mass_matrix(robot), np.zeros(3)
+    for log, measured_axes in zip(records, measured, strict=True):
         for first, last in log.pieces:
             wrench = reaching(without_map(robot), log.voltage[first:last]) @ drive.T @ mass
-            most = np.maximum(most, np.where(known, np.abs(wrench).max(axis=0), 0.0))
+            largest_drive = np.maximum(largest_drive, np.where(measured_axes, np.abs(wrench).max(axis=0), 0.0))
     if robot.wheels.traction_mu is None:
-        return most
-    return np.minimum(most, np.abs(robot.wheels.wrench_matrix) @ grips(robot))  # beyond it wheels slip
+        return largest_drive
+    return np.minimum(largest_drive, np.abs(robot.wheels.wrench_matrix) @ grips(robot))  # beyond it wheels slip
 
 
 def _moved(twist: FloatArray, axis: int, first: int, last: int, rows: int) -> bool:
     """Whether the mean over so many rows is beyond what noise makes of it, in as many rows."""
-    own = twist[first : last + 1, axis]
-    clear = CLEAR * difference_noise(own) / np.sqrt(measured_rows(own, rows))
-    return int(count_far(twist, axis, first, last, rows, clear)) >= rows
+    axis_speed = twist[first : last + 1, axis]
+    clear_mean = MOTION_ERRORS * difference_noise(axis_speed) / np.sqrt(measured_rows(axis_speed, rows))
+    return int(count_far(twist, axis, first, last, rows, clear_mean)) >= rows

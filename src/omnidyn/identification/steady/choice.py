@@ -36,7 +36,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.statistics import huber_loss
 
 AUTO = "auto"
-APART = 2.0  # standard errors from which two shapes are told apart
+SHAPE_ERRORS = 2.0  # standard errors from which two shapes are told apart
 NOT_COMPARED = {
     "one_speed": "the points of a group have nearly one speed",
     "not_determined": "the directions do not determine all of its levels",
@@ -138,46 +138,46 @@ def choose_shape(robot: Robot, points: ForcePoints, *, shape: str = AUTO, robust
     scores = _scores(fits, errors)
     if shape != AUTO:
         return ShapeChoice(scores, shape, fits, missing)
-    chosen, own, scored = _of_groups(fits, _choice(scores, errors), robust)
-    return ShapeChoice(scores, chosen, fits, missing, own, scored)
+    shared_shape, shape_by_group, scores_by_group = _of_groups(fits, _choice(scores, errors), robust)
+    return ShapeChoice(scores, shared_shape, fits, missing, shape_by_group, scores_by_group)
 
 
 def _of_groups(
-    fits: Mapping[str, Mapping[str, ShapeFit]], chosen: str, robust: bool
+    fits: Mapping[str, Mapping[str, ShapeFit]], shared_shape: str, robust: bool
 ) -> tuple[str, dict[str, str], dict[str, tuple[ShapeScore, ...]]]:
     """(the shape that groups share, group -> that of one which tells another from it, group -> the scores in it).
 
     What is left of the groups without these may share a simpler one, or a better: it is chosen anew.
     """
-    rest, own = [*next(iter(fits.values()))], dict[str, str]()
-    scored: dict[str, tuple[ShapeScore, ...]] = {}
-    alone = {group: {name: {group: fit[group]} for name, fit in fits.items()} for group in rest}
-    while len(rest) + len(own) > 1 and rest:
-        found = {}
-        for group in rest:
-            errors = _LeftOutErrors(alone[group], robust)
-            scored[group] = _scores(alone[group], errors)
-            able = [score.name for score in scored[group] if score.in_model and not score.at_bound]
-            if able and errors.apart(chosen, able[0]) > APART:
-                found[group] = _choice(scored[group], errors)
-        if not found:
+    sharing_groups, shape_by_group = [*next(iter(fits.values()))], dict[str, str]()
+    scores_by_group: dict[str, tuple[ShapeScore, ...]] = {}
+    fits_of_group = {group: {name: {group: fit[group]} for name, fit in fits.items()} for group in sharing_groups}
+    while len(sharing_groups) + len(shape_by_group) > 1 and sharing_groups:
+        new_shapes = {}
+        for group in sharing_groups:
+            errors = _LeftOutErrors(fits_of_group[group], robust)
+            scores_by_group[group] = _scores(fits_of_group[group], errors)
+            usable_names = [score.name for score in scores_by_group[group] if score.in_model and not score.at_bound]
+            if usable_names and errors.apart(shared_shape, usable_names[0]) > SHAPE_ERRORS:
+                new_shapes[group] = _choice(scores_by_group[group], errors)
+        if not new_shapes:
             break
-        own |= found
-        rest = [group for group in rest if group not in own]
-        if rest:
-            left = {name: {group: fit[group] for group in rest} for name, fit in fits.items()}
-            errors = _LeftOutErrors(left, robust)
-            chosen = _choice(_scores(left, errors), errors)
-    return chosen, own, {group: scored[group] for group in own}
+        shape_by_group |= new_shapes
+        sharing_groups = [group for group in sharing_groups if group not in shape_by_group]
+        if sharing_groups:
+            shared_fits = {name: {group: fit[group] for group in sharing_groups} for name, fit in fits.items()}
+            errors = _LeftOutErrors(shared_fits, robust)
+            shared_shape = _choice(_scores(shared_fits, errors), errors)
+    return shared_shape, shape_by_group, {group: scores_by_group[group] for group in shape_by_group}
 
 
 def _refuse_lost_signs(points: ForcePoints) -> None:
-    along = points.along[np.isfinite(points.along)]
-    wrong = int((along < 0.0).sum())
-    if wrong > len(along) / 2:
+    travel_forces = points.along[np.isfinite(points.along)]
+    wrong = int((travel_forces < 0.0).sum())
+    if wrong > len(travel_forces) / 2:
         raise InsufficientDataError(
             "the force points against the motion, as if friction drove the robot",
-            got=f"in {wrong} of {len(along)} points",
+            got=f"in {wrong} of {len(travel_forces)} points",
             expected="forces along the motion",
             remedy="check the sign of the currents (`current_unsigned`) and which wheel is which"
             if points.force_from == CURRENT
@@ -200,8 +200,8 @@ class _LeftOutErrors:
             for name, groups in fits.items()
         }
         folds = [fit.fold for fit in next(iter(fits.values())).values()]
-        before = np.cumsum([0, *(int(fold.max()) + 1 for fold in folds)])
-        self.fold = np.concatenate([fold + first for fold, first in zip(folds, before[:-1], strict=True)])
+        first_folds = np.cumsum([0, *(int(fold.max()) + 1 for fold in folds)])
+        self.fold = np.concatenate([fold + first for fold, first in zip(folds, first_folds[:-1], strict=True)])
         self._loss = self.squares
         if robust:  # Huber's loss, its bound two scales of the shape that has the least
             limit = HUBER / RAYLEIGH * float(np.sqrt(min(np.median(square) for square in self.squares.values())))
@@ -214,35 +214,37 @@ class _LeftOutErrors:
 
     def apart(self, name: str, best: str) -> float:
         """How much worse than the best, in standard errors: of the difference or of the best's own, the smaller."""
-        behind, error = _difference(self._loss[name], self._loss[best], self.fold)
+        difference, error = _difference(self._loss[name], self._loss[best], self.fold)
         error = min(error, rms_and_error(self._loss[best], self.fold)[1])
-        if not behind or math.isnan(error):
+        if not difference or math.isnan(error):
             return 0.0
-        return behind / error if error > 0.0 else math.copysign(math.inf, behind)
+        return difference / error if error > 0.0 else math.copysign(math.inf, difference)
 
 
 def _scores(fits: Mapping[str, Mapping[str, ShapeFit]], errors: _LeftOutErrors) -> tuple[ShapeScore, ...]:
-    along = {name: np.concatenate([fit.along_error**2 for fit in groups.values()]) for name, groups in fits.items()}
+    squares_by_shape = {
+        name: np.concatenate([fit.along_error**2 for fit in groups.values()]) for name, groups in fits.items()
+    }
     squares, fold, order = errors.squares, errors.fold, errors.order
-    found = []
+    scores = []
     for name in order:
-        apart = errors.apart(name, order[0])
+        distance = errors.apart(name, order[0])
         groups = list(fits[name].values())
-        found.append(
+        scores.append(
             ShapeScore(
                 name,
                 SHAPES[name].words,
                 len(groups[0].keys),
                 *rms_and_error(squares[name], fold),
-                *rms_and_error(along[name], fold),
+                *rms_and_error(squares_by_shape[name], fold),
                 *_difference(squares[name], squares[order[0]], fold),
-                apart,
-                apart > APART,
+                distance,
+                distance > SHAPE_ERRORS,
                 SHAPES[name].in_model,
                 any((fit.free <= 0.0).any() for fit in groups),
             )
         )
-    return tuple(found)
+    return tuple(scores)
 
 
 def _difference(first: FloatArray, second: FloatArray, fold: IntArray) -> tuple[float, float]:
@@ -255,15 +257,15 @@ def _difference(first: FloatArray, second: FloatArray, fold: IntArray) -> tuple[
 
 def _choice(scores: Sequence[ShapeScore], errors: _LeftOutErrors) -> str:
     """The simplest shape that a robot file can hold and that the data cannot tell from the best of those."""
-    able = [score for score in scores if score.in_model and not score.at_bound]
-    if not able:
+    usable_scores = [score for score in scores if score.in_model and not score.at_bound]
+    if not usable_scores:
         raise InsufficientDataError(
             "no shape of friction fits: every one has a level below 0",
             got=", ".join(score.name for score in scores),
             expected="forces that point along the motion",
             remedy="check the sign of the currents, and which wheel is which",
         )
-    equal = [score for score in able if errors.apart(score.name, able[0].name) <= APART]
+    equal = [score for score in usable_scores if errors.apart(score.name, usable_scores[0].name) <= SHAPE_ERRORS]
     return min(equal, key=lambda score: (score.levels, score.loo)).name
 
 

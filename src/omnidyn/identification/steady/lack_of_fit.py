@@ -18,7 +18,7 @@ from scipy.special import fdtrc, stdtr
 
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.identification.lack_of_fit import Force, LackOfFit, Remedy
-from omnidyn.identification.steady.choice import APART
+from omnidyn.identification.steady.choice import SHAPE_ERRORS
 from omnidyn.identification.steady.operating_points import ForcePoints
 from omnidyn.identification.steady.shapes import (
     HUBER,
@@ -37,10 +37,10 @@ from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import huber_weight
 
 FALSE_ALARM = 0.002  # of all tests of a group together, by Student's t: few directions have longer tails
-MATTERS = 0.02  # of the force: what is missing and smaller does not matter
+FORCE_SHARE = 0.02  # of the force: what is missing and smaller does not matter
 SLOW_SHARE = 0.02  # of the fastest rim: a part of the shape that moves less may be at rest
 STILL_TIMES = 2.0  # as sure as that: what is not known to move is left out, and what hardly is
-SPARE = 6  # folds beyond the levels that a test needs
+SPARE_FOLDS = 6  # folds beyond the levels that a test needs
 ROUNDS = 10  # of robust weights
 TURNED_DEG = (15.0, 30.0, 45.0, 60.0, 75.0)
 REPEATS = "repeats"
@@ -54,55 +54,57 @@ def lack_of_fit(robot: Robot, points: ForcePoints, fit: ShapeFit) -> LackOfFit:
     error there. No robot file holds any of these remedies. Nothing is tried where there are too few directions.
     """
     moving = all_moving(robot, points, fit)
-    turning = is_turning(robot, points) and bool(moving.turns.any())
-    untested = LackOfFit(False, {"force": 0.0}, {"force": 0.0}, (), (), {})
-    if not len(moving) or int(fold_numbers(moving).max()) + 1 < len(fit.keys) + SPARE:
-        return untested
-    problem = LinearShape(robot, moving, fit, turning)
-    plain = problem.solve(np.zeros((*problem.target.shape, 0)))
-    if plain is None:
-        return untested
-    tried: dict[str, _Solved] = {}
+    has_yaw = is_turning(robot, points) and bool(moving.turns.any())
+    untested_lack = LackOfFit(False, {"force": 0.0}, {"force": 0.0}, (), (), {})
+    if not len(moving) or int(fold_numbers(moving).max()) + 1 < len(fit.keys) + SPARE_FOLDS:
+        return untested_lack
+    problem = LinearShape(robot, moving, fit, has_yaw)
+    plain_fit = problem.solve(np.zeros((*problem.target.shape, 0)))
+    if plain_fit is None:
+        return untested_lack
+    fit_by_key: dict[str, _Solved] = {}
     for key, columns in UNOFFERED_SHAPES.items():
-        solved = problem.solve(problem.components(columns(robot, moving))) if turning or key != ABOUT_YAW else None
-        if solved is not None:
-            tried[key] = solved
+        shape_fit = problem.solve(problem.components(columns(robot, moving))) if has_yaw or key != ABOUT_YAW else None
+        if shape_fit is not None:
+            fit_by_key[key] = shape_fit
     size = float(np.sqrt(np.mean((problem.target**2).sum(axis=1))))
-    tests = sum(solved.new for solved in tried.values()) + 1
-    forces = {key: _gain(solved, plain, problem.fold, tests) for key, solved in tried.items()}
-    better = sorted((key for key in forces if _matters(forces[key], size)), key=lambda key: forces[key].after)
-    repeated = _repeated(plain, problem, len(fit.keys))
-    found = bool(better) or (repeated.probability * tests < FALSE_ALARM and repeated.size > MATTERS * size)
-    share = repeated.share if found else 0.0
-    if better:
-        share = max(share, 1.0 - (forces[better[0]].after / forces[better[0]].before) ** 2)
+    tests = sum(key_fit.new for key_fit in fit_by_key.values()) + 1
+    forces = {key: _gain(key_fit, plain_fit, problem.fold, tests) for key, key_fit in fit_by_key.items()}
+    better_keys = sorted((key for key in forces if _matters(forces[key], size)), key=lambda key: forces[key].after)
+    repeat_test = _repeated(plain_fit, problem, len(fit.keys))
+    is_lacking = bool(better_keys) or (
+        repeat_test.probability * tests < FALSE_ALARM and repeat_test.size > FORCE_SHARE * size
+    )
+    share = repeat_test.share if is_lacking else 0.0
+    if better_keys:
+        share = max(share, 1.0 - (forces[better_keys[0]].after / forces[better_keys[0]].before) ** 2)
     return LackOfFit(
-        found,
+        is_lacking,
         {"force": share},
-        {"force": max((forces[key].size for key in better), default=0.0)},
+        {"force": max((forces[key].size for key in better_keys), default=0.0)},
         (),
-        tuple(_remedy(key, forces, better) for key in better),
+        tuple(_remedy(key, forces, better_keys) for key in better_keys),
         {},
-        tried=(*tried, *([REPEATS] if repeated.tested else [])),
+        tried=(*fit_by_key, *([REPEATS] if repeat_test.is_tested else [])),
     )
 
 
 def _matters(force: Force, size: float) -> bool:
     """Whether a gain is no chance, tells more of what was left out, and is large. size [N]: rms of all forces."""
-    return force.p < FALSE_ALARM and force.gain > APART * force.gain_std and force.size > MATTERS * size
+    return force.p < FALSE_ALARM and force.gain > SHAPE_ERRORS * force.gain_std and force.size > FORCE_SHARE * size
 
 
-def _remedy(key: str, forces: Mapping[str, Force], better: Sequence[str]) -> Remedy:
+def _remedy(key: str, forces: Mapping[str, Force], better_keys: Sequence[str]) -> Remedy:
     """The best names those which do as well: their left-out error is within a standard error of its gain."""
-    force, best = forces[key], forces[better[0]]
-    alike = [other for other in better[1:] if forces[other].after - best.after <= best.gain_std]
-    before, after = force.before**2, force.after**2
+    force, best = forces[key], forces[better_keys[0]]
+    similar_keys = [rival_key for rival_key in better_keys[1:] if forces[rival_key].after - best.after <= best.gain_std]
+    square_before, square_after = force.before**2, force.after**2
     return Remedy(
         key,
         Statement("cause", NOTE, key),
-        1.0 - after / before,
-        2.0 * force.after * force.gain_std / before,
-        tuple(alike) if force is best else (),
+        1.0 - square_after / square_before,
+        2.0 * force.after * force.gain_std / square_before,
+        tuple(similar_keys) if force is best else (),
         offered=False,
         force=force,
     )
@@ -131,8 +133,8 @@ class _Solved:
 class LinearShape:
     """The chosen shape, linear about its fitted levels, with more columns beside it."""
 
-    def __init__(self, robot: Robot, points: ForcePoints, fit: ShapeFit, turning: bool):
-        self.arm, self.seen = float(np.mean(robot.wheels.robot_radius)), seen_components(points, turning)
+    def __init__(self, robot: Robot, points: ForcePoints, fit: ShapeFit, has_yaw: bool):
+        self.arm, self.seen = float(np.mean(robot.wheels.robot_radius)), seen_components(points, has_yaw)
         wrench, slope = fit.shape.table(robot, points, is_turning_fit(fit), fit.free)
         self.base, self.force = self.components(slope), self.components(wrench[:, :, None])
         self.target = self.components((points.wrench - wrench)[:, :, None])[:, :, 0] + self.base @ fit.free
@@ -144,9 +146,9 @@ class LinearShape:
         scale = np.array([1.0, 1.0, self.arm])[None, :, None]
         return (wrench / scale)[:, : self.seen.shape[1]] * self.seen[:, :, None]
 
-    def solve(self, more: FloatArray) -> _Solved | None:
+    def solve(self, extra_columns: FloatArray) -> _Solved | None:
         """Robust least squares, each fold left out once; None where the columns are not determined."""
-        design = np.concatenate([self.base[:, :, self.sizes], more], axis=2)
+        design = np.concatenate([self.base[:, :, self.sizes], extra_columns], axis=2)
         norm = np.linalg.norm(design, axis=(0, 1))
         if (norm == 0.0).any() or self.count <= design.shape[2] + 1:
             return None
@@ -163,14 +165,14 @@ class LinearShape:
                 break
             weight = huber_weight(length, HUBER * scale)
         normal, right = self._sums(design, weight)
-        without = normal.sum(axis=0) - normal
-        if np.linalg.cond(without).max() > 1e8:
+        normal_without_fold = normal.sum(axis=0) - normal
+        if np.linalg.cond(normal_without_fold).max() > 1e8:
             return None
-        levels = np.linalg.solve(without, (right.sum(axis=0) - right)[:, :, None])[:, :, 0]
+        levels = np.linalg.solve(normal_without_fold, (right.sum(axis=0) - right)[:, :, None])[:, :, 0]
         deviation = levels - levels.mean(axis=0)
         std = np.sqrt((self.count - 1) / self.count * (deviation**2).sum(axis=0))
         error = self.target - np.einsum("ncp,np->nc", design, levels[self.fold])
-        return _Solved(level, std, error, self.target - design @ level, self.count - len(level), more.shape[2])
+        return _Solved(level, std, error, self.target - design @ level, self.count - len(level), extra_columns.shape[2])
 
     def _sums(self, design: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The normal equations of each fold: (folds, p, p), (folds, p)."""
@@ -186,16 +188,16 @@ def is_turning_fit(fit: ShapeFit) -> bool:
     return fit.error.shape[1] == 3
 
 
-def _gain(solved: _Solved, plain: _Solved, fold: IntArray, tests: int) -> Force:
+def _gain(new_fit: _Solved, plain_fit: _Solved, fold: IntArray, tests: int) -> Force:
     """What the new columns add to the force, and take away of the left-out error."""
-    new = slice(len(solved.level) - solved.new, None)
-    size = np.abs(solved.level[new]) / np.sqrt(len(solved.error))  # the columns are of length 1
+    new = slice(len(new_fit.level) - new_fit.new, None)
+    size = np.abs(new_fit.level[new]) / np.sqrt(len(new_fit.error))  # the columns are of length 1
     with np.errstate(divide="ignore", invalid="ignore"):
-        t = np.where(solved.std[new] > 0.0, np.abs(solved.level[new]) / solved.std[new], 0.0)
-    p = float(np.min(2.0 * stdtr(solved.degrees, -t)))
-    before, after = (plain.error**2).sum(axis=1), (solved.error**2).sum(axis=1)
-    first, second = float(np.sqrt(before.mean())), float(np.sqrt(after.mean()))
-    spread = mean_error(before - after, fold) / max(first + second, 1e-300)
+        t = np.where(new_fit.std[new] > 0.0, np.abs(new_fit.level[new]) / new_fit.std[new], 0.0)
+    p = float(np.min(2.0 * stdtr(new_fit.degrees, -t)))
+    square_before, square_after = (plain_fit.error**2).sum(axis=1), (new_fit.error**2).sum(axis=1)
+    first, second = float(np.sqrt(square_before.mean())), float(np.sqrt(square_after.mean()))
+    spread = mean_error(square_before - square_after, fold) / max(first + second, 1e-300)
     return Force(float(np.linalg.norm(size)), first, second, first - second, spread, min(1.0, tests * p))
 
 
@@ -204,28 +206,31 @@ class _Repeated:
     probability: float = 1.0
     size: float = 0.0
     share: float = 0.0
-    tested: bool = False
+    is_tested: bool = False
 
 
-def _repeated(plain: _Solved, problem: LinearShape, levels: int) -> _Repeated:
+def _repeated(plain_fit: _Solved, problem: LinearShape, levels: int) -> _Repeated:
     """Whether the errors of one direction agree more than by chance: spread of their means, beside that within."""
     counts = np.bincount(problem.fold, minlength=problem.count)
-    again = counts[problem.fold] > 1
-    folds, n = int((counts > 1).sum()), int(again.sum())
-    dimensions = plain.residual.shape[1]
+    repeated_rows = counts[problem.fold] > 1
+    folds, n = int((counts > 1).sum()), int(repeated_rows.sum())
+    dimensions = plain_fit.residual.shape[1]
     between_degrees, within_degrees = dimensions * folds - levels, dimensions * (n - folds)
-    if folds < SPARE or between_degrees < 1:
+    if folds < SPARE_FOLDS or between_degrees < 1:
         return _Repeated()
     mean = np.zeros((problem.count, dimensions))
-    np.add.at(mean, problem.fold, plain.residual)
+    np.add.at(mean, problem.fold, plain_fit.residual)
     mean = (mean / np.maximum(counts, 1)[:, None])[problem.fold]
-    between, within = float((mean[again] ** 2).sum()), float(((plain.residual - mean)[again] ** 2).sum())
-    excess = max(0.0, between - between_degrees * within / within_degrees)
-    ratio = (between / between_degrees) / (within / within_degrees) if within > 0.0 else np.inf
+    square_between, square_within = (
+        float((mean[repeated_rows] ** 2).sum()),
+        float(((plain_fit.residual - mean)[repeated_rows] ** 2).sum()),
+    )
+    excess = max(0.0, square_between - between_degrees * square_within / within_degrees)
+    ratio = (square_between / between_degrees) / (square_within / within_degrees) if square_within > 0.0 else np.inf
     return _Repeated(
         float(fdtrc(between_degrees, within_degrees, ratio)),
         float(np.sqrt(excess / n)),
-        excess / max(between + within, 1e-300),
+        excess / max(square_between + square_within, 1e-300),
         True,
     )
 
@@ -266,10 +271,10 @@ UNOFFERED_SHAPES: dict[str, Callable[[Robot, ForcePoints], FloatArray]] = {
 TILTED_FLOOR = {"forward and backward", "left and right", "pull"}
 
 
-def unoffered_columns(robot: Robot, points: ForcePoints, problem: LinearShape, turning: bool) -> list[FloatArray]:
+def unoffered_columns(robot: Robot, points: ForcePoints, problem: LinearShape, has_yaw: bool) -> list[FloatArray]:
     """What each part that is not offered would add, in components of a problem: (points, components, levels) each."""
     return [
         problem.components(columns(robot, points))
         for key, columns in UNOFFERED_SHAPES.items()
-        if turning or key != ABOUT_YAW
+        if has_yaw or key != ABOUT_YAW
     ]

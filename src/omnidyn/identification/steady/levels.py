@@ -79,7 +79,11 @@ class FittedLevels:
 
 
 def estimate_of(
-    fits: Sequence[FittedLevels], robot: Robot, data: str, priors: Mapping[str, Prior] | None = None, **more: Any
+    fits: Sequence[FittedLevels],
+    robot: Robot,
+    data: str,
+    priors: Mapping[str, Prior] | None = None,
+    **extra_fields: Any,
 ) -> Estimate:
     """The Estimate of levels that were fitted apart, which do not correlate.
 
@@ -88,7 +92,7 @@ def estimate_of(
         robot: with the friction that they make.
         data: what they were made from.
         priors: what else is known of the robot's numbers by these data.
-        more: other fields of the Estimate.
+        extra_fields: other fields of the Estimate.
     """
     keys = tuple(key for fit in fits for key in fit.keys)
     matrix, first = np.eye(len(keys)), 0
@@ -97,15 +101,15 @@ def estimate_of(
         matrix[first:last, first:last] = fit.correlation
         first = last
     std = {key: value for fit in fits for key, value in fit.by_key(fit.std).items()}
-    known = {key: identified(value, f"steady state, {data}") for key, value in std.items()} | dict(priors or {})
+    priors_by_key = {key: identified(value, f"steady state, {data}") for key, value in std.items()} | dict(priors or {})
     return Estimate(
-        robot=with_correlation(with_priors(robot, known), keys, matrix),
+        robot=with_correlation(with_priors(robot, priors_by_key), keys, matrix),
         value={key: value for fit in fits for key, value in fit.by_key(fit.level).items()},
         std=std,
         ci95={key: interval for fit in fits for key, interval in fit.intervals().items()},
         correlation=Correlation(keys, matrix),
         degrees_of_freedom={key: fit.degrees_of_freedom for fit in fits for key in fit.keys},
-        at_bound=tuple(key for fit in fits for key, held in zip(fit.keys, fit.at_bound, strict=True) if held),
+        at_bound=tuple(key for fit in fits for key, is_held in zip(fit.keys, fit.at_bound, strict=True) if is_held),
         data=data,
-        **more,
+        **extra_fields,
     )

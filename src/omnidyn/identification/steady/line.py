@@ -107,13 +107,13 @@ def _minimise(
     design: FloatArray, force: FloatArray, variance: FloatArray, wobble: FloatArray, free: tuple[bool, bool]
 ) -> tuple[FittedLine, FloatArray]:
     """The line of the free ones among B and C, and (B, C)."""
-    chosen = np.flatnonzero(free)
-    columns = np.ascontiguousarray(design[:, chosen])
+    free_columns = np.flatnonzero(free)
+    columns = np.ascontiguousarray(design[:, free_columns])
     wobble = wobble if free[0] else 0.0 * wobble
-    found = errors_in_variables(columns, force, variance, wobble, _solve, tolerance=TOLERANCE, most=MAX_ITERATIONS)
+    line_fit = errors_in_variables(columns, force, variance, wobble, _solve, tolerance=TOLERANCE, most=MAX_ITERATIONS)
     parameters = np.zeros(PARAMETERS)
-    parameters[chosen] = found.parameters
-    return found, parameters
+    parameters[free_columns] = line_fit.parameters
+    return line_fit, parameters
 
 
 def _solve(matrix: FloatArray, right: FloatArray) -> FloatArray:
@@ -143,8 +143,8 @@ def _bounded(
         return free
     problem = (design, force, variance, wobble)
     corners = [_minimise(*problem, choice)[1] for choice in ((True, False), (False, True))]
-    allowed = [corner for corner in (*corners, np.zeros(PARAMETERS)) if (corner >= 0.0).all()]
-    return min(allowed, key=lambda parameters: _cost(parameters, *problem))
+    allowed_corners = [corner for corner in (*corners, np.zeros(PARAMETERS)) if (corner >= 0.0).all()]
+    return min(allowed_corners, key=lambda parameters: _cost(parameters, *problem))
 
 
 def confidence_band(estimate: Estimate, axis: int, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -166,48 +166,52 @@ def confidence_band(estimate: Estimate, axis: int, speed: FloatArray) -> tuple[F
 
 FEW_DEGREES = 2
 AGREEMENT = 0.05  # forces that differ by less than this share of their size agree
-UNLIKELY = 0.01  # probability below which the scatter contradicts the std given
+LEAST_PROBABILITY = 0.01  # probability below which the scatter contradicts the std given
 ORIGINS = ("table", "current", "voltage")  # of forces
 
 
 def line_statements(axis: int, line: Line, weighted: bool) -> list[Statement]:
     """What is weak about one fitted line. weighted: by std that came with the data."""
-    found: list[Statement] = []
+    weak_points: list[Statement] = []
     head = AXES[axis]
     if line.degrees_of_freedom <= FEW_DEGREES and not line.absolute_std:
         numbers = {"degrees": line.degrees_of_freedom, "rows": line.rows, "quantile": line.quantile}
-        found.append(Statement("few_degrees", subject=head, numbers=numbers))
+        weak_points.append(Statement("few_degrees", subject=head, numbers=numbers))
     for k, name in enumerate(line.keys):
         low, high = line.ci95[k]
         if line.at_bound[k]:
-            found.append(Statement("coefficient_at_bound", subject=name, numbers={"free": line.free[k], "high": high}))
+            weak_points.append(
+                Statement("coefficient_at_bound", subject=name, numbers={"free": line.free[k], "high": high})
+            )
         elif low <= 0.0 <= high:
-            found.append(Statement("interval_contains_zero", subject=name, numbers={"ci95": (low, high)}))
+            weak_points.append(Statement("interval_contains_zero", subject=name, numbers={"ci95": (low, high)}))
     if not line.converged:
-        found.append(Statement("speed_std_not_settled", subject=head))
+        weak_points.append(Statement("speed_std_not_settled", subject=head))
     degrees = line.degrees_of_freedom
     if weighted and degrees >= 1:
         share = chdtr(degrees, line.reduced_chi2 * degrees)
-        if not UNLIKELY / 2 <= share <= 1.0 - UNLIKELY / 2:
+        if not LEAST_PROBABILITY / 2 <= share <= 1.0 - LEAST_PROBABILITY / 2:
             numbers = {"times": np.sqrt(line.reduced_chi2), "absolute_std": line.absolute_std}
-            found.append(Statement("scatter_contradicts_std", subject=head, numbers=numbers))
-    return found
+            weak_points.append(Statement("scatter_contradicts_std", subject=head, numbers=numbers))
+    return weak_points
 
 
 def point_statements(robot: Robot, points: SteadyTable) -> list[Statement]:
     """What is odd about the points, whatever line is drawn through them."""
-    found = [*statements(points.notes)]
+    odd_points = [*statements(points.notes)]
     for axis in range(len(AXES)):
         rows = np.flatnonzero(points.axis_index == axis)
         if rows.size:
             wrong = int((points.force[rows] * points.speed[rows] < 0.0).sum())
-            against = Statement("axis_against_motion", subject=AXES[axis], numbers={"wrong": wrong, "rows": rows.size})
-            found += [against] if wrong else []
-            found += _beyond_no_load(robot, axis, points, rows)
+            sign_statement = Statement(
+                "axis_against_motion", subject=AXES[axis], numbers={"wrong": wrong, "rows": rows.size}
+            )
+            odd_points += [sign_statement] if wrong else []
+            odd_points += _beyond_no_load(robot, axis, points, rows)
             forces = {points.force_from: points.force[rows], **_recomputed(robot, axis, points, rows)}
             for pair in combinations([name for name in ORIGINS if name in forces], 2):
-                found += _compare(axis, pair, forces[pair[0]], forces[pair[1]])
-    return found
+                odd_points += _compare(axis, pair, forces[pair[0]], forces[pair[1]])
+    return odd_points
 
 
 def _beyond_no_load(robot: Robot, axis: int, points: SteadyTable, rows: NDArray[np.intp]) -> list[Statement]:
@@ -215,12 +219,12 @@ def _beyond_no_load(robot: Robot, axis: int, points: SteadyTable, rows: NDArray[
     if points.voltage is None:
         return []
     ratio = no_load_ratio(robot, points.twists[rows], points.voltage[rows])
-    beyond = ratio[ratio > 1.0]
-    if not beyond.size:
+    excess_ratios = ratio[ratio > 1.0]
+    if not excess_ratios.size:
         return []
-    excess = 100.0 * (beyond[np.isfinite(beyond)] - 1.0)
+    excess = 100.0 * (excess_ratios[np.isfinite(excess_ratios)] - 1.0)
     numbers = {
-        "beyond": beyond.size,
+        "beyond": excess_ratios.size,
         "moving": int((points.speed[rows] != 0.0).sum()),
         "excess": (excess.min(), excess.max()) if excess.size else None,
     }
@@ -233,10 +237,10 @@ def no_load_ratio(robot: Robot, twist: FloatArray, voltage: FloatArray) -> Float
     Above 1 the motors brake as a whole. Infinite where the voltage opposes the motion, NaN at rest or without voltage.
     """
     emf = back_emf(robot.motor, wheel_speed(robot.wheels, twist))
-    own, against = (emf * emf).sum(axis=1), (emf * voltage).sum(axis=1)
+    emf_square, emf_by_voltage = (emf * emf).sum(axis=1), (emf * voltage).sum(axis=1)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        ratio = np.where(against > 0.0, own / against, np.inf)
-    return np.where((own > 0.0) & np.isfinite(against), ratio, np.nan)
+        ratio = np.where(emf_by_voltage > 0.0, emf_square / emf_by_voltage, np.inf)
+    return np.where((emf_square > 0.0) & np.isfinite(emf_by_voltage), ratio, np.nan)
 
 
 def _recomputed(robot: Robot, axis: int, points: SteadyTable, rows: NDArray[np.intp]) -> dict[str, FloatArray]:
@@ -252,8 +256,8 @@ def _recomputed(robot: Robot, axis: int, points: SteadyTable, rows: NDArray[np.i
 
 
 def _compare(axis: int, origins: tuple[str, str], a: FloatArray, b: FloatArray) -> list[Statement]:
-    known = np.isfinite(a) & np.isfinite(b)
-    a, b = a[known], b[known]
+    known_rows = np.isfinite(a) & np.isfinite(b)
+    a, b = a[known_rows], b[known_rows]
     size = float(np.sqrt(np.mean(a**2))) if a.size else 0.0
     if size == 0.0:
         return []
@@ -264,8 +268,8 @@ def _compare(axis: int, origins: tuple[str, str], a: FloatArray, b: FloatArray) 
     return [Statement("forces_disagree", subject=AXES[axis], numbers=numbers)]
 
 
-def rest_statements(axis: int, resting: int, rest: str) -> list[Statement]:
+def rest_statements(axis: int, resting: int, rest_use: str) -> list[Statement]:
     """How rows at rest were used, where that matters."""
     codes = {"line": ("rest_as_sliding", "warning"), "ignore": ("rest_not_used", NOTE)}
-    code, severity = codes.get(rest, ("", ""))
+    code, severity = codes.get(rest_use, ("", ""))
     return [Statement(code, severity, AXES[axis], {"rows": resting})] if resting and code else []

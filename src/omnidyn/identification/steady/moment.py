@@ -25,12 +25,12 @@ from omnidyn.run import Run
 from omnidyn.statement import Statement
 from omnidyn.statistics import autocorrelation_time, huber_weight, t_quantile
 
-FALSE = 0.002  # of right runs for which a change is told where commands come again; by the shape, of right logs:
+FALSE_SHARE = 0.002  # of right runs for which a change is told where commands come again; by the shape, of right logs:
 FALSE_BY_SHAPE = 0.01
-SPARE = 4  # degrees of freedom that a test needs
-LEAST = 3  # pieces, or windows, on either side of a cut
-AS_GOOD = 6.0  # of t squared, by which another cut, or a drift, must be worse than the best to be ruled out
-MATTERS = 0.02  # of the force: a smaller change does not matter
+SPARE_DEGREES = 4  # degrees of freedom that a test needs
+LEAST_PIECES = 3  # pieces, or windows, on either side of a cut
+RIVAL_MARGIN = 6.0  # of t squared, by which another cut, or a drift, must be worse than the best to be ruled out
+FORCE_SHARE = 0.02  # of the force: a smaller change does not matter
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,9 @@ class Moment:
     def statement(self) -> Statement:
         """The change, with its numbers."""
         numbers = {name: value for name, value in asdict(self).items() if name != "source"}
-        before, after = self.vanished
-        gone = {"vanished": "before" if before else "after" if after else ""}
-        return Statement("changes_within_run", subject=self.source, numbers=numbers | gone)
+        is_before, is_after = self.vanished
+        vanished_side = {"vanished": "before" if is_before else "after" if is_after else ""}
+        return Statement("changes_within_run", subject=self.source, numbers=numbers | vanished_side)
 
     def short(self) -> Statement:
         """When, by how much, and both levels."""
@@ -70,72 +70,81 @@ class Moment:
         return Statement("change_in_run", subject=self.source, numbers={name: getattr(self, name) for name in names})
 
 
-def levelled(points: ForcePoints, found: Sequence[Moment], sources: Mapping[int, str]) -> ForcePoints:
+def levelled(points: ForcePoints, changes: Sequence[Moment], sources: Mapping[int, str]) -> ForcePoints:
     """The points as they would be had nothing changed: forces after each change over 1 + change; what it falls into,
     and the side on which no force is left, go. sources: of the runs, by number."""
-    wrench, kept = points.wrench.copy(), np.ones(len(points), bool)
-    for each in found:
-        of_run = np.array([sources[number] == each.source for number in points.run.tolist()])
-        before, after = of_run & (points.span[:, 1] <= each.at), of_run & (points.span[:, 0] >= each.at)
-        if any(each.vanished):
-            kept &= ~of_run | (after if each.vanished[0] else before)
+    wrench, kept_points = points.wrench.copy(), np.ones(len(points), bool)
+    for change in changes:
+        run_points = np.array([sources[number] == change.source for number in points.run.tolist()])
+        points_before, points_after = (
+            run_points & (points.span[:, 1] <= change.at),
+            run_points & (points.span[:, 0] >= change.at),
+        )
+        if any(change.vanished):
+            kept_points &= ~run_points | (points_after if change.vanished[0] else points_before)
             continue
-        wrench[after] /= 1.0 + each.change
-        kept &= ~of_run | before | after
-    return replace(points, wrench=wrench).chosen(kept)
+        wrench[points_after] /= 1.0 + change.change
+        kept_points &= ~run_points | points_before | points_after
+    return replace(points, wrench=wrench).chosen(kept_points)
 
 
 def moments(
     runs: Sequence[Run], robot: Robot, origin: str, window: tuple[float, float] | None = None
 ) -> tuple[tuple[Moment, ...], set[str]]:
     """(the changes inside runs, one a run at the most; names of the runs that could be tested)."""
-    held = {number: held_forces(run, robot, origin, window) for number, run in enumerate(runs)}
-    cuts = {number: _cuts(one) for number, one in held.items()}
-    found = [_moment(held[number], cuts[number], run.source) for number, run in enumerate(runs) if cuts[number]]
-    return tuple(moment for moment in found if moment), {runs[number].source for number in held if cuts[number]}
+    forces_by_run = {number: held_forces(run, robot, origin, window) for number, run in enumerate(runs)}
+    cuts = {number: _cuts(run_forces) for number, run_forces in forces_by_run.items()}
+    changes = [
+        _moment(forces_by_run[number], cuts[number], run.source) for number, run in enumerate(runs) if cuts[number]
+    ]
+    return tuple(moment for moment in changes if moment), {
+        runs[number].source for number in forces_by_run if cuts[number]
+    }
 
 
-def _cuts(held: HeldForces) -> list[int]:
+def _cuts(held_pieces: HeldForces) -> list[int]:
     """Pieces before which there may be a change: some command must come on both sides, and pieces to spare."""
-    n, command = len(held.command), held.command.tolist()
-    if n - len(set(command)) - 1 < SPARE:
+    n, command = len(held_pieces.command), held_pieces.command.tolist()
+    if n - len(set(command)) - 1 < SPARE_DEGREES:
         return []
-    return [cut for cut in range(LEAST, n - LEAST + 1) if set(command[:cut]) & set(command[cut:])]
+    return [cut for cut in range(LEAST_PIECES, n - LEAST_PIECES + 1) if set(command[:cut]) & set(command[cut:])]
 
 
 @dataclass(frozen=True, eq=False)
 class _Shift:
     """d of a cut and its standard error, along the force and across it (2,). size: Hotelling's T squared; degrees: of
-    freedom, both with the memory of what is left. rest (n, 2): what is left."""
+    freedom, both with the memory of what is left. residual (n, 2): what is left."""
 
     value: FloatArray
     std: FloatArray
     size: float
     degrees: float
-    rest: FloatArray
+    residual: FloatArray
 
     @property
     def chance(self) -> float:
         """Of as much by noise alone: F = T^2 (m - 1) / (2 m) with 2 and m - 1 degrees of freedom."""
-        if self.degrees < SPARE:
+        if self.degrees < SPARE_DEGREES:
             return 1.0
         return float(fdtrc(2.0, self.degrees - 1.0, self.size * (self.degrees - 1.0) / (2.0 * self.degrees)))
 
 
-def _moment(held: HeldForces, cuts: Sequence[int], source: str) -> Moment | None:
-    y, size = _along(held)
-    tried = {cut: _shift(y, held.command, cut) for cut in cuts}
-    best = max(cuts, key=lambda cut: tried[cut].size)
-    shift = tried[best]
-    memory = max(autocorrelation_time(column) for column in shift.rest.T)
+def _moment(held_pieces: HeldForces, cuts: Sequence[int], source: str) -> Moment | None:
+    y, size = _along(held_pieces)
+    shift_by_cut = {cut: _shift(y, held_pieces.command, cut) for cut in cuts}
+    best = max(cuts, key=lambda cut: shift_by_cut[cut].size)
+    shift = shift_by_cut[best]
+    memory = max(autocorrelation_time(column) for column in shift.residual.T)
     shift = replace(shift, std=shift.std * np.sqrt(memory), size=shift.size / memory, degrees=shift.degrees / memory)
     p = min(1.0, len(cuts) * shift.chance)
-    if p > FALSE or abs(shift.value[0]) < MATTERS or _drifts(y, held, shift):
+    if p > FALSE_SHARE or abs(shift.value[0]) < FORCE_SHARE or _drifts(y, held_pieces, shift):
         return None
-    near = [cut for cut in cuts if tried[cut].size / memory > shift.size - AS_GOOD]
-    both = np.isin(held.command, np.intersect1d(held.command[:best], held.command[best:]))
-    after = np.arange(len(y)) >= best
-    force = float(size[both].mean())
+    near_cuts = [cut for cut in cuts if shift_by_cut[cut].size / memory > shift.size - RIVAL_MARGIN]
+    common_commands = np.isin(
+        held_pieces.command, np.intersect1d(held_pieces.command[:best], held_pieces.command[best:])
+    )
+    pieces_after = np.arange(len(y)) >= best
+    force = float(size[common_commands].mean())
     spread = t_quantile(shift.degrees)
     value, std = float(shift.value[0]), float(shift.std[0])
     scatter = std * np.sqrt(len(y)) / 2.0  # of one piece, over the force
@@ -144,55 +153,59 @@ def _moment(held: HeldForces, cuts: Sequence[int], source: str) -> Moment | None
         middle, half = force * float(y[rows, 0].mean()), float(spread * force * scatter / np.sqrt(rows.sum()))
         return middle, (middle - half, middle + half)
 
-    ends = (float(held.span[min(near) - 1, 0]), float(held.span[max(near), 1]))
-    at = 0.5 * float(held.span[best - 1, 1] + held.span[best, 0])
-    before, after_it = level(both & ~after), level(both & after)
-    base = before[0] / force
+    ends = (float(held_pieces.span[min(near_cuts) - 1, 0]), float(held_pieces.span[max(near_cuts), 1]))
+    time = 0.5 * float(held_pieces.span[best - 1, 1] + held_pieces.span[best, 0])
+    level_before, level_after = level(common_commands & ~pieces_after), level(common_commands & pieces_after)
+    base = level_before[0] / force
     ci95 = ((value - spread * std) / base, (value + spread * std) / base)
-    return Moment(source, at, ends, *before, *after_it, value / base, ci95, p)
+    return Moment(source, time, ends, *level_before, *level_after, value / base, ci95, p)
 
 
-def _along(held: HeldForces) -> tuple[FloatArray, FloatArray]:
+def _along(held_pieces: HeldForces) -> tuple[FloatArray, FloatArray]:
     """(force of each piece along the mean of its command and across it, over that mean (n, 2); the mean [N] (n,))."""
-    y, size = np.zeros(held.force.shape), np.zeros(len(held.force))
-    for c in np.unique(held.command):
-        rows = held.command == c
-        x, across = mean = held.force[rows].mean(axis=0)
+    y, size = np.zeros(held_pieces.force.shape), np.zeros(len(held_pieces.force))
+    for c in np.unique(held_pieces.command):
+        rows = held_pieces.command == c
+        x, across_force = mean = held_pieces.force[rows].mean(axis=0)
         size[rows] = np.linalg.norm(mean)
-        y[rows] = held.force[rows] @ np.array([[x, -across], [across, x]]) / max(float(mean @ mean), 1e-300)
+        y[rows] = (
+            held_pieces.force[rows]
+            @ np.array([[x, -across_force], [across_force, x]])
+            / max(float(mean @ mean), 1e-300)
+        )
     return y, size
 
 
 def _without_commands(values: FloatArray, command: IntArray) -> FloatArray:
     """Columns less their mean at each command."""
-    left = values.copy()
+    remaining = values.copy()
     for c in np.unique(command):
-        left[command == c] -= left[command == c].mean(axis=0)
-    return left
+        remaining[command == c] -= remaining[command == c].mean(axis=0)
+    return remaining
 
 
 def _shift(y: FloatArray, command: IntArray, cut: int) -> _Shift:
     """The step at a cut, each command with a mean of its own; without memory."""
     x = _without_commands((np.arange(len(y)) >= cut).astype(float), command)
-    left = _without_commands(y, command)
+    remaining = _without_commands(y, command)
     square = float(x @ x)
-    value = x @ left / square
-    rest = left - x[:, None] * value
+    value = x @ remaining / square
+    rest_of_shift = remaining - x[:, None] * value
     degrees = len(y) - len(np.unique(command)) - 1
-    covariance = rest.T @ rest / degrees / square
+    covariance = rest_of_shift.T @ rest_of_shift / degrees / square
     covariance += np.eye(2) * max(1e-9 * float(np.trace(covariance)), 1e-300)  # of a log without noise
     size = float(value @ np.linalg.solve(covariance, value))
-    return _Shift(value, np.sqrt(np.diag(covariance)), size, degrees, rest)
+    return _Shift(value, np.sqrt(np.diag(covariance)), size, degrees, rest_of_shift)
 
 
-def _drifts(y: FloatArray, held: HeldForces, shift: _Shift) -> bool:
+def _drifts(y: FloatArray, held_pieces: HeldForces, shift: _Shift) -> bool:
     """Whether a slow drift, a parabola in time, is nearly as likely as a step, which has as many free numbers."""
-    t = held.span.mean(axis=1) - held.span.mean()
-    slow = _without_commands(np.stack([t, t**2], axis=1), held.command)
-    left = _without_commands(y, held.command)
-    drift = left - slow @ np.linalg.lstsq(slow, left, rcond=None)[0]
-    (_, by_step), (_, by_drift) = (np.linalg.slogdet(rest.T @ rest) for rest in (shift.rest, drift))
-    return bool(shift.degrees * (by_drift - by_step) < AS_GOOD)
+    t = held_pieces.span.mean(axis=1) - held_pieces.span.mean()
+    slow = _without_commands(np.stack([t, t**2], axis=1), held_pieces.command)
+    remaining = _without_commands(y, held_pieces.command)
+    drift = remaining - slow @ np.linalg.lstsq(slow, remaining, rcond=None)[0]
+    (_, by_step), (_, by_drift) = (np.linalg.slogdet(residual.T @ residual) for residual in (shift.residual, drift))
+    return bool(shift.degrees * (by_drift - by_step) < RIVAL_MARGIN)
 
 
 # A change inside a run where no command comes again: the fitted shape of friction is the yardstick
@@ -207,8 +220,8 @@ def _drifts(y: FloatArray, held: HeldForces, shift: _Shift) -> bool:
 
 SPARE_NUMBERS = 6  # numbers beyond those that are fitted
 ROUNDS = 10  # of robust weights
-WORST = 1e4  # condition of what determines levels
-SEEN = 0.05  # the chance of as much beside another part, above which that may be it
+MOST_CONDITION = 1e4  # condition of what determines levels
+RIVAL_CHANCE = 0.05  # the chance of as much beside another part, above which that may be it
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +236,7 @@ class _Run:
 
     @property
     def cuts(self) -> range:
-        return range(LEAST, len(self.span) - LEAST + 1)
+        return range(LEAST_PIECES, len(self.span) - LEAST_PIECES + 1)
 
 
 @dataclass(frozen=True)
@@ -248,42 +261,44 @@ def moments_by_shape(
     points: ForcePoints,
     fit_of: Callable[[str], ShapeFit],
     sources: Mapping[int, str],
-    told: Sequence[Moment] = (),
+    known_moments: Sequence[Moment] = (),
 ) -> tuple[tuple[Moment, ...], set[str]]:
     """(the changes inside runs, one a run at the most; names of the runs that could be tested). fit_of: group -> its
     fit; sources: of the runs, by number.
 
-    told: what commands that come again have told; of those runs nothing more is said.
+    known_moments: what commands that come again have told; of those runs nothing more is said.
     """
-    known = {each.source for each in told}
-    runs = [_run(robot, points, fit_of, number, source) for number, source in sources.items() if source not in known]
-    found = [run for run in runs if run is not None]
-    tests = sum(len(run.cuts) for run in found)
-    moments = tuple(moment for run in found if (moment := _change_by_shape(run, tests)) is not None)
-    return moments, {run.source for run in found}
+    known_sources = {known_moment.source for known_moment in known_moments}
+    runs = [
+        _run(robot, points, fit_of, number, source) for number, source in sources.items() if source not in known_sources
+    ]
+    runs_found = [run for run in runs if run is not None]
+    tests = sum(len(run.cuts) for run in runs_found)
+    moments = tuple(moment for run in runs_found if (moment := _change_by_shape(run, tests)) is not None)
+    return moments, {run.source for run in runs_found}
 
 
 def _run(robot: Robot, points: ForcePoints, fit_of: Callable[[str], ShapeFit], number: int, source: str) -> _Run | None:
     """None where there are too few windows."""
-    own = points.chosen(points.run == number)
-    if not len(own):
+    run_points = points.chosen(points.run == number)
+    if not len(run_points):
         return None
-    fit = fit_of(own.group[0])
-    own = all_moving(robot, own, fit)
-    own = own.chosen(np.argsort(own.span[:, 0], kind="stable"))
-    if len(own) < 2 * LEAST:
+    fit = fit_of(run_points.group[0])
+    run_points = all_moving(robot, run_points, fit)
+    run_points = run_points.chosen(np.argsort(run_points.span[:, 0], kind="stable"))
+    if len(run_points) < 2 * LEAST_PIECES:
         return None
-    turning = is_turning(robot, own)
-    problem = LinearShape(robot, own, fit, turning)
+    has_yaw = is_turning(robot, run_points)
+    problem = LinearShape(robot, run_points, fit, has_yaw)
     if problem.seen.sum() < problem.sizes.sum() + 1 + SPARE_NUMBERS:
         return None
     base = problem.base[:, :, problem.sizes]
     rivals = [
-        more
-        for more in unoffered_columns(robot, own, problem, turning)
-        if _determined(np.concatenate([base, more], axis=2), int(problem.seen.sum()))
+        extra_columns
+        for extra_columns in unoffered_columns(robot, run_points, problem, has_yaw)
+        if _determined(np.concatenate([base, extra_columns], axis=2), int(problem.seen.sum()))
     ]
-    return _Run(source, fit.shape.name, own.span, problem, rivals)
+    return _Run(source, fit.shape.name, run_points.span, problem, rivals)
 
 
 def _determined(design: FloatArray, count: int) -> bool:
@@ -291,33 +306,41 @@ def _determined(design: FloatArray, count: int) -> bool:
     norm = np.linalg.norm(design, axis=(0, 1))
     if (norm == 0.0).any() or count - len(norm) < SPARE_NUMBERS:
         return False
-    return bool(np.linalg.cond((design / norm).reshape(-1, len(norm))) <= WORST)
+    return bool(np.linalg.cond((design / norm).reshape(-1, len(norm))) <= MOST_CONDITION)
 
 
 def _change_by_shape(run: _Run, tests: int) -> Moment | None:
-    tried = {cut: step for cut in run.cuts if (step := _step(run, cut)) is not None}
-    if not tried:
+    step_by_cut = {cut: step for cut in run.cuts if (step := _step(run, cut)) is not None}
+    if not step_by_cut:
         return None
-    best = max(tried, key=lambda cut: tried[cut].size)
-    step = tried[best]
+    best = max(step_by_cut, key=lambda cut: step_by_cut[cut].size)
+    step = step_by_cut[best]
     p = step.chance(tests)
-    if p > FALSE_BY_SHAPE or abs(step.value) < MATTERS:
+    if p > FALSE_BY_SHAPE or abs(step.value) < FORCE_SHARE:
         return None
-    if any((other := _step(run, best, more)) is None or other.chance(1) > SEEN for more in run.rivals):
+    if any(
+        (rival_step := _step(run, best, extra_columns)) is None or rival_step.chance(1) > RIVAL_CHANCE
+        for extra_columns in run.rivals
+    ):
         return None
-    near = [cut for cut in tried if tried[cut].size ** 2 > step.size**2 - AS_GOOD]
-    before, after = _levels(run, best)
+    near_cuts = [cut for cut in step_by_cut if step_by_cut[cut].size ** 2 > step.size**2 - RIVAL_MARGIN]
+    level_before, level_after = _levels(run, best)
     # The shape was fitted to both sides: d is a share of what it has on average.
-    share = float(np.linalg.norm(run.problem.force[:, :, 0], axis=1).mean()) / before[0]
+    share = float(np.linalg.norm(run.problem.force[:, :, 0], axis=1).mean()) / level_before[0]
     spread = t_quantile(step.degrees)
-    low = share * min(tried[cut].value - spread * tried[cut].std for cut in near)  # T is not known any better
-    high = share * max(tried[cut].value + spread * tried[cut].std for cut in near)
+    low = share * min(
+        step_by_cut[cut].value - spread * step_by_cut[cut].std for cut in near_cuts
+    )  # T is not known any better
+    high = share * max(step_by_cut[cut].value + spread * step_by_cut[cut].std for cut in near_cuts)
     return Moment(
         run.source,
         0.5 * float(run.span[best - 1, 1] + run.span[best, 0]),
-        (float(run.span[min(near) - 1, 0]), float(run.span[max(near), 1] if max(near) < len(run.span) else np.inf)),
-        *before,
-        *after,
+        (
+            float(run.span[min(near_cuts) - 1, 0]),
+            float(run.span[max(near_cuts), 1] if max(near_cuts) < len(run.span) else np.inf),
+        ),
+        *level_before,
+        *level_after,
         share * step.value,
         (low, high),
         p,
@@ -325,37 +348,37 @@ def _change_by_shape(run: _Run, tests: int) -> Moment | None:
     )
 
 
-def _step(run: _Run, cut: int, more: FloatArray | None = None) -> _Step | None:
-    """The step at a cut, levels fitted anew beside it; more: columns of a part that is not offered."""
-    after = (np.arange(len(run.span)) >= cut).astype(float)
-    solved = _solved(run, run.problem.force * after[:, None, None], more)
-    if solved is None:
+def _step(run: _Run, cut: int, extra_columns: FloatArray | None = None) -> _Step | None:
+    """The step at a cut, levels fitted anew beside it; extra_columns: columns of a part that is not offered."""
+    is_after = (np.arange(len(run.span)) >= cut).astype(float)
+    step_fit = _solved(run, run.problem.force * is_after[:, None, None], extra_columns)
+    if step_fit is None:
         return None
-    level, covariance, degrees = solved
+    level, covariance, degrees = step_fit
     return _Step(float(level[-1]), float(np.sqrt(covariance[-1, -1])), degrees)
 
 
 def _levels(run: _Run, cut: int) -> list[tuple[float, tuple[float, float]]]:
     """(mean force over the windows [N], its 95 % interval) with the levels before the cut, and after it."""
-    problem, found = run.problem, []
+    problem, levels = run.problem, []
     for side in (np.arange(len(run.span)) < cut, np.arange(len(run.span)) >= cut):
         # The same model with the step on the other side: the levels are then those of this side.
-        solved = _solved(run, problem.force * (~side)[:, None, None], None)
-        assert solved is not None
-        level, covariance, degrees = solved
+        level_fit = _solved(run, problem.force * (~side)[:, None, None], None)
+        assert level_fit is not None
+        level, covariance, degrees = level_fit
         base = problem.base[:, :, problem.sizes]
         way = problem.force[:, :, 0] / np.maximum(np.linalg.norm(problem.force[:, :, 0], axis=1), 1e-300)[:, None]
         row = np.append(np.einsum("nc,nck->k", way, base) / len(base), 0.0)
         middle = float(row @ level)
         half = t_quantile(degrees) * float(np.sqrt(row @ covariance @ row))
-        found.append((middle, (middle - half, middle + half)))
-    return found
+        levels.append((middle, (middle - half, middle + half)))
+    return levels
 
 
-def _solved(run: _Run, step: FloatArray, more: FloatArray | None) -> tuple[FloatArray, FloatArray, int] | None:
+def _solved(run: _Run, step: FloatArray, extra_columns: FloatArray | None) -> tuple[FloatArray, FloatArray, int] | None:
     """(levels, the step's the last, covariance, degrees of freedom) by robust least squares; None: not determined."""
     problem = run.problem
-    parts = [problem.base[:, :, problem.sizes], *([] if more is None else [more]), step]
+    parts = [problem.base[:, :, problem.sizes], *([] if extra_columns is None else [extra_columns]), step]
     design = np.concatenate(parts, axis=2)
     count = int(problem.seen.sum())
     if not _determined(design, count):
@@ -372,8 +395,8 @@ def _solved(run: _Run, step: FloatArray, more: FloatArray | None) -> tuple[Float
         if scale == 0.0:
             break
         weight = huber_weight(length, HUBER * scale)
-    rest = problem.target - design @ level
-    variance = float((weight[:, None] * rest**2).sum()) / degrees
-    memory = max(autocorrelation_time(rest[:, c]) for c in range(rest.shape[1]))
+    residual = problem.target - design @ level
+    variance = float((weight[:, None] * residual**2).sum()) / degrees
+    memory = max(autocorrelation_time(residual[:, c]) for c in range(residual.shape[1]))
     covariance = np.linalg.inv(normal) * max(variance, 1e-300) * memory
     return level / norm, covariance / np.outer(norm, norm), degrees

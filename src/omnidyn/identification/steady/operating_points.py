@@ -98,9 +98,9 @@ class ForcePoints:
             along = (self.wrench[:, :2] * self.twist[:, :2]).sum(axis=1) / speed
         return np.where(self.travels, along, np.nan)
 
-    def chosen(self, keep: NDArray) -> ForcePoints:
+    def chosen(self, selection: NDArray) -> ForcePoints:
         """Some of the points: a mask or indices."""
-        index = np.arange(len(self))[keep]
+        index = np.arange(len(self))[selection]
         arrays = (
             "twist",
             "traction",
@@ -133,8 +133,11 @@ class SteadyWindows:
 
     def points(self, robot: Robot) -> ForcePoints:
         """What the forces of a robot's motors are there. Errors: as of `force_points`."""
-        made = [(number, _point(run, robot, each, self.speed, self.origin), each) for number, run, each in self.found]
-        return _moving(_stacked(made, robot, self.names, self.speed, self.origin, [*self.notes]), robot)
+        made_points = [
+            (number, _point(run, robot, plateau, self.speed, self.origin), plateau)
+            for number, run, plateau in self.found
+        ]
+        return _moving(_stacked(made_points, robot, self.names, self.speed, self.origin, [*self.notes]), robot)
 
 
 def force_points(
@@ -175,10 +178,10 @@ def steady_windows(
     names = tuple(groups) if groups is not None else ("all",) * len(runs)
     if len(names) != len(runs):
         raise InputError("one group per run", got=f"{len(names)} groups", expected=str(len(runs)), where="groups")
-    kept, twice = count_once(runs, names)
-    runs, names = [runs[k] for k in kept], tuple(names[k] for k in kept)
+    kept_runs, repeat_notes = count_once(runs, names)
+    runs, names = [runs[k] for k in kept_runs], tuple(names[k] for k in kept_runs)
     origin = _origin(runs, force_from)
-    found, empty = [], []
+    windows_found, empty = [], []
     for number, run in enumerate(runs):
         if run.wheels is not None and run.wheels != robot.wheels.count:
             raise InputError(
@@ -190,15 +193,15 @@ def steady_windows(
         run = on_clock_of_wheels(_with_voltage(run, robot) if origin == VOLTAGE else run)
         windows = pool(find_plateaus(run, start=window[0], end=window[1]) if window else find_plateaus(run))
         empty += [] if windows else [run.source]
-        found += [(number, run, rows) for rows in windows]
-    lacking = (
+        windows_found += [(number, run, rows) for rows in windows]
+    missing_notes = (
         [Statement("no_steady_window", subject=empty[0] or "run 0", numbers={"empty": len(empty), "runs": len(runs)})]
         if empty
         else []
     )
     if origin == CURRENT:
-        _refuse_unsigned(runs, [each for *_, each in found])
-    return SteadyWindows(tuple(found), names, speed, origin, (*statements(twice), *lacking))
+        _refuse_unsigned(runs, [plateau for *_, plateau in windows_found])
+    return SteadyWindows(tuple(windows_found), names, speed, origin, (*statements(repeat_notes), *missing_notes))
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,24 +230,24 @@ def held_forces(run: Run, robot: Robot, origin: str, window: tuple[float, float]
     else:
         wheels = _means(speed, pieces)
         if angle is not None:
-            turned = np.array([angle[rows.stop - 1] - angle[rows.start] for rows in pieces])
-            wheels = turned / np.diff(span, axis=1)
+            turned_angles = np.array([angle[rows.stop - 1] - angle[rows.start] for rows in pieces])
+            wheels = turned_angles / np.diff(span, axis=1)
         mean = mean if origin == CURRENT else settled_current(robot.motor, reaching(robot, mean), wheels)
         twist = twist_from_wheel_speed(robot.wheels, wheels)
         rate = twist_from_wheel_speed(robot.wheels, np.array([_slope(run.t[rows], speed[rows]) for rows in pieces]))
     wrench = wrench_from_traction(robot.wheels, traction(robot.motor, robot.wheels, mean))
     force = (wrench - rate @ mass_matrix(robot).T + frame_wrench(robot, twist))[:, :2]
     command = _commands(run, pieces)
-    known = np.isfinite(force).all(axis=1)
-    return HeldForces(span[known], command[known], force[known])
+    known_pieces = np.isfinite(force).all(axis=1)
+    return HeldForces(span[known_pieces], command[known_pieces], force[known_pieces])
 
 
 def _means(values: FloatArray, pieces: Sequence[slice]) -> FloatArray:
     """The mean of the known rows of each piece; NaN where there is none. Shape (pieces, columns)."""
-    known = np.isfinite(values)
+    known_mask = np.isfinite(values)
     sums, counts = (
         np.array([part[rows].sum(axis=0) for rows in pieces], dtype=float)
-        for part in (np.where(known, values, 0.0), known)
+        for part in (np.where(known_mask, values, 0.0), known_mask)
     )
     return np.where(counts > 0.0, sums / np.maximum(counts, 1.0), np.nan)
 
@@ -257,29 +260,31 @@ def _slope(t: FloatArray, values: FloatArray) -> FloatArray:
 
 def _commands(run: Run, pieces: Sequence[slice]) -> IntArray:
     """The number of the command of each piece, alike where it is the same."""
-    given = next((run.channels[name] for name in COMMANDS if name in run.channels), None)
-    if given is None:
+    command_values = next((run.channels[name] for name in COMMANDS if name in run.channels), None)
+    if command_values is None:
         return np.zeros(len(pieces), dtype=int)
-    command = np.nan_to_num(_means(given, pieces))
-    alike = SAME_COMMAND * max(float(np.abs(command).max(initial=0.0)), 1e-12)
-    return np.unique(np.round(command / alike / 2.0), axis=0, return_inverse=True)[1].ravel()
+    command = np.nan_to_num(_means(command_values, pieces))
+    command_tolerance = SAME_COMMAND * max(float(np.abs(command).max(initial=0.0)), 1e-12)
+    return np.unique(np.round(command / command_tolerance / 2.0), axis=0, return_inverse=True)[1].ravel()
 
 
-def _origin(runs: Sequence[Run], asked: str) -> str:
+def _origin(runs: Sequence[Run], requested_origin: str) -> str:
     if not runs:
         raise InsufficientDataError("no runs", got="0 runs", expected="at least one")
-    if asked not in ("", CURRENT, VOLTAGE):
-        raise InputError("no such origin of the force", got=asked, expected="current or voltage", where="force_from")
-    if asked:
-        return asked
+    if requested_origin not in ("", CURRENT, VOLTAGE):
+        raise InputError(
+            "no such origin of the force", got=requested_origin, expected="current or voltage", where="force_from"
+        )
+    if requested_origin:
+        return requested_origin
     if origin := force_origin(runs):
         return origin
-    lacking = next(run for run in runs if run.current is None)
+    run_without_current = next(run for run in runs if run.current is None)
     raise InputError(
         "no force can be had from this run",
-        got=", ".join(lacking.channels) or "no channels",
+        got=", ".join(run_without_current.channels) or "no channels",
         expected="current, or voltage (or duty and supply) with a speed",
-        where=lacking.source,
+        where=run_without_current.source,
     )
 
 
@@ -298,71 +303,71 @@ def _with_voltage(run: Run, robot: Robot) -> Run:
     return run.replace(voltage=voltage)
 
 
-def _point(run: Run, robot: Robot, each: Plateau, speed: str, origin: str) -> dict[str, FloatArray]:
+def _point(run: Run, robot: Robot, plateau: Plateau, speed: str, origin: str) -> dict[str, FloatArray]:
     """Motion and force of one window."""
-    moves = _twist(run, robot, each, speed)
-    current, current_std = _current(run, robot, each, origin)
+    moves = _twist(run, robot, plateau, speed)
+    current, current_std = _current(run, robot, plateau, origin)
     force = traction(robot.motor, robot.wheels, current)
-    inertial, inertial_std = _inertial_wrench(robot, each)
+    inertial, inertial_std = _inertial_wrench(robot, plateau)
     unit_force = traction(robot.motor, robot.wheels, np.eye(len(current)))
     per_wheel = wrench_from_traction(robot.wheels, unit_force)  # of one ampere in each motor, (wheels, 3)
-    twist, still = moves
+    twist, still_speed = moves
     travel, turn = np.hypot(*twist[:2]), abs(twist[2]) * float(np.mean(robot.wheels.robot_radius))
     return {
         "twist": twist,
-        "still": still,
-        "travels": travel > max(still, SPOT_SHARE * turn),
-        "turns": turn > max(still, SPOT_SHARE * travel),
+        "still": still_speed,
+        "travels": travel > max(still_speed, SPOT_SHARE * turn),
+        "turns": turn > max(still_speed, SPOT_SHARE * travel),
         "traction": force,
         "wrench": wrench_from_traction(robot.wheels, force) - inertial + frame_wrench(robot, twist),
         "wrench_std": np.sqrt(current_std**2 @ per_wheel**2 + inertial_std**2),
         "inertial": inertial,
-        "direction": _direction(robot, each, twist),
+        "direction": _direction(robot, plateau, twist),
     }
 
 
-def _inertial_wrench(robot: Robot, each: Plateau) -> tuple[FloatArray, FloatArray]:
+def _inertial_wrench(robot: Robot, plateau: Plateau) -> tuple[FloatArray, FloatArray]:
     """M dv/dt [N, N, N m] of a window, and its standard error; by the wheels, else by the twist, else 0."""
-    name = "wheel_speed" if "wheel_speed" in each.rate else "twist"
-    rate, std = each.rate.get(name, np.zeros(3)), each.rate_std.get(name, np.zeros(3))
+    name = "wheel_speed" if "wheel_speed" in plateau.rate else "twist"
+    rate, std = plateau.rate.get(name, np.zeros(3)), plateau.rate_std.get(name, np.zeros(3))
     if not np.isfinite(std).all():  # too few numbers to tell
         return np.zeros(3), np.zeros(3)
     if name == "wheel_speed":
-        one = twist_from_wheel_speed(robot.wheels, np.eye(len(rate)))  # of 1 rad/s^2 at each wheel, (wheels, 3)
-        rate, std = rate @ one, np.sqrt(std**2 @ one**2)
+        unit_twists = twist_from_wheel_speed(robot.wheels, np.eye(len(rate)))  # of 1 rad/s^2 at each wheel, (wheels, 3)
+        rate, std = rate @ unit_twists, np.sqrt(std**2 @ unit_twists**2)
     mass = mass_matrix(robot)
     return mass @ rate, np.sqrt(mass**2 @ std**2)
 
 
-def _current(run: Run, robot: Robot, each: Plateau, origin: str) -> tuple[FloatArray, FloatArray]:
+def _current(run: Run, robot: Robot, plateau: Plateau, origin: str) -> tuple[FloatArray, FloatArray]:
     """Current of each motor and its standard error [A]."""
     if origin == CURRENT:
-        _need(run, each, "current")
-        return each.mean["current"], each.std["current"]
-    _need(run, each, "voltage")
-    _need(run, each, "wheel_speed")
-    volts, speed = reaching(robot, each.mean["voltage"]), each.mean["wheel_speed"]
+        _need(run, plateau, "current")
+        return plateau.mean["current"], plateau.std["current"]
+    _need(run, plateau, "voltage")
+    _need(run, plateau, "wheel_speed")
+    volts, speed = reaching(robot, plateau.mean["voltage"]), plateau.mean["wheel_speed"]
     current = settled_current(robot.motor, volts, speed)
-    by_volts = settled_current(robot.motor, volts + each.std["voltage"], speed) - current
-    by_speed = settled_current(robot.motor, volts, speed + each.std["wheel_speed"]) - current
+    by_volts = settled_current(robot.motor, volts + plateau.std["voltage"], speed) - current
+    by_speed = settled_current(robot.motor, volts, speed + plateau.std["wheel_speed"]) - current
     return current, np.hypot(by_volts, by_speed)
 
 
-def _need(run: Run, each: Plateau, channel: str) -> None:
-    if channel not in each.mean or not np.isfinite(each.mean[channel]).all():
+def _need(run: Run, plateau: Plateau, channel: str) -> None:
+    if channel not in plateau.mean or not np.isfinite(plateau.mean[channel]).all():
         raise InputError(
             "the run lacks a channel", got=", ".join(run.channels) or "no channels", expected=channel, where=run.source
         )
 
 
-def _twist(run: Run, robot: Robot, each: Plateau, speed: str) -> tuple[FloatArray, FloatArray]:
+def _twist(run: Run, robot: Robot, plateau: Plateau, speed: str) -> tuple[FloatArray, FloatArray]:
     """(twist, what counts as still [m/s]) of one window."""
     if speed == GROUND:
-        _need(run, each, "twist")
-        rims, spread = rim_speed(robot.wheels, each.mean["twist"]), np.hypot(*each.std["twist"][:2])
-        return each.mean["twist"], _still(rims, STILL_ERRORS * float(spread))
+        _need(run, plateau, "twist")
+        rims, spread = rim_speed(robot.wheels, plateau.mean["twist"]), np.hypot(*plateau.std["twist"][:2])
+        return plateau.mean["twist"], _still(rims, STILL_ERRORS * float(spread))
     if speed == SET:
-        commanded = _commanded(robot, each)
+        commanded = _commanded(robot, plateau)
         if commanded is None:
             raise InputError(
                 "the run lacks a set speed",
@@ -372,9 +377,9 @@ def _twist(run: Run, robot: Robot, each: Plateau, speed: str) -> tuple[FloatArra
                 where=run.source,
             )
         return commanded, _still(rim_speed(robot.wheels, commanded), 0.0)
-    _need(run, each, "wheel_speed")
-    twist = twist_from_wheel_speed(robot.wheels, each.mean["wheel_speed"])
-    spread = float((each.std["wheel_speed"] * robot.wheels.radii).max())
+    _need(run, plateau, "wheel_speed")
+    twist = twist_from_wheel_speed(robot.wheels, plateau.mean["wheel_speed"])
+    spread = float((plateau.std["wheel_speed"] * robot.wheels.radii).max())
     return twist, _still(rim_speed(robot.wheels, twist), STILL_ERRORS * spread)
 
 
@@ -382,17 +387,17 @@ def _still(rims: FloatArray, floor: float) -> FloatArray:
     return np.asarray(max(STILL_SHARE * float(np.abs(rims).max()), floor))
 
 
-def _commanded(robot: Robot, each: Plateau) -> FloatArray | None:
+def _commanded(robot: Robot, plateau: Plateau) -> FloatArray | None:
     """The commanded twist of a window, None where no set speed was logged."""
     for name in ("twist_command", "wheel_speed_command"):
-        command = each.mean.get(name)
+        command = plateau.mean.get(name)
         if command is not None and np.isfinite(command).all():
             return command if name == "twist_command" else twist_from_wheel_speed(robot.wheels, command)
     return None
 
 
-def _direction(robot: Robot, each: Plateau, twist: FloatArray) -> FloatArray:
-    commanded = _commanded(robot, each)
+def _direction(robot: Robot, plateau: Plateau, twist: FloatArray) -> FloatArray:
+    commanded = _commanded(robot, plateau)
     way = twist if commanded is None or not commanded.any() else commanded
     return np.degrees(np.arctan2(way[1], way[0]))
 
@@ -401,11 +406,11 @@ def _refuse_unsigned(runs: Sequence[Run], windows: Sequence[Plateau]) -> None:
     """A sensor without sign: no current is ever below 0 although wheels turn both ways."""
     lowest = min((float(np.nanmin(run.current, initial=0.0)) for run in runs if run.current is not None), default=0.0)
     speeds = [window.mean.get("wheel_speed", window.mean.get("wheel_speed_command")) for window in windows]
-    back = sum(bool((speed < 0.0).any()) for speed in speeds if speed is not None)
-    if lowest >= 0.0 and back > UNSIGNED_SHARE * len(windows):
+    backward_count = sum(bool((speed < 0.0).any()) for speed in speeds if speed is not None)
+    if lowest >= 0.0 and backward_count > UNSIGNED_SHARE * len(windows):
         raise InputError(
             "the currents have no sign: none is below 0",
-            got=f"wheels that turn backward in {back} of {len(windows)} windows",
+            got=f"wheels that turn backward in {backward_count} of {len(windows)} windows",
             expected="currents signed as the torque",
             remedy="use `current_unsigned`",
             where=runs[0].source,
@@ -413,33 +418,33 @@ def _refuse_unsigned(runs: Sequence[Run], windows: Sequence[Plateau]) -> None:
 
 
 def _stacked(
-    found: list[tuple[int, dict[str, FloatArray], Plateau]],
+    point_rows: list[tuple[int, dict[str, FloatArray], Plateau]],
     robot: Robot,
     names: tuple[str, ...],
     speed: str,
     origin: str,
     notes: list[Statement],
 ) -> ForcePoints:
-    if not found:
+    if not point_rows:
         raise InsufficientDataError(
             "no steady window was found",
             got="; ".join(map(str, notes)) or "no rows",
             expected="stretches of constant speed, half a second or longer",
             remedy="hold each command longer",
         )
-    arrays = {name: np.array([point[name] for _, point, _ in found]) for name in found[0][1]}
+    arrays = {name: np.array([point[name] for _, point, _ in point_rows]) for name in point_rows[0][1]}
     notes = [*notes, *_about_acceleration(arrays.pop("inertial"), arrays["wrench"], robot)]
-    if any(each.speed_from == ANGLE for *_, each in found) and speed == WHEEL:
+    if any(plateau.speed_from == ANGLE for *_, plateau in point_rows) and speed == WHEEL:
         notes = [*notes, Statement("speeds_from_angles", NOTE)]
     travels, turns = arrays.pop("travels") > 0.0, arrays.pop("turns") > 0.0
     return ForcePoints(
         **arrays,
         travels=travels,
         turns=turns,
-        group=tuple(names[number] for number, _, _ in found),
-        run=np.array([number for number, _, _ in found]),
-        rows=np.array([each.count for *_, each in found]),
-        span=np.array([(each.start, each.end) for *_, each in found]),
+        group=tuple(names[number] for number, _, _ in point_rows),
+        run=np.array([number for number, _, _ in point_rows]),
+        rows=np.array([plateau.count for *_, plateau in point_rows]),
+        span=np.array([(plateau.start, plateau.end) for *_, plateau in point_rows]),
         speed_from=speed,
         force_from=origin,
         notes=tuple(notes),
@@ -449,10 +454,10 @@ def _stacked(
 def _about_acceleration(inertial: FloatArray, wrench: FloatArray, robot: Robot) -> list[Statement]:
     """What accelerations took of the forces, where it is worth a word."""
     scale = [1.0, 1.0, float(np.mean(robot.wheels.robot_radius))]
-    most = float(np.linalg.norm(inertial / scale, axis=1).max())
-    if most <= ACCELERATES * float(np.median(np.linalg.norm(wrench / scale, axis=1))):
+    largest_share = float(np.linalg.norm(inertial / scale, axis=1).max())
+    if largest_share <= ACCELERATES * float(np.median(np.linalg.norm(wrench / scale, axis=1))):
         return []
-    return [Statement("windows_accelerate", numbers={"force": most})]
+    return [Statement("windows_accelerate", numbers={"force": largest_share})]
 
 
 def _moving(points: ForcePoints, robot: Robot) -> ForcePoints:
@@ -467,16 +472,16 @@ def _moving(points: ForcePoints, robot: Robot) -> ForcePoints:
             expected="windows in motion",
         )
     resting = int((~moves).sum())
-    kept = points.chosen(moves)
-    left_out = Statement("windows_at_rest", NOTE, numbers={"windows": resting})
-    return replace(kept, notes=(*kept.notes, left_out)) if resting else kept
+    moving_points = points.chosen(moves)
+    rest_note = Statement("windows_at_rest", NOTE, numbers={"windows": resting})
+    return replace(moving_points, notes=(*moving_points.notes, rest_note)) if resting else moving_points
 
 
 # How fast a robot follows its firmware's speed loop, beside how often its log has a row
 #
 # A loop that settles within a row shows no transient: whole logs then say no more than their steady stretches do.
 
-SETTLED = 2.0  # time constants: what is left of a transient then is a seventh
+SETTLING_CONSTANTS = 2.0  # time constants: what is left of a transient then is a seventh
 
 
 def settling_time(robot: Robot) -> float:
@@ -486,8 +491,8 @@ def settling_time(robot: Robot) -> float:
 
     A, B of `state_space`: sliding, below the voltage limit. At least a period of the loop.
     """
-    system, turned = state_space(robot), wheel_speed(robot.wheels, np.eye(3)).T
-    kp, ki = (np.reshape(gain, (-1, 1)) * turned for gain in (robot.drive.kp, robot.drive.ki))
+    system, turn_matrix = state_space(robot), wheel_speed(robot.wheels, np.eye(3)).T
+    kp, ki = (np.reshape(gain, (-1, 1)) * turn_matrix for gain in (robot.drive.kp, robot.drive.ki))
     matrix = system.A - system.B @ kp
     if np.any(robot.drive.ki):
         matrix = np.block([[matrix, -system.B @ ki], [np.eye(3), np.zeros((3, 3))]])
@@ -503,11 +508,11 @@ def why_no_transient(runs: Sequence[Run], robot: Robot) -> str:
     """
     if any(run.current is None or (run.wheel_speed is None and run.wheel_angle is None) for run in runs):
         return ""
-    settled = SETTLED * settling_time(robot)
+    settled_time = SETTLING_CONSTANTS * settling_time(robot)
     row = min(run.step for run in runs)
-    if settled > row:
+    if settled_time > row:
         return ""
     return (
-        f"the speed loop of {robot.name} settles in {1e3 * settled:.0f} ms, a row comes every {1e3 * row:.0f} ms: "
+        f"the speed loop of {robot.name} settles in {1e3 * settled_time:.0f} ms, a row comes every {1e3 * row:.0f} ms: "
         "no transient is seen, so that whole logs say no more than their steady stretches, and take longer to fit"
     )

@@ -115,8 +115,8 @@ def driven_axes(robot: Robot, twist: FloatArray, wrench: FloatArray) -> BoolArra
     """
     arm = float(np.mean(robot.wheels.robot_radius))
     rims = np.abs(twist) * [1.0, 1.0, arm]
-    pushed = np.abs(wrench) / [1.0, 1.0, arm]
-    size = np.where(moving(rims).any(axis=1, keepdims=True), rims, pushed)
+    axis_push = np.abs(wrench) / [1.0, 1.0, arm]
+    size = np.where(moving(rims).any(axis=1, keepdims=True), rims, axis_push)
     return (size >= DRIVEN_SHARE * size.max(axis=1, keepdims=True)) & (size > 0.0)
 
 
@@ -136,14 +136,14 @@ def _points(
 ) -> SteadyTable:
     """One point per row and axis. In a turning frame the friction also balances M omega v."""
     balanced = wrench + frame_wrench(robot, twist)
-    chosen = driven_axes(robot, twist, balanced) if axis is None else _chosen(axis, len(twist))
-    row, column = np.nonzero(chosen)
+    chosen_rows = driven_axes(robot, twist, balanced) if axis is None else _chosen(axis, len(twist))
+    row, column = np.nonzero(chosen_rows)
     if not row.size:
         raise InputError("nothing is driven in any row", got="no speed and no force", where=source)
     speeds = None if speed_std is None else _one_each("speed_std", speed_std, 3, "axis")[column]
-    left_out = int((moving(twist) & ~chosen).sum())
-    if left_out and axis is None:
-        numbers = {"count": left_out, "share": DRIVEN_SHARE}
+    left_out_count = int((moving(twist) & ~chosen_rows).sum())
+    if left_out_count and axis is None:
+        numbers = {"count": left_out_count, "share": DRIVEN_SHARE}
         notes = (*notes, Statement("slow_speeds_left_out", NOTE, numbers=numbers))
     return SteadyTable(
         axis=[AXES[k] for k in column],
@@ -162,7 +162,7 @@ def _points(
 
 def _chosen(axis: str | Sequence[str], rows: int) -> BoolArray:
     names = SteadyTable(axis, np.zeros(rows), np.zeros(rows)).axis  # checks names and their number
-    return np.array([[name == each for each in AXES] for name in names])
+    return np.array([[name == axis_name for axis_name in AXES] for name in names])
 
 
 def _wrench_std(robot: Robot, current_std: FloatArray) -> FloatArray:

@@ -60,24 +60,24 @@ class Shape:
     viscous: bool = False
     plain: bool = False
 
-    def keys(self, robot: Robot, turning: bool) -> tuple[str, ...]:
+    def keys(self, robot: Robot, has_yaw: bool) -> tuple[str, ...]:
         """Keys of the levels; one per wheel where a key ends in [i]."""
-        return tuple(key for term in self._used(turning) for key in _spelled(term, robot))
+        return tuple(key for term in self._used(has_yaw) for key in _spelled(term, robot))
 
-    def force(self, robot: Robot, points: ForcePoints, turning: bool, level: FloatArray) -> FloatArray:
+    def force(self, robot: Robot, points: ForcePoints, has_yaw: bool, level: FloatArray) -> FloatArray:
         """The driving wrench [N, N, N m] that balances this friction. Shape (points, 3)."""
-        return self.table(robot, points, turning, level)[0]
+        return self.table(robot, points, has_yaw, level)[0]
 
     def table(
-        self, robot: Robot, points: ForcePoints, turning: bool, level: FloatArray
+        self, robot: Robot, points: ForcePoints, has_yaw: bool, level: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """(wrench, its derivative by the levels), shapes (points, 3) and (points, 3, levels)."""
         parts, wrench, first = [], np.zeros((len(points), 3)), 0
-        for term in self._used(turning):
+        for term in self._used(has_yaw):
             count = len(_spelled(term, robot))
-            own = level[first : first + count]
-            slope = _ellipse_slope(points, own) if term.ellipse else term.columns(robot, points)
-            wrench += _ellipse_force(points, own) if term.ellipse else slope @ own
+            term_level = level[first : first + count]
+            slope = _ellipse_slope(points, term_level) if term.ellipse else term.columns(robot, points)
+            wrench += _ellipse_force(points, term_level) if term.ellipse else slope @ term_level
             parts.append(slope)
             first += count
         return wrench, np.concatenate(parts, axis=2)
@@ -87,8 +87,8 @@ class Shape:
         """Whether the force is linear in the levels."""
         return not any(term.ellipse for term in self.terms)
 
-    def _used(self, turning: bool) -> list[Term]:
-        return [term for term in self.terms if turning or not term.yaw]
+    def _used(self, has_yaw: bool) -> list[Term]:
+        return [term for term in self.terms if has_yaw or not term.yaw]
 
 
 def _spelled(term: Term, robot: Robot) -> list[str]:
@@ -99,8 +99,8 @@ def _spelled(term: Term, robot: Robot) -> list[str]:
 
 def _side(value: FloatArray, points: ForcePoints) -> FloatArray:
     """The sign of speeds [m/s], 0 where they are not known to move. Shape (points, ...)."""
-    still = points.still.reshape(-1, *([1] * (value.ndim - 1)))
-    return np.where(np.abs(value) > still, np.sign(value), 0.0)
+    still_speed = points.still.reshape(-1, *([1] * (value.ndim - 1)))
+    return np.where(np.abs(value) > still_speed, np.sign(value), 0.0)
 
 
 def _arm(robot: Robot) -> float:
@@ -148,8 +148,8 @@ def element_speeds(shape: Shape, robot: Robot, points: ForcePoints) -> FloatArra
     names = {term.keys[0].rpartition(".")[0] for term in shape.terms}
     parts = [np.full((len(points), 1), np.inf)]
     if BODY_AXES in names:
-        seen = np.stack([points.travels, points.travels, points.turns], axis=1)
-        parts.append(np.where(seen, np.abs(points.twist * [1.0, 1.0, _arm(robot)]), np.inf))
+        seen_parts = np.stack([points.travels, points.travels, points.turns], axis=1)
+        parts.append(np.where(seen_parts, np.abs(points.twist * [1.0, 1.0, _arm(robot)]), np.inf))
     if WHEELS in names:
         parts.append(np.abs(rim_speed(robot.wheels, points.twist)))
     return np.concatenate(parts, axis=1)
@@ -214,16 +214,16 @@ _PLAIN = {
 
 
 def _shapes() -> dict[str, Shape]:
-    found = {}
+    shapes = {}
     for name, (words, terms, viscous) in _PLAIN.items():
-        dry, more = tuple(_TERMS[term] for term in terms), tuple(_TERMS[term] for term in viscous)
-        plain = "plain" in terms
-        found[name] = Shape(name, words, dry, plain=plain)
-        both, also = f"{words}; and viscous", (*dry, *more)
-        found[name + VISCOUS] = Shape(name + VISCOUS, both, also, viscous=True, plain=plain)
+        dry, viscous_terms = tuple(_TERMS[term] for term in terms), tuple(_TERMS[term] for term in viscous)
+        is_plain = "plain" in terms
+        shapes[name] = Shape(name, words, dry, plain=is_plain)
+        viscous_words, viscous_shape_terms = f"{words}; and viscous", (*dry, *viscous_terms)
+        shapes[name + VISCOUS] = Shape(name + VISCOUS, viscous_words, viscous_shape_terms, viscous=True, plain=is_plain)
     roller = tuple(_TERMS[term] for term in ("wheel", "roller"))
-    found["wheel+roller"] = Shape("wheel+roller", "at the wheels and along their axles", roller, in_model=False)
-    return found
+    shapes["wheel+roller"] = Shape("wheel+roller", "at the wheels and along their axles", roller, in_model=False)
+    return shapes
 
 
 SHAPES = _shapes()
@@ -232,11 +232,11 @@ SHAPES = _shapes()
 def friction_of(shape: Shape, robot: Robot, level: dict[str, float]) -> Friction:
     """The friction of a robot file with these levels (key -> level, none negative), and no other."""
     form = DirectionFriction(ellipse=PLAIN if shape.plain else DISSIPATION)
-    found = robot.replace(friction=Friction(direction=form))
+    new_robot = robot.replace(friction=Friction(direction=form))
     for name, value in level.items():
-        for key in expand(name, found):  # a disc has one level for both its entries
-            found = Key.parse(key).set(found, value, checked=False)
-    return Friction(**found.friction.model_dump())
+        for key in expand(name, new_robot):  # a disc has one level for both its entries
+            new_robot = Key.parse(key).set(new_robot, value, checked=False)
+    return Friction(**new_robot.friction.model_dump())
 
 
 # Fitting one shape of friction to points at constant speed, and its error on directions that it has not seen
@@ -246,10 +246,10 @@ def friction_of(shape: Shape, robot: Robot, level: dict[str, float]) -> Friction
 # std        delete-one jackknife over the same folds: it needs no assumption on how the errors within one direction
 #            hang together. B. Efron, C. Stein, Ann. Stat. 9, 586 (1981)
 
-VECTOR, ALONG = "vector", "along"
+VECTOR, ALONG_TRAVEL = "vector", "along"
 HUBER = 2.0  # scales of a two-dimensional residual
 RAYLEIGH = 1.1774  # median length of a two-dimensional normal residual, in its standard deviations
-ITERATIONS, SETTLED, WEIGHTS_SETTLED = 30, 1e-10, 1e-6
+ITERATIONS, LEVEL_TOLERANCE, WEIGHT_TOLERANCE = 30, 1e-10, 1e-6
 MAX_CONDITION = 1e7
 FEW_FOLDS = 6
 FEW_TURNS = 4  # both ways at two speeds
@@ -280,8 +280,8 @@ class ShapeFit(FittedLevels):
 
 def is_turning(robot: Robot, points: ForcePoints) -> bool:
     """Whether enough points turn to tell the friction about yaw."""
-    turning = np.abs(points.twist[:, 2]) * _arm(robot)
-    return bool((points.turns & (turning > SPOT_SHARE * turning.max())).sum() >= FEW_TURNS)
+    rim_speeds = np.abs(points.twist[:, 2]) * _arm(robot)
+    return bool((points.turns & (rim_speeds > SPOT_SHARE * rim_speeds.max())).sum() >= FEW_TURNS)
 
 
 def fit_shape(
@@ -289,29 +289,29 @@ def fit_shape(
     robot: Robot,
     points: ForcePoints,
     *,
-    turning: bool | None = None,
+    has_yaw: bool | None = None,
     robust: bool = True,
     aim: str = VECTOR,
 ) -> ShapeFit | None:
     """Fit a shape to points of one group, and leave each direction out once.
 
-    turning: to the torque too; by default where `is_turning`. aim: what is fitted, the force "vector" or the force
+    has_yaw: to the torque too; by default where `is_turning`. aim: what is fitted, the force "vector" or the force
     "along" travel only; the errors are of both.
     None where the points do not determine all of its levels, with or without one of the directions.
     """
-    turning = is_turning(robot, points) if turning is None else turning
-    keys, fold = shape.keys(robot, turning), fold_numbers(points)
+    has_yaw = is_turning(robot, points) if has_yaw is None else has_yaw
+    keys, fold = shape.keys(robot, has_yaw), fold_numbers(points)
     count = int(fold.max()) + 1
     if count <= len(keys):
         return None
-    problem = _Problem(shape, robot, points, turning, aim)
+    problem = _Problem(shape, robot, points, has_yaw, aim)
     weight, free = np.ones(len(points)), problem.solve(np.ones(len(points)), problem.first())
     if free is not None and robust:
         weight, free = problem.reweighted(free)
-    without = None if free is None else problem.left_out(weight, free, fold)
-    if free is None or without is None:
+    left_out_fit = None if free is None else problem.left_out(weight, free, fold)
+    if free is None or left_out_fit is None:
         return None
-    levels, error = without
+    levels, error = left_out_fit
     deviation = levels - levels.mean(axis=0)
     way = points.twist[:, :2] / np.where(points.speed > 0.0, points.speed, 1.0)[:, None]
     return ShapeFit(
@@ -343,12 +343,12 @@ def fold_numbers(points: ForcePoints) -> IntArray:
     return indices
 
 
-def seen_components(points: ForcePoints, turning: bool) -> FloatArray:
+def seen_components(points: ForcePoints, has_yaw: bool) -> FloatArray:
     """1 for the components of the force that a point tells, 0 for others: F_x, F_y where it travels, and T where it
     turns. A turn on the spot has no direction of travel, and friction at rest holds any force. Shape (points, 2 or 3).
     """
-    seen = np.stack([points.travels, points.travels, points.turns], axis=1).astype(float)
-    return seen[:, : 3 if turning else 2]
+    seen_parts = np.stack([points.travels, points.travels, points.turns], axis=1).astype(float)
+    return seen_parts[:, : 3 if has_yaw else 2]
 
 
 def rms_and_error(squares: FloatArray, fold: IntArray) -> tuple[float, float]:
@@ -366,19 +366,19 @@ def mean_error(values: FloatArray, fold: IntArray) -> float:
 class _Problem:
     """Least squares of one shape on given points. `level`: of the shape, in the order of its keys."""
 
-    def __init__(self, shape: Shape, robot: Robot, points: ForcePoints, turning: bool, aim: str):
-        self.shape, self.robot, self.points, self.turning, self.aim = shape, robot, points, turning, aim
+    def __init__(self, shape: Shape, robot: Robot, points: ForcePoints, has_yaw: bool, aim: str):
+        self.shape, self.robot, self.points, self.turning, self.aim = shape, robot, points, has_yaw, aim
         self.wrench = self._components(points.wrench)
         self.target = self._aimed(self.wrench)
-        self.count = len(shape.keys(robot, turning))
+        self.count = len(shape.keys(robot, has_yaw))
         self._constant = self._table(np.zeros(self.count)) if shape.linear else None
 
     def _components(self, wrench: FloatArray) -> FloatArray:
         """(F_x, F_y), and T / b where the robot turns [N], of an array of shape (points, 3, ...)."""
-        more = [1] * (wrench.ndim - 2)
-        scale = np.array([1.0, 1.0, _arm(self.robot)]).reshape(1, 3, *more)
-        seen = seen_components(self.points, self.turning)
-        return (wrench / scale)[:, : seen.shape[1]] * seen.reshape(*seen.shape, *more)
+        extra_axes = [1] * (wrench.ndim - 2)
+        scale = np.array([1.0, 1.0, _arm(self.robot)]).reshape(1, 3, *extra_axes)
+        seen_parts = seen_components(self.points, self.turning)
+        return (wrench / scale)[:, : seen_parts.shape[1]] * seen_parts.reshape(*seen_parts.shape, *extra_axes)
 
     def _aimed(self, force: FloatArray) -> FloatArray:
         """What is fitted: all components, or the one along travel. Shape (points, components, ...)."""
@@ -404,15 +404,15 @@ class _Problem:
             start[:2] = max(float(np.median(np.hypot(*self.points.wrench[:, :2].T))), 1e-6)
         return start
 
-    def solve(self, weight: FloatArray, level: FloatArray, held: BoolArray | None = None) -> FloatArray | None:
-        """The levels of weighted least squares, from `level` on; `held` levels stay 0. None: not determined."""
-        free = np.ones(self.count, dtype=bool) if held is None else ~held
+    def solve(self, weight: FloatArray, level: FloatArray, held_levels: BoolArray | None = None) -> FloatArray | None:
+        """The levels of weighted least squares, from `level` on; `held_levels` levels stay 0. None: not determined."""
+        free = np.ones(self.count, dtype=bool) if held_levels is None else ~held_levels
         for _ in range(ITERATIONS):
             step = self._step(weight, level, free)
             if step is None:
                 return None
             level = level + step
-            if self.shape.linear or np.abs(step).max() <= SETTLED * max(np.abs(level).max(), 1e-12):
+            if self.shape.linear or np.abs(step).max() <= LEVEL_TOLERANCE * max(np.abs(level).max(), 1e-12):
                 break
         return level
 
@@ -442,9 +442,9 @@ class _Problem:
             new = self.solve(weight, level)
             if new is None:
                 break
-            settled = np.abs(new - level).max() <= WEIGHTS_SETTLED * max(np.abs(new).max(), 1e-12)
+            is_settled = np.abs(new - level).max() <= WEIGHT_TOLERANCE * max(np.abs(new).max(), 1e-12)
             level = new
-            if settled:
+            if is_settled:
                 break
         return weight, level
 
@@ -452,22 +452,22 @@ class _Problem:
         """(levels without each fold, error on its points in all components); None where not determined."""
         error, levels = np.empty_like(self.wrench), []
         for number in range(int(fold.max()) + 1):
-            out = fold == number
-            own = self.solve(np.where(out, 0.0, weight), level)
-            if own is None:
+            fold_points = fold == number
+            fold_level = self.solve(np.where(fold_points, 0.0, weight), level)
+            if fold_level is None:
                 return None
-            levels.append(own)
-            error[out] = (self.wrench - self.table(own)[0])[out]
+            levels.append(fold_level)
+            error[fold_points] = (self.wrench - self.table(fold_level)[0])[fold_points]
         return np.array(levels), error
 
     def bounded(self, weight: FloatArray, free: FloatArray) -> FloatArray:
         """No level below 0: the lowest is held at 0 and the others fitted again, until none is left below."""
-        level, held = free, np.zeros(len(free), dtype=bool)
+        level, held_levels = free, np.zeros(len(free), dtype=bool)
         while (level < 0.0).any():
-            held = held | (level == level.min())
-            if held.all():
+            held_levels = held_levels | (level == level.min())
+            if held_levels.all():
                 return np.zeros_like(free)
-            new = self.solve(weight, np.where(held, 0.0, np.maximum(level, 0.0)), held)
+            new = self.solve(weight, np.where(held_levels, 0.0, np.maximum(level, 0.0)), held_levels)
             if new is None:
                 return np.maximum(level, 0.0)
             level = new

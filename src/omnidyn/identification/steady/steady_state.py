@@ -51,21 +51,21 @@ class _Findings:
     lines: dict[int, Line] = field(default_factory=dict)
     bounds: dict[int, float] = field(default_factory=dict)
     warnings: list[Statement] = field(default_factory=list)
-    unfitted: list[Statement] = field(default_factory=list)
+    unfitted_notes: list[Statement] = field(default_factory=list)
 
 
 def fit_steady_state(
     robot: Robot,
     data: SteadyTable,
     *,
-    rest: str = "bound",
+    rest_use: str = "bound",
     rest_speed: Sequence[float] = (0.0, 0.0, 0.0),
     absolute_std: bool = False,
 ) -> Estimate:
     """Identify B and C of every axis in `data`, eqs (15)-(17).
 
     data: from `read_steady_table`, `SteadyTable(axis, speed, force)` or the functions of points.py.
-    rest: what a row at rest says. "bound": friction can hold that force, so breakaway is at least that; the line is
+    rest_use: what a row at rest says. "bound": friction can hold that force, so breakaway is at least that; the line is
     fitted to the moving rows. "line": it is a point of the sliding line, force = C (the paper's way). "ignore": no more
     than that it is there.
     rest_speed: speeds up to this count as rest, per axis [m/s, m/s, rad/s].
@@ -79,7 +79,7 @@ def fit_steady_state(
     would count twice; InputError for a wrong option.
     """
     check_order("fit_steady_state(robot, data)", (robot, Robot), (data, SteadyTable))
-    limits = _options(rest, rest_speed, absolute_std, data)
+    limits = _options(rest_use, rest_speed, absolute_std, data)
     if not robot.friction.only_axes:
         raise UnsupportedError(
             "this fit knows friction on the body axes only",
@@ -87,50 +87,50 @@ def fit_steady_state(
             expected="[friction.axes] alone",
             remedy="remove [friction.direction] and [friction.wheels]",
         )
-    found = _Findings(warnings=point_statements(robot, data))
+    findings = _Findings(warnings=point_statements(robot, data))
     for axis in range(len(AXES)):
-        _study(axis, data, rest, limits[axis], absolute_std, found)
-    if not found.lines:
-        held = [
+        _study(axis, data, rest_use, limits[axis], absolute_std, findings)
+    if not findings.lines:
+        bound_notes = [
             Statement("holds_at_least", NOTE, AXES[axis], {"bound": bound, "key": _breakaway(axis)})
-            for axis, bound in found.bounds.items()
+            for axis, bound in findings.bounds.items()
         ]
         raise InsufficientDataError(
-            "; ".join(map(str, ["no axis can be fitted", *found.unfitted, *held])),
+            "; ".join(map(str, ["no axis can be fitted", *findings.unfitted_notes, *bound_notes])),
             expected="three rows in motion or more, at two speeds or more, per axis",
             where=data.source,
         )
-    found.warnings += found.unfitted
+    findings.warnings += findings.unfitted_notes
     if data.force_from == "voltage":
-        found.warnings.append(Statement("forces_from_voltage", NOTE))
-    friction = _friction(robot.friction.axes, found)
+        findings.warnings.append(Statement("forces_from_voltage", NOTE))
+    friction = _friction(robot.friction.axes, findings)
     name = f"{(Path(data.source).name if data.sha256 else data.source) or 'unnamed'}, {len(data)} points"
     name = f"{name}, sha256 {data.sha256}" if data.sha256 else name
     method = {
         "weighted": data.force_std is not None,
         "absolute_std": absolute_std,
         "force_from": data.force_from,
-        "rest": rest,
+        "rest": rest_use,
     }
     return estimate_of(
-        list(found.lines.values()),
+        list(findings.lines.values()),
         robot.replace(friction=robot.friction.replace(axes=friction)),
         name,
         {
             _breakaway(axis): identified(None, f"lower bound from rest, {name}")
-            for axis, bound in found.bounds.items()
+            for axis, bound in findings.bounds.items()
             if friction.breakaway is not None and friction.breakaway[axis] == bound
         },
-        lower_bound={_breakaway(axis): bound for axis, bound in found.bounds.items()},
-        warnings=tuple(found.warnings),
+        lower_bound={_breakaway(axis): bound for axis, bound in findings.bounds.items()},
+        warnings=tuple(findings.warnings),
         method=str(Statement("line_method", NOTE, numbers=method)),
         scale="" if data.force_from == "table" else scale_of_traction(robot, data.force_from == "current"),
     )
 
 
-def _options(rest: str, rest_speed: Sequence[float], absolute_std: bool, data: SteadyTable) -> FloatArray:
-    if rest not in REST:
-        raise InputError("unknown use of rows at rest", got=rest, expected=" or ".join(REST), where="rest")
+def _options(rest_use: str, rest_speed: Sequence[float], absolute_std: bool, data: SteadyTable) -> FloatArray:
+    if rest_use not in REST:
+        raise InputError("unknown use of rows at rest", got=rest_use, expected=" or ".join(REST), where="rest")
     limits = np.asarray(rest_speed, dtype=float)
     if limits.shape != (3,) or not ((limits >= 0.0) & np.isfinite(limits)).all():
         raise InputError(
@@ -143,49 +143,49 @@ def _options(rest: str, rest_speed: Sequence[float], absolute_std: bool, data: S
     return limits
 
 
-def _study(axis: int, data: SteadyTable, rest: str, limit: float, absolute_std: bool, found: _Findings) -> None:
+def _study(axis: int, data: SteadyTable, rest_use: str, limit: float, absolute_std: bool, findings: _Findings) -> None:
     """One axis: its bound from rest, its line, its warnings."""
-    mine = data.axis_index == axis
-    moving = mine & (np.abs(data.speed) > limit)
-    resting = mine & ~moving
-    if not mine.any():
-        found.unfitted.append(Statement("axis_without_data", NOTE, AXES[axis]))
+    axis_rows = data.axis_index == axis
+    moving = axis_rows & (np.abs(data.speed) > limit)
+    resting = axis_rows & ~moving
+    if not axis_rows.any():
+        findings.unfitted_notes.append(Statement("axis_without_data", NOTE, AXES[axis]))
         return
-    found.warnings += rest_statements(axis, int(resting.sum()), rest)
-    if rest == "bound" and resting.any():
-        found.bounds[axis] = float(np.abs(data.force[resting]).max())
-    used = moving | (resting & (data.force != 0.0)) if rest == "line" else moving
-    speed = np.where(moving, data.speed, 0.0)[used]
-    if not _identifiable(axis, speed, data.force[used], absolute_std, found, data.source):
+    findings.warnings += rest_statements(axis, int(resting.sum()), rest_use)
+    if rest_use == "bound" and resting.any():
+        findings.bounds[axis] = float(np.abs(data.force[resting]).max())
+    used_rows = moving | (resting & (data.force != 0.0)) if rest_use == "line" else moving
+    speed = np.where(moving, data.speed, 0.0)[used_rows]
+    if not _identifiable(axis, speed, data.force[used_rows], absolute_std, findings, data.source):
         return
-    spreads = [None if std is None else std[used] for std in (data.speed_std, data.force_std)]
+    spreads = [None if std is None else std[used_rows] for std in (data.speed_std, data.force_std)]
     keys = f"friction.axes.viscous[{axis}]", f"friction.axes.coulomb[{axis}]"
-    line = fit_line(speed, data.force[used], *spreads, absolute_std=absolute_std, keys=keys)
+    line = fit_line(speed, data.force[used_rows], *spreads, absolute_std=absolute_std, keys=keys)
     if (line.level > MAX_FRICTION).any():
-        beyond = {"level": line.level.max()}
-        found.unfitted.append(Statement("axis_beyond_any_robot", subject=AXES[axis], numbers=beyond))
+        excess_level = {"level": line.level.max()}
+        findings.unfitted_notes.append(Statement("axis_beyond_any_robot", subject=AXES[axis], numbers=excess_level))
         return
-    found.lines[axis] = line
-    found.warnings += line_statements(axis, line, data.force_std is not None)
+    findings.lines[axis] = line
+    findings.warnings += line_statements(axis, line, data.force_std is not None)
 
 
 def _identifiable(
-    axis: int, speed: FloatArray, force: FloatArray, absolute_std: bool, found: _Findings, source: str
+    axis: int, speed: FloatArray, force: FloatArray, absolute_std: bool, findings: _Findings, source: str
 ) -> bool:
-    """Whether the rows determine a line; what is known instead goes to `found`.
+    """Whether the rows determine a line; what is known instead goes to `findings`.
 
     Raises InsufficientDataError for too few rows: to leave such an axis out would hide the user's own points.
     """
     size = np.abs(speed)
     if not size.any():
-        found.unfitted.append(Statement("axis_never_moved", subject=AXES[axis]))
+        findings.unfitted_notes.append(Statement("axis_never_moved", subject=AXES[axis]))
         return False
-    needed = PARAMETERS if absolute_std else PARAMETERS + 1
-    if len(speed) < needed:
+    needed_rows = PARAMETERS if absolute_std else PARAMETERS + 1
+    if len(speed) < needed_rows:
         raise InsufficientDataError(
             f"axis {AXES[axis]}: too few rows for a line with intervals",
             got=f"{len(speed)} usable rows",
-            expected=f"{needed} or more at two speeds or more",
+            expected=f"{needed_rows} or more at two speeds or more",
             where=source,
             remedy="measure more points, or remove this axis from the data",
         )
@@ -193,7 +193,7 @@ def _identifiable(
         return True
     total = float(np.mean(force * np.sign(speed)))
     numbers = {"speed": size.max(), "sum": total}
-    found.unfitted.append(Statement("axis_at_one_speed", subject=AXES[axis], numbers=numbers))
+    findings.unfitted_notes.append(Statement("axis_at_one_speed", subject=AXES[axis], numbers=numbers))
     return False
 
 
@@ -201,27 +201,27 @@ def _breakaway(axis: int) -> str:
     return f"friction.axes.breakaway[{axis}]"
 
 
-def _friction(before: AxesFriction, found: _Findings) -> AxesFriction:
+def _friction(old_friction: AxesFriction, findings: _Findings) -> AxesFriction:
     """The friction with the fitted B and C; breakaway raised only as far as C or a row at rest demands."""
-    viscous, coulomb, breakaway = (level.copy() for level in before.levels)
-    for axis, line in found.lines.items():
+    viscous, coulomb, breakaway = (level.copy() for level in old_friction.levels)
+    for axis, line in findings.lines.items():
         viscous[axis], coulomb[axis] = line.level
-        if before.breakaway is None:
+        if old_friction.breakaway is None:
             breakaway[axis] = coulomb[axis]
         elif breakaway[axis] < coulomb[axis]:
-            raised = {"before": breakaway[axis]}
-            found.warnings.append(Statement("breakaway_raised", subject=_breakaway(axis), numbers=raised))
+            raised_level = {"before": breakaway[axis]}
+            findings.warnings.append(Statement("breakaway_raised", subject=_breakaway(axis), numbers=raised_level))
             breakaway[axis] = coulomb[axis]
         else:
-            found.warnings.append(Statement("breakaway_kept", NOTE, _breakaway(axis), {"level": breakaway[axis]}))
-    for axis, bound in found.bounds.items():
+            findings.warnings.append(Statement("breakaway_kept", NOTE, _breakaway(axis), {"level": breakaway[axis]}))
+    for axis, bound in findings.bounds.items():
         if bound > breakaway[axis]:
             numbers = {"bound": bound, "coulomb": coulomb[axis]}
-            found.warnings.append(Statement("breakaway_from_rest", subject=_breakaway(axis), numbers=numbers))
+            findings.warnings.append(Statement("breakaway_from_rest", subject=_breakaway(axis), numbers=numbers))
             breakaway[axis] = bound
-    raised = before.breakaway is not None or bool((breakaway > coulomb).any())
-    return before.replace(
-        viscous=viscous.tolist(), coulomb=coulomb.tolist(), breakaway=breakaway.tolist() if raised else None
+    raised_level = old_friction.breakaway is not None or bool((breakaway > coulomb).any())
+    return old_friction.replace(
+        viscous=viscous.tolist(), coulomb=coulomb.tolist(), breakaway=breakaway.tolist() if raised_level else None
     )
 
 
@@ -229,7 +229,7 @@ def _friction(before: AxesFriction, found: _Findings) -> AxesFriction:
 
 
 def identify_lines(
-    runs: Sequence[Run], robot: Robot, asked: SteadyState, groups: Sequence[str] | None = None
+    runs: Sequence[Run], robot: Robot, method: SteadyState, groups: Sequence[str] | None = None
 ) -> dict[str, Estimate]:
     """B and C of each axis and group: group -> Estimate. groups: name of each run's group.
 
@@ -237,15 +237,15 @@ def identify_lines(
     Raises InsufficientDataError when no axis of a group has three points at two speeds or more.
     """
     points = force_points(
-        runs, robot, groups=groups, speed=asked.speed, force_from=asked.force_from, window=asked.window
+        runs, robot, groups=groups, speed=method.speed, force_from=method.force_from, window=method.window
     )
     priors = {key: prior for key, prior in robot.priors.items() if key.rpartition(".")[0] not in (DIRECTION, WHEELS)}
-    plain = robot.replace(friction=Friction(axes=robot.friction.axes), priors=priors)
-    found = {}
+    plain_robot = robot.replace(friction=Friction(axes=robot.friction.axes), priors=priors)
+    estimates = {}
     for group in points.groups:
-        own = points.of(group)
-        found[group] = fit_steady_state(plain, steady_table(robot, own, group))
-    return found
+        group_points = points.of(group)
+        estimates[group] = fit_steady_state(plain_robot, steady_table(robot, group_points, group))
+    return estimates
 
 
 def steady_table(robot: Robot, points: ForcePoints, source: str = "") -> SteadyTable:

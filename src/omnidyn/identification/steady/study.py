@@ -54,21 +54,23 @@ LASTING = Stability({}, ())  # whether levels last, `moments` says
 
 @dataclass(frozen=True, eq=False)
 class SteadyFit:
-    """The levels of friction before their diagnosis. parts: group -> its points; anew: group -> its levels were the
-    robot another one. The rest as in SteadyStudy."""
+    """The levels of friction before their diagnosis. parts: group -> its points; refit_by_group: group -> its levels
+    were the robot another one. The rest as in SteadyStudy."""
 
     runs: Sequence[Run]
     robot: Robot
-    asked: SteadyState
+    method: SteadyState
     windows: SteadyWindows
     points: ForcePoints
     choice: ShapeChoice
     parts: Mapping[str, ForcePoints]
-    anew: Mapping[str, Callable[[Robot], dict[str, float]]]
+    refit_by_group: Mapping[str, Callable[[Robot], dict[str, float]]]
     estimates: Mapping[str, Estimate]
 
 
-def fit_steady(runs: Sequence[Run], robot: Robot, asked: SteadyState, groups: Sequence[str] | None = None) -> SteadyFit:
+def fit_steady(
+    runs: Sequence[Run], robot: Robot, method: SteadyState, groups: Sequence[str] | None = None
+) -> SteadyFit:
     """The levels of friction of each group, from the steady windows of runs.
 
     groups: name of each run's group (a floor, a load); every group has its own levels of one shape, and where its
@@ -78,15 +80,15 @@ def fit_steady(runs: Sequence[Run], robot: Robot, asked: SteadyState, groups: Se
     without the channels needed.
     """
     windows = steady_windows(
-        runs, robot, groups=groups, speed=asked.speed, force_from=asked.force_from, window=asked.window
+        runs, robot, groups=groups, speed=method.speed, force_from=method.force_from, window=method.window
     )
     points = windows.points(robot)
     try:
-        choice = choose_shape(robot, points, shape=asked.shape, robust=asked.robust)
+        choice = choose_shape(robot, points, shape=method.shape, robust=method.robust)
     except InsufficientDataError as error:  # one long drive: what changes in it needs no shape
-        changed, _ = moments(runs, robot, points.force_from, asked.window)
-        numbers = {"changes": tuple(moment.short() for moment in changed)}
-        words = f"{error.what}; {Statement('force_changes_in_run', numbers=numbers)}" if changed else error.what
+        changes, _ = moments(runs, robot, points.force_from, method.window)
+        numbers = {"changes": tuple(moment.short() for moment in changes)}
+        words = f"{error.what}; {Statement('force_changes_in_run', numbers=numbers)}" if changes else error.what
         raise InsufficientDataError(
             words, got=error.got, expected=error.expected, remedy=error.remedy, where=error.where
         ) from error
@@ -94,15 +96,16 @@ def fit_steady(runs: Sequence[Run], robot: Robot, asked: SteadyState, groups: Se
         raise InsufficientDataError(
             "a robot file cannot hold this shape: it is for comparison only",
             got=choice.chosen,
-            expected=", ".join(name for name, each in SHAPES.items() if each.in_model),
+            expected=", ".join(name for name, shape in SHAPES.items() if shape.in_model),
             where="shape",
         )
     parts = {group: points.of(group) for group in points.groups}
-    anew = {group: partial(_levels, windows, choice.of(group), group, asked.robust) for group in parts}
+    refit_by_group = {group: partial(_levels, windows, choice.of(group), group, method.robust) for group in parts}
     estimates = {
-        group: _estimate(robot, part, choice, group, asked.robust, anew[group]) for group, part in parts.items()
+        group: _estimate(robot, part, choice, group, method.robust, refit_by_group[group])
+        for group, part in parts.items()
     }
-    return SteadyFit(runs, robot, asked, windows, points, choice, parts, anew, estimates)
+    return SteadyFit(runs, robot, method, windows, points, choice, parts, refit_by_group, estimates)
 
 
 def undiagnosed(fit: SteadyFit) -> SteadyStudy:
@@ -113,43 +116,44 @@ def undiagnosed(fit: SteadyFit) -> SteadyStudy:
 def diagnosed(fit: SteadyFit) -> SteadyStudy:
     """The study of a fit: what its shape leaves out, what changes inside a run, and what its levels rest on."""
     points, choice, robot = fit.points, fit.choice, fit.robot
-    changed, tested = moments(fit.runs, robot, points.force_from, fit.asked.window)
+    changes, tested_runs = moments(fit.runs, robot, points.force_from, fit.method.window)
     sources = {number: run.source for number, run, _ in fit.windows.found}
-    by_shape, tested_by_shape = moments_by_shape(robot, points, choice.fit, sources, changed)
-    changed += by_shape
-    untested = tuple(name for name in sources.values() if name not in tested | tested_by_shape)
+    by_shape, tested_by_shape = moments_by_shape(robot, points, choice.fit, sources, changes)
+    changes += by_shape
+    untested_runs = tuple(name for name in sources.values() if name not in tested_runs | tested_by_shape)
     lack = {
-        group: _lack(robot, part, choice, group, changed, sources, fit.asked.robust)
+        group: _lack(robot, part, choice, group, changes, sources, fit.method.robust)
         for group, part in fit.parts.items()
     }
-    within = {group for group, part in fit.parts.items() if _changed(part, changed, sources)}
-    known = {
-        group: Diagnosis(lack[group], rests_on(robot, estimate.value, fit.anew[group]), LASTING)
+    changed_groups = {group for group, part in fit.parts.items() if _changed(part, changes, sources)}
+    diagnosis_by_group = {
+        group: Diagnosis(lack[group], rests_on(robot, estimate.value, fit.refit_by_group[group]), LASTING)
         for group, estimate in fit.estimates.items()
     }  # whether the levels last, `moments` says
     estimates = {
-        group: replace(estimate, study=partial(known.__getitem__, group)) for group, estimate in fit.estimates.items()
+        group: replace(estimate, study=partial(diagnosis_by_group.__getitem__, group))
+        for group, estimate in fit.estimates.items()
     }
-    return _study(replace(fit, estimates=estimates), changed, lack, within, untested)
+    return _study(replace(fit, estimates=estimates), changes, lack, changed_groups, untested_runs)
 
 
 def _study(
     fit: SteadyFit,
-    changed: Sequence[Moment],
+    changes: Sequence[Moment],
     lack: Mapping[str, LackOfFit],
-    within: Collection[str],
-    untested: tuple[str, ...] = (),
+    changed_groups: Collection[str],
+    untested_runs: tuple[str, ...] = (),
 ) -> SteadyStudy:
     """The study.
 
     Args:
         fit: the levels.
-        changed: changes inside a run.
+        changes: changes inside a run.
         lack: group -> what its shape leaves out.
-        within: groups with a change inside a run.
-        untested: runs that could not be tested for one.
+        changed_groups: groups with a change inside a run.
+        untested_runs: runs that could not be tested for one.
     """
-    robot, points, choice, robust = fit.robot, fit.points, fit.choice, fit.asked.robust
+    robot, points, choice, robust = fit.robot, fit.points, fit.choice, fit.method.robust
     travel = {group: _travel(part) for group, part in fit.parts.items()}
     viscous = {
         group: _viscous(robot, fit.windows, choice, group, part, travel[group], robust)
@@ -160,9 +164,11 @@ def _study(
     if robot.wheels.count > 3:  # the part of the traction that pushes nowhere: G f = 0
         from scipy.linalg import null_space  # slow to import, and most robots have three wheels
 
-        against = {group: part.traction @ null_space(robot.wheels.wrench_matrix) for group, part in fit.parts.items()}
-        internal = {group: float(np.sqrt(np.mean((f**2).sum(axis=1)))) for group, f in against.items()}
-    turning = any(is_turning(robot, part) for part in fit.parts.values())
+        internal_forces = {
+            group: part.traction @ null_space(robot.wheels.wrench_matrix) for group, part in fit.parts.items()
+        }
+        internal = {group: float(np.sqrt(np.mean((f**2).sum(axis=1)))) for group, f in internal_forces.items()}
+    has_yaw = any(is_turning(robot, part) for part in fit.parts.values())
     return SteadyStudy(
         robot=robot,
         points=points,
@@ -175,34 +181,34 @@ def _study(
         lack_of_fit=lack,
         statements=statements(
             (
-                *result_statements(choice, viscous, differences, internal, lack, within),
+                *result_statements(choice, viscous, differences, internal, lack, changed_groups),
                 scale_of_traction(robot, points.force_from == CURRENT),
             )
         ),
         warnings=(
             *points.notes,
-            *point_statements(points, choice, turning),
-            *(moment.statement() for moment in changed),
-            *_not_tested(untested, len({number for number, *_ in fit.windows.found})),
-            *lack_statements(lack, choice, within),
+            *point_statements(points, choice, has_yaw),
+            *(moment.statement() for moment in changes),
+            *_not_tested(untested_runs, len({number for number, *_ in fit.windows.found})),
+            *lack_statements(lack, choice, changed_groups),
         ),
-        moments=tuple(changed),
-        untested=untested,
-        advice=tuple(advice(choice, viscous, lack, turning, points.force_from)),
+        moments=tuple(changes),
+        untested=untested_runs,
+        advice=tuple(advice(choice, viscous, lack, has_yaw, points.force_from)),
     )
 
 
-def _not_tested(untested: Sequence[str], runs: int) -> list[Statement]:
+def _not_tested(untested_runs: Sequence[str], runs: int) -> list[Statement]:
     """That runs are too short to be tested for a change inside, or no command comes again in them."""
-    if not untested:
+    if not untested_runs:
         return []
-    return [Statement("changes_not_tested", NOTE, untested[0], {"untested": len(untested), "runs": runs})]
+    return [Statement("changes_not_tested", NOTE, untested_runs[0], {"untested": len(untested_runs), "runs": runs})]
 
 
-def _changed(points: ForcePoints, found: Sequence[Moment], sources: Mapping[int, str]) -> list[Moment]:
+def _changed(points: ForcePoints, changes: Sequence[Moment], sources: Mapping[int, str]) -> list[Moment]:
     """The changes inside the runs of these points; without those of runs that have one name."""
     sources_here, names = {sources[number] for number in points.run.tolist()}, [*sources.values()]
-    return [moment for moment in found if moment.source in sources_here and names.count(moment.source) == 1]
+    return [moment for moment in changes if moment.source in sources_here and names.count(moment.source) == 1]
 
 
 def _lack(
@@ -210,15 +216,15 @@ def _lack(
     points: ForcePoints,
     choice: ShapeChoice,
     group: str,
-    found: Sequence[Moment],
+    changes: Sequence[Moment],
     sources: Mapping[int, str],
     robust: bool,
 ) -> LackOfFit:
     """Whether the shape of a group fits: on both sides of a change inside a run, which would look like another shape
     wherever directions were driven on one side of it only."""
-    fit, inside = choice.fit(group), _changed(points, found, sources)
-    if inside:
-        points = levelled(points, inside, sources)
+    fit, inner_changes = choice.fit(group), _changed(points, changes, sources)
+    if inner_changes:
+        points = levelled(points, inner_changes, sources)
         fit = fit_shape(fit.shape, robot, points, robust=robust) or fit
     return lack_of_fit(robot, points, fit)
 
@@ -230,10 +236,10 @@ def _levels(windows: SteadyWindows, shape: str, group: str, robust: bool, robot:
 
 
 def _travel(points: ForcePoints) -> Travel:
-    along = points.along[np.isfinite(points.along)]
-    n = len(along)
-    spread = float(np.std(along, ddof=1)) if n > 1 else float("nan")
-    mean, error = (float(np.mean(along)), spread / np.sqrt(n)) if n else (float("nan"), float("nan"))
+    travel_forces = points.along[np.isfinite(points.along)]
+    n = len(travel_forces)
+    spread = float(np.std(travel_forces, ddof=1)) if n > 1 else float("nan")
+    mean, error = (float(np.mean(travel_forces)), spread / np.sqrt(n)) if n else (float("nan"), float("nan"))
     speed = points.speed[points.travels] if points.travels.any() else points.speed
     return Travel(
         mean,
@@ -257,7 +263,7 @@ def _viscous(
     robust: bool,
 ) -> tuple[Viscous, ...]:
     """The viscous levels of the chosen shape, fitted beside its other levels."""
-    name, found = base_name(choice.of(group)) + VISCOUS, []
+    name, viscous_levels = base_name(choice.of(group)) + VISCOUS, []
     fit = choice.fits[name][group] if name in choice.fits else None
     if fit is None and speeds_differ(points):  # the other groups may have one speed only
         fit = fit_shape(SHAPES[name], robot, points, robust=robust)
@@ -265,20 +271,20 @@ def _viscous(
         return ()
     brake, guesses = _back_emf(robot, points)
     at_rim = float(np.trace(brake) / np.sum(robot.wheels.wrench_matrix**2))
-    moved = moved_by_the_file(robot, fit.by_key(fit.free), partial(_levels, windows, name, group, robust))
+    shifts = moved_by_the_file(robot, fit.by_key(fit.free), partial(_levels, windows, name, group, robust))
     for k, key in enumerate(fit.keys):
         name = Key.parse(key)
         if name.level != VISCOUS_LEVEL:
             continue
         level, slow, fast = travel.mean, travel.slow, travel.fast
         if name.axis == YAW:
-            turned = np.abs(points.twist[points.turns, 2])
-            level, slow, fast = float(np.abs(points.wrench[points.turns, 2]).mean()), turned.min(), turned.max()
+            yaw_speeds = np.abs(points.twist[points.turns, 2])
+            level, slow, fast = float(np.abs(points.wrench[points.turns, 2]).mean()), yaw_speeds.min(), yaw_speeds.max()
         on_body = float(brake[name.axis, name.axis] if name.axis is not None else np.mean(np.diag(brake)[:2]))
-        value, std = float(fit.free[k]), float(np.linalg.norm([fit.std[k], *moved[k]]))
+        value, std = float(fit.free[k]), float(np.linalg.norm([fit.std[k], *shifts[k]]))
         half = t_quantile(fit.degrees_of_freedom) * std
         low, high = value - half, value + half
-        found.append(
+        viscous_levels.append(
             Viscous(
                 key,
                 value,
@@ -295,7 +301,7 @@ def _viscous(
                 sum_std=float(fit.std[k]),
             )
         )
-    return tuple(found)
+    return tuple(viscous_levels)
 
 
 def _back_emf(robot: Robot, points: ForcePoints) -> tuple[FloatArray, tuple[str, ...]]:
@@ -317,17 +323,17 @@ def _estimate(
     choice: ShapeChoice,
     group: str,
     robust: bool,
-    again: Callable[[Robot], Mapping[str, float]],
+    refit: Callable[[Robot], Mapping[str, float]],
 ) -> Estimate:
-    alone = choice.fit(group)
-    moved = moved_by_the_file(robot, alone.by_key(alone.free), again)
-    fit = replace(alone, covariance=alone.covariance + moved @ moved.T)
+    group_fit = choice.fit(group)
+    shifts = moved_by_the_file(robot, group_fit.by_key(group_fit.free), refit)
+    fit = replace(group_fit, covariance=group_fit.covariance + shifts @ shifts.T)
     name, runs = "" if group == "all" else f"{group}: ", len(set(points.run.tolist()))
-    friction, kept = _friction(robot, fit, fit.by_key(fit.level), is_turning(robot, points))
+    friction, kept_levels = _friction(robot, fit, fit.by_key(fit.level), is_turning(robot, points))
     priors = {
         key: prior
         for key, prior in robot.priors.items()
-        if key in kept or not ((place := find_key(key)) and place.level)
+        if key in kept_levels or not ((place := find_key(key)) and place.level)
     }
     method = {
         "shape": fit.shape.name,
@@ -340,45 +346,45 @@ def _estimate(
         [fit],
         robot.replace(friction=friction, priors=priors),
         f"{name}{runs} runs, {len(points)} steady points, {int(points.rows.sum())} rows",
-        warnings=tuple(fit_statements(fit, robust, kept, _back_emf(robot, points)[1])),
+        warnings=tuple(fit_statements(fit, robust, kept_levels, _back_emf(robot, points)[1])),
         method=str(Statement("steady_method", NOTE, numbers=method)),
         scale=scale_of_traction(robot, points.force_from == CURRENT),
-        log_alone=alone.intervals() if moved.size else {},
+        log_alone=group_fit.intervals() if shifts.size else {},
     )
 
 
-def _friction(robot: Robot, fit: ShapeFit, value: dict[str, float], turning: bool) -> tuple[Friction, dict[str, float]]:
+def _friction(robot: Robot, fit: ShapeFit, value: dict[str, float], has_yaw: bool) -> tuple[Friction, dict[str, float]]:
     """The new friction; what the robot had about yaw is kept where the data do not turn, and named."""
-    if turning or fit.shape.name.startswith("wheel"):  # friction at the wheels resists turning by itself
+    if has_yaw or fit.shape.name.startswith("wheel"):  # friction at the wheels resists turning by itself
         return friction_of(fit.shape, robot, value), {}
-    before = robot.friction
-    coulomb = before.axes.coulomb[2] + before.direction.yaw_coulomb
-    viscous = before.axes.viscous[2] + before.direction.yaw_viscous
+    old_friction = robot.friction
+    coulomb = old_friction.axes.coulomb[2] + old_friction.direction.yaw_coulomb
+    viscous = old_friction.axes.viscous[2] + old_friction.direction.yaw_viscous
     on_axes = fit.shape.name.startswith("box")
     names = (
         (f"{BODY_AXES}.coulomb[2]", f"{BODY_AXES}.viscous[2]")
         if on_axes
         else (f"{DIRECTION}.yaw_coulomb", f"{DIRECTION}.yaw_viscous")
     )
-    kept = {key: level for key, level in zip(names, (coulomb, viscous), strict=True) if level > 0.0}
-    return friction_of(fit.shape, robot, value | kept), kept
+    kept_levels = {key: level for key, level in zip(names, (coulomb, viscous), strict=True) if level > 0.0}
+    return friction_of(fit.shape, robot, value | kept_levels), kept_levels
 
 
 def _differences(choice: ShapeChoice) -> tuple[Difference, ...]:
     """Every level between every two groups: independent data, so their variances add up."""
-    fits, found = {group: choice.fit(group) for group in choice.fits[choice.chosen]}, []
+    fits, differences = {group: choice.fit(group) for group in choice.fits[choice.chosen]}, []
     for first, second in combinations(fits, 2):
-        one, other = fits[first], fits[second]
-        for k, key in enumerate(one.keys):
-            if key not in other.keys:  # only one of the groups turns, or their shapes differ
+        first_fit, second_fit = fits[first], fits[second]
+        for k, key in enumerate(first_fit.keys):
+            if key not in second_fit.keys:  # only one of the groups turns, or their shapes differ
                 continue
-            j = other.keys.index(key)
-            values = float(one.free[k]), float(other.free[j])
-            std = float(np.hypot(one.std[k], other.std[j]))
-            half = t_quantile(min(one.degrees_of_freedom, other.degrees_of_freedom)) * std
+            j = second_fit.keys.index(key)
+            values = float(first_fit.free[k]), float(second_fit.free[j])
+            std = float(np.hypot(first_fit.std[k], second_fit.std[j]))
+            half = t_quantile(min(first_fit.degrees_of_freedom, second_fit.degrees_of_freedom)) * std
             gap = values[1] - values[0]
-            found.append(Difference(key, first, second, values, gap, std, gap - half, gap + half))
-    return tuple(found)
+            differences.append(Difference(key, first, second, values, gap, std, gap - half, gap + half))
+    return tuple(differences)
 
 
 # What the levels of a steady state rest on: the logs asked anew with each fixed number 1 % larger
@@ -396,40 +402,42 @@ FIXED = {
 
 
 def rests_on(
-    robot: Robot, value: Mapping[str, float], again: Callable[[Robot], Mapping[str, float]]
+    robot: Robot, value: Mapping[str, float], refit: Callable[[Robot], Mapping[str, float]]
 ) -> dict[str, dict[str, float]]:
-    """Number -> fixed key -> relative change of the number per percent of the key. again: the numbers of a robot."""
-    found: dict[str, dict[str, float]] = {name: {} for name in value}
-    for key, beside in FIXED.items():
+    """Number -> fixed key -> relative change of the number per percent of the key. refit: the numbers of a robot."""
+    changes_by_number: dict[str, dict[str, float]] = {name: {} for name in value}
+    for key, tied_keys in FIXED.items():
         try:
-            other = again(_larger(robot, key, *beside))
+            other_values = refit(_larger(robot, key, *tied_keys))
         except OmnidynError:  # no number of this robot, or none that these logs can be read with
             continue
-        for name, now in value.items():
-            if now > 0.0 and name in other:
-                found[name][key] = other[name] / now - 1.0
-    return found
+        for name, value_now in value.items():
+            if value_now > 0.0 and name in other_values:
+                changes_by_number[name][key] = other_values[name] / value_now - 1.0
+    return changes_by_number
 
 
 def moved_by_the_file(
-    robot: Robot, value: Mapping[str, float], again: Callable[[Robot], Mapping[str, float]]
+    robot: Robot, value: Mapping[str, float], refit: Callable[[Robot], Mapping[str, float]]
 ) -> FloatArray:
     """What one std of each number that the file of the robot knows only so far moves the numbers by, to first order.
     Shape (numbers, K). A torque constant brings the EMF constant with it: both are one number of the magnet."""
-    known = {key: std for key, (_, std) in known_priors(robot).items() if Key.parse(key).name in FIXED}
-    magnet = any(Key.parse(key).name == TORQUE for key in known)
-    found = []
-    for key, std in known.items():
+    std_by_key = {key: std for key, (_, std) in known_priors(robot).items() if Key.parse(key).name in FIXED}
+    magnet = any(Key.parse(key).name == TORQUE for key in std_by_key)
+    shifts = []
+    for key, std in std_by_key.items():
         place = Key.parse(key)
         if magnet and place.name == EMF:
             continue
         try:
-            other = again(_larger(robot, key, *(str(Key(name, place.index)) for name in FIXED[place.name])))
+            other_values = refit(_larger(robot, key, *(str(Key(name, place.index)) for name in FIXED[place.name])))
         except OmnidynError:  # no number that these logs are read with
             continue
         size = STEP * float(place.get(robot))
-        found.append([std / size * (other.get(name, now) - now) for name, now in value.items()])
-    return np.array(found).reshape(-1, len(value)).T
+        shifts.append(
+            [std / size * (other_values.get(name, value_now) - value_now) for name, value_now in value.items()]
+        )
+    return np.array(shifts).reshape(-1, len(value)).T
 
 
 def _larger(robot: Robot, *names: str) -> Robot:

@@ -139,15 +139,15 @@ def _travel_table(study: SteadyStudy) -> Table:
     rows = [
         (
             group,
-            f"{each.runs}",
-            f"{each.points}",
-            f"{each.rows}",
-            f"{each.slow:.3g} .. {each.fast:.3g}",
-            f"{each.mean:.2f}",
-            f"{each.std:.2f}",
-            f"{each.deviation:.2f}",
+            f"{travel.runs}",
+            f"{travel.points}",
+            f"{travel.rows}",
+            f"{travel.slow:.3g} .. {travel.fast:.3g}",
+            f"{travel.mean:.2f}",
+            f"{travel.std:.2f}",
+            f"{travel.deviation:.2f}",
         )
-        for group, each in study.travel.items()
+        for group, travel in study.travel.items()
     ]
     head = ("group", "runs", "points", "rows", "speed m/s", "along travel N", "+-", "scatter N")
     return Table(head, rows, name="travel")
@@ -163,7 +163,7 @@ def _shape_table(study: SteadyStudy) -> Table:
         marks += [] if score.in_model else ["not in a robot file"]
         marks += ["a level below 0"] if score.at_bound else []
         best = score.behind == 0.0 and score.behind_std == 0.0
-        behind, error = ("", "") if best else (f"{score.behind:.2f}", f"{score.behind_std:.2f}")
+        behind_text, error = ("", "") if best else (f"{score.behind:.2f}", f"{score.behind_std:.2f}")
         rows.append(
             (
                 score.name,
@@ -171,7 +171,7 @@ def _shape_table(study: SteadyStudy) -> Table:
                 f"{score.loo:.2f}",
                 f"{score.loo_std:.2f}",
                 f"{score.along:.2f}",
-                behind,
+                behind_text,
                 error,
                 ", ".join(marks),
             )
@@ -198,7 +198,7 @@ def _level_table(study: SteadyStudy) -> Table:
 
 LOW_WEIGHT = 0.5
 WRONG_WAY = 0.05  # share of points whose force points against the motion from which a sign is doubted
-MATTERS = 0.02  # of the force: a viscous part below this does not matter in the speeds driven
+FORCE_SHARE = 0.02  # of the force: a viscous part below this does not matter in the speeds driven
 
 
 def result_statements(
@@ -207,19 +207,19 @@ def result_statements(
     differences: Sequence[Difference],
     internal: Mapping[str, float],
     lack: Mapping[str, LackOfFit],
-    within: Collection[str],
+    changed_groups: Collection[str],
 ) -> list[Statement]:
-    """What the data say. within: groups in which the force changes within a run."""
+    """What the data say. changed_groups: groups in which the force changes within a run."""
     statements = _shape_statements(choice)
     statements += [
         _of(
             group,
-            Statement("no_lack_of_fit", NOTE, numbers={"changes": group in within})
-            if one.tried
+            Statement("no_lack_of_fit", NOTE, numbers={"changes": group in changed_groups})
+            if group_lack.tried
             else Statement("fit_not_tested", NOTE),
         )
-        for group, one in lack.items()
-        if not one.found
+        for group, group_lack in lack.items()
+        if not group_lack.found
     ]
     statements += [
         _of(group, _viscous(level, choice.of(group))) for group, levels in viscous.items() for level in levels
@@ -255,35 +255,37 @@ def _shape_statements(choice: ShapeChoice) -> list[Statement]:
     where it is not the chosen one and the data do tell the two apart.
     """
     score, best = choice.score, choice.scores[0]
-    box = next((other for other in choice.scores if other.name == "box" and other is not score), None)
+    box = next(
+        (rival_score for rival_score in choice.scores if rival_score.name == "box" and rival_score is not score), None
+    )
     numbers = {"error": (score.loo, score.loo_std), "box": (box.loo, box.loo_std) if box else None}
     statements = [Statement("shape_chosen", NOTE, score.name, numbers)]
     for group, name in choice.own.items():
         scores = {score.name: score for score in choice.scored[group]}
-        score, other = scores[name], scores[choice.chosen]
+        score, other_score = scores[name], scores[choice.chosen]
         numbers = {"shape": name, "error": (score.loo, score.loo_std), "other": None}
         if name != choice.chosen:
-            numbers |= {"other": other.name, "other_error": (other.loo, other.loo_std)}
+            numbers |= {"other": other_score.name, "other_error": (other_score.loo, other_score.loo_std)}
         statements.append(Statement("group_shape", NOTE, group, numbers))
     first, *ties = [score for score in choice.scores if not score.told_apart] or [choice.score]
     if ties:
         numbers = {"shapes": [tie.name for tie in ties], "behind": [(tie.behind, tie.behind_std) for tie in ties]}
         statements.append(Statement("shapes_tied", NOTE, first.name, numbers))
     if best.name != choice.chosen and score.told_apart:
-        why = "not_in_model" if not best.in_model else "below_zero" if best.at_bound else "not_asked"
-        numbers = {"behind": (score.behind, score.behind_std), "why": why}
+        reason = "not_in_model" if not best.in_model else "below_zero" if best.at_bound else "not_asked"
+        numbers = {"behind": (score.behind, score.behind_std), "why": reason}
         statements.append(Statement("better_shape_not_used", NOTE, best.name, numbers))
     return statements
 
 
 def lack_statements(
-    lack: Mapping[str, LackOfFit], choice: ShapeChoice, within: Collection[str] = ()
+    lack: Mapping[str, LackOfFit], choice: ShapeChoice, changed_groups: Collection[str] = ()
 ) -> list[Statement]:
-    """That no offered shape fits, and what would. within: groups in which the force changes within a run."""
+    """That no offered shape fits, and what would. changed_groups: groups in which the force changes within a run."""
     statements = []
-    for group, one in lack.items():
-        numbers = {"changes": group in within, "share": one.channels["force"], "with": ""}
-        if one.remedies and (best := one.remedies[0]).force:
+    for group, group_lack in lack.items():
+        numbers = {"changes": group in changed_groups, "share": group_lack.channels["force"], "with": ""}
+        if group_lack.remedies and (best := group_lack.remedies[0]).force:
             numbers |= {
                 "with": best.cause,
                 "shape": choice.of(group),
@@ -291,52 +293,56 @@ def lack_statements(
                 "error_before": best.force.before,
                 "same": best.same_as,
             }
-        statements += [_of(group, Statement("no_shape_fits", numbers=numbers))] if one.found else []
+        statements += [_of(group, Statement("no_shape_fits", numbers=numbers))] if group_lack.found else []
     return statements
 
 
-def _viscous(level: Viscous, chosen: str) -> Statement:
+def _viscous(level: Viscous, shape_name: str) -> Statement:
     numbers = {name: value for name, value in asdict(level).items() if name not in ("key", "seen")}
     if level.guesses:
         return Statement("viscous_with_back_emf", NOTE, level.key, numbers)
     if not level.seen:
-        matters = level.effect > MATTERS * level.level
+        matters = level.effect > FORCE_SHARE * level.level
         return Statement("viscous_not_identifiable", NOTE, level.key, numbers | {"matters": matters})
     if level.value < 0.0:
         return Statement("force_falls_with_speed", NOTE, level.key, numbers)
-    return Statement("viscous_seen", NOTE, level.key, numbers | {"in_shape": "viscous" in chosen})
+    return Statement("viscous_seen", NOTE, level.key, numbers | {"in_shape": "viscous" in shape_name})
 
 
-def point_statements(points: ForcePoints, choice: ShapeChoice, turning: bool) -> list[Statement]:
+def point_statements(points: ForcePoints, choice: ShapeChoice, has_yaw: bool) -> list[Statement]:
     """What is weak about the points or the comparison of shapes."""
     statements = []
-    along = points.along[np.isfinite(points.along)]
-    wrong = int((along < 0.0).sum())
-    if wrong > WRONG_WAY * max(len(along), 1):
+    travel_forces = points.along[np.isfinite(points.along)]
+    wrong = int((travel_forces < 0.0).sum())
+    if wrong > WRONG_WAY * max(len(travel_forces), 1):
         statements.append(
-            Statement("against_motion", "warning", points.force_from, {"wrong": wrong, "points": len(along)})
+            Statement("against_motion", "warning", points.force_from, {"wrong": wrong, "points": len(travel_forces)})
         )
     if points.force_from == VOLTAGE:
         statements.append(Statement("forces_from_voltage", NOTE))
-    if not turning:
+    if not has_yaw:
         statements.append(Statement("not_turned"))
-    for why in dict.fromkeys(choice.missing.values()):
-        shapes = [name for name, reason in choice.missing.items() if reason == why]
-        statements.append(Statement("shapes_not_compared", NOTE, numbers={"why": why, "shapes": shapes}))
+    for missing_reason in dict.fromkeys(choice.missing.values()):
+        shapes = [name for name, reason in choice.missing.items() if reason == missing_reason]
+        statements.append(Statement("shapes_not_compared", NOTE, numbers={"why": missing_reason, "shapes": shapes}))
     return statements
 
 
-def fit_statements(fit: ShapeFit, robust: bool, kept: Mapping[str, float], guesses: Sequence[str]) -> list[Statement]:
-    """What is weak about the levels of one group. kept: levels of the robot file; guesses: of the back-EMF."""
+def fit_statements(
+    fit: ShapeFit, robust: bool, kept_levels: Mapping[str, float], guesses: Sequence[str]
+) -> list[Statement]:
+    """What is weak about the levels of one group. kept_levels: levels of the robot file; guesses: of the back-EMF."""
     statements = [
         Statement("level_at_bound", subject=key, numbers={"free": free})
         for key, free in zip(fit.keys, fit.free.tolist(), strict=True)
         if free < 0.0
     ]
-    far = int((fit.weight < LOW_WEIGHT).sum())
-    if robust and far:
-        statements.append(Statement("points_far_from_shape", NOTE, numbers={"far": far, "points": len(fit.weight)}))
-    statements += [Statement("level_kept", NOTE, key, {"level": level}) for key, level in kept.items()]
+    far_count = int((fit.weight < LOW_WEIGHT).sum())
+    if robust and far_count:
+        statements.append(
+            Statement("points_far_from_shape", NOTE, numbers={"far": far_count, "points": len(fit.weight)})
+        )
+    statements += [Statement("level_kept", NOTE, key, {"level": level}) for key, level in kept_levels.items()]
     levels = [key for key in fit.keys if Key.parse(key).level == VISCOUS]
     if levels and guesses:
         statements.append(Statement("rests_on_back_emf", numbers={"levels": levels, "guesses": guesses}))
@@ -347,15 +353,15 @@ def advice(
     choice: ShapeChoice,
     viscous: Mapping[str, Sequence[Viscous]],
     lack: Mapping[str, LackOfFit],
-    turning: bool,
+    has_yaw: bool,
     force_from: str,
 ) -> list[Statement]:
     """What to measure next."""
     statements = []
-    if any(one.found for one in lack.values()):
-        keys = {remedy.key for one in lack.values() for remedy in one.remedies}
+    if any(group_lack.found for group_lack in lack.values()):
+        keys = {remedy.key for group_lack in lack.values() for remedy in group_lack.remedies}
         statements.append(Statement("drive_turned_around" if keys & TILTED_FLOOR else "look_beyond_shapes", NOTE))
-    if not turning:
+    if not has_yaw:
         statements.append(Statement("turn_on_the_spot", NOTE))
     if not any(viscous.values()):
         statements.append(Statement("drive_at_two_speeds", NOTE))

@@ -22,7 +22,7 @@ from omnidyn.identification.output_error.problem.friction_laws import bending_ke
 from omnidyn.identification.output_error.problem.problem import Parts, Point, Problem, bounded
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.output_error.trust.breakaway import levels_of
-from omnidyn.identification.structure.misfit import FALSE, Misfit, chance, memory_beside, misfit, with_cause
+from omnidyn.identification.structure.misfit import FALSE_SHARE, Misfit, chance, memory_beside, misfit, with_cause
 from omnidyn.identification.structure.missing.candidates import Candidate, Trial, unoffered
 from omnidyn.identification.structure.missing.laws import candidates
 from omnidyn.identification.structure.missing.refits import refits
@@ -33,18 +33,18 @@ from omnidyn.identification.structure.tails import as_counted, calmer, wild_samp
 from omnidyn.model.keys import BODY_AXES, BREAKAWAY, CENTRE, DIRECTION, EMF, TORQUE, WHEELS, Key, expand
 from omnidyn.model.known.told import holding
 
-SURE = 2.0  # degrees of freedom with which the power of the slowest errors is known within its own size
-SHOWN = 400  # columns: about what themes and candidates show
+SLOW_DEGREES = 2.0  # degrees of freedom with which the power of the slowest errors is known within its own size
+SHOWN_COLUMNS = 400  # columns: about what themes and candidates show
 
 
 @dataclass(frozen=True, eq=False)
 class Examined:
     """A diagnosis, and what it was made with. memory: of each column, of what is left beside all that residuals follow;
-    tried: how many causes were looked at; rows: how many numbers of the logs."""
+    cause_count: how many causes were looked at; rows: how many numbers of the logs."""
 
     diagnosis: Diagnosis
     memory: Sequence[AutoRegression]
-    tried: int
+    cause_count: int
     rows: int
 
 
@@ -57,101 +57,116 @@ def diagnose(solution: Solution) -> Diagnosis:
 def examine(solution: Solution) -> Examined:
     """The diagnosis of a fit at its best point, and what it was made with.
 
-    A cause that is clear by itself is found where its chance, times their number, is below FALSE (Bonferroni). Sizes,
-    and causes that are alike, make that no stricter: of 39 causes at 86 sizes noise passes the best as often as of 35
-    to 60 that have nothing in common, by draws from their scalar products.
+    A cause that is clear by itself is found where its chance, times their number, is below FALSE_SHARE (Bonferroni).
+    Sizes, and causes that are alike, make that no stricter: of 39 causes at 86 sizes noise passes the best as often as
+    of 35 to 60 that have nothing in common, by draws from their scalar products.
     """
     solver, point = solution.solver, solution.state.point
-    whole = with_levels(solver.problem, point, levels_of(solution))
-    few = Decimated.of(whole)
-    problem = bounded(few.problem, SHOWN, effects(few.problem))
-    engine = solver.engine.on(few.all_rows(problem))
-    parts = few.kept(engine.residuals(point))
-    moved = motions(problem, point)
-    rows = with_rounding(Rows.of(problem, point, as_counted(solution, problem, parts)), moved)
-    seen = misfit(rows, moved)
-    stable = stability(seen.linear)
-    bench = Workbench(problem, point, type(engine), moved, stable.likely)
-    every = [*candidates(bench), *unoffered(bench)]
-    tried = _tried(bench, [one for one in every if not one.late])
-    ranked = remedies(seen.linear, tried, seen.shown)
-    count = int(sum(there.sum() for there in rows.there))
-    found = bool(seen.found) or any(_chance(seen.linear, tried, r) * len(tried) < FALSE for r in ranked)
-    if found:
-        tried += _tried(bench, [one for one in every if one.late])
-        ranked = remedies(seen.linear, tried, seen.shown)
-    told, cause = _fitted(solution, problem, parts, seen, tried, ranked) if found else ((), None)
-    memory = memory_beside(rows, cause) if cause and not seen.found else seen.linear.memory
-    seen = with_cause(seen, cause) if cause else seen
+    full_problem = with_levels(solver.problem, point, levels_of(solution))
+    decimated = Decimated.of(full_problem)
+    problem = bounded(decimated.problem, SHOWN_COLUMNS, effects(decimated.problem))
+    engine = solver.engine.on(decimated.all_rows(problem))
+    parts = decimated.kept(engine.residuals(point))
+    piece_motions = motions(problem, point)
+    rows = with_rounding(Rows.of(problem, point, as_counted(solution, problem, parts)), piece_motions)
+    misfit_result = misfit(rows, piece_motions)
+    stable = stability(misfit_result.linear)
+    bench = Workbench(problem, point, type(engine), piece_motions, stable.likely)
+    causes = [*candidates(bench), *unoffered(bench)]
+    candidate_trials = _tried(bench, [candidate for candidate in causes if not candidate.is_late])
+    ranking = remedies(misfit_result.linear, candidate_trials, misfit_result.columns_by_piece)
+    count = int(sum(mask.sum() for mask in rows.masks))
+    has_cause = bool(misfit_result.found_themes) or any(
+        _chance(misfit_result.linear, candidate_trials, r) * len(candidate_trials) < FALSE_SHARE for r in ranking
+    )
+    if has_cause:
+        candidate_trials += _tried(bench, [candidate for candidate in causes if candidate.is_late])
+        ranking = remedies(misfit_result.linear, candidate_trials, misfit_result.columns_by_piece)
+    fitted_remedies, cause = (
+        _fitted(solution, problem, parts, misfit_result, candidate_trials, ranking) if has_cause else ((), None)
+    )
+    memory = memory_beside(rows, cause) if cause and not misfit_result.found_themes else misfit_result.linear.memory
+    misfit_result = with_cause(misfit_result, cause) if cause else misfit_result
     names = [f"{name}[{i}]" for name, i in problem.columns]
-    levels = noise_levels(seen.linear, moved, solver.nu > 0.0)
-    found = found or bool(levels.beyond)
-    channels = levels.channels(dict(zip(names, seen.shares.tolist(), strict=True)))
-    wild = {} if solver.nu else wild_samples(seen, moved)
-    pictures = binned(rows, moved, int(np.argmax([*channels.values()]))) if found else ()
+    levels = noise_levels(misfit_result.linear, piece_motions, solver.nu > 0.0)
+    has_cause = has_cause or bool(levels.beyond_names)
+    channels = levels.channels(dict(zip(names, misfit_result.shares.tolist(), strict=True)))
+    outliers = {} if solver.nu else wild_samples(misfit_result, piece_motions)
+    pictures = binned(rows, piece_motions, int(np.argmax([*channels.values()]))) if has_cause else ()
     lack = LackOfFit(
-        found,
+        has_cause,
         channels,
         _sizes(rows, channels),
-        seen.found,
-        (*told, *calmer(seen, wild)),
-        seen.tested,
+        misfit_result.found_themes,
+        (*fitted_remedies, *calmer(misfit_result, outliers)),
+        misfit_result.p_by_theme,
         pictures,
-        wild,
+        outliers,
         levels.noise,
-        levels.beyond,
-        levels.at_rest,
-        dict(zip(names, seen.rounded.tolist(), strict=True)) if rows.rounding else {},
-        seen.linear.degrees < SURE,
+        levels.beyond_names,
+        levels.noise_at_rest,
+        dict(zip(names, misfit_result.rounded.tolist(), strict=True)) if rows.rounding else {},
+        misfit_result.linear.degrees < SLOW_DEGREES,
     )
-    diagnosis = Diagnosis(lack, rests_on(seen.linear.plain, bench), stable)
-    return Examined(diagnosis, memory, len(tried), count)
+    diagnosis = Diagnosis(lack, rests_on(misfit_result.linear.plain, bench), stable)
+    return Examined(diagnosis, memory, len(candidate_trials), count)
 
 
-def _tried(bench: Workbench, every: Sequence[Candidate]) -> list[tuple[Candidate, list[Trial]]]:
+def _tried(bench: Workbench, causes: Sequence[Candidate]) -> list[tuple[Candidate, list[Trial]]]:
     """Candidates that can be simulated, with their trials."""
-    tried = [(one, one.tried(bench)) for one in every]
-    return [each for each in tried if each[1]]
+    candidate_trials = [(candidate, candidate.tried(bench)) for candidate in causes]
+    return [pair for pair in candidate_trials if pair[1]]
 
 
-def _chance(linear: Linear, tried: Sequence[tuple[Candidate, list[Trial]]], best: Remedy) -> float:
+def _chance(linear: Linear, candidate_trials: Sequence[tuple[Candidate, list[Trial]]], best: Remedy) -> float:
     """The chance that noise alone lets a remedy explain as much, by how well it is known along what that shows."""
-    shown = [trial.shown for one, trials in tried if one.key == best.key for trial in trials if trial.at == best.at]
-    return min(chance(linear, own) for own in shown)
+    columns_by_trial = [
+        trial.columns_by_piece
+        for candidate, trials in candidate_trials
+        if candidate.key == best.key
+        for trial in trials
+        if trial.at == best.at
+    ]
+    return min(chance(linear, columns) for columns in columns_by_trial)
 
 
 def _fitted(
     solution: Solution,
     problem: Problem,
     parts: Sequence[Parts],
-    seen: Misfit,
-    tried: Sequence[tuple[Candidate, list[Trial]]],
-    ranked: Sequence[Remedy],
+    misfit_result: Misfit,
+    candidate_trials: Sequence[tuple[Candidate, list[Trial]]],
+    ranking: Sequence[Remedy],
 ) -> tuple[tuple[Remedy, ...], list[FloatArray] | None]:
     """(the remedies, the best of them and other shapes as fits find them; what the first shows of each piece).
 
     A size stays that of the first step; so does all, where the numbers that a fit needs cost more than it explains.
     """
-    near = {one.key: one for one in ranked}
-    anew = refits(solution, problem, parts, ranked, [one for one, _ in tried])
-    tried = [anew.get(one.key, (one, trials)) for one, trials in tried]
-    again = remedies(seen.linear, tried, seen.shown) or ranked
-    shown = [
-        trial.shown
-        for one, trials in tried
+    remedy_by_key = {remedy.key: remedy for remedy in ranking}
+    refit_by_key = refits(solution, problem, parts, ranking, [candidate for candidate, _ in candidate_trials])
+    candidate_trials = [refit_by_key.get(candidate.key, (candidate, trials)) for candidate, trials in candidate_trials]
+    next_ranking = remedies(misfit_result.linear, candidate_trials, misfit_result.columns_by_piece) or ranking
+    columns_by_trial = [
+        trial.columns_by_piece
+        for trial_candidate, trials in candidate_trials
         for trial in trials
-        if again and one.key == again[0].key and (trial.fitted or trial.at == again[0].at)
+        if next_ranking
+        and trial_candidate.key == next_ranking[0].key
+        and (trial.fitted or trial.at == next_ranking[0].at)
     ]
-    told = tuple(_with_first_step(one, near[one.key], anew) if one.key in near else one for one in again)
-    return with_odometry(told, problem.columns), shown[0] if shown else None
+    fitted_remedies = tuple(
+        _with_first_step(remedy, remedy_by_key[remedy.key], refit_by_key) if remedy.key in remedy_by_key else remedy
+        for remedy in next_ranking
+    )
+    return with_odometry(fitted_remedies, problem.columns), columns_by_trial[0] if columns_by_trial else None
 
 
-def _with_first_step(again: Remedy, near: Remedy, fitted: Container[str]) -> Remedy:
+def _with_first_step(remedy: Remedy, first_step: Remedy, fitted: Container[str]) -> Remedy:
     """A remedy with what its first step says of it: its size, and what is the same, of which not both were fitted."""
-    if again.key in fitted:  # a fit makes more of it, but not of its rivals, of which there are columns only
-        again = replace(again, size=near.size, at=near.at, share=min(again.share, near.share))
-    same = [key for key in near.same_as if not (key in fitted and again.key in fitted)]
-    return replace(again, same_as=tuple(dict.fromkeys((*again.same_as, *same))))
+    if remedy.key in fitted:  # a fit makes more of it, but not of its rivals, of which there are columns only
+        remedy = replace(remedy, size=first_step.size, at=first_step.at, share=min(remedy.share, first_step.share))
+    rival_keys = [key for key in first_step.same_as if not (key in fitted and remedy.key in fitted)]
+    return replace(remedy, same_as=tuple(dict.fromkeys((*remedy.same_as, *rival_keys))))
 
 
 def with_levels(problem: Problem, point: Point, levels: dict[str, float]) -> Problem:
@@ -162,14 +177,14 @@ def with_levels(problem: Problem, point: Point, levels: dict[str, float]) -> Pro
 
 def _sizes(rows: Rows, channels: Mapping[str, float]) -> dict[str, float]:
     """How large a share of the residual of each column is, root mean square."""
-    mean = rows.squares(rows.residual) / np.maximum(rows.added(lambda k, j: rows.there[k][j]), 1.0)
+    mean = rows.squares(rows.residual) / np.maximum(rows.added(lambda k, j: rows.masks[k][j]), 1.0)
     return dict(zip(channels, np.sqrt(np.array([*channels.values()]) * mean).tolist(), strict=True))
 
 
 # What each fitted number rests on: how far it would move if a number that was taken as it stands were another one
 
 PERCENT = 0.01
-TRIED = 0.01  # relative change of a fixed number, either way is alike
+TRIAL_CHANGE = 0.01  # relative change of a fixed number, either way is alike
 FIXED = (
     "body.mass_kg",
     "body.inertia_kg_m2",
@@ -200,25 +215,28 @@ def rests_on(linear: Linear, bench: Workbench) -> dict[str, dict[str, float]]:
     _, j = linear.whole()
     problem = bench.problem
     values = bench.point.values
-    found: dict[str, dict[str, float]] = {p.name: {} for p in problem.robot_parameters}
-    taken = {Key.parse(p.name).name for p in problem.robot_parameters}
-    fixed = [(name, TRIED) for name in FIXED if Key.parse(name).name not in taken]
-    for name, tried in [*fixed, *((name, TRIED_FALL) for name in _of_laws(bench))]:
-        robot = scaled(bench.robot, name, 1.0 + tried)
+    changes_by_number: dict[str, dict[str, float]] = {p.name: {} for p in problem.robot_parameters}
+    parameter_names = {Key.parse(p.name).name for p in problem.robot_parameters}
+    fixed = [(name, TRIAL_CHANGE) for name in FIXED if Key.parse(name).name not in parameter_names]
+    for name, relative_change in [*fixed, *((name, TRIED_FALL) for name in _of_laws(bench))]:
+        robot = scaled(bench.robot, name, 1.0 + relative_change)
         if robot is None:
             continue
         try:
-            shown = bench.change(robot)
+            columns_by_piece = bench.change(robot)
         except OmnidynError:
             continue
-        if not any(own.any() for own in shown):
+        if not any(columns.any() for columns in columns_by_piece):
             continue  # of an axis that never moved
-        step = solved(j, -linear.white(shown)[:, 0]) / tried * PERCENT
+        step = solved(j, -linear.white(columns_by_piece)[:, 0]) / relative_change * PERCENT
         for p, value, change in zip(problem.robot_parameters, values, step, strict=False):
             share = change if p.log else change / value if value else np.nan
             if np.isfinite(share):
-                found[p.name][name] = float(share)
-    return {name: dict(sorted(by.items(), key=lambda item: -abs(item[1]))) for name, by in found.items()}
+                changes_by_number[p.name][name] = float(share)
+    return {
+        name: dict(sorted(change_by_key.items(), key=lambda item: -abs(item[1])))
+        for name, change_by_key in changes_by_number.items()
+    }
 
 
 def _of_laws(bench: Workbench) -> list[str]:

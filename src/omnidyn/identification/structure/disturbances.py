@@ -31,20 +31,20 @@ class Theme:
 
 def _on_axes(values: list[tuple[int, FloatArray]]) -> FloatArray:
     """Forces (n, K, 3) each along one axis, from (axis, size (n,))."""
-    out = np.zeros((len(values[0][1]), len(values), N_AXES))
+    forces = np.zeros((len(values[0][1]), len(values), N_AXES))
     for k, (axis, size) in enumerate(values):
-        out[:, k, axis] = size
-    return out
+        forces[:, k, axis] = size
+    return forces
 
 
 def _speed(motion: Motion, top: FloatArray) -> FloatArray:
     """Friction against the speed of each axis: beside the line, curves that fall or rise at any speed."""
-    found = []
+    terms = []
     for axis in range(N_AXES):
         side, share = np.sign(motion.twist[:, axis]), np.abs(motion.twist[:, axis]) / top[axis]
-        found += [(axis, side), (axis, side * share), (axis, side * share**2)]
-        found += [(axis, side * np.exp(-share / width)) for width in (0.03, 0.1, 0.3)]
-    return _on_axes(found)
+        terms += [(axis, side), (axis, side * share), (axis, side * share**2)]
+        terms += [(axis, side * np.exp(-share / width)) for width in (0.03, 0.1, 0.3)]
+    return _on_axes(terms)
 
 
 def _one_way(motion: Motion, top: FloatArray) -> FloatArray:
@@ -60,16 +60,16 @@ def _travel(motion: Motion, top: FloatArray) -> FloatArray:
     size = np.hypot(motion.twist[:, 0], motion.twist[:, 1])
     moving = np.where(size > 0.0, size, 1.0)
     c, s = motion.twist[:, 0] / moving, motion.twist[:, 1] / moving
-    turns, turned = np.sign(w), np.abs(w)
-    found = [
+    turns, absolute_w = np.sign(w), np.abs(w)
+    terms = [
         (0, c),
         (1, s),
         (0, c**3),
         (1, s**3),
-        (0, np.sign(x) * turned),
-        (1, np.sign(y) * turned),
-        (0, np.sign(x) * (turned > 0.0)),
-        (1, np.sign(y) * (turned > 0.0)),
+        (0, np.sign(x) * absolute_w),
+        (1, np.sign(y) * absolute_w),
+        (0, np.sign(x) * (absolute_w > 0.0)),
+        (1, np.sign(y) * (absolute_w > 0.0)),
         (YAW, turns * (size > 0.0)),
         (YAW, turns * np.hypot(x, y)),
         (YAW, turns * c**2),
@@ -86,7 +86,7 @@ def _travel(motion: Motion, top: FloatArray) -> FloatArray:
         (0, turns),
         (1, turns),
     ]
-    return _on_axes(found)
+    return _on_axes(terms)
 
 
 def _wheels(motion: Motion, top: FloatArray) -> FloatArray:
@@ -100,18 +100,18 @@ def _wheels(motion: Motion, top: FloatArray) -> FloatArray:
 def _acceleration(motion: Motion, top: FloatArray) -> FloatArray:
     """Mass and inertia that are other than said, and the terms of a turning frame."""
     x, y, w = motion.twist.T
-    found = [(axis, motion.pace[:, other]) for axis in range(N_AXES) for other in range(N_AXES)]
-    return _on_axes([*found, (0, w * y), (1, w * x), (0, w**2), (1, w**2), (0, w * np.abs(w)), (1, w * np.abs(w))])
+    terms = [(axis, motion.pace[:, source_axis]) for axis in range(N_AXES) for source_axis in range(N_AXES)]
+    return _on_axes([*terms, (0, w * y), (1, w * x), (0, w**2), (1, w**2), (0, w * np.abs(w)), (1, w * np.abs(w))])
 
 
 def _inputs(motion: Motion, top: FloatArray) -> FloatArray:
     """Motors and drivers that give more or less than said: each, by its voltage, its current and what all draw."""
     g, u, i = motion.robot.wheels.wrench_matrix, motion.voltage, motion.current
-    most, peak = (max(float(np.abs(values).max()), 1e-12) for values in (u, i))
+    voltage_limit, peak = (max(float(np.abs(values).max()), 1e-12) for values in (u, i))
     draw = np.abs(i).sum(axis=1, keepdims=True) / peak
-    share, load = u / most, i / peak
-    each = np.concatenate([share, np.sign(u)], axis=1)[:, :, None] * np.concatenate([g, g], axis=1).T
-    along = np.stack(
+    share, load = u / voltage_limit, i / peak
+    motor_forces = np.concatenate([share, np.sign(u)], axis=1)[:, :, None] * np.concatenate([g, g], axis=1).T
+    total_forces = np.stack(
         [
             (share * np.abs(share)) @ g.T,
             (share * draw) @ g.T,
@@ -124,7 +124,7 @@ def _inputs(motion: Motion, top: FloatArray) -> FloatArray:
         axis=1,
     )
     dry = np.sign(motion.twist) * (np.abs(load) @ np.abs(g).T)  # friction that grows with what the gears carry
-    return np.concatenate([each, along, _on_axes([(a, dry[:, a]) for a in range(N_AXES)])], axis=1)
+    return np.concatenate([motor_forces, total_forces, _on_axes([(a, dry[:, a]) for a in range(N_AXES)])], axis=1)
 
 
 def _time(motion: Motion, top: FloatArray) -> FloatArray:
@@ -150,13 +150,15 @@ def _sensors(motion: Motion, top: FloatArray) -> FloatArray:
     """Sensors that show more or less, later or one-sided: each column by itself. Shape (C, n, K)."""
     speed, dt = motion.shown(motion.twist[:, None, :])[:, :, 0], np.diff(motion.t)
     count = len(speed)
-    out = np.zeros((count, len(motion.t), 4 * count))
-    for c, own in enumerate(speed):
-        pace = np.zeros_like(own)
-        pace[1:-1] = (own[2:] - own[:-2]) / (dt[1:] + dt[:-1])
-        most = max(float(np.abs(own).max()), 1e-12)
-        out[c, :, 4 * c : 4 * c + 4] = np.stack([own, pace, np.abs(own), own * np.abs(own) / most], axis=1)
-    return out
+    columns = np.zeros((count, len(motion.t), 4 * count))
+    for c, values in enumerate(speed):
+        pace = np.zeros_like(values)
+        pace[1:-1] = (values[2:] - values[:-2]) / (dt[1:] + dt[:-1])
+        largest_value = max(float(np.abs(values).max()), 1e-12)
+        columns[c, :, 4 * c : 4 * c + 4] = np.stack(
+            [values, pace, np.abs(values), values * np.abs(values) / largest_value], axis=1
+        )
+    return columns
 
 
 THEMES = (
@@ -177,6 +179,6 @@ def shown_by_themes(motion: Motion, top: FloatArray, themes: Sequence[Theme] = T
     """(what all directions of all themes show of a motion (C, n, K), how many of the K each theme has)."""
     forces = [theme.directions(motion, top) for theme in themes if not theme.sensed]
     ends = np.cumsum([force.shape[1] for force in forces])[:-1]
-    pushed = iter(np.split(motion.shown_by(np.concatenate(forces, axis=1)), ends, axis=2) if forces else ())
-    columns = [theme.directions(motion, top) if theme.sensed else next(pushed) for theme in themes]
+    force_columns = iter(np.split(motion.shown_by(np.concatenate(forces, axis=1)), ends, axis=2) if forces else ())
+    columns = [theme.directions(motion, top) if theme.sensed else next(force_columns) for theme in themes]
     return np.concatenate(columns, axis=2), [column.shape[2] for column in columns]

@@ -33,78 +33,91 @@ from omnidyn.identification.structure.windows import Shown, Windows, shown
 from omnidyn.run import UNITS
 from omnidyn.statistics import sensor_step, stretches
 
-FALSE = 0.002  # of right models in which the fit leaves more than the noise, all tests together
+FALSE_SHARE = 0.002  # of right models in which the fit leaves more than the noise, all tests together
 MARGIN = 0.1  # share of the residual, below which noise may be a little more in some rows than in others
-PARABOLA, NOTHING = 2, -1  # degree of what is taken out of a window
-FEW_HOLDS, FEW_SETS, TOLD = 6, 3, 10.0  # groups, and degrees of freedom, without which nothing is told
-FORGOTTEN = 0.05  # correlation of repeats below which slow errors differ in them
-ENOUGH = 50.0  # degrees of freedom of errors as they are, slow ones too, below which slow ones are left out
-FOLLOWED, LEAST_ROWS = 1000, 200  # rows by which errors have forgotten; differences without which nothing is told
-COARSE = 0.5  # of a step of the sensor: less noise leaves rounding that repeats itself
-FAR = 2.0  # times the sum of squares of residuals, which a step within a straight model hardly changes
-KNOWN = 1e9  # degrees of freedom of what is known
+PARABOLA, NO_TREND = 2, -1  # degree of what is taken out of a window
+FEW_HOLDS, FEW_SETS, LEAST_DEGREES = 6, 3, 10.0  # groups, and degrees of freedom, without which nothing is told
+FORGOTTEN_CORRELATION = 0.05  # correlation of repeats below which slow errors differ in them
+SLOW_DEGREES = 50.0  # degrees of freedom of errors as they are, slow ones too, below which slow ones are left out
+FOLLOWED_ROWS, LEAST_ROWS = 1000, 200  # rows by which errors have forgotten; differences without which nothing is told
+COARSE_STEP = 0.5  # of a step of the sensor: less noise leaves rounding that repeats itself
+PULL_RATIO = 2.0  # times the sum of squares of residuals, which a step within a straight model hardly changes
+KNOWN_DEGREES = 1e9  # degrees of freedom of what is known
 THIRD = np.array([1.0, -3.0, 3.0, -1.0])
 WHITE = 0.1  # relative difference of the variance by second and by fourth differences up to which noise is white
 
 
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """noise: output -> its level by the best source that tells it; at_rest: where the robot rests; beyond: outputs in
-    which the fit leaves more than the noise, by a source that decides."""
+    """noise: output -> its level by the best source that tells it; noise_at_rest: where the robot rests; beyond_names:
+    outputs in which the fit leaves more than the noise, by a source that decides."""
 
     noise: dict[str, Noise]
-    at_rest: dict[str, Noise]
-    beyond: tuple[str, ...]
+    noise_at_rest: dict[str, Noise]
+    beyond_names: tuple[str, ...]
 
     def channels(self, shares: Mapping[str, float]) -> dict[str, float]:
         """Shares of the variance of residuals that are no noise, by what they follow or by the level of the noise."""
-        return dict(shares) | {name: max(shares[name], self.noise[name].share) for name in self.beyond}
+        return dict(shares) | {name: max(shares[name], self.noise[name].share) for name in self.beyond_names}
 
 
-def noise_levels(linear: Linear, motions: Sequence[Motion], pulled_in: bool = False) -> Levels:
+def noise_levels(linear: Linear, motions: Sequence[Motion], is_pulled_in: bool = False) -> Levels:
     """What the log shows of the noise of each output, and whether the fit leaves more.
 
-    pulled_in: whether residuals are as Student's t counts them (tails.py), and so no longer those of the rows.
+    is_pulled_in: whether residuals are as Student's t counts them (tails.py), and so no longer those of the rows.
     """
     rows = replace(linear.rows, residual=_without_pull(linear))
-    every = {
-        f"{column[0]}[{column[1]}]": _of_column(rows, c, own, linear.memory[c], pulled_in)
-        for c, (own, column) in enumerate(zip(shown(rows, motions), rows.problem.columns, strict=True))
+    tests_by_column = {
+        f"{column[0]}[{column[1]}]": _of_column(rows, c, windows, linear.memory[c], is_pulled_in)
+        for c, (windows, column) in enumerate(zip(shown(rows, motions), rows.problem.columns, strict=True))
     }
-    likely = FALSE / max(sum(each.decides for own in every.values() for each in own), 1)
-    noise, beyond = dict[str, Noise](), list[str]()
-    for name, own in every.items():
-        clear = [each for each in own if each.decides and each.p < likely and each.most >= MARGIN]
-        if own:
-            noise[name] = min(clear, key=lambda each: each.p) if clear else own[0]
-        if clear:
-            beyond.append(name)
-    at_rest = {name: each for name, own in every.items() for each in own if each.source == REST}
-    return Levels(noise, at_rest, tuple(beyond))
+    p_limit = FALSE_SHARE / max(
+        sum(test.decides for column_list in tests_by_column.values() for test in column_list), 1
+    )
+    noise, beyond_names = dict[str, Noise](), list[str]()
+    for name, column_tests in tests_by_column.items():
+        clear_tests = [test for test in column_tests if test.decides and test.p < p_limit and test.most >= MARGIN]
+        if column_tests:
+            noise[name] = min(clear_tests, key=lambda test: test.p) if clear_tests else column_tests[0]
+        if clear_tests:
+            beyond_names.append(name)
+    noise_at_rest = {
+        name: test for name, column_list in tests_by_column.items() for test in column_list if test.source == REST
+    }
+    return Levels(noise, noise_at_rest, tuple(beyond_names))
 
 
 def _without_pull(linear: Linear) -> list[FloatArray]:
     """Residuals without what the parameters make of them in white rows: errors with a memory may have pulled them off.
 
-    A step that makes a column FAR larger leads beyond where the model is straight: such a one stays as it is.
+    A step that makes a column PULL_RATIO larger leads beyond where the model is straight: such a one stays as it is.
     """
-    rows, none = linear.rows, [np.zeros((*each.shape, 0)) for each in linear.rows.residual]
-    left = left_beside(rows, linear, none)[0]
-    beyond = rows.squares(left) > FAR * rows.squares(rows.residual)
-    own = [beyond[columns][:, None] for columns in rows.column]
-    return [np.where(far, before, after) for far, before, after in zip(own, rows.residual, left, strict=True)]
+    rows, no_columns = linear.rows, [np.zeros((*residual.shape, 0)) for residual in linear.rows.residual]
+    residuals = left_beside(rows, linear, no_columns)[0]
+    is_pulled = rows.squares(residuals) > PULL_RATIO * rows.squares(rows.residual)
+    is_pulled_by_piece = [is_pulled[columns][:, None] for columns in rows.column]
+    return [
+        np.where(is_far, raw_residual, white_residual)
+        for is_far, raw_residual, white_residual in zip(is_pulled_by_piece, rows.residual, residuals, strict=True)
+    ]
 
 
-def _of_column(rows: Rows, c: int, own: Shown, memory: AutoRegression, pulled_in: bool) -> list[Noise]:
+def _of_column(rows: Rows, c: int, windows: Shown, memory: AutoRegression, is_pulled_in: bool) -> list[Noise]:
     """By every source that tells, best first."""
     name, i = rows.problem.columns[c]
-    more, moves, unit = _taken(rows), _moves(rows, c), unit_of(name, i)
-    tests = [(REPEATS, _repeated(own, memory, name in TRAVEL)), (HOLDS, _held(own, memory)), (REST, _rested(own))]
-    told = [(source, test) for source, test in tests if test is not None and test.level > COARSE * _step(rows, c)]
-    if not pulled_in and not any(source != REST for source, _ in told):
-        other = [(ROUNDING, _rounded(rows, c)), (NEIGHBOURS, _neighbours(rows, c, memory))]
-        told = [*[(source, test) for source, test in other if test is not None][:1], *told]
-    return [test.noise(source, more, moves, own.step, unit) for source, test in told]
+    taken_factor, moves, unit = _taken(rows), _moves(rows, c), unit_of(name, i)
+    tests = [
+        (REPEATS, _repeated(windows, memory, name in TRAVEL)),
+        (HOLDS, _held(windows, memory)),
+        (REST, _rested(windows)),
+    ]
+    coarse_tests = [
+        (source, test) for source, test in tests if test is not None and test.level > COARSE_STEP * _step(rows, c)
+    ]
+    if not is_pulled_in and not any(source != REST for source, _ in coarse_tests):
+        other_tests = [(ROUNDING, _rounded(rows, c)), (NEIGHBOURS, _neighbours(rows, c, memory))]
+        coarse_tests = [*[(source, test) for source, test in other_tests if test is not None][:1], *coarse_tests]
+    return [test.noise(source, taken_factor, moves, windows.step, unit) for source, test in coarse_tests]
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +127,7 @@ class _Power:
     squares: FloatArray
     counts: FloatArray
     numbers: int
-    each: float
+    window_degrees: float
 
     @property
     def mean(self) -> float:
@@ -124,16 +137,16 @@ class _Power:
     @property
     def degrees(self) -> float:
         """Of freedom: by the memory, no more than the scatter of the groups allows: 2 mean^2/variance of the mean."""
-        many, total = len(self.squares), float(self.counts.sum())
-        off = self.squares - self.counts * self.squares.sum() / total
-        scatter = many / max(many - 1, 1) * float((off**2).sum())
-        return min(self.each * total, 2.0 * float(self.squares.sum()) ** 2 / max(scatter, TINY))
+        group_count, total = len(self.squares), float(self.counts.sum())
+        deviations = self.squares - self.counts * self.squares.sum() / total
+        scatter = group_count / max(group_count - 1, 1) * float((deviations**2).sum())
+        return min(self.window_degrees * total, 2.0 * float(self.squares.sum()) ** 2 / max(scatter, TINY))
 
 
 @dataclass(frozen=True)
 class _Test:
-    """level, residual: in their unit; p; degrees: of the level; share: of the residual that is no noise; rows, removed:
-    of a window. new: the share in rows made white."""
+    """level, residual: in their unit; p; degrees: of the level; share: of the residual that is no noise; rows,
+    removed_degrees: of a window. new: the share in rows made white."""
 
     level: float
     residual: float
@@ -141,13 +154,14 @@ class _Test:
     degrees: float
     share: float
     rows: int
-    removed: int
+    removed_degrees: int
     new: float = 0.0
 
-    def noise(self, source: str, more: float, moves: float, step: float, unit: str) -> Noise:
-        """As people read it. more: what a fit leaves is smaller by, for it has taken some; moves: of the output."""
-        residual = self.residual * np.sqrt(more)
-        slowest = self.removed / (2.0 * self.rows * step)
+    def noise(self, source: str, taken_factor: float, moves: float, step: float, unit: str) -> Noise:
+        """As people read it. taken_factor: what a fit leaves is smaller by, for it has taken some; moves: of the
+        output."""
+        residual = self.residual * np.sqrt(taken_factor)
+        slowest = self.removed_degrees / (2.0 * self.rows * step)
         return Noise(
             source,
             self.level,
@@ -163,69 +177,81 @@ class _Test:
         )
 
 
-def _test(noise: _Power, left: _Power, both: float, rows: int, removed: int) -> _Test | None:
-    """Of what is left beside the noise. both: mean square of all residuals."""
-    if noise.degrees < TOLD or left.degrees < TOLD or noise.mean <= 0.0:
+def _test(noise: _Power, residual_power: _Power, mean_square: float, rows: int, removed_degrees: int) -> _Test | None:
+    """Of what is left beside the noise. mean_square: mean square of all residuals."""
+    if noise.degrees < LEAST_DEGREES or residual_power.degrees < LEAST_DEGREES or noise.mean <= 0.0:
         return None
-    p = float(fdtrc(left.degrees, noise.degrees, left.mean / noise.mean))
-    share = max(1.0 - noise.mean / max(both, TINY), 0.0)
-    return _Test(float(np.sqrt(noise.mean)), float(np.sqrt(both)), p, noise.degrees, share, rows, removed)
+    p = float(fdtrc(residual_power.degrees, noise.degrees, residual_power.mean / noise.mean))
+    share = max(1.0 - noise.mean / max(mean_square, TINY), 0.0)
+    return _Test(
+        float(np.sqrt(noise.mean)), float(np.sqrt(mean_square)), p, noise.degrees, share, rows, removed_degrees
+    )
 
 
-def _both_ways(plain: _Test | None, white: _Test | None) -> _Test | None:
+def _both_ways(plain_test: _Test | None, white: _Test | None) -> _Test | None:
     """Rows as they are, in their units, with the better chance of the two."""
-    if plain is None or white is None:
-        return plain
-    return replace(plain, p=min(1.0, 2.0 * min(plain.p, white.p)), new=white.share)
+    if plain_test is None or white is None:
+        return plain_test
+    return replace(plain_test, p=min(1.0, 2.0 * min(plain_test.p, white.p)), new=white.share)
 
 
-def _held(own: Shown, memory: AutoRegression) -> _Test | None:
-    if own.held.several < FEW_HOLDS or own.busy.several < FEW_HOLDS:
+def _held(windows: Shown, memory: AutoRegression) -> _Test | None:
+    if windows.held_windows.several < FEW_HOLDS or windows.busy.several < FEW_HOLDS:
         return None
-    way = _Way.of(own.held.values.shape[1], PARABOLA, memory)
+    way = _Way.of(windows.held_windows.values.shape[1], PARABOLA, memory)
 
     def test(way: _Way) -> _Test | None:
         """What is left in motion beside the scatter of holds, both seen this way."""
-        held, busy = way.power(own.held), way.power(own.busy)
-        both = (held.squares.sum() + busy.squares.sum()) / ((held.counts.sum() + busy.counts.sum()) * held.numbers)
-        return _test(held, busy, float(both), way.rows, way.removed)
+        held_power, busy = way.power(windows.held_windows), way.power(windows.busy)
+        mean_square = (held_power.squares.sum() + busy.squares.sum()) / (
+            (held_power.counts.sum() + busy.counts.sum()) * held_power.numbers
+        )
+        return _test(held_power, busy, float(mean_square), way.rows, way.removed_degrees)
 
     return _both_ways(test(way), test(way.white(memory)) if memory.remembers else None)
 
 
-def _rested(own: Shown) -> _Test | None:
-    moving, resting = own.held + own.busy, own.resting
+def _rested(windows: Shown) -> _Test | None:
+    moving, resting = windows.held_windows + windows.busy, windows.resting
     if not len(resting.values) or not len(moving.values):
         return None
     way = _Way.of(moving.values.shape[1], PARABOLA, None)
-    rest, left = way.power(resting), way.power(moving)
-    found = _test(rest, left, left.mean, way.rows, way.removed)
-    coarse = max(sensor_step(each) for each in (*resting.values, resting.values.ravel()))
-    return None if found is None or coarse > found.level else found
+    rest_power, motion_power = way.power(resting), way.power(moving)
+    rest_test = _test(rest_power, motion_power, motion_power.mean, way.rows, way.removed_degrees)
+    sensor_steps = max(sensor_step(window) for window in (*resting.values, resting.values.ravel()))
+    return None if rest_test is None or sensor_steps > rest_test.level else rest_test
 
 
-def _repeated(own: Shown, memory: AutoRegression, counts_on: bool) -> _Test | None:
+def _repeated(windows: Shown, memory: AutoRegression, counts_on: bool) -> _Test | None:
     """counts_on: whether what is logged counts from a start, which differs between repeats."""
-    if own.again.several < FEW_SETS:
+    if windows.repeat_windows.several < FEW_SETS:
         return None
-    lags = memory.autocovariance(min(own.apart, FOLLOWED) + 1)
-    far = abs(lags[-1]) < FORGOTTEN * lags[0] and not memory.adds_up and not counts_on
-    way = _Way.of(own.again.values.shape[1], NOTHING if far else PARABOLA, memory)
-    if far and way.each * (len(own.again.groups) - own.again.several) < ENOUGH:  # too few to know slow errors
+    lags = memory.autocovariance(min(windows.row_gap, FOLLOWED_ROWS) + 1)
+    is_forgotten = abs(lags[-1]) < FORGOTTEN_CORRELATION * lags[0] and not memory.adds_up and not counts_on
+    way = _Way.of(windows.repeat_windows.values.shape[1], NO_TREND if is_forgotten else PARABOLA, memory)
+    if (
+        is_forgotten
+        and way.window_degrees * (len(windows.repeat_windows.groups) - windows.repeat_windows.several) < SLOW_DEGREES
+    ):  # too few to know slow errors
         way = _Way.of(way.rows, PARABOLA, memory)
 
     def test(way: _Way) -> _Test | None:
         """What repeats have in common beside what they differ by, both seen this way."""
-        seen, groups = way.seen(own.again.values), own.again.groups
-        many = _summed(groups, np.ones(len(groups)))
-        mean = np.stack([_summed(groups, column) for column in seen.T], axis=1) / many[:, None]
-        common = many * (mean**2).sum(axis=1)
-        every = _summed(groups, (seen**2).sum(axis=1))
-        apart, alike = (
-            _Power(squares, count, seen.shape[1], way.each)
-            for squares, count in ((every - common, many - 1.0), (common, np.ones_like(many)))
+        repeat_values, groups = way.seen(windows.repeat_windows.values), windows.repeat_windows.groups
+        repeat_counts = _summed(groups, np.ones(len(groups)))
+        mean = np.stack([_summed(groups, column) for column in repeat_values.T], axis=1) / repeat_counts[:, None]
+        common_squares = repeat_counts * (mean**2).sum(axis=1)
+        all_squares = _summed(groups, (repeat_values**2).sum(axis=1))
+        apart_power, alike_power = (
+            _Power(squares, count, repeat_values.shape[1], way.window_degrees)
+            for squares, count in (
+                (all_squares - common_squares, repeat_counts - 1.0),
+                (common_squares, np.ones_like(repeat_counts)),
+            )
         )
-        return _test(apart, alike, float(every.sum() / seen.size), way.rows, way.removed)
+        return _test(
+            apart_power, alike_power, float(all_squares.sum() / repeat_values.size), way.rows, way.removed_degrees
+        )
 
     return _both_ways(test(way), test(way.white(memory)) if memory.remembers else None)
 
@@ -235,12 +261,12 @@ def _neighbours(rows: Rows, c: int, memory: AutoRegression) -> _Test | None:
     if memory.remembers:
         return None
     series = [
-        own[a:b]
-        for own, (k, j) in zip(_shown(rows, c), _where(rows, c), strict=True)
+        windows[a:b]
+        for windows, (k, j) in zip(_shown(rows, c), _where(rows, c), strict=True)
         for a, b in stretches(np.append(rows.steps[k][j][1:] == 1, False)).tolist()
     ]
     second, third, fourth = (
-        np.concatenate([np.diff(each, n) for each in series if len(each) > n] or [np.zeros(0)]) for n in (2, 3, 4)
+        np.concatenate([np.diff(values, n) for values in series if len(values) > n] or [np.zeros(0)]) for n in (2, 3, 4)
     )
     if len(fourth) < LEAST_ROWS or abs(np.mean(fourth**2) / 70.0 / max(np.mean(second**2) / 6.0, TINY) - 1.0) > WHITE:
         return None
@@ -253,57 +279,59 @@ def _neighbours(rows: Rows, c: int, memory: AutoRegression) -> _Test | None:
 def _rounded(rows: Rows, c: int) -> _Test | None:
     """Of outputs that an encoder counts, whose noise is little more than what it rounds: tick^2/12."""
     tick = float(rows.problem.tick[c])
-    return _beside_all(rows, c, tick**2 / 12.0, KNOWN) if tick > 0.0 else None
+    return _beside_all(rows, c, tick**2 / 12.0, KNOWN_DEGREES) if tick > 0.0 else None
 
 
 def _beside_all(rows: Rows, c: int, noise: float, degrees: float) -> _Test:
     """A variance of noise beside all residuals of a column."""
-    left = np.concatenate([rows.residual[k][j][rows.there[k][j]] for k, j in _where(rows, c)])
-    both = float(np.mean(left**2))
-    p = float(fdtrc(len(left), degrees, both / max(noise, TINY)))
-    return _Test(noise**0.5, both**0.5, p, degrees, max(1.0 - noise / max(both, TINY), 0.0), len(left), 0)
+    residuals = np.concatenate([rows.residual[k][j][rows.masks[k][j]] for k, j in _where(rows, c)])
+    mean_square = float(np.mean(residuals**2))
+    p = float(fdtrc(len(residuals), degrees, mean_square / max(noise, TINY)))
+    return _Test(
+        noise**0.5, mean_square**0.5, p, degrees, max(1.0 - noise / max(mean_square, TINY), 0.0), len(residuals), 0
+    )
 
 
 def _where(rows: Rows, c: int) -> list[tuple[int, int]]:
     """Pieces that have a column and known rows of it, and which of theirs it is."""
-    every = [(k, columns.index(c)) for k, columns in enumerate(rows.column) if c in columns]
-    return [(k, j) for k, j in every if rows.there[k][j].any()]
+    piece_columns = [(k, columns.index(c)) for k, columns in enumerate(rows.column) if c in columns]
+    return [(k, j) for k, j in piece_columns if rows.masks[k][j].any()]
 
 
 def _shown(rows: Rows, c: int) -> list[FloatArray]:
     """What the log shows of a column in the known rows of each of these pieces."""
-    whole = [(rows.pieces[k], rows.there[k][j], j) for k, j in _where(rows, c)]
-    return [piece.record.outputs[piece.first : piece.last + 1, j][there] for piece, there, j in whole]
+    column_pieces = [(rows.pieces[k], rows.masks[k][j], j) for k, j in _where(rows, c)]
+    return [piece.record.outputs[piece.first : piece.last + 1, j][mask] for piece, mask, j in column_pieces]
 
 
 def _step(rows: Rows, c: int) -> float:
     """The step in which a column was measured, 0 where none shows."""
-    shown = _shown(rows, c)
-    return max(float(rows.problem.tick[c]), sensor_step(np.concatenate(shown)) if shown else 0.0)
+    windows = _shown(rows, c)
+    return max(float(rows.problem.tick[c]), sensor_step(np.concatenate(windows)) if windows else 0.0)
 
 
 def _moves(rows: Rows, c: int) -> float:
     """Root mean square of what an output shows; of what is no speed, about its mean."""
     values = np.concatenate([*_shown(rows, c), np.zeros(0)])
-    own = values if rows.problem.columns[c][0] in SPEEDS or not values.size else values - values.mean()
-    return float(np.sqrt(np.mean(own**2))) if own.size else 0.0
+    centred_values = values if rows.problem.columns[c][0] in SPEEDS or not values.size else values - values.mean()
+    return float(np.sqrt(np.mean(centred_values**2))) if centred_values.size else 0.0
 
 
 def _taken(rows: Rows) -> float:
     """Rows over those that are left once the fit has taken some for its numbers and starts."""
-    total = sum(int(there.sum()) for there in rows.there)
+    total = sum(int(mask.sum()) for mask in rows.masks)
     free = len(rows.problem.parameters) + sum(int(piece.free.sum()) for piece in rows.pieces)
     return total / max(total - free, 1)
 
 
 @dataclass(frozen=True, eq=False)
 class _Way:
-    """How windows are looked at: along `ways` (L, d), orthonormal, with polynomials taken out, `removed` of them, once
-    `memory` has made the rows white. each: degrees of freedom of a window."""
+    """How windows are looked at: along `ways` (L, d), orthonormal, with polynomials taken out, `removed_degrees` of
+    them, once `memory` has made the rows white. window_degrees: degrees of freedom of a window."""
 
     ways: FloatArray
-    removed: int
-    each: float
+    removed_degrees: int
+    window_degrees: float
     memory: AutoRegression | None = None
 
     @property
@@ -317,19 +345,19 @@ class _Way:
         numbers = float(ways.shape[1])
         if memory is None or not memory.remembers:
             return cls(ways, degree + 1, numbers)
-        if degree == NOTHING:  # windows side by side are not independent
-            lags = memory.autocovariance(FOLLOWED)
+        if degree == NO_TREND:  # windows side by side are not independent
+            lags = memory.autocovariance(FOLLOWED_ROWS)
             return cls(ways, 0, rows / (2.0 * float(((lags / lags[0]) ** 2).sum()) - 1.0))
         covariance = toeplitz(memory.autocovariance(rows))
         if memory.adds_up:
             covariance = np.tri(rows) @ covariance @ np.tri(rows).T
-        own = ways.T @ covariance @ ways
-        return cls(ways, degree + 1, float(np.trace(own) ** 2 / (own**2).sum()))
+        window_covariance = ways.T @ covariance @ ways
+        return cls(ways, degree + 1, float(np.trace(window_covariance) ** 2 / (window_covariance**2).sum()))
 
     def white(self, memory: AutoRegression) -> _Way:
         """The same of rows made white."""
-        ways = _beside(_through(memory, _polynomials(self.rows, self.removed - 1)))
-        return _Way(ways, self.removed, float(ways.shape[1]), memory)
+        ways = _beside(_through(memory, _polynomials(self.rows, self.removed_degrees - 1)))
+        return _Way(ways, self.removed_degrees, float(ways.shape[1]), memory)
 
     def seen(self, values: FloatArray) -> FloatArray:
         """Windows (m, L) along these ways, (m, d)."""
@@ -338,7 +366,9 @@ class _Way:
     def power(self, windows: Windows) -> _Power:
         """By groups."""
         squares = _summed(windows.groups, (self.seen(windows.values) ** 2).sum(axis=1))
-        return _Power(squares, _summed(windows.groups, np.ones(len(windows.groups))), self.ways.shape[1], self.each)
+        return _Power(
+            squares, _summed(windows.groups, np.ones(len(windows.groups))), self.ways.shape[1], self.window_degrees
+        )
 
 
 def _summed(groups: IntArray, values: FloatArray) -> FloatArray:
@@ -348,8 +378,8 @@ def _summed(groups: IntArray, values: FloatArray) -> FloatArray:
 
 def _polynomials(rows: int, degree: int) -> FloatArray:
     """Of degree 0 to `degree`, (rows, degree + 1)."""
-    at = np.linspace(-1.0, 1.0, rows)
-    return np.stack([at**k for k in range(degree + 1)], axis=1) if degree >= 0 else np.zeros((rows, 0))
+    positions = np.linspace(-1.0, 1.0, rows)
+    return np.stack([positions**k for k in range(degree + 1)], axis=1) if degree >= 0 else np.zeros((rows, 0))
 
 
 def _beside(columns: FloatArray) -> FloatArray:
@@ -366,43 +396,43 @@ def _through(memory: AutoRegression, columns: FloatArray) -> FloatArray:
 
 # Residuals in bins, for the eye: against the speed, the acceleration, the time in the log, the heading
 
-BINS, LEAST = 16, 5  # of a picture; rows of a bin that is shown
+BINS, LEAST_BIN_ROWS = 16, 5  # of a picture; rows of a bin that is shown
 
 
 def binned(rows: Rows, motions: Sequence[Motion], column: int) -> tuple[Binned, ...]:
     """The residuals of one column of the problem."""
     name, i = rows.problem.columns[column]
-    residual, against = [], {}
+    residual, values_by_label = [], {}
     for k, motion in enumerate(motions):
         if column not in rows.column[k]:
             continue
         c = rows.column[k].index(column)
-        there = rows.there[k][c]
+        mask = rows.masks[k][c]
         level = motion.shown(motion.twist[:, None, :])[c, :, 0]
-        residual.append(rows.residual[k][c][there])
-        every = {
+        residual.append(rows.residual[k][c][mask])
+        values_by_name = {
             f"{name}[{i}] of the model": level,
             "its change in a second": np.gradient(level, motion.t),
             "share of the log that has gone by": motion.share,
             "heading [rad]": np.mod(motion.pose[:, 2], 2.0 * np.pi),
         }
-        for words, values in every.items():
-            against.setdefault(words, []).append(values[there])
+        for words, values in values_by_name.items():
+            values_by_label.setdefault(words, []).append(values[mask])
     error = np.concatenate(residual) if residual else np.zeros(0)
-    found = (
+    bins = (
         _bins(error, np.concatenate(values), f"{name}[{i}]", unit_of(name, i), words)
-        for words, values in against.items()
+        for words, values in values_by_label.items()
     )
-    return tuple(each for each in found if len(each.at) > 1)
+    return tuple(curve for curve in bins if len(curve.at) > 1)
 
 
-def _bins(error: FloatArray, values: FloatArray, output: str, unit: str, against: str) -> Binned:
+def _bins(error: FloatArray, values: FloatArray, output: str, unit: str, label: str) -> Binned:
     """Bins of as many rows each."""
     order = np.array_split(np.argsort(values, kind="stable"), BINS)
-    own = [rows for rows in order if len(rows) >= LEAST]
-    mean = np.array([error[rows].mean() for rows in own])
-    std = np.array([2.0 * error[rows].std(ddof=1) / np.sqrt(len(rows)) for rows in own])
-    return Binned(output, unit, against, np.array([values[rows].mean() for rows in own]), mean, std)
+    bin_rows = [rows for rows in order if len(rows) >= LEAST_BIN_ROWS]
+    mean = np.array([error[rows].mean() for rows in bin_rows])
+    std = np.array([2.0 * error[rows].std(ddof=1) / np.sqrt(len(rows)) for rows in bin_rows])
+    return Binned(output, unit, label, np.array([values[rows].mean() for rows in bin_rows]), mean, std)
 
 
 def unit_of(name: str, i: int) -> str:

@@ -15,22 +15,22 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from omnidyn.arrays import BoolArray, FloatArray, IntArray
-from omnidyn.identification.output_error.linear.rows import SAME, Linear, Rows
+from omnidyn.identification.output_error.linear.rows import EIGEN_TOLERANCE, Linear, Rows
 from omnidyn.identification.output_error.problem.problem import Problem
 from omnidyn.identification.output_error.problem.record import Record
 from omnidyn.identification.stability import LOGS, TIME, Level, Shift, Split, Stability
-from omnidyn.identification.structure.misfit import TOLD as KNOWN
+from omnidyn.identification.structure.misfit import LEAST_DEGREES as KNOWN
 from omnidyn.identification.structure.misfit import memory_beside
 from omnidyn.statistics import homogeneity, t_quantile
 
 BLOCKS = 40  # of each log, the same share of its time each
-FIRM = 50.0  # rows that the noise of an output in a part is worth beforehand: that of all logs
-FALSE = 0.01  # of right logs in which some moment is found; the same between logs
+PRIOR_ROWS = 50.0  # rows that the noise of an output in a part is worth beforehand: that of all logs
+FALSE_SHARE = 0.01  # of right logs in which some moment is found; the same between logs
 FIRST = BLOCKS // 10  # blocks before the first moment, and after the last
 MOST_LOGS = 30  # logs that are each looked through for a moment
-AS_GOOD = 6.0  # of chi squared, by which a moment must be worse than the best to be ruled out
+RIVAL_MARGIN = 6.0  # of chi squared, by which a moment must be worse than the best to be ruled out
 CHANCE = 2.0  # standard errors of the scatter over blocks, from which it is more than the noise makes
-TOLD = 0.5  # std over that of the prior, beyond which the prior holds a number: it is the same in all parts
+PRIOR_SHARE = 0.5  # std over that of the prior, beyond which the prior holds a number: it is the same in all parts
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,20 +50,20 @@ def stability(linear: Linear) -> Stability:
     A memory of which little is known may be the change itself: once more then, with that of what the likeliest would
     leave.
     """
-    seen = _Look(linear).stability()
-    if seen.splits or not seen.likely or linear.degrees >= KNOWN:
-        return seen
-    return _Look(Linear(linear.rows, memory_beside(linear.rows, _after(linear.rows, seen.likely[0])))).stability()
+    changes = _Look(linear).stability()
+    if changes.splits or not changes.likely or linear.degrees >= KNOWN:
+        return changes
+    return _Look(Linear(linear.rows, memory_beside(linear.rows, _after(linear.rows, changes.likely[0])))).stability()
 
 
 def _after(rows: Rows, share: float) -> list[FloatArray]:
     """What the numbers show after a share of each log, and not before: slopes (C, rows, P) of each piece."""
-    later = [
+    late_rows = [
         piece.record.t[piece.first : piece.last + 1] - piece.record.t[0]
         >= share * (piece.record.t[-1] - piece.record.t[0])
         for piece in rows.pieces
     ]
-    return [slopes * after[:, None] for slopes, after in zip(rows.slopes, later, strict=True)]
+    return [slopes * is_late[:, None] for slopes, is_late in zip(rows.slopes, late_rows, strict=True)]
 
 
 class _Look:
@@ -73,8 +73,8 @@ class _Look:
         self.linear, self.blocks = linear, Blocks.of(linear)
         self.problem, self.values = linear.rows.problem, linear.rows.point.values
         self.prior, self.pull = _known(self.problem, self.values, self.blocks.size)
-        whole = self.blocks.part(np.ones((len(self.blocks.products), BLOCKS), dtype=bool))
-        self.told, self.shared = _told(whole, self.problem, self.values, self.prior)
+        whole_matrix = self.blocks.part(np.ones((len(self.blocks.products), BLOCKS), dtype=bool))
+        self.told, self.shared = _told(whole_matrix, self.problem, self.values, self.prior)
 
     def stability(self) -> Stability:
         """All comparisons."""
@@ -86,40 +86,42 @@ class _Look:
             cuts += [self._moment(log) for log in range(logs)]
         tests = (len(self.told) + 1) * sum(len(cut) for cut in cuts)
         moments = [split for log, cut in enumerate(cuts, -1) if (split := self._split_at(cut, log, tests))]
-        tested = {TIME: self._least([one for cut in cuts for one in cut.values()], tests)}
+        p_by_kind = {TIME: self._least([comparison for cut in cuts for comparison in cut.values()], tests)}
         splits = sorted(moments, key=lambda split: split.p)[:1]
         if logs > 1:
-            between = self._compared([self.blocks.log[:, None] == log for log in range(logs)])
-            tested[LOGS] = self._least([between], len(self.told) + 1)
+            log_comparison = self._compared([self.blocks.log[:, None] == log for log in range(logs)])
+            p_by_kind[LOGS] = self._least([log_comparison], len(self.told) + 1)
             names = [record.source or f"log {k + 1}" for k, record in enumerate(self.blocks.records)]
-            split = self._split(between, LOGS, names, len(self.told) + 1, "", (np.nan, (np.nan, np.nan)), np.nan)
+            split = self._split(log_comparison, LOGS, names, len(self.told) + 1, "", (np.nan, (np.nan, np.nan)), np.nan)
             splits += [split] if split else []
-        likely = max(cuts[0], key=lambda cut: cuts[0][cut].joint[1]) / BLOCKS
-        return Stability(tested, tuple(splits), (likely,))
+        likely_share = max(cuts[0], key=lambda cut: cuts[0][cut].joint[1]) / BLOCKS
+        return Stability(p_by_kind, tuple(splits), (likely_share,))
 
     def _moment(self, log: int | None) -> dict[int, _Compared]:
         """Every cut of a log, or of all: blocks before it -> what differs."""
-        mine = np.ones_like(self.blocks.log, dtype=bool) if log is None else self.blocks.log == log
+        log_blocks = np.ones_like(self.blocks.log, dtype=bool) if log is None else self.blocks.log == log
         return {
-            cut: self._compared([mine[:, None] & (np.arange(BLOCKS) < cut), mine[:, None] & (np.arange(BLOCKS) >= cut)])
+            cut: self._compared(
+                [log_blocks[:, None] & (np.arange(BLOCKS) < cut), log_blocks[:, None] & (np.arange(BLOCKS) >= cut)]
+            )
             for cut in range(FIRST, BLOCKS - FIRST + 1)
         }
 
-    def _compared(self, chosen: Sequence[BoolArray]) -> _Compared:
+    def _compared(self, masks: Sequence[BoolArray]) -> _Compared:
         """Numbers of parts, each compared, and all together."""
-        chosen = [np.broadcast_to(own, (len(self.blocks.products), BLOCKS)) for own in chosen]
-        parts = [self.blocks.part(own) for own in chosen]
+        masks = [np.broadcast_to(blocks_of_part, (len(self.blocks.products), BLOCKS)) for blocks_of_part in masks]
+        parts = [self.blocks.part(finite_parts) for finite_parts in masks]
         steps, covariance = apart(parts, self.told, self.shared, self.prior, self.pull)
         k, t = steps.shape
-        open_ = ~np.isfinite(np.diag(covariance)).reshape(k, t)
-        ratio, degrees = self._scatter(chosen, steps, covariance)
+        unknown_numbers = ~np.isfinite(np.diag(covariance)).reshape(k, t)
+        ratio, degrees = self._scatter(masks, steps, covariance)
         p = np.ones(t)
         for j in range(t):
-            own = np.flatnonzero(~open_[:, j])
-            if own.size > 1:
-                at = own * t + j
-                chi2, of = homogeneity(steps[own, j], covariance[np.ix_(at, at)])
-                p[j] = self._chance(chi2, of, ratio[j], degrees[j])
+            parts_of_number = np.flatnonzero(~unknown_numbers[:, j])
+            if parts_of_number.size > 1:
+                indices = parts_of_number * t + j
+                chi2, chi2_degrees = homogeneity(steps[parts_of_number, j], covariance[np.ix_(indices, indices)])
+                p[j] = self._chance(chi2, chi2_degrees, ratio[j], degrees[j])
         return _Compared(
             steps,
             covariance * np.outer(*2 * [np.tile(np.sqrt(ratio), k)]),
@@ -128,7 +130,7 @@ class _Look:
         )
 
     def _scatter(
-        self, chosen: Sequence[BoolArray], steps: FloatArray, covariance: FloatArray
+        self, masks: Sequence[BoolArray], steps: FloatArray, covariance: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """(T,) twice: the scatter of each number over blocks, over what the noise makes of it, 1 where it is not more
         by more than chance has it; and the degrees of freedom behind that, as in trust/uncertainty.py.
@@ -137,102 +139,131 @@ class _Look:
         so that what differs between the parts has no share in it.
         """
         t = len(self.told)
-        moved, expected = [], np.zeros(t)
-        for k, own in enumerate(chosen):
-            at = slice(k * t, (k + 1) * t)
-            known = np.where(np.isfinite(covariance[at, at]), covariance[at, at], 0.0)
-            gradient, information = self.blocks.scores(own)
-            left = gradient[:, self.told] - information[:, self.told][:, :, self.told] @ steps[k]
-            moved.append(left @ known)
-            expected += np.diag(known)
-        every = np.concatenate(moved)
-        second, fourth = (every**2).sum(axis=0), (every**4).sum(axis=0)
-        degrees = np.clip(3.0 * second**2 / np.where(fourth > 0.0, fourth, np.inf), 3.0, len(every))
+        squares, expected = [], np.zeros(t)
+        for k, mask in enumerate(masks):
+            indices = slice(k * t, (k + 1) * t)
+            known_covariance = np.where(np.isfinite(covariance[indices, indices]), covariance[indices, indices], 0.0)
+            gradient, information = self.blocks.scores(mask)
+            residual_gradient = gradient[:, self.told] - information[:, self.told][:, :, self.told] @ steps[k]
+            squares.append(residual_gradient @ known_covariance)
+            expected += np.diag(known_covariance)
+        all_squares = np.concatenate(squares)
+        second, fourth = (all_squares**2).sum(axis=0), (all_squares**4).sum(axis=0)
+        degrees = np.clip(3.0 * second**2 / np.where(fourth > 0.0, fourth, np.inf), 3.0, len(all_squares))
         ratio = second / np.where(expected > 0.0, expected, np.inf)
-        more = ratio > 1.0 + CHANCE * np.sqrt(2.0 / degrees)
-        return np.where(more, ratio, 1.0), np.where(more, degrees, np.inf)
+        excess = ratio > 1.0 + CHANCE * np.sqrt(2.0 / degrees)
+        return np.where(excess, ratio, 1.0), np.where(excess, degrees, np.inf)
 
     def _together(
         self, steps: FloatArray, covariance: FloatArray, ratio: float, degrees: float
     ) -> tuple[float, float, float]:
         """(p, chi squared, `ratio`) of all numbers that every part tells."""
         k, t = steps.shape
-        kept = np.flatnonzero(np.isfinite(np.diag(covariance)).reshape(k, t).all(axis=0))
-        if not kept.size:
+        told_numbers = np.flatnonzero(np.isfinite(np.diag(covariance)).reshape(k, t).all(axis=0))
+        if not told_numbers.size:
             return 1.0, 0.0, 1.0
-        at = (np.arange(k)[:, None] * t + kept).ravel()
-        off = np.kron(np.diff(np.eye(k), axis=0), np.eye(kept.size))  # of each part from the one before
-        step, spread = off @ steps[:, kept].ravel(), off @ covariance[np.ix_(at, at)] @ off.T
+        indices = (np.arange(k)[:, None] * t + told_numbers).ravel()
+        differences = np.kron(np.diff(np.eye(k), axis=0), np.eye(told_numbers.size))  # of each part from the one before
+        step, spread = (
+            differences @ steps[:, told_numbers].ravel(),
+            differences @ covariance[np.ix_(indices, indices)] @ differences.T,
+        )
         size = np.sqrt(np.diag(spread))
         values, vectors = np.linalg.eigh(spread / np.outer(size, size))
-        seen = values > 1e-9
-        chi2 = float(((vectors[:, seen].T @ (step / size)) ** 2 / values[seen]).sum())
-        return self._chance(chi2, int(seen.sum()), ratio, degrees), chi2, ratio
+        seen_directions = values > 1e-9
+        chi2 = float(((vectors[:, seen_directions].T @ (step / size)) ** 2 / values[seen_directions]).sum())
+        return self._chance(chi2, int(seen_directions.sum()), ratio, degrees), chi2, ratio
 
-    def _chance(self, chi2: float, of: int, ratio: float, degrees: float) -> float:
-        """Of a chi squared with `of` degrees of freedom, of noise `ratio` times as large, known by `degrees`."""
-        known = max(min(self.linear.degrees, degrees), 1.0)
-        return float(fdtrc(of, known, chi2 / ratio / of) if np.isfinite(known) else chdtrc(of, chi2 / ratio))
+    def _chance(self, chi2: float, chi2_degrees: int, ratio: float, degrees: float) -> float:
+        """Of a chi squared with `chi2_degrees` degrees of freedom, of noise `ratio` times as large, known by
+        `degrees`."""
+        known_degrees = max(min(self.linear.degrees, degrees), 1.0)
+        return float(
+            fdtrc(chi2_degrees, known_degrees, chi2 / ratio / chi2_degrees)
+            if np.isfinite(known_degrees)
+            else chdtrc(chi2_degrees, chi2 / ratio)
+        )
 
     @staticmethod
-    def _least(found: Sequence[_Compared], tests: int) -> float:
-        return min(1.0, tests * min((min(one.joint[0], float(one.p.min())) for one in found), default=1.0))
+    def _least(comparisons: Sequence[_Compared], tests: int) -> float:
+        return min(
+            1.0,
+            tests
+            * min((min(comparison.joint[0], float(comparison.p.min())) for comparison in comparisons), default=1.0),
+        )
 
-    def _split_at(self, found: dict[int, _Compared], log: int, tests: int) -> Split | None:
+    def _split_at(self, comparison_by_cut: dict[int, _Compared], log: int, tests: int) -> Split | None:
         """The moment at which numbers of a log (-1: of all) change most, None where they do not."""
-        if self._least(list(found.values()), tests) > FALSE:
+        if self._least(list(comparison_by_cut.values()), tests) > FALSE_SHARE:
             return None
-        best = max(found, key=lambda cut: found[cut].joint[1])
-        if self._least([found[best]], tests) > FALSE:  # one number alone, at another moment
-            best = min(found, key=lambda cut: float(found[cut].p.min()))
+        best = max(comparison_by_cut, key=lambda cut: comparison_by_cut[cut].joint[1])
+        if self._least([comparison_by_cut[best]], tests) > FALSE_SHARE:  # one number alone, at another moment
+            best = min(comparison_by_cut, key=lambda cut: float(comparison_by_cut[cut].p.min()))
         records = self.blocks.records if log < 0 else [self.blocks.records[log]]
-        _, most, ratio = found[best].joint
-        near = [cut for cut, one in found.items() if one.joint[1] > most - AS_GOOD * ratio] or [best]
+        _, largest_chi2, ratio = comparison_by_cut[best].joint
+        near_cuts = [
+            cut
+            for cut, comparison in comparison_by_cut.items()
+            if comparison.joint[1] > largest_chi2 - RIVAL_MARGIN * ratio
+        ] or [best]
         share = best / BLOCKS
-        span, least = max(r.span for r in records), min(r.span for r in records)
-        alike = span < 1.02 * least
-        when = (share * span, ((min(near) - 1) / BLOCKS * span, (max(near) + 1) / BLOCKS * span))
-        where = "" if log < 0 else records[0].source or f"log {log + 1}"
-        nowhere = (np.nan, (np.nan, np.nan))
-        return self._split(found[best], TIME, ["before", "after"], tests, where, when if alike else nowhere, share)
+        span, shortest_span = max(r.span for r in records), min(r.span for r in records)
+        same_spans = span < 1.02 * shortest_span
+        moment = (share * span, ((min(near_cuts) - 1) / BLOCKS * span, (max(near_cuts) + 1) / BLOCKS * span))
+        log_name = "" if log < 0 else records[0].source or f"log {log + 1}"
+        no_moment = (np.nan, (np.nan, np.nan))
+        return self._split(
+            comparison_by_cut[best],
+            TIME,
+            ["before", "after"],
+            tests,
+            log_name,
+            moment if same_spans else no_moment,
+            share,
+        )
 
     def _split(
         self,
-        found: _Compared,
-        by: str,
+        comparison: _Compared,
+        grouping: str,
         names: Sequence[str],
         tests: int,
-        where: str,
-        when: tuple[float, tuple[float, float]],
+        log_name: str,
+        moment: tuple[float, tuple[float, float]],
         share: float,
     ) -> Split | None:
-        if self._least([found], tests) > FALSE:
+        if self._least([comparison], tests) > FALSE_SHARE:
             return None
         shifts = [
-            Shift(self.problem.parameters[self.told[j]].name, tuple(self._levels(found, j, names)), float(tests * p))
-            for j, p in enumerate(found.p.tolist())
-            if tests * p <= FALSE
+            Shift(
+                self.problem.parameters[self.told[j]].name, tuple(self._levels(comparison, j, names)), float(tests * p)
+            )
+            for j, p in enumerate(comparison.p.tolist())
+            if tests * p <= FALSE_SHARE
         ]
         # A level that no friction can have is another one than any friction: it is no change of that.
         bounds = dict(zip(self.problem.names, self.problem.parameters, strict=True))
         shifts = [
-            one
-            for one in sorted(shifts, key=lambda shift: shift.p)
-            if all(at.ci95[1] > bounds[one.key].low and at.ci95[0] < bounds[one.key].high for at in one.levels)
+            shift
+            for shift in sorted(shifts, key=lambda shift: shift.p)
+            if all(
+                level.ci95[1] > bounds[shift.key].low and level.ci95[0] < bounds[shift.key].high
+                for level in shift.levels
+            )
         ]
-        return Split(by, where, *when, share, min(1.0, tests * found.joint[0]), tuple(shifts))
+        return Split(grouping, log_name, *moment, share, min(1.0, tests * comparison.joint[0]), tuple(shifts))
 
     @np.errstate(over="ignore")  # a part that hardly tells a number: it may be anything up to infinity
-    def _levels(self, found: _Compared, j: int, names: Sequence[str]) -> list[Level]:
+    def _levels(self, comparison: _Compared, j: int, names: Sequence[str]) -> list[Level]:
         """What a number is in each part that tells it."""
-        p, at, t = self.problem.parameters[self.told[j]], self.told[j], len(self.told)
-        quantile, inner = t_quantile(self.linear.degrees), p.inner(float(self.values[at]))
+        p, parameter_index, t = self.problem.parameters[self.told[j]], self.told[j], len(self.told)
+        quantile, inner_value = t_quantile(self.linear.degrees), p.inner(float(self.values[parameter_index]))
         levels = []
         for k, name in enumerate(names):
-            variance = float(found.covariance[k * t + j, k * t + j])
+            variance = float(comparison.covariance[k * t + j, k * t + j])
             if np.isfinite(variance):
-                value = inner + float(found.steps[k, j]) / self.blocks.size[at]
-                std = np.sqrt(variance) / self.blocks.size[at]
+                value = inner_value + float(comparison.steps[k, j]) / self.blocks.size[parameter_index]
+                std = np.sqrt(variance) / self.blocks.size[parameter_index]
                 low, high = (p.outer(value + side * quantile * std) for side in (-1.0, 1.0))
                 levels.append(Level(name, p.outer(value), float(std * p.slope(p.outer(value))), (low, high)))
         return levels
@@ -248,19 +279,25 @@ def _known(problem: Problem, values: FloatArray, size: FloatArray) -> tuple[Floa
     return prior, pull
 
 
-def _told(whole: FloatArray, problem: Problem, values: FloatArray, prior: FloatArray) -> tuple[IntArray, IntArray]:
+def _told(
+    whole_matrix: FloatArray, problem: Problem, values: FloatArray, prior: FloatArray
+) -> tuple[IntArray, IntArray]:
     """(numbers of the robot that the logs tell, which are compared; what all parts share).
 
     Shared are numbers of the log, such as latencies, and what priors hold. What stands at a bound is neither.
     """
     free = np.array([p.low < value < p.high for p, value in zip(problem.parameters, values, strict=True)], dtype=bool)
-    at = np.flatnonzero(free)
-    size, vectors = np.linalg.eigh(whole[1:, 1:][np.ix_(at, at)] + np.diag(prior[at]))
-    seen = size > 1e-12 * max(float(size.max(initial=0.0)), 1e-300)
-    kept = np.zeros(len(prior))
-    kept[at] = np.sqrt(np.diag((vectors[:, seen] / size[seen]) @ vectors[:, seen].T) * prior[at])
-    own = (np.arange(len(prior)) < problem.robot_count) & free & ~(kept > TOLD)
-    return np.flatnonzero(own), np.flatnonzero(free & ~own)
+    free_indices = np.flatnonzero(free)
+    size, vectors = np.linalg.eigh(
+        whole_matrix[1:, 1:][np.ix_(free_indices, free_indices)] + np.diag(prior[free_indices])
+    )
+    seen_parts = size > 1e-12 * max(float(size.max(initial=0.0)), 1e-300)
+    prior_shares = np.zeros(len(prior))
+    prior_shares[free_indices] = np.sqrt(
+        np.diag((vectors[:, seen_parts] / size[seen_parts]) @ vectors[:, seen_parts].T) * prior[free_indices]
+    )
+    told_mask = (np.arange(len(prior)) < problem.robot_count) & free & ~(prior_shares > PRIOR_SHARE)
+    return np.flatnonzero(told_mask), np.flatnonzero(free & ~told_mask)
 
 
 # A fit in blocks of its logs: what each alone says of the numbers, to first order around the fit of all
@@ -288,7 +325,7 @@ class Blocks:
     @classmethod
     def of(cls, linear: Linear) -> Blocks:
         """The blocks of a fit in white rows."""
-        rows, found = linear.rows, cls([], [], [], [], np.zeros(0, dtype=int), [], np.zeros(0))
+        rows, blocks = linear.rows, cls([], [], [], [], np.zeros(0, dtype=int), [], np.zeros(0))
         of_pieces = [_white(linear, k) for k in range(len(rows.pieces))]
         count = len(rows.problem.parameters)
         size = np.sqrt(sum((x[:, 1 : 1 + count] ** 2).sum(axis=0) for x, _, _ in of_pieces))
@@ -301,98 +338,103 @@ class Blocks:
             number = np.zeros(products.shape[:2])
             for b in np.unique(block).tolist():
                 for c in range(products.shape[1]):
-                    own = x[(block == b) & (column == c)]
-                    products[b, c], number[b, c] = own.T @ own, len(own)
-            known = piece.start_prior(rows.point.states[k])[1]
-            wide = np.zeros(x.shape[1] - 1 - count)
-            held = np.flatnonzero(piece.free)[: len(wide)]
-            wide[: len(held)] = np.append(known, np.zeros(len(piece.free)))[held]
-            found.products.append(products)
-            found.number.append(number)
-            found.column.append(np.array(rows.column[k]))
-            found.start.append(np.diag(wide))
+                    rows_of_block = x[(block == b) & (column == c)]
+                    products[b, c], number[b, c] = rows_of_block.T @ rows_of_block, len(rows_of_block)
+            start_information = piece.start_prior(rows.point.states[k])[1]
+            information = np.zeros(x.shape[1] - 1 - count)
+            free_states = np.flatnonzero(piece.free)[: len(information)]
+            information[: len(free_states)] = np.append(start_information, np.zeros(len(piece.free)))[free_states]
+            blocks.products.append(products)
+            blocks.number.append(number)
+            blocks.column.append(np.array(rows.column[k]))
+            blocks.start.append(np.diag(information))
             log.append(places.setdefault(id(piece.record), len(places)))
-            if len(places) > len(found.records):
-                found.records.append(piece.record)
-        return cls(found.products, found.number, found.column, found.start, np.array(log), found.records, size)
+            if len(places) > len(blocks.records):
+                blocks.records.append(piece.record)
+        return cls(blocks.products, blocks.number, blocks.column, blocks.start, np.array(log), blocks.records, size)
 
-    def part(self, chosen: BoolArray) -> FloatArray:
-        """Scalar products [e, J] (1 + P, 1 + P) of the blocks `chosen` (pieces, B), their starts taken out."""
+    def part(self, mask: BoolArray) -> FloatArray:
+        """Scalar products [e, J] (1 + P, 1 + P) of the blocks `mask` (pieces, B), their starts taken out."""
         count = len(self.size)
-        noise, total = self._noise(chosen), np.zeros((1 + count, 1 + count))
-        for k, own in enumerate(chosen):
-            if own.any():
-                x = np.einsum("bcij,c->ij", self.products[k][own], 1.0 / noise[self.column[k]])
+        noise, total = self._noise(mask), np.zeros((1 + count, 1 + count))
+        for k, piece_mask in enumerate(mask):
+            if piece_mask.any():
+                x = np.einsum("bcij,c->ij", self.products[k][piece_mask], 1.0 / noise[self.column[k]])
                 first = np.flatnonzero(self.number[k].sum(axis=1))[:1]
-                total += _without(x, 1 + count, self.start[k] * bool(own[first].any()))
+                total += _without(x, 1 + count, self.start[k] * bool(piece_mask[first].any()))
         return total
 
-    def scores(self, chosen: BoolArray) -> tuple[FloatArray, FloatArray]:
-        """(gradients (N, P), information (N, P, P)) of the blocks `chosen` (pieces, B), one by one."""
-        noise, count = self._noise(chosen), len(self.size)
+    def scores(self, mask: BoolArray) -> tuple[FloatArray, FloatArray]:
+        """(gradients (N, P), information (N, P, P)) of the blocks `mask` (pieces, B), one by one."""
+        noise, count = self._noise(mask), len(self.size)
         x = [
-            np.einsum("bcij,c->bij", self.products[k][own], 1.0 / noise[self.column[k]])[:, : 1 + count, : 1 + count]
-            for k, own in enumerate(chosen)
+            np.einsum("bcij,c->bij", self.products[k][piece_mask], 1.0 / noise[self.column[k]])[
+                :, : 1 + count, : 1 + count
+            ]
+            for k, piece_mask in enumerate(mask)
         ]
-        every = np.concatenate(x)
-        return every[:, 1:, 0], every[:, 1:, 1:]
+        gradients = np.concatenate(x)
+        return gradients[:, 1:, 0], gradients[:, 1:, 1:]
 
-    def _noise(self, chosen: BoolArray) -> FloatArray:
+    def _noise(self, mask: BoolArray) -> FloatArray:
         """Variance of the white rows of each output in a part. Shape (outputs,)."""
-        outputs = 1 + max(int(each.max(initial=0)) for each in self.column)
-        square, number = np.full(outputs, FIRM), np.full(outputs, FIRM)
-        for k, own in enumerate(chosen):
-            np.add.at(square, self.column[k], self.products[k][own][:, :, 0, 0].sum(axis=0))
-            np.add.at(number, self.column[k], self.number[k][own].sum(axis=0))
+        outputs = 1 + max(int(piece_columns.max(initial=0)) for piece_columns in self.column)
+        square, number = np.full(outputs, PRIOR_ROWS), np.full(outputs, PRIOR_ROWS)
+        for k, piece_mask in enumerate(mask):
+            np.add.at(square, self.column[k], self.products[k][piece_mask][:, :, 0, 0].sum(axis=0))
+            np.add.at(number, self.column[k], self.number[k][piece_mask].sum(axis=0))
         return square / number
 
 
 def _white(linear: Linear, k: int) -> tuple[FloatArray, IntArray, IntArray]:
     """(white [e, J, Z] (N, 1 + P + S), the block of each row (N,), its output (N,)) of a piece."""
     rows, piece = linear.rows, linear.rows.pieces[k]
-    every = np.concatenate([rows.residual[k][:, :, None], rows.slopes[k], rows.own[k]], axis=2)
-    x = linear.with_start(k, every)
+    columns = np.concatenate([rows.residual[k][:, :, None], rows.slopes[k], rows.start_slopes[k]], axis=2)
+    x = linear.with_start(k, columns)
     share = piece.record.share[piece.first : piece.last + 1]
     number = np.minimum((share * BLOCKS).astype(int), BLOCKS - 1)
-    there = rows.there[k]
-    block = np.concatenate([number[own] for own in there])
-    column = np.concatenate([np.full(int(own.sum()), c) for c, own in enumerate(there)])
+    mask = rows.masks[k]
+    block = np.concatenate([number[row_mask] for row_mask in mask])
+    column = np.concatenate([np.full(int(row_mask.sum()), c) for c, row_mask in enumerate(mask)])
     return x, block, column
 
 
-def _without(x: FloatArray, kept: int, known: FloatArray) -> FloatArray:
-    """Scalar products (n, n) without what the columns after the first `kept` explain. known: of these, beforehand."""
-    own = x[kept:, kept:] + known
-    size = np.sqrt(np.maximum(np.diag(own), 0.0))
-    there = size > 0.0
-    if not there.any():
-        return x[:kept, :kept]
-    size = size[there]
-    values, vectors = np.linalg.eigh(own[np.ix_(there, there)] / np.outer(size, size))
-    seen = values > SAME * values[-1]
-    half = (vectors[:, seen] / np.sqrt(values[seen])).T @ (x[kept:, :kept][there] / size[:, None])
-    return x[:kept, :kept] - half.T @ half
+def _without(x: FloatArray, kept_count: int, known_information: FloatArray) -> FloatArray:
+    """Scalar products (n, n) without what the columns after the first `kept_count` explain. known_information: of
+    these, beforehand."""
+    nuisance_products = x[kept_count:, kept_count:] + known_information
+    size = np.sqrt(np.maximum(np.diag(nuisance_products), 0.0))
+    positive_rows = size > 0.0
+    if not positive_rows.any():
+        return x[:kept_count, :kept_count]
+    size = size[positive_rows]
+    values, vectors = np.linalg.eigh(nuisance_products[np.ix_(positive_rows, positive_rows)] / np.outer(size, size))
+    seen_values = values > EIGEN_TOLERANCE * values[-1]
+    half = (vectors[:, seen_values] / np.sqrt(values[seen_values])).T @ (
+        x[kept_count:, :kept_count][positive_rows] / size[:, None]
+    )
+    return x[:kept_count, :kept_count] - half.T @ half
 
 
 def apart(
-    parts: Sequence[FloatArray], told: IntArray, shared: IntArray, prior: FloatArray, pull: FloatArray
+    parts: Sequence[FloatArray], told_numbers: IntArray, shared: IntArray, prior: FloatArray, pull: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """(steps (K, T), their covariance (K T, K T)) of the numbers `told`, fitted in each of K parts for itself.
+    """(steps (K, T), their covariance (K T, K T)) of the numbers `told_numbers`, fitted in each of K parts for itself.
 
     parts: scalar products [e, J] (1 + P, 1 + P) of each. shared: numbers that all parts have in common, with what is
     known of them beforehand: `prior` (P,) of the information, `pull` (P,) of the gradient. A number that a part does
     not tell has an infinite variance there.
     """
-    k, t = len(parts), len(told)
-    wide = k * t + len(shared)
-    information, gradient = np.zeros((wide, wide)), np.zeros(wide)
-    common = np.arange(k * t, wide)
-    information[common, common], gradient[common] = prior[shared], pull[shared]
+    k, t = len(parts), len(told_numbers)
+    total_count = k * t + len(shared)
+    information, gradient = np.zeros((total_count, total_count)), np.zeros(total_count)
+    shared_indices = np.arange(k * t, total_count)
+    information[shared_indices, shared_indices], gradient[shared_indices] = prior[shared], pull[shared]
     for i, part in enumerate(parts):
-        at = np.concatenate([np.arange(i * t, (i + 1) * t), common])
-        own = np.concatenate([told, shared])
-        information[np.ix_(at, at)] += part[1:, 1:][np.ix_(own, own)]
-        gradient[at] += part[1:, 0][own]
+        indices = np.concatenate([np.arange(i * t, (i + 1) * t), shared_indices])
+        number_indices = np.concatenate([told_numbers, shared])
+        information[np.ix_(indices, indices)] += part[1:, 1:][np.ix_(number_indices, number_indices)]
+        gradient[indices] += part[1:, 0][number_indices]
     step, covariance = _solved(information, gradient)
     return step[: k * t].reshape(k, t), covariance[: k * t, : k * t]
 
@@ -400,12 +442,12 @@ def apart(
 def _solved(information: FloatArray, gradient: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(step, covariance), infinite for what has a part in a direction that is not seen."""
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
-    there = size > 1e-9 * size.max(initial=0.0)
-    size = np.where(there, size, 1.0)
+    positive_rows = size > 1e-9 * size.max(initial=0.0)
+    size = np.where(positive_rows, size, 1.0)
     values, vectors = np.linalg.eigh(information / np.outer(size, size))
-    seen = values > 1e-9
-    root = vectors[:, seen] / np.sqrt(values[seen]) / size[:, None]
-    lost = ~there | ((vectors[:, ~seen] ** 2).sum(axis=1) > 1e-4)
+    seen_values = values > 1e-9
+    root = vectors[:, seen_values] / np.sqrt(values[seen_values]) / size[:, None]
+    lost = ~positive_rows | ((vectors[:, ~seen_values] ** 2).sum(axis=1) > 1e-4)
     covariance = root @ root.T
     covariance[lost, lost] = np.inf
     return root @ (root.T @ gradient), covariance

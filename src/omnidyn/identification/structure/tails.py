@@ -30,96 +30,106 @@ from omnidyn.model.mass import mass_matrix
 from omnidyn.statement import NOTE, Statement
 from omnidyn.statistics import HUBER_CLIP, huber_loss, robust_std
 
-BEYOND = 5.0  # robust standard deviations: of normal noise one sample in two million is so far out
-LEAST, HELD = 3, 0.1  # samples, and their share of the squares, from which they are worth a word
-ONE, NEAR = 2, 0.5  # rows within which samples far out are one; [s] in which an error of the motion dies away
-AFTER = 0.05  # [s] in which a change of the motion shows in a sample
+OUTLIER_SCALES = 5.0  # robust standard deviations: of normal noise one sample in two million is so far out
+LEAST_OUTLIERS, ENERGY_SHARE = 3, 0.1  # samples, and their share of the squares, from which they are worth a word
+ONE, NEAR_TIME = 2, 0.5  # rows within which samples far out are one; [s] in which an error of the motion dies away
+CHANGE_TIME = 0.05  # [s] in which a change of the motion shows in a sample
 SPRINKLED = 0.01  # chance of so many of them near each other, or where it changes so much, from which they are random
 ROUNDS = 20  # of weights and fit in turn
 
 
-def wild_samples(seen: Misfit, moved: Sequence[Motion]) -> dict[str, Wild]:
+def wild_samples(misfit_result: Misfit, piece_motions: Sequence[Motion]) -> dict[str, Wild]:
     """Output -> its wild samples, where there are some: in what is left beside all that residuals follow, made white.
 
     F. R. Hampel's rule with the median absolute deviation, J. Am. Stat. Assoc. 69, 383 (1974), where those of every
     output are sprinkled at random over its rows: else they are of one cause, and none is wild.
     """
-    linear, rows, change = seen.linear, seen.linear.rows, [_change(motion) for motion in moved]
+    linear, rows, change = (
+        misfit_result.linear,
+        misfit_result.linear.rows,
+        [_change(motion) for motion in piece_motions],
+    )
     series: dict[int, list[tuple[FloatArray, FloatArray]]] = {}
     for k, columns in enumerate(rows.column):
-        left = rows.residual[k] - seen.explained[k]
+        residuals = rows.residual[k] - misfit_result.explained_by_piece[k]
         for j, c in enumerate(columns):
-            new = linear.of_column(k, j, left[j][:, None])[:, 0]
-            series.setdefault(c, []).append((new, change[k][rows.there[k][j]]))
-    found, near = {}, NEAR / float(np.median([motion.piece.step for motion in moved]))
+            new = linear.of_column(k, j, residuals[j][:, None])[:, 0]
+            series.setdefault(c, []).append((new, change[k][rows.masks[k][j]]))
+    outliers_by_output, near_rows = {}, NEAR_TIME / float(np.median([motion.piece.step for motion in piece_motions]))
     for c, pieces in series.items():
-        new, by = (np.concatenate(each) for each in zip(*pieces, strict=True))
+        new, changes = (np.concatenate(arrays) for arrays in zip(*pieces, strict=True))
         scale = float(robust_std(new, 0.0)) if new.size else 0.0
-        out = np.abs(new) > BEYOND * scale
-        held = float((new[out] ** 2).sum() / max((new**2).sum(), 1e-300))
-        if scale > 0.0 and out.sum() >= LEAST and held > HELD:
-            if not sprinkled(out, by, near):
+        outlier_mask = np.abs(new) > OUTLIER_SCALES * scale
+        energy_share = float((new[outlier_mask] ** 2).sum() / max((new**2).sum(), 1e-300))
+        if scale > 0.0 and outlier_mask.sum() >= LEAST_OUTLIERS and energy_share > ENERGY_SHARE:
+            if not sprinkled(outlier_mask, changes, near_rows):
                 return {}
             name, i = rows.problem.columns[c]
-            found[f"{name}[{i}]"] = Wild(float(out.mean()), held)
-    return found
+            outliers_by_output[f"{name}[{i}]"] = Wild(float(outlier_mask.mean()), energy_share)
+    return outliers_by_output
 
 
 def _change(motion: Motion) -> FloatArray:
     """How much the motion changes about each row (n,): the largest change over a row, in kinetic energy."""
     step = np.diff(motion.twist, axis=0, prepend=motion.twist[:1])
     energy = np.einsum("ni,ij,nj->n", step, mass_matrix(motion.robot), step)
-    about = 1 + 2 * round(AFTER / time_of_row(motion.t, motion.piece.record.staggered))
-    return np.asarray(maximum_filter1d(energy, about, mode="nearest"))
+    width = 1 + 2 * round(CHANGE_TIME / time_of_row(motion.t, motion.piece.record.staggered))
+    return np.asarray(maximum_filter1d(energy, width, mode="nearest"))
 
 
-def sprinkled(out: BoolArray, change: FloatArray, near: float) -> bool:
+def sprinkled(outlier_mask: BoolArray, change: FloatArray, near_rows: float) -> bool:
     """Whether some rows come at random: one by one, not in bursts, and not where the motion changes more.
 
-    near: rows in which an error of the motion dies away. H. B. Mann and D. R. Whitney, Ann. Math. Stat. 18, 50 (1947).
+    near_rows: rows in which an error of the motion dies away. H. B. Mann and D. R. Whitney, Ann. Math. Stat. 18, 50
+    (1947).
     """
-    at = np.flatnonzero(out)
-    gaps = np.diff(at)
-    apart, gaps = at[np.append(True, gaps > ONE)], gaps[gaps > ONE]
-    if len(apart) < LEAST:
+    outlier_rows = np.flatnonzero(outlier_mask)
+    gaps = np.diff(outlier_rows)
+    burst_starts, gaps = outlier_rows[np.append(True, gaps > ONE)], gaps[gaps > ONE]
+    if len(burst_starts) < LEAST_OUTLIERS:
         return False
-    by_chance = 1.0 - (1.0 - len(apart) / len(out)) ** (near - ONE)
-    close = int((gaps <= near).sum())
-    bursts = float(bdtrc(close - 1, len(gaps), by_chance)) if close else 1.0
-    rises = float(mannwhitneyu(change[apart], change[~out], alternative="greater").pvalue)
+    by_chance = 1.0 - (1.0 - len(burst_starts) / len(outlier_mask)) ** (near_rows - ONE)
+    close_count = int((gaps <= near_rows).sum())
+    bursts = float(bdtrc(close_count - 1, len(gaps), by_chance)) if close_count else 1.0
+    rises = float(mannwhitneyu(change[burst_starts], change[~outlier_mask], alternative="greater").pvalue)
     return min(bursts, rises) > SPRINKLED
 
 
-def calmer(seen: Misfit, wild: Mapping[str, Wild]) -> tuple[Remedy, ...]:
-    """Student's t as a remedy where samples are wild: none, or one. Its gain is the share of the held-out error that it
-    takes away beside all that residuals follow, of Huber's loss for both, so that it compares with other remedies."""
-    if not wild:
+def calmer(misfit_result: Misfit, outliers_by_output: Mapping[str, Wild]) -> tuple[Remedy, ...]:
+    """Student's t as a remedy where samples are outliers_by_output: none, or one. Its gain is the share of the held-out
+    error that it takes away beside all that residuals follow, of Huber's loss for both, so that it compares with other
+    remedies."""
+    if not outliers_by_output:
         return ()
-    linear = seen.linear
+    linear = misfit_result.linear
     e, j = linear.whole()
-    columns = np.column_stack([j, linear.white(seen.shown)])
-    plain, robust = list[float](), list[float]()
+    columns = np.column_stack([j, linear.white(misfit_result.columns_by_piece)])
+    plain_losses, robust = list[float](), list[float]()
     scale = float(robust_std(e[e != 0.0], 0.0))
-    for own in Blocks(linear, [shown[:, :, :0] for shown in seen.shown]).block:
-        others, bound = np.delete(np.arange(len(e)), own), HUBER_CLIP * scale
-        first = solved(columns[others], e[others])
-        ways = first, _students(columns[others], e[others], first, scale)
-        one, other = (float(huber_loss((e[own] - columns[own] @ by) ** 2, bound).sum()) for by in ways)
-        plain.append(one)
-        robust.append(other)
-    change = (np.array(plain) - robust) / max(sum(plain), 1e-300)
-    percent = 100.0 * max(each.share for each in wild.values())
+    for block_rows in Blocks(
+        linear, [columns_by_piece[:, :, :0] for columns_by_piece in misfit_result.columns_by_piece]
+    ).block:
+        other_rows, bound = np.delete(np.arange(len(e)), block_rows), HUBER_CLIP * scale
+        first = solved(columns[other_rows], e[other_rows])
+        ways = first, _students(columns[other_rows], e[other_rows], first, scale)
+        plain_loss, robust_loss = (
+            float(huber_loss((e[block_rows] - columns[block_rows] @ way) ** 2, bound).sum()) for way in ways
+        )
+        plain_losses.append(plain_loss)
+        robust.append(robust_loss)
+    change = (np.array(plain_losses) - robust) / max(sum(plain_losses), 1e-300)
+    percent = 100.0 * max(outliers.share for outliers in outliers_by_output.values())
     cause = Statement("outliers", NOTE, numbers={"percent": percent})
     return (Remedy(LOSS, cause, float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change))), share=0.0),)
 
 
-def _students(columns: FloatArray, e: FloatArray, begin: FloatArray, scale: float) -> FloatArray:
+def _students(columns: FloatArray, e: FloatArray, start_coefficients: FloatArray, scale: float) -> FloatArray:
     """What Student's t fits columns (N, K) to e (N,) by, at a known scale: least squares with its weights, again."""
-    by = begin
+    coefficients = start_coefficients
     for _ in range(ROUNDS):
-        root = np.sqrt((NU + 1.0) / (NU + ((e - columns @ by) / scale) ** 2))
-        by = solved(columns * root[:, None], e * root)
-    return by
+        root = np.sqrt((NU + 1.0) / (NU + ((e - columns @ coefficients) / scale) ** 2))
+        coefficients = solved(columns * root[:, None], e * root)
+    return coefficients
 
 
 def as_counted(solution: Solution, problem: Problem, parts: Sequence[Parts]) -> list[Parts]:
@@ -131,18 +141,20 @@ def as_counted(solution: Solution, problem: Problem, parts: Sequence[Parts]) -> 
     nu = solution.solver.nu
     if not nu:
         return list(parts)
-    every, variance = solution.solver.problem.columns, solution.state.variance
-    slope, number, pulled = np.zeros(len(every)), np.zeros(len(every)), list[FloatArray]()
+    problem_columns, variance = solution.solver.problem.columns, solution.state.variance
+    slope, number, pulled_residuals = np.zeros(len(problem_columns)), np.zeros(len(problem_columns)), list[FloatArray]()
     for piece, (residual, _, _) in zip(problem.pieces, parts, strict=True):
-        own = np.array([every.index(column) for column in piece.record.columns])
-        pull, _, curvature, _ = row_terms(residual, variance[own], nu, None, np.ones(len(own)), True)
-        there = np.isfinite(residual)
-        slope[own] += np.where(there, curvature, 0.0).sum(axis=1)
-        number[own] += there.sum(axis=1)
-        pulled.append(np.where(there, pull, np.nan))
+        column_indices = np.array([problem_columns.index(column) for column in piece.record.columns])
+        pull, _, curvature, _ = row_terms(
+            residual, variance[column_indices], nu, None, np.ones(len(column_indices)), True
+        )
+        mask = np.isfinite(residual)
+        slope[column_indices] += np.where(mask, curvature, 0.0).sum(axis=1)
+        number[column_indices] += mask.sum(axis=1)
+        pulled_residuals.append(np.where(mask, pull, np.nan))
     mean = np.where(slope > 0.0, slope / np.maximum(number, 1.0), 1.0)
-    partses = []
-    for piece, own, (_, slopes, at) in zip(problem.pieces, pulled, parts, strict=True):
-        places = [every.index(column) for column in piece.record.columns]
-        partses.append((own / mean[places][:, None], slopes, at))
-    return partses
+    parts_by_piece = []
+    for piece, column_indices, (_, slopes, piece_slopes) in zip(problem.pieces, pulled_residuals, parts, strict=True):
+        places = [problem_columns.index(column) for column in piece.record.columns]
+        parts_by_piece.append((column_indices / mean[places][:, None], slopes, piece_slopes))
+    return parts_by_piece

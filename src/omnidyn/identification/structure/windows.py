@@ -22,12 +22,15 @@ from omnidyn.identification.output_error.problem.problem import Piece
 from omnidyn.logs.plateaus import COMMANDS, command_changes
 from omnidyn.statistics import stretches
 
-FORGOTTEN, SETTLED = 5.0, 3.0  # time constants after which nothing is left of a start, and what is left is modelled
-LEAST = 12  # rows of a window
-EQUAL = 1e-3  # of the largest command: commands that differ by less are the same
-EVEN = 0.2  # of a row: rows that are longer or shorter are not as long
-MOST = 0.5  # of the rows of a window in which it moves
-NEVER = 10**9  # rows
+FORGETTING_CONSTANTS, SETTLING_CONSTANTS = (
+    5.0,
+    3.0,
+)  # time constants after which nothing is left of a start, and what is left is modelled
+LEAST_ROWS = 12  # rows of a window
+COMMAND_TOLERANCE = 1e-3  # of the largest command: commands that differ by less are the same
+STEP_TOLERANCE = 0.2  # of a row: rows that are longer or shorter are not as long
+MOVING_SHARE = 0.5  # of the rows of a window in which it moves
+ENDLESS_ROWS = 10**9  # rows
 MIX = np.uint64(0x9E3779B97F4A7C15)  # odd, so that no power of it is 0 in 64 bits
 Found = tuple[int, int, int, Hashable]  # piece, column in it, first known row, group
 
@@ -39,17 +42,17 @@ class Windows:
     values: FloatArray
     groups: IntArray
 
-    def __add__(self, other: Windows) -> Windows:
+    def __add__(self, windows: Windows) -> Windows:
         """Both, the groups apart."""
-        groups = np.concatenate([self.groups, other.groups + self.groups.max(initial=-1) + 1])
-        return Windows(np.concatenate([self.values, other.values]), groups)
+        groups = np.concatenate([self.groups, windows.groups + self.groups.max(initial=-1) + 1])
+        return Windows(np.concatenate([self.values, windows.values]), groups)
 
     @classmethod
-    def of(cls, rows: Rows, found: Sequence[Found], length: int) -> Windows:
+    def of(cls, rows: Rows, places: Sequence[Found], length: int) -> Windows:
         """Of (piece, column in it, first known row, group)."""
-        names = {name: i for i, name in enumerate(dict.fromkeys(name for *_, name in found))}
-        values = [rows.residual[k][j][rows.there[k][j]][first : first + length] for k, j, first, _ in found]
-        return cls(np.array(values).reshape(-1, length), np.array([names[name] for *_, name in found], dtype=int))
+        names = {name: i for i, name in enumerate(dict.fromkeys(name for *_, name in places))}
+        values = [rows.residual[k][j][rows.masks[k][j]][first : first + length] for k, j, first, _ in places]
+        return cls(np.array(values).reshape(-1, length), np.array([names[name] for *_, name in places], dtype=int))
 
     @property
     def several(self) -> int:
@@ -59,53 +62,53 @@ class Windows:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """The windows of one column. step [s]: of its rows. again: those with repeats, by sets."""
+    """The windows of one column. step [s]: of its rows. repeat_windows: those with repeats, by sets."""
 
     step: float
-    held: Windows
+    held_windows: Windows
     busy: Windows
     resting: Windows
-    again: Windows
-    apart: int  # rows that repeats are from each other, at least
+    repeat_windows: Windows
+    row_gap: int  # rows that repeats are from each other, at least
 
 
 @dataclass(frozen=True, eq=False)
 class _Set:
-    """Stretches of `length` rows with the same commands: pieces (m,), rows (m,) that they begin at there; apart: rows
+    """Stretches of `length` rows with the same commands: pieces (m,), rows (m,) that they begin at there; row_gap: rows
     from one to the next, at least."""
 
     pieces: IntArray
     rows: IntArray
     length: int
-    apart: int
+    row_gap: int
 
 
 @dataclass(frozen=True, eq=False)
 class _Column:
     """A column in a piece, by its known rows: k, j; rows (n,) of the piece; joined (n,): whether the row before is
-    known, too; moves, rests (n,); since (n,) [s] the last change of command, 0 where none comes in steps; holds (n,):
-    which hold, by its command; step [s]."""
+    known, too; moves, resting_rows (n,); time_since_change (n,) [s] the last change of command, 0 where none comes in
+    steps; hold_numbers (n,): which hold, by its command; step [s]."""
 
     k: int
     j: int
     rows: IntArray
     joined: BoolArray
     moves: BoolArray
-    rests: BoolArray
-    since: FloatArray
-    holds: IntArray
+    resting_rows: BoolArray
+    time_since_change: FloatArray
+    hold_numbers: IntArray
     step: float
 
     def whole(self, row: int, length: int) -> int | None:
         """The index of a row from which on so many are known, and in most of which it moves; None where not."""
-        at = int(np.searchsorted(self.rows, row))
-        own = self.rows[at : at + length]
+        first_index = int(np.searchsorted(self.rows, row))
+        stretch_rows = self.rows[first_index : first_index + length]
         return (
-            at
-            if len(own) == length
-            and own[0] == row
-            and own[-1] == row + length - 1
-            and (self.moves[at : at + length].mean() >= MOST)
+            first_index
+            if len(stretch_rows) == length
+            and stretch_rows[0] == row
+            and stretch_rows[-1] == row + length - 1
+            and (self.moves[first_index : first_index + length].mean() >= MOVING_SHARE)
             else None
         )
 
@@ -113,158 +116,192 @@ class _Column:
         """Stretches of joined rows in which a mask holds, (first, behind the last); each within one hold."""
         cut = ~self.joined
         if by_hold:
-            cut = cut | (np.diff(self.holds, prepend=self.holds[:1]) != 0)
-        found = []
+            cut = cut | (np.diff(self.hold_numbers, prepend=self.hold_numbers[:1]) != 0)
+        joined_runs = []
         for a, b in stretches(mask).tolist():
             edges = [a, *(np.flatnonzero(cut[a + 1 : b]) + a + 1).tolist(), b]
-            found += [(x, y) for x, y in pairwise(edges) if y - x >= LEAST]
-        return found
+            joined_runs += [(x, y) for x, y in pairwise(edges) if y - x >= LEAST_ROWS]
+        return joined_runs
 
 
 def slowest(motions: Sequence[Motion]) -> float:
     """The slowest time constant of the fitted robot [s], in the median of rows."""
-    left = np.concatenate([np.abs(np.linalg.eigvals(motion.decay)).max(axis=1) for motion in motions])
-    steps, decays = np.concatenate([np.diff(motion.t) for motion in motions]), (left > 0.0) & (left < 1.0)
-    return float(np.median(-steps[decays] / np.log(left[decays]))) if decays.any() else np.inf
+    decay_rates = np.concatenate([np.abs(np.linalg.eigvals(motion.decay)).max(axis=1) for motion in motions])
+    steps, decays = np.concatenate([np.diff(motion.t) for motion in motions]), (decay_rates > 0.0) & (decay_rates < 1.0)
+    return float(np.median(-steps[decays] / np.log(decay_rates[decays]))) if decays.any() else np.inf
 
 
 def shown(rows: Rows, motions: Sequence[Motion]) -> list[Shown]:
     """The windows of each column of the problem."""
     constant = slowest(motions)
     commands = _commands(rows.pieces)
-    holds = [_holds(piece, command) for piece, command in zip(rows.pieces, commands, strict=True)]
-    repeats = _repeats(rows.pieces, commands, FORGOTTEN * constant)
-    return [_of_column(rows, motions, c, SETTLED * constant, repeats, holds) for c in range(len(rows.problem.columns))]
+    holds_by_piece = [_holds(piece, command) for piece, command in zip(rows.pieces, commands, strict=True)]
+    repeats = _repeats(rows.pieces, commands, FORGETTING_CONSTANTS * constant)
+    return [
+        _of_column(rows, motions, c, SETTLING_CONSTANTS * constant, repeats, holds_by_piece)
+        for c in range(len(rows.problem.columns))
+    ]
 
 
 def _of_column(
     rows: Rows,
     motions: Sequence[Motion],
     c: int,
-    settled: float,
+    settling_time: float,
     repeats: Sequence[_Set],
-    holds: Sequence[tuple[FloatArray, IntArray]],
+    holds_by_piece: Sequence[tuple[FloatArray, IntArray]],
 ) -> Shown:
     parts = [
-        _column(rows, motions[k], k, own.index(c), settled, *holds[k])
-        for k, own in enumerate(rows.column)
-        if c in own and rows.there[k][own.index(c)].sum() >= LEAST
+        _column(rows, motions[k], k, columns.index(c), settling_time, *holds_by_piece[k])
+        for k, columns in enumerate(rows.column)
+        if c in columns and rows.masks[k][columns.index(c)].sum() >= LEAST_ROWS
     ]
     step = float(np.median([part.step for part in parts])) if parts else 1.0
-    still = [part.runs((part.since >= settled) & part.moves, by_hold=True) for part in parts]
-    lengths = [b - a for own in still for a, b in own]
-    length = max(LEAST, int(min(settled / step, float(np.median(lengths)) if lengths else 1e3)))
-    held, busy, resting = list[Found](), list[Found](), list[Found]()
-    for part, own in zip(parts, still, strict=True):
-        used = np.zeros(len(part.rows), dtype=bool)
-        for a, b in own:
+    still_runs = [part.runs((part.time_since_change >= settling_time) & part.moves, by_hold=True) for part in parts]
+    lengths = [b - a for runs in still_runs for a, b in runs]
+    length = max(LEAST_ROWS, int(min(settling_time / step, float(np.median(lengths)) if lengths else 1e3)))
+    held_windows, busy_windows, rest_windows = list[Found](), list[Found](), list[Found]()
+    for part, part_runs in zip(parts, still_runs, strict=True):
+        used_rows = np.zeros(len(part.rows), dtype=bool)
+        for a, b in part_runs:
             for first in range(b - length, a - 1, -length):
-                held.append((part.k, part.j, first, int(part.holds[first])))
-                used[first : first + length] = True
-        for mask, into in ((part.moves & ~used, busy), (part.rests, resting)):
+                held_windows.append((part.k, part.j, first, int(part.hold_numbers[first])))
+                used_rows[first : first + length] = True
+        for mask, windows in ((part.moves & ~used_rows, busy_windows), (part.resting_rows, rest_windows)):
             for a, b in part.runs(mask):
-                into += [(part.k, part.j, first, (part.k, first)) for first in range(a, b - length + 1, length)]
-    again, apart = _again(parts, repeats, length)
-    return Shown(step, *(Windows.of(rows, found, length) for found in (held, busy, resting, again)), apart=apart)
+                windows += [(part.k, part.j, first, (part.k, first)) for first in range(a, b - length + 1, length)]
+    repeat_windows, row_gap = _again(parts, repeats, length)
+    return Shown(
+        step,
+        *(Windows.of(rows, places, length) for places in (held_windows, busy_windows, rest_windows, repeat_windows)),
+        row_gap=row_gap,
+    )
 
 
-def _column(rows: Rows, motion: Motion, k: int, j: int, settled: float, since: FloatArray, holds: IntArray) -> _Column:
-    known, at = np.flatnonzero(rows.there[k][j]), np.arange(len(motion.t))
-    stands = (motion.twist == 0.0).all(axis=1)
-    moved = np.maximum.accumulate(np.where(stands, 0, at))
-    rests = stands & (motion.t - motion.t[moved] >= settled)
-    moves, step = rows.moves[k][j] & ~stands, usual_step(motion.t[known])
-    return _Column(k, j, known, rows.steps[k][j] == 1, moves[known], rests[known], since[known], holds[known], step)
+def _column(
+    rows: Rows,
+    motion: Motion,
+    k: int,
+    j: int,
+    settling_time: float,
+    time_since_change: FloatArray,
+    hold_numbers: IntArray,
+) -> _Column:
+    known_rows, row_numbers = np.flatnonzero(rows.masks[k][j]), np.arange(len(motion.t))
+    still_rows = (motion.twist == 0.0).all(axis=1)
+    last_moving_rows = np.maximum.accumulate(np.where(still_rows, 0, row_numbers))
+    resting_rows = still_rows & (motion.t - motion.t[last_moving_rows] >= settling_time)
+    moves, step = rows.moves[k][j] & ~still_rows, usual_step(motion.t[known_rows])
+    return _Column(
+        k,
+        j,
+        known_rows,
+        rows.steps[k][j] == 1,
+        moves[known_rows],
+        resting_rows[known_rows],
+        time_since_change[known_rows],
+        hold_numbers[known_rows],
+        step,
+    )
 
 
 def _again(parts: Sequence[_Column], repeats: Sequence[_Set], length: int) -> tuple[list[Found], int]:
     """(windows of what came again: piece, column in it, first known row, set; rows that they are apart, at least)."""
-    of, found, apart = {part.k: part for part in parts}, [], NEVER
+    part_by_piece, places, row_gap = {part.k: part for part in parts}, [], ENDLESS_ROWS
     for number, repeat in enumerate(repeats):
         for first in range(0, repeat.length - length + 1, length):
-            own = [
-                (k, of[k].j, at, (number, first))
+            repeat_places = [
+                (k, part_by_piece[k].j, first_index, (number, first))
                 for k, row in zip(repeat.pieces.tolist(), repeat.rows.tolist(), strict=True)
-                if k in of and (at := of[k].whole(row + first, length)) is not None
+                if k in part_by_piece and (first_index := part_by_piece[k].whole(row + first, length)) is not None
             ]
-            if len(own) > 1:
-                found += own
-                apart = min(apart, repeat.apart)
-    return found, apart
+            if len(repeat_places) > 1:
+                places += repeat_places
+                row_gap = min(row_gap, repeat.row_gap)
+    return places, row_gap
 
 
 def _commands(pieces: Sequence[Piece]) -> list[FloatArray]:
-    """What is commanded in the rows of each piece, in steps of EQUAL of the largest command, (rows, any)."""
-    found = []
+    """What is commanded in the rows of each piece, in steps of COMMAND_TOLERANCE of the largest command, (rows,
+    any)."""
+    commands_by_piece = []
     for piece in pieces:
         record, rows = piece.record, slice(piece.first, piece.last + 1)
         channels = record.run.channels if record.run is not None else {}
-        given = next((channels[name] for name in COMMANDS if name in channels), None)
-        if given is None or not np.isfinite(given[piece.first : piece.last]).all():
-            given = record.voltage if record.set_point is None else record.set_point
-        found.append(np.nan_to_num(given[rows]))
-    top = max(float(np.abs(own).max()) for own in found)
-    return [np.round(own / (EQUAL * max(top, TINY))) for own in found]
+        command = next((channels[name] for name in COMMANDS if name in channels), None)
+        if command is None or not np.isfinite(command[piece.first : piece.last]).all():
+            command = record.voltage if record.set_point is None else record.set_point
+        commands_by_piece.append(np.nan_to_num(command[rows]))
+    top = max(float(np.abs(commands).max()) for commands in commands_by_piece)
+    return [np.round(commands / (COMMAND_TOLERANCE * max(top, TINY))) for commands in commands_by_piece]
 
 
 def _holds(piece: Piece, commands: FloatArray) -> tuple[FloatArray, IntArray]:
     """(time since the last change of command [s], 0 where none comes in steps, a number of the command) of each row."""
-    t, at = piece.record.t[piece.first : piece.last + 1], np.arange(len(commands))
+    t, row_numbers = piece.record.t[piece.first : piece.last + 1], np.arange(len(commands))
     changes = command_changes(piece.record.run) if piece.record.run is not None else None
     if changes is None:
         return np.zeros(len(t)), np.zeros(len(t), dtype=int)
-    changed = changes[piece.first : piece.last + 1] | (at == 0)
-    begun = np.maximum.accumulate(np.where(changed, at, 0))
-    _, which = np.unique(commands[begun], axis=0, return_inverse=True)
-    return t - t[begun], which.reshape(-1)
+    change_mask = changes[piece.first : piece.last + 1] | (row_numbers == 0)
+    hold_starts = np.maximum.accumulate(np.where(change_mask, row_numbers, 0))
+    _, hold_numbers = np.unique(commands[hold_starts], axis=0, return_inverse=True)
+    return t - t[hold_starts], hold_numbers.reshape(-1)
 
 
-def _repeats(pieces: Sequence[Piece], commands: Sequence[FloatArray], forgotten: float) -> list[_Set]:
+def _repeats(pieces: Sequence[Piece], commands: Sequence[FloatArray], memory_time: float) -> list[_Set]:
     """Stretches of rows whose commands, and those of the time before them in which a robot forgets, came again.
 
     A row is known by all commands of that time and by the rows since the last change. Commands become random numbers,
     those of a time a sum of such, each times a power of an odd one: two that differ have the same in one of 2^64.
     """
     steps = [np.diff(piece.record.t[piece.first : piece.last + 1]) for piece in pieces]
-    usual = float(np.median(np.concatenate(steps)))
-    if not forgotten / usual < max(map(len, steps)):
+    usual_time = float(np.median(np.concatenate(steps)))
+    if not memory_time / usual_time < max(map(len, steps)):
         return []
-    before = int(np.ceil(forgotten / usual))
+    memory_rows = int(np.ceil(memory_time / usual_time))
     if len({command.shape[1] for command in commands}) > 1:
         return []
-    _, which = np.unique(np.concatenate(commands), axis=0, return_inverse=True)
-    random = np.random.default_rng(0).integers(0, 2**63, size=int(which.max()) + 1, dtype=np.uint64)
-    power = MIX ** np.arange(before + 1, dtype=np.uint64)
+    _, command_numbers = np.unique(np.concatenate(commands), axis=0, return_inverse=True)
+    random = np.random.default_rng(0).integers(0, 2**63, size=int(command_numbers.max()) + 1, dtype=np.uint64)
+    power = MIX ** np.arange(memory_rows + 1, dtype=np.uint64)
     starts = np.cumsum([0, *map(len, commands)])
     keys = np.arange(starts[-1], dtype=np.uint64)  # of a row of which not enough is known: its own
     for step, start, end in zip(steps, starts, starts[1:], strict=False):
-        if end - start <= before:
+        if end - start <= memory_rows:
             continue
-        own = which.reshape(-1)[start:end]
-        changed = np.diff(own, prepend=-1) != 0
-        at = np.arange(end - start)
-        since = at[:-1] - np.maximum.accumulate(np.where(changed, at, 0))[:-1]  # of the command that led to a row
-        past = sliding_window_view(random[own[:-1]], before) @ power[:before]
-        uneven = np.cumsum([0, *(np.abs(step / usual - 1.0) > EVEN)])
-        told = uneven[before:] == uneven[: end - start - before]
-        keys[start + before : end][told] = (past + since[before - 1 :].astype(np.uint64) * power[before])[told]
+        piece_numbers = command_numbers.reshape(-1)[start:end]
+        change_mask = np.diff(piece_numbers, prepend=-1) != 0
+        row_numbers = np.arange(end - start)
+        rows_since_change = (
+            row_numbers[:-1] - np.maximum.accumulate(np.where(change_mask, row_numbers, 0))[:-1]
+        )  # of the command that led to a row
+        past_hash = sliding_window_view(random[piece_numbers[:-1]], memory_rows) @ power[:memory_rows]
+        uneven = np.cumsum([0, *(np.abs(step / usual_time - 1.0) > STEP_TOLERANCE)])
+        same_steps = uneven[memory_rows:] == uneven[: end - start - memory_rows]
+        keys[start + memory_rows : end][same_steps] = (
+            past_hash + rows_since_change[memory_rows - 1 :].astype(np.uint64) * power[memory_rows]
+        )[same_steps]
     return _joined(keys, starts)
 
 
 def _joined(keys: NDArray[np.uint64], starts: IntArray) -> list[_Set]:
     """Rows of one key in stretches whose rows all come again at the same places."""
-    _, which = np.unique(keys, return_inverse=True)
-    order = np.argsort(which, kind="stable")
-    groups = np.split(order, np.flatnonzero(np.diff(which[order])) + 1)
-    found: list[tuple[IntArray, int]] = []
-    for group in sorted((group for group in groups if len(group) > 1), key=lambda each: int(each[0])):
-        if found and len(found[-1][0]) == len(group) and (found[-1][0] + found[-1][1] == group).all():
-            found[-1] = (found[-1][0], found[-1][1] + 1)
+    _, key_numbers = np.unique(keys, return_inverse=True)
+    order = np.argsort(key_numbers, kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(key_numbers[order])) + 1)
+    joined_groups: list[tuple[IntArray, int]] = []
+    for group in sorted((group for group in groups if len(group) > 1), key=lambda joined_group: int(joined_group[0])):
+        if (
+            joined_groups
+            and len(joined_groups[-1][0]) == len(group)
+            and (joined_groups[-1][0] + joined_groups[-1][1] == group).all()
+        ):
+            joined_groups[-1] = (joined_groups[-1][0], joined_groups[-1][1] + 1)
         else:
-            found.append((group, 1))
-    pieces = [np.searchsorted(starts, group, side="right") - 1 for group, _ in found]
+            joined_groups.append((group, 1))
+    pieces = [np.searchsorted(starts, group, side="right") - 1 for group, _ in joined_groups]
     return [
         _Set(piece, group - starts[piece], length, int(np.diff(group).min()))
-        for piece, (group, length) in zip(pieces, found, strict=True)
-        if length >= LEAST
+        for piece, (group, length) in zip(pieces, joined_groups, strict=True)
+        if length >= LEAST_ROWS
     ]

@@ -47,7 +47,7 @@ def paper_pictures(robot: Robot) -> Iterator[Picture]:
     yield draw_robot(robot)
     yield draw_traces(table1_runs(robot))
     points = table_1_points()
-    yield draw_friction({rest: fit_steady_state(robot, points, rest=rest) for rest in TREATMENTS})
+    yield draw_friction({rest: fit_steady_state(robot, points, rest_use=rest) for rest in TREATMENTS})
     yield draw_steps(step_responses(robot))
     yield draw_dead_zone(dead_zone_ramps(robot))
     yield draw_reconciliation(reconciliations(robot))

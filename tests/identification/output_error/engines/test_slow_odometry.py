@@ -121,7 +121,7 @@ def test_guesses_of_an_axis_that_rested_are_not_asked_for(driven, robot):
     still["twist"][:, 1:] = 1e-3 * np.sin(np.arange(len(run)) * 1.7)[:, None] * np.isfinite(still["twist"][:, 1:])
     only_x = Run(run.t, twist_command=still["twist_command"], twist=still["twist"])
     records = read_records([only_x], robot, OutputError())
-    assert motion(records, robot).moved.tolist() == [True, False, False]
+    assert motion(records, robot).moving_axes.tolist() == [True, False, False]
     free = begun("all", [only_x], robot, OutputError(), joint=False)[0].question.free
     assert not [key for key in free if key.startswith("friction.direction.yaw")]
 

@@ -12,7 +12,7 @@ from omnidyn.identification.output_error.engines.speed_loop import LoopEngine
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.prepare import make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
-from omnidyn.identification.output_error.solve.loop import FEW, loop_start, retimed, solve_loop
+from omnidyn.identification.output_error.solve.loop import FEW_ITERATIONS, loop_start, retimed, solve_loop
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solver
 from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
@@ -257,7 +257,7 @@ def test_motors_that_are_wrong_guesses_come_before_latencies(looped):
     asked = OutputError(nuisances=("latency",), free=(RESISTANCE, *friction_keys(looped)))
     problem = make_problem(read_records([log(looped, 3, 300)], start, asked), start, asked)
     solver, progress = Solver(problem, LoopEngine(problem)), FitProgress()
-    all_at_once = solver.minimise(loop_start(problem, 0.0, progress), FEW)
+    all_at_once = solver.minimise(loop_start(problem, 0.0, progress), FEW_ITERATIONS)
     all_at_once = solver.minimise(retimed(solver, all_at_once.state.point, progress))
     assert solve_loop(problem, 0.0, progress).state.objective < all_at_once.state.objective - 10.0
 

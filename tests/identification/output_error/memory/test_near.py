@@ -9,7 +9,7 @@ from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
 from omnidyn.identification.output_error.memory.whitened import near
-from omnidyn.identification.output_error.prepare import FINE, make_problem, read_records
+from omnidyn.identification.output_error.prepare import FINE_TOLERANCE, make_problem, read_records
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.model.first_guess import first_guess, with_gear
 from omnidyn.model.robot import GIVEN
@@ -49,7 +49,7 @@ def apart(ours, theirs):
 
 def test_it_is_exact_at_its_point_and_nearly_so_beside_it(problem):
     """1 % more friction: by a step a row speeds are off by five times as much as put right at the point."""
-    dear, cheap, point = ImplicitEngine(problem, FINE), ImplicitEngine(problem), problem.start()
+    dear, cheap, point = ImplicitEngine(problem, FINE_TOLERANCE), ImplicitEngine(problem), problem.start()
     ours = near(dear, point)
     assert max(apart(ours.residuals(point), dear.residuals(point))) < 1e-9
     more = np.where(["friction" in name for name in problem.names], 1.01, 1.0)

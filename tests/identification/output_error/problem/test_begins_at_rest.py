@@ -23,7 +23,7 @@ def share_at_rest(vx, volts):
         twist = np.random.default_rng(seed).normal(size=(ROWS, 3)) * [NOISE, NOISE, 4.0 * NOISE]
         twist[: len(vx), 0] += vx
         log = record(Run(t=0.01 * np.arange(ROWS), voltage=voltage, twist=twist), AXEBOT)
-        found += not pieces([log], AXEBOT, AUTO, late=False)[0].free[:3].any()
+        found += not pieces([log], AXEBOT, AUTO, has_latency=False)[0].free[:3].any()
     return found / DRAWS
 
 

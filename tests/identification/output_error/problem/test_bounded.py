@@ -62,7 +62,7 @@ def test_what_is_held_is_bounded_by_rows_times_columns_times_what_is_shown(solut
 
 
 def test_long_logs_of_few_channels_stay_within_the_rows(solution):
-    assert sum(p.last - p.first + 1 for p in bounded(solution.solver.problem, most=1000).pieces) <= 1000 < ROWS
+    assert sum(p.last - p.first + 1 for p in bounded(solution.solver.problem, row_limit=1000).pieces) <= 1000 < ROWS
 
 
 def test_intervals_beside_a_bounded_diagnosis_are_those_of_all_rows(case, log, monkeypatch):

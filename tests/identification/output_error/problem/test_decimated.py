@@ -8,7 +8,7 @@ import pytest
 from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.prepare import make_problem, read_records
-from omnidyn.identification.output_error.problem.decimated import KEPT, LONGEST, Decimated
+from omnidyn.identification.output_error.problem.decimated import KEPT_ROWS, LONGEST, Decimated
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.simulate import simulate
 
@@ -40,7 +40,7 @@ def test_as_many_rows_as_the_bench_of_wrong_worlds_has(robot, rate, seconds, log
     problem = problem_of(rate, seconds, robot, logs)
     few = Decimated.of(problem)
     rows = sum(piece.last - piece.first + 1 for piece in few.problem.pieces)
-    assert rows >= 0.99 * KEPT
+    assert rows >= 0.99 * KEPT_ROWS
     assert rows == pytest.approx(rate * seconds * logs / stride, rel=0.01)
     assert stride / rate <= LONGEST
     assert (few.problem is problem) == (stride == 1)

@@ -47,7 +47,7 @@ def test_counts_and_their_tick_are_found(log):
     found = differences([log])
     assert found is not None
     assert found.ticks == pytest.approx(TICK)
-    assert not found.why
+    assert not found.reason
     angle, lost = added_up(log, found)
     assert np.diff(angle, axis=0) == pytest.approx(log.wheel_speed[1:] / RATE)
     assert not lost.any()
@@ -78,7 +78,7 @@ def test_speeds_over_uneven_rows_of_their_own_stamps(log):
     speed = log.wheel_speed * 0.01 / dt[:, None]
     found = differences([Run(np.cumsum(dt), voltage=log.voltage, wheel_speed=speed)])
     assert found is not None
-    assert found.stamped
+    assert found.has_stamps
     assert found.ticks == pytest.approx(TICK)
 
 
@@ -126,7 +126,7 @@ def test_missing_rows_split_the_log(axebot, log):
     speed = log.wheel_speed.copy()
     speed[1000, 2] = np.nan
     run = with_speed(log, speed, kept)
-    read = record(run, axebot, counted=differences([run]))
+    read = record(run, axebot, count_differences=differences([run]))
     assert [first for first, _ in read.pieces] == [0, 700, 999, 1299]
     assert {name for name, _ in read.columns} == {"wheel_angle"}
     assert [each.numbers["rows"] for each in read.notes if each.code == "split_at_missing_counts"] == [3]
@@ -136,7 +136,7 @@ def test_a_wheel_that_is_out_for_long_is_one_loss(axebot, log):
     speed = log.wheel_speed.copy()
     speed[800:1200, 1] = np.nan
     run = with_speed(log, speed)
-    read = record(run, axebot, counted=differences([run]))
+    read = record(run, axebot, count_differences=differences([run]))
     assert read.pieces == ((0, 799), (1199, len(log) - 1))
     assert {name for name, _ in read.columns} == {"wheel_angle"}
     assert [each.numbers["rows"] for each in read.notes if each.code == "split_at_missing_counts"] == [400]
@@ -145,7 +145,7 @@ def test_a_wheel_that_is_out_for_long_is_one_loss(axebot, log):
 def test_too_many_missing_rows_leave_them_as_they_are(axebot, log):
     kept = np.random.default_rng(6).random(len(log)) > 0.1
     run = with_speed(log, log.wheel_speed, kept)
-    read = record(run, axebot, counted=differences([run]))
+    read = record(run, axebot, count_differences=differences([run]))
     assert {name for name, _ in read.columns} == {"wheel_speed"}
     assert [each.numbers["why"].code for each in read.notes if each.code == "counts_as_readings"] == ["counts_missing"]
 

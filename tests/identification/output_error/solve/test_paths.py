@@ -63,7 +63,7 @@ def problem_of(seed, missing=()):
 def test_a_fit_of_counts_from_bad_guesses_finds_what_one_from_the_truth_does(seed):
     """It ended where an axis creeps that should rest, thousands above."""
     problem, true = problem_of(seed)
-    solver = Solver(problem, ImplicitEngine(problem), counted=False)
+    solver = Solver(problem, ImplicitEngine(problem), counts_ticks=False)
     found = solver.state(coarse_point(problem, 0.0, FitProgress()).point)
     assert found.objective < solver.minimise(true).state.objective + 50.0
 

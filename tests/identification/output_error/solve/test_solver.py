@@ -9,7 +9,7 @@ from omnidyn.identification.methods import OutputError
 from omnidyn.identification.output_error.engines.exact import ExactEngine
 from omnidyn.identification.output_error.prepare import make_problem, motion, read_records
 from omnidyn.identification.output_error.problem.record import record
-from omnidyn.identification.output_error.solve.solver import CLOSE, MAX_ITERATIONS, Solver, State
+from omnidyn.identification.output_error.solve.solver import END_PRECISION, MAX_ITERATIONS, Solver, State
 from omnidyn.model import dynamics
 from omnidyn.simulation.simulate import simulate
 from tests.support.axebot_logs import excitation, noisy_draw
@@ -48,13 +48,13 @@ def test_a_fit_derives_the_motors_once(axebot, monkeypatch):
 
 def test_what_an_axis_held_is_asked_only_where_one_stood_still(axebot):
     log = noisy_draw(simulate(axebot, excitation(20.0), 0.01), 0)
-    assert motion([record(log, axebot)], axebot).moved.all()
-    assert not motion([record(log, axebot)], axebot).held.any()
+    assert motion([record(log, axebot)], axebot).moving_axes.all()
+    assert not motion([record(log, axebot)], axebot).held_forces.any()
     assert log.twist is not None
     still = log.replace(twist=log.twist * [1.0, 0.0, 1.0])
     found = motion([record(still, axebot)], axebot)
-    assert found.moved.tolist() == [True, False, True]
-    assert found.held[1] > 1.0
+    assert found.moving_axes.tolist() == [True, False, True]
+    assert found.held_forces[1] > 1.0
 
 
 # ---- steps that creep along a kink ----------------------------------------------------------------------
@@ -64,7 +64,7 @@ class Kink(Solver):
     """A solver on a descent without an end, of which each step lowers F by a number of `drops`."""
 
     def __init__(self, problem, close, drops):
-        super().__init__(problem, ExactEngine(problem), close=close)
+        super().__init__(problem, ExactEngine(problem), precision=close)
         self.drops, self.level = iter(drops), 0.0
 
     def state(self, point, variance=None):
@@ -110,5 +110,5 @@ def test_steps_that_gain_are_no_creep(on_a_kink):
 
 def test_a_fine_fit_may_creep(on_a_kink):
     """Behind a speed loop it creeps for long, and yet finds its way: it ends by the distance alone."""
-    found = on_a_kink(CLOSE, [0.0, *[1e-6] * 80])
+    found = on_a_kink(END_PRECISION, [0.0, *[1e-6] * 80])
     assert (found.iterations, found.converged) == (MAX_ITERATIONS, False)

@@ -33,7 +33,7 @@ def test_a_ridge_is_walked_as_far_as_it_goes(angle, width):
     x, y = levels(walk.edges)
     np.testing.assert_allclose([x.min(), y.min()], [np.cos(angle), np.sin(angle)], rtol=0.02 + 2.0 * width)
     assert min(x.max(), y.max()) > 5.0
-    assert sorted(place.q > 1.0 for place in walk.gone) == [False, True]
+    assert sorted(place.q > 1.0 for place in walk.lost_places) == [False, True]
 
 
 @pytest.mark.parametrize("low", [-0.05, -0.02])
@@ -57,7 +57,7 @@ def test_two_slants_tell_both(width):
     np.testing.assert_allclose([x.max(), y.max()], high, rtol=0.012)
     assert np.all([x.min(), y.min()] <= low)  # it ends outside
     assert np.all([x.max(), y.max()] >= high)
-    assert not walk.gone
+    assert not walk.lost_places
 
 
 def test_fits_are_counted():

@@ -25,14 +25,14 @@ P = TypeVar("P", bound=Fitted)
 class Weighting:
     """variance (columns,) by Problem.columns; nu of Student's t, 0 for Gauss; mode and block as in kernel/march.py.
 
-    counted: whether counts are taken as such, or like any other output.
+    counts_ticks: whether counts are taken as such, or like any other output.
     """
 
     variance: FloatArray
     nu: float = 0.0
     mode: int = 0
     block: int = 1
-    counted: bool = False
+    counts_ticks: bool = False
 
 
 class Engine(Generic[P]):
@@ -42,14 +42,14 @@ class Engine(Generic[P]):
     2. says in attributes what it is: a fit asks these, and never for its name;
     3. gives what only some have (`with_levels`, `drives`, `meets_limit`, `of`) where its attributes promise it.
 
-    exact: takes each row in one step without error, and has `drives`. looped: a speed loop makes its voltages.
+    exact: takes each row in one step without error, and has `drives`. has_loop: a speed loop makes its voltages.
     tol [m/s]: tolerance of its steps, None for one a row. levels: key -> level of breakaway that it holds. members: its
     groups.
     """
 
     problem: P
     exact: bool = False
-    looped: bool = False
+    has_loop: bool = False
     tol: float | None = None
     levels: Mapping[str, float] = MappingProxyType({})
     members: Sequence[Any] = ()
@@ -99,41 +99,41 @@ class Engine(Generic[P]):
         return True
 
 
-def added(piece: Piece, every: tuple[Column, ...], parts: Parts, weighting: Weighting, count: int) -> PieceSums:
-    """The sums of kernel/march.py for a piece of a problem with the columns `every` and `count` parameters.
+def added(piece: Piece, all_columns: tuple[Column, ...], parts: Parts, weighting: Weighting, count: int) -> PieceSums:
+    """The sums of kernel/march.py for a piece of a problem with the columns `all_columns` and `count` parameters.
 
     parts: residuals (C, rows), slopes (C, rows, U) and (U,) the index of each slope among the parameters and states.
     """
-    residual, slopes, at = parts
+    residual, slopes, indices = parts
     columns, width = piece.record.columns, count + N_AXES + len(piece.record.columns)
-    known = np.array([every.index(column) for column in columns])
-    there = np.isfinite(residual) & np.isfinite(slopes).all(axis=2)  # at a kink a slope may not be a number
+    column_indices = np.array([all_columns.index(column) for column in columns])
+    mask = np.isfinite(residual) & np.isfinite(slopes).all(axis=2)  # at a kink a slope may not be a number
     r, j = residual, slopes
-    if not there.all():
-        r, j = np.where(there, residual, np.nan), np.where(there[:, :, None], slopes, 0.0)
-    variance, final = weighting.variance[known], bool(weighting.mode & FINAL)
-    tick = np.array(piece.record.ticks) if weighting.counted and any(piece.record.ticks) else None
-    share = np.ones(len(known)) if tick is None else information(variance, tick)[0]
+    if not mask.all():
+        r, j = np.where(mask, residual, np.nan), np.where(mask[:, :, None], slopes, 0.0)
+    variance, final = weighting.variance[column_indices], bool(weighting.mode & FINAL)
+    tick = np.array(piece.record.ticks) if weighting.counts_ticks and any(piece.record.ticks) else None
+    share = np.ones(len(column_indices)) if tick is None else information(variance, tick)[0]
     pull, square, curvature, rho = row_terms(r, variance, weighting.nu, tick, share, final)
     grad, info = np.zeros((len(r), width)), np.zeros((len(r), width, width))
-    grad[:, at] = np.einsum("ck,cku->cu", pull, j)
-    info[:, at[:, None], at] = row_squares(j, curvature)
+    grad[:, indices] = np.einsum("ck,cku->cu", pull, j)
+    info[:, indices[:, None], indices] = row_squares(j, curvature)
     score, drift = np.zeros((0, width)), np.zeros((0, len(r)))
     if final:
         starts = np.arange(0, r.shape[1], weighting.block)
         score = np.zeros((len(starts), width))
-        score[:, at] = np.add.reduceat(np.einsum("ck,cku->ku", pull / variance[:, None], j), starts, axis=0)
+        score[:, indices] = np.add.reduceat(np.einsum("ck,cku->ku", pull / variance[:, None], j), starts, axis=0)
         drift = np.add.reduceat(pull.T, starts, axis=0)
     waves = None
     if weighting.mode & WAVES:
         waves = np.zeros((len(r), HARMONICS, 2, width))
         if tick is not None:
-            shown = piece.record.outputs[piece.first : piece.last + 1].T - r
-            waves[..., at] = row_waves(j, shown / np.where(tick > 0.0, tick, np.nan)[:, None], HARMONICS)
+            model_outputs = piece.record.outputs[piece.first : piece.last + 1].T - r
+            waves[..., indices] = row_waves(j, model_outputs / np.where(tick > 0.0, tick, np.nan)[:, None], HARMONICS)
     lag = (pull[:, 1:] * pull[:, :-1]).sum(axis=1)
     return PieceSums(
-        known,
-        there.sum(axis=1).astype(float),
+        column_indices,
+        mask.sum(axis=1).astype(float),
         square.sum(axis=1),
         rho.sum(axis=1),
         lag,
@@ -147,20 +147,25 @@ def added(piece: Piece, every: tuple[Column, ...], parts: Parts, weighting: Weig
 
 # The driver of a problem: what is free of it and what is not
 
-LATE = "latency."
+LATENCY_PREFIX = "latency."
 
 
 def driver_of(problem: Problem, values: FloatArray) -> tuple[Driver, list[int]]:
     """(the driver at these values, index of each of its numbers among the parameters or -1)."""
-    where = [problem.where(name) for name in Driver._fields]
-    plain = Driver(dead_band=problem.robot.drive.dead_band)
-    return Driver(*(float(values[k]) if k >= 0 else own for k, own in zip(where, plain, strict=True))), where
+    indices = [problem.where(name) for name in Driver._fields]
+    default_driver = Driver(dead_band=problem.robot.drive.dead_band)
+    return Driver(
+        *(
+            float(values[k]) if k >= 0 else default_value
+            for k, default_value in zip(indices, default_driver, strict=True)
+        )
+    ), indices
 
 
 def late_by(problem: Problem, values: FloatArray, columns: Sequence[Column]) -> tuple[list[float], list[int]]:
     """(by how much each column is late [s], index of that among the parameters or -1: as late as the robot's drive)."""
-    where = [problem.where(LATE + name) for name, _ in columns]
-    return [float(values[k]) if k >= 0 else problem.robot.drive.latency for k in where], where
+    indices = [problem.where(LATENCY_PREFIX + name) for name, _ in columns]
+    return [float(values[k]) if k >= 0 else problem.robot.drive.latency for k in indices], indices
 
 
 # What rows that were simulated before add up to; apart from the engines, so that few edits compile it anew
@@ -170,39 +175,39 @@ def late_by(problem: Problem, values: FloatArray, columns: Sequence[Column]) -> 
 def row_terms(residual, variance, nu, tick, share, final):
     """(w r, w r^2, curvature, rho) of every residual (C, rows), see kernel/march.py; 0 where it is NaN."""
     columns, rows = residual.shape
-    out = np.zeros((4, columns, rows))
+    terms = np.zeros((4, columns, rows))
     for c in range(columns):
         for k in range(rows):
             if residual[c, k] == residual[c, k]:
                 pull, square, curvature, rho = terms_of(residual[c, k], variance, nu, c, tick, share, final)
-                out[0, c, k], out[1, c, k], out[2, c, k], out[3, c, k] = pull, square, curvature, rho
-    return out
+                terms[0, c, k], terms[1, c, k], terms[2, c, k], terms[3, c, k] = pull, square, curvature, rho
+    return terms
 
 
 @kernel
 def row_waves(slopes, turns, count):
     """Sum over the rows of (cos, sin)(2 pi m turns) J, m = 1 to `count`; turns (C, rows), NaN where there is none."""
     columns, rows, width = slopes.shape
-    out = np.zeros((columns, count, 2, width))
+    sums = np.zeros((columns, count, 2, width))
     for c in range(columns):
         for k in range(rows):
             if turns[c, k] == turns[c, k]:
-                add_waves(out[c], slopes[c, k], turns[c, k])
-    return out
+                add_waves(sums[c], slopes[c, k], turns[c, k])
+    return sums
 
 
 @kernel
 def row_squares(slopes, weight):
     """Sum over the rows of weight J J'. Shapes (C, rows, U), (C, rows) -> (C, U, U)."""
     columns, rows, count = slopes.shape
-    out = np.zeros((columns, count, count))
+    sums = np.zeros((columns, count, count))
     for c in range(columns):
         for k in range(rows):
             for a in range(count):
-                pulled = weight[c, k] * slopes[c, k, a]
+                weighted_slope = weight[c, k] * slopes[c, k, a]
                 for b in range(a + 1):
-                    out[c, a, b] += pulled * slopes[c, k, b]
+                    sums[c, a, b] += weighted_slope * slopes[c, k, b]
         for a in range(count):
             for b in range(a):
-                out[c, b, a] = out[c, a, b]
-    return out
+                sums[c, b, a] = sums[c, a, b]
+    return sums

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification.output_error.engines.engine import LATE as LATE
 from omnidyn.identification.output_error.engines.engine import Engine, Weighting, driver_of, late_by
 from omnidyn.identification.output_error.kernel.counts import HARMONICS, information
 from omnidyn.identification.output_error.kernel.march import (
@@ -23,12 +22,12 @@ from omnidyn.identification.output_error.kernel.march import (
     march,
 )
 from omnidyn.identification.output_error.kernel.march_axis import (
-    BY,
     GRAD,
     LAG,
     LOSS,
     NUMBER,
     SIZE,
+    SLOPE_COUNT,
     SQUARE,
     march_axis,
     spread,
@@ -102,37 +101,39 @@ class ExactEngine(Engine[Problem]):
 
     def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
         """What the march over every piece adds up."""
-        now, slopes = self.mapping.at(point.values[: self.problem.robot_count])
+        primitives_now, slopes = self.mapping.at(point.values[: self.problem.robot_count])
         if self._axes_only:
             return [
-                self._axes(piece, state, now, slopes, weighting)
+                self._axes(piece, state, primitives_now, slopes, weighting)
                 for piece, state in zip(self.problem.pieces, point.states, strict=True)
             ]
         return [
-            self._piece(piece, state, point.values, now, slopes, weighting)[0]
+            self._piece(piece, state, point.values, primitives_now, slopes, weighting)[0]
             for piece, state in zip(self.problem.pieces, point.states, strict=True)
         ]
 
     def outputs(self, point: Point) -> list[tuple[FloatArray, FloatArray]]:
         """(outputs, slopes) of every piece, rows of its record, NaN outside: (rows, C) and (rows, C, P + 3 + C)."""
-        now, slopes = self.mapping.at(point.values[: self.problem.robot_count])
-        plain = Weighting(np.ones(len(self.problem.columns)), mode=KEEP)
+        primitives_now, slopes = self.mapping.at(point.values[: self.problem.robot_count])
+        keep_weighting = Weighting(np.ones(len(self.problem.columns)), mode=KEEP)
         return [
-            self._piece(piece, state, point.values, now, slopes, plain)[1]
+            self._piece(piece, state, point.values, primitives_now, slopes, keep_weighting)[1]
             for piece, state in zip(self.problem.pieces, point.states, strict=True)
         ]
 
     def residuals(self, point: Point) -> list[Parts]:
         """(residuals (C, rows), slopes (C, rows, U), at (U,)) of the rows of every piece; see engines/engine.py."""
-        partses, count = [], len(self.problem.parameters)
+        parts_by_piece, count = [], len(self.problem.parameters)
         for piece, (value, slopes) in zip(self.problem.pieces, self.outputs(point), strict=True):
-            rows, used = slice(piece.first, piece.last + 1), used_by(piece, count)
-            by = np.moveaxis(slopes[rows], 1, 0)[:, :, used]
-            partses.append(((piece.record.outputs[rows] - value[rows]).T, np.nan_to_num(by), used))
-        return partses
+            rows, used_indices = slice(piece.first, piece.last + 1), used_by(piece, count)
+            piece_slopes = np.moveaxis(slopes[rows], 1, 0)[:, :, used_indices]
+            parts_by_piece.append(
+                ((piece.record.outputs[rows] - value[rows]).T, np.nan_to_num(piece_slopes), used_indices)
+            )
+        return parts_by_piece
 
     def _axes(
-        self, piece: Piece, state: FloatArray, now: Primitives, by: Primitives, weighting: Weighting
+        self, piece: Piece, state: FloatArray, values_now: Primitives, slopes_now: Primitives, weighting: Weighting
     ) -> PieceSums:
         """The sums of a piece, axis by axis."""
         record, count = piece.record, len(self.problem.parameters)
@@ -140,7 +141,7 @@ class ExactEngine(Engine[Problem]):
         rows, grad, info = np.zeros((N_AXES, SIZE)), np.zeros((N_AXES, width)), np.zeros((N_AXES, width, width))
         blocks = _blocks(piece, weighting)
         score, drift = np.zeros((blocks, width)), np.zeros((blocks, N_AXES))
-        scores = np.zeros((N_AXES, blocks, BY + 1))
+        scores = np.zeros((N_AXES, blocks, SLOPE_COUNT + 1))
         for axis in range(N_AXES):
             march_axis(
                 record.t,
@@ -149,10 +150,10 @@ class ExactEngine(Engine[Problem]):
                 axis,
                 piece.first,
                 piece.last,
-                now.drive[axis],
-                now.rate[axis],
-                now.coulomb[axis],
-                now.hold[axis],
+                values_now.drive[axis],
+                values_now.rate[axis],
+                values_now.coulomb[axis],
+                values_now.hold[axis],
                 state[axis],
                 weighting.variance[axis],
                 weighting.nu,
@@ -161,92 +162,119 @@ class ExactEngine(Engine[Problem]):
                 rows[axis],
                 scores[axis],
             )
-            slopes = np.zeros((BY, width))
-            slopes[0, :count], slopes[1, :count] = by.rate[axis], by.coulomb[axis]
+            slopes = np.zeros((SLOPE_COUNT, width))
+            slopes[0, :count], slopes[1, :count] = slopes_now.rate[axis], slopes_now.coulomb[axis]
             slopes[2, count + axis] = piece.free[axis]
-            grad[axis], info[axis] = rows[axis, GRAD : GRAD + BY] @ slopes, spread(rows[axis], slopes)
+            grad[axis], info[axis] = rows[axis, GRAD : GRAD + SLOPE_COUNT] @ slopes, spread(rows[axis], slopes)
             if blocks:
-                score += scores[axis, :, :BY] @ slopes
-                drift[:, axis] = scores[axis, :, BY]
-        number, square, loss, lag = (rows[:, what] for what in (NUMBER, SQUARE, LOSS, LAG))
+                score += scores[axis, :, :SLOPE_COUNT] @ slopes
+                drift[:, axis] = scores[axis, :, SLOPE_COUNT]
+        number, square, loss, lag = (rows[:, index] for index in (NUMBER, SQUARE, LOSS, LAG))
         return PieceSums(np.arange(N_AXES), number, square, loss, lag, grad, info, score, drift)
 
     def _piece(
-        self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, weighting: Weighting
+        self,
+        piece: Piece,
+        state: FloatArray,
+        values: FloatArray,
+        values_now: Primitives,
+        slopes_now: Primitives,
+        weighting: Weighting,
     ) -> tuple[PieceSums, tuple[FloatArray, FloatArray]]:
-        count, used = len(self.problem.parameters), used_by(piece, len(self.problem.parameters))
-        physics, slopes, groups = self._numbers(piece, state, values, now, by, padded(used))
-        room = self._room(piece, state, values, now, by, padded(used))
+        count, used_indices = len(self.problem.parameters), used_by(piece, len(self.problem.parameters))
+        physics, slopes, groups = self._numbers(piece, state, values, values_now, slopes_now, padded(used_indices))
+        room = self._room(piece, state, values, values_now, slopes_now, padded(used_indices))
         return march_piece(piece, state, self.problem.columns, count, (physics, slopes, groups), weighting, room)
 
     def _room(
-        self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, space: int
+        self,
+        piece: Piece,
+        state: FloatArray,
+        values: FloatArray,
+        values_now: Primitives,
+        slopes_now: Primitives,
+        space: int,
     ) -> Room | None:
         """The force in the room, where one is free."""
         problem, columns = self.problem, piece.record.columns
-        where = np.array([problem.where(name) for name in TILT])
-        if (where < 0).all():
+        tilt_indices = np.array([problem.where(name) for name in TILT])
+        if (tilt_indices < 0).all():
             return None
-        facing, at = facing_at_start(piece, problem.robot), -1
+        start_heading, heading_index = facing_at_start(piece, problem.robot), -1
         if HEADING in columns:
-            own = N_AXES + columns.index(HEADING)
-            facing = float(state[own])
-            at = len(problem.parameters) + int(np.cumsum(piece.free)[own]) - 1 if piece.free[own] else -1
+            heading_state = N_AXES + columns.index(HEADING)
+            start_heading = float(state[heading_state])
+            heading_index = (
+                len(problem.parameters) + int(np.cumsum(piece.free)[heading_state]) - 1
+                if piece.free[heading_state]
+                else -1
+            )
         slopes = np.zeros((N_AXES, space))
-        slopes[:, : problem.robot_count] = by.per_force
-        return Room(self._forces(TILT, values), now.per_force, slopes, facing, where, at)
+        slopes[:, : problem.robot_count] = slopes_now.per_force
+        return Room(
+            self._forces(TILT, values), values_now.per_force, slopes, start_heading, tilt_indices, heading_index
+        )
 
     def _numbers(
-        self, piece: Piece, state: FloatArray, values: FloatArray, now: Primitives, by: Primitives, room: int
+        self,
+        piece: Piece,
+        state: FloatArray,
+        values: FloatArray,
+        values_now: Primitives,
+        slopes_now: Primitives,
+        room: int,
     ) -> tuple[Physics, PhysicsSlopes, IntArray]:
         """Physics and slopes of the outputs of one piece."""
         problem, columns = self.problem, piece.record.columns
         count, robot_count, width = len(problem.parameters), problem.robot_count, len(columns)
 
         def wide(slope: FloatArray) -> FloatArray:
-            out = np.zeros((*slope.shape[:-1], room))
-            out[..., :robot_count] = slope
-            return out
+            padded_slope = np.zeros((*slope.shape[:-1], room))
+            padded_slope[..., :robot_count] = slope
+            return padded_slope
 
-        facing = state[N_AXES + columns.index(HEADING)] if HEADING in columns else 0.0
-        maps, slopes = _maps(columns, now, facing), _maps(columns, by, facing, (robot_count,))
-        seconds, late = late_by(problem, values, columns)
-        (driver, at_driver), force = driver_of(problem, values), self._forces(PUSH, values)
-        turned = any(problem.where(name) >= 0 for name in TILT)
+        start_heading = state[N_AXES + columns.index(HEADING)] if HEADING in columns else 0.0
+        maps, slopes = (
+            _maps(columns, values_now, start_heading),
+            _maps(columns, slopes_now, start_heading, (robot_count,)),
+        )
+        seconds, latency_indices = late_by(problem, values, columns)
+        (driver, driver_indices), force = driver_of(problem, values), self._forces(PUSH, values)
+        has_tilt = any(problem.where(name) >= 0 for name in TILT)
         physics = Physics(
-            np.stack([now.rate, now.coulomb, now.hold]),
-            now.drive,
-            now.per_force * force,
+            np.stack([values_now.rate, values_now.coulomb, values_now.hold]),
+            values_now.drive,
+            values_now.per_force * force,
             maps[0],
             maps[1],
             maps[2],
             _wheel_of(columns),
             np.array(seconds),
             driver,
-            bool(maps[1].any()) or turned,
+            bool(maps[1].any()) or has_tilt,
         )
-        at = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)
-        push, travel = wide(by.per_force * force[:, None]), wide(slopes[1])
+        free_indices = np.where(piece.free, count + np.cumsum(piece.free) - 1, -1)
+        push, travel = wide(slopes_now.per_force * force[:, None]), wide(slopes[1])
         for axis, name in enumerate(PUSH):
             if (k := problem.where(name)) >= 0:
-                push[axis, k] = now.per_force[axis]
+                push[axis, k] = values_now.per_force[axis]
         for c, (name, i) in enumerate(columns):
             if name == POSITION:
-                travel[c, N_AXES:, at[N_AXES + columns.index(HEADING)]] = turned_by(facing)[i]
+                travel[c, N_AXES:, free_indices[N_AXES + columns.index(HEADING)]] = turned_by(start_heading)[i]
         varies = np.array([bool(travel[c].any()) for c in range(width)])
         derivatives = PhysicsSlopes(
-            wide(np.stack([by.rate, by.coulomb])),
-            wide(by.drive),
+            wide(np.stack([slopes_now.rate, slopes_now.coulomb])),
+            wide(slopes_now.drive),
             push,
             wide(slopes[0]),
             travel,
             wide(slopes[2]),
             not self.mapping.linear,
             varies,
-            np.array(late),
-            np.array(at_driver),
-            at[:N_AXES],
-            at[N_AXES:],
+            np.array(latency_indices),
+            np.array(driver_indices),
+            free_indices[:N_AXES],
+            free_indices[N_AXES:],
         )
         starts = [c for c in range(width) if c == 0 or columns[c][0] != columns[c - 1][0]]
         return physics, derivatives, np.array([*starts, width])
@@ -257,33 +285,39 @@ def used_by(piece: Piece, count: int) -> IntArray:
     return np.concatenate([np.arange(count), count + np.flatnonzero(piece.free)])
 
 
-def padded(used: IntArray) -> int:
+def padded(used_indices: IntArray) -> int:
     """Entries of a row of slopes."""
-    return -(-len(used) // VECTOR) * VECTOR
+    return -(-len(used_indices) // VECTOR) * VECTOR
 
 
 def march_piece(
     piece: Piece,
     state: FloatArray,
-    every: Sequence[Column],
+    all_columns: Sequence[Column],
     count: int,
     numbers: tuple[Physics, PhysicsSlopes, IntArray],
     weighting: Weighting,
     room: Room | None = None,
 ) -> tuple[PieceSums, tuple[FloatArray, FloatArray]]:
-    """The sums of a piece, and its (outputs, slopes) where the weighting keeps them. every: the columns of the problem.
+    """The sums of a piece, and its (outputs, slopes) where the weighting keeps them. all_columns: the columns of the
+    problem.
 
     count: of parameters. numbers: physics, their slopes (rows of `padded`), and the first column of each group, and C.
     """
-    columns, used, (physics, slopes, groups) = piece.record.columns, used_by(piece, count), numbers
-    known, total = np.array([every.index(column) for column in columns]), count + N_AXES + len(columns)
-    counted = weighting.counted and any(piece.record.ticks)
-    tick = np.array(piece.record.ticks) if counted else None
-    share = np.ones(len(known)) if tick is None else information(weighting.variance[known], tick)[0]
-    loss = Loss(weighting.variance[known], weighting.nu, weighting.block, weighting.mode, share)
+    columns, used_indices, (physics, slopes, groups) = piece.record.columns, used_by(piece, count), numbers
+    column_indices, total = np.array([all_columns.index(column) for column in columns]), count + N_AXES + len(columns)
+    counts_ticks = weighting.counts_ticks and any(piece.record.ticks)
+    tick = np.array(piece.record.ticks) if counts_ticks else None
+    share = np.ones(len(column_indices)) if tick is None else information(weighting.variance[column_indices], tick)[0]
+    loss = Loss(weighting.variance[column_indices], weighting.nu, weighting.block, weighting.mode, share)
     moves = any(name == POSITION for name, _ in columns)
     sums = _empty(
-        len(columns), slopes.law.shape[2], len(used), len(piece.record.t), weighting.mode, _blocks(piece, weighting)
+        len(columns),
+        slopes.law.shape[2],
+        len(used_indices),
+        len(piece.record.t),
+        weighting.mode,
+        _blocks(piece, weighting),
     )
     march(
         piece.record.t,
@@ -306,47 +340,51 @@ def march_piece(
         np.zeros((3, 3)) if moves else None,
         room,
     )
-    grad, score = _at(used, sums.grad, total), _at(used, sums.score, total)
+    grad, score = _at(used_indices, sums.grad, total), _at(used_indices, sums.score, total)
     info = np.zeros((len(columns), total, total))
-    info[:, used[:, None], used] = sums.info[:, : len(used), : len(used)]
-    waves = _at(used, sums.waves, total) if weighting.mode & WAVES else None
-    tight = PieceSums(known, sums.number, sums.square, sums.loss, sums.lag, grad, info, score, sums.drift, waves)
-    return tight, (sums.predicted, _at(used, sums.slopes, total))
+    info[:, used_indices[:, None], used_indices] = sums.info[:, : len(used_indices), : len(used_indices)]
+    waves = _at(used_indices, sums.waves, total) if weighting.mode & WAVES else None
+    piece_sums = PieceSums(
+        column_indices, sums.number, sums.square, sums.loss, sums.lag, grad, info, score, sums.drift, waves
+    )
+    return piece_sums, (sums.predicted, _at(used_indices, sums.slopes, total))
 
 
-def _maps(columns: Sequence[Column], now: Primitives, facing: float, more: tuple[int, ...] = ()) -> list[FloatArray]:
-    """(M, Q, E) of the outputs, or their derivatives where `more` is the shape of the parameters.
+def _maps(
+    columns: Sequence[Column], values_now: Primitives, start_heading: float, extra_shape: tuple[int, ...] = ()
+) -> list[FloatArray]:
+    """(M, Q, E) of the outputs, or their derivatives where `extra_shape` is the shape of the parameters.
 
-    facing: heading at the start of the piece [rad].
+    start_heading: heading at the start of the piece [rad].
     """
-    speed, travel = np.zeros((len(columns), N_AXES, *more)), np.zeros((len(columns), PATH, *more))
-    volts = np.zeros((len(columns), *more))
+    speed, travel = np.zeros((len(columns), N_AXES, *extra_shape)), np.zeros((len(columns), PATH, *extra_shape))
+    volts = np.zeros((len(columns), *extra_shape))
     for c, (name, i) in enumerate(columns):
         if name == "wheel_speed":
-            speed[c] = now.wheels[i]
+            speed[c] = values_now.wheels[i]
         elif name == "wheel_angle":
-            travel[c, :N_AXES] = now.wheels[i]
+            travel[c, :N_AXES] = values_now.wheels[i]
         elif name == "current":
-            speed[c], volts[c] = now.braking[i], now.per_volt[i]
-        elif more:  # the twist and the pose themselves
+            speed[c], volts[c] = values_now.braking[i], values_now.per_volt[i]
+        elif extra_shape:  # the twist and the pose themselves
             continue
         elif name == POSITION:
-            travel[c, N_AXES:] = body_to_world(facing)[i, : PATH - N_AXES]
+            travel[c, N_AXES:] = body_to_world(start_heading)[i, : PATH - N_AXES]
         else:
             (speed if name == "twist" else travel)[c, i if name == "twist" else 2] = 1.0
     return [speed, travel, volts]
 
 
-def turned_by(facing: float) -> FloatArray:
-    """d/d facing of what turns the displacement into the world: a quarter of a turn further. Shape (2, 2)."""
-    return body_to_world(facing + 0.5 * np.pi)[:2, :2]
+def turned_by(start_heading: float) -> FloatArray:
+    """d/d start_heading of what turns the displacement into the world: a quarter of a turn further. Shape (2, 2)."""
+    return body_to_world(start_heading + 0.5 * np.pi)[:2, :2]
 
 
-def _at(used: IntArray, values: FloatArray, total: int) -> FloatArray:
+def _at(used_indices: IntArray, values: FloatArray, total: int) -> FloatArray:
     """Values of the kernel's parameters among all, 0 for the rest. Shape (*batch, total)."""
-    wide = np.zeros((*values.shape[:-1], total))
-    wide[..., used] = values[..., : len(used)]
-    return wide
+    all_values = np.zeros((*values.shape[:-1], total))
+    all_values[..., used_indices] = values[..., : len(used_indices)]
+    return all_values
 
 
 def _wheel_of(columns: Sequence[Column]) -> IntArray:
@@ -358,18 +396,18 @@ def _blocks(piece: Piece, weighting: Weighting) -> int:
     return -(-(piece.last - piece.first + 1) // weighting.block) if weighting.mode & FINAL else 0
 
 
-def _empty(columns: int, padded: int, total: int, rows: int, mode: int, blocks: int) -> Sums:
-    kept = (rows, columns) if mode & KEEP else (0, columns)
+def _empty(columns: int, padded_size: int, total: int, rows: int, mode: int, blocks: int) -> Sums:
+    kept_shape = (rows, columns) if mode & KEEP else (0, columns)
     return Sums(
         np.zeros(columns),
         np.zeros(columns),
         np.zeros(columns),
         np.zeros(columns),
-        np.zeros((columns, padded)),
-        np.zeros((columns, padded, padded)),
-        np.zeros((blocks, padded)),
+        np.zeros((columns, padded_size)),
+        np.zeros((columns, padded_size, padded_size)),
+        np.zeros((blocks, padded_size)),
         np.zeros((blocks, columns)),
-        np.full(kept, np.nan),
-        np.full((*kept, total), np.nan),
-        np.zeros((columns, HARMONICS if mode & WAVES else 0, 2, padded)),
+        np.full(kept_shape, np.nan),
+        np.full((*kept_shape, total), np.nan),
+        np.zeros((columns, HARMONICS if mode & WAVES else 0, 2, padded_size)),
     )

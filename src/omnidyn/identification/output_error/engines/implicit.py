@@ -17,8 +17,8 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.parallel import side_by_side
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.engine import Engine, driver_of, late_by
-from omnidyn.identification.output_error.engines.exact import HEADING, LATE, POSITION, PUSH, TILT
+from omnidyn.identification.output_error.engines.engine import LATENCY_PREFIX, Engine, driver_of, late_by
+from omnidyn.identification.output_error.engines.exact import HEADING, POSITION, PUSH, TILT
 from omnidyn.identification.output_error.problem.heading import headings, in_the_body
 from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
@@ -31,7 +31,7 @@ from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, Vo
 from omnidyn.simulation.sensitivity.sample import PATH, PLACE, TURN
 from omnidyn.simulation.sensitivity.slipping import slipping_samples
 
-FINER = 1e-6  # [m/s] where a path is fitted: what a speed is off by adds up, to a tick of an encoder in 10 s
+PATH_TOLERANCE = 1e-6  # [m/s] where a path is fitted: what a speed is off by adds up, to a tick of an encoder in 10 s
 STEPS = 2  # a row, of derivatives at the end of a fit; it begins with one
 LEAST_TOL = 1e-5  # [m/s] of the run itself
 Shown = tuple[FloatArray, FloatArray, FloatArray]  # value (rows, m), its time derivative (rows, m), (rows, K, m)
@@ -50,13 +50,13 @@ class LastPoints:
     def at(self, point: Point, find: Callable[[Point], list[Parts]]) -> list[Parts]:
         """What `find` says at a point, found anew unless it is one of the last."""
         key = (point.values.tobytes(), *(state.tobytes() for state in point.states))
-        partses = self._found.get(key) or find(point)
+        parts_by_piece = self._found.get(key) or find(point)
         with self._changing:
             self._found.pop(key, None)
             while len(self._found) >= self.KEPT:
                 del self._found[next(iter(self._found))]
-            self._found[key] = partses
-        return partses
+            self._found[key] = parts_by_piece
+        return parts_by_piece
 
 
 class ImplicitEngine(Engine[Problem]):
@@ -73,18 +73,18 @@ class ImplicitEngine(Engine[Problem]):
         """The engine of wheels that roll, or of wheels that may slip. tol [m/s]: finer where a path is fitted."""
         travels = any(name in TRAVELS for name, _ in problem.columns)
         kind = ImplicitEngine if problem.robot.wheels.traction_mu is None else SlipEngine
-        return kind(problem, tol if tol is None or not travels else min(tol, FINER))
+        return kind(problem, tol if tol is None or not travels else min(tol, PATH_TOLERANCE))
 
     def __init__(self, problem: Problem, tol: float | None = None):
         self.problem, self.tol = problem, tol
         nuisances = [p.name for p in problem.parameters[problem.robot_count :]]
-        known = (*Driver._fields, *((*TILT, *PUSH) if self.pushes else ()))
-        other = [name for name in nuisances if not name.startswith(LATE) and name not in known]
-        if other:
+        known_names = (*Driver._fields, *((*TILT, *PUSH) if self.pushes else ()))
+        other_names = [name for name in nuisances if not name.startswith(LATENCY_PREFIX) and name not in known_names]
+        if other_names:
             raise UnsupportedError(
                 "this robot is fitted by an engine which does not know all that is asked for",
-                got=", ".join(other),
-                expected=f"nuisances: latency, {', '.join(known)}",
+                got=", ".join(other_names),
+                expected=f"nuisances: latency, {', '.join(known_names)}",
                 remedy="leave it out of the nuisances",
                 where=problem.robot.name,
             )
@@ -110,19 +110,19 @@ class ImplicitEngine(Engine[Problem]):
     def _simulated(self, point: Point) -> list[Parts]:
         robot, values = holding(self.problem.robot_at(point.values), self.levels), point.values
         scales = [abs(float(value)) or 1.0 for value in values]
-        moved = [
+        moved_robots = [
             tuple(holding(p.on(robot, float(value) + side * EPS * scale), self.levels) for side in (1.0, -1.0))
             for p, value, scale in zip(self.problem.robot_parameters, values, scales, strict=False)
         ]
         return side_by_side(
-            lambda own: self._piece(robot, moved, scales, own[0], own[1], values),
+            lambda piece_job: self._piece(robot, moved_robots, scales, piece_job[0], piece_job[1], values),
             zip(self.problem.pieces, point.states, strict=True),
         )
 
     def _piece(
         self,
         robot: Robot,
-        moved: list[tuple[Robot, ...]],
+        moved_robots: list[tuple[Robot, ...]],
         scales: list[float],
         piece: Piece,
         state: FloatArray,
@@ -131,128 +131,149 @@ class ImplicitEngine(Engine[Problem]):
         """(residuals (C, rows), slopes (C, rows, U), index of each of the U among the P parameters and the states)."""
         record, count = piece.record, len(self.problem.parameters)
         t, measured = record.t[piece.first : piece.last + 1], record.outputs[piece.first : piece.last + 1].T
-        late, where = late_by(self.problem, values, record.columns)
-        distinct = sorted(set(late))
-        seen, at, factors = self._run(robot, moved, scales, piece, state, values, distinct)
+        latencies, latency_indices = late_by(self.problem, values, record.columns)
+        distinct = sorted(set(latencies))
+        samples, slope_indices, factors = self._run(robot, moved_robots, scales, piece, state, values, distinct)
         residual = np.empty(measured.shape)
-        keys = len(at)
+        keys = len(slope_indices)
         offsets = count + N_AXES + np.flatnonzero(piece.free[N_AXES:])
-        at += [*dict.fromkeys(k for k in where if k >= 0), *offsets]
-        slopes = np.zeros((*measured.shape, len(at)))
+        slope_indices += [*dict.fromkeys(k for k in latency_indices if k >= 0), *offsets]
+        slopes = np.zeros((*measured.shape, len(slope_indices)))
         faces = N_AXES + record.columns.index(HEADING) if HEADING in record.columns else -1
-        facing = float(state[faces]) if faces >= 0 else 0.0
-        shown: dict[tuple[str, float], Shown] = {}
+        start_heading = float(state[faces]) if faces >= 0 else 0.0
+        values_by_channel: dict[tuple[str, float], Shown] = {}
         for c, (name, i) in enumerate(record.columns):
-            key, number = (name, late[c]), distinct.index(late[c])
-            if key not in shown:
-                shown[key] = self._shown(seen, number, name, facing)
-            value, pace, by = shown[key]
+            key, number = (name, latencies[c]), distinct.index(latencies[c])
+            if key not in values_by_channel:
+                values_by_channel[key] = self._shown(samples, number, name, start_heading)
+            value, pace, channel_slopes = values_by_channel[key]
             residual[c] = measured[c] - value[:, i] - state[N_AXES + c]
             residual[c][t - t[0] < piece.margin[c]] = np.nan
-            np.multiply(by[:, :, i], factors, out=slopes[c, :, :keys])
-            if where[c] >= 0:
-                slopes[c, :, at.index(where[c])] = -pace[:, i]
+            np.multiply(channel_slopes[:, :, i], factors, out=slopes[c, :, :keys])
+            if latency_indices[c] >= 0:
+                slopes[c, :, slope_indices.index(latency_indices[c])] = -pace[:, i]
             if piece.at_rest and name != "current":  # before its first row it was at rest, too
-                before = t - t[0] < late[c]
-                residual[c][before], slopes[c, before] = measured[c][before] - state[N_AXES + c], 0.0
+                rows_before_start = t - t[0] < latencies[c]
+                residual[c][rows_before_start], slopes[c, rows_before_start] = (
+                    measured[c][rows_before_start] - state[N_AXES + c],
+                    0.0,
+                )
             if piece.free[N_AXES + c]:
-                slopes[c, :, at.index(count + N_AXES + c)] = 1.0
+                slopes[c, :, slope_indices.index(count + N_AXES + c)] = 1.0
             if name == POSITION and piece.free[faces]:  # a quarter of a turn further is d/d facing
-                slopes[c, :, at.index(count + faces)] = seen[number].position(facing + 0.5 * np.pi)[0][:, i]
-        return residual, slopes, np.array(at)
+                slopes[c, :, slope_indices.index(count + faces)] = samples[number].position(
+                    start_heading + 0.5 * np.pi
+                )[0][:, i]
+        return residual, slopes, np.array(slope_indices)
 
     def _run(
         self,
         robot: Robot,
-        moved: list[tuple[Robot, ...]],
+        moved_robots: list[tuple[Robot, ...]],
         scales: list[float],
         piece: Piece,
         state: FloatArray,
         values: FloatArray,
-        late: list[float],
+        latencies: list[float],
     ) -> tuple[list[LateSample], list[int], FloatArray]:
         """(a look at the run for every latency, index of each direction among the slopes, their factors)."""
         t = piece.record.t[piece.first : piece.last + 1]
-        voltage, directions, at, factors = self._directions(robot, moved, scales, piece, values)
-        push, more, where = self._forces(robot, moved, piece, values, directions)
+        voltage, directions, slope_indices, factors = self._directions(robot, moved_robots, scales, piece, values)
+        push, force_directions, force_indices = self._forces(robot, moved_robots, piece, values, directions)
         program, travel = VoltageProgram(t, voltage, state[:N_AXES], push), travel_of(piece.record.columns)
-        factors = np.concatenate([factors, np.ones(len(where))])
-        return self._sampled(robot, program, more, late, travel), [*at, *where], factors
+        factors = np.concatenate([factors, np.ones(len(force_indices))])
+        return (
+            self._sampled(robot, program, force_directions, latencies, travel),
+            [*slope_indices, *force_indices],
+            factors,
+        )
 
     def _forces(
         self,
         robot: Robot,
-        moved: list[tuple[Robot, ...]],
+        moved_robots: list[tuple[Robot, ...]],
         piece: Piece,
         values: FloatArray,
         directions: Sequence[Direction],
     ) -> tuple[FloatArray | None, list[Direction], list[int]]:
         """(the wrench from outside over the rows, None without one; the directions, those along its numbers behind; the
         place of these among the parameters)."""
-        every = (*TILT, *PUSH)
-        known = {name: k for name in every if (k := self.problem.where(name)) >= 0}
-        if not known:
+        force_names = (*TILT, *PUSH)
+        index_by_name = {name: k for name in force_names if (k := self.problem.where(name)) >= 0}
+        if not index_by_name:
             return None, list(directions), []
-        facing, own = _between(headings(piece, robot)), list(directions)
-        force = np.array([values[known[name]] if name in known else 0.0 for name in every])
+        heading_at, new_directions = _between(headings(piece, robot)), list(directions)
+        force = np.array([values[index_by_name[name]] if name in index_by_name else 0.0 for name in force_names])
 
-        def wrench(of: Robot, force: FloatArray) -> FloatArray:
-            return in_the_body(facing, force[:2], of.body.centre) + force[2:]
+        def wrench(moved_robot: Robot, force: FloatArray) -> FloatArray:
+            return in_the_body(heading_at, force[:2], moved_robot.body.centre) + force[2:]
 
-        for k, (up, down) in enumerate(moved):
-            if up.body.centre != down.body.centre:
-                own[k] = replace(own[k], push=difference(np.array([wrench(up, force), wrench(down, force)]))[0])
-        one = np.eye(len(force))
-        own += [Direction(name, push=wrench(robot, one[j])) for j, name in enumerate(every) if name in known]
-        return wrench(robot, force), own, list(known.values())
+        for k, (upper, lower) in enumerate(moved_robots):
+            if upper.body.centre != lower.body.centre:
+                new_directions[k] = replace(
+                    new_directions[k], push=difference(np.array([wrench(upper, force), wrench(lower, force)]))[0]
+                )
+        identity = np.eye(len(force))
+        new_directions += [
+            Direction(name, push=wrench(robot, identity[j]))
+            for j, name in enumerate(force_names)
+            if name in index_by_name
+        ]
+        return wrench(robot, force), new_directions, list(index_by_name.values())
 
     def _sampled(
-        self, robot: Robot, program: VoltageProgram, directions: Sequence[Direction], late: Sequence[float], travel: int
+        self,
+        robot: Robot,
+        program: VoltageProgram,
+        directions: Sequence[Direction],
+        latencies: Sequence[float],
+        travel: int,
     ) -> list[LateSample]:
         """The run of this program, seen with every latency."""
-        return late_samples(robot, program, directions, late, self.tol, travel)[0]
+        return late_samples(robot, program, directions, latencies, self.tol, travel)[0]
 
-    def _shown(self, seen: list[LateSample], number: int, name: str, facing: float) -> Shown:
-        """What a channel of m columns shows at latency `number`, from the start; facing: the heading there [rad]."""
-        own = seen[number]
+    def _shown(self, samples: list[LateSample], number: int, name: str, start_heading: float) -> Shown:
+        """What a channel of m columns shows at latency `number`, from the start; start_heading: the heading there
+        [rad]."""
+        sample = samples[number]
         if name == POSITION:
-            return own.position(facing)
+            return sample.position(start_heading)
         if name == "twist":
-            return own.twist, own.pace, own.dtwist
-        every = {
-            "heading": own.heading,
-            "wheel_speed": own.wheel_speeds,
-            "wheel_angle": own.wheel_angles,
-            "current": own.currents,
+            return sample.twist, sample.pace, sample.dtwist
+        channels = {
+            "heading": sample.heading,
+            "wheel_speed": sample.wheel_speeds,
+            "wheel_angle": sample.wheel_angles,
+            "current": sample.currents,
         }
-        return every[name]()
+        return channels[name]()
 
     def _directions(
-        self, robot: Robot, moved: list[tuple[Robot, ...]], scales: list[float], piece: Piece, values: FloatArray
+        self, robot: Robot, moved_robots: list[tuple[Robot, ...]], scales: list[float], piece: Piece, values: FloatArray
     ) -> tuple[FloatArray, list[Direction], list[int], FloatArray]:
         """(voltages at the motors, directions, index of each among the slopes, what turns its derivative into that)."""
         record, count = piece.record, len(self.problem.parameters)
-        rows, (driver, where) = slice(piece.first, piece.last + 1), driver_of(self.problem, values)
-        at, directions = list(range(self.problem.robot_count)), []
+        rows, (driver, driver_indices) = slice(piece.first, piece.last + 1), driver_of(self.problem, values)
+        slope_indices, directions = list(range(self.problem.robot_count)), []
         logged = clip_voltage(robot.motor, through_the_end(record.voltage[rows]))
         share = record.share[rows]
-        voltage, by = at_motors(logged, share, driver)
-        for p, (up, down) in zip(self.problem.robot_parameters, moved, strict=True):
+        voltage, voltage_slopes = at_motors(logged, share, driver)
+        for p, (upper, lower) in zip(self.problem.robot_parameters, moved_robots, strict=True):
             rate = None
-            if up.motor.voltage_limit != down.motor.voltage_limit:
-                ends = [at_motors(clip_voltage(r.motor, logged), share, driver)[0] for r in (up, down)]
+            if upper.motor.voltage_limit != lower.motor.voltage_limit:
+                ends = [at_motors(clip_voltage(r.motor, logged), share, driver)[0] for r in (upper, lower)]
                 rate = difference(np.array(ends))[0]
-            directions.append(Direction(p.name, up, down, rate))
-        for name, k, rate in zip(Driver._fields, where, by, strict=True):
+            directions.append(Direction(p.name, upper, lower, rate))
+        for name, k, rate in zip(Driver._fields, driver_indices, voltage_slopes, strict=True):
             if k >= 0:
                 directions.append(Direction(name, voltage=rate))
-                at.append(k)
+                slope_indices.append(k)
         for axis in np.flatnonzero(piece.free[:N_AXES]):
             directions.append(Direction("start", start=np.eye(N_AXES)[axis]))
-            at.append(count + int(axis))
-        factors = np.ones(len(at))
+            slope_indices.append(count + int(axis))
+        factors = np.ones(len(slope_indices))
         factors[: self.problem.robot_count] = 1.0 / np.array(scales[: self.problem.robot_count])
-        return voltage, directions, at, factors
+        return voltage, directions, slope_indices, factors
 
 
 class SlipEngine(ImplicitEngine):
@@ -261,11 +282,16 @@ class SlipEngine(ImplicitEngine):
     pushes = False
 
     def _sampled(
-        self, robot: Robot, program: VoltageProgram, directions: Sequence[Direction], late: Sequence[float], travel: int
+        self,
+        robot: Robot,
+        program: VoltageProgram,
+        directions: Sequence[Direction],
+        latencies: Sequence[float],
+        travel: int,
     ) -> list[LateSample]:
         steps, tol = (1, 0.0) if self.tol is None else (STEPS, max(self.tol, LEAST_TOL))
-        seen = slipping_samples(robot, program, directions, late, steps, tol)
-        return cast(list[LateSample], seen)  # what is asked of both is the same
+        samples = slipping_samples(robot, program, directions, latencies, steps, tol)
+        return cast(list[LateSample], samples)  # what is asked of both is the same
 
 
 def _between(headings: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import UnsupportedError
-from omnidyn.identification.output_error.engines.exact import LATE
+from omnidyn.identification.output_error.engines.engine import LATENCY_PREFIX
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine, Shown, through_the_end, travel_of
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
 from omnidyn.model.motor import DYNAMIC
@@ -19,10 +19,10 @@ from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.sensitivity.late_sample import Direction, LateSample, looped_samples
 from omnidyn.simulation.simulate import simulate
 
-SETTLED = 1e-10  # [m/s, A, V] a run that changes less from tick to tick stays as it is until the next command
+STEADY_CHANGE = 1e-10  # [m/s, A, V] a run that changes less from tick to tick stays as it is until the next command
 SLOW_LOOP = 0.5  # periods in a row, beyond which a current is seen between its ticks
 NEAR_LIMIT = 0.9  # of the voltage limit
-STEEPEST = 1e8  # a loop that swings has derivatives that grow without bound: they are cut, for they mean nothing
+SLOPE_LIMIT = 1e8  # a loop that swings has derivatives that grow without bound: they are cut, for they mean nothing
 
 
 class LoopEngine(ImplicitEngine):
@@ -31,7 +31,7 @@ class LoopEngine(ImplicitEngine):
     Raises UnsupportedError for nuisances other than latencies.
     """
 
-    looped = True
+    has_loop = True
 
     @classmethod
     def of(cls, problem: Problem, tol: float | None = None) -> LoopEngine:
@@ -39,11 +39,13 @@ class LoopEngine(ImplicitEngine):
         return cls(problem, tol)
 
     def __init__(self, problem: Problem, tol: float | None = None):
-        other = [p.name for p in problem.parameters[problem.robot_count :] if not p.name.startswith(LATE)]
-        if other:
+        other_names = [
+            p.name for p in problem.parameters[problem.robot_count :] if not p.name.startswith(LATENCY_PREFIX)
+        ]
+        if other_names:
             raise UnsupportedError(
                 "a log of set speeds has no voltage that could be changed on its way",
-                got=", ".join(other),
+                got=", ".join(other_names),
                 expected="latency",
                 where="nuisances",
             )
@@ -63,43 +65,53 @@ class LoopEngine(ImplicitEngine):
     def _piece(
         self,
         robot: Robot,
-        moved: list[tuple[Robot, ...]],
+        moved_robots: list[tuple[Robot, ...]],
         scales: list[float],
         piece: Piece,
         state: FloatArray,
         values: FloatArray,
     ) -> Parts:
-        residual, slopes, at = super()._piece(robot, moved, scales, piece, state, values)
-        return residual, np.clip(np.nan_to_num(slopes), -STEEPEST, STEEPEST), at
+        residual, slopes, indices = super()._piece(robot, moved_robots, scales, piece, state, values)
+        return residual, np.clip(np.nan_to_num(slopes), -SLOPE_LIMIT, SLOPE_LIMIT), indices
 
     def _run(
         self,
         robot: Robot,
-        moved: list[tuple[Robot, ...]],
+        moved_robots: list[tuple[Robot, ...]],
         scales: list[float],
         piece: Piece,
         state: FloatArray,
         values: FloatArray,
-        late: list[float],
+        latencies: list[float],
     ) -> tuple[list[LateSample], list[int], FloatArray]:
         """As of any run; where currents jump from tick to tick, a look a period after theirs is the last one."""
         count, (t, set_point) = self.problem.robot_count, _driven(piece)
         directions = [
-            Direction(p.name, up, down) for p, (up, down) in zip(self.problem.robot_parameters, moved, strict=True)
+            Direction(p.name, upper, lower)
+            for p, (upper, lower) in zip(self.problem.robot_parameters, moved_robots, strict=True)
         ]
-        own = self.problem.where(f"{LATE}current")
-        more = [float(values[own]) - self._period] if own >= 0 and self._jumps(piece) else []
-        seen = looped_samples(
-            robot, t, set_point, directions, [*late, *more], self.tol, travel_of(piece.record.columns), SETTLED
+        current_index = self.problem.where(f"{LATENCY_PREFIX}current")
+        earlier_times = (
+            [float(values[current_index]) - self._period] if current_index >= 0 and self._jumps(piece) else []
         )
-        return seen, list(range(count)), 1.0 / np.array(scales[:count])
+        samples = looped_samples(
+            robot,
+            t,
+            set_point,
+            directions,
+            [*latencies, *earlier_times],
+            self.tol,
+            travel_of(piece.record.columns),
+            STEADY_CHANGE,
+        )
+        return samples, list(range(count)), 1.0 / np.array(scales[:count])
 
-    def _shown(self, seen: list[LateSample], number: int, name: str, facing: float) -> Shown:
+    def _shown(self, samples: list[LateSample], number: int, name: str, start_heading: float) -> Shown:
         """As of any run; a current that jumps from tick to tick changes by what it does within a period."""
-        value, pace, by = super()._shown(seen, number, name, facing)
-        if name == "current" and seen[-1].late < seen[number].late:
-            pace = (seen[-1].currents()[0] - value) / self._period
-        return value, pace, by
+        value, pace, channel_slopes = super()._shown(samples, number, name, start_heading)
+        if name == "current" and samples[-1].late < samples[number].late:
+            pace = (samples[-1].currents()[0] - value) / self._period
+        return value, pace, channel_slopes
 
     @property
     def _period(self) -> float:

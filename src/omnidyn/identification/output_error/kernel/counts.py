@@ -35,10 +35,10 @@ def tail(u):
     """exp(u^2/2) P(x > u) of a normal number; at least 1e-16 relative for u > -_FAR."""
     if u < _FAR:
         return 0.5 * math.erfc(u / math.sqrt(2.0)) * math.exp(0.5 * u * u)
-    below = u
+    fraction = u
     for k in range(_TERMS, 0, -1):
-        below = u + k / below
-    return _DENSITY / below
+        fraction = u + k / fraction
+    return _DENSITY / fraction
 
 
 @part
@@ -69,9 +69,9 @@ def count_terms(z, h):
     else:
         low, high = size - h, size + h
         total = 0.5 * (math.erf(high / math.sqrt(2.0)) - math.erf(low / math.sqrt(2.0)))
-        left, right = _DENSITY * math.exp(-0.5 * low * low), _DENSITY * math.exp(-0.5 * high * high)
-        mean = (left - right) / total
-        spread = 1.0 + (low * left - high * right) / total - mean * mean
+        left_density, right = _DENSITY * math.exp(-0.5 * low * low), _DENSITY * math.exp(-0.5 * high * high)
+        mean = (left_density - right) / total
+        spread = 1.0 + (low * left_density - high * right) / total - mean * mean
         rho = -math.log(total / (2.0 * h)) - _CONSTANT
     spread = min(max(spread, 0.0), 1.0)
     return (-mean if z < 0.0 else mean), mean * mean + spread, spread, rho

@@ -30,7 +30,9 @@ from omnidyn.simulation.exact.position import move_on, put_displacement
 from omnidyn.simulation.exact.slopes import acceleration_at_end, hold_slopes, step_slopes, travel_slopes
 
 PATH = 5  # integrals of the twist, then x and y of the displacement
-SAME = 1e-7  # times 1/a [s]: steps that differ by less share one exponential, to first order, which leaves 1e-15
+STEP_TOLERANCE = (
+    1e-7  # times 1/a [s]: steps that differ by less share one exponential, to first order, which leaves 1e-15
+)
 FINAL, KEEP, WAVES = 1, 2, 4  # what a march is for, beside the sums
 
 
@@ -49,7 +51,7 @@ class Physics(NamedTuple):
     travel_map: FloatArray  # (C, 5) Q
     input_map: FloatArray  # (C,) E
     input_wheel: IntArray  # (C,) w
-    late: FloatArray  # (C,) latency [s]
+    latencies: FloatArray  # (C,) latency [s]
     driver: Driver
     travels: bool  # whether Q has an entry
 
@@ -66,7 +68,7 @@ class PhysicsSlopes(NamedTuple):
     maps_vary: bool
     travel_varies: BoolArray  # (C,)
     at_late: IntArray  # (C,)
-    at_driver: IntArray  # (3,)
+    driver_indices: IntArray  # (3,)
     at_start: IntArray  # (3,)
     at_offset: IntArray  # (C,)
 
@@ -138,24 +140,24 @@ def terms_of(residual, variance, nu, c, tick, share, final):
 @part
 def held(cache, rates, dt):
     """Refresh `cache` (row 3: dt; rows 0..2: phi, dphi, psi, dpsi of the axes) for a step of dt."""
-    off = dt - cache[3, 0]
+    dt_error = dt - cache[3, 0]
     for axis in range(3):
-        if abs(off) * rates[axis] > SAME or cache[3, 1] == 0.0:
+        if abs(dt_error) * rates[axis] > STEP_TOLERANCE or cache[3, 1] == 0.0:
             for k in range(3):
                 cache[k, 0], cache[k, 1], cache[k, 2], cache[k, 3] = hold_slopes(rates[k], dt)
             cache[3, 0], cache[3, 1] = dt, 1.0
             return 0.0
-    return off
+    return dt_error
 
 
 @part
-def held_values(cache, axis, rate, off):
-    """phi, dphi, psi, dpsi of a step `off` longer than the one in `cache`, to first order."""
+def held_values(cache, axis, rate, dt_error):
+    """phi, dphi, psi, dpsi of a step `dt_error` longer than the one in `cache`, to first order."""
     phi, dphi, psi, dpsi = cache[axis, 0], cache[axis, 1], cache[axis, 2], cache[axis, 3]
-    if off == 0.0:
+    if dt_error == 0.0:
         return phi, dphi, psi, dpsi
     decay = 1.0 - rate * phi
-    return phi + off * decay, dphi - off * (phi + rate * dphi), psi + off * phi, dpsi + off * dphi
+    return phi + dt_error * decay, dphi - dt_error * (phi + rate * dphi), psi + dt_error * phi, dpsi + dt_error * dphi
 
 
 @part
@@ -193,7 +195,7 @@ def put_volts(volts, u, k, share, driver):
 
 
 @part
-def put_drive(g, dg, volts, drive, push, d_drive, d_push, at_driver, vary):
+def put_drive(g, dg, volts, drive, push, d_drive, d_push, driver_indices, vary):
     """Drive of the axes and its slopes."""
     for axis in range(3):
         for i in range(dg.shape[1]):
@@ -205,8 +207,8 @@ def put_drive(g, dg, volts, drive, push, d_drive, d_push, at_driver, vary):
                 for i in range(dg.shape[1]):
                     dg[axis, i] += d_drive[axis, w, i] * volts[0, w]
             for k in range(3):
-                if at_driver[k] >= 0:
-                    dg[axis, at_driver[k]] += drive[axis, w] * volts[1 + k, w]
+                if driver_indices[k] >= 0:
+                    dg[axis, driver_indices[k]] += drive[axis, w] * volts[1 + k, w]
 
 
 @part
@@ -215,10 +217,10 @@ def advance(v, s, g, dv, ds, dg, law, dlaw, dt, cache, travels, place, pieces):
     if place is not None:
         put_displacement(place, pieces, v, g, law, dt)
         move_on(s, ds, place, dv, dg, dlaw[1], dlaw[0])
-    off = held(cache, law[0], dt)
+    dt_error = held(cache, law[0], dt)
     for axis in range(3):
         a, c, hold = law[0, axis], law[1, axis], law[2, axis]
-        phi, dphi, psi, dpsi = held_values(cache, axis, a, off)
+        phi, dphi, psi, dpsi = held_values(cache, axis, a, dt_error)
         if travels:
             path, kv, kg, kc, ka = travel_slopes(v[axis], g[axis], c, hold, a, dt, phi, dphi, psi, dpsi)
             s[axis] += path
@@ -276,24 +278,24 @@ def put_row(row, c, v, s, dv, ds, speed_map, travel_map, d_speed, d_travel, vary
 
 
 @part
-def add_latency(row, c, at, v, s, g, law, speed_map, travel_map, place):
+def add_latency(row, c, latency_index, v, s, g, law, speed_map, travel_map, place):
     """The slope of column c by its latency: what was earlier."""
     for axis in range(3):
         pace = acceleration_at_end(v[axis], g[axis], law[1, axis], law[2, axis], law[0, axis])
-        row[at] -= speed_map[c, axis] * pace + travel_map[c, axis] * v[axis]
+        row[latency_index] -= speed_map[c, axis] * pace + travel_map[c, axis] * v[axis]
     if place is not None:
         east, north = rotated(s[2], v[0], v[1])
-        row[at] -= travel_map[c, 3] * east + travel_map[c, 4] * north
+        row[latency_index] -= travel_map[c, 3] * east + travel_map[c, 4] * north
 
 
 @part
-def add_input(row, volts, wheel, e, d_input, c, at_driver):
+def add_input(row, volts, wheel, e, d_input, c, driver_indices):
     """What a current takes directly from the voltage of its wheel."""
     for i in range(len(row)):
         row[i] += d_input[c, i] * volts[0, wheel]
     for k in range(3):
-        if at_driver[k] >= 0:
-            row[at_driver[k]] += e * volts[1 + k, wheel]
+        if driver_indices[k] >= 0:
+            row[driver_indices[k]] += e * volts[1 + k, wheel]
     return e * volts[0, wheel]
 
 
@@ -330,7 +332,7 @@ def march(
     """
     law, dlaw, size = physics.law, slopes.law, slopes.law.shape[2]
     speed_map, travel_map, d_speed, vary = physics.speed_map, physics.travel_map, slopes.speed_map, slopes.maps_vary
-    final, keep, travels = (loss.mode & FINAL) != 0, (loss.mode & KEEP) != 0, physics.travels
+    final, keeps_rows, travels = (loss.mode & FINAL) != 0, (loss.mode & KEEP) != 0, physics.travels
     v, s, g, v_now, s_now = start.copy(), np.zeros(PATH), np.zeros(3), np.zeros(3), np.zeros(PATH)
     dv, ds, dg, dv_now, ds_now = (
         np.zeros((3, size)),
@@ -342,33 +344,35 @@ def march(
     for axis in range(3):
         if slopes.at_start[axis] >= 0:
             dv[axis, slopes.at_start[axis]] = 1.0
-    volts, row, before = np.zeros((4, u.shape[1])), np.zeros(size), np.zeros(len(offset))
+    volts, row, value_before = np.zeros((4, u.shape[1])), np.zeros(size), np.zeros(len(offset))
     pointer, steps, parts = np.full(len(groups) - 1, first), np.zeros((4, 4)), np.zeros((len(groups) - 1, 4, 4))
-    drive, d_drive, driver, at_driver = physics.drive, slopes.drive, physics.driver, slopes.at_driver
-    lates, wheels, input_map, d_input = physics.late, physics.input_wheel, physics.input_map, slopes.input_map
+    drive, d_drive, driver, driver_indices = physics.drive, slopes.drive, physics.driver, slopes.driver_indices
+    lates, wheels, input_map, d_input = physics.latencies, physics.input_wheel, physics.input_map, slopes.input_map
     at_late, at_offset, variance, nu, block = slopes.at_late, slopes.at_offset, loss.variance, loss.nu, loss.block
     d_travel, travel_varies, share = slopes.travel_map, slopes.travel_varies, loss.share
     number, square, total, lag, grad, info = sums.number, sums.square, sums.loss, sums.lag, sums.grad, sums.info
-    score, drift, predicted, kept, waves = sums.score, sums.drift, sums.predicted, sums.slopes, sums.waves
-    at_rest = not start.any() and slopes.at_start[0] < 0 and slopes.at_start[1] < 0 and slopes.at_start[2] < 0
+    score, drift, predicted, kept_slopes, waves = sums.score, sums.drift, sums.predicted, sums.slopes, sums.waves
+    begins_at_rest = not start.any() and slopes.at_start[0] < 0 and slopes.at_start[1] < 0 and slopes.at_start[2] < 0
     for k in range(first, last + 1):
         put_volts(volts, u, k, (t[k] - origin) / span, driver)
-        put_drive(g, dg, volts, drive, physics.push, d_drive, slopes.push, at_driver, vary)
+        put_drive(g, dg, volts, drive, physics.push, d_drive, slopes.push, driver_indices, vary)
         dt = t[k + 1] - t[k] if k < last else math.inf
         if room is not None:
             add_pull(g, dg, room, v, s, dv, ds, dt if k < last else 0.0)
         for group in range(len(groups) - 1):
-            late = lates[groups[group]]
-            while pointer[group] <= last and t[pointer[group]] - late - t[k] < dt:
+            latency = lates[groups[group]]
+            while pointer[group] <= last and t[pointer[group]] - latency - t[k] < dt:
                 sample = pointer[group]
                 pointer[group] += 1
-                into = t[sample] - late - t[k]
-                early = into < 0.0  # what was before the first row is known of a robot at rest only: it has no margin
-                if t[sample] - t[first] < margin[groups[group]] or (early and not at_rest):
+                time_in_row = t[sample] - latency - t[k]
+                early = (
+                    time_in_row < 0.0
+                )  # what was before the first row is known of a robot at rest only: it has no margin
+                if t[sample] - t[first] < margin[groups[group]] or (early and not begins_at_rest):
                     continue
-                into = max(into, 0.0)
+                time_in_row = max(time_in_row, 0.0)
                 copy_motion(v, s, dv, ds, v_now, s_now, dv_now, ds_now, travels, place)
-                if into > 0.0:
+                if time_in_row > 0.0:
                     advance(
                         v_now,
                         s_now,
@@ -378,7 +382,7 @@ def march(
                         dg,
                         law,
                         dlaw,
-                        into,
+                        time_in_row,
                         parts[group],
                         travels,
                         place,
@@ -403,25 +407,25 @@ def march(
                     if wheels[c] >= 0:
                         if early:
                             continue
-                        value += add_input(row, volts, wheels[c], input_map[c], d_input, c, at_driver)
+                        value += add_input(row, volts, wheels[c], input_map[c], d_input, c, driver_indices)
                     if at_late[c] >= 0 and not early:
                         add_latency(row, c, at_late[c], v_now, s_now, g, law, speed_map, travel_map, place)
                     if at_offset[c] >= 0:
                         row[at_offset[c]] += 1.0
-                    if keep:
+                    if keeps_rows:
                         predicted[sample, c] = value
-                        for i in range(kept.shape[2]):  # a slice compiles the words of its error too: 1.5 s
-                            kept[sample, c, i] = row[i]
+                        for i in range(kept_slopes.shape[2]):  # a slice compiles the words of its error too: 1.5 s
+                            kept_slopes[sample, c, i] = row[i]
                     residual = y[sample, c] - value
                     if residual != residual:
-                        before[c] = 0.0
+                        value_before[c] = 0.0
                         continue
-                    pull, more, curvature, rho = terms_of(residual, variance, nu, c, tick, share, final)
+                    pull, pull_change, curvature, rho = terms_of(residual, variance, nu, c, tick, share, final)
                     number[c] += 1.0
-                    square[c] += more
+                    square[c] += pull_change
                     total[c] += rho
-                    lag[c] += pull * before[c]
-                    before[c] = pull
+                    lag[c] += pull * value_before[c]
+                    value_before[c] = pull
                     add_information(info[c], grad[c], row, pull, curvature)
                     if tick is not None:  # noqa: SIM102 alone, it is decided at compile time
                         if tick[c] > 0.0:

@@ -10,10 +10,10 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel
-from omnidyn.identification.output_error.kernel.march import FINAL, SAME, loss_terms
+from omnidyn.identification.output_error.kernel.march import FINAL, STEP_TOLERANCE, loss_terms
 from omnidyn.simulation.exact.slopes import hold_slopes, step_slopes
 
-BY = 3  # slopes: by a, by c, by the speed at the start
+SLOPE_COUNT = 3  # slopes: by a, by c, by the speed at the start
 # Where the sums stand in the row that a march fills; the pairs of `info` are aa, ac, av, cc, cv, vv.
 NUMBER, SQUARE, LOSS, LAG, GRAD, INFO, SIZE = 0, 1, 2, 3, 4, 7, 13
 
@@ -22,23 +22,23 @@ NUMBER, SQUARE, LOSS, LAG, GRAD, INFO, SIZE = 0, 1, 2, 3, 4, 7, 13
 def march_axis(t, u, y, axis, first, last, drive, rate, coulomb, hold, start, variance, nu, block, mode, sums, scores):
     """Add to `sums` (SIZE,) what column `axis` of y says, over rows first..last. Arguments as in march.py.
 
-    scores (blocks, BY + 1), filled in a final march: by a, by c, by the start, and
+    scores (blocks, SLOPE_COUNT + 1), filled in a final march: by a, by c, by the start, and
     the drift. drive (W,): acceleration per volt of this axis; rate, coulomb, hold, start: of this axis.
     """
     final, wheels = (mode & FINAL) != 0, u.shape[1]
     v, va, vc, vs = start, 0.0, 0.0, 1.0
-    phi = dphi = length = before = 0.0
+    phi = dphi = length = value_before = 0.0
     count = square = total = lag = ga = gc = gs = 0.0
     aa = ac = as_ = cc = cs = ss = 0.0
     for k in range(first, last + 1):
         residual = y[k, axis] - v
         if residual == residual:
-            pull, more, curvature, rho = loss_terms(residual, variance, nu, final)
+            pull, pull_change, curvature, rho = loss_terms(residual, variance, nu, final)
             count += 1.0
-            square += more
+            square += pull_change
             total += rho
-            lag += pull * before
-            before = pull
+            lag += pull * value_before
+            value_before = pull
             ga += pull * va
             gc += pull * vc
             gs += pull * vs
@@ -56,19 +56,21 @@ def march_axis(t, u, y, axis, first, last, drive, rate, coulomb, hold, start, va
                 score[2] += pull / variance * vs
                 score[3] += pull
         else:
-            before = 0.0
+            value_before = 0.0
         if k == last:
             break
         g = 0.0
         for w in range(wheels):
             g += drive[w] * u[k, w]
         dt = t[k + 1] - t[k]
-        off = dt - length
-        if abs(off) * rate > SAME or length == 0.0:
+        dt_error = dt - length
+        if abs(dt_error) * rate > STEP_TOLERANCE or length == 0.0:
             phi, dphi, _, _ = hold_slopes(rate, dt)
-            length, off = dt, 0.0
+            length, dt_error = dt, 0.0
         decay = 1.0 - rate * phi
-        v, kv, _, kc, ka = step_slopes(v, g, coulomb, hold, rate, phi + off * decay, dphi - off * (phi + rate * dphi))
+        v, kv, _, kc, ka = step_slopes(
+            v, g, coulomb, hold, rate, phi + dt_error * decay, dphi - dt_error * (phi + rate * dphi)
+        )
         va = kv * va + ka
         vc = kv * vc + kc
         vs = kv * vs
@@ -88,6 +90,6 @@ def march_axis(t, u, y, axis, first, last, drive, rate, coulomb, hold, start, va
 
 
 def spread(row: FloatArray, slopes: FloatArray) -> FloatArray:
-    """`info` of a row of sums in the parameters that `slopes` (BY, P) leads to. Shape (P, P)."""
+    """`info` of a row of sums in the parameters that `slopes` (SLOPE_COUNT, P) leads to. Shape (P, P)."""
     aa, ac, av, cc, cv, vv = row[INFO:]
     return slopes.T @ np.array([[aa, ac, av], [ac, cc, cv], [av, cv, vv]]) @ slopes

@@ -18,7 +18,7 @@ class Room(NamedTuple):
     force: FloatArray  # (2,) along x and y of the room [N]
     per_force: FloatArray  # (3,) acceleration of the axes per force
     d_per_force: FloatArray  # (3, P)
-    facing: float  # heading at the start of the piece [rad]
+    start_heading: float  # heading at the start of the piece [rad]
     at_force: IntArray  # (2,)
     at_facing: int
 
@@ -26,7 +26,7 @@ class Room(NamedTuple):
 @part
 def add_pull(g, dg, room, v, s, dv, ds, dt):
     """Add to the drive of the axes the pull of the room, as it is in the middle of a step of dt."""
-    angle = room.facing + s[2] + 0.5 * dt * v[2]
+    angle = room.start_heading + s[2] + 0.5 * dt * v[2]
     cos, sin = math.cos(angle), math.sin(angle)
     for axis in range(2):
         east, north = (cos, sin) if axis == 0 else (-sin, cos)

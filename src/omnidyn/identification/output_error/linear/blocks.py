@@ -20,33 +20,40 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.identification.output_error.linear.rows import SAME, Linear, Rows, lengths, noise_models, with_priors
+from omnidyn.identification.output_error.linear.rows import (
+    EIGEN_TOLERANCE,
+    Linear,
+    Rows,
+    lengths,
+    noise_models,
+    with_priors,
+)
 from omnidyn.identification.output_error.problem.nuisances import LATENCY
 from omnidyn.identification.output_error.problem.problem import Problem, bounded
 from omnidyn.identification.output_error.solve.solver import Normal, Solution
 from omnidyn.model.actuation import DEAD_BAND
 
 BLOCKS = 10  # of the log, each held out once
-SURE = 10.8  # what a likelihood that is sure of a nuisance gains by it: 2 F, by chance once in a thousand logs
+NUISANCE_GAIN = 10.8  # what a likelihood that is sure of a nuisance gains by it: 2 F, by chance once in a thousand logs
 
 
 class Blocks:
     """Scalar products of [e, J, Z] in blocks of rows. matrix (B, n, n); shows (n,): which columns are not all 0."""
 
-    def __init__(self, linear: Linear, *shown: Sequence[FloatArray]):
+    def __init__(self, linear: Linear, *extra_columns: Sequence[FloatArray]):
         number = self.numbers(linear)
         self.count, self.rows = len(linear.rows.problem.parameters), len(number)
         self.block = [np.flatnonzero(number == b) for b in range(BLOCKS)]
         # Priors are held out of no block.
-        self.total: FloatArray = with_priors(linear, sum(each[0].shape[2] for each in shown))
+        self.total: FloatArray = with_priors(linear, sum(columns[0].shape[2] for columns in extra_columns))
         self.matrix: FloatArray = np.zeros((BLOCKS, *self.total.shape))
         first = 0
         for k in range(len(linear.rows.pieces)):
-            every = linear.beside(k, [each[k] for each in shown])
-            block = number[first : (first := first + len(every))]
+            all_rows = linear.beside(k, [columns[k] for columns in extra_columns])
+            block = number[first : (first := first + len(all_rows))]
             for b in np.unique(block).tolist():
-                own = every[block == b]
-                self.matrix[b] += own.T @ own
+                rows_of_block = all_rows[block == b]
+                self.matrix[b] += rows_of_block.T @ rows_of_block
         self.total += self.matrix.sum(axis=0)
         self.shows, self.size = np.diag(self.total) > 0.0, lengths(self.total)
         self.matrix /= np.outer(self.size, self.size)
@@ -54,47 +61,51 @@ class Blocks:
 
     def of(self, matrix: FloatArray, total: FloatArray) -> Blocks:
         """Blocks with other scalar products, of the same rows."""
-        other = copy.copy(self)
-        other.matrix, other.total = matrix, total
-        return other
+        other_blocks = copy.copy(self)
+        other_blocks.matrix, other_blocks.total = matrix, total
+        return other_blocks
 
     @staticmethod
     def numbers(linear: Linear) -> IntArray:
         """The block of each row, by its time: blocks are whole stretches of time. -1 of priors, which are in all."""
-        when, pieces = [], linear.rows
-        whole = sum(r.shape[1] for r in pieces.residual)
-        seen = 0
-        for k, there in enumerate(pieces.there):
-            parts = [seen + np.flatnonzero(own) for own in there]
-            own = np.concatenate(parts) if parts else np.zeros(0, int)
-            when.append(np.concatenate([own, np.full(linear.length(k) - len(own), seen)]))
-            seen += there.shape[1]
-        at = np.concatenate(when)
-        number = np.minimum(at * BLOCKS // max(whole, 1), BLOCKS - 1)
+        times, pieces = [], linear.rows
+        row_count = sum(r.shape[1] for r in pieces.residual)
+        rows_before = 0
+        for k, mask in enumerate(pieces.masks):
+            parts = [rows_before + np.flatnonzero(row_masks) for row_masks in mask]
+            row_mask = np.concatenate(parts) if parts else np.zeros(0, int)
+            times.append(np.concatenate([row_mask, np.full(linear.length(k) - len(row_mask), rows_before)]))
+            rows_before += mask.shape[1]
+        time_of_row = np.concatenate(times)
+        number = np.minimum(time_of_row * BLOCKS // max(row_count, 1), BLOCKS - 1)
         return np.concatenate([number, np.full(len(pieces.problem.parameters), -1)])
 
-    def fitted(self, matrix: FloatArray, at: IntArray) -> FloatArray:
-        """What the columns `at` are fitted by."""
-        values, vectors = np.linalg.eigh(matrix[np.ix_(at, at)])
-        kept = values > SAME * values[-1]
-        return vectors[:, kept] @ ((vectors[:, kept].T @ matrix[at, 0]) / values[kept])
+    def fitted(self, matrix: FloatArray, indices: IntArray) -> FloatArray:
+        """What the columns `indices` are fitted by."""
+        values, vectors = np.linalg.eigh(matrix[np.ix_(indices, indices)])
+        kept_values = values > EIGEN_TOLERANCE * values[-1]
+        return vectors[:, kept_values] @ ((vectors[:, kept_values].T @ matrix[indices, 0]) / values[kept_values])
 
-    def left(self, at: IntArray) -> float:
+    def left(self, indices: IntArray) -> float:
         """The sum of squares that is left with these columns."""
-        by = self.fitted(self.total, at)
-        return float(self.total[0, 0] - by @ self.total[at, 0])
+        coefficients = self.fitted(self.total, indices)
+        return float(self.total[0, 0] - coefficients @ self.total[indices, 0])
 
-    def held_out(self, at: IntArray) -> FloatArray:
+    def held_out(self, indices: IntArray) -> FloatArray:
         """The squared error of each block by a fit to all others. Shape (B,)."""
-        found = []
-        for own in self.matrix:
-            by = self.fitted(self.total - own, at)
-            found.append(own[0, 0] - 2.0 * by @ own[at, 0] + by @ own[np.ix_(at, at)] @ by)
-        return np.array(found)
+        errors = []
+        for block_matrix in self.matrix:
+            coefficients = self.fitted(self.total - block_matrix, indices)
+            errors.append(
+                block_matrix[0, 0]
+                - 2.0 * coefficients @ block_matrix[indices, 0]
+                + coefficients @ block_matrix[np.ix_(indices, indices)] @ coefficients
+            )
+        return np.array(errors)
 
-    def predicted(self, at: IntArray) -> FloatArray:
+    def predicted(self, indices: IntArray) -> FloatArray:
         """The same, by whatever is known of it beyond a linear step."""
-        return self.held_out(at)
+        return self.held_out(indices)
 
 
 def rejected_nuisances(solution: Solution) -> tuple[str, ...]:
@@ -103,15 +114,15 @@ def rejected_nuisances(solution: Solution) -> tuple[str, ...]:
     if not steps:
         return ()
     blocks, problem = _blocks(solution), solution.solver.problem
-    at = 1 + np.flatnonzero(~solution.held)
+    indices = 1 + np.flatnonzero(~solution.held_parameters)
     lost: list[int] = []
     while steps:
-        found = {j: _harm(blocks, at, j, step) for j, step in steps.items()}
-        worst = max(found, key=lambda j: found[j])
-        if found[worst] <= 1.0:
+        harm_by_number = {j: _harm(blocks, indices, j, step) for j, step in steps.items()}
+        most_harmful = max(harm_by_number, key=lambda j: harm_by_number[j])
+        if harm_by_number[most_harmful] <= 1.0:
             break
-        blocks, at = _without(blocks, worst, steps.pop(worst)), at[at != 1 + worst]
-        lost.append(worst)
+        blocks, indices = _without(blocks, most_harmful, steps.pop(most_harmful)), indices[indices != 1 + most_harmful]
+        lost.append(most_harmful)
     return tuple(problem.parameters[j].name for j in lost)
 
 
@@ -119,29 +130,35 @@ def _steps(solution: Solution) -> dict[int, float]:
     """Which nuisances the likelihood is sure of, by their place, and the step to where they are not fitted."""
     normal, problem = Normal(solution.solver, solution.state), solution.solver.problem
     variance = np.diag(np.linalg.pinv(normal.information, hermitian=True))
-    found = {}
+    steps_by_number = {}
     for j, p in enumerate(problem.parameters):
         step = p.inner(p.value) - float(normal.inner[j])
-        if p.part in (LATENCY, DEAD_BAND) and not solution.held[j] and step**2 > SURE * variance[j] > 0.0:
-            found[j] = step
-    return found
+        if (
+            p.part in (LATENCY, DEAD_BAND)
+            and not solution.held_parameters[j]
+            and step**2 > NUISANCE_GAIN * variance[j] > 0.0
+        ):
+            steps_by_number[j] = step
+    return steps_by_number
 
 
 def _blocks(solution: Solution) -> Blocks:
     """The fit in blocks of white rows."""
-    whole = solution.solver.problem
-    assert isinstance(whole, Problem)
-    problem = bounded(whole)
+    full_problem = solution.solver.problem
+    assert isinstance(full_problem, Problem)
+    problem = bounded(full_problem)
     engine = solution.solver.engine.on(problem)
     rows = Rows.of(problem, solution.state.point, engine.residuals(solution.state.point))
-    slopes = [np.where(solution.held, 0.0, slope) for slope in rows.slopes]  # what a bound holds, holds in every block
+    slopes = [
+        np.where(solution.held_parameters, 0.0, slope) for slope in rows.slopes
+    ]  # what a bound holds, holds in every block
     linear = Linear(replace(rows, slopes=slopes), noise_models(rows, rows.residual))
     return Blocks(linear, [np.zeros((*residual.shape, 0)) for residual in rows.residual])
 
 
-def _harm(blocks: Blocks, at: IntArray, j: int, step: float) -> float:
+def _harm(blocks: Blocks, indices: IntArray, j: int, step: float) -> float:
     """By how many standard errors the error of blocks that are left out is lower without number j."""
-    change = blocks.held_out(at) - _without(blocks, j, step).held_out(at[at != 1 + j])
+    change = blocks.held_out(indices) - _without(blocks, j, step).held_out(indices[indices != 1 + j])
     return float(change.sum() / max(change.std(ddof=1) * np.sqrt(len(change)), 1e-300))
 
 
@@ -153,4 +170,4 @@ def _without(blocks: Blocks, j: int, step: float) -> Blocks:
     def moved(matrix: FloatArray) -> FloatArray:
         return turn.T @ matrix @ turn
 
-    return blocks.of(np.array([moved(own) for own in blocks.matrix]), moved(blocks.total))
+    return blocks.of(np.array([moved(block_matrix) for block_matrix in blocks.matrix]), moved(blocks.total))

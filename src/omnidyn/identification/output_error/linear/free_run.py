@@ -21,7 +21,7 @@ from omnidyn.identification.output_error.problem.nuisances import TRAVELS
 from omnidyn.identification.output_error.problem.problem import Column, Point, Problem, bounded
 from omnidyn.identification.output_error.solve.solver import Solution
 
-CLEAR = 1.0  # standard errors of the difference by which one fit must predict better to be taken for another
+BETTER_ERRORS = 1.0  # standard errors of the difference by which one fit must predict better to be taken for another
 LEAST_GAIN = 0.1  # of the squared error, the same: 5 % of the error
 TINY = 1e-300
 
@@ -43,17 +43,17 @@ class FreeRun:
     @property
     def error(self) -> float:
         """Root mean square of the error of each output over its own spread, the geometric mean of all outputs."""
-        seen = (self.rows > 0.0) & (self.spread > 0.0)
-        share = np.sqrt(self.square.sum(axis=0)[seen] / self.rows[seen]) / self.spread[seen]
-        return float(np.exp(np.log(np.maximum(share, TINY)).mean())) if seen.any() else np.nan
+        seen_outputs = (self.rows > 0.0) & (self.spread > 0.0)
+        share = np.sqrt(self.square.sum(axis=0)[seen_outputs] / self.rows[seen_outputs]) / self.spread[seen_outputs]
+        return float(np.exp(np.log(np.maximum(share, TINY)).mean())) if seen_outputs.any() else np.nan
 
-    def is_better(self, other: FreeRun) -> bool:
+    def is_better(self, reference: FreeRun) -> bool:
         """Whether it predicts blocks clearly better than another: by the share of the squared error that it takes away,
-        the mean of all outputs, beyond CLEAR standard errors of it."""
-        whole = np.maximum(other.square.sum(axis=0), TINY)
-        gain = ((other.square - self.square) / whole)[:, self.rows > 0.0].mean(axis=1)
+        the mean of all outputs, beyond BETTER_ERRORS standard errors of it."""
+        reference_squares = np.maximum(reference.square.sum(axis=0), TINY)
+        gain = ((reference.square - self.square) / reference_squares)[:, self.rows > 0.0].mean(axis=1)
         spread = float(gain.std(ddof=1)) * np.sqrt(len(gain))
-        return bool(gain.sum() > max(CLEAR * spread, LEAST_GAIN))
+        return bool(gain.sum() > max(BETTER_ERRORS * spread, LEAST_GAIN))
 
 
 def free_run(
@@ -70,34 +70,36 @@ def free_run(
         memory: of each column, where the fit filtered its errors; none: they are white.
         values: (P,) a point that no log was fitted by, such as the robot as it was given; nothing is held out of it.
     """
-    whole = solution.solver.problem
-    assert isinstance(whole, Problem)
-    pieces = [replace(piece, margin=margin) for piece, margin in zip(whole.pieces, margins, strict=True)]
-    problem = bounded(replace(whole, pieces=tuple(pieces)))
+    full_problem = solution.solver.problem
+    assert isinstance(full_problem, Problem)
+    pieces = [replace(piece, margin=margin) for piece, margin in zip(full_problem.pieces, margins, strict=True)]
+    problem = bounded(replace(full_problem, pieces=tuple(pieces)))
     point = solution.state.point if values is None else Point(values, solution.state.point.states)
     rows = Rows.of(problem, point, solution.solver.engine.unfiltered.on(problem).residuals(point))
-    held = solution.held if values is None else np.ones(len(solution.held), bool)
-    rows = replace(rows, slopes=[np.where(held, 0.0, slopes) for slopes in rows.slopes])
-    white = noise_models(rows, rows.residual, most=0)
+    held_parameters = solution.held_parameters if values is None else np.ones(len(solution.held_parameters), bool)
+    rows = replace(rows, slopes=[np.where(held_parameters, 0.0, slopes) for slopes in rows.slopes])
+    white = noise_models(rows, rows.residual, order_limit=0)
     models = white
     if memory:
-        models = [memory.get(column, plain) for column, plain in zip(problem.columns, white, strict=True)]
-    seen = Linear(rows, white)
-    residual, slopes = seen.whole()
-    number, column = _places(seen)
+        models = [memory.get(column, model) for column, model in zip(problem.columns, white, strict=True)]
+    white_rows = Linear(rows, white)
+    residual, slopes = white_rows.whole()
+    number, column = _places(white_rows)
     steps = np.zeros((BLOCKS, slopes.shape[1]))
-    at = 1 + np.flatnonzero(np.any(slopes != 0.0, axis=0))
-    if at.size:
-        blocks = Blocks(Linear(rows, models), [np.zeros((*own.shape, 0)) for own in rows.residual])
+    indices = 1 + np.flatnonzero(np.any(slopes != 0.0, axis=0))
+    if indices.size:
+        blocks = Blocks(
+            Linear(rows, models), [np.zeros((*column_residuals.shape, 0)) for column_residuals in rows.residual]
+        )
         for b in range(BLOCKS):
-            steps[b, at - 1] = blocks.fitted(blocks.total - blocks.matrix[b], at) / blocks.size[at]
+            steps[b, indices - 1] = blocks.fitted(blocks.total - blocks.matrix[b], indices) / blocks.size[indices]
     variance, square = np.array([model.variance for model in white]), np.zeros((BLOCKS, len(white)))
     for b in range(BLOCKS):
         block = number == b
-        left = residual[block] - slopes[block] @ steps[b]
-        square[b] = np.bincount(column[block], left**2, len(white)) * variance
+        block_residual = residual[block] - slopes[block] @ steps[b]
+        square[b] = np.bincount(column[block], block_residual**2, len(white)) * variance
     travels = np.array([name in TRAVELS for name, _ in problem.columns])
-    count = np.where(travels & ~travels.all(), 0.0, rows.added(lambda k, j: rows.there[k][j]))
+    count = np.where(travels & ~travels.all(), 0.0, rows.added(lambda k, j: rows.masks[k][j]))
     return FreeRun(square, count, _spread(rows), bool(travels.all()))
 
 
@@ -110,19 +112,19 @@ def margins_of(solutions: Sequence[Solution]) -> list[FloatArray]:
 def _places(linear: Linear) -> tuple[IntArray, IntArray]:
     """(block of each white row, its column), (N,) each; -1 where it is none of a log."""
     rows, column = linear.rows, list[IntArray]()
-    for k, there in enumerate(rows.there):
-        of_rows = np.repeat(rows.column[k], there.sum(axis=1))
+    for k, mask in enumerate(rows.masks):
+        of_rows = np.repeat(rows.column[k], mask.sum(axis=1))
         column.append(np.concatenate([of_rows, np.full(linear.length(k) - len(of_rows), -1)]))
     column.append(np.full(len(rows.problem.parameters), -1))
-    found = np.concatenate(column)
-    return np.where(found >= 0, Blocks.numbers(linear), -1), found
+    column_of_row = np.concatenate(column)
+    return np.where(column_of_row >= 0, Blocks.numbers(linear), -1), column_of_row
 
 
 def _spread(rows: Rows) -> FloatArray:
     """Standard deviation of what was measured of each column in the rows that count. Shape (C,)."""
     values: list[list[FloatArray]] = [[] for _ in rows.problem.columns]
-    for piece, there, columns in zip(rows.pieces, rows.there, rows.column, strict=True):
+    for piece, mask, columns in zip(rows.pieces, rows.masks, rows.column, strict=True):
         measured = piece.record.outputs[piece.first : piece.last + 1].T
         for j, c in enumerate(columns):
-            values[c].append(measured[j, there[j]])
+            values[c].append(measured[j, mask[j]])
     return np.array([np.concatenate(value).std() if value and np.concatenate(value).size else 0.0 for value in values])

@@ -57,16 +57,16 @@ class Motion:
     def turned(self) -> FloatArray:
         """How far each wheel has turned since the first row [rad]. Shape (n, W)."""
         way = 0.5 * (self.twist[1:] + self.twist[:-1]) * np.diff(self.t)[:, None]
-        turned = np.cumsum(way @ self.robot.wheels.wrench_matrix, axis=0) / self.robot.wheels.radii
-        return np.append(np.zeros_like(turned[:1]), turned, axis=0)
+        angles = np.cumsum(way @ self.robot.wheels.wrench_matrix, axis=0) / self.robot.wheels.radii
+        return np.append(np.zeros_like(angles[:1]), angles, axis=0)
 
     def twist_by(self, force: FloatArray) -> FloatArray:
         """The change of the twist by forces [N, N, N m] from each row on. Shapes (n, K, 3) -> (n, K, 3)."""
-        pushed = np.einsum("nij,nkj->nki", self.gain, force[:-1])
-        out = np.zeros((len(force), *pushed.shape[1:]))
+        twist_changes = np.einsum("nij,nkj->nki", self.gain, force[:-1])
+        responses = np.zeros((len(force), *twist_changes.shape[1:]))
         for k in range(len(self.decay)):
-            out[k + 1] = out[k] @ self.decay[k].T + pushed[k]
-        return out[..., :N_AXES]
+            responses[k + 1] = responses[k] @ self.decay[k].T + twist_changes[k]
+        return responses[..., :N_AXES]
 
     def under(self, voltage: FloatArray, dt: FloatArray, row: int) -> FloatArray:
         """The twist of the fitted robot from a row on, other voltages (m, W) held for dt (m,). Shape (m + 1, 3)."""
@@ -82,8 +82,8 @@ class Motion:
     def shown(self, change: FloatArray) -> FloatArray:
         """What the columns show of a change of the twist (n, K, 3). Shape (C, n, K)."""
         columns = self.piece.record.columns
-        every = {name: self._channel(name, change) for name in dict.fromkeys(name for name, _ in columns)}
-        return np.stack([every[name][..., i] for name, i in columns])
+        channels = {name: self._channel(name, change) for name in dict.fromkeys(name for name, _ in columns)}
+        return np.stack([channels[name][..., i] for name, i in columns])
 
     def _channel(self, name: str, change: FloatArray) -> FloatArray:
         """What all components of a channel show of a change of the twist (n, K, 3). Shape (n, K, components)."""
@@ -99,11 +99,11 @@ class Motion:
         path = _added_up(change, step)
         return path[..., YAW:] if name == "heading" else self._position(change, path[..., YAW])
 
-    def _position(self, change: FloatArray, turned: FloatArray) -> FloatArray:
+    def _position(self, change: FloatArray, angles: FloatArray) -> FloatArray:
         c, s = np.cos(self.pose[:, 2])[:, None], np.sin(self.pose[:, 2])[:, None]
         vx, vy = self.twist[:, :1], self.twist[:, 1:2]
-        east = c * (change[..., 0] - vy * turned) - s * (change[..., 1] + vx * turned)
-        north = s * (change[..., 0] - vy * turned) + c * (change[..., 1] + vx * turned)
+        east = c * (change[..., 0] - vy * angles) - s * (change[..., 1] + vx * angles)
+        north = s * (change[..., 0] - vy * angles) + c * (change[..., 1] + vx * angles)
         return _added_up(np.stack([east, north], axis=-1), np.diff(self.t)[:, None, None])
 
 
@@ -131,8 +131,8 @@ def _motion(piece: Piece, robot: Robot, state: FloatArray, driver: Driver) -> Mo
     if HEADING in record.columns:
         faces = float(state[N_AXES + record.columns.index(HEADING)])
     if record.set_point is None:
-        asked, _ = at_motors(record.voltage[rows], record.share[rows], driver)
-        run = simulate(_ideal(robot), asked, np.diff(t), twist=state[:N_AXES], pose=(0.0, 0.0, faces))
+        requested_voltage, _ = at_motors(record.voltage[rows], record.share[rows], driver)
+        run = simulate(_ideal(robot), requested_voltage, np.diff(t), twist=state[:N_AXES], pose=(0.0, 0.0, faces))
     else:
         run = simulate(robot, dt=np.diff(t), wheel_speed_command=record.set_point[rows], pose=(0.0, 0.0, faces))
     assert run.twist is not None
@@ -158,49 +158,53 @@ def _answers(
     """(decay, gain) of every row, by the trapezoidal rule; an axis that rests at both ends of a row stays at rest."""
     slips = ~rolls[1:] | ~rolls[:-1]
     robot = robot.model_copy(update={"wheels": robot.wheels.model_copy(update={"traction_mu": None})})
-    middle, held = 0.5 * (twist[1:] + twist[:-1]), voltage[:-1]
-    rests = (twist[1:] == 0.0) & (twist[:-1] == 0.0)
+    middle, held_voltage = 0.5 * (twist[1:] + twist[:-1]), voltage[:-1]
+    resting_axes = (twist[1:] == 0.0) & (twist[:-1] == 0.0)
     rate = np.empty((len(middle), N_AXES, N_AXES))
     for axis in range(N_AXES):
         change = SMALL * np.eye(N_AXES)[axis]
-        up, down = acceleration(robot, middle + change, held), acceleration(robot, middle - change, held)
-        rate[:, :, axis] = (up - down) / (2.0 * SMALL)
+        upper, lower = (
+            acceleration(robot, middle + change, held_voltage),
+            acceleration(robot, middle - change, held_voltage),
+        )
+        rate[:, :, axis] = (upper - lower) / (2.0 * SMALL)
     per_force = np.array(np.broadcast_to(np.linalg.inv(mass_matrix(robot)), rate.shape), dtype=float)
-    gathered = np.zeros((N_AXES, N_AXES))
+    integral_gain = np.zeros((N_AXES, N_AXES))
     if robot.drive.kind == SPEED:
-        kp, ki = (per_wheel(own or 0.0, robot.wheels.count) for own in (robot.drive.kp, robot.drive.ki))
+        kp, ki = (per_wheel(loop_gain or 0.0, robot.wheels.count) for loop_gain in (robot.drive.kp, robot.drive.ki))
         rate -= np.einsum("aw,wb->ab", *_by_speed(robot, kp))
-        gathered = np.einsum("aw,wb->ab", *_by_speed(robot, ki))
+        integral_gain = np.einsum("aw,wb->ab", *_by_speed(robot, ki))
     if slips.any():  # whose push does not depend on the speed
-        each, turns = _by_speed(robot, per_wheel(robot.motor.emf_constant, robot.wheels.count))
+        emf_by_wheel, turns = _by_speed(robot, per_wheel(robot.motor.emf_constant, robot.wheels.count))
         ratio = per_wheel(robot.motor.gear_ratio, robot.wheels.count)
-        rate += np.einsum("aw,nw,wb->nab", each * ratio, slips, turns)
-    rate[rests[:, :, None] | rests[:, None, :]] = 0.0
-    per_force[rests] = 0.0
+        rate += np.einsum("aw,nw,wb->nab", emf_by_wheel * ratio, slips, turns)
+    rate[resting_axes[:, :, None] | resting_axes[:, None, :]] = 0.0
+    per_force[resting_axes] = 0.0
     # What crosses zero within a row jumps in its friction, not in its slope: no rate may be faster than a row.
     h = dt[:, None, None]
     size = np.abs(rate * h).max(axis=(1, 2))
     rate *= np.minimum(1.0, 1.0 / np.maximum(size, 1e-12))[:, None, None]
-    if gathered.any():
-        rate, per_force, rests = _with_integral(rate, per_force, rests, gathered)
-    one = np.eye(rate.shape[1])
-    left = np.linalg.inv(one - 0.5 * h * rate)
-    decay = left @ (one + 0.5 * h * rate)
-    decay[rests] = 0.0
-    return decay, left @ (h * per_force)
+    if integral_gain.any():
+        rate, per_force, resting_axes = _with_integral(rate, per_force, resting_axes, integral_gain)
+    identity = np.eye(rate.shape[1])
+    inverse = np.linalg.inv(identity - 0.5 * h * rate)
+    decay = inverse @ (identity + 0.5 * h * rate)
+    decay[resting_axes] = 0.0
+    return decay, inverse @ (h * per_force)
 
 
 def _with_integral(
-    rate: FloatArray, per_force: FloatArray, rests: BoolArray, gathered: FloatArray
+    rate: FloatArray, per_force: FloatArray, resting_axes: BoolArray, integral_gain: FloatArray
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """The same with the way p of the change d beside it: d' = rate d - gathered p + f/M, p' = d. At rest both are 0."""
+    """The same with the way p of the change d beside it: d' = rate d - integral_gain p + f/M, p' = d. At rest both are
+    0."""
     n = len(rate)
-    whole = np.zeros((n, 2 * N_AXES, 2 * N_AXES))
-    whole[:, :N_AXES, :N_AXES], whole[:, :N_AXES, N_AXES:] = rate, -gathered
-    whole[:, N_AXES:, :N_AXES] = np.eye(N_AXES)
-    still = np.concatenate([rests, rests], axis=1)
-    whole[still[:, :, None] | still[:, None, :]] = 0.0
-    return whole, np.concatenate([per_force, np.zeros_like(per_force)], axis=1), still
+    block_rate = np.zeros((n, 2 * N_AXES, 2 * N_AXES))
+    block_rate[:, :N_AXES, :N_AXES], block_rate[:, :N_AXES, N_AXES:] = rate, -integral_gain
+    block_rate[:, N_AXES:, :N_AXES] = np.eye(N_AXES)
+    resting_states = np.concatenate([resting_axes, resting_axes], axis=1)
+    block_rate[resting_states[:, :, None] | resting_states[:, None, :]] = 0.0
+    return block_rate, np.concatenate([per_force, np.zeros_like(per_force)], axis=1), resting_states
 
 
 def _by_speed(robot: Robot, volts: FloatArray) -> tuple[FloatArray, FloatArray]:

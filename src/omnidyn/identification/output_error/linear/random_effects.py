@@ -16,7 +16,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 
 SEED = 20_13
-SURE = 2.0  # standard errors beyond what is seen of a share
+SHARE_ERRORS = 2.0  # standard errors beyond what is seen of a share
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,40 +65,56 @@ def drawn_together(root: FloatArray, count: int) -> FloatArray:
     signs = np.random.default_rng(SEED).choice([-1.0, 1.0], root.shape[1])
     values = np.zeros((len(root), count))
     for first in range(0, root.shape[1], count):
-        own = root[:, first : first + count] * signs[first : first + count]
-        values[:, : own.shape[1]] += own
+        root_columns = root[:, first : first + count] * signs[first : first + count]
+        values[:, : root_columns.shape[1]] += root_columns
     return values
 
 
-def share(seen: float, noise: float, apart: float, error: float) -> float:
-    """How much of a variance there is: what is seen beyond the noise and `SURE` errors over what there would be."""
-    return float(np.clip((seen - noise + SURE * error) / apart, 0.0, 1.0)) if apart > 0.0 else 0.0
+def share(observed: float, noise: float, spread_square: float, error: float) -> float:
+    """How much of a variance there is: what is seen beyond the noise and `SHARE_ERRORS` errors over what there would
+    be."""
+    return (
+        float(np.clip((observed - noise + SHARE_ERRORS * error) / spread_square, 0.0, 1.0))
+        if spread_square > 0.0
+        else 0.0
+    )
 
 
 def scaled(
-    shown: Sequence[FloatArray], left: FloatArray, fitted: FloatArray, sure: Sequence[int] | None = None
+    effect_columns: Sequence[FloatArray],
+    residuals: FloatArray,
+    fitted: FloatArray,
+    certain_counts: Sequence[int] | None = None,
 ) -> list[RandomEffects]:
     """Effects by as much of their variance as errors have: E |Z'e|^2 = tr S + s^2 tr S^2, S = Z'QZ, whose variance is
     2 tr (S + s^2 S^2)^2.
 
-    shown: what those of each piece show in its own rows, one piece after the other. left (N,): the errors of all rows
-    without what parameters make of them; fitted (N, P'): an orthonormal basis of that, which Q takes out. sure: how
-    many of each piece, its last, have all of their variance: of them the errors are not asked.
+    effect_columns: what those of each piece show in its own rows, one piece after the other. residuals (N,): the errors
+    of all rows without what parameters make of them; fitted (N, P'): an orthonormal basis of that, which Q takes out.
+    certain_counts: how many of each piece, its last, have all of their variance: of them the errors are not asked.
     """
-    asked = [z.shape[1] - own for z, own in zip(shown, sure or [0] * len(shown), strict=True)]
-    seen, noise, apart, both, first = 0.0, 0.0, 0.0, np.zeros(2 * fitted.shape[1:]), 0
-    effects = [RandomEffects.of(z[:, :own]) for z, own in zip(shown, asked, strict=True)]
+    counts = [
+        z.shape[1] - sure_count
+        for z, sure_count in zip(effect_columns, certain_counts or [0] * len(effect_columns), strict=True)
+    ]
+    observed, noise, pair_square, product_sum, first = 0.0, 0.0, 0.0, np.zeros(2 * fitted.shape[1:]), 0
+    effects = [RandomEffects.of(z[:, :sure_count]) for z, sure_count in zip(effect_columns, counts, strict=True)]
     for effect in effects:
-        own = slice(first, first := first + len(effect.z))
-        taken = effect.z.T @ fitted[own]
-        seen += float(((effect.z.T @ left[own]) ** 2).sum())
-        noise += float(effect.square.sum() - (taken**2).sum())
-        apart += float((effect.square**2).sum() - 2.0 * ((effect.z @ taken) ** 2).sum())
-        both += taken.T @ taken
-    apart += float((both**2).sum())
+        count = slice(first, first := first + len(effect.z))
+        projection = effect.z.T @ fitted[count]
+        observed += float(((effect.z.T @ residuals[count]) ** 2).sum())
+        noise += float(effect.square.sum() - (projection**2).sum())
+        pair_square += float((effect.square**2).sum() - 2.0 * ((effect.z @ projection) ** 2).sum())
+        product_sum += projection.T @ projection
+    pair_square += float((product_sum**2).sum())
     square = np.concatenate([effect.square for effect in effects])
-    likely = share(seen, noise, apart, 0.0)
-    error = 2.0 * (apart + 2.0 * likely * float((square**3).sum()) + likely**2 * float((square**4).sum()))
-    part = share(seen, noise, apart, float(np.sqrt(max(error, 0.0))))
-    sizes = [np.where(np.arange(z.shape[1]) < own, part**0.5, 1.0) for z, own in zip(shown, asked, strict=True)]
-    return [RandomEffects.of(z, size) for z, size in zip(shown, sizes, strict=True)]
+    effect_share = share(observed, noise, pair_square, 0.0)
+    error = 2.0 * (
+        pair_square + 2.0 * effect_share * float((square**3).sum()) + effect_share**2 * float((square**4).sum())
+    )
+    part = share(observed, noise, pair_square, float(np.sqrt(max(error, 0.0))))
+    sizes = [
+        np.where(np.arange(z.shape[1]) < sure_count, part**0.5, 1.0)
+        for z, sure_count in zip(effect_columns, counts, strict=True)
+    ]
+    return [RandomEffects.of(z, size) for z, size in zip(effect_columns, sizes, strict=True)]

@@ -25,10 +25,13 @@ from omnidyn.identification.output_error.problem.outputs import TRAVEL
 from omnidyn.identification.output_error.problem.problem import Parts, Piece, Point, Problem
 
 TINY = 1e-300
-SAME = 1e-10  # of the largest eigenvalue of columns of length 1: below it directions are one
-BARE = 0.32  # of a tick: rounding alone has 1/sqrt(12)
+EIGEN_TOLERANCE = 1e-10  # of the largest eigenvalue of columns of length 1: below it directions are one
+ROUNDING_NOISE = 0.32  # of a tick: rounding alone has 1/sqrt(12)
 SIMULATED = 0.3  # of what the first order is off by: what a motion that is simulated anew is
-OPEN, FEWEST = 2_000_000, 40  # numbers of a piece that what rounding may be off by is held in; columns, at least
+MOST_NUMBERS, LEAST_COLUMNS = (
+    2_000_000,
+    40,
+)  # numbers of a piece that what rounding may be off by is held in; columns, at least
 Shown = Sequence[FloatArray]  # of each piece: (C, rows, K)
 
 
@@ -36,7 +39,7 @@ Shown = Sequence[FloatArray]  # of each piece: (C, rows, K)
 class Rows:
     """The rows of a fit as they are: of each piece residuals (C, rows), and slopes (C, rows, P), (C, rows, S) of it.
 
-    there: of each piece (C, rows), which rows count; steps: of each column of each piece, rows since the one before.
+    masks: of each piece (C, rows), which rows count; steps: of each column of each piece, rows since the one before.
     column: of each piece (C,), which column of the problem it is. moves: of each piece (C, rows), see `moving_rows`.
     rounding: of each piece (C, rows, M), what is shown by what its inputs were rounded by, and last, in as many columns
     as `losses` has of it, by what they did while rows are missing; none where there is neither.
@@ -46,8 +49,8 @@ class Rows:
     point: Point
     residual: list[FloatArray]
     slopes: list[FloatArray]
-    own: list[FloatArray]
-    there: list[BoolArray]
+    start_slopes: list[FloatArray]
+    masks: list[BoolArray]
     steps: list[list[IntArray]]
     column: list[list[int]]
     moves: list[BoolArray]
@@ -57,30 +60,35 @@ class Rows:
     @classmethod
     def of(cls, problem: Problem, point: Point, parts: Sequence[Parts]) -> Rows:
         """The rows that an engine shows at a point, by the numbers that the solver sees."""
-        count, every = len(problem.parameters), problem.columns
+        count, all_columns = len(problem.parameters), problem.columns
         scale = [p.slope(float(v)) for p, v in zip(problem.parameters, point.values, strict=True)]
         rows = cls(problem, point, [], [], [], [], [], [], [])
-        for piece, (every_residual, slopes, at) in zip(problem.pieces, parts, strict=True):
+        for piece, (every_residual, slopes, indices) in zip(problem.pieces, parts, strict=True):
             residual = anew(piece, every_residual)
-            wide = np.zeros((*residual.shape, count))
-            mine = at < count
-            wide[:, :, at[mine]] = slopes[:, :, mine]
+            all_slopes = np.zeros((*residual.shape, count))
+            is_parameter = indices < count
+            all_slopes[:, :, indices[is_parameter]] = slopes[:, :, is_parameter]
             rows.residual.append(residual)
-            rows.slopes.append(wide * scale)
-            rows.own.append(slopes[:, :, ~mine])
-            known = [known_rows(piece, own, by) for own, by in zip(residual, slopes, strict=True)]
-            rows.there.append(np.array([np.isin(np.arange(residual.shape[1]), at_rows) for at_rows, _ in known]))
-            rows.steps.append([steps for _, steps in known])
-            rows.column.append([every.index(column) for column in piece.record.columns])
+            rows.slopes.append(all_slopes * scale)
+            rows.start_slopes.append(slopes[:, :, ~is_parameter])
+            known_masks = [
+                known_rows(piece, column_residual, column_slopes)
+                for column_residual, column_slopes in zip(residual, slopes, strict=True)
+            ]
+            rows.masks.append(np.array([np.isin(np.arange(residual.shape[1]), at_rows) for at_rows, _ in known_masks]))
+            rows.steps.append([steps for _, steps in known_masks])
+            rows.column.append([all_columns.index(column) for column in piece.record.columns])
             rows.moves.append(moving_rows(piece, every_residual))
         return rows
 
     def is_rounding(self, c: int, variance: float) -> bool:
         """Whether errors of this variance in column c of the problem are little more than what its encoder rounds."""
         ticks = [
-            piece.record.ticks[own.index(c)] for piece, own in zip(self.pieces, self.column, strict=True) if c in own
+            piece.record.ticks[columns.index(c)]
+            for piece, columns in zip(self.pieces, self.column, strict=True)
+            if c in columns
         ]
-        return bool(ticks) and variance < (BARE * min(ticks)) ** 2
+        return bool(ticks) and variance < (ROUNDING_NOISE * min(ticks)) ** 2
 
     @property
     def pieces(self) -> tuple[Piece, ...]:
@@ -88,14 +96,14 @@ class Rows:
 
     def squares(self, values: Sequence[FloatArray]) -> FloatArray:
         """Squares of values (C, rows) of each piece in the rows that count, added up for each column of the problem."""
-        return self.added(lambda k, j: values[k][j][self.there[k][j]] ** 2)
+        return self.added(lambda k, j: values[k][j][self.masks[k][j]] ** 2)
 
-    def added(self, of: Callable[[int, int], FloatArray]) -> FloatArray:
+    def added(self, value_of: Callable[[int, int], FloatArray]) -> FloatArray:
         """What each piece k and its column j has, added up for each column of the problem. Shape (columns,)."""
         values = np.zeros(len(self.problem.columns))
         for k, columns in enumerate(self.column):
             for j, c in enumerate(columns):
-                values[c] += float(of(k, j).sum())
+                values[c] += float(value_of(k, j).sum())
         return values
 
 
@@ -122,43 +130,43 @@ class Linear:
         if not self.rows.rounding:
             return []
         e, j = self.plain.whole()
-        shown = [self._without_start(k, values) for k, values in enumerate(self.rows.rounding)]
-        return scaled(shown, e - j @ solved(j, e), j @ root_of_covariance(j), self.rows.losses)
+        white_columns = [self._without_start(k, values) for k, values in enumerate(self.rows.rounding)]
+        return scaled(white_columns, e - j @ solved(j, e), j @ root_of_covariance(j), self.rows.losses)
 
     @cached_property
     def rounded_square(self) -> float:
         """The sum of squares that rounded inputs explain of the residuals, in rows white beside the noise alone."""
         if not self.rounding:
             return 0.0
-        (e, j), (bare, slopes), first, found = self.whole(), self.plain.whole(), 0, 0.0
-        left = bare - slopes @ solved(j, e)
-        for one, losses in zip(self.rounding, self.rows.losses, strict=True):
-            own = slice(first, first := first + len(one.z))
-            trust = np.where(np.arange(len(one.size)) < len(one.size) - losses, 1.0, SIMULATED)[:, None]
-            found += float(((one.z @ (trust * one.likely(left[own]))) ** 2).sum())
-        return found
+        (e, j), (bare_residual, slopes), first, square = self.whole(), self.plain.whole(), 0, 0.0
+        residual = bare_residual - slopes @ solved(j, e)
+        for effect, losses in zip(self.rounding, self.rows.losses, strict=True):
+            rows_of_piece = slice(first, first := first + len(effect.z))
+            trust = np.where(np.arange(len(effect.size)) < len(effect.size) - losses, 1.0, SIMULATED)[:, None]
+            square += float(((effect.z @ (trust * effect.likely(residual[rows_of_piece]))) ** 2).sum())
+        return square
 
-    def white(self, shown: Shown) -> FloatArray:
+    def white(self, columns_by_piece: Shown) -> FloatArray:
         """What is shown in the rows, as the fit sees it: (N, K), starts projected out, a row of 0 for each prior."""
-        found = [self._white(k, values) for k, values in enumerate(shown)]
-        return np.concatenate([*found, np.zeros((len(self.rows.problem.parameters), found[0].shape[1]))])
+        white_pieces = [self._white(k, values) for k, values in enumerate(columns_by_piece)]
+        return np.concatenate([*white_pieces, np.zeros((len(self.rows.problem.parameters), white_pieces[0].shape[1]))])
 
     def _white(self, k: int, values: FloatArray) -> FloatArray:
-        one = self._without_start(k, values)
-        return self.rounding[k].white(one) if self.rounding else one
+        white_columns = self._without_start(k, values)
+        return self.rounding[k].white(white_columns) if self.rounding else white_columns
 
-    def beside(self, k: int, shown: Sequence[FloatArray]) -> FloatArray:
+    def beside(self, k: int, extra_columns: Sequence[FloatArray]) -> FloatArray:
         """[e, J, Z] of piece k in white rows, (N, 1 + P + K), Z of several (C, rows, K of its own): each is made white
         by itself, so that little more than what is returned is held."""
-        every, first = [self.rows.residual[k][:, :, None], self.rows.slopes[k], *shown], 0
-        values = np.empty((self.length(k), sum(each.shape[2] for each in every)))
-        for each in every:
-            values[:, first : (first := first + each.shape[2])] = self._white(k, each)
+        all_columns, first = [self.rows.residual[k][:, :, None], self.rows.slopes[k], *extra_columns], 0
+        values = np.empty((self.length(k), sum(column_set.shape[2] for column_set in all_columns)))
+        for columns in all_columns:
+            values[:, first : (first := first + columns.shape[2])] = self._white(k, columns)
         return values
 
     def length(self, k: int) -> int:
         """How many white rows a piece has, with those of what is known of its start."""
-        return len(self._starts[k]) if self.rows.own[k].shape[2] else int(self.rows.there[k].sum())
+        return len(self._starts[k]) if self.rows.start_slopes[k].shape[2] else int(self.rows.masks[k].sum())
 
     @property
     def priors(self) -> FloatArray:
@@ -173,12 +181,14 @@ class Linear:
 
     def _without_start(self, k: int, values: FloatArray) -> FloatArray:
         """Columns of piece k made white, what its start explains projected out."""
-        one, start = self.of_piece(k, values), self._starts[k]
-        if not self.rows.own[k].shape[2]:
-            return one
-        one = np.concatenate([one, np.zeros((len(start) - len(one), one.shape[1]))])
-        one -= start @ (start.T @ one)
-        return one
+        white_columns, start = self.of_piece(k, values), self._starts[k]
+        if not self.rows.start_slopes[k].shape[2]:
+            return white_columns
+        white_columns = np.concatenate(
+            [white_columns, np.zeros((len(start) - len(white_columns), white_columns.shape[1]))]
+        )
+        white_columns -= start @ (start.T @ white_columns)
+        return white_columns
 
     @cached_property
     def _starts(self) -> list[FloatArray]:
@@ -186,48 +196,48 @@ class Linear:
         return [self._start(k) for k in range(len(self.rows.pieces))]
 
     def _start(self, k: int) -> FloatArray:
-        piece, own = self.rows.pieces[k], self.of_piece(k, self.rows.own[k])
-        if not own.shape[1]:
-            return own
-        _, known = piece.start_prior(self.rows.point.states[k])
-        held = np.sqrt(known[piece.free[: len(known)]])
-        extra = np.zeros((len(held), own.shape[1]))
-        extra[np.arange(len(held)), np.arange(len(held))] = held
-        own = np.vstack([own, extra])
-        size = np.linalg.norm(own, axis=0)
-        left, size_, _ = np.linalg.svd(own[:, size > 0.0] / size[size > 0.0], full_matrices=False)
-        return left[:, size_ > 1e-9 * size_.max(initial=1e-300)]
+        piece, start_columns = self.rows.pieces[k], self.of_piece(k, self.rows.start_slopes[k])
+        if not start_columns.shape[1]:
+            return start_columns
+        _, start_information = piece.start_prior(self.rows.point.states[k])
+        start_roots = np.sqrt(start_information[piece.free[: len(start_information)]])
+        extra = np.zeros((len(start_roots), start_columns.shape[1]))
+        extra[np.arange(len(start_roots)), np.arange(len(start_roots))] = start_roots
+        start_columns = np.vstack([start_columns, extra])
+        size = np.linalg.norm(start_columns, axis=0)
+        left_vectors, size_, _ = np.linalg.svd(start_columns[:, size > 0.0] / size[size > 0.0], full_matrices=False)
+        return left_vectors[:, size_ > 1e-9 * size_.max(initial=1e-300)]
 
     def with_start(self, k: int, values: FloatArray) -> FloatArray:
         """Columns of piece k made white, its start still in them, what its inputs were rounded by in none."""
-        one = self.of_piece(k, values)
+        white_columns = self.of_piece(k, values)
         if not self.rounding:
-            return one
-        beside = self.rounding[k]
-        known = np.zeros((len(beside.z) - len(one), one.shape[1]))  # of its start beforehand
-        return beside.white(np.concatenate([one, known]))[: len(one)]
+            return white_columns
+        effect = self.rounding[k]
+        no_rows = np.zeros((len(effect.z) - len(white_columns), white_columns.shape[1]))  # of its start beforehand
+        return effect.white(np.concatenate([white_columns, no_rows]))[: len(white_columns)]
 
     def of_piece(self, k: int, values: FloatArray) -> FloatArray:
         """Columns of piece k made white, its start, and what its inputs were rounded by, still in them."""
-        ends = np.cumsum([0, *(int(there.sum()) for there in self.rows.there[k])])
-        found = np.empty((int(ends[-1]), values.shape[2]))
+        ends = np.cumsum([0, *(int(row_mask.sum()) for row_mask in self.rows.masks[k])])
+        white_rows = np.empty((int(ends[-1]), values.shape[2]))
         for j in range(len(self.rows.column[k])):
-            found[ends[j] : ends[j + 1]] = self.of_column(k, j, values[j])
-        return found
+            white_rows[ends[j] : ends[j + 1]] = self.of_column(k, j, values[j])
+        return white_rows
 
     def of_column(self, k: int, j: int, values: FloatArray) -> FloatArray:
         """Values (rows, K) of column j of piece k made white, in the rows that count."""
         rows, memory = self.rows, self.memory[self.rows.column[k][j]]
-        there = rows.there[k][j]
-        return self._new(k, j, np.ascontiguousarray(values[there])) / np.sqrt(max(memory.variance, TINY))
+        row_mask = rows.masks[k][j]
+        return self._new(k, j, np.ascontiguousarray(values[row_mask])) / np.sqrt(max(memory.variance, TINY))
 
-    def _new(self, k: int, j: int, known: FloatArray) -> FloatArray:
+    def _new(self, k: int, j: int, known_gains: FloatArray) -> FloatArray:
         """What is new in the rows (n, K) of column j of piece k that count."""
         rows, memory = self.rows, self.memory[self.rows.column[k][j]]
         steps = rows.steps[k][j]
         if memory.remembers and memory.moving is None and (k, j) not in self._gains:
             self._gains[k, j] = memory.gains(steps)
-        return memory.new(known, steps, rows.moves[k][j, rows.there[k][j]], self._gains.get((k, j)))
+        return memory.new(known_gains, steps, rows.moves[k][j, rows.masks[k][j]], self._gains.get((k, j)))
 
     @cached_property
     def _gains(self) -> dict[tuple[int, int], Gains]:
@@ -238,16 +248,16 @@ class Linear:
         """The same as of `Rows`, of values made white."""
         return self.rows.added(lambda k, j: self.of_column(k, j, values[k][j][:, None]) ** 2)
 
-    def without_starts(self, shown: Shown) -> list[FloatArray]:
+    def without_starts(self, columns_by_piece: Shown) -> list[FloatArray]:
         """What is shown, in rows as they are, without what the starts of pieces, and rounded inputs, explain of it.
         (C, rows, K) each."""
         arrays = []
-        for k, values in enumerate(shown):
+        for k, values in enumerate(columns_by_piece):
             values = values - self.rounded_off(k, values)
-            own = self.rows.own[k]
-            if own.shape[2]:
-                white_own = self.of_piece(k, own)
-                values = values - own @ solved(white_own, self.of_piece(k, values))
+            start_slopes = self.rows.start_slopes[k]
+            if start_slopes.shape[2]:
+                white_own = self.of_piece(k, start_slopes)
+                values = values - start_slopes @ solved(white_own, self.of_piece(k, values))
             arrays.append(values)
         return arrays
 
@@ -258,55 +268,58 @@ class Linear:
         return self.rows.rounding[k] @ self.rounding[k].predicted(self._without_start(k, values))
 
     def open(self, k: int) -> FloatArray:
-        """What that may be off by, (C, rows, M) of variance 1 each; of many, as few as OPEN leaves room for."""
-        shown, root = self.rows.rounding[k], self.rounding[k].open
-        most = max(OPEN // max(shown[:, :, 0].size, 1), FEWEST)
-        return shown @ (root if root.shape[1] <= most else drawn_together(root, most))
+        """What that may be off by, (C, rows, M) of variance 1 each; of many, as few as MOST_NUMBERS leaves room for."""
+        rounding_columns, root = self.rows.rounding[k], self.rounding[k].open
+        column_limit = max(MOST_NUMBERS // max(rounding_columns[:, :, 0].size, 1), LEAST_COLUMNS)
+        return rounding_columns @ (root if root.shape[1] <= column_limit else drawn_together(root, column_limit))
 
-    def known(self, shown: Shown) -> FloatArray:
+    def known(self, columns_by_piece: Shown) -> FloatArray:
         """Degrees of freedom with which the noise along some directions is known, by how well the memory is. (K,).
 
-        shown: of each piece (C, rows, K), as it is, of length 1 once white. By how far the variance may be off that a
-        memory gives to a direction, see AutoRegression.scatter; 2/var V: Satterthwaite's.
+        columns_by_piece: of each piece (C, rows, K), as it is, of length 1 once white. By how far the variance may be
+            off that a memory gives to a direction, see AutoRegression.scatter; 2/var V: Satterthwaite's.
         """
-        scatter = np.zeros(shown[0].shape[2])
+        scatter = np.zeros(columns_by_piece[0].shape[2])
         for c, memory in enumerate(self.memory):
-            leaning = np.zeros((1 + memory.order, len(scatter)))
+            memory_slopes = np.zeros((1 + memory.order, len(scatter)))
             for k, columns in enumerate(self.rows.column):
                 for j in (j for j, column in enumerate(columns) if column == c):
-                    there, steps = self.rows.there[k][j], self.rows.steps[k][j]
-                    own = np.ascontiguousarray(shown[k][j][there])
-                    leaning += memory.leaning(own, self._new(k, j, own), steps)
-            scatter += memory.scatter(leaning / max(memory.variance, TINY))
+                    row_mask, steps = self.rows.masks[k][j], self.rows.steps[k][j]
+                    column_values = np.ascontiguousarray(columns_by_piece[k][j][row_mask])
+                    memory_slopes += memory.leaning(column_values, self._new(k, j, column_values), steps)
+            scatter += memory.scatter(memory_slopes / max(memory.variance, TINY))
         return 2.0 / np.maximum(scatter, TINY)
 
-    def rounded(self, shown: Shown) -> FloatArray:
+    def rounded(self, columns_by_piece: Shown) -> FloatArray:
         """By how much rounding makes the variance along some directions larger than white noise does, 1 or more. (K,).
 
-        shown: as in `known`. Columns with a memory have it in their memory.
+        columns_by_piece: as in `known`. Columns with a memory have it in their memory.
         """
-        more = np.zeros(shown[0].shape[2])
+        factors = np.zeros(columns_by_piece[0].shape[2])
         for k, (piece, columns) in enumerate(zip(self.rows.pieces, self.rows.column, strict=True)):
             for j, (c, tick) in enumerate(zip(columns, piece.record.ticks, strict=True)):
                 variance = max(self.memory[c].variance, TINY)
                 if tick <= 0.0 or self.memory[c].remembers:
                     continue
-                there = self.rows.there[k][j]
-                angle = (piece.record.outputs[piece.first : piece.last + 1, j] - self.rows.residual[k][j])[there]
+                row_mask = self.rows.masks[k][j]
+                angle = (piece.record.outputs[piece.first : piece.last + 1, j] - self.rows.residual[k][j])[row_mask]
                 share = tick**2 / 12.0 / variance
-                beside = max(1.0 / share - 1.0, 0.0) / 12.0
-                more += share * of_rounding(angle, tick, shown[k][j][there] / np.sqrt(variance), beside**0.5)
-        return np.maximum(1.0 + more, 1.0)
+                noise_square = max(1.0 / share - 1.0, 0.0) / 12.0
+                factors += share * of_rounding(
+                    angle, tick, columns_by_piece[k][j][row_mask] / np.sqrt(variance), noise_square**0.5
+                )
+        return np.maximum(1.0 + factors, 1.0)
 
     def whole(self) -> tuple[FloatArray, FloatArray]:
         """(e (N,), J (N, P)) of the fit itself, its priors as rows."""
-        every = np.concatenate([*(self.beside(k, []) for k in range(len(self.rows.pieces))), self.priors])
-        return np.ascontiguousarray(every[:, 0]), np.ascontiguousarray(every[:, 1:])
+        all_rows = np.concatenate([*(self.beside(k, []) for k in range(len(self.rows.pieces))), self.priors])
+        return np.ascontiguousarray(all_rows[:, 0]), np.ascontiguousarray(all_rows[:, 1:])
 
 
-def with_priors(linear: Linear, more: int) -> FloatArray:
-    """Scalar products of [e, J] in the rows of the priors, and 0 of `more` columns. (1 + P + more, 1 + P + more)."""
-    return np.pad(linear.priors.T @ linear.priors, (0, more))
+def with_priors(linear: Linear, extra_count: int) -> FloatArray:
+    """Scalar products of [e, J] in the rows of the priors, and 0 of `extra_count` columns. (1 + P + more, 1 + P +
+    more)."""
+    return np.pad(linear.priors.T @ linear.priors, (0, extra_count))
 
 
 def lengths(products: FloatArray) -> FloatArray:
@@ -327,8 +340,8 @@ def solved(columns: FloatArray, right: FloatArray) -> FloatArray:
 def solved_by(matrix: FloatArray, right: FloatArray) -> FloatArray:
     """The shortest x with matrix x = right, the matrix (K, K) one of scalar products of columns of length 1."""
     values, vectors = np.linalg.eigh(matrix)
-    kept = values > SAME * max(float(values.max(initial=0.0)), TINY)
-    return vectors[:, kept] @ ((vectors[:, kept].T @ right).T / values[kept]).T
+    kept_values = values > EIGEN_TOLERANCE * max(float(values.max(initial=0.0)), TINY)
+    return vectors[:, kept_values] @ ((vectors[:, kept_values].T @ right).T / values[kept_values]).T
 
 
 def root_of_covariance(columns: FloatArray) -> FloatArray:
@@ -337,28 +350,33 @@ def root_of_covariance(columns: FloatArray) -> FloatArray:
     size[size == 0.0] = 1.0
     columns = columns / size
     values, vectors = np.linalg.eigh(columns.T @ columns)
-    kept = values > SAME * max(float(values.max(initial=0.0)), TINY)
-    return vectors[:, kept] / np.sqrt(values[kept]) / size[:, None]
+    kept_values = values > EIGEN_TOLERANCE * max(float(values.max(initial=0.0)), TINY)
+    return vectors[:, kept_values] / np.sqrt(values[kept_values]) / size[:, None]
 
 
 def noise_models(
-    rows: Rows, left: Sequence[FloatArray], taken: Sequence[FloatArray] | None = None, most: int | None = None
+    rows: Rows,
+    residuals: Sequence[FloatArray],
+    removed_columns: Sequence[FloatArray] | None = None,
+    order_limit: int | None = None,
 ) -> list[AutoRegression]:
-    """The memory of each column. taken: of each piece (C, rows, K), what a fit has taken out, as likely as it is. most:
-    the highest order."""
+    """The memory of each column. removed_columns: of each piece (C, rows, K), what a fit has taken out, as likely as it
+    is. order_limit: the highest order."""
     auto_regressions = []
     for c in range(len(rows.problem.columns)):
         series, moves = list[FloatArray](), list[BoolArray]()
-        for k, own in enumerate(rows.column):
-            for j, column in enumerate(own):
+        for k, columns in enumerate(rows.column):
+            for j, column in enumerate(columns):
                 if column == c:
-                    there = rows.there[k][j]
-                    more = [] if taken is None else [taken[k][j][there]]
-                    series += without_gaps(np.column_stack([left[k][j][there], *more]), rows.steps[k][j])
-                    moves += without_gaps(rows.moves[k][j, there], rows.steps[k][j])
-        plain, adds_up = autoregression(series, 0), rows.problem.columns[c][0] in TRAVEL
-        is_white = most == 0 or rows.is_rounding(c, plain.variance)
-        auto_regressions.append(plain if is_white else autoregression(series, may_add_up=adds_up, moves=moves))
+                    row_mask = rows.masks[k][j]
+                    removed_list = [] if removed_columns is None else [removed_columns[k][j][row_mask]]
+                    series += without_gaps(
+                        np.column_stack([residuals[k][j][row_mask], *removed_list]), rows.steps[k][j]
+                    )
+                    moves += without_gaps(rows.moves[k][j, row_mask], rows.steps[k][j])
+        white_model, is_travel = autoregression(series, 0), rows.problem.columns[c][0] in TRAVEL
+        is_white = order_limit == 0 or rows.is_rounding(c, white_model.variance)
+        auto_regressions.append(white_model if is_white else autoregression(series, may_add_up=is_travel, moves=moves))
     return auto_regressions
 
 
@@ -371,20 +389,20 @@ def noise_models(
 # Source: B. Widrow, I. Kollar, Quantization Noise (2008).
 
 HARMONICS = 24  # beyond them rounding is as good as white
-APART = 0.2  # of a tick: from there on two rows have no positive correlation
+ROUNDING_DISTANCE = 0.2  # of a tick: from there on two rows have no positive correlation
 
 
-def of_rounding(angle: FloatArray, tick: float, ways: FloatArray, beside: float = 0.0) -> FloatArray:
+def of_rounding(angle: FloatArray, tick: float, ways: FloatArray, noise_ratio: float = 0.0) -> FloatArray:
     """By how much the variance of sums of rounding, w' e, is more than that of white noise w' w, over tick^2/12. (K,).
 
-    angle (rows,): what is rounded [as tick]; ways (rows, K): w. beside: std of the noise beside it, in ticks.
+    angle (rows,): what is rounded [as tick]; ways (rows, K): w. noise_ratio: std of the noise beside it, in ticks.
     """
-    more = np.zeros(ways.shape[1])
+    factors = np.zeros(ways.shape[1])
     for m in range(1, HARMONICS + 1):
-        common = 6.0 / (np.pi * m) ** 2 * np.exp(-((2.0 * np.pi * m * beside) ** 2))
+        weight = 6.0 / (np.pi * m) ** 2 * np.exp(-((2.0 * np.pi * m * noise_ratio) ** 2))
         wave = np.abs(np.exp(2j * np.pi * m * angle / tick) @ ways) ** 2
-        more += common * (wave - (ways**2).sum(axis=0))
-    return more
+        factors += weight * (wave - (ways**2).sum(axis=0))
+    return factors
 
 
 def anew(piece: Piece, residual: FloatArray) -> FloatArray:
@@ -393,12 +411,14 @@ def anew(piece: Piece, residual: FloatArray) -> FloatArray:
     Of a wheel that turns by nearly nothing from row to row, or by nearly whole ticks, one row knows nothing of another
     only where that has brought it round.
     """
-    out = residual.copy()
+    new_residual = residual.copy()
     for c, tick in enumerate(piece.record.ticks):
         if tick <= 0.0:
             continue
         model = np.nan_to_num(piece.record.outputs[piece.first : piece.last + 1, c] - residual[c]) / tick
-        apart = np.abs(np.diff(model) - np.round(np.diff(model)))
-        round_ = np.concatenate([[0.0], np.cumsum(np.where(apart < APART, apart, 1.0))]) // 1.0
-        out[c, 1:][round_[1:] == round_[:-1]] = np.nan
-    return out
+        level_distance = np.abs(np.diff(model) - np.round(np.diff(model)))
+        round_ = (
+            np.concatenate([[0.0], np.cumsum(np.where(level_distance < ROUNDING_DISTANCE, level_distance, 1.0))]) // 1.0
+        )
+        new_residual[c, 1:][round_[1:] == round_[:-1]] = np.nan
+    return new_residual

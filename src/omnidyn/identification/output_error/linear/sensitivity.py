@@ -18,7 +18,7 @@ from omnidyn.identification.output_error.linear.rows import Linear, Rows, length
 from omnidyn.identification.output_error.linear.workbench import Workbench
 from omnidyn.identification.output_error.memory.autoregression import AutoRegression
 from omnidyn.identification.output_error.memory.whitening import Weighed
-from omnidyn.identification.output_error.problem.differences import JUMP, LOST, NEARLY, UNEVEN
+from omnidyn.identification.output_error.problem.differences import COUNT_SHARE, GAP_ROWS, JUMP, UNEVEN
 from omnidyn.identification.output_error.problem.parameters import robot_parameter
 from omnidyn.identification.output_error.problem.problem import Fitted, Piece, Point, Problem, bounded
 from omnidyn.identification.output_error.problem.record import Record
@@ -28,47 +28,48 @@ from omnidyn.model.layout import N_AXES
 from omnidyn.model.motor import per_wheel
 from omnidyn.statement import WARNING, Statement
 
-TRIED = 0.01  # relative change of a fixed number, either way is alike
+TRIAL_CHANGE = 0.01  # relative change of a fixed number, either way is alike
 
 
-def moved_by_the_file(weighed: Weighed, held: Mapping[str, float]) -> FloatArray:
+def moved_by_the_file(weighed_fit: Weighed, stds_by_key: Mapping[str, float]) -> FloatArray:
     """What one std of each number that the fit took as it stands moves its parameters by, in the numbers that the
-    solver sees. Shape (P, K). held: key -> std, as the robot file has it; with groups it is the same number in all.
+    solver sees. Shape (P, K). stds_by_key: key -> std, as the robot file has it; with groups it is the same number in
+    all.
 
     To first order, as in `rests_on`; 0 for what shows in no row, or cannot be simulated. The covariance of what is
     fitted beside numbers that are taken as they stand: S. F. Schmidt, Adv. Control Syst. 3, 293 (1966).
     """
-    linear, engine, point = as_weighed(weighed)
+    linear, engine, point = as_weighed(weighed_fit)
     benches = [
         (Workbench(problem, member_point, type(member_engine), ()), places)
         for problem, member_point, member_engine, places in members_of(engine, linear.rows.problem, point)
     ]
     _, j = linear.whole()
-    moved = np.zeros((j.shape[1], len(held)))
-    for k, (key, std) in enumerate(held.items()):
-        shown = [np.zeros((*residual.shape, 1)) for residual in linear.rows.residual]
+    shifts = np.zeros((j.shape[1], len(stds_by_key)))
+    for k, (key, std) in enumerate(stds_by_key.items()):
+        columns_by_piece = [np.zeros((*residual.shape, 1)) for residual in linear.rows.residual]
         try:
             for bench, places in benches:
-                number = robot_parameter(bench.robot, key, None, tuple(held))
-                step = TRIED * (abs(number.value) or std)
+                number = robot_parameter(bench.robot, key, None, tuple(stds_by_key))
+                step = TRIAL_CHANGE * (abs(number.value) or std)
                 changes = bench.change(number.on(bench.robot, number.value + step))
                 for place, change in zip(places, changes, strict=True):
-                    shown[place] = change / step
+                    columns_by_piece[place] = change / step
         except OmnidynError:
             continue
-        moved[:, k] = solved(j, -linear.white(shown)[:, 0]) * std
-    return moved
+        shifts[:, k] = solved(j, -linear.white(columns_by_piece)[:, 0]) * std
+    return shifts
 
 
-def as_weighed(weighed: Weighed) -> tuple[Linear, Engine, Point]:
+def as_weighed(weighed_fit: Weighed) -> tuple[Linear, Engine, Point]:
     """(the rows of a fit made white by the memory that it was weighed with, what simulates them, its best point)."""
-    solver, point = weighed.plain.solver, weighed.plain.state.point
+    solver, point = weighed_fit.plain_solution.solver, weighed_fit.plain_solution.state.point
     assert isinstance(solver.problem, Problem)
-    problem, variance = bounded(solver.problem, 1), weighed.plain.state.variance
+    problem, variance = bounded(solver.problem, 1), weighed_fit.plain_solution.state.variance
     engine = solver.engine.on(problem)
     rows = Rows.of(problem, point, engine.residuals(point))
     memory = [
-        weighed.models.get(column, AutoRegression(np.zeros(0), float(variance[c]), 0))
+        weighed_fit.models.get(column, AutoRegression(np.zeros(0), float(variance[c]), 0))
         for c, column in enumerate(problem.columns)
     ]
     return Linear(rows, memory), engine, point
@@ -97,60 +98,66 @@ def members_of(engine: Engine, problem: Problem, point: Point) -> list[tuple[Pro
 #
 # In the tests of a fit all u are random effects, as many as there are stretches (`with_rounding`), and so is what rows
 # that are missing hide: what they may explain is a known cause, and no lack of fit. Inputs that are held
-# for less than HELD leave what the memory of the noise knows.
+# for less than HOLD_TIME leave what the memory of the noise knows.
 
-HELD = 0.1  # [s]
-WIDER = 1.1  # times an interval, from which on what widens it is said
+HOLD_TIME = 0.1  # [s]
+WIDENING_RATIO = 1.1  # times an interval, from which on what widens it is said
 DRAWS = 60  # a variance within a fifth; always the same ones
 SEED = 20_12
 
 
-def beside_rounding(weighed: Weighed, records: Sequence[Record]) -> tuple[Trust, list[Statement]]:
+def beside_rounding(weighed_fit: Weighed, records: Sequence[Record]) -> tuple[Trust, list[Statement]]:
     """(the trust in a fit, with what inputs in steps may have been rounded by; what is to be said of that)."""
     steps = max(float(input_steps(record).max()) for record in records)
     if not steps:
-        return weighed.known, []
-    known = weighed.known.beside(moved_by_rounding(weighed))
+        return weighed_fit.uncertainty, []
+    uncertainty = weighed_fit.uncertainty.beside(moved_by_rounding(weighed_fit))
     with np.errstate(divide="ignore", invalid="ignore"):
-        wider = float(np.nanmax(known.std / weighed.known.std, initial=1.0))
-    rounded = Statement("rounded_inputs", WARNING, numbers={"step": steps, "wider": wider})
-    return known, [rounded] if wider > WIDER else []
+        largest_ratio = float(np.nanmax(uncertainty.std / weighed_fit.uncertainty.std, initial=1.0))
+    rounded = Statement("rounded_inputs", WARNING, numbers={"step": steps, "wider": largest_ratio})
+    return uncertainty, [rounded] if largest_ratio > WIDENING_RATIO else []
 
 
-def moved_by_rounding(weighed: Weighed) -> FloatArray:
+def moved_by_rounding(weighed_fit: Weighed) -> FloatArray:
     """What the rounding of its inputs moves the parameters of a fit by, in the numbers that the solver sees: their
     covariance is that times its transpose. Shape (P, DRAWS).
 
     One piece after the other. Of logs that are longer than what is looked at as much less as there are more rows.
     """
-    linear, engine, point = as_weighed(weighed)
+    linear, engine, point = as_weighed(weighed_fit)
     products, random = with_priors(linear, DRAWS), np.random.default_rng(SEED)
     for problem, own_point, _, places in members_of(engine, linear.rows.problem, point):
         for place, motion in zip(places, motions(problem, own_point), strict=True):
-            every = linear.beside(place, [_shown(motion, _drawn(motion, random))])
-            products += every.T @ every
+            white_columns = linear.beside(place, [_shown(motion, _drawn(motion, random))])
+            products += white_columns.T @ white_columns
     size = lengths(products)
     gram = products / np.outer(size, size)
-    j, other = np.arange(1, len(gram) - DRAWS), np.r_[0, len(gram) - DRAWS : len(gram)]
-    by = solved_by(gram[np.ix_(j, j)], gram[np.ix_(j, other)])
-    left = (gram[np.ix_(other, other)] - by.T @ gram[np.ix_(j, other)]) * np.outer(size[other], size[other])
-    rows, every = (_rows(own) for own in (linear.rows.problem, weighed.plain.solver.problem))
-    return (by * size[other] / size[j, None])[:, 1:] * np.sqrt(_share(left) / DRAWS * rows / every)
+    j, other_indices = np.arange(1, len(gram) - DRAWS), np.r_[0, len(gram) - DRAWS : len(gram)]
+    coefficients = solved_by(gram[np.ix_(j, j)], gram[np.ix_(j, other_indices)])
+    remaining = (
+        gram[np.ix_(other_indices, other_indices)] - coefficients.T @ gram[np.ix_(j, other_indices)]
+    ) * np.outer(size[other_indices], size[other_indices])
+    rows, white_columns = (
+        _rows(row_problem) for row_problem in (linear.rows.problem, weighed_fit.plain_solution.solver.problem)
+    )
+    return (coefficients * size[other_indices] / size[j, None])[:, 1:] * np.sqrt(
+        _share(remaining) / DRAWS * rows / white_columns
+    )
 
 
-def with_rounding(rows: Rows, moved: Sequence[Motion]) -> Rows:
+def with_rounding(rows: Rows, piece_motions: Sequence[Motion]) -> Rows:
     """The rows of a fit with what the rounding of inputs shows in them, where they are rounded; and what an input does
     that changed while rows are missing."""
-    every = [_stretches(motion.piece) for motion in moved]
-    if not any(every) and not any(losses(motion.piece).size for motion in moved):
+    stretches_by_piece = [_stretches(motion.piece) for motion in piece_motions]
+    if not any(stretches_by_piece) and not any(losses(motion.piece).size for motion in piece_motions):
         return rows
-    shown, lost = list[FloatArray](), [shown_by_losses(motion) for motion in moved]
-    for motion, own, more in zip(moved, every, lost, strict=True):
-        volts = np.zeros((len(motion.t), len(own), motion.voltage.shape[1]))
-        for k, (w, first, last, step) in enumerate(own):
+    columns_by_piece, losses_by_piece = list[FloatArray](), [shown_by_losses(motion) for motion in piece_motions]
+    for motion, stretches, loss_columns in zip(piece_motions, stretches_by_piece, losses_by_piece, strict=True):
+        volts = np.zeros((len(motion.t), len(stretches), motion.voltage.shape[1]))
+        for k, (w, first, last, step) in enumerate(stretches):
             volts[first:last, k, w] = step / np.sqrt(12.0)
-        shown.append(np.nan_to_num(np.concatenate([_shown(motion, volts), more], axis=2)))
-    return replace(rows, rounding=shown, losses=[each.shape[2] for each in lost])
+        columns_by_piece.append(np.nan_to_num(np.concatenate([_shown(motion, volts), loss_columns], axis=2)))
+    return replace(rows, rounding=columns_by_piece, losses=[lost_columns.shape[2] for lost_columns in losses_by_piece])
 
 
 def effects(problem: Problem) -> list[int]:
@@ -162,15 +169,15 @@ def _stretches(piece: Piece) -> list[tuple[int, int, int, float]]:
     """(wheel, first row, row behind the last, step [V]) of each stretch in which an input is held and may be off."""
     record, rows = piece.record, slice(piece.first, piece.last + 1)
     inputs, steps, t = as_logged(record)[rows], input_steps(record), record.t[rows]
-    found = []
+    stretches = []
     for w in np.flatnonzero(steps).tolist():
         edges = [*np.flatnonzero(_changed(inputs, w)).tolist(), len(t)]
-        found += [
+        stretches += [
             (w, a, b, float(steps[w]))
             for a, b in pairwise(edges)
-            if inputs[a].any() and t[b - 1] - t[a] >= HELD  # what is off is off
+            if inputs[a].any() and t[b - 1] - t[a] >= HOLD_TIME  # what is off is off
         ]
-    return found
+    return stretches
 
 
 def _changed(inputs: FloatArray, w: int) -> BoolArray:
@@ -178,19 +185,19 @@ def _changed(inputs: FloatArray, w: int) -> BoolArray:
     and those in which all others do, for then it is another command that came to the same step. (rows,)."""
     changes = np.ones(inputs.shape, dtype=bool)
     changes[1:] = np.diff(inputs, axis=0) != 0.0
-    others = np.delete(changes, w, axis=1)
-    return changes[:, w] | (others.all(axis=1) & others.any(axis=1))
+    other_changes = np.delete(changes, w, axis=1)
+    return changes[:, w] | (other_changes.all(axis=1) & other_changes.any(axis=1))
 
 
 def _drawn(motion: Motion, random: np.random.Generator) -> FloatArray:
     """Draws of what was rounded off [V], another one at each change of an input. Shape (rows, DRAWS, W)."""
     record, rows = motion.piece.record, slice(motion.piece.first, motion.piece.last + 1)
     inputs, steps = as_logged(record)[rows], input_steps(record)
-    off = np.zeros((len(inputs), DRAWS, len(steps)))
+    draws = np.zeros((len(inputs), DRAWS, len(steps)))
     for w in np.flatnonzero(steps).tolist():
         stretch = np.cumsum(_changed(inputs, w)) - 1
-        off[:, :, w] = steps[w] * random.uniform(-0.5, 0.5, (int(stretch[-1]) + 1, DRAWS))[stretch]
-    return off * np.any(inputs, axis=1, keepdims=True)[:, :, None]  # what is off is off
+        draws[:, :, w] = steps[w] * random.uniform(-0.5, 0.5, (int(stretch[-1]) + 1, DRAWS))[stretch]
+    return draws * np.any(inputs, axis=1, keepdims=True)[:, :, None]  # what is off is off
 
 
 def _shown(motion: Motion, volts: FloatArray) -> FloatArray:
@@ -209,13 +216,13 @@ def _rows(problem: Fitted) -> int:
     return sum(piece.last - piece.first + 1 for piece in problem.pieces)
 
 
-def _share(left: FloatArray) -> float:
-    """How much of the variance of what may have been rounded off there is. left: scalar products (1 + DRAWS, 1 + DRAWS)
-    of residuals and draws without what the parameters make of them."""
-    both = left[1:, 1:] ** 2
-    apart = float(both.sum() - np.trace(both)) / (DRAWS * (DRAWS - 1))
-    seen, noise = float(np.mean(left[0, 1:] ** 2)), float(np.mean(np.diag(left)[1:]))
-    return share(seen, noise, apart, float(np.sqrt(2.0 * both.mean())))
+def _share(products: FloatArray) -> float:
+    """How much of the variance of what may have been rounded off there is. products: scalar products (1 + DRAWS, 1 +
+    DRAWS) of residuals and draws without what the parameters make of them."""
+    squares = products[1:, 1:] ** 2
+    pair_square = float(squares.sum() - np.trace(squares)) / (DRAWS * (DRAWS - 1))
+    observed, noise = float(np.mean(products[0, 1:] ** 2)), float(np.mean(np.diag(products)[1:]))
+    return share(observed, noise, pair_square, float(np.sqrt(2.0 * squares.mean())))
 
 
 # What a log does not tell of its inputs where rows are missing: since when the next one has been applied
@@ -224,7 +231,7 @@ def _share(left: FloatArray) -> float:
 # beside that, by simulation. Of z there is a share u, even between 0 and 1 and another one at each loss: random effects
 # in the tests of a fit, as inputs that are rounded are, but all of their variance is there.
 
-LASTS = 3.0  # [s] that a change of speed may be seen
+LOSS_TIME = 3.0  # [s] that a change of speed may be seen
 
 
 def losses(piece: Piece) -> IntArray:
@@ -234,22 +241,22 @@ def losses(piece: Piece) -> IntArray:
     """
     record, rows = piece.record, slice(piece.first, piece.last + 1)
     row = np.diff(record.t[rows]) / usual_step(record.t[rows])
-    if record.staggered or record.set_point is not None or np.mean(np.abs(row - np.round(row)) <= UNEVEN) < NEARLY:
+    if record.staggered or record.set_point is not None or np.mean(np.abs(row - np.round(row)) <= UNEVEN) < COUNT_SHARE:
         return np.zeros(0, dtype=int)
     voltage = np.nan_to_num(record.voltage[rows])
     jumps = (np.abs(np.diff(voltage, axis=0)) > JUMP * np.ptp(voltage, axis=0).max()).any(axis=1)
-    return np.flatnonzero(jumps & (row > LOST))
+    return np.flatnonzero(jumps & (row > GAP_ROWS))
 
 
 def shown_by_losses(motion: Motion) -> FloatArray:
     """What the columns show of each input that changed at once, and of one that did halfway, times the root of the mean
     square of u. (C, rows, 2 K)."""
-    at, voltage = losses(motion.piece), motion.voltage.copy()
-    before, end = motion.piece.record.voltage[motion.piece.last - 1 : motion.piece.last + 1]
-    voltage[-1] += np.nan_to_num(end - before)  # it drives no row
-    change = np.zeros((len(motion.t), 2 * len(at), N_AXES))
-    for k, row in enumerate(at.tolist()):
-        last = int(np.searchsorted(motion.t[:-1], motion.t[row + 1] + LASTS))
+    loss_rows, voltage = losses(motion.piece), motion.voltage.copy()
+    voltage_before, end = motion.piece.record.voltage[motion.piece.last - 1 : motion.piece.last + 1]
+    voltage[-1] += np.nan_to_num(end - voltage_before)  # it drives no row
+    change = np.zeros((len(motion.t), 2 * len(loss_rows), N_AXES))
+    for k, row in enumerate(loss_rows.tolist()):
+        last = int(np.searchsorted(motion.t[:-1], motion.t[row + 1] + LOSS_TIME))
         dt = np.diff(motion.t[row : last + 1])
         dt = np.concatenate([[0.5 * dt[0]] * 2, dt[1:]])
         ways = [
@@ -265,10 +272,10 @@ def shown_by_losses(motion: Motion) -> FloatArray:
 
 LEVELS = 12  # of different size, from which on it is no chance that all are whole steps
 PARTS = 4  # of the least difference of two levels, of which the step may be one
-WHOLE = 0.02  # of a step, by which a level may be beside it: the text of a log is rounded, too
-LEAST = 1e-3  # of the largest input, below which a step does not matter
-SAME = 1e-6  # of the largest input: what is nearer is the same, written otherwise
-FEW = 200  # inputs, which tell soon of most logs that theirs are in no steps
+STEP_TOLERANCE = 0.02  # of a step, by which a level may be beside it: the text of a log is rounded, too
+LEAST_STEP = 1e-3  # of the largest input, below which a step does not matter
+LEVEL_TOLERANCE = 1e-6  # of the largest input: what is nearer is the same, written otherwise
+SAMPLE_INPUTS = 200  # inputs, which tell soon of most logs that theirs are in no steps
 
 
 def as_logged(record: Record) -> FloatArray:
@@ -279,7 +286,9 @@ def as_logged(record: Record) -> FloatArray:
     run = record.run
     if run is None or record.set_point is not None:
         return record.voltage
-    return next((each for each in (run.voltage, run.duty) if each is not None), record.voltage)
+    return next(
+        (input_columns for input_columns in (run.voltage, run.duty) if input_columns is not None), record.voltage
+    )
 
 
 def input_steps(record: Record) -> FloatArray:
@@ -291,36 +300,38 @@ def input_steps(record: Record) -> FloatArray:
     steps = np.array([_step(column) for column in inputs.T])
     if run.voltage is not None or run.duty is None or not steps.any():
         return steps
-    driven = np.abs(inputs) > 0.0
+    driven_rows = np.abs(inputs) > 0.0
     with np.errstate(divide="ignore", invalid="ignore"):
-        supply = np.median(np.abs(record.voltage / inputs)[driven & np.isfinite(record.voltage)])
+        supply = np.median(np.abs(record.voltage / inputs)[driven_rows & np.isfinite(record.voltage)])
     return steps * float(supply)
 
 
 def _step(column: FloatArray) -> float:
     """The step of one input, by the levels that it holds: all are whole steps."""
-    changed = np.flatnonzero(np.diff(column) != 0.0) + 1
-    if len(changed) < LEVELS:
+    change_rows = np.flatnonzero(np.diff(column) != 0.0) + 1
+    if len(change_rows) < LEVELS:
         return 0.0
-    held = np.abs(column[changed])
-    held = held[np.isfinite(held)]
-    largest = float(held.max(initial=0.0))
-    if _apart(held[:FEW], largest).min(initial=largest) < LEAST * largest:  # nor are those of all of them further apart
+    held_levels = np.abs(column[change_rows])
+    held_levels = held_levels[np.isfinite(held_levels)]
+    largest = float(held_levels.max(initial=0.0))
+    if (
+        _apart(held_levels[:SAMPLE_INPUTS], largest).min(initial=largest) < LEAST_STEP * largest
+    ):  # nor are those of all of them further apart
         return 0.0
-    levels, apart = np.unique(np.concatenate([[0.0], held])), _apart(held, largest)
-    if len(apart) < LEVELS:
+    levels, level_steps = np.unique(np.concatenate([[0.0], held_levels])), _apart(held_levels, largest)
+    if len(level_steps) < LEVELS:
         return 0.0
     for parts in range(1, PARTS + 1):
-        step = float(apart.min()) / parts
-        if step < LEAST * largest:
+        step = float(level_steps.min()) / parts
+        if step < LEAST_STEP * largest:
             return 0.0
-        beside = np.abs(levels / step - np.round(levels / step))
-        if beside.max() <= WHOLE:
+        distance = np.abs(levels / step - np.round(levels / step))
+        if distance.max() <= STEP_TOLERANCE:
             return step
     return 0.0
 
 
-def _apart(held: FloatArray, largest: float) -> FloatArray:
+def _apart(held_levels: FloatArray, largest: float) -> FloatArray:
     """The differences of levels, 0 among them."""
-    apart = np.diff(np.sort(np.concatenate([[0.0], held])))
-    return apart[apart > SAME * largest]
+    level_steps = np.diff(np.sort(np.concatenate([[0.0], held_levels])))
+    return level_steps[level_steps > LEVEL_TOLERANCE * largest]

@@ -47,16 +47,18 @@ class Workbench:
         Of each piece (C, rows, 1), 0 where nothing was measured. By a step a row where the implicit engine simulates:
         what that is off by goes out of the difference. Raises OmnidynError for what cannot be simulated.
         """
-        other = robot or self.robot
-        kind = self.kind if not self.kind.exact or is_exact(other) else ImplicitEngine
+        other_robot = robot or self.robot
+        kind = self.kind if not self.kind.exact or is_exact(other_robot) else ImplicitEngine
         if kind not in self._before:
             self._before[kind] = self._residuals(self.robot, IDEAL, kind)
-        return _apart(self._before[kind], self._residuals(other, driver, kind))
+        return _apart(self._before[kind], self._residuals(other_robot, driver, kind))
 
-    def changes(self, before: Robot, after: Sequence[Robot]) -> list[list[FloatArray]]:
+    def changes(self, base_robot: Robot, other_robots: Sequence[Robot]) -> list[list[FloatArray]]:
         """What the columns show of other robots less what they show of one that the same engine simulates."""
-        own = self._residuals(before, IDEAL, ImplicitEngine)
-        return [_apart(own, self._residuals(other, IDEAL, ImplicitEngine)) for other in after]
+        base_residuals = self._residuals(base_robot, IDEAL, ImplicitEngine)
+        return [
+            _apart(base_residuals, self._residuals(other_robot, IDEAL, ImplicitEngine)) for other_robot in other_robots
+        ]
 
     def on_time(self) -> Workbench:
         """The same with channels that are not late."""
@@ -69,35 +71,37 @@ class Workbench:
 
     def by_forces(self, forces: Sequence[Callable[[Motion], FloatArray]]) -> list[list[FloatArray]]:
         """What each of several forces shows: in one go through the rows, which takes hardly longer than one of them."""
-        found: list[list[FloatArray]] = [[] for _ in forces]
+        columns_by_force: list[list[FloatArray]] = [[] for _ in forces]
         for motion in self.motions:
-            every = [force(motion) for force in forces]
-            ends = np.cumsum([own.shape[1] for own in every])[:-1]
-            parts = np.split(motion.shown_by(np.concatenate(every, axis=1)), ends, axis=2)
-            for own, part in zip(found, parts, strict=True):
-                own.append(part)
-        return found
+            forces_at_rows = [force(motion) for force in forces]
+            ends = np.cumsum([force_rows.shape[1] for force_rows in forces_at_rows])[:-1]
+            parts = np.split(motion.shown_by(np.concatenate(forces_at_rows, axis=1)), ends, axis=2)
+            for columns, part in zip(columns_by_force, parts, strict=True):
+                columns.append(part)
+        return columns_by_force
 
     def _residuals(self, robot: Robot, driver: Driver, kind: type[Engine[Problem]]) -> list[FloatArray]:
-        known, records = self.problem.robot_count, dict[int, Record]()
+        robot_count, records = self.problem.robot_count, dict[int, Record]()
         pieces = [replace(piece, record=_driven(piece, driver, records)) for piece in self.problem.pieces]
-        bare = Problem(robot, self.problem.parameters[known:], 0, tuple(pieces))
-        parts = kind.of(bare).residuals(Point(self.point.values[known:], self.point.states))
+        bare_problem = Problem(robot, self.problem.parameters[robot_count:], 0, tuple(pieces))
+        parts = kind.of(bare_problem).residuals(Point(self.point.values[robot_count:], self.point.states))
         return [residual for residual, _, _ in parts]
 
 
-def _apart(before: Sequence[FloatArray], after: Sequence[FloatArray]) -> list[FloatArray]:
-    return [np.nan_to_num(a - b)[:, :, None] for a, b in zip(before, after, strict=True)]
+def _apart(base_residuals: Sequence[FloatArray], other_residuals: Sequence[FloatArray]) -> list[FloatArray]:
+    return [np.nan_to_num(a - b)[:, :, None] for a, b in zip(base_residuals, other_residuals, strict=True)]
 
 
 def _driven(piece: Piece, driver: Driver, records: dict[int, Record]) -> Record:
     """The record of a piece with what the driver makes of its voltages; each record once."""
-    own = piece.record
+    piece_record = piece.record
     if driver == IDEAL:
-        return own
-    if id(own) not in records:
-        records[id(own)] = replace(own, voltage=at_motors(own.voltage, own.share, driver)[0])
-    return records[id(own)]
+        return piece_record
+    if id(piece_record) not in records:
+        records[id(piece_record)] = replace(
+            piece_record, voltage=at_motors(piece_record.voltage, piece_record.share, driver)[0]
+        )
+    return records[id(piece_record)]
 
 
 def on_time(parameters: Sequence[Parameter], values: FloatArray) -> FloatArray:
@@ -108,7 +112,7 @@ def on_time(parameters: Sequence[Parameter], values: FloatArray) -> FloatArray:
 def scaled(robot: Robot, name: str, factor: float) -> Robot | None:
     """The robot with a number, on all wheels, times a factor; None where it has none or 0."""
     try:
-        keys = [Key.parse(each) for each in expand(name, robot)]
+        keys = [Key.parse(full_key) for full_key in expand(name, robot)]
         values = [float(key.get(robot)) for key in keys]
     except OmnidynError:
         return None

@@ -35,12 +35,12 @@ from omnidyn.identification.output_error.memory.moving import (
 ORDERS = 10.0  # times log10 of the number of rows: the highest order that is tried
 SHARE = 0.1  # of the rows that may be coefficients
 PATIENCE = 15  # orders without a better one, after which none is looked for
-FOLLOWED = 20_000  # rows after which a memory is as good as endless
-MIXED = 2  # order from which on white noise beside errors that remember is asked for
-BLOCK, MORE = 50, 1.5  # rows; standard errors above the power of white noise from which on the same is asked
-MANY = 300_000  # numbers of series, from which it pays to look for columns that say nothing new
+MEMORY_ROWS = 20_000  # rows after which a memory is as good as endless
+MIXED_ORDER = 2  # order from which on white noise beside errors that remember is asked for
+BLOCK, POWER_ERRORS = 50, 1.5  # rows; standard errors above the power of white noise from which on the same is asked
+MANY_NUMBERS = 300_000  # numbers of series, from which it pays to look for columns that say nothing new
 EMPTY = 1e-9  # of the squares of the errors themselves
-ANYWHERE = 1e8  # times the variance of what is new: where errors that add up may begin
+START_VARIANCE = 1e8  # times the variance of what is new: where errors that add up may begin
 
 
 Gains = tuple[FloatArray, FloatArray]  # of innovations.py
@@ -82,45 +82,51 @@ class AutoRegression:
         """(phi (p,), covariance of p rows in a row (p, p)) of the errors as they are, for `innovations`."""
         if not self.adds_up:
             return self.coefficients, self.covariance
-        back = np.tri(self.order + 1, self.order, -1)  # from the last row to those before, by the changes between
-        start = back @ self.covariance @ back.T + ANYWHERE
+        lower_triangle = np.tri(
+            self.order + 1, self.order, -1
+        )  # from the last row to those before, by the changes between
+        start = lower_triangle @ self.covariance @ lower_triangle.T + START_VARIANCE
         return np.append(self.coefficients, 0.0) + np.append(1.0, -self.coefficients), start
 
     def gains(self, steps: IntArray) -> Gains:
         """What `new` needs of its rows alone, for those who ask it of many series. steps (n,): see innovations.py."""
         return gains(steps, *self.filter)
 
-    def new(self, series: FloatArray, steps: IntArray, moves: BoolArray, known: Gains | None = None) -> FloatArray:
+    def new(
+        self, series: FloatArray, steps: IntArray, moves: BoolArray, known_gains: Gains | None = None
+    ) -> FloatArray:
         """What is new in each row of series (n, K), see innovations.py.
 
         Args:
             series: columns of one memory.
             steps: rows since the one before, (n,).
             moves: in which rows the robot does, (n,).
-            known: the `gains` of these steps, where they are known.
+            known_gains: the `gains` of these steps, where they are known.
         """
         if self.moving is not None:
             return new_while_moving(series, steps, moves, *self.moving)
-        return innovations(series, steps, self.filter[0], *known or self.gains(steps)) if self.remembers else series
+        return (
+            innovations(series, steps, self.filter[0], *known_gains or self.gains(steps)) if self.remembers else series
+        )
 
     @cached_property
     def covariance(self) -> FloatArray:
         """Covariance of p rows in a row, (p, p), where what is new has variance 1."""
         lags = self.autocovariance(self.order)
-        at = np.arange(self.order)
-        return lags[np.abs(at[:, None] - at)]
+        positions = np.arange(self.order)
+        return lags[np.abs(positions[:, None] - positions)]
 
     def autocovariance(self, count: int) -> FloatArray:
         """Of rows 0 to count - 1 apart, where what is new has variance 1. Shape (count,)."""
-        known, left = [1.0 / float(np.prod(1.0 - self.partial**2))], 0.0
-        left = known[0]
-        for before, k in zip(_steps(self.partial), self.partial, strict=False):  # Levinson's, the other way round
-            known.append(float(before @ known[::-1][: len(before)]) + k * left)
-            left *= 1.0 - k * k
+        covariances, variance = [1.0 / float(np.prod(1.0 - self.partial**2))], 0.0
+        variance = covariances[0]
+        for phi_before, k in zip(_steps(self.partial), self.partial, strict=False):  # Levinson's, the other way round
+            covariances.append(float(phi_before @ covariances[::-1][: len(phi_before)]) + k * variance)
+            variance *= 1.0 - k * k
         phi = self.coefficients
-        while len(known) < count:
-            known.append(float(phi @ known[: -len(phi) - 1 : -1]) if len(phi) else 0.0)
-        return np.array(known[:count])
+        while len(covariances) < count:
+            covariances.append(float(phi @ covariances[: -len(phi) - 1 : -1]) if len(phi) else 0.0)
+        return np.array(covariances[:count])
 
     @cached_property
     def degrees(self) -> float:
@@ -141,7 +147,7 @@ class AutoRegression:
         """
         if not self.order:
             return 1.0
-        slowest = min(float(np.abs(np.roots([1.0, *-self.coefficients])).max()), 1.0 - 1.0 / FOLLOWED)
+        slowest = min(float(np.abs(np.roots([1.0, *-self.coefficients])).max()), 1.0 - 1.0 / MEMORY_ROWS)
         return (1.0 + slowest) / (1.0 - slowest)
 
     def leaning(self, ways: FloatArray, new: FloatArray, steps: IntArray) -> FloatArray:
@@ -153,30 +159,36 @@ class AutoRegression:
         length, p, phi = (new**2).sum(axis=0), self.order, self.coefficients
         ways = np.diff(ways, axis=0, prepend=ways[:1]) if self.adds_up else ways
         row = np.arange(len(ways))
-        since = row - np.maximum.accumulate(np.where(steps == 1, 0, row)) - self.adds_up  # rows known before, in a row
-        at = row[since >= min(p, int(since.max(initial=0)) // 2)]
-        past = [ways[np.maximum(at - i, 0)] * (since[at] >= i)[:, None] for i in range(1, p + 1)]
-        rest = ways[at] - sum(each * own for each, own in zip(phi, past, strict=True))
-        square = (rest**2).sum(axis=0)
+        rows_since_gap = (
+            row - np.maximum.accumulate(np.where(steps == 1, 0, row)) - self.adds_up
+        )  # rows known before, in a row
+        usable_rows = row[rows_since_gap >= min(p, int(rows_since_gap.max(initial=0)) // 2)]
+        past_rows = [
+            ways[np.maximum(usable_rows - i, 0)] * (rows_since_gap[usable_rows] >= i)[:, None] for i in range(1, p + 1)
+        ]
+        remaining = ways[usable_rows] - sum(
+            coefficient * past_row for coefficient, past_row in zip(phi, past_rows, strict=True)
+        )
+        square = (remaining**2).sum(axis=0)
         share = length / np.where(square > 0.0, square, np.inf)
-        return np.vstack([length, *(-2.0 * (rest * each).sum(axis=0) * share for each in past)])
+        return np.vstack([length, *(-2.0 * (remaining * coefficient).sum(axis=0) * share for coefficient in past_rows)])
 
-    def scatter(self, leaning: FloatArray) -> FloatArray:
+    def scatter(self, memory_slopes: FloatArray) -> FloatArray:
         """Variance that the uncertainty of this memory itself gives to each variance V = (J~' J~/s^2)^-1. Shape (K,).
 
-        dV = -g~' dg~/s^2 with g = J V: by phi, and by s^2 itself. leaning (1 + p, K): that of g, over s^2.
+        dV = -g~' dg~/s^2 with g = J V: by phi, and by s^2 itself. memory_slopes (1 + p, K): that of g, over s^2.
         """
-        total = 2.0 / max(self.rows, 1) * leaning[0] ** 2
-        return total + self._scattered(leaning[1:]) / max(self.rows, 1) if self.order else total
+        total = 2.0 / max(self.rows, 1) * memory_slopes[0] ** 2
+        return total + self._scattered(memory_slopes[1:]) / max(self.rows, 1) if self.order else total
 
     def _scattered(self, by_phi: FloatArray) -> FloatArray:
         """Variance, times rows, of what has the slopes by_phi (p, K) by phi. Shape (K,)."""
-        by, known = by_phi, self.covariance
+        slopes, phi_covariance = by_phi, self.covariance
         if self.slopes is not None:
-            by, known = self.slopes.T @ by_phi, self.slopes.T @ known @ self.slopes
+            slopes, phi_covariance = self.slopes.T @ by_phi, self.slopes.T @ phi_covariance @ self.slopes
         if self.information is not None:
-            known = self.information / max(self.rows, 1)
-        return (by * np.linalg.solve(known, by)).sum(axis=0)
+            phi_covariance = self.information / max(self.rows, 1)
+        return (slopes * np.linalg.solve(phi_covariance, slopes)).sum(axis=0)
 
 
 def _steps(partial: FloatArray) -> list[FloatArray]:
@@ -189,33 +201,33 @@ def _steps(partial: FloatArray) -> list[FloatArray]:
 
 def autoregression(
     stretches: Sequence[FloatArray],
-    most: int | None = None,
+    order_limit: int | None = None,
     may_add_up: bool = False,
     moves: Sequence[BoolArray] | None = None,
 ) -> AutoRegression:
     """That of series without gaps, each of shape (n, K): the series is what all K columns add up to in the square.
 
     The first column is the series itself; the others may be what a fit has taken out of it, see whitening.py.
-    most: the highest order; by default ORDERS log10(rows). may_add_up: whether the errors may add up: whether they do
-    is found by their likelihood, and no row in which nothing changes counts then, for a robot at rest adds nothing.
-    moves (n,) of each stretch: in which rows the robot does, where errors may remember only while it does.
+    order_limit: the highest order; by default ORDERS log10(rows). may_add_up: whether the errors may add up: whether
+    they do is found by their likelihood, and no row in which nothing changes counts then, for a robot at rest adds
+    nothing. moves (n,) of each stretch: in which rows the robot does, where errors may remember only while it does.
     Without rows it has order 0 and variance 0.
     """
     stretches = _without_empty_axes(stretches)
-    auto_regression, cost = _fitted(stretches, most)
-    own = while_moving(stretches, moves) if moves and most is None else None
-    if own is not None and own.cost < cost:
-        return _of_motion(own, sum(int(each.sum()) for each in moves or ()))
+    auto_regression, cost = _fitted(stretches, order_limit)
+    moving_model = while_moving(stretches, moves) if moves and order_limit is None else None
+    if moving_model is not None and moving_model.cost < cost:
+        return _of_motion(moving_model, sum(int(mask.sum()) for mask in moves or ()))
     if not may_add_up or not auto_regression.order:
         return auto_regression
-    changes, own = _fitted([np.diff(stretch, axis=0) for stretch in stretches], most)
-    own += (auto_regression.rows - changes.rows) * _log_variance(
+    changes, moving_model = _fitted([np.diff(stretch, axis=0) for stretch in stretches], order_limit)
+    moving_model += (auto_regression.rows - changes.rows) * _log_variance(
         stretches
     )  # a stretch may begin wherever the others are
-    if own >= cost:
+    if moving_model >= cost:
         return auto_regression
-    moving = [each[(each != 0.0).any(axis=1)] for each in (np.diff(stretch, axis=0) for stretch in stretches)]
-    return replace(_fitted(moving, most)[0], adds_up=True)
+    moving = [mask[(mask != 0.0).any(axis=1)] for mask in (np.diff(stretch, axis=0) for stretch in stretches)]
+    return replace(_fitted(moving, order_limit)[0], adds_up=True)
 
 
 def _without_empty_axes(stretches: Sequence[FloatArray]) -> Sequence[FloatArray]:
@@ -223,41 +235,41 @@ def _without_empty_axes(stretches: Sequence[FloatArray]) -> Sequence[FloatArray]
 
     What is fitted depends on squares and products of rows summed over columns, which no rotation of columns changes.
     """
-    if sum(stretch.size for stretch in stretches) < MANY:
+    if sum(stretch.size for stretch in stretches) < MANY_NUMBERS:
         return stretches
     products = np.sum([stretch.T @ stretch for stretch in stretches], axis=0)
-    held, axes = np.linalg.eigh(products[1:, 1:])
-    axes = axes[:, held > EMPTY * products[0, 0]]
+    eigenvalues, axes = np.linalg.eigh(products[1:, 1:])
+    axes = axes[:, eigenvalues > EMPTY * products[0, 0]]
     return [np.column_stack([stretch[:, 0], stretch[:, 1:] @ axes]) for stretch in stretches]
 
 
-def _of_motion(found: Moving, rows: int) -> AutoRegression:
+def _of_motion(moving: Moving, rows: int) -> AutoRegression:
     """Errors that remember in the rows that move, so many."""
-    partial, slopes = told_by_many(found.mixed)
+    partial, slopes = told_by_many(moving.mixed)
     return AutoRegression(
         partial,
-        found.variance * found.settled,
+        moving.variance * moving.settled,
         rows,
-        slopes=slopes @ found.slopes,
-        moving=(found.phi, found.share),
-        information=found.information,
+        slopes=slopes @ moving.slopes,
+        moving=(moving.phi, moving.share),
+        information=moving.information,
     )
 
 
-def _fitted(stretches: Sequence[FloatArray], most: int | None) -> tuple[AutoRegression, float]:
+def _fitted(stretches: Sequence[FloatArray], order_limit: int | None) -> tuple[AutoRegression, float]:
     """(the autoregression of series as they are, its BIC); by two numbers where that says as much: moving.py."""
     rows = sum(len(stretch) for stretch in stretches)
     if not rows:
         return AutoRegression(np.zeros(0), 0.0, 0), 0.0
-    limit = int(min(ORDERS * np.log10(max(rows, 1)), SHARE * rows)) if most is None else most
+    limit = int(min(ORDERS * np.log10(max(rows, 1)), SHARE * rows)) if order_limit is None else order_limit
     ends = np.cumsum([0, *map(len, stretches)])
-    ahead = np.ascontiguousarray(np.concatenate(stretches), dtype=float)
-    partial, order, variance, cost = _burg(ahead, ahead.copy(), ends, limit, PATIENCE)
+    forward_errors = np.ascontiguousarray(np.concatenate(stretches), dtype=float)
+    partial, order, variance, cost = _burg(forward_errors, forward_errors.copy(), ends, limit, PATIENCE)
     cost += rows * _log_variance(stretches)
-    if most is None and (order >= MIXED or _slow(stretches)):
-        both, slopes, new, own = mixed(stretches)
-        if own < cost:
-            return AutoRegression(both, new, rows, slopes=slopes), own
+    if order_limit is None and (order >= MIXED_ORDER or _slow(stretches)):
+        mixed_partials, slopes, new, mixed_criterion = mixed(stretches)
+        if mixed_criterion < cost:
+            return AutoRegression(mixed_partials, new, rows, slopes=slopes), mixed_criterion
     return AutoRegression(partial[:order], variance, rows), cost
 
 
@@ -269,8 +281,8 @@ def _slow(stretches: Sequence[FloatArray]) -> bool:
     ]
     blocks = sum(map(len, sums))
     expected = BLOCK * math.exp(_log_variance(stretches)) * blocks
-    return blocks > 0 and sum(float((each**2).sum()) for each in sums) > expected * (
-        1.0 + MORE * math.sqrt(2.0 / blocks)
+    return blocks > 0 and sum(float((block_sum**2).sum()) for block_sum in sums) > expected * (
+        1.0 + POWER_ERRORS * math.sqrt(2.0 / blocks)
     )
 
 
@@ -280,47 +292,50 @@ def _log_variance(stretches: Sequence[FloatArray]) -> float:
 
 
 @kernel
-def _burg(ahead, behind, ends, limit, patience):
+def _burg(forward_errors, backward_errors, ends, limit, patience):
     """(partial correlations, the order with the least BIC, its variance, its BIC less that of white ones), in place.
 
-    ahead, behind (rows, K): the series, twice: errors of the predictions from the rows before and from those after.
-    ends (stretches + 1,): where each stretch ends. With m orders done, row t of a stretch that begins at s is one of
-    ahead from t = s + m on, and what stands beside it in the next order is row t - 1 of behind.
+    forward_errors, backward_errors (rows, K): the series, twice: errors of the predictions from the rows before and
+    from those after. ends (stretches + 1,): where each stretch ends. With m orders done, row t of a stretch that begins
+    at s is one of ahead from t = s + m on, and what stands beside it in the next order is row t - 1 of backward_errors.
     """
-    rows, count = ahead.shape
-    power, both = np.zeros(count), np.zeros(count)
+    rows, count = forward_errors.shape
+    power, error_power = np.zeros(count), np.zeros(count)
     partial, variance = np.zeros(max(limit, 0)), 0.0
     for t in range(rows):
         for j in range(count):
-            variance += ahead[t, j] * ahead[t, j]
+            variance += forward_errors[t, j] * forward_errors[t, j]
     variance /= max(rows, 1)
-    best, least, found, cost, k = 0, 0.0, variance, 0.0, 0.0
+    best, least_cost, best_variance, cost, k = 0, 0.0, variance, 0.0, 0.0
     for order in range(limit):
         pairs = 0
         power[:] = 0.0
-        both[:] = 0.0
+        error_power[:] = 0.0
         for s in range(len(ends) - 1):
             last, first = ends[s + 1] - 1, ends[s] + order
             for t in range(last, first - 1, -1):  # from behind, for a row takes what stood in the one before
                 if order > 0:
                     for j in range(count):
-                        before, own = behind[t - 1, j], ahead[t, j]
-                        behind[t, j] = before - k * own
-                        ahead[t, j] = own - k * before
+                        backward, forward = backward_errors[t - 1, j], forward_errors[t, j]
+                        backward_errors[t, j] = backward - k * forward
+                        forward_errors[t, j] = forward - k * backward
                 if t < last:
                     for j in range(count):
-                        power[j] += ahead[t + 1, j] * ahead[t + 1, j] + behind[t, j] * behind[t, j]
-                        both[j] += ahead[t + 1, j] * behind[t, j]
+                        power[j] += (
+                            forward_errors[t + 1, j] * forward_errors[t + 1, j]
+                            + backward_errors[t, j] * backward_errors[t, j]
+                        )
+                        error_power[j] += forward_errors[t + 1, j] * backward_errors[t, j]
             pairs += max(last - first, 0)
         total = power.sum()
-        k = 2.0 * both.sum() / total if total > 0.0 else 1.0
+        k = 2.0 * error_power.sum() / total if total > 0.0 else 1.0
         if abs(k) >= 1.0:
             break
         partial[order] = k
         variance *= 1.0 - k * k
         cost += pairs * math.log1p(-k * k) + math.log(rows)  # rows that reach so far back
-        if cost < least:
-            best, least, found = order + 1, cost, variance
+        if cost < least_cost:
+            best, least_cost, best_variance = order + 1, cost, variance
         elif order + 1 >= best + patience:
             break
-    return partial, best, found, least
+    return partial, best, best_variance, least_cost

@@ -31,25 +31,25 @@ def gains(steps, phi, covariance):
     """
     p = len(phi)
     gain, variance = np.zeros((len(steps), p)), np.zeros(len(steps))
-    spread, pulled = np.zeros((p, p)), np.zeros(p)
-    known, m = 0, 0  # rows in a row up to the last one; rows so far
+    spread, projection = np.zeros((p, p)), np.zeros(p)
+    known_count, m = 0, 0  # rows in a row up to the last one; rows so far
     for t in range(len(steps)):
-        if steps[t] == 1 and known >= p:
-            known += 1
+        if steps[t] == 1 and known_count >= p:
+            known_count += 1
             continue
         if steps[t] == 0:
             spread[:, :] = covariance
-        elif known >= p:
+        elif known_count >= p:
             spread[:, :] = 0.0
         for _ in range(steps[t]):
-            open_one_row_on(phi, spread, pulled)
+            open_one_row_on(phi, spread, projection)
         variance[m] = spread[0, 0]
         for i in range(p):
             gain[m, i] = spread[i, 0] / variance[m]
         for a in range(p):
             for b in range(p):
                 spread[a, b] -= gain[m, a] * gain[m, b] * variance[m]
-        known = known + 1 if steps[t] == 1 else 1
+        known_count = known_count + 1 if steps[t] == 1 else 1
         m += 1
     return gain[:m].copy(), variance[:m].copy()
 
@@ -60,68 +60,68 @@ def innovations(series, steps, phi, gain, variance):
     phi (p,) as for `gains`; gain, variance: theirs. Returns (n, K)."""
     n, count = series.shape
     p = len(phi)
-    out = series.copy()
-    state, fresh = np.zeros((p, count)), np.zeros(count)
-    known, m = 0, 0
+    new_values = series.copy()
+    state, new_row = np.zeros((p, count)), np.zeros(count)
+    known_count, m = 0, 0
     for t in range(n):
-        if steps[t] == 1 and known >= p:
+        if steps[t] == 1 and known_count >= p:
             for i in range(p):
                 for j in range(count):
-                    out[t, j] -= phi[i] * series[t - 1 - i, j]
-            known += 1
+                    new_values[t, j] -= phi[i] * series[t - 1 - i, j]
+            known_count += 1
             continue
         if steps[t] == 0:
             state[:, :] = 0.0
-        elif known >= p:
+        elif known_count >= p:
             for i in range(p):
                 state[i] = series[t - 1 - i]
         for _ in range(steps[t]):
-            expect_one_row_on(phi, state, fresh)
+            expect_one_row_on(phi, state, new_row)
         if p > 0:
             root = math.sqrt(variance[m])
             for j in range(count):
-                fresh[j] = series[t, j] - state[0, j]
-                out[t, j] = fresh[j] / root
+                new_row[j] = series[t, j] - state[0, j]
+                new_values[t, j] = new_row[j] / root
             for i in range(p):
                 for j in range(count):
-                    state[i, j] += gain[m, i] * fresh[j]
-        known = known + 1 if steps[t] == 1 else 1
+                    state[i, j] += gain[m, i] * new_row[j]
+        known_count = known_count + 1 if steps[t] == 1 else 1
         m += 1
-    return out
+    return new_values
 
 
 @part
-def expect_one_row_on(phi, state, fresh):
+def expect_one_row_on(phi, state, new_row):
     """What is expected of the next row, and of the p - 1 before it. state (p, K)."""
     p, count = state.shape
-    fresh[:] = 0.0
+    new_row[:] = 0.0
     for i in range(p):
         for j in range(count):
-            fresh[j] += phi[i] * state[i, j]
+            new_row[j] += phi[i] * state[i, j]
     for i in range(p - 1, 0, -1):
         for j in range(count):
             state[i, j] = state[i - 1, j]
     for j in range(count):
-        state[0, j] = fresh[j]
+        state[0, j] = new_row[j]
 
 
 @part
-def open_one_row_on(phi, spread, pulled):
+def open_one_row_on(phi, spread, projection):
     """How far the next row is open: spread becomes T spread T' + e e', e the new row."""
-    p, ahead = len(phi), 1.0
+    p, row_variance = len(phi), 1.0
     for a in range(p):
-        pulled[a] = 0.0
+        projection[a] = 0.0
         for i in range(p):
-            pulled[a] += phi[i] * spread[i, a]
+            projection[a] += phi[i] * spread[i, a]
     for i in range(p):
-        ahead += phi[i] * pulled[i]
+        row_variance += phi[i] * projection[i]
     for a in range(p - 1, 0, -1):
         for b in range(p - 1, 0, -1):
             spread[a, b] = spread[a - 1, b - 1]
     for a in range(1, p):
-        spread[0, a] = pulled[a - 1]
-        spread[a, 0] = pulled[a - 1]
-    spread[0, 0] = ahead
+        spread[0, a] = projection[a - 1]
+        spread[a, 0] = projection[a - 1]
+    spread[0, 0] = row_variance
 
 
 def without_gaps(series: NDArray[T], steps: IntArray) -> list[NDArray[T]]:

@@ -22,8 +22,8 @@ from omnidyn.compiled.kernel import kernel, part
 
 STARTS = ((0.95, -4.0), (0.8, -3.0), (0.8, 0.0))  # of phi, and of the logarithm of lambda
 LOW, HIGH = (0.0, -16.0), (0.9999, 16.0)
-COLOURED = 3.0  # standard errors of the correlation of neighbours, beyond which what is left is not white
-LEAST = 0.02  # share of the rows that move, and that rest, for the two to be told apart
+WHITE_ERRORS = 3.0  # standard errors of the correlation of neighbours, beyond which what is left is not white
+LEAST_SHARE = 0.02  # share of the rows that move, and that rest, for the two to be told apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,11 +50,11 @@ class Moving:
     @property
     def slopes(self) -> FloatArray:
         """Of `mixed` by phi and the logarithm of lambda. Shape (2, 2)."""
-        half, ahead = 0.5 * (self.phi**2 + self.share - 1.0), self.settled
+        half, next_variance = 0.5 * (self.phi**2 + self.share - 1.0), self.settled
         root = math.sqrt(half * half + self.share)
         by_phi, by_log = self.phi * (1.0 + half / root), 0.5 * self.share * (1.0 + (half + 1.0) / root)
-        way = self.phi / ahead**2
-        return np.array([[1.0, 0.0], [1.0 / ahead - way * by_phi, -way * by_log]])
+        way = self.phi / next_variance**2
+        return np.array([[1.0, 0.0], [1.0 / next_variance - way * by_phi, -way * by_log]])
 
 
 def while_moving(stretches: Sequence[FloatArray], moves: Sequence[BoolArray]) -> Moving | None:
@@ -64,28 +64,28 @@ def while_moving(stretches: Sequence[FloatArray], moves: Sequence[BoolArray]) ->
     moves (n,) of each: in which rows it does.
     """
     series, ends = np.ascontiguousarray(np.concatenate(stretches)), np.cumsum([0, *map(len, stretches)])
-    there = np.concatenate(moves)
+    moving_mask = np.concatenate(moves)
     rows = len(series)
-    if not LEAST < there.mean() < 1.0 - LEAST:
+    if not LEAST_SHARE < moving_mask.mean() < 1.0 - LEAST_SHARE:
         return None
     white = rows * math.log(max(float((series**2).sum()) / rows, 1e-300))
 
-    def looked(at: FloatArray) -> Look:
-        share = math.exp(at[1])
-        square, logs, g, by_logs, h, both = _likelihood(series, there, ends, at[0], share)
+    def looked(numbers_here: FloatArray) -> Look:
+        share = math.exp(numbers_here[1])
+        square, logs, g, by_logs, h, cross_square = _likelihood(series, moving_mask, ends, numbers_here[0], share)
         size, way = max(square / rows, 1e-300), np.array([1.0, share])
         gradient = (g / size + by_logs) * way
-        curved = (2.0 * h / size + both - np.outer(by_logs, by_logs) / rows) * np.outer(way, way)
-        return rows * math.log(size) + logs, gradient, curved, size
+        curvature_here = (2.0 * h / size + cross_square - np.outer(by_logs, by_logs) / rows) * np.outer(way, way)
+        return rows * math.log(size) + logs, gradient, curvature_here, size
 
-    at, curved, size, cost = scored(looked, STARTS, LOW, HIGH)
+    numbers, curvature, size, cost = scored(looked, STARTS, LOW, HIGH)
     cost += 2.0 * math.log(rows)
-    moving = Moving(float(at[0]), math.exp(at[1]), size, 0.5 * curved, cost)
+    moving = Moving(float(numbers[0]), math.exp(numbers[1]), size, 0.5 * curvature, cost)
     steps = np.ones(rows, np.intp)
     steps[ends[:-1]] = 0
-    new = new_while_moving(series[:, :1].copy(), steps, there, moving.phi, moving.share)[:, 0]
-    coloured = abs(float(new[1:] @ new[:-1])) > COLOURED * math.sqrt(rows) * float((new**2).mean())
-    return moving if cost < white and not coloured else None
+    new = new_while_moving(series[:, :1].copy(), steps, moving_mask, moving.phi, moving.share)[:, 0]
+    is_coloured = abs(float(new[1:] @ new[:-1])) > WHITE_ERRORS * math.sqrt(rows) * float((new**2).mean())
+    return moving if cost < white and not is_coloured else None
 
 
 @kernel
@@ -93,9 +93,9 @@ def new_while_moving(series, steps, moves, phi, share):
     """What is new in each row, with the same variance throughout: `innovations` of such errors. series (n, K); steps
     (n,); moves (n,): which rows do. Returns (n, K)."""
     n, count = series.shape
-    out, x, spread = np.zeros((n, count)), np.zeros(count), 0.0
+    new_values, x, spread = np.zeros((n, count)), np.zeros(count), 0.0
     half = 0.5 * (phi * phi + share - 1.0)
-    usual = 1.0 + half + math.sqrt(half * half + share)
+    usual_variance = 1.0 + half + math.sqrt(half * half + share)
     for t in range(n):
         m = 1.0 if moves[t] else 0.0
         if steps[t] == 0:
@@ -103,13 +103,13 @@ def new_while_moving(series, steps, moves, phi, share):
         for _ in range(steps[t]):
             spread = m * (phi * phi * spread + share)
             x *= m * phi
-        ahead = 1.0 + spread
+        row_variance = 1.0 + spread
         for j in range(count):
             new = series[t, j] - x[j]
-            out[t, j] = new * math.sqrt(usual / ahead)
-            x[j] += spread / ahead * new
-        spread /= ahead
-    return out
+            new_values[t, j] = new * math.sqrt(usual_variance / row_variance)
+            x[j] += spread / row_variance * new
+        spread /= row_variance
+    return new_values
 
 
 @kernel
@@ -117,48 +117,52 @@ def _likelihood(series, moves, ends, phi, share):
     """(sum of squares of what is new over its own variance, sum of the logarithms of that; slopes (2,) of either by phi
     and lambda; of the squares Gauss-Newton's matrix (2, 2), of the logarithms that of Fisher's), s^2 being 1."""
     count = series.shape[1]
-    square, logs, g, by_logs, h, both = 0.0, 0.0, np.zeros(2), np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2))
-    x, dx, spread, wide = np.zeros(count), np.zeros((count, 2)), 0.0, np.zeros(2)
-    left = 1.0 - phi * phi
+    square, logs, g, by_logs, h, cross_square = 0.0, 0.0, np.zeros(2), np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2))
+    x, dx, spread, spread_slopes = np.zeros(count), np.zeros((count, 2)), 0.0, np.zeros(2)
+    stationary = 1.0 - phi * phi
     for s in range(len(ends) - 1):
         for t in range(ends[s], ends[s + 1]):
             m = 1.0 if moves[t] else 0.0
             if t == ends[s]:
-                spread, wide[0], wide[1] = m * share / left, m * 2.0 * phi * share / (left * left), m / left
+                spread, spread_slopes[0], spread_slopes[1] = (
+                    m * share / stationary,
+                    m * 2.0 * phi * share / (stationary * stationary),
+                    m / stationary,
+                )
                 x[:], dx[:] = 0.0, 0.0
             else:
-                wide[0] = m * (phi * phi * wide[0] + 2.0 * phi * spread)
-                wide[1] = m * (phi * phi * wide[1] + 1.0)
+                spread_slopes[0] = m * (phi * phi * spread_slopes[0] + 2.0 * phi * spread)
+                spread_slopes[1] = m * (phi * phi * spread_slopes[1] + 1.0)
                 spread = m * (phi * phi * spread + share)
                 for j in range(count):
                     dx[j, 0] = m * (phi * dx[j, 0] + x[j])
                     dx[j, 1] *= m * phi
                     x[j] *= m * phi
-            ahead = 1.0 + spread
-            logs += math.log(ahead)
+            row_variance = 1.0 + spread
+            logs += math.log(row_variance)
             for a in range(2):
-                by_logs[a] += wide[a] / ahead
+                by_logs[a] += spread_slopes[a] / row_variance
                 for b in range(2):
-                    both[a, b] += wide[a] * wide[b] / (ahead * ahead)
+                    cross_square[a, b] += spread_slopes[a] * spread_slopes[b] / (row_variance * row_variance)
             for j in range(count):
-                square += _learn(series[t, j], x, dx[j], j, spread, ahead, wide, g, h)
-            spread /= ahead
-            wide /= ahead * ahead
-    return square, logs, g, by_logs, h, both
+                square += _learn(series[t, j], x, dx[j], j, spread, row_variance, spread_slopes, g, h)
+            spread /= row_variance
+            spread_slopes /= row_variance * row_variance
+    return square, logs, g, by_logs, h, cross_square
 
 
 @part
-def _learn(value, x, dx, j, spread, ahead, wide, g, h):
+def _learn(value, x, dx, j, spread, row_variance, spread_slopes, g, h):
     """A value becomes known; what its square over its variance is."""
     new, square = value - x[j], 0.0
-    square = new * new / ahead
+    square = new * new / row_variance
     for a in range(2):
-        g[a] += -2.0 * new * dx[a] / ahead - square * wide[a] / ahead
+        g[a] += -2.0 * new * dx[a] / row_variance - square * spread_slopes[a] / row_variance
         for b in range(2):
-            h[a, b] += dx[a] * dx[b] / ahead
+            h[a, b] += dx[a] * dx[b] / row_variance
     for a in range(2):
-        dx[a] += wide[a] / (ahead * ahead) * new - spread / ahead * dx[a]
-    x[j] += spread / ahead * new
+        dx[a] += spread_slopes[a] / (row_variance * row_variance) * new - spread / row_variance * dx[a]
+    x[j] += spread / row_variance * new
     return square
 
 
@@ -175,8 +179,8 @@ def _learn(value, x, dx, j, spread, ahead, wide, g, h):
 MIXED_STARTS = ((0.95, 0.8), (0.7, 0.4), (0.0, 0.5))  # of phi and theta
 LONGEST = 60  # rows that an autoregression takes to tell the same
 TAIL = 0.05  # of theta^rows: what is left out there
-MOST = 0.9999, TAIL ** (1.0 / LONGEST)  # of phi and theta
-ROUNDS, CLOSE = 40, 0.05  # of Gauss-Newton; of the log likelihood: near enough to its best
+NUMBER_LIMITS = 0.9999, TAIL ** (1.0 / LONGEST)  # of phi and theta
+ROUNDS, LIKELIHOOD_TOLERANCE = 40, 0.05  # of Gauss-Newton; of the log likelihood: near enough to its best
 Look = tuple[float, FloatArray, FloatArray, float]
 STEP = 1e-4  # of the differences that tell how an autoregression moves with the two
 
@@ -187,77 +191,79 @@ def mixed(stretches: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray, floa
     rows = sum(map(len, stretches))
     series, ends = np.ascontiguousarray(np.concatenate(stretches)), np.cumsum([0, *map(len, stretches)])
 
-    def looked(at: FloatArray) -> Look:
-        square, logs, gradient, curved = _mixed_likelihood(series, ends, *at)
+    def looked(numbers_here: FloatArray) -> Look:
+        square, logs, gradient, curvature = _mixed_likelihood(series, ends, *numbers_here)
         size = max(square / rows, 1e-300)
-        return rows * math.log(size) + logs, gradient / size, curved / size, size
+        return rows * math.log(size) + logs, gradient / size, curvature / size, size
 
-    at, _, size, cost = scored(looked, MIXED_STARTS, (-MOST[0], -MOST[1]), MOST)
-    return *told_by_many(at), size, cost + 2.0 * math.log(rows)
+    numbers, _, size, cost = scored(looked, MIXED_STARTS, (-NUMBER_LIMITS[0], -NUMBER_LIMITS[1]), NUMBER_LIMITS)
+    return *told_by_many(numbers), size, cost + 2.0 * math.log(rows)
 
 
 def scored(
-    looked: Callable[[FloatArray], Look],
+    evaluate: Callable[[FloatArray], Look],
     starts: Sequence[tuple[float, float]],
     low: tuple[float, float],
     high: tuple[float, float],
 ) -> tuple[FloatArray, FloatArray, float, float]:
     """(the two numbers (2,), the matrix there, variance, cost) of the least cost, from the best of some starts.
 
-    looked: (cost, gradient (2,), Gauss-Newton's or Fisher's matrix (2, 2), variance) of two numbers, in one scale.
+    evaluate: (cost, gradient (2,), Gauss-Newton's or Fisher's matrix (2, 2), variance) of two numbers, in one scale.
     """
-    at: FloatArray = min(map(np.array, starts), key=lambda each: looked(each)[0])
-    cost, gradient, curved, size = looked(at)
+    numbers: FloatArray = min(map(np.array, starts), key=lambda start_numbers: evaluate(start_numbers)[0])
+    cost, gradient, curvature, size = evaluate(numbers)
     damping = 1e-3
     for _ in range(ROUNDS):
-        step = np.linalg.lstsq(curved + damping * np.diag(curved.diagonal()), gradient)[0]
-        trial: FloatArray = np.clip(at - step, low, high).astype(float)
-        new = looked(trial)
+        step = np.linalg.lstsq(curvature + damping * np.diag(curvature.diagonal()), gradient)[0]
+        trial: FloatArray = np.clip(numbers - step, low, high).astype(float)
+        new = evaluate(trial)
         if new[0] >= cost:
             damping *= 10.0
             if damping > 1e3:
                 break
             continue
-        won, at, damping = cost - new[0], trial, 0.1 * damping
-        cost, gradient, curved, size = new
-        if won < CLOSE:
+        gain, numbers, damping = cost - new[0], trial, 0.1 * damping
+        cost, gradient, curvature, size = new
+        if gain < LIKELIHOOD_TOLERANCE:
             break
-    return at, curved, size, cost
+    return numbers, curvature, size, cost
 
 
-def told_by_many(at: FloatArray) -> tuple[FloatArray, FloatArray]:
+def told_by_many(numbers: FloatArray) -> tuple[FloatArray, FloatArray]:
     """(partial correlations (p,) of the autoregression that tells the same, slopes (p, 2) of its coefficients by the
-    two numbers). at: phi and theta."""
-    theta = max(abs(float(at[1])), 1e-9)
+    two numbers). numbers: phi and theta."""
+    theta = max(abs(float(numbers[1])), 1e-9)
     count = int(np.clip(math.ceil(math.log(TAIL) / math.log(theta)), 2, LONGEST))
-    steps = STEP * (1.0 - at**2)
-    slopes = [coefficients(partials(at + w, count)) - coefficients(partials(at - w, count)) for w in np.diag(steps)]
-    return partials(at, count), np.transpose(slopes) / (2.0 * steps)
+    steps = STEP * (1.0 - numbers**2)
+    slopes = [
+        coefficients(partials(numbers + w, count)) - coefficients(partials(numbers - w, count)) for w in np.diag(steps)
+    ]
+    return partials(numbers, count), np.transpose(slopes) / (2.0 * steps)
 
 
-def partials(at: FloatArray, count: int) -> FloatArray:
+def partials(numbers: FloatArray, count: int) -> FloatArray:
     """The first partial correlations, by the Durbin-Levinson recursion of the autocovariance. Shape (count,).
 
-    at: phi and theta.
+    numbers: phi and theta.
     """
-    phi, theta = at
+    phi, theta = numbers
     first = (1.0 - phi * theta) * (phi - theta) / (1.0 + theta * theta - 2.0 * phi * theta)
     lags = np.append(1.0, first * phi ** np.arange(count))
-    values, known, left = np.zeros(count), np.zeros(count), 1.0
+    values, coefficients_known, variance = np.zeros(count), np.zeros(count), 1.0
     for m in range(count):
-        values[m] = (lags[m + 1] - known[:m] @ lags[m:0:-1]) / left
-        known[:m] -= values[m] * known[:m][::-1]
-        known[m] = values[m]
-        left *= 1.0 - values[m] ** 2
+        values[m] = (lags[m + 1] - coefficients_known[:m] @ lags[m:0:-1]) / variance
+        coefficients_known[:m] -= values[m] * coefficients_known[:m][::-1]
+        coefficients_known[m] = values[m]
+        variance *= 1.0 - values[m] ** 2
     return values
 
 
 def coefficients(partial: FloatArray) -> FloatArray:
     """phi of an autoregression by its partial correlations, by Levinson's recursion. Shape (p,)."""
-    known = np.array(partial)
+    phi = np.array(partial)
     for m, k in enumerate(partial):
-        known[:m] -= k * known[:m][::-1]
-    return known
+        phi[:m] -= k * phi[:m][::-1]
+    return phi
 
 
 @kernel
@@ -271,15 +277,15 @@ def _mixed_likelihood(series, ends, phi, theta):
         r, by_phi[:], by_theta[:] = (1.0 + theta * theta - 2.0 * phi * theta) / (1.0 - phi * phi), 0.0, 0.0
         for t in range(ends[s], ends[s + 1]):
             first = t == ends[s]
-            back = 0.0 if first else theta / r
-            r = r if first else 1.0 + theta * theta - theta * back
+            feedback = 0.0 if first else theta / r
+            r = r if first else 1.0 + theta * theta - theta * feedback
             for j in range(count):
                 if first:
                     new[j] = series[t, j]
                 else:
-                    by_phi[j] = back * by_phi[j] - series[t - 1, j]
-                    by_theta[j] = back * by_theta[j] + new[j]
-                    new[j] = series[t, j] - phi * series[t - 1, j] + back * new[j]
+                    by_phi[j] = feedback * by_phi[j] - series[t - 1, j]
+                    by_theta[j] = feedback * by_theta[j] + new[j]
+                    new[j] = series[t, j] - phi * series[t - 1, j] + feedback * new[j]
                 square += new[j] * new[j] / r
                 g[0] += by_phi[j] * new[j]
                 g[1] += by_theta[j] * new[j]

@@ -18,7 +18,7 @@ from omnidyn.identification.output_error.memory.autoregression import AutoRegres
 from omnidyn.identification.output_error.problem.outputs import SPEEDS
 from omnidyn.identification.output_error.problem.problem import Column, Parts, Piece, Point, Problem
 
-FORGOTTEN = 1000  # rows missing in a row after which a stretch begins anew
+FORGETTING_ROWS = 1000  # rows missing in a row after which a stretch begins anew
 Rows = tuple[NDArray[np.intp], IntArray]  # which rows of a piece are known, rows since the one before (0: at a start)
 
 
@@ -56,22 +56,22 @@ class WhitenedEngine(Engine[Problem]):
         pieces, parts = self.problem.pieces, self.engine.residuals(point)
         if self._moves is None:
             self._moves = [moving_rows(piece, part[0]) for piece, part in zip(pieces, parts, strict=True)]
-        yield from (self._filtered(*each) for each in zip(pieces, parts, self._moves, strict=True))
+        yield from (self._filtered(*piece_parts) for piece_parts in zip(pieces, parts, self._moves, strict=True))
 
     def _filtered(self, piece: Piece, parts: Parts, moves: BoolArray) -> Parts:
-        residual, slopes, at = parts
+        residual, slopes, indices = parts
         residual, slopes = residual.copy(), slopes.copy()
         for c, column in enumerate(piece.record.columns):
             if column not in self.models or not self.models[column].order:
                 continue
             rows, steps = known_rows(piece, residual[c], slopes[c])
             if rows.size < residual.shape[1]:
-                left = np.setdiff1d(np.arange(residual.shape[1]), rows)
-                residual[c, left], slopes[c, left] = np.nan, 0.0
+                other_rows = np.setdiff1d(np.arange(residual.shape[1]), rows)
+                residual[c, other_rows], slopes[c, other_rows] = np.nan, 0.0
             series = np.column_stack([residual[c, rows], slopes[c, rows]])
             new = self.models[column].new(series, steps, moves[c, rows])
             residual[c, rows], slopes[c, rows] = new[:, 0], new[:, 1:]
-        return residual, slopes, at
+        return residual, slopes, indices
 
 
 class TangentEngine(Engine[Problem]):
@@ -86,29 +86,37 @@ class TangentEngine(Engine[Problem]):
 
     def residuals(self, point: Point) -> list[Parts]:
         """Residuals and slopes of every piece, see engines/engine.py."""
-        partses, moved = [], point.values - self.point.values
-        for (residual, slopes, at), now, before in zip(self._parts, point.states, self.point.states, strict=True):
-            partses.append((residual - slopes @ np.concatenate([moved, now - before])[at], slopes, at))
-        return partses
+        parts_by_piece, value_changes = [], point.values - self.point.values
+        for (residual, slopes, indices), state, start_state in zip(
+            self._parts, point.states, self.point.states, strict=True
+        ):
+            parts_by_piece.append(
+                (residual - slopes @ np.concatenate([value_changes, state - start_state])[indices], slopes, indices)
+            )
+        return parts_by_piece
 
 
 class NearEngine(Engine[Problem]):
-    """Shows what `dear` would show near a point, by `cheap`, an engine of the same problem, corrected at the point.
+    """Shows what `exact_engine` would show near a point, by `fast_engine`, an engine of the same problem, corrected at
+    the point.
 
     The implicit engine with a step a row is three times as fast as with a tolerance, and what it is off by hardly
     changes on the way of some standard errors. Residuals and slopes are exact at the point itself. Its kinks are not
     where those of the dear engine are, which must have the last word.
     """
 
-    def __init__(self, dear: Engine[Problem], cheap: Engine[Problem], point: Point):
-        self.problem, self._cheap = dear.problem, cheap
-        both = zip(dear.residuals(point), cheap.residuals(point), strict=True)
-        self._off = [(np.nan_to_num(a[0] - b[0]), np.nan_to_num(a[1] - b[1])) for a, b in both]
+    def __init__(self, exact_engine: Engine[Problem], fast_engine: Engine[Problem], point: Point):
+        self.problem, self._cheap = exact_engine.problem, fast_engine
+        pairs = zip(exact_engine.residuals(point), fast_engine.residuals(point), strict=True)
+        self._off = [(np.nan_to_num(a[0] - b[0]), np.nan_to_num(a[1] - b[1])) for a, b in pairs]
 
     def residuals(self, point: Point) -> list[Parts]:
         """Residuals and slopes of every piece, see engines/engine.py."""
         parts = zip(self._cheap.residuals(point), self._off, strict=True)
-        return [(residual + off, slopes + more, at) for (residual, slopes, at), (off, more) in parts]
+        return [
+            (residual + residual_change, slopes + extra_slopes, indices)
+            for (residual, slopes, indices), (residual_change, extra_slopes) in parts
+        ]
 
 
 def near(engine: Engine[Problem], point: Point) -> Engine[Problem]:
@@ -123,9 +131,9 @@ def moving_rows(piece: Piece, residual: FloatArray) -> BoolArray:
 
     residual (C, rows): as it is. Of what is no speed, all rows count as moving.
     """
-    there = [column[0] in SPEEDS for column in piece.record.columns]
-    shown = piece.record.outputs[piece.first : piece.last + 1].T - residual
-    return np.asarray((shown != 0.0) | ~np.array(there)[:, None])
+    is_speed = [column[0] in SPEEDS for column in piece.record.columns]
+    model_outputs = piece.record.outputs[piece.first : piece.last + 1].T - residual
+    return np.asarray((model_outputs != 0.0) | ~np.array(is_speed)[:, None])
 
 
 def known_rows(piece: Piece, residual: FloatArray, slopes: FloatArray) -> Rows:
@@ -133,24 +141,24 @@ def known_rows(piece: Piece, residual: FloatArray, slopes: FloatArray) -> Rows:
     rows = np.flatnonzero(np.isfinite(residual) & np.isfinite(slopes).all(axis=1))
     if not rows.size:
         return rows, rows
-    apart = np.diff(piece.record.t[piece.first : piece.last + 1][rows])
-    usual = float(np.median(apart)) if apart.size else 1.0
-    steps = np.concatenate([[0], np.maximum(np.round(apart / usual), 1.0)]).astype(np.intp)
-    steps[steps > FORGOTTEN] = 0
+    time_steps = np.diff(piece.record.t[piece.first : piece.last + 1][rows])
+    usual_time = float(np.median(time_steps)) if time_steps.size else 1.0
+    steps = np.concatenate([[0], np.maximum(np.round(time_steps / usual_time), 1.0)]).astype(np.intp)
+    steps[steps > FORGETTING_ROWS] = 0
     return rows, steps
 
 
 def spacing(pieces: Sequence[Piece], column: Column) -> tuple[float, float, float]:
     """(least, greatest, share of uneven ones) of the usual times between known rows of a column in every piece [s]."""
-    usual, uneven, count = [], 0, 0
+    usual_times, uneven, count = [], 0, 0
     for piece in pieces:
         if column not in piece.record.columns:
             continue
         values = piece.record.outputs[piece.first : piece.last + 1, piece.record.columns.index(column)]
-        apart = np.diff(piece.record.t[piece.first : piece.last + 1][np.isfinite(values)])
-        if not apart.size:
+        time_steps = np.diff(piece.record.t[piece.first : piece.last + 1][np.isfinite(values)])
+        if not time_steps.size:
             continue
-        usual.append(float(np.median(apart)))
-        steps = apart / usual[-1]
+        usual_times.append(float(np.median(time_steps)))
+        steps = time_steps / usual_times[-1]
         uneven, count = uneven + int((np.abs(steps - np.round(steps)) > 0.25).sum()), count + len(steps)
-    return min(usual, default=1.0), max(usual, default=1.0), uneven / max(count, 1)
+    return min(usual_times, default=1.0), max(usual_times, default=1.0), uneven / max(count, 1)

@@ -52,27 +52,30 @@ from omnidyn.statistics import t_quantile
 
 ROUNDS, TURNS = 6, 20  # of simulations; of memory and numbers in turn between them
 FEW_STEPS = 4  # of one: what the next memory moves is near
-NEARBY = 10.0  # standard errors: after a round that has moved a number further, the next one is no last one either
+NEARBY_ERRORS = (
+    10.0  # standard errors: after a round that has moved a number further, the next one is no last one either
+)
 # Squared distance to the best point, in standard errors, at which a round ends: far from the last one, and near it.
-FAR_OFF, CLOSE_BY = 1.0, 1e-2
-SETTLED = 0.1  # standard errors: a round that moves no number further is the last one
+EARLY_PRECISION, LATE_PRECISION = 1.0, 1e-2
+SETTLED_ERRORS = 0.1  # standard errors: a round that moves no number further is the last one
 LARGEST = 20_000_000  # slopes that are held at once; a log with more keeps the sandwich
 ONE_RATE = 1.1  # greatest over least time between the rows of a column, beyond which rows are no measure of memory
 UNEVEN = 0.05  # share of rows off an even grid that is worth a word
-BENT = 0.25  # of the information expected: less, or four times as much, is a bend that no parabola tells
-COARSE = 0.3  # of a tick: errors of a counted angle that pass what rounding has, 1/sqrt(12), spread it evenly
-FEW = 10.0  # memories in a log, below which the memory itself is hardly known
+BEND_SHARE = 0.25  # of the information expected: less, or four times as much, is a bend that no parabola tells
+COARSE_TICK = 0.3  # of a tick: errors of a counted angle that pass what rounding has, 1/sqrt(12), spread it evenly
+FEW_MEMORIES = 10.0  # memories in a log, below which the memory itself is hardly known
 
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
     """A point and how far it can be trusted. solution: by filtered rows where errors remember, its solver has a
-    WhitenedEngine then. plain: the same point with residuals as they are. known: the trust in `solution`. models: the
-    memory of each column, none where rows are not filtered. warnings: what a reader must know of that."""
+    WhitenedEngine then. plain_solution: the same point with residuals as they are. uncertainty: the trust in
+    `solution`. models: the memory of each column, none where rows are not filtered. warnings: what a reader must know
+    of that."""
 
     solution: Solution
-    plain: Solution
-    known: Trust
+    plain_solution: Solution
+    uncertainty: Trust
     models: Mapping[Column, AutoRegression] = field(default_factory=dict)
     warnings: tuple[Statement, ...] = ()
 
@@ -82,7 +85,7 @@ def why_not(solution: Solution) -> str:
     solver, problem = solution.solver, solution.solver.problem
     if solver.nu:
         return "Student's t has no autoregression here"
-    if (solution.state.variance < (COARSE * solver.tick) ** 2).any():
+    if (solution.state.variance < (COARSE_TICK * solver.tick) ** 2).any():
         return "counts whose rounding is the noise have no autoregression here"
     slopes = sum(
         (p.last - p.first + 1) * len(p.record.columns) * (len(problem.parameters) + len(p.free)) for p in problem.pieces
@@ -90,55 +93,69 @@ def why_not(solution: Solution) -> str:
     if slopes > LARGEST:
         return "the logs are too long for an autoregression"
     for column in problem.columns:
-        least, greatest, _ = spacing(problem.pieces, column)
-        if greatest > ONE_RATE * least:
+        least_time, greatest_time, _ = spacing(problem.pieces, column)
+        if greatest_time > ONE_RATE * least_time:
             return f"the logs have {column[0]} at several rates"
     return ""
 
 
-def whitened(solution: Solution, before: Trust, progress: Progress = silent) -> Weighed | None:
+def whitened(solution: Solution, uncertainty_before: Trust, progress: Progress = silent) -> Weighed | None:
     """The fit anew with errors that remember; None where they do not, or where no memory makes them white.
 
-    solution, before: the fit by residuals as they are, and the trust in it.
+    solution, uncertainty_before: the fit by residuals as they are, and the trust in it.
     """
     if solution.solver.tick.any():
         solution = _as_readings(solution)
     solver, models = solution.solver, _memory(solution, None)
     if not any(model.order for model in models.values()):
         return None
-    now, moved, blocked = solution.state.point, np.inf, None
-    for each in range(ROUNDS):
-        progress(Report(f"errors with a memory, round {each + 1}"))
-        models, far = _straight(solver, now, models), moved > NEARBY
-        engine = near(solver.engine.unfiltered, now) if far else solver.engine.unfiltered
-        close = CLOSE_BY if engine is solver.engine.unfiltered else FAR_OFF
-        found = _filtered(solver, engine, models, close).minimise(now, FEW_STEPS, blocked=None if far else blocked)
-        moved, now, blocked = _moved(found, now), found.state.point, found.blocked
-        models = _memory(found, _inverse(Normal(found.solver, found.state).information))
-        if not far and moved <= SETTLED:
+    point, movement, blocked_parameters = solution.state.point, np.inf, None
+    for iteration in range(ROUNDS):
+        progress(Report(f"errors with a memory, round {iteration + 1}"))
+        models, is_far = _straight(solver, point, models), movement > NEARBY_ERRORS
+        engine = near(solver.engine.unfiltered, point) if is_far else solver.engine.unfiltered
+        precision = LATE_PRECISION if engine is solver.engine.unfiltered else EARLY_PRECISION
+        new_solution = _filtered(solver, engine, models, precision).minimise(
+            point, FEW_STEPS, blocked_parameters=None if is_far else blocked_parameters
+        )
+        movement, point, blocked_parameters = (
+            _moved(new_solution, point),
+            new_solution.state.point,
+            new_solution.blocked_parameters,
+        )
+        models = _memory(new_solution, _inverse(Normal(new_solution.solver, new_solution.state).information))
+        if not is_far and movement <= SETTLED_ERRORS:
             break
-    filtered = _filtered(solver, solver.engine.unfiltered, models, solver.close)
-    found = replace(filtered.minimise(now, blocked=blocked), notes=solution.notes)
-    left = trust(filtered, found)
-    if left.kind == SANDWICH and solver.counted:
+    filtered_solver = _filtered(solver, solver.engine.unfiltered, models, solver.close)
+    new_solution = replace(filtered_solver.minimise(point, blocked_parameters=blocked_parameters), notes=solution.notes)
+    remaining_uncertainty = trust(filtered_solver, new_solution)
+    if remaining_uncertainty.kind == SANDWICH and solver.counted:
         return None
     # Rounding of a slow wheel is never white, so counts may end here. Without a memory their errors, which are sums of
     # all that came before, would have intervals many times too narrow.
-    known = left if left.kind == SANDWICH else _trusted(found, before, models)
-    plain = replace(found, state=solver.state(found.state.point), solver=solver)
-    return Weighed(found, plain, known, models, tuple(_statements(found, models, known)))
+    uncertainty = (
+        remaining_uncertainty
+        if remaining_uncertainty.kind == SANDWICH
+        else _trusted(new_solution, uncertainty_before, models)
+    )
+    plain_solution = replace(new_solution, state=solver.state(new_solution.state.point), solver=solver)
+    return Weighed(
+        new_solution, plain_solution, uncertainty, models, tuple(_statements(new_solution, models, uncertainty))
+    )
 
 
 def _straight(
     solver: Solver[Problem], start: Point, models: Mapping[Column, AutoRegression]
 ) -> Mapping[Column, AutoRegression]:
     """The memory that rows straight near a point settle at, memory and numbers in turn: nothing is simulated for it."""
-    tangent, now = TangentEngine(solver.engine.unfiltered, start), start
+    tangent, point = TangentEngine(solver.engine.unfiltered, start), start
     for _ in range(TURNS):
-        found = _filtered(solver, tangent, models, solver.close, tangent.moves).minimise(now, FEW_STEPS)
-        models = _memory(found, _inverse(Normal(found.solver, found.state).information), tangent.moves)
-        moved, now = _moved(found, now), found.state.point
-        if moved <= SETTLED:
+        new_solution = _filtered(solver, tangent, models, solver.close, tangent.moves).minimise(point, FEW_STEPS)
+        models = _memory(
+            new_solution, _inverse(Normal(new_solution.solver, new_solution.state).information), tangent.moves
+        )
+        movement, point = _moved(new_solution, point), new_solution.state.point
+        if movement <= SETTLED_ERRORS:
             break
     return models
 
@@ -147,24 +164,26 @@ def _filtered(
     solver: Solver[Problem],
     engine: Engine[Problem],
     models: Mapping[Column, AutoRegression],
-    close: float,
+    precision: float,
     moves: Sequence[BoolArray] | None = None,
 ) -> Solver[Problem]:
-    """The solver for errors of these memories, which ends `close` to the best point."""
-    return Solver(solver.problem, WhitenedEngine(engine, models, moves), 0.0, close, solver.counted)
+    """The solver for errors of these memories, which ends `precision` to the best point."""
+    return Solver(solver.problem, WhitenedEngine(engine, models, moves), 0.0, precision, solver.counted)
 
 
-def _moved(found: Solution, before: Point) -> float:
+def _moved(new_solution: Solution, point_before: Point) -> float:
     """How far a fit has moved the number that it has moved furthest, in standard errors."""
-    std = np.sqrt(np.maximum(np.diag(_inverse(Normal(found.solver, found.state).information)), 0.0))
-    moved = np.abs(found.solver.inner(found.state.point.values) - found.solver.inner(before.values))
-    return float((moved[std > 0.0] / std[std > 0.0]).max(initial=0.0))
+    std = np.sqrt(np.maximum(np.diag(_inverse(Normal(new_solution.solver, new_solution.state).information)), 0.0))
+    movements = np.abs(
+        new_solution.solver.inner(new_solution.state.point.values) - new_solution.solver.inner(point_before.values)
+    )
+    return float((movements[std > 0.0] / std[std > 0.0]).max(initial=0.0))
 
 
 def _as_readings(solution: Solution) -> Solution:
     """The same point, its counts like any other output: rounding is a small part of errors that remember."""
     solver = solution.solver
-    solver = Solver(solver.problem, solver.engine.unfiltered, 0.0, solver.close, counted=False)
+    solver = Solver(solver.problem, solver.engine.unfiltered, 0.0, solver.close, counts_ticks=False)
     return replace(solution, state=solver.state(solution.state.point), solver=solver)
 
 
@@ -179,15 +198,17 @@ def _memory(
     solver = solution.solver
     series: dict[Column, list[FloatArray]] = {column: [] for column in solver.problem.columns}
     moving: dict[Column, list[BoolArray]] = {column: [] for column in solver.problem.columns}
-    taken = None if covariance is None else _roots(_of_pieces(solution, covariance))
+    roots_by_piece = None if covariance is None else _roots(_of_pieces(solution, covariance))
     for k, parts in enumerate(solver.engine.unfiltered.residuals(solution.state.point)):
         piece = solver.problem.pieces[k]
-        mine = moving_rows(piece, parts[0]) if moves is None else moves[k]
+        masks = moving_rows(piece, parts[0]) if moves is None else moves[k]
         for column, rows, residual, slopes, steps in _columns(piece, parts):
-            more = [] if taken is None else [slopes @ taken[k][parts[2]]]
-            series[column] += without_gaps(np.column_stack([residual, *more]), steps)
-            moving[column] += without_gaps(mine[piece.record.columns.index(column), rows], steps)
-    return {column: autoregression(own, moves=moving[column]) for column, own in series.items() if own}
+            removed_list = [] if roots_by_piece is None else [slopes @ roots_by_piece[k][parts[2]]]
+            series[column] += without_gaps(np.column_stack([residual, *removed_list]), steps)
+            moving[column] += without_gaps(masks[piece.record.columns.index(column), rows], steps)
+    return {
+        column: autoregression(stretches, moves=moving[column]) for column, stretches in series.items() if stretches
+    }
 
 
 def _columns(piece: Piece, parts: Parts) -> Iterator[tuple[Column, IntArray, FloatArray, FloatArray, IntArray]]:
@@ -227,104 +248,119 @@ def _inverse(information: FloatArray) -> FloatArray:
 def _roots(covariances: Sequence[FloatArray]) -> list[FloatArray]:
     """The roots of several, of as many columns each: a piece whose start is seen has more that are open."""
     roots = [_root(covariance) for covariance in covariances]
-    most = max((root.shape[1] for root in roots), default=0)
-    return [np.pad(root, ((0, 0), (0, most - root.shape[1]))) for root in roots]
+    most_columns = max((root.shape[1] for root in roots), default=0)
+    return [np.pad(root, ((0, 0), (0, most_columns - root.shape[1]))) for root in roots]
 
 
 def _root(covariance: FloatArray) -> FloatArray:
     """R with R R' the covariance, without what is not open."""
     values, vectors = np.linalg.eigh(covariance)
-    kept = values > 1e-14 * max(float(values.max(initial=0.0)), 1e-300)
-    return vectors[:, kept] * np.sqrt(values[kept])
+    kept_values = values > 1e-14 * max(float(values.max(initial=0.0)), 1e-300)
+    return vectors[:, kept_values] * np.sqrt(values[kept_values])
 
 
-def _trusted(found: Solution, before: Trust, models: Mapping[Column, AutoRegression]) -> Trust:
-    """The trust in a fit by filtered rows. before: in the one by residuals as they are."""
-    solver = found.solver
-    known = trust(solver, found, WHITE)
-    degrees = _degrees(found, known, models)
-    filtered = WhitenedEngine(solver.engine.unfiltered, models).residuals(found.state.point)
-    wider = widening(solver.problem, filtered, found.state.variance, _of_pieces(found, known.plain))
-    known = replace(known, covariance=_observed(found, known) * np.outer(wider, wider))
-    told = ~known.open & ~before.open
-    plain = np.sqrt(np.diag(before.plain))
-    ratio = known.std[told] / np.where(plain[told] > 0.0, plain[told], 1.0)
+def _trusted(new_solution: Solution, uncertainty_before: Trust, models: Mapping[Column, AutoRegression]) -> Trust:
+    """The trust in a fit by filtered rows. uncertainty_before: in the one by residuals as they are."""
+    solver = new_solution.solver
+    uncertainty = trust(solver, new_solution, WHITE)
+    degrees = _degrees(new_solution, uncertainty, models)
+    filtered_parts = WhitenedEngine(solver.engine.unfiltered, models).residuals(new_solution.state.point)
+    widening_factors = widening(
+        solver.problem,
+        filtered_parts,
+        new_solution.state.variance,
+        _of_pieces(new_solution, uncertainty.plain_covariance),
+    )
+    uncertainty = replace(
+        uncertainty, covariance=_observed(new_solution, uncertainty) * np.outer(widening_factors, widening_factors)
+    )
+    compared_numbers = ~uncertainty.open & ~uncertainty_before.open
+    plain_std = np.sqrt(np.diag(uncertainty_before.plain_covariance))
+    ratio = uncertainty.std[compared_numbers] / np.where(
+        plain_std[compared_numbers] > 0.0, plain_std[compared_numbers], 1.0
+    )
     return replace(
-        known,
+        uncertainty,
         kind=AUTOREGRESSIVE,
         degrees=int(degrees),
         quantile=t_quantile(degrees),
-        neighbours=before.neighbours,
+        neighbours=uncertainty_before.neighbours,
         widening=float(ratio.max(initial=0.0)) or 1.0,
     )
 
 
-def _observed(found: Solution, known: Trust) -> FloatArray:
+def _observed(new_solution: Solution, uncertainty: Trust) -> FloatArray:
     """The covariance by the information that is observed: how much the score changes between the ends of intervals.
 
     Shape (P, P). Where a number is not told or stands at a bound, nothing leads to the ends: it stays as expected.
     """
-    solver, point = found.solver, found.state.point
-    if (known.open | known.held | ~(known.std > 0.0)).any():
-        return known.covariance
-    axes = _root(known.covariance / np.outer(known.std, known.std)) * known.std[:, None]
-    inner = solver.inner(point.values)
+    solver, point = new_solution.solver, new_solution.state.point
+    if (uncertainty.open | uncertainty.held_parameters | ~(uncertainty.std > 0.0)).any():
+        return uncertainty.covariance
+    axes = _root(uncertainty.covariance / np.outer(uncertainty.std, uncertainty.std)) * uncertainty.std[:, None]
+    inner_values = solver.inner(point.values)
 
     def gradient(end: FloatArray) -> FloatArray:
         return Normal(solver, solver.state(Point(solver.outer(end), point.states))).gradient
 
-    ends = [solver.clipped(inner + side * known.quantile * way) for way in axes.T for side in (1.0, -1.0)]
+    ends = [solver.clipped(inner_values + side * uncertainty.quantile * way) for way in axes.T for side in (1.0, -1.0)]
     gradients = np.array(side_by_side(gradient, ends))
-    apart = np.linalg.norm(np.array(ends[0::2]) - np.array(ends[1::2]), axis=1) / np.linalg.norm(axes, axis=0)
-    curved = (gradients[1::2] - gradients[0::2]) @ axes / apart[:, None]
-    values, vectors = np.linalg.eigh(0.5 * (curved + curved.T))
-    stretched = (axes @ vectors) / np.sqrt(np.clip(values, BENT, 1.0 / BENT))
-    return stretched @ stretched.T
+    end_distances = np.linalg.norm(np.array(ends[0::2]) - np.array(ends[1::2]), axis=1) / np.linalg.norm(axes, axis=0)
+    curvature = (gradients[1::2] - gradients[0::2]) @ axes / end_distances[:, None]
+    values, vectors = np.linalg.eigh(0.5 * (curvature + curvature.T))
+    scaled_axes = (axes @ vectors) / np.sqrt(np.clip(values, BEND_SHARE, 1.0 / BEND_SHARE))
+    return scaled_axes @ scaled_axes.T
 
 
-def _degrees(found: Solution, known: Trust, models: Mapping[Column, AutoRegression]) -> float:
+def _degrees(new_solution: Solution, uncertainty: Trust, models: Mapping[Column, AutoRegression]) -> float:
     """Degrees of freedom of the least known variance among those that the logs tell."""
-    told = ~known.open
-    if not told.any():
-        return float(max(known.degrees, 1))
-    solver = found.solver
-    leaning = {column: np.zeros((1 + model.order, int(told.sum()))) for column, model in models.items()}
-    of_pieces = _of_pieces(found, known.plain)
-    scale = Normal(solver, found.state).scale[told]
-    pieces = zip(solver.problem.pieces, solver.engine.unfiltered.residuals(found.state.point), of_pieces, strict=True)
+    open_numbers = ~uncertainty.open
+    if not open_numbers.any():
+        return float(max(uncertainty.degrees, 1))
+    solver = new_solution.solver
+    memory_slopes = {column: np.zeros((1 + model.order, int(open_numbers.sum()))) for column, model in models.items()}
+    of_pieces = _of_pieces(new_solution, uncertainty.plain_covariance)
+    scale = Normal(solver, new_solution.state).scale[open_numbers]
+    pieces = zip(
+        solver.problem.pieces, solver.engine.unfiltered.residuals(new_solution.state.point), of_pieces, strict=True
+    )
     for piece, parts, covariance in pieces:
-        ways = covariance[:, : len(told)][:, told] / scale
+        ways = covariance[:, : len(open_numbers)][:, open_numbers] / scale
         moves = moving_rows(piece, parts[0])
         for column, rows, _, slopes, steps in _columns(piece, parts):
             if column not in models:
                 continue
-            own = slopes @ ways[parts[2]]
-            new = models[column].new(own, steps, moves[piece.record.columns.index(column), rows])
-            leaning[column] += models[column].leaning(own, new, steps)
-    variance, scatter = np.diag(known.plain)[told], np.zeros(int(told.sum()))
+            column_ways = slopes @ ways[parts[2]]
+            new = models[column].new(column_ways, steps, moves[piece.record.columns.index(column), rows])
+            memory_slopes[column] += models[column].leaning(column_ways, new, steps)
+    variance, scatter = np.diag(uncertainty.plain_covariance)[open_numbers], np.zeros(int(open_numbers.sum()))
     for column, model in models.items():
-        scatter += model.scatter(leaning[column] / found.state.variance[solver.problem.columns.index(column)])
+        scatter += model.scatter(
+            memory_slopes[column] / new_solution.state.variance[solver.problem.columns.index(column)]
+        )
     degrees = 2.0 * variance**2 / np.maximum(scatter, 1e-300)
-    return float(np.clip(degrees.min(), 3.0, max(known.degrees, 3)))
+    return float(np.clip(degrees.min(), 3.0, max(uncertainty.degrees, 3)))
 
 
-def _statements(found: Solution, models: Mapping[Column, AutoRegression], known: Trust) -> Iterator[Statement]:
+def _statements(
+    new_solution: Solution, models: Mapping[Column, AutoRegression], uncertainty: Trust
+) -> Iterator[Statement]:
     """What a reader should know of the memory: what it is, logs too short for it, stamps that are not even."""
-    pieces = found.solver.problem.pieces
+    pieces = new_solution.solver.problem.pieces
     orders = sorted({model.order for model in models.values() if model.slopes is None})
-    beside = {model.moving is not None for model in models.values() if model.slopes is not None}
+    is_moving = {model.moving is not None for model in models.values() if model.slopes is not None}
     longest = max(models, key=lambda column: models[column].memory)
     model, lasts = models[longest], models[longest].memory * spacing(pieces, longest)[0]
     numbers = {
-        "neighbours": np.abs(known.neighbours).max(),
+        "neighbours": np.abs(uncertainty.neighbours).max(),
         "orders": (orders[0], orders[-1]) if orders else None,
-        "beside_white": ("moving" if beside == {True} else "all") if beside else "",
+        "beside_white": ("moving" if is_moving == {True} else "all") if is_moving else "",
         "memory": lasts,
-        "widening": known.widening,
+        "widening": uncertainty.widening,
     }
     yield Statement("autocorrelated_noise", NOTE, numbers=numbers)
-    if model.rows < FEW * model.memory:
-        numbers = {"memory": lasts, "times": model.rows / model.memory, "enough": FEW * lasts}
+    if model.rows < FEW_MEMORIES * model.memory:
+        numbers = {"memory": lasts, "times": model.rows / model.memory, "enough": FEW_MEMORIES * lasts}
         yield Statement("short_for_memory", WARNING, f"{longest[0]}[{longest[1]}]", numbers)
     uneven = max(spacing(pieces, column)[2] for column in models)
     if uneven > UNEVEN:
@@ -344,8 +380,8 @@ def _statements(found: Solution, models: Mapping[Column, AutoRegression], known:
 # better; this says how sure the one at hand is.
 
 BLOCK = 50  # rows whose errors are summed
-FALSE = 0.01  # of logs in which channels seem to go together and do not
-LEAST = 0.25  # of a variance: a correlation is not known so well that it could take away more
+FALSE_SHARE = 0.01  # of logs in which channels seem to go together and do not
+LEAST_VARIANCE = 0.25  # of a variance: a correlation is not known so well that it could take away more
 
 
 def correlation(problem: Problem, parts: Sequence[Parts]) -> FloatArray | None:
@@ -356,20 +392,20 @@ def correlation(problem: Problem, parts: Sequence[Parts]) -> FloatArray | None:
     count, sums = len(problem.columns), []
     for piece, (residual, _, _) in zip(problem.pieces, parts, strict=True):
         blocks = residual.shape[1] // BLOCK
-        own = np.full((count, blocks), np.nan)
-        at = [problem.columns.index(column) for column in piece.record.columns]
-        cut = residual[:, : blocks * BLOCK].reshape(len(at), blocks, BLOCK)
-        own[at] = np.where(np.isfinite(cut).any(axis=2), np.nan_to_num(cut).sum(axis=2), np.nan)
-        sums.append(own)
-    every = np.concatenate(sums, axis=1)
-    there, every = np.isfinite(every), np.nan_to_num(every)
-    size = every**2 @ there.T
-    found = every @ every.T / np.sqrt(np.maximum(size * size.T, 1e-300))
-    both = there.astype(float) @ there.T
+        block_sums = np.full((count, blocks), np.nan)
+        column_indices = [problem.columns.index(column) for column in piece.record.columns]
+        cut = residual[:, : blocks * BLOCK].reshape(len(column_indices), blocks, BLOCK)
+        block_sums[column_indices] = np.where(np.isfinite(cut).any(axis=2), np.nan_to_num(cut).sum(axis=2), np.nan)
+        sums.append(block_sums)
+    all_sums = np.concatenate(sums, axis=1)
+    mask, all_sums = np.isfinite(all_sums), np.nan_to_num(all_sums)
+    size = all_sums**2 @ mask.T
+    correlations = all_sums @ all_sums.T / np.sqrt(np.maximum(size * size.T, 1e-300))
+    pair_counts = mask.astype(float) @ mask.T
     pairs = np.triu_indices(count, 1)
-    score = float((both[pairs] * found[pairs] ** 2).sum())
-    np.fill_diagonal(found, 1.0)
-    return found if len(pairs[0]) and score > chdtri(len(pairs[0]), FALSE) else None
+    score = float((pair_counts[pairs] * correlations[pairs] ** 2).sum())
+    np.fill_diagonal(correlations, 1.0)
+    return correlations if len(pairs[0]) and score > chdtri(len(pairs[0]), FALSE_SHARE) else None
 
 
 def widening(
@@ -381,17 +417,17 @@ def widening(
     parameters and states, in the units of its slopes.
     """
     rho, count = correlation(problem, parts), len(problem.parameters)
-    own = np.ones(count)
+    variances = np.ones(count)
     if rho is None:
-        return own
-    plain, more = np.diag(covariances[0])[:count], np.zeros(count)
-    for piece, (residual, slopes, at), covariance in zip(problem.pieces, parts, covariances, strict=True):
+        return variances
+    plain_variances, cross_terms = np.diag(covariances[0])[:count], np.zeros(count)
+    for piece, (residual, slopes, indices), covariance in zip(problem.pieces, parts, covariances, strict=True):
         columns = [problem.columns.index(column) for column in piece.record.columns]
-        known = np.isfinite(residual)[:, :, None]
-        ways = np.where(known, slopes, 0.0) @ covariance[at][:, :count] / variance[columns, None, None] ** 0.5
+        known_mask = np.isfinite(residual)[:, :, None]
+        ways = np.where(known_mask, slopes, 0.0) @ covariance[indices][:, :count] / variance[columns, None, None] ** 0.5
         for c, own_c in enumerate(columns):
             for d, own_d in enumerate(columns[:c]):
-                more += 2.0 * rho[own_c, own_d] * (ways[c] * ways[d]).sum(axis=0)
-    told = plain > 0.0
-    own[told] = np.sqrt(np.maximum(1.0 + more[told] / plain[told], LEAST))
-    return own
+                cross_terms += 2.0 * rho[own_c, own_d] * (ways[c] * ways[d]).sum(axis=0)
+    positive = plain_variances > 0.0
+    variances[positive] = np.sqrt(np.maximum(1.0 + cross_terms[positive] / plain_variances[positive], LEAST_VARIANCE))
+    return variances

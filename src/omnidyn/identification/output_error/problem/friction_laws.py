@@ -22,7 +22,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.stick_slip.plant import plant
 from omnidyn.statement import NOTE, Statement
 
-APART = 1.001  # S over C at least
+LEVEL_RATIO = 1.001  # S over C at least
 
 
 def falls(name: str, robot: Robot) -> bool:
@@ -40,33 +40,40 @@ def coulomb_below(name: str, robot: Robot | None = None) -> str:
 
     robot: whose own level backward it is, where it has one.
     """
-    key, at, group = name.partition(AT)
-    found = key.replace(BREAKAWAY, COULOMB)
+    key, separator, group = name.partition(AT)
+    coulomb_name = key.replace(BREAKAWAY, COULOMB)
     law = robot and getattr(robot.friction, Key.parse(key).table.rpartition(".")[2])
-    if law is not None and "_backward" in found and law.coulomb_backward is None:
-        found = found.replace("_backward", "")
-    return f"{found}{at}{group}"
+    if law is not None and "_backward" in coulomb_name and law.coulomb_backward is None:
+        coulomb_name = coulomb_name.replace("_backward", "")
+    return f"{coulomb_name}{separator}{group}"
 
 
 def speed_of(name: str, names: Sequence[str]) -> str:
     """Of `names`, the speed over which this breakaway falls; "" where it is not among them."""
-    key, at, group = name.partition(AT)
-    own = Key.parse(key)
-    yaw = "yaw_" if own.field.startswith("yaw_") else ""
-    list_, end = f"{own.table}.{yaw}stribeck_speed", "" if own.index is None else f"[{own.index}]"
-    return next((each for each in (f"{list_}{end}{at}{group}", f"{list_}{at}{group}") if each in names), "")
+    key, separator, group = name.partition(AT)
+    level_key = Key.parse(key)
+    yaw = "yaw_" if level_key.field.startswith("yaw_") else ""
+    list_, end = f"{level_key.table}.{yaw}stribeck_speed", "" if level_key.index is None else f"[{level_key.index}]"
+    return next(
+        (
+            speed_name
+            for speed_name in (f"{list_}{end}{separator}{group}", f"{list_}{separator}{group}")
+            if speed_name in names
+        ),
+        "",
+    )
 
 
 def kept_in_order(p: Parameter, robot: Robot, names: Sequence[str]) -> Parameter:
     """The parameter with the bound that the other level is, where that one is not free (`names`) and they fall."""
     if falls(p.name, robot) and coulomb_below(p.name, robot) not in names:
-        least = APART * float(Key.parse(coulomb_below(p.name, robot)).get(robot))
-        return replace(p, low=max(p.low, least), value=max(p.value, least))
-    above = p.name.replace(COULOMB, BREAKAWAY)
-    if Key.parse(p.name).level == COULOMB and above not in names and falls(above, robot):
-        hold = _level(above, robot)
-        most = p.high if hold is None else hold / APART
-        return replace(p, high=min(p.high, most), value=min(p.value, most))
+        least_level = LEVEL_RATIO * float(Key.parse(coulomb_below(p.name, robot)).get(robot))
+        return replace(p, low=max(p.low, least_level), value=max(p.value, least_level))
+    breakaway_name = p.name.replace(COULOMB, BREAKAWAY)
+    if Key.parse(p.name).level == COULOMB and breakaway_name not in names and falls(breakaway_name, robot):
+        hold = _level(breakaway_name, robot)
+        most_level = p.high if hold is None else hold / LEVEL_RATIO
+        return replace(p, high=min(p.high, most_level), value=min(p.value, most_level))
     return p
 
 
@@ -93,33 +100,33 @@ BANDS = tuple(
 
 def without_band(robot: Robot, free: Sequence[str]) -> Robot:
     """The robot with the levels of Karnopp's law as Coulomb's. Raises InputError where its band is free."""
-    asked = [key for key in free if Key.parse(key).name in BANDS]
-    if asked:
+    requested_bands = [key for key in free if Key.parse(key).name in BANDS]
+    if requested_bands:
         raise InputError(
             "cannot be free",
-            got=asked[0],
+            got=requested_bands[0],
             expected="coulomb, breakaway or viscous",
             remedy="leave it out: the speed below which Karnopp's law rests is chosen for a solver, not measured",
             where="free",
         )
-    usual = {name: type(getattr(robot.friction, name)) for name in tables_with_band(robot)}
+    default_tables = {name: type(getattr(robot.friction, name)) for name in tables_with_band(robot)}
     return _changed(
         robot,
-        {n: {s: f.model_fields[s].default for s in SPEEDS if s in f.model_fields} for n, f in usual.items()},
+        {n: {s: f.model_fields[s].default for s in SPEEDS if s in f.model_fields} for n, f in default_tables.items()},
         COULOMB,
     )
 
 
-def with_band(robot: Robot, of: Robot) -> Robot:
+def with_band(robot: Robot, begin_robot: Robot) -> Robot:
     """A fitted robot with the law of the robot that it began from."""
-    own = {name: getattr(of.friction, name) for name in tables_with_band(of)}
-    speeds = {n: {s: getattr(law, s) for s in SPEEDS if hasattr(law, s)} for n, law in own.items()}
+    table_laws = {name: getattr(begin_robot.friction, name) for name in tables_with_band(begin_robot)}
+    speeds = {n: {s: getattr(law, s) for s in SPEEDS if hasattr(law, s)} for n, law in table_laws.items()}
     return _changed(robot, speeds, KARNOPP)
 
 
-def band_note(of: Robot) -> tuple[Statement, ...]:
+def band_note(begin_robot: Robot) -> tuple[Statement, ...]:
     """What is to be said of it."""
-    return (Statement("karnopp_as_coulomb", NOTE),) if tables_with_band(of) else ()
+    return (Statement("karnopp_as_coulomb", NOTE),) if tables_with_band(begin_robot) else ()
 
 
 def tables_with_band(robot: Robot) -> list[str]:
@@ -129,8 +136,8 @@ def tables_with_band(robot: Robot) -> list[str]:
 
 def _changed(robot: Robot, speeds: Mapping[str, Mapping[str, Any]], law: str) -> Robot:
     """The robot with another law, and other bands, in some tables."""
-    own = {n: getattr(robot.friction, n).model_copy(update={"law": law, **speed}) for n, speed in speeds.items()}
-    return robot.model_copy(update={"friction": robot.friction.model_copy(update=own)}) if own else robot
+    new_tables = {n: getattr(robot.friction, n).model_copy(update={"law": law, **speed}) for n, speed in speeds.items()}
+    return robot.model_copy(update={"friction": robot.friction.model_copy(update=new_tables)}) if new_tables else robot
 
 
 # Bristles (Dahl, LuGre) as free numbers: where a damping starts that the robot file leaves to the critical rule
@@ -159,17 +166,17 @@ def with_damping(robot: Robot, names: Sequence[str]) -> Robot:
             ("direction", "yaw_damping"): float(rows[YAW]) * length**2,
             ("wheels", "damping"): float(np.mean(rows[N_AXES:])),
         }
-        changed = law.replace(**{field: values[table, field]})
-        robot = robot.replace(friction=robot.friction.replace(**{table: changed}))
+        damped_law = law.replace(**{field: values[table, field]})
+        robot = robot.replace(friction=robot.friction.replace(**{table: damped_law}))
     return robot
 
 
 def bending_keys(robot: Robot) -> list[str]:
     """Stiffness and damping of every bristle that has them in the file; lists by their name."""
-    found = []
+    keys_found = []
     for table in type(robot.friction).model_fields:
         law = getattr(robot.friction, table)
         if KINDS[law.law].bends:
             names = (f"{yaw}{name}" for yaw in ("", "yaw_") for name in ("stiffness", "damping"))
-            found += [f"friction.{table}.{name}" for name in names if getattr(law, name, None) is not None]
-    return found
+            keys_found += [f"friction.{table}.{name}" for name in names if getattr(law, name, None) is not None]
+    return keys_found

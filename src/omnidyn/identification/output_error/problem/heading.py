@@ -52,5 +52,5 @@ def _integral(record: Record, robot: Robot) -> FloatArray:
 
 def _without_gaps(t: FloatArray, values: FloatArray) -> FloatArray:
     """Values with what is missing on straight lines between what is there; 0 where nothing is."""
-    known = np.isfinite(values)
-    return np.interp(t, t[known], values[known]) if known.any() else np.zeros(len(t))
+    known_mask = np.isfinite(values)
+    return np.interp(t, t[known_mask], values[known_mask]) if known_mask.any() else np.zeros(len(t))

@@ -37,14 +37,14 @@ from omnidyn.statistics import difference_noise
 LATENCY, TILT, PUSH = "latency", "tilt", "push"
 NUISANCES = (LATENCY, GAIN, DEAD_BAND, FADE, TILT, PUSH)
 TRAVELS = ("heading", "position", "wheel_angle")  # outputs that count from an unknown start
-EARLIEST, LATEST = -0.1, 0.3  # [s]
+LEAST_LATENCY, MOST_LATENCY = -0.1, 0.3  # [s]
 FILTER = (
     0.03  # [s] of a speed that was smoothed forwards and backwards: so early it shows what the voltage is yet to do
 )
 SUPPLY_STD = 0.1  # of a nominal supply: a battery is full or it is not
 MOST_FADE = 0.9
-SILENT = 5  # rows without voltage that show a robot at rest
-CLEAR = 4.0  # standard errors from 0 that count as motion
+SILENT_ROWS = 5  # rows without voltage that show a robot at rest
+MOTION_ERRORS = 4.0  # standard errors from 0 that count as motion
 LEAD = 5  # rows whose mean is where a free start begins
 
 
@@ -60,18 +60,18 @@ def implausible(name: str, latency: float, fitted: bool = True) -> Statement:
 
 
 def nuisance_parameters(
-    wanted: Sequence[str], records: Sequence[Record], robot: Robot, from_: float = EARLIEST
+    wanted_names: Sequence[str], records: Sequence[Record], robot: Robot, from_: float = LEAST_LATENCY
 ) -> list[Parameter]:
     """The nuisances asked for as free parameters; latencies begin at `from_` [s].
 
     Raises InputError for a name that is none.
     """
-    unknown = [name for name in wanted if name.partition(".")[0] not in NUISANCES]
+    unknown = [name for name in wanted_names if name.partition(".")[0] not in NUISANCES]
     if unknown:
         raise InputError("no such nuisance", got=unknown[0], expected=", ".join(NUISANCES), where="nuisances")
     channels = measured_channels(records)
     parameters: list[Parameter] = []
-    for name in wanted:
+    for name in wanted_names:
         if name == LATENCY:
             parameters += [_latency(channel, robot, from_) for channel in channels]
         elif name.startswith(f"{LATENCY}."):
@@ -80,13 +80,15 @@ def nuisance_parameters(
                 raise InputError("no such channel", got=name, expected=", ".join(channels), where="nuisances")
             parameters.append(_latency(channel, robot))
         elif name == GAIN:
-            prior = (1.0, SUPPLY_STD) if any(record.supplied for record in records) else None
+            prior = (1.0, SUPPLY_STD) if any(record.is_nominal_supply for record in records) else None
             parameters.append(Parameter(GAIN, 1.0, 0.1, 10.0, True, prior))
         elif name == DEAD_BAND:
-            most = max(float(np.nanmax(np.abs(record.voltage))) for record in records)
-            own, seen = robot.drive.dead_band, least_that_drove(records, robot)
-            high = max(seen if np.isfinite(seen) else 0.5 * most, own)
-            parameters.append(Parameter(DEAD_BAND, own, 0.0, high, prior=_of_file(robot, KEY_DEAD, own)))
+            largest_voltage = max(float(np.nanmax(np.abs(record.voltage))) for record in records)
+            file_dead_band, driving_voltage = robot.drive.dead_band, least_that_drove(records, robot)
+            high = max(driving_voltage if np.isfinite(driving_voltage) else 0.5 * largest_voltage, file_dead_band)
+            parameters.append(
+                Parameter(DEAD_BAND, file_dead_band, 0.0, high, prior=_of_file(robot, KEY_DEAD, file_dead_band))
+            )
         elif name.partition(".")[0] in (TILT, PUSH):
             parameters += _forces(name, robot)
         else:
@@ -94,17 +96,27 @@ def nuisance_parameters(
     return list({p.name: p for p in parameters}.values())
 
 
-def _latency(channel: str, robot: Robot, from_: float = EARLIEST) -> Parameter:
+def _latency(channel: str, robot: Robot, from_: float = LEAST_LATENCY) -> Parameter:
     """How late a channel is, that of the robot's own drive included, with which it begins."""
-    own = robot.drive.latency
-    prior = _of_file(robot, KEY_LATE, own)
-    return Parameter(f"{LATENCY}.{channel}", own, min(from_, own), max(LATEST, 2.0 * own), prior=prior)
+    file_latency = robot.drive.latency
+    prior = _of_file(robot, KEY_LATE, file_latency)
+    return Parameter(
+        f"{LATENCY}.{channel}",
+        file_latency,
+        min(from_, file_latency),
+        max(MOST_LATENCY, 2.0 * file_latency),
+        prior=prior,
+    )
 
 
 def _of_file(robot: Robot, key: str, value: float) -> tuple[float, float] | None:
     """What the robot file knows of a number, unless a fit wrote it: its log would count twice."""
-    known = robot.priors.get(key)
-    return None if known is None or known.std is None or known.origin == IDENTIFIED else (value, known.std)
+    file_prior = robot.priors.get(key)
+    return (
+        None
+        if file_prior is None or file_prior.std is None or file_prior.origin == IDENTIFIED
+        else (value, file_prior.std)
+    )
 
 
 def _as_fitted(channel: str, channels: Sequence[str]) -> str:
@@ -128,12 +140,17 @@ def measured_channels(records: Sequence[Record]) -> list[str]:
 def _forces(name: str, robot: Robot) -> list[Parameter]:
     """The force on one axis, or on all that it has; at most what the robot weighs, at its wheels for yaw."""
     weight, kind = GRAVITY * robot.body.mass, name.partition(".")[0]
-    most = (weight, weight, weight * float(np.max(robot.wheels.robot_radius)))
-    every = [Parameter(f"{kind}.{axis}", 0.0, -own, own) for axis, own in zip(AXES, most, strict=True)]
-    every = every[:YAW] if kind == TILT else every
-    parameters = [p for p in every if name in (kind, p.name)]
+    force_limits = (weight, weight, weight * float(np.max(robot.wheels.robot_radius)))
+    force_parameters = [
+        Parameter(f"{kind}.{axis}", 0.0, -force_limit, force_limit)
+        for axis, force_limit in zip(AXES, force_limits, strict=True)
+    ]
+    force_parameters = force_parameters[:YAW] if kind == TILT else force_parameters
+    parameters = [p for p in force_parameters if name in (kind, p.name)]
     if not parameters:
-        raise InputError("no such axis", got=name, expected=", ".join(p.name for p in every), where="nuisances")
+        raise InputError(
+            "no such axis", got=name, expected=", ".join(p.name for p in force_parameters), where="nuisances"
+        )
     return parameters
 
 
@@ -143,50 +160,50 @@ def automatic(records: Sequence[Record], quick: bool = True) -> tuple[str, ...]:
     quick: whether another one costs next to nothing; else none is tried that has to be shown first. A nominal supply is
     in the intervals of every fit.
     """
-    tried = (LATENCY, DEAD_BAND) if quick else (LATENCY,)
-    return (*tried, GAIN) if any(record.supplied for record in records) else tried
+    candidate_names = (LATENCY, DEAD_BAND) if quick else (LATENCY,)
+    return (*candidate_names, GAIN) if any(record.is_nominal_supply for record in records) else candidate_names
 
 
 def pieces(
-    records: Sequence[Record], robot: Robot, start: str, late: bool, start_std: FloatArray | None = None
+    records: Sequence[Record], robot: Robot, start: str, has_latency: bool, start_std: FloatArray | None = None
 ) -> list[Piece]:
-    """The pieces of all records. start: "rest", "free" or "auto"; late: whether a latency is free.
+    """The pieces of all records. start: "rest", "free" or "auto"; has_latency: whether a latency is free.
 
     start_std: of a start that was measured, None where it may be anywhere.
 
     "auto": at rest where the log begins with a voltage that is held and without visible motion; else free. From rest
     no row is left out for a latency: what was before is known.
     """
-    found = []
+    result = []
     for record in records:
         twist = measured_twist(record, robot)
         for number, (first, last) in enumerate(record.pieces):
-            rest = start == REST and number == 0
-            found.append(_piece(record, twist, first, last, rest, start == AUTO, late))
+            is_at_rest = start == REST and number == 0
+            result.append(_piece(record, twist, first, last, is_at_rest, start == AUTO, has_latency))
             if twist is not None and start_std is not None:
-                found[-1] = replace(found[-1], start_std=start_std)
-    return found
+                result[-1] = replace(result[-1], start_std=start_std)
+    return result
 
 
 def _piece(
-    record: Record, twist: FloatArray | None, first: int, last: int, rest: bool, decide: bool, late: bool
+    record: Record, twist: FloatArray | None, first: int, last: int, is_at_rest: bool, decide: bool, has_latency: bool
 ) -> Piece:
     columns = record.columns
     travels = np.array([name in TRAVELS for name, _ in columns])
     rows = slice(first, min(first + LEAD, last + 1))
     guess = np.zeros(3) if twist is None else np.array([_mean(twist[rows, axis]) for axis in range(3)])
     if decide:
-        rest = _begins_at_rest(record, twist, first, last)
+        is_at_rest = _begins_at_rest(record, twist, first, last)
     offset = np.array([_mean(record.outputs[rows, c]) if travels[c] else 0.0 for c in range(len(columns))])
     duration = float(record.t[last] - record.t[first])
-    margin = min(LATEST, 0.1 * duration) if late and not rest else 0.0
+    margin = min(MOST_LATENCY, 0.1 * duration) if has_latency and not is_at_rest else 0.0
     return Piece(
         record,
         first,
         last,
-        np.zeros(3) if rest else guess,
+        np.zeros(3) if is_at_rest else guess,
         offset,
-        np.concatenate([np.full(3, not rest), travels]),
+        np.concatenate([np.full(3, not is_at_rest), travels]),
         np.full(len(columns), margin),
     )
 
@@ -197,14 +214,18 @@ def _begins_at_rest(record: Record, twist: FloatArray | None, first: int, last: 
     Of a voltage that breakaway holds, too: a start that is next to rest would slide away under it. Such a voltage may
     also turn a moving robot round: that takes more rows, and no trend either.
     """
-    stop = min(first + 10 * SILENT, last + 1)
-    changed = np.flatnonzero((record.voltage[first:stop] != record.voltage[first]).any(axis=1))
-    rows, driven = int(changed[0]) if changed.size else stop - first, bool(record.voltage[first].any())
-    if rows < (4 * SILENT if driven else SILENT) or twist is None:
+    stop = min(first + 10 * SILENT_ROWS, last + 1)
+    change_rows = np.flatnonzero((record.voltage[first:stop] != record.voltage[first]).any(axis=1))
+    rows, is_driven = int(change_rows[0]) if change_rows.size else stop - first, bool(record.voltage[first].any())
+    if rows < (4 * SILENT_ROWS if is_driven else SILENT_ROWS) or twist is None:
         return False
-    seen = twist[first : first + rows]
-    known = [seen[kept, axis] for axis in range(seen.shape[1]) if (kept := np.isfinite(seen[:, axis])).any()]
-    return bool(known) and all(errors_from_rest(each, driven) <= CLEAR for each in known)
+    first_speeds = twist[first : first + rows]
+    known_speeds = [
+        first_speeds[finite_rows, axis]
+        for axis in range(first_speeds.shape[1])
+        if (finite_rows := np.isfinite(first_speeds[:, axis])).any()
+    ]
+    return bool(known_speeds) and all(errors_from_rest(speeds, is_driven) <= MOTION_ERRORS for speeds in known_speeds)
 
 
 def errors_from_rest(speed: FloatArray, trend: bool) -> float:
@@ -213,13 +234,13 @@ def errors_from_rest(speed: FloatArray, trend: bool) -> float:
     time = np.arange(n) - 0.5 * (n - 1)
     slope = float(time @ speed) / max(float(time @ time), 1.0) if trend else 0.0
     spread = float(np.std(speed - slope * time))
-    apart = np.hypot(mean * np.sqrt(n), slope * np.sqrt(time @ time))
-    return 0.0 if apart == 0.0 else float(apart / spread) if spread > 0.0 else np.inf
+    distance = np.hypot(mean * np.sqrt(n), slope * np.sqrt(time @ time))
+    return 0.0 if distance == 0.0 else float(distance / spread) if spread > 0.0 else np.inf
 
 
 def _mean(values: FloatArray) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if known.size else 0.0
+    known_values = values[np.isfinite(values)]
+    return float(known_values.mean()) if known_values.size else 0.0
 
 
 # Which voltages drove a robot, whatever its model: they bound the dead band of its driver from above
@@ -228,10 +249,10 @@ def _mean(values: FloatArray) -> float:
 # the
 # dead band. Where the robot visibly became faster, the greatest voltage of the rows before is above the dead band.
 
-FASTER = 5.0  # standard errors by which a robot is faster, of windows by the hundred
+GAIN_ERRORS = 5.0  # standard errors by which a robot is faster, of windows by the hundred
 WINDOWS, LEAST_ROWS = (0.1, 0.3, 0.6), 5  # [s], and at least so many rows, over which a speed is found
 SHARE = 0.1  # of the fastest: less may be noise with a memory
-LASTS = 2  # windows for which it is faster, at least
+LASTING_WINDOWS = 2  # windows for which it is faster, at least
 TOP, OF_MEDIAN = 0.95, 1.2533  # a quantile that stands for the fastest; std error of a median over that of a mean
 
 
@@ -242,7 +263,11 @@ def least_that_drove(records: Sequence[Record], robot: Robot) -> float:
 
 def _of_record(record: Record, robot: Robot) -> float:
     """By the speeds, and by the heading where there is one: it may be known far better."""
-    reach, names, found = float(np.mean(robot.wheels.robot_radius)), [name for name, _ in record.columns], np.inf
+    reach, names, least_voltage = (
+        float(np.mean(robot.wheels.robot_radius)),
+        [name for name, _ in record.columns],
+        np.inf,
+    )
     twist = measured_twist(record, robot)
     for first, last in record.pieces:
         rows = slice(first, last + 1)
@@ -255,9 +280,9 @@ def _of_record(record: Record, robot: Robot) -> float:
                 means.append(_of_speeds(twist[rows] * [1.0, 1.0, reach], width))
             if "heading" in names:
                 means.append(_of_angle(reach * record.outputs[rows, names.index("heading")], t, width))
-            least = (_least(fast, noise, voltage, width, round(LATEST / step)) for fast, noise in means)
-            found = min([found, *least])
-    return found
+            least_voltages = (_least(fast, noise, voltage, width, round(MOST_LATENCY / step)) for fast, noise in means)
+            least_voltage = min([least_voltage, *least_voltages])
+    return least_voltage
 
 
 def _of_speeds(rim: FloatArray, width: int) -> tuple[FloatArray, float]:
@@ -265,29 +290,31 @@ def _of_speeds(rim: FloatArray, width: int) -> tuple[FloatArray, float]:
 
     Of the medians of a window, so that wild samples move nobody.
     """
-    known = rim[:, np.isfinite(rim).all(axis=0)]
-    windows = len(known) // width
-    if not windows or not known.shape[1]:
+    known_speeds = rim[:, np.isfinite(rim).all(axis=0)]
+    windows = len(known_speeds) // width
+    if not windows or not known_speeds.shape[1]:
         return np.zeros(0), 0.0
-    noise = np.array([difference_noise(column) for column in known.T])
-    middle = np.median(known[: windows * width].reshape(windows, width, -1), axis=1)
+    noise = np.array([difference_noise(column) for column in known_speeds.T])
+    middle = np.median(known_speeds[: windows * width].reshape(windows, width, -1), axis=1)
     return np.sqrt((middle**2).sum(axis=1)), OF_MEDIAN * float(np.sqrt((noise**2).sum() / width))
 
 
 def _of_angle(path: FloatArray, t: FloatArray, width: int) -> tuple[FloatArray, float]:
     """The same of an angle times the reach of the wheels (rows,) [m]."""
-    at = np.arange(0, len(path), width)
-    if not np.isfinite(path).all() or len(at) < 2:
+    window_starts = np.arange(0, len(path), width)
+    if not np.isfinite(path).all() or len(window_starts) < 2:
         return np.zeros(0), 0.0
-    span = np.diff(t[at])
-    return np.abs(np.diff(path[at])) / span, float(np.sqrt(2.0) * difference_noise(path) / np.median(span))
+    span = np.diff(t[window_starts])
+    return np.abs(np.diff(path[window_starts])) / span, float(np.sqrt(2.0) * difference_noise(path) / np.median(span))
 
 
-def _least(fast: FloatArray, noise: float, voltage: FloatArray, width: int, before: int) -> float:
+def _least(fast: FloatArray, noise: float, voltage: FloatArray, width: int, row_shift: int) -> float:
     """The least voltage in force where windows of rows show a robot that became faster, and stayed so."""
-    if len(fast) < LASTS + 2 or not fast.any():
+    if len(fast) < LASTING_WINDOWS + 2 or not fast.any():
         return np.inf
-    clear = max(FASTER * np.sqrt(2.0) * noise, SHARE * float(np.quantile(fast, TOP)))
-    stays = np.lib.stride_tricks.sliding_window_view(fast[1:], LASTS).min(axis=1)
-    faster = np.flatnonzero(stays - fast[: len(stays)] > clear)
-    return min((float(voltage[max(k * width - before, 0) : (k + 2) * width].max()) for k in faster), default=np.inf)
+    clear_gain = max(GAIN_ERRORS * np.sqrt(2.0) * noise, SHARE * float(np.quantile(fast, TOP)))
+    lasting_speed = np.lib.stride_tricks.sliding_window_view(fast[1:], LASTING_WINDOWS).min(axis=1)
+    faster_windows = np.flatnonzero(lasting_speed - fast[: len(lasting_speed)] > clear_gain)
+    return min(
+        (float(voltage[max(k * width - row_shift, 0) : (k + 2) * width].max()) for k in faster_windows), default=np.inf
+    )

@@ -31,7 +31,7 @@ class Outputs:
 
     notes: what was decided on the way.
 
-    unused: what was measured and is not fitted, and why. lost (rows,): rows before which a wheel may have
+    unused_notes: what was measured and is not fitted, and why. lost (rows,): rows before which a wheel may have
     turned by any angle, None where nothing was added up.
     """
 
@@ -39,46 +39,69 @@ class Outputs:
     values: FloatArray
     ticks: tuple[float, ...]
     notes: tuple[Statement, ...]
-    unused: tuple[Statement, ...]
+    unused_notes: tuple[Statement, ...]
     lost: BoolArray | None = None
 
 
 def outputs_of(
-    run: Run, robot: Robot, wanted: Sequence[str] | None, tick_rad: float | None, counted: Differences | None = None
+    run: Run,
+    robot: Robot,
+    wanted_names: Sequence[str] | None,
+    tick_rad: float | None,
+    count_differences: Differences | None = None,
 ) -> Outputs:
-    """wanted: names of OUTPUTS, "pose" for two of them; None for all that the log has and that do not say it twice.
+    """wanted_names: names of OUTPUTS, "pose" for two of them; None for all that the log has and that do not say it
+    twice.
 
     tick_rad: of the angles of the wheels; None: found in the log; 0: they are taken like any other output.
-    counted: what the wheel speeds are differences of: they are fitted as angles.
+    count_differences: what the wheel speeds are differences of: they are fitted as angles.
     Raises InputError for an unknown name and for a log without any of them.
     """
-    wanted = wanted if wanted is None else [each for name in wanted for each in (PARTS if name == POSE else (name,))]
-    unknown = [name for name in wanted or () if name not in OUTPUTS]
+    wanted_names = (
+        wanted_names
+        if wanted_names is None
+        else [part for name in wanted_names for part in (PARTS if name == POSE else (name,))]
+    )
+    unknown = [name for name in wanted_names or () if name not in OUTPUTS]
     if unknown:
         raise InputError("no such output", got=unknown[0], expected=", ".join((*OUTPUTS, POSE)), where="outputs")
-    found = {name: value for name in OUTPUTS if (value := _measured(run, name)) is not None}
-    unused = [Statement("output_not_asked", NOTE, name) for name in found if wanted is not None and name not in wanted]
-    if wanted is not None:
-        found = {name: value for name, value in found.items() if name in wanted}
-    if not found:
+    values_by_output = {name: value for name in OUTPUTS if (value := _measured(run, name)) is not None}
+    unused_notes = [
+        Statement("output_not_asked", NOTE, name)
+        for name in values_by_output
+        if wanted_names is not None and name not in wanted_names
+    ]
+    if wanted_names is not None:
+        values_by_output = {name: value for name, value in values_by_output.items() if name in wanted_names}
+    if not values_by_output:
         raise InputError(
             "the log has no output to fit",
             got=", ".join(run.channels) or "no channels",
-            expected=", ".join(wanted or OUTPUTS),
+            expected=", ".join(wanted_names or OUTPUTS),
             where=run.source,
         )
-    found, notes = _without_doubles(run, robot, found, wanted is not None)
-    found, given, lost = _counted(run, found, counted, notes)
-    if "position" in found and "heading" not in found:  # where the robot faces at the start is fitted all the same
-        found["heading"] = np.full((len(run), 1), np.nan)
-    found = {name: found[name] for name in OUTPUTS if name in found}
-    columns = tuple((name, i) for name, value in found.items() for i in range(value.shape[1]))
+    values_by_output, notes = _without_doubles(run, robot, values_by_output, wanted_names is not None)
+    values_by_output, given_tick, lost_rows = _counted(run, values_by_output, count_differences, notes)
+    if (
+        "position" in values_by_output and "heading" not in values_by_output
+    ):  # where the robot faces at the start is fitted all the same
+        values_by_output["heading"] = np.full((len(run), 1), np.nan)
+    values_by_output = {name: values_by_output[name] for name in OUTPUTS if name in values_by_output}
+    columns = tuple((name, i) for name, value in values_by_output.items() for i in range(value.shape[1]))
     ticks = tuple(
-        0.0 if name != "wheel_angle" else float(given[i]) if given is not None else _tick(found[name][:, i], tick_rad)
+        0.0
+        if name != "wheel_angle"
+        else float(given_tick[i])
+        if given_tick is not None
+        else _tick(values_by_output[name][:, i], tick_rad)
         for name, i in columns
     )
-    values = next(iter(found.values())) if len(found) == 1 else np.hstack(list(found.values()))
-    return Outputs(columns, np.ascontiguousarray(values), ticks, tuple(notes), tuple(unused), lost)
+    values = (
+        next(iter(values_by_output.values()))
+        if len(values_by_output) == 1
+        else np.hstack(list(values_by_output.values()))
+    )
+    return Outputs(columns, np.ascontiguousarray(values), ticks, tuple(notes), tuple(unused_notes), lost_rows)
 
 
 def _measured(run: Run, name: str) -> FloatArray | None:
@@ -91,45 +114,45 @@ def _measured(run: Run, name: str) -> FloatArray | None:
 
 
 def _without_doubles(
-    run: Run, robot: Robot, found: dict[str, FloatArray], asked: bool
+    run: Run, robot: Robot, values_by_output: dict[str, FloatArray], is_asked: bool
 ) -> tuple[dict[str, FloatArray], list[Statement]]:
     """Without outputs that are computed from another one; where they were asked for, with a warning instead."""
-    if not found.keys() & set(TRAVEL) and not set(SPEEDS) <= found.keys():
-        return found, []
+    if not values_by_output.keys() & set(TRAVEL) and not set(SPEEDS) <= values_by_output.keys():
+        return values_by_output, []
     notes = []
     for name, source in redundant(run, robot).items():
-        if name not in found or source not in found:
+        if name not in values_by_output or source not in values_by_output:
             continue
-        both = {"output": name, "computed_from": source}
-        if asked:
-            notes.append(Statement("same_data_twice", WARNING, run.source or LOG, both))
+        output_pair = {"output": name, "computed_from": source}
+        if is_asked:
+            notes.append(Statement("same_data_twice", WARNING, run.source or LOG, output_pair))
         else:
-            found = {key: value for key, value in found.items() if key != name}
-            notes.append(Statement("nothing_new", NOTE, run.source or LOG, both))
-    return found, notes
+            values_by_output = {key: value for key, value in values_by_output.items() if key != name}
+            notes.append(Statement("nothing_new", NOTE, run.source or LOG, output_pair))
+    return values_by_output, notes
 
 
 def _counted(
-    run: Run, found: dict[str, FloatArray], counted: Differences | None, notes: list[Statement]
+    run: Run, values_by_output: dict[str, FloatArray], count_differences: Differences | None, notes: list[Statement]
 ) -> tuple[dict[str, FloatArray], FloatArray | None, BoolArray | None]:
     """(the outputs, speeds that are differences of counts as angles; ticks of these, rows before which one is lost)."""
-    if counted is None or "wheel_speed" not in found or "wheel_angle" in found:
-        return found, None, None
-    tick = {"tick": float(np.median(counted.ticks))}
-    if counted.why is not None:
-        notes.append(Statement("counts_as_readings", NOTE, run.source or LOG, tick | {"why": counted.why}))
-        return found, None, None
-    angle, lost = added_up(run, counted)
+    if count_differences is None or "wheel_speed" not in values_by_output or "wheel_angle" in values_by_output:
+        return values_by_output, None, None
+    tick = {"tick": float(np.median(count_differences.ticks))}
+    if count_differences.reason is not None:
+        notes.append(Statement("counts_as_readings", NOTE, run.source or LOG, tick | {"why": count_differences.reason}))
+        return values_by_output, None, None
+    angle, lost = added_up(run, count_differences)
     notes.append(Statement("counts_added_up", NOTE, run.source or LOG, tick))
     return (
-        {name: value for name, value in found.items() if name != "wheel_speed"} | {"wheel_angle": angle},
-        counted.ticks,
+        {name: value for name, value in values_by_output.items() if name != "wheel_speed"} | {"wheel_angle": angle},
+        count_differences.ticks,
         lost,
     )
 
 
-def _tick(values: FloatArray, given: float | None) -> float:
-    return find_tick(values) if given is None else given
+def _tick(values: FloatArray, given_tick: float | None) -> float:
+    return find_tick(values) if given_tick is None else given_tick
 
 
 # Whether one channel of a log is computed from another: wheel odometry is the integral of its own twist
@@ -139,24 +162,24 @@ def _tick(values: FloatArray, given: float | None) -> float:
 # part
 # by the noise of the rate, sqrt(N) sigma dt.
 
-NEAR = 0.2  # of what independent measurements part by
+NOISE_SHARE = 0.2  # of what independent measurements part by
 WINDOWS = (1, 16, 256)  # rows
-ENOUGH, LEAST = 50_000, 30  # rows looked at; windows needed
-SPARSE = 0.2  # of the rows: a channel that is blank in more has a clock of its own
+MOST_ROWS, LEAST_WINDOWS = 50_000, 30  # rows looked at; windows needed
+BLANK_SHARE = 0.2  # of the rows: a channel that is blank in more has a clock of its own
 MEANS, SHIFTS = (1, 2, 3, 4, 5, 8, 10, 16, 20), (0, 1)  # rows of wheels that an odometry averages, and is late by
 GAINS = 0.5, 2.0  # its radius and the robot file's may differ
-POLES, MOST_APART = 2, 20  # of a filter that an odometry comes through, and how many rows of wheels between two of it
+POLES, MOST_TAPS = 2, 20  # of a filter that an odometry comes through, and how many rows of wheels between two of it
 WHITE = 1.5  # third differences of mere noise are 1.8 times the second ones, of a smooth speed less
-TO_STD = MAD_TO_STD / np.sqrt(20.0)  # from the median size of third differences to the noise of a row
+STD_FACTOR = MAD_TO_STD / np.sqrt(20.0)  # from the median size of third differences to the noise of a row
 
 
 def redundant(run: Run, robot: Robot) -> dict[str, str]:
     """Outputs that say nothing beside another one: output -> the one that it is computed from, or that has it all."""
-    found = {}
+    source_by_output = {}
     if run.wheel_angle is not None and run.wheel_speed is not None:
         t, angle, speed = _together(run.t, run.wheel_angle, run.wheel_speed)
         if goes_along(np.diff(angle, axis=0), _held(speed, np.diff(t)), speed, t):
-            found["wheel_speed"] = "wheel_angle"
+            source_by_output["wheel_speed"] = "wheel_angle"
     source = "twist" if run.twist is not None else "wheel_speed"
     twist = run.twist if run.twist is not None else run.wheel_speed
     if run.pose is not None and twist is not None:
@@ -165,20 +188,22 @@ def redundant(run: Run, robot: Robot) -> dict[str, str]:
         t, pose, twist = _together(run.t, run.pose, twist)
         change = np.diff(pose, axis=0)
         if goes_along(change[:, 2:], _held(twist[:, 2:], np.diff(t)), twist[:, 2:], t):
-            found["heading"] = source
+            source_by_output["heading"] = source
         if goes_along(change[:, :2], _turned(twist, pose[:, 2], np.diff(t)), twist[:, :2], t):
-            found["position"] = source
+            source_by_output["position"] = source
     if is_wheel_odometry(run, robot):
-        found["twist"] = found.get("wheel_speed", "wheel_speed")
-    return found
+        source_by_output["twist"] = source_by_output.get("wheel_speed", "wheel_speed")
+    return source_by_output
 
 
-def _together(t: FloatArray, one: FloatArray, other: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _together(
+    t: FloatArray, left_values: FloatArray, right_values: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Two channels and their times: only the rows that hold both, where a clock of their own leaves others blank."""
-    t, one, other = t[:ENOUGH], one[:ENOUGH], other[:ENOUGH]
-    known = np.isfinite(one).any(axis=1) & np.isfinite(other).any(axis=1)
-    rows = np.flatnonzero(known) if known.mean() < 1.0 - SPARSE else slice(None)
-    return t[rows], one[rows], other[rows]
+    t, left_values, right_values = t[:MOST_ROWS], left_values[:MOST_ROWS], right_values[:MOST_ROWS]
+    known_rows = np.isfinite(left_values).any(axis=1) & np.isfinite(right_values).any(axis=1)
+    rows = np.flatnonzero(known_rows) if known_rows.mean() < 1.0 - BLANK_SHARE else slice(None)
+    return t[rows], left_values[rows], right_values[rows]
 
 
 def is_wheel_odometry(run: Run, robot: Robot) -> bool:
@@ -190,9 +215,9 @@ def is_wheel_odometry(run: Run, robot: Robot) -> bool:
     """
     if run.twist is None or run.wheel_speed is None or run.wheel_speed.shape[1] != robot.wheels.count:
         return False
-    speed, twist = run.wheel_speed[:ENOUGH], run.twist[:ENOUGH]
-    wheels, rows = (np.flatnonzero(np.isfinite(each).all(axis=1)) for each in (speed, twist))
-    if len(wheels) < LEAST + max(MEANS) or len(rows) < LEAST:
+    speed, twist = run.wheel_speed[:MOST_ROWS], run.twist[:MOST_ROWS]
+    wheels, rows = (np.flatnonzero(np.isfinite(channel).all(axis=1)) for channel in (speed, twist))
+    if len(wheels) < LEAST_WINDOWS + max(MEANS) or len(rows) < LEAST_WINDOWS:
         return False
     body = twist_from_wheel_speed(robot.wheels, speed[wheels])
     third, second = (np.median(np.abs(np.diff(body, order, axis=0)), axis=0) for order in (3, 2))
@@ -200,71 +225,75 @@ def is_wheel_odometry(run: Run, robot: Robot) -> bool:
         return False
     sums = np.concatenate([np.zeros((1, 3)), np.cumsum(body, axis=0)])
     last = np.searchsorted(wheels, rows, side="right")
-    known = last >= max(MEANS) + max(SHIFTS)
-    last, told = last[known], twist[rows[known]]
-    if len(last) < LEAST:
+    usable_rows = last >= max(MEANS) + max(SHIFTS)
+    last, logged_twist = last[usable_rows], twist[rows[usable_rows]]
+    if len(last) < LEAST_WINDOWS:
         return False
     for count in MEANS:
         for shift in SHIFTS:
             mean = (sums[last - shift] - sums[last - shift - count]) / count
-            if _is_same(told, mean, TO_STD * third / np.sqrt(count)):
+            if _is_same(logged_twist, mean, STD_FACTOR * third / np.sqrt(count)):
                 return True
-    return _is_filtered(twist[rows], body, np.searchsorted(wheels, rows, side="right") - 1, TO_STD * third, second)
+    return _is_filtered(twist[rows], body, np.searchsorted(wheels, rows, side="right") - 1, STD_FACTOR * third, second)
 
 
-def _is_filtered(told: FloatArray, body: FloatArray, last: IntArray, noise: FloatArray, second: FloatArray) -> bool:
+def _is_filtered(
+    logged_twist: FloatArray, body: FloatArray, last: IntArray, noise: FloatArray, second: FloatArray
+) -> bool:
     """Whether a twist is the wheels' through a recursive filter: y_k = sum a_i y_(k-i) + sum b_j x_(k-j).
 
-    told: the twist, (rows, 3); body: that of the wheels, (wheel rows, 3), `last` of which came before each of `told`.
+    logged_twist: the twist, (rows, 3); body: that of the wheels, (wheel rows, 3), `last` of which came before each of
+    `logged_twist`.
     noise: of the wheels. Of errors that the wheels have by themselves no more can be left over than comes in by b:
     where y is a sensor of its own, off² = E(y - b s)² + |b|² noise² >= |b|² noise² for any b, s being the true speed.
     """
-    apart = int(np.median(np.diff(last))) if len(last) > 1 else 0
-    taps = POLES * max(apart, 1) + 1
-    known = np.flatnonzero(last >= taps)
-    known = known[known >= POLES]
+    row_spacing = int(np.median(np.diff(last))) if len(last) > 1 else 0
+    taps = POLES * max(row_spacing, 1) + 1
+    usable_rows = np.flatnonzero(last >= taps)
+    usable_rows = usable_rows[usable_rows >= POLES]
     if (
-        not 0 < apart <= MOST_APART
-        or len(known) < LEAST + 3 * (taps + POLES)
-        or not (noise / TO_STD > WHITE * second).all()
+        not 0 < row_spacing <= MOST_TAPS
+        or len(usable_rows) < LEAST_WINDOWS + 3 * (taps + POLES)
+        or not (noise / STD_FACTOR > WHITE * second).all()
     ):
         return False
-    for axis in range(told.shape[1]):
-        own = [told[known - k, axis] for k in range(1, POLES + 1)]
-        theirs = [body[last[known] - k, axis] for k in range(taps)]
-        table = np.column_stack([*own, *theirs])
-        found, *_ = np.linalg.lstsq(table, told[known, axis])
-        off = np.sqrt(np.mean((told[known, axis] - table @ found) ** 2))
-        if not off <= NEAR * noise[axis] * float(np.linalg.norm(found[POLES:])):
+    for axis in range(logged_twist.shape[1]):
+        past_outputs = [logged_twist[usable_rows - k, axis] for k in range(1, POLES + 1)]
+        past_inputs = [body[last[usable_rows] - k, axis] for k in range(taps)]
+        table = np.column_stack([*past_outputs, *past_inputs])
+        coefficients, *_ = np.linalg.lstsq(table, logged_twist[usable_rows, axis])
+        rms_error = np.sqrt(np.mean((logged_twist[usable_rows, axis] - table @ coefficients) ** 2))
+        if not rms_error <= NOISE_SHARE * noise[axis] * float(np.linalg.norm(coefficients[POLES:])):
             return False
     return True
 
 
-def _is_same(told: FloatArray, mean: FloatArray, noise: FloatArray) -> bool:
+def _is_same(logged_twist: FloatArray, mean: FloatArray, noise: FloatArray) -> bool:
     """Whether a twist is a mean of the wheels', but for a factor on each axis, and far below their noise."""
     power = (mean**2).sum(axis=0)
-    gain = np.where(power > 0.0, (told * mean).sum(axis=0) / np.where(power > 0.0, power, 1.0), 1.0)
-    off = np.sqrt(np.mean((told - gain * mean) ** 2, axis=0))
-    return bool(((gain > GAINS[0]) & (gain < GAINS[1]) & (off <= NEAR * noise)).all())
+    gain = np.where(power > 0.0, (logged_twist * mean).sum(axis=0) / np.where(power > 0.0, power, 1.0), 1.0)
+    rms_error = np.sqrt(np.mean((logged_twist - gain * mean) ** 2, axis=0))
+    return bool(((gain > GAINS[0]) & (gain < GAINS[1]) & (rms_error <= NOISE_SHARE * noise)).all())
 
 
-def goes_along(change: FloatArray, tried: Iterator[FloatArray], rate: FloatArray, t: FloatArray) -> bool:
-    """Whether one of `tried`, changes from row to row by the rate, is what `change` is. All of shape (rows, K)."""
+def goes_along(change: FloatArray, trial_changes: Iterator[FloatArray], rate: FloatArray, t: FloatArray) -> bool:
+    """Whether one of `trial_changes`, changes from row to row by the rate, is what `change` is. All of shape (rows,
+    K)."""
     third = np.abs(np.diff(rate, 3, axis=0))
     third = third[np.isfinite(third).all(axis=1)]
-    if len(third) < LEAST:
+    if len(third) < LEAST_WINDOWS:
         return False
-    noise = TO_STD * np.median(third, axis=0)
-    noise = np.where(noise > 0.0, noise, TO_STD * third.mean(axis=0)) * usual_step(t)
-    for own in tried:
-        off = change - own
-        off = off[np.isfinite(off).all(axis=1)]
+    noise = STD_FACTOR * np.median(third, axis=0)
+    noise = np.where(noise > 0.0, noise, STD_FACTOR * third.mean(axis=0)) * usual_step(t)
+    for trial_change in trial_changes:
+        deviation = change - trial_change
+        deviation = deviation[np.isfinite(deviation).all(axis=1)]
         for rows in WINDOWS:
-            count = len(off) // rows
-            if count < LEAST:
+            count = len(deviation) // rows
+            if count < LEAST_WINDOWS:
                 break
-            parted = off[: count * rows].reshape(count, rows, -1).sum(axis=1)
-            if (np.sqrt(np.mean(parted**2, axis=0)) <= NEAR * np.sqrt(rows) * noise).all():
+            block_sums = deviation[: count * rows].reshape(count, rows, -1).sum(axis=1)
+            if (np.sqrt(np.mean(block_sums**2, axis=0)) <= NOISE_SHARE * np.sqrt(rows) * noise).all():
                 return True
     return False
 

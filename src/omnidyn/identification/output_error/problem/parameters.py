@@ -20,7 +20,7 @@ SPAN = 1e4  # a number that must be positive stays within so many times its star
 SPAN_OF_SPEED = 30.0  # the same of a speed at which friction changes: far beyond, it changes nothing, or in no time
 LIGHT = 1e-3  # of its start, that what spins stays above: it has no place where it would be off, but slopes need a size
 
-WITHIN = 0.95  # of the distance of the wheels: as far as a centre of mass may be ahead, or aside
+OFFSET_SHARE = 0.95  # of the distance of the wheels: as far as a centre of mass may be ahead, or aside
 LARGEST = 700.0  # e^709 is the last float
 
 
@@ -30,7 +30,8 @@ class Parameter:
 
     name: key of the robot file, or of a nuisance. value: where it starts. low, high: bounds. prior: (mean, std) of what
     is known beforehand, in the unit of the value; of a `log` number std over mean is that of its logarithm, so that
-    half and twice of a rough guess are equally far from it. also: other keys of the robot file, tied by a factor.
+    half and twice of a rough guess are equally far from it. tied_numbers: other keys of the robot file, tied by a
+    factor.
     """
 
     name: str
@@ -39,7 +40,7 @@ class Parameter:
     high: float
     log: bool = False
     prior: tuple[float, float] | None = None
-    also: tuple[tuple[str, float], ...] = ()
+    tied_numbers: tuple[tuple[str, float], ...] = ()
 
     @property
     def part(self) -> str:
@@ -50,9 +51,9 @@ class Parameter:
         """The number that the solver sees."""
         return math.log(value) if self.log else value
 
-    def outer(self, inner: float) -> float:
+    def outer(self, inner_value: float) -> float:
         """The value behind the number that the solver sees."""
-        return math.exp(min(inner, LARGEST)) if self.log else inner
+        return math.exp(min(inner_value, LARGEST)) if self.log else inner_value
 
     def slope(self, value: float) -> float:
         """d value / d inner."""
@@ -69,7 +70,7 @@ class Parameter:
     def on(self, robot: Robot, value: float) -> Robot:
         """The robot with this number and those tied to it; not checked, for speed."""
         robot = Key.parse(self.name).set(robot, value, checked=False)
-        for key, factor in self.also:
+        for key, factor in self.tied_numbers:
             robot = Key.parse(key).set(robot, factor * value, checked=False)
         return robot
 
@@ -81,8 +82,10 @@ def robot_at(robot: Robot, parameters: Sequence[Parameter], values: Sequence[flo
     return robot
 
 
-def robot_parameter(robot: Robot, key: str, prior: tuple[float, float] | None, others: Sequence[str] = ()) -> Parameter:
-    """A number of the robot file as a free parameter; `others` are free beside it.
+def robot_parameter(
+    robot: Robot, key: str, prior: tuple[float, float] | None, free_names: Sequence[str] = ()
+) -> Parameter:
+    """A number of the robot file as a free parameter; `free_names` are free beside it.
 
     Friction may be 0: it has a linear scale and a bound at 0. So may what rotors and wheels weigh beside the body: on
     a logarithmic scale 0 is infinitely far off, and a robot without rotors keeps some of the guess as mass. A centre of
@@ -94,30 +97,32 @@ def robot_parameter(robot: Robot, key: str, prior: tuple[float, float] | None, o
     if place.level:
         return Parameter(key, value, 0.0, FRICTION_LIMIT, prior=prior)
     if place.name == CENTRE:
-        widest = WITHIN * max(np.atleast_1d(robot.wheels.robot_radius).tolist())
-        return Parameter(key, value, -widest, widest, prior=prior)
+        widest_offset = OFFSET_SHARE * max(np.atleast_1d(robot.wheels.robot_radius).tolist())
+        return Parameter(key, value, -widest_offset, widest_offset, prior=prior)
     if value <= 0.0:
         raise InputError("cannot be free", got=f"{key} = {value:g}", expected="a number above 0", where="free")
     if place.name in (ROTOR, WHEEL):
         return Parameter(key, value, LIGHT * value, value * SPAN, prior=prior)
     span = SPAN_OF_SPEED if place.part == FRICTION and place.field.endswith("_speed") else SPAN
-    most = 1.0 if place.name == EFFICIENCY else value * span
-    also = tuple((str(follower), float(follower.get(robot)) / value) for follower in _followers(robot, place, others))
-    return Parameter(key, value, value / span, most, True, prior, also)
+    upper_limit = 1.0 if place.name == EFFICIENCY else value * span
+    tied_numbers = tuple(
+        (str(follower), float(follower.get(robot)) / value) for follower in _followers(robot, place, free_names)
+    )
+    return Parameter(key, value, value / span, upper_limit, True, prior, tied_numbers)
 
 
-def _followers(robot: Robot, key: Key, others: Sequence[str]) -> list[Key]:
+def _followers(robot: Robot, key: Key, free_names: Sequence[str]) -> list[Key]:
     """The EMF constants that keep their ratio to this torque constant, for both are one number of the magnet.
 
     Wheel by wheel where either stands once for each; those that are free themselves do not follow.
     """
-    asked = [each for each in map(Key.parse, others) if each.name == EMF]
-    if key.name != TORQUE or Key(EMF) in asked:
+    free_emf_keys = [free_key for free_key in map(Key.parse, free_names) if free_key.name == EMF]
+    if key.name != TORQUE or Key(EMF) in free_emf_keys:
         return []
-    if key.index is None and not asked:
-        return [Key.parse(each) for each in expand(EMF, robot)]
+    if key.index is None and not free_emf_keys:
+        return [Key.parse(emf_name) for emf_name in expand(EMF, robot)]
     wheels = range(robot.wheels.count) if key.index is None else [key.index]
-    return [each for wheel in wheels if (each := Key(EMF, wheel)) not in asked]
+    return [emf_key for wheel in wheels if (emf_key := Key(EMF, wheel)) not in free_emf_keys]
 
 
 def names_of(names: str | Sequence[str]) -> tuple[str, ...]:
@@ -127,9 +132,9 @@ def names_of(names: str | Sequence[str]) -> tuple[str, ...]:
 
 def refuse_repeated(names: Sequence[str]) -> None:
     """Raises InputError for a name that is asked for twice."""
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise InputError("asked for twice", got=", ".join(twice), expected="every key once", where="free")
+    repeated_names = sorted({name for name in names if names.count(name) > 1})
+    if repeated_names:
+        raise InputError("asked for twice", got=", ".join(repeated_names), expected="every key once", where="free")
 
 
 def refuse_unknown(keys: Sequence[str], robot: Robot) -> None:

@@ -73,8 +73,8 @@ class PrimitiveMap:
 
     def __init__(self, robot: Robot, parameters: Sequence[Parameter]):
         self.robot, self.parameters = robot, tuple(parameters)
-        own = robot.friction.axes.breakaway
-        self.breakaway = np.full(3, np.nan) if own is None else np.array(own)
+        breakaway = robot.friction.axes.breakaway
+        self.breakaway = np.full(3, np.nan) if breakaway is None else np.array(breakaway)
         self.linear = all(p.name in BOX for p in parameters)
         self._start = np.array([Key.parse(p.name).get(robot) for p in parameters])
         motors = motor_wrench(robot)
@@ -83,11 +83,11 @@ class PrimitiveMap:
 
     def with_levels(self, levels: Mapping[str, float]) -> Self:
         """The same with these levels of breakaway, by key; 0 follows coulomb."""
-        other = copy.copy(self)
-        other.breakaway = self.breakaway.copy()
+        new_map = copy.copy(self)
+        new_map.breakaway = self.breakaway.copy()
         for name, level in levels.items():
-            other.breakaway[Key.parse(name).axis] = level
-        return other
+            new_map.breakaway[Key.parse(name).axis] = level
+        return new_map
 
     def robot_at(self, values: FloatArray) -> Robot:
         """The robot with these values, not checked."""
@@ -96,29 +96,33 @@ class PrimitiveMap:
     def at(self, values: FloatArray) -> tuple[Primitives, Primitives]:
         """(primitives, their derivatives by the values). `values`, shape (P,)."""
         if self.linear:  # in rate and coulomb; nothing else depends on the friction of the axes
-            moved, base, probe = values - self._start, self._base, self._probe
-            rate, coulomb = base.rate + probe.rate @ moved, base.coulomb + probe.coulomb @ moved
+            value_changes, base, probe = values - self._start, self._base, self._probe
+            rate, coulomb = base.rate + probe.rate @ value_changes, base.coulomb + probe.coulomb @ value_changes
             return self._held(base, self._masses, rate, coulomb), probe
         robot = self.robot_at(values)
         motors = motor_wrench(robot)
-        now = primitives(robot, motors)
-        slopes = [np.zeros((*part.shape, len(values))) for part in now.parts]
-        fast = self._friction_slopes(robot, now, motors)
+        primitives_now = primitives(robot, motors)
+        slopes = [np.zeros((*part.shape, len(values))) for part in primitives_now.parts]
+        fast = self._friction_slopes(robot, primitives_now, motors)
         for j, (p, value) in enumerate(zip(self.parameters, values, strict=True)):
             if p.name in BOX:
-                for slope, known in zip(slopes, fast.parts, strict=True):
-                    slope[..., j] = known[..., j]
+                for slope, fast_slope in zip(slopes, fast.parts, strict=True):
+                    slope[..., j] = fast_slope[..., j]
                 continue
             step = EPS * (abs(float(value)) or 1.0)
-            up, down = (primitives(p.on(robot, float(value) + side * step)) for side in (1.0, -1.0))
-            for slope, a, b in zip(slopes, up.parts, down.parts, strict=True):
+            upper, lower = (primitives(p.on(robot, float(value) + side * step)) for side in (1.0, -1.0))
+            for slope, a, b in zip(slopes, upper.parts, lower.parts, strict=True):
                 slope[..., j] = (a - b) / (2.0 * step)
-        return self._held(now, axis_masses(robot), now.rate, now.coulomb), Primitives(*slopes)
+        return self._held(primitives_now, axis_masses(robot), primitives_now.rate, primitives_now.coulomb), Primitives(
+            *slopes
+        )
 
-    def _held(self, now: Primitives, masses: FloatArray, rate: FloatArray, coulomb: FloatArray) -> Primitives:
+    def _held(
+        self, primitives_now: Primitives, masses: FloatArray, rate: FloatArray, coulomb: FloatArray
+    ) -> Primitives:
         """At this rate and coulomb, with the breakaway of this mapping; never below coulomb."""
         hold = np.fmax(coulomb, self.breakaway / masses)
-        return replace(now, rate=rate, coulomb=coulomb, hold=hold)
+        return replace(primitives_now, rate=rate, coulomb=coulomb, hold=hold)
 
     def _friction_slopes(self, robot: Robot, base: Primitives, motors: MotorWrench) -> Primitives:
         """Derivatives by the six levels of the axes, from one probe: B moves the rate of its axis, C its coulomb."""

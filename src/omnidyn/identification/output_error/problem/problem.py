@@ -50,8 +50,8 @@ class Piece:
         """(pull (3,) of what is known of the start, its information (3,)), 0 for what is not free; state (3 + C,)."""
         if self.start_std is None:
             return np.zeros_like(self.start), np.zeros_like(self.start)
-        known = np.where(self.free[: len(self.start)], self.start_std**-2.0, 0.0)
-        return known * (self.start - state[: len(self.start)]), known
+        start_information = np.where(self.free[: len(self.start)], self.start_std**-2.0, 0.0)
+        return start_information * (self.start - state[: len(self.start)]), start_information
 
 
 class Fitted:
@@ -68,11 +68,11 @@ class Fitted:
     @property
     def tick(self) -> FloatArray:
         """The largest tick of each column in any record, 0 where it is not counted. Shape (columns,)."""
-        most = dict.fromkeys(self.columns, 0.0)
+        largest_ticks = dict.fromkeys(self.columns, 0.0)
         for piece in self.pieces:
             for column, tick in zip(piece.record.columns, piece.record.ticks, strict=True):
-                most[column] = max(most[column], tick)
-        return np.array(list(most.values()))
+                largest_ticks[column] = max(largest_ticks[column], tick)
+        return np.array(list(largest_ticks.values()))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -120,10 +120,10 @@ class Problem(Fitted):
         if lengths.sum() <= rows:
             return self
         count = int(np.clip(rows // LEAST_ROWS, 1, len(lengths)))
-        taken = np.unique(np.linspace(0, len(lengths) - 1, count).round().astype(int))
-        share = min(rows / lengths[taken].sum(), 1.0)
+        chosen_pieces = np.unique(np.linspace(0, len(lengths) - 1, count).round().astype(int))
+        share = min(rows / lengths[chosen_pieces].sum(), 1.0)
         pieces = [
-            replace(piece, last=piece.first + max(int((length - 1) * (share if k in taken else 0.0)), 1))
+            replace(piece, last=piece.first + max(int((length - 1) * (share if k in chosen_pieces else 0.0)), 1))
             for k, (piece, length) in enumerate(zip(self.pieces, lengths.tolist(), strict=True))
         ]
         return replace(self, pieces=tuple(pieces))
@@ -167,20 +167,23 @@ NUMBERS = 25_000_000  # rows x columns x what is shown in each, that are held at
 ROWS, EFFECTS = 30_000, 600  # that are looked at, of `growing` those of a piece
 
 
-def bounded(problem: Problem, beside: int = 0, growing: Sequence[int] = (), most: int = ROWS) -> Problem:
-    """The problem on the beginnings of its pieces, so that at most NUMBERS numbers are shown in at most `most` rows.
+def bounded(
+    problem: Problem, extra_columns: int = 0, growing_columns: Sequence[int] = (), row_limit: int = ROWS
+) -> Problem:
+    """The problem on the beginnings of its pieces, so that at most NUMBERS numbers are shown in at most `row_limit`
+    rows.
 
-    beside: columns that are shown beside residuals and their slopes. growing: of each piece, columns beside these, of
-    which fewer rows have fewer.
+    extra_columns: columns that are shown beside residuals and their slopes. growing_columns: of each piece, columns
+    beside these, of which fewer rows have fewer.
     """
-    whole, even, more = 0, 0.0, 0.0
-    for piece, own in zip(problem.pieces, growing or [0] * len(problem.pieces), strict=True):
+    total_rows, fixed_numbers, growing_numbers = 0, 0.0, 0.0
+    for piece, piece_columns in zip(problem.pieces, growing_columns or [0] * len(problem.pieces), strict=True):
         rows = piece.last - piece.first + 1
         numbers = rows * len(piece.record.columns)
-        whole += rows
-        even += numbers * (1 + len(problem.parameters) + len(piece.free) + beside)
-        more += numbers * own
+        total_rows += rows
+        fixed_numbers += numbers * (1 + len(problem.parameters) + len(piece.free) + extra_columns)
+        growing_numbers += numbers * piece_columns
     # even s + more s^2 = NUMBERS for the share s, in the form that no small term spoils
-    share = 2.0 * NUMBERS / (even + (even**2 + 4.0 * more * NUMBERS) ** 0.5)
-    share = min(share, EFFECTS / max([1, *growing]))
-    return problem.shortened(min(most, int(share * whole)))
+    share = 2.0 * NUMBERS / (fixed_numbers + (fixed_numbers**2 + 4.0 * growing_numbers * NUMBERS) ** 0.5)
+    share = min(share, EFFECTS / max([1, *growing_columns]))
+    return problem.shortened(min(row_limit, int(share * total_rows)))

@@ -32,8 +32,9 @@ class Record:
     """One run. t (rows,); voltage (rows, W); outputs (rows, C), columns named by (channel, index).
 
     ticks (C,): of columns that are counts [rad], 0 for the others. pieces: (first, last) rows of what has no gap.
-    supplied: whether the voltage is a duty times a supply that was not logged. notes: what was decided on the way.
-    unused: what the log holds and a fit does not use, and why.
+    is_nominal_supply: whether the voltage is a duty times a supply that was not logged. notes: what was decided on the
+    way.
+    unused_notes: what the log holds and a fit does not use, and why.
     set_point (rows, W): set speeds of the wheels [rad/s] where the loop in the firmware makes the voltage, which is 0
     here then; else None. run: what it was read from.
 
@@ -47,17 +48,17 @@ class Record:
     ticks: tuple[float, ...]
     pieces: tuple[tuple[int, int], ...]
     source: str
-    supplied: bool
+    is_nominal_supply: bool
     notes: tuple[Statement, ...]
     set_point: FloatArray | None = None
-    unused: tuple[Statement, ...] = ()
+    unused_notes: tuple[Statement, ...] = ()
     run: Run | None = None
 
     def __post_init__(self) -> None:
         for name in ("t", "voltage", "outputs", "set_point"):
-            given = getattr(self, name)
-            if given is not None:
-                object.__setattr__(self, name, _read_only(given))
+            field_value = getattr(self, name)
+            if field_value is not None:
+                object.__setattr__(self, name, _read_only(field_value))
 
     @property
     def staggered(self) -> bool:
@@ -79,9 +80,9 @@ class Record:
 
 
 def _read_only(values: FloatArray) -> FloatArray:
-    own = np.ascontiguousarray(values).view()
-    own.flags.writeable = False
-    return own
+    read_only_view = np.ascontiguousarray(values).view()
+    read_only_view.flags.writeable = False
+    return read_only_view
 
 
 def record(
@@ -90,12 +91,12 @@ def record(
     outputs: Sequence[str] | None = None,
     loop: bool = False,
     tick_rad: float | None = None,
-    counted: Differences | None = None,
+    count_differences: Differences | None = None,
 ) -> Record:
     """Raises InputError for a run without inputs or outputs, InsufficientDataError where no piece is long enough.
 
     loop: take the set speeds even where a voltage was logged, for its gains are asked for. outputs, tick_rad,
-    counted: as in outputs.py.
+    count_differences: as in outputs.py.
     """
     source = run.source or LOG
     refuse_slope(robot.floor, "a fit starts from")
@@ -110,67 +111,69 @@ def record(
     set_point = _set_point(run, robot, loop)
     if set_point is not None:
         refuse_slip(robot.wheels, "a fit through a speed loop knows")
-    voltage, supplied, notes = _voltage(run, robot) if set_point is None else (np.zeros_like(set_point), False, [])
-    clipped = clip_voltage(robot.motor, voltage)
-    beyond = np.abs(clipped) < np.abs(voltage)
-    if beyond.any():
-        rows = {"rows": int(beyond.any(axis=1).sum())}
+    voltage, is_nominal_supply, notes = (
+        _voltage(run, robot) if set_point is None else (np.zeros_like(set_point), False, [])
+    )
+    clipped_voltage = clip_voltage(robot.motor, voltage)
+    beyond_limit = np.abs(clipped_voltage) < np.abs(voltage)
+    if beyond_limit.any():
+        rows = {"rows": int(beyond_limit.any(axis=1).sum())}
         notes.append(Statement("input_beyond_limit", WARNING, source, rows))
-        voltage = clipped
+        voltage = clipped_voltage
     voltage = mapped(robot, voltage)
-    found = outputs_of(run, robot, outputs, tick_rad, counted)
+    log_outputs = outputs_of(run, robot, outputs, tick_rad, count_differences)
     inputs = voltage if set_point is None else set_point
     finite = np.isfinite(inputs)
     _refuse_wheels_without_input(run, robot, finite)
-    known = np.full(len(run), True) if finite.all() else np.asarray(finite.all(axis=1))
+    known_rows = np.full(len(run), True) if finite.all() else np.asarray(finite.all(axis=1))
     parts = segments(run.t, usual=run.step)
-    pieces = [piece for s in _cut(parts, found.lost) for piece in _whole(known, s.start, s.stop)]
+    pieces = [piece for s in _cut(parts, log_outputs.lost) for piece in _whole(known_rows, s.start, s.stop)]
     if len(parts) > 1:
         lost = [float(run.t[b.start] - run.t[a.stop - 1]) for a, b in pairwise(parts)]
         notes.append(Statement("split_at_gaps", NOTE, source, {"gaps": len(lost), "longest": max(lost)}))
     if not pieces:
         raise InsufficientDataError(
             "no stretch of the log has inputs throughout",
-            got=f"{int(known.sum())} rows of {len(run)} with all inputs",
+            got=f"{int(known_rows.sum())} rows of {len(run)} with all inputs",
             expected=f"{SHORTEST} rows in a row",
             where=run.source,
             remedy="log the voltage or the duty of every wheel in every row",
         )
-    if not known.all():
-        notes.append(Statement("split_at_missing_inputs", NOTE, source, {"rows": int((~known).sum())}))
-    if found.lost is not None and (many := int(found.lost[1:].sum())):
-        notes.append(Statement("split_at_missing_counts", NOTE, source, {"rows": many}))
+    if not known_rows.all():
+        notes.append(Statement("split_at_missing_inputs", NOTE, source, {"rows": int((~known_rows).sum())}))
+    if log_outputs.lost is not None and (lost_count := int(log_outputs.lost[1:].sum())):
+        notes.append(Statement("split_at_missing_counts", NOTE, source, {"rows": lost_count}))
     return Record(
         run.t,
         voltage,
-        found.values,
-        found.columns,
-        found.ticks,
+        log_outputs.values,
+        log_outputs.columns,
+        log_outputs.ticks,
         tuple(pieces),
         run.source,
-        supplied,
-        (*notes, *found.notes),
+        is_nominal_supply,
+        (*notes, *log_outputs.notes),
         set_point,
-        (*_unused_inputs(run, set_point is not None), *found.unused),
+        (*_unused_inputs(run, set_point is not None), *log_outputs.unused_notes),
         run,
     )
 
 
-def _unused_inputs(run: Run, looped: bool) -> list[Statement]:
-    """Inputs that drive nothing, and what does. looped: the speed loop of the robot file makes the voltage."""
-    volts = "speed_loop" if looped else "voltage" if run.voltage is not None else ""
-    why = {
-        "voltage": "speed_loop" if looped else "",
+def _unused_inputs(run: Run, has_loop: bool) -> list[Statement]:
+    """Inputs that drive nothing, and what does. has_loop: the speed loop of the robot file makes the voltage."""
+    volts = "speed_loop" if has_loop else "voltage" if run.voltage is not None else ""
+    reason_by_input = {
+        "voltage": "speed_loop" if has_loop else "",
         "duty": volts,
         "supply": volts,
-        "wheel_speed_command": "" if looped else "motor_voltage",
-        "twist_command": "wheel_speed_command" if looped else "motor_voltage",
+        "wheel_speed_command": "" if has_loop else "motor_voltage",
+        "twist_command": "wheel_speed_command" if has_loop else "motor_voltage",
     }
-    if looped and run.wheel_speed_command is None:
-        why["twist_command"] = ""
+    if has_loop and run.wheel_speed_command is None:
+        reason_by_input["twist_command"] = ""
     return [
         Statement("input_not_used", NOTE, name, {"driver": driver})
-        for name, driver in why.items()
+        for name, driver in reason_by_input.items()
         if driver and getattr(run, name) is not None
     ]
 
@@ -195,9 +198,9 @@ def _voltage(run: Run, robot: Robot) -> tuple[FloatArray, bool, list[Statement]]
     nominal = robot.drive.supply
     voltage = asked_voltage(run.voltage, run.duty, run.supply, nominal)
     if voltage is not None:
-        supplied = run.voltage is None and run.supply is None
-        taken = Statement("supply_nominal", WARNING, run.source or LOG, {"supply": nominal})
-        return voltage, supplied, [taken] if supplied else []
+        is_nominal_supply = run.voltage is None and run.supply is None
+        supply_note = Statement("supply_nominal", WARNING, run.source or LOG, {"supply": nominal})
+        return voltage, is_nominal_supply, [supply_note] if is_nominal_supply else []
     if run.duty is not None:
         raise InputError(
             "a duty needs a supply",
@@ -229,13 +232,13 @@ def _cut(parts: Sequence[slice], lost: BoolArray | None) -> list[slice]:
     """Parts of a log, cut before the rows of `lost`, where an angle begins anew."""
     if lost is None:
         return list(parts)
-    at = [[s.start, *(s.start + 1 + np.flatnonzero(lost[s.start + 1 : s.stop])).tolist(), s.stop] for s in parts]
-    return [slice(a, b) for edges in at for a, b in pairwise(edges)]
+    cut_rows = [[s.start, *(s.start + 1 + np.flatnonzero(lost[s.start + 1 : s.stop])).tolist(), s.stop] for s in parts]
+    return [slice(a, b) for edges in cut_rows for a, b in pairwise(edges)]
 
 
-def _whole(known: BoolArray, start: int, stop: int) -> list[tuple[int, int]]:
+def _whole(known_rows: BoolArray, start: int, stop: int) -> list[tuple[int, int]]:
     """Stretches of rows with all inputs, (first, last). The last row needs none: nothing follows it."""
-    if known[start : stop - 1].all():
+    if known_rows[start : stop - 1].all():
         return [(start, stop - 1)] if stop - start >= SHORTEST else []
-    found = start + stretches(known[start:stop])
-    return [(int(a), int(b) - 1) for a, b in found if b - a >= SHORTEST]
+    row_stretches = start + stretches(known_rows[start:stop])
+    return [(int(a), int(b) - 1) for a, b in row_stretches if b - a >= SHORTEST]

@@ -30,20 +30,21 @@ if TYPE_CHECKING:
 
 WINDOW = 0.15  # [s], and at least so many rows:
 LEAST_ROWS, EDGE = 6, 3  # of a window; averaged at each of its ends
-CLEAR = 4.0  # standard errors of the noise that a speed must be away from 0
+MOTION_ERRORS = 4.0  # standard errors of the noise that a speed must be away from 0
 LEAST_WINDOWS = 8
 SLOPE = 0.05  # [s] over which an angle or a position is differentiated
-ENOUGH = 200_000  # rows of a piece that are looked at
+MOST_ROWS = 200_000  # rows of a piece that are looked at
 SAMPLE = 1500  # rows for a median
 
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """One axis: rows (windows, 3) of int g, int v, int sgn v, and the change of v. most: largest |g| in motion."""
+    """One axis: rows (windows, 3) of int g, int v, int sgn v, and the change of v. largest_drive: largest |g| in
+    motion."""
 
     design: FloatArray
     change: FloatArray
-    most: float
+    largest_drive: float
 
 
 def measured_twist(record: Record, robot: Robot) -> FloatArray | None:
@@ -72,8 +73,8 @@ def measured_twists(record: Record, robot: Robot) -> Iterator[FloatArray]:
 
 def _together(record: Record, columns: Sequence[int]) -> FloatArray:
     """Outputs by column; with clocks of their own in the rows of the first, the others on the line. (rows, columns)."""
-    own = slice(columns.start, columns.stop) if isinstance(columns, range) else columns
-    values = record.outputs[:, own]
+    column_slice = slice(columns.start, columns.stop) if isinstance(columns, range) else columns
+    values = record.outputs[:, column_slice]
     if not record.staggered:
         return values
     return np.where(
@@ -84,53 +85,60 @@ def _together(record: Record, columns: Sequence[int]) -> FloatArray:
 def _rates(record: Record, columns: Sequence[int]) -> FloatArray:
     """Slope of columns over a few rows, NaN outside of the pieces. Shape (rows, columns)."""
     values, t = _together(record, columns), record.t
-    found = np.full(values.shape, np.nan)
+    rates = np.full(values.shape, np.nan)
     for first, last in record.pieces:
         rows = np.arange(first, last + 1)
         rows = rows[np.isfinite(values[rows, 0])] if record.staggered else rows
         if len(rows) < 2:
             continue
-        near = max(1, round(0.5 * SLOPE / usual_step(t[rows[: SAMPLE + 1]])))
-        at = np.arange(len(rows))
-        low, high = rows[np.maximum(at - near, 0)], rows[np.minimum(at + near, len(rows) - 1)]
-        found[rows] = (values[high] - values[low]) / (t[high] - t[low])[:, None]
-    return found
+        half_width = max(1, round(0.5 * SLOPE / usual_step(t[rows[: SAMPLE + 1]])))
+        row_numbers = np.arange(len(rows))
+        low, high = (
+            rows[np.maximum(row_numbers - half_width, 0)],
+            rows[np.minimum(row_numbers + half_width, len(rows) - 1)],
+        )
+        rates[rows] = (values[high] - values[low]) / (t[high] - t[low])[:, None]
+    return rates
 
 
 def integral_start(mapping: PrimitiveMap, values: FloatArray, records: Sequence[Record]) -> FloatArray:
     """Rates and levels of the axes by the integral form. Shape (2, 3), NaN where an axis has too few windows."""
-    now, _ = mapping.at(values)
-    found = np.full((2, 3), np.nan)
+    primitives_now, _ = mapping.at(values)
+    rates_and_levels = np.full((2, 3), np.nan)
     twists = [measured_twist(record, mapping.robot) for record in records]
-    seen = [(record, twist, _parts(record)) for record, twist in zip(records, twists, strict=True) if twist is not None]
+    usable_logs = [
+        (record, twist, _parts(record)) for record, twist in zip(records, twists, strict=True) if twist is not None
+    ]
     for axis in range(3):
-        parts = [_windows(*each, now.drive[axis], axis) for each in seen]
+        parts = [_windows(*usable_log, primitives_now.drive[axis], axis) for usable_log in usable_logs]
         if not parts:
             continue
         design = np.concatenate([part.design for part in parts])
         change = np.concatenate([part.change for part in parts])
         if len(change) >= LEAST_WINDOWS:
             rate, level = np.linalg.lstsq(design[:, 1:], design[:, 0] - change, rcond=None)[0]
-            most = max(part.most for part in parts)
-            found[:, axis] = max(rate, 0.05), min(max(level, 0.0), most)
-    return found
+            largest_drive = max(part.largest_drive for part in parts)
+            rates_and_levels[:, axis] = max(rate, 0.05), min(max(level, 0.0), largest_drive)
+    return rates_and_levels
 
 
-def friction_values(mapping: PrimitiveMap, values: FloatArray, found: FloatArray) -> FloatArray:
-    """The friction parameters among `values` that give the rates and levels `found`, as far as 0 allows."""
-    now, slopes = mapping.at(values)
+def friction_values(mapping: PrimitiveMap, values: FloatArray, rates_and_levels: FloatArray) -> FloatArray:
+    """The friction parameters among `values` that give the rates and levels `rates_and_levels`, as far as 0 allows."""
+    primitives_now, slopes = mapping.at(values)
     values = values.copy()
     for j, p in enumerate(mapping.parameters):
-        for kind, (have, slope) in enumerate(((now.rate, slopes.rate), (now.coulomb, slopes.coulomb))):
+        for kind, (have, slope) in enumerate(
+            ((primitives_now.rate, slopes.rate), (primitives_now.coulomb, slopes.coulomb))
+        ):
             axis = int(np.argmax(np.abs(slope[:, j])))
-            if p.name in BOX and slope[axis, j] != 0.0 and np.isfinite(found[kind, axis]):
-                values[j] = max(values[j] + (found[kind, axis] - have[axis]) / slope[axis, j], p.low)
+            if p.name in BOX and slope[axis, j] != 0.0 and np.isfinite(rates_and_levels[kind, axis]):
+                values[j] = max(values[j] + (rates_and_levels[kind, axis] - have[axis]) / slope[axis, j], p.low)
     return values
 
 
 def _parts(record: Record) -> list[tuple[int, int, int]]:
     """(first, last, rows of a window) of what is looked at of each piece."""
-    ends = [(first, min(last, first + ENOUGH)) for first, last in record.pieces]
+    ends = [(first, min(last, first + MOST_ROWS)) for first, last in record.pieces]
     return [(first, last, window_rows(record, first, last)) for first, last in ends]
 
 
@@ -138,17 +146,19 @@ def _windows(
     record: Record, twist: FloatArray, parts: Sequence[tuple[int, int, int]], drive: FloatArray, axis: int
 ) -> Windows:
     """The windows of one axis of a log, of all `_parts` of it."""
-    designs, changes, most = [np.zeros((0, 3))], [np.zeros(0)], 0.0
+    designs, changes, largest_drive = [np.zeros((0, 3))], [np.zeros(0)], 0.0
     for first, last, rows in parts:
         if last - first < 2 * rows or np.isfinite(twist[first : last + 1, axis]).sum() < 2 * LEAST_ROWS:
             continue
         noise = difference_noise(twist[first : last + 1, axis])
-        clear = CLEAR * noise / np.sqrt(measured_rows(twist[first : last + 1, axis], max(rows // 2, 1)))
-        design, change, own = window_sums(record.t, record.voltage, twist, axis, first, last, drive, rows, clear)
+        clear_speed = MOTION_ERRORS * noise / np.sqrt(measured_rows(twist[first : last + 1, axis], max(rows // 2, 1)))
+        design, change, window_drive = window_sums(
+            record.t, record.voltage, twist, axis, first, last, drive, rows, clear_speed
+        )
         designs.append(design)
         changes.append(change)
-        most = max(most, own)
-    return Windows(np.concatenate(designs), np.concatenate(changes), most)
+        largest_drive = max(largest_drive, window_drive)
+    return Windows(np.concatenate(designs), np.concatenate(changes), largest_drive)
 
 
 def window_rows(record: Record, first: int, last: int) -> int:
@@ -167,12 +177,12 @@ def _smoothed(y, axis, first, last, width):
     """(values, missing ones held; their centred mean over `width` rows, shorter at the ends) of rows first..last."""
     count = last - first + 1
     v, total, mean = np.empty(count), np.zeros(count + 1), np.empty(count)
-    known = 0.0
+    last_value = 0.0
     for k in range(count):
         if y[first + k, axis] == y[first + k, axis]:
-            known = y[first + k, axis]
-        v[k] = known
-        total[k + 1] = total[k] + known
+            last_value = y[first + k, axis]
+        v[k] = last_value
+        total[k + 1] = total[k] + last_value
     for k in range(count):
         low, high = max(k - width // 2, 0), min(k + width - width // 2, count)
         mean[k] = (total[high] - total[low]) / (high - low)
@@ -183,28 +193,28 @@ def _smoothed(y, axis, first, last, width):
 def count_far(y, axis, first, last, width, limit):
     """Rows first..last of column `axis` whose mean over `width` rows is beyond `limit`."""
     _, mean = _smoothed(y, axis, first, last, width)
-    far = 0
+    far_count = 0
     for value in mean:
-        far += abs(value) > limit
-    return far
+        far_count += abs(value) > limit
+    return far_count
 
 
 @kernel
-def window_sums(t, u, y, axis, first, last, drive, rows, clear):
+def window_sums(t, u, y, axis, first, last, drive, rows, clear_speed):
     """(design (n, 3), change (n,), largest |g| in motion) of windows of `rows` rows, each half over the next."""
     v, mean = _smoothed(y, axis, first, last, max(rows // 2, 1))
-    count, most = last - first + 1, 0.0
+    count, largest_drive = last - first + 1, 0.0
     side, total = np.empty(count), np.zeros((4, count + 1))
-    sums, same = np.zeros(3), np.ones(count, np.int64)
+    sums, side_rows = np.zeros(3), np.ones(count, np.int64)
     for k in range(count):
-        side[k] = 0.0 if abs(mean[k]) <= clear else (1.0 if mean[k] > 0.0 else -1.0)
+        side[k] = 0.0 if abs(mean[k]) <= clear_speed else (1.0 if mean[k] > 0.0 else -1.0)
         if k > 0:
-            same[k] = same[k - 1] + 1 if side[k] == side[k - 1] else 1
+            side_rows[k] = side_rows[k - 1] + 1 if side[k] == side[k - 1] else 1
             dt, g = t[first + k] - t[first + k - 1], 0.0
             for w in range(len(drive)):
                 g += drive[w] * u[first + k - 1, w]
             if side[k - 1] != 0.0:
-                most = max(most, abs(g))
+                largest_drive = max(largest_drive, abs(g))
             sums[0] += g * dt
             sums[1] += 0.5 * (v[k] + v[k - 1]) * dt
             sums[2] += 0.5 * (side[k] + side[k - 1]) * dt
@@ -213,16 +223,16 @@ def window_sums(t, u, y, axis, first, last, drive, rows, clear):
         total[3, k + 1] = total[3, k] + v[k]
     step = max(rows // 2, 1)
     size = max((count - rows) // step + 1, 0)
-    design, change, used = np.empty((size, 3)), np.empty(size), 0
-    for begin in range(0, count - rows + 1, step):
-        stop = begin + rows
-        if side[stop - 1] == 0.0 or same[stop - 1] < rows:
+    design, change, window_count = np.empty((size, 3)), np.empty(size), 0
+    for first_row in range(0, count - rows + 1, step):
+        stop = first_row + rows
+        if side[stop - 1] == 0.0 or side_rows[stop - 1] < rows:
             continue
         for i in range(4):
-            ends = total[i, stop] - total[i, stop - EDGE] - total[i, begin + EDGE] + total[i, begin]
+            ends = total[i, stop] - total[i, stop - EDGE] - total[i, first_row + EDGE] + total[i, first_row]
             if i < 3:
-                design[used, i] = ends / EDGE
+                design[window_count, i] = ends / EDGE
             else:
-                change[used] = ends / EDGE
-        used += 1
-    return design[:used], change[:used], most
+                change[window_count] = ends / EDGE
+        window_count += 1
+    return design[:window_count], change[:window_count], largest_drive

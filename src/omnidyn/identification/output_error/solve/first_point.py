@@ -23,11 +23,11 @@ from omnidyn.model.keys import FRICTION, find_key
 from omnidyn.model.robot import Robot
 
 CURRENTS, MOTOR = f"{LATENCY}.current", "motor"
-MANY = 100_000  # rows to which a long log is first fitted
-FEW = 1500  # the same for the implicit engine
+MANY_ROWS = 100_000  # rows to which a long log is first fitted
+FEW_ROWS = 1500  # the same for the implicit engine
 LATENCIES = 500  # steps for their median
-LESS = (0.3, 0.1, 0.03)  # shares of its friction with which a robot may move as the log does
-NEAR = 0.1  # squared distance to the best point, in standard errors, that is near
+FRICTION_SHARES = (0.3, 0.1, 0.03)  # shares of its friction with which a robot may move as the log does
+NEAR_PRECISION = 0.1  # squared distance to the best point, in standard errors, that is near
 BIAS = 1e-4  # the same per row: what a step a row is off by does not shrink with the rows
 
 
@@ -38,66 +38,70 @@ def first_point(solver: Solver, records: Sequence[Record]) -> State:
     """
     problem = solver.problem
     mapping = PrimitiveMap(problem.robot, problem.robot_parameters)
-    own = problem.start()
+    start_point = problem.start()
     count = problem.robot_count
-    found = integral_start(mapping, own.values[:count], records)
-    values = own.values.copy()
-    values[:count] = friction_values(mapping, own.values[:count], found)
-    short = problem.shortened(MANY)
+    integral_point = integral_start(mapping, start_point.values[:count], records)
+    values = start_point.values.copy()
+    values[:count] = friction_values(mapping, start_point.values[:count], integral_point)
+    short = problem.shortened(MANY_ROWS)
     trial = solver if short is problem else Solver(short, ExactEngine(short))
-    states = [trial.state(own), trial.state(Point(values, own.states))]
+    states = [trial.state(start_point), trial.state(Point(values, start_point.states))]
     best = _with_latencies(trial, min(states, key=lambda state: state.objective))
     return best if trial is solver else trial.minimise(best).state
 
 
-def _with_latencies(solver: Solver, begun: State) -> State:
+def _with_latencies(solver: Solver, start_state: State) -> State:
     """The state with the best of a few latencies for each channel.
 
     A current follows the voltage at once, so that its likelihood jumps where a latency passes a row: no descent crosses
     that. What a channel shows depends on its own latency only, so that one march tries a latency for all of them.
     """
-    problem, point = solver.problem, begun.point
-    own = [j for j, p in enumerate(problem.parameters) if p.name.startswith(LATENCY)]
-    if not own:
-        return begun
+    problem, point = solver.problem, start_state.point
+    latency_indices = [j for j, p in enumerate(problem.parameters) if p.name.startswith(LATENCY)]
+    if not latency_indices:
+        return start_state
     row = problem.pieces[0].record.step_of(slice(2 * LATENCIES + 1))
-    tried = [0.0, *(row * k for k in (-0.5, 0.5, 1.5, 2.5, 4.5, 8.5)), 0.02, 0.05, 0.1]
+    latencies = [0.0, *(row * k for k in (-0.5, 0.5, 1.5, 2.5, 4.5, 8.5)), 0.02, 0.05, 0.1]
 
-    def cost(late: float) -> FloatArray:
+    def cost(latency: float) -> FloatArray:
         values = point.values.copy()
-        values[own] = late
+        values[latency_indices] = latency
         state = solver.state(Point(values, point.states), np.ones(len(problem.columns)) if solver.nu else None)
         square = per_column(state.sums, len(problem.columns), "square")
         number = np.maximum(per_column(state.sums, len(problem.columns), "number"), 1.0)
         return np.log(np.maximum(square / number, solver.floor))
 
-    costs = side_by_side(cost, tried)
+    costs = side_by_side(cost, latencies)
     values = point.values.copy()
-    for j in own:
-        mine = [k for k, (channel, _) in enumerate(problem.columns) if f"{LATENCY}.{channel}" == problem.names[j]]
-        values[j] = tried[int(np.argmin([cost[mine].sum() for cost in costs]))]
+    for j in latency_indices:
+        channel_columns = [
+            k for k, (channel, _) in enumerate(problem.columns) if f"{LATENCY}.{channel}" == problem.names[j]
+        ]
+        values[j] = latencies[int(np.argmin([cost[channel_columns].sum() for cost in costs]))]
     return solver.state(Point(values, point.states))
 
 
-def coarse_point(problem: Problem, nu: float, progress: FitProgress, other: Solution | None = None) -> State:
-    """A state near the best point, by a step a row; a long log is first fitted in part. other: a fit of the same pieces
-    with other nuisances, near which it begins."""
+def coarse_point(problem: Problem, nu: float, progress: FitProgress, base_solution: Solution | None = None) -> State:
+    """A state near the best point, by a step a row; a long log is first fitted in part. base_solution: a fit of the
+    same pieces with other nuisances, near which it begins."""
     progress.enter("looking for a start")
     rows = sum(piece.last - piece.first for piece in problem.pieces)
-    solver = Solver(problem, ImplicitEngine.of(problem), nu, max(NEAR, BIAS * rows))
-    if other is not None:
-        values = dict(zip(other.solver.problem.names, other.state.point.values.tolist(), strict=True))
-        near = Point(np.array([values.get(p.name, p.value) for p in problem.parameters]), other.state.point.states)
-        return solver.minimise(near, progress=progress).state
-    short, own = problem.shortened(FEW), moving_start(problem, nu, progress)
+    solver = Solver(problem, ImplicitEngine.of(problem), nu, max(NEAR_PRECISION, BIAS * rows))
+    if base_solution is not None:
+        values = dict(zip(base_solution.solver.problem.names, base_solution.state.point.values.tolist(), strict=True))
+        near_point = Point(
+            np.array([values.get(p.name, p.value) for p in problem.parameters]), base_solution.state.point.states
+        )
+        return solver.minimise(near_point, progress=progress).state
+    short, start_point = problem.shortened(FEW_ROWS), moving_start(problem, nu, progress)
     if short is problem:
-        return solver.minimise(own, progress=progress).state
-    found = (
-        Solver(short, ImplicitEngine.of(short), nu, NEAR)
-        .minimise(own, progress=progress.aside("a part of the log first"))
+        return solver.minimise(start_point, progress=progress).state
+    short_point = (
+        Solver(short, ImplicitEngine.of(short), nu, NEAR_PRECISION)
+        .minimise(start_point, progress=progress.aside("a part of the log first"))
         .state.point
     )
-    states = [solver.state(point) for point in (own, found)]
+    states = [solver.state(point) for point in (start_point, short_point)]
     return solver.minimise(min(states, key=lambda state: state.objective).point, progress=progress).state
 
 
@@ -111,15 +115,17 @@ def _timed(problem: Problem, point: Point, nu: float, progress: FitProgress) -> 
     parts = {p.part for p in problem.parameters}
     if LATENCY not in parts or (MOTOR not in parts and problem.where(CURRENTS) < 0):
         return point
-    held = _on_time(problem)
-    first = Solver(held, ImplicitEngine.of(held), nu, NEAR).minimise(point, progress=progress.aside("motors first"))
+    held_problem = _on_time(problem)
+    first = Solver(held_problem, ImplicitEngine.of(held_problem), nu, NEAR_PRECISION).minimise(
+        point, progress=progress.aside("motors first")
+    )
     return _with_latencies(Solver(problem, ImplicitEngine.of(problem), nu), first.state).point
 
 
 def _on_time(problem: Problem) -> Problem:
     """The problem with every latency held at its start."""
-    still = [replace(p, low=p.value, high=p.value) if p.part == LATENCY else p for p in problem.parameters]
-    return replace(problem, parameters=tuple(still))
+    parameters = [replace(p, low=p.value, high=p.value) if p.part == LATENCY else p for p in problem.parameters]
+    return replace(problem, parameters=tuple(parameters))
 
 
 class RateEngine(ImplicitEngine):
@@ -133,20 +139,20 @@ class RateEngine(ImplicitEngine):
     def _piece(
         self,
         robot: Robot,
-        moved: list[tuple[Robot, ...]],
+        moved_robots: list[tuple[Robot, ...]],
         scales: list[float],
         piece: Piece,
         state: FloatArray,
         values: FloatArray,
     ) -> Parts:
-        residual, slopes, at = super()._piece(robot, moved, scales, piece, state, values)
+        residual, slopes, indices = super()._piece(robot, moved_robots, scales, piece, state, values)
         for c, (name, _) in enumerate(piece.record.columns):
             if name in TRAVELS:
-                known = np.flatnonzero(np.isfinite(residual[c]))
-                gained, by = np.diff(residual[c][known]), np.diff(slopes[c][known], axis=0)
+                known_rows = np.flatnonzero(np.isfinite(residual[c]))
+                residual_steps, slope_steps = np.diff(residual[c][known_rows]), np.diff(slopes[c][known_rows], axis=0)
                 residual[c] = np.nan
-                residual[c][known[1:]], slopes[c][known[1:]] = gained, by
-        return residual, slopes, at
+                residual[c][known_rows[1:]], slopes[c][known_rows[1:]] = residual_steps, slope_steps
+        return residual, slopes, indices
 
 
 def _by_rates(problem: Problem, point: Point, nu: float, progress: FitProgress) -> Point:
@@ -156,10 +162,10 @@ def _by_rates(problem: Problem, point: Point, nu: float, progress: FitProgress) 
     went too far before, and no descent gets across the level at which it would rest. Rates of few, noisy rows say less
     than their path, so that the better one of both is taken.
     """
-    held = _on_time(problem)
-    solver = Solver(held, RateEngine(held), nu, NEAR, counted=False)
-    found = solver.minimise(point, progress=progress.aside("rates before paths")).state.point
-    return Point(found.values, point.states)
+    held_problem = _on_time(problem)
+    solver = Solver(held_problem, RateEngine(held_problem), nu, NEAR_PRECISION, counts_ticks=False)
+    rate_point = solver.minimise(point, progress=progress.aside("rates before paths")).state.point
+    return Point(rate_point.values, point.states)
 
 
 def _levels_first(problem: Problem, point: Point, nu: float, progress: FitProgress) -> Point:
@@ -171,13 +177,15 @@ def _levels_first(problem: Problem, point: Point, nu: float, progress: FitProgre
     shape = [key is not None and key.part == FRICTION and not key.level for key in keys]
     if not any(shape):
         return point
-    held = tuple(
-        replace(p, low=v, high=v) if own else p
-        for p, own, v in zip(problem.parameters, shape, point.values.tolist(), strict=True)
+    held_parameters = tuple(
+        replace(p, low=v, high=v) if is_shape else p
+        for p, is_shape, v in zip(problem.parameters, shape, point.values.tolist(), strict=True)
     )
-    first = replace(problem, parameters=held)
-    aside = progress.aside("levels of friction first")
-    return Solver(first, ImplicitEngine.of(first), nu, NEAR).minimise(point, progress=aside).state.point
+    first = replace(problem, parameters=held_parameters)
+    inner_progress = progress.aside("levels of friction first")
+    return (
+        Solver(first, ImplicitEngine.of(first), nu, NEAR_PRECISION).minimise(point, progress=inner_progress).state.point
+    )
 
 
 def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
@@ -185,14 +193,23 @@ def moving_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
 
     With the latencies that go with it. Where outputs add up, the better one of that and what their rates say.
     """
-    own, short = problem.start(), problem.shortened(FEW)
+    start_point, short = problem.start(), problem.shortened(FEW_ROWS)
     solver = Solver(short, ImplicitEngine.of(short), nu)
     friction = np.array([p.part == FRICTION for p in problem.parameters], bool)
-    points = [own, *(Point(np.where(friction, share * own.values, own.values), own.states) for share in LESS)]
+    points = [
+        start_point,
+        *(
+            Point(np.where(friction, share * start_point.values, start_point.values), start_point.states)
+            for share in FRICTION_SHARES
+        ),
+    ]
     costs = side_by_side(lambda point: solver.state(point).objective, points)
     best = points[int(np.argmin(costs))]
     best = _levels_first(short, best, nu, progress)
-    begun = [best]
+    start_states = [best]
     if any(name in TRAVELS for name, _ in short.columns):
-        begun.append(_by_rates(short, best, nu, progress))
-    return min((_timed(short, one, nu, progress) for one in begun), key=lambda point: solver.state(point).objective)
+        start_states.append(_by_rates(short, best, nu, progress))
+    return min(
+        (_timed(short, start_state, nu, progress) for start_state in start_states),
+        key=lambda point: solver.state(point).objective,
+    )

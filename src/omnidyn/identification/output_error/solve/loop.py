@@ -16,7 +16,7 @@ from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.errors import InsufficientDataError, UnsupportedError
 from omnidyn.identification.methods import FREE, REST
 from omnidyn.identification.output_error.engines.speed_loop import SLOW_LOOP, LoopEngine
-from omnidyn.identification.output_error.problem.nuisances import EARLIEST, LATEST, TRAVELS
+from omnidyn.identification.output_error.problem.nuisances import LEAST_LATENCY, MOST_LATENCY, TRAVELS
 from omnidyn.identification.output_error.problem.parameters import Parameter
 from omnidyn.identification.output_error.problem.problem import Piece, Point, Problem
 from omnidyn.identification.output_error.problem.record import Record
@@ -28,19 +28,19 @@ from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import GIVEN, Robot
 from omnidyn.statement import WARNING, Statement
 
-FINE = 1e-3  # [m/s] tolerance at the end of a fit; it begins with a step a tick
+FINE_TOLERANCE = 1e-3  # [m/s] tolerance at the end of a fit; it begins with a step a tick
 SETTING_OFF = 60  # rows of each log on which starts are tried
-STILL = 3  # rows at the beginning in which nothing may move
-CLEAR = 6.0  # standard errors, of the scatter of these rows, that count as motion
+STILL_ROWS = 3  # rows at the beginning in which nothing may move
+MOTION_ERRORS = 6.0  # standard errors, of the scatter of these rows, that count as motion
 LATENCY, CURRENTS = "latency", "latency.current"
 DRIVE, MOTOR = "drive", "motor"
-AROUND = 3  # periods of the loop, each way, in which a latency of the currents is tried
+LATENCY_PERIODS = 3  # periods of the loop, each way, in which a latency of the currents is tried
 GAIN_FACTORS, LEVEL_FACTORS = (0.1, 0.3, 1.0, 3.0, 10.0), (0.3, 1.0, 3.0)
-LATE = (0.0, 0.02, 0.05, 0.1, 0.15)  # [s]
+TRIAL_LATENCIES = (0.0, 0.02, 0.05, 0.1, 0.15)  # [s]
 BEST = 2  # of the starts from which the fit is carried on
-FAR = (1.0, -1.0, 3.0, -3.0, 6.0, -6.0)  # standard errors by which a gain is moved
-LESS, ROUNDS = 1.0, 10  # of -log likelihood that counts as another branch; how often
-FEW = 8  # iterations of each before the better one is taken
+GAIN_MOVES = (1.0, -1.0, 3.0, -3.0, 6.0, -6.0)  # standard errors by which a gain is moved
+BRANCH_GAIN, ROUNDS = 1.0, 10  # of -log likelihood that counts as another branch; how often
+FEW_ITERATIONS = 8  # iterations of each before the better one is taken
 SHARES = (0.25, 0.5)  # of the longest log, from its start on, that are fitted before all of it
 
 
@@ -49,12 +49,12 @@ def looped(records: Sequence[Record]) -> bool:
     return records[0].set_point is not None
 
 
-def loop_keys(robot: Robot, moved: BoolArray, source: str = "") -> list[str]:
+def loop_keys(robot: Robot, moving_axes: BoolArray, source: str = "") -> list[str]:
     """What is free by default: friction, of axes that moved only, and the gains that nobody has given.
 
     Raises InsufficientDataError where nothing moved.
     """
-    if not moved.any():
+    if not moving_axes.any():
         raise InsufficientDataError(
             "the robot never visibly moved: a speed loop shows its friction in motion only",
             got="rest",
@@ -62,9 +62,9 @@ def loop_keys(robot: Robot, moved: BoolArray, source: str = "") -> list[str]:
             remedy="ask for speeds at which it sets off",
             where=source,
         )
-    still = np.flatnonzero(~moved).tolist()
-    kept = [key for key in friction_keys(robot) if Key.parse(key).axis not in still]
-    return [*kept, *(key for key in gain_keys(robot) if not _given(robot, key))]
+    still_axes = np.flatnonzero(~moving_axes).tolist()
+    kept_keys = [key for key in friction_keys(robot) if Key.parse(key).axis not in still_axes]
+    return [*kept_keys, *(key for key in gain_keys(robot) if not _given(robot, key))]
 
 
 def _given(robot: Robot, key: str) -> bool:
@@ -103,14 +103,14 @@ def loop_pieces(records: Sequence[Record], robot: Robot, start: str) -> list[Pie
 
 def left_out(records: Sequence[Record], pieces: Sequence[Piece]) -> list[Statement]:
     """Which logs and pieces are not used."""
-    used, unused = {id(piece.record) for piece in pieces}, []
-    moving = sum(id(record) not in used for record in records)
-    later = sum(len(record.pieces) > 1 for record in records if id(record) in used)
+    used_records, unused_notes = {id(piece.record) for piece in pieces}, []
+    moving = sum(id(record) not in used_records for record in records)
+    later_count = sum(len(record.pieces) > 1 for record in records if id(record) in used_records)
     if moving:
-        unused.append(Statement("begins_in_motion", WARNING, numbers={"logs": moving, "of": len(records)}))
-    if later:
-        unused.append(Statement("used_to_first_gap", WARNING, numbers={"logs": later}))
-    return unused
+        unused_notes.append(Statement("begins_in_motion", WARNING, numbers={"logs": moving, "of": len(records)}))
+    if later_count:
+        unused_notes.append(Statement("used_to_first_gap", WARNING, numbers={"logs": later_count}))
+    return unused_notes
 
 
 def _begins_at_rest(twists: Sequence[FloatArray], first: int, last: int) -> bool:
@@ -119,11 +119,13 @@ def _begins_at_rest(twists: Sequence[FloatArray], first: int, last: int) -> bool
     twists: as each channel tells it, each (rows, 3).
     """
     for axis in range(N_AXES):
-        speeds = [own[np.isfinite(own)] for own in (twist[first : last + 1, axis] for twist in twists)]
+        speeds = [
+            axis_speeds[np.isfinite(axis_speeds)] for axis_speeds in (twist[first : last + 1, axis] for twist in twists)
+        ]
         speed = max(speeds, key=len, default=np.zeros(0))
-        still = speed[:STILL]
-        scatter = float(np.std(np.diff(speed))) / np.sqrt(2.0 * len(still)) if len(speed) > 1 else 0.0
-        if len(still) and not abs(float(still.mean())) <= CLEAR * scatter:
+        first_speeds = speed[:STILL_ROWS]
+        scatter = float(np.std(np.diff(speed))) / np.sqrt(2.0 * len(first_speeds)) if len(speed) > 1 else 0.0
+        if len(first_speeds) and not abs(float(first_speeds.mean())) <= MOTION_ERRORS * scatter:
             return False
     return True
 
@@ -146,35 +148,40 @@ def _piece(record: Record, first: int, last: int) -> Piece:
 def solve_loop(problem: Problem, nu: float, progress: FitProgress) -> Solution:
     """Several starts with a step a tick, on what sets off; then all of it, as well as it must be."""
     first = Solver(problem, LoopEngine(problem), nu)
-    coarse = _motors_first(first, first.minimise(loop_start(problem, nu, progress), FEW, progress), progress)
-    coarse = first.minimise(retimed(first, coarse.state.point, progress), progress=progress)
+    coarse_solution = _motors_first(
+        first, first.minimise(loop_start(problem, nu, progress), FEW_ITERATIONS, progress), progress
+    )
+    coarse_solution = first.minimise(retimed(first, coarse_solution.state.point, progress), progress=progress)
     progress.enter("the same as exactly as it must be")
-    fine = Solver(problem, LoopEngine(problem, FINE), nu)
-    return beyond_jumps(fine.minimise(coarse.state.point, progress=progress), progress)
+    fine_solver = Solver(problem, LoopEngine(problem, FINE_TOLERANCE), nu)
+    return beyond_jumps(fine_solver.minimise(coarse_solution.state.point, progress=progress), progress)
 
 
-def _motors_first(solver: Solver, found: Solution, progress: FitProgress) -> Solution:
-    """The better one of `found` and a fit from the robot as it is that takes motors first, every latency at its start.
+def _motors_first(solver: Solver, coarse_solution: Solution, progress: FitProgress) -> Solution:
+    """The better one of `coarse_solution` and a fit from the robot as it is that takes motors first, every latency at
+    its start.
 
     With motors that are guesses a few rows of setting off look like a latency, and no descent comes back from there.
     """
     problem = solver.problem
     parts = {p.part for p in problem.parameters}
     if not {LATENCY, MOTOR} <= parts:
-        return found
-    still = [replace(p, low=p.value, high=p.value) if p.part == LATENCY else p for p in problem.parameters]
-    held = replace(problem, parameters=tuple(still))
-    aside = progress.aside("motors first")
-    first = Solver(held, solver.engine.on(held), solver.nu).minimise(problem.start(), progress=aside)
-    other = solver.minimise(first.state.point, FEW, progress.below(found.state.objective))
-    return min(found, other, key=lambda solution: solution.state.objective)
+        return coarse_solution
+    held_parameters = [replace(p, low=p.value, high=p.value) if p.part == LATENCY else p for p in problem.parameters]
+    held_problem = replace(problem, parameters=tuple(held_parameters))
+    inner_progress = progress.aside("motors first")
+    first = Solver(held_problem, solver.engine.on(held_problem), solver.nu).minimise(
+        problem.start(), progress=inner_progress
+    )
+    motor_solution = solver.minimise(first.state.point, FEW_ITERATIONS, progress.below(coarse_solution.state.objective))
+    return min(coarse_solution, motor_solution, key=lambda solution: solution.state.objective)
 
 
 def loop_start(problem: Problem, nu: float, progress: FitProgress) -> Point:
     """Where a fit begins: the best of several starts, tried on what sets off."""
     short = shortened(problem, SETTING_OFF)
-    found = best_start(Solver(short, LoopEngine(short), nu), progress)
-    return Point(found.values, problem.start().states)
+    start_state = best_start(Solver(short, LoopEngine(short), nu), progress)
+    return Point(start_state.values, problem.start().states)
 
 
 def retimed(solver: Solver, point: Point, progress: FitProgress) -> Point:
@@ -185,24 +192,26 @@ def retimed(solver: Solver, point: Point, progress: FitProgress) -> Point:
     """
     problem, nu = solver.problem, solver.nu
     period = 1.0 / (problem.robot.drive.rate or np.inf)
-    late = [j for j, p in enumerate(problem.parameters) if p.part == LATENCY]
-    own = [j for j in late if problem.names[j].partition("@")[0] == CURRENTS]
+    latency_indices = [j for j, p in enumerate(problem.parameters) if p.part == LATENCY]
+    current_indices = [j for j in latency_indices if problem.names[j].partition("@")[0] == CURRENTS]
     short = shortened(problem, SETTING_OFF)
     row = min(p.step for p in short.pieces)
-    if not own or not period:
+    if not current_indices or not period:
         return point
-    reach = range(-AROUND, AROUND + 1) if period >= SLOW_LOOP * row else (-1, 0)  # a fast loop settles between rows
-    places = (0.0, *(float(point.values[j]) for j in late))
-    near = sorted({int(np.floor(place / period)) + k for place in places for k in reach})
-    middles = (np.array(near) + 0.5) * period
+    reach = (
+        range(-LATENCY_PERIODS, LATENCY_PERIODS + 1) if period >= SLOW_LOOP * row else (-1, 0)
+    )  # a fast loop settles between rows
+    places = (0.0, *(float(point.values[j]) for j in latency_indices))
+    near_latencies = sorted({int(np.floor(place / period)) + k for place in places for k in reach})
+    middles = (np.array(near_latencies) + 0.5) * period
     trial = Solver(short, solver.engine.on(short), nu)
-    for j in own:
-        now, states = float(point.values[j]), []
-        trials = (now, *middles[(middles > EARLIEST) & (middles < LATEST)])
-        for k, each in enumerate(trials):
+    for j in current_indices:
+        latency, states = float(point.values[j]), []
+        trials = (latency, *middles[(middles > LEAST_LATENCY) & (middles < MOST_LATENCY)])
+        for k, trial_latency in enumerate(trials):
             progress.counted(f"trying {problem.names[j]},", k, len(trials))
             values = point.values.copy()
-            values[j] = each
+            values[j] = trial_latency
             states.append(trial.state(Point(values, point.states), np.ones(len(problem.columns)) if nu else None))
         point = min(states, key=lambda state: state.objective).point
     return point
@@ -215,40 +224,40 @@ def shortened(problem: Problem, rows: int) -> Problem:
 
 def best_start(solver: Solver, progress: FitProgress) -> Point:
     """The best of several starts: all gains, all friction and all latencies by factors, then a few steps of each."""
-    problem, seen = solver.problem, progress.below()
-    delays = _if_any(problem, LATENCY, LATE, 0.0)
-    by_delay = _tried(solver, [(late, 1.0, 1.0) for late in delays], "latencies", seen)
-    late = delays[int(np.argmin([state.objective for state in by_delay]))]
+    problem, below_progress = solver.problem, progress.below()
+    delays = _if_any(problem, LATENCY, TRIAL_LATENCIES, 0.0)
+    by_delay = _tried(solver, [(trial_delay, 1.0, 1.0) for trial_delay in delays], "latencies", below_progress)
+    delay = delays[int(np.argmin([state.objective for state in by_delay]))]
     levels, gains = _if_any(problem, FRICTION, LEVEL_FACTORS), _if_any(problem, DRIVE, GAIN_FACTORS)
-    factors = [(late, *pair) for pair in itertools.product(levels, gains)]
-    states = sorted(_tried(solver, factors, "friction and gains", seen), key=lambda state: state.objective)
-    tried = [solver.minimise(state.point, FEW, seen) for state in states[:BEST]]
-    return min(tried, key=lambda solution: solution.state.objective).state.point
+    factors = [(delay, *pair) for pair in itertools.product(levels, gains)]
+    states = sorted(_tried(solver, factors, "friction and gains", below_progress), key=lambda state: state.objective)
+    solutions = [solver.minimise(state.point, FEW_ITERATIONS, below_progress) for state in states[:BEST]]
+    return min(solutions, key=lambda solution: solution.state.objective).state.point
 
 
 def _tried(
-    solver: Solver, which: Sequence[tuple[float, float, float]], what: str, progress: FitProgress
+    solver: Solver, trials: Sequence[tuple[float, float, float]], description: str, progress: FitProgress
 ) -> list[State]:
     """The states at each (latency [s], factor of friction, factor of gains)."""
     states = []
-    for k, each in enumerate(which):
-        progress.counted(f"looking for a start, {what}", k, len(which))
-        states.append(_moved(solver, *each))
+    for k, trial in enumerate(trials):
+        progress.counted(f"looking for a start, {description}", k, len(trials))
+        states.append(_moved(solver, *trial))
         progress.better(states[-1])
     return states
 
 
-def _moved(solver: Solver, late: float, level: float, gain: float) -> State:
+def _moved(solver: Solver, latency: float, level: float, gain: float) -> State:
     """All latencies [s], all friction and all gains at once, by factors of where they start."""
     problem = solver.problem
-    own = problem.start()
-    values = own.values.copy()
+    start_point = problem.start()
+    values = start_point.values.copy()
     for j, p in enumerate(problem.parameters):
         if p.part == LATENCY:
-            values[j] = late
+            values[j] = latency
         else:
             values[j] = _within(p, p.value * (gain if p.part == DRIVE else level))
-    return solver.state(Point(values, own.states), np.ones(len(problem.columns)) if solver.nu else None)
+    return solver.state(Point(values, start_point.states), np.ones(len(problem.columns)) if solver.nu else None)
 
 
 def beyond_jumps(solution: Solution, progress: FitProgress) -> Solution:
@@ -259,20 +268,22 @@ def beyond_jumps(solution: Solution, progress: FitProgress) -> Solution:
     some standard errors, the others following: where F rises by less than the parabola says, there is another branch to
     descend into. A run away from the limit has no such branch.
     """
-    solver, seen = solution.solver, progress.below(solution.state.objective)
+    solver, below_progress = solution.solver, progress.below(solution.state.objective)
     progress.enter("looking for a better branch, beyond jumps of the likelihood")
     if not np.any(solver.problem.robot.drive.ki) or not solver.engine.meets_limit(solution.state.point):
         return solution
-    grown = solver.minimise(_grown(solver, solution.state.point), FEW, seen)
-    solution = min(solution, grown, key=lambda each: each.state.objective)
+    grown_solution = solver.minimise(_grown(solver, solution.state.point), FEW_ITERATIONS, below_progress)
+    solution = min(solution, grown_solution, key=lambda candidate: candidate.state.objective)
     gains = [j for j, p in enumerate(solver.problem.parameters) if p.part == DRIVE]
     for _ in range(ROUNDS):
-        better = next(_branches(solver, solution, gains, progress), None)
-        found = None if better is None else solver.minimise(better.point, FEW, seen)
-        if found is None or found.state.objective >= solution.state.objective - LESS:
+        better_state = next(_branches(solver, solution, gains, progress), None)
+        new_solution = (
+            None if better_state is None else solver.minimise(better_state.point, FEW_ITERATIONS, below_progress)
+        )
+        if new_solution is None or new_solution.state.objective >= solution.state.objective - BRANCH_GAIN:
             break
-        solution = found
-    return solver.minimise(solution.state.point, progress=seen)
+        solution = new_solution
+    return solver.minimise(solution.state.point, progress=below_progress)
 
 
 def _grown(solver: Solver, point: Point) -> Point:
@@ -284,8 +295,8 @@ def _grown(solver: Solver, point: Point) -> Point:
     longest = max(p.last - p.first for p in solver.problem.pieces)
     for share in SHARES:
         short = shortened(solver.problem, max(int(share * longest), SETTING_OFF))
-        found = Solver(short, solver.engine.on(short), solver.nu, solver.close).minimise(point, FEW)
-        point = Point(found.state.point.values, point.states)
+        short_solution = Solver(short, solver.engine.on(short), solver.nu, solver.close).minimise(point, FEW_ITERATIONS)
+        point = Point(short_solution.state.point.values, point.states)
     return point
 
 
@@ -293,13 +304,13 @@ def _branches(solver: Solver, solution: Solution, gains: Sequence[int], progress
     """States at some standard errors in a gain where F has risen by less than it should have, nearest first."""
     normal = Normal(solver, solution.state)
     covariance = np.linalg.pinv(normal.information, hermitian=True)
-    ways = [*itertools.product(FAR, gains)]
-    for k, (far, j) in enumerate(ways):
+    ways = [*itertools.product(GAIN_MOVES, gains)]
+    for k, (distance, j) in enumerate(ways):
         progress.counted("looking for a better branch, beyond jumps of the likelihood,", k, len(ways))
-        step = far * covariance[:, j] / np.sqrt(max(covariance[j, j], 1e-300))
+        step = distance * covariance[:, j] / np.sqrt(max(covariance[j, j], 1e-300))
         values = solver.outer(solver.clipped(normal.inner + step))
         state = solver.state(Point(values, solution.state.point.states), _scale(solver, solution))
-        if state.objective < solution.state.objective + 0.5 * far * far - LESS:
+        if state.objective < solution.state.objective + 0.5 * distance * distance - BRANCH_GAIN:
             yield state
 
 
@@ -307,8 +318,8 @@ def _scale(solver: Solver, solution: Solution) -> FloatArray | None:
     return solution.state.variance if solver.nu else None
 
 
-def _if_any(problem: Problem, part: str, factors: tuple[float, ...], plain: float = 1.0) -> tuple[float, ...]:
-    return factors if any(p.part == part for p in problem.parameters) else (plain,)
+def _if_any(problem: Problem, part: str, factors: tuple[float, ...], default: float = 1.0) -> tuple[float, ...]:
+    return factors if any(p.part == part for p in problem.parameters) else (default,)
 
 
 def _within(p: Parameter, value: float) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from omnidyn.identification.output_error.solve.solver import State
 from omnidyn.progress import Progress, Report, silent
 
-WORTH = 2.0  # [s] of a search that are told
+LEAST_SECONDS = 2.0  # [s] of a search that are told
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Best:
     """The best of a fit so far: a state of all that is fitted, or, before there is one, of each group alone."""
 
     state: State | None
-    alone: Mapping[str, State]
+    states_by_group: Mapping[str, State]
 
 
 class FitProgress:
@@ -55,23 +55,25 @@ class FitProgress:
         """A better state than those before."""
         self(Report("fitting", state=state))
 
-    def counted(self, words: str, k: int, of: int) -> None:
-        """What comes now, the k-th of `of` from 0, and how long they will take, where that is worth a word."""
-        now = monotonic()
-        self._begun = now if k == 0 else self._begun
-        left = (now - self._begun) / k * (of - k) if k else 0.0
-        self.enter(f"{words} {k + 1} of {of}" + (f", about {left:.0f} s left" if left >= WORTH else ""))
+    def counted(self, words: str, k: int, total: int) -> None:
+        """What comes now, the k-th of `total` from 0, and how long they will take, where that is worth a word."""
+        time_now = monotonic()
+        self._begun = time_now if k == 0 else self._begun
+        time_left = (time_now - self._begun) / k * (total - k) if k else 0.0
+        self.enter(
+            f"{words} {k + 1} of {total}" + (f", about {time_left:.0f} s left" if time_left >= LEAST_SECONDS else "")
+        )
 
     def below(self, objective: float = np.inf) -> FitProgress:
         """The same, of a search that goes several ways: sees only states below all before, and below `objective`."""
-        least = objective
+        least_objective = objective
 
         def listen(report: Report) -> None:
-            nonlocal least
+            nonlocal least_objective
             if report.state is None:
                 self(report)
-            elif report.state.objective < least:
-                least = report.state.objective
+            elif report.state.objective < least_objective:
+                least_objective = report.state.objective
                 self(report)
 
         return FitProgress(listen)

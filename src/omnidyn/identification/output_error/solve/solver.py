@@ -22,18 +22,23 @@ from omnidyn.progress import Progress, Report
 from omnidyn.statement import Statement
 
 MAX_ITERATIONS = 60
-CLOSE = 1e-5  # squared distance to the best point, in standard errors, at which it ends
-ENOUGH = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
+END_PRECISION = 1e-5  # squared distance to the best point, in standard errors, at which it ends
+KINK_PRECISION = 1e-3  # the same where a step has failed: F has kinks, and this close they are all that is left
 CREEP, STEPS = 3.0, 2  # times `close`, that so many steps in a row each lower F by less than: they creep along a kink
-FAR = 100.0  # squared distance to the best point, in standard errors, beyond which a bend is not that of the end
+BEND_DISTANCE = (
+    100.0  # squared distance to the best point, in standard errors, beyond which a bend is not that of the end
+)
 DAMPING, LEAST_DAMPING = 1e-4, 1e-10
-FIRM, SHORT = 1e-2, 10.0  # least damping after a step that failed; that of a step with what was blocked at an edge
+FIRM_DAMPING, SHORT_DAMPING = (
+    1e-2,
+    10.0,
+)  # least damping after a step that failed; that of a step with what was blocked at an edge
 PRECISION = 1e-7  # of an output, relative to its size: below it noise is not told from none
-UNSEEN = 1e-100  # information on the start of a piece that is none: divided by it, nothing is finite
+NO_INFORMATION = 1e-100  # information on the start of a piece that is none: divided by it, nothing is finite
 SCALE_CHANGE = 1e-3  # of a variance, relative, at which it counts as found
 
 
-FASTEST = np.array([30.0, 30.0, 300.0])  # [m/s, m/s, rad/s] no robot sets off faster; a step astray would not end
+SPEED_LIMITS = np.array([30.0, 30.0, 300.0])  # [m/s, m/s, rad/s] no robot sets off faster; a step astray would not end
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,33 +54,44 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where the minimisation ended. held: parameters at a bound that they push against. converged: or cut short.
+    """Where the minimisation ended. held_parameters: parameters at a bound that they push against. converged: or cut
+    short.
 
-    solver: which found it. blocked: latencies that stand at an edge. notes: what is to be said of the way there.
-    plain: the fit without nuisances that it was chosen beside.
+    solver: which found it. blocked_parameters: latencies that stand at an edge. notes: what is to be said of the way
+    there.
+    plain_solution: the fit without nuisances that it was chosen beside.
     """
 
     state: State
-    held: BoolArray
+    held_parameters: BoolArray
     iterations: int
     converged: bool
     solver: Solver[Any]
-    blocked: BoolArray | None = None
+    blocked_parameters: BoolArray | None = None
     notes: tuple[Statement, ...] = ()
-    plain: Solution | None = None
+    plain_solution: Solution | None = None
 
 
 class Solver(Generic[P]):
     """Minimises F over a problem. `floor` (columns,): least variance of each column.
 
-    close: squared distance to the best point, in standard errors, at which it ends. counted: whether counts have a
-    likelihood of their own.
+    precision: squared distance to the best point, in standard errors, at which it ends. counts_ticks: whether counts
+    have a likelihood of their own.
     """
 
-    def __init__(self, problem: P, engine: Engine[P], nu: float = 0.0, close: float = CLOSE, counted: bool = True):
-        self.problem, self.engine, self.nu, self.close, self.counted = problem, engine, nu, close, counted
-        self.creep = CREEP * close if close > CLOSE else 0.0  # a speed loop may creep for long, and yet find its way
-        self.tick = problem.tick if counted else np.zeros(len(problem.columns))
+    def __init__(
+        self,
+        problem: P,
+        engine: Engine[P],
+        nu: float = 0.0,
+        precision: float = END_PRECISION,
+        counts_ticks: bool = True,
+    ):
+        self.problem, self.engine, self.nu, self.close, self.counted = problem, engine, nu, precision, counts_ticks
+        self.creep = (
+            CREEP * precision if precision > END_PRECISION else 0.0
+        )  # a speed loop may creep for long, and yet find its way
+        self.tick = problem.tick if counts_ticks else np.zeros(len(problem.columns))
         self.floor = np.maximum(_floor(problem), (LEAST_SHARE * self.tick) ** 2)
         self._edges, self.order = Edges(problem), Order(problem)
         self._low = np.array([p.inner(p.low) if not p.log or p.low > 0 else -np.inf for p in problem.parameters])
@@ -83,18 +99,18 @@ class Solver(Generic[P]):
 
     def state(self, point: Point, variance: FloatArray | None = None) -> State:
         """F and all sums at a point; at a fixed `variance` for Student's t and counts, which are none without."""
-        given = np.ones(len(self.problem.columns)) if variance is None else variance
+        given_variance = np.ones(len(self.problem.columns)) if variance is None else variance
         scaled = self.scaled & (bool(self.nu) or variance is not None)
         sums = self.engine.sums(
-            point, Weighting(given, self.nu, counted=bool(self.tick.any()) and variance is not None)
+            point, Weighting(given_variance, self.nu, counts_ticks=bool(self.tick.any()) and variance is not None)
         )
-        count = per_column(sums, len(given), "number")
-        mean = per_column(sums, len(given), "square") / np.maximum(count, 1.0)
-        now = np.where(scaled, given, np.maximum(mean, self.floor))
-        objective = float(0.5 * count @ np.log(now))
+        count = per_column(sums, len(given_variance), "number")
+        mean = per_column(sums, len(given_variance), "square") / np.maximum(count, 1.0)
+        variance_now = np.where(scaled, given_variance, np.maximum(mean, self.floor))
+        objective = float(0.5 * count @ np.log(variance_now))
         if scaled.any():
-            objective += float(per_column(sums, len(given), "loss")[scaled].sum())
-        return State(point, sums, objective + self._prior(point), now, self.problem)
+            objective += float(per_column(sums, len(given_variance), "loss")[scaled].sum())
+        return State(point, sums, objective + self._prior(point), variance_now, self.problem)
 
     @property
     def scaled(self) -> BoolArray:
@@ -106,107 +122,123 @@ class Solver(Generic[P]):
         start: Point | State,
         limit: int = MAX_ITERATIONS,
         progress: Progress | None = None,
-        blocked: BoolArray | None = None,
+        blocked_parameters: BoolArray | None = None,
         scales: FloatArray | None = None,
     ) -> Solution:
         """The best point from `start`; `progress` sees every better one on the way.
 
-        Where the start is a state that this engine found, the logs are not marched through for it again. blocked (P,):
-        latencies that a solution near by has found to stand at an edge. scales (columns,): variances that it has found,
-        of Student's t; without them least squares come first, which wild samples lead far away.
+        Where the start is a state that this engine found, the logs are not marched through for it again.
+        blocked_parameters (P,): latencies that a solution near by has found to stand at an edge. scales (columns,):
+        variances that it has found, of Student's t; without them least squares come first, which wild samples lead far
+        away.
         """
         if not self.scaled.any():
-            return self._descend(self._begun(start), limit, progress, blocked)
+            return self._descend(self._begun(start), limit, progress, blocked_parameters)
         start = start.point if isinstance(start, State) else start
         if scales is not None:
-            return self._descend(self._rescaled(self.state(self._inside(start), scales))[0], limit, progress, blocked)
-        plain = Solver(self.problem, self.engine, close=self.close, counted=False).minimise(start, limit)
-        now = self.state(plain.state.point, np.maximum(plain.state.variance - self.tick**2 / 12.0, self.floor))
-        return self._descend(self._rescaled(now)[0], limit, progress, blocked)
+            return self._descend(
+                self._rescaled(self.state(self._inside(start), scales))[0], limit, progress, blocked_parameters
+            )
+        plain_solution = Solver(self.problem, self.engine, precision=self.close, counts_ticks=False).minimise(
+            start, limit
+        )
+        start_state = self.state(
+            plain_solution.state.point, np.maximum(plain_solution.state.variance - self.tick**2 / 12.0, self.floor)
+        )
+        return self._descend(self._rescaled(start_state)[0], limit, progress, blocked_parameters)
 
-    def _descend(self, now: State, limit: int, progress: Progress | None, blocked: BoolArray | None) -> Solution:
+    def _descend(
+        self, state: State, limit: int, progress: Progress | None, blocked_parameters: BoolArray | None
+    ) -> Solution:
         damping, change = DAMPING, 0.0
-        held = np.zeros(len(self.problem.parameters), bool)
-        blocked, bend = held if blocked is None else blocked, Bend(len(held))
-        released, creeping = False, 0
+        held_parameters = np.zeros(len(self.problem.parameters), bool)
+        blocked_parameters, bend = (
+            held_parameters if blocked_parameters is None else blocked_parameters,
+            Bend(len(held_parameters)),
+        )
+        is_released, slow_steps = False, 0
         for iteration in range(limit):
-            normal, before = Normal(self, now), now.objective
-            held, better = normal.held, False
+            normal, objective_before = Normal(self, state), state.objective
+            held_parameters, is_better = normal.held, False
             if not self.scaled.any():  # a scale that is held meanwhile would be taken for a bend
                 bend.learn(normal.inner, normal.gradient, normal.information)
-            still, onto = held | blocked, np.zeros(len(held))
-            while not better and (away := normal.distance_without(still)) / (1.0 + damping) > (
-                self.close if damping < FIRM else max(ENOUGH, self.close)
+            still_parameters, shift = held_parameters | blocked_parameters, np.zeros(len(held_parameters))
+            while not is_better and (distance := normal.distance_without(still_parameters)) / (1.0 + damping) > (
+                self.close if damping < FIRM_DAMPING else max(KINK_PRECISION, self.close)
             ):
-                if away > FAR:
+                if distance > BEND_DISTANCE:
                     bend.forget()
-                moved = normal.moved(damping, still, bend.beside(normal.information, still), onto)
-                trial = self.state(moved, now.variance if self.scaled.any() else None)
-                better = trial.objective < now.objective
-                edge = None if better else self._edges.not_yet(still)
+                moved_point = normal.moved(
+                    damping, still_parameters, bend.beside(normal.information, still_parameters), shift
+                )
+                trial = self.state(moved_point, state.variance if self.scaled.any() else None)
+                is_better = trial.objective < state.objective
+                edge = None if is_better else self._edges.not_yet(still_parameters)
                 if edge is not None:  # once more, and from here on, without what may stand at a jump or a kink
-                    onto = self._edges.onto(normal.inner, self.inner(moved.values), still | ~edge)
-                    blocked = blocked | edge
-                    still = still | blocked
+                    shift = self._edges.onto(normal.inner, self.inner(moved_point.values), still_parameters | ~edge)
+                    blocked_parameters = blocked_parameters | edge
+                    still_parameters = still_parameters | blocked_parameters
                     continue
-                if not better and onto.any():  # what was a guess is dropped before steps get shorter
-                    onto = np.zeros(len(held))
+                if not is_better and shift.any():  # what was a guess is dropped before steps get shorter
+                    shift = np.zeros(len(held_parameters))
                     continue
-                if not better and bend.known:
+                if not is_better and bend.known:
                     bend.forget()
                     continue
-                damping = max(damping / 10.0, LEAST_DAMPING) if better else max(damping * 10.0, FIRM)
-                now = trial if better else now
-            creeping = creeping + 1 if better and before - now.objective < self.creep else 0
+                damping = max(damping / 10.0, LEAST_DAMPING) if is_better else max(damping * 10.0, FIRM_DAMPING)
+                state = trial if is_better else state
+            slow_steps = slow_steps + 1 if is_better and objective_before - state.objective < self.creep else 0
             if self.scaled.any():
-                now, change = self._rescaled(now)
-            if better and progress:
-                progress(Report("fitting", state=now))
-            if creeping >= STEPS and change < SCALE_CHANGE:
-                return Solution(now, held, iteration + 1, True, self, blocked)
-            if not better and blocked.any() and not released:  # a shorter step may stay this side of the edge
-                blocked, released, damping = np.zeros_like(blocked), True, SHORT
-            elif not better and change < SCALE_CHANGE:  # close enough, or no way down: a kink
-                return Solution(now, held, iteration + 1, True, self, blocked)
-        return Solution(now, held, limit, False, self, blocked)
+                state, change = self._rescaled(state)
+            if is_better and progress:
+                progress(Report("fitting", state=state))
+            if slow_steps >= STEPS and change < SCALE_CHANGE:
+                return Solution(state, held_parameters, iteration + 1, True, self, blocked_parameters)
+            if (
+                not is_better and blocked_parameters.any() and not is_released
+            ):  # a shorter step may stay this side of the edge
+                blocked_parameters, is_released, damping = np.zeros_like(blocked_parameters), True, SHORT_DAMPING
+            elif not is_better and change < SCALE_CHANGE:  # close enough, or no way down: a kink
+                return Solution(state, held_parameters, iteration + 1, True, self, blocked_parameters)
+        return Solution(state, held_parameters, limit, False, self, blocked_parameters)
 
-    def _rescaled(self, now: State) -> tuple[State, float]:
+    def _rescaled(self, state: State) -> tuple[State, float]:
         """The same point at better scales of Student's t and counts, and the largest relative change.
 
         With m = mean w z^2, which is 1 at the right scale, one Newton step per column: log s += (m - 1)/information,
         that of log s being 2 nu/(nu + 3) a row for Student's t, and as in kernel/counts.py for counts.
         """
-        number = np.maximum(per_column(now.sums, len(now.variance), "number"), 1.0)
-        mean = per_column(now.sums, len(now.variance), "square") / number / now.variance
-        known = information(now.variance, self.tick)[1]
+        number = np.maximum(per_column(state.sums, len(state.variance), "number"), 1.0)
+        mean = per_column(state.sums, len(state.variance), "square") / number / state.variance
+        tick_information = information(state.variance, self.tick)[1]
         if self.nu:
-            known = np.where(self.tick > 0.0, known, 2.0 * self.nu / (self.nu + 3.0))
-        step = np.where(self.scaled, np.clip(2.0 * (mean - 1.0) / known, -1.0, 1.0), 0.0)
-        variance = np.where(self.scaled, np.maximum(now.variance * np.exp(step), self.floor), now.variance)
-        change = float(np.abs(np.log(variance / now.variance)).max())
-        return (self.state(now.point, variance), change) if change >= SCALE_CHANGE else (now, change)
+            tick_information = np.where(self.tick > 0.0, tick_information, 2.0 * self.nu / (self.nu + 3.0))
+        step = np.where(self.scaled, np.clip(2.0 * (mean - 1.0) / tick_information, -1.0, 1.0), 0.0)
+        variance = np.where(self.scaled, np.maximum(state.variance * np.exp(step), self.floor), state.variance)
+        change = float(np.abs(np.log(variance / state.variance)).max())
+        return (self.state(state.point, variance), change) if change >= SCALE_CHANGE else (state, change)
 
     def inner(self, values: FloatArray) -> FloatArray:
         return np.array([p.inner(float(v)) for p, v in zip(self.problem.parameters, values, strict=True)])
 
-    def outer(self, inner: FloatArray) -> FloatArray:
-        return np.array([p.outer(float(z)) for p, z in zip(self.problem.parameters, inner, strict=True)])
+    def outer(self, inner_values: FloatArray) -> FloatArray:
+        return np.array([p.outer(float(z)) for p, z in zip(self.problem.parameters, inner_values, strict=True)])
 
-    def clipped(self, inner: FloatArray) -> FloatArray:
-        return self.order.kept(np.clip(inner, self._low, self._high))
+    def clipped(self, inner_values: FloatArray) -> FloatArray:
+        return self.order.kept(np.clip(inner_values, self._low, self._high))
 
-    def at_bound(self, inner: FloatArray, gradient: FloatArray) -> BoolArray:
+    def at_bound(self, inner_values: FloatArray, gradient: FloatArray) -> BoolArray:
         """Which parameters stand at a bound and are pushed against it by `gradient` (downhill direction)."""
-        ends = ((inner <= self._low) & (gradient < 0.0)) | ((inner >= self._high) & (gradient > 0.0))
-        return ends | self.order.at_bound(inner, gradient)
+        ends = ((inner_values <= self._low) & (gradient < 0.0)) | ((inner_values >= self._high) & (gradient > 0.0))
+        return ends | self.order.at_bound(inner_values, gradient)
 
     def _begun(self, start: Point | State) -> State:
         """The state to start from, within the bounds; one of this very problem is not marched through again."""
         if not isinstance(start, State):
             return self.state(self._inside(start))
-        inside = self._inside(start.point)
-        known = start.problem is self.problem and np.array_equal(inside.values, start.point.values)
-        return start if known else self.state(inside)
+        inner_point = self._inside(start.point)
+        is_start = start.problem is self.problem and np.array_equal(inner_point.values, start.point.values)
+        return start if is_start else self.state(inner_point)
 
     def _inside(self, point: Point) -> Point:
         return Point(self.outer(self.clipped(self.inner(point.values))), point.states)
@@ -218,8 +250,10 @@ class Solver(Generic[P]):
                 mean, std = p.known
                 total += 0.5 * ((p.inner(float(value)) - mean) / std) ** 2
         for piece, state in zip(self.problem.pieces, point.states, strict=True):
-            pull, known = piece.start_prior(state)
-            total += 0.5 * float(pull[known > 0.0] ** 2 @ (1.0 / known[known > 0.0]))
+            pull, start_information = piece.start_prior(state)
+            total += 0.5 * float(
+                pull[start_information > 0.0] ** 2 @ (1.0 / start_information[start_information > 0.0])
+            )
         return total
 
 
@@ -256,18 +290,19 @@ class Normal:
         gradient, information = self.prior_gradient.copy(), np.diag(self.prior_information)
         for grad, info in self.pieces:
             k = self._count
-            damped = _damped(info, damping)
+            damped_information = _damped(info, damping)
             gradient += grad[:k]
-            information = information + damped[:k, :k]
+            information = information + damped_information[:k, :k]
             if grad.shape[0] > k:
-                lift = of_states(damped[k:, k:], damped[k:, :k])
+                lift = of_states(damped_information[k:, k:], damped_information[k:, :k])
                 gradient -= lift.T @ grad[k:]
-                information -= damped[:k, k:] @ lift
+                information -= damped_information[:k, k:] @ lift
         return gradient, information
 
-    def distance_without(self, still: BoolArray) -> float:
-        """Squared length of the Gauss-Newton step in standard errors, over the parameters that are not `still`."""
-        free, fold = ~still, self.solver.order.together(self.inner, still)
+    def distance_without(self, still_parameters: BoolArray) -> float:
+        """Squared length of the Gauss-Newton step in standard errors, over the parameters that are not
+        `still_parameters`."""
+        free, fold = ~still_parameters, self.solver.order.together(self.inner, still_parameters)
         gradient = fold.T @ self.gradient
         step = _solve((fold.T @ self.information @ fold)[np.ix_(free, free)], gradient[free])
         total = float(step @ gradient[free])
@@ -279,36 +314,36 @@ class Normal:
 
     def scores(self) -> FloatArray:
         """Score of each block of rows, the states eliminated. Shape (blocks, P). Needs sums of a final march."""
-        k, found = self._count, []
+        k, block_scores = self._count, []
         for sums, (_, info) in zip(self.state.sums, self.pieces, strict=True):
             score = sums.score * np.concatenate([self.scale, np.ones(sums.score.shape[1] - k)])
-            own = score[:, :k]
+            block_score = score[:, :k]
             if info.shape[0] > k:
-                own = own - score[:, k:] @ of_states(info[k:, k:], info[k:, :k])
-            found.append(own)
-        return np.concatenate(found)
+                block_score = block_score - score[:, k:] @ of_states(info[k:, k:], info[k:, :k])
+            block_scores.append(block_score)
+        return np.concatenate(block_scores)
 
-    def moved(self, damping: float, still: BoolArray, bend: FloatArray, onto: FloatArray) -> Point:
-        """The point of the damped step, within the bounds, without the parameters that are `still`.
+    def moved(self, damping: float, still_parameters: BoolArray, bend: FloatArray, onto: FloatArray) -> Point:
+        """The point of the damped step, within the bounds, without the parameters that are `still_parameters`.
 
         bend (P, P): what the information lacks, see `Bend`. onto (P,): the step of these, see `Edges`.
         """
         gradient, information = self._reduced(damping)
-        free, fold = ~still, self.solver.order.together(self.inner, still)
+        free, fold = ~still_parameters, self.solver.order.together(self.inner, still_parameters)
         gradient, information = fold.T @ gradient, fold.T @ (information + bend) @ fold
-        step = np.where(still, onto, 0.0)
+        step = np.where(still_parameters, onto, 0.0)
         step[free] = _solve(information[np.ix_(free, free)], (gradient - information @ step)[free])
-        inner = self.solver.clipped(self.inner + fold @ step)
-        step = inner - self.inner
+        inner_values = self.solver.clipped(self.inner + fold @ step)
+        step = inner_values - self.inner
         k, states = self._count, []
         for (grad, info), old in zip(self.pieces, self.state.point.states, strict=True):
             new = old.copy()
             if grad.shape[0] > k:
-                damped = _damped(info, damping)
-                new += of_states(damped[k:, k:], grad[k:] - damped[k:, :k] @ step)
-                new[: len(FASTEST)] = np.clip(new[: len(FASTEST)], -FASTEST, FASTEST)
+                damped_information = _damped(info, damping)
+                new += of_states(damped_information[k:, k:], grad[k:] - damped_information[k:, :k] @ step)
+                new[: len(SPEED_LIMITS)] = np.clip(new[: len(SPEED_LIMITS)], -SPEED_LIMITS, SPEED_LIMITS)
             states.append(new)
-        return Point(self.solver.outer(inner), tuple(states))
+        return Point(self.solver.outer(inner_values), tuple(states))
 
 
 def of_states(information: FloatArray, right: FloatArray) -> FloatArray:
@@ -323,9 +358,14 @@ def of_states(information: FloatArray, right: FloatArray) -> FloatArray:
 
 
 def _weighted(
-    sums: PieceSums, weight: FloatArray, scale: FloatArray, states: FloatArray, known: tuple[FloatArray, FloatArray]
+    sums: PieceSums,
+    weight: FloatArray,
+    scale: FloatArray,
+    states: FloatArray,
+    start_prior: tuple[FloatArray, FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
-    """Gradient and information of a piece over its columns, in inner numbers. known: of its start, see `start_prior`.
+    """Gradient and information of a piece over its columns, in inner numbers. start_prior: of its start, see
+    `start_prior`.
 
     States that are not free do not move. Nor does a speed that the rows only know to be below the fastest (a robot may
     forget its start before the first row that is used), or that they would pull beyond it.
@@ -334,19 +374,19 @@ def _weighted(
     full = np.concatenate([scale, np.ones(sums.grad.shape[1] - count)])
     grad = (weight @ sums.grad) * full
     info = np.tensordot(weight, sums.info, 1) * np.outer(full, full)
-    start = np.arange(count, count + len(known[0]))
-    grad[start] += known[0]
-    info[start, start] += known[1]
-    told = info.diagonal()[count:]
-    if not told.max(initial=0.0) > UNSEEN:
+    start = np.arange(count, count + len(start_prior[0]))
+    grad[start] += start_prior[0]
+    info[start, start] += start_prior[1]
+    state_information = info.diagonal()[count:]
+    if not state_information.max(initial=0.0) > NO_INFORMATION:
         return grad[:count], info[:count, :count]
-    still = told <= UNSEEN
-    still[: len(FASTEST)] |= told[: len(FASTEST)] < FASTEST**-2
-    speeds, pull = states[: len(FASTEST)], grad[count : count + len(FASTEST)]
-    still[: len(FASTEST)] |= (np.abs(speeds) >= FASTEST) & (np.sign(speeds) * pull > 0.0)
-    where = np.flatnonzero(still) + count
-    grad[where], info[where, :], info[:, where] = 0.0, 0.0, 0.0
-    info[where, where] = 1.0
+    unseen_states = state_information <= NO_INFORMATION
+    unseen_states[: len(SPEED_LIMITS)] |= state_information[: len(SPEED_LIMITS)] < SPEED_LIMITS**-2
+    speeds, pull = states[: len(SPEED_LIMITS)], grad[count : count + len(SPEED_LIMITS)]
+    unseen_states[: len(SPEED_LIMITS)] |= (np.abs(speeds) >= SPEED_LIMITS) & (np.sign(speeds) * pull > 0.0)
+    state_indices = np.flatnonzero(unseen_states) + count
+    grad[state_indices], info[state_indices, :], info[:, state_indices] = 0.0, 0.0, 0.0
+    info[state_indices, state_indices] = 1.0
     return grad, info
 
 
@@ -359,8 +399,8 @@ def _solve(information: FloatArray, gradient: FloatArray) -> FloatArray:
     size = np.sqrt(np.maximum(information.diagonal(), 0.0))
     size[size == 0.0] = 1.0
     values, vectors = np.linalg.eigh(information / np.outer(size, size))
-    seen = values > 1e-13 * max(float(values.max(initial=0.0)), 1e-300)
-    inverse = np.where(seen, 1.0 / np.where(seen, values, 1.0), 0.0)
+    seen_values = values > 1e-13 * max(float(values.max(initial=0.0)), 1e-300)
+    inverse = np.where(seen_values, 1.0 / np.where(seen_values, values, 1.0), 0.0)
     return (vectors @ (inverse * (vectors.T @ (gradient / size)))) / size
 
 

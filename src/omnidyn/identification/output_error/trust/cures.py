@@ -30,10 +30,13 @@ from omnidyn.simulation.simulate import simulate
 from omnidyn.statement import NOTE, Statement
 
 EXACT = 30.0  # times its numbers that a direction may go: the same to the log, and not only nearly
-TRIED, SEEN = 1e-3, 0.01  # size of the change that is tried; share of it in a channel from which that shows it
+TRIAL_CHANGE, SEEN_SHARE = (
+    1e-3,
+    0.01,
+)  # size of the change that is tried; share of it in a channel from which that shows it
 ROWS, STEP, HOLD = 1000, 0.01, 50  # of an experiment: rows, their length [s], rows of one level
-MOST = 5  # cures that are named
-MEASURABLE = (
+MOST_CURES = 5  # cures that are named
+MEASURABLE_KEYS = (
     "body.mass_kg",
     "wheels.wheel_radius_m",
     "wheels.robot_radius_m",
@@ -74,17 +77,21 @@ class Blind:
         return Statement("cures", NOTE, numbers={"cures": self.cures})
 
 
-def blind_directions(problem: Problem, values: FloatArray, ways: Sequence[Way], moved: BoolArray) -> tuple[Blind, ...]:
-    """Each direction with what would show it. values (P,); moved (3,): which axes did."""
+def blind_directions(
+    problem: Problem, values: FloatArray, ways: Sequence[Way], moving_axes: BoolArray
+) -> tuple[Blind, ...]:
+    """Each direction with what would show it. values (P,); moving_axes (3,): which axes did."""
     drives = _drives(problem, values) if ways else ()
-    return tuple(side_by_side(lambda way: _direction(problem, values, way, moved, drives), ways))
+    return tuple(side_by_side(lambda way: _direction(problem, values, way, moving_axes, drives), ways))
 
 
-def _direction(problem: Problem, values: FloatArray, way: Way, moved: BoolArray, drives: Sequence[_Drive]) -> Blind:
-    at = np.flatnonzero(way.step)
-    names = [problem.names[j].partition("@")[0] for j in at]
-    changes = {name: 0.01 * _relative(problem, values, way, int(j)) for name, j in zip(names, at, strict=True)}
-    cures = tuple(dict.fromkeys(_cures(problem, values, way, names, moved, drives)))[:MOST]
+def _direction(
+    problem: Problem, values: FloatArray, way: Way, moving_axes: BoolArray, drives: Sequence[_Drive]
+) -> Blind:
+    indices = np.flatnonzero(way.step)
+    names = [problem.names[j].partition("@")[0] for j in indices]
+    changes = {name: 0.01 * _relative(problem, values, way, int(j)) for name, j in zip(names, indices, strict=True)}
+    cures = tuple(dict.fromkeys(_cures(problem, values, way, names, moving_axes, drives)))[:MOST_CURES]
     return Blind(changes, way.reach > EXACT, cures)
 
 
@@ -95,32 +102,34 @@ def _relative(problem: Problem, values: FloatArray, way: Way, j: int) -> float:
 
 
 def _cures(
-    problem: Problem, values: FloatArray, way: Way, names: list[str], moved: BoolArray, drives: Sequence[_Drive]
+    problem: Problem, values: FloatArray, way: Way, names: list[str], moving_axes: BoolArray, drives: Sequence[_Drive]
 ) -> Iterator[str]:
-    yield from (one for one in MEASURABLE if any(_is(name, one) for name in names))
+    yield from (measurable for measurable in MEASURABLE_KEYS if any(_is(name, measurable) for name in names))
     if not drives:
         return
     of_the_log, of_all_axes = drives
     try:
         yield from _by_channels(problem, of_the_log.differs(problem, values, way))
-        seen = of_all_axes.differs(problem, values, way)
-        if any(seen[name] for name in dict.fromkeys(name for name, _ in problem.columns) if name in seen):
+        seen_channels = of_all_axes.differs(problem, values, way)
+        if any(
+            seen_channels[name] for name in dict.fromkeys(name for name, _ in problem.columns) if name in seen_channels
+        ):
             axes = {key.axis for name in names if (key := find_key(name)) is not None and key.axis is not None}
-            yield from [AXES[axis] for axis in sorted(axes) if not moved[axis]] or ["drive"]
+            yield from [AXES[axis] for axis in sorted(axes) if not moving_axes[axis]] or ["drive"]
     except OmnidynError:
         return
 
 
-def _is(name: str, one: str) -> bool:
+def _is(name: str, pattern: str) -> bool:
     key = find_key(name)
-    return (Key.parse(name).name if key is not None else name) == one
+    return (Key.parse(name).name if key is not None else name) == pattern
 
 
-def _by_channels(problem: Problem, seen: Mapping[str, bool]) -> Iterator[str]:
+def _by_channels(problem: Problem, seen_channels: Mapping[str, bool]) -> Iterator[str]:
     """Channels that were not logged, and would show it under the same voltages."""
     logged = {name for name, _ in problem.columns}
-    for channel, instead in CHANNELS.items():
-        if not logged & set(instead) and seen[channel]:
+    for channel, replaced_channels in CHANNELS.items():
+        if not logged & set(replaced_channels) and seen_channels[channel]:
             yield channel
 
 
@@ -131,7 +140,7 @@ class _Drive:
     volts: FloatArray
     dt: FloatArray
     start: FloatArray
-    before: Mapping[str, FloatArray]
+    channels_before: Mapping[str, FloatArray]
 
     @classmethod
     def of(cls, problem: Problem, values: FloatArray, volts: FloatArray, dt: FloatArray, start: FloatArray) -> _Drive:
@@ -139,23 +148,25 @@ class _Drive:
 
     def differs(self, problem: Problem, values: FloatArray, way: Way) -> dict[str, bool]:
         """Channel -> whether a change along the direction shows in it."""
-        other = values.copy()
+        other_values = values.copy()
         for j in np.flatnonzero(way.step):
             p = problem.parameters[j]
-            other[j] = p.outer(p.inner(float(values[j])) + TRIED * float(way.step[j]))
-        after, found = _channels(problem, other, self.volts, self.dt, self.start), {}
-        for name, own in self.before.items():
-            size = np.sqrt((own**2).mean(axis=0))
-            change = np.sqrt(((after[name] - own) ** 2).mean(axis=0))
-            found[name] = bool((change > SEEN * TRIED * np.maximum(size, 1e-3 * size.max(initial=1e-9))).any())
-        return found
+            other_values[j] = p.outer(p.inner(float(values[j])) + TRIAL_CHANGE * float(way.step[j]))
+        channels_after, differs_by_channel = _channels(problem, other_values, self.volts, self.dt, self.start), {}
+        for name, channel_values in self.channels_before.items():
+            size = np.sqrt((channel_values**2).mean(axis=0))
+            change = np.sqrt(((channels_after[name] - channel_values) ** 2).mean(axis=0))
+            differs_by_channel[name] = bool(
+                (change > SEEN_SHARE * TRIAL_CHANGE * np.maximum(size, 1e-3 * size.max(initial=1e-9))).any()
+            )
+        return differs_by_channel
 
 
 def _drives(problem: Problem, values: FloatArray) -> tuple[_Drive, ...]:
     """That of the log, and one along all axes; none where there are no voltages, or no engine simulates them."""
     if any(piece.record.set_point is not None for piece in problem.pieces):
         return ()
-    piece = max(problem.pieces, key=lambda each: each.last - each.first)
+    piece = max(problem.pieces, key=lambda drive_input: drive_input.last - drive_input.first)
     rows = slice(piece.first, min(piece.last, piece.first + ROWS))
     t = piece.record.t[piece.first : rows.stop + 1]
     robot = problem.robot_at(values)
@@ -164,9 +175,12 @@ def _drives(problem: Problem, values: FloatArray) -> tuple[_Drive, ...]:
     levels = np.random.default_rng(0).uniform(-1.0, 1.0, (ROWS // HOLD, 3)) @ shape.T
     limit = robot.motor.voltage_limit or max(float(np.nanmax(np.abs(p.record.voltage))) for p in problem.pieces)
     volts = np.repeat(np.clip(levels, -1.0, 1.0) * float(np.min(limit)), HOLD, axis=0)
-    asked = (piece.record.voltage[rows], np.diff(t), piece.start), (volts, np.full(len(volts), STEP), np.zeros(3))
+    drive_inputs = (
+        (piece.record.voltage[rows], np.diff(t), piece.start),
+        (volts, np.full(len(volts), STEP), np.zeros(3)),
+    )
     try:
-        return tuple(side_by_side(lambda each: _Drive.of(problem, values, *each), asked))
+        return tuple(side_by_side(lambda drive_input: _Drive.of(problem, values, *drive_input), drive_inputs))
     except OmnidynError:
         return ()
 
@@ -197,17 +211,19 @@ def _channels(
 #
 # D I D = V diag(1/s^2) V',   I: what the rows tell, without priors;   D: what a change of 1 is for each number
 #
-# A direction is blind where s, how far it may go within a standard error, is LOST or more. D is the number itself, so
-# that 0.5 is half of it; of a friction it is at least a tenth of what the motors can push: one near 0 is not lost
-# because
-# it may as well be twice as large. Where several directions are blind, any mixture of them is: they are told apart so
-# that each holds as few numbers as possible (row echelon form, the largest pivot first).
+# A direction is blind where s, how far it may go within a standard error, is LOST_DISTANCE or more. D is the number
+# itself, so that 0.5 is half of it; of a friction it is at least a tenth of what the motors can push: one near 0 is not
+# lost because it may as well be twice as large. Where several directions are blind, any mixture of them is: they are
+# told apart so that each holds as few numbers as possible (row echelon form, the largest pivot first).
 
-LOST = 0.5  # how far a blind direction may go within a standard error, over the size of its numbers
-SAME = 1e-13  # of the largest eigenvalue: below it there is only rounding
+LOST_DISTANCE = 0.5  # how far a blind direction may go within a standard error, over the size of its numbers
+EIGEN_TOLERANCE = 1e-13  # of the largest eigenvalue: below it there is only rounding
 SMALL = 0.1  # of what the motors push with, that a friction counts as, at least
-LATE = 0.05  # [s] that a latency counts as
-SHARE, VISIBLE = 0.05, 3.0  # of the largest; standard errors: less of both, and a number has no part in a direction
+LATENCY_SIZE = 0.05  # [s] that a latency counts as
+SHARE, VISIBLE_ERRORS = (
+    0.05,
+    3.0,
+)  # of the largest; standard errors: less of both, and a number has no part in a direction
 
 
 @dataclass(frozen=True)
@@ -225,21 +241,21 @@ def blind_ways(problem: Fitted, values: FloatArray, information: FloatArray) -> 
     # What shows where sizes are the numbers themselves shows no less where they are larger; to find these takes time.
     if values.all() and not _lost(information, _own_sizes(problem, values))[1].any():
         return ()
-    size, found = sizes(problem, values), []
+    size, blind_list = sizes(problem, values), []
     scaled, lost, vectors = _lost(information, size)
     for way in _sparse(vectors[:, lost].T):
-        seen = float(way @ scaled @ way)
-        told = (np.abs(way) > SHARE) | (way**2 * np.diag(scaled) > VISIBLE**2)
-        reach = seen**-0.5 if seen > 0.0 else np.inf
-        found.append(Way(reach, np.where(told, way, 0.0) * size, size))
-    return tuple(found)
+        way_information = float(way @ scaled @ way)
+        named_numbers = (np.abs(way) > SHARE) | (way**2 * np.diag(scaled) > VISIBLE_ERRORS**2)
+        reach = way_information**-0.5 if way_information > 0.0 else np.inf
+        blind_list.append(Way(reach, np.where(named_numbers, way, 0.0) * size, size))
+    return tuple(blind_list)
 
 
 def _lost(information: FloatArray, size: FloatArray) -> tuple[FloatArray, BoolArray, FloatArray]:
     """(scaled information (P, P), which of its eigenvectors are blind (P,), these in columns)."""
     scaled = information * np.outer(size, size)
     eigen, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
-    return scaled, eigen < max(LOST**-2.0, SAME * float(eigen.max(initial=0.0))), vectors
+    return scaled, eigen < max(LOST_DISTANCE**-2.0, EIGEN_TOLERANCE * float(eigen.max(initial=0.0))), vectors
 
 
 def sizes(problem: Fitted, values: FloatArray) -> FloatArray:
@@ -265,10 +281,12 @@ def _size(p: Parameter, value: float, push: FloatArray, top: FloatArray) -> floa
     key = find_key(p.name.partition("@")[0])
     if key is not None:
         axis = key.axis or 0
-        least = {COULOMB: push[axis], BREAKAWAY: push[axis], VISCOUS: push[axis] / top[axis]}.get(key.level or "", 0.0)
-        return max(abs(value), SMALL * float(least)) or 1.0
+        limits_by_level = {COULOMB: push[axis], BREAKAWAY: push[axis], VISCOUS: push[axis] / top[axis]}.get(
+            key.level or "", 0.0
+        )
+        return max(abs(value), SMALL * float(limits_by_level)) or 1.0
     if p.part == LATENCY:
-        return LATE
+        return LATENCY_SIZE
     if p.part == DEAD_BAND:
         return max(abs(value), 0.1)
     return max(SMALL * float(push.max()), 1e-9) if p.part in (TILT, PUSH) else 1.0
@@ -286,14 +304,14 @@ def _pushes(problem: Fitted, robot: Robot) -> FloatArray:
 
 def _sparse(basis: FloatArray) -> list[FloatArray]:
     """Directions that span the same, each with as few numbers as may be, its largest entry 1. Shape (K, P)."""
-    rows, done = basis.copy(), []
+    rows, pivot_rows = basis.copy(), []
     for k in range(len(rows)):
-        open_ = np.abs(rows[k:]).copy()
-        open_[:, done] = 0.0
-        at, pivot = np.unravel_index(int(open_.argmax()), open_.shape)
-        rows[[k, k + at]] = rows[[k + at, k]]
+        open_entries = np.abs(rows[k:]).copy()
+        open_entries[:, pivot_rows] = 0.0
+        pivot_row, pivot = np.unravel_index(int(open_entries.argmax()), open_entries.shape)
+        rows[[k, k + pivot_row]] = rows[[k + pivot_row, k]]
         rows[k] /= rows[k, pivot]
-        others = np.arange(len(rows)) != k
-        rows[others] -= np.outer(rows[others, pivot], rows[k])
-        done.append(int(pivot))
+        other_rows = np.arange(len(rows)) != k
+        rows[other_rows] -= np.outer(rows[other_rows, pivot], rows[k])
+        pivot_rows.append(int(pivot))
     return [row / row[int(np.abs(row).argmax())] for row in rows]

@@ -15,10 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 FIRST = (0.94, 0.97, 0.99, 0.997, 1.0, 1.003, 1.01, 1.03, 1.06)  # s to begin with, at q = 1
-LEAST, MOST = 0.005, 0.08  # steps of the logarithm of q
+LEAST_STEP, MOST_STEP = 0.005, 0.08  # steps of the logarithm of q
 ROW = 9  # values of s at each q
-NARROW, WIDER = 0.003, 1.5  # how far they reach at least, and in shares of how far the last likely ones did
-ANEW = 0.02  # steps of q that are so small try twice as many, twice as far, before the ridge ends there
+NARROW_WIDTH, WIDTH_FACTOR = (
+    0.003,
+    1.5,
+)  # how far they reach at least, and in shares of how far the last likely ones did
+RETRY_STEP = 0.02  # steps of q that are so small try twice as many, twice as far, before the ridge ends there
 
 
 class Place(NamedTuple):
@@ -32,11 +35,11 @@ class Walk(NamedTuple):
     """Where likely levels lie between, and the last ones of a direction in which they went out of bounds."""
 
     edges: list[Place]
-    gone: list[Place]
+    lost_places: list[Place]
 
 
-def trade(cost: Callable[[Place], float], limit: float, inside: Callable[[Place], bool]) -> Walk:
-    """Walk the ridge both ways, as long as what is within `limit` of the least cost is `inside`."""
+def trade(cost: Callable[[Place], float], limit: float, is_inside: Callable[[Place], bool]) -> Walk:
+    """Walk the ridge both ways, as long as what is within `limit` of the least cost is `is_inside`."""
     row = dict[float, float]()
 
     def of(s: float) -> float:
@@ -46,7 +49,7 @@ def trade(cost: Callable[[Place], float], limit: float, inside: Callable[[Place]
     likely_levels(of, FIRST, limit)
     start, walk = _Row(1.0, row), Walk([], [])
     for way in (1.0, -1.0):
-        _outwards(cost, limit, inside, start, way, walk)
+        _outwards(cost, limit, is_inside, start, way, walk)
     return walk
 
 
@@ -57,62 +60,62 @@ class _Row:
         self.q, self.s = q, sorted(cost)
         self.cost = [cost[s] for s in self.s]
 
-    def likely(self, most: float) -> tuple[int, int] | None:
+    def likely(self, cost_limit: float) -> tuple[int, int] | None:
         """Index of the first and of the last s that costs no more; None where none does."""
-        found = [k for k, each in enumerate(self.cost) if each <= most]
-        return (found[0], found[-1]) if found else None
+        likely_indices = [k for k, cost in enumerate(self.cost) if cost <= cost_limit]
+        return (likely_indices[0], likely_indices[-1]) if likely_indices else None
 
-    def middle(self, most: float) -> tuple[float, float]:
+    def middle(self, cost_limit: float) -> tuple[float, float]:
         """(the middle of the likely s, how far they reach from it as a share); the best s and 0 where none is."""
-        low, high = self.likely(most) or (int(np.argmin(self.cost)),) * 2
+        low, high = self.likely(cost_limit) or (int(np.argmin(self.cost)),) * 2
         return float(np.sqrt(self.s[low] * self.s[high])), float(np.sqrt(self.s[high] / self.s[low]) - 1.0)
 
 
 def _outwards(
     cost: Callable[[Place], float],
     limit: float,
-    inside: Callable[[Place], bool],
+    is_inside: Callable[[Place], bool],
     start: _Row,
     way: float,
     walk: Walk,
 ) -> None:
-    rows, step, most = [start], LEAST, min(start.cost) + limit
-    beyond: list[Place] = []
-    while step >= LEAST:
+    rows, step, cost_limit = [start], LEAST_STEP, min(start.cost) + limit
+    outer_places: list[Place] = []
+    while step >= LEAST_STEP:
         q = float(rows[-1].q * np.exp(way * step))
-        s, reach = _next(rows, q, most)
+        s, reach = _next(rows, q, cost_limit)
         row = _row(cost, q, s, reach, ROW)
-        most = min(most, min(row.cost) + limit)
-        if row.likely(most) is None and step <= ANEW:
+        cost_limit = min(cost_limit, min(row.cost) + limit)
+        if row.likely(cost_limit) is None and step <= RETRY_STEP:
             row = _row(cost, q, s, 2.0 * reach, 2 * ROW)
-            most = min(most, min(row.cost) + limit)
-        if row.likely(most) is None:
-            beyond, step = [Place(q, row.s[0]), Place(q, row.s[-1])], 0.5 * step
+            cost_limit = min(cost_limit, min(row.cost) + limit)
+        if row.likely(cost_limit) is None:
+            outer_places, step = [Place(q, row.s[0]), Place(q, row.s[-1])], 0.5 * step
             continue
-        beyond, step = [], min(2.0 * step, MOST)
+        outer_places, step = [], min(2.0 * step, MOST_STEP)
         rows.append(row)
-        if not inside(here := Place(q, row.middle(most)[0])):
-            walk.gone.append(here)
+        if not is_inside(place := Place(q, row.middle(cost_limit)[0])):
+            walk.lost_places.append(place)
             break
-    walk.edges.extend(beyond)
+    walk.edges.extend(outer_places)
     for row in rows:
-        for k in row.likely(most) or ():
+        for k in row.likely(cost_limit) or ():
             walk.edges.extend(Place(row.q, row.s[j]) for j in (max(k - 1, 0), min(k + 1, len(row.s) - 1)))
 
 
 def _row(cost: Callable[[Place], float], q: float, s: float, reach: float, count: int) -> _Row:
     grid = (s * (1.0 + reach * np.linspace(-1.0, 1.0, count))).tolist()
-    return _Row(q, {each: cost(Place(q, each)) for each in grid})
+    return _Row(q, {grid_value: cost(Place(q, grid_value)) for grid_value in grid})
 
 
-def _next(rows: list[_Row], q: float, most: float) -> tuple[float, float]:
+def _next(rows: list[_Row], q: float, cost_limit: float) -> tuple[float, float]:
     """(s at the next q, as the ellipse through the first and the last row has it; how far to look from it)."""
-    likely = [row for row in rows if row.likely(most)] or rows[:1]
-    (first, _), (last, wide) = likely[0].middle(most), likely[-1].middle(most)
-    reach = max(NARROW, WIDER * wide)
-    if len(likely) == 1:
-        return first, reach + abs(float(np.log(q / likely[0].q)))
-    sides = np.array([[row.q**-2.0, row.q**2.0] for row in (likely[0], likely[-1])])
+    likely_rows = [row for row in rows if row.likely(cost_limit)] or rows[:1]
+    (first, _), (last, last_width) = likely_rows[0].middle(cost_limit), likely_rows[-1].middle(cost_limit)
+    reach = max(NARROW_WIDTH, WIDTH_FACTOR * last_width)
+    if len(likely_rows) == 1:
+        return first, reach + abs(float(np.log(q / likely_rows[0].q)))
+    sides = np.array([[row.q**-2.0, row.q**2.0] for row in (likely_rows[0], likely_rows[-1])])
     a, b = np.linalg.solve(sides, [first**2, last**2])
     square = a / q**2 + b * q**2
     return (float(np.sqrt(square)) if square > 0.0 else last), reach
@@ -123,9 +126,12 @@ def _next(rows: list[_Row], q: float, most: float) -> tuple[float, float]:
 # Each level costs a fit, so none is tried twice: first a grid, until it gets hopeless; then between the best and its
 # neighbours; then where likely ends, either way. What is returned as an end is a level that was found unlikely.
 
-HOPELESS, IN_A_ROW = 50.0, 4  # beyond the least cost, times the limit, that so many levels of a grid in a row are
+HOPELESS_COST, HOPELESS_LEVELS = (
+    50.0,
+    4,
+)  # beyond the least cost, times the limit, that so many levels of a grid in a row are
 ROUNDS = 3  # in which the gaps beside the best level are halved
-FINEST = 0.005  # relative width of the gap in which likely ends, at which it is found
+GAP_WIDTH = 0.005  # relative width of the gap in which likely ends, at which it is found
 HALVINGS = 12  # times that gaps are halved, of up to four levels each
 
 
@@ -135,26 +141,31 @@ def likely_levels(cost: Callable[[float], float], grid: Sequence[float], limit: 
     grid: levels > 0 to begin with, increasing. low: its first level where that is likely; high: infinite where its
     last one is.
     """
-    known: dict[float, float] = {}
+    cost_by_level: dict[float, float] = {}
     for level in grid:
-        known[level] = cost(level)
-        beyond = list(known.values())[-IN_A_ROW:]
-        if len(beyond) == IN_A_ROW and min(beyond) > min(known.values()) + HOPELESS * limit:
+        cost_by_level[level] = cost(level)
+        last_costs = list(cost_by_level.values())[-HOPELESS_LEVELS:]
+        if len(last_costs) == HOPELESS_LEVELS and min(last_costs) > min(cost_by_level.values()) + HOPELESS_COST * limit:
             break
     for k in range(HALVINGS):
-        best, likely = _likely(known, limit)
-        gaps = [(a, b) for a, b in pairwise(sorted(known)) if b / a > 1.0 + FINEST]
-        wide = [(a, b) for a, b in gaps if a == likely[-1] or b == likely[0] or (best in (a, b) and k < ROUNDS)]
-        if not wide:
+        best, likely_range = _likely(cost_by_level, limit)
+        gaps = [(a, b) for a, b in pairwise(sorted(cost_by_level)) if b / a > 1.0 + GAP_WIDTH]
+        wide_gaps = [
+            (a, b) for a, b in gaps if a == likely_range[-1] or b == likely_range[0] or (best in (a, b) and k < ROUNDS)
+        ]
+        if not wide_gaps:
             break
-        for a, b in wide:
-            known[middle] = cost(middle := float(np.sqrt(a * b)))
-    best, likely = _likely(known, limit)
-    below, above = ([x for x in known if x < likely[0]], [x for x in known if x > likely[-1]])
-    return best, max(below, default=likely[0]), min(above, default=np.inf)
+        for a, b in wide_gaps:
+            cost_by_level[middle] = cost(middle := float(np.sqrt(a * b)))
+    best, likely_range = _likely(cost_by_level, limit)
+    lower_levels, upper_levels = (
+        [x for x in cost_by_level if x < likely_range[0]],
+        [x for x in cost_by_level if x > likely_range[-1]],
+    )
+    return best, max(lower_levels, default=likely_range[0]), min(upper_levels, default=np.inf)
 
 
-def _likely(known: dict[float, float], limit: float) -> tuple[float, list[float]]:
+def _likely(cost_by_level: dict[float, float], limit: float) -> tuple[float, list[float]]:
     """(the level of the least cost, those within `limit` of it)."""
-    best = min(known, key=lambda level: known[level])
-    return best, sorted(level for level in known if known[level] <= known[best] + limit)
+    best = min(cost_by_level, key=lambda level: cost_by_level[level])
+    return best, sorted(level for level in cost_by_level if cost_by_level[level] <= cost_by_level[best] + limit)

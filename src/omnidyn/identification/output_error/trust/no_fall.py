@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from omnidyn.identification.output_error.engines.implicit import ImplicitEngine
-from omnidyn.identification.output_error.problem.friction_laws import APART, speed_of
+from omnidyn.identification.output_error.problem.friction_laws import LEVEL_RATIO, speed_of
 from omnidyn.identification.output_error.problem.problem import Point
 from omnidyn.identification.output_error.solve.solver import Solution, Solver
 from omnidyn.identification.output_error.solve.steps import Order
@@ -22,56 +22,59 @@ from omnidyn.identification.output_error.trust.support import at_the_end
 from omnidyn.identification.output_error.trust.uncertainty import RISE, Trust
 from omnidyn.statement import WARNING, Statement
 
-AT_ONCE = 0.3  # of the least speed that is looked for: a fall that hardly shows
+SUDDEN_SHARE = 0.3  # of the least speed that is looked for: a fall that hardly shows
 STEP, HALVINGS = (
     0.05,
     3,
 )  # relative, of the first step outward, each twice as long as the one before; then halvings of the last
-REFIT, NEAR, TOL = 3, 0.1, 1e-3  # iterations at each level; squared standard errors to its best point; [m/s]
+REFIT, NEAR_PRECISION, TOL = 3, 0.1, 1e-3  # iterations at each level; squared standard errors to its best point; [m/s]
 
 Intervals = dict[str, tuple[float | None, tuple[float, float]]]
 
 
-def without_a_fall(solution: Solution, known: Trust) -> tuple[Trust, Intervals, list[Statement]]:
+def without_a_fall(solution: Solution, uncertainty: Trust) -> tuple[Trust, Intervals, list[Statement]]:
     """(the trust without Stribeck speeds of falls that are not seen; breakaway there -> (std, 95 % interval); notes).
 
     Costs a fit by the implicit engine where there is such a number, else nothing.
     """
-    problem, values, found = solution.solver.problem, solution.state.point.values, Intervals()
+    problem, values, level_intervals = solution.solver.problem, solution.state.point.values, Intervals()
     warnings = list[Statement]()
-    for s, c, v in _not_seen(solution, known):
-        known = _without(known, v)
-        steep = 1.0 if known.blind[c] else known.rise(np.eye(len(known.std))[c]) / RISE
-        low, high = _likely(solution, s, v, float(values[c]), LIMIT * steep)
-        low = max(min(low, float(values[c] - known.quantile * known.std[c])), 0.0)
-        found[problem.names[s]] = None if high == np.inf else (high - low) / (2.0 * known.quantile), (low, high)
+    for s, c, v in _not_seen(solution, uncertainty):
+        uncertainty = _without(uncertainty, v)
+        steepness = 1.0 if uncertainty.blind_parameters[c] else uncertainty.rise(np.eye(len(uncertainty.std))[c]) / RISE
+        low, high = _likely(solution, s, v, float(values[c]), LIMIT * steepness)
+        low = max(min(low, float(values[c] - uncertainty.quantile * uncertainty.std[c])), 0.0)
+        level_intervals[problem.names[s]] = (
+            None if high == np.inf else (high - low) / (2.0 * uncertainty.quantile),
+            (low, high),
+        )
         numbers = {"speed": problem.names[v], "high": high if high < np.inf else None}
         warnings.append(Statement("no_fall", WARNING, problem.names[s], numbers))
-    return known, found, warnings
+    return uncertainty, level_intervals, warnings
 
 
-def _not_seen(solution: Solution, known: Trust) -> list[tuple[int, int, int]]:
+def _not_seen(solution: Solution, uncertainty: Trust) -> list[tuple[int, int, int]]:
     """Indices of (breakaway, Coulomb friction, Stribeck speed), all free, between which no fall is seen."""
     problem, values = solution.solver.problem, solution.state.point.values
     if solution.solver.engine.exact:
         return []
-    ended, found = {p.name for p in at_the_end(problem, values)}, []
+    names_at_bound, triples = {p.name for p in at_the_end(problem, values)}, []
     for s, c in Order(problem).pairs:
         name = speed_of(problem.names[s], problem.names)
         if not name:
             continue
         v, way = problem.where(name), np.zeros(len(values))
         way[[s, c]] = 1.0, -1.0
-        spread = np.sqrt(way @ np.where(np.isfinite(known.covariance), known.covariance, 0.0) @ way)
-        if known.open[v] or name in ended or way @ values <= known.quantile * spread:
-            found.append((s, c, v))
-    return found
+        spread = np.sqrt(way @ np.where(np.isfinite(uncertainty.covariance), uncertainty.covariance, 0.0) @ way)
+        if uncertainty.open[v] or name in names_at_bound or way @ values <= uncertainty.quantile * spread:
+            triples.append((s, c, v))
+    return triples
 
 
-def _without(known: Trust, index: int) -> Trust:
-    blind, covariance = known.blind.copy(), known.covariance.copy()
-    blind[index], covariance[index, index] = True, np.inf
-    return replace(known, blind=blind, covariance=covariance)
+def _without(uncertainty: Trust, index: int) -> Trust:
+    blind_mask, covariance = uncertainty.blind_parameters.copy(), uncertainty.covariance.copy()
+    blind_mask[index], covariance[index, index] = True, np.inf
+    return replace(uncertainty, blind_parameters=blind_mask, covariance=covariance)
 
 
 def _likely(solution: Solution, s: int, v: int, coulomb: float, limit: float) -> tuple[float, float]:
@@ -79,27 +82,29 @@ def _likely(solution: Solution, s: int, v: int, coulomb: float, limit: float) ->
     point, problem = solution.state.point, solution.solver.problem
 
     def cost(level: float) -> float:
-        values, every = point.values.copy(), list(problem.parameters)
-        for k, value in ((s, level), (v, AT_ONCE * every[v].low)):
-            values[k], every[k] = value, replace(every[k], value=value, low=value, high=value)
-        held = replace(problem, parameters=tuple(every))
-        solver = Solver(held, ImplicitEngine(held, TOL), solution.solver.nu, NEAR)
+        values, parameters = point.values.copy(), list(problem.parameters)
+        for k, value in ((s, level), (v, SUDDEN_SHARE * parameters[v].low)):
+            values[k], parameters[k] = value, replace(parameters[k], value=value, low=value, high=value)
+        held_problem = replace(problem, parameters=tuple(parameters))
+        solver = Solver(held_problem, ImplicitEngine(held_problem, TOL), solution.solver.nu, NEAR_PRECISION)
         return solver.minimise(Point(values, point.states), REFIT).state.objective
 
-    tried = {level: cost(level) for level in (APART * coulomb, max(APART * coulomb, float(point.values[s])))}
-    best, most = min(tried, key=lambda level: tried[level]), min(tried.values()) + limit
+    cost_by_level = {
+        level: cost(level) for level in (LEVEL_RATIO * coulomb, max(LEVEL_RATIO * coulomb, float(point.values[s])))
+    }
+    best, cost_limit = min(cost_by_level, key=lambda level: cost_by_level[level]), min(cost_by_level.values()) + limit
 
     def end(way: int, last: float) -> float:
         """Where likely levels end, upward (1) or downward (-1), looked for no further than `last`."""
-        inside, share = best, way * STEP
-        while cost(outside := way * min(way * best * (1.0 + share), way * last)) <= most:
-            if outside == last:
+        inner_level, share = best, way * STEP
+        while cost(outer_level := way * min(way * best * (1.0 + share), way * last)) <= cost_limit:
+            if outer_level == last:
                 return np.inf if way > 0 else last
-            inside, share = outside, 2.0 * share
+            inner_level, share = outer_level, 2.0 * share
         for _ in range(HALVINGS):
-            middle = 0.5 * (inside + outside)
-            inside, outside = (middle, outside) if cost(middle) <= most else (inside, middle)
-        return outside
+            middle = 0.5 * (inner_level + outer_level)
+            inner_level, outer_level = (middle, outer_level) if cost(middle) <= cost_limit else (inner_level, middle)
+        return outer_level
 
-    low = coulomb if tried[APART * coulomb] <= most else end(-1, APART * coulomb)
+    low = coulomb if cost_by_level[LEVEL_RATIO * coulomb] <= cost_limit else end(-1, LEVEL_RATIO * coulomb)
     return low, end(1, HIGHEST * coulomb)

@@ -19,7 +19,7 @@ from omnidyn.identification.output_error.trust.uncertainty import Trust
 from omnidyn.identification.steady.study_table import Difference
 from omnidyn.statistics import central_interval, t_quantile
 
-OUTWARD, HALVINGS = 12, 12  # steps of 1.5 standard errors out, then halvings
+OUTWARD_STEPS, HALVINGS = 12, 12  # steps of 1.5 standard errors out, then halvings
 LEAST_RUNS, LEAST_DRAWS = 5, 20
 SEED = 20120101
 
@@ -41,7 +41,7 @@ class Resampled:
 def resampled(
     solver: Solver,
     solution: Solution,
-    known: Trust,
+    uncertainty: Trust,
     profile: Sequence[str] = (),
     draws: int = 0,
     strata: Strata | None = None,
@@ -56,46 +56,46 @@ def resampled(
     unknown = [name for name in profile if name not in names]
     if unknown:
         raise InputError("not a free number", got=unknown[0], expected=", ".join(names), where="profile")
-    found: dict[str, tuple[float | None, tuple[float, float]]] = {}
-    drawn, widening = None, 1.0
+    interval_by_name: dict[str, tuple[float | None, tuple[float, float]]] = {}
+    bootstrap_draws, widening = None, 1.0
     if draws:
-        drawn = bootstrap(solver, solution, draws, strata=strata, progress=progress)
+        bootstrap_draws = bootstrap(solver, solution, draws, strata=strata, progress=progress)
         widening = small_sample(least_runs(solver, strata))
         for j, p in enumerate(solver.problem.parameters):
-            if known.blind[j]:
+            if uncertainty.blind_parameters[j]:
                 continue
-            inner = np.array([p.inner(float(v)) for v in drawn[:, j]])
-            low, high = draw_interval(p.inner(float(values[j])), inner, widening)
+            inner_draws = np.array([p.inner(float(v)) for v in bootstrap_draws[:, j]])
+            low, high = draw_interval(p.inner(float(values[j])), inner_draws, widening)
             low = max(low, p.inner(p.low)) if not p.log else low
-            spread = widening_of_std(least_runs(solver, strata)) * float(drawn[:, j].std(ddof=1))
-            found[p.name] = (spread, (p.outer(low), p.outer(high)))
+            spread = widening_of_std(least_runs(solver, strata)) * float(bootstrap_draws[:, j].std(ddof=1))
+            interval_by_name[p.name] = (spread, (p.outer(low), p.outer(high)))
     for name in profile:
-        if not known.blind[j := names.index(name)]:
+        if not uncertainty.blind_parameters[j := names.index(name)]:
             (progress or FitProgress()).enter(f"the profile of {name}")
-            found[name] = (None, profile_interval(solver, solution, known, j))
-    return Resampled(found, drawn, widening)
+            interval_by_name[name] = (None, profile_interval(solver, solution, uncertainty, j))
+    return Resampled(interval_by_name, bootstrap_draws, widening)
 
 
-def beside(again: Resampled, solution: Solution, alone: Trust, known: Trust) -> Resampled:
+def beside(resampled_fit: Resampled, solution: Solution, uncertainty_alone: Trust, uncertainty: Trust) -> Resampled:
     """The same intervals beside what moves the numbers and no likelihood, and no draw of the logs, sees: what the robot
     file knows only so far, what inputs were rounded by. Each end is as much farther away as adds up in squares.
 
-    alone, known: the trust without that, and with it.
+    uncertainty_alone, uncertainty: the trust without that, and with it.
     """
-    problem, found = solution.solver.problem, dict(again.intervals)
-    for name, (spread, ends) in again.intervals.items():
+    problem, interval_by_name = solution.solver.problem, dict(resampled_fit.intervals)
+    for name, (spread, ends) in resampled_fit.intervals.items():
         j = problem.names.index(name)
         p, value = problem.parameters[j], float(solution.state.point.values[j])
-        more = max(float(known.covariance[j, j] - alone.covariance[j, j]), 0.0)
-        if not 0.0 < more < np.inf:
+        extra_variance = max(float(uncertainty.covariance[j, j] - uncertainty_alone.covariance[j, j]), 0.0)
+        if not 0.0 < extra_variance < np.inf:
             continue
         middle = p.inner(value)
         low, high = (p.inner(end) if end > 0.0 or not p.log else -np.inf for end in ends)
-        low = middle - float(np.hypot(middle - low, known.quantile * more**0.5))
-        high = middle + float(np.hypot(high - middle, known.quantile * more**0.5))
-        wider = None if spread is None else float(np.hypot(spread, more**0.5 * p.slope(value)))
-        found[name] = wider, (p.outer(low if p.log else max(low, p.low)), p.outer(high))
-    return replace(again, intervals=found)
+        low = middle - float(np.hypot(middle - low, uncertainty.quantile * extra_variance**0.5))
+        high = middle + float(np.hypot(high - middle, uncertainty.quantile * extra_variance**0.5))
+        wider_std = None if spread is None else float(np.hypot(spread, extra_variance**0.5 * p.slope(value)))
+        interval_by_name[name] = wider_std, (p.outer(low if p.log else max(low, p.low)), p.outer(high))
+    return replace(resampled_fit, intervals=interval_by_name)
 
 
 def draw_interval(value: float, draws: FloatArray, widening: float) -> tuple[float, float]:
@@ -118,20 +118,20 @@ def small_sample(runs: int) -> float:
     return widening_of_std(runs) * (t_quantile(runs - 1.0) / t_quantile(np.inf))
 
 
-def profile_interval(solver: Solver, solution: Solution, known: Trust, index: int) -> tuple[float, float]:
+def profile_interval(solver: Solver, solution: Solution, uncertainty: Trust, index: int) -> tuple[float, float]:
     """95 % interval of one parameter by the profile of the likelihood, all others fitted anew at each value.
 
     2 (F - least F) is 3.84 at its ends, and more where residuals are not white (`Trust.rise`); an end at a bound is
     that bound.
     """
-    std, limit = float(known.std[index]), known.rise(np.eye(len(known.std))[index])
-    own = solver.problem.parameters[index]
-    best = own.inner(float(solution.state.point.values[index]))
+    std, limit = float(uncertainty.std[index]), uncertainty.rise(np.eye(len(uncertainty.std))[index])
+    parameter = solver.problem.parameters[index]
+    best = parameter.inner(float(solution.state.point.values[index]))
     low, high = (
         _end(solver, solution, index, best, way * (std if std > 0.0 else abs(best) or 1.0), limit)
         for way in (-1.0, 1.0)
     )
-    return own.outer(low), own.outer(high)
+    return parameter.outer(low), parameter.outer(high)
 
 
 def difference_interval(
@@ -147,8 +147,8 @@ def difference_interval(
 
     def rise(change: float, point: Point) -> tuple[float, Point]:
         engine = TiedEngine(solver.engine, first, second, change)
-        found = Solver(engine.problem, engine, solver.nu, counted=solver.counted).minimise(point)
-        return 2.0 * (found.state.objective - solution.state.objective), found.state.point
+        tied_solution = Solver(engine.problem, engine, solver.nu, counts_ticks=solver.counted).minimise(point)
+        return 2.0 * (tied_solution.state.objective - solution.state.objective), tied_solution.state.point
 
     best, point = float(values[second] - values[first]), Point(np.delete(values, second), states)
     low, high = (_crossing(rise, best, way * std, way * np.inf, point, limit) for way in (-1.0, 1.0))
@@ -156,12 +156,14 @@ def difference_interval(
 
 
 def _end(solver: Solver, solution: Solution, index: int, best: float, step: float, limit: float) -> float:
-    own = solver.problem.parameters[index]
+    parameter = solver.problem.parameters[index]
 
-    def rise(inner: float, point: Point) -> tuple[float, Point]:
-        return _rise(solver, solution, index, inner, point)
+    def rise(inner_value: float, point: Point) -> tuple[float, Point]:
+        return _rise(solver, solution, index, inner_value, point)
 
-    return _crossing(rise, best, step, own.inner(own.low if step < 0.0 else own.high), solution.state.point, limit)
+    return _crossing(
+        rise, best, step, parameter.inner(parameter.low if step < 0.0 else parameter.high), solution.state.point, limit
+    )
 
 
 def _crossing(
@@ -173,33 +175,33 @@ def _crossing(
     limit: float,
 ) -> float:
     """Where 2 (F - least F) passes `limit` on the way from `best` by steps of 1.5 `step`, or the bound before it."""
-    inside, outside = best, best
-    for _ in range(OUTWARD):
-        outside = min(outside + 1.5 * step, bound) if step > 0.0 else max(outside + 1.5 * step, bound)
-        up, point = rise(outside, point)
-        if up > limit:
+    inner_value, outer_value = best, best
+    for _ in range(OUTWARD_STEPS):
+        outer_value = min(outer_value + 1.5 * step, bound) if step > 0.0 else max(outer_value + 1.5 * step, bound)
+        rise_here, point = rise(outer_value, point)
+        if rise_here > limit:
             break
-        inside = outside
-        if outside == bound:
+        inner_value = outer_value
+        if outer_value == bound:
             return bound
     for _ in range(HALVINGS):
-        middle = 0.5 * (inside + outside)
-        up, point = rise(middle, point)
-        inside, outside = (middle, outside) if up <= limit else (inside, middle)
-    return 0.5 * (inside + outside)
+        middle = 0.5 * (inner_value + outer_value)
+        rise_here, point = rise(middle, point)
+        inner_value, outer_value = (middle, outer_value) if rise_here <= limit else (inner_value, middle)
+    return 0.5 * (inner_value + outer_value)
 
 
-def _rise(solver: Solver, solution: Solution, index: int, inner: float, point: Point) -> tuple[float, Point]:
+def _rise(solver: Solver, solution: Solution, index: int, inner_value: float, point: Point) -> tuple[float, Point]:
     """2 (F - least F) with one parameter held at a value, and the point there."""
     parameters = list(solver.problem.parameters)
-    value = parameters[index].outer(inner)
+    value = parameters[index].outer(inner_value)
     parameters[index] = replace(parameters[index], value=value, low=value, high=value)
     values = point.values.copy()
     values[index] = value
     problem = replace(solver.problem, parameters=tuple(parameters))
-    held = Solver(problem, solver.engine, solver.nu, counted=solver.counted)
-    found = held.minimise(Point(values, point.states))
-    return 2.0 * (found.state.objective - solution.state.objective), found.state.point
+    held_solver = Solver(problem, solver.engine, solver.nu, counts_ticks=solver.counted)
+    solution_there = held_solver.minimise(Point(values, point.states))
+    return 2.0 * (solution_there.state.objective - solution.state.objective), solution_there.state.point
 
 
 def bootstrap(
@@ -218,16 +220,16 @@ def bootstrap(
     pieces, states = solver.problem.pieces, solution.state.point.states
     of_group = runs_by_group(solver, strata)
     refuse_few_runs({group: len(runs) for group, runs in of_group.items()})
-    rng, found = np.random.default_rng(seed), []
+    rng, draw_values = np.random.default_rng(seed), []
     for draw in range(draws):
         (progress or FitProgress()).enter(f"drawing the runs anew, {draw + 1} of {draws}")
-        drawn = [runs[k] for runs in of_group.values() for k in rng.integers(len(runs), size=len(runs))]
-        chosen = [k for run in drawn for k, piece in enumerate(pieces) if id(piece.record) == run]
-        problem = replace(solver.problem, pieces=tuple(pieces[k] for k in chosen))
-        again = Solver(problem, solver.engine.on(problem), solver.nu, counted=solver.counted)
-        point = Point(solution.state.point.values, tuple(states[k] for k in chosen))
-        found.append(again.minimise(point).state.point.values)
-    return np.array(found)
+        drawn_runs = [runs[k] for runs in of_group.values() for k in rng.integers(len(runs), size=len(runs))]
+        chosen_pieces = [k for run in drawn_runs for k, piece in enumerate(pieces) if id(piece.record) == run]
+        problem = replace(solver.problem, pieces=tuple(pieces[k] for k in chosen_pieces))
+        draw_solver = Solver(problem, solver.engine.on(problem), solver.nu, counts_ticks=solver.counted)
+        point = Point(solution.state.point.values, tuple(states[k] for k in chosen_pieces))
+        draw_values.append(draw_solver.minimise(point).state.point.values)
+    return np.array(draw_values)
 
 
 def refuse_few_runs(runs: Mapping[str, int]) -> None:
@@ -262,10 +264,10 @@ def least_runs(solver: Solver, strata: Strata | None = None) -> int:
 
 def runs_by_group(solver: Solver, strata: Strata | None) -> dict[str, list[int]]:
     """Group -> its runs, each by the id of its record; without groups all are in one."""
-    found: dict[str, list[int]] = {}
+    runs_of_group: dict[str, list[int]] = {}
     for run in dict.fromkeys(id(piece.record) for piece in solver.problem.pieces):
-        found.setdefault(strata[run] if strata else "", []).append(run)
-    return found
+        runs_of_group.setdefault(strata[run] if strata else "", []).append(run)
+    return runs_of_group
 
 
 # A problem in which one number is another one plus a given change: for the profile of a difference
@@ -276,23 +278,27 @@ class TiedEngine(Engine[Problem]):
 
     def __init__(self, engine: Engine, first: int, second: int, change: float):
         self._engine, self._first, self._second, self._change = engine, first, second, change
-        whole, own = engine.problem, list(engine.problem.parameters)
-        one, other = own[first], own[second]
-        own[first] = replace(one, low=max(one.low, other.low - change), high=min(one.high, other.high - change))
-        del own[second]
-        count = whole.robot_count - (second < whole.robot_count)
-        self.problem: Problem = replace(whole, parameters=tuple(own), robot_count=count)
+        full_problem, parameters = engine.problem, list(engine.problem.parameters)
+        first_parameter, second_parameter = parameters[first], parameters[second]
+        parameters[first] = replace(
+            first_parameter,
+            low=max(first_parameter.low, second_parameter.low - change),
+            high=min(first_parameter.high, second_parameter.high - change),
+        )
+        del parameters[second]
+        count = full_problem.robot_count - (second < full_problem.robot_count)
+        self.problem: Problem = replace(full_problem, parameters=tuple(parameters), robot_count=count)
 
     def on(self, problem: Problem) -> TiedEngine:
         """The same engine on other pieces of the same logs."""
-        whole = replace(self._engine.problem, pieces=problem.pieces)
-        return TiedEngine(self._engine.on(whole), self._first, self._second, self._change)
+        full_problem = replace(self._engine.problem, pieces=problem.pieces)
+        return TiedEngine(self._engine.on(full_problem), self._first, self._second, self._change)
 
     def sums(self, point: Point, weighting: Weighting) -> list[PieceSums]:
         """The sums of the whole problem; what slopes by `second` is added to what slopes by `first`."""
-        left = np.delete(np.arange(len(point.values) + 1), self._second)
+        kept_indices = np.delete(np.arange(len(point.values) + 1), self._second)
         values = np.empty(len(point.values) + 1)
-        values[left] = point.values
+        values[kept_indices] = point.values
         values[self._second] = values[self._first] + self._change
         return [self._folded(sums) for sums in self._engine.sums(Point(values, point.states), weighting)]
 
@@ -301,9 +307,9 @@ class TiedEngine(Engine[Problem]):
         return replace(sums, grad=grad, score=score, info=self._along(self._along(sums.info, 1), 2), waves=None)
 
     def _along(self, values: FloatArray, axis: int) -> FloatArray:
-        moved = np.moveaxis(values, axis, 0).copy()
-        moved[self._first] += moved[self._second]
-        return np.moveaxis(np.delete(moved, self._second, axis=0), 0, axis)
+        moved_values = np.moveaxis(values, axis, 0).copy()
+        moved_values[self._first] += moved_values[self._second]
+        return np.moveaxis(np.delete(moved_values, self._second, axis=0), 0, axis)
 
 
 # What differs between groups that were fitted together: second minus first, with an interval of its own
@@ -311,50 +317,50 @@ class TiedEngine(Engine[Problem]):
 
 def differences(
     solution: Solution,
-    known: Trust,
-    again: Resampled,
-    own: Iterable[str],
+    uncertainty: Trust,
+    resampled_fit: Resampled,
+    own_keys: Iterable[str],
     groups: Sequence[str],
     profile: Sequence[str],
     strata: Strata,
 ) -> tuple[Difference, ...]:
-    """Every number of `own` between every two groups that have it and determine it.
+    """Every number of `own_keys` between every two groups that have it and determine it.
 
     Its interval is by profile where that is asked for, from draws of a bootstrap where there are any, else to first
     order in the covariance.
     """
     names = solution.solver.problem.names
-    found = []
-    for key in own:
-        there = [group for group in groups if f"{key}{AT}{group}" in names]
-        for first, second in combinations(there, 2):
+    group_differences = []
+    for key in own_keys:
+        groups_with_key = [group for group in groups if f"{key}{AT}{group}" in names]
+        for first, second in combinations(groups_with_key, 2):
             a, b = names.index(f"{key}{AT}{first}"), names.index(f"{key}{AT}{second}")
-            if known.blind[a] or known.blind[b]:
+            if uncertainty.blind_parameters[a] or uncertainty.blind_parameters[b]:
                 continue
             pair = float(solution.state.point.values[a]), float(solution.state.point.values[b])
-            std, low, high = _interval(solution, known, again, a, b, strata, key in profile)
-            found.append(Difference(key, first, second, pair, pair[1] - pair[0], std, low, high))
-    return tuple(found)
+            std, low, high = _interval(solution, uncertainty, resampled_fit, a, b, strata, key in profile)
+            group_differences.append(Difference(key, first, second, pair, pair[1] - pair[0], std, low, high))
+    return tuple(group_differences)
 
 
 def _interval(
-    solution: Solution, known: Trust, again: Resampled, a: int, b: int, strata: Strata, profiled: bool
+    solution: Solution, uncertainty: Trust, resampled_fit: Resampled, a: int, b: int, strata: Strata, profiled: bool
 ) -> tuple[float, float, float]:
     """(std, low, high) of number b minus number a."""
     solver, values = solution.solver, solution.state.point.values
     change = float(values[b] - values[a])
-    along = np.zeros(len(values))  # the change of the numbers that the solver sees, to first order
-    along[a], along[b] = (
+    direction = np.zeros(len(values))  # the change of the numbers that the solver sees, to first order
+    direction[a], direction[b] = (
         side * solver.problem.parameters[k].slope(float(values[k])) for side, k in ((-1.0, a), (1.0, b))
     )
-    if again.draws is not None:
-        drawn = again.draws[:, b] - again.draws[:, a]
-        std = widening_of_std(least_runs(solver, strata)) * float(drawn.std(ddof=1))
-        low, high = draw_interval(change, drawn, again.widening)
+    if resampled_fit.draws is not None:
+        difference_draws = resampled_fit.draws[:, b] - resampled_fit.draws[:, a]
+        std = widening_of_std(least_runs(solver, strata)) * float(difference_draws.std(ddof=1))
+        low, high = draw_interval(change, difference_draws, resampled_fit.widening)
     else:
-        covariance = np.where(np.isfinite(known.covariance), known.covariance, 0.0)
-        std = float(np.sqrt(max(along @ covariance @ along, 0.0)))
-        low, high = change - known.quantile * std, change + known.quantile * std
+        covariance = np.where(np.isfinite(uncertainty.covariance), uncertainty.covariance, 0.0)
+        std = float(np.sqrt(max(direction @ covariance @ direction, 0.0)))
+        low, high = change - uncertainty.quantile * std, change + uncertainty.quantile * std
     if profiled and std > 0.0:
-        low, high = difference_interval(solver, solution, a, b, std, known.rise(along)) or (low, high)
+        low, high = difference_interval(solver, solution, a, b, std, uncertainty.rise(direction)) or (low, high)
     return std, low, high

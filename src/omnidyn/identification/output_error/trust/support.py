@@ -25,28 +25,28 @@ def supported(solver: Solver, solution: Solution, names: tuple[str, ...]) -> tup
     normal = Normal(solver, solution.state)
     variance = np.diag(np.linalg.pinv(normal.information, hermitian=True))
     std = np.sqrt(np.where(variance >= 0.0, variance, np.inf))  # rounding, where the model does not follow at all
-    blind = np.diag(normal.information) <= 0.0
+    blind_mask = np.diag(normal.information) <= 0.0
     largest = max(float(np.nanmax(np.abs(piece.record.voltage))) for piece in solver.problem.pieces)
     limits = {LATENCY: LATENCY_STD, DEAD_BAND: DEAD_SHARE * largest, GAIN: np.inf}
-    early, kept = too_early(solver, solution), []
+    early, kept_names = too_early(solver, solution), []
     for j, parameter in enumerate(solver.problem.parameters):
         kind = parameter.part
-        if kind in names and not blind[j] and std[j] <= limits[kind] and parameter.name not in early:
-            kept.append(parameter.name)
-    return tuple(kept)
+        if kind in names and not blind_mask[j] and std[j] <= limits[kind] and parameter.name not in early:
+            kept_names.append(parameter.name)
+    return tuple(kept_names)
 
 
 def too_early(solver: Solver, solution: Solution) -> dict[str, float]:
     """Latencies at or before the earliest that is plausible, by their names [s]."""
     pairs = zip(solver.problem.parameters, solution.state.point.values.tolist(), strict=True)
-    late = {p.name: value for p, value in pairs if p.part == LATENCY}
-    limit = earliest([piece.record for piece in solver.problem.pieces]) if late else 0.0
-    return {name: value for name, value in late.items() if value <= limit}
+    latency_by_name = {p.name: value for p, value in pairs if p.part == LATENCY}
+    limit = earliest([piece.record for piece in solver.problem.pieces]) if latency_by_name else 0.0
+    return {name: value for name, value in latency_by_name.items() if value <= limit}
 
 
 # Numbers that ended where their search ends: they are no estimates
 
-NEAR = 0.01  # of the range: a descent that is on its way out is stopped by the last rows that it would lose
+BOUND_SHARE = 0.01  # of the range: a descent that is on its way out is stopped by the last rows that it would lose
 
 
 def at_the_end(problem: Fitted, values: FloatArray) -> Iterator[Parameter]:
@@ -58,5 +58,5 @@ def at_the_end(problem: Fitted, values: FloatArray) -> Iterator[Parameter]:
         low, high = (p.inner(p.low), p.inner(p.high)) if p.log else (p.low, p.high)
         share = (p.inner(value) - low) / (high - low) if high > low else 0.5
         lossless = p.name.startswith(EFFICIENCY)
-        if (share >= 1.0 - NEAR and not lossless) or (share <= NEAR and (p.log or p.low < 0.0)):
+        if (share >= 1.0 - BOUND_SHARE and not lossless) or (share <= BOUND_SHARE and (p.log or p.low < 0.0)):
             yield p

@@ -34,20 +34,20 @@ from omnidyn.statistics import t_quantile
 
 BLOCKS, LEAST_BLOCK = 100, 8  # blocks in all; rows of one, at least
 MANY_RUNS = 20  # from so many on each run is a block
-COLOURED = 4.0  # standard errors of a correlation of neighbours, and of a variance ratio
-BLIND = 1e-9  # eigenvalue of the information, its diagonal scaled to 1, below which a direction is not seen
-UNTOLD = 3.0  # std of a logarithm beyond which a number is not told: 95 % of it lie between 1/360 and 360 times
-WEAK = 1e-4  # below it, is hardly seen
+COLOUR_ERRORS = 4.0  # standard errors of a correlation of neighbours, and of a variance ratio
+BLIND_EIGENVALUE = 1e-9  # eigenvalue of the information, its diagonal scaled to 1, below which a direction is not seen
+LOST_STD = 3.0  # std of a logarithm beyond which a number is not told: 95 % of it lie between 1/360 and 360 times
+WEAK_EIGENVALUE = 1e-4  # below it, is hardly seen
 SHARE = 0.05  # of a blind direction that a parameter must have to be named
-WIDER = 1.05  # times as wide, below which it is not worth a word
+WIDENING_RATIO = 1.05  # times as wide, below which it is not worth a word
 WHITE, SANDWICH, AUTOREGRESSIVE = "white", "sandwich", "autoregressive"
 # Std over that of the prior from which on the logs say too little of a number. Of two guesses of which only the product
 # shows each keeps 0.71 of its own, of three 0.82, however long the log.
-TOLD = 0.5
+PRIOR_SHARE = 0.5
 # The same where more than half of the variance is what priors, of any number, leave open: the logs must then have said
 # most of it. Viscous friction beside the back-EMF of motors that are guesses keeps 0.3 to 0.7; Coulomb friction beside
 # rotors that may weigh 0.1 of the robot keeps 0.08 to 0.15, which its interval tells.
-TOLD_BY_OTHERS, MOST = 0.25, 0.5
+OTHERS_SHARE, MOST_SHARE = 0.25, 0.5
 PRECISION = 1e-14  # of the largest eigenvalue of a matrix whose diagonal is 1: below it there is only rounding
 RISE = float(chdtri(1, 0.05))  # of 2 F at the ends of a 95 % interval: 3.84
 
@@ -56,20 +56,21 @@ RISE = float(chdtri(1, 0.05))  # of 2 F at the ends of a 95 % interval: 3.84
 class Trust:
     """Covariance of the parameters in the numbers that the solver sees, and what is behind it.
 
-    covariance (P, P): infinite variances where the data are blind. held: at a bound. blind: not determined by the data,
-    alone or only together with others, and no prior holds it; unseen: not even together, prior or none. guessed: what a
-    prior holds more than the data do, see TOLD; its covariance is the posterior's. free_step (P,): from a bound to
-    where the fit would go without it. kind: white, sandwich or autoregressive (memory/whitening.py). widening: largest
-    ratio of the std to that for white residuals. quantile: standard errors in half a 95 % interval. degrees: of freedom
-    behind it. neighbours (columns,): correlation of successive residuals. directions: blind or weak ones no prior
+    covariance (P, P): infinite variances where the data are blind. held_parameters: at a bound. blind_parameters: not
+    determined by the data, alone or only together with others, and no prior holds it; unseen: not even together, prior
+    or none. guessed_parameters: what a prior holds more than the data do, see PRIOR_SHARE; its covariance is the
+    posterior's. free_step (P,): from a bound to where the fit would go without it. kind: white, sandwich or
+    autoregressive (memory/whitening.py). widening: largest ratio of the std to that for white residuals. quantile:
+    standard errors in half a 95 % interval. degrees: of freedom behind it. neighbours (columns,): correlation of
+    successive residuals. directions: blind or weak ones no prior
     holds: (eigenvalue, relative change of each parameter). runs: that were the blocks, 0 where these were shorter than
-    a run. plain (P, P): inverse of the information, which is what the likelihood itself curves by; the covariance where
-    the noise is white. ways: what the rows do not tell, priors or none (cures.py).
+    a run. plain_covariance (P, P): inverse of the information, which is what the likelihood itself curves by; the
+    covariance where the noise is white. ways: what the rows do not tell, priors or none (cures.py).
     """
 
     covariance: FloatArray
-    held: BoolArray
-    blind: BoolArray
+    held_parameters: BoolArray
+    blind_parameters: BoolArray
     unseen: BoolArray
     free_step: FloatArray
     kind: str
@@ -79,22 +80,22 @@ class Trust:
     neighbours: FloatArray
     directions: tuple[tuple[float, FloatArray], ...]
     runs: int
-    plain: FloatArray
-    guessed: BoolArray
+    plain_covariance: FloatArray
+    guessed_parameters: BoolArray
     ways: tuple[Way, ...] = ()
 
     @property
     def open(self) -> BoolArray:
         """What the data do not determine, whether a prior holds it or not."""
-        return self.blind | self.guessed
+        return self.blind_parameters | self.guessed_parameters
 
     @cached_property
     def std(self) -> FloatArray:
         return np.sqrt(np.diag(self.covariance))
 
-    def beside(self, moved: FloatArray) -> Trust:
+    def beside(self, shifts: FloatArray) -> Trust:
         """The same beside numbers that are only known so far: what a std of each moves the parameters by, (P, K)."""
-        return replace(self, covariance=self.covariance + moved @ moved.T)
+        return replace(self, covariance=self.covariance + shifts @ shifts.T)
 
     def rise(self, way: FloatArray) -> float:
         """2 (F - least F) at the ends of a 95 % interval of the sum of way (P,) times the parameters.
@@ -102,52 +103,61 @@ class Trust:
         3.84 where noise is white. Elsewhere the likelihood is too steep, and as much more of it as the variance is
         larger than its curvature tells: Kent, Biometrika 69 (1982); Royall, Tsou, J. R. Stat. Soc. B 65 (2003).
         """
-        steep = float(way @ self.plain @ way)
-        if self.kind == WHITE or steep <= 0.0:
+        slope_square = float(way @ self.plain_covariance @ way)
+        if self.kind == WHITE or slope_square <= 0.0:
             return RISE
-        known = np.where(np.isfinite(self.covariance), self.covariance, 0.0)
-        return self.quantile**2 * float(way @ known @ way) / steep
+        finite_covariance = np.where(np.isfinite(self.covariance), self.covariance, 0.0)
+        return self.quantile**2 * float(way @ finite_covariance @ way) / slope_square
 
 
 def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
     """The covariance at a solution; `kind`: "white", "sandwich" or "auto"."""
-    counted = bool(solver.tick.any())
+    has_ticks = bool(solver.tick.any())
     sums = solver.engine.sums(solution.state.point, final_weighting(solver, solution.state.variance))
     normal = Normal(solver, State(solution.state.point, sums, solution.state.objective, solution.state.variance))
     relative = _relative(solver, solution)
-    seen, directions, lost = _seen(normal.information, relative, normal.prior_information)
+    seen_numbers, directions, lost = _seen(normal.information, relative, normal.prior_information)
     root = _root_of_inverse(normal.information, lost)
-    plain = root @ root.T
+    plain_covariance = root @ root.T
     runs = _runs(solver, sums)
     count = len(runs) if len(runs) >= MANY_RUNS else 0
     scores = normal.scores()
     if count:
         scores = np.array([scores[run].sum(axis=0) for run in runs]) * np.sqrt(count / (count - 1.0))
-    influence = scores @ plain  # what each block moves each parameter by
-    coloured, neighbours = _coloured(solver, sums, runs if count else None)
+    influence = scores @ plain_covariance  # what each block moves each parameter by
+    is_coloured, neighbours = _coloured(solver, sums, runs if count else None)
     if kind == "auto":  # a loss that is not the likelihood of the noise says nothing by its curvature alone
-        kind = SANDWICH if coloured or solver.nu or counted else WHITE  # nor does an encoder at rest, which repeats
-    guessed = seen & _guessed(plain, normal.prior_information)
-    told = seen & ~guessed
-    independent = _degrees(influence, told)
-    degrees = independent if kind == SANDWICH else _rows(solver, sums) - int(seen.sum())
-    if len(influence) <= len(plain):
-        kind, degrees = WHITE, _rows(solver, sums) - int(seen.sum())
-    least, scattered = _least(solver, solution, root), scores @ root
+        kind = (
+            SANDWICH if is_coloured or solver.nu or has_ticks else WHITE
+        )  # nor does an encoder at rest, which repeats
+    guessed_numbers = seen_numbers & _guessed(plain_covariance, normal.prior_information)
+    told_numbers = seen_numbers & ~guessed_numbers
+    independent = _degrees(influence, told_numbers)
+    degrees = independent if kind == SANDWICH else _rows(solver, sums) - int(seen_numbers.sum())
+    if len(influence) <= len(plain_covariance):
+        kind, degrees = WHITE, _rows(solver, sums) - int(seen_numbers.sum())
+    least_covariance, score_columns = _least(solver, solution, root), scores @ root
     exact = not solver.nu and silent(solver, solution).any()  # what is more, and no chance, is an error of the model
-    beyond = (1.0 + np.sqrt(len(least) / independent)) ** 2 if exact else 1.0
-    wide = _at_least(scattered.T @ scattered + (root.T * normal.prior_information) @ root, least, float(beyond))
-    covariance, wide = (root @ each @ root.T for each in (wide if kind == SANDWICH else least, wide))
-    widening = float(np.sqrt(_ratio(np.diag(wide), np.diag(plain), told)))
+    scatter_limit = (1.0 + np.sqrt(len(least_covariance) / independent)) ** 2 if exact else 1.0
+    wide_covariance = _at_least(
+        score_columns.T @ score_columns + (root.T * normal.prior_information) @ root,
+        least_covariance,
+        float(scatter_limit),
+    )
+    covariance, wide_covariance = (
+        root @ middle @ root.T
+        for middle in (wide_covariance if kind == SANDWICH else least_covariance, wide_covariance)
+    )
+    widening = float(np.sqrt(_ratio(np.diag(wide_covariance), np.diag(plain_covariance), told_numbers)))
     logs = np.array([p.log for p in solver.problem.parameters], bool)
-    seen = seen & ~(logs & (np.sqrt(np.diag(covariance)) > UNTOLD))
-    covariance[~seen, ~seen] = np.inf
+    seen_numbers = seen_numbers & ~(logs & (np.sqrt(np.diag(covariance)) > LOST_STD))
+    covariance[~seen_numbers, ~seen_numbers] = np.inf
     return Trust(
         covariance,
         normal.held,
-        ~seen,
+        ~seen_numbers,
         _unseen(normal),
-        _free_step(plain, normal),
+        _free_step(plain_covariance, normal),
         kind,
         widening,
         t_quantile(degrees if degrees > 0 else np.inf),
@@ -155,8 +165,8 @@ def trust(solver: Solver, solution: Solution, kind: str = "auto") -> Trust:
         neighbours,
         directions,
         count if kind == SANDWICH else 0,
-        plain,
-        guessed,
+        plain_covariance,
+        guessed_numbers,
         blind_ways(solver.problem, solution.state.point.values, normal.information - np.diag(normal.prior_information)),
     )
 
@@ -166,15 +176,16 @@ def _unseen(normal: Normal) -> BoolArray:
     return np.diag(normal.information) - normal.prior_information <= 0.0
 
 
-def _guessed(plain: FloatArray, prior: FloatArray) -> BoolArray:
-    """Which numbers priors hold more than the data do. plain (P, P): of the posterior; prior (P,): information.
+def _guessed(plain_covariance: FloatArray, prior: FloatArray) -> BoolArray:
+    """Which numbers priors hold more than the data do. plain_covariance (P, P): of the posterior; prior (P,):
+    information.
 
     The posterior C = (D + P)^-1 of data D and priors P is C D C + C P C: what noise and what priors leave open.
     """
-    variance = np.diag(plain)
-    kept = np.sqrt(variance * prior)  # std over that of its own prior, 0 without one
-    by_priors = np.einsum("ij,j,ij->i", plain, prior, plain) > MOST * variance
-    return (kept > TOLD) | ((kept > TOLD_BY_OTHERS) & by_priors)
+    variance = np.diag(plain_covariance)
+    prior_shares = np.sqrt(variance * prior)  # std over that of its own prior, 0 without one
+    by_priors = np.einsum("ij,j,ij->i", plain_covariance, prior, plain_covariance) > MOST_SHARE * variance
+    return (prior_shares > PRIOR_SHARE) | ((prior_shares > OTHERS_SHARE) & by_priors)
 
 
 def final_weighting(solver: Solver, variance: FloatArray) -> Weighting:
@@ -190,9 +201,13 @@ def _rows(solver: Solver, sums: list[PieceSums]) -> int:
 
 def _runs(solver: Solver, sums: list[PieceSums]) -> list[NDArray[np.intp]]:
     """The blocks of each run."""
-    of = [id(piece.record) for piece, own in zip(solver.problem.pieces, sums, strict=True) for _ in own.score]
-    names = np.array(of)
-    return [np.flatnonzero(names == run) for run in dict.fromkeys(of)]
+    record_of_block = [
+        id(piece.record)
+        for piece, piece_sums in zip(solver.problem.pieces, sums, strict=True)
+        for _ in piece_sums.score
+    ]
+    names = np.array(record_of_block)
+    return [np.flatnonzero(names == run) for run in dict.fromkeys(record_of_block)]
 
 
 def _coloured(
@@ -216,18 +231,20 @@ def _coloured(
     if runs is not None:
         drift = np.array([drift[run].sum(axis=0) for run in runs])
     slow, blocks = (drift**2).sum(axis=0), (drift != 0.0).sum(axis=0)
-    fast = np.abs(neighbours) * np.sqrt(np.maximum(per_column(sums, columns, "number"), 1.0)) > COLOURED
-    return bool((fast | (slow / square > 1.0 + COLOURED * np.sqrt(2.0 / np.maximum(blocks, 1.0)))).any()), neighbours
+    fast = np.abs(neighbours) * np.sqrt(np.maximum(per_column(sums, columns, "number"), 1.0)) > COLOUR_ERRORS
+    return bool(
+        (fast | (slow / square > 1.0 + COLOUR_ERRORS * np.sqrt(2.0 / np.maximum(blocks, 1.0)))).any()
+    ), neighbours
 
 
-def _degrees(influence: FloatArray, seen: BoolArray) -> float:
+def _degrees(influence: FloatArray, seen_numbers: BoolArray) -> float:
     """Degrees of freedom of a sum of squares over blocks of unlike weight (Satterthwaite), the least of all parameters.
 
     (sum of variances)^2 / (sum of their squares), the latter from fourth powers, which are 3 times as large.
     """
-    chosen = influence[:, seen]
-    second, fourth = (chosen**2).sum(axis=0), (chosen**4).sum(axis=0)
-    if not chosen.size or not fourth.all():
+    seen_influence = influence[:, seen_numbers]
+    second, fourth = (seen_influence**2).sum(axis=0), (seen_influence**4).sum(axis=0)
+    if not seen_influence.size or not fourth.all():
         return float(len(influence))
     return float(np.clip((3.0 * second**2 / fourth).min(), 3.0, len(influence) - 1))
 
@@ -249,25 +266,27 @@ def _seen(
     1 % of the first two goes with 30 % of the third. What a prior holds, `prior` (P,) of the information, is not lost.
     """
     diagonal = np.diag(information)
-    seen = diagonal > 0.0
-    chosen = np.flatnonzero(seen)  # those at a bound too: what is lost with them is lost on the other side
+    seen_numbers = diagonal > 0.0
+    seen_indices = np.flatnonzero(
+        seen_numbers
+    )  # those at a bound too: what is lost with them is lost on the other side
     directions, lost = [], []
-    if chosen.size:
-        size = np.sqrt(diagonal[chosen])
-        values, vectors = np.linalg.eigh(information[np.ix_(chosen, chosen)] / np.outer(size, size))
-        open_ = (vectors[:, values >= BLIND] ** 2 / values[values >= BLIND]).sum(axis=1)
+    if seen_indices.size:
+        size = np.sqrt(diagonal[seen_indices])
+        values, vectors = np.linalg.eigh(information[np.ix_(seen_indices, seen_indices)] / np.outer(size, size))
+        open_variance = (vectors[:, values >= BLIND_EIGENVALUE] ** 2 / values[values >= BLIND_EIGENVALUE]).sum(axis=1)
         for value, vector in zip(values, vectors.T, strict=True):
-            held = float(vector**2 @ (prior[chosen] / size**2))
-            if value < WEAK and not (held > 0.0 and held > 0.5 * value):
+            held_share = float(vector**2 @ (prior[seen_indices] / size**2))
+            if value < WEAK_EIGENVALUE and not (held_share > 0.0 and held_share > 0.5 * value):
                 way = np.zeros(len(diagonal))
-                way[chosen] = vector / size / relative[chosen]
+                way[seen_indices] = vector / size / relative[seen_indices]
                 way /= np.abs(way).max()
                 directions.append((float(value), way))
-                if value < BLIND:
+                if value < BLIND_EIGENVALUE:
                     lost.append(np.zeros(len(diagonal)))
-                    lost[-1][chosen] = vector
-                    seen[chosen[vector**2 / BLIND > open_]] = False
-    return seen, tuple(directions), np.array(lost).reshape(-1, len(diagonal)).T
+                    lost[-1][seen_indices] = vector
+                    seen_numbers[seen_indices[vector**2 / BLIND_EIGENVALUE > open_variance]] = False
+    return seen_numbers, tuple(directions), np.array(lost).reshape(-1, len(diagonal)).T
 
 
 def _root_of_inverse(information: FloatArray, lost: FloatArray) -> FloatArray:
@@ -278,21 +297,23 @@ def _root_of_inverse(information: FloatArray, lost: FloatArray) -> FloatArray:
     if these were known. Covariances are compared as C of R C R': of numbers that are guesses and of which only the
     product shows the std of the product is a thousandth of theirs, and differences of such matrices say nothing of it.
     """
-    there = np.diag(information) > 0.0
-    size = np.sqrt(np.diag(information)[there])
-    left = np.eye(len(size)) - lost[there] @ lost[there].T
-    values, vectors = np.linalg.eigh(left @ (information[np.ix_(there, there)] / np.outer(size, size)) @ left)
-    kept = values > PRECISION * values.max(initial=0.0)
-    root = np.zeros((len(information), int(kept.sum())))
-    root[there] = left @ (vectors[:, kept] / np.sqrt(values[kept])) / size[:, None]
+    seen_rows = np.diag(information) > 0.0
+    size = np.sqrt(np.diag(information)[seen_rows])
+    projector = np.eye(len(size)) - lost[seen_rows] @ lost[seen_rows].T
+    values, vectors = np.linalg.eigh(
+        projector @ (information[np.ix_(seen_rows, seen_rows)] / np.outer(size, size)) @ projector
+    )
+    kept_values = values > PRECISION * values.max(initial=0.0)
+    root = np.zeros((len(information), int(kept_values.sum())))
+    root[seen_rows] = projector @ (vectors[:, kept_values] / np.sqrt(values[kept_values])) / size[:, None]
     return root
 
 
-def _ratio(wide: FloatArray, plain: FloatArray, seen: BoolArray) -> float:
+def _ratio(wide_covariance: FloatArray, plain_covariance: FloatArray, seen_numbers: BoolArray) -> float:
     """The largest ratio of two variances among what is seen. Shapes (P,)."""
-    if not seen.any():
+    if not seen_numbers.any():
         return 1.0
-    return float((wide[seen] / np.maximum(plain[seen], 1e-300)).max())
+    return float((wide_covariance[seen_numbers] / np.maximum(plain_covariance[seen_numbers], 1e-300)).max())
 
 
 def _least(solver: Solver, solution: Solution, root: FloatArray) -> FloatArray:
@@ -302,29 +323,32 @@ def _least(solver: Solver, solution: Solution, root: FloatArray) -> FloatArray:
     """
     if not silent(solver, solution).any():
         return np.eye(root.shape[1])
-    information, scatter = (root.T @ each @ root for each in rounding_scatter(solver, solution))
+    information, scatter = (root.T @ scatter_matrix @ root for scatter_matrix in rounding_scatter(solver, solution))
     inverse = np.linalg.inv(information)
     return inverse @ scatter @ inverse
 
 
-def _at_least(wide: FloatArray, least: FloatArray, beyond: float) -> FloatArray:
-    """The sandwich, with no variance below `least`, of any sum of parameters: few blocks may also err to the good side.
+def _at_least(wide_covariance: FloatArray, least_covariance: FloatArray, scatter_limit: float) -> FloatArray:
+    """The sandwich, with no variance below `least_covariance`, of any sum of parameters: few blocks may also err to the
+    good side.
 
-    With least = L L' and wide = L (V diag(l) V') L': L (V diag(max(l, 1)) V') L', where l up to `beyond` count as 1. To
-    stretch the std of each parameter alone would not do: that of a product is all in their correlation. beyond: where
-    `least` is what the noise makes, the edge of the ratios that K numbers and n blocks show by chance, which is
-    (1 + sqrt(K/n))^2 (Marchenko, Pastur, Math. USSR Sb. 1 (1967)); else 1. Shapes (K, K), see `_root_of_inverse`.
+    With least_covariance = L L' and wide_covariance = L (V diag(l) V') L': L (V diag(max(l, 1)) V') L', where l up to
+    `scatter_limit` count as 1. To stretch the std of each parameter alone would not do: that of a product is all in
+    their correlation.
+    scatter_limit: where `least_covariance` is what the noise makes, the edge of the ratios that K numbers and n blocks
+    show by chance, which is (1 + sqrt(K/n))^2 (Marchenko, Pastur, Math. USSR Sb. 1 (1967)); else 1. Shapes (K, K), see
+    `_root_of_inverse`.
     """
-    lower = np.linalg.cholesky(0.5 * (least + least.T))
-    back = np.linalg.inv(lower)
-    ratio, ways = np.linalg.eigh(back @ wide @ back.T)
-    more = lower @ ways * np.sqrt(np.where(ratio > beyond, ratio - 1.0, 0.0).clip(0.0))
-    return least + more @ more.T
+    lower = np.linalg.cholesky(0.5 * (least_covariance + least_covariance.T))
+    inverse = np.linalg.inv(lower)
+    ratio, ways = np.linalg.eigh(inverse @ wide_covariance @ inverse.T)
+    correction = lower @ ways * np.sqrt(np.where(ratio > scatter_limit, ratio - 1.0, 0.0).clip(0.0))
+    return least_covariance + correction @ correction.T
 
 
-def _free_step(plain: FloatArray, normal: Normal) -> FloatArray:
+def _free_step(plain_covariance: FloatArray, normal: Normal) -> FloatArray:
     """From where a bound holds a parameter to where the fit would be without the bound, to first order."""
-    return np.where(normal.held, plain @ normal.gradient, 0.0)
+    return np.where(normal.held, plain_covariance @ normal.gradient, 0.0)
 
 
 # What the log alone leaves open, and what numbers of the file that are only known so far add to it
@@ -341,20 +365,22 @@ def given(problem: Problem) -> BoolArray:
     return np.array([p.prior is not None for p in problem.parameters], dtype=bool)
 
 
-def from_the_log_alone(problem: Problem, known: Trust) -> Trust | None:
+def from_the_log_alone(problem: Problem, uncertainty: Trust) -> Trust | None:
     """The trust in the others were all that the file knows exact; None where it knows nothing with a std."""
-    finite = np.isfinite(np.diag(known.covariance))
+    finite = np.isfinite(np.diag(uncertainty.covariance))
     of_file = given(problem) & finite
     if not of_file.any():
         return None
-    own = finite & ~of_file
-    covariance = known.covariance.copy()
-    across = covariance[np.ix_(own, of_file)]
-    told = np.linalg.pinv(covariance[np.ix_(of_file, of_file)], hermitian=True)
-    left = covariance[np.ix_(own, own)] - across @ told @ across.T
-    covariance[np.ix_(own, own)] = 0.5 * (left + left.T)
+    log_numbers = finite & ~of_file
+    covariance = uncertainty.covariance.copy()
+    cross_covariance = covariance[np.ix_(log_numbers, of_file)]
+    file_information = np.linalg.pinv(covariance[np.ix_(of_file, of_file)], hermitian=True)
+    log_covariance = (
+        covariance[np.ix_(log_numbers, log_numbers)] - cross_covariance @ file_information @ cross_covariance.T
+    )
+    covariance[np.ix_(log_numbers, log_numbers)] = 0.5 * (log_covariance + log_covariance.T)
     np.fill_diagonal(covariance, np.maximum(np.diag(covariance), 0.0))
-    return replace(known, covariance=covariance)
+    return replace(uncertainty, covariance=covariance)
 
 
 # The spread of a fit to counts that show no noise: what an encoder rounds off is a function of the angle
@@ -373,12 +399,12 @@ def from_the_log_alone(problem: Problem, known: Trust) -> Trust | None:
 # least.
 
 STEPS = 4096  # of the integrals over a tick
-CLOSE = 1e-6  # relative, to the least variance: the noise does not show
+NOISE_TOLERANCE = 1e-6  # relative, to the least variance: the noise does not show
 
 
 def silent(solver: Solver, solution: Solution) -> BoolArray:
     """Columns of counts whose noise does not show. Shape (columns,)."""
-    return (solver.tick > 0.0) & (solution.state.variance <= (1.0 + CLOSE) * (LEAST_SHARE * solver.tick) ** 2)
+    return (solver.tick > 0.0) & (solution.state.variance <= (1.0 + NOISE_TOLERANCE) * (LEAST_SHARE * solver.tick) ** 2)
 
 
 def rounding_scatter(solver: Solver, solution: Solution) -> tuple[FloatArray, FloatArray]:
@@ -386,20 +412,22 @@ def rounding_scatter(solver: Solver, solution: Solution) -> tuple[FloatArray, Fl
 
     States of the pieces are eliminated. Needs an engine that knows counts.
     """
-    state, quiet = solution.state, silent(solver, solution)
-    one = np.ones(len(state.variance))
-    sums = solver.engine.sums(state.point, Weighting(one))  # sum of J J'
-    waves = solver.engine.sums(state.point, Weighting(state.variance, mode=WAVES, counted=True))
-    usual = information(state.variance, solver.tick)[0]
+    state, is_quiet = solution.state, silent(solver, solution)
+    ones = np.ones(len(state.variance))
+    sums = solver.engine.sums(state.point, Weighting(ones))  # sum of J J'
+    waves = solver.engine.sums(state.point, Weighting(state.variance, mode=WAVES, counts_ticks=True))
+    usual_curvature = information(state.variance, solver.tick)[0]
     if solver.nu:
-        usual = np.where(solver.tick > 0.0, usual, (solver.nu + 1.0) / (solver.nu + 3.0))
-    curved, scatters = [], []
-    for piece, own, more in zip(solver.problem.pieces, sums, waves, strict=True):
-        ticks = np.where(quiet[own.columns], piece.record.ticks, 0.0)
-        curvature, scatter = _of_piece(own, more.waves, ticks, state.variance[own.columns], usual[own.columns])
-        curved.append(curvature)
+        usual_curvature = np.where(solver.tick > 0.0, usual_curvature, (solver.nu + 1.0) / (solver.nu + 3.0))
+    curvatures, scatters = [], []
+    for piece, piece_sums, wave_terms in zip(solver.problem.pieces, sums, waves, strict=True):
+        ticks = np.where(is_quiet[piece_sums.columns], piece.record.ticks, 0.0)
+        curvature, scatter = _of_piece(
+            piece_sums, wave_terms.waves, ticks, state.variance[piece_sums.columns], usual_curvature[piece_sums.columns]
+        )
+        curvatures.append(curvature)
         scatters.append(scatter)
-    normal = Normal(solver, State(state.point, curved, state.objective, one))
+    normal = Normal(solver, State(state.point, curvatures, state.objective, ones))
     count, total = len(normal.scale), np.diag(normal.prior_information)
     for scatter, (_, info) in zip(scatters, normal.pieces, strict=True):
         full = np.concatenate([normal.scale, np.ones(len(scatter) - count)])[: len(info)]
@@ -412,19 +440,19 @@ def rounding_scatter(solver: Solver, solution: Solution) -> tuple[FloatArray, Fl
 
 
 def _of_piece(
-    sums: PieceSums, waves: FloatArray | None, ticks: FloatArray, variance: FloatArray, usual: FloatArray
+    sums: PieceSums, waves: FloatArray | None, ticks: FloatArray, variance: FloatArray, usual_curvature: FloatArray
 ) -> tuple[PieceSums, FloatArray]:
     """The sums of a piece with the mean curvature for its information, and the variance of its score."""
     assert waves is not None
     info, scatter = np.zeros_like(sums.info), np.zeros(sums.info.shape[1:])
     for c, square in enumerate(sums.info):
         if ticks[c] == 0.0:
-            info[c] = usual[c] / variance[c] * square
+            info[c] = usual_curvature[c] / variance[c] * square
             scatter += info[c]
             continue
-        series, whole, curvature = rounding(0.5 * ticks[c] / math.sqrt(variance[c]), HARMONICS, STEPS)
+        series, mean_curvature, curvature = rounding(0.5 * ticks[c] / math.sqrt(variance[c]), HARMONICS, STEPS)
         power = 0.5 * series**2
-        told = np.einsum("m,mkp,mkq->pq", power, waves[c], waves[c])
-        scatter += (told + (whole - power.sum()) * square) / variance[c]
+        tick_information = np.einsum("m,mkp,mkq->pq", power, waves[c], waves[c])
+        scatter += (tick_information + (mean_curvature - power.sum()) * square) / variance[c]
         info[c] = curvature / variance[c] * square
     return replace(sums, info=info), scatter

@@ -20,7 +20,7 @@ import numpy as np
 
 from omnidyn.identification.lack_of_fit import CHANGE, LOSS, LackOfFit, Remedy
 from omnidyn.identification.ladder import STANDS, Ladder, Rung
-from omnidyn.identification.output_error.begin import WHOLE
+from omnidyn.identification.output_error.begin import ALL_LOGS
 from omnidyn.identification.output_error.conclusion import unexplained
 from omnidyn.identification.output_error.fit import Fit
 from omnidyn.identification.output_error.linear.free_run import margins_of
@@ -28,7 +28,7 @@ from omnidyn.identification.output_error.linear.motion import motions
 from omnidyn.identification.output_error.solve.progress import FitProgress
 from omnidyn.identification.output_error.solve.solver import Solution
 from omnidyn.identification.structure.diagnosis import Examined, examine
-from omnidyn.identification.structure.ladder.held_out import CLEAR, Errors, errors
+from omnidyn.identification.structure.ladder.held_out import GAIN_ERRORS, Errors, errors
 from omnidyn.identification.structure.ladder.models import (
     Model,
     Move,
@@ -50,11 +50,13 @@ from omnidyn.run import Run
 from omnidyn.statement import NOTE, Statement
 
 STEPS = 4  # at most
-TRIED = 3  # remedies that are fitted in a step
-TOLD_APART = 10.0  # of BIC, from which one of two models is the better one: very strong (Kass & Raftery, 1995)
-ROUGHLY = 0.05  # of a first step's chi squared, which is that rough
+TRIED_REMEDIES = 3  # remedies that are fitted in a step
+BIC_MARGIN = 10.0  # of BIC, from which one of two models is the better one: very strong (Kass & Raftery, 1995)
+ROUGH_SHARE = 0.05  # of a first step's chi squared, which is that rough
 LIMITS = (0.5, 0.9)  # quantiles of the largest current, from which a limit is looked for
-BY_FAR = 50.0  # of BIC, from which a richer model is the better one though a few blocks scatter more than it gains
+CLEAR_BIC_MARGIN = (
+    50.0  # of BIC, from which a richer model is the better one though a few blocks scatter more than it gains
+)
 Fits = Callable[
     [Move, Model, Statement | None], list[Model | Untried]
 ]  # of a move from a model, and in the place of which step
@@ -65,141 +67,198 @@ def climb(
 ) -> tuple[Fit, Solution, Ladder]:
     """The best fit of some runs, its solution, and the way to it. fit, solution: of the robot as it was given. names:
     of the group of each run, where there are groups."""
-    stands, rungs, calm = Model.first(fit, solution), list[Rung](), False
-    seen: dict[str, Examined] | None = None
+    base_model, rungs, is_calm = Model.first(fit, solution), list[Rung](), False
+    examinations: dict[str, Examined] | None = None
 
-    def fits(move: Move, before: Model, instead: Statement | None) -> list[Model | Untried]:
-        return tried(move, before, runs, names, progress, instead)
+    def fits(move: Move, start_model: Model, replaced_step: Statement | None) -> list[Model | Untried]:
+        return tried(move, start_model, runs, names, progress, replaced_step)
 
-    purse, step, most = Purse(), 0, STEPS
-    while (step := step + 1) <= most:
+    purse, step, step_limit = Purse(), 0, STEPS
+    while (step := step + 1) <= step_limit:
         progress.enter(f"step {step} of the ladder: looking for what the model leaves out")
-        seen = seen or _examined(stands)
-        if not calm:
-            made, found = calmed(step, stands, seen, runs, names, progress)
-            rungs, calm = [*rungs, *found], bool(found)
-            if made is not stands:
-                stands, seen, most = made, None, most + 1
+        examinations = examinations or _examined(base_model)
+        if not is_calm:
+            calm_model, new_rungs = calmed(step, base_model, examinations, runs, names, progress)
+            rungs, is_calm = [*rungs, *new_rungs], bool(new_rungs)
+            if calm_model is not base_model:
+                base_model, examinations, step_limit = calm_model, None, step_limit + 1
                 continue
-        if unexplained(stands.solution.solver, stands.solution):
-            return _ended(stands, rungs, "mend_first")
-        lacks = _lacks(seen)
-        if not lacks:
-            drifts = any(each.diagnosis.lack_of_fit.drifts for each in seen.values())
-            return _ended(stands, rungs, "slow_errors" if drifts else "only_noise")
-        found, best, after = _climbed(step, stands, seen, lacks, fits, purse)
-        rungs += [rung for rung in found if rung.step or not rungs]
-        rungs += [_untried(step, each) for each in purse.told()]
+        if unexplained(base_model.solution.solver, base_model.solution):
+            return _ended(base_model, rungs, "mend_first")
+        lack_by_group = _lacks(examinations)
+        if not lack_by_group:
+            drifts = any(examination.diagnosis.lack_of_fit.drifts for examination in examinations.values())
+            return _ended(base_model, rungs, "slow_errors" if drifts else "only_noise")
+        new_rungs, best, next_examinations = _climbed(step, base_model, examinations, lack_by_group, fits, purse)
+        rungs += [rung for rung in new_rungs if rung.step or not rungs]
+        rungs += [_untried(step, examination) for examination in purse.told()]
         if best is None:
-            made, found = (stands, []) if calm else calmed(step, stands, seen, runs, names, progress, gave_up=True)
-            rungs, calm = [*rungs, *(rung for rung in found if rung.step)], True
-            if made is stands:
-                return _ended(stands, rungs, "nothing_pays", **_untaken(lacks))
-            best, after, most = made, None, most + 1
-        stands, seen = best, after
-    return _ended(stands, rungs, "step_limit", steps=STEPS)
+            calm_model, new_rungs = (
+                (base_model, [])
+                if is_calm
+                else calmed(step, base_model, examinations, runs, names, progress, gave_up=True)
+            )
+            rungs, is_calm = [*rungs, *(rung for rung in new_rungs if rung.step)], True
+            if calm_model is base_model:
+                return _ended(base_model, rungs, "nothing_pays", **_untaken(lack_by_group))
+            best, next_examinations, step_limit = calm_model, None, step_limit + 1
+        base_model, examinations = best, next_examinations
+    return _ended(base_model, rungs, "step_limit", steps=STEPS)
 
 
 def _climbed(
-    step: int, stands: Model, seen: Mapping[str, Examined], lacks: Mapping[str, LackOfFit], fits: Fits, purse: Purse
+    step: int,
+    base_model: Model,
+    examinations: Mapping[str, Examined],
+    lack_by_group: Mapping[str, LackOfFit],
+    fits: Fits,
+    purse: Purse,
 ) -> tuple[list[Rung], Model | None, dict[str, Examined] | None]:
     """(the rungs of a step, the model to go on from, None where nothing pays, and its diagnosis, where it is made)."""
-    every, found, best, after = list[Model | Untried](), list[Rung](), None, None
-    first = {group: offered(lack) for group, lack in lacks.items()}
-    far = {group: unseen(lack, stands, group) for group, lack in lacks.items()}
-    quick, slow = quick_first(moves(first, stands), stands)
-    for asked in (quick, slow, moves_apart(first, stands), moves(far, stands)):
-        if best is not None and after is not None and not _lacks(after):  # what rivals it, and no more
-            asked = purse.rivals(asked, best) if asked is slow else []
-        more = [fit for move in purse.pays(asked, stands) for fit in fits(move, stands, None)]
-        if not more:
+    tried_models, new_rungs, best, next_examinations = list[Model | Untried](), list[Rung](), None, None
+    first = {group: offered(lack) for group, lack in lack_by_group.items()}
+    unseen_by_group = {group: unseen(lack, base_model, group) for group, lack in lack_by_group.items()}
+    quick, slow = quick_first(moves(first, base_model), base_model)
+    for candidate_moves in (quick, slow, moves_apart(first, base_model), moves(unseen_by_group, base_model)):
+        if (
+            best is not None and next_examinations is not None and not _lacks(next_examinations)
+        ):  # what rivals it, and no more
+            candidate_moves = purse.rivals(candidate_moves, best) if candidate_moves is slow else []
+        new_models = [fit for move in purse.pays(candidate_moves, base_model) for fit in fits(move, base_model, None)]
+        if not new_models:
             continue
-        every += more
-        found, best = judged(step, stands, every, seen)
-        after = _examined(best) if best is not None else None
-    if best is not None and best.move is not None and stands.before is not None:  # may the step before go?
-        again = purse.pays([best.move], stands.before)
-        every += [fit for move in again for fit in fits(move, stands.before, stands.cause)]
-        found, best = judged(step, stands, every, seen)
-        after = _examined(best) if best is not None and best.instead else after
-    return found, best, after
+        tried_models += new_models
+        new_rungs, best = judged(step, base_model, tried_models, examinations)
+        next_examinations = _examined(best) if best is not None else None
+    if best is not None and best.move is not None and base_model.base_model is not None:  # may the step before go?
+        repeated_moves = purse.pays([best.move], base_model.base_model)
+        tried_models += [fit for move in repeated_moves for fit in fits(move, base_model.base_model, base_model.cause)]
+        new_rungs, best = judged(step, base_model, tried_models, examinations)
+        next_examinations = _examined(best) if best is not None and best.replaced_step else next_examinations
+    return new_rungs, best, next_examinations
 
 
 def _examined(model: Model) -> dict[str, Examined]:
     """What a model leaves out, of each group. Of the fit that counts errors as white, for a memory takes up slips; and
     where that finds nothing, as its answer would say: no ladder ends calm on a fit that its answer finds wrong."""
-    seen = {group: examine(alone) for group, alone in model.alone.items()}
-    return seen if _lacks(seen) else {group: examine(alone) for group, alone in model.answered().items()}
+    examinations = {group: examine(group_fit) for group, group_fit in model.alone.items()}
+    return (
+        examinations
+        if _lacks(examinations)
+        else {group: examine(group_fit) for group, group_fit in model.answered().items()}
+    )
 
 
-def _lacks(seen: Mapping[str, Examined]) -> dict[str, LackOfFit]:
+def _lacks(examinations: Mapping[str, Examined]) -> dict[str, LackOfFit]:
     """The groups in which something is left out, and what."""
-    every = {group: each.diagnosis.lack_of_fit for group, each in seen.items()}
-    return {group: lack for group, lack in every.items() if lack.found}
+    lack_by_group = {group: examination.diagnosis.lack_of_fit for group, examination in examinations.items()}
+    return {group: lack for group, lack in lack_by_group.items() if lack.found}
 
 
 def offered(lack: LackOfFit) -> list[Remedy]:
     """The remedies that are worth a fit, best first: those that a robot file or a fit can hold, and nothing else is the
     same as; and what the first of them cannot be told from."""
-    able = simpler_first([r for r in lack.remedies if r.offered and r.key not in (CHANGE, LOSS) and not r.rivals])
-    same = [r for r in able[TRIED:] if r.key in able[0].same_as]
-    return [*able[:TRIED], *same[: TRIED - 1]]
+    usable_remedies = simpler_first(
+        [r for r in lack.remedies if r.offered and r.key not in (CHANGE, LOSS) and not r.rivals]
+    )
+    rival_remedies = [r for r in usable_remedies[TRIED_REMEDIES:] if r.key in usable_remedies[0].same_as]
+    return [*usable_remedies[:TRIED_REMEDIES], *rival_remedies[: TRIED_REMEDIES - 1]]
 
 
-def unseen(lack: LackOfFit, stands: Model, group: str) -> list[Remedy]:
+def unseen(lack: LackOfFit, base_model: Model, group: str) -> list[Remedy]:
     """What is far from the fit however little of it there is, and was not among the first remedies of a group."""
     first = {remedy.key for remedy in offered(lack)}
-    problem, point = stands.alone[group].solver.problem, stands.alone[group].state.point
-    robot = stands.robot(group)
+    problem, point = base_model.alone[group].solver.problem, base_model.alone[group].state.point
+    robot = base_model.robot(group)
     boxed, limit = any(robot.friction.axes.coulomb), robot.motor.current_limit
     shape = DIRECTION if boxed else BODY_AXES
-    found = [Remedy(shape, cause("other_shape", shape), 0.0, 0.0)]
-    found.append(Remedy(WHEELS, cause("friction_at_wheels"), 0.0, 0.0))
-    found.append(Remedy(EACH_WHEEL, cause("friction_at_each_wheel"), 0.0, 0.0))
-    usual = Remedy("", cause("stribeck"), 0.0, 0.0, size=(USUAL_FALL - 1.0,) * N_AXES, at=USUAL_SPEED)
-    found += [replace(usual, key=key) for key in other_laws(robot.friction) if key in FALLS]
+    extra_remedies = [Remedy(shape, cause("other_shape", shape), 0.0, 0.0)]
+    extra_remedies.append(Remedy(WHEELS, cause("friction_at_wheels"), 0.0, 0.0))
+    extra_remedies.append(Remedy(EACH_WHEEL, cause("friction_at_each_wheel"), 0.0, 0.0))
+    usual_fall = Remedy("", cause("stribeck"), 0.0, 0.0, size=(USUAL_FALL - 1.0,) * N_AXES, at=USUAL_SPEED)
+    extra_remedies += [replace(usual_fall, key=key) for key in other_laws(robot.friction) if key in FALLS]
     if limit is None:
-        most = np.concatenate([np.abs(motion.current).max(axis=1) for motion in motions(problem, point)])
-        levels = np.quantile(most[most > 0.0], LIMITS).tolist() if most.any() else []
-        found += [
-            Remedy(LIMIT, sized("current_limit_from", "", limit=lambda _, at: at)(0.0, at), 0.0, 0.0, at=at)
-            for at in levels
+        largest_currents = np.concatenate([np.abs(motion.current).max(axis=1) for motion in motions(problem, point)])
+        levels = (
+            np.quantile(largest_currents[largest_currents > 0.0], LIMITS).tolist() if largest_currents.any() else []
+        )
+        extra_remedies += [
+            Remedy(
+                LIMIT,
+                sized("current_limit_from", "", limit=lambda _, at_value: at_value)(0.0, limit_value),
+                0.0,
+                0.0,
+                at=limit_value,
+            )
+            for limit_value in levels
         ]
-    return [remedy for remedy in found if remedy.key not in first and can(remedy.key, robot)]
+    return [remedy for remedy in extra_remedies if remedy.key not in first and can(remedy.key, robot)]
 
 
 def judged(
-    step: int, stands: Model, every: Sequence[Model | Untried], seen: Mapping[str, Examined]
+    step: int, base_model: Model, tried_models: Sequence[Model | Untried], examinations: Mapping[str, Examined]
 ) -> tuple[list[Rung], Model | None]:
     """(the rungs of a step, that of the model before first; the model to go on from, None where nothing pays).
 
-    seen: of each group what the model before leaves out; its memory is of what is left beside all that residuals
-    follow.
+    examinations: of each group what the model before leaves out; its memory is of what is left beside all that
+    residuals follow.
     """
-    models = [each for each in every if isinstance(each, Model)]
-    count, memory = sum(each.tried for each in seen.values()), {group: each.memory for group, each in seen.items()}
-    margins = margins_of([each.solution for each in (stands, *models)])
-    before = errors(stands.solution, memory, margins, stands.numbers)
-    by = [errors(model.solution, memory, margins, model.numbers) for model in models]
-    why = [_why_not(model, own, before, count, _beyond(model, seen)) for model, own in zip(models, by, strict=True)]
-    paying = [k for k, reason in enumerate(why) if reason is None]
-    best = max(paying, key=lambda k: by[k].gain(before)[0], default=None)
-    alike = [k for k in paying if best is not None and (_is_alike(by[best], by[k]) or _is_same(by[best], by[k]))]
-    taken = min(
-        alike, key=lambda k: (by[k].numbers, models[k].shapes, not models[k].instead, by[k].bic(count)), default=None
+    models = [tried_model for tried_model in tried_models if isinstance(tried_model, Model)]
+    count, memory = (
+        sum(examination.cause_count for examination in examinations.values()),
+        {group: examination.memory for group, examination in examinations.items()},
+    )
+    margins = margins_of([model_here.solution for model_here in (base_model, *models)])
+    base_errors = errors(base_model.solution, memory, margins, base_model.numbers)
+    errors_by_model = [errors(model.solution, memory, margins, model.numbers) for model in models]
+    reasons = [
+        _why_not(model, errors_k, base_errors, count, _beyond(model, examinations))
+        for model, errors_k in zip(models, errors_by_model, strict=True)
+    ]
+    paying = [k for k, reason in enumerate(reasons) if reason is None]
+    best = max(paying, key=lambda k: errors_by_model[k].gain(base_errors)[0], default=None)
+    similar_models = [
+        k
+        for k in paying
+        if best is not None
+        and (
+            _is_alike(errors_by_model[best], errors_by_model[k]) or _is_same(errors_by_model[best], errors_by_model[k])
+        )
+    ]
+    best_index = min(
+        similar_models,
+        key=lambda k: (
+            errors_by_model[k].numbers,
+            models[k].shapes,
+            not models[k].replaced_step,
+            errors_by_model[k].bic(count),
+        ),
+        default=None,
     )
     rungs = []
-    for k, (model, own) in enumerate(zip(models, by, strict=True)):
-        same = [o for o in paying if taken in (k, o) and o != k and k in paying and _is_same(by[k], by[o])]
-        reason = why[k] or Statement(_why_other(k, taken, alike, same), NOTE)
-        others = [models[o].key for o in same] + _not_fitted(models, model, own, before, seen)
-        others += hidden_by(model.key, model.solution.solver.problem.columns)
-        rungs.append(_rung(step, model, own, before, count, k == taken, reason, others, stands))
+    for k, (model, model_errors) in enumerate(zip(models, errors_by_model, strict=True)):
+        equal_models = [
+            o
+            for o in paying
+            if best_index in (k, o) and o != k and k in paying and _is_same(errors_by_model[k], errors_by_model[o])
+        ]
+        reason = reasons[k] or Statement(_why_other(k, best_index, similar_models, equal_models), NOTE)
+        rival_names = [models[o].key for o in equal_models] + _not_fitted(
+            models, model, model_errors, base_errors, examinations
+        )
+        rival_names += hidden_by(model.key, model.solution.solver.problem.columns)
+        rungs.append(
+            _rung(step, model, model_errors, base_errors, count, k == best_index, reason, rival_names, base_model)
+        )
     rungs.sort(key=lambda rung: (not rung.taken, -rung.gain))
     rungs = [*{_mark(rung): rung for rung in reversed(rungs)}.values()][::-1]  # a limit found twice is one
-    rungs += [_untried(step, each) for each in every if isinstance(each, Untried)]
-    first = [Rung(0, "", STANDS, before.numbers, before.size, taken=True, value=stands.value)] if step == 1 else []
-    return [*first, *rungs], None if taken is None else models[taken]
+    rungs += [_untried(step, tried_model) for tried_model in tried_models if isinstance(tried_model, Untried)]
+    first = (
+        [Rung(0, "", STANDS, base_errors.numbers, base_errors.size, taken=True, value=base_model.value)]
+        if step == 1
+        else []
+    )
+    return [*first, *rungs], None if best_index is None else models[best_index]
 
 
 def _mark(rung: Rung) -> tuple[Any, ...]:
@@ -217,120 +276,139 @@ def _mark(rung: Rung) -> tuple[Any, ...]:
     return rung.key, rounded(rung.cause)
 
 
-def _untried(step: int, each: Untried) -> Rung:
-    nothing, move = np.nan, each.move
-    return Rung(step, move.key, each.cause, 0, nothing, nothing, nothing, nothing, why=each.why, groups=move.groups)
+def _untried(step: int, untried_model: Untried) -> Rung:
+    no_number, move = np.nan, untried_model.move
+    return Rung(
+        step,
+        move.key,
+        untried_model.cause,
+        0,
+        no_number,
+        no_number,
+        no_number,
+        no_number,
+        why=untried_model.reason,
+        groups=move.groups,
+    )
 
 
 def _why_not(
-    model: Model, own: Errors, before: Errors, count: int, beyond: tuple[float, Statement | None]
+    model: Model, model_errors: Errors, base_errors: Errors, count: int, untaken_gain: tuple[float, Statement | None]
 ) -> Statement | None:
     """Why a model is no step up, None where it is one."""
-    gain, std = own.gain(before)
-    if not gain > CLEAR * std:
+    gain, std = model_errors.gain(base_errors)
+    if not gain > GAIN_ERRORS * std:
         return Statement("predicts_no_better", NOTE)
-    if own.bic(count) >= before.bic():
+    if model_errors.bic(count) >= base_errors.bic():
         return Statement("costs_more_than_it_explains", NOTE)
-    at_least, other = beyond
-    noise = own.left / max(own.rows, 1)
-    if (before.left - own.left) / noise - np.log(max(own.rows, 2)) * (own.numbers - before.numbers) < at_least:
-        return Statement("other_explains_more", NOTE, numbers={"cause": other})
+    at_least, untaken_cause = untaken_gain
+    noise = model_errors.square / max(model_errors.rows, 1)
+    if (base_errors.square - model_errors.square) / noise - np.log(max(model_errors.rows, 2)) * (
+        model_errors.numbers - base_errors.numbers
+    ) < at_least:
+        return Statement("other_explains_more", NOTE, numbers={"cause": untaken_cause})
     if unexplained(model.solution.solver, model.solution):
         return Statement("step_does_not_follow", NOTE)
     return None
 
 
-def _why_other(k: int, taken: int | None, alike: Sequence[int], same: Sequence[int]) -> str:
+def _why_other(k: int, best_index: int | None, similar_models: Sequence[int], equal_models: Sequence[int]) -> str:
     """The code of why a model that pays is taken or not."""
-    if k == taken:
+    if k == best_index:
         return "pays"
-    if same:
+    if equal_models:
         return "not_distinguishable"
-    return "as_good_not_simpler" if k in alike else "pays_less"
+    return "as_good_not_simpler" if k in similar_models else "pays_less"
 
 
-def _is_alike(best: Errors, other: Errors) -> bool:
+def _is_alike(best: Errors, best_errors: Errors) -> bool:
     """Whether another model predicts as well as the best one, within a standard error, and is about as likely."""
-    gain, std = best.gain(other)
-    return best is other or (gain <= CLEAR * std and other.bic() - best.bic() < BY_FAR)
+    gain, std = best.gain(best_errors)
+    return best is best_errors or (gain <= GAIN_ERRORS * std and best_errors.bic() - best.bic() < CLEAR_BIC_MARGIN)
 
 
-def _is_same(one: Errors, other: Errors) -> bool:
+def _is_same(left_errors: Errors, right_errors: Errors) -> bool:
     """Whether the logs cannot tell two apart: as likely, with as many numbers."""
-    return abs(one.bic() - other.bic()) < TOLD_APART
+    return abs(left_errors.bic() - right_errors.bic()) < BIC_MARGIN
 
 
 def _not_fitted(
-    models: Sequence[Model], model: Model, own: Errors, before: Errors, seen: Mapping[str, Examined]
+    models: Sequence[Model],
+    model: Model,
+    model_errors: Errors,
+    base_errors: Errors,
+    examinations: Mapping[str, Examined],
 ) -> list[str]:
     """What the diagnosis could not tell from a model, was not fitted, and might explain as much as the model does."""
     assert model.move is not None
-    fitted, noise = {tried.key for tried in models}, own.left / max(own.rows, 1)
-    enough = (1.0 - ROUGHLY) * (before.left - own.left) / noise - TOLD_APART
+    fitted, noise = {model_k.key for model_k in models}, model_errors.square / max(model_errors.rows, 1)
+    least_chi2 = (1.0 - ROUGH_SHARE) * (base_errors.square - model_errors.square) / noise - BIC_MARGIN
     return [
         r.key
         for group, remedy in model.move.remedies.items()
-        for r in seen[group].diagnosis.lack_of_fit.remedies
-        if r.key in remedy.same_as and r.key not in fitted and r.chi2 >= enough
+        for r in examinations[group].diagnosis.lack_of_fit.remedies
+        if r.key in remedy.same_as and r.key not in fitted and r.chi2 >= least_chi2
     ]
 
 
 def _rung(
     step: int,
     model: Model,
-    own: Errors,
-    before: Errors,
+    model_errors: Errors,
+    base_errors: Errors,
     count: int,
-    taken: bool,
-    why: Statement,
-    same: Sequence[str],
-    stands: Model,
+    is_taken: bool,
+    reason: Statement,
+    equal_keys: Sequence[str],
+    base_model: Model,
 ) -> Rung:
-    gain, std = own.gain(before)
-    others = dict.fromkeys(key for key in same if taken and key != model.key)
-    found = as_fitted(model.cause, stands.value, model.value)
-    if model.instead is not None:
-        found = Statement("instead_of", NOTE, numbers={"cause": found, "step": model.instead})
+    gain, std = model_errors.gain(base_errors)
+    rival_keys = dict.fromkeys(key for key in equal_keys if is_taken and key != model.key)
+    shown_cause = as_fitted(model.cause, base_model.value, model.value)
+    if model.replaced_step is not None:
+        shown_cause = Statement("instead_of", NOTE, numbers={"cause": shown_cause, "step": model.replaced_step})
     return Rung(
         step,
         model.key,
-        found,
-        own.numbers,
-        own.size,
+        shown_cause,
+        model_errors.numbers,
+        model_errors.size,
         gain,
         std,
-        own.bic(count) - before.bic(),
-        taken,
-        why,
-        tuple(others),
-        model.instead is not None,
+        model_errors.bic(count) - base_errors.bic(),
+        is_taken,
+        reason,
+        tuple(rival_keys),
+        model.replaced_step is not None,
         model.value,
         model.move.groups if model.move else (),
     )
 
 
-def _beyond(model: Model, seen: Mapping[str, Examined]) -> tuple[float, Statement | None]:
+def _beyond(model: Model, examinations: Mapping[str, Examined]) -> tuple[float, Statement | None]:
     """(what the best cause explains that is never taken, less what its numbers cost, in chi squared; that cause): of
     all groups in which something was switched on."""
     assert model.move is not None
-    found = [_beyond_one(seen[group]) for group in model.move.remedies]
-    worth = [value for value, _ in found if value > 0.0]
-    most, best = max(found, key=lambda one: one[0])
-    return (sum(worth), best) if worth else (most, best)
+    gains_and_causes = [_beyond_one(examinations[group]) for group in model.move.remedies]
+    positive_gains = [value for value, _ in gains_and_causes if value > 0.0]
+    largest_gain, best = max(gains_and_causes, key=lambda pair: pair[0])
+    return (sum(positive_gains), best) if positive_gains else (largest_gain, best)
 
 
-def _beyond_one(seen: Examined) -> tuple[float, Statement | None]:
-    lack = seen.diagnosis.lack_of_fit
-    others = [r for r in lack.remedies if not r.offered or r.key == CHANGE]
-    worth = [(r.chi2 - np.log(max(seen.rows, 2)) * r.numbers, r.cause) for r in others]
-    return max(worth, key=lambda one: one[0], default=(-np.inf, None))
+def _beyond_one(examination: Examined) -> tuple[float, Statement | None]:
+    lack = examination.diagnosis.lack_of_fit
+    unusable_remedies = [r for r in lack.remedies if not r.offered or r.key == CHANGE]
+    gains_and_causes = [(r.chi2 - np.log(max(examination.rows, 2)) * r.numbers, r.cause) for r in unusable_remedies]
+    return max(gains_and_causes, key=lambda pair: pair[0], default=(-np.inf, None))
 
 
-def _untaken(lacks: Mapping[str, LackOfFit]) -> dict[str, Any]:
+def _untaken(lack_by_group: Mapping[str, LackOfFit]) -> dict[str, Any]:
     """What was not taken because no robot file holds it, of each group."""
-    found = {group: looks for group, lack in lacks.items() if (looks := _looks_like(lack)) is not None}
-    groups = ("" if group == WHOLE else group for group in found)
-    return {"groups": tuple(groups), "causes": tuple(found.values())}
+    untaken_by_group = {
+        group: statement for group, lack in lack_by_group.items() if (statement := _looks_like(lack)) is not None
+    }
+    groups = ("" if group == ALL_LOGS else group for group in untaken_by_group)
+    return {"groups": tuple(groups), "causes": tuple(untaken_by_group.values())}
 
 
 def _looks_like(lack: LackOfFit) -> Statement | None:
@@ -346,8 +424,8 @@ def _looks_like(lack: LackOfFit) -> Statement | None:
     return None
 
 
-def _ended(stands: Model, rungs: Sequence[Rung], why: str, **numbers: Any) -> tuple[Fit, Solution, Ladder]:
-    return stands.fit, stands.solution, Ladder(tuple(rungs), Statement(why, NOTE, numbers=numbers))
+def _ended(base_model: Model, rungs: Sequence[Rung], reason: str, **numbers: Any) -> tuple[Fit, Solution, Ladder]:
+    return base_model.fit, base_model.solution, Ladder(tuple(rungs), Statement(reason, NOTE, numbers=numbers))
 
 
 # A step where samples are wild: a fit that counts them little, before any other, for they hide causes
@@ -355,8 +433,8 @@ def _ended(stands: Model, rungs: Sequence[Rung], why: str, **numbers: Any) -> tu
 
 def calmed(
     step: int,
-    stands: Model,
-    seen: Mapping[str, Examined],
+    base_model: Model,
+    examinations: Mapping[str, Examined],
     runs: Sequence[Run],
     names: Sequence[str] | None,
     progress: FitProgress,
@@ -365,27 +443,27 @@ def calmed(
     """(the model to go on from, the rungs of a step): of Student's t where that predicts better, by more than a
     standard error, what is not wild; as it stands, and no rungs, where no sample is wild, or a cause gains more.
     gave_up: no such cause paid. It counts as no number of the fit."""
-    own = {
+    remedy_by_group = {
         group: remedy
-        for group, each in seen.items()
-        for remedy in each.diagnosis.lack_of_fit.remedies
-        if remedy.key == LOSS and (gave_up or remedy.gain > _best_cause(each.diagnosis.lack_of_fit))
+        for group, examination in examinations.items()
+        for remedy in examination.diagnosis.lack_of_fit.remedies
+        if remedy.key == LOSS and (gave_up or remedy.gain > _best_cause(examination.diagnosis.lack_of_fit))
     }
-    if not own:
-        return stands, []
-    best = max(own.values(), key=lambda remedy: remedy.gain - remedy.gain_std)
-    made = tried(Move(dict.fromkeys(stands.begins, best)), stands, runs, names, progress)[0]
-    count, nothing = len(stands.value), np.nan
-    rung = Rung(step, LOSS, best.cause, count, nothing, best.gain, best.gain_std, nothing)
-    first = [Rung(0, "", STANDS, count, nothing, taken=True, value=stands.value)] if step == 1 else []
-    if isinstance(made, Model) and unexplained(made.solution.solver, made.solution):
-        return stands, []
-    if not isinstance(made, Model):
-        return stands, [*first, replace(rung, why=made.why)]
+    if not remedy_by_group:
+        return base_model, []
+    best = max(remedy_by_group.values(), key=lambda remedy: remedy.gain - remedy.gain_std)
+    calm_model = tried(Move(dict.fromkeys(base_model.begins, best)), base_model, runs, names, progress)[0]
+    count, no_number = len(base_model.value), np.nan
+    rung = Rung(step, LOSS, best.cause, count, no_number, best.gain, best.gain_std, no_number)
+    first = [Rung(0, "", STANDS, count, no_number, taken=True, value=base_model.value)] if step == 1 else []
+    if isinstance(calm_model, Model) and unexplained(calm_model.solution.solver, calm_model.solution):
+        return base_model, []
+    if not isinstance(calm_model, Model):
+        return base_model, [*first, replace(rung, why=calm_model.reason)]
     if not best.gain > best.gain_std:
-        return stands, [*first, replace(rung, why=Statement("predicts_no_better", NOTE), value=made.value)]
-    taken = replace(rung, why=Statement("pays", NOTE), value=made.value, taken=True)
-    return replace(made, before=None), [*first, taken]
+        return base_model, [*first, replace(rung, why=Statement("predicts_no_better", NOTE), value=calm_model.value)]
+    taken_rung = replace(rung, why=Statement("pays", NOTE), value=calm_model.value, taken=True)
+    return replace(calm_model, before=None), [*first, taken_rung]
 
 
 def _best_cause(lack: LackOfFit) -> float:

@@ -22,18 +22,20 @@ from omnidyn.identification.structure.tails import as_counted
 
 Shows = Callable[[Point], list[Parts]]
 Memories = Sequence[AutoRegression] | Mapping[str, Sequence[AutoRegression]]
-FAR = 1.5  # times what a fit to all leaves of a block, from which the error by a fit to all others is simulated
+SIMULATION_RATIO = (
+    1.5  # times what a fit to all leaves of a block, from which the error by a fit to all others is simulated
+)
 SHARES = (1.0, 0.5, 0.25, 0.125)  # of a step that are tried
-CLEAR = 1.0  # standard errors of its gain by which a step must pay
+GAIN_ERRORS = 1.0  # standard errors of its gain by which a step must pay
 
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """Of a model. held_out (B,): the squared error of each block by a fit to all others; left: of all, by the fit to
+    """Of a model. held_out (B,): the squared error of each block by a fit to all others; square: of all, by the fit to
     all; rows: how many there are. numbers: how many are fitted."""
 
     held_out: FloatArray
-    left: float
+    square: float
     rows: int
     numbers: int
 
@@ -42,101 +44,115 @@ class Errors:
         """Root mean square of the held-out error."""
         return float(np.sqrt(max(self.held_out.sum(), 0.0) / max(self.rows, 1)))
 
-    def bic(self, tried: int = 1) -> float:
+    def bic(self, model_count: int = 1) -> float:
         """n log(S/n) + k log n, and 2 log of the number of models that it is the best of."""
         n = max(self.rows, 2)
-        return float(n * np.log(max(self.left, 1e-300) / n) + self.numbers * np.log(n) + 2.0 * np.log(max(tried, 1)))
+        return float(
+            n * np.log(max(self.square, 1e-300) / n) + self.numbers * np.log(n) + 2.0 * np.log(max(model_count, 1))
+        )
 
-    def gain(self, before: Errors) -> tuple[float, float]:
+    def gain(self, base_errors: Errors) -> tuple[float, float]:
         """(share of the squared held-out error of another model that this one takes away, its standard error)."""
-        change = (before.held_out - self.held_out) / max(float(before.held_out.sum()), 1e-300)
+        change = (base_errors.held_out - self.held_out) / max(float(base_errors.held_out.sum()), 1e-300)
         return float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change)))
 
 
-def errors(solution: Solution, memory: Memories, margins: Sequence[FloatArray], more: int = 0) -> Errors:
+def errors(solution: Solution, memory: Memories, margins: Sequence[FloatArray], extra_numbers: int = 0) -> Errors:
     """The errors of a fit. memory: of each column, of each group where there are any; margins: of each piece, see
-    `margins_of`; more: numbers that are fitted beside its parameters. One that a bound holds was fitted, too: it is no
-    gain of the model without it.
+    `margins_of`; extra_numbers: numbers that are fitted beside its parameters. One that a bound holds was fitted, too:
+    it is no gain of the model without it.
 
     Of groups a tenth of each is held out at a time: no number that a group has for itself is without a log.
     """
     engine = solution.solver.engine
     if not isinstance(memory, Mapping) or not engine.members:
         memory = next(iter(memory.values())) if isinstance(memory, Mapping) else memory
-        blocks, seen = _blocks(solution, memory, margins)
+        blocks, row_count = _blocks(solution, memory, margins)
     else:
-        parts, seen, told = list[tuple[Blocks, IntArray]](), 0, set[int]()
+        parts, row_count, counted_priors = list[tuple[Blocks, IntArray]](), 0, set[int]()
         for member in engine.members:
-            own = [margins[k] for k in member.places]
-            found, rows = _blocks(
+            group_margins = [margins[k] for k in member.places]
+            group_blocks, rows = _blocks(
                 member.alone(solution),
                 memory[member.name],
-                own,
-                [k for k, at in enumerate(member.at.tolist()) if at in told],
+                group_margins,
+                [k for k, parameter_index in enumerate(member.at.tolist()) if parameter_index in counted_priors],
             )
-            parts.append((found, member.at))
-            seen, told = seen + rows, told | {*member.at.tolist()}
+            parts.append((group_blocks, member.at))
+            row_count, counted_priors = row_count + rows, counted_priors | {*member.at.tolist()}
         blocks = _Together(parts, len(solution.solver.problem.parameters))
-    known = np.arange(1, 1 + blocks.count)
-    return Errors(blocks.predicted(known), blocks.left(known), seen, blocks.count + more)
+    number_indices = np.arange(1, 1 + blocks.count)
+    return Errors(
+        blocks.predicted(number_indices), blocks.left(number_indices), row_count, blocks.count + extra_numbers
+    )
 
 
 def _blocks(
-    solution: Solution, memory: Sequence[AutoRegression], margins: Sequence[FloatArray], told: Container[int] = ()
+    solution: Solution,
+    memory: Sequence[AutoRegression],
+    margins: Sequence[FloatArray],
+    counted_priors: Container[int] = (),
 ) -> tuple[Blocks, int]:
-    """(blocks of one group, how many rows they have). told: parameters whose priors another group has already."""
-    whole, point = solution.solver.problem, solution.state.point
-    pieces = [replace(piece, margin=margin) for piece, margin in zip(whole.pieces, margins, strict=True)]
-    few = Decimated.of(replace(whole, pieces=tuple(pieces)))
-    problem = bounded(few.problem)
-    engine = solution.solver.engine.on(few.all_rows(problem))
-    shows: Shows = lambda at: as_counted(solution, problem, few.kept(engine.residuals(at)))  # noqa: E731
-    bare = [replace(p, prior=None) if k in told else p for k, p in enumerate(problem.parameters)]
-    rows = Rows.of(replace(problem, parameters=tuple(bare)), point, shows(point))
-    slopes = [np.where(solution.held, 0.0, slope) for slope in rows.slopes]  # what a bound holds, holds in every block
+    """(blocks of one group, how many rows they have). counted_priors: parameters whose priors another group has
+    already."""
+    full_problem, point = solution.solver.problem, solution.state.point
+    pieces = [replace(piece, margin=margin) for piece, margin in zip(full_problem.pieces, margins, strict=True)]
+    decimated = Decimated.of(replace(full_problem, pieces=tuple(pieces)))
+    problem = bounded(decimated.problem)
+    engine = solution.solver.engine.on(decimated.all_rows(problem))
+    shows: Shows = lambda columns: as_counted(solution, problem, decimated.kept(engine.residuals(columns)))  # noqa: E731
+    parameters = [replace(p, prior=None) if k in counted_priors else p for k, p in enumerate(problem.parameters)]
+    rows = Rows.of(replace(problem, parameters=tuple(parameters)), point, shows(point))
+    slopes = [
+        np.where(solution.held_parameters, 0.0, slope) for slope in rows.slopes
+    ]  # what a bound holds, holds in every block
     linear = Linear(replace(rows, slopes=slopes), memory)
-    nothing = [np.zeros((*residual.shape, 0)) for residual in rows.residual]
-    return _AsTheyAre(linear, nothing, shows), int(sum(there.sum() for there in rows.there))
+    no_columns = [np.zeros((*residual.shape, 0)) for residual in rows.residual]
+    return _AsTheyAre(linear, no_columns, shows), int(sum(mask.sum() for mask in rows.masks))
 
 
 class _AsTheyAre(Blocks):
     """The blocks of a fit, and what its engine shows at a point: what one to all others predicts can be simulated."""
 
-    def __init__(self, linear: Linear, shown: Sequence[FloatArray], shows: Shows):
-        super().__init__(linear, shown)
+    def __init__(self, linear: Linear, columns_by_piece: Sequence[FloatArray], shows: Shows):
+        super().__init__(linear, columns_by_piece)
         self.linear, self.shows = linear, shows
 
-    def predicted(self, at: IntArray) -> FloatArray:
+    def predicted(self, indices: IntArray) -> FloatArray:
         """The squared error of each block by a fit to all others, simulated where a linear step says far more than the
         fit to all leaves there: it follows numbers that hardly anything but this block tells to where no slope holds,
         and a fit would not."""
-        values, inside = self.held_out(at), self.fitted(self.total, at)
-        for b, own in enumerate(self.matrix):
-            left = own[0, 0] - 2.0 * inside @ own[at, 0] + inside @ own[np.ix_(at, at)] @ inside
-            if values[b] > FAR * left:
-                values[b] = self._simulated(self.fitted(self.total - own, at) / self.size[at], b)
+        values, fitted_inside = self.held_out(indices), self.fitted(self.total, indices)
+        for b, block_matrix in enumerate(self.matrix):
+            block_error = (
+                block_matrix[0, 0]
+                - 2.0 * fitted_inside @ block_matrix[indices, 0]
+                + fitted_inside @ block_matrix[np.ix_(indices, indices)] @ fitted_inside
+            )
+            if values[b] > SIMULATION_RATIO * block_error:
+                values[b] = self._simulated(self.fitted(self.total - block_matrix, indices) / self.size[indices], b)
         return values
 
     def _simulated(self, step: FloatArray, b: int) -> float:
         """The squared error of a block, the numbers as far along a step (P,) as the other blocks gain by it."""
-        before, after, mine = self._square(0.0 * step), np.zeros(0), self.block[b]
+        base_squares, step_squares, block_rows = self._square(0.0 * step), np.zeros(0), self.block[b]
         for share in (*SHARES, 0.0):
-            after = self._square(share * step)
-            if np.delete(after, mine).sum() <= np.delete(before, mine).sum():
+            step_squares = self._square(share * step)
+            if np.delete(step_squares, block_rows).sum() <= np.delete(base_squares, block_rows).sum():
                 break
-        return float(after[mine].sum())
+        return float(step_squares[block_rows].sum())
 
     def _square(self, step: FloatArray) -> FloatArray:
         """The squared errors (N,) of all rows and priors where the numbers that the solver sees are a step away."""
         rows = self.linear.rows
         values = [
-            min(max(p.outer(p.inner(value) + by), p.low), p.high)
-            for p, value, by in zip(rows.problem.parameters, rows.point.values.tolist(), step.tolist(), strict=True)
+            min(max(p.outer(p.inner(value) + shift), p.low), p.high)
+            for p, value, shift in zip(rows.problem.parameters, rows.point.values.tolist(), step.tolist(), strict=True)
         ]
         point = replace(rows.point, values=np.array(values))
-        shown = Rows.of(rows.problem, point, self.shows(point))
-        moved = replace(rows, point=point, residual=shown.residual)
-        return replace(self.linear, rows=moved).whole()[0] ** 2
+        simulated_rows = Rows.of(rows.problem, point, self.shows(point))
+        moved_rows = replace(rows, point=point, residual=simulated_rows.residual)
+        return replace(self.linear, rows=moved_rows).whole()[0] ** 2
 
 
 class _Together(Blocks):
@@ -147,10 +163,10 @@ class _Together(Blocks):
         self.count, self.rows = count, sum(part.rows for part, _ in parts)
         self.matrix = np.zeros((len(parts[0][0].matrix), 1 + count, 1 + count))
         self.total = np.zeros((1 + count, 1 + count))
-        for part, at in parts:
-            where, size = np.concatenate([[0], 1 + at]), np.outer(part.size, part.size)
-            self.matrix[:, where[:, None], where] += part.matrix * size
-            self.total[where[:, None], where] += part.total * size
+        for part, indices in parts:
+            positions, size = np.concatenate([[0], 1 + indices]), np.outer(part.size, part.size)
+            self.matrix[:, positions[:, None], positions] += part.matrix * size
+            self.total[positions[:, None], positions] += part.total * size
         self.size = np.sqrt(np.diag(self.total))
         self.size[0] = 1.0
         self.size[self.size == 0.0] = 1.0

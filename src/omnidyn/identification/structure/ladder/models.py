@@ -41,10 +41,10 @@ from omnidyn.statement import NOTE, Statement
 
 @dataclass(frozen=True)
 class Move:
-    """group -> the remedy that is switched on there, the same in all. all: whether these are all groups."""
+    """group -> the remedy that is switched on there, the same in all. is_everywhere: whether these are all groups."""
 
     remedies: Mapping[str, Remedy]
-    all: bool = True
+    is_everywhere: bool = True
 
     @property
     def key(self) -> str:
@@ -64,7 +64,7 @@ class Move:
     @property
     def groups(self) -> tuple[str, ...]:
         """In which groups it is switched on, where not in all."""
-        return () if self.all else tuple(self.remedies)
+        return () if self.is_everywhere else tuple(self.remedies)
 
     def at(self, cause: Statement) -> Statement:
         """A cause with the groups in which it is switched on, where not in all."""
@@ -75,7 +75,7 @@ class Move:
 @dataclass(frozen=True, eq=False)
 class Model:
     """A fit, and what it came to. begins: group -> the robot and the question it began from. numbers: see `Switch`.
-    before: what stood when it was tried; instead: of which step it is in the place."""
+    base_model: what stood when it was tried; replaced_step: of which step it is in the place."""
 
     fit: Fit
     solution: Solution
@@ -83,8 +83,8 @@ class Model:
     move: Move | None = None
     cause: Statement = STANDS
     numbers: int = 0
-    before: Model | None = None
-    instead: Statement | None = None
+    base_model: Model | None = None
+    replaced_step: Statement | None = None
 
     @classmethod
     def first(cls, fit: Fit, solution: Solution) -> Model:
@@ -109,7 +109,7 @@ class Model:
 
     def answered(self) -> dict[str, Solution]:
         """The same where an answer has it: fitted once more where errors remember."""
-        return self._alone(self.fit.weighed(self.solution).plain)
+        return self._alone(self.fit.weighed(self.solution).plain_solution)
 
     def _alone(self, solution: Solution) -> dict[str, Solution]:
         members = solution.solver.engine.members
@@ -117,14 +117,14 @@ class Model:
 
     def robot(self, group: str) -> Robot:
         """The fitted robot of a group."""
-        found = self.alone[group]
-        return found.solver.problem.robot_at(found.state.point.values)
+        group_fit = self.alone[group]
+        return group_fit.solver.problem.robot_at(group_fit.state.point.values)
 
     @property
     def shapes(self) -> int:
         """In how many ways friction is fitted, group by group: one where all have the same."""
-        names = [alone.solver.problem.names for alone in self.alone.values()]
-        return len({frozenset(name for name in own if name.startswith(FRICTION)) for own in names})
+        names = [group_fit.solver.problem.names for group_fit in self.alone.values()]
+        return len({frozenset(name for name in friction_keys if name.startswith(FRICTION)) for friction_keys in names})
 
 
 @dataclass(frozen=True)
@@ -133,38 +133,43 @@ class Untried:
 
     move: Move
     cause: Statement
-    why: Statement
+    reason: Statement
 
 
-def moves(worth: Mapping[str, Sequence[Remedy]], stands: Model) -> list[Move]:
+def moves(remedies_by_group: Mapping[str, Sequence[Remedy]], base_model: Model) -> list[Move]:
     """What is to be tried of the remedies of each group, best first: in all groups, and where it is their own, in those
     that ask for it."""
-    found = []
-    for key, own in _of_groups(worth):
-        every = [group for group in stands.begins if can(key, stands.robot(group))] or [*own]
-        some = next(iter(own.values()))
-        parts = [{group: own.get(group, some) for group in every}]
-        if is_own(key, stands.fit.question) and own.keys() != parts[0].keys():
-            parts.append(own)
-        found += [Move(part, len(part) == len(stands.begins)) for part in parts]
-    return found
+    new_moves = []
+    for key, remedy_by_group in _of_groups(remedies_by_group):
+        capable_groups = [group for group in base_model.begins if can(key, base_model.robot(group))] or [
+            *remedy_by_group
+        ]
+        any_remedy = next(iter(remedy_by_group.values()))
+        parts = [{group: remedy_by_group.get(group, any_remedy) for group in capable_groups}]
+        if is_own(key, base_model.fit.question) and remedy_by_group.keys() != parts[0].keys():
+            parts.append(remedy_by_group)
+        new_moves += [Move(part, len(part) == len(base_model.begins)) for part in parts]
+    return new_moves
 
 
-def moves_apart(worth: Mapping[str, Sequence[Remedy]], stands: Model) -> list[Move]:
+def moves_apart(remedies_by_group: Mapping[str, Sequence[Remedy]], base_model: Model) -> list[Move]:
     """The same in each group alone, where several ask for it."""
     return [
-        Move({group: remedy}, all=False)
-        for key, own in _of_groups(worth)
-        if len(own) > 1 and is_own(key, stands.fit.question)
-        for group, remedy in own.items()
+        Move({group: remedy}, is_everywhere=False)
+        for key, remedy_by_group in _of_groups(remedies_by_group)
+        if len(remedy_by_group) > 1 and is_own(key, base_model.fit.question)
+        for group, remedy in remedy_by_group.items()
     ]
 
 
-def _of_groups(worth: Mapping[str, Sequence[Remedy]]) -> list[tuple[str, dict[str, Remedy]]]:
+def _of_groups(remedies_by_group: Mapping[str, Sequence[Remedy]]) -> list[tuple[str, dict[str, Remedy]]]:
     """(key, group -> the remedy) of all remedies, in the order of the groups' own."""
-    named = {group: _numbered(own) for group, own in worth.items()}
-    names = dict.fromkeys(name for row in zip_longest(*named.values()) for name in row if name)
-    return [(name[0], {group: each[name] for group, each in named.items() if name in each}) for name in names]
+    numbered_by_group = {group: _numbered(remedies) for group, remedies in remedies_by_group.items()}
+    names = dict.fromkeys(name for row in zip_longest(*numbered_by_group.values()) for name in row if name)
+    return [
+        (name[0], {group: numbered[name] for group, numbered in numbered_by_group.items() if name in numbered})
+        for name in names
+    ]
 
 
 def _numbered(remedies: Sequence[Remedy]) -> dict[tuple[str, int], Remedy]:
@@ -175,10 +180,10 @@ def _numbered(remedies: Sequence[Remedy]) -> dict[tuple[str, int], Remedy]:
 
 def is_own(key: str, question: OutputError) -> bool:
     """Whether each group of a fit has for itself what this is about: friction, unless other numbers are asked for."""
-    own = question.per_free
+    group_keys = question.per_free
     if key.partition(".")[0] == FRICTION:
-        return not own or any(name.partition(".")[0] == FRICTION for name in own)
-    return any(name == key or name.startswith((f"{key}.", f"{key}[")) for name in own)
+        return not group_keys or any(name.partition(".")[0] == FRICTION for name in group_keys)
+    return any(name == key or name.startswith((f"{key}.", f"{key}[")) for name in group_keys)
 
 
 def can(key: str, robot: Robot) -> bool:
@@ -191,8 +196,8 @@ def can(key: str, robot: Robot) -> bool:
     if key == WHEELS:
         return friction.wheels == WheelFriction()
     if key == EACH_WHEEL:  # beside a box that acts where wheels do, too, only once they have a level for all
-        one = bool(friction.wheels.coulomb) and not np.ndim(friction.wheels.coulomb)
-        return one or (friction.wheels == WheelFriction() and any(friction.direction.coulomb))
+        has_one_coulomb = bool(friction.wheels.coulomb) and not np.ndim(friction.wheels.coulomb)
+        return has_one_coulomb or (friction.wheels == WheelFriction() and any(friction.direction.coulomb))
     if key in BREAKS:
         return key in {f"{table}.{BREAKAWAY}" for table in may_break_away(friction)}
     return key not in LAWS or key in other_laws(friction)
@@ -200,73 +205,74 @@ def can(key: str, robot: Robot) -> bool:
 
 def tried(
     move: Move,
-    stands: Model,
+    base_model: Model,
     runs: Sequence[Run],
     names: Sequence[str] | None,
     progress: FitProgress,
-    instead: Statement | None = None,
+    replaced_step: Statement | None = None,
 ) -> list[Model | Untried]:
     """A move, fitted in every way in which it can be switched on. names: of the group of each run."""
-    every = {
-        group: switches(remedy, *stands.begins[group], stands.alone[group]) for group, remedy in move.remedies.items()
+    switches_by_group = {
+        group: switches(remedy, *base_model.begins[group], base_model.alone[group])
+        for group, remedy in move.remedies.items()
     }
-    found: list[Model | Untried] = []
-    for ways in zip(*every.values(), strict=False):
+    tried_models: list[Model | Untried] = []
+    for ways in zip(*switches_by_group.values(), strict=False):
         cause = move.at(ways[0].cause)
-        aside = progress.aside(f"the ladder tries {cause}")
-        begins = _begins(stands, dict(zip(every, ways, strict=True)))
+        inner_progress = progress.aside(f"the ladder tries {cause}")
+        begin_by_group = _begins(base_model, dict(zip(switches_by_group, ways, strict=True)))
         try:
-            fit = _fit(stands, begins, runs, names, aside)
-            solution, _ = fit.with_levels(fit.solve(aside), aside)
+            fit = _fit(base_model, begin_by_group, runs, names, inner_progress)
+            solution, _ = fit.with_levels(fit.solve(inner_progress), inner_progress)
         except OmnidynError as error:
-            found.append(Untried(move, cause, Statement("not_fittable", NOTE, numbers={"error": str(error)})))
+            tried_models.append(Untried(move, cause, Statement("not_fittable", NOTE, numbers={"error": str(error)})))
             continue
-        numbers = stands.numbers + sum(way.numbers for way in ways)
-        found.append(Model(fit, solution, begins, move, cause, numbers, stands, instead))
-    return found
+        numbers = base_model.numbers + sum(way.numbers for way in ways)
+        tried_models.append(Model(fit, solution, begin_by_group, move, cause, numbers, base_model, replaced_step))
+    return tried_models
 
 
-def _begins(stands: Model, ways: Mapping[str, Switch]) -> dict[str, tuple[Robot, OutputError]]:
+def _begins(base_model: Model, ways: Mapping[str, Switch]) -> dict[str, tuple[Robot, OutputError]]:
     """Each group as it is switched on, or as it ended."""
-    found = {}
-    for group, start in stands.begins.items():
-        way = ways.get(group) or as_it_ended(*start, stands.alone[group])
-        way = way if len(stands.begins) == 1 else with_levels_as_they_are(way)  # groups profile none
-        found[group] = way.robot, way.question
-    return found
+    begin_by_group = {}
+    for group, start in base_model.begins.items():
+        way = ways.get(group) or as_it_ended(*start, base_model.alone[group])
+        way = way if len(base_model.begins) == 1 else with_levels_as_they_are(way)  # groups profile none
+        begin_by_group[group] = way.robot, way.question
+    return begin_by_group
 
 
 def _fit(
-    stands: Model,
-    begins: Mapping[str, tuple[Robot, OutputError]],
+    base_model: Model,
+    begin_by_group: Mapping[str, tuple[Robot, OutputError]],
     runs: Sequence[Run],
     names: Sequence[str] | None,
     progress: FitProgress,
 ) -> Fit:
     if names is None:
-        return Fit.of(runs, *begins[stands.fit.groups[0].name], progress=progress)
-    asked, first = stands.fit.question, next(iter(begins.values()))[1]
-    profiles = [set(question.profile) for _, question in begins.values()]
+        return Fit.of(runs, *begin_by_group[base_model.fit.groups[0].name], progress=progress)
+    group_keys, first = base_model.fit.question, next(iter(begin_by_group.values()))[1]
+    profiles = [set(question.profile) for _, question in begin_by_group.values()]
     question = replace(
-        asked,
-        per_free=_own(stands, begins),
+        group_keys,
+        per_free=_own(base_model, begin_by_group),
         nuisances=first.nuisances,
         loss=first.loss,
-        profile=tuple(name for name in asked.profile if all(name in profile for profile in profiles)),
+        profile=tuple(name for name in group_keys.profile if all(name in profile for profile in profiles)),
     )
-    return Fit.of(runs, stands.fit.began, question, names, progress, begins)
+    return Fit.of(runs, base_model.fit.given_robot, question, names, progress, begin_by_group)
 
 
-def _own(stands: Model, begins: Mapping[str, tuple[Robot, OutputError]]) -> tuple[str, ...]:
+def _own(base_model: Model, begin_by_group: Mapping[str, tuple[Robot, OutputError]]) -> tuple[str, ...]:
     """The numbers that each group has for itself: where friction is its own, all of it that was not shared before."""
-    asked = stands.fit.question.per_free
-    if not is_own(FRICTION, stands.fit.question):
-        return asked
-    shared = {name for name in stands.solution.solver.problem.names if AT not in name}
-    keys = [key for robot, question in begins.values() for key in expand_keys(question.free or (), robot)]
+    group_keys = base_model.fit.question.per_free
+    if not is_own(FRICTION, base_model.fit.question):
+        return group_keys
+    shared = {name for name in base_model.solution.solver.problem.names if AT not in name}
+    keys = [key for robot, question in begin_by_group.values() for key in expand_keys(question.free or (), robot)]
     of_friction: Callable[[str], bool] = lambda key: (place := find_key(key)) is not None and place.part == FRICTION  # noqa: E731
-    own = [key for key in keys if of_friction(key) and key not in shared]
-    return tuple(dict.fromkeys([*(key for key in asked if not of_friction(key)), *own]))
+    friction_keys = [key for key in keys if of_friction(key) and key not in shared]
+    return tuple(dict.fromkeys([*(key for key in group_keys if not of_friction(key)), *friction_keys]))
 
 
 # What the ladder spends on fits of wheels that slip, which take a hundred times as long as others
@@ -277,9 +283,9 @@ def _own(stands: Model, begins: Mapping[str, tuple[Robot, OutputError]]) -> tupl
 # the same on every machine. What is not tried for that is in the answer, by name.
 
 FITS = 4  # of wheels that slip, in all steps together
-CLEARLY = 6.0  # of chi squared, by which one remedy explains more than another
-NOT_NEEDED = Statement("slow_and_not_needed", NOTE)
-BEYOND = Statement("slow_fits_spent", NOTE, numbers={"fits": FITS})
+CHI2_MARGIN = 6.0  # of chi squared, by which one remedy explains more than another
+NOT_NEEDED_NOTE = Statement("slow_and_not_needed", NOTE)
+SPENT_NOTE = Statement("slow_fits_spent", NOTE, numbers={"fits": FITS})
 
 
 class Purse:
@@ -288,44 +294,44 @@ class Purse:
     def __init__(self) -> None:
         self.left, self._untried = FITS, list[Untried]()
 
-    def pays(self, moves: Sequence[Move], stands: Model) -> list[Move]:
+    def pays(self, moves: Sequence[Move], base_model: Model) -> list[Move]:
         """Those of some moves that are made; the others are noted."""
-        made = list[Move]()
+        paid_moves = list[Move]()
         for move in moves:
-            slow = is_slow(move, stands)
+            slow = is_slow(move, base_model)
             if slow and not self.left:
-                self._leave(move, BEYOND)
+                self._leave(move, SPENT_NOTE)
                 continue
             self.left -= slow
-            made.append(move)
-        return made
+            paid_moves.append(move)
+        return paid_moves
 
     def rivals(self, moves: Sequence[Move], best: Model) -> list[Move]:
         """Those of some slow moves that promised about as much as one that leaves nothing but noise; the others are
         noted. Both by the diagnosis of what stood before."""
         assert best.move is not None
-        least = best.move.promise - CLEARLY
+        least_promise = best.move.promise - CHI2_MARGIN
         for move in moves:
-            if move.promise < least:
-                self._leave(move, NOT_NEEDED)
-        return [move for move in moves if move.promise >= least]
+            if move.promise < least_promise:
+                self._leave(move, NOT_NEEDED_NOTE)
+        return [move for move in moves if move.promise >= least_promise]
 
     def told(self) -> list[Untried]:
         """What was not tried since it was told last."""
-        untrieds, self._untried = self._untried, []
-        return untrieds
+        untried_models, self._untried = self._untried, []
+        return untried_models
 
-    def _leave(self, move: Move, why: Statement) -> None:
-        self._untried.append(Untried(move, move.cause, why))
+    def _leave(self, move: Move, reason: Statement) -> None:
+        self._untried.append(Untried(move, move.cause, reason))
 
 
-def is_slow(move: Move, stands: Model) -> bool:
+def is_slow(move: Move, base_model: Model) -> bool:
     """Whether a move is a fit with wheels that slip."""
-    slips = any(robot.wheels.traction_mu is not None for robot, _ in stands.begins.values())
+    slips = any(robot.wheels.traction_mu is not None for robot, _ in base_model.begins.values())
     return slips or move.key == TRACTION
 
 
-def quick_first(moves: Sequence[Move], stands: Model) -> tuple[list[Move], list[Move]]:
+def quick_first(moves: Sequence[Move], base_model: Model) -> tuple[list[Move], list[Move]]:
     """(those of other engines, those with wheels that slip), each best first."""
-    slow = [move for move in moves if is_slow(move, stands)]
+    slow = [move for move in moves if is_slow(move, base_model)]
     return [move for move in moves if move not in slow], slow

@@ -26,9 +26,9 @@ from omnidyn.model.layout import N_AXES
 from omnidyn.model.robot import Robot
 from omnidyn.statement import NOTE, Statement
 
-LEAST = -0.9  # relative change of a number that is above 0: what goes further is no explanation
+LEAST_CHANGE = -0.9  # relative change of a number that is above 0: what goes further is no explanation
 STEP = 0.02  # relative change that a smooth number is tried with
-WHEN = np.linspace(0.1, 0.9, 9)  # shares of the run at which it may change
+CHANGE_SHARES = np.linspace(0.1, 0.9, 9)  # shares of the run at which it may change
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Trial:
     """What a change by 1 would change in the log, of each piece (C, rows, K), K numbers. at: where it is tried, such as
     the level of a limit. fitted: of one that was, and is shown whole by its one column."""
 
-    shown: list[FloatArray]
+    columns_by_piece: list[FloatArray]
     at: float = 0.0
     fitted: Fitted | None = None
 
@@ -53,15 +53,16 @@ class Trial:
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """key: of the robot file, a nuisance, or CHANGE. trials: one or more. cause: what it is, of its fitted change and
-    where it was tried. least: a change below it makes no sense. offered: whether a robot file or a fit can hold it.
-    late: whether it has an engine of its own, and is asked only where something is left out."""
+    where it was tried. least_change: a change below it makes no sense. is_offered: whether a robot file or a fit can
+    hold it.
+    is_late: whether it has an engine of its own, and is asked only where something is left out."""
 
     key: str
     trials: Callable[[Workbench], list[Trial]]
     cause: Callable[[float, float], Statement]
-    least: float = -np.inf
-    offered: bool = True
-    late: bool = False
+    least_change: float = -np.inf
+    is_offered: bool = True
+    is_late: bool = False
 
     def tried(self, bench: Workbench) -> list[Trial]:
         """Its trials; none where the engine cannot simulate them."""
@@ -83,7 +84,9 @@ def as_it_is(code: str, subject: str = "") -> Callable[[float, float], Statement
 
 def sized(code: str, subject: str, **numbers: Callable[[float, float], Any]) -> Callable[[float, float], Statement]:
     """A cause with numbers, each of the fitted change and where it was tried."""
-    return lambda change, at: Statement(code, NOTE, subject, {name: of(change, at) for name, of in numbers.items()})
+    return lambda change, place: Statement(
+        code, NOTE, subject, {name: value_of(change, place) for name, value_of in numbers.items()}
+    )
 
 
 def numbers(bench: Workbench) -> Iterator[Candidate]:
@@ -91,55 +94,59 @@ def numbers(bench: Workbench) -> Iterator[Candidate]:
     for key in ("body.mass_kg", "body.inertia_kg_m2", "wheels.robot_radius_m"):
         yield from _number(bench.robot, key)
     for name in ("wheels.wheel_radius_m", "motor.resistance_ohm", TORQUE):
-        beside = EMF if name == TORQUE else ""
-        yield from _number(bench.robot, name, beside)
+        tied_key = EMF if name == TORQUE else ""
+        yield from _number(bench.robot, name, tied_key)
         for i in range(bench.robot.wheels.count):
-            yield from _number(bench.robot, f"{name}[{i}]", f"{beside}[{i}]" if beside else "")
+            yield from _number(bench.robot, f"{name}[{i}]", f"{tied_key}[{i}]" if tied_key else "")
 
 
-def _number(robot: Robot, key: str, beside: str = "") -> Iterator[Candidate]:
+def _number(robot: Robot, key: str, tied_key: str = "") -> Iterator[Candidate]:
     """A number, of all wheels where the key is that of a list, and another one that follows it."""
-    changed = scaled(robot, key, 1.0 + STEP)
-    if changed is None:
+    new_robot = scaled(robot, key, 1.0 + STEP)
+    if new_robot is None:
         return
-    if beside:
-        changed = scaled(changed, beside, 1.0 + STEP) or changed
+    if tied_key:
+        new_robot = scaled(new_robot, tied_key, 1.0 + STEP) or new_robot
 
     def trials(bench: Workbench) -> list[Trial]:
-        return [Trial([own / STEP for own in bench.change(changed)])]
+        return [Trial([columns / STEP for columns in bench.change(new_robot)])]
 
-    yield Candidate(key, trials, sized("number_off", key, change=lambda change, _: change), LEAST)
+    yield Candidate(key, trials, sized("number_off", key, change=lambda change, _: change), LEAST_CHANGE)
 
 
 def of_the_log(bench: Workbench) -> Iterator[Candidate]:
     """What a log does to a right model: nuisances that are not fitted, and a change on the way."""
-    if not bench.kind.looped:
+    if not bench.kind.has_loop:
         gain, fade, band = Driver(gain=1.0 + STEP), Driver(fade=STEP), Driver(dead_band=0.1)
-        yield Candidate(GAIN, _driver(GAIN, gain, STEP), sized("gain", "", gain=lambda by, _: 1.0 + by))
-        yield Candidate(FADE, _driver(FADE, fade, STEP), sized("fading_voltage", "", percent=lambda by, _: 100.0 * by))
-        yield Candidate(DEAD_BAND, _driver(DEAD_BAND, band, 0.1), sized("dead_band", "", value=lambda by, _: by), 0.0)
+        yield Candidate(GAIN, _driver(GAIN, gain, STEP), sized("gain", "", gain=lambda change, _: 1.0 + change))
+        yield Candidate(
+            FADE, _driver(FADE, fade, STEP), sized("fading_voltage", "", percent=lambda change, _: 100.0 * change)
+        )
+        yield Candidate(
+            DEAD_BAND, _driver(DEAD_BAND, band, 0.1), sized("dead_band", "", value=lambda change, _: change), 0.0
+        )
     yield Candidate(TILT, _by(in_the_room), as_it_is("force_in_the_room"))
     yield Candidate(PUSH, _by(_on_the_body), as_it_is("push_on_the_body"))
     for channel in dict.fromkeys(name for name, _ in bench.problem.columns):
-        late = sized("late_channel", channel, late=lambda by, _: by)
-        yield Candidate(f"{LATENCY}.{channel}", _late(channel), late)
-    mass, at = float(bench.robot.body.mass), partial(_seconds, bench)
-    for what, force in (("friction", _friction), ("mass", _inertia), ("supply", _drive)):
-        changed = sized(
+        late_cause = sized("late_channel", channel, late=lambda change, _: change)
+        yield Candidate(f"{LATENCY}.{channel}", _late(channel), late_cause)
+    mass, time_of = float(bench.robot.body.mass), partial(_seconds, bench)
+    for subject, force in (("friction", _friction), ("mass", _inertia), ("supply", _drive)):
+        cause_of_change = sized(
             "change_on_the_way",
-            what,
-            by=lambda by, _: by,
+            subject,
+            by=lambda change, _: change,
             before=lambda *_: mass,
-            after=lambda by, _: max(mass + by, 0.0),
+            after=lambda change, _: max(mass + change, 0.0),
             share=lambda _, share: share,
-            at=lambda _, share: at(share),
+            at=lambda _, share: time_of(share),
         )
-        yield Candidate(CHANGE, _later(force), changed)
+        yield Candidate(CHANGE, _later(force), cause_of_change)
 
 
 def _driver(name: str, driver: Driver, size: float) -> Callable[[Workbench], list[Trial]]:
     assert getattr(driver, name) != getattr(Driver(), name)
-    return lambda bench: [Trial([own / size for own in bench.change(driver=driver)])]
+    return lambda bench: [Trial([columns / size for columns in bench.change(driver=driver)])]
 
 
 def _by(force: Callable[[Motion], FloatArray]) -> Callable[[Workbench], list[Trial]]:
@@ -155,12 +162,12 @@ def _late(channel: str) -> Callable[[Workbench], list[Trial]]:
     """A delay of a channel: it shows what was earlier."""
 
     def trials(bench: Workbench) -> list[Trial]:
-        shown = []
+        columns_by_piece = []
         for motion in bench.motions:
             level = motion.shown(motion.twist[:, None, :])
-            own = np.array([name == channel for name, _ in motion.piece.record.columns])
-            shown.append(np.where(own[:, None, None], -np.gradient(level, motion.t, axis=1), 0.0))
-        return [Trial(shown)]
+            is_channel = np.array([name == channel for name, _ in motion.piece.record.columns])
+            columns_by_piece.append(np.where(is_channel[:, None, None], -np.gradient(level, motion.t, axis=1), 0.0))
+        return [Trial(columns_by_piece)]
 
     return trials
 
@@ -169,9 +176,11 @@ def _later(force: Callable[[Motion], FloatArray]) -> Callable[[Workbench], list[
     """Forces that begin at some time of the log, at several times."""
 
     def trials(bench: Workbench) -> list[Trial]:
-        every = [*WHEN.tolist(), *bench.moments]
-        shown = bench.by_forces([lambda m, when=when: force(m) * (m.share >= when)[:, None, None] for when in every])
-        return [Trial(own, when) for own, when in zip(shown, every, strict=True)]
+        shares = [*CHANGE_SHARES.tolist(), *bench.moments]
+        columns_by_share = bench.by_forces(
+            [lambda m, start_share=share: force(m) * (m.share >= start_share)[:, None, None] for share in shares]
+        )
+        return [Trial(columns, start_share) for columns, start_share in zip(columns_by_share, shares, strict=True)]
 
     return trials
 
@@ -194,8 +203,8 @@ def _inertia(motion: Motion) -> FloatArray:
 
 def _drive(motion: Motion) -> FloatArray:
     """Of voltages that are all larger by a share: what the motors push with, without the back-EMF."""
-    at_rest = drive_wrench(motion.robot, np.zeros_like(motion.twist), motion.voltage)
-    return at_rest[:, None, :]
+    stall_wrench = drive_wrench(motion.robot, np.zeros_like(motion.twist), motion.voltage)
+    return stall_wrench[:, None, :]
 
 
 # What robots do that no law of a robot file holds yet: rivals of the candidates, so that none stands in for them
@@ -215,14 +224,14 @@ def unoffered(bench: Workbench) -> Iterator[Candidate]:
         ("sag", _sag, (0.0,)),
         ("heat", _heat, (0.0,)),
     ):
-        yield Candidate(key, _tried(force, sizes), as_it_is("cause", key), offered=False)
-    yield Candidate("filter", _filtered, as_it_is("cause", "filter"), offered=False)
+        yield Candidate(key, _tried(force, sizes), as_it_is("cause", key), is_offered=False)
+    yield Candidate("filter", _filtered, as_it_is("cause", "filter"), is_offered=False)
 
 
 def _tried(force: Force, sizes: tuple[float, ...]) -> Callable[[Workbench], list[Trial]]:
     def trials(bench: Workbench) -> list[Trial]:
-        shown = bench.by_forces([lambda m, size=size: force(m, size) for size in sizes])
-        return [Trial(own, size) for own, size in zip(shown, sizes, strict=True)]
+        columns_by_size = bench.by_forces([lambda m, size=size: force(m, size) for size in sizes])
+        return [Trial(columns, size) for columns, size in zip(columns_by_size, sizes, strict=True)]
 
     return trials
 
@@ -241,9 +250,9 @@ def _drag(motion: Motion, _: float) -> FloatArray:
 
 
 def _waves(motion: Motion, count: float) -> FloatArray:
-    g, turned = motion.robot.wheels.wrench_matrix, motion.turned
+    g, turned_angles = motion.robot.wheels.wrench_matrix, motion.turned
     moving = (motion.twist @ g != 0.0).astype(float)
-    waves = np.concatenate([np.cos(count * turned) * moving, np.sin(count * turned) * moving], axis=1)
+    waves = np.concatenate([np.cos(count * turned_angles) * moving, np.sin(count * turned_angles) * moving], axis=1)
     return waves[:, :, None] * np.concatenate([g, g], axis=1).T
 
 
@@ -260,10 +269,10 @@ def _heat(motion: Motion, _: float) -> FloatArray:
 
 def _filtered(bench: Workbench) -> list[Trial]:
     """What a filter takes out beside the delay: the bend of every speed."""
-    shown = []
+    columns_by_piece = []
     for motion in bench.motions:
         level = motion.shown(motion.twist[:, None, :])
         bend = np.gradient(np.gradient(level, motion.t, axis=1), motion.t, axis=1)
         speed = np.array([name in ("twist", "wheel_speed") for name, _ in motion.piece.record.columns])
-        shown.append(np.where(speed[:, None, None], bend, 0.0))
-    return [Trial(shown)]
+        columns_by_piece.append(np.where(speed[:, None, None], bend, 0.0))
+    return [Trial(columns_by_piece)]

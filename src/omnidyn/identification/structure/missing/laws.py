@@ -35,14 +35,17 @@ from omnidyn.model.motor import mass_at_rim, per_wheel, settled_current, tractio
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.slip.plant import grips
 
-NEARBY = 1e-4  # [m] of a centre of mass
+CENTRE_STEP = 1e-4  # [m] of a centre of mass
 LOSS, SHARE = 0.05, 0.03  # of a gear; of the robot's mass that rotors may be, each a small one to try
 LIMITS = (0.5, 0.7, 0.85, 0.95, 0.99)  # quantiles of the largest current, at which a limit is tried
-ABOVE = (0.1, 0.25, 0.5, 1.0)  # shares by which breakaway may exceed Coulomb friction
+EXCESS_SHARES = (0.1, 0.25, 0.5, 1.0)  # shares by which breakaway may exceed Coulomb friction
 SPEEDS = (0.01, 0.03, 0.1, 0.3)  # of the fastest speed, over which the level may fall
 BENDS = (2e-4, 1e-3, 5e-3)  # [m] by which bristles may bend before they slip
 USUAL_FALL, USUAL_SPEED = 1.3, 0.05  # breakaway over Coulomb friction, and [m/s] over which it falls to it
-LIGHT, AMPLE = 0.02, 1e6  # wheels, as a share of the robot's mass at their rims; a grip that no motor overcomes
+LIGHT_SHARE, AMPLE_GRIP = (
+    0.02,
+    1e6,
+)  # wheels, as a share of the robot's mass at their rims; a grip that no motor overcomes
 TRACTION = "wheels.traction_mu"
 FALL, BEND, DAMPING = "stribeck_speed", "stiffness", "damping"  # numbers by which laws are named: Stribeck, Dahl, LuGre
 DAHL = "dahl"
@@ -50,43 +53,45 @@ DAHL = "dahl"
 
 def candidates(bench: Workbench) -> Iterator[Candidate]:
     """All that may be asked of a fit: numbers, laws, and what the log does; what is free already is left out."""
-    taken = set(bench.problem.names)
-    taken |= {key.name for name in bench.problem.names if (key := find_key(name))}
+    free_names = set(bench.problem.names)
+    free_names |= {key.name for name in bench.problem.names if (key := find_key(name))}
     of_laws = (*_of_the_body(bench), *_of_motors(bench), *_of_friction(bench))
-    for one in (*numbers(bench), *of_laws, *of_the_log(bench)):
-        key = find_key(one.key)
-        if one.key == CHANGE or not (one.key in taken or (key and key.name in taken)):
-            yield one
+    for candidate in (*numbers(bench), *of_laws, *of_the_log(bench)):
+        key = find_key(candidate.key)
+        if candidate.key == CHANGE or not (candidate.key in free_names or (key and key.name in free_names)):
+            yield candidate
 
 
 def _of_the_body(bench: Workbench) -> Iterator[Candidate]:
     body = bench.robot.body
-    other = bench.robot.model_copy(update={"body": body.model_copy(update={"rotating_frame": not body.rotating_frame})})
+    other_robot = bench.robot.model_copy(
+        update={"body": body.model_copy(update={"rotating_frame": not body.rotating_frame})}
+    )
     frame = as_it_is("no_turning_frame" if body.rotating_frame else "turning_frame")
-    yield Candidate("body.rotating_frame", lambda b: [Trial(b.change(other))], frame)
+    yield Candidate("body.rotating_frame", lambda b: [Trial(b.change(other_robot))], frame)
     centre = as_it_is("other_centre" if any(body.centre) else "centre_off_the_middle")
     yield Candidate(CENTRE, lambda b: [Trial(b.by_force(_off_centre))], centre)
 
 
 def _off_centre(motion: Motion) -> FloatArray:
     """What a centre of mass a metre ahead, and one a metre aside, does to the body as it moves. Shape (n, 2, 3)."""
-    body, found = motion.robot.body, []
-    for way in np.eye(2) * NEARBY:
-        up, down = (
+    body, wrenches = motion.robot.body, []
+    for way in np.eye(2) * CENTRE_STEP:
+        upper, lower = (
             motion.robot.model_copy(
                 update={"body": body.model_copy(update={"centre": tuple(body.centre + side * way)})}
             )
             for side in (1.0, -1.0)
         )
-        turned = frame_wrench(up, motion.twist) - frame_wrench(down, motion.twist)
-        found.append((turned - motion.pace @ (mass_matrix(up) - mass_matrix(down))) / (2.0 * NEARBY))
-    return np.stack(found, axis=1)
+        wrench_change = frame_wrench(upper, motion.twist) - frame_wrench(lower, motion.twist)
+        wrenches.append((wrench_change - motion.pace @ (mass_matrix(upper) - mass_matrix(lower))) / (2.0 * CENTRE_STEP))
+    return np.stack(wrenches, axis=1)
 
 
 def _of_motors(bench: Workbench) -> Iterator[Candidate]:
     motor, n = bench.robot.motor, bench.robot.wheels.count
     if motor.current_limit is None and any(np.any(m.current) for m in bench.motions):
-        yield Candidate("motor.current_limit_A", _limits, sized("current_limit", "", limit=lambda _, at: at))
+        yield Candidate("motor.current_limit_A", _limits, sized("current_limit", "", limit=lambda _, place: place))
     peak = float(max(np.abs(m.voltage).max() for m in bench.motions))
     at_rim = per_wheel(motor.gear_ratio, n) ** 2 / bench.robot.wheels.radii**2
     spins = float(SHARE * bench.robot.body.mass / at_rim.sum())
@@ -95,15 +100,15 @@ def _of_motors(bench: Workbench) -> Iterator[Candidate]:
     if not np.any(motor.rotor_inertia):
         yield _switched_on(bench.robot, "motor.rotor_inertia_kg_m2", "rotor_inertia", spins)
     if np.all(per_wheel(motor.gear_efficiency, n) == 1.0):
-        lossy = _with(bench.robot, gear_efficiency=1.0 - LOSS)
+        lossy_robot = _with(bench.robot, gear_efficiency=1.0 - LOSS)
         yield Candidate(
             "motor.gear_efficiency",
-            lambda b: [Trial([own / LOSS for own in b.change(lossy)])],
-            sized("gear_efficiency", "", efficiency=lambda by, _: 1.0 - by),
+            lambda b: [Trial([columns / LOSS for columns in b.change(lossy_robot)])],
+            sized("gear_efficiency", "", efficiency=lambda change, _: 1.0 - change),
             0.0,
         )
-    if bench.robot.wheels.traction_mu is None and not bench.kind.looped:
-        yield Candidate(TRACTION, _grips, sized("slipping_wheels", "", share=lambda _, at: at), late=True)
+    if bench.robot.wheels.traction_mu is None and not bench.kind.has_loop:
+        yield Candidate(TRACTION, _grips, sized("slipping_wheels", "", share=lambda _, place: place), is_late=True)
 
 
 def _switched_on(robot: Robot, key: str, field: str, size: float) -> Candidate:
@@ -111,8 +116,8 @@ def _switched_on(robot: Robot, key: str, field: str, size: float) -> Candidate:
     on = _with(robot, **{field: size})
     return Candidate(
         key,
-        lambda b: [Trial([own / size for own in b.change(on)])],
-        sized("switched_on", key, value=lambda by, _: by),
+        lambda b: [Trial([columns / size for columns in b.change(on)])],
+        sized("switched_on", key, value=lambda change, _: change),
         0.0,
     )
 
@@ -122,8 +127,8 @@ def _with(robot: Robot, **changes: Any) -> Robot:
 
 
 def _limits(bench: Workbench) -> list[Trial]:
-    most = np.concatenate([np.abs(m.current).max(axis=1) for m in bench.motions])
-    levels = np.unique(np.quantile(most[most > 0.0], LIMITS)).tolist()
+    largest_currents = np.concatenate([np.abs(m.current).max(axis=1) for m in bench.motions])
+    levels = np.unique(np.quantile(largest_currents[largest_currents > 0.0], LIMITS)).tolist()
     return [Trial(bench.change(_with(bench.robot, current_limit=level)), level) for level in levels]
 
 
@@ -132,13 +137,15 @@ def _grips(bench: Workbench) -> list[Trial]:
 
     A wheel that slips leaps as its voltage does: as late as the fit has it, which such leaps lead astray, and on time.
     """
-    whole, robot = slippery(bench.robot, 1.0), bench.robot
-    every = [np.abs(traction(robot.motor, robot.wheels, m.current)) / grips(whole) for m in bench.motions]
-    most = np.concatenate([own.max(axis=1) for own in every])
-    levels = np.unique(np.quantile(most[most > 0.0], LIMITS)).tolist() if most.any() else []
-    wide, low = slippery(robot, AMPLE), [slippery(robot, mu) for mu in levels]
-    shown = [*bench.changes(wide, low), *bench.on_time().changes(wide, low)]
-    return [Trial(own, mu) for own, mu in zip(shown, 2 * levels, strict=True)]
+    full_grip, robot = slippery(bench.robot, 1.0), bench.robot
+    traction_shares = [np.abs(traction(robot.motor, robot.wheels, m.current)) / grips(full_grip) for m in bench.motions]
+    largest_shares = np.concatenate([share.max(axis=1) for share in traction_shares])
+    levels = (
+        np.unique(np.quantile(largest_shares[largest_shares > 0.0], LIMITS)).tolist() if largest_shares.any() else []
+    )
+    wide_grip, low = slippery(robot, AMPLE_GRIP), [slippery(robot, mu) for mu in levels]
+    columns_by_grip = [*bench.changes(wide_grip, low), *bench.on_time().changes(wide_grip, low)]
+    return [Trial(share, mu) for share, mu in zip(columns_by_grip, 2 * levels, strict=True)]
 
 
 def slippery(robot: Robot, mu: float) -> Robot:
@@ -146,7 +153,7 @@ def slippery(robot: Robot, mu: float) -> Robot:
     slip at no speed that is known, get that of light ones."""
     changes: dict[str, Any] = {"traction_mu": mu}
     if (mass_at_rim(robot.motor, robot.wheels) <= 0.0).any():
-        share = LIGHT * robot.body.mass / robot.wheels.count
+        share = LIGHT_SHARE * robot.body.mass / robot.wheels.count
         changes["wheel_inertia"] = float(share * np.mean(robot.wheels.radii**2))
     return robot.model_copy(update={"wheels": robot.wheels.model_copy(update=changes)})
 
@@ -178,15 +185,15 @@ def other_laws(friction: Friction) -> list[str]:
     at every speed, of Dahl's bristles by LuGre's law; bristles of either where it is, and the same both ways."""
     names = []
     for table in FORCES:
-        own = table_of(friction, table)
-        one_way = getattr(own, "coulomb_backward", None) is not None
-        if not np.any(own.coulomb) or getattr(own, "ellipse", DISSIPATION) != DISSIPATION:
+        law_table = table_of(friction, table)
+        one_way = getattr(law_table, "coulomb_backward", None) is not None
+        if not np.any(law_table.coulomb) or getattr(law_table, "ellipse", DISSIPATION) != DISSIPATION:
             continue  # a plain ellipse takes no other law
-        if own.stribeck_speed is None and own.law != DAHL:
+        if law_table.stribeck_speed is None and law_table.law != DAHL:
             names.append(f"{table}.{FALL}")
-        if own.law == COULOMB and own.breakaway is None and not one_way:
+        if law_table.law == COULOMB and law_table.breakaway is None and not one_way:
             names.append(f"{table}.{BEND}")
-        if own.law in (COULOMB, DAHL) and not one_way:
+        if law_table.law in (COULOMB, DAHL) and not one_way:
             names.append(f"{table}.{DAMPING}")
     return names
 
@@ -216,32 +223,36 @@ def _falling(force: Callable[[Motion, float], FloatArray], bench: Workbench) -> 
     where the robot moves. Tried with several speeds over which it falls [m/s at the rims]."""
     top = max(float(np.abs(m.twist @ bench.robot.wheels.wrench_matrix).max()) for m in bench.motions)
     speeds = [share * top for share in SPEEDS if top > 0.0]
-    shown = bench.by_forces([lambda m, v=v: force(m, v) for v in speeds])
-    return [Trial(own, v) for own, v in zip(shown, speeds, strict=True)]
+    columns_by_speed = bench.by_forces([lambda m, v=v: force(m, v) for v in speeds])
+    return [Trial(columns, v) for columns, v in zip(columns_by_speed, speeds, strict=True)]
 
 
-def falling(robot: Robot, table: str, above: FloatArray, over: float) -> Friction:
-    """The friction with a level that is `above` times Coulomb friction at rest, and falls to it over a speed [m/s at
-    the rims]; with Dahl's bristles it is LuGre's law. above: of each axis; of the direction of travel and about
-    yaw; of all wheels."""
-    own, about, boxed = table_of(robot.friction, table), over / arm(robot), table == BODY_AXES
-    changes = held_above(robot, table, above) | {FALL: (over, over, about) if boxed else over}
+def falling(robot: Robot, table: str, excess_shares: FloatArray, fall_speed: float) -> Friction:
+    """The friction with a level that is `excess_shares` times Coulomb friction at rest, and falls to it over a speed
+    [m/s at the rims]; with Dahl's bristles it is LuGre's law. excess_shares: of each axis; of the direction of travel
+    and about yaw; of all wheels."""
+    law_table, turn_speed, boxed = table_of(robot.friction, table), fall_speed / arm(robot), table == BODY_AXES
+    changes = held_above(robot, table, excess_shares) | {
+        FALL: (fall_speed, fall_speed, turn_speed) if boxed else fall_speed
+    }
     if f"yaw_{BREAKAWAY}" in changes:
-        changes[f"yaw_{FALL}"] = about
-    if own.law == DAHL:
+        changes[f"yaw_{FALL}"] = turn_speed
+    if law_table.law == DAHL:
         changes |= {"law": LUGRE, "dahl_exponent": 1.0}
-    return _with_table(robot.friction, table, own.replace(**changes))
+    return _with_table(robot.friction, table, law_table.replace(**changes))
 
 
-def held_above(robot: Robot, table: str, above: FloatArray) -> dict[str, Any]:
-    """The levels of breakaway of a table that are `above` times Coulomb friction, see `falling`."""
-    own = table_of(robot.friction, table)
+def held_above(robot: Robot, table: str, excess_shares: FloatArray) -> dict[str, Any]:
+    """The levels of breakaway of a table that are `excess_shares` times Coulomb friction, see `falling`."""
+    law_table = table_of(robot.friction, table)
     if table == BODY_AXES:
-        return {BREAKAWAY: tuple((above * own.coulomb).tolist())}
+        return {BREAKAWAY: tuple((excess_shares * law_table.coulomb).tolist())}
     if table == DIRECTION:
-        yaw = {f"yaw_{BREAKAWAY}": float(above[1] * own.yaw_coulomb)} if own.yaw_coulomb > 0.0 else {}
-        return {BREAKAWAY: tuple((above[0] * np.array(own.coulomb)).tolist())} | yaw
-    return {BREAKAWAY: _plain(above[0] * np.array(own.coulomb))}
+        yaw = (
+            {f"yaw_{BREAKAWAY}": float(excess_shares[1] * law_table.yaw_coulomb)} if law_table.yaw_coulomb > 0.0 else {}
+        )
+        return {BREAKAWAY: tuple((excess_shares[0] * np.array(law_table.coulomb)).tolist())} | yaw
+    return {BREAKAWAY: _plain(excess_shares[0] * np.array(law_table.coulomb))}
 
 
 def arm(robot: Robot) -> float:
@@ -249,26 +260,28 @@ def arm(robot: Robot) -> float:
     return float(np.mean(robot.wheels.robot_radius))
 
 
-def _of_axes(motion: Motion, over: float) -> FloatArray:
+def _of_axes(motion: Motion, fall_speed: float) -> FloatArray:
     speed, level = motion.twist * [1.0, 1.0, arm(motion.robot)], motion.robot.friction.axes.coulomb
-    return np.eye(N_AXES) * (-np.sign(speed) * fallen(speed, 1.0 / over, EXPONENT) * level)[:, None, :]
+    return np.eye(N_AXES) * (-np.sign(speed) * fallen(speed, 1.0 / fall_speed, EXPONENT) * level)[:, None, :]
 
 
-def _of_travel(motion: Motion, over: float) -> FloatArray:
+def _of_travel(motion: Motion, fall_speed: float) -> FloatArray:
     """Along the direction of travel, and about yaw."""
     law, yaw = motion.robot.friction.direction, motion.twist[:, YAW]
-    weighed = motion.twist[:, :YAW] * law.coulomb
-    fall = fallen(np.linalg.norm(motion.twist[:, :YAW], axis=1, keepdims=True), 1.0 / over, EXPONENT)
-    along = fall * weighed * law.coulomb / np.maximum(np.linalg.norm(weighed, axis=1, keepdims=True), 1e-12)
-    about = np.sign(yaw) * fallen(arm(motion.robot) * yaw, 1.0 / over, EXPONENT) * law.yaw_coulomb
+    scaled_twist = motion.twist[:, :YAW] * law.coulomb
+    fall = fallen(np.linalg.norm(motion.twist[:, :YAW], axis=1, keepdims=True), 1.0 / fall_speed, EXPONENT)
+    travel_force = (
+        fall * scaled_twist * law.coulomb / np.maximum(np.linalg.norm(scaled_twist, axis=1, keepdims=True), 1e-12)
+    )
+    yaw_force = np.sign(yaw) * fallen(arm(motion.robot) * yaw, 1.0 / fall_speed, EXPONENT) * law.yaw_coulomb
     zero = np.zeros_like(yaw)
-    return -np.stack([np.column_stack([along, zero]), np.column_stack([zero, zero, about])], axis=1)
+    return -np.stack([np.column_stack([travel_force, zero]), np.column_stack([zero, zero, yaw_force])], axis=1)
 
 
-def _of_rims(motion: Motion, over: float) -> FloatArray:
+def _of_rims(motion: Motion, fall_speed: float) -> FloatArray:
     g, rim = motion.robot.wheels.wrench_matrix, motion.twist @ motion.robot.wheels.wrench_matrix
     level = per_wheel(motion.robot.friction.wheels.coulomb, g.shape[1])
-    return -((np.sign(rim) * fallen(rim, 1.0 / over, EXPONENT) * level) @ g.T)[:, None, :]
+    return -((np.sign(rim) * fallen(rim, 1.0 / fall_speed, EXPONENT) * level) @ g.T)[:, None, :]
 
 
 FORCES = {BODY_AXES: _of_axes, DIRECTION: _of_travel, WHEELS: _of_rims}  # of a fall, of each table
@@ -283,33 +296,33 @@ def _bending(law: Callable[[Robot, str, float], Friction], table: str, bench: Wo
 def lowered(robot: Robot, table: str) -> Robot:
     """The robot with no level of a table beyond twice what its motors give together, to which a fit may drive one:
     bristles would be as stiff, and steps as short."""
-    own, motor = table_of(robot.friction, table), robot.motor
+    law_table, motor = table_of(robot.friction, table), robot.motor
     volts = per_wheel(motor.voltage_limit, robot.wheels.count)
-    most = 2.0 * np.abs(traction(motor, robot.wheels, settled_current(motor, volts, np.zeros_like(volts)))).sum()
+    force_limit = 2.0 * np.abs(traction(motor, robot.wheels, settled_current(motor, volts, np.zeros_like(volts)))).sum()
     units = np.array([1.0, 1.0, arm(robot)]) if table == BODY_AXES else 1.0
-    changes = {"coulomb": _plain(np.minimum(own.coulomb, most * units))}
+    changes = {"coulomb": _plain(np.minimum(law_table.coulomb, force_limit * units))}
     if table == DIRECTION:
-        changes["yaw_coulomb"] = float(min(own.yaw_coulomb, most * arm(robot)))
-    lower = _with_table(robot.friction, table, own.model_copy(update=changes))
+        changes["yaw_coulomb"] = float(min(law_table.yaw_coulomb, force_limit * arm(robot)))
+    lower = _with_table(robot.friction, table, law_table.model_copy(update=changes))
     return robot.model_copy(update={"friction": lower})
 
 
 def bent(robot: Robot, table: str, bend: float, law: str = DAHL) -> Friction:
     """The friction with bristles at a table, that bend by a length [m at the rims] before they slip, or are as stiff as
     they are."""
-    own, far = table_of(robot.friction, table), arm(robot)
+    law_table, arm_length = table_of(robot.friction, table), arm(robot)
 
     def stiff(level: ArrayLike, units: FloatArray | float = 1.0) -> Any:
         return _plain(np.maximum(np.asarray(level) * units / bend, 1e-3))
 
     changes: dict[str, Any] = {"law": law}
-    if own.stiffness is None and table == BODY_AXES:
-        changes[BEND] = stiff(own.coulomb, np.array([1.0, 1.0, far]))
-    elif own.stiffness is None:
-        changes[BEND] = stiff(np.mean(own.coulomb))
-        if table == DIRECTION and own.yaw_coulomb > 0.0:
-            changes[f"yaw_{BEND}"] = stiff(own.yaw_coulomb, far)
-    return _with_table(robot.friction, table, own.replace(**changes))
+    if law_table.stiffness is None and table == BODY_AXES:
+        changes[BEND] = stiff(law_table.coulomb, np.array([1.0, 1.0, arm_length]))
+    elif law_table.stiffness is None:
+        changes[BEND] = stiff(np.mean(law_table.coulomb))
+        if table == DIRECTION and law_table.yaw_coulomb > 0.0:
+            changes[f"yaw_{BEND}"] = stiff(law_table.yaw_coulomb, arm_length)
+    return _with_table(robot.friction, table, law_table.replace(**changes))
 
 
 def bristled(robot: Robot, table: str, bend: float) -> Friction:
@@ -326,31 +339,31 @@ BRISTLES = {BEND: (bent, "dahl"), DAMPING: (bristled, "lugre")}
 def along_travel(friction: Friction) -> Friction:
     """An ellipse in the place of a box, at the same levels."""
     axes = friction.axes
-    other = DirectionFriction(
+    ellipse = DirectionFriction(
         coulomb=axes.coulomb[:2],
         viscous=0.5 * (axes.viscous[0] + axes.viscous[1]),
         yaw_coulomb=axes.coulomb[YAW],
         yaw_viscous=axes.viscous[YAW],
     )
-    return Friction(direction=other, wheels=friction.wheels)
+    return Friction(direction=ellipse, wheels=friction.wheels)
 
 
 def along_axes(friction: Friction) -> Friction:
     """A box in the place of an ellipse, at the same levels."""
     direction = friction.direction
     viscous = (direction.viscous, direction.viscous, direction.yaw_viscous)
-    own = AxesFriction(viscous=viscous, coulomb=(*direction.coulomb, direction.yaw_coulomb))
-    return Friction(axes=own, wheels=friction.wheels)
+    box_friction = AxesFriction(viscous=viscous, coulomb=(*direction.coulomb, direction.yaw_coulomb))
+    return Friction(axes=box_friction, wheels=friction.wheels)
 
 
-def _in_place(other: Callable[[Friction], Friction], bench: Workbench) -> list[Trial]:
+def _in_place(make_friction: Callable[[Friction], Friction], bench: Workbench) -> list[Trial]:
     """The same robot with friction of another shape; a change by 1 is the whole of it."""
-    return [Trial(bench.change(bench.robot.model_copy(update={"friction": other(bench.robot.friction)})))]
+    return [Trial(bench.change(bench.robot.model_copy(update={"friction": make_friction(bench.robot.friction)})))]
 
 
-def breaking(robot: Robot, table: str, above: FloatArray) -> Friction:
-    """The friction with levels of breakaway that are `above` times Coulomb friction, see `falling`."""
-    law = table_of(robot.friction, table).model_copy(update=held_above(robot, table, above))
+def breaking(robot: Robot, table: str, excess_shares: FloatArray) -> Friction:
+    """The friction with levels of breakaway that are `excess_shares` times Coulomb friction, see `falling`."""
+    law = table_of(robot.friction, table).model_copy(update=held_above(robot, table, excess_shares))
     return _with_table(robot.friction, table, law)
 
 
@@ -359,10 +372,10 @@ def _breaking(table: str, bench: Workbench) -> list[Trial]:
     trials, robot = [], bench.robot
     # Levels that hold for themselves: each axis; travel, and turning where friction resists it; all wheels.
     parts = {BODY_AXES: N_AXES, DIRECTION: 1 + (robot.friction.direction.yaw_coulomb > 0.0), WHEELS: 1}[table]
-    for share in ABOVE:
+    for share in EXCESS_SHARES:
         columns = [
-            bench.change(robot.model_copy(update={"friction": breaking(robot, table, above)}))
-            for above in 1.0 + share * np.eye(parts)
+            bench.change(robot.model_copy(update={"friction": breaking(robot, table, excess_row)}))
+            for excess_row in 1.0 + share * np.eye(parts)
         ]
         trials.append(Trial([np.concatenate(pieces, axis=2) for pieces in zip(*columns, strict=True)], share))
     return trials

@@ -35,9 +35,14 @@ from omnidyn.identification.structure.missing.switches import Switch, as_fitted,
 from omnidyn.model.keys import BODY_AXES, DIRECTION, WHEELS
 
 BEST = 3  # candidates that are fitted beside the shapes
-CLOSE = 0.1  # squared standard errors to the best point that are enough to compare
-STEPS, MORE, GO_ON = 5, 10, 2  # of every fit; of the best of them; how many those are
-ALWAYS = (PUSH, DIRECTION, BODY_AXES, WHEELS)  # a constant force; friction of another shape in the place of what is
+FIT_PRECISION = 0.1  # squared standard errors to the best point that are enough to compare
+STEPS, MORE_STEPS, MORE_FITS = 5, 10, 2  # of every fit; of the best of them; how many those are
+ALWAYS_TRIED = (
+    PUSH,
+    DIRECTION,
+    BODY_AXES,
+    WHEELS,
+)  # a constant force; friction of another shape in the place of what is
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,45 +63,51 @@ def refits(
     solution: Solution,
     problem: Problem,
     parts: Sequence[Parts],
-    ranked: Sequence[Remedy],
+    ranking: Sequence[Remedy],
     candidates: Sequence[Candidate],
 ) -> dict[str, tuple[Candidate, list[Trial]]]:
     """Key -> a candidate with what a fit with it shows. problem, parts: what was fitted, its rows at the best point.
 
-    ranked: by columns near the fit. Nothing of wheels that slip, whose fits take as long as all else.
+    ranking: by columns near the fit. Nothing of wheels that slip, whose fits take as long as all else.
     """
     if problem.robot.wheels.traction_mu is not None:
         return {}
-    point, begun = solution.state.point, []
-    fine, few = solution.solver.engine, problem.pieces[0].record is not solution.solver.problem.pieces[0].record
-    kinds = [type(fine) if fine.looped else ImplicitEngine, *([ExactEngine] if few and fine.exact else [])]
+    point, begun_fits = solution.state.point, []
+    engine, is_decimated = (
+        solution.solver.engine,
+        problem.pieces[0].record is not solution.solver.problem.pieces[0].record,
+    )
+    kinds = [
+        type(engine) if engine.has_loop else ImplicitEngine,
+        *([ExactEngine] if is_decimated and engine.exact else []),
+    ]
     try:
-        off = {kind: _by_coarse_steps(problem, parts, point, kind) for kind in kinds}
+        errors_by_kind = {kind: _by_coarse_steps(problem, parts, point, kind) for kind in kinds}
     except OmnidynError:  # a nuisance that the implicit engine does not know
         return {}
-    for candidate, remedy in _asked(ranked, candidates):
+    for candidate, remedy in _asked(ranking, candidates):
         for way in switches(remedy, problem.robot, _question(problem), solution):
             try:
-                begun.append(_begun(candidate, way, problem, solution, off).gone_on(STEPS))
+                begun_fits.append(_begun(candidate, way, problem, solution, errors_by_kind).gone_on(STEPS))
             except OmnidynError:  # no engine simulates it, or nothing is left to be fitted
                 continue
-    begun.sort(key=lambda each: each.state.objective)
-    found: dict[str, tuple[Candidate, list[Trial]]] = {}
-    for k, each in enumerate(begun):
-        trial = _trial(each.gone_on(MORE) if k < GO_ON else each, problem, parts, solution)
-        found.setdefault(each.candidate.key, (each.candidate, []))[1].append(trial)
-    return found
+    begun_fits.sort(key=lambda begun_fit: begun_fit.state.objective)
+    trials_by_key: dict[str, tuple[Candidate, list[Trial]]] = {}
+    for k, next_fit in enumerate(begun_fits):
+        trial = _trial(next_fit.gone_on(MORE_STEPS) if k < MORE_FITS else next_fit, problem, parts, solution)
+        trials_by_key.setdefault(next_fit.candidate.key, (next_fit.candidate, []))[1].append(trial)
+    return trials_by_key
 
 
-def _asked(ranked: Sequence[Remedy], candidates: Sequence[Candidate]) -> Iterator[tuple[Candidate, Remedy]]:
+def _asked(ranking: Sequence[Remedy], candidates: Sequence[Candidate]) -> Iterator[tuple[Candidate, Remedy]]:
     """What to fit: the best that a robot file or a fit can hold, a constant push and every shape: far from the best fit
     with them, columns near the one without tell little."""
-    known = {candidate.key: candidate for candidate in candidates}
-    best = simpler_first([each for each in ranked if each.offered and each.key != CHANGE])[:BEST]
-    yield from ((known[each.key], each) for each in best)
-    for key in ALWAYS:
-        if key in known and key not in {each.key for each in best}:
-            yield known[key], Remedy(key, known[key].cause(0.0, 0.0), 0.0, 0.0)
+    candidate_by_key = {candidate.key: candidate for candidate in candidates}
+    best = simpler_first([remedy for remedy in ranking if remedy.offered and remedy.key != CHANGE])[:BEST]
+    yield from ((candidate_by_key[remedy.key], remedy) for remedy in best)
+    for key in ALWAYS_TRIED:
+        if key in candidate_by_key and key not in {remedy.key for remedy in best}:
+            yield candidate_by_key[key], Remedy(key, candidate_by_key[key].cause(0.0, 0.0), 0.0, 0.0)
 
 
 def _question(problem: Problem) -> OutputError:
@@ -107,14 +118,16 @@ def _question(problem: Problem) -> OutputError:
 class _Coarse(Engine[Problem]):
     """An engine by a step a row, or a tick, three times as fast, and what that was off by in the fit before."""
 
-    def __init__(self, problem: Problem, kind: Kind, off: Sequence[FloatArray]):
-        self.problem, self._kind, self._off = problem, kind, off
+    def __init__(self, problem: Problem, kind: Kind, coarse_errors: Sequence[FloatArray]):
+        self.problem, self._kind, self._off = problem, kind, coarse_errors
         self._engine = kind.of(problem)
 
     def residuals(self, point: Point) -> list[Parts]:
         """Residuals and slopes of every piece, see engines/engine.py."""
-        both = zip(self._engine.residuals(point), self._off, strict=True)
-        return [(residual + off, slopes, at) for (residual, slopes, at), off in both]
+        parts_and_errors = zip(self._engine.residuals(point), self._off, strict=True)
+        return [
+            (residual + coarse_error, slopes, indices) for (residual, slopes, indices), coarse_error in parts_and_errors
+        ]
 
     def on(self, problem: Problem) -> _Coarse:
         """The same engine on other pieces, of which nothing is known."""
@@ -123,47 +136,61 @@ class _Coarse(Engine[Problem]):
 
 def _by_coarse_steps(problem: Problem, parts: Sequence[Parts], point: Point, kind: Kind) -> list[FloatArray]:
     """What a step a row, or a tick, of an engine is off by in the rows of a fit. Of each piece (C, rows)."""
-    known = problem.robot_count  # a robot as it stands needs no slopes: what was driven to 0 has none
-    bare = replace(problem, robot=problem.robot_at(point.values), parameters=problem.parameters[known:], robot_count=0)
-    coarse = kind.of(bare).residuals(Point(point.values[known:], point.states))
-    return [np.nan_to_num(fine[0] - rough[0]) for fine, rough in zip(parts, coarse, strict=True)]
+    robot_count = problem.robot_count  # a robot as it stands needs no slopes: what was driven to 0 has none
+    bare_problem = replace(
+        problem, robot=problem.robot_at(point.values), parameters=problem.parameters[robot_count:], robot_count=0
+    )
+    coarse_parts = kind.of(bare_problem).residuals(Point(point.values[robot_count:], point.states))
+    return [
+        np.nan_to_num(fine_part[0] - coarse_part[0]) for fine_part, coarse_part in zip(parts, coarse_parts, strict=True)
+    ]
 
 
 def _begun(
-    candidate: Candidate, way: Switch, problem: Problem, solution: Solution, off: Mapping[Kind, Sequence[FloatArray]]
+    candidate: Candidate,
+    way: Switch,
+    problem: Problem,
+    solution: Solution,
+    errors_by_kind: Mapping[Kind, Sequence[FloatArray]],
 ) -> _Refit:
-    """Where a fit with a candidate begins. off: of engines that may simulate it, the first of them any candidate.
+    """Where a fit with a candidate begins. errors_by_kind: of engines that may simulate it, the first of them any
+    candidate.
 
     The exact engine is off by nothing where no rows are left out. Raises OmnidynError where none can.
     """
     records = list({id(piece.record): piece.record for piece in problem.pieces}.values())
     keys = expand_keys(way.question.free or (), way.robot)
-    coarse, few = next(iter(off)), problem.pieces[0].record is not solution.solver.problem.pieces[0].record
-    exact = not coarse.looped and is_exact(way.robot) and stays_exact(way.robot, keys)
-    kind = ExactEngine if exact and (not few or ExactEngine in off) else coarse
-    made = make_problem(records, way.robot, replace(way.question, free=keys), kind)
-    made = replace(made, pieces=problem.pieces)
-    before, values = _values(problem, solution), np.array([p.value for p in made.parameters])
-    for k, name in enumerate(made.names[made.robot_count :], made.robot_count):
-        values[k] = before.get(name, values[k])  # numbers of the robot stand in it where they were found
-    engine = _Coarse(made, kind, off[kind]) if kind in off else kind.of(made)
-    solver = Solver(made, engine, solution.solver.nu, CLOSE, counted=False)
-    begins = [values]
-    if made.robot.wheels.traction_mu is not None:  # whose leaps lead the latency of wheels that roll astray
-        begins.append(on_time(made.parameters, values))
-    states = [solver.state(Point(begin, solution.state.point.states)) for begin in begins]
+    coarse_kind, is_decimated = (
+        next(iter(errors_by_kind)),
+        problem.pieces[0].record is not solution.solver.problem.pieces[0].record,
+    )
+    exact = not coarse_kind.has_loop and is_exact(way.robot) and stays_exact(way.robot, keys)
+    kind = ExactEngine if exact and (not is_decimated or ExactEngine in errors_by_kind) else coarse_kind
+    new_problem = make_problem(records, way.robot, replace(way.question, free=keys), kind)
+    new_problem = replace(new_problem, pieces=problem.pieces)
+    values_before, values = _values(problem, solution), np.array([p.value for p in new_problem.parameters])
+    for k, name in enumerate(new_problem.names[new_problem.robot_count :], new_problem.robot_count):
+        values[k] = values_before.get(name, values[k])  # numbers of the robot stand in it where they were found
+    engine = _Coarse(new_problem, kind, errors_by_kind[kind]) if kind in errors_by_kind else kind.of(new_problem)
+    solver = Solver(new_problem, engine, solution.solver.nu, FIT_PRECISION, counts_ticks=False)
+    start_values = [values]
+    if new_problem.robot.wheels.traction_mu is not None:  # whose leaps lead the latency of wheels that roll astray
+        start_values.append(on_time(new_problem.parameters, values))
+    states = [solver.state(Point(start_value, solution.state.point.states)) for start_value in start_values]
     return _Refit(candidate, way, solver, min(states, key=lambda state: state.objective))
 
 
 def _trial(refit: _Refit, problem: Problem, parts: Sequence[Parts], solution: Solution) -> Trial:
     """What a fit shows less of the log than the fit before."""
-    made, point = refit.solver.problem, refit.state.point
-    after = refit.solver.engine.residuals(point)
-    shown = [np.nan_to_num(a[0] - b[0])[:, :, None] for a, b in zip(parts, after, strict=True)]
-    before, value = _values(problem, solution), dict(zip(made.names, point.values.tolist(), strict=True))
-    changes = {name: (before[name], value[name]) for name in problem.names[: problem.robot_count] if name in value}
-    numbers = max(len(made.parameters) - len(problem.parameters) + refit.way.numbers, 1)
-    return Trial(shown, fitted=Fitted(as_fitted(refit.way.cause, before, value), numbers, changes))
+    new_problem, point = refit.solver.problem, refit.state.point
+    parts_after = refit.solver.engine.residuals(point)
+    columns_by_piece = [np.nan_to_num(a[0] - b[0])[:, :, None] for a, b in zip(parts, parts_after, strict=True)]
+    values_before, value = _values(problem, solution), dict(zip(new_problem.names, point.values.tolist(), strict=True))
+    changes = {
+        name: (values_before[name], value[name]) for name in problem.names[: problem.robot_count] if name in value
+    }
+    numbers = max(len(new_problem.parameters) - len(problem.parameters) + refit.way.numbers, 1)
+    return Trial(columns_by_piece, fitted=Fitted(as_fitted(refit.way.cause, values_before, value), numbers, changes))
 
 
 def _values(problem: Problem, solution: Solution) -> dict[str, float]:

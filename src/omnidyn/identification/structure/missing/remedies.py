@@ -21,10 +21,10 @@ from omnidyn.model.actuation import GAIN
 from omnidyn.model.keys import BODY_AXES, DIRECTION
 from omnidyn.statement import NOTE, Statement
 
-CLEAR = 2.0  # standard errors by which a remedy may seem worse on blocks it was not fitted to
-NOTHING = 1e-4  # of where a number began, below which there is none of it
+LOSS_ERRORS = 2.0  # standard errors by which a remedy may seem worse on blocks it was not fitted to
+ZERO_SHARE = 1e-4  # of where a number began, below which there is none of it
 RIVAL = 0.3  # of what the best explains, from which another explanation is worth a look
-TOLD_APART, ROUGHLY = 6.0, 0.05  # of chi squared, or its share, by which one must be better than the other
+CHI2_MARGIN, CHI2_SHARE = 6.0, 0.05  # of chi squared, or its share, by which one must be better than the other
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Tried:
 
     candidate: Candidate
     trial: Trial
-    at: IntArray
+    column_indices: IntArray
     shows: int
     chi2: float
     size: FloatArray
@@ -47,53 +47,69 @@ class Tried:
 
 
 def remedies(
-    linear: Linear, tried: Sequence[tuple[Candidate, list[Trial]]], found: Sequence[FloatArray], most: int = 8
+    linear: Linear,
+    candidate_trials: Sequence[tuple[Candidate, list[Trial]]],
+    theme_columns: Sequence[FloatArray],
+    remedy_limit: int = 8,
 ) -> tuple[Remedy, ...]:
-    """The candidates that explain something, best first. found: of each piece (C, rows, K), what residuals follow."""
-    flat = [(one, trial) for one, trials in tried for trial in trials]
+    """The candidates that explain something, best first. theme_columns: of each piece (C, rows, K), what residuals
+    follow."""
+    flat = [(candidate, trial) for candidate, trials in candidate_trials for trial in trials]
     if not flat:
         return ()
-    blocks = Blocks(linear, *(trial.shown for _, trial in flat), found)
-    themes = np.arange(len(blocks.size) - found[0].shape[2], len(blocks.size))
-    known = np.arange(1, 1 + blocks.count)
-    base, first, best = blocks.left(known), 1 + blocks.count, {}
-    before = blocks.held_out(known)
+    blocks = Blocks(linear, *(trial.columns_by_piece for _, trial in flat), theme_columns)
+    themes = np.arange(len(blocks.size) - theme_columns[0].shape[2], len(blocks.size))
+    parameter_indices = np.arange(1, 1 + blocks.count)
+    base, first, best = blocks.left(parameter_indices), 1 + blocks.count, {}
+    errors_before = blocks.held_out(parameter_indices)
     penalty = np.log(max(blocks.rows, 2))
     noise = base / max(blocks.rows - blocks.count, 1)
-    for one, trial in flat:
-        k = trial.shown[0].shape[2]
-        at = np.arange(first, first + k)
+    for trial_candidate, trial in flat:
+        k = trial.columns_by_piece[0].shape[2]
+        column_indices = np.arange(first, first + k)
         first += k
-        chi2 = (base - blocks.left(np.concatenate([known, at]))) / noise
-        both = np.concatenate([known, at])
-        fitted = blocks.fitted(blocks.total, both) / blocks.size[both]
-        size, step = fitted[len(known) :], fitted[: len(known)]
-        if size.max() < one.least:
+        chi2 = (base - blocks.left(np.concatenate([parameter_indices, column_indices]))) / noise
+        joint_indices = np.concatenate([parameter_indices, column_indices])
+        fitted = blocks.fitted(blocks.total, joint_indices) / blocks.size[joint_indices]
+        size, step = fitted[len(parameter_indices) :], fitted[: len(parameter_indices)]
+        if size.max() < trial_candidate.least_change:
             continue
-        own = Tried(one, trial, at, int(blocks.shows[at].sum()), float(chi2), size, step)
-        if one.key not in best or chi2 - penalty * own.numbers > best[one.key].chi2 - penalty * best[one.key].numbers:
-            best[one.key] = own
-    ranked = sorted(best.values(), key=lambda t: t.chi2 - penalty * t.numbers, reverse=True)
-    worth = [t for t in ranked if t.chi2 > penalty * t.numbers + 2.0 * np.log(max(len(best), 1))][: 2 * most]
+        candidate_result = Tried(
+            trial_candidate, trial, column_indices, int(blocks.shows[column_indices].sum()), float(chi2), size, step
+        )
+        if (
+            trial_candidate.key not in best
+            or chi2 - penalty * candidate_result.numbers
+            > best[trial_candidate.key].chi2 - penalty * best[trial_candidate.key].numbers
+        ):
+            best[trial_candidate.key] = candidate_result
+    ranked_results = sorted(best.values(), key=lambda t: t.chi2 - penalty * t.numbers, reverse=True)
+    worthy_results = [t for t in ranked_results if t.chi2 > penalty * t.numbers + 2.0 * np.log(max(len(best), 1))][
+        : 2 * remedy_limit
+    ]
     ranking = []
-    for t in worth:
-        after = blocks.held_out(np.concatenate([known, t.at]))
-        change = (before - after) / max(float(before.sum()), 1e-300)
+    for t in worthy_results:
+        errors_after = blocks.held_out(np.concatenate([parameter_indices, t.column_indices]))
+        change = (errors_before - errors_after) / max(float(errors_before.sum()), 1e-300)
         gain, std = float(change.sum()), float(change.std(ddof=1) * np.sqrt(len(change)))
-        same = tuple(o.candidate.key for o in worth if o is not t and _same(blocks, known, base, noise, t, o))
+        equal_keys = tuple(
+            o.candidate.key
+            for o in worthy_results
+            if o is not t and _same(blocks, parameter_indices, base, noise, t, o)
+        )
         fitted = t.trial.fitted
         cause = fitted.cause if fitted else t.candidate.cause(float(t.size[0]), t.trial.at)
-        every = (base - blocks.left(np.concatenate([known, t.at, themes]))) / noise
-        share = (t.chi2 - t.numbers) / max(every - t.numbers - len(themes), t.chi2 - t.numbers, 1e-300)
+        gain_with_themes = (base - blocks.left(np.concatenate([parameter_indices, t.column_indices, themes]))) / noise
+        share = (t.chi2 - t.numbers) / max(gain_with_themes - t.numbers - len(themes), t.chi2 - t.numbers, 1e-300)
         ranking.append(
             Remedy(
                 t.candidate.key,
                 cause,
                 gain,
                 std,
-                same,
+                equal_keys,
                 share,
-                t.candidate.offered,
+                t.candidate.is_offered,
                 t.chi2,
                 t.numbers,
                 tuple(t.size.tolist()),
@@ -101,8 +117,10 @@ def remedies(
                 fitted.changes if fitted else _changes(linear.rows, t),
             )
         )
-    kept = [r for r in ranking if r.gain > -CLEAR * r.gain_std and r.chi2 > RIVAL * worth[0].chi2]
-    return tuple(_best_first(kept)[:most])
+    kept_remedies = [
+        r for r in ranking if r.gain > -LOSS_ERRORS * r.gain_std and r.chi2 > RIVAL * worthy_results[0].chi2
+    ]
+    return tuple(_best_first(kept_remedies)[:remedy_limit])
 
 
 def _best_first(ranking: list[Remedy]) -> list[Remedy]:
@@ -113,28 +131,37 @@ def _best_first(ranking: list[Remedy]) -> list[Remedy]:
     if not ranking:
         return ranking
     first = ranking[0]
-    ahead = [r for r in ranking if r.gain - r.gain_std > first.gain + first.gain_std]
-    return [*sorted(ahead, key=lambda r: -r.gain), *(r for r in ranking if r not in ahead)]
+    better_remedies = [r for r in ranking if r.gain - r.gain_std > first.gain + first.gain_std]
+    return [*sorted(better_remedies, key=lambda r: -r.gain), *(r for r in ranking if r not in better_remedies)]
 
 
-def _changes(rows: Rows, tried: Tried) -> dict[str, tuple[float, float]]:
+def _changes(rows: Rows, result: Tried) -> dict[str, tuple[float, float]]:
     """Number of the robot -> (what it is, what it would be beside a candidate), to first order; none for a candidate
     that takes the place of what these numbers belong to."""
-    if tried.candidate.key in (BODY_AXES, DIRECTION):
+    if result.candidate.key in (BODY_AXES, DIRECTION):
         return {}
-    found = {}
-    for p, value, by in zip(rows.problem.robot_parameters, rows.point.values.tolist(), tried.step, strict=False):
-        then = min(max(p.outer(p.inner(value) + float(by)), p.low), p.high)
-        if max(abs(value), abs(then)) > NOTHING * abs(p.value):  # else it is 0, and stays so
-            found[p.name] = value, then
-    return found
+    changes = {}
+    for p, value, step in zip(rows.problem.robot_parameters, rows.point.values.tolist(), result.step, strict=False):
+        value_after = min(max(p.outer(p.inner(value) + float(step)), p.low), p.high)
+        if max(abs(value), abs(value_after)) > ZERO_SHARE * abs(p.value):  # else it is 0, and stays so
+            changes[p.name] = value, value_after
+    return changes
 
 
-def _same(blocks: Blocks, known: IntArray, base: float, noise: float, one: Tried, other: Tried) -> bool:
+def _same(
+    blocks: Blocks, parameter_indices: IntArray, base: float, noise: float, left_result: Tried, right_result: Tried
+) -> bool:
     """Whether the log cannot tell two apart: as good as each other, and both hardly better than one."""
-    both = (base - blocks.left(np.concatenate([known, one.at, other.at]))) / noise
-    least = max(TOLD_APART, ROUGHLY * max(one.chi2, other.chi2))  # to first order, for either is a larger change
-    return abs(one.chi2 - other.chi2) < least and both - max(one.chi2, other.chi2) < least
+    joint_gain = (
+        base - blocks.left(np.concatenate([parameter_indices, left_result.column_indices, right_result.column_indices]))
+    ) / noise
+    least_gain = max(
+        CHI2_MARGIN, CHI2_SHARE * max(left_result.chi2, right_result.chi2)
+    )  # to first order, for either is a larger change
+    return (
+        abs(left_result.chi2 - right_result.chi2) < least_gain
+        and joint_gain - max(left_result.chi2, right_result.chi2) < least_gain
+    )
 
 
 # What a log of nothing but a twist hides, if the robot computed that from its wheels, with a radius that is wrong
@@ -144,7 +171,7 @@ def _same(blocks: Blocks, known: IntArray, base: float, noise: float, one: Tried
 # like
 # a body of I/s^2. No fit to such a log can tell.
 
-HIDDEN = {
+HIDDEN_KEYS = {
     "motor.resistance_ohm": "wheels.wheel_radius_m",
     GAIN: "wheels.wheel_radius_m",
     "body.inertia_kg_m2": "wheels.robot_radius_m",
@@ -153,16 +180,16 @@ HIDDEN = {
 
 def hidden_by(key: str, columns: Iterable[tuple[str, int]]) -> list[str]:
     """The radius that looks like a change of a number, to logs of these columns: none, or one."""
-    return [HIDDEN[key]] if key in HIDDEN and {name for name, _ in columns} == {"twist"} else []
+    return [HIDDEN_KEYS[key]] if key in HIDDEN_KEYS and {name for name, _ in columns} == {"twist"} else []
 
 
 def with_odometry(remedies: Sequence[Remedy], columns: Sequence[tuple[str, int]]) -> tuple[Remedy, ...]:
     """The same; those that may be a radius name it, and the radius them."""
-    behind = {remedy.key: hidden_by(remedy.key, columns) for remedy in remedies}
-    found = []
+    hidden_by_key = {remedy.key: hidden_by(remedy.key, columns) for remedy in remedies}
+    new_remedies = []
     for remedy in remedies:
-        looks = [key for key, radii in behind.items() if remedy.key in radii]
-        cause = Statement("if_odometry", NOTE, numbers={"cause": remedy.cause}) if looks else remedy.cause
-        same = tuple(dict.fromkeys((*remedy.same_as, *behind[remedy.key], *looks)))
-        found.append(replace(remedy, same_as=same, cause=cause))
-    return tuple(found)
+        alias_keys = [key for key, radii in hidden_by_key.items() if remedy.key in radii]
+        cause = Statement("if_odometry", NOTE, numbers={"cause": remedy.cause}) if alias_keys else remedy.cause
+        equal_keys = tuple(dict.fromkeys((*remedy.same_as, *hidden_by_key[remedy.key], *alias_keys)))
+        new_remedies.append(replace(remedy, same_as=equal_keys, cause=cause))
+    return tuple(new_remedies)
