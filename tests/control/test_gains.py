@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+import omnidyn
+from omnidyn.control.pid import Pid
 from omnidyn.control.speed_loop import SWIFT, check_faster, check_integral, pole_rate, pose_gains, speed_gains
 from omnidyn.errors import InputError
 
@@ -42,3 +44,25 @@ def test_gains_out_of_range_are_refused():
         check_faster(float("nan"))
     with pytest.raises(InputError, match="integral: no share for the slow pole; got 2"):
         check_integral(2)
+
+
+@pytest.mark.parametrize("faster", [0.3, 3.0, 20.0])
+@pytest.mark.parametrize("latency", [0.0, 0.01, 0.02, 0.03, 0.04])
+@pytest.mark.parametrize("name", ["axebot", "mecanum"])
+def test_friction_is_compensated_towards_the_path(name, latency, faster):
+    """Off a path that stands still, the direction of friction is the way back, no faster than steps allow."""
+    robot = omnidyn.load_robot(name)
+    loop = Pid(robot.replace(drive=robot.drive.replace(latency=latency)), faster=faster)
+    off = np.array([2e-3, -1e-3, 3e-3])
+    way = loop.aim(off, np.array(0.0), np.zeros(3), np.zeros((3, 3))).way
+    assert np.all(way * off > 0.0)
+    assert np.all(np.abs(way) <= np.abs(off) / loop.dt)
+
+
+@pytest.mark.parametrize("latency", [0.02, 0.04])
+def test_a_turning_path_is_followed_where_an_axis_is_faster_than_the_loop_may_be(latency):
+    robot = omnidyn.load_robot("mecanum")
+    robot = robot.replace(drive=robot.drive.replace(latency=latency))
+    assert Pid(robot).gains.speed[2] < 0.0  # of that axis friction was once compensated away from the path
+    turning = omnidyn.path("eight:period_s=12,heading=turning,turn_rad_s=0.5")
+    assert omnidyn.track(robot, turning, "pid").rmse_heading <= 5e-4

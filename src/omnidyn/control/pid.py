@@ -4,8 +4,9 @@
     volts = inverse model of the path's motion, friction included, plus alpha as an acceleration
 
 The gains follow from two poles and a slow one (speed_loop.py). Dry friction is compensated in the direction in which
-the robot is to move, the way back to the path included: nu_ref + (k_p/k_d) e. Without `feedforward` nothing is known
-of the robot but what its volts push.
+the robot is to move, the way back to the path included: nu_ref + (p/2) e, p the rate of the two poles. That is k_p/k_d
+of a robot that nothing slows down; k_d itself falls below 0 where an axis by itself is faster than the loop may be.
+Without `feedforward` nothing is known of the robot but what its volts push.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.control.controller import WHEEL_SPEED, Guarded
 from omnidyn.control.feedforward import DT, Volts, check_delay, check_dt, lateness
 from omnidyn.control.paths.motion import Path
-from omnidyn.control.speed_loop import MOST_STEPS, check_faster, check_integral, pose_gains
+from omnidyn.control.speed_loop import MOST_STEPS, check_faster, check_integral, pole_rate, pose_gains
 from omnidyn.model.frames import world_to_body
 from omnidyn.model.inverse import Effort
 from omnidyn.model.robot import Robot
@@ -74,7 +75,7 @@ class Pid(Guarded):
         super()._take(robot)
         self.volts, self.late = Volts(robot, self.dt, self.friction), lateness(robot, self.delay, self.dt)
         self.gains = pose_gains(self.volts.held.rates, self.faster, self.integral, self.dt, self.late)
-        self._home = self.gains.place / self.gains.speed
+        self._home = 0.5 * pole_rate(self.volts.held.rates, self.faster, self.dt, self.late)
 
     def reset(self) -> None:
         """Forget all steps."""

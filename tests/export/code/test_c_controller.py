@@ -34,6 +34,12 @@ def driven(kind):
     return ROBOT.replace(drive=Drive.model_validate({"kind": kind, "latency_s": 0.03, **loop}))
 
 
+def late(name, latency):
+    """A preset whose yaw is faster than the loop may be."""
+    robot = omnidyn.load_robot(name)
+    return robot.replace(drive=robot.drive.replace(latency=latency))
+
+
 ROBOTS = [
     ROBOT,
     *(without_losses(random_robot(seed)) for seed in range(4)),
@@ -42,6 +48,7 @@ ROBOTS = [
     driven("duty"),
     driven("speed"),
     without_losses(with_centre(random_robot(7), 7)),
+    late("mecanum", 0.03),
 ]
 
 
