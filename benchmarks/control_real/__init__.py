@@ -1,0 +1,182 @@
+"""Closed loops on a plant that shares no code with omnidyn, with the sensors that people have, beside what they write.
+
+Every cell is an rms error of 0.5 s and later against the true pose. A cell is lost where a controller has more than
+1.1 times the best of others and more than a difference that counts. `python -m benchmarks.control_real 7 clover` draws
+a fourth plant from seed 7, and drives the clover alone.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from benchmarks.control_real.paths import FunctionPath, paths
+from benchmarks.control_real.plant import Plant
+from benchmarks.control_real.rivals import DT, FRICTION_SHARE, LQR_GAIN, HandPid, LqrIntegral, to_body
+from benchmarks.control_real.robots import NUMBERS, Numbers, random_numbers, robot_of
+from benchmarks.table import Table, machine
+from omnidyn.arrays import FloatArray
+from omnidyn.control.mpc.controller import Mpc
+from omnidyn.control.pid import Pid
+from omnidyn.model.robot import Robot
+
+SENSORS = ("instantaneous", "encoder", "camera", "jitter")
+POSE_NOISE, TWIST_NOISE = np.array([1e-3, 1e-3, 1e-3]), np.array([5e-3, 5e-3, 0.02])
+CAMERA_RATE, CAMERA_DELAY = 60.0, 0.04  # [Hz], [s]
+JITTER, SKIP, ALLOWED = 2e-3, 0.5, 1.1  # [s], [s], times the best
+COUNTS = (0.05, 0.2)  # [mm], [mrad] a difference that counts
+OURS, RIVALS = ("pid", "mpc"), ("PID + kS", "LQR + I")
+
+
+class Instruments:
+    """What a controller is given in place of the truth. kind: one of SENSORS."""
+
+    def __init__(self, kind: str, plant: Plant, seed: int) -> None:
+        self.kind, self.plant, self._random = kind, plant, np.random.default_rng(seed)
+        self._twist_of = np.linalg.pinv(plant.directions.T)
+        self._angles, self._pose, self._t = plant.encoders(), plant.pose, plant.t
+        self._frames = [(-math.inf, plant.pose)]
+        self._next = 0
+
+    def seen(self) -> tuple[FloatArray, FloatArray]:
+        """(pose, twist) as measured now. Shapes (3,)."""
+        noise = self._random.standard_normal(6)
+        if self.kind in ("instantaneous", "jitter"):
+            return self.plant.pose + POSE_NOISE * noise[:3], self.plant.twist + TWIST_NOISE * noise[3:]
+        twist = self._counted()
+        if self.kind == "encoder":
+            return self._pose.copy(), twist
+        while self._frames and len(self._frames) > 1 and self._frames[1][0] <= self.plant.t + 1e-9:
+            self._frames.pop(0)
+        return self._frames[0][1].copy(), twist
+
+    def _counted(self) -> FloatArray:
+        """Means of the speeds since the last call, added up to a pose."""
+        angles, seconds = self.plant.encoders(), self.plant.t - self._t
+        moved = self._twist_of @ ((angles - self._angles) * self.plant.radius)
+        self._pose = self._pose + to_body(self._pose[2] + 0.5 * moved[2]).T @ moved
+        self._angles, self._t = angles, self.plant.t
+        return moved / seconds if seconds > 0.0 else np.zeros(3)
+
+    def drive(self, output: FloatArray, seconds: float) -> None:
+        """Let the plant go on; a camera takes its pictures meanwhile."""
+        end = self.plant.t + seconds
+        if self.kind == "camera":
+            while self._next / CAMERA_RATE < end:
+                self._advance(output, self._next / CAMERA_RATE - self.plant.t)
+                pose = self.plant.pose + POSE_NOISE * self._random.standard_normal(3)
+                self._frames.append((self.plant.t + CAMERA_DELAY, pose))
+                self._next += 1
+        self._advance(output, end - self.plant.t)
+
+    def _advance(self, output: FloatArray, seconds: float) -> None:
+        if seconds > 1e-9:
+            self.plant.step(output, seconds)
+
+
+def told(robot: Robot, kind: str) -> Robot:
+    """The robot as its file says which sensors it has."""
+    return robot
+
+
+def makers(name: str, numbers: Numbers, kind: str) -> dict[str, Callable[[Plant], Any]]:
+    """Controller -> what makes it for a plant."""
+    robot = told(robot_of(name, numbers), kind)
+    return {
+        "PID": HandPid,
+        "PID + kS": lambda plant: HandPid(plant, FRICTION_SHARE),
+        "LQR + I": lambda plant: LqrIntegral(plant, LQR_GAIN.get(name, 10.0)),
+        "pid": lambda plant: Pid(robot),
+        "mpc": lambda plant: Mpc(robot),
+    }
+
+
+def wrench_at(t: float, friction: FloatArray) -> FloatArray:
+    """A knock of three times what friction holds, and a long push of 0.8 times, every 6 s."""
+    phase = t % 6.0
+    return 3.0 * friction if 1.0 <= phase < 1.15 else -0.8 * friction if 2.5 <= phase < 4.5 else 0.0 * friction
+
+
+def errors(plant: Plant, control: Any, path: FunctionPath, kind: str, seed: int = 0) -> tuple[float, float, float]:
+    """(rms of the position [mm], of the heading [mrad], median time of a step [us])."""
+    plant.reset(path.at(0.0).pose)
+    instruments, random = Instruments(kind, plant, seed), np.random.default_rng(seed + 1)
+    early = round(plant.latency / DT)
+    start, took, off = -early * DT, [], []
+    while (t := start + plant.t) < path.end - 0.5 * DT:
+        pose, twist = instruments.seen()
+        plant.push = wrench_at(t, plant.friction) if path.name == "push" and t >= 0.0 else np.zeros(3)
+        before = time.thread_time()
+        output = np.asarray(control.step(t, pose, twist, path))
+        took.append(time.thread_time() - before)
+        instruments.drive(output, DT + (JITTER * random.uniform(-1.0, 1.0) if kind == "jitter" else 0.0))
+        if start + plant.t >= SKIP:
+            error = plant.pose - path.at(start + plant.t).pose
+            off.append((math.hypot(error[0], error[1]), math.remainder(error[2], 2.0 * math.pi)))
+    rms = 1e3 * np.sqrt(np.mean(np.square(off), axis=0))
+    return float(rms[0]), float(rms[1]), 1e6 * float(np.median(took))
+
+
+def lost(cells: dict[str, tuple[float, float, float]]) -> list[tuple[str, str]]:
+    """(controller, "mm" or "mrad") where one of ours is beaten."""
+    found = []
+    for k, unit in enumerate(("mm", "mrad")):
+        best = min(cells[name][k] for name in RIVALS)
+        for name in OURS:
+            if cells[name][k] > max(ALLOWED * best, best + COUNTS[k]):
+                found.append((name, unit))
+            best = min(best, cells[name][k])
+    return found
+
+
+def table_of(robots: dict[str, Numbers], names: list[str]) -> Table:
+    """A row per robot, path and sensors."""
+    controllers = list(makers("axebot", NUMBERS["axebot"], SENSORS[0]))
+    columns = ["robot", "path", "sensors", *controllers, "lost"]
+    table = Table("control_real: rms of position mm / heading mrad on an independent plant", columns, notes=[machine()])
+    count = {name: 0 for name in OURS}
+    times: dict[str, list[float]] = {name: [] for name in OURS}
+    for robot, numbers in robots.items():
+        for name in names:
+            for kind in SENSORS:
+                path, plant = paths()[name], Plant(numbers)
+                cells = {
+                    control: errors(plant, make(plant), path, kind)
+                    for control, make in makers(robot, numbers, kind).items()
+                }
+                beaten = lost(cells)
+                for control, _ in beaten:
+                    count[control] += 1
+                for control in OURS:
+                    times[control].append(cells[control][2])
+                words = {control: f"{cell[0]:.2f}/{cell[1]:.2f}" for control, cell in cells.items()}
+                words["lost"] = ", ".join(f"{control} {unit}" for control, unit in beaten)
+                table.add(robot=robot, path=name, sensors=kind, **words)
+    total = 2 * len(table.rows)
+    for control in OURS:
+        table.add(
+            "0 cells",
+            count[control] == 0,
+            robot="all",
+            path=control,
+            sensors=f"{np.median(times[control]):.0f} us a step",
+            lost=f"{count[control]} of {total}",
+        )
+    return table
+
+
+def measure() -> Table:
+    """The three robots on all paths."""
+    return table_of(NUMBERS, list(paths()))
+
+
+def main(arguments: list[str]) -> None:
+    """A seed draws a fourth plant; a word is a path, all by default."""
+    seeds = [int(word) for word in arguments if word.isdigit()]
+    names = [word for word in arguments if not word.isdigit()] or list(paths())
+    robots = {f"seed {seed}": random_numbers(seed) for seed in seeds} or NUMBERS
+    print(table_of(robots, names).as_text())
