@@ -23,6 +23,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.pid import Pid
 from omnidyn.model.robot import Robot
+from omnidyn.model.sensors import Sensors
 
 SENSORS = ("instantaneous", "encoder", "camera", "jitter")
 POSE_NOISE, TWIST_NOISE = np.array([1e-3, 1e-3, 1e-3]), np.array([5e-3, 5e-3, 0.02])
@@ -80,7 +81,11 @@ class Instruments:
 
 def told(robot: Robot, kind: str) -> Robot:
     """The robot as its file says which sensors it has."""
-    return robot
+    sensors = {
+        "encoder": Sensors(twist="mean"),
+        "camera": Sensors(twist="mean", pose_delay=CAMERA_DELAY, pose_rate=CAMERA_RATE),
+    }
+    return robot.replace(sensors=sensors.get(kind))
 
 
 def makers(name: str, numbers: Numbers, kind: str) -> dict[str, Callable[[Plant], Any]]:

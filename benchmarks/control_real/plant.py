@@ -28,7 +28,7 @@ def wrench_matrix(azimuth: FloatArray, lever: float, roller: FloatArray) -> Floa
     return np.ascontiguousarray(np.vstack([along - np.tan(angle) * outward, np.full(len(phi), lever)]))
 
 
-@njit
+@njit(cache=True)
 def advance(state, before, impulse, seconds, volts, push, motors, matrices, axes, disc, battery, flags):
     """Move `state` (pose, twist, wheel angles) on by a time; see Plant for the tables."""
     steps = math.ceil(seconds / SUBSTEP - 1e-9)

@@ -13,6 +13,7 @@ import numpy as np
 import omnidyn
 from omnidyn.control.controller import Info
 from omnidyn.control.controllers import controller_named
+from omnidyn.model.frames import world_to_body
 from tests.support.exported import STRICT
 
 SANITIZERS = ("-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
@@ -118,3 +119,27 @@ class CController:
         if hasattr(own, "horizon"):
             return own.dt * (own.steps_late + np.arange(own.horizon + 1))
         return np.array([0.0, own.late, own.late + own.dt])
+
+
+class Averaged:
+    """Any controller, its twist the mean over the last step, as encoders have it."""
+
+    def __init__(self, controller: Any) -> None:
+        self._controller, self._last = controller, None
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._controller, name)
+
+    def reset(self) -> None:
+        """Forget all steps."""
+        self._controller.reset()
+        self._last = None
+
+    def step(self, t: float, pose: Any, twist: Any, path: Any) -> Any:
+        """The output of the controller."""
+        mean = np.zeros(3)
+        if self._last is not None:
+            moved = pose - self._last
+            mean = world_to_body(pose[2] - 0.5 * moved[2]) @ moved / self._controller.dt
+        self._last = np.array(pose)
+        return self._controller.step(t, pose, mean, path)

@@ -30,10 +30,12 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.control.late_pose import LatePose, late_pose
 from omnidyn.control.paths.adapter import as_path
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.motor import DUTY, SPEED, no_load_speed
 from omnidyn.model.robot import Robot
+from omnidyn.model.sensors import sensors_of
 from omnidyn.model.surroundings import refuse_slope
 from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.slip.plant import grips
@@ -142,7 +144,7 @@ class Safe:
         """Make ready for a robot; settings and memory stay."""
         refuse_slope(robot.floor, "controllers know")
         robot = without_slip(robot)
-        self.robot = robot
+        self.robot, self.sensors = robot, sensors_of(robot)
         self.output = output_kind(robot)
         self.limit = output_limit(robot)
         self._per_volt = 1.0 / supply_of(robot, self.supply) if self.output == DUTY else 1.0
@@ -220,6 +222,19 @@ class Safe:
 class Guarded(Safe, ABC):
     """A controller whose steps are checked before and after it sees them; subclasses write `_output`."""
 
+    dt: float  # [s] between two steps
+    _late_pose: LatePose | None = None
+
+    def _take(self, robot: Robot) -> None:
+        super()._take(robot)
+        self._late_pose = late_pose(robot, self.dt, self._late_pose)
+
+    def reset(self) -> None:
+        """Forget all steps."""
+        super().reset()
+        if self._late_pose is not None:
+            self._late_pose.reset()
+
     def step(self, t: float, pose: Any, twist: Any, path: Any) -> FloatArray:
         """What to send to the drive from t [s] on. Shape (wheels,). Never raises."""
         place, speed = vector(pose), vector(twist)
@@ -230,6 +245,8 @@ class Guarded(Safe, ABC):
         except Exception:  # whatever stands in place of a path, it is none
             return self._guarded(t, BAD_PATH, "", None)
         status = PATH_ENDED if _ended(follow, t) else OK
+        if self._late_pose is not None and math.isfinite(now := _number(t)):
+            place = self._late_pose.now(now, place, speed)
         return self._guarded(t, "", status, lambda dt: self._output(float(t), dt, place, speed, follow))
 
     @abstractmethod

@@ -106,7 +106,10 @@ class Pid(Guarded):
         """
         turned = world_to_body(heading + np.array([0.0, 1.0]) * self.dt * velocity[1, 2])
         error, now, then = turned[0] @ off, turned[0] @ velocity[1], turned[1] @ velocity[2]
-        back = self.gains.speed * (turned[0] @ velocity[0] - twist) + self.gains.place * error
+        speed = turned[0] @ velocity[0]
+        if self.sensors.averaged:  # a mean is half a step old
+            speed = speed - 0.5 * (then - now)
+        back = self.gains.speed * (speed - twist) + self.gains.place * error
         change, way = self.volts.change(now, then), 0.5 * (now + then) + self._home * error
         if not self.feedforward:
             now, change = 0.0 * now, 0.0 * change

@@ -22,6 +22,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
 from omnidyn.control.controllers import ControllerFile, controller_spec, options_of
 from omnidyn.control.feedforward import DT
+from omnidyn.control.mpc.settings import Settings
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import is_several
 from omnidyn.control.paths.path import path as path_named
@@ -68,7 +69,7 @@ class Range(NamedTuple):
 TUNED: dict[str, dict[str, Range]] = {
     "pid": {"faster": Range(0.3, 20.0), "integral": Range(0.0, 1.0, log=False)},
     "speed": {"faster": Range(0.3, 20.0)},
-    "mpc": {"volts": Range(1e-4, 1.0), "scale_walk": Range(5e-4, 0.1)},
+    "mpc": {"volts": Range(1e-6, 1.0), "scale_walk": Range(5e-4, 0.1)},
 }
 
 
@@ -242,6 +243,8 @@ def tune(
         return math.log(value) + outside
 
     defaults = options_of(spec.controller)
+    if "volts" in ranges:  # by default it follows from the robot
+        defaults["volts"] = Settings().volts_weight(robot)
     start = {name: float(spec.options.get(name, defaults[name])) for name in ranges}
     first = np.array([interval.of(start[name]) for name, interval in ranges.items()])
     corners = np.vstack([first, *(first + _aside(first, k) for k in range(len(first)))])

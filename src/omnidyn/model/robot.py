@@ -13,6 +13,7 @@ from omnidyn.errors import printable
 from omnidyn.model.friction import Friction
 from omnidyn.model.log_effects import KeyCorrelation, LogEffects
 from omnidyn.model.motor import Drive, Motor, mass_at_rim
+from omnidyn.model.sensors import Sensors
 from omnidyn.model.surroundings import FARTHEST_LOAD, Floor, Variations
 from omnidyn.model.value import Flag, Text, Value, number, place
 from omnidyn.model.wheels import Wheels, check_count
@@ -105,6 +106,7 @@ class Robot(Displayable, Value):
     drive: Drive = Drive()
     friction: Friction = Friction()
     floor: Floor = Floor()
+    sensors: Annotated[Sensors | None, Field(description="what speeds and poses are to a controller")] = None
     variations: Annotated[Variations, Field(description="what it can be varied by, by name")] = Variations()
     correlation: Annotated[KeyCorrelation | None, Field(description="which numbers are off together")] = None
     log: Annotated[LogEffects | None, Field(description="what the logs of its fit did beside the robot")] = None

@@ -116,7 +116,8 @@ def robot_to_toml(robot: Robot) -> str:
     if robot.source:
         head.append(f"source = {toml_literal(robot.source)}")
     tables = [_table(name, getattr(robot, name), robot.priors) for name in TABLES]
-    return "\n".join(head) + "\n" + "".join(tables) + _by_name(robot) + _of_logs(robot) + _together(robot)
+    tables += [_of_sensors(robot), _by_name(robot), _of_logs(robot), _together(robot)]
+    return "\n".join(head) + "\n" + "".join(tables)
 
 
 def _table(name: str, value: BaseModel, priors: dict[str, Prior]) -> str:
@@ -144,6 +145,11 @@ def _by_name(robot: Robot) -> str:
         for name in variations.names[kind]
     )
     return "".join(_table(path, value, robot.priors) or f"\n[{path}]\n" for path, value in tables)
+
+
+def _of_sensors(robot: Robot) -> str:
+    """The table of its sensors; one that says nothing is kept, for it goes before what a fit found."""
+    return "" if robot.sensors is None else _table("sensors", robot.sensors, {}) or "\n[sensors]\n"
 
 
 def _of_logs(robot: Robot) -> str:

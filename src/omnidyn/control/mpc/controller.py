@@ -39,6 +39,7 @@ from omnidyn.control.controller import (
     without_slip,
 )
 from omnidyn.control.feedforward import DT, check_dt
+from omnidyn.control.late_pose import LatePose, late_pose
 from omnidyn.control.mpc.loop import INACCURATE_STEP, NO_STATE, Batch, Memory, MpcWorkspace, control_step
 from omnidyn.control.mpc.model import numbers, volts
 from omnidyn.control.mpc.observer import PUSH, SCALE
@@ -61,6 +62,7 @@ class Mpc:
     """
 
     name = "mpc"
+    _late_pose: LatePose | None = None
 
     def __init__(
         self,
@@ -96,6 +98,7 @@ class Mpc:
         self._room = MpcWorkspace.of(self.horizon, volts(robot))
         self._numbers = numbers(robot, self.dt, self.friction)
         self._tables = self.settings.tables(robot, self.dt, self.observer)
+        self._late_pose = late_pose(robot, self.dt, self._late_pose)
         self._control = None  # compiled by the first step
 
     def reset(self) -> None:
@@ -103,6 +106,8 @@ class Mpc:
         self._memory = Memory.of(self.horizon, self.robot.wheels.count, self.steps_late, self.settings)
         self._known, self._t, self._last, self._asked = False, math.nan, self._zeros.copy(), (WAITING, 0, 0.0)
         self._state = np.zeros(6)
+        if self._late_pose is not None:
+            self._late_pose.reset()
 
     def replace(self, *, robot: Robot) -> Self:
         """The same controller for another robot. Where the friction is another, its share is learned anew."""
@@ -165,6 +170,8 @@ class Mpc:
                 pose = vector(pose)
             if twist.__class__ is not np.ndarray or twist.shape != (3,):
                 twist = vector(twist)
+            if self._late_pose is not None:
+                pose = self._late_pose.now(t, pose, twist)
             state[:3], state[3:] = pose, twist
             return self._solved(t, since, path, start)
         except Exception as raised:  # the loop of a robot must not end here, but where a user ends it
@@ -177,8 +184,8 @@ class Mpc:
         """The output of a step whose arguments look well."""
         preview = self._preview
         row = preview.row_at(t, path)
-        consecutive = self._known and 0.5 * self.dt < since < 1.5 * self.dt
-        arguments = self._numbers, self._tables, preview.rows, row, self._state, consecutive, self._memory, self._room
+        elapsed = since if self._known and 0.5 * self.dt < since < 1.5 * self.dt else 0.0
+        arguments = self._numbers, self._tables, preview.rows, row, self._state, elapsed, self._memory, self._room
         if self._control is None:
             self._control = machine_code(control_step, *arguments)
         passes = self._control(*arguments)

@@ -13,7 +13,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.compiled.kernel import kernel, part
 from omnidyn.control.mpc.interior_point import ROOM_SIZE, QuadraticProgram, make_bounds, solve_limited
-from omnidyn.control.mpc.model import Numbers
+from omnidyn.control.mpc.model import LINEAR_SIZE, STEP, Numbers, held_for
 from omnidyn.control.mpc.observer import (
     DD,
     ESTIMATE_SIZE,
@@ -30,11 +30,13 @@ from omnidyn.control.mpc.observer import (
     WALK_SCALE,
     WALK_TWIST,
     begin_with,
+    follow,
     observe,
     run_on,
 )
 from omnidyn.control.mpc.program import (
     AGAIN,
+    AVERAGED,
     CURRENT,
     LEARN,
     SLEW,
@@ -54,6 +56,7 @@ from omnidyn.errors import InputError
 
 LARGEST_STATE = 1e9  # of any number of a state
 NO_STATE, NO_INPUT, INACCURATE_STEP = -1, -2, -3  # what a step returns in place of its passes
+SAME_STEP = 1e-6  # of a step: what differs by less is as long
 
 
 # The arrays that a controller works in: what it remembers from step to step, and room that it does not
@@ -109,7 +112,7 @@ def _unlearn(estimate: FloatArray, settings: Settings) -> None:
 
 class MpcWorkspace(NamedTuple):
     """What a step works in: stage, answer, inverse, target, wanted, bounds, interior of its program; before (n + 1, 6):
-    the motion along which it was made."""
+    the motion along which it was made; linear: that of the numbers, for a step as long as the one before was."""
 
     stage: FloatArray
     answer: FloatArray
@@ -119,6 +122,7 @@ class MpcWorkspace(NamedTuple):
     bounds: FloatArray
     before: FloatArray
     interior: FloatArray
+    linear: FloatArray
 
     @classmethod
     def of(cls, n: int, limit: FloatArray) -> Self:
@@ -134,6 +138,7 @@ class MpcWorkspace(NamedTuple):
             bounds,
             np.zeros((n + 1, 6)),
             np.zeros((ROOM_SIZE, n, wheels)),
+            np.zeros((1, LINEAR_SIZE)),
         )
 
 
@@ -149,8 +154,10 @@ def past_delay(numbers, memory, stage):
 
 
 @part
-def control(numbers, tables, preview, start, state, consecutive, memory, room):
+def control(numbers, tables, preview, start, state, elapsed, memory, room):
     """One step from a measured state (6,). Returns passes of the solver; u[0] is the answer, within bounds.
+
+    elapsed: since the step before [s], 0 where that is not to be gone on from.
 
     -1 where the state is no number, or no place; -2 where no input was found: then nothing of the step is of use.
     INACCURATE_STEP less the passes where the answer may be off by more than rounding.
@@ -161,20 +168,25 @@ def control(numbers, tables, preview, start, state, consecutive, memory, room):
     for i in range(6):
         if not abs(state[i]) <= LARGEST_STATE:
             return NO_STATE
-    shift(memory, consecutive, preview, start)
-    if settings[LEARN] != 0.0:
-        if consecutive:
-            observe(numbers, estimate, stage, state, drive_of(numbers.push, sent, 0))
+    shift(memory, elapsed, preview, start)
+    averaged = settings[AVERAGED] != 0.0
+    if elapsed > 0.0 and (settings[LEARN] != 0.0 or averaged):
+        observed = numbers
+        if abs(elapsed - numbers.linear[0, STEP]) > SAME_STEP * elapsed:
+            held_for(numbers.linear, elapsed, room.linear)
+            observed = Numbers(room.linear, numbers.push, numbers.pull, numbers.levels)
+        drive = drive_of(numbers.push, sent, 0)
+        if settings[LEARN] != 0.0:
+            observe(observed, estimate, stage, state, drive, averaged)
         else:
-            begin_with(estimate, state)
-        put3(x, 0, 0, vector(estimate, POSE, 0))
-        put3(x, 0, 3, vector(estimate, TWIST, 0))
+            follow(observed, estimate, stage, state, drive)
     else:
-        for i in range(6):
-            x[0, i] = state[i]
+        begin_with(estimate, state)
+    put3(x, 0, 0, vector(estimate, POSE, 0))
+    put3(x, 0, 3, vector(estimate, TWIST, 0))
     past_delay(numbers, memory, stage)
     add = nearest_turn(x[0, 2], preview[start, 2])
-    if not consecutive:
+    if elapsed == 0.0:
         for k in range(1, len(x)):
             x[k, 2] += add
     if rests(preview, start, x):
@@ -223,13 +235,13 @@ def control(numbers, tables, preview, start, state, consecutive, memory, room):
 
 
 @kernel
-def control_step(numbers, tables, preview, start, state, consecutive, memory, room):
+def control_step(numbers, tables, preview, start, state, elapsed, memory, room):
     """`control` of one robot."""
-    return control(numbers, tables, preview, start, state, consecutive, memory, room)
+    return control(numbers, tables, preview, start, state, elapsed, memory, room)
 
 
 @kernel
-def control_batch(numbers, tables, previews, start, states, consecutive, memories, room):
+def control_batch(numbers, tables, previews, start, states, elapsed, memories, room):
     """`control` of many robots: what each remembers has one more axis in front. Returns the passes of each.
 
     start: (which of the previews, its row) of each robot.
@@ -239,9 +251,7 @@ def control_batch(numbers, tables, previews, start, states, consecutive, memorie
         memory = Memory(
             memories.estimate[i], memories.sent[i], memories.x[i], memories.u[i], memories.active[i], memories.fast[i]
         )
-        passes[i] = control(
-            numbers, tables, previews[start[i, 0]], start[i, 1], states[i], consecutive[i], memory, room
-        )
+        passes[i] = control(numbers, tables, previews[start[i, 0]], start[i, 1], states[i], elapsed[i], memory, room)
     return passes
 
 
@@ -287,7 +297,8 @@ class Batch:
         if len(paths) > 1:
             start[:, 0] = np.arange(self.count)
         memory = self._memory
-        passes = control_batch(self._numbers, self._tables, previews, start, state, self._known, memory, self._room)
+        elapsed = np.where(self._known, self._numbers.linear[0, STEP], 0.0)
+        passes = control_batch(self._numbers, self._tables, previews, start, state, elapsed, memory, self._room)
         self._known = (passes >= 0) | (passes <= INACCURATE_STEP)
         sent = memory.u[:, 0].copy()
         sent[~self._known] = 0.0

@@ -16,6 +16,8 @@ import numpy as np
 from scipy.linalg import expm
 
 from omnidyn.arrays import FloatArray
+from omnidyn.compiled.kernel import part
+from omnidyn.control.mpc.small import IDENTITY, ZERO_MATRIX, added, matrix, mm, put9, scaled
 from omnidyn.model.dynamics import discretise, frame_terms, is_decoupled, motor_wrench, state_space
 from omnidyn.model.layout import N_AXES, Plant, blank_plant
 from omnidyn.model.mass import per_mass
@@ -71,6 +73,31 @@ def numbers(robot: Robot, dt: float, friction: bool = True) -> Numbers:
         linear[0, ELLIPSE_FALL:LINEAR_SIZE] = body.fall, body.form, body.exponent, *(body.breakaway - body.coulomb)
         levels = _levels(robot, plant.element, directions)
     return Numbers(linear, push, np.asarray(np.linalg.pinv(push), dtype=float), levels)
+
+
+TERMS = 12  # of the series of a change of dt, which is half of dt at the most
+
+
+@part
+def held_for(linear, elapsed, changed):
+    """Write into `changed` the row `linear` for steps of another length [s], at most half of dt off.
+
+    With d what it is longer: e^(A d) = I + A PHI_d by its series, PHI = PHI_dt + DECAY_dt PHI_d and so on.
+    """
+    decay, phi, psi = matrix(linear, 0, DECAY), matrix(linear, 0, PHI), matrix(linear, 0, PSI)
+    rates = mm(added(decay, scaled(IDENTITY, -1.0)), matrix(linear, 0, FEED))
+    d = elapsed - linear[0, STEP]
+    once = twice = ZERO_MATRIX  # PHI_d / d and PSI_d / d^2
+    for k in range(TERMS, 0, -1):
+        once = added(scaled(mm(rates, once), d / (k + 1)), IDENTITY)
+        twice = added(scaled(mm(rates, twice), d / (k + 2)), scaled(IDENTITY, 0.5))
+    short = scaled(once, d)
+    for i in range(LINEAR_SIZE):
+        changed[0, i] = linear[0, i]
+    put9(changed, 0, DECAY, mm(decay, added(IDENTITY, mm(rates, short))))
+    put9(changed, 0, PHI, added(phi, mm(decay, short)))
+    put9(changed, 0, PSI, added(psi, added(scaled(phi, d), mm(decay, scaled(twice, d * d)))))
+    changed[0, STEP] = elapsed
 
 
 def volts(robot: Robot) -> FloatArray:

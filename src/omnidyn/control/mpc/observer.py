@@ -2,6 +2,9 @@
 
     twist+ = model(twist, a, d, scale) + noise,   d and scale walk at random;   pose and twist are measured with noise
 
+What is measured may be the mean of the twist over the step, as differences of encoders are: the model's own mean then
+stands beside it, and what it says of twist, push and scale is that of (twist + twist+)/2.
+
 d makes the controller free of offset; scale is told apart from it wherever the robot reverses. An extended Kalman
 filter per axis with three states (speed, d, scale), one with one state for each entry of the pose: what the settings
 say of noise and walks decides how much is believed. A measurement beyond all that is believed at once. Source:
@@ -10,10 +13,12 @@ offset-free MPC, Pannocchia & Rawlings, AIChE J. 49 (2003); the scale is our own
 
 from __future__ import annotations
 
+import math
+
 from omnidyn.compiled.kernel import part
-from omnidyn.control.mpc.model import PHI
+from omnidyn.control.mpc.model import PHI, STEP
 from omnidyn.control.mpc.riccati import V, advance
-from omnidyn.control.mpc.small import minus, put3, vector
+from omnidyn.control.mpc.small import minus, plus, put3, vector
 from omnidyn.control.mpc.stages import friction_at, linear_stage
 
 PUSH, SCALE, TWIST, POSE = 0, 1, 2, 3  # what is believed; rows of a table with a column for each axis
@@ -22,6 +27,7 @@ NOISE, WALK_TWIST, WALK_PUSH, WALK_SCALE, POSE_NOISE, WALK_POSE = 11, 12, 13, 14
 ESTIMATE_SIZE = 17
 LEAST_SCALE, LARGEST_SCALE = 0.0, 3.0  # of the scale
 OUTLIER_SQUARE = 36.0  # squares of the std that an innovation may be; more is a robot that was moved
+KNOCK_SQUARE = 9.0  # the same of a push that nobody expected: it may be any from then on
 PASSES = 4
 STICKING_SHARE = 0.0001  # of the speed below which friction falls to 0 in the program: here what sticks is to stick
 
@@ -51,16 +57,51 @@ def begin_with(estimate, state):
 
 
 @part
-def observe(numbers, estimate, stage, state, drive):
-    """Update `estimate` (ESTIMATE_SIZE, 3) by the state (6,) that a step under `drive` [m/s^2] has led to."""
-    pose, twist = run_on(numbers, estimate, stage, vector(estimate, POSE, 0), vector(estimate, TWIST, 0), drive)
+def mean_twist(dt, pose, twist, after, end):
+    """The mean of the twist over a step of dt [s] in the body frame, by what an encoder counts: see `along_path`."""
+    turn = 0.25 * (twist[2] + end[2]) * dt
+    per = 1.0 / ((1.0 - turn * turn / 6.0) * dt)
+    cos, sin = per * math.cos(pose[2] + turn), per * math.sin(pose[2] + turn)
+    dx, dy = after[0] - pose[0], after[1] - pose[1]
+    return cos * dx + sin * dy, cos * dy - sin * dx, (after[2] - pose[2]) / dt
+
+
+@part
+def follow(numbers, estimate, stage, state, drive):
+    """Without an observer: the pose measured, and the twist at which a step ends whose mean was measured."""
+    before, twist = vector(estimate, POSE, 0), vector(estimate, TWIST, 0)
+    after, end = run_on(numbers, estimate, stage, before, twist, drive)
+    mean = mean_twist(numbers.linear[0, STEP], before, twist, after, end)
+    put3(estimate, POSE, 0, (state[0], state[1], state[2]))
+    put3(estimate, TWIST, 0, plus(end, minus((state[3], state[4], state[5]), mean)))
+
+
+@part
+def observe(numbers, estimate, stage, state, drive, averaged):
+    """Update `estimate` (ESTIMATE_SIZE, 3) by the state (6,) that a step under `drive` [m/s^2] has led to.
+
+    averaged: whether the twist of the state is the mean over that step.
+    """
+    before, begin, dt = vector(estimate, POSE, 0), vector(estimate, TWIST, 0), numbers.linear[0, STEP]
+    pose, twist = run_on(numbers, estimate, stage, before, begin, drive)
+    shown = mean_twist(dt, before, begin, pose, twist) if averaged else twist
     unit_scale = (1.0, 1.0, 1.0)
     force = friction_at(numbers.linear, numbers.levels, unit_scale, twist, 1.0, False)[0]
     put3(estimate, TWIST, 0, twist)
-    put3(estimate, POSE, 0, pose)
+    if averaged:
+        middle = before[2] + 0.5 * (pose[2] - before[2])
+        cos, sin = math.cos(middle), math.sin(middle)
     for i in range(3):
         phi, decay = numbers.linear[0, PHI + 4 * i], stage[0, V + 4 * i]
-        observe_axis(estimate, i, decay, phi, -phi * force[i], state[3 + i])
+        moved = dt * observe_axis(estimate, i, decay, phi, -phi * force[i], state[3 + i] - shown[i], averaged)
+        if averaged:
+            pose = (
+                pose[0] + (cos if i == 0 else -sin if i == 1 else 0.0) * moved,
+                pose[1] + (sin if i == 0 else cos if i == 1 else 0.0) * moved,
+                pose[2] + (moved if i == 2 else 0.0),
+            )
+    put3(estimate, POSE, 0, pose)
+    for i in range(3):
         var, noise = estimate[PP, i] + estimate[WALK_POSE, i] ** 2, estimate[POSE_NOISE, i] ** 2
         innovation = state[i] - estimate[POSE, i]
         if not innovation * innovation <= OUTLIER_SQUARE * (var + noise):
@@ -72,23 +113,35 @@ def observe(numbers, estimate, stage, state, drive):
 
 
 @part
-def observe_axis(estimate, i, decay, by_push, by_scale, measured):
-    """The filter of one axis: covariance a step on, then what the measured speed says of all three."""
+def observe_axis(estimate, i, decay, by_push, by_scale, innovation, averaged):
+    """The filter of one axis: covariance a step on, then what the measured speed says of all three.
+
+    Returns by how much the mean of the speed is other than was predicted, 0 where that is not measured.
+    """
     vv, vd, vs = estimate[VV, i], estimate[VD, i], estimate[VS, i]
     dd, ds, ss = estimate[DD, i], estimate[DS, i], estimate[SS, i]
     d = decay * vd + by_push * dd + by_scale * ds
     s = decay * vs + by_push * ds + by_scale * ss
-    v = decay * (decay * vv + by_push * vd + by_scale * vs) + by_push * d + by_scale * s
-    v += estimate[WALK_TWIST, i] ** 2
+    across = decay * vv + by_push * vd + by_scale * vs
+    v = decay * across + by_push * d + by_scale * s + estimate[WALK_TWIST, i] ** 2
     dd, ss = dd + estimate[WALK_PUSH, i] ** 2, ss + estimate[WALK_SCALE, i] ** 2
-    noise, innovation = estimate[NOISE, i] ** 2, measured - estimate[TWIST, i]
-    r = 1.0 / (v + noise)
-    estimate[PUSH, i] += d * r * innovation
-    estimate[SCALE, i] = min(max(estimate[SCALE, i] + s * r * innovation, LEAST_SCALE), LARGEST_SCALE)
+    seen, seen_v, seen_d, seen_s = v, v, d, s  # variance of what is measured, and its covariance with the three
+    if averaged:
+        seen = 0.25 * (vv + 2.0 * across + v)
+        seen_v, seen_d, seen_s = 0.5 * (across + v), 0.5 * (vd + d), 0.5 * (vs + s)
+    noise = estimate[NOISE, i] ** 2
+    r = 1.0 / (seen + noise)
+    estimate[PUSH, i] += seen_d * r * innovation
+    estimate[SCALE, i] = min(max(estimate[SCALE, i] + seen_s * r * innovation, LEAST_SCALE), LARGEST_SCALE)
     if not innovation * innovation * r <= OUTLIER_SQUARE:
-        estimate[TWIST, i] = measured
+        estimate[TWIST, i] += innovation
         estimate[VV, i], estimate[VD, i], estimate[VS, i] = noise, 0.0, 0.0
     else:
-        estimate[TWIST, i] += v * r * innovation
-        estimate[VV, i], estimate[VD, i], estimate[VS, i] = noise * v * r, noise * d * r, noise * s * r
-    estimate[DD, i], estimate[DS, i], estimate[SS, i] = dd - d * d * r, ds - d * s * r, ss - s * s * r
+        estimate[TWIST, i] += seen_v * r * innovation
+        estimate[VV, i] = v - seen_v * seen_v * r
+        estimate[VD, i], estimate[VS, i] = d - seen_v * seen_d * r, s - seen_v * seen_s * r
+    if not innovation * innovation * r <= KNOCK_SQUARE:
+        dd += (innovation / by_push) ** 2
+    estimate[DD, i], estimate[DS, i] = dd - seen_d * seen_d * r, ds - seen_d * seen_s * r
+    estimate[SS, i] = ss - seen_s * seen_s * r
+    return seen * r * innovation if averaged else 0.0

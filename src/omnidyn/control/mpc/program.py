@@ -12,7 +12,8 @@ from omnidyn.control.mpc.small import dot, matrix, minus, mv, plus, put3, vector
 from omnidyn.control.mpc.stages import frame_at, friction_at, level_at, linear_stage
 
 POSE_WEIGHT, TWIST_WEIGHT, LAST_WEIGHT, AGAIN, LEARN = 0, 3, 6, 7, 8  # entries of `settings`
-SLEW, CURRENT, SPEED, SPEED_WEIGHT, SETTINGS_SIZE = 9, 10, 11, 14, 15  # limits: V a step, whether, [m/s], cost
+SLEW, CURRENT, SPEED, SPEED_WEIGHT = 9, 10, 11, 14  # limits: V a step, whether, [m/s], cost
+AVERAGED, SETTINGS_SIZE = 15, 16  # whether measured speeds are means over the step before
 ARRIVED = (1.5e-5, 1.5e-5, 1e-4)  # [m, m, rad] from the path, where nothing more has to be overcome
 HOME = (30.0, 30.0, 60.0)  # [1/s] speed of the way back per distance, for the direction of friction
 
@@ -86,11 +87,11 @@ FRICTION_CHANGE, HEADING_CHANGE, VOLTAGE_CHANGE = 0.25, 0.02, 0.05
 
 
 @part
-def shift(memory, consecutive, preview, start):
+def shift(memory, elapsed, preview, start):
     """The prediction of the last step as guess of this one; the reference where there is none."""
     x, u, active, fast = memory.x, memory.u, memory.active, memory.fast
     n = len(u)
-    if not consecutive:
+    if elapsed == 0.0:
         for k in range(n + 1):
             put3(x, k, 0, vector(preview, start + k, 0))
             put3(x, k, 3, vector(preview, start + k, 3))

@@ -12,6 +12,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.control.mpc.model import emf, volts
 from omnidyn.control.mpc.program import (
     AGAIN,
+    AVERAGED,
     CURRENT,
     LAST_WEIGHT,
     LEARN,
@@ -24,11 +25,16 @@ from omnidyn.control.mpc.program import (
 )
 from omnidyn.control.paths.adapter import as_path
 from omnidyn.errors import InputError
+from omnidyn.model.dynamics import motor_wrench
 from omnidyn.model.frames import world_to_body
+from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
+from omnidyn.model.sensors import sensors_of
 from omnidyn.model.wheels import per_wheel
 
 Three = tuple[float, float, float]
+VOLTS = 2e-3  # [1/V^2] of the paper's robot
+PER_VOLT_SQUARE = 4.788951776922385  # [m^2/s^4/V^2] sum of its squared accelerations in the plane by 1 V on a wheel
 
 
 class Tables(NamedTuple):
@@ -47,6 +53,7 @@ class Tables(NamedTuple):
 class Settings:
     """Weights of errors of the pose [1/m^2, 1/m^2, 1/rad^2], of the twist, of volts beside those of the path [1/V^2].
 
+    volts: None: VOLTS for the paper's robot, and of another in proportion to the square of what a volt speeds it up by.
     last: how much more the end of the horizon counts. again: how often at most a step is made linear anew.
     noise, pose_noise: std of the measured twist and pose that the observer expects [m/s, m/s, rad/s], [m, m, rad].
     walk, pose_walk: std of what a step may bring that the model does not know. push_walk: of the change of an unknown
@@ -57,7 +64,7 @@ class Settings:
 
     pose: Three = (200.0, 200.0, 20.0)
     twist: Three = (1.0, 1.0, 0.1)
-    volts: float = 2e-3
+    volts: float | None = None
     last: float = 5.0
     again: int = 2
     noise: Three = (0.01, 0.01, 0.04)
@@ -83,15 +90,26 @@ class Settings:
         speed = self.speed
         if speed is not None and (len(speed) != 3 or not all(0.0 < limit <= 1e9 for limit in speed)):
             raise InputError("no limits", got=speed, expected="three numbers above 0, or None", where="speed")
-        for name, low, high in (("volts", 1e-9, 1e9), ("last", 0.0, 1e6), ("again", 1, 20), ("scale_walk", 0.0, 10.0)):
+        for name, low, high in (("last", 0.0, 1e6), ("again", 1, 20), ("scale_walk", 0.0, 10.0)):
             if not low <= getattr(self, name) <= high:
                 raise InputError("out of range", got=getattr(self, name), expected=f"{low:g} to {high:g}", where=name)
+
+        if self.volts is not None and not 1e-9 <= self.volts <= 1e9:
+            raise InputError("out of range", got=self.volts, expected="1e-09 to 1e+09, or None", where="volts")
+
+    def volts_weight(self, robot: Robot) -> float:
+        """The weight of volts beside those of the path, for a robot [1/V^2]."""
+        if self.volts is not None:
+            return float(self.volts)
+        per_volt = per_mass(robot, motor_wrench(robot).driving)[:, :2]
+        return VOLTS * min(max(round(float(np.sum(per_volt**2)) / PER_VOLT_SQUARE, 12), 1e-3), 1e3)
 
     def tables(self, robot: Robot, dt: float, learn: bool) -> Tables:
         """The settings for a robot and steps of dt [s]; learn: whether the observer runs."""
         table, count = np.zeros(SETTINGS_SIZE), robot.wheels.count
         table[POSE_WEIGHT : POSE_WEIGHT + 3], table[TWIST_WEIGHT : TWIST_WEIGHT + 3] = self.pose, self.twist
         table[LAST_WEIGHT], table[AGAIN], table[LEARN] = self.last, self.again, learn
+        table[AVERAGED] = sensors_of(robot).averaged
         table[SLEW] = 0.0 if self.slew is None else self.slew * dt
         motor_current = robot.motor.current_limit
         table[CURRENT] = self.current is not None or motor_current is not None
@@ -101,7 +119,7 @@ class Settings:
             *(per_wheel(np.inf if maximum is None else maximum, count) for maximum in (self.current, motor_current))
         )
         limit = np.array([volts(robot), np.minimum(amperes * per_wheel(robot.motor.resistance, count), 1e9)])
-        return Tables(table, np.full(count, float(self.volts)), limit, emf(robot))
+        return Tables(table, np.full(count, self.volts_weight(robot)), limit, emf(robot))
 
 
 # The part of a path that lies ahead, on the grid of the steps: sampled in blocks, so that a step only looks it up

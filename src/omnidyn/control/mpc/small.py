@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from omnidyn.compiled.kernel import part
 
+IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+ZERO_MATRIX = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
 
 @part
 def vector(t, k, i):
@@ -102,6 +105,12 @@ def added(a, b):
         a[7] + b[7],
         a[8] + b[8],
     )
+
+
+@part
+def scaled(a, c):
+    """c a of a matrix."""
+    return c * a[0], c * a[1], c * a[2], c * a[3], c * a[4], c * a[5], c * a[6], c * a[7], c * a[8]
 
 
 @part

@@ -44,8 +44,6 @@ from omnidyn.control.mpc.riccati import CP, CV, GX, GY, HP, HV, E, V
 from omnidyn.control.mpc.small import added, inverse, matrix, minus, mm, mv, plus, put3, put9, vector
 from omnidyn.model.friction.stribeck import fall
 
-ZERO_MATRIX = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
 
 @part
 def level_at(levels, e, speed):

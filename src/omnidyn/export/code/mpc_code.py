@@ -115,7 +115,7 @@ def _constants(controller: Mpc) -> str:
         "FARTHEST": LARGEST_STATE,
         "EXACT": observer.STICKING_SHARE,
         "LAST_WEIGHT": settings.last,
-        "VOLTS_WEIGHT": settings.volts,
+        "VOLTS_WEIGHT": settings.volts_weight(robot),
         "BEYOND": BOUND_TOLERANCE,
         "BACK_OFF": interior_point.BACK_OFF,
         "CENTRE": CENTRING,
@@ -129,7 +129,7 @@ def _constants(controller: Mpc) -> str:
         "MOST_SCALE": observer.LARGEST_SCALE,
         "START_PUSH": loop.START_PUSH,
         "START_SCALE": loop.START_SCALE,
-        "SHARP": settings.volts,
+        "SHARP": settings.volts_weight(robot),
     }
     if ellipse:
         numbers |= dict(

@@ -1,0 +1,103 @@
+"""Controllers take speeds and poses for what the robot file says they are: means over a step, poses that are late."""
+
+import math
+
+import numpy as np
+import pytest
+
+import omnidyn
+from benchmarks.control_real import errors, told
+from benchmarks.control_real.paths import paths
+from benchmarks.control_real.plant import Plant
+from benchmarks.control_real.robots import NUMBERS, robot_of
+from omnidyn.control.late_pose import LatePose
+from omnidyn.control.mpc.controller import Mpc
+from omnidyn.control.mpc.model import DECAY, LINEAR_SIZE, PHI, PSI, STEP, held_for, numbers
+from omnidyn.control.pid import Pid
+from omnidyn.model.log_effects import Lateness, LogEffects
+from omnidyn.model.robot_file import parse_robot, robot_to_toml
+from omnidyn.model.sensors import Sensors, sensors_of
+from tests.support.controlled import Averaged
+from tests.support.mixed_robots import random_robot
+
+AXEBOT = omnidyn.load_robot("axebot")
+MEAN = Sensors(twist="mean")
+
+
+@pytest.mark.parametrize("make", [Pid, Mpc, lambda robot: Mpc(robot, observer=False)], ids=["pid", "mpc", "alone"])
+def test_encoder_differences_cost_little(make):
+    instant = omnidyn.track(AXEBOT, "eight:period_s=5", make(AXEBOT), duration=6.0)
+    mean = omnidyn.track(AXEBOT, "eight:period_s=5", Averaged(make(AXEBOT.replace(sensors=MEAN))), duration=6.0)
+    assert mean.rmse_position <= 1.1 * instant.rmse_position
+
+
+@pytest.mark.parametrize("kind, limit", [("camera", 1.5), ("jitter", 0.7)])
+@pytest.mark.parametrize("make", [Pid, Mpc])
+def test_an_independent_plant_is_driven_with_real_sensors(make, kind, limit):
+    """A camera of 40 ms, or a clock that is up to 2 ms off, on a plant that shares no code with ours [mm]."""
+    plant = Plant(NUMBERS["axebot"])
+    control = make(told(robot_of("axebot", NUMBERS["axebot"]), kind))
+    assert errors(plant, control, paths()["clover"], kind)[0] < limit
+
+
+def test_a_pose_that_is_late_is_moved_by_what_was_counted_since():
+    """On a circle at a constant twist: the pose now, in closed form, from one 0.07 s old."""
+    speed, omega, age, dt = 0.5, 1.2, 0.07, 0.02
+
+    def place(t):
+        angle = 0.3 + omega * t
+        radius = speed / omega
+        return np.array(
+            [radius * (math.sin(angle) - math.sin(0.3)), -radius * (math.cos(angle) - math.cos(0.3)), angle]
+        )
+
+    bridge, twist = LatePose(age, averaged=True), np.array([speed, 0.0, omega])
+    for k in range(20):
+        found = bridge.now(k * dt, place(k * dt - age), twist)
+    np.testing.assert_allclose(found, place(19 * dt), atol=5e-5)
+    frozen = place(19 * dt - age)
+    for k in range(20, 24):  # what comes again as it was only grows older
+        found = bridge.now(k * dt, frozen, twist)
+    np.testing.assert_allclose(found, place(23 * dt), atol=5e-5)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("share", [0.55, 0.9, 1.3, 1.49])
+def test_a_step_of_another_length_is_that_of_its_own_numbers(seed, share):
+    """Against the matrix exponential of that length."""
+    robot, dt = random_robot(seed), 0.02
+    changed = np.zeros((1, LINEAR_SIZE))
+    held_for(numbers(robot, dt).linear, share * dt, changed)
+    wanted = numbers(robot, share * dt).linear
+    for column in (DECAY, PHI, PSI):
+        np.testing.assert_allclose(
+            changed[0, column : column + 9], wanted[0, column : column + 9], rtol=1e-9, atol=1e-15
+        )
+    assert changed[0, STEP] == share * dt
+
+
+def test_what_a_fit_found_of_its_logs_is_what_controllers_take():
+    late = Lateness(averaged=True, position=0.05)
+    fitted = AXEBOT.replace(log=LogEffects(latency=late))
+    assert sensors_of(fitted) == Sensors(twist="mean", pose_delay=0.05)
+    assert sensors_of(fitted.replace(sensors=Sensors())) == Sensors()
+    assert sensors_of(AXEBOT) == Sensors()
+
+
+def test_the_table_of_a_file_is_read_and_written():
+    robot = AXEBOT.replace(sensors=Sensors(twist="mean", encoder_counts=2048.0, pose_delay=0.04, pose_rate=60.0))
+    text = robot_to_toml(robot)
+    assert "[sensors]" in text and "pose_rate_Hz = 60" in text
+    assert parse_robot(text).sensors == robot.sensors
+    assert "sensors" not in robot_to_toml(AXEBOT)
+
+
+@pytest.mark.parametrize("name", ["axebot", "mecanum"])
+def test_weights_follow_what_a_volt_does(name):
+    """A robot of four times the mass and inertia is as quick with four times the volts, at a weight 16 times less."""
+    robot = omnidyn.load_robot(name)
+    body = robot.body.replace(mass=4.0 * robot.body.mass, inertia=4.0 * robot.body.inertia)
+    heavy = robot.replace(body=body)
+    light_weight, heavy_weight = (float(Mpc(each)._tables.weight[0]) for each in (robot, heavy))
+    assert heavy_weight == pytest.approx(light_weight / 16.0, rel=1e-6)
+    assert float(Mpc(AXEBOT)._tables.weight[0]) == 2e-3
