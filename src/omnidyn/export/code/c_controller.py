@@ -29,6 +29,7 @@ from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse, refuse_controller
 from omnidyn.export.spelling import c_comment, c_number, filled
 from omnidyn.model.robot import Robot
+from omnidyn.model.sensors import sensors_of
 from omnidyn.model.wheels import wheel_speed
 
 KIND = "c-controller"
@@ -36,6 +37,7 @@ NOTES = (
     "compile with -std=c99 and without -ffast-math, which would take away the tests for numbers that are none",
     "one omnidyn_control for each robot, reset once; nothing else is remembered, no memory is taken",
 )
+LATE_POSE = "poses that arrive late ([sensors] pose_delay_s): give it the pose as of now, by the turns of wheels"
 _UNITS = {"voltage": "volts at the motors", "duty": "duties, -1 to 1", "wheel_speed": "speeds of the wheels [rad/s]"}
 
 
@@ -51,6 +53,8 @@ def c_controller(robot: Robot, controller: str | os.PathLike = "pid", dt: float 
     refuse_controller(KIND, spec.controller)
     refuse(KIND, robot)
     law, omissions = spec.make(robot, dt=dt), left_out(KIND, robot)
+    if sensors_of(robot).pose_age(dt) > 0.0:
+        omissions = (*omissions, LATE_POSE)
     predicts = isinstance(law, Mpc)
     code = mpc_code(law) if predicts else control_code(law)  # pyright: ignore[reportArgumentType]  none is refused
     about = [f"{law.name} of {robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in omissions)]

@@ -26,6 +26,7 @@ from omnidyn.control.mpc.model import (
 from omnidyn.control.mpc.settings import Settings
 from omnidyn.errors import UnsupportedError
 from omnidyn.export.spelling import c_number, filled
+from omnidyn.model.sensors import sensors_of
 from omnidyn.model.wheels import wheel_speed
 
 FOLDER = files("omnidyn.export.code") / "mpc"
@@ -99,6 +100,7 @@ def _constants(controller: Mpc) -> str:
         "TURNING": turning,
         "OFF_CENTRE": any(robot.body.centre),
         "LEARN": controller.observer,
+        "AVERAGED": sensors_of(robot).averaged,
         "BOUNDED": _bounded(controller),
         "CURRENT": _current(controller),
         "SLEW": settings.slew is not None,
@@ -126,6 +128,7 @@ def _constants(controller: Mpc) -> str:
         "MOVED": program.FRICTION_CHANGE,
         "PULLED": program.VOLTAGE_CHANGE,
         "FARTHEST_OFF": observer.OUTLIER_SQUARE,
+        "KNOCK": observer.KNOCK_SQUARE,
         "MOST_SCALE": observer.LARGEST_SCALE,
         "START_PUSH": loop.START_PUSH,
         "START_SCALE": loop.START_SCALE,

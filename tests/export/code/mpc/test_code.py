@@ -16,6 +16,7 @@ from omnidyn.errors import UnsupportedError
 from omnidyn.export.code.c_controller import c_controller
 from omnidyn.model.friction import DirectionFriction, Friction, WheelFriction
 from omnidyn.model.motor import Drive
+from omnidyn.model.sensors import Sensors
 from omnidyn.simulation.live import LiveRobot
 from tests.support.controlled import CController
 from tests.support.exported import STRICT
@@ -29,6 +30,7 @@ ELLIPSE = Friction(direction=DirectionFriction(coulomb=(2.6, 1.9), viscous=0.9, 
 FOUR = ROBOT.wheels.replace(azimuth_deg=(45.0, 135.0, 225.0, 315.0))
 DUTY = Drive.model_validate({"kind": "duty", "supply_V": 7.0, "latency_s": 0.04})
 LOOP = Drive.model_validate({"kind": "speed", "rate_Hz": 200.0, "kp_V_s_rad": 0.1})
+MEAN = Sensors(twist="mean")
 VARIANTS = {
     "duty, two steps late": (ROBOT.replace(drive=DUTY), {}),
     "ellipse in a turning frame": (ROBOT.replace(friction=ELLIPSE, body=TURNING), {}),
@@ -42,6 +44,8 @@ VARIANTS = {
         {"slew": 300.0},
     ),
     "no observer, five ahead": (ROBOT, {"observer": False, "horizon": 5}),
+    "speeds that are means": (ROBOT.replace(sensors=MEAN), {}),
+    "speeds that are means, no observer": (ROBOT.replace(sensors=MEAN), {"observer": False}),
     "no friction, a loop in the firmware": (ROBOT.replace(drive=LOOP), {"friction": False}),
 }
 OK, LIMITED, STILL, BACKWARDS, BAD_TIME, BAD_POSE, BAD_TWIST, BAD_PATH = range(8)
@@ -58,9 +62,12 @@ def test_every_step_is_that_of_python(robot, options, tmp_path):
     follow, rng, apart = path("zigzag"), np.random.default_rng(1), []
     live = LiveRobot(robot, 0.02, pose=follow.at(0.0).pose)
     with CController(robot, tmp_path / "c", controller_file(tmp_path, options)) as control:
+        before = np.array(live.twist)
         for k in range(80):
             off = rng.standard_normal(6) * [2e-4, 2e-4, 4e-4, 1e-3, 1e-3, 4e-3]
-            seen = np.float32(np.concatenate([live.pose, live.twist]) + off).astype(float)
+            after = np.array(live.twist)
+            twist = after if robot.sensors is None else 0.5 * (before + after)
+            seen, before = np.float32(np.concatenate([live.pose, twist]) + off).astype(float), after
             own = control.own.step(k * 0.02, seen[:3], seen[3:], follow)
             apart.append(np.abs(control.step(k * 0.02, seen[:3], seen[3:], follow) - own).max() / control.limit.max())
             live.step(own)
@@ -74,19 +81,22 @@ def in_double(text):
     return re.sub(r"(?<=[0-9.])f\b", "", text)
 
 
-def test_in_double_precision_its_formulas_are_those_of_python(tmp_path):
+@pytest.mark.parametrize("sensors", [None, MEAN])
+def test_in_double_precision_its_formulas_are_those_of_python(sensors, tmp_path):
     """What float32 hides: every number of the observer, the model and the program."""
-    for name, text in c_controller(ROBOT, controller="mpc").files.items():
+    robot = ROBOT.replace(sensors=sensors)
+    for name, text in c_controller(robot, controller="mpc").files.items():
         (tmp_path / name).write_text(in_double(text))
     (tmp_path / "one.c").write_text('#include "omnidyn_control.c"\nomnidyn_control one;\n')
     subprocess.run(["gcc", *STRICT, "-shared", "-fPIC", "-o", "one.so", "one.c", "-lm"], cwd=tmp_path, check=True)
     library = ctypes.CDLL(str(tmp_path / "one.so"))
-    one, own = ctypes.addressof(ctypes.c_char.in_dll(library, "one")), controller_named("mpc", ROBOT)
+    one, own = ctypes.addressof(ctypes.c_char.in_dll(library, "one")), controller_named("mpc", robot)
     follow = path("eight")
     library.omnidyn_control_reset(ctypes.c_void_p(one))
     live, rng, apart = LiveRobot(ROBOT, 0.02, pose=follow.at(0.0).pose), np.random.default_rng(2), []
     for k in range(80):
         seen = np.concatenate([live.pose, live.twist]) + rng.standard_normal(6) * [2e-4, 2e-4, 4e-4, 1e-3, 1e-3, 4e-3]
+        seen[3:] += [0.06, 0.0, -0.3] if k == 40 else [0.0, 0.0, 0.0]  # a knock
         motion, found = follow.at(0.02 * (k + np.arange(21))), np.zeros(3)
         rows = np.ascontiguousarray(np.concatenate([motion.pose, motion.velocity], axis=1))
         given = [each.ctypes.data_as(ctypes.c_void_p) for each in (seen[:3].copy(), seen[3:].copy(), rows, found)]

@@ -3,25 +3,87 @@
 
 /* What a measured state (pose, twist) says of the state, the push on each axis, and the share of its friction: a Kalman
    filter with three states for each axis, and one for each entry of the pose. */
+#if AVERAGED
+/* The mean of the twist over a step from `before`, as encoders count it. */
+static void mean_twist(const omnidyn_control *c, const float before[6], float mean[3])
+{
+    const float *pose = c->believed[0], turn = 0.25f * (before[5] + c->believed[1][2]) * OMNIDYN_DT;
+    const float per = 1.0f / ((1.0f - turn * turn / 6.0f) * OMNIDYN_DT);
+    seen(c->base[2] + before[2] + turn, per * (pose[0] - before[0]), per * (pose[1] - before[1]), mean);
+    mean[2] = (pose[2] - before[2]) / OMNIDYN_DT;
+}
+#endif
+
+#if AVERAGED && !LEARN
+/* Without an observer: the pose measured, and the twist at which a step ends whose mean was measured. */
+static void follow(omnidyn_control *c, const float *measured, int known)
+{
+    float before[6], mean[3];
+    int i;
+    memcpy(before, c->believed, sizeof(before));
+    run_on(c, c->believed[0], c->sent[0]);
+    mean_twist(c, before, mean);
+    ROLLED for (i = 0; i < 3; i++) {
+        c->believed[0][i] = measured[i];
+        c->believed[1][i] = measured[3 + i] + (known ? c->believed[1][i] - mean[i] : 0.0f);
+    }
+}
+#endif
+
 #if LEARN
 static void observe(omnidyn_control *c, const float *measured, int known)
 {
     float force[4][3];
     int i, j, q;
+#if AVERAGED
+    float before[6], mean[3], moved[3], middle;
+    memcpy(before, c->believed, sizeof(before));
+#endif
     run_on(c, c->believed[0], c->sent[0]);
+#if AVERAGED
+    mean_twist(c, before, mean);
+    middle = c->base[2] + 0.5f * (before[2] + c->believed[0][2]);
+#endif
     friction_at(c->believed[1], PLAIN, force);
     ROLLED for (i = 0; i < 3; i++) {
-        float(*p)[3] = c->spread[i], *place = &c->unsure[i], *pose = &c->believed[0][i], *twist = &c->believed[1][i];
+        float(*p)[3] = c->spread[i], *twist = &c->believed[1][i];
+#if AVERAGED
+        const float begin = p[0][0], left = measured[3 + i] - mean[i];
+        float across[3];
+#else
+        float *place = &c->unsure[i], *pose = &c->believed[0][i];
+        const float left = measured[3 + i] - *twist, off = measured[i] - *pose;
+#endif
         const float by[3] = {c->columns[0][1 + i][3 + i], PHI(i)[i], -PHI(i)[i] * force[0][i]};
-        const float noise = NOISE[i], left = measured[3 + i] - *twist, off = measured[i] - *pose;
+        const float noise = NOISE[i];
         float r, gain[3];
         ROLLED for (j = 0; j < 3; j++) {
             p[0][j] = by[0] * p[0][j] + by[1] * p[1][j] + by[2] * p[2][j];
         }
+#if AVERAGED
+        ROLLED for (j = 0; j < 3; j++) {
+            across[j] = p[j][0];
+        }
+#endif
         ROLLED for (j = 0; j < 3; j++) {
             p[j][0] = dot3(by, p[j]);
             p[j][j] += (float)known * WALK[j][i];
         }
+#if AVERAGED /* what is measured is (twist + twist+)/2 */
+        moved[i] = 0.25f * (begin + 2.0f * across[0] + p[0][0]);
+        r = known ? 1.0f / (moved[i] + noise) : 0.0f;
+        moved[i] *= OMNIDYN_DT * r * left;
+        ROLLED for (j = 0; j < 3; j++) {
+            across[j] = 0.5f * (across[j] + p[j][0]);
+            gain[j] = across[j] * r;
+            c->believed[1 + j][i] += gain[j] * left;
+        }
+        ROLLED for (j = 0; j < 3; j++) {
+            ROLLED for (q = 0; q < 3; q++) {
+                p[q][j] -= gain[q] * across[j];
+            }
+        }
+#else
         r = known ? 1.0f / (p[0][0] + noise) : 0.0f;
         ROLLED for (j = 0; j < 3; j++) {
             gain[j] = p[j][0] * r;
@@ -32,13 +94,31 @@ static void observe(omnidyn_control *c, const float *measured, int known)
                 p[q][j] -= gain[q] * p[0][j];
             }
         }
+#endif
+        r *= left * left;
+        if (r > KNOCK) { /* a push that nobody expected */
+            p[1][1] += left * left / (by[1] * by[1]);
+        }
         c->believed[3][i] = c->believed[3][i] > 0.0f ? c->believed[3][i] : 0.0f;
         c->believed[3][i] = c->believed[3][i] < MOST_SCALE ? c->believed[3][i] : MOST_SCALE;
-        if (!known || !(left * left * r <= FARTHEST_OFF)) { /* a robot that was moved */
+        if (!known || !(r <= FARTHEST_OFF)) { /* a robot that was moved */
+#if AVERAGED
+            *twist = known ? *twist + (1.0f - gain[0]) * left : measured[3 + i];
+#else
             *twist = measured[3 + i];
+#endif
             p[0][1] = p[1][0] = p[0][2] = p[2][0] = 0.0f;
             p[0][0] = noise;
         }
+#if AVERAGED
+    }
+    seen(-middle, moved[0], moved[1], mean);
+    mean[2] = moved[2];
+    ROLLED for (i = 0; i < 3; i++) {
+        float *place = &c->unsure[i], *pose = &c->believed[0][i], r, gain[1];
+        const float off = measured[i] - *pose - mean[i];
+        *pose += mean[i];
+#endif
         *place += WALK[3][i];
         r = 1.0f / (*place + POSE_NOISE[i]);
         gain[0] = known && off * off * r <= FARTHEST_OFF ? *place * r : 1.0f;
@@ -236,6 +316,9 @@ static void control(omnidyn_control *c, const float *pose, const float *twist, c
     guess(c, known);
 #if LEARN
     observe(c, measured, known);
+    memcpy(c->x, c->believed, sizeof(measured));
+#elif AVERAGED
+    follow(c, measured, known);
     memcpy(c->x, c->believed, sizeof(measured));
 #else
     memcpy(c->x, measured, sizeof(measured));
