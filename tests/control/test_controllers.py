@@ -12,6 +12,8 @@ from omnidyn.control.controller import (
     BAD_POSE,
     BAD_TIME,
     BAD_TWIST,
+    BRIDGED,
+    MOST_BRIDGED,
     OK,
     PATH_ENDED,
     TIME_STANDS_STILL,
@@ -80,9 +82,13 @@ def test_its_output_fits_the_drive_and_its_limit(name, robot):
 def test_what_is_missing_gives_zeros_and_a_word(name, pose, twist, path, word):
     control = controller_named(name, AXEBOT)
     control.step(0.0, [0.1, 0.1, 0.1], REST, EIGHT)
-    np.testing.assert_array_equal(control.step(0.02, pose, twist, path), np.zeros(3))
+    bridged = 0 if word == BAD_PATH else MOST_BRIDGED
+    for k in range(bridged):
+        assert control.step(0.02 + 0.02 * k, pose, twist, path).any()
+        assert control.info.status == BRIDGED[word]
+    np.testing.assert_array_equal(control.step(0.02 + 0.02 * bridged, pose, twist, path), np.zeros(3))
     assert control.info.status == word
-    assert control.step(0.04, REST, REST, EIGHT).shape == (3,)
+    assert control.step(0.04 + 0.02 * bridged, REST, REST, EIGHT).shape == (3,)
     assert control.info.status == OK
 
 

@@ -10,6 +10,7 @@ from benchmarks.control_real import errors, told
 from benchmarks.control_real.paths import paths
 from benchmarks.control_real.plant import Plant
 from benchmarks.control_real.robots import NUMBERS, robot_of
+from omnidyn.control.controllers import controller_named
 from omnidyn.control.late_pose import LatePose
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.mpc.model import DECAY, LINEAR_SIZE, PHI, PSI, STEP, held_for, numbers
@@ -17,6 +18,7 @@ from omnidyn.control.pid import Pid
 from omnidyn.model.log_effects import Lateness, LogEffects
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
 from omnidyn.model.sensors import Sensors, sensors_of
+from omnidyn.simulation.live import LiveRobot
 from tests.support.controlled import Averaged
 from tests.support.mixed_robots import random_robot
 
@@ -102,3 +104,34 @@ def test_weights_follow_what_a_volt_does(name):
     light_weight, heavy_weight = (float(Mpc(each)._tables.weight[0]) for each in (robot, heavy))
     assert heavy_weight == pytest.approx(light_weight / 16.0, rel=1e-6)
     assert float(Mpc(AXEBOT)._tables.weight[0]) == 2e-3
+
+
+@pytest.mark.parametrize("name", ["pid", "mpc", "speed", "feedforward"])
+def test_two_missing_samples_are_bridged_and_no_more(name):
+    follow, control = omnidyn.path("eight"), controller_named(name, AXEBOT)
+    live = LiveRobot(AXEBOT, 0.02, pose=follow.at(0.0).pose)
+    words, sent = [], []
+    for k in range(60):
+        lost = 40 <= k < 43 or k == 50
+        pose = np.full(3, np.nan) if lost else np.array(live.pose)
+        sent.append(control.step(0.02 * k, pose, np.array(live.twist), follow))
+        words.append(control.info.status)
+        live.step(sent[-1])
+    assert words[40:44] == ["pose missing: bridged"] * 2 + ["pose missing", "ok"]
+    assert words[50:52] == ["pose missing: bridged", "ok"]
+    assert sent[41].any()
+    assert not sent[42].any()
+    if name != "mpc":
+        assert np.array_equal(sent[40], sent[39])
+
+
+@pytest.mark.parametrize("make", [Pid, Mpc])
+def test_a_fifth_of_all_samples_may_be_missing(make):
+    """The error of a loop that loses each sample with a chance of one in five [m]."""
+    follow, random, off = omnidyn.path("eight"), np.random.default_rng(5), []
+    control, live = make(AXEBOT), LiveRobot(AXEBOT, 0.02, pose=follow.at(0.0).pose)
+    for k in range(250):
+        pose = np.full(3, np.nan) if random.random() < 0.2 else np.array(live.pose)
+        live.step(control.step(0.02 * k, pose, np.array(live.twist), follow))
+        off.append(np.hypot(*(np.array(live.pose) - follow.at(0.02 * (k + 1)).pose)[:2]))
+    assert np.sqrt(np.mean(np.square(off[25:]))) < 4e-3

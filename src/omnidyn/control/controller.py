@@ -7,7 +7,9 @@ A controller must:
 2. say by `output` what that is: "voltage" [V], "duty" [1], or "wheel_speed" [rad/s] for a drive with a speed loop;
 3. keep |output| <= `limit`, shape (wheels,), in every step;
 4. never raise in `step` but an interrupt: what is missing, NaN, of a wrong shape or earlier than the step before gives
-   zeros, and a word in `info.status`. A time that stands still repeats the last output;
+   zeros, and a word in `info.status`. Up to MOST_BRIDGED measurements or commands missing in a row, each a step after
+   the one before, are bridged: by what an observer predicts, else by the last output. A time that stands still repeats
+   the last output;
 5. go on where a path has ended: it holds the last pose of the path, and says so in `info.status`;
 6. tell by `info` what the last step did: status, iterations, time, predicted path, limits met;
 7. forget by `reset()` all it remembers of steps before;
@@ -45,6 +47,9 @@ BAD_TIME, BACKWARDS, TIME_STANDS_STILL = "time is no finite number", "time went 
 BAD_POSE, BAD_TWIST, BAD_COMMAND = "pose missing", "twist missing", "command missing"
 BAD_PATH, FAILED = "no path", "no output found"
 INACCURATE = "inaccurate"  # the output is sent, but rounding may have moved it
+BRIDGED = {word: f"{word}: bridged" for word in (BAD_POSE, BAD_TWIST, BAD_COMMAND)}
+MOST_BRIDGED = 2  # measurements missing in a row
+LATEST = 1.5  # steps after the one before: what comes later is not gone on from
 LARGEST_STATE = 1e9  # of any number of a state: what is beyond is no place, and no speed
 VOLTAGE, WHEEL_SPEED = "voltage", "wheel_speed"
 
@@ -134,6 +139,7 @@ class Safe:
     """
 
     name = "controller"
+    dt: float  # [s] between two steps
 
     def __init__(self, robot: Robot, supply: float | None = None) -> None:
         self.supply = supply
@@ -155,6 +161,7 @@ class Safe:
         self.info = Info()
         self._t: float | None = None
         self._last = self._zeros.copy()
+        self._missing = 0
 
     def replace(self, *, robot: Robot) -> Self:
         """The same controller, its memory included, for another robot."""
@@ -185,8 +192,13 @@ class Safe:
                 return self._safe(BACKWARDS, start)
             self.info = Info(TIME_STANDS_STILL, time=time.perf_counter() - start)
             return self._last.copy()
+        if word in BRIDGED and 0.0 < dt < LATEST * self.dt and self._missing < MOST_BRIDGED:
+            self._missing += 1
+            self.info = Info(BRIDGED[word], time=time.perf_counter() - start)
+            return self._last.copy()
         if word or output is None:
             return self._safe(word, start)
+        self._missing = 0
         try:
             demand, limits = output(dt)
             sent = np.clip(demand, -self.limit, self.limit)
@@ -222,7 +234,6 @@ class Safe:
 class Guarded(Safe, ABC):
     """A controller whose steps are checked before and after it sees them; subclasses write `_output`."""
 
-    dt: float  # [s] between two steps
     _late_pose: LatePose | None = None
 
     def _take(self, robot: Robot) -> None:

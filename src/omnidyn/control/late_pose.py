@@ -47,7 +47,9 @@ class LatePose:
         self._seen: tuple[Place, Place] | None = None  # a pose, and what was counted when the robot was there
 
     def now(self, t: float, pose: FloatArray, twist: FloatArray) -> FloatArray:
-        """The pose at time t [s], from what was measured. Shapes (3,)."""
+        """The pose at time t [s], from what was measured. Shapes (3,). NaN for what is no number."""
+        if not (np.isfinite(pose).all() and np.isfinite(twist).all()):
+            return np.full(3, np.nan)
         x, y, heading = pose.tolist()
         counted = self._count(t, *twist.tolist())
         if self._seen is None or self._seen[0] != (x, y, heading):

@@ -23,8 +23,11 @@ from omnidyn.control.controller import (
     BAD_POSE,
     BAD_TIME,
     BAD_TWIST,
+    BRIDGED,
     FAILED,
     INACCURATE,
+    LATEST,
+    MOST_BRIDGED,
     OK,
     PATH_ENDED,
     TIME_STANDS_STILL,
@@ -40,12 +43,13 @@ from omnidyn.control.controller import (
 )
 from omnidyn.control.feedforward import DT, check_dt
 from omnidyn.control.late_pose import LatePose, late_pose
-from omnidyn.control.mpc.loop import INACCURATE_STEP, NO_STATE, Batch, Memory, MpcWorkspace, control_step
+from omnidyn.control.mpc.loop import INACCURATE_STEP, NO_STATE, Batch, Memory, MpcWorkspace, control_step, expect
 from omnidyn.control.mpc.model import numbers, volts
 from omnidyn.control.mpc.observer import PUSH, SCALE
 from omnidyn.control.mpc.settings import Preview, Settings
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.robot import Robot
+from omnidyn.model.sensors import sensors_of
 from omnidyn.model.surroundings import refuse_slope
 from omnidyn.model.wheels import wheel_speed
 
@@ -90,6 +94,7 @@ class Mpc:
         refuse_slope(robot.floor, "controllers know")
         robot = without_slip(robot)
         self.robot, self.output, self.limit = robot, output_kind(robot), output_limit(robot)
+        self.sensors = sensors_of(robot)
         self._per_volt = 1.0 / supply_of(robot, self.supply) if self.output == "duty" else 1.0
         latency = min(round(robot.drive.latency / self.dt), MOST_DELAY)
         self.steps_late = latency if self.delay is None else self.delay
@@ -105,7 +110,7 @@ class Mpc:
         """Forget all steps."""
         self._memory = Memory.of(self.horizon, self.robot.wheels.count, self.steps_late, self.settings)
         self._known, self._t, self._last, self._asked = False, math.nan, self._zeros.copy(), (WAITING, 0, 0.0)
-        self._state = np.zeros(6)
+        self._state, self._missing, self._since = np.zeros(6), 0, math.nan
         if self._late_pose is not None:
             self._late_pose.reset()
 
@@ -165,7 +170,7 @@ class Mpc:
                 word = self._timing(t, since)
                 if word:
                     return self._other(word, start)
-            self._t, state = t, self._state
+            self._t, self._since, state = t, since, self._state
             if pose.__class__ is not np.ndarray or pose.shape != (3,):
                 pose = vector(pose)
             if twist.__class__ is not np.ndarray or twist.shape != (3,):
@@ -173,18 +178,29 @@ class Mpc:
             if self._late_pose is not None:
                 pose = self._late_pose.now(t, pose, twist)
             state[:3], state[3:] = pose, twist
-            return self._solved(t, since, path, start)
+            sent = self._solved(t, since, path, start)
+            self._missing = 0
+            return sent
         except Exception as raised:  # the loop of a robot must not end here, but where a user ends it
             error = told_by(raised)
             if isinstance(error, INTERRUPTS):
                 raise error from raised
             return self._refused(t, pose, twist, path, raised, start)
 
+    def _bridged(self, t: float, path: Any, word: str, start: float) -> FloatArray:
+        """The output of a step with what is expected in place of a sample that lacks a measurement."""
+        self._missing += 1
+        expect(self._numbers, self.sensors.averaged, self._memory, self._room, self._state)
+        sent = self._solved(t, self._since, path, start)
+        if self._asked[0] in (OK, PATH_ENDED):
+            self._asked = (BRIDGED[word], *self._asked[1:])
+        return sent
+
     def _solved(self, t: float, since: float, path: Any, start: float) -> FloatArray:
         """The output of a step whose arguments look well."""
         preview = self._preview
         row = preview.row_at(t, path)
-        elapsed = since if self._known and 0.5 * self.dt < since < 1.5 * self.dt else 0.0
+        elapsed = since if self._known and 0.5 * self.dt < since < LATEST * self.dt else 0.0
         arguments = self._numbers, self._tables, preview.rows, row, self._state, elapsed, self._memory, self._room
         if self._control is None:
             self._control = machine_code(control_step, *arguments)
@@ -208,7 +224,7 @@ class Mpc:
     def _failed(self, t: float, passes: int, start: float) -> FloatArray:
         """Zeros for a state that is none, and where no input was found: the memory may be why, and goes."""
         if passes == NO_STATE:
-            return self._other(BAD_POSE if _bad(self._state[:3]) else BAD_TWIST, start)
+            raise ValueError("no state")
         self.reset()
         self._t = t
         return self._other(FAILED, start)
@@ -258,12 +274,15 @@ class Mpc:
             word = BAD_PATH
         else:
             word = failure(error)
+        late = not self._known or self._missing >= MOST_BRIDGED or not 0.5 * self.dt < self._since < LATEST * self.dt
+        if word in BRIDGED and not late and callable(getattr(path, "at", None)):
+            try:
+                return self._bridged(t, path, word, start)
+            except Exception as raised:  # as in `step`
+                error = told_by(raised)
+                if isinstance(error, INTERRUPTS):
+                    raise error from raised
         return self._other(word, start)
-
-
-def _bad(values: FloatArray) -> bool:
-    """Whether a number is none, or beyond all bounds."""
-    return not bool(np.all(np.abs(values) <= 1e9))
 
 
 def _whole(name: str, value: Any, low: int, high: int) -> int:

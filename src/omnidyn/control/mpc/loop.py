@@ -31,6 +31,7 @@ from omnidyn.control.mpc.observer import (
     WALK_TWIST,
     begin_with,
     follow,
+    mean_twist,
     observe,
     run_on,
 )
@@ -232,6 +233,18 @@ def control(numbers, tables, preview, start, state, elapsed, memory, room):
             sent[j, i] = sent[j + 1, i]
         sent[len(sent) - 1, i] = u[0, i]
     return INACCURATE_STEP - total if inaccurate else total
+
+
+@kernel
+def expect(numbers, averaged, memory, room, state):
+    """Write into `state` (6,) what is expected to be measured."""
+    before, begin = vector(memory.estimate, POSE, 0), vector(memory.estimate, TWIST, 0)
+    drive = drive_of(numbers.push, memory.sent, 0)
+    pose, twist = run_on(numbers, memory.estimate, room.stage, before, begin, drive)
+    if averaged:
+        twist = mean_twist(numbers.linear[0, STEP], before, begin, pose, twist)
+    for i in range(3):
+        state[i], state[3 + i] = pose[i], twist[i]
 
 
 @kernel

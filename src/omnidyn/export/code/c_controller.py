@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.control.controller import LARGEST_STATE, WHEEL_SPEED, Safe
+from omnidyn.control.controller import LARGEST_STATE, LATEST, MOST_BRIDGED, WHEEL_SPEED, Safe
 from omnidyn.control.controllers import controller_spec
 from omnidyn.control.feedforward import DT, Feedforward, check_dt
 from omnidyn.control.mpc.controller import Mpc
@@ -81,6 +81,7 @@ def _header(law: Any, about: str) -> str:
         INPUT=f"{mpc_input(law)}\n\n" if predicts else "",
         AHEAD=_AHEAD if predicts else _NOW_AND_AHEAD,
         ROWS="OMNIDYN_HORIZON + 1" if predicts else "3",
+        BRIDGED=str(MOST_BRIDGED),
     ).lstrip()
 
 
@@ -88,7 +89,7 @@ _INCLUDES = '#include "omnidyn_control.h"\n\n#include <math.h>\n'
 
 _MEMORY = """    float sum[3];
     float last[OMNIDYN_WHEELS];
-    int begun;"""
+    int begun, missing;"""
 
 _NOW_AND_AHEAD = """now, OMNIDYN_LATE [s] ahead,
    when the output acts, and OMNIDYN_LATE + OMNIDYN_DT ahead"""
@@ -118,7 +119,8 @@ typedef struct {
 @MEMORY@
 } omnidyn_control;
 
-/* What a step says of itself. Up to OMNIDYN_STILL the output is as wanted; from OMNIDYN_BACKWARDS on it is zeros. */
+/* What a step says of itself. Up to OMNIDYN_STILL the output is as wanted; from OMNIDYN_BACKWARDS on it is zeros, but
+   that @BRIDGED@ measurements missing in a row are bridged. */
 enum {
     OMNIDYN_OK,
     OMNIDYN_LIMITED,   /* a motor is at a limit of voltage or current */
@@ -177,7 +179,8 @@ def control_code(controller: AnyOf) -> str:
     helpers = [text for name, text in _HELPERS if f"{name}(" in "".join(traced)]
     tables = {"LIMIT": controller.limit} if controller.output == WHEEL_SPEED else _limits(controller)
     constants = [f"static const float {name}[{len(table)}] = {{{_numbers(table)}}};" for name, table in tables.items()]
-    step = filled(_STEP, WANTED=textwrap.indent(body, "    "), FARTHEST=_c(LARGEST_STATE), LARGEST="3.0e38f")
+    numbers = {"FARTHEST": _c(LARGEST_STATE), "LARGEST": "3.0e38f", "LATEST": _c(LATEST * controller.dt)}
+    step = filled(_STEP, WANTED=textwrap.indent(body, "    "), BRIDGED=str(MOST_BRIDGED), **numbers)
     parts = ["\n".join(constants), "\n".join(helpers), *traced, *_within(controller), step.strip()]
     return "\n\n".join(part for part in parts if part)
 
@@ -431,13 +434,13 @@ void omnidyn_control_reset(omnidyn_control *self)
     for (k = 0; k < OMNIDYN_WHEELS; k++) {
         self->last[k] = 0.0f;
     }
-    self->begun = 0;
+    self->begun = self->missing = 0;
 }
 
 int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[3], const float twist[3],
                          const omnidyn_motion path[3], float output[OMNIDYN_WHEELS])
 {
-    int k, limited, begun = self->begun;
+    int k, limited, why, begun = self->begun;
     if (!sane(&elapsed, 1)) {
         return safe(self, output, OMNIDYN_BAD_TIME);
     }
@@ -453,17 +456,23 @@ int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[
         }
         return OMNIDYN_STILL;
     }
-    if (!sane(pose, 3)) {
-        return safe(self, output, OMNIDYN_BAD_POSE);
+    why = !sane(pose, 3) ? OMNIDYN_BAD_POSE : !sane(twist, 3) ? OMNIDYN_BAD_TWIST : OMNIDYN_OK;
+    if (why != OMNIDYN_OK && begun && elapsed < @LATEST@ && self->missing < @BRIDGED@) { /* the last output again */
+        self->missing++;
+        for (k = 0; k < OMNIDYN_WHEELS; k++) {
+            output[k] = self->last[k];
+        }
+        return why;
     }
-    if (!sane(twist, 3)) {
-        return safe(self, output, OMNIDYN_BAD_TWIST);
+    if (why != OMNIDYN_OK) {
+        return safe(self, output, why);
     }
     for (k = 0; k < 3; k++) {
         if (!sane(path[k].pose, 3) || !sane(path[k].velocity, 3)) {
             return safe(self, output, OMNIDYN_BAD_PATH);
         }
     }
+    self->missing = 0;
     limited = wanted(self, begun ? elapsed : 0.0f, pose, twist, path, output);
     for (k = 0; k < OMNIDYN_WHEELS; k++) {
         if (!(fabsf(output[k]) <= @LARGEST@)) {

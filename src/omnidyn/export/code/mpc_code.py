@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.control.controller import LARGEST_STATE, WHEEL_SPEED
+from omnidyn.control.controller import LARGEST_STATE, MOST_BRIDGED, WHEEL_SPEED
 from omnidyn.control.mpc import interior_point, loop, observer, program
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.mpc.model import (
@@ -70,7 +70,7 @@ def mpc_memory(controller: Mpc) -> str:
     n, wheels, settings = "OMNIDYN_HORIZON", "OMNIDYN_WHEELS", controller.settings
     lines = ["float believed[4][3], base[3]; /* pose, twist, push, share of friction */"]
     lines += ["float unsure[3], spread[3][3][3]; /* of these */"] if controller.observer else []
-    lines += [f"float sent[{controller.steps_late + 1}][3], last[{wheels}];", "int begun, known;"]
+    lines += [f"float sent[{controller.steps_late + 1}][3], last[{wheels}];", "int begun, known, missing;"]
     lines += [f"float slewed[{wheels}];"] if settings.slew is not None else []
     lines += [
         f"omnidyn_input input[{n} * {wheels}];",
@@ -112,6 +112,7 @@ def _constants(controller: Mpc) -> str:
         "FIRST_PASSES": interior_point.FIRST,
         "LAST_PASSES": interior_point.LAST,
         "MOST": MOST_PASSES,
+        "MOST_BRIDGED": MOST_BRIDGED,
     }
     numbers = {
         "FARTHEST": LARGEST_STATE,

@@ -97,6 +97,7 @@ def test_in_double_precision_its_formulas_are_those_of_python(sensors, tmp_path)
     for k in range(80):
         seen = np.concatenate([live.pose, live.twist]) + rng.standard_normal(6) * [2e-4, 2e-4, 4e-4, 1e-3, 1e-3, 4e-3]
         seen[3:] += [0.06, 0.0, -0.3] if k == 40 else [0.0, 0.0, 0.0]  # a knock
+        seen[:3] += np.nan if k in (50, 51) else 0.0
         motion, found = follow.at(0.02 * (k + np.arange(21))), np.zeros(3)
         rows = np.ascontiguousarray(np.concatenate([motion.pose, motion.velocity], axis=1))
         given = [each.ctypes.data_as(ctypes.c_void_p) for each in (seen[:3].copy(), seen[3:].copy(), rows, found)]
@@ -192,7 +193,7 @@ def test_it_is_small_and_asks_for_no_memory(tmp_path, capsys):
     stack = [int(line.split("\t")[1]) for line in (tmp_path / "c" / "omnidyn_control.su").read_text().splitlines()]
     with capsys.disabled():
         print(f"\nmpc of the axebot in C: {code} bytes of code, {sum(one)} of memory and at most {sum(stack)} of stack")
-    assert code <= 8192
+    assert code <= 8300  # 115 of them bridge missing samples and learn pushes that nobody expected
     assert sum(own) == 0
     assert sum(one) + sum(stack) <= 11 * 1024
 

@@ -48,11 +48,11 @@ static void observe(omnidyn_control *c, const float *measured, int known)
     ROLLED for (i = 0; i < 3; i++) {
         float(*p)[3] = c->spread[i], *twist = &c->believed[1][i];
 #if AVERAGED
-        const float begin = p[0][0], left = measured[3 + i] - mean[i];
+        const float begin = p[0][0], left = c->missing ? 0.0f : measured[3 + i] - mean[i];
         float across[3];
 #else
         float *place = &c->unsure[i], *pose = &c->believed[0][i];
-        const float left = measured[3 + i] - *twist, off = measured[i] - *pose;
+        const float left = c->missing ? 0.0f : measured[3 + i] - *twist, off = c->missing ? 0.0f : measured[i] - *pose;
 #endif
         const float by[3] = {c->columns[0][1 + i][3 + i], PHI(i)[i], -PHI(i)[i] * force[0][i]};
         const float noise = NOISE[i];
@@ -116,7 +116,7 @@ static void observe(omnidyn_control *c, const float *measured, int known)
     mean[2] = moved[2];
     ROLLED for (i = 0; i < 3; i++) {
         float *place = &c->unsure[i], *pose = &c->believed[0][i], r, gain[1];
-        const float off = measured[i] - *pose - mean[i];
+        const float off = c->missing ? 0.0f : measured[i] - *pose - mean[i];
         *pose += mean[i];
 #endif
         *place += WALK[3][i];
@@ -296,7 +296,37 @@ static int has_moved(const omnidyn_control *c)
 }
 
 
-/* What is wanted of a step whose numbers are sane, in volts: row 0 of u. */
+/* Whether all of n numbers are finite, and none is beyond what a place or a speed can be. */
+static int sane(const float *values, int n)
+{
+    while (n-- > 0) {
+        if (!(fabsf(values[n]) <= FARTHEST)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+#if !LEARN
+/* What is expected to be measured, in place of what is no number. */
+static void expect(omnidyn_control *c, float measured[6])
+{
+    float before[6], after[6];
+    int i;
+    memcpy(before, c->believed, sizeof(before));
+    run_on(c, c->believed[0], c->sent[0]);
+    memcpy(after, c->believed, sizeof(after));
+#if AVERAGED
+    mean_twist(c, before, after + 3);
+#endif
+    memcpy(c->believed, before, sizeof(before));
+    ROLLED for (i = 0; i < 6; i++) {
+        measured[i] = c->missing ? after[i] : measured[i];
+    }
+}
+#endif
+
+/* What is wanted of a step in volts: row 0 of u. Its numbers are sane, but for a measurement that is to be bridged. */
 static void control(omnidyn_control *c, const float *pose, const float *twist, const omnidyn_motion *path, int known)
 {
     float measured[6];
@@ -318,9 +348,12 @@ static void control(omnidyn_control *c, const float *pose, const float *twist, c
     observe(c, measured, known);
     memcpy(c->x, c->believed, sizeof(measured));
 #elif AVERAGED
+    expect(c, measured);
     follow(c, measured, known);
     memcpy(c->x, c->believed, sizeof(measured));
 #else
+    expect(c, measured);
+    memcpy(c->believed, measured, sizeof(measured));
     memcpy(c->x, measured, sizeof(measured));
 #endif
     for (k = 1; k <= LATE_STEPS; k++) {
@@ -349,17 +382,6 @@ static void control(omnidyn_control *c, const float *pose, const float *twist, c
     }
 }
 
-/* Whether all of n numbers are finite, and none is beyond what a place or a speed can be. */
-static int sane(const float *values, int n)
-{
-    while (n-- > 0) {
-        if (!(fabsf(values[n]) <= FARTHEST)) {
-            return 0;
-        }
-    }
-    return 1;
-}
-
 void omnidyn_control_reset(omnidyn_control *c)
 {
     int i;
@@ -376,19 +398,25 @@ void omnidyn_control_reset(omnidyn_control *c)
 int omnidyn_control_step(omnidyn_control *c, float elapsed, const float pose[3], const float twist[3],
                          const omnidyn_motion path[OMNIDYN_HORIZON + 1], float output[OMNIDYN_WHEELS])
 {
-    int i, j, says = OMNIDYN_OK;
+    const int known = c->known && fabsf(elapsed - OMNIDYN_DT) < 0.5f * OMNIDYN_DT;
+    int i, j, says = OMNIDYN_OK, bridged = OMNIDYN_OK;
     if (c->begun && elapsed == 0.0f) {
         memcpy(output, c->last, sizeof(c->last));
         return OMNIDYN_STILL;
-    }
-    if (!sane((const float *)path, 6 * (OMNIDYN_HORIZON + 1))) {
-        says = OMNIDYN_BAD_PATH;
     }
     if (!sane(twist, 3)) {
         says = OMNIDYN_BAD_TWIST;
     }
     if (!sane(pose, 3)) {
         says = OMNIDYN_BAD_POSE;
+    }
+    c->missing = says ? c->missing + 1 : 0;
+    if (known && c->missing <= MOST_BRIDGED) {
+        bridged = says;
+        says = OMNIDYN_OK;
+    }
+    if (says == OMNIDYN_OK && !sane((const float *)path, 6 * (OMNIDYN_HORIZON + 1))) {
+        says = OMNIDYN_BAD_PATH;
     }
     if (elapsed < 0.0f) {
         says = OMNIDYN_BACKWARDS;
@@ -397,7 +425,7 @@ int omnidyn_control_step(omnidyn_control *c, float elapsed, const float pose[3],
         says = OMNIDYN_BAD_TIME;
     }
     if (says == OMNIDYN_OK) {
-        control(c, pose, twist, path, c->known && fabsf(elapsed - OMNIDYN_DT) < 0.5f * OMNIDYN_DT);
+        control(c, pose, twist, path, known);
         if (!sane(c->x[1], 6)) {
             says = OMNIDYN_FAILED;
         }
@@ -434,5 +462,5 @@ int omnidyn_control_step(omnidyn_control *c, float elapsed, const float pose[3],
 #endif
         c->last[i] = output[i] = within(volts, OUTPUT_LIMIT(i));
     }
-    return says;
+    return c->known && bridged ? bridged : says;
 }
