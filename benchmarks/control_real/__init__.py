@@ -22,8 +22,8 @@ from benchmarks.table import Table, machine
 from omnidyn.arrays import FloatArray
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.pid import Pid
+from omnidyn.model.log_effects import Sensors
 from omnidyn.model.robot import Robot
-from omnidyn.model.sensors import Sensors
 
 SENSORS = ("instantaneous", "encoder", "camera", "jitter")
 POSE_NOISE, TWIST_NOISE = np.array([1e-3, 1e-3, 1e-3]), np.array([5e-3, 5e-3, 0.02])
@@ -158,7 +158,7 @@ def table_of(robots: dict[str, Numbers], names: list[str]) -> Table:
                     count[control] += 1
                 for control in OURS:
                     times[control].append(cells[control][2])
-                words = {control: f"{cell[0]:.2f}/{cell[1]:.2f}" for control, cell in cells.items()}
+                words: dict[str, Any] = {control: f"{cell[0]:.2f}/{cell[1]:.2f}" for control, cell in cells.items()}
                 words["lost"] = ", ".join(f"{control} {unit}" for control, unit in beaten)
                 table.add(robot=robot, path=name, sensors=kind, **words)
     total = 2 * len(table.rows)

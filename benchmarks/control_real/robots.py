@@ -133,4 +133,5 @@ def robot_of(name: str, numbers: Numbers) -> Robot:
             latency=numbers.get("latency", 0.0),
         ),
         friction=Friction(**friction),
+        priors={},
     )

@@ -15,9 +15,8 @@ from omnidyn.control.late_pose import LatePose
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.mpc.model import DECAY, LINEAR_SIZE, PHI, PSI, STEP, held_for, numbers
 from omnidyn.control.pid import Pid
-from omnidyn.model.log_effects import Lateness, LogEffects
+from omnidyn.model.log_effects import Lateness, LogEffects, Sensors
 from omnidyn.model.robot_file import parse_robot, robot_to_toml
-from omnidyn.model.sensors import Sensors, sensors_of
 from omnidyn.simulation.live import LiveRobot
 from tests.support.controlled import Averaged
 from tests.support.mixed_robots import random_robot
@@ -81,9 +80,9 @@ def test_a_step_of_another_length_is_that_of_its_own_numbers(seed, share):
 def test_what_a_fit_found_of_its_logs_is_what_controllers_take():
     late = Lateness(averaged=True, position=0.05)
     fitted = AXEBOT.replace(log=LogEffects(latency=late))
-    assert sensors_of(fitted) == Sensors(twist="mean", pose_delay=0.05)
-    assert sensors_of(fitted.replace(sensors=Sensors())) == Sensors()
-    assert sensors_of(AXEBOT) == Sensors()
+    assert fitted.sensor_model == Sensors(twist="mean", pose_delay=0.05)
+    assert fitted.replace(sensors=Sensors()).sensor_model == Sensors()
+    assert AXEBOT.sensor_model == Sensors()
 
 
 def test_the_table_of_a_file_is_read_and_written():

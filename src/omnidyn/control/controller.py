@@ -37,7 +37,6 @@ from omnidyn.control.paths.adapter import as_path
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.motor import DUTY, SPEED, no_load_speed
 from omnidyn.model.robot import Robot
-from omnidyn.model.sensors import sensors_of
 from omnidyn.model.surroundings import refuse_slope
 from omnidyn.model.wheels import per_wheel
 from omnidyn.simulation.slip.plant import grips
@@ -150,7 +149,7 @@ class Safe:
         """Make ready for a robot; settings and memory stay."""
         refuse_slope(robot.floor, "controllers know")
         robot = without_slip(robot)
-        self.robot, self.sensors = robot, sensors_of(robot)
+        self.robot, self.sensors = robot, robot.sensor_model
         self.output = output_kind(robot)
         self.limit = output_limit(robot)
         self._per_volt = 1.0 / supply_of(robot, self.supply) if self.output == DUTY else 1.0

@@ -16,7 +16,6 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.model.robot import Robot
-from omnidyn.model.sensors import sensors_of
 
 Place = tuple[float, float, float]
 
@@ -26,7 +25,7 @@ def late_pose(robot: Robot, dt: float, before: LatePose | None = None) -> LatePo
 
     before: of the same controller; where the sensors are the same, a copy of it.
     """
-    sensors = sensors_of(robot)
+    sensors = robot.sensor_model
     age = sensors.pose_age(dt)
     if before is not None and (before.age, before.averaged) == (age, sensors.averaged):
         return deepcopy(before)

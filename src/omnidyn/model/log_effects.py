@@ -7,7 +7,7 @@ level. What a fit finds of the robot itself, such as the dead band of its driver
 from __future__ import annotations
 
 import hashlib
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
@@ -43,6 +43,44 @@ class Lateness(Value):
             return (drive if self.wheel_angle is None else self.wheel_angle) + 0.5 * row
         delay = getattr(self, channel)
         return drive if delay is None else float(delay)
+
+
+INSTANTANEOUS, MEAN = "instantaneous", "mean"
+LATEST_POSE, FASTEST, MOST_COUNTS = 1.0, 1e5, 10_000_000  # [s], [Hz], per turn
+
+
+class Sensors(Value):
+    """What speeds and poses are to a controller: the table [sensors] of a robot file.
+
+    twist: "instantaneous", or "mean": over the time since the step before, as differences of encoders are.
+
+    encoder_counts: of an encoder per turn of its wheel, None where unknown. pose_delay [s]: age of a pose when it
+    arrives. pose_rate [Hz]: of new poses, None: one in every step.
+    """
+
+    twist: Annotated[Literal["instantaneous", "mean"], Field(description="mean: differences of encoders")] = (
+        INSTANTANEOUS
+    )
+    encoder_counts: Annotated[
+        Annotated[float, number(1.0, MOST_COUNTS)] | None, Field(description="per turn of a wheel")
+    ] = None
+    pose_delay: Annotated[
+        Annotated[float, number(0.0, LATEST_POSE)],
+        Field(alias="pose_delay_s", description="age of a pose when it arrives"),
+    ] = 0.0
+    pose_rate: Annotated[
+        Annotated[float, number(0.1, FASTEST)] | None, Field(alias="pose_rate_Hz", description="of new poses")
+    ] = None
+
+    @property
+    def averaged(self) -> bool:
+        """Whether speeds are means over a step."""
+        return self.twist == MEAN
+
+    def pose_age(self, dt: float) -> float:
+        """The mean age of a new pose in a loop with steps of dt [s]: it waits for the step [s]."""
+        wait = 0.0 if self.pose_rate is None else 0.5 * min(dt, 1.0 / self.pose_rate)
+        return self.pose_delay + wait
 
 
 Force = Annotated[float, number(-HARDEST, HARDEST)]
@@ -92,6 +130,15 @@ class LogEffects(Value):
         late = [(name, value) for name, value in late if abs(value) >= LEAST_LATENCY]
         parts += [f"{name} {abs(value):.3g} s {'late' if value >= 0.0 else 'early'}" for name, value in late]
         return ", ".join(parts + (["speeds that are means over a row"] if self.latency.averaged else []))
+
+
+def sensors_of(sensors: Sensors | None, log: LogEffects | None, drive: float) -> Sensors:
+    """The sensors of a file, else what its fit found of its logs. drive: the latency of the robot [s]."""
+    if sensors is not None or log is None:
+        return sensors or Sensors()
+    late = log.latency
+    behind = 0.0 if late.position is None else float(late.position) - drive
+    return Sensors(twist=MEAN if late.averaged else INSTANTANEOUS, pose_delay=min(max(behind, 0.0), LATEST_POSE))
 
 
 def log_mark(run: Run) -> str:

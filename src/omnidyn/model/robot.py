@@ -11,9 +11,8 @@ from pydantic import AfterValidator, Field, model_validator
 from omnidyn.document import Document
 from omnidyn.errors import printable
 from omnidyn.model.friction import Friction
-from omnidyn.model.log_effects import KeyCorrelation, LogEffects
+from omnidyn.model.log_effects import KeyCorrelation, LogEffects, Sensors, sensors_of
 from omnidyn.model.motor import Drive, Motor, mass_at_rim
-from omnidyn.model.sensors import Sensors
 from omnidyn.model.surroundings import FARTHEST_LOAD, Floor, Variations
 from omnidyn.model.value import Flag, Text, Value, number, place
 from omnidyn.model.wheels import Wheels, check_count
@@ -146,6 +145,11 @@ class Robot(Displayable, Value):
                 "times as far. inertia_kg_m2 is about the centre of mass, in kg m2"
             )
         return self
+
+    @property
+    def sensor_model(self) -> Sensors:
+        """What its speeds and poses are to a controller: as its file says, else as the fit found of its logs."""
+        return sensors_of(self.sensors, self.log, self.drive.latency)
 
     @property
     def rigid(self) -> Robot:

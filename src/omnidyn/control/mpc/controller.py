@@ -49,7 +49,6 @@ from omnidyn.control.mpc.observer import PUSH, SCALE
 from omnidyn.control.mpc.settings import Preview, Settings
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.robot import Robot
-from omnidyn.model.sensors import sensors_of
 from omnidyn.model.surroundings import refuse_slope
 from omnidyn.model.wheels import wheel_speed
 
@@ -94,7 +93,7 @@ class Mpc:
         refuse_slope(robot.floor, "controllers know")
         robot = without_slip(robot)
         self.robot, self.output, self.limit = robot, output_kind(robot), output_limit(robot)
-        self.sensors = sensors_of(robot)
+        self.sensors = robot.sensor_model
         self._per_volt = 1.0 / supply_of(robot, self.supply) if self.output == "duty" else 1.0
         latency = min(round(robot.drive.latency / self.dt), MOST_DELAY)
         self.steps_late = latency if self.delay is None else self.delay
@@ -109,7 +108,8 @@ class Mpc:
     def reset(self) -> None:
         """Forget all steps."""
         self._memory = Memory.of(self.horizon, self.robot.wheels.count, self.steps_late, self.settings)
-        self._known, self._t, self._last, self._asked = False, math.nan, self._zeros.copy(), (WAITING, 0, 0.0)
+        self._known, self._t, self._last = False, math.nan, self._zeros.copy()
+        self._asked: tuple[str, int, float] = (WAITING, 0, 0.0)
         self._state, self._missing, self._since = np.zeros(6), 0, math.nan
         if self._late_pose is not None:
             self._late_pose.reset()
@@ -193,7 +193,7 @@ class Mpc:
         expect(self._numbers, self.sensors.averaged, self._memory, self._room, self._state)
         sent = self._solved(t, self._since, path, start)
         if self._asked[0] in (OK, PATH_ENDED):
-            self._asked = (BRIDGED[word], *self._asked[1:])
+            self._asked = (BRIDGED[word], self._asked[1], self._asked[2])
         return sent
 
     def _solved(self, t: float, since: float, path: Any, start: float) -> FloatArray:
@@ -279,9 +279,9 @@ class Mpc:
             try:
                 return self._bridged(t, path, word, start)
             except Exception as raised:  # as in `step`
-                error = told_by(raised)
-                if isinstance(error, INTERRUPTS):
-                    raise error from raised
+                cause = told_by(raised)
+                if isinstance(cause, INTERRUPTS):
+                    raise cause from raised
         return self._other(word, start)
 
 

@@ -88,6 +88,7 @@ def observe(numbers, estimate, stage, state, drive, averaged):
     unit_scale = (1.0, 1.0, 1.0)
     force = friction_at(numbers.linear, numbers.levels, unit_scale, twist, 1.0, False)[0]
     put3(estimate, TWIST, 0, twist)
+    cos, sin = 1.0, 0.0
     if averaged:
         middle = before[2] + 0.5 * (pose[2] - before[2])
         cos, sin = math.cos(middle), math.sin(middle)

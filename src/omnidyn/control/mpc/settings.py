@@ -29,7 +29,6 @@ from omnidyn.model.dynamics import motor_wrench
 from omnidyn.model.frames import world_to_body
 from omnidyn.model.mass import per_mass
 from omnidyn.model.robot import Robot
-from omnidyn.model.sensors import sensors_of
 from omnidyn.model.wheels import per_wheel
 
 Three = tuple[float, float, float]
@@ -109,7 +108,7 @@ class Settings:
         table, count = np.zeros(SETTINGS_SIZE), robot.wheels.count
         table[POSE_WEIGHT : POSE_WEIGHT + 3], table[TWIST_WEIGHT : TWIST_WEIGHT + 3] = self.pose, self.twist
         table[LAST_WEIGHT], table[AGAIN], table[LEARN] = self.last, self.again, learn
-        table[AVERAGED] = sensors_of(robot).averaged
+        table[AVERAGED] = robot.sensor_model.averaged
         table[SLEW] = 0.0 if self.slew is None else self.slew * dt
         motor_current = robot.motor.current_limit
         table[CURRENT] = self.current is not None or motor_current is not None

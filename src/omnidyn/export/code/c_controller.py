@@ -29,7 +29,6 @@ from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse, refuse_controller
 from omnidyn.export.spelling import c_comment, c_number, filled
 from omnidyn.model.robot import Robot
-from omnidyn.model.sensors import sensors_of
 from omnidyn.model.wheels import wheel_speed
 
 KIND = "c-controller"
@@ -53,7 +52,7 @@ def c_controller(robot: Robot, controller: str | os.PathLike = "pid", dt: float 
     refuse_controller(KIND, spec.controller)
     refuse(KIND, robot)
     law, omissions = spec.make(robot, dt=dt), left_out(KIND, robot)
-    if sensors_of(robot).pose_age(dt) > 0.0:
+    if robot.sensor_model.pose_age(dt) > 0.0:
         omissions = (*omissions, LATE_POSE)
     predicts = isinstance(law, Mpc)
     code = mpc_code(law) if predicts else control_code(law)  # pyright: ignore[reportArgumentType]  none is refused

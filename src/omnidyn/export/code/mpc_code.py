@@ -26,7 +26,6 @@ from omnidyn.control.mpc.model import (
 from omnidyn.control.mpc.settings import Settings
 from omnidyn.errors import UnsupportedError
 from omnidyn.export.spelling import c_number, filled
-from omnidyn.model.sensors import sensors_of
 from omnidyn.model.wheels import wheel_speed
 
 FOLDER = files("omnidyn.export.code") / "mpc"
@@ -100,7 +99,7 @@ def _constants(controller: Mpc) -> str:
         "TURNING": turning,
         "OFF_CENTRE": any(robot.body.centre),
         "LEARN": controller.observer,
-        "AVERAGED": sensors_of(robot).averaged,
+        "AVERAGED": robot.sensor_model.averaged,
         "BOUNDED": _bounded(controller),
         "CURRENT": _current(controller),
         "SLEW": settings.slew is not None,

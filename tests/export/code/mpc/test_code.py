@@ -15,8 +15,8 @@ from omnidyn.control.paths.path import path
 from omnidyn.errors import UnsupportedError
 from omnidyn.export.code.c_controller import c_controller
 from omnidyn.model.friction import DirectionFriction, Friction, WheelFriction
+from omnidyn.model.log_effects import Sensors
 from omnidyn.model.motor import Drive
-from omnidyn.model.sensors import Sensors
 from omnidyn.simulation.live import LiveRobot
 from tests.support.controlled import CController
 from tests.support.exported import STRICT
