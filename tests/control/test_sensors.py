@@ -1,6 +1,7 @@
 """Controllers take speeds and poses for what the robot file says they are: means over a step, poses that are late."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +29,8 @@ MEAN = Sensors(twist="mean")
 @pytest.mark.parametrize("make", [Pid, Mpc, lambda robot: Mpc(robot, observer=False)], ids=["pid", "mpc", "alone"])
 def test_encoder_differences_cost_little(make):
     instant = omnidyn.track(AXEBOT, "eight:period_s=5", make(AXEBOT), duration=6.0)
-    mean = omnidyn.track(AXEBOT, "eight:period_s=5", Averaged(make(AXEBOT.replace(sensors=MEAN))), duration=6.0)
+    averaged: Any = Averaged(make(AXEBOT.replace(sensors=MEAN)))
+    mean = omnidyn.track(AXEBOT, "eight:period_s=5", averaged, duration=6.0)
     assert mean.rmse_position <= 1.1 * instant.rmse_position
 
 
@@ -52,7 +54,7 @@ def test_a_pose_that_is_late_is_moved_by_what_was_counted_since():
             [radius * (math.sin(angle) - math.sin(0.3)), -radius * (math.cos(angle) - math.cos(0.3)), angle]
         )
 
-    bridge, twist = LatePose(age, averaged=True), np.array([speed, 0.0, omega])
+    bridge, twist, found = LatePose(age, averaged=True), np.array([speed, 0.0, omega]), np.zeros(3)
     for k in range(20):
         found = bridge.now(k * dt, place(k * dt - age), twist)
     np.testing.assert_allclose(found, place(19 * dt), atol=5e-5)

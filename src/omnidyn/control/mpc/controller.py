@@ -275,7 +275,7 @@ class Mpc:
         else:
             word = failure(error)
         late = not self._known or self._missing >= MOST_BRIDGED or not 0.5 * self.dt < self._since < LATEST * self.dt
-        if word in BRIDGED and not late and callable(getattr(path, "at", None)):
+        if word in BRIDGED and not late:
             try:
                 return self._bridged(t, path, word, start)
             except Exception as raised:  # as in `step`

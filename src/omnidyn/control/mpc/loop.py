@@ -155,6 +155,24 @@ def past_delay(numbers, memory, stage):
 
 
 @part
+def measure(numbers, settings, state, elapsed, memory, room):
+    """What a measured state (6,) says of where the robot is and how it moves."""
+    estimate, averaged = memory.estimate, settings[AVERAGED] != 0.0
+    if elapsed == 0.0 or (settings[LEARN] == 0.0 and not averaged):
+        begin_with(estimate, state)
+        return
+    observed = numbers
+    if abs(elapsed - numbers.linear[0, STEP]) > SAME_STEP * elapsed:
+        held_for(numbers.linear, elapsed, room.linear)
+        observed = Numbers(room.linear, numbers.push, numbers.pull, numbers.levels)
+    drive = drive_of(numbers.push, memory.sent, 0)
+    if settings[LEARN] != 0.0:
+        observe(observed, estimate, room.stage, state, drive, averaged)
+    else:
+        follow(observed, estimate, room.stage, state, drive)
+
+
+@part
 def control(numbers, tables, preview, start, state, elapsed, memory, room):
     """One step from a measured state (6,). Returns passes of the solver; u[0] is the answer, within bounds.
 
@@ -170,19 +188,7 @@ def control(numbers, tables, preview, start, state, elapsed, memory, room):
         if not abs(state[i]) <= LARGEST_STATE:
             return NO_STATE
     shift(memory, elapsed, preview, start)
-    averaged = settings[AVERAGED] != 0.0
-    if elapsed > 0.0 and (settings[LEARN] != 0.0 or averaged):
-        observed = numbers
-        if abs(elapsed - numbers.linear[0, STEP]) > SAME_STEP * elapsed:
-            held_for(numbers.linear, elapsed, room.linear)
-            observed = Numbers(room.linear, numbers.push, numbers.pull, numbers.levels)
-        drive = drive_of(numbers.push, sent, 0)
-        if settings[LEARN] != 0.0:
-            observe(observed, estimate, stage, state, drive, averaged)
-        else:
-            follow(observed, estimate, stage, state, drive)
-    else:
-        begin_with(estimate, state)
+    measure(numbers, settings, state, elapsed, memory, room)
     put3(x, 0, 0, vector(estimate, POSE, 0))
     put3(x, 0, 3, vector(estimate, TWIST, 0))
     past_delay(numbers, memory, stage)
