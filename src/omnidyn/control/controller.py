@@ -252,8 +252,9 @@ class Guarded(Safe, ABC):
             return self._guarded(t, BAD_POSE if place is None else BAD_TWIST, "", None)
         try:
             follow = as_path(path)
-        except Exception:  # whatever stands in place of a path, it is none
-            return self._guarded(t, BAD_PATH, "", None)
+        except Exception as raised:  # whatever stands in place of a path, it is none
+            word = f"{FAILED}: {type(raised).__name__}" if callable(getattr(path, "at", None)) else BAD_PATH
+            return self._guarded(t, word, "", None)
         status = PATH_ENDED if _ended(follow, t) else OK
         if self._late_pose is not None and math.isfinite(now := _number(t)):
             place = self._late_pose.now(now, place, speed)
