@@ -244,7 +244,7 @@ def tune(
 
     defaults = options_of(spec.controller)
     if "volts" in ranges:  # by default it follows from the robot
-        defaults["volts"] = Settings().volts_weight(robot)
+        defaults["volts"] = Settings().of(robot).volts
     start = {name: float(spec.options.get(name, defaults[name])) for name in ranges}
     first = np.array([interval.of(start[name]) for name, interval in ranges.items()])
     corners = np.vstack([first, *(first + _aside(first, k) for k in range(len(first)))])

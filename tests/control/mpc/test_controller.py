@@ -302,3 +302,13 @@ def test_weights_that_rounding_cannot_follow_are_said_and_the_output_is_sent():
     assert np.isfinite(sent).all()
     assert (np.abs(sent) <= controller.limit).all()
     assert np.any(sent[-1])
+
+
+def test_weights_follow_the_robot_and_are_the_paper_s_for_its_own():
+    own = Settings().of(ROBOT)
+    assert (own.pose, own.volts, own.walk) == ((200.0, 200.0, 20.0), 2e-3, (0.003, 0.003, 0.012))
+    heavy = Settings().of(ROBOT.replace(body=ROBOT.body.replace(mass=4.0 * ROBOT.body.mass)))
+    np.testing.assert_allclose(heavy.pose, (800.0, 800.0, 80.0))
+    np.testing.assert_allclose(heavy.walk, (0.006, 0.006, 0.024))
+    assert heavy.volts == pytest.approx(2e-3 / 16.0)
+    assert Settings(pose=(1.0, 2.0, 3.0), volts=0.1).of(ROBOT).pose == (1.0, 2.0, 3.0)

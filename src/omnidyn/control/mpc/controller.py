@@ -101,13 +101,14 @@ class Mpc:
         self._preview = Preview(self.dt, self.steps_late, self.horizon)
         self._room = MpcWorkspace.of(self.horizon, volts(robot))
         self._numbers = numbers(robot, self.dt, self.friction)
+        self.robot_settings = self.settings.of(robot)
         self._tables = self.settings.tables(robot, self.dt, self.observer)
         self._late_pose = late_pose(robot, self.dt, self._late_pose)
         self._control = None  # compiled by the first step
 
     def reset(self) -> None:
         """Forget all steps."""
-        self._memory = Memory.of(self.horizon, self.robot.wheels.count, self.steps_late, self.settings)
+        self._memory = Memory.of(self.horizon, self.robot.wheels.count, self.steps_late, self.robot_settings)
         self._known, self._t, self._last = False, math.nan, self._zeros.copy()
         self._asked: tuple[str, int, float] = (WAITING, 0, 0.0)
         self._state, self._missing, self._since = np.zeros(6), 0, math.nan
@@ -123,7 +124,10 @@ class Mpc:
             clone.reset()
             return clone
         same_friction = robot.friction == self.robot.friction
-        clone._memory, clone._state = self._memory.copied(None if same_friction else self.settings), self._state.copy()
+        clone._memory, clone._state = (
+            self._memory.copied(None if same_friction else clone.robot_settings),
+            self._state.copy(),
+        )
         clone._preview = copy(self._preview)  # what it has sampled stays as it is, to the last bit
         clone._last = np.clip(self._last, -clone.limit, clone.limit)
         return clone
@@ -136,7 +140,12 @@ class Mpc:
     def batch(self, count: int) -> Batch:
         """As many controllers of the same robot as asked for, in one: `Batch.step_batch`. They begin anew."""
         return Batch(
-            self._numbers, self._tables, self._room, self.settings, self._preview, _whole("count", count, 1, 10_000_000)
+            self._numbers,
+            self._tables,
+            self._room,
+            self.robot_settings,
+            self._preview,
+            _whole("count", count, 1, 10_000_000),
         )
 
     @property

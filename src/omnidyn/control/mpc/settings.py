@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,7 +32,10 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
 
 Three = tuple[float, float, float]
-VOLTS = 2e-3  # [1/V^2] of the paper's robot
+POSE: Three = (200.0, 200.0, 20.0)  # of the paper's robot, as VOLTS [1/V^2] and WALK
+VOLTS = 2e-3
+WALK: Three = (0.003, 0.003, 0.012)
+PAPER_MASS = 1.5  # [kg]
 PER_VOLT_SQUARE = 4.788951776922385  # [m^2/s^4/V^2] sum of its squared accelerations in the plane by 1 V on a wheel
 
 
@@ -52,7 +55,8 @@ class Tables(NamedTuple):
 class Settings:
     """Weights of errors of the pose [1/m^2, 1/m^2, 1/rad^2], of the twist, of volts beside those of the path [1/V^2].
 
-    volts: None: VOLTS for the paper's robot, and of another in proportion to the square of what a volt speeds it up by.
+    pose, volts, walk: None: POSE, VOLTS and WALK of the paper's robot; of another volts go with the square of what a
+    volt speeds it up by, pose and the square of walk with the mass.
     last: how much more the end of the horizon counts. again: how often at most a step is made linear anew.
     noise, pose_noise: std of the measured twist and pose that the observer expects [m/s, m/s, rad/s], [m, m, rad].
     walk, pose_walk: std of what a step may bring that the model does not know. push_walk: of the change of an unknown
@@ -61,14 +65,14 @@ class Settings:
     speed: limits of the twist [m/s, m/s, rad/s], soft: speed_weight is the cost beyond them, as of the twist.
     """
 
-    pose: Three = (200.0, 200.0, 20.0)
+    pose: Three | None = None
     twist: Three = (1.0, 1.0, 0.1)
     volts: float | None = None
     last: float = 5.0
     again: int = 2
     noise: Three = (0.01, 0.01, 0.04)
     pose_noise: Three = (0.002, 0.002, 0.004)
-    walk: Three = (0.003, 0.003, 0.012)
+    walk: Three | None = None
     pose_walk: Three = (5e-4, 5e-4, 1e-3)
     push_walk: Three = (0.02, 0.02, 0.08)
     scale_walk: float = 0.005
@@ -79,6 +83,8 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name in ("pose", "twist", "noise", "pose_noise", "walk", "pose_walk", "push_walk"):
+            if name in ("pose", "walk") and getattr(self, name) is None:
+                continue
             value = np.asarray(getattr(self, name), dtype=float)
             if value.shape != (3,) or not np.all((value >= 0.0) & (value <= 1e9)):
                 raise InputError("no weights", got=getattr(self, name), expected="three numbers >= 0", where=name)
@@ -96,17 +102,26 @@ class Settings:
         if self.volts is not None and not 1e-9 <= self.volts <= 1e9:
             raise InputError("out of range", got=self.volts, expected="1e-09 to 1e+09, or None", where="volts")
 
-    def volts_weight(self, robot: Robot) -> float:
-        """The weight of volts beside those of the path, for a robot [1/V^2]."""
-        if self.volts is not None:
-            return float(self.volts)
-        per_volt = per_mass(robot, motor_wrench(robot).driving)[:, :2]
-        return VOLTS * min(max(round(float(np.sum(per_volt**2)) / PER_VOLT_SQUARE, 12), 1e-3), 1e3)
+    def of(self, robot: Robot) -> Settings:
+        """The settings with a number in place of each None, for a robot.
+
+        A heavier robot has more of what its model does not know, and pays less for the volts that correct it. Both laws
+        were found beside others on `bench control_real`.
+        """
+        heavier = min(max(robot.body.mass / PAPER_MASS, 0.1), 100.0)
+        pose = tuple(heavier * weight for weight in POSE) if self.pose is None else self.pose
+        walk = tuple(math.sqrt(heavier) * std for std in WALK) if self.walk is None else self.walk
+        volts = self.volts
+        if volts is None:
+            per_volt = per_mass(robot, motor_wrench(robot).driving)[:, :2]
+            volts = VOLTS * min(max(round(float(np.sum(per_volt**2)) / PER_VOLT_SQUARE, 12), 1e-3), 1e3)
+        return replace(self, pose=pose, walk=walk, volts=volts)
 
     def tables(self, robot: Robot, dt: float, learn: bool) -> Tables:
         """The settings for a robot and steps of dt [s]; learn: whether the observer runs."""
+        settings = self.of(robot)
         table, count = np.zeros(SETTINGS_SIZE), robot.wheels.count
-        table[POSE_WEIGHT : POSE_WEIGHT + 3], table[TWIST_WEIGHT : TWIST_WEIGHT + 3] = self.pose, self.twist
+        table[POSE_WEIGHT : POSE_WEIGHT + 3], table[TWIST_WEIGHT : TWIST_WEIGHT + 3] = settings.pose, settings.twist
         table[LAST_WEIGHT], table[AGAIN], table[LEARN] = self.last, self.again, learn
         table[AVERAGED] = robot.sensor_model.averaged
         table[SLEW] = 0.0 if self.slew is None else self.slew * dt
@@ -118,7 +133,7 @@ class Settings:
             *(per_wheel(np.inf if maximum is None else maximum, count) for maximum in (self.current, motor_current))
         )
         limit = np.array([volts(robot), np.minimum(amperes * per_wheel(robot.motor.resistance, count), 1e9)])
-        return Tables(table, np.full(count, self.volts_weight(robot)), limit, emf(robot))
+        return Tables(table, np.full(count, settings.volts), limit, emf(robot))
 
 
 # The part of a path that lies ahead, on the grid of the steps: sampled in blocks, so that a step only looks it up

@@ -45,11 +45,11 @@ typedef struct {
 
 def mpc_code(controller: Mpc) -> str:
     """The body of its C file. Raises UnsupportedError for what float32 cannot hold."""
-    if controller.settings.speed is not None:
+    if controller.robot_settings.speed is not None:
         raise UnsupportedError(
             "the model predictive controller in C has no limit of the speed: float32 cannot hold its weight beside the "
             "others",
-            got=controller.settings.speed,
+            got=controller.robot_settings.speed,
             expected="none",
             where="speed",
             remedy="leave `speed` out of the controller file, and ask for slower paths",
@@ -66,7 +66,7 @@ def mpc_input(controller: Mpc) -> str:
 
 def mpc_memory(controller: Mpc) -> str:
     """The fields of `omnidyn_control`: what it remembers, and room to work in."""
-    n, wheels, settings = "OMNIDYN_HORIZON", "OMNIDYN_WHEELS", controller.settings
+    n, wheels, settings = "OMNIDYN_HORIZON", "OMNIDYN_WHEELS", controller.robot_settings
     lines = ["float believed[4][3], base[3]; /* pose, twist, push, share of friction */"]
     lines += ["float unsure[3], spread[3][3][3]; /* of these */"] if controller.observer else []
     lines += [f"float sent[{controller.steps_late + 1}][3], last[{wheels}];", "int begun, known, missing;"]
@@ -82,16 +82,16 @@ def mpc_memory(controller: Mpc) -> str:
 def _bounded(controller: Mpc) -> bool:
     """Whether the bounds of the volts are others in each step."""
     limit = volts(controller.robot)
-    return controller.settings.slew is not None or _current(controller) or bool(np.any(limit != limit[0]))
+    return controller.robot_settings.slew is not None or _current(controller) or bool(np.any(limit != limit[0]))
 
 
 def _current(controller: Mpc) -> bool:
-    return controller.settings.current is not None or controller.robot.motor.current_limit is not None
+    return controller.robot_settings.current is not None or controller.robot.motor.current_limit is not None
 
 
 def _constants(controller: Mpc) -> str:
     """Numbers and tables, those alone that this controller needs."""
-    settings, linear, robot = controller.settings, controller._numbers.linear[0], controller.robot
+    settings, linear, robot = controller.robot_settings, controller._numbers.linear[0], controller.robot
     turning, ellipse = bool(linear[TURNING] != 0.0), bool(linear[ELLIPSE] > 0.0)
     whether = {
         "LEVELS": len(controller._numbers.levels),
@@ -117,7 +117,7 @@ def _constants(controller: Mpc) -> str:
         "FARTHEST": LARGEST_STATE,
         "EXACT": observer.STICKING_SHARE,
         "LAST_WEIGHT": settings.last,
-        "VOLTS_WEIGHT": settings.volts_weight(robot),
+        "VOLTS_WEIGHT": settings.volts,
         "BEYOND": BOUND_TOLERANCE,
         "BACK_OFF": interior_point.BACK_OFF,
         "CENTRE": CENTRING,
@@ -132,7 +132,7 @@ def _constants(controller: Mpc) -> str:
         "MOST_SCALE": observer.LARGEST_SCALE,
         "START_PUSH": loop.START_PUSH,
         "START_SCALE": loop.START_SCALE,
-        "SHARP": settings.volts_weight(robot),
+        "SHARP": settings.volts,
     }
     if ellipse:
         numbers |= dict(
@@ -152,10 +152,10 @@ def _constants(controller: Mpc) -> str:
 
 def _matrices(controller: Mpc, linear: np.ndarray) -> dict[str, Any]:
     """Tables of the model, the cost and the observer."""
-    settings, numbers = controller.settings, controller._numbers
+    settings, numbers = controller.robot_settings, controller._numbers
     matrices: dict[str, Any] = {"GAINS": np.concatenate([_square(linear, at) for at in (DECAY, PHI, PSI)])}
     matrices |= {"FEED": _square(linear, FEED), "PUSH": numbers.push.T, "PULL": numbers.pull}
-    matrices |= {"WEIGHT": (*settings.pose, *settings.twist)}
+    matrices |= {"WEIGHT": np.array((settings.pose, settings.twist), dtype=float).ravel()}
     matrices |= {"NEAR": program.STANDSTILL, "HOME": program.HOME, "ARRIVED": program.ARRIVED}
     if len(numbers.levels):
         assert (GX, BY_MASS_GX, SOFT_SPEED) == (0, 3, 9)  # columns that model.c counts by hand
@@ -169,13 +169,15 @@ def _noise(settings: Settings) -> dict[str, Any]:
     return {
         "NOISE": np.square(settings.noise),
         "POSE_NOISE": np.square(settings.pose_noise),
-        "WALK": np.square((settings.walk, settings.push_walk, (settings.scale_walk,) * 3, settings.pose_walk)),
+        "WALK": np.square(
+            np.array((settings.walk, settings.push_walk, (settings.scale_walk,) * 3, settings.pose_walk), dtype=float)
+        ),
     }
 
 
 def _outputs(controller: Mpc, robot: Any) -> dict[str, Any]:
     """Tables of optional limits, and of how twists become speeds of wheels."""
-    settings, tables = controller.settings, dict[str, Any]()
+    settings, tables = controller.robot_settings, dict[str, Any]()
     if controller.output == WHEEL_SPEED:
         tables["SPEED_OF"] = np.array([wheel_speed(robot.wheels, axis) for axis in np.eye(3)]).T
     if _current(controller):
