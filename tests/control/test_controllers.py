@@ -30,6 +30,7 @@ from omnidyn.control.feedforward import Feedforward
 from omnidyn.control.pid import Pid
 from omnidyn.control.speed_loop import SpeedLoop
 from omnidyn.errors import InputError, Terminated
+from omnidyn.model.motor import Drive
 from omnidyn.model.robot_file import load_robot
 from omnidyn.simulation.live import LiveRobot
 from tests.support.friction_shapes import shaped
@@ -330,3 +331,13 @@ def test_options_that_nobody_has_are_refused():
         several(["pid"], AXEBOT, horizon=20)
     with pytest.raises(InputError, match="none of these controllers has that"):
         several(["pid"], AXEBOT, no_observer=True)
+
+
+def test_a_supply_measured_now_is_behind_the_duty(name):
+    robot = AXEBOT.replace(drive=Drive(kind="duty", supply=12.0))
+    moved = [0.01, 0.0, 0.0]
+    full, sagged, odd = (controller_named(name, robot) for _ in range(3))
+    first = full.step(0.0, moved, REST, EIGHT)
+    np.testing.assert_allclose(sagged.step(0.0, moved, REST, EIGHT, supply=10.0), first * 1.2, rtol=1e-12)
+    for k, supply in enumerate((None, math.nan, -1.0, 0.0, "12")):
+        assert np.isfinite(odd.step(0.02 * k, moved, REST, EIGHT, supply=supply)).all()

@@ -2,8 +2,9 @@
 
 A controller must:
 
-1. take `step(t, pose, twist, path)`: time [s], pose (x, y, heading) in the world, twist (v_x, v_y, omega) in the body
-   frame, shapes (3,), and a Path (path.py); return what to send to the drive until the next step, shape (wheels,);
+1. take `step(t, pose, twist, path, supply=None)`: time [s], pose (x, y, heading) in the world, twist (v_x, v_y,
+   omega) in the body frame, shapes (3,), a Path (path.py), and the measured supply behind a duty [V], where it is
+   known; return what to send to the drive until the next step, shape (wheels,);
 2. say by `output` what that is: "voltage" [V], "duty" [1], or "wheel_speed" [rad/s] for a drive with a speed loop;
 3. keep |output| <= `limit`, shape (wheels,), in every step;
 4. never raise in `step` but an interrupt: what is missing, NaN, of a wrong shape or earlier than the step before gives
@@ -49,6 +50,7 @@ INACCURATE = "inaccurate"  # the output is sent, but rounding may have moved it
 BRIDGED = {word: f"{word}: bridged" for word in (BAD_POSE, BAD_TWIST, BAD_COMMAND)}
 MOST_BRIDGED = 2  # measurements missing in a row
 LATEST = 1.5  # steps after the one before: what comes later is not gone on from
+MOST_SUPPLY = 1e4  # [V]
 LARGEST_STATE = 1e9  # of any number of a state: what is beyond is no place, and no speed
 VOLTAGE, WHEEL_SPEED = "voltage", "wheel_speed"
 
@@ -118,7 +120,7 @@ class Controller(Protocol):
         """What the last step did."""
         ...
 
-    def step(self, t: float, pose: Any, twist: Any, path: Any) -> FloatArray:
+    def step(self, t: float, pose: Any, twist: Any, path: Any, supply: float | None = None) -> FloatArray:
         """What to send to the drive from t [s] on. Shape (wheels,). Never raises."""
         ...
 
@@ -245,8 +247,9 @@ class Guarded(Safe, ABC):
         if self._late_pose is not None:
             self._late_pose.reset()
 
-    def step(self, t: float, pose: Any, twist: Any, path: Any) -> FloatArray:
+    def step(self, t: float, pose: Any, twist: Any, path: Any, supply: float | None = None) -> FloatArray:
         """What to send to the drive from t [s] on. Shape (wheels,). Never raises."""
+        self._per_volt = per_volt(self.output, supply, self._per_volt)
         place, speed = vector(pose), vector(twist)
         if place is None or speed is None:
             return self._guarded(t, BAD_POSE if place is None else BAD_TWIST, "", None)
@@ -290,6 +293,12 @@ def supply_of(robot: Robot, supply: float | None = None) -> float:
 def failure(error: Exception) -> str:
     """Why a step found no output, in words: what a path does not say, else the kind of the error."""
     return f"{FAILED}: {error.what if isinstance(error, InputError) else type(error).__name__}"
+
+
+def per_volt(output: str, supply: Any, before: float) -> float:
+    """The duty that one volt is behind a supply measured now [V]; as `before` for another output, or without one."""
+    volts = _number(supply)
+    return 1.0 / volts if output == DUTY and 0.0 < volts <= MOST_SUPPLY else before
 
 
 def _number(value: Any) -> float:

@@ -37,6 +37,7 @@ from omnidyn.control.controller import (
     failure,
     output_kind,
     output_limit,
+    per_volt,
     supply_of,
     vector,
     without_slip,
@@ -170,9 +171,11 @@ class Mpc:
         }
         return tuple(name for name, value in met.items() if value)
 
-    def step(self, t: float, pose: Any, twist: Any, path: Any) -> FloatArray:
+    def step(self, t: float, pose: Any, twist: Any, path: Any, supply: float | None = None) -> FloatArray:
         """What to send to the drive from t [s] on. Shape (wheels,). Never raises."""
         start = time.perf_counter()
+        if supply is not None:
+            self._per_volt = per_volt(self.output, supply, self._per_volt)
         try:
             since = t - self._t
             if since <= 0.0 or since != since:
