@@ -55,6 +55,7 @@ from omnidyn.model.wheels import wheel_speed
 
 HORIZON, MOST_HORIZON, MOST_DELAY = 20, 500, 50
 MET = 1e-5  # [V] from a limit
+LEAST_REST = 0.02  # of a step, that a delay may be off a whole number of them
 
 
 class Mpc:
@@ -96,11 +97,16 @@ class Mpc:
         self.robot, self.output, self.limit = robot, output_kind(robot), output_limit(robot)
         self.sensors = robot.sensor_model
         self._per_volt = 1.0 / supply_of(robot, self.supply) if self.output == "duty" else 1.0
-        latency = min(round(robot.drive.latency / self.dt), MOST_DELAY)
-        self.steps_late = latency if self.delay is None else self.delay
+        steps = min(robot.drive.latency / self.dt, float(MOST_DELAY)) if self.delay is None else float(self.delay)
+        self.steps_late = round(steps)
+        is_whole = abs(steps - self.steps_late) < LEAST_REST
+        whole = self.steps_late if is_whole else math.floor(steps)
+        rest = 0.0 if is_whole else (steps - whole) * self.dt
         self._zeros = np.zeros(robot.wheels.count)
-        self._preview = Preview(self.dt, self.steps_late, self.horizon)
+        self._preview = Preview(self.dt, whole, self.horizon, rest)
         self._room = MpcWorkspace.of(self.horizon, volts(robot))
+        if rest > 0.0:
+            self._room.rest[:] = numbers(robot, rest, self.friction).linear
         self._numbers = numbers(robot, self.dt, self.friction)
         self.robot_settings = self.settings.of(robot)
         self._tables = self.settings.tables(robot, self.dt, self.observer)
@@ -109,7 +115,7 @@ class Mpc:
 
     def reset(self) -> None:
         """Forget all steps."""
-        self._memory = Memory.of(self.horizon, self.robot.wheels.count, self.steps_late, self.robot_settings)
+        self._memory = Memory.of(self.horizon, self.robot.wheels.count, self._preview.inputs, self.robot_settings)
         self._known, self._t, self._last = False, math.nan, self._zeros.copy()
         self._asked: tuple[str, int, float] = (WAITING, 0, 0.0)
         self._state, self._missing, self._since = np.zeros(6), 0, math.nan
@@ -121,7 +127,7 @@ class Mpc:
         clone = object.__new__(type(self))
         clone.__dict__.update(self.__dict__)
         clone._take(robot)
-        if robot.wheels.count != self.robot.wheels.count or clone.steps_late != self.steps_late:
+        if robot.wheels.count != self.robot.wheels.count or clone._preview.inputs != self._preview.inputs:
             clone.reset()
             return clone
         same_friction = robot.friction == self.robot.friction
@@ -129,7 +135,8 @@ class Mpc:
             self._memory.copied(None if same_friction else clone.robot_settings),
             self._state.copy(),
         )
-        clone._preview = copy(self._preview)  # what it has sampled stays as it is, to the last bit
+        if clone._preview.rest == self._preview.rest:
+            clone._preview = copy(self._preview)  # what it has sampled stays as it is, to the last bit
         clone._last = np.clip(self._last, -clone.limit, clone.limit)
         return clone
 

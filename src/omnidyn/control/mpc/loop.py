@@ -113,7 +113,8 @@ def _unlearn(estimate: FloatArray, settings: Settings) -> None:
 
 class MpcWorkspace(NamedTuple):
     """What a step works in: stage, answer, inverse, target, wanted, bounds, interior of its program; before (n + 1, 6):
-    the motion along which it was made; linear: that of the numbers, for a step as long as the one before was."""
+    the motion along which it was made; linear: that of the numbers, for a step as long as the one before was; rest: for
+    the part of a step by which the delay is more than whole steps, zeros where it is none."""
 
     stage: FloatArray
     answer: FloatArray
@@ -124,6 +125,7 @@ class MpcWorkspace(NamedTuple):
     before: FloatArray
     interior: FloatArray
     linear: FloatArray
+    rest: FloatArray
 
     @classmethod
     def of(cls, n: int, limit: FloatArray) -> Self:
@@ -140,18 +142,37 @@ class MpcWorkspace(NamedTuple):
             np.zeros((n + 1, 6)),
             np.zeros((ROOM_SIZE, n, wheels)),
             np.zeros((1, LINEAR_SIZE)),
+            np.zeros((1, LINEAR_SIZE)),
         )
 
 
 @part
-def past_delay(numbers, memory, stage):
-    """Move row 0 of x on by the inputs that are under way: rows 1.. of `sent`."""
+def past_delay(numbers, memory, room):
+    """Move row 0 of x on by the inputs that are under way: rows 1.. of `sent`, the first of them for a part of a step
+    where the delay is no whole number of steps."""
     x = memory.x
     for j in range(1, len(memory.sent)):
+        model = numbers
+        if (j == 1) & (room.rest[0, STEP] > 0.0):
+            model = Numbers(room.rest, numbers.push, numbers.pull, numbers.levels)
         drive = drive_of(numbers.push, memory.sent, j)
-        pose, twist = run_on(numbers, memory.estimate, stage, vector(x, 0, 0), vector(x, 0, 3), drive)
+        pose, twist = run_on(model, memory.estimate, room.stage, vector(x, 0, 0), vector(x, 0, 3), drive)
         put3(x, 0, 0, pose)
         put3(x, 0, 3, twist)
+
+
+@part
+def last_drive(numbers, memory, room):
+    """The drive of the step that has passed: the mean of two inputs where the delay is no whole number of steps."""
+    drive, share = drive_of(numbers.push, memory.sent, 0), room.rest[0, STEP] / numbers.linear[0, STEP]
+    if share > 0.0:
+        then = drive_of(numbers.push, memory.sent, 1)
+        drive = (
+            share * drive[0] + (1.0 - share) * then[0],
+            share * drive[1] + (1.0 - share) * then[1],
+            share * drive[2] + (1.0 - share) * then[2],
+        )
+    return drive
 
 
 @part
@@ -165,7 +186,7 @@ def measure(numbers, settings, state, elapsed, memory, room):
     if abs(elapsed - numbers.linear[0, STEP]) > SAME_STEP * elapsed:
         held_for(numbers.linear, elapsed, room.linear)
         observed = Numbers(room.linear, numbers.push, numbers.pull, numbers.levels)
-    drive = drive_of(numbers.push, memory.sent, 0)
+    drive = last_drive(numbers, memory, room)
     if settings[LEARN] != 0.0:
         observe(observed, estimate, room.stage, state, drive, averaged)
     else:
@@ -191,7 +212,7 @@ def control(numbers, tables, preview, start, state, elapsed, memory, room):
     measure(numbers, settings, state, elapsed, memory, room)
     put3(x, 0, 0, vector(estimate, POSE, 0))
     put3(x, 0, 3, vector(estimate, TWIST, 0))
-    past_delay(numbers, memory, stage)
+    past_delay(numbers, memory, room)
     add = nearest_turn(x[0, 2], preview[start, 2])
     if elapsed == 0.0:
         for k in range(1, len(x)):
@@ -245,7 +266,7 @@ def control(numbers, tables, preview, start, state, elapsed, memory, room):
 def expect(numbers, averaged, memory, room, state):
     """Write into `state` (6,) what is expected to be measured."""
     before, begin = vector(memory.estimate, POSE, 0), vector(memory.estimate, TWIST, 0)
-    drive = drive_of(numbers.push, memory.sent, 0)
+    drive = last_drive(numbers, memory, room)
     pose, twist = run_on(numbers, memory.estimate, room.stage, before, begin, drive)
     if averaged:
         twist = mean_twist(numbers.linear[0, STEP], before, begin, pose, twist)
@@ -289,7 +310,7 @@ class Batch:
 
     def reset(self) -> None:
         """Forget all steps."""
-        blank = Memory.of(self._like.ahead, len(self._tables.weight), self._like.late, self._settings)
+        blank = Memory.of(self._like.ahead, len(self._tables.weight), self._like.inputs, self._settings)
         self._memory = Memory._make(np.repeat(array[None], self.count, axis=0) for array in blank)
         self._known = np.zeros(self.count, bool)
         self._previews: list[Preview] = []

@@ -145,21 +145,27 @@ GRID_TOLERANCE = 1e-6  # of a step
 class Preview:
     """Rows of pose and twist of a path, `rows`: shape (samples, 6), dt apart; `end`: of the path [s].
 
-    late: steps until an output acts; ahead: steps of the horizon.
+    late: whole steps until an output acts, and rest [s] beyond them; ahead: steps of the horizon.
     """
 
-    def __init__(self, dt: float, late: int, ahead: int) -> None:
-        self._dt, self.late, self.ahead = dt, late, ahead
+    def __init__(self, dt: float, late: int, ahead: int, rest: float = 0.0) -> None:
+        self._dt, self.late, self.ahead, self.rest = dt, late, ahead, rest
         self._need = late + ahead + 1
         self._path, self._begin, self._most = None, math.nan, -1
         self.rows, self.end = np.zeros((0, 6)), math.inf
 
     def another(self) -> Preview:
         """The same for another path."""
-        return Preview(self._dt, self.late, self.ahead)
+        return Preview(self._dt, self.late, self.ahead, self.rest)
+
+    @property
+    def inputs(self) -> int:
+        """How many inputs are under way when a step begins."""
+        return self.late + (self.rest > 0.0)
 
     def row_at(self, t: float, path: Any) -> int:
         """The row of `rows` at which the horizon of a step at time t [s] begins."""
+        t = t + self.rest
         if path is self._path:
             position = (t - self._begin) / self._dt
             row = round(position)
