@@ -90,6 +90,11 @@ class Mpc:
         self._take(robot)
         self.reset()
 
+    @property
+    def late_part(self) -> float:
+        """By how much the delay of the drive is more than whole steps [s]."""
+        return self._preview.rest
+
     def _take(self, robot: Robot) -> None:
         """Make ready for a robot; settings stay."""
         refuse_slope(robot.floor, "controllers know")

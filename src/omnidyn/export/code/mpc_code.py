@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from importlib.resources import files
 from typing import Any
 
@@ -44,7 +45,16 @@ typedef struct {
 
 
 def mpc_code(controller: Mpc) -> str:
-    """The body of its C file. Raises UnsupportedError for what float32 cannot hold."""
+    """The body of its C file. Raises UnsupportedError for what float32 cannot hold, and for a part of a step."""
+    late = controller.robot.drive.latency
+    if controller.late_part > 0.0:
+        raise UnsupportedError(
+            "the model predictive controller in C counts the latency of the drive in whole steps",
+            got=f"{late:.4g} s, {late / controller.dt:.3g} steps of {controller.dt:g} s",
+            expected="a whole number of steps",
+            where="drive.latency_s",
+            remedy=f"export it with --dt {late / math.ceil(late / controller.dt):.4g}, and call it as often",
+        )
     if controller.robot_settings.speed is not None:
         raise UnsupportedError(
             "the model predictive controller in C has no limit of the speed: float32 cannot hold its weight beside the "
