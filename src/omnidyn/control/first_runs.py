@@ -25,12 +25,20 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("predictive controller", partial(_tracked, paper)),
         ("predictive controller, any friction", partial(_tracked, mecanum)),
         ("predictive controllers of many robots", partial(_many, paper)),
+        ("a measurement that is missing", partial(_bridged, paper)),
     ]
 
 
 def _tracked(robot: Robot) -> Tracking:
     """A few steps along a path."""
     return track(robot, PATH, "mpc", duration=SECONDS)
+
+
+def _bridged(robot: Robot) -> FloatArray:
+    """A step, and one without a measurement."""
+    controller, rest, route = Mpc(robot), np.zeros(3), path(PATH)
+    controller.step(0.0, rest, rest, route)
+    return controller.step(controller.dt, np.full(3, np.nan), rest, route)
 
 
 def _many(robot: Robot) -> FloatArray:

@@ -199,6 +199,6 @@ def test_controllers_and_robots_without_c_are_refused_by_name(monkeypatch):
 def test_a_latency_that_is_no_whole_number_of_steps_is_refused_for_the_predictive_controller():
     robot = omnidyn.load_robot("axebot")
     robot = robot.replace(drive=robot.drive.replace(latency=0.03))
-    with pytest.raises(UnsupportedError, match=r"1\.5 steps of 0\.02 s.*export it with --dt 0\.015"):
+    with pytest.raises(UnsupportedError, match=r"1\.5 steps of 0\.02 s.*export it with `dt` 0\.015"):
         c_controller(robot, controller="mpc")
     assert c_controller(robot, controller="mpc", dt=0.015).files

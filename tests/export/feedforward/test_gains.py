@@ -174,7 +174,7 @@ def test_gains_of_wheels_per_tick():
 def test_a_robot_whose_friction_is_a_guess_is_refused(make):
     wheels = omnidyn.load_robot("mecanum").wheels
     robot = first_guess("new", wheels, 7.5)
-    with pytest.raises(InputError, match=r"gains are guesses.*coulomb.*identify LOG.*`force_guess`"):
+    with pytest.raises(InputError, match=r"gains are guesses.*coulomb.*omnidyn identify.*`force_guess`"):
         make(robot)
     made = make(robot, force_guess=True)
     assert all("GUESSES, not measured" in text.partition("kS = ")[0] for text in made.files.values())

@@ -186,7 +186,7 @@ def test_a_robot_that_never_moved_gives_a_bound_only():  # BAD_INPUTS 27
 @pytest.mark.parametrize(
     "options, words",
     [
-        ({"rest": "maybe"}, "rest: unknown use of rows at rest; got maybe; expected bound or line or ignore"),
+        ({"rest_use": "maybe"}, "rest: unknown use of rows at rest; got maybe; expected bound or line or ignore"),
         ({"rest_speed": (0.1, 0.1)}, "rest_speed: cannot tell rest from motion; .*three speeds"),
         ({"rest_speed": (0.1, -0.1, 0.0)}, "rest_speed: cannot tell rest from motion"),
         ({"absolute_std": True}, "absolute_std needs the std of the forces"),

@@ -119,7 +119,7 @@ def test_every_candidate_that_a_fit_can_hold_begins_to_be_fitted(layout):
     problem, parts = bench.problem, solution.solver.engine.residuals(solution.state.point)
     off = {ImplicitEngine: refits._by_coarse_steps(problem, parts, solution.state.point, ImplicitEngine)}
     for one in every:
-        if not one.offered or one.key == CHANGE:
+        if not one.is_offered or one.key == CHANGE:
             continue
         for trial in one.trials(bench)[:1]:
             remedy = Remedy(one.key, "", 0.0, 0.0, size=(0.02,) * trial.columns_by_piece[0].shape[2], at=trial.at)

@@ -169,7 +169,7 @@ def test_blocks_of_groups_are_those_of_one_fit_where_all_is_each_groups_own(give
     }
     together = errors(given.solution, memory, margins_of([given.solution]))
     parts = [errors(one, memory[name], margins_of([one])) for name, one in given.alone.items()]
-    assert together.left == pytest.approx(sum(each.left for each in parts), rel=1e-9)
+    assert together.square == pytest.approx(sum(each.square for each in parts), rel=1e-9)
     assert together.held_out == pytest.approx(sum(each.held_out for each in parts), rel=1e-9)
     assert (together.rows, together.numbers) == (sum(each.rows for each in parts), 12)
 

@@ -164,15 +164,13 @@ def past_delay(numbers, memory, room):
 @part
 def last_drive(numbers, memory, room):
     """The drive of the step that has passed: the mean of two inputs where the delay is no whole number of steps."""
-    drive, share = drive_of(numbers.push, memory.sent, 0), room.rest[0, STEP] / numbers.linear[0, STEP]
-    if share > 0.0:
-        then = drive_of(numbers.push, memory.sent, 1)
-        drive = (
-            share * drive[0] + (1.0 - share) * then[0],
-            share * drive[1] + (1.0 - share) * then[1],
-            share * drive[2] + (1.0 - share) * then[2],
-        )
-    return drive
+    before, share = drive_of(numbers.push, memory.sent, 0), room.rest[0, STEP] / numbers.linear[0, STEP]
+    then, share = drive_of(numbers.push, memory.sent, min(1, len(memory.sent) - 1)), share if share > 0.0 else 1.0
+    return (
+        share * before[0] + (1.0 - share) * then[0],
+        share * before[1] + (1.0 - share) * then[1],
+        share * before[2] + (1.0 - share) * then[2],
+    )
 
 
 @part

@@ -53,7 +53,7 @@ def mpc_code(controller: Mpc) -> str:
             got=f"{late:.4g} s, {late / controller.dt:.3g} steps of {controller.dt:g} s",
             expected="a whole number of steps",
             where="drive.latency_s",
-            remedy=f"export it with --dt {late / math.ceil(late / controller.dt):.4g}, and call it as often",
+            remedy=f"export it with `dt` {late / math.ceil(late / controller.dt):.4g}, and call it as often",
         )
     if controller.robot_settings.speed is not None:
         raise UnsupportedError(

@@ -147,7 +147,7 @@ def guessed_gains(robot: Robot, force_guess: bool) -> tuple[str, ...]:
             "these gains are guesses: no log has told the friction of this robot",
             got=f"a guess for {', '.join(keys)}",
             expected="friction that was identified, measured or given",
-            remedy="fit it (omnidyn identify LOG --robot FILE -o fit.toml) and export the fit, or use `force_guess`",
+            remedy="fit it by `omnidyn identify` and export the fit, or use `force_guess`",
         )
     return (f"GUESSES, not measured: kS, and what follows from it, rest on a guess for {', '.join(keys)}",)
 

@@ -57,14 +57,15 @@ def best_with_force(solution: Solution, forced_solutions: Sequence[Solution]) ->
         [free_run(forced_solution, margins) for forced_solution in forced_solutions],
     )
     k = int(np.argmin([run.error for run in runs]))
+    if run_without_force.adds_up or not runs[k].is_better(run_without_force):
+        return solution
     problem, values = forced_solutions[k].solver.problem, forced_solutions[k].state.point.values
-    std = trust(forced_solutions[k].solver, forced_solutions[k], AUTO).std
     force_indices = [problem.where(name) for name in problem.names if name not in solution.solver.problem.names]
-    if (
-        run_without_force.adds_up
-        or not runs[k].is_better(run_without_force)
-        or not (np.abs(values[force_indices]) > FORCE_ERRORS * std[force_indices]).any()
-    ):
+    try:
+        std = trust(forced_solutions[k].solver, forced_solutions[k], AUTO).std
+    except np.linalg.LinAlgError:  # the logs do not tell the force from the other numbers
+        return solution
+    if not (np.abs(values[force_indices]) > FORCE_ERRORS * std[force_indices]).any():
         return solution
     names = tuple(problem.names[j] for j in force_indices)
     numbers = {

@@ -463,7 +463,7 @@ def calmed(
     if not best.gain > best.gain_std:
         return base_model, [*first, replace(rung, why=Statement("predicts_no_better", NOTE), value=calm_model.value)]
     taken_rung = replace(rung, why=Statement("pays", NOTE), value=calm_model.value, taken=True)
-    return replace(calm_model, before=None), [*first, taken_rung]
+    return replace(calm_model, base_model=None), [*first, taken_rung]
 
 
 def _best_cause(lack: LackOfFit) -> float:
