@@ -73,7 +73,7 @@ def test_a_free_run_at_one_speed_says_between_what():
     assert {"dead_band", "lag"} <= set(fit.unidentifiable)
     assert all(np.isnan(fit.std[name]) for name in ("dead_band", "lag", "inertia"))
     assert fit.ci95["dead_band"] == pytest.approx((0.35, 2.0))
-    assert fit.ci95["slope"][0] < 0.01  # that of a dead band just below 2 V; rounding had it at 0.37 on some processors
+    assert fit.ci95["slope"][0] < 0.1  # that of a dead band near 2 V, up to rounding; it was 0.37 on some processors
     assert not fit.statement().numbers["lag_known"]
     assert "it is between 0.35 and 2 V, because it turned steadily at that input" in str(fit.statement())
 
