@@ -81,6 +81,13 @@ def test_a_wrong_mass_is_found_though_wheels_slip():
     assert wrong.lack_of_fit.found
 
 
+def test_a_wrong_mass_is_fitted_by_default_though_no_constant_force_can_be_tried():
+    """Coloured errors ask for one, and the engine of wheels that slip knows none: it ended in a refusal."""
+    heavy = ROBOT.replace(body=ROBOT.body.replace(mass=1.4 * ROBOT.body.mass))
+    estimate = identify(log(2, 3.0), heavy, OutputError(free="friction"), quick=True).estimate
+    assert not [name for name in estimate.nuisances if name.startswith(("push", "tilt"))]
+
+
 def test_which_wheels_roll_is_seen_as_the_reference_has_it():
     run = log(2, 3.0, noisy=False)
     question = OutputError(

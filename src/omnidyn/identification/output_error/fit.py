@@ -324,7 +324,10 @@ class Fit:
             chosen_solution.solver.problem.nuisances,
             progress.aside("once more with a constant force"),
         )
-        forced_solutions = [self.beside(chosen_solution, [*names, force], inner_progress) for force in (PUSH, TILT)]
+        try:
+            forced_solutions = [self.beside(chosen_solution, [*names, force], inner_progress) for force in (PUSH, TILT)]
+        except UnsupportedError:  # an engine that knows no constant force
+            return chosen_solution
         return best_with_force(chosen_solution, forced_solutions)
 
     def _plain(self, solution: Solution, progress: FitProgress) -> Solution:
