@@ -121,7 +121,6 @@ def _constants(controller: Mpc) -> str:
         "FIRST_PASSES": interior_point.FIRST,
         "LAST_PASSES": interior_point.LAST,
         "MOST": MOST_PASSES,
-        "MOST_BRIDGED": MOST_BRIDGED,
     }
     numbers = {
         "FARTHEST": LARGEST_STATE,
@@ -150,7 +149,17 @@ def _constants(controller: Mpc) -> str:
         )
     if settings.slew is not None:
         numbers["SLEW_STEP"] = settings.slew * controller.dt
-    lines = [f"#define {name} {int(value)}" for name, value in whether.items()]
+    lines = [
+        "#ifndef OMNIDYN_MOST_BRIDGED /* -DOMNIDYN_MOST_BRIDGED=0: a missing measurement gives zeros, in less code */",
+        f"#define OMNIDYN_MOST_BRIDGED {MOST_BRIDGED}",
+        "#endif",
+        "#if OMNIDYN_MOST_BRIDGED",
+        "#define MISSING (c->missing)",
+        "#else",
+        "#define MISSING 0",
+        "#endif",
+    ]
+    lines += [f"#define {name} {int(value)}" for name, value in whether.items()]
     lines += [f"#define {name} {c_number(float(value), True)}" for name, value in numbers.items()]
     matrices = _matrices(controller, linear) | ({"FRAME": _square(linear, TURNING)} if turning else {})
     matrices |= {"BY_MASS": _square(linear, BY_MASS)} if ellipse else {}

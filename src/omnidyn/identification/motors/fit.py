@@ -39,7 +39,13 @@ from omnidyn.identification.motors.problem import (
     motor_problem,
     motor_record,
 )
-from omnidyn.identification.motors.rest import rested_under, turned_under, turns_both_ways
+from omnidyn.identification.motors.rest import (
+    rested_under,
+    slope_between,
+    turned_under,
+    turns_at_one_input,
+    turns_both_ways,
+)
 from omnidyn.identification.motors.windows import line_numbers
 from omnidyn.identification.output_error.conclusion import intervals
 from omnidyn.identification.output_error.problem.differences import added_up, differences
@@ -112,7 +118,12 @@ def fit_motor(
             fit = _with_rival(fit, answers[way])
     if fit.dead_band_seen:
         fit = _with_bend(fit, bend(fit_by_way[best_way][0], fit_by_way[best_way][1].state))
-    return fit.bounded(turned_under(logs, motor, way=orientation_of(logs, motor)), resting_input)
+    fit = fit.bounded(turned_under(logs, motor, way=orientation_of(logs, motor)), resting_input)
+    if BAND not in fit.unidentifiable:
+        return fit
+    low, high = slope_between(logs, motor, fit.ci95[BAND])  # both go together
+    least, most = fit.ci95[SLOPE]
+    return replace(fit, ci95={**fit.ci95, SLOPE: (min(least, low), max(most, high))})
 
 
 def solved(
@@ -232,6 +243,8 @@ def _answer(
             std[BAND], ci95[BAND] = float("nan"), (problem.parameters[band_index].low, high)
     parameters_at_bound = {p.name: p for p in at_the_end(problem, values) if p.name != BAND}  # which is no estimate
     blind_names |= parameters_at_bound.keys()
+    if LAG in parameters_at_bound and turns_at_one_input(logs, motor):  # no transient and one speed: rounding decides
+        blind_names |= {BAND}
     for name, p in parameters_at_bound.items():
         std[name], ci95[name] = float("nan"), (p.low, p.high)
     value[INERTIA] = value[SLOPE] * value[LAG]

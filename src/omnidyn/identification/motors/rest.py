@@ -39,6 +39,7 @@ CURRENT = "current"
 TURNING_ERRORS = 5.0  # standard errors of a steady speed, from which the motor turns
 SLOWING_ERRORS = 3.0  # standard errors of the mean of a half: a motor that slows down more may be running out
 NOISE = 2.0  # standard errors of the input
+SAME_INPUT = 0.02  # relative difference of inputs that are one
 
 
 class Span(NamedTuple):
@@ -286,6 +287,22 @@ def rested_under(logs: Sequence[MotorLog], motor: int) -> float:
     return max(
         (abs(window.input_value) - window.error for window in _steady(logs, motor) if window.is_resting), default=0.0
     )
+
+
+def turns_at_one_input(logs: Sequence[MotorLog], motor: int) -> bool:
+    """Whether a motor turns steadily under inputs of one size alone: they tell its slope and its dead band together."""
+    levels = [abs(window.input_value) for window in _steady(logs, motor) if window.turns]
+    return bool(levels) and max(levels) - min(levels) <= SAME_INPUT * max(levels)
+
+
+def slope_between(logs: Sequence[MotorLog], motor: int, dead_band: tuple[float, float]) -> tuple[float, float]:
+    """Between which a slope lies, by the windows of steady turning: slope |speed| = |input| - dead band.
+
+    dead_band: its ends, as sizes. (inf, -inf), which bounds nothing, where no window is known.
+    """
+    windows = [window for window in _steady(logs, motor) if window.turns]
+    ends = [(abs(window.input_value) - band) / abs(window.speed) for window in windows for band in dead_band]
+    return max(min(ends, default=math.inf), 0.0), max(ends, default=-math.inf)
 
 
 class _Window(NamedTuple):

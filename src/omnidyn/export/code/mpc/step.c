@@ -48,11 +48,11 @@ static void observe(omnidyn_control *c, const float *measured, int known)
     ROLLED for (i = 0; i < 3; i++) {
         float(*p)[3] = c->spread[i], *twist = &c->believed[1][i];
 #if AVERAGED
-        const float begin = p[0][0], left = c->missing ? 0.0f : measured[3 + i] - mean[i];
+        const float begin = p[0][0], left = MISSING ? 0.0f : measured[3 + i] - mean[i];
         float across[3];
 #else
         float *place = &c->unsure[i], *pose = &c->believed[0][i];
-        const float left = c->missing ? 0.0f : measured[3 + i] - *twist, off = c->missing ? 0.0f : measured[i] - *pose;
+        const float left = MISSING ? 0.0f : measured[3 + i] - *twist, off = MISSING ? 0.0f : measured[i] - *pose;
 #endif
         const float by[3] = {c->columns[0][1 + i][3 + i], PHI(i)[i], -PHI(i)[i] * force[0][i]};
         const float noise = NOISE[i];
@@ -116,7 +116,7 @@ static void observe(omnidyn_control *c, const float *measured, int known)
     mean[2] = moved[2];
     ROLLED for (i = 0; i < 3; i++) {
         float *place = &c->unsure[i], *pose = &c->believed[0][i], r, gain[1];
-        const float off = c->missing ? 0.0f : measured[i] - *pose - mean[i];
+        const float off = MISSING ? 0.0f : measured[i] - *pose - mean[i];
         *pose += mean[i];
 #endif
         *place += WALK[3][i];
@@ -321,7 +321,7 @@ static void expect(omnidyn_control *c, float measured[6])
 #endif
     memcpy(c->believed, before, sizeof(before));
     ROLLED for (i = 0; i < 6; i++) {
-        measured[i] = c->missing ? after[i] : measured[i];
+        measured[i] = MISSING ? after[i] : measured[i];
     }
 }
 #endif
@@ -410,11 +410,13 @@ int omnidyn_control_step(omnidyn_control *c, float elapsed, const float pose[3],
     if (!sane(pose, 3)) {
         says = OMNIDYN_BAD_POSE;
     }
+#if OMNIDYN_MOST_BRIDGED
     c->missing = says ? c->missing + 1 : 0;
-    if (known && c->missing <= MOST_BRIDGED) {
+    if (known && c->missing <= OMNIDYN_MOST_BRIDGED) {
         bridged = says;
         says = OMNIDYN_OK;
     }
+#endif
     if (says == OMNIDYN_OK && !sane((const float *)path, 6 * (OMNIDYN_HORIZON + 1))) {
         says = OMNIDYN_BAD_PATH;
     }
