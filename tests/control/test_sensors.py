@@ -88,7 +88,7 @@ def test_what_a_fit_found_of_its_logs_is_what_controllers_take():
 
 
 def test_the_table_of_a_file_is_read_and_written():
-    robot = AXEBOT.replace(sensors=Sensors(twist="mean", encoder_counts=2048.0, pose_delay=0.04, pose_rate=60.0))
+    robot = AXEBOT.replace(sensors=Sensors(twist="mean", pose_delay=0.04, pose_rate=60.0))
     text = robot_to_toml(robot)
     assert "[sensors]" in text
     assert "pose_rate_Hz = 60" in text

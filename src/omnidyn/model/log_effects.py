@@ -46,7 +46,7 @@ class Lateness(Value):
 
 
 INSTANTANEOUS, MEAN = "instantaneous", "mean"
-LATEST_POSE, FASTEST, MOST_COUNTS = 1.0, 1e5, 10_000_000  # [s], [Hz], per turn
+LATEST_POSE, FASTEST = 1.0, 1e5  # [s], [Hz]
 
 
 class Sensors(Value):
@@ -54,16 +54,12 @@ class Sensors(Value):
 
     twist: "instantaneous", or "mean": over the time since the step before, as differences of encoders are.
 
-    encoder_counts: of an encoder per turn of its wheel, None where unknown. pose_delay [s]: age of a pose when it
-    arrives. pose_rate [Hz]: of new poses, None: one in every step.
+    pose_delay [s]: age of a pose when it arrives. pose_rate [Hz]: of new poses, None: one in every step.
     """
 
     twist: Annotated[Literal["instantaneous", "mean"], Field(description="mean: differences of encoders")] = (
         INSTANTANEOUS
     )
-    encoder_counts: Annotated[
-        Annotated[float, number(1.0, MOST_COUNTS)] | None, Field(description="per turn of a wheel")
-    ] = None
     pose_delay: Annotated[
         Annotated[float, number(0.0, LATEST_POSE)],
         Field(alias="pose_delay_s", description="age of a pose when it arrives"),

@@ -148,6 +148,9 @@ def test_motors_that_have_one_speed_have_no_line(tmp_path, monkeypatch, capsys):
     code, err = check(COMMANDS["motors"], capsys)
     assert code == 4
     assert "is 3 in every row, while its voltage says that the wheel turns" in err
+    code, err = check((*COMMANDS["motors"], "--method", "steady-state"), capsys)
+    assert code == 4
+    assert "a line needs several speeds; got 3 rad/s in every window" in err
 
 
 @pytest.mark.parametrize("folder", ["", "code/path_1e300"])

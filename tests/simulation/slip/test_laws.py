@@ -189,7 +189,7 @@ def test_other_robots_and_tolerances_against_the_events(number, tol):
 @pytest.mark.long
 def test_few_draws_are_rejected_and_most_slip():
     found = [reference(number) for number in (*FIRST, *SECOND)]
-    assert sum(each[-1] for each in found) <= REJECTED
+    assert sum(each[-1] for each in found) <= 2
     assert sum(bool(each[-2].any()) for each in found) >= 0.9 * len(found)
 
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from omnidyn.compiled.kernel import plain
 from omnidyn.export.code.c_types import INT, REAL, Array, Type
 from omnidyn.export.code.program import CProgram
 from omnidyn.export.spelling import SINGLE_MAX, c_number, filled
@@ -115,7 +114,7 @@ def _tables(robot: Robot) -> dict[str, np.ndarray]:
 def _tables_with_inductance(robot: Robot) -> dict[str, np.ndarray]:
     laws = axis_laws(robot)
     largest_force = LARGEST_START["current"] * np.abs(current_gain(robot)).sum(axis=1)
-    return {"LAWS": laws, "RATES": np.array(plain(axis_rates)(laws)), "GAUSS": GAUSS, "MOST_FORCE": largest_force}
+    return {"LAWS": laws, "RATES": axis_rates(laws), "GAUSS": GAUSS, "MOST_FORCE": largest_force}
 
 
 def volts_code(program: CProgram, robot: Robot) -> str:

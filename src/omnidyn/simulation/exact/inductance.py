@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.compiled.kernel import kernel, maker, part
+from omnidyn.compiled.kernel import kernel, maker, part, plain
 from omnidyn.errors import InputError
 from omnidyn.model.dynamics import drive_wrench, state_space, wrench_from_currents
 from omnidyn.model.mass import axis_masses
@@ -226,7 +226,7 @@ def _empty_axes():
 
 
 @maker
-def axis_rates(laws):
+def _axis_rates(laws):
     """How fast each axis changes, and forgets that it does [1/s]: (fast, its decay, slow, its decay). Shape (3, 4)."""
     out = np.empty((3, 4))
     for axis in range(3):
@@ -239,6 +239,11 @@ def axis_rates(laws):
         out[axis, 2] = product / fast
         out[axis, 3] = product / fast if square > 0.0 else -mean
     return out
+
+
+def axis_rates(laws: FloatArray) -> FloatArray:
+    """What `_axis_rates` gives, in plain Python: a table of exported C. Shape (3, 4)."""
+    return np.array(plain(_axis_rates)(laws))
 
 
 @part
@@ -322,7 +327,7 @@ def step_poses(twists, accelerations, eventful, drive, dt, laws, start, gauss):
     """Pose after each step; the heading is a compensated sum of closed forms. Shape (n + 1, 3)."""
     poses = np.empty((len(dt) + 1, 3))
     poses[0] = start
-    axes, rates, yaw = _empty_axes(), axis_rates(laws), law_of(laws, 2)
+    axes, rates, yaw = _empty_axes(), _axis_rates(laws), law_of(laws, 2)
     plan, piece = _empty_nodes(COUNT * MAX_PIECES), _empty_nodes(COUNT)
     planned, turning_bound, columns, length, phi, total, carry = 0.0, 0.0, 0, 0.0, 0.0, 0.0, 0.0
     for k in range(len(dt)):

@@ -115,7 +115,7 @@ def test_a_profile_knows_of_colour(axebot, clean, loss):
 
 
 def test_breakaway_knows_of_colour(axebot):
-    """Of 9 intervals 8 or more hold the truth; by the limit for white noise 19 of 30 did."""
+    """All 9 intervals hold the truth; by the limit for white noise 19 of 30 did."""
     levels = tuple(1.2 * c for c in axebot.friction.axes.coulomb)
     axes = axebot.friction.axes.model_copy(update={"breakaway": levels})
     robot = axebot.replace(friction=axebot.friction.model_copy(update={"axes": axes}))
@@ -124,7 +124,7 @@ def test_breakaway_knows_of_colour(axebot):
         log = coloured(simulate(robot, excitation(30.0, seed=200 + seed), 0.01), seed)
         fit = identify(log, axebot, OutputError(nuisances=(), free=[*BOX, *keys], start="rest")).estimate
         held += sum(fit.ci95[key][0] <= level <= fit.ci95[key][1] for key, level in zip(keys, levels, strict=True))
-    assert held >= 8
+    assert held == 9
 
 
 def test_bootstrap_over_runs(axebot):
