@@ -117,6 +117,8 @@ def test_options_of_one_method_choose_it(given, method):
         ("duty", 0.01, "duty", MotorFit(input="duty")),
         ("voltage", 1.0, "", MotorLine()),
         ("current", 0.01, "", MotorLine()),
+        ("voltage", 0.01, "current", MotorLine(input="current")),
+        ("voltage", 0.01, "wind", MotorLine(input="wind")),
     ],
 )
 def test_logs_of_motors_say_whether_whole_logs_are_fitted(channel, step, input, method):

@@ -66,12 +66,13 @@ def default_motor_method(runs: Sequence[Run], input: str, progress: Progress) ->
     from omnidyn.identification.motors.fit import FREE_RUN_INPUTS  # imported lazily: slow to load
     from omnidyn.identification.motors.start import SLOW_ROW
 
-    kind = motor_input(runs, [input] if input else MOTOR_INPUTS)
+    kind = input or motor_input(runs, MOTOR_INPUTS)
     step = max((usual_step(run.t) for run in runs), default=0.0)
     reason = f"rows are {step:.2g} s apart" if step > SLOW_ROW else ""
     if kind and kind not in FREE_RUN_INPUTS:
         reason = f"the input is a {kind}"
-    if not reason:
+    if kind and not reason:
         return MotorFit(input=input)
-    progress(Report(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {reason}", urgent=True))
-    return MotorLine(input=input)
+    if reason:
+        progress(Report(f"{STEADY_STATE}, not {OUTPUT_ERROR}: {reason}", urgent=True))
+    return MotorLine(input=input)  # which names all inputs where there is none
