@@ -23,7 +23,7 @@ from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.paths.motion import Path, Reference
 from omnidyn.control.pid import Pid
 from omnidyn.control.speed_loop import MOST_STEPS, SpeedController
-from omnidyn.export.code.mpc_code import mpc_code, mpc_input, mpc_memory
+from omnidyn.export.code.mpc_code import mpc_code, mpc_input, mpc_memory, mpc_switches
 from omnidyn.export.code.trace import Traced, inputs, statements
 from omnidyn.export.contract import Export
 from omnidyn.export.features import left_out, refuse, refuse_controller
@@ -71,6 +71,8 @@ def _header(law: Any, about: str) -> str:
         "LATE": c_number(late, True),
     } | ({"HORIZON": str(law.horizon)} if predicts else {})
     defines = "\n".join(f"#define OMNIDYN_{name} {text}" for name, text in numbers.items())
+    if predicts:
+        defines = f"{defines}\n{mpc_switches()}"
     return filled(
         _HEADER,
         ABOUT=about,

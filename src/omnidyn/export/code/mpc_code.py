@@ -21,6 +21,7 @@ from omnidyn.control.mpc.model import (
     PHI,
     PSI,
     SOFT_SPEED,
+    TERMS,
     TURNING,
     volts,
 )
@@ -35,6 +36,7 @@ PARTS = ("model.c", "solver.c", "step.c")
 BOUND_TOLERANCE, NARROWEST = 1e-3, 1e-3  # [V]
 # Of the interior point method: where its mean product stops, how fast it falls, passes, [V] from a bound. It need find
 # the bounds that are met alone: the active set finds the inputs.
+FLOAT_SAME_STEP = 1e-5  # of a step: what differs by less is as long
 FINAL_GAP, CENTRING, MOST_PASSES, LEAST_SLACK = 1e-4, 0.1, 30, 2e-6
 
 _INPUT = """/* An input of the horizon: its volts, and room to find them. */
@@ -86,7 +88,24 @@ def mpc_memory(controller: Mpc) -> str:
         f"float x[{n} + 1][6], goal[{n} + 1][6], before[{n}][6], way[{n}][3];",
         f"float columns[{n}][8][6], gain[{n}][3][7];",
     ]
-    return "\n".join(f"    {line}" for line in lines)
+    held = "#if OMNIDYN_ELAPSED\n    float held[9][3], step; /* gains of a step, and its length [s] */\n#endif"
+    return "\n".join([*(f"    {line}" for line in lines), held])
+
+
+def mpc_switches() -> str:
+    """Of its header: parts that may be left out, and how."""
+    return filled(_SWITCHES.strip(), BRIDGED=str(MOST_BRIDGED))
+
+
+_SWITCHES = """
+/* -DOMNIDYN_MOST_BRIDGED=0: a missing measurement gives zeros. -DOMNIDYN_ELAPSED=0: a step takes OMNIDYN_DT, not the
+   time that passed. Less code both. */
+#ifndef OMNIDYN_MOST_BRIDGED
+#define OMNIDYN_MOST_BRIDGED @BRIDGED@
+#endif
+#ifndef OMNIDYN_ELAPSED
+#define OMNIDYN_ELAPSED 1
+#endif"""
 
 
 def _bounded(controller: Mpc) -> bool:
@@ -116,6 +135,7 @@ def _constants(controller: Mpc) -> str:
         "WHEEL_SPEED": controller.output == WHEEL_SPEED,
         "LATE_STEPS": controller.steps_late,
         "PASSES": observer.PASSES,
+        "TERMS": TERMS,
         "SOON": program.COMPARED_STEPS,
         "AGAIN": settings.again,
         "FIRST_PASSES": interior_point.FIRST,
@@ -124,6 +144,7 @@ def _constants(controller: Mpc) -> str:
     }
     numbers = {
         "FARTHEST": LARGEST_STATE,
+        "SAME_STEP": FLOAT_SAME_STEP,
         "EXACT": observer.STICKING_SHARE,
         "LAST_WEIGHT": settings.last,
         "VOLTS_WEIGHT": settings.volts,
@@ -150,9 +171,6 @@ def _constants(controller: Mpc) -> str:
     if settings.slew is not None:
         numbers["SLEW_STEP"] = settings.slew * controller.dt
     lines = [
-        "#ifndef OMNIDYN_MOST_BRIDGED /* -DOMNIDYN_MOST_BRIDGED=0: a missing measurement gives zeros, in less code */",
-        f"#define OMNIDYN_MOST_BRIDGED {MOST_BRIDGED}",
-        "#endif",
         "#if OMNIDYN_MOST_BRIDGED",
         "#define MISSING (c->missing)",
         "#else",

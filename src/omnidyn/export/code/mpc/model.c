@@ -9,7 +9,14 @@
 #define ROLLED
 #endif
 
-#define PHI(i) GAINS[3 + (i)] /* rows of DECAY, PHI, PSI are those of GAINS */
+#if OMNIDYN_ELAPSED /* the gains and the length of the step that is looked at */
+#define HELD c->held
+#define STEP c->step
+#else
+#define HELD GAINS
+#define STEP OMNIDYN_DT
+#endif
+#define PHI(i) HELD[3 + (i)] /* rows of DECAY, PHI, PSI are those of the gains */
 
 static float within(float value, float most)
 {
@@ -38,6 +45,69 @@ static float dot3(const float *a, const float *b)
 {
     return dot(a, b, 3);
 }
+
+#if OMNIDYN_ELAPSED
+/* Add a product, times a number, to a matrix. */
+static void add_product(float by, float a[3][3], float b[3][3], float sum[3][3])
+{
+    int i, j, k;
+    ROLLED for (i = 0; i < 3; i++) {
+        ROLLED for (j = 0; j < 3; j++) {
+            ROLLED for (k = 0; k < 3; k++) {
+                sum[i][j] += by * a[i][k] * b[k][j];
+            }
+        }
+    }
+}
+
+/* What is summed up becomes `by` times the rates times itself, and `one` on the diagonal; next is room. */
+static void next_term(float by, float rates[3][3], float sum[3][3], float one, float next[3][3])
+{
+    int i;
+    memset(next, 0, 9 * sizeof(float));
+    ROLLED for (i = 0; i < 3; i++) {
+        next[i][i] = one;
+    }
+    add_product(by, rates, sum, next);
+    memcpy(sum, next, 9 * sizeof(float));
+}
+
+/* The gains for a step of another length: with d what it is longer, e^(A d) = I + A PHI_d by its series, once = PHI_d/d
+   and twice = PSI_d/d^2. */
+static void hold_for(omnidyn_control *c, float step)
+{
+    const float d = step - OMNIDYN_DT;
+    float(*room)[3][3] = (float(*)[3][3])c->columns; /* the program of this step is yet to come */
+    float(*decay)[3] = room[0], (*rates)[3] = room[1], (*once)[3] = room[2], (*twice)[3] = room[3], (*next)[3] = room[4];
+    int i, k;
+    c->step = step;
+    memcpy(c->held, GAINS, sizeof(c->held));
+    if (fabsf(d) <= SAME_STEP * OMNIDYN_DT) {
+        return;
+    }
+    memset(room, 0, 4 * sizeof(*room));
+    memcpy(decay, GAINS, sizeof(*room));
+    memcpy(next, FEED, sizeof(*room));
+    ROLLED for (i = 0; i < 3; i++) {
+        decay[i][i] -= 1.0f;
+    }
+    add_product(1.0f, decay, next, rates);
+    memcpy(decay, GAINS, sizeof(*room));
+    for (k = TERMS; k > 0; k--) {
+        next_term(d / (float)(k + 1), rates, once, 1.0f, next);
+        next_term(d / (float)(k + 2), rates, twice, 0.5f, next);
+    }
+    memset(next, 0, sizeof(*room));
+    add_product(d, rates, once, next);
+    add_product(1.0f, decay, next, c->held);
+    add_product(d, decay, once, c->held + 3);
+    add_product(d * d, decay, twice, c->held + 6);
+    ROLLED for (i = 0; i < 9; i++) {
+        c->held[6 + i / 3][i % 3] += d * GAINS[3 + i / 3][i % 3];
+    }
+    memset(room, 0, 5 * sizeof(*room)); /* entries of `columns` that stay 0 are not written */
+}
+#endif
 
 /* How friction is taken: falling to 0 below a small speed; with the wider slope that the program needs; as good as not
    falling at all. */
@@ -115,11 +185,11 @@ static void linear_stage(const omnidyn_control *c, const float *x, const float *
     }
     /* both: of twist and displacement, what K stands for (3), then twist, constant, drive. */
     ROLLED for (i = 0; i < 6; i++) {
-        const float *gain = GAINS[3 + i];
+        const float *gain = HELD[3 + i];
         float *row = both[i];
         ROLLED for (j = 0; j < 3; j++) {
             row[j] = dot3(gain, f[1 + j]);
-            row[3 + j] = GAINS[i][j];
+            row[3 + j] = HELD[i][j];
             row[7 + j] = gain[j];
         }
         row[6] = dot3(gain, f[0]) + dot3(row, end);
@@ -134,7 +204,7 @@ static void linear_stage(const omnidyn_control *c, const float *x, const float *
             n[i] = -n[i];
         }
         ROLLED for (i = 0; i < 6; i++) {
-            const float *gain = GAINS[3 + i];
+            const float *gain = HELD[3 + i];
             both[i][6] += dot3(gain, n);
             ROLLED for (j = 0; j < 3; j++) {
                 ROLLED for (p = 0; p < 3; p++) {
@@ -161,13 +231,13 @@ static void linear_stage(const omnidyn_control *c, const float *x, const float *
             }
         }
     }
-    angle = (twist[2] + end[2]) * (0.25f * OMNIDYN_DT);
+    angle = (twist[2] + end[2]) * (0.25f * STEP);
     sine = 1.0f - angle * angle / 6.0f; /* a chord is shorter than its arc */
     angle += x[2];
     cosine = sine * cosf(c->base[2] + angle);
     sine *= sinf(c->base[2] + angle);
-    f[0][0] = (twist[0] + end[0]) * (0.5f * OMNIDYN_DT);
-    f[0][1] = (twist[1] + end[1]) * (0.5f * OMNIDYN_DT);
+    f[0][0] = (twist[0] + end[0]) * (0.5f * STEP);
+    f[0][1] = (twist[1] + end[1]) * (0.5f * STEP);
     turn[0] = -sine * f[0][0] - cosine * f[0][1];
     turn[1] = cosine * f[0][0] - sine * f[0][1];
     turn[2] = 1.0f;

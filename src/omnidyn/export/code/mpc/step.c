@@ -7,10 +7,10 @@
 /* The mean of the twist over a step from `before`, as encoders count it. */
 static void mean_twist(const omnidyn_control *c, const float before[6], float mean[3])
 {
-    const float *pose = c->believed[0], turn = 0.25f * (before[5] + c->believed[1][2]) * OMNIDYN_DT;
-    const float per = 1.0f / ((1.0f - turn * turn / 6.0f) * OMNIDYN_DT);
+    const float *pose = c->believed[0], turn = 0.25f * (before[5] + c->believed[1][2]) * STEP;
+    const float per = 1.0f / ((1.0f - turn * turn / 6.0f) * STEP);
     seen(c->base[2] + before[2] + turn, per * (pose[0] - before[0]), per * (pose[1] - before[1]), mean);
-    mean[2] = (pose[2] - before[2]) / OMNIDYN_DT;
+    mean[2] = (pose[2] - before[2]) / STEP;
 }
 #endif
 
@@ -55,7 +55,6 @@ static void observe(omnidyn_control *c, const float *measured, int known)
         const float left = MISSING ? 0.0f : measured[3 + i] - *twist, off = MISSING ? 0.0f : measured[i] - *pose;
 #endif
         const float by[3] = {c->columns[0][1 + i][3 + i], PHI(i)[i], -PHI(i)[i] * force[0][i]};
-        const float noise = NOISE[i];
         float r, gain[3];
         ROLLED for (j = 0; j < 3; j++) {
             p[0][j] = by[0] * p[0][j] + by[1] * p[1][j] + by[2] * p[2][j];
@@ -71,8 +70,8 @@ static void observe(omnidyn_control *c, const float *measured, int known)
         }
 #if AVERAGED /* what is measured is (twist + twist+)/2 */
         moved[i] = 0.25f * (begin + 2.0f * across[0] + p[0][0]);
-        r = known ? 1.0f / (moved[i] + noise) : 0.0f;
-        moved[i] *= OMNIDYN_DT * r * left;
+        r = known ? 1.0f / (moved[i] + NOISE[i]) : 0.0f;
+        moved[i] *= STEP * r * left;
         ROLLED for (j = 0; j < 3; j++) {
             across[j] = 0.5f * (across[j] + p[j][0]);
             gain[j] = across[j] * r;
@@ -84,7 +83,7 @@ static void observe(omnidyn_control *c, const float *measured, int known)
             }
         }
 #else
-        r = known ? 1.0f / (p[0][0] + noise) : 0.0f;
+        r = known ? 1.0f / (p[0][0] + NOISE[i]) : 0.0f;
         ROLLED for (j = 0; j < 3; j++) {
             gain[j] = p[j][0] * r;
             c->believed[1 + j][i] += gain[j] * left;
@@ -107,8 +106,10 @@ static void observe(omnidyn_control *c, const float *measured, int known)
 #else
             *twist = measured[3 + i];
 #endif
-            p[0][1] = p[1][0] = p[0][2] = p[2][0] = 0.0f;
-            p[0][0] = noise;
+            ROLLED for (j = 0; j < 3; j++) {
+                p[0][j] = p[j][0] = 0.0f;
+            }
+            p[0][0] = NOISE[i];
         }
 #if AVERAGED
     }
@@ -332,7 +333,9 @@ static void control(omnidyn_control *c, const float *pose, const float *twist, c
     float measured[6];
     int k, i, again;
     ROLLED for (i = 0; i < 3; i++) { /* all poses are relative to where the path begins: small numbers are exact */
-        const float from = path[0].pose[i], by = i == 2 ? remainderf(from - c->base[2], TURN) : from - c->base[i];
+        const float from = path[0].pose[i];
+        float by = from - c->base[i];
+        by = i == 2 ? remainderf(by, TURN) : by;
         c->base[i] = from;
         c->believed[0][i] -= by;
         for (k = 0; k <= OMNIDYN_HORIZON; k++) {
@@ -356,6 +359,9 @@ static void control(omnidyn_control *c, const float *pose, const float *twist, c
     memcpy(c->believed, measured, sizeof(measured));
     memcpy(c->x, measured, sizeof(measured));
 #endif
+#if OMNIDYN_ELAPSED
+    hold_for(c, OMNIDYN_DT);
+#endif
     for (k = 1; k <= LATE_STEPS; k++) {
         run_on(c, c->x[0], c->sent[k]);
     }
@@ -372,8 +378,9 @@ static void control(omnidyn_control *c, const float *pose, const float *twist, c
             return;
         }
         for (k = 0; k < OMNIDYN_HORIZON; k++) { /* half-way between two predictions */
+            float *x = c->x[k + 1];
             ROLLED for (i = 3; i < 6; i++) {
-                c->x[k + 1][i] = 0.5f * (c->x[k + 1][i] + c->before[k][i]);
+                x[i] = 0.5f * (x[i] + c->before[k][i]);
             }
         }
 #if BOUNDED
@@ -427,6 +434,9 @@ int omnidyn_control_step(omnidyn_control *c, float elapsed, const float pose[3],
         says = OMNIDYN_BAD_TIME;
     }
     if (says == OMNIDYN_OK) {
+#if OMNIDYN_ELAPSED
+        hold_for(c, known ? elapsed : OMNIDYN_DT);
+#endif
         control(c, pose, twist, path, known);
         if (!sane(c->x[1], 6)) {
             says = OMNIDYN_FAILED;
