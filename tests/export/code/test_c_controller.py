@@ -12,6 +12,7 @@ from omnidyn.control.paths.motion import Path, Reference
 from omnidyn.errors import InputError, UnsupportedError
 from omnidyn.export.code.c_controller import c_controller
 from omnidyn.export.features import CONTROLLERS, REFUSES, Cell
+from omnidyn.model.log_effects import Sensors
 from omnidyn.model.motor import Drive
 from tests.support.controlled import CController
 from tests.support.exported import STRICT, exact_robot
@@ -202,3 +203,23 @@ def test_a_latency_that_is_no_whole_number_of_steps_is_refused_for_the_predictiv
     with pytest.raises(UnsupportedError, match=r"1\.5 steps of 0\.02 s.*export it with `dt` 0\.015"):
         c_controller(robot, controller="mpc")
     assert c_controller(robot, controller="mpc", dt=0.015).files
+
+
+@pytest.mark.parametrize("name", ["pid", "mpc"])
+@pytest.mark.parametrize("twist", ["mean", "instantaneous"])
+def test_a_late_pose_is_brought_up_to_now_as_in_python(name, twist, tmp_path):
+    """A camera of 30 Hz and 50 ms in a loop that trembles, with a sample that is missing."""
+    robot = ROBOT.replace(sensors=Sensors(twist=twist, pose_delay=0.05, pose_rate=30.0))
+    follow, rng, apart = omnidyn.path("eight"), np.random.default_rng(4), []
+    times = 0.02 * np.arange(120) + [0.0, *rng.uniform(-0.003, 0.003, 119)]
+    with CController(robot, tmp_path / "c", name) as control:
+        for k, t in enumerate(times):
+            old = follow.at(np.floor((t - 0.05) * 30.0) / 30.0).pose + np.array([1e-3, -2e-3, 4e-3])
+            measured = np.array([*old, *follow.twist_at(t - (0.01 if twist == "mean" else 0.0))[1]])
+            if k in (50, 51):
+                measured[k - 47] = np.nan
+            measured = np.float32(measured).astype(float)
+            own = control.own.step(t, measured[:3], measured[3:], follow)
+            apart.append(np.abs(control.step(t, measured[:3], measured[3:], follow) - own).max() / 6.0)
+    assert np.median(apart) < 1e-3
+    assert np.percentile(apart, 90) < 1e-2

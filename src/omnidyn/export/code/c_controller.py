@@ -8,10 +8,12 @@ What it works out is traced from the controllers of Python (trace.py): there is 
 
 from __future__ import annotations
 
+import math
 import os
 import textwrap
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
@@ -36,7 +38,6 @@ NOTES = (
     "compile with -std=c99 and without -ffast-math, which would take away the tests for numbers that are none",
     "one omnidyn_control for each robot, reset once; nothing else is remembered, no memory is taken",
 )
-LATE_POSE = "poses that arrive late ([sensors] pose_delay_s): give it the pose as of now, by the turns of wheels"
 _UNITS = {"voltage": "volts at the motors", "duty": "duties, -1 to 1", "wheel_speed": "speeds of the wheels [rad/s]"}
 
 
@@ -52,14 +53,13 @@ def c_controller(robot: Robot, controller: str | os.PathLike = "pid", dt: float 
     refuse_controller(KIND, spec.controller)
     refuse(KIND, robot)
     law, omissions = spec.make(robot, dt=dt), left_out(KIND, robot)
-    if robot.sensor_model.pose_age(dt) > 0.0:
-        omissions = (*omissions, LATE_POSE)
     predicts = isinstance(law, Mpc)
     code = mpc_code(law) if predicts else control_code(law)  # pyright: ignore[reportArgumentType]  none is refused
     about = [f"{law.name} of {robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in omissions)]
     head = c_comment(about)
-    files = {"omnidyn_control.h": _header(law, head), "omnidyn_control.c": f"{head}\n{_INCLUDES}\n{code}\n"}
-    return Export(KIND, robot.name, files, omissions, NOTES, folder=True)
+    code = "\n\n".join([f"{head}\n{_INCLUDES.rstrip()}", _late_pose_code(law), code])
+    texts = {"omnidyn_control.h": _header(law, head), "omnidyn_control.c": f"{code}\n"}
+    return Export(KIND, robot.name, texts, omissions, NOTES, folder=True)
 
 
 def _header(law: Any, about: str) -> str:
@@ -78,13 +78,45 @@ def _header(law: Any, about: str) -> str:
         ABOUT=about,
         DEFINES=defines,
         UNITS=_UNITS[law.output],
-        MEMORY=mpc_memory(law) if predicts else _MEMORY,
-        INPUT=f"{mpc_input(law)}\n\n" if predicts else "",
+        MEMORY=(mpc_memory(law) if predicts else _MEMORY) + ("\n    omnidyn_late late;" if _is_late(law) else ""),
+        INPUT=(f"{mpc_input(law)}\n\n" if predicts else "")
+        + (f"{filled(_LATE, ROWS=str(_late_rows(law))).strip()}\n\n" if _is_late(law) else ""),
         AHEAD=_AHEAD if predicts else _NOW_AND_AHEAD,
         ROWS="OMNIDYN_HORIZON + 1" if predicts else "3",
         BRIDGED=str(MOST_BRIDGED),
     ).lstrip()
 
+
+# Poses that arrive late, as of now
+
+
+def _is_late(law: Any) -> bool:
+    """Whether the poses of its robot are old when they arrive."""
+    return law.sensors.pose_age(law.dt) > 0.0
+
+
+def _late_rows(law: Any) -> int:
+    """How many steps are kept, where they may be half as long as they should be; 0 where poses are new."""
+    return math.ceil(2.0 * law.sensors.pose_age(law.dt) / law.dt) + 2 if _is_late(law) else 0
+
+
+def _late_pose_code(law: Any) -> str:
+    """The function that brings a late pose up to now, none where poses are new."""
+    if not _is_late(law):
+        return "#define LATE_ROWS 0"
+    numbers = {"ROWS": _late_rows(law), "MEAN": int(law.sensors.averaged), "AGE": _c(law.sensors.pose_age(law.dt))}
+    defines = "\n".join(f"#define LATE_{name} {value}" for name, value in numbers.items())
+    text = files("omnidyn.export.code").joinpath("late_pose.c").read_text("utf-8")
+    return f"#include <string.h>\n\n{defines}\n\n{text.strip()}"
+
+
+_LATE = """
+/* Places of the last steps, seen from where the robot is now, and the pose that arrived last. */
+typedef struct {
+    float age[@ROWS@], place[@ROWS@][3], seen[3], then[3], twist[3], waited;
+    int count, known;
+} omnidyn_late;
+"""
 
 _INCLUDES = '#include "omnidyn_control.h"\n\n#include <math.h>\n'
 
@@ -436,12 +468,18 @@ void omnidyn_control_reset(omnidyn_control *self)
         self->last[k] = 0.0f;
     }
     self->begun = self->missing = 0;
+#if LATE_ROWS
+    memset(&self->late, 0, sizeof(self->late));
+#endif
 }
 
 int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[3], const float twist[3],
                          const omnidyn_motion path[3], float output[OMNIDYN_WHEELS])
 {
     int k, limited, why, begun = self->begun;
+#if LATE_ROWS
+    float now[3];
+#endif
     if (!sane(&elapsed, 1)) {
         return safe(self, output, OMNIDYN_BAD_TIME);
     }
@@ -458,6 +496,14 @@ int omnidyn_control_step(omnidyn_control *self, float elapsed, const float pose[
         return OMNIDYN_STILL;
     }
     why = !sane(pose, 3) ? OMNIDYN_BAD_POSE : !sane(twist, 3) ? OMNIDYN_BAD_TWIST : OMNIDYN_OK;
+#if LATE_ROWS
+    if (why == OMNIDYN_OK) {
+        pose_now(&self->late, elapsed, pose, twist, now);
+        pose = now;
+    } else {
+        self->late.waited += elapsed;
+    }
+#endif
     if (why != OMNIDYN_OK && begun && elapsed < @LATEST@ && self->missing < @BRIDGED@) { /* the last output again */
         self->missing++;
         for (k = 0; k < OMNIDYN_WHEELS; k++) {

@@ -417,6 +417,17 @@ int omnidyn_control_step(omnidyn_control *c, float elapsed, const float pose[3],
     if (!sane(pose, 3)) {
         says = OMNIDYN_BAD_POSE;
     }
+#if LATE_ROWS
+    float now[3];
+    if (elapsed >= 0.0f && elapsed <= FARTHEST) {
+        if (says == OMNIDYN_OK) {
+            pose_now(&c->late, elapsed, pose, twist, now);
+            pose = now;
+        } else {
+            c->late.waited += elapsed;
+        }
+    }
+#endif
 #if OMNIDYN_MOST_BRIDGED
     c->missing = says ? c->missing + 1 : 0;
     if (known && c->missing <= OMNIDYN_MOST_BRIDGED) {
