@@ -15,7 +15,6 @@ import numpy as np
 from benchmarks.control_real import ALLOWED, COUNTS, OURS, POSE_NOISE, Instruments, errors, makers
 from benchmarks.control_real.paths import paths
 from benchmarks.control_real.plant import Plant
-from benchmarks.control_real.rivals import DT
 from benchmarks.control_real.robots import NUMBERS, Numbers
 from benchmarks.table import Table, machine
 from omnidyn.arrays import FloatArray
