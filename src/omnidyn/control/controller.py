@@ -78,8 +78,8 @@ class Info:
 
     @property
     def ok(self) -> bool:
-        """Whether the output is what the controller wanted to send, a path at its end included."""
-        return self.status in (OK, PATH_ENDED)
+        """Whether the output is what the controller wanted to send: for a path that ended or a doubtful state, too."""
+        return self.status in (OK, PATH_ENDED, *DOUBTS.values())
 
 
 class Followed(Protocol):

@@ -210,8 +210,8 @@ class Mpc:
             verdict = self._gate.judge(float(t), state)
             sent = self._solved(t, since, path, start)
             self._missing = 0
-            if verdict != TRUSTED:
-                self._asked = (DOUBTS.get(verdict, self._asked[0]), self._asked[1], self._asked[2])
+            if verdict != TRUSTED and self._asked[0] in (OK, PATH_ENDED):
+                self._asked = (DOUBTS[verdict], *self._asked[1:])
             return sent
         except Exception as raised:  # the loop of a robot must not end here, but where a user ends it
             error = told_by(raised)
