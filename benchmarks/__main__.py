@@ -35,6 +35,7 @@ NAMES = {
     "control": "tracking on the eight references of the peers, seven conditions, every controller (three minutes)",
     "control_plants": "tracking of richer robots: identified numbers beside those of a data sheet (two minutes)",
     "control_real": "closed loops on an independent plant with real sensors, beside hand PID and LQR (a minute)",
+    "control_mismatch": "the same with wrong friction, payload, slip, jumps, missing samples, latency (a minute)",
     "coloured": "output error where errors have a memory: coverage, std beside the Cramer-Rao bound (an hour)",
     "forces": "a right robot under random forces of the floor: what is found, what intervals hold (ten minutes)",
     "ten_robots": "ten robots of a simulator of its own: init, then identify: coverage, what is reported (10 minutes)",

@@ -89,7 +89,7 @@ def test_what_is_missing_gives_zeros_and_a_word(name, pose, twist, path, word):
         assert control.info.status == BRIDGED[word]
     np.testing.assert_array_equal(control.step(0.02 + 0.02 * bridged, pose, twist, path), np.zeros(3))
     assert control.info.status == word
-    assert control.step(0.04 + 0.02 * bridged, REST, REST, EIGHT).shape == (3,)
+    assert control.step(0.04 + 0.02 * bridged, [0.1, 0.1, 0.1], REST, EIGHT).shape == (3,)
     assert control.info.status == OK
 
 
@@ -176,8 +176,9 @@ def test_reset_forgets_all_steps(name):
 def test_another_robot_takes_over_what_is_remembered(name):
     control, other = controller_named(name, AXEBOT), controller_named(name, AXEBOT)
     for k in range(10):
-        control.step(0.02 * k, [0.05, 0.02, 0.1], REST, EIGHT)
-        other.step(0.02 * k, [0.05, 0.02, 0.1], REST, EIGHT)
+        near = [0.01, -0.02, 0.03] + EIGHT.twist_at(0.02 * k)[0]
+        control.step(0.02 * k, near, REST, EIGHT)
+        other.step(0.02 * k, near, REST, EIGHT)
     same, heavy = (
         control.replace(robot=AXEBOT),
         control.replace(robot=AXEBOT.replace(body=AXEBOT.body.replace(mass=3.0))),

@@ -35,6 +35,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.control.late_pose import LatePose, late_pose
 from omnidyn.control.paths.adapter import as_path
+from omnidyn.control.pose_gate import JUMPED, REPEATED, SLIPPED, PoseGate
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.motor import DUTY, SPEED, no_load_speed
 from omnidyn.model.robot import Robot
@@ -48,6 +49,11 @@ BAD_POSE, BAD_TWIST, BAD_COMMAND = "pose missing", "twist missing", "command mis
 BAD_PATH, FAILED = "no path", "no output found"
 INACCURATE = "inaccurate"  # the output is sent, but rounding may have moved it
 BRIDGED = {word: f"{word}: bridged" for word in (BAD_POSE, BAD_TWIST, BAD_COMMAND)}
+DOUBTS = {
+    JUMPED: "pose jumped: followed slowly",
+    SLIPPED: "twist disagrees with poses: corrected",
+    REPEATED: "measurement repeated: moved on",
+}
 MOST_BRIDGED = 2  # measurements missing in a row
 LATEST = 1.5  # steps after the one before: what comes later is not gone on from
 MOST_SUPPLY = 1e4  # [V]
@@ -72,8 +78,8 @@ class Info:
 
     @property
     def ok(self) -> bool:
-        """Whether the output is what the controller wanted to send, a path at its end included."""
-        return self.status in (OK, PATH_ENDED)
+        """Whether the output is what the controller wanted to send: for a path that ended or a doubtful state, too."""
+        return self.status in (OK, PATH_ENDED, *DOUBTS.values())
 
 
 class Followed(Protocol):
@@ -236,16 +242,20 @@ class Guarded(Safe, ABC):
     """A controller whose steps are checked before and after it sees them; subclasses write `_output`."""
 
     _late_pose: LatePose | None = None
+    _gate: PoseGate | None = None
 
     def _take(self, robot: Robot) -> None:
         super()._take(robot)
         self._late_pose = late_pose(robot, self.dt, self._late_pose)
+        self._gate = PoseGate(robot, self.dt) if self._gate is None else self._gate.replaced(robot)
 
     def reset(self) -> None:
         """Forget all steps."""
         super().reset()
         if self._late_pose is not None:
             self._late_pose.reset()
+        if self._gate is not None:
+            self._gate.reset()
 
     def step(self, t: float, pose: Any, twist: Any, path: Any, supply: float | None = None) -> FloatArray:
         """What to send to the drive from t [s] on. Shape (wheels,). Never raises."""
@@ -259,8 +269,12 @@ class Guarded(Safe, ABC):
             word = f"{FAILED}: {type(raised).__name__}" if callable(getattr(path, "at", None)) else BAD_PATH
             return self._guarded(t, word, "", None)
         status = PATH_ENDED if _ended(follow, t) else OK
-        if self._late_pose is not None and math.isfinite(now := _number(t)):
-            place = self._late_pose.now(now, place, speed)
+        if math.isfinite(now := _number(t)):
+            if self._late_pose is not None:
+                place = self._late_pose.now(now, place, speed)
+            state = np.concatenate([place, speed])
+            status = DOUBTS.get(self._gate.judge(now, state), status)
+            place, speed = state[:3], state[3:]
         return self._guarded(t, "", status, lambda dt: self._output(float(t), dt, place, speed, follow))
 
     @abstractmethod

@@ -24,6 +24,7 @@ from omnidyn.control.controller import (
     BAD_TIME,
     BAD_TWIST,
     BRIDGED,
+    DOUBTS,
     FAILED,
     INACCURATE,
     LATEST,
@@ -48,6 +49,7 @@ from omnidyn.control.mpc.loop import INACCURATE_STEP, NO_STATE, Batch, Memory, M
 from omnidyn.control.mpc.model import numbers, volts
 from omnidyn.control.mpc.observer import PUSH, SCALE
 from omnidyn.control.mpc.settings import Preview, Settings
+from omnidyn.control.pose_gate import TRUSTED, PoseGate
 from omnidyn.errors import INTERRUPTS, InputError, told_by
 from omnidyn.model.robot import Robot
 from omnidyn.model.surroundings import refuse_slope
@@ -68,6 +70,7 @@ class Mpc:
 
     name = "mpc"
     _late_pose: LatePose | None = None
+    _gate: PoseGate | None = None
 
     def __init__(
         self,
@@ -116,6 +119,7 @@ class Mpc:
         self.robot_settings = self.settings.of(robot)
         self._tables = self.settings.tables(robot, self.dt, self.observer)
         self._late_pose = late_pose(robot, self.dt, self._late_pose)
+        self._gate = PoseGate(robot, self.dt) if self._gate is None else self._gate.replaced(robot)
         self._control = None  # compiled by the first step
 
     def reset(self) -> None:
@@ -126,6 +130,7 @@ class Mpc:
         self._state, self._missing, self._since = np.zeros(6), 0, math.nan
         if self._late_pose is not None:
             self._late_pose.reset()
+        self._gate.reset()
 
     def replace(self, *, robot: Robot) -> Self:
         """The same controller for another robot. Where the friction is another, its share is learned anew."""
@@ -165,7 +170,7 @@ class Mpc:
     def info(self) -> Info:
         """What the last step did."""
         status, iterations, took = self._asked
-        if status not in (OK, PATH_ENDED, INACCURATE):
+        if status not in (OK, PATH_ENDED, INACCURATE, *DOUBTS.values()):
             return Info(status, iterations, took)
         return Info(status, iterations, took, self._memory.x[1:, :3].copy(), self._met())
 
@@ -202,8 +207,11 @@ class Mpc:
             if self._late_pose is not None:
                 pose = self._late_pose.now(t, pose, twist)
             state[:3], state[3:] = pose, twist
+            verdict = self._gate.judge(float(t), state)
             sent = self._solved(t, since, path, start)
             self._missing = 0
+            if verdict != TRUSTED and self._asked[0] in (OK, PATH_ENDED):
+                self._asked = (DOUBTS[verdict], *self._asked[1:])
             return sent
         except Exception as raised:  # the loop of a robot must not end here, but where a user ends it
             error = told_by(raised)
