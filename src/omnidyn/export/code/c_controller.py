@@ -37,6 +37,7 @@ NOTES = (
     "one omnidyn_control for each robot, reset once; nothing else is remembered, no memory is taken",
 )
 LATE_POSE = "poses that arrive late ([sensors] pose_delay_s): give it the pose as of now, by the turns of wheels"
+FILTERED = "a filter of the speeds ([sensors] twist_filter_s): give it means over a step, by the turns of wheels"
 _UNITS = {"voltage": "volts at the motors", "duty": "duties, -1 to 1", "wheel_speed": "speeds of the wheels [rad/s]"}
 
 
@@ -54,6 +55,8 @@ def c_controller(robot: Robot, controller: str | os.PathLike = "pid", dt: float 
     law, omissions = spec.make(robot, dt=dt), left_out(KIND, robot)
     if robot.sensor_model.pose_age(dt) > 0.0:
         omissions = (*omissions, LATE_POSE)
+    if law.sensors.twist_filter > 0.0:
+        omissions = (*omissions, FILTERED)
     predicts = isinstance(law, Mpc)
     code = mpc_code(law) if predicts else control_code(law)  # pyright: ignore[reportArgumentType]  none is refused
     about = [f"{law.name} of {robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in omissions)]
