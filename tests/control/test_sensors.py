@@ -65,7 +65,7 @@ def test_a_pose_that_is_late_is_moved_by_what_was_counted_since():
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize("share", [0.55, 0.9, 1.3, 1.49])
+@pytest.mark.parametrize("share", [0.55, 0.9, 1.3, 1.49, 2.4])
 def test_a_step_of_another_length_is_that_of_its_own_numbers(seed, share):
     """Against the matrix exponential of that length."""
     robot, dt = random_robot(seed), 0.02

@@ -22,6 +22,12 @@ if TYPE_CHECKING:
 
 
 MOST_CONTROLLERS = 12
+SENSORS = typer.Option(
+    "",
+    "--sensors",
+    metavar="SPEC",
+    help="encoder:2048, filter:30ms, pose:60Hz,40ms, dropouts:5%, jitter:2ms, missed:1%; default: [sensors].",
+)
 
 
 def track(
@@ -44,7 +50,8 @@ def track(
     no_observer: bool = typer.Option(False, "--no-observer", help="No observer of what the model misses."),
     noise: float = typer.Option(0.0, help="Std of the measured speeds [m/s]; other measurements in proportion."),
     delay: int = typer.Option(0, help="Steps until an output acts."),
-    seed: int = typer.Option(0, min=0, help="Of the noise."),
+    sensors: str = SENSORS,
+    seed: int = typer.Option(0, min=0, help="Of the noise, and of what sensors lose."),
     dt: float = typer.Option(0.02, help="Time between two steps [s]."),
     duration: float | None = typer.Option(None, help="How long to track [s]; default: as long as the path."),
     horizon: int | None = typer.Option(None, min=1, help="Steps that an mpc looks ahead."),
@@ -63,12 +70,14 @@ def track(
     keep_inputs([], [robot, plant], files, out, report, gif)
     from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
     from omnidyn.control.controllers import several
+    from omnidyn.control.instruments import instruments, told
     from omnidyn.control.tracking import trackings_document
     from omnidyn.model.vary import vary_as
 
-    around = Circumstances(dt, duration, skip, noise, delay, seed)
-    believed = omnidyn.load_robot(robot)
-    driven, follow = vary_as(omnidyn.load_robot(plant) if plant else believed, with_), omnidyn.path(path)
+    in_file = omnidyn.load_robot(robot)
+    driven, follow = vary_as(omnidyn.load_robot(plant) if plant else in_file, with_), omnidyn.path(path)
+    kit, believed = instruments(sensors or None, driven), told(in_file, sensors or None)
+    around = Circumstances(dt, duration, skip, noise, delay, seed, sensors=kit)
     demand, options = omnidyn.path_demand(believed, follow), told_of_loop(believed, around)
     options |= {} if horizon is None else {"horizon": horizon}
     trackings: list[Tracking] = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, overload
 
@@ -15,10 +15,12 @@ from omnidyn.arrays import FloatArray
 from omnidyn.control.controller import OK, Controller
 from omnidyn.control.controllers import ControllerFile, controller_named, told_apart
 from omnidyn.control.feedforward import DT, check_dt
+from omnidyn.control.instruments import MOST_JITTER, Instruments, Readings, instruments, told
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import path as path_named
 from omnidyn.control.tracking import Tracking, Trackings
 from omnidyn.errors import InputError
+from omnidyn.model.log_effects import Sensors
 from omnidyn.model.motor import DUTY, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.run import Run
@@ -29,6 +31,7 @@ MOST_STEPS = 1_000_000
 MOST_DELAY = 100
 # What a noise of 1 m/s on the speeds is on the others: x, y [m], heading [rad], v_x, v_y [m/s], omega [rad/s].
 NOISE = np.array([0.2, 0.2, 0.4, 1.0, 1.0, 4.0])
+Push = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -36,8 +39,9 @@ class Circumstances:
     """Under what a robot is driven. dt [s]; duration [s], None: that of the path; skip [s]: no errors before it.
 
     noise [m/s]: std of the measured speeds; of omega 4 times as many rad/s, of x and y 0.2 s, of the heading 0.4 s
-    times. delay: steps until an output acts. push: constant wrench on the body [N, N, N m]. seed: of the noise.
-    supply [V]: behind a duty.
+    times, where no encoder counts. delay: steps until an output acts. push: wrench on the body [N, N, N m], or what it
+    is at a time [s]. seed: of the noise, and of what instruments draw. supply [V]: behind a duty. sensors: with which
+    the robot is measured, None: those of its file.
     """
 
     dt: float = DT
@@ -46,8 +50,9 @@ class Circumstances:
     noise: float = 0.0
     delay: int = 0
     seed: int = 0
-    push: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    push: Push | Callable[[float], Push] = (0.0, 0.0, 0.0)
     supply: float | None = None
+    sensors: Instruments | None = None
 
     def __post_init__(self) -> None:
         check_dt(self.dt)
@@ -55,6 +60,13 @@ class Circumstances:
             value = getattr(self, name)
             if not low <= value <= high:
                 raise InputError("out of range", got=value, expected=f"{low:g} to {high:g}", where=name)
+        if self.sensors is not None and not self.sensors.jitter <= MOST_JITTER * self.dt:
+            raise InputError(
+                "the jitter is no part of a step",
+                got=f"{self.sensors.jitter:g} s",
+                expected=f"at most {MOST_JITTER * self.dt:g} s, half of dt",
+                where="sensors",
+            )
         if self.duration is not None and not self.dt <= self.duration <= MOST_STEPS * self.dt:
             raise InputError(
                 "cannot track for that long",
@@ -92,8 +104,9 @@ def track(  # pyright: ignore[reportInconsistentOverload]  it has the options by
     noise: float = 0.0,
     delay: int = 0,
     seed: int = 0,
-    push: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    push: Push | Callable[[float], Push] = (0.0, 0.0, 0.0),
     supply: float | None = None,
+    sensors: str | Instruments | Sensors | None = None,
 ) -> Tracking | Trackings:
     """Drive a simulated robot along a path with a controller, and see how near it comes; or with several, one by one.
 
@@ -111,11 +124,13 @@ def track(  # pyright: ignore[reportInconsistentOverload]  it has the options by
         duration: That is tracked [s]; that of the path by default.
         skip: Errors before it count for nothing [s]: the start from rest is no error of tracking.
         noise: Std of the measured speeds [m/s]; on omega 4 times as many rad/s, on x and y 0.2 s, on the heading 0.4 s
-            times as much.
+            times as much. Nothing that an encoder counts has it.
         delay: Steps until an output acts.
         seed: Of the noise.
-        push: A constant wrench on the body [N, N, N m] that no model knows.
+        push: A wrench on the body [N, N, N m] that no model knows: a constant, or a function of the time [s].
         supply: Behind a duty [V].
+        sensors: With which the robot is measured, such as "encoder:2048,pose:60Hz,40ms" (control/instruments.py); a
+            controller that is made here knows of them. By default those of the [sensors] of the plant's file.
 
     Raises InputError for what cannot be driven, or a number out of range.
     """
@@ -123,13 +138,15 @@ def track(  # pyright: ignore[reportInconsistentOverload]  it has the options by
     check_order("track(robot, path, controller)", (robot, Robot), (path, kinds), (controller, object))
     if not 0 <= delay <= MOST_DELAY or delay != int(delay):
         raise InputError("no delay in steps", got=delay, expected=f"0 to {MOST_DELAY}", where="delay")
-    around = Circumstances(dt, duration, skip, noise, int(delay), seed, push, supply)
+    kit = instruments(sensors, plant or robot)
+    around = Circumstances(dt, duration, skip, noise, int(delay), seed, push, supply, kit)
+    believed = told(robot, sensors)
     follow = path_named(path)
     wanted = list(controller) if isinstance(controller, list | tuple) else [controller]
     if not wanted:
         raise InputError("no controller", got="an empty list", expected="one controller or more", where="controller")
-    options = {"supply": supply, **told_of_loop(robot, around)}
-    controllers = told_apart([_controller(entry, robot, options) for entry in wanted])
+    options = {"supply": supply, **told_of_loop(believed, around)}
+    controllers = told_apart([_controller(entry, believed, options) for entry in wanted])
     trackings = [tracked(plant or robot, follow, follower, around) for follower in controllers]
     return Trackings(tuple(trackings)) if isinstance(controller, list | tuple) else trackings[0]
 
@@ -160,24 +177,36 @@ def told_of_loop(robot: Robot, around: Circumstances) -> dict[str, Any]:
 def tracked(plant: Robot, path: Path, controller: Controller, around: Circumstances) -> Tracking:
     """`track`, with all there is to it. Raises InputError where the robots take different outputs."""
     _check_match(plant, controller, around.supply)
-    count, dt, n = around.steps(path), around.dt, plant.wheels.count
-    t: FloatArray = np.arange(count + 1, dtype=np.float64) * dt
-    live = LiveRobot(plant, dt, pose=path.at(0.0).pose, delay=around.delay, supply=around.supply, push=around.push)
+    around.steps(path)
+    dt, n, kit = around.dt, plant.wheels.count, around.sensors or instruments(None, plant)
+    random = np.random.default_rng([around.seed, 1])
+    lengths = kit.lengths(dt, path.duration if around.duration is None else around.duration, random)
+    count, push = len(lengths), around.push if callable(around.push) else None
+    t: FloatArray = np.arange(count + 1) * dt
+    if kit.jitter or kit.missed:
+        t[1:] = np.cumsum(lengths)
+    steady = (0.0, 0.0, 0.0) if callable(around.push) else around.push
+    live = LiveRobot(plant, dt, pose=path.at(0.0).pose, delay=around.delay, supply=around.supply, push=steady)
     controller.reset()
     early = round(plant.drive.latency / dt) + around.delay
-    draws = np.random.default_rng(around.seed).standard_normal((count + early, 6)) * (around.noise * NOISE)
+    draws = np.random.default_rng(around.seed).standard_normal((count + early, 6))
+    lost = random.random(count + early) < kit.dropouts
+    readings = Readings(kit, live, -early * dt, around.noise * NOISE)
     sent, volts, state = np.empty((count, n)), np.empty((count, n)), np.empty((count + 1, 6 + n))
     for k in range(-early, 0):  # it waits where the path begins; what is sent now acts when it does
-        measured = np.array([*live.pose, *live.twist]) + draws[k]
-        live.step(controller.step(k * dt, measured[:3], measured[3:], path))
+        live.step(controller.step(k * dt, *readings.seen(draws[k], bool(lost[k])), path))
+        readings.passed(dt)
     state[0] = *live.pose, *live.twist, *live.wheel_speed
     took, words = np.empty(count), dict[str, int]()
     for k in range(count):
-        measured = state[k, :6] + draws[k]
+        pose, twist = readings.seen(draws[k], bool(lost[k]))
         start = time.perf_counter()
-        sent[k] = controller.step(float(t[k]), measured[:3], measured[3:], path)
+        sent[k] = controller.step(float(t[k]), pose, twist, path)
         took[k] = time.perf_counter() - start
-        live.step(sent[k])
+        if push is not None:
+            live.push(push(float(t[k])))
+        live.step(sent[k], float(lengths[k]))
+        readings.passed(float(lengths[k]))
         volts[k] = live.voltage
         state[k + 1] = *live.pose, *live.twist, *live.wheel_speed
         status = controller.info.status
@@ -197,6 +226,7 @@ def tracked(plant: Robot, path: Path, controller: Controller, around: Circumstan
         full,
         took,
         words,
+        str(kit),
     )
 
 

@@ -33,6 +33,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.control.filtered_twist import FilteredTwist, filtered_twist
 from omnidyn.control.late_pose import LatePose, late_pose
 from omnidyn.control.paths.adapter import as_path
 from omnidyn.control.pose_gate import JUMPED, REPEATED, SLIPPED, PoseGate
@@ -147,6 +148,7 @@ class Safe:
 
     name = "controller"
     dt: float  # [s] between two steps
+    _filtered_twist: FilteredTwist | None = None
 
     def __init__(self, robot: Robot, supply: float | None = None) -> None:
         self.supply = supply
@@ -156,8 +158,9 @@ class Safe:
     def _take(self, robot: Robot) -> None:
         """Make ready for a robot; settings and memory stay."""
         refuse_slope(robot.floor, "controllers know")
-        robot = without_slip(robot)
+        robot = in_steps(without_slip(robot), self.dt)
         self.robot, self.sensors = robot, robot.sensor_model
+        self._filtered_twist = filtered_twist(robot, self._filtered_twist)
         self.output = output_kind(robot)
         self.limit = output_limit(robot)
         self._per_volt = 1.0 / supply_of(robot, self.supply) if self.output == DUTY else 1.0
@@ -169,6 +172,8 @@ class Safe:
         self._t: float | None = None
         self._last = self._zeros.copy()
         self._missing = 0
+        if self._filtered_twist is not None:
+            self._filtered_twist.reset()
 
     def replace(self, *, robot: Robot) -> Self:
         """The same controller, its memory included, for another robot."""
@@ -221,6 +226,12 @@ class Safe:
         self.info = Info(status, time=time.perf_counter() - start, limits=limits)
         return sent.copy()
 
+    def _unfiltered(self, t: Any, twist: FloatArray) -> FloatArray:
+        """The twist measured, what a filter did to it taken back."""
+        if self._filtered_twist is None or not math.isfinite(now := _number(t)):
+            return twist
+        return self._filtered_twist.mean(now, twist)
+
     def _safe(self, word: str, start: float) -> FloatArray:
         """Zeros, and why."""
         self._last = self._zeros.copy()
@@ -263,6 +274,7 @@ class Guarded(Safe, ABC):
         place, speed = vector(pose), vector(twist)
         if place is None or speed is None:
             return self._guarded(t, BAD_POSE if place is None else BAD_TWIST, "", None)
+        speed = self._unfiltered(t, speed)
         try:
             follow = as_path(path)
         except Exception as raised:  # whatever stands in place of a path, it is none
@@ -282,6 +294,12 @@ class Guarded(Safe, ABC):
         self, t: float, dt: float, pose: FloatArray, twist: FloatArray, path: Any
     ) -> tuple[FloatArray, tuple[str, ...]]:
         """(the output wanted, shape (wheels,), and the limits it met). dt [s] since the last step, 0 in the first."""
+
+
+def in_steps(robot: Robot, dt: float) -> Robot:
+    """The robot as a loop with steps of dt [s] sees it: without a filter of its speeds that is short beside them."""
+    sensors = robot.sensor_model.in_steps(dt)
+    return robot if sensors == robot.sensor_model else robot.replace(sensors=sensors)
 
 
 def output_kind(robot: Robot) -> str:

@@ -93,6 +93,7 @@ class SpeedLoop(_VelocityLoop):
         speed, set_point = vector(twist), vector(command)
         if speed is None or set_point is None:
             return self._guarded(t, BAD_TWIST if speed is None else BAD_COMMAND, "", None)
+        speed = self._unfiltered(t, speed)
         return self._guarded(t, "", OK, lambda dt: self._follow(dt, speed, set_point))
 
     def _follow(self, dt: float, twist: FloatArray, command: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:

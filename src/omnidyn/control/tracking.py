@@ -29,7 +29,7 @@ class Tracking(Displayable):
     controller, plant, path: their names. run: what the robot did. wanted: poses of the path at the times of the run,
     shape (samples, 3). skip [s]: errors before it count for nothing. dt [s]: between two steps.
     saturated_share: of the steps, those with an output at its limit. step_times [s]: of the controller, shape (steps,).
-    statuses: word of `info.status` other than "ok" -> number of steps.
+    statuses: word of `info.status` other than "ok" -> number of steps. sensors: with which the robot was measured.
     """
 
     controller: str
@@ -42,6 +42,7 @@ class Tracking(Displayable):
     saturated_share: float
     step_times: FloatArray
     statuses: Mapping[str, int] = field(default_factory=dict)
+    sensors: str = ""
 
     def __repr__(self) -> str:
         return f"<Tracking of {self.path} by {self.controller}: rmse {self.rmse_position:.3g} m>"
@@ -181,7 +182,7 @@ def trackings_document(trackings: Sequence[Tracking], notes: Sequence[Statement]
     head = (
         f"{first.plant} along {first.path}: {len(first.step_times)} steps of {first.dt:g} s, {span:.6g} s; errors from "
     )
-    head += f"{first.skip:g} s on"
+    head += f"{first.skip:g} s on; sensors {first.sensors}"
     rows = [
         (
             tracking.controller,
@@ -227,6 +228,7 @@ def trackings_document(trackings: Sequence[Tracking], notes: Sequence[Statement]
         "dt_s": first.dt,
         "duration_s": span,
         "skip_s": first.skip,
+        "sensors": first.sensors,
         "controllers": [tracking.to_dict() for tracking in trackings],
         "notes": plain(list(notes)),
         "warnings": plain(warnings),

@@ -46,20 +46,25 @@ class Lateness(Value):
 
 
 INSTANTANEOUS, MEAN = "instantaneous", "mean"
-LATEST_POSE, FASTEST = 1.0, 1e5  # [s], [Hz]
+LATEST_POSE, FASTEST, SLOWEST_FILTER = 1.0, 1e5, 1.0  # [s], [Hz], [s]
+SHORT_FILTER = 0.3  # of a step: what a shorter filter shows is nearer to the instant than to a mean
 
 
 class Sensors(Value):
     """What speeds and poses are to a controller: the table [sensors] of a robot file.
 
     twist: "instantaneous", or "mean": over the time since the step before, as differences of encoders are.
-
+    twist_filter [s]: time constant of a low pass of first order behind that, 0 without one.
     pose_delay [s]: age of a pose when it arrives. pose_rate [Hz]: of new poses, None: one in every step.
     """
 
     twist: Annotated[Literal["instantaneous", "mean"], Field(description="mean: differences of encoders")] = (
         INSTANTANEOUS
     )
+    twist_filter: Annotated[
+        Annotated[float, number(0.0, SLOWEST_FILTER)],
+        Field(alias="twist_filter_s", description="time constant of a low pass of the speeds"),
+    ] = 0.0
     pose_delay: Annotated[
         Annotated[float, number(0.0, LATEST_POSE)],
         Field(alias="pose_delay_s", description="age of a pose when it arrives"),
@@ -70,8 +75,16 @@ class Sensors(Value):
 
     @property
     def averaged(self) -> bool:
-        """Whether speeds are means over a step."""
-        return self.twist == MEAN
+        """Whether speeds are means over a step, once a filter behind them is taken back: it forgets within steps too.
+
+        The mean is weighted by what the filter keeps of each instant, which is much the same in a short step.
+        """
+        return self.twist == MEAN or self.twist_filter > 0.0
+
+    def in_steps(self, dt: float) -> Sensors:
+        """What they are in a loop with steps of dt [s]: without a filter that is short beside them."""
+        short = self.twist == INSTANTANEOUS and self.twist_filter < SHORT_FILTER * dt
+        return self.replace(twist_filter=0.0) if short and self.twist_filter else self
 
     def pose_age(self, dt: float) -> float:
         """The mean age of a new pose in a loop with steps of dt [s]: it waits for the step [s]."""

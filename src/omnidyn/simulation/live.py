@@ -6,6 +6,8 @@ them at once; a test holds that. A command may act late: by whole steps, by the 
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -16,7 +18,7 @@ from omnidyn.model.motor import DUTY, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.commands import Commands
-from omnidyn.simulation.contract import Conditions
+from omnidyn.simulation.contract import Conditions, Engine
 from omnidyn.simulation.engine import TOLERANCE, as_start, choose_engine
 from omnidyn.statement import Statement
 
@@ -30,9 +32,9 @@ class LiveRobot:
 
     voltage (wheels,): that the last step asked of the drivers, as a log has it; of a speed loop, as the step began.
 
-    dt [s]: how long each command is held. delay: steps until a command acts, beside the latency of the robot's drive;
-    until the first one does, nothing acts. supply [V]: behind a duty. push: constant wrench (3,) on the body
-    [N, N, N m]. twist, pose: of the start. tol: of the implicit engine [m/s].
+    dt [s]: how long each command is held, where its step does not say. delay: steps of dt until a command acts, beside
+    the latency of the robot's drive; until the first one does, nothing acts. supply [V]: behind a duty. push: wrench
+    (3,) on the body [N, N, N m]. twist, pose: of the start. tol: of the implicit engine [m/s].
     """
 
     def __init__(
@@ -50,15 +52,27 @@ class LiveRobot:
         self.robot, self.dt, self.supply = robot, dt, supply
         self.pose, self.twist = as_start("pose", pose, 3), as_start("twist", twist, 3)
         self._kind, n = robot.drive.kind, robot.wheels.count
-        late = delay + robot.drive.latency / dt
-        self._whole = int(np.floor(late + EDGE))
-        self._part = late - self._whole if late - self._whole > EDGE else 0.0
-        self._queue = [np.zeros(n) for _ in range(self._whole + (self._part > 0.0))]
+        self._late = delay * dt + robot.drive.latency
+        self._acting, self._under_way = np.zeros(n), deque[tuple[float, FloatArray]]()  # (seconds until it acts, it)
         self.voltage, self._fresh = np.zeros(n), False
         self._turning: FloatArray | None = None
-        around = Conditions(self._kind == SPEED, robot.drive.coasts, push if any(push) else None)
-        self._engine = choose_engine(robot, around, tol)
+        self._tol, self._engines = tol, dict[tuple[float, float, float], Engine]()
+        self._engine = self._engine_under(push)
         self._state = self._engine.start(self.twist, self.pose, np.zeros(n))
+
+    def _engine_under(self, push: tuple[float, float, float]) -> Engine:
+        """The engine that moves it under a push."""
+        if push not in self._engines:
+            around = Conditions(self._kind == SPEED, self.robot.drive.coasts, push if any(push) else None)
+            self._engines[push] = choose_engine(self.robot, around, self._tol)
+        return self._engines[push]
+
+    def push(self, wrench: tuple[float, float, float]) -> None:
+        """From now on, this wrench pushes the body [N, N, N m]."""
+        engine = self._engine_under(wrench)
+        if type(engine) is not type(self._engine):  # windings: their currents settle in less than a millisecond
+            self._state = engine.start(self.twist, self.pose, np.zeros(self.robot.wheels.count))
+        self._engine = engine
 
     @property
     def wheel_speed(self) -> FloatArray:
@@ -70,19 +84,26 @@ class LiveRobot:
         """What is to be said of the way so far, as `simulate` says it."""
         return self._engine.statements(self._state)
 
-    def step(self, command: FloatArray) -> None:
-        """Hold a command for dt: volts, a duty, or wheel speeds, shape (wheels,), whichever the drive takes."""
+    def step(self, command: FloatArray, seconds: float | None = None) -> None:
+        """Hold a command: volts, a duty, or wheel speeds, shape (wheels,), whichever the drive takes.
+
+        seconds: for how long, dt by default.
+        """
         output = np.array(command, dtype=float)
         if self._kind != SPEED:
             output = self.voltage = self._volts(output)
-        self._queue.append(output)
+        self._under_way.append((self._late, output))
         self._fresh = True
-        parts = [(1.0, self._queue[0])]
-        if self._part:
-            parts = [(self._part, self._queue[0]), (1.0 - self._part, self._queue[1])]
-        self._queue.pop(0)
-        for share, row in parts:
-            self._hold(share * self.dt, row)
+        left, edge = self.dt if seconds is None else seconds, EDGE * self.dt
+        while left > edge:
+            while self._under_way and self._under_way[0][0] <= edge:
+                self._acting = self._under_way.popleft()[1]
+            length = min(left, self._under_way[0][0]) if self._under_way else left
+            if left - length <= edge:
+                length = left
+            self._hold(length, self._acting)
+            self._under_way = deque((wait - length, output) for wait, output in self._under_way)
+            left -= length
 
     def _hold(self, length: float, command: FloatArray) -> None:
         """Go on by a length of time [s] with a command held."""

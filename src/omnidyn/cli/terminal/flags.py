@@ -32,6 +32,7 @@ PLAIN_OPTIONS = (
     "plant",
     "pose",
     "rate",
+    "sensors",
     "skip",
     "skip_bad_rows",
     "sort",

@@ -36,6 +36,7 @@ from omnidyn.control.controller import (
     WHEEL_SPEED,
     Info,
     failure,
+    in_steps,
     output_kind,
     output_limit,
     per_volt,
@@ -44,6 +45,7 @@ from omnidyn.control.controller import (
     without_slip,
 )
 from omnidyn.control.feedforward import DT, check_dt
+from omnidyn.control.filtered_twist import FilteredTwist, filtered_twist
 from omnidyn.control.late_pose import LatePose, late_pose
 from omnidyn.control.mpc.loop import INACCURATE_STEP, NO_STATE, Batch, Memory, MpcWorkspace, control_step, expect
 from omnidyn.control.mpc.model import numbers, volts
@@ -57,6 +59,7 @@ from omnidyn.model.wheels import wheel_speed
 
 HORIZON, MOST_HORIZON, MOST_DELAY = 20, 500, 50
 MET = 1e-5  # [V] from a limit
+LONGEST = 2.5  # steps after the one before, up to which its observer goes on: it may miss one
 LEAST_REST = 0.02  # of a step, that a delay may be off a whole number of them
 
 
@@ -70,6 +73,7 @@ class Mpc:
 
     name = "mpc"
     _late_pose: LatePose | None = None
+    _filtered_twist: FilteredTwist | None = None
     _gate: PoseGate | None = None
 
     def __init__(
@@ -101,7 +105,7 @@ class Mpc:
     def _take(self, robot: Robot) -> None:
         """Make ready for a robot; settings stay."""
         refuse_slope(robot.floor, "controllers know")
-        robot = without_slip(robot)
+        robot = in_steps(without_slip(robot), self.dt)
         self.robot, self.output, self.limit = robot, output_kind(robot), output_limit(robot)
         self.sensors = robot.sensor_model
         self._per_volt = 1.0 / supply_of(robot, self.supply) if self.output == "duty" else 1.0
@@ -119,6 +123,7 @@ class Mpc:
         self.robot_settings = self.settings.of(robot)
         self._tables = self.settings.tables(robot, self.dt, self.observer)
         self._late_pose = late_pose(robot, self.dt, self._late_pose)
+        self._filtered_twist = filtered_twist(robot, self._filtered_twist)
         self._gate = PoseGate(robot, self.dt) if self._gate is None else self._gate.replaced(robot)
         self._control = None  # compiled by the first step
 
@@ -128,9 +133,9 @@ class Mpc:
         self._known, self._t, self._last = False, math.nan, self._zeros.copy()
         self._asked: tuple[str, int, float] = (WAITING, 0, 0.0)
         self._state, self._missing, self._since = np.zeros(6), 0, math.nan
-        if self._late_pose is not None:
-            self._late_pose.reset()
-        self._gate.reset()
+        for sensor in (self._late_pose, self._filtered_twist, self._gate):
+            if sensor is not None:
+                sensor.reset()
 
     def replace(self, *, robot: Robot) -> Self:
         """The same controller for another robot. Where the friction is another, its share is learned anew."""
@@ -204,6 +209,8 @@ class Mpc:
                 pose = vector(pose)
             if twist.__class__ is not np.ndarray or twist.shape != (3,):
                 twist = vector(twist)
+            if self._filtered_twist is not None:
+                twist = self._filtered_twist.mean(t, twist)
             if self._late_pose is not None:
                 pose = self._late_pose.now(t, pose, twist)
             state[:3], state[3:] = pose, twist
@@ -232,7 +239,7 @@ class Mpc:
         """The output of a step whose arguments look well."""
         preview = self._preview
         row = preview.row_at(t, path)
-        elapsed = since if self._known and 0.5 * self.dt < since < LATEST * self.dt else 0.0
+        elapsed = since if self._known and 0.5 * self.dt < since < LONGEST * self.dt else 0.0
         arguments = self._numbers, self._tables, preview.rows, row, self._state, elapsed, self._memory, self._room
         if self._control is None:
             self._control = machine_code(control_step, *arguments)

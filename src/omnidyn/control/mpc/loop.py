@@ -185,6 +185,13 @@ def measure(numbers, settings, state, elapsed, memory, room):
         held_for(numbers.linear, elapsed, room.linear)
         observed = Numbers(room.linear, numbers.push, numbers.pull, numbers.levels)
     drive = last_drive(numbers, memory, room)
+    if elapsed > 1.5 * numbers.linear[0, STEP]:  # a step was missed: what was sent last held on
+        sent = memory.sent
+        for j in range(len(sent) - 1):
+            for i in range(sent.shape[1]):
+                sent[j, i] = sent[j + 1, i]
+        then = last_drive(numbers, memory, room)
+        drive = 0.5 * (drive[0] + then[0]), 0.5 * (drive[1] + then[1]), 0.5 * (drive[2] + then[2])
     if settings[LEARN] != 0.0:
         observe(observed, estimate, room.stage, state, drive, averaged)
     else:

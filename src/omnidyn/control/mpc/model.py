@@ -75,7 +75,7 @@ def numbers(robot: Robot, dt: float, friction: bool = True) -> Numbers:
     return Numbers(linear, push, np.asarray(np.linalg.pinv(push), dtype=float), levels)
 
 
-TERMS = 12  # of the series of a change of dt, which is half of dt at the most
+TERMS = 18  # of the series of a change of dt, which is 1.5 dt at the most
 
 
 @part

@@ -38,6 +38,7 @@ NOTES = (
     "compile with -std=c99 and without -ffast-math, which would take away the tests for numbers that are none",
     "one omnidyn_control for each robot, reset once; nothing else is remembered, no memory is taken",
 )
+FILTERED = "a filter of the speeds ([sensors] twist_filter_s): give it means over a step, by the turns of wheels"
 _UNITS = {"voltage": "volts at the motors", "duty": "duties, -1 to 1", "wheel_speed": "speeds of the wheels [rad/s]"}
 
 
@@ -53,6 +54,8 @@ def c_controller(robot: Robot, controller: str | os.PathLike = "pid", dt: float 
     refuse_controller(KIND, spec.controller)
     refuse(KIND, robot)
     law, omissions = spec.make(robot, dt=dt), left_out(KIND, robot)
+    if law.sensors.twist_filter > 0.0:
+        omissions = (*omissions, FILTERED)
     predicts = isinstance(law, Mpc)
     code = mpc_code(law) if predicts else control_code(law)  # pyright: ignore[reportArgumentType]  none is refused
     about = [f"{law.name} of {robot.name}, by omnidyn. SI units.", *(f"Not in it: {words}" for words in omissions)]
