@@ -28,7 +28,7 @@ from omnidyn.simulation.batch.parameters import WIDTH
 from omnidyn.simulation.exact.march import PIECE, SPIN_UP, travel
 from omnidyn.simulation.exact.step import course, exact_step, pieces, turned_within
 
-SPEED, DRIVE, POSE, LAW = 0, 3, 6, 12  # first rows of `work`
+SPEED, DRIVE, POSE, LAW = 0, 3, 6, 12  # first rows of `work`; what only a pose needs stands between POSE and its law
 X, Y, HEADING, COS, SIN, CARRY = range(6)  # rows of a pose
 FLUSH = 128  # steps after which totals go into double precision
 TOTALS = 4  # sum, sum of squares, least and largest of each row
@@ -55,14 +55,14 @@ class Rows(NamedTuple):
 
 
 @inlined
-def load(work, law, state):
-    """Copy a law and a state into `work`."""
+def load(work, first, law, state):
+    """Copy a state into `work`, and a law into its rows `first`..."""
     for i in range(len(state)):
         to, source = work[i if i < 3 else POSE + i - 3], state[i]
         for n in range(WIDTH):
             to[n] = source[n]
     for i in range(len(law)):
-        to, source = work[LAW + i], law[i]
+        to, source = work[first + i], law[i]
         for n in range(WIDTH):
             to[n] = source[n]
 
@@ -163,7 +163,7 @@ def march_twist(first, last, laws, rows, record):
     sums = np.zeros((TOTALS * 3, WIDTH), laws.dtype)
     speed, drive, law = work[SPEED:DRIVE], work[DRIVE:POSE], work[LAW:after]
     for b in range(first, last):
-        load(work, laws[b], states[b])
+        load(work, LAW, laws[b], states[b])
         failure = first_failure(fails[b])
         for k in range(steps):
             if width > 1:
