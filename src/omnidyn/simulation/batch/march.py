@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from omnidyn.arrays import FloatArray, IntArray
-from omnidyn.compiled.kernel import kernel, inlined
+from omnidyn.compiled.kernel import inlined, kernel
 from omnidyn.simulation.batch.exact import (
     BREAKAWAY,
     COULOMB,
@@ -25,8 +25,7 @@ from omnidyn.simulation.batch.exact import (
     put_shared_drive,
 )
 from omnidyn.simulation.batch.parameters import WIDTH
-from omnidyn.simulation.exact.march import PIECE, SPIN_UP, travel
-from omnidyn.simulation.exact.step import course, exact_step, pieces, turned_within
+from omnidyn.simulation.exact.step import exact_step
 
 SPEED, DRIVE, POSE, LAW = 0, 3, 6, 12  # first rows of `work`; what only a pose needs stands between POSE and its law
 X, Y, HEADING, COS, SIN, CARRY = range(6)  # rows of a pose

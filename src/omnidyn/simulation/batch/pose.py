@@ -51,7 +51,7 @@ def gauss_four(parameters: BatchParameters, dt: float, dtype: Any) -> GaussFour:
 
 
 @inlined
-def _rotation(x, k):
+def rotation(x, k):
     """(cos x, sin x) of a small angle; k: `numbers`."""
     y, one = x * x, k[ONE]
     sine = one - y * k[2] * (one - y * k[3] * (one - y * k[4] * (one - y * k[5])))
@@ -104,7 +104,7 @@ def _add_node(work, time, weight, k, fresh):
     )
     dx, dy = work[DX], work[DY]
     for n in range(WIDTH):
-        cos, sin = _rotation((w[n] - wq[n] + force[n] * time) / a[n], k)
+        cos, sin = rotation((w[n] - wq[n] + force[n] * time) / a[n], k)
         ahead, aside = weight * (cos * x[n] - sin * y[n]), weight * (sin * x[n] + cos * y[n])
         dx[n] = ahead if fresh else dx[n] + ahead
         dy[n] = aside if fresh else dy[n] + aside
@@ -128,7 +128,7 @@ def _go_alone(work, n, dt, gauss):
 
 
 @inlined
-def _move_on(work, k):
+def move_on(work, k):
     """Add a step to the poses; the heading is a compensated sum."""
     x, y, heading, cosine, sine, carry = (
         work[POSE],
@@ -147,7 +147,7 @@ def _move_on(work, k):
         total = heading[n] + corrected
         carry[n] = (total - heading[n]) - corrected
         heading[n] = total
-        a, b = _rotation(turn[n], k)
+        a, b = rotation(turn[n], k)
         cos, sin = cos * a - sin * b, sin * a + cos * b
         scale = more - half * (cos * cos + sin * sin)
         cosine[n], sine[n] = scale * cos, scale * sin
@@ -169,7 +169,7 @@ def _step(work, times, weights, gauss, k, zero):
     for n in range(WIDTH):
         if not work[ALONE, n] <= k[FAST] and _go_alone(work, n, dt, gauss):
             spun = n
-    _move_on(work, k)
+    move_on(work, k)
     for n in range(WIDTH):
         if not work[ALONE, n] <= k[FAST]:
             work[POSE + 3, n], work[POSE + 4, n] = math.cos(work[POSE + 2, n]), math.sin(work[POSE + 2, n])
