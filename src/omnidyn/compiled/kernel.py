@@ -100,6 +100,12 @@ def part(function: Callable[..., Any]) -> Callable[..., Any]:
     return _linked(function, counted=False)
 
 
+def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A part whose code stands in the kernel itself, however large that is: its loops see what the kernel knows of its
+    arrays, and become vector instructions without a check at each call."""
+    return _linked(function, counted=False, forceinline=True)
+
+
 def one_of(functions: Sequence[Callable[..., Any]]) -> Any:
     """A part that hands what it is given to one of several parts: its first argument is the number of it, from 0."""
     last = functions[-1]
@@ -134,15 +140,16 @@ def maker(function: Callable[..., Any]) -> Callable[..., Any]:
     return _linked(function, counted=True)
 
 
-def _linked(function: Callable[..., Any], counted: bool) -> Any:
+def _linked(function: Callable[..., Any], counted: bool, **options: bool) -> Any:
     """A function inside kernels; where numba is switched off, for debuggers, the function itself.
 
     numba counts who holds an array: it adds and removes one, atomically, around nearly every call that has a branch. In
     small functions of arithmetic that costs three times as much as the rest.
     """
     supported = private.used()
-    options: dict[str, Any] = {"_nrt": counted} if supported else {}
-    dispatcher = numba.njit(error_model=ERROR_MODEL, **options)(function)
+    if supported:
+        options["_nrt"] = counted
+    dispatcher: Any = numba.njit(error_model=ERROR_MODEL, **options)(function)
     if dispatcher is function or not supported:
         return dispatcher
 

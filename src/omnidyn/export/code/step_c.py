@@ -88,7 +88,7 @@ def _settled(program: CProgram) -> dict[tuple[str, str], tuple[Type, ...]]:
         (MARCH.replace("march", "step"), "held"): (REAL, REAL),
         (MARCH, "exact_step"): (REAL,) * 7,
         (MARCH, "pieces"): (REAL,) * 7,
-        (MARCH, "_travel"): (AXES,) * 6 + (REAL, nodes, nodes),
+        (MARCH, "travel"): (AXES,) * 6 + (REAL, nodes, nodes),
         (MARCH, "turned_within"): (REAL,) * 7,
     }
 

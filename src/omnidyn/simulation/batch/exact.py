@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.arrays import FloatArray
-from omnidyn.compiled.kernel import part
+from omnidyn.compiled.kernel import inlined
 from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters
 from omnidyn.simulation.exact.step import exact_step
 
@@ -32,7 +32,7 @@ def exact_law(parameters: BatchParameters, dt: float) -> FloatArray:
     )
 
 
-@part
+@inlined
 def put_drive(drive, law, volts):
     """Fill `drive` (3, WIDTH) [m/s^2] from the volts of each robot (wheels, WIDTH), of three wheels or more."""
     wheels = len(volts)
@@ -48,7 +48,7 @@ def put_drive(drive, law, volts):
                 row[n] += u[n] * g[n]
 
 
-@part
+@inlined
 def put_shared_drive(drive, law, volts):
     """Fill `drive` (3, WIDTH) [m/s^2] from volts that all robots share (wheels,)."""
     wheels = len(volts)
@@ -64,7 +64,7 @@ def put_shared_drive(drive, law, volts):
                 row[n] += u * g[n]
 
 
-@part
+@inlined
 def advance(speed, drive, law, zero):
     """The speeds (3, WIDTH) after a step, in place, under `drive` (3, WIDTH) held; `zero` is 0 in their type."""
     for axis in range(3):

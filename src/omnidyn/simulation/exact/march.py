@@ -219,7 +219,7 @@ def _displacement(start, event, before, after, rate, begin, stop, nodes, weights
 
 
 @maker
-def _travel(start, end, event, before, after, rate, dt, nodes, weights):
+def travel(start, end, event, before, after, rate, dt, nodes, weights):
     """Displacement over a whole step in the body frame at its start: pieces between events, short where it is fast."""
     x = y = time = 0.0
     spin = turning(start[2], end[2], before[2], after[2], rate[2])
@@ -251,7 +251,7 @@ def _poses(twists, drive, levels, grid, start, rule):
         for i in range(3):
             out[k + 1, i] = out[k, i]
         if moving:
-            x, y = _travel(twists[k], twists[k + 1], event, before, after, rate, dt, nodes, weights)
+            x, y = travel(twists[k], twists[k + 1], event, before, after, rate, dt, nodes, weights)
             turn = turned_within(dt, twists[k, 2], twists[k + 1, 2], event[2], before[2], after[2], rate[2])
             carry = put_next_pose(out, k, x, y, turn, carry)
     return out

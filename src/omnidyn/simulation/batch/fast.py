@@ -1,0 +1,159 @@
+"""The fast pose of blocks of robots: 2 Gauss nodes a step, whatever happens within it.
+
+    heading  += h/2 (omega_1 + omega_2)
+    position += R(heading) h/2 sum_q R(turned_q) (v_x, v_y)_q,   turned_q = omega t_q + (omega' - omega) t_q^2/(2 h)
+
+Speeds at the nodes are exact, by `exact_step` with the phi of their time; omega' is that at the end of the step. A
+heading is kept with its cosine and sine, which are turned step by step and kept at length 1. What the quadrature makes
+of a stop or a reversal inside a step is of the order of h^2 times the jump of the acceleration.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from omnidyn.compiled.kernel import inlined, kernel
+from omnidyn.simulation.batch.exact import BREAKAWAY, COULOMB, PER_VOLT, PHI, RATE, put_drive, put_shared_drive
+from omnidyn.simulation.batch.march import DRIVE, POSE, SPEED, TOTALS, first_failure, keep, load, spoil, store
+from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters, in_blocks
+from omnidyn.simulation.exact.step import exact_step
+
+FIRST, SECOND, END, NODE_PHI, LAW = 12, 15, 18, 21, 27  # rows of `work`: speeds at the nodes and the end; see march.py
+# sin x = x (1 - x^2/6 (1 - x^2/20 (1 - x^2/42))), cos x = 1 - x^2/2 (1 - x^2/12 (1 - x^2/30)): 1e-10 up to 0.3 rad
+SERIES = (1 / 6, 1 / 20, 1 / 42, 1 / 2, 1 / 12, 1 / 30)
+
+
+class GaussTwo(NamedTuple):
+    """The rule of a fast pose. phi (blocks, 6, WIDTH) [s]: of the time of each node, 3 axes each.
+
+    numbers: SERIES, then 1, 3/2, h/2, and of each node its time and its square over 2 h [s]; in the type of the batch.
+    """
+
+    phi: NDArray[Any]
+    numbers: NDArray[Any]
+
+
+def gauss_two(parameters: BatchParameters, dt: float, dtype: Any) -> GaussTwo:
+    """The rule of steps of dt [s]."""
+    times, rate = dt * (0.5 + np.array([-1.0, 1.0]) / np.sqrt(12.0)), parameters.damping / parameters.mass
+    phi = np.concatenate([-np.expm1(-rate * time) / rate for time in times])
+    numbers = [*SERIES, 1.0, 1.5, dt / 2.0, *times, *(times**2 / (2.0 * dt))]
+    return GaussTwo(in_blocks(phi, dtype), np.array(numbers, dtype))
+
+
+@inlined
+def _rotation(x, k):
+    """(cos x, sin x) of a small angle; k: `numbers`."""
+    y, one = x * x, k[6]
+    return one - y * k[3] * (one - y * k[4] * (one - y * k[5])), x * (
+        one - y * k[0] * (one - y * k[1] * (one - y * k[2]))
+    )
+
+
+@inlined
+def _speeds(work, zero):
+    """The speeds at both nodes and at the end of a step, from one look at each axis."""
+    for axis in range(3):
+        v, g, c, s = work[SPEED + axis], work[DRIVE + axis], work[LAW + COULOMB + axis], work[LAW + BREAKAWAY + axis]
+        a, phi, phi1, phi2 = (
+            work[LAW + RATE + axis],
+            work[LAW + PHI + axis],
+            work[NODE_PHI + axis],
+            work[NODE_PHI + 3 + axis],
+        )
+        first, second, end = work[FIRST + axis], work[SECOND + axis], work[END + axis]
+        for n in range(WIDTH):
+            first[n] = exact_step(v[n], g[n], c[n], s[n], a[n], phi1[n], zero)
+            second[n] = exact_step(v[n], g[n], c[n], s[n], a[n], phi2[n], zero)
+            end[n] = exact_step(v[n], g[n], c[n], s[n], a[n], phi[n], zero)
+
+
+@inlined
+def _speeds_of_three(work, u0, u1, u2, zero):
+    """The same under volts of three wheels that all robots share."""
+    for axis in range(3):
+        v, c, s, a = (
+            work[SPEED + axis],
+            work[LAW + COULOMB + axis],
+            work[LAW + BREAKAWAY + axis],
+            work[LAW + RATE + axis],
+        )
+        phi, phi1, phi2, place = (
+            work[LAW + PHI + axis],
+            work[NODE_PHI + axis],
+            work[NODE_PHI + 3 + axis],
+            LAW + PER_VOLT + 3 * axis,
+        )
+        g0, g1, g2 = work[place], work[place + 1], work[place + 2]
+        first, second, end = work[FIRST + axis], work[SECOND + axis], work[END + axis]
+        for n in range(WIDTH):
+            g = u0 * g0[n] + u1 * g1[n] + u2 * g2[n]
+            first[n] = exact_step(v[n], g, c[n], s[n], a[n], phi1[n], zero)
+            second[n] = exact_step(v[n], g, c[n], s[n], a[n], phi2[n], zero)
+            end[n] = exact_step(v[n], g, c[n], s[n], a[n], phi[n], zero)
+
+
+@inlined
+def _move_on(work, k):
+    """Add a step to the poses, and make its end the start of the next one."""
+    x, y, heading, cosine, sine = work[POSE], work[POSE + 1], work[POSE + 2], work[POSE + 3], work[POSE + 4]
+    vx, vy, w = work[SPEED], work[SPEED + 1], work[SPEED + 2]
+    x1, y1, w1, x2, y2, w2 = (
+        work[FIRST],
+        work[FIRST + 1],
+        work[FIRST + 2],
+        work[SECOND],
+        work[SECOND + 1],
+        work[SECOND + 2],
+    )
+    ex, ey, ew, more, half_dt = work[END], work[END + 1], work[END + 2], k[7], k[8]
+    half = k[3]
+    for n in range(WIDTH):
+        change = ew[n] - w[n]
+        cos1, sin1 = _rotation(k[9] * w[n] + k[11] * change, k)
+        cos2, sin2 = _rotation(k[10] * w[n] + k[12] * change, k)
+        dx = half_dt * (cos1 * x1[n] - sin1 * y1[n] + cos2 * x2[n] - sin2 * y2[n])
+        dy = half_dt * (sin1 * x1[n] + cos1 * y1[n] + sin2 * x2[n] + cos2 * y2[n])
+        turn = half_dt * (w1[n] + w2[n])
+        cos, sin = cosine[n], sine[n]
+        x[n] += cos * dx - sin * dy
+        y[n] += sin * dx + cos * dy
+        heading[n] += turn
+        a, b = _rotation(turn, k)
+        cos, sin = cos * a - sin * b, sin * a + cos * b
+        scale = more - half * (cos * cos + sin * sin)
+        cosine[n], sine[n] = scale * cos, scale * sin
+        vx[n], vy[n], w[n] = ex[n], ey[n], ew[n]
+
+
+@kernel
+def march_fast(first, last, laws, rows, record, rule):
+    """Move blocks first..last through all rows of volts, with fast poses."""
+    volts, states, fails = rows
+    _, steps, wheels, width = volts.shape
+    zero, after = laws.dtype.type(0), LAW + laws.shape[1]
+    work, sums = np.zeros((after, WIDTH), laws.dtype), np.zeros((TOTALS * 6, WIDTH), laws.dtype)
+    drive, law = work[DRIVE:POSE], work[LAW:after]
+    for b in range(first, last):
+        load(work, LAW, laws[b], states[b])
+        for i in range(6):
+            for n in range(WIDTH):
+                work[NODE_PHI + i, n] = rule.phi[b, i, n]
+        failure = first_failure(fails[b])
+        for k in range(steps):
+            if width == 1 and wheels == 3:
+                _speeds_of_three(work, volts[0, k, 0, 0], volts[0, k, 1, 0], volts[0, k, 2, 0], zero)
+            else:
+                if width > 1:
+                    put_drive(drive, law, volts[b, k])
+                else:
+                    put_shared_drive(drive, law, volts[0, k, :, 0])
+                _speeds(work, zero)
+            _move_on(work, rule.numbers)
+            if k >= failure:
+                spoil(work, 6, fails[b], k)
+            keep(work, k, steps, b, record, sums, 6)
+        store(states[b], work)
