@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from tests.support.plain_environment import PlainVelocity
 
 import omnidyn
 from omnidyn.simulation.environments.environments import Environments, Setting
 from omnidyn.simulation.environments.pool import Range
+from tests.support.plain_environment import PlainVelocity
 
 AXEBOT = omnidyn.load_robot("axebot")
 SETTING = Setting(duration=0.14, substeps=2, randomise={"body.mass_kg": Range(0.8, 1.2, when="startup")})

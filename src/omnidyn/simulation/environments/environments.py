@@ -43,7 +43,7 @@ from omnidyn.simulation.environments.pool import (
     largest_voltage,
     rows_of,
 )
-from omnidyn.simulation.environments.step import reset_blocks, step_blocks
+from omnidyn.simulation.environments.step import follow_up, reset_blocks, step_blocks
 
 TASKS = {"velocity": VELOCITY, "pose": POSE, "path": PATH}
 AUTORESET = {"next_step": NEXT_STEP, "same_step": SAME_STEP, "disabled": DISABLED}
@@ -166,8 +166,8 @@ class Environments:
         part = late - whole if late - whole > EDGE else 0.0
         lags, shares = ([whole + 1, whole], [part, 1.0 - part]) if part else ([whole], [1.0])
         substep = np.array(shares) * setting.dt / setting.substeps
-        measured = task != VELOCITY or sensors.averaged
-        rows = rows_of(self.pool.robots, 0.5 * substep if measured else substep, kind)
+        travels = task != VELOCITY or sensors.averaged
+        rows = rows_of(self.pool.robots, 0.5 * substep if travels else substep, kind)
         interval = 0 if setting.interval is None else max(1, round(setting.interval / setting.dt))
         if interval == 0 and any(entry.when == INTERVAL for entry in setting.randomise.values()):
             raise InputError("no interval for a range", got="interval=None", expected="seconds", where="interval")
@@ -180,6 +180,8 @@ class Environments:
             np.array(lags, dtype=np.int64),
             np.array(shares),
             sensors.averaged,
+            travels,
+            any(setting.push),
             round(sensors.pose_delay / setting.dt),
             1 if sensors.pose_rate is None else max(1, round(1.0 / (sensors.pose_rate * setting.dt))),
             (robot.drive.dead_band / largest_voltage(robot)).astype(kind),
@@ -208,9 +210,10 @@ class Environments:
         return np.ascontiguousarray(rows, dtype=self.dtype)
 
     def _buffers(self) -> Buffers:
-        observation = np.zeros((self.columns, self.count), self.dtype)
-        flags = [np.zeros(self.count, np.uint8) for _ in range(2)]
-        return Buffers(observation, np.zeros(self.count, self.dtype), *flags, np.zeros_like(observation))
+        whole = W * len(self.state.twist)
+        observation = np.zeros((self.columns, whole), self.dtype)
+        flags = [np.zeros(whole, np.uint8) for _ in range(2)]
+        return Buffers(observation, np.zeros(whole, self.dtype), *flags, np.zeros_like(observation))
 
     def reset(self, mask: Any = None, seed: int | None = None) -> FloatArray:
         """Begin an episode of all environments, or of those in a mask, (count,). Returns observations, a view.
@@ -228,7 +231,7 @@ class Environments:
             raise InputError("not begun yet", got="a mask", expected="a reset of all first", where="mask")
         self._begun = True
         reset_blocks(self.numbers, self.state, chosen, base, self.buffers.observation)
-        return self.buffers.observation.T
+        return self.buffers.observation[:, : self.count].T
 
     def step(self, action: ArrayLike) -> Step:
         """Hold actions for dt: shares of the largest voltage, -1 to 1. Shape (count, wheels).
@@ -246,14 +249,20 @@ class Environments:
             raise InputError("nobody resets them", got=got, expected="a reset of these first", where="step")
         if not columns.flags.c_contiguous:
             columns = np.ascontiguousarray(columns)
-        rest = (self._now, self.numbers, self.state, columns, self.buffers)
-        jobs = [self._threads.submit(step_blocks, *part, *rest) for part in self._parts[1:]] if self._threads else []
-        step_blocks(*self._parts[0], *rest)
+        jobs = [self._threads.submit(self._run, part, columns) for part in self._parts[1:]] if self._threads else []
+        self._run(self._parts[0], columns)
         for job in jobs:
             job.result()
         self._now += 1
         out = self.buffers
-        return Step(out.observation.T, out.reward, out.terminated.view(np.bool_), out.truncated.view(np.bool_))
+        columns = (out.reward, out.terminated.view(np.bool_), out.truncated.view(np.bool_))
+        return Step(out.observation[:, : self.count].T, *(column[: self.count] for column in columns))
+
+    def _run(self, part: tuple[int, int], action: FloatArray) -> None:
+        """A step of some blocks."""
+        over = step_blocks(*part, self._now, self.numbers, self.state, action, self.buffers)
+        if over or self.numbers.interval:
+            follow_up(*part, self.numbers, self.state, self.buffers)
 
     @property
     def over(self) -> Any:
@@ -263,7 +272,7 @@ class Environments:
     @property
     def final(self) -> FloatArray:
         """The last observation of episodes that ended in this step, where the next has begun. (count, columns)."""
-        return self.buffers.final.T
+        return self.buffers.final[:, : self.count].T
 
     def by_robot(self, rows: FloatArray) -> FloatArray:
         """Rows of blocks, (blocks, rows, W), as (count, rows)."""

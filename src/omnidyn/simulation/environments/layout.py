@@ -30,10 +30,11 @@ class Numbers(NamedTuple):
 
     task, autoreset: as above. substeps: of a piece. limit: steps of an episode. lags, shares: a row per piece of a
     step, the steps by which the voltage that acts in it is late, and its length as a share. averaged: whether measured
-    speeds are means over the step. late, hold [steps]: age of a new pose, and from one to the next. dead: band of the
-    driver, as a share of the largest voltage, (wheels,). push: largest wrench [N, N, N m], (3,); interval [steps]: from
-    one to the next, 0: for an episode. spread: largest goal or start, (3,). sizes: of the pool (startup, reset,
-    interval). pool: numbers of robots, (members, rows). path: poses and velocities step by step, (steps, 6). dt [s].
+    speeds are means over the step; travels: whether means and poses are needed; pushed: whether there are pushes.
+    late, hold [steps]: age of a new pose, and from one to the next. dead: band of the driver, as a share of the largest
+    voltage, (wheels,). push: largest wrench [N, N, N m], (3,); interval [steps]: from one to the next, 0: for an
+    episode. spread: largest goal or start, (3,). sizes: of the pool (startup, reset, interval). pool: numbers of
+    robots, (members, rows). path: poses and velocities step by step, (steps, 6). dt [s].
     """
 
     task: int
@@ -43,6 +44,8 @@ class Numbers(NamedTuple):
     lags: Any
     shares: Any
     averaged: bool
+    travels: bool
+    pushed: bool
     late: int
     hold: int
     dead: Any
@@ -58,9 +61,9 @@ class Numbers(NamedTuple):
 class State(NamedTuple):
     """What changes. robots: their numbers, (blocks, rows, W). twist, pose, goal, push, mean: (blocks, 3, W).
 
-    action: the last one, (blocks, wheels, W); past: those before, (blocks, lags, wheels, W); places: poses of steps
-    before, (blocks, steps, 3, W). count, episode, member, start (of the path): (blocks, W). key: of the random numbers;
-    ended: whether the episode is over, (blocks, W).
+    past: actions of steps before, (blocks, lags, wheels, W); places: poses of these, (blocks, steps, 3, W). count,
+    episode, member, start (of the path): (blocks, W). key: of the random numbers; ended: whether the episode is over,
+    (blocks, W).
     """
 
     robots: Any
@@ -69,7 +72,6 @@ class State(NamedTuple):
     goal: Any
     push: Any
     mean: Any
-    action: Any
     past: Any
     places: Any
     count: Any
@@ -81,7 +83,7 @@ class State(NamedTuple):
 
 
 class Buffers(NamedTuple):
-    """What a step gives. observation, final: (columns, robots). reward, terminated, truncated: (robots,)."""
+    """What a step gives, of whole blocks. observation, final: (columns, W blocks). The others: (W blocks,)."""
 
     observation: Any
     reward: Any
@@ -103,7 +105,6 @@ def new_state(numbers: Numbers, robots: int, wheels: int) -> State:
     return State(
         np.zeros((blocks, numbers.pool.shape[1], W), dtype),
         *three,
-        np.zeros((blocks, wheels, W), dtype),
         np.zeros((blocks, max(1, int(numbers.lags.max())), wheels, W), dtype),
         np.zeros((blocks, max(1, numbers.late + numbers.hold), 3, W), dtype),
         *counts,

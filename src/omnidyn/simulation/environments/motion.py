@@ -36,27 +36,41 @@ def copy_rows(target, source):
 
 
 @part
-def put_drive(drive, action, robots, gain, dead, push):
-    """Fill drive (3, W): accelerations of voltages, as shares of the largest, (wheels, W), and of a push (3, W).
+def put_drive(drive, action, robots, gain, dead):
+    """Fill drive (3, W): accelerations of voltages, which are shares of the largest, (wheels, W).
 
     gain: the first row of the gains among those of `robots`. dead: (wheels,), of the driver.
     """
-    zero = drive.dtype.type(0)
-    for j in range(3):
-        total, force, per_mass = drive[j], push[j], robots[PER_MASS + j]
-        for n in range(W):
-            total[n] = force[n] * per_mass[n]
     for wheel in range(len(action)):
-        volts, band = action[wheel], dead[wheel]
+        volts = action[wheel]
+        shrink(volts, dead[wheel])
         for j in range(3):
             total, per_volt = drive[j], robots[gain + 3 * wheel + j]
-            if band == zero:
+            if wheel:
                 for n in range(W):
                     total[n] += per_volt[n] * volts[n]
             else:
                 for n in range(W):
-                    left = max(abs(volts[n]) - band, zero)
-                    total[n] += per_volt[n] * (left if volts[n] > zero else -left)
+                    total[n] = per_volt[n] * volts[n]
+
+
+@part
+def shrink(volts, band):
+    """What a driver with a dead band passes on, in place."""
+    zero = volts.dtype.type(0)
+    if band > zero:
+        for n in range(W):
+            left = max(abs(volts[n]) - band, zero)
+            volts[n] = left if volts[n] > zero else -left
+
+
+@part
+def add_push(drive, push, robots):
+    """Add to drive (3, W) what a push (3, W) does to the masses."""
+    for j in range(3):
+        total, force, per_mass = drive[j], push[j], robots[PER_MASS + j]
+        for n in range(W):
+            total[n] += force[n] * per_mass[n]
 
 
 @part

@@ -10,7 +10,7 @@ Way and turn are those of the pose that is measured, which may be old. The rewar
     velocity   -(e_x^2 + e_y^2 + (b e_omega)^2) [m^2/s^2]        pose, path   -(e_x^2 + e_y^2 + (b e_heading)^2) [m^2]
 
 with b = ARM, a length that makes an angle a way. An episode ends early in one case only: a robot that stands at its
-goal, within NEAR, has reached it.
+goal, within NEAR_PLACE, NEAR_HEADING and NEAR_SPEED, has reached it.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import numpy as np
 
 from omnidyn.compiled.kernel import part
 from omnidyn.simulation.environments.layout import PATH, POSE, PREVIEW, VELOCITY, W
+from omnidyn.simulation.environments.motion import copy_row
 
 ARM = 0.1  # [m]
 NEAR_PLACE, NEAR_HEADING, NEAR_SPEED = 0.02, 0.05, 0.05  # [m], [rad], [m/s] and, per ARM, [rad/s]
@@ -36,79 +37,83 @@ def wrapped(angle):
 @part
 def put_reward(numbers, reward, reached, twist, pose, goal, start, count):
     """Fill reward and reached (W,), from the twist, or the pose, against a goal or the path. Shapes (3, W)."""
+    arm = reward.dtype.type(ARM * ARM)
+    if numbers.task == VELOCITY:
+        v_x, v_y, omega, to_x, to_y, to_omega = twist[0], twist[1], twist[2], goal[0], goal[1], goal[2]
+        for n in range(W):
+            x, y, yaw = v_x[n] - to_x[n], v_y[n] - to_y[n], omega[n] - to_omega[n]
+            reward[n] = -(x * x + y * y + arm * yaw * yaw)
+    else:
+        for n in range(W):
+            put_pose_reward(numbers, reward, reached, twist, pose, goal, start, count, n)
+
+
+@part
+def put_pose_reward(numbers, reward, reached, twist, pose, goal, start, count, n):
+    """The same for robot n of a block, whose pose counts."""
     kind = reward.dtype.type
     arm = kind(ARM * ARM)
-    if numbers.task == VELOCITY:
-        for n in range(W):
-            x, y, yaw = twist[0, n] - goal[0, n], twist[1, n] - goal[1, n], twist[2, n] - goal[2, n]
-            reward[n] = -(x * x + y * y + arm * yaw * yaw)
-        return
-    for n in range(W):
-        where = min(start[n] + count[n], len(numbers.path) - 1)
-        gx, gy, angle = goal[0, n], goal[1, n], goal[2, n]
-        if numbers.task == PATH:
-            gx, gy, angle = numbers.path[where, 0], numbers.path[where, 1], numbers.path[where, 2]
-        x, y, yaw = gx - pose[0, n], gy - pose[1, n], kind(wrapped(np.float64(angle - pose[2, n])))
-        reward[n] = -(x * x + y * y + arm * yaw * yaw)
-        if numbers.task == POSE:
-            speed = math.sqrt(np.float64(twist[0, n] ** 2 + twist[1, n] ** 2 + arm * twist[2, n] ** 2))
-            far = math.sqrt(np.float64(x * x + y * y))
-            reached[n] = (far < NEAR_PLACE) & (abs(yaw) < NEAR_HEADING) & (speed < NEAR_SPEED)
+    at_x, at_y, at_angle = goal[0, n], goal[1, n], goal[2, n]
+    if numbers.task == PATH:
+        now = min(start[n] + count[n], len(numbers.path) - 1)
+        at_x, at_y, at_angle = numbers.path[now, 0], numbers.path[now, 1], numbers.path[now, 2]
+    x, y, yaw = at_x - pose[0, n], at_y - pose[1, n], kind(wrapped(np.float64(at_angle) - np.float64(pose[2, n])))
+    reward[n] = -(x * x + y * y + arm * yaw * yaw)
+    if numbers.task == POSE:
+        speed = math.sqrt(np.float64(twist[0, n] ** 2 + twist[1, n] ** 2 + arm * twist[2, n] ** 2))
+        far = math.sqrt(np.float64(x * x + y * y))
+        reached[n] = (far < NEAR_PLACE) & (abs(yaw) < NEAR_HEADING) & (speed < NEAR_SPEED)
 
 
 @part
-def put_measured_pose(numbers, measured, pose, places, count):
-    """Fill measured (3, W): the pose that the sensors show, a new one every `hold` steps, `late` steps old."""
-    if numbers.late == 0 and numbers.hold == 1:
-        for j in range(3):
-            for n in range(W):
-                measured[j, n] = pose[j, n]
-        return
-    for n in range(W):
-        seen = max(0, (count[n] - numbers.late) // numbers.hold * numbers.hold)
-        for j in range(3):
-            measured[j, n] = pose[j, n] if seen == count[n] else places[seen % len(places), j, n]
+def measured_pose(numbers, pose, places, count, n):
+    """The pose that the sensors show of robot n: a new one every `hold` steps, `late` steps old."""
+    seen = max(0, (count[n] - numbers.late) // numbers.hold * numbers.hold)
+    if seen == count[n]:
+        return pose[0, n], pose[1, n], np.float64(pose[2, n])
+    slot = seen % len(places)
+    return places[slot, 0, n], places[slot, 1, n], np.float64(places[slot, 2, n])
 
 
 @part
-def put_observation(numbers, out, twist, measured, goal, action, start, count):
-    """Fill out (columns, W). Shapes (3, W), of the action (wheels, W)."""
-    kind = out.dtype.type
+def put_observation(numbers, out, first, twist, action, pose, places, goal, start, count):
+    """Fill the columns of a block, from robot `first` on, of out (columns, robots). Shapes (3, W), (wheels, W)."""
     for j in range(3):
+        copy_row(out[j, first : first + W], twist[j])
+        if numbers.task == VELOCITY:
+            copy_row(out[3 + j, first : first + W], goal[j])
+    if numbers.task != VELOCITY:
         for n in range(W):
-            out[j, n] = twist[j, n]
-    if numbers.task == VELOCITY:
-        for j in range(3):
-            for n in range(W):
-                out[3 + j, n] = goal[j, n]
-    elif numbers.task == POSE:
-        for n in range(W):
-            heading = np.float64(measured[2, n])
-            cos, sin = kind(math.cos(heading)), kind(math.sin(heading))
-            x, y, angle = goal[0, n] - measured[0, n], goal[1, n] - measured[1, n], np.float64(goal[2, n]) - heading
-            out[3, n], out[4, n] = cos * x + sin * y, cos * y - sin * x
-            out[5, n], out[6, n] = kind(math.sin(angle)), kind(math.cos(angle))
-    else:
-        put_path(numbers, out, measured, start, count)
-    first = len(out) - len(action)
+            x, y, heading = measured_pose(numbers, pose, places, count, n)
+            if numbers.task == POSE:
+                put_goal(out, first + n, x, y, heading, goal[0, n], goal[1, n], np.float64(goal[2, n]))
+            else:
+                put_path(out, first + n, x, y, heading, numbers.path, start[n] + count[n])
+    column = len(out) - len(action)
     for wheel in range(len(action)):
-        for n in range(W):
-            out[first + wheel, n] = action[wheel, n]
+        copy_row(out[column + wheel, first : first + W], action[wheel])
 
 
 @part
-def put_path(numbers, out, measured, start, count):
-    """The columns of the path."""
-    kind, path = out.dtype.type, numbers.path
-    for n in range(W):
-        heading = np.float64(measured[2, n])
-        cos, sin = kind(math.cos(heading)), kind(math.sin(heading))
-        now = min(start[n] + count[n], len(path) - 1 - PREVIEW[-1])
-        x, y = path[now, 0] - measured[0, n], path[now, 1] - measured[1, n]
-        out[3, n], out[4, n] = cos * x + sin * y, cos * y - sin * x
-        out[5, n] = kind(wrapped(np.float64(path[now, 2]) - heading))
-        for k in range(len(PREVIEW)):
-            then = now + PREVIEW[k]
-            x, y = path[then, 3], path[then, 4]
-            out[6 + 3 * k, n], out[7 + 3 * k, n] = cos * x + sin * y, cos * y - sin * x
-            out[8 + 3 * k, n] = path[then, 5]
+def put_goal(out, robot, x, y, heading, to_x, to_y, to_heading):
+    """The columns of a goal."""
+    kind = out.dtype.type
+    cos, sin, turn = kind(math.cos(heading)), kind(math.sin(heading)), to_heading - heading
+    x, y = to_x - x, to_y - y
+    out[3, robot], out[4, robot] = cos * x + sin * y, cos * y - sin * x
+    out[5, robot], out[6, robot] = kind(math.sin(turn)), kind(math.cos(turn))
+
+
+@part
+def put_path(out, robot, x, y, heading, path, step):
+    """The columns of the path, at a step of it."""
+    kind = out.dtype.type
+    now = min(step, len(path) - 1 - PREVIEW[-1])
+    cos, sin = kind(math.cos(heading)), kind(math.sin(heading))
+    x, y = path[now, 0] - x, path[now, 1] - y
+    out[3, robot], out[4, robot] = cos * x + sin * y, cos * y - sin * x
+    out[5, robot] = kind(wrapped(np.float64(path[now, 2]) - heading))
+    for k in range(len(PREVIEW)):
+        x, y = path[now + PREVIEW[k], 3], path[now + PREVIEW[k], 4]
+        out[6 + 3 * k, robot], out[7 + 3 * k, robot] = cos * x + sin * y, cos * y - sin * x
+        out[8 + 3 * k, robot] = path[now + PREVIEW[k], 5]
