@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.robot import Robot
+from omnidyn.simulation.batch.parameters import BatchParameters
 from omnidyn.simulation.environments.layout import (
     DISABLED,
     NEXT_STEP,
@@ -36,7 +37,7 @@ from omnidyn.simulation.environments.layout import (
     new_state,
 )
 from omnidyn.simulation.environments.pool import (
-    INTERVAL,
+    Pool,
     Range,
     check_robots,
     drawn_pool,
@@ -57,9 +58,11 @@ MOST_ROBOTS, MOST_LAG, EDGE = 2**24, 1000, 1e-9
 class Setting:
     """What a task is made of, apart from the robots.
 
-    dt [s]: of a step; substeps: of the simulation in it. duration [s]: of an episode, None: that of the task. spread:
+    task: "velocity", to drive at a twist; "pose", to stop at a pose; "path", to follow one. dt [s]: of a step; substeps: of the simulation in it. duration [s]: of an episode, None: that of the task. spread:
     half the width of goals, or of starts beside a path, (3,). push: largest wrench [N, N, N m], (3,), drawn evenly,
     anew each interval [s], None: for an episode. latency [s]: until an action acts, beside that of the robot's drive.
+    uncertainty: when numbers are drawn as far off as the std and correlations of the robot file say: "startup",
+    "reset", "interval", or "" for never. randomise: ranges of numbers by their keys in the robot file.
     """
 
     task: Literal["velocity", "pose", "path"] = "velocity"
@@ -70,6 +73,7 @@ class Setting:
     push: tuple[float, float, float] = (0.0, 0.0, 0.0)
     interval: float | None = None
     latency: float = 0.0
+    uncertainty: Literal["", "startup", "reset", "interval"] = ""
     randomise: Mapping[str, Range] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -105,13 +109,26 @@ class Step(NamedTuple):
     truncated: Any
 
 
+def _checked(parameters: BatchParameters, robot: Robot, setting: Setting) -> BatchParameters:
+    """The parameters. Raises InputError for those of another drive, or together with other draws."""
+    if parameters.wheels != robot.wheels.count or parameters.count < 1:
+        got = f"{parameters.count} robots of {parameters.wheels} wheels"
+        raise InputError("not of this robot", got=got, expected=f"{robot.wheels.count} wheels", where="parameters")
+    if setting.randomise or setting.uncertainty:
+        got = "`parameters` beside `randomise` or `uncertainty`"
+        raise InputError("drawn twice", got=got, expected="one of them", where="parameters")
+    return parameters
+
+
 class Environments:
     """Robots with one task each.
 
     Args:
-        robots: One robot for all, or several for life: environment k has the robot k modulo their number.
+        robots: One robot for all, or several for life: environment k has the robot k modulo their number. Their drive,
+            sensors and limits are those of the first.
         count: Number of environments.
         setting: What their task is made of.
+        parameters: Numbers of robots for life, as `omnidyn.sample` draws them, in place of those of `robots`.
         path: Poses and velocities in the world, step by step, for the task "path". Shape (steps, 6).
         autoreset: When an episode that ended begins anew: with the next step, in the same one, or never.
         dtype: Of all numbers, float32 or float64.
@@ -125,6 +142,7 @@ class Environments:
         count: int = 1,
         setting: Setting | None = None,
         *,
+        parameters: BatchParameters | None = None,
         path: FloatArray | None = None,
         autoreset: str = "next_step",
         dtype: Any = np.float32,
@@ -144,8 +162,11 @@ class Environments:
         self.setting, self.count, self.autoreset, self.dtype = setting, count, autoreset, np.dtype(dtype)
         if self.dtype not in (np.float32, np.float64):
             raise InputError("no such numbers", got=self.dtype.name, expected="float32 or float64", where="dtype")
-        self.pool = drawn_pool(given, setting.randomise, seed)
-        check_robots(self.pool.robots)
+        if parameters is not None:
+            self.pool = Pool(_checked(parameters, given[0], setting), (parameters.count, 1, 1))
+        else:
+            self.pool = drawn_pool(given, setting.randomise, setting.uncertainty, seed)
+            check_robots(self.pool.robots)
         self.wheels = given[0].wheels.count
         self.columns = columns_of(TASKS[setting.task], self.wheels)
         self.numbers = self._numbers(given[0], path)
@@ -167,9 +188,10 @@ class Environments:
         lags, shares = ([whole + 1, whole], [part, 1.0 - part]) if part else ([whole], [1.0])
         substep = np.array(shares) * setting.dt / setting.substeps
         travels = task != VELOCITY or sensors.averaged
-        rows = rows_of(self.pool.robots, 0.5 * substep if travels else substep, kind)
+        voltage = largest_voltage(robot)
+        rows = rows_of(self.pool.parameters, voltage, 0.5 * substep if travels else substep, kind)
         interval = 0 if setting.interval is None else max(1, round(setting.interval / setting.dt))
-        if interval == 0 and any(entry.when == INTERVAL for entry in setting.randomise.values()):
+        if interval == 0 and self.pool.sizes[2] > 1:
             raise InputError("no interval for a range", got="interval=None", expected="seconds", where="interval")
         spread = SPREAD[setting.task] if setting.spread is None else setting.spread
         return Numbers(
@@ -184,7 +206,7 @@ class Environments:
             any(setting.push),
             round(sensors.pose_delay / setting.dt),
             1 if sensors.pose_rate is None else max(1, round(1.0 / (sensors.pose_rate * setting.dt))),
-            (robot.drive.dead_band / largest_voltage(robot)).astype(kind),
+            (robot.drive.dead_band / voltage).astype(kind),
             np.array(setting.push, dtype=kind),
             interval,
             np.array(spread, dtype=kind),

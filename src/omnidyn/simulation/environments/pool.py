@@ -10,20 +10,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.model.dynamics import state_space
 from omnidyn.model.keys import Key
-from omnidyn.model.mass import axis_masses
+from omnidyn.model.known.uncertainty import plausible
 from omnidyn.model.motor import DUTY, DYNAMIC, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
-from omnidyn.simulation.environments.layout import PHI
-from omnidyn.simulation.exact.march import axis_levels, why_not_exact
+from omnidyn.simulation.batch.parameters import BatchParameters, batch_parameters
+from omnidyn.simulation.exact.march import why_not_exact
 
 STARTUP, RESET, INTERVAL = WHEN = "startup", "reset", "interval"
 ABS, SCALE, ADD = HOW = "abs", "scale", "add"
@@ -59,39 +58,58 @@ class Range:
 
 @dataclass(frozen=True)
 class Pool:
-    """robots: shape of the draws (startup, reset, interval), the last one fastest. sizes: how many of each."""
+    """parameters: of a robot for every place, the last one fastest. sizes: draws for life, for episodes, for intervals.
 
-    robots: tuple[Robot, ...]
+    robots: of the same places, those that were given or drawn; none where only parameters were given.
+    """
+
+    parameters: BatchParameters
     sizes: tuple[int, int, int]
+    robots: tuple[Robot, ...] = ()
 
 
-def drawn_pool(robots: Sequence[Robot], ranges: Mapping[str, Range], seed: int = 0) -> Pool:
-    """The pool of robots that are given, for life, and of ranges of numbers, by their keys in the robot file.
+def drawn_pool(robots: Sequence[Robot], ranges: Mapping[str, Range], uncertainty: str = "", seed: int = 0) -> Pool:
+    """The pool of robots that are given, for life, of what their numbers may be off by, and of ranges of these.
 
     A key of a list without its place, such as "friction.axes.coulomb", draws one factor or number for all of its
-    entries. The draws of a range are spread evenly over it (a Latin hypercube). Raises InputError for an unknown key,
-    or a range in which the robot leaves what a robot file may hold.
+    entries. The draws of a range are spread evenly over it, those of a std over its normal (Latin hypercubes).
+
+    Args:
+        robots: For life, one after the other.
+        ranges: By keys of the robot file.
+        uncertainty: When other draws of the std and correlations of the robot file are taken: "startup", "reset" or
+            "interval"; "" takes none. They need one robot.
+        seed: Of the draws.
+
+    Raises InputError for an unknown key or time, or a range in which the robot leaves what a robot file may hold, and
+    InsufficientDataError where no number of a robot has a std.
     """
-    if not ranges:
-        return Pool(tuple(robots), (len(robots), 1, 1))
-    sizes = _sizes(len(robots), {entry.when for entry in ranges.values()})
+    if uncertainty not in ("", *WHEN):
+        raise InputError("unknown time of a draw", got=uncertainty, expected=", ".join(WHEN), where="uncertainty")
+    sizes = _sizes(len(robots), {entry.when for entry in ranges.values()} | ({uncertainty} - {""}))
+    bases, along = list(robots), 0
+    if uncertainty:
+        if len(robots) > 1:
+            got = f"{len(robots)} robots"
+            raise InputError("draws of std take one robot", got=got, expected="one, or no draws", where="uncertainty")
+        along = WHEN.index(uncertainty)
+        bases = plausible(robots[0], sizes[along], seed)
     random, shares = np.random.default_rng(seed), {}
     for name, entry in ranges.items():
         count = sizes[WHEN.index(entry.when)]
         shares[name] = (random.permutation(count) + 0.5) / count
     members = []
     for place in np.ndindex(sizes):
-        robot = robots[place[0] % len(robots)]
+        robot = bases[place[along] % len(bases)]
         for name, entry in ranges.items():
             robot = _changed(robot, name, entry, float(shares[name][place[WHEN.index(entry.when)]]))
         members.append(robot)
-    return Pool(tuple(members), sizes)
+    return Pool(batch_parameters(members), sizes, tuple(members))
 
 
 def _sizes(robots: int, when: set[str]) -> tuple[int, int, int]:
     """How many draws there are of each kind."""
-    kinds = len(when)
-    each = max(2, int(MOST_MEMBERS ** (1.0 / kinds)))
+    each = max(2, int(MOST_MEMBERS ** (1.0 / max(1, len(when)))))
     startup, reset, interval = (each if kind in when else 1 for kind in WHEN)
     return max(startup, robots), reset, interval
 
@@ -157,15 +175,13 @@ def largest_voltage(robot: Robot) -> FloatArray:
     return np.minimum(volts, robot.drive.supply)
 
 
-def rows_of(robots: Sequence[Robot], pieces: FloatArray, dtype: type) -> FloatArray:
-    """The numbers of robots. Shape (robots, rows). pieces [s]: lengths whose phi is needed, shape (pieces,)."""
-    wheels = robots[0].wheels.count
-    table: FloatArray = np.empty((len(robots), PHI + 3 * len(pieces) + 3 * wheels))
-    for k, robot in enumerate(robots):
-        system, masses = state_space(robot), axis_masses(robot)
-        levels = axis_levels(robot, system)
-        gain = system.B * largest_voltage(robot)
-        held = -np.expm1(-levels.rate * pieces[:, None]) / levels.rate
-        parts = (levels.coulomb, levels.breakaway, levels.rate, 1.0 / masses, held, gain.T)
-        table[k] = np.concatenate([np.ravel(part) for part in parts])
-    return np.ascontiguousarray(table, dtype=dtype)
+def rows_of(parameters: BatchParameters, voltage: FloatArray, pieces: FloatArray, dtype: Any) -> FloatArray:
+    """The numbers of robots. Shape (robots, rows).
+
+    voltage: what an action of 1 is [V], (wheels,). pieces [s]: lengths whose phi is needed, shape (pieces,).
+    """
+    mass, rate = parameters.mass, parameters.damping / parameters.mass
+    held = [-np.expm1(-rate * length) / rate for length in pieces]
+    gain = parameters.push * voltage[:, None] / mass[:, None]  # (3, wheels, n)
+    columns = [parameters.coulomb / mass, parameters.breakaway / mass, rate, 1.0 / mass, *held, *gain.swapaxes(0, 1)]
+    return np.ascontiguousarray(np.concatenate(columns).T, dtype=dtype)
