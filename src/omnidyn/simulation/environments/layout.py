@@ -1,0 +1,113 @@
+"""What a step of environments works on: numbers of robots, states, settings, buffers. Blocks of W robots.
+
+An array of a block has the robots last: (blocks, rows, W). Buffers that callers see have a column per robot, beside
+each other: (columns, robots).
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+W = 64  # robots in a block
+
+VELOCITY, POSE, PATH = 0, 1, 2  # tasks
+NEXT_STEP, SAME_STEP, DISABLED = 0, 1, 2  # when an episode that ended begins anew
+
+# Rows of the numbers of a robot, three each: one per axis; then phi of each piece of a step, then gain, 3 per wheel
+COULOMB, BREAKAWAY, RATE, PER_MASS, PHI = 0, 3, 6, 9, 12
+
+PREVIEW = (1, 5)  # steps ahead of which the path shows its twist
+
+# Numbers of draws in an episode
+GOAL, START, MEMBER = 0, 4, 8
+LATER, PER_INTERVAL, AGAIN = 16, 4, 3  # from LATER on for every interval a push of 3, and a member
+
+
+class Numbers(NamedTuple):
+    """What does not change from step to step.
+
+    task, autoreset: as above. substeps: of a piece. limit: steps of an episode. lags, shares: a row per piece of a
+    step, the steps by which the voltage that acts in it is late, and its length as a share. averaged: whether measured
+    speeds are means over the step; travels: whether means and poses are needed; pushed: whether there are pushes.
+    late, hold [steps]: age of a new pose, and from one to the next. dead: band of the driver, as a share of the largest
+    voltage, (wheels,). push: largest wrench [N, N, N m], (3,); interval [steps]: from one to the next, 0: for an
+    episode. spread: largest goal or start, (3,). sizes: of the pool (startup, reset, interval). pool: numbers of
+    robots, (members, rows). path: poses and velocities step by step, (steps, 6). dt [s].
+    """
+
+    task: int
+    autoreset: int
+    substeps: int
+    limit: int
+    lags: Any
+    shares: Any
+    averaged: bool
+    travels: bool
+    pushed: bool
+    late: int
+    hold: int
+    dead: Any
+    push: Any
+    interval: int
+    spread: Any
+    sizes: Any
+    pool: Any
+    path: Any
+    dt: float
+
+
+class State(NamedTuple):
+    """What changes. robots: their numbers, (blocks, rows, W). twist, pose, goal, push, mean: (blocks, 3, W).
+
+    past: actions of steps before, (blocks, lags, wheels, W); places: poses of these, (blocks, steps, 3, W). count,
+    episode, member, start (of the path): (blocks, W). key: of the random numbers; ended: whether the episode is over,
+    (blocks, W).
+    """
+
+    robots: Any
+    twist: Any
+    pose: Any
+    goal: Any
+    push: Any
+    mean: Any
+    past: Any
+    places: Any
+    count: Any
+    episode: Any
+    member: Any
+    start: Any
+    key: Any
+    ended: Any
+
+
+class Buffers(NamedTuple):
+    """What a step gives, of whole blocks. observation, final: (columns, W blocks). The others: (W blocks,)."""
+
+    observation: Any
+    reward: Any
+    terminated: Any
+    truncated: Any
+    final: Any
+
+
+def columns_of(task: int, wheels: int) -> int:
+    """How many numbers an observation has."""
+    return (6, 7, 6 + 3 * len(PREVIEW))[task] + wheels
+
+
+def new_state(numbers: Numbers, robots: int, wheels: int) -> State:
+    """A state for so many robots, whose blocks are whole; nobody has begun yet."""
+    blocks, dtype = -(-robots // W), numbers.pool.dtype
+    three = [np.zeros((blocks, 3, W), dtype) for _ in range(5)]
+    counts = [np.zeros((blocks, W), np.int32) for _ in range(4)]
+    return State(
+        np.zeros((blocks, numbers.pool.shape[1], W), dtype),
+        *three,
+        np.zeros((blocks, max(1, int(numbers.lags.max())), wheels, W), dtype),
+        np.zeros((blocks, max(1, numbers.late + numbers.hold), 3, W), dtype),
+        *counts,
+        np.zeros((blocks, W), np.uint32),
+        np.zeros((blocks, W), np.uint8),
+    )
