@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.control.controller import LARGEST_STATE, MOST_BRIDGED, WHEEL_SPEED
+from omnidyn.control.controller import LARGEST_STATE, LATEST, MOST_BRIDGED, WHEEL_SPEED
 from omnidyn.control.mpc import interior_point, loop, observer, program
-from omnidyn.control.mpc.controller import Mpc
+from omnidyn.control.mpc.controller import LONGEST, Mpc
 from omnidyn.control.mpc.model import (
     BY_MASS,
     BY_MASS_GX,
@@ -171,6 +171,8 @@ def _constants(controller: Mpc) -> str:
     if settings.slew is not None:
         numbers["SLEW_STEP"] = settings.slew * controller.dt
     lines = [
+        f"#define LATEST {c_number(LATEST, True)}",
+        f"#define LONGEST (OMNIDYN_ELAPSED ? {c_number(LONGEST, True)} : LATEST)",
         "#if OMNIDYN_MOST_BRIDGED",
         "#define MISSING (c->missing)",
         "#else",

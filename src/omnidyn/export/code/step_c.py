@@ -229,7 +229,7 @@ static int omnidyn_advance(const @REAL@ u[], @REAL@ h, @REAL@ twist[3], @REAL@ p
         poses[0][axis] = pose[axis];
     }
     if (moving) {
-        const many_rr way = travel_of(twist, next, event, before, after, RATE, h, NODES, WEIGHTS);
+        const many_rr way = travel(twist, next, event, before, after, RATE, h, NODES, WEIGHTS);
         const @REAL@ turn = turned_within(h, twist[2], next[2], event[2], before[2], after[2], RATE[2]);
         const @REAL@ left = put_next_pose(poses, 0, way.a0, way.a1, turn, *lost);
         if (!all_within(next, 3, @LARGEST@) || !all_within(poses[1], 3, @LARGEST@)) {

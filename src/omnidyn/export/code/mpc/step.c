@@ -347,6 +347,14 @@ static void control(omnidyn_control *c, const float *pose, const float *twist, c
     measured[2] = remainderf(measured[2], TURN);
     take_path(c, path);
     guess(c, known);
+#if OMNIDYN_ELAPSED && LATE_STEPS
+    if (c->step > LATEST * OMNIDYN_DT) { /* a step was missed: what was sent last held on */
+        ROLLED for (i = 0; i < 3; i++) {
+            c->sent[0][i] = 0.5f * (c->sent[0][i] + c->sent[1][i]);
+        }
+        memmove(c->sent[1], c->sent[LATE_STEPS > 1 ? 2 : 1], (LATE_STEPS - 1) * sizeof(c->sent[0]));
+    }
+#endif
 #if LEARN
     observe(c, measured, known);
     memcpy(c->x, c->believed, sizeof(measured));
@@ -405,7 +413,7 @@ void omnidyn_control_reset(omnidyn_control *c)
 int omnidyn_control_step(omnidyn_control *c, float elapsed, const float pose[3], const float twist[3],
                          const omnidyn_motion path[OMNIDYN_HORIZON + 1], float output[OMNIDYN_WHEELS])
 {
-    const int known = c->known && fabsf(elapsed - OMNIDYN_DT) < 0.5f * OMNIDYN_DT;
+    const int known = c->known && elapsed > 0.5f * OMNIDYN_DT && elapsed < LONGEST * OMNIDYN_DT;
     int i, j, says = OMNIDYN_OK, bridged = OMNIDYN_OK;
     if (c->begun && elapsed == 0.0f) {
         memcpy(output, c->last, sizeof(c->last));
@@ -430,7 +438,7 @@ int omnidyn_control_step(omnidyn_control *c, float elapsed, const float pose[3],
 #endif
 #if OMNIDYN_MOST_BRIDGED
     c->missing = says ? c->missing + 1 : 0;
-    if (known && c->missing <= OMNIDYN_MOST_BRIDGED) {
+    if (known && elapsed < LATEST * OMNIDYN_DT && c->missing <= OMNIDYN_MOST_BRIDGED) {
         bridged = says;
         says = OMNIDYN_OK;
     }
