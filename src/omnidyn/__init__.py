@@ -19,6 +19,8 @@ __version__ = "0.1.0"
 
 # Public name -> where it is defined. The list is tested: a name added here is a promise.
 _HOME = {
+    "Batch": "omnidyn.simulation.batch.batch",
+    "BatchRun": "omnidyn.simulation.batch.result",
     "Comparison": "omnidyn.comparison.result",
     "Estimate": "omnidyn.identification.estimate",
     "Identification": "omnidyn.identification.identification",
@@ -55,8 +57,10 @@ _HOME = {
     "read_log": "omnidyn.logs.read_log",
     "read_steady_table": "omnidyn.logs.steady_table",
     "read_voltages": "omnidyn.logs.command_file",
+    "sample": "omnidyn.simulation.batch.sample",
     "save_robot": "omnidyn.model.robot_file",
     "simulate": "omnidyn.simulation.simulate",
+    "simulate_batch": "omnidyn.simulation.batch.batch",
     "state_space": "omnidyn.model.dynamics",
     "track": "omnidyn.control.closed_loop",
     "tune": "omnidyn.control.tune",
@@ -98,6 +102,9 @@ if TYPE_CHECKING:
     from omnidyn.model.vary import vary_robot
     from omnidyn.run import Run
     from omnidyn.simulation.band import confidence_band
+    from omnidyn.simulation.batch.batch import Batch, simulate_batch
+    from omnidyn.simulation.batch.result import BatchRun
+    from omnidyn.simulation.batch.sample import sample
     from omnidyn.simulation.simulate import simulate
 
 

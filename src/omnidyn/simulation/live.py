@@ -80,6 +80,11 @@ class LiveRobot:
         return wheel_speed(self.robot.wheels, self.twist) if self._turning is None else self._turning
 
     @property
+    def engine(self) -> str:
+        """The name of the engine that moves it."""
+        return self._engine.name
+
+    @property
     def warnings(self) -> tuple[Statement, ...]:
         """What is to be said of the way so far, as `simulate` says it."""
         return self._engine.statements(self._state)
@@ -105,9 +110,28 @@ class LiveRobot:
             self._under_way = deque((wait - length, output) for wait, output in self._under_way)
             left -= length
 
+    def run(self, commands: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Steps of all rows of commands, shape (rows, wheels). Returns twists and poses, the start in row 0."""
+        if self._whole or self._part:
+            twists, poses = [self.twist], [self.pose]
+            for command in commands:
+                self.step(command)
+                twists.append(self.twist)
+                poses.append(self.pose)
+            return np.array(twists), np.array(poses)
+        rows = np.array(commands, dtype=float)
+        if self._kind != SPEED:
+            rows = self._volts(rows)
+        motion = self._engine.advance(self._state, self._commands(np.full(len(rows), self.dt), rows))
+        asked = rows if motion.asked is None else motion.asked
+        self._state, self.twist, self.pose, self.voltage = motion.state, motion.twist[-1], motion.pose[-1], asked[-1]
+        if motion.wheel_speed is not None:
+            self._turning = motion.wheel_speed[-1]
+        return motion.twist, motion.pose
+
     def _hold(self, length: float, command: FloatArray) -> None:
         """Go on by a length of time [s] with a command held."""
-        motion = self._engine.advance(self._state, self._commands(np.array([length]), command))
+        motion = self._engine.advance(self._state, self._commands(np.array([length]), command[None]))
         self._state, self.twist, self.pose = motion.state, motion.twist[-1], motion.pose[-1]
         if motion.wheel_speed is not None:
             self._turning = motion.wheel_speed[-1]
@@ -115,11 +139,11 @@ class LiveRobot:
             self.voltage, self._fresh = motion.asked[0], False
 
     def _commands(self, dt: FloatArray, command: FloatArray) -> Commands:
-        """A command as it reaches the motors, or the speed loop."""
+        """Rows of commands as they reach the motors, or the speed loop."""
         if self._kind == SPEED:
-            return Commands(dt, None, set_point=command[None])
-        coasts = (command == 0.0)[None] if self.robot.drive.coasts else None
-        return Commands(dt, reaching(self.robot, command)[None], open_circuit=coasts)
+            return Commands(dt, None, set_point=command)
+        coasts = (command == 0.0) if self.robot.drive.coasts else None
+        return Commands(dt, reaching(self.robot, command), open_circuit=coasts)
 
     def _volts(self, command: FloatArray) -> FloatArray:
         """What a command asks of the drivers [V]."""

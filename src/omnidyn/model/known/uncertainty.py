@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,10 +56,28 @@ def plausible(robot: Robot, count: int = DRAWS, seed: int = 0) -> list[Robot]:
     Raises InsufficientDataError where no number of the robot has a std, InputError for a strange count.
     """
     check_order("plausible(robot, count)", (robot, Robot), (count, object))
-    keys, uncertain = _known(robot)
-    if not 1 <= count <= MOST_DRAWS:
-        raise InputError("strange number of draws", got=count, expected=f"1 to {MOST_DRAWS}", where="draws")
-    return [_drawn(robot, keys, uncertain, off) for off in _errors(uncertain, count, seed)]
+    draws = Draws(robot, count, seed)
+    return [draws.robot(k) for k in range(count)]
+
+
+class Draws:
+    """The draws of `plausible`, a robot made only where it is asked for."""
+
+    def __init__(self, robot: Robot, count: int, seed: int) -> None:
+        self._origin, (self.keys, self._uncertain) = robot, _known(robot)
+        if not 1 <= count <= MOST_DRAWS:
+            raise InputError("strange number of draws", got=count, expected=f"1 to {MOST_DRAWS}", where="draws")
+        self._off = _errors(self._uncertain, count, seed)
+
+    @property
+    def values(self) -> FloatArray:
+        """The numbers drawn, not yet brought back into any range. Shape (count, keys)."""
+        columns = zip(self.keys, self._uncertain.value.tolist(), self._off.T, self._uncertain.log, strict=True)
+        return np.stack([_off(key, value, off, bool(log)) for key, value, off, log in columns], axis=1)
+
+    def robot(self, k: int) -> Robot:
+        """Robot k."""
+        return _drawn(self._origin, self.keys, self._uncertain, self._off[k])
 
 
 def _known(robot: Robot) -> tuple[list[Key], Told]:
@@ -179,7 +197,7 @@ def _drawn(robot: Robot, keys: Sequence[Key], uncertain: Told, off: FloatArray) 
         draw = robot
         for k, key in enumerate(keys):
             value = float(uncertain.value[k])
-            draw = key.set(draw, _off(key, value, float(off[k]), bool(uncertain.log[k])), checked=False)
+            draw = key.set(draw, float(_off(key, value, float(off[k]), bool(uncertain.log[k]))), checked=False)
         draw = holding(draw)
         bad_parts = _out_of_range(draw, robot)
         if not bad_parts:
@@ -188,10 +206,13 @@ def _drawn(robot: Robot, keys: Sequence[Key], uncertain: Told, off: FloatArray) 
     return robot
 
 
-def _off(key: Key, value: float, error: float, log: bool) -> float:
+def _off(key: Key, value: float, error: Any, log: bool) -> Any:
+    """A number that is off by an error, or by each of many, on its scale."""
     if log:
-        return value * math.exp(min(max(error, -FURTHEST), FURTHEST))
-    return value + error if key.name in SIGNED else max(LEAST_SHARE * max(value, abs(error)), value + error)
+        return value * np.exp(np.clip(error, -FURTHEST, FURTHEST))
+    if key.name in SIGNED:
+        return value + error
+    return np.maximum(LEAST_SHARE * np.maximum(value, np.abs(error)), value + error)
 
 
 def _out_of_range(robot: Robot, origin: Robot) -> set[str]:
@@ -223,7 +244,7 @@ def effects(robot: Robot, function: Callable[[Robot], ArrayLike], keys: Sequence
         value = float(key.get(robot))
         std = (priors[name].std if name in priors else None) or 0.01 * abs(value)
         log = is_log(name, value, std)
-        moved_robot = holding(key.set(robot, _off(key, value, std / value if log else std, log), checked=False))
+        moved_robot = holding(key.set(robot, float(_off(key, value, std / value if log else std, log)), checked=False))
         moved_value = at if _out_of_range(moved_robot, robot) else np.asarray(function(moved_robot), dtype=float)
         with np.errstate(invalid="ignore", divide="ignore"):
             changes[name] = float(np.nanmax(np.abs(moved_value - at) / np.abs(at), initial=0.0))

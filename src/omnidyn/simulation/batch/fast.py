@@ -148,7 +148,7 @@ def march_fast(first, last, laws, rows, record, rule):
                 _speeds_of_three(work, volts[0, k, 0, 0], volts[0, k, 1, 0], volts[0, k, 2, 0], zero)
             else:
                 if width > 1:
-                    put_drive(drive, law, volts[b, k])
+                    put_drive(drive, law, volts[b - first, k])
                 else:
                     put_shared_drive(drive, law, volts[0, k, :, 0])
                 _speeds(work, zero)

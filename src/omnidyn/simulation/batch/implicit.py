@@ -1,13 +1,14 @@
-"""Blocks of robots in a turning frame, under friction on the axes or along the direction of travel: SDIRK2 as in
-../implicit/step.py, whose stages are solved without a branch.
+"""Blocks of robots in a turning frame, under friction of the axes or of the direction of travel, without a branch.
+
+SDIRK2 as in ../implicit/step.py; only its stages are solved otherwise.
 
 Stage of length tau, omega its yaw speed, which comes first, C the levels, d the damping, b = M v* + tau F:
 
     A v + tau C n = b,   A = [[M_x + tau d_x, -tau m omega], [tau m omega, M_y + tau d_y]]
 
-Friction of the axes, n = sgn v: v_x = 0 where |b_x + t soft(b_y, tau C_y)/A_yy| <= tau C_x, t = tau m omega; its sign is
-that of what stands within | |. With its friction known, v_y = soft(b_y - t v_0, tau C_y)/(A_yy + t^2/A_xx), v_0 that of
-v_y = 0, and v_x follows.
+Friction of the axes, n = sgn v: v_x = 0 where |b_x + t soft(b_y, tau C_y)/A_yy| <= tau C_x, t = tau m omega; its sign
+is that of what stands within | |. With its friction known, v_y = soft(b_y - t v_0, tau C_y)/(A_yy + t^2/A_xx), v_0
+being the v_x of v_y = 0, and v_x follows.
 
 Of the direction of travel, n = C v/|C v|: with rho = |C v|, A' = C^-1 A C^-1 and b' = C^-1 b, (rho A' + tau) n = b' and
 |n| = 1. At rest where |b'| <= tau. Newton on 1/|n(rho)| - 1, nearly linear in rho: as many steps for all; a robot that
@@ -238,7 +239,7 @@ def march_implicit(first, last, laws, rows, record, rule):
         load(work, LAW, laws[b], states[b])
         failure = first_failure(fails[b])
         for step in range(steps):
-            _put_push(work, wheels, volts[b, step] if width > 1 else volts[0, step], width == 1)
+            _put_push(work, wheels, volts[b - first, step] if width > 1 else volts[0, step], width == 1)
             for n in range(WIDTH):
                 work[NODE, n], work[NODE + 1, n], work[NODE + 2, n] = zero, zero, zero
             _stage(work, NODE, zero, rule.box, k, zero)

@@ -45,7 +45,7 @@ class Record(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """What moves. volts: (1, steps, wheels, 1) that all robots share, or (blocks, steps, wheels, WIDTH); states
+    """What moves. volts: (1, steps, wheels, 1) that all robots share, or (those blocks, steps, wheels, WIDTH); states
     (blocks, 3 or 9, WIDTH): twist and pose; fails (blocks, WIDTH): the step from which on a robot is lost."""
 
     volts: NDArray[Any]
@@ -166,7 +166,7 @@ def march_twist(first, last, laws, rows, record):
         failure = first_failure(fails[b])
         for k in range(steps):
             if width > 1:
-                put_drive(drive, law, volts[b, k])
+                put_drive(drive, law, volts[b - first, k])
                 advance(speed, drive, law, zero)
             elif wheels == 3:
                 advance_three(speed, law, volts[0, k, 0, 0], volts[0, k, 1, 0], volts[0, k, 2, 0], zero)

@@ -52,17 +52,23 @@ class BatchParameters(NamedTuple):
         return BatchParameters(*(values[..., robots] for values in self))
 
 
-def batch_parameters(robots: Sequence[Robot]) -> BatchParameters:
-    """The numbers of robots, one after the other. Raises InputError where they differ in their number of wheels."""
+def wheels_of(robots: Sequence[Robot]) -> int:
+    """The number of wheels of each of some robots. Raises InputError where they differ in it, or there is no robot."""
     counts = sorted({robot.wheels.count for robot in robots})
     if len(counts) != 1:
         raise InputError(
             "cannot simulate these robots as one batch",
-            got=f"robots of {' and '.join(map(str, counts)) or 'no'} wheels",
+            got=f"robots of {' and '.join(map(str, counts))} wheels" if counts else "no robot",
             expected="one robot or more, all with as many wheels",
             remedy="simulate a batch for each number of wheels",
             where="robots",
         )
+    return counts[0]
+
+
+def batch_parameters(robots: Sequence[Robot]) -> BatchParameters:
+    """The numbers of robots, one after the other. Raises InputError where they differ in their number of wheels."""
+    wheels_of(robots)
     distinct_robots = {id(robot): robot for robot in robots}  # a robot that is repeated is read once
     position = {key: k for k, key in enumerate(distinct_robots)}
     rows = [_of_robot(robot) for robot in distinct_robots.values()]

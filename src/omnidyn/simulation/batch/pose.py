@@ -21,7 +21,7 @@ from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters, in_block
 from omnidyn.simulation.exact.march import MAX_TURN_PER_STEP, NODES, PIECE, WEIGHTS, travel, turning
 from omnidyn.simulation.exact.step import course, exact_step, pieces, turned_within
 
-# Rows of `work`: speeds at a node and at the end of a step, displacement and turn; f of yaw, whether a robot goes alone.
+# Rows of `work`: speeds at a node and at the end of a step, displacement and turn, f of yaw, how fast the step goes.
 NODE, END, DX, DY, TURN, FORCE, ALONE, NODE_PHI, LAW = 12, 15, 18, 19, 20, 21, 22, 23, 35
 # sin x = x (1 - x^2/6 (1 - x^2/20 (1 - ..))), cos x = 1 - x^2/2 (1 - x^2/12 (1 - ..)): to the last bit up to PIECE
 SERIES = [1.0 / (k * (k + 1)) for k in (2, 4, 6, 8, 10, 12, 1, 3, 5, 7, 9, 11)]
@@ -72,7 +72,7 @@ def _speeds(work, to, first_phi, zero):
 
 @inlined
 def _see_events(work, k, zero):
-    """Fill rows FORCE and TURN, and ALONE: how fast a step goes [1/s], beyond all bounds where something stops in it."""
+    """Fill FORCE and TURN, and ALONE: how fast a step goes [1/s], beyond all bounds where something stops in it."""
     alone, force, turn, w, last = work[ALONE], work[FORCE], work[TURN], work[SPEED + 2], work[END + 2]
     dt, event, a = k[DT], k[FAST] + k[FAST], work[LAW + RATE + 2]
     for n in range(WIDTH):
@@ -192,7 +192,7 @@ def march_pose(first, last, laws, rows, record, rule):
         failure = first_failure(fails[b])
         for k in range(steps):
             if width > 1:
-                put_drive(drive, law, volts[b, k])
+                put_drive(drive, law, volts[b - first, k])
             else:
                 put_shared_drive(drive, law, volts[0, k, :, 0])
             spun = _step(work, rule.times, rule.weights, rule.gauss, rule.numbers, zero)

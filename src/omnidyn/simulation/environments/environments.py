@@ -58,9 +58,10 @@ MOST_ROBOTS, MOST_LAG, EDGE = 2**24, 1000, 1e-9
 class Setting:
     """What a task is made of, apart from the robots.
 
-    task: "velocity", to drive at a twist; "pose", to stop at a pose; "path", to follow one. dt [s]: of a step; substeps: of the simulation in it. duration [s]: of an episode, None: that of the task. spread:
-    half the width of goals, or of starts beside a path, (3,). push: largest wrench [N, N, N m], (3,), drawn evenly,
-    anew each interval [s], None: for an episode. latency [s]: until an action acts, beside that of the robot's drive.
+    task: "velocity", to drive at a twist; "pose", to stop at a pose; "path", to follow one. dt [s]: of a step;
+    substeps: of the simulation in it. duration [s]: of an episode, None: that of the task. spread: half the width of
+    goals, or of starts beside a path, (3,). push: largest wrench [N, N, N m], (3,), drawn evenly, anew each interval
+    [s], None: for an episode. latency [s]: until an action acts, beside that of the robot's drive.
     uncertainty: when numbers are drawn as far off as the std and correlations of the robot file say: "startup",
     "reset", "interval", or "" for never. randomise: ranges of numbers by their keys in the robot file.
     """
@@ -134,6 +135,8 @@ class Environments:
         dtype: Of all numbers, float32 or float64.
         threads: That share a step.
         seed: Of the pool that ranges draw from.
+
+    begun: whether they have been reset.
     """
 
     def __init__(
@@ -159,6 +162,7 @@ class Environments:
         if autoreset not in AUTORESET:
             raise InputError("unknown autoreset", got=autoreset, expected=", ".join(AUTORESET), where="autoreset")
         check_robots(given)
+        self.robot = given[0]
         self.setting, self.count, self.autoreset, self.dtype = setting, count, autoreset, np.dtype(dtype)
         if self.dtype not in (np.float32, np.float64):
             raise InputError("no such numbers", got=self.dtype.name, expected="float32 or float64", where="dtype")
@@ -176,7 +180,7 @@ class Environments:
         share = -(-blocks // threads)
         self._parts = [(first, min(blocks, first + share)) for first in range(0, blocks, share)]
         self._threads = ThreadPoolExecutor(len(self._parts) - 1) if len(self._parts) > 1 else None
-        self._now, self._begun = 0, False
+        self._now, self.begun = 0, False
 
     def _numbers(self, robot: Robot, path: FloatArray | None) -> Numbers:
         """What a step needs to know."""
@@ -242,16 +246,16 @@ class Environments:
 
         seed: of their random numbers from here on; without one, each goes on with its own.
         """
-        if seed is None and not self._begun:
+        if seed is None and not self.begun:
             seed = int(np.random.SeedSequence().entropy)  # pyright: ignore[reportArgumentType]
         base = -1 if seed is None else int(np.random.SeedSequence(seed).generate_state(1)[0])
         chosen = np.ones(self.count, np.bool_) if mask is None else np.asarray(mask)
         if chosen.shape != (self.count,) or chosen.dtype != np.bool_:
             got = f"{chosen.dtype} of shape {chosen.shape}"
             raise InputError("not a mask", got=got, expected=f"bool of shape ({self.count},)", where="mask")
-        if not self._begun and not chosen.all():
+        if not self.begun and not chosen.all():
             raise InputError("not begun yet", got="a mask", expected="a reset of all first", where="mask")
-        self._begun = True
+        self.begun = True
         reset_blocks(self.numbers, self.state, chosen, base, self.buffers.observation)
         return self.buffers.observation[:, : self.count].T
 
@@ -264,7 +268,7 @@ class Environments:
         if columns.shape != (self.wheels, self.count):
             got, expected = np.shape(action), f"({self.count}, {self.wheels})"
             raise InputError("wrong shape", got=got, expected=expected, where="action")
-        if not self._begun:
+        if not self.begun:
             raise InputError("not begun yet", got="a step", expected="a reset first", where="step")
         if self.autoreset == "disabled" and self.over.any():
             got = f"{int(self.over.sum())} episodes that are over"
@@ -277,8 +281,8 @@ class Environments:
             job.result()
         self._now += 1
         out = self.buffers
-        columns = (out.reward, out.terminated.view(np.bool_), out.truncated.view(np.bool_))
-        return Step(out.observation[:, : self.count].T, *(column[: self.count] for column in columns))
+        terminated, truncated = (flags[: self.count].view(np.bool_) for flags in (out.terminated, out.truncated))
+        return Step(out.observation[:, : self.count].T, out.reward[: self.count], terminated, truncated)
 
     def _run(self, part: tuple[int, int], action: FloatArray) -> None:
         """A step of some blocks."""
@@ -296,19 +300,28 @@ class Environments:
         """The last observation of episodes that ended in this step, where the next has begun. (count, columns)."""
         return self.buffers.final[:, : self.count].T
 
-    def by_robot(self, rows: FloatArray) -> FloatArray:
-        """Rows of blocks, (blocks, rows, W), as (count, rows)."""
-        return rows.swapaxes(1, 2).reshape(-1, rows.shape[1])[: self.count]
+    def _by_robot(self, rows: FloatArray) -> FloatArray:
+        """A copy of rows of blocks, (blocks, rows, W), as (count, rows)."""
+        return rows.swapaxes(1, 2).reshape(-1, rows.shape[1])[: self.count].copy()
 
     @property
     def twist(self) -> FloatArray:
         """The true twists. Shape (count, 3)."""
-        return self.by_robot(self.state.twist)
+        return self._by_robot(self.state.twist)
 
     @property
     def pose(self) -> FloatArray:
         """The true poses; zeros in the task "velocity", which asks for none. Shape (count, 3)."""
-        return self.by_robot(self.state.pose)
+        return self._by_robot(self.state.pose)
+
+    @property
+    def steps_done(self) -> Any:
+        """Steps of the episodes so far; may be set, to spread their ends. Shape (count,)."""
+        return self.state.count.reshape(-1)[: self.count].copy()
+
+    @steps_done.setter
+    def steps_done(self, steps: ArrayLike) -> None:
+        self.state.count.reshape(-1)[: self.count] = np.clip(steps, 0, self.setting.steps - 1)
 
     @property
     def privileged(self) -> FloatArray:
@@ -318,7 +331,7 @@ class Environments:
         """
         state, phi = self.state, 3 * len(self.numbers.lags)
         robots = np.delete(state.robots, slice(PER_MASS + 3, PER_MASS + 3 + phi), axis=1)
-        return self.by_robot(np.concatenate([state.twist, state.pose, state.push, robots], axis=1))
+        return self._by_robot(np.concatenate([state.twist, state.pose, state.push, robots], axis=1))
 
     def close(self) -> None:
         """Let go of threads."""

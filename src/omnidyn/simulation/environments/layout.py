@@ -101,13 +101,8 @@ def new_state(numbers: Numbers, robots: int, wheels: int) -> State:
     """A state for so many robots, whose blocks are whole; nobody has begun yet."""
     blocks, dtype = -(-robots // W), numbers.pool.dtype
     three = [np.zeros((blocks, 3, W), dtype) for _ in range(5)]
+    past = np.zeros((blocks, max(1, int(numbers.lags.max())), wheels, W), dtype)
+    places = np.zeros((blocks, max(1, numbers.late + numbers.hold), 3, W), dtype)
     counts = [np.zeros((blocks, W), np.int32) for _ in range(4)]
-    return State(
-        np.zeros((blocks, numbers.pool.shape[1], W), dtype),
-        *three,
-        np.zeros((blocks, max(1, int(numbers.lags.max())), wheels, W), dtype),
-        np.zeros((blocks, max(1, numbers.late + numbers.hold), 3, W), dtype),
-        *counts,
-        np.zeros((blocks, W), np.uint32),
-        np.zeros((blocks, W), np.uint8),
-    )
+    marks = np.zeros((blocks, W), np.uint32), np.zeros((blocks, W), np.uint8)
+    return State._make([np.zeros((blocks, numbers.pool.shape[1], W), dtype), *three, past, places, *counts, *marks])

@@ -16,7 +16,7 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError, UnsupportedError
-from omnidyn.model.keys import Key
+from omnidyn.model.keys import Key, expand
 from omnidyn.model.known.uncertainty import plausible
 from omnidyn.model.motor import DUTY, DYNAMIC, SPEED
 from omnidyn.model.robot import Robot
@@ -116,19 +116,13 @@ def _sizes(robots: int, when: set[str]) -> tuple[int, int, int]:
 
 def _changed(robot: Robot, name: str, entry: Range, share: float) -> Robot:
     """The robot with one number, or all numbers of a list, changed."""
-    keys = [Key.parse(key) for key in _entries(robot, name)]
+    keys = [Key.parse(key) for key in expand(name, robot)]
     for key in keys:
         try:
             robot = key.set(robot, entry.of(float(key.get(robot)), share))
         except InputError as error:
             raise error.at(f"range of {name}") from None
     return robot
-
-
-def _entries(robot: Robot, name: str) -> list[str]:
-    """The key itself, or those of all entries of its list."""
-    value = Key.parse(name).get(robot) if "[" not in name else 0.0
-    return [f"{name}[{k}]" for k in range(len(value))] if isinstance(value, tuple | list | np.ndarray) else [name]
 
 
 def why_no_environment(robot: Robot) -> list[str]:

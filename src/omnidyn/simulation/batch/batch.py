@@ -1,0 +1,314 @@
+"""Batch: many robots in the middle of their motion; `simulate_batch`: from rest to the end of rows of commands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from omnidyn.arrays import FloatArray, IntArray
+from omnidyn.errors import InputError
+from omnidyn.model.motor import SPEED
+from omnidyn.model.robot import Robot
+from omnidyn.simulation.batch.blocks import EXACT_POSE, FAST_POSE, BatchCommands, BlockGroup, GroupRun, drivers_of
+from omnidyn.simulation.batch.choice import DUTY, GENERAL, VOLTAGE, WHEEL_SPEED, engine_kind
+from omnidyn.simulation.batch.parameters import batch_parameters, wheels_of
+from omnidyn.simulation.batch.result import BatchRun, BatchState, Statistics
+from omnidyn.simulation.batch.sample import Sample
+from omnidyn.simulation.batch.singles import SingleGroup
+from omnidyn.simulation.batch.threads import Threads
+from omnidyn.simulation.commands import MAX_DT, MIN_DT, as_floats
+from omnidyn.simulation.engine import as_tolerance
+from omnidyn.statement import WARNING, Statement
+
+POSES = (None, FAST_POSE, EXACT_POSE)
+
+
+def simulate_batch(
+    robots: Sequence[Robot] | Sample,
+    voltage: ArrayLike | None = None,
+    dt: float | None = None,
+    *,
+    duty: ArrayLike | None = None,
+    wheel_speed_command: ArrayLike | None = None,
+    supply: float | None = None,
+    start_twist: ArrayLike = (0.0, 0.0, 0.0),
+    start_pose: ArrayLike = (0.0, 0.0, 0.0),
+    pose: str | None = EXACT_POSE,
+    every: int | None = None,
+    statistics: bool = False,
+    dtype: Any = float,
+    threads: int | None = None,
+    tol: float | None = None,
+) -> BatchRun:
+    """Simulate many robots under commands held from row to row, as `simulate` does one.
+
+    Returns a BatchRun: the end of each, and what else is asked for. Each robot has the same bits in any batch and with
+    any number of threads. One that cannot go on, such as by a command that is not finite, is NaN and marked as failed.
+
+    Args:
+        robots: Robots of as many wheels each, or `sample`.
+        voltage: [V], shape (rows, wheels) for all, or (robots, rows, wheels).
+        dt: Length of each row [s].
+        duty: In place of a voltage, -1..1 of the supply.
+        wheel_speed_command: In place of a voltage, for drives with a speed loop [rad/s].
+        supply: Voltage of the battery behind a duty [V]; None takes that of the robot.
+        start_twist: [m/s, m/s, rad/s], shape (3,) or (robots, 3).
+        start_pose: [m, m, rad], shape (3,) or (robots, 3).
+        pose: "exact", as `simulate`; "fast", 2 Gauss nodes a step, within 2e-6 m and rad over 10 s at 1 kHz; None.
+        every: Keep samples of every so many rows, the start included.
+        statistics: Keep mean, root mean square, least and largest over the ends of all rows.
+        dtype: float, or numpy.float32 in half the time, for what moves in blocks.
+        threads: How many work; None takes one for each processor.
+        tol: Of engines that are not exact [m/s]; None takes one fixed step a row.
+
+    Raises InputError for wrong shapes, values that are not finite in what all robots share, a dt outside 1e-9..3600 s.
+    """
+    given = {VOLTAGE: voltage, DUTY: duty, WHEEL_SPEED: wheel_speed_command}
+    names = [name for name, value in given.items() if value is not None]
+    if len(names) != 1 or dt is None:
+        raise InputError(
+            "cannot tell what to apply",
+            got=" and ".join(names) or "no command",
+            expected=f"one of {', '.join(given)}, and dt",
+        )
+    batch = Batch(
+        robots,
+        dt,
+        command=names[0],
+        supply=supply,
+        start_twist=start_twist,
+        start_pose=start_pose,
+        pose=pose,
+        dtype=dtype,
+        threads=threads,
+        tol=tol,
+    )
+    return batch.run(given[names[0]], every=every, statistics=statistics)
+
+
+class Batch:
+    """Many robots in the middle of their motion; the arguments are those of `simulate_batch`.
+
+    command: what `step` and `run` take, "voltage" [V], "duty" or "wheel_speed_command" [rad/s].
+    """
+
+    def __init__(
+        self,
+        robots: Sequence[Robot] | Sample,
+        dt: float,
+        *,
+        command: str = VOLTAGE,
+        supply: float | None = None,
+        start_twist: ArrayLike = (0.0, 0.0, 0.0),
+        start_pose: ArrayLike = (0.0, 0.0, 0.0),
+        pose: str | None = EXACT_POSE,
+        dtype: Any = float,
+        threads: int | None = None,
+        tol: float | None = None,
+    ) -> None:
+        self.dt, self.command, self.pose, self._supply = _as_dt(dt), command, pose, supply
+        _check_word("pose", pose, POSES)
+        _check_word("command", command, (VOLTAGE, DUTY, WHEEL_SPEED))
+        _check_word("dtype", np.dtype(dtype).name, ("float64", "float32"))
+        as_tolerance(tol)
+        self._threads = Threads(threads)
+        self._groups = self._group(robots, np.dtype(dtype), tol)
+        self.count = sum(group.count for _, group in self._groups)
+        self._start = start_twist, start_pose
+        self.reset()
+
+    def _group(self, robots: Sequence[Robot] | Sample, dtype: Any, tol: float | None) -> list[tuple[IntArray, Any]]:
+        """(indices, the group that moves those robots), one for each engine."""
+        if isinstance(robots, Sample) and robots.parameters is not None:
+            kind = engine_kind(robots.center, self.command, tol)
+            if kind != GENERAL:
+                _check_drive(robots.center, self.command, self._supply)
+                self.wheels = robots.center.wheels.count
+                turning = np.full(len(robots), robots.center.body.rotating_frame)
+                drivers = [(robots.center, slice(None))]
+                group = BlockGroup(kind, robots.parameters, drivers, turning, self.dt, self.pose, dtype)
+                return [(np.arange(len(robots)), group)]
+        fleet = list(robots)
+        self.wheels = wheels_of(fleet)
+        kinds: dict[int, str] = {}
+        for robot in fleet:
+            if id(robot) not in kinds:
+                _check_drive(robot, self.command, self._supply)
+                kinds[id(robot)] = engine_kind(robot, self.command, tol)
+        places: dict[str, list[int]] = {}
+        for k, robot in enumerate(fleet):
+            places.setdefault(kinds[id(robot)], []).append(k)
+        groups = []
+        for kind, index in places.items():
+            members = [fleet[k] for k in index]
+            if kind == GENERAL:
+                group: Any = SingleGroup(members, self.command, self._supply, self.dt, self.pose, tol)
+            else:
+                turning = np.array([robot.body.rotating_frame for robot in members])
+                parameters = batch_parameters(members)
+                group = BlockGroup(kind, parameters, drivers_of(members), turning, self.dt, self.pose, dtype)
+            groups.append((np.array(index), group))
+        return groups
+
+    @property
+    def engines(self) -> dict[str, int]:
+        """Name of an engine -> number of robots that it moves."""
+        engines: dict[str, int] = {}
+        for _, group in self._groups:
+            for name, count in group.engines.items():
+                engines[name] = engines.get(name, 0) + count
+        return engines
+
+    @property
+    def state(self) -> BatchState:
+        """Where all robots are."""
+        twist, pose = np.empty((self.count, 3)), np.empty((self.count, 3))
+        failed = np.empty(self.count, bool)
+        for index, group in self._groups:
+            twist[index], pose_rows, failed[index] = group.state()
+            if self.pose is not None:
+                pose[index] = pose_rows
+        return BatchState(twist, None if self.pose is None else pose, failed)
+
+    def reset(
+        self, mask: ArrayLike | None = None, *, twist: ArrayLike | None = None, pose: ArrayLike | None = None
+    ) -> BatchState:
+        """Put the robots of a mask (n,), or all, to a twist and a pose, shape (3,) or (n, 3), else to their start."""
+        chosen = np.ones(self.count, bool) if mask is None else np.asarray(mask)
+        if chosen.dtype != bool or chosen.shape != (self.count,):
+            raise InputError(
+                "no mask of robots",
+                got=f"{chosen.dtype}, shape {chosen.shape}",
+                expected=f"bool, shape ({self.count},)",
+                where="mask",
+            )
+        twists = self._rows("twist", self._start[0] if twist is None else twist)
+        poses = self._rows("pose", self._start[1] if pose is None else pose)
+        for index, group in self._groups:
+            here = np.flatnonzero(chosen[index])
+            group.reset(here, twists[index[here]], poses[index[here]])
+        return self.state
+
+    def _rows(self, name: str, value: ArrayLike) -> FloatArray:
+        array = as_floats(name, value)
+        if array.shape not in ((3,), (self.count, 3)):
+            raise InputError("wrong shape", got=array.shape, expected=f"(3,) or ({self.count}, 3)", where=name)
+        return np.broadcast_to(array, (self.count, 3))
+
+    def step(self, command: ArrayLike) -> BatchState:
+        """Hold a command for dt, shape (wheels,) for all or (n, wheels). Returns where all robots are then."""
+        rows = as_floats(self.command, command)
+        if rows.ndim not in (1, 2):
+            self._refuse(rows, f"({self.wheels},) or ({self.count}, {self.wheels})")
+        self._run(self._commands(rows[None] if rows.ndim == 1 else rows[:, None]), 0, False)
+        return self.state
+
+    def run(self, command: ArrayLike, *, every: int | None = None, statistics: bool = False) -> BatchRun:
+        """Hold rows of commands, shape (rows, wheels) for all or (n, rows, wheels); see `simulate_batch`."""
+        if every is not None and (not isinstance(every, int) or every < 1):
+            raise InputError(
+                "cannot keep every so many samples", got=every, expected="1 or more, or None", where="every"
+            )
+        commands = self._commands(as_floats(self.command, command))
+        return self._merged(commands, self._run(commands, every or 0, statistics), every or 0, statistics)
+
+    def _commands(self, rows: FloatArray) -> BatchCommands:
+        shapes = f"(rows, {self.wheels}) or ({self.count}, rows, {self.wheels})"
+        if rows.ndim not in (2, 3) or rows.shape[-1] != self.wheels or not rows.shape[-2]:
+            self._refuse(rows, shapes)
+        if rows.ndim == 3 and len(rows) != self.count:
+            self._refuse(rows, shapes)
+        if rows.ndim == 2:
+            bad_rows = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+            if bad_rows.size:
+                raise InputError(
+                    "not a finite number",
+                    got=rows[bad_rows[0]].tolist(),
+                    expected="numbers",
+                    where=f"{self.command} row {bad_rows[0]}",
+                )
+        return BatchCommands(self.command, rows[None] if rows.ndim == 2 else rows, self._supply)
+
+    def _refuse(self, rows: FloatArray, expected: str) -> None:
+        raise InputError("wrong shape", got=rows.shape, expected=expected, where=self.command)
+
+    def _run(self, commands: BatchCommands, every: int, statistics: bool) -> list[GroupRun]:
+        return [
+            group.run(commands if len(self._groups) == 1 else commands.of(index), every, statistics, self._threads)
+            for index, group in self._groups
+        ]
+
+    def _merged(self, commands: BatchCommands, runs: list[GroupRun], every: int, statistics: bool) -> BatchRun:
+        """One run of those of the groups."""
+        samples = _together([run.samples for run in runs], self._groups, self.count)
+        totals = _together([run.totals for run in runs], self._groups, self.count)
+        has_pose, steps = self.pose is not None, commands.steps
+        return BatchRun(
+            end=self.state,
+            engines=self.engines,
+            t=np.arange(samples.shape[1]) * (every * self.dt) if samples is not None else None,
+            twists=None if samples is None else samples[..., :3],
+            poses=None if samples is None or not has_pose else samples[..., 3:],
+            twist_statistics=None if totals is None else _statistics(totals, 0, steps),
+            pose_statistics=None if totals is None or not has_pose else _statistics(totals, 3, steps),
+            warnings=_warnings(runs, self.command, steps * len(commands.rows)),
+        )
+
+
+def _together(parts: list[Any], groups: list[tuple[IntArray, Any]], count: int) -> Any:
+    """What the groups give, robot by robot; None where they give nothing."""
+    if parts[0] is None or len(parts) == 1:
+        return parts[0]
+    whole = np.empty((count, *parts[0].shape[1:]))
+    for (index, _), part in zip(groups, parts, strict=True):
+        whole[index] = part
+    return whole
+
+
+def _statistics(totals: FloatArray, first: int, steps: int) -> Statistics:
+    """Of the three rows from `first` on; totals (n, sums, sums of squares, least, largest)."""
+    total, squares, least, largest = (part[:, first : first + 3] for part in np.split(totals, 4, axis=1))
+    return Statistics(total / steps, np.sqrt(squares / steps), least, largest)
+
+
+def _warnings(runs: list[GroupRun], command: str, rows: int) -> tuple[Statement, ...]:
+    clipped = [run.clipped for run in runs if run.clipped[0]]
+    statements = []
+    if clipped:
+        numbers = {"clipped": sum(count for count, _ in clipped), "rows": rows, "first": min(row for _, row in clipped)}
+        statements.append(Statement("clipped", WARNING, command, numbers))
+    return (*statements, *(statement for run in runs for statement in run.warnings))
+
+
+def _as_dt(dt: float) -> float:
+    if not isinstance(dt, int | float | np.floating | np.integer) or not MIN_DT <= dt <= MAX_DT:
+        raise InputError("step out of range", got=dt, expected=f"one number, {MIN_DT:g} to {MAX_DT:g} s", where="dt")
+    return float(dt)
+
+
+def _check_word(name: str, word: Any, words: tuple[Any, ...]) -> None:
+    if word not in words:
+        expected = ", ".join(str(choice) for choice in words)
+        raise InputError(f"no such {name}", got=word, expected=f"one of {expected}", where=name)
+
+
+def _check_drive(robot: Robot, command: str, supply: float | None) -> None:
+    """Raises InputError for a command that the drive of a robot cannot take."""
+    if command == WHEEL_SPEED and robot.drive.kind != SPEED:
+        raise InputError(
+            f"the drive of {robot.name} takes no {command}",
+            got=f'[drive] kind = "{robot.drive.kind}"',
+            expected='kind = "speed"',
+            remedy="add the gains and the rate of its speed loop to the robot file",
+        )
+    battery = robot.drive.supply if supply is None else supply
+    if command == DUTY and not (battery is not None and np.isfinite(battery) and battery > 0.0):
+        raise InputError(
+            "a duty needs a supply",
+            got=battery or "no supply",
+            expected="positive volts, supply= or [drive] supply_V",
+            remedy='add [drive] kind = "duty" and supply_V to the robot file',
+        )

@@ -1,0 +1,66 @@
+"""Which engine moves which robot of a batch: what a robot is decides, not the company it is in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from omnidyn.model.friction import AxesFriction, DirectionFriction, Friction, WheelFriction
+from omnidyn.model.motor import DYNAMIC
+from omnidyn.model.robot import Robot
+from omnidyn.simulation.exact.march import why_not_exact
+
+EXACT, BOX, DIRECTION, GENERAL = "exact", "box", "direction", "general"
+VOLTAGE, DUTY, WHEEL_SPEED = "voltage", "duty", "wheel_speed_command"
+NO_FRICTION = (0.0, 0.0, 0.0)
+
+
+def engine_kind(robot: Robot, command: str, tol: float | None) -> str:
+    """EXACT: blocks by the exact formula. BOX, DIRECTION: blocks of fixed implicit steps, friction of the axes or along
+    the direction of travel. GENERAL: the engine of `simulate`, robot by robot.
+
+    command: what is given. tol [m/s]: of an engine that is not exact, None for one fixed step a row.
+    """
+    drive = robot.drive
+    if command == WHEEL_SPEED or (command == DUTY and drive.coasts) or drive.latency > 0.0:
+        return GENERAL
+    if robot.motor.electrical == DYNAMIC:
+        return GENERAL
+    if not why_not_exact(robot):
+        return EXACT
+    shape = _shape(robot.friction)
+    if tol is not None or shape == GENERAL or why_not_exact(_on_axes(robot)):
+        return GENERAL
+    return shape
+
+
+def _shape(friction: Friction) -> str:
+    """BOX or DIRECTION, where no level falls and nothing holds more than it slides with."""
+    axes, way = friction.axes, friction.direction
+    bare = DirectionFriction(
+        coulomb=way.coulomb,
+        viscous=way.viscous,
+        yaw_coulomb=way.yaw_coulomb,
+        yaw_viscous=way.yaw_viscous,
+        ellipse=way.ellipse,
+    )
+    levels = {"breakaway": way.coulomb, "yaw_breakaway": way.yaw_coulomb}
+    if friction.wheels != WheelFriction() or not axes.is_plain or axes.breakaway not in (None, axes.coulomb):
+        return GENERAL
+    if way.replace(**levels) != bare.replace(**levels):
+        return GENERAL
+    if way.coulomb == (0.0, 0.0):
+        return BOX
+    round_ = way.coulomb[0] == way.coulomb[1] or way.ellipse == "dissipation"
+    return DIRECTION if round_ and min(way.coulomb) > 0.0 and axes.coulomb[:2] == (0.0, 0.0) else GENERAL
+
+
+def _on_axes(robot: Robot) -> Robot:
+    """The robot without turning frame, its damping all on the axes: what else stands against the exact engine stays."""
+    way = robot.friction.direction
+    damping = np.add(robot.friction.axes.viscous, (way.viscous, way.viscous, way.yaw_viscous))
+    return robot.model_copy(
+        update={
+            "body": robot.body.model_copy(update={"rotating_frame": False}),
+            "friction": Friction(axes=AxesFriction(viscous=tuple(damping.tolist()), coulomb=NO_FRICTION)),
+        }
+    )

@@ -1,0 +1,213 @@
+"""sample: many robots that may be meant, drawn from what is known of one, as a struct of arrays.
+
+From a fit, or a robot file with std: all numbers that have one, with their correlations, by the scales and the Latin
+hypercube of model/known/uncertainty.py. From ranges: each number evenly between its ends, apart from the others.
+
+Numbers that only scale what moves a robot are drawn for a million robots at once, beside friction:
+
+    push of a volt ~ l K_t/(R r),   back-EMF ~ l^2 K_t K_v/(R r^2)
+
+Any other number, or one that differs from wheel to wheel, takes a robot of its own for each draw: 0.2 ms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from omnidyn.arrays import FloatArray
+from omnidyn.errors import InputError
+from omnidyn.model.dynamics import motor_wrench
+from omnidyn.model.keys import BODY_AXES, BREAKAWAY, COULOMB, DIRECTION, EMF, TORQUE, VISCOUS, Key, expand
+from omnidyn.model.known.told import holding
+from omnidyn.model.known.uncertainty import MOST_DRAWS, Draws
+from omnidyn.model.mass import added_mass
+from omnidyn.model.robot import Robot
+from omnidyn.simulation.batch.parameters import BatchParameters, batch_parameters
+
+MASS, INERTIA, RADIUS = "body.mass_kg", "body.inertia_kg_m2", "wheels.wheel_radius_m"
+POWERS = {  # of push and of back-EMF, by each number
+    "motor.resistance_ohm": (-1, -1),
+    TORQUE: (1, 1),
+    EMF: (0, 1),
+    "motor.gear_ratio": (1, 2),
+    RADIUS: (-1, -2),
+}
+SPINS = ("motor.gear_ratio", RADIUS)  # they also change the mass of what spins
+LEVELS = (VISCOUS, COULOMB, BREAKAWAY)
+
+
+class Sample:
+    """Robots drawn around one. center: that robot; keys, values (n, keys): what was drawn, in the unit of each key.
+
+    parameters: of all of them, for blocks; None where each takes a robot of its own. A sequence of robots, each made as
+    it is asked for.
+    """
+
+    def __init__(
+        self, center: Robot, keys: Sequence[str], values: FloatArray, robot_of: Callable[[int], Robot]
+    ) -> None:
+        self.center, self.keys, self.values, self._robot_of = center, tuple(keys), values, robot_of
+        self.parameters = scaled_parameters(center, dict(zip(keys, values.T, strict=True)))
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __iter__(self) -> Iterator[Robot]:
+        return (self._robot_of(k) for k in range(len(self)))
+
+    def robot(self, k: int) -> Robot:
+        """Robot k of the sample."""
+        if not 0 <= k < len(self):
+            raise InputError("no such robot", got=k, expected=f"0 to {len(self) - 1}", where="robot")
+        return self._robot_of(k)
+
+    def __repr__(self) -> str:
+        return f"<Sample of {len(self)} robots around {self.center.name}: {', '.join(self.keys)}>"
+
+
+def sample(
+    fit: Any,
+    count: int,
+    seed: int = 0,
+    *,
+    ranges: Mapping[str, tuple[float, float]] | None = None,
+    factors: Mapping[str, tuple[float, float]] | None = None,
+) -> Sample:
+    """Robots that may be meant: by all std and correlations of a fit or of a robot, or by ranges of numbers.
+
+    What is drawn beyond a limit of the robot file comes back half-way as often as it takes; friction stays above 0, and
+    breakaway is at least its Coulomb level. One seed gives the same robots, always.
+
+    Args:
+        fit: An estimate, or a robot.
+        count: Number of robots.
+        seed: Of the draws.
+        ranges: Key of a robot file -> (low, high), in its unit; that of a list stands for each entry.
+        factors: The same in shares of the value, such as (0.8, 1.2).
+
+    Raises InputError for a range that the robot cannot have, InsufficientDataError where nothing has a std.
+    """
+    center = fit if isinstance(fit, Robot) else getattr(fit, "robot", None)
+    if not isinstance(center, Robot):
+        raise InputError("cannot draw robots from this", got=type(fit).__name__, expected="an estimate, or a robot")
+    if not isinstance(count, int) or not 1 <= count <= MOST_DRAWS:
+        raise InputError("strange number of draws", got=count, expected=f"1 to {MOST_DRAWS}", where="count")
+    if ranges is None and factors is None:
+        draws = Draws(center, count, seed)
+        keys, values = [str(key) for key in draws.keys], draws.values
+        found = Sample(center, keys, values, draws.robot)
+        ends = [values.min(axis=0), values.max(axis=0)]
+        if found.parameters is not None and not all(_is_allowed(center, keys, end) for end in ends):
+            found.parameters = batch_parameters(list(found))
+        return found
+    ends = _ends(center, ranges or {}, factors or {})
+    low, high = np.array(list(ends.values())).T
+    values = low + (high - low) * np.random.default_rng(seed).random((count, len(ends)))
+    keys = [Key.parse(name) for name in ends]
+    return Sample(center, list(ends), values, lambda k: _with(center, keys, values[k]))
+
+
+def _ends(
+    center: Robot, ranges: Mapping[str, tuple[float, float]], factors: Mapping[str, tuple[float, float]]
+) -> dict[str, tuple[float, float]]:
+    """Key -> lowest and highest value. Raises InputError for a range that the robot cannot have."""
+    ends: dict[str, tuple[float, float]] = {}
+    for given, name, pair in [(ranges, name, ranges[name]) for name in ranges] + [
+        (factors, name, factors[name]) for name in factors
+    ]:
+        where = "ranges" if given is ranges else "factors"
+        for text in expand(name, center):
+            key = Key.parse(text)
+            value = float(key.get(center))
+            try:
+                low, high = (float(end) * (value if given is factors else 1.0) for end in pair)
+            except (TypeError, ValueError):
+                raise InputError("not a range", got=pair, expected="(low, high)", where=f"{where}, {name}") from None
+            if text in ends or not low <= high:
+                expected = "low <= high" if text not in ends else "each number once"
+                raise InputError("not a range", got=pair, expected=expected, where=f"{where}, {name}")
+            for end in (low, high):
+                _check(center, text, end)
+            ends[text] = low, high
+    return ends
+
+
+def _with(center: Robot, keys: Sequence[Key], values: FloatArray) -> Robot:
+    robot = center
+    for key, value in zip(keys, values.tolist(), strict=True):
+        robot = key.set(robot, value, checked=False)
+    return holding(robot)
+
+
+def _check(center: Robot, name: str, value: float) -> None:
+    """Raises InputError where a robot file may not have this number, breakaway being at least its Coulomb level."""
+    key = Key.parse(name)
+    if not key.level:
+        key.set(center, value)
+        return
+    law = getattr(holding(key.set(center, value, checked=False)).friction, key.table.rpartition(".")[2])
+    law.replace()
+
+
+def _is_allowed(center: Robot, keys: Sequence[str], values: FloatArray) -> bool:
+    try:
+        for name, value in zip(keys, values.tolist(), strict=True):
+            _check(center, name, value)
+    except InputError:
+        return False
+    return True
+
+
+def scaled_parameters(center: Robot, drawn: Mapping[str, FloatArray]) -> BatchParameters | None:
+    """The numbers of robots like `center` but for what was drawn, key -> values (n,); None where one does not scale."""
+    spins = added_mass(center).any()
+    if not all(_scales(name) and not (spins and name in SPINS) for name in drawn) or any(center.body.centre):
+        return None
+    count = len(next(iter(drawn.values())))
+    share = {name: drawn[name] / float(Key.parse(name).get(center)) for name in POWERS if name in drawn}
+    push, back_emf = np.ones(count), np.ones(count)
+    for name, factor in share.items():
+        push, back_emf = push * factor ** POWERS[name][0], back_emf * factor ** POWERS[name][1]
+
+    def level(table: str, field: str) -> FloatArray:
+        """A level of friction along the three axes, shape (3, n)."""
+        names = [f"{table}.{field}[{axis}]" for axis in range(3)]
+        if table == DIRECTION:
+            names[2] = f"{table}.yaw_{field}"
+            if field == VISCOUS:
+                names[:2] = [f"{table}.{field}"] * 2
+        return np.array([drawn.get(name, np.full(count, float(Key.parse(name).get(center)))) for name in names])
+
+    motors, base = motor_wrench(center), batch_parameters([center])
+    damping = level(BODY_AXES, VISCOUS) + level(DIRECTION, VISCOUS)
+    slides, along = level(BODY_AXES, COULOMB), level(DIRECTION, COULOMB)
+    holds = slides if center.friction.axes.breakaway is None else np.maximum(slides, level(BODY_AXES, BREAKAWAY))
+    mass, inertia = (drawn.get(name, np.full(count, value)) for name, value in _body(center))
+    spin = np.diag(added_mass(center))[:, None]
+    return BatchParameters(
+        base.push * push,
+        damping - np.diag(motors.braking)[:, None] * back_emf,
+        slides + along,
+        holds + along,
+        np.stack([mass, mass, inertia]) + spin,
+        mass,
+    )
+
+
+def _body(center: Robot) -> list[tuple[str, float]]:
+    return [(MASS, center.body.mass), (INERTIA, center.body.inertia)]
+
+
+def _scales(name: str) -> bool:
+    """Whether a number enters by a scale or as a level."""
+    if name in POWERS or name in (MASS, INERTIA):
+        return True
+    key = Key.parse(name)
+    return (
+        key.table in (BODY_AXES, DIRECTION)
+        and key.field.removeprefix("yaw_") in LEVELS
+        and not (key.table == DIRECTION and BREAKAWAY in key.field)
+    )

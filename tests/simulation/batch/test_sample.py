@@ -1,0 +1,110 @@
+"""sample: the covariance and the ranges come out again; the struct of arrays is that of its robots."""
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.model.known.uncertainty import plausible
+from omnidyn.model.log_effects import key_correlation
+from omnidyn.model.robot import Prior
+from omnidyn.simulation.batch.parameters import batch_parameters
+
+ROBOT = omnidyn.load_robot("axebot")
+KEYS = ("friction.axes.coulomb[0]", "friction.axes.viscous[0]", "motor.torque_constant_Nm_A")
+
+
+def known(robot, stds, matrix):
+    """A robot with these std and correlations."""
+    return robot.replace(
+        priors={key: Prior(std=std) for key, std in zip(KEYS, stds, strict=True)},
+        correlation=key_correlation(KEYS, np.array(matrix)),
+    )
+
+
+MATRIX = [[1.0, -0.8, 0.3], [-0.8, 1.0, 0.0], [0.3, 0.0, 1.0]]
+
+
+def test_draws_have_the_std_and_the_correlations():
+    robot = known(ROBOT, (0.1, 0.05, 0.0002), MATRIX)
+    drawn = omnidyn.sample(robot, 20_000, seed=1)
+    assert drawn.keys == KEYS
+    logs = np.log(drawn.values)
+    np.testing.assert_allclose(logs.std(axis=0), [0.1 / 2.2, 0.05 / 0.94, 0.0002 / 0.0059], rtol=0.02)
+    np.testing.assert_allclose(np.corrcoef(logs.T), MATRIX, atol=0.02)
+
+
+def test_the_arrays_are_those_of_the_robots_it_makes():
+    robot = known(ROBOT, (0.3, 0.1, 0.001), MATRIX)
+    drawn = omnidyn.sample(robot, 50, seed=2)
+    robots = list(drawn)
+    assert [r.friction for r in robots] == [r.friction for r in plausible(robot, 50, seed=2)]
+    for values, truth in zip(drawn.parameters, batch_parameters(robots), strict=True):
+        np.testing.assert_allclose(values, truth, rtol=1e-14, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["axebot", "lekiwi", "mecanum", "four-wheel"])
+def test_ranges_and_factors(name):
+    robot = omnidyn.load_robot(name)
+    factors = {
+        key: (0.5, 2.0)
+        for key in (
+            "friction",
+            "body.inertia_kg_m2",
+            "motor.resistance_ohm",
+            "motor.torque_constant_Nm_A",
+            "motor.emf_constant_Vs_rad",
+        )
+    }
+    if not (robot.motor.rotor_inertia or robot.wheels.wheel_inertia):
+        factors |= {"motor.gear_ratio": (0.9, 1.1), "wheels.wheel_radius_m": (0.9, 1.1)}
+    drawn = omnidyn.sample(robot, 40, ranges={"body.mass_kg": (1.0, 3.0)}, factors=factors)
+    mass = drawn.values[:, drawn.keys.index("body.mass_kg")]
+    assert 1.0 <= mass.min() < 1.2
+    assert 2.8 < mass.max() <= 3.0
+    for values, truth in zip(drawn.parameters, batch_parameters(list(drawn)), strict=True):
+        np.testing.assert_allclose(values, truth, rtol=1e-13, atol=1e-14)
+    assert drawn.robot(3).body.mass == mass[3]
+
+
+def test_numbers_of_single_wheels_take_a_robot_each():
+    drawn = omnidyn.sample(ROBOT, 5, factors={"wheels.robot_radius_m": (0.9, 1.1)})
+    assert drawn.parameters is None
+    voltage = np.full((30, 3), 2.0)
+    run = omnidyn.simulate_batch(drawn, voltage, 0.01)
+    single = omnidyn.simulate(drawn.robot(4), voltage, 0.01)
+    assert np.abs(run.end.twist[4] - single.twist[-1]).max() < 1e-12
+
+
+def test_a_sample_moves_as_its_robots_do():
+    robot = known(omnidyn.load_robot("axebot"), (0.3, 0.1, 0.001), MATRIX)
+    drawn, voltage = omnidyn.sample(robot, 100), np.full((50, 3), [1.0, 3.0, -2.0])
+    arrays, robots = omnidyn.simulate_batch(drawn, voltage, 0.01), omnidyn.simulate_batch(list(drawn), voltage, 0.01)
+    np.testing.assert_allclose(arrays.end.twist, robots.end.twist, atol=1e-13)
+    assert arrays.engines == robots.engines == {"exact engine, in blocks": 100}
+
+
+def test_draws_out_of_range_come_back_as_plausible_brings_them():
+    robot = known(ROBOT, (0.1, 0.05, 0.02), MATRIX)  # torque constants of 1e-9 and less among them
+    drawn = omnidyn.sample(robot, 3000, seed=3)
+    far = int(np.argmin(drawn.values[:, 2]))
+    low = drawn.robot(far).motor.torque_constant
+    assert low >= 1e-9
+    np.testing.assert_allclose(
+        drawn.parameters.push[:, :, far], batch_parameters([drawn.robot(far)]).push[:, :, 0], rtol=1e-13
+    )
+
+
+def test_bad_calls_are_refused():
+    with pytest.raises(InsufficientDataError, match="std"):
+        omnidyn.sample(ROBOT.replace(priors={}), 10)
+    with pytest.raises(InputError, match="not a range"):
+        omnidyn.sample(ROBOT, 10, ranges={"body.mass_kg": (2.0, 1.0)})
+    with pytest.raises(InputError, match=r"mass_kg"):
+        omnidyn.sample(ROBOT, 10, ranges={"body.mass_kg": (-2.0, 1.0)})
+    with pytest.raises(InputError, match="each number once"):
+        omnidyn.sample(ROBOT, 10, ranges={"body.mass_kg": (1.0, 2.0)}, factors={"body.mass_kg": (0.9, 1.1)})
+    with pytest.raises(InputError, match="an estimate, or a robot"):
+        omnidyn.sample("axebot", 10)
+    with pytest.raises(InputError, match="strange number"):
+        omnidyn.sample(ROBOT, 0)
