@@ -182,7 +182,7 @@ def tracked(plant: Robot, path: Path, controller: Controller, around: Circumstan
     random = np.random.default_rng([around.seed, 1])
     lengths = kit.lengths(dt, path.duration if around.duration is None else around.duration, random)
     count, push = len(lengths), around.push if callable(around.push) else None
-    t: FloatArray = np.arange(count + 1) * dt
+    t: FloatArray = np.arange(count + 1, dtype=np.float64) * dt
     if kit.jitter or kit.missed:
         t[1:] = np.cumsum(lengths)
     steady = (0.0, 0.0, 0.0) if callable(around.push) else around.push

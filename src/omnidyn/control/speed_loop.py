@@ -3,6 +3,7 @@
     r+    = c + p (r - c)                                   the reference follows the command c as fast as the loop can
     volts = inverse model of (r -> r+), friction included,  plus (k e + k_i sum e dt) as an acceleration,  e = r - nu
 
+r in e is that of the time the measured nu is of: earlier by what an output is late, and by half a step for a mean.
 The inverse model does the work; the loop corrects what it misses. The sum stops where a motor is at its limit.
 """
 
@@ -54,25 +55,25 @@ class _VelocityLoop(Safe):
     def reset(self) -> None:
         """Forget all steps."""
         super().reset()
-        self._sum, self._reference = np.zeros(3), None
+        self._sum, self._reference, self._past = np.zeros(3), None, []
 
     def _drive(
-        self, dt: float, twist: FloatArray, now: FloatArray, then: FloatArray
+        self, dt: float, off: FloatArray, now: FloatArray, then: FloatArray
     ) -> tuple[FloatArray, tuple[str, ...]]:
-        """The output that takes the reference from now to then, the twist being what it is."""
+        """The output that takes the reference from now to then, the twist being off by so much."""
         if self.output == WHEEL_SPEED:  # a loop in the firmware does the rest
             return wheel_speed(self.robot.wheels, then), ()
-        raised_sum = self._sum + (now - twist) * min(dt, MOST_STEPS * self.dt)
+        raised_sum = self._sum + off * min(dt, MOST_STEPS * self.dt)
         for total in (raised_sum, self._sum):  # at a limit, nothing is added to the sum
-            sent, met = self.volts.within(self.effort(twist, now, then, total), together=True)
+            sent, met = self.volts.within(self.effort(off, now, then, total), together=True)
             if not met and np.isfinite(sent).all():
                 self._sum = total
                 break
         return self._sent(sent), met
 
-    def effort(self, twist: FloatArray, now: FloatArray, then: FloatArray, total: FloatArray) -> Effort:
+    def effort(self, off: FloatArray, now: FloatArray, then: FloatArray, total: FloatArray) -> Effort:
         """What takes the reference from now to then, with a sum of errors [m, m, rad]. Shape (3,) -> (wheels,)."""
-        acceleration = self.volts.change(now, then) + self.gains.speed * (now - twist) + self.gains.sum * total
+        acceleration = self.volts.change(now, then) + self.gains.speed * off + self.gains.sum * total
         return self.volts.softly(now, acceleration, 0.5 * (now + then))
 
 
@@ -101,7 +102,15 @@ class SpeedLoop(_VelocityLoop):
         then = command + self.gains.decay * (now - command)
         then = np.where(np.abs(then - command) < SETTLED * self.volts.fade, command, then)
         self._reference = then
-        return self._drive(dt, twist, now, then)
+        return self._drive(dt, self._due(now) - twist, now, then)
+
+    def _due(self, now: FloatArray) -> FloatArray:
+        """The reference at the time that a twist measured now is of, straight between two steps. Shape (3,)."""
+        back = self.late / self.dt + 0.5 * self.sensors.averaged
+        whole = int(back)
+        self._past = [now, *self._past[: whole + 1]]
+        newer, older = (self._past[min(k, len(self._past) - 1)] for k in (whole, whole + 1))
+        return newer + (back - whole) * (older - newer)
 
 
 class SpeedController(_VelocityLoop, Guarded):
@@ -114,8 +123,12 @@ class SpeedController(_VelocityLoop, Guarded):
         self, t: float, dt: float, pose: FloatArray, twist: FloatArray, path: Path
     ) -> tuple[FloatArray, tuple[str, ...]]:
         ahead = t + self.late
-        _, twists, _ = path.twist_at(np.array([ahead, ahead + self.dt]))
-        return self._drive(dt, twist, twists[0], twists[1])
+        _, twists, _ = path.twist_at(np.array([t, ahead, ahead + self.dt]))
+        return self._drive(dt, self.due(twists) - twist, twists[1], twists[2])
+
+    def due(self, twists: FloatArray) -> FloatArray:
+        """The twist that should be measured now, of those of the path now, when an output acts, and a step later."""
+        return twists[0] - 0.5 * (twists[2] - twists[1]) if self.sensors.averaged else twists[0]
 
 
 # Gains by where the poles of the closed loop should lie, from the state space of the robot. Each axis for itself

@@ -35,6 +35,8 @@ Three = tuple[float, float, float]
 POSE: Three = (200.0, 200.0, 20.0)  # of the paper's robot, as VOLTS [1/V^2] and WALK
 VOLTS = 2e-3
 WALK: Three = (0.003, 0.003, 0.012)
+POSE_NOISE: Three = (0.002, 0.002, 0.004)
+LATE_NOISE = 4.0  # times as much of a late pose: when it was taken is not known to the millisecond
 PAPER_MASS = 1.5  # [kg]
 PER_VOLT_SQUARE = 4.788951776922385  # [m^2/s^4/V^2] sum of its squared accelerations in the plane by 1 V on a wheel
 
@@ -56,7 +58,8 @@ class Settings:
     """Weights of errors of the pose [1/m^2, 1/m^2, 1/rad^2], of the twist, of volts beside those of the path [1/V^2].
 
     pose, volts, walk: None: POSE, VOLTS and WALK of the paper's robot; of another volts go with the square of what a
-    volt speeds it up by, pose and the square of walk with the mass.
+    volt speeds it up by, pose and the square of walk with the mass. pose_noise: None: POSE_NOISE, LATE_NOISE times as
+    much where poses are late.
     last: how much more the end of the horizon counts. again: how often at most a step is made linear anew.
     noise, pose_noise: std of the measured twist and pose that the observer expects [m/s, m/s, rad/s], [m, m, rad].
     walk, pose_walk: std of what a step may bring that the model does not know. push_walk: of the change of an unknown
@@ -71,7 +74,7 @@ class Settings:
     last: float = 5.0
     again: int = 2
     noise: Three = (0.01, 0.01, 0.04)
-    pose_noise: Three = (0.002, 0.002, 0.004)
+    pose_noise: Three | None = None
     walk: Three | None = None
     pose_walk: Three = (5e-4, 5e-4, 1e-3)
     push_walk: Three = (0.02, 0.02, 0.08)
@@ -83,7 +86,7 @@ class Settings:
 
     def __post_init__(self) -> None:
         for name in ("pose", "twist", "noise", "pose_noise", "walk", "pose_walk", "push_walk"):
-            if name in ("pose", "walk") and getattr(self, name) is None:
+            if name in ("pose", "walk", "pose_noise") and getattr(self, name) is None:
                 continue
             value = np.asarray(getattr(self, name), dtype=float)
             if value.shape != (3,) or not np.all((value >= 0.0) & (value <= 1e9)):
@@ -115,7 +118,11 @@ class Settings:
         if volts is None:
             per_volt = per_mass(robot, motor_wrench(robot).driving)[:, :2]
             volts = VOLTS * min(max(round(float(np.sum(per_volt**2)) / PER_VOLT_SQUARE, 12), 1e-3), 1e3)
-        return replace(self, pose=pose, walk=walk, volts=volts)
+        sensors, pose_noise = robot.sensor_model, self.pose_noise
+        if pose_noise is None:
+            late = sensors.pose_delay > 0.0 or sensors.pose_rate is not None
+            pose_noise = tuple((LATE_NOISE if late else 1.0) * std for std in POSE_NOISE)
+        return replace(self, pose=pose, walk=walk, volts=volts, pose_noise=pose_noise)
 
     def tables(self, robot: Robot, dt: float, learn: bool) -> Tables:
         """The settings for a robot and steps of dt [s]; learn: whether the observer runs."""

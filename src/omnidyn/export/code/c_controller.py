@@ -290,8 +290,8 @@ def _feedforward(controller: Feedforward) -> tuple[list[str], str]:
 
 def _speed(controller: SpeedController) -> tuple[list[str], str]:
     """(functions, statements that put what is wanted into `output`)."""
-    names = {"pose": (2, 3), "velocity": (2, 3)}
-    head = "float place[2][3], velocity[2][3]"
+    names = {"pose": (3, 3), "velocity": (3, 3)}
+    head = "float place[3][3], velocity[3][3]"
 
     def twists(pose: Any, velocity: Any) -> Any:
         return _Given(pose, velocity).twist_at(0.0)[1]
@@ -299,23 +299,23 @@ def _speed(controller: SpeedController) -> tuple[list[str], str]:
     if controller.output == WHEEL_SPEED:
 
         def speeds(pose: Any, velocity: Any) -> dict[str, Any]:
-            return {"output": wheel_speed(controller.robot.wheels, twists(pose, velocity)[1])}
+            return {"output": wheel_speed(controller.robot.wheels, twists(pose, velocity)[2])}
 
-        call = f"(void)elapsed;\n{_LOOK_AHEAD}wheel_speeds({_ARGUMENTS}, output);"
+        call = f"(void)elapsed;\n{_LOOK_AROUND}wheel_speeds({_ARGUMENTS}, output);"
         return [_function("wheel_speeds", names, speeds, controller)], f"{head};\n{call}"
 
-    def efforts(pose: Any, velocity: Any, twist: Any, total: Any) -> dict[str, Any]:
+    def efforts(pose: Any, velocity: Any, off: Any, total: Any) -> dict[str, Any]:
         ahead = twists(pose, velocity)
-        return _named(controller.effort(twist, ahead[0], ahead[1], total))
+        return _named(controller.effort(off, ahead[1], ahead[2], total))
 
     def errors(pose: Any, velocity: Any, twist: Any) -> dict[str, Any]:
-        return {"off": twists(pose, velocity)[0] - twist}
+        return {"off": controller.due(twists(pose, velocity)) - twist}
 
     functions = [
         _function("errors", {**names, "twist": (3,)}, errors, controller),
-        _function("effort", {**names, "twist": (3,), "total": (3,)}, efforts, controller),
+        _function("effort", {**names, "off": (3,), "total": (3,)}, efforts, controller),
     ]
-    call = f"{_LOOK_AHEAD}errors({_ARGUMENTS}, twist, off);\n{_summed(controller, f'{_ARGUMENTS}, twist')}"
+    call = f"{_LOOK_AROUND}errors({_ARGUMENTS}, twist, off);\n{_summed(controller, f'{_ARGUMENTS}, off')}"
     return functions, f"{head}, off[3], more[3], current[OMNIDYN_WHEELS];\n{call}"
 
 
@@ -381,6 +381,11 @@ def _c(value: float) -> str:
 _LOOK_AHEAD = """for (k = 0; k < 6; k++) {
     place[k / 3][k % 3] = path[1 + k / 3].pose[k % 3];
     velocity[k / 3][k % 3] = path[1 + k / 3].velocity[k % 3];
+}
+"""
+_LOOK_AROUND = """for (k = 0; k < 9; k++) {
+    place[k / 3][k % 3] = path[k / 3].pose[k % 3];
+    velocity[k / 3][k % 3] = path[k / 3].velocity[k % 3];
 }
 """
 _ARGUMENTS = "(const float(*)[3])place, (const float(*)[3])velocity"
