@@ -78,7 +78,7 @@ def mpc_memory(controller: Mpc) -> str:
     """The fields of `omnidyn_control`: what it remembers, and room to work in."""
     n, wheels, settings = "OMNIDYN_HORIZON", "OMNIDYN_WHEELS", controller.robot_settings
     lines = ["float believed[4][3], base[3]; /* pose, twist, push, share of friction */"]
-    lines += ["float unsure[3], spread[3][3][3]; /* of these */"] if controller.observer else []
+    lines += ["float unsure[3], spread[3][3][3], knocks[3]; /* of these */"] if controller.observer else []
     lines += [f"float sent[{controller.steps_late + 1}][3], last[{wheels}];", "int begun, known, missing;"]
     lines += [f"float slewed[{wheels}];"] if settings.slew is not None else []
     lines += [
@@ -138,6 +138,8 @@ def _constants(controller: Mpc) -> str:
         "PULLED": program.VOLTAGE_CHANGE,
         "FARTHEST_OFF": observer.OUTLIER_SQUARE,
         "KNOCK": observer.KNOCK_SQUARE,
+        "MOST_KNOCKS": observer.MOST_KNOCKS,
+        "KNOCK_MEMORY": observer.KNOCK_MEMORY,
         "MOST_SCALE": observer.LARGEST_SCALE,
         "START_PUSH": loop.START_PUSH,
         "START_SCALE": loop.START_SCALE,
@@ -157,6 +159,11 @@ def _constants(controller: Mpc) -> str:
         "#define MISSING (c->missing)",
         "#else",
         "#define MISSING 0",
+        "#endif",
+    ]
+    lines += [
+        "#ifndef OMNIDYN_FEW_KNOCKS /* =0: every knock counts, in less code */",
+        "#define OMNIDYN_FEW_KNOCKS 1",
         "#endif",
     ]
     lines += [f"#define {name} {int(value)}" for name, value in whether.items()]
