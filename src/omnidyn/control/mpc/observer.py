@@ -7,8 +7,8 @@ stands beside it, and what it says of twist, push and scale is that of (twist + 
 
 d makes the controller free of offset; scale is told apart from it wherever the robot reverses. An extended Kalman
 filter per axis with three states (speed, d, scale), one with one state for each entry of the pose: what the settings
-say of noise and walks decides how much is believed. A measurement beyond all that is believed at once. Source:
-offset-free MPC, Pannocchia & Rawlings, AIChE J. 49 (2003); the scale is our own.
+say of noise and walks decides how much is believed. A measurement beyond all that is believed at once; of knocks that
+follow each other a few are. Source: offset-free MPC, Pannocchia & Rawlings, AIChE J. 49 (2003); the scale is our own.
 """
 
 from __future__ import annotations
@@ -24,10 +24,12 @@ from omnidyn.control.mpc.stages import friction_at, linear_stage
 PUSH, SCALE, TWIST, POSE = 0, 1, 2, 3  # what is believed; rows of a table with a column for each axis
 VV, VD, VS, DD, DS, SS, PP = 4, 5, 6, 7, 8, 9, 10  # covariance of speed, push and scale; variance of the pose
 NOISE, WALK_TWIST, WALK_PUSH, WALK_SCALE, POSE_NOISE, WALK_POSE = 11, 12, 13, 14, 15, 16  # std, and std of a step
-ESTIMATE_SIZE = 17
+KNOCKS = 17  # how many there were of late
+ESTIMATE_SIZE = 18
 LEAST_SCALE, LARGEST_SCALE = 0.0, 3.0  # of the scale
 OUTLIER_SQUARE = 36.0  # squares of the std that an innovation may be; more is a robot that was moved
 KNOCK_SQUARE = 9.0  # the same of a push that nobody expected: it may be any from then on
+MOST_KNOCKS, KNOCK_MEMORY = 3.0, 0.99  # of late, and what a step leaves of them: a loop that swings knocks itself
 PASSES = 4
 STICKING_SHARE = 0.0001  # of the speed below which friction falls to 0 in the program: here what sticks is to stick
 
@@ -141,8 +143,10 @@ def observe_axis(estimate, i, decay, by_push, by_scale, innovation, averaged):
         estimate[TWIST, i] += seen_v * r * innovation
         estimate[VV, i] = v - seen_v * seen_v * r
         estimate[VD, i], estimate[VS, i] = d - seen_v * seen_d * r, s - seen_v * seen_s * r
-    if not innovation * innovation * r <= KNOCK_SQUARE:
+    estimate[KNOCKS, i] *= KNOCK_MEMORY
+    if not innovation * innovation * r <= KNOCK_SQUARE and estimate[KNOCKS, i] < MOST_KNOCKS:
         dd += (innovation / by_push) ** 2
+        estimate[KNOCKS, i] += 1.0
     estimate[DD, i], estimate[DS, i] = dd - seen_d * seen_d * r, ds - seen_d * seen_s * r
     estimate[SS, i] = ss - seen_s * seen_s * r
     return seen * r * innovation if averaged else 0.0

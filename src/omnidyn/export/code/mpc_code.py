@@ -80,7 +80,7 @@ def mpc_memory(controller: Mpc) -> str:
     """The fields of `omnidyn_control`: what it remembers, and room to work in."""
     n, wheels, settings = "OMNIDYN_HORIZON", "OMNIDYN_WHEELS", controller.robot_settings
     lines = ["float believed[4][3], base[3]; /* pose, twist, push, share of friction */"]
-    lines += ["float unsure[3], spread[3][3][3]; /* of these */"] if controller.observer else []
+    lines += ["float unsure[3], spread[3][3][3], knocks[3]; /* of these */"] if controller.observer else []
     lines += [f"float sent[{controller.steps_late + 1}][3], last[{wheels}];", "int begun, known, missing;"]
     lines += [f"float slewed[{wheels}];"] if settings.slew is not None else []
     lines += [
@@ -99,12 +99,15 @@ def mpc_switches() -> str:
 
 _SWITCHES = """
 /* -DOMNIDYN_MOST_BRIDGED=0: a missing measurement gives zeros. -DOMNIDYN_ELAPSED=0: a step takes OMNIDYN_DT, not the
-   time that passed. Less code both. */
+   time that passed. -DOMNIDYN_FEW_KNOCKS=0: a loop that swings under pushes may go on. Less code each. */
 #ifndef OMNIDYN_MOST_BRIDGED
 #define OMNIDYN_MOST_BRIDGED @BRIDGED@
 #endif
 #ifndef OMNIDYN_ELAPSED
 #define OMNIDYN_ELAPSED 1
+#endif
+#ifndef OMNIDYN_FEW_KNOCKS
+#define OMNIDYN_FEW_KNOCKS 1
 #endif"""
 
 
@@ -159,6 +162,8 @@ def _constants(controller: Mpc) -> str:
         "PULLED": program.VOLTAGE_CHANGE,
         "FARTHEST_OFF": observer.OUTLIER_SQUARE,
         "KNOCK": observer.KNOCK_SQUARE,
+        "MOST_KNOCKS": observer.MOST_KNOCKS,
+        "KNOCK_MEMORY": observer.KNOCK_MEMORY,
         "MOST_SCALE": observer.LARGEST_SCALE,
         "START_PUSH": loop.START_PUSH,
         "START_SCALE": loop.START_SCALE,

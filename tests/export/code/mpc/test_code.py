@@ -179,7 +179,7 @@ def test_nothing_that_is_no_step_gets_through(tmp_path):
 def test_it_is_small_and_asks_for_no_memory(tmp_path, capsys):
     c_controller(ROBOT, controller="mpc").write(tmp_path / "c")
     (tmp_path / "c" / "size.c").write_text('#include "omnidyn_control.h"\nomnidyn_control one;\n')
-    without = ["-DOMNIDYN_MOST_BRIDGED=0", "-DOMNIDYN_ELAPSED=0"]
+    without = ["-DOMNIDYN_MOST_BRIDGED=0", "-DOMNIDYN_ELAPSED=0", "-DOMNIDYN_FEW_KNOCKS=0"]
     for options, most, most_memory in ((without, 8192, 11 * 1024), ([], 12288, 11776)):
         for name in ("omnidyn_control", "size"):
             command = ["gcc", *STRICT, "-Os", "-fstack-usage", *options, "-c", f"{name}.c"]

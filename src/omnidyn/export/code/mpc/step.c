@@ -95,7 +95,13 @@ static void observe(omnidyn_control *c, const float *measured, int known)
         }
 #endif
         r *= left * left;
+#if OMNIDYN_FEW_KNOCKS
+        c->knocks[i] *= KNOCK_MEMORY;
+        if (r > KNOCK && c->knocks[i] < MOST_KNOCKS) { /* a push that nobody expected */
+            c->knocks[i] += 1.0f;
+#else
         if (r > KNOCK) { /* a push that nobody expected */
+#endif
             p[1][1] += left * left / (by[1] * by[1]);
         }
         c->believed[3][i] = c->believed[3][i] > 0.0f ? c->believed[3][i] : 0.0f;
