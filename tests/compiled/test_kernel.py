@@ -253,7 +253,7 @@ def test_no_part_gives_an_array_away():
     """numba lets a part return an argument: its caller would take off a reference that nobody has put on."""
     assert given_away(ast.parse("def f(x):\n    x[0] = 1.0\n    return 2.0, x")) == ["x"]
     checked = 0
-    for name, node in sources_of(decorated("part")):
+    for name, node in sources_of(decorated("part") | decorated("inlined")):
         assert not given_away(node), name
         checked += 1
     assert checked > 50
@@ -263,7 +263,7 @@ def test_no_part_calls_a_maker():
     """Makers are private: whoever calls one stands in its module."""
     makers = decorated("maker")
     assert all(name.rpartition(".")[2].startswith("_") for name in makers)
-    for name, node in sources_of(decorated("part")):
+    for name, node in sources_of(decorated("part") | decorated("inlined")):
         calls = {getattr(call.func, "id", "") for call in ast.walk(node) if isinstance(call, ast.Call)}
         assert not makers & {f"{name.rpartition('.')[0]}.{called}" for called in calls}, name
 

@@ -5,6 +5,8 @@ from types import ModuleType
 import omnidyn
 
 PUBLIC = [
+    "Batch",
+    "BatchRun",
     "Comparison",
     "Estimate",
     "Identification",
@@ -42,8 +44,10 @@ PUBLIC = [
     "read_log",
     "read_steady_table",
     "read_voltages",
+    "sample",
     "save_robot",
     "simulate",
+    "simulate_batch",
     "state_space",
     "track",
     "tune",

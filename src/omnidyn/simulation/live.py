@@ -112,7 +112,7 @@ class LiveRobot:
 
     def run(self, commands: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Steps of all rows of commands, shape (rows, wheels). Returns twists and poses, the start in row 0."""
-        if self._whole or self._part:
+        if self._late > 0.0 or self._under_way:
             twists, poses = [self.twist], [self.pose]
             for command in commands:
                 self.step(command)

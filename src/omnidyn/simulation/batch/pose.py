@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from omnidyn.compiled.kernel import inlined, kernel, maker
+from omnidyn.compiled.kernel import inlined, kernel, part
 from omnidyn.simulation.batch.exact import BREAKAWAY, COULOMB, PHI, RATE, put_drive, put_shared_drive
 from omnidyn.simulation.batch.march import DRIVE, POSE, SPEED, TOTALS, first_failure, keep, load, spoil, store
 from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters, in_blocks
@@ -110,11 +110,13 @@ def _add_node(work, time, weight, k, fresh):
         dy[n] = aside if fresh else dy[n] + aside
 
 
-@maker
-def _go_alone(work, n, dt, gauss):
-    """Displacement and turn of one robot by the scalar engine. Returns whether it turns further than one step may."""
-    start, end, rate = np.empty(3), np.empty(3), np.empty(3)
-    event, before, after = np.empty(3), np.empty(3), np.empty(3)
+@part
+def _go_alone(work, n, dt, gauss, room):
+    """Displacement and turn of one robot by the scalar engine. Returns whether it turns further than one step may.
+
+    room (6, 3): to work in.
+    """
+    start, end, rate, event, before, after = room[0], room[1], room[2], room[3], room[4], room[5]
     for axis in range(3):
         start[axis], end[axis], rate[axis] = work[SPEED + axis, n], work[END + axis, n], work[LAW + RATE + axis, n]
         drive, coulomb = float(work[DRIVE + axis, n]), float(work[LAW + COULOMB + axis, n])
@@ -122,7 +124,7 @@ def _go_alone(work, n, dt, gauss):
         event[axis], before[axis], after[axis] = pieces(start[axis], drive, coulomb, breakaway, rate[axis], phi, dt)
     if not abs(start[2]) * dt <= MAX_TURN_PER_STEP:
         return True
-    work[DX, n], work[DY, n] = travel(start, end, event, before, after, rate, dt, *gauss)
+    work[DX, n], work[DY, n] = travel(start, end, event, before, after, rate, dt, gauss[0], gauss[1])
     work[TURN, n] = turned_within(dt, start[2], end[2], event[2], before[2], after[2], rate[2])
     return False
 
@@ -158,7 +160,7 @@ def move_on(work, k):
 
 
 @inlined
-def _step(work, times, weights, gauss, k, zero):
+def _step(work, times, weights, gauss, room, k, zero):
     """One step of all, the drive being there. Returns a robot that turned too far, or -1."""
     _speeds(work, END, LAW + PHI, zero)
     _see_events(work, k, zero)
@@ -167,7 +169,7 @@ def _step(work, times, weights, gauss, k, zero):
         _add_node(work, times[node], weights[node], k, node == 0)
     spun, dt = -1, float(k[DT])
     for n in range(WIDTH):
-        if not work[ALONE, n] <= k[FAST] and _go_alone(work, n, dt, gauss):
+        if not work[ALONE, n] <= k[FAST] and _go_alone(work, n, dt, gauss, room):
             spun = n
     move_on(work, k)
     for n in range(WIDTH):
@@ -183,7 +185,7 @@ def march_pose(first, last, laws, rows, record, rule):
     _, steps, _, width = volts.shape
     zero, after = laws.dtype.type(0), LAW + laws.shape[1]
     work, sums = np.zeros((after, WIDTH), laws.dtype), np.zeros((TOTALS * 6, WIDTH), laws.dtype)
-    drive, law = work[DRIVE:POSE], work[LAW:after]
+    drive, law, room = work[DRIVE:POSE], work[LAW:after], np.empty((6, 3))
     for b in range(first, last):
         load(work, LAW, laws[b], states[b])
         for i in range(rule.phi.shape[1]):
@@ -195,7 +197,7 @@ def march_pose(first, last, laws, rows, record, rule):
                 put_drive(drive, law, volts[b - first, k])
             else:
                 put_shared_drive(drive, law, volts[0, k, :, 0])
-            spun = _step(work, rule.times, rule.weights, rule.gauss, rule.numbers, zero)
+            spun = _step(work, rule.times, rule.weights, rule.gauss, room, rule.numbers, zero)
             if spun >= 0:
                 fails[b, spun] = min(fails[b, spun], k)
                 failure = min(failure, k)

@@ -202,23 +202,23 @@ def _fastest_rate(t, event, rate, spin):
     return fastest + spin
 
 
-@maker
+@part
 def _displacement(start, event, before, after, rate, begin, stop, nodes, weights):
     """Displacement between two times of a step that no event separates, in the body frame at its start [m]."""
     x = y = 0.0
-    now = np.empty(3)
     for node in range(len(nodes)):
         t = begin + (stop - begin) * nodes[node]
-        for axis in range(3):
-            now[axis] = speed_within(t, start[axis], event[axis], before[axis], after[axis], rate[axis])
-        turned = turned_within(t, start[2], now[2], event[2], before[2], after[2], rate[2])
-        dx, dy = rotated(turned, now[0], now[1])
+        vx = speed_within(t, start[0], event[0], before[0], after[0], rate[0])
+        vy = speed_within(t, start[1], event[1], before[1], after[1], rate[1])
+        omega = speed_within(t, start[2], event[2], before[2], after[2], rate[2])
+        turned = turned_within(t, start[2], omega, event[2], before[2], after[2], rate[2])
+        dx, dy = rotated(turned, vx, vy)
         x += (stop - begin) * weights[node] * dx
         y += (stop - begin) * weights[node] * dy
     return x, y
 
 
-@maker
+@part
 def travel(start, end, event, before, after, rate, dt, nodes, weights):
     """Displacement over a whole step in the body frame at its start: pieces between events, short where it is fast."""
     x = y = time = 0.0
