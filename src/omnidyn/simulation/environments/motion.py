@@ -87,7 +87,7 @@ def slide(twist, drive, robots, phi, steps):
 
 @part
 def travel(twist, pose, mean, room, drive, robots, phi, steps, length, share):
-    """`slide` with pose and mean. phi: of half a step. length [s]: of a step; share: of a step in the whole time.
+    """`slide` with pose and mean. phi: of half a step. length [s]: of a step; share: what a step counts in the mean.
 
     room (6, W): twists before, and in the middle.
     """

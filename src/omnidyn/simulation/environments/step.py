@@ -105,9 +105,10 @@ def move(numbers, state, b, now, action, rooms):
     copy_rows(twist, state.twist[b])
     if numbers.travels:
         copy_rows(pose, state.pose[b])
+        kept = mean.dtype.type(numbers.kept)
         for j in range(3):
             for n in range(W):
-                mean[j, n] = 0
+                mean[j, n] = kept * state.mean[b, j, n]
     for piece in range(len(numbers.lags)):
         lag = numbers.lags[piece]
         copy_rows(acting, past[(now - lag) % len(past)] if lag else action)
@@ -117,7 +118,18 @@ def move(numbers, state, b, now, action, rooms):
         if numbers.travels:
             share = numbers.shares[piece] / numbers.substeps
             length = share * numbers.dt
-            travel(twist, pose, mean, room, drive, robots, phi_of(piece), numbers.substeps, length, share)
+            travel(
+                twist,
+                pose,
+                mean,
+                room,
+                drive,
+                robots,
+                phi_of(piece),
+                numbers.substeps,
+                length,
+                share * (1.0 - numbers.kept),
+            )
         else:
             slide(twist, drive, robots, phi_of(piece), numbers.substeps)
     if late:
