@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from omnidyn.compiled.kernel import part
+from omnidyn.compiled.kernel import inlined, part
 from omnidyn.simulation.environments.layout import PATH, POSE, PREVIEW, VELOCITY, W
 from omnidyn.simulation.environments.motion import copy_row
 
@@ -28,7 +28,7 @@ NEAR_PLACE, NEAR_HEADING, NEAR_SPEED = 0.02, 0.05, 0.05  # [m], [rad], [m/s] and
 TURN = 2.0 * math.pi
 
 
-@part
+@inlined
 def put_reward(numbers, reward, reached, twist, pose, goal, start, count):
     """Fill reward and reached (W,), from the twist, or the pose, against a goal or the path. Shapes (3, W)."""
     arm = reward.dtype.type(ARM * ARM)
@@ -70,7 +70,7 @@ def measured_pose(numbers, pose, places, count, n):
     return places[slot, 0, n], places[slot, 1, n], np.float64(places[slot, 2, n])
 
 
-@part
+@inlined
 def put_observation(numbers, out, first, twist, action, pose, places, goal, start, count):
     """Fill the columns of a block, from robot `first` on, of out (columns, robots). Shapes (3, W), (wheels, W)."""
     for j in range(3):
