@@ -45,6 +45,7 @@ NAMES = {
     "mpc": "the predictive controller: a step beside others' in the same run, cold starts, tracking, C (8 minutes)",
     "group_shapes": "a shape of friction per group, a level of each wheel: taken where it is so only (half an hour)",
     "blind": "what a log cannot tell: 20 rank-deficient set-ups, 20 full-rank ones, 20 with equal causes (two minutes)",
+    "environments": "65,536 environments: steps a second, checkers, a million steps beside plain Python (3 minutes)",
     "exports": "the paper's robot in C, FMU, MuJoCo, python-control, WPILib: errors, drift at rest (a minute)",
     "exported_c": "exported C on a million random calls under sanitizers: findings, the slowest call (four minutes)",
     "exported_robots": "20 robots of init and three presets in C and FMU: differences, sizes, stack (four minutes)",

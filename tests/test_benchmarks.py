@@ -29,6 +29,7 @@ QUICK = (
     "identify_loop",
     "ten_robots",
     "studies",
+    "environments",
 )
 
 

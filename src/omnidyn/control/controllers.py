@@ -31,6 +31,7 @@ from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import toml_literal
 
 SCHEMA = 1
+POLICY, POLICY_SUFFIX = "policy", ".npz"
 # Name -> where its class is defined. Its arguments are the robot, then options by name.
 NAMES = {
     "feedforward": "omnidyn.control.feedforward:Feedforward",
@@ -38,8 +39,8 @@ NAMES = {
     "pid": "omnidyn.control.pid:Pid",
     "mpc": "omnidyn.control.mpc.controller:Mpc",
 }
-# The same, for comparison alone: each needs a package of its own.
-UNLISTED_NAMES = {"araujo": "omnidyn.control.araujo:Araujo"}
+# The same, of those that need more than a robot: a package of its own, a file.
+UNLISTED_NAMES = {"araujo": "omnidyn.control.araujo:Araujo", POLICY: "omnidyn.control.policy:Policy"}
 OF_THE_CALL = ("dt", "supply", "delay")  # what the loop says, not the file
 SETTINGS = "settings"  # an argument of some controllers: a value type, whose fields are options here
 LONGEST_LIST = 16
@@ -83,7 +84,7 @@ def controller_class(name: str) -> type[Any]:
         raise InputError(
             "unknown controller",
             got=name,
-            expected=f"{', '.join(places)}, or a controller file (.toml)",
+            expected=f"{', '.join(places)}, or a controller file (.toml, .npz)",
             remedy=f"did you mean {matches[0]}?" if matches else "",
             where="controller",
         )
@@ -190,9 +191,9 @@ def _spec(text: str, no_friction: bool, no_observer: bool) -> ControllerFile:
     """A controller by name or file, without what it shall do without."""
     name, without = text, set[str]()
     for key in ("friction", "observer"):
-        if not text.endswith(".toml") and name.endswith(f"_no_{key}"):
+        if not text.endswith((".toml", POLICY_SUFFIX)) and name.endswith(f"_no_{key}"):
             name, without = name.removesuffix(f"_no_{key}"), without | {key}
-    spec = load_controller(text) if text.endswith(".toml") else ControllerFile(name)
+    spec = load_controller(text) if text.endswith((".toml", POLICY_SUFFIX)) else ControllerFile(name)
     if no_friction or "friction" in without:
         without |= {"friction", "observer"}
     if no_observer:
@@ -202,8 +203,10 @@ def _spec(text: str, no_friction: bool, no_observer: bool) -> ControllerFile:
 
 
 def load_controller(path: str | os.PathLike) -> ControllerFile:
-    """Read a controller file. Raises InputError, which names the nearest key for one that is unknown."""
+    """Read a controller file, or a trained policy (.npz). Raises InputError, with the nearest key for one unknown."""
     file_name = os.fspath(path)
+    if file_name.endswith(POLICY_SUFFIX):
+        return ControllerFile(POLICY, {POLICY: file_name}, "trained")
     table = parse_toml(read_text(path), file_name)
     keys = ("schema", "controller", "source", "options")
     for key in table:

@@ -88,6 +88,16 @@ def test_a_mean_twist_is_the_way_over_the_time():
     assert np.abs(twists[1:, 0] - observations[1:, 0, :3]).max() > 0.05
 
 
+def test_a_low_pass_forgets_by_its_time_constant():
+    robot = AXEBOT.replace(sensors=Sensors(twist_filter=0.05))
+    filtered = driven(robot, Setting(substeps=4))[4][:, 0, :3]
+    means = driven(AXEBOT.replace(sensors=Sensors(twist="mean")), Setting(substeps=4))[4][:, 0, :3]
+    kept, expected = np.exp(-0.02 / 0.05), np.zeros(3)
+    for seen, mean in zip(filtered, means, strict=True):
+        expected = kept * expected + (1.0 - kept) * mean
+        assert seen == pytest.approx(expected, abs=1e-12)
+
+
 @pytest.mark.parametrize("rate, delay", [(None, 0.06), (10.0, 0.0), (12.5, 0.04)])
 def test_poses_are_seen_late_and_seldom(rate, delay):
     robot = AXEBOT.replace(sensors=Sensors(pose_delay=delay, pose_rate=rate))

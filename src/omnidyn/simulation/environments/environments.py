@@ -184,7 +184,8 @@ class Environments:
 
     def _numbers(self, robot: Robot, path: FloatArray | None) -> Numbers:
         """What a step needs to know."""
-        setting, sensors, kind = self.setting, robot.sensor_model, self.dtype.type
+        setting, kind = self.setting, self.dtype.type
+        sensors = robot.sensor_model.in_steps(setting.dt)
         task = TASKS[setting.task]
         late = (setting.latency + robot.drive.latency) / setting.dt
         whole = math.floor(late + EDGE)
@@ -206,6 +207,7 @@ class Environments:
             np.array(lags, dtype=np.int64),
             np.array(shares),
             sensors.averaged,
+            math.exp(-setting.dt / sensors.twist_filter) if sensors.twist_filter else 0.0,
             travels,
             any(setting.push),
             round(sensors.pose_delay / setting.dt),
@@ -237,9 +239,9 @@ class Environments:
 
     def _buffers(self) -> Buffers:
         whole = W * len(self.state.twist)
-        observation = np.zeros((self.columns, whole), self.dtype)
-        flags = [np.zeros(whole, np.uint8) for _ in range(2)]
-        return Buffers(observation, np.zeros(whole, self.dtype), *flags, np.zeros_like(observation))
+        observation, reward = np.zeros((self.columns, whole), self.dtype), np.zeros(whole, self.dtype)
+        terminated, truncated = np.zeros((2, whole), np.uint8)
+        return Buffers(observation, reward, terminated, truncated, np.zeros_like(observation))
 
     def reset(self, mask: Any = None, seed: int | None = None) -> FloatArray:
         """Begin an episode of all environments, or of those in a mask, (count,). Returns observations, a view.

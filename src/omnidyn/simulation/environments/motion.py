@@ -16,26 +16,26 @@ import math
 
 import numpy as np
 
-from omnidyn.compiled.kernel import part
+from omnidyn.compiled.kernel import inlined, part
 from omnidyn.simulation.environments.layout import BREAKAWAY, COULOMB, PER_MASS, PHI, RATE, W
 from omnidyn.simulation.exact.step import exact_step
 
 
-@part
+@inlined
 def copy_row(target, source):
     """target[:] = source, shapes (W,)."""
     for n in range(W):
         target[n] = source[n]
 
 
-@part
+@inlined
 def copy_rows(target, source):
     """The same, row by row."""
     for j in range(len(source)):
         copy_row(target[j], source[j])
 
 
-@part
+@inlined
 def put_drive(drive, action, robots, gain, dead):
     """Fill drive (3, W): accelerations of voltages, which are shares of the largest, (wheels, W).
 
@@ -54,7 +54,7 @@ def put_drive(drive, action, robots, gain, dead):
                     total[n] = per_volt[n] * volts[n]
 
 
-@part
+@inlined
 def shrink(volts, band):
     """What a driver with a dead band passes on, in place."""
     zero = volts.dtype.type(0)
@@ -64,7 +64,7 @@ def shrink(volts, band):
             volts[n] = left if volts[n] > zero else -left
 
 
-@part
+@inlined
 def add_push(drive, push, robots):
     """Add to drive (3, W) what a push (3, W) does to the masses."""
     for j in range(3):
@@ -73,7 +73,7 @@ def add_push(drive, push, robots):
             total[n] += force[n] * per_mass[n]
 
 
-@part
+@inlined
 def slide(twist, drive, robots, phi, steps):
     """Go on by so many steps, whose phi stands in three rows of `robots` from `phi` on."""
     zero = drive.dtype.type(0)
@@ -87,7 +87,7 @@ def slide(twist, drive, robots, phi, steps):
 
 @part
 def travel(twist, pose, mean, room, drive, robots, phi, steps, length, share):
-    """`slide` with pose and mean. phi: of half a step. length [s]: of a step; share: of a step in the whole time.
+    """`slide` with pose and mean. phi: of half a step. length [s]: of a step; share: what a step counts in the mean.
 
     room (6, W): twists before, and in the middle.
     """

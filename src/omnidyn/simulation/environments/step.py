@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from omnidyn.compiled.kernel import kernel, part
+from omnidyn.compiled.kernel import inlined, kernel, part
 from omnidyn.simulation.environments.draws import draw, robot_key, uniform
 from omnidyn.simulation.environments.layout import (
     AGAIN,
@@ -77,7 +77,7 @@ def begin_episode(numbers, state, b, n, action):
             state.past[b, k, wheel, n] = 0
 
 
-@part
+@inlined
 def take_action(out, action, first):
     """The actions of a block, from robot `first` on, within -1 and 1, and 0 for what is no number. out (wheels, W)."""
     kind = out.dtype.type
@@ -96,7 +96,7 @@ def take_action(out, action, first):
             row[n] = value if value > -one else -one
 
 
-@part
+@inlined
 def move(numbers, state, b, now, action, rooms):
     """A block over a step: all pieces of it. action, acting: (wheels, W); room (6, W); the other rooms (3, W)."""
     twist, pose, mean, drive, acting, room = rooms
@@ -105,9 +105,10 @@ def move(numbers, state, b, now, action, rooms):
     copy_rows(twist, state.twist[b])
     if numbers.travels:
         copy_rows(pose, state.pose[b])
+        kept = mean.dtype.type(numbers.kept)
         for j in range(3):
             for n in range(W):
-                mean[j, n] = 0
+                mean[j, n] = kept * state.mean[b, j, n]
     for piece in range(len(numbers.lags)):
         lag = numbers.lags[piece]
         copy_rows(acting, past[(now - lag) % len(past)] if lag else action)
@@ -117,7 +118,18 @@ def move(numbers, state, b, now, action, rooms):
         if numbers.travels:
             share = numbers.shares[piece] / numbers.substeps
             length = share * numbers.dt
-            travel(twist, pose, mean, room, drive, robots, phi_of(piece), numbers.substeps, length, share)
+            travel(
+                twist,
+                pose,
+                mean,
+                room,
+                drive,
+                robots,
+                phi_of(piece),
+                numbers.substeps,
+                length,
+                share * (1.0 - numbers.kept),
+            )
         else:
             slide(twist, drive, robots, phi_of(piece), numbers.substeps)
     if late:
@@ -128,7 +140,7 @@ def move(numbers, state, b, now, action, rooms):
         copy_rows(state.mean[b], mean)
 
 
-@part
+@inlined
 def observe(numbers, state, b, action, observation):
     """Write the observations of a block. action: the last one, (wheels, W)."""
     twist = state.mean[b] if numbers.averaged else state.twist[b]
@@ -146,7 +158,7 @@ def observe(numbers, state, b, action, observation):
     )
 
 
-@part
+@inlined
 def count_step(numbers, state, b):
     """One step more, and a pose to remember."""
     count = state.count[b]
@@ -169,7 +181,7 @@ def change(numbers, state, b):
             take_member(numbers, state, b, n, b * W + n, count // numbers.interval)
 
 
-@part
+@inlined
 def judge(numbers, state, b, buffers, row, reached):
     """Reward and end of the steps of a block; whether an episode ends, or has ended a step ago."""
     put_reward(numbers, row, reached, state.twist[b], state.pose[b], state.goal[b], state.start[b], state.count[b])

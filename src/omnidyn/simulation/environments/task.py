@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from omnidyn.compiled.kernel import part
+from omnidyn.compiled.kernel import inlined, part
 from omnidyn.simulation.environments.layout import PATH, POSE, PREVIEW, VELOCITY, W
 from omnidyn.simulation.environments.motion import copy_row
 
@@ -28,13 +28,7 @@ NEAR_PLACE, NEAR_HEADING, NEAR_SPEED = 0.02, 0.05, 0.05  # [m], [rad], [m/s] and
 TURN = 2.0 * math.pi
 
 
-@part
-def wrapped(angle):
-    """The same angle from -pi to pi [rad]."""
-    return angle - TURN * np.round(angle / TURN)
-
-
-@part
+@inlined
 def put_reward(numbers, reward, reached, twist, pose, goal, start, count):
     """Fill reward and reached (W,), from the twist, or the pose, against a goal or the path. Shapes (3, W)."""
     arm = reward.dtype.type(ARM * ARM)
@@ -57,7 +51,8 @@ def put_pose_reward(numbers, reward, reached, twist, pose, goal, start, count, n
     if numbers.task == PATH:
         now = min(start[n] + count[n], len(numbers.path) - 1)
         at_x, at_y, at_angle = numbers.path[now, 0], numbers.path[now, 1], numbers.path[now, 2]
-    x, y, yaw = at_x - pose[0, n], at_y - pose[1, n], kind(wrapped(np.float64(at_angle) - np.float64(pose[2, n])))
+    turn = np.float64(at_angle) - np.float64(pose[2, n])
+    x, y, yaw = at_x - pose[0, n], at_y - pose[1, n], kind(turn - TURN * np.round(turn / TURN))
     reward[n] = -(x * x + y * y + arm * yaw * yaw)
     if numbers.task == POSE:
         speed = math.sqrt(np.float64(twist[0, n] ** 2 + twist[1, n] ** 2 + arm * twist[2, n] ** 2))
@@ -75,7 +70,7 @@ def measured_pose(numbers, pose, places, count, n):
     return places[slot, 0, n], places[slot, 1, n], np.float64(places[slot, 2, n])
 
 
-@part
+@inlined
 def put_observation(numbers, out, first, twist, action, pose, places, goal, start, count):
     """Fill the columns of a block, from robot `first` on, of out (columns, robots). Shapes (3, W), (wheels, W)."""
     for j in range(3):
@@ -112,7 +107,8 @@ def put_path(out, robot, x, y, heading, path, step):
     cos, sin = kind(math.cos(heading)), kind(math.sin(heading))
     x, y = path[now, 0] - x, path[now, 1] - y
     out[3, robot], out[4, robot] = cos * x + sin * y, cos * y - sin * x
-    out[5, robot] = kind(wrapped(np.float64(path[now, 2]) - heading))
+    turn = np.float64(path[now, 2]) - heading
+    out[5, robot] = kind(turn - TURN * np.round(turn / TURN))
     for k in range(len(PREVIEW)):
         x, y = path[now + PREVIEW[k], 3], path[now + PREVIEW[k], 4]
         out[6 + 3 * k, robot], out[7 + 3 * k, robot] = cos * x + sin * y, cos * y - sin * x
