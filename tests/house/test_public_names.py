@@ -5,6 +5,7 @@ from types import ModuleType
 import omnidyn
 
 PUBLIC = [
+    "Campaign",
     "Comparison",
     "Estimate",
     "Identification",
@@ -30,6 +31,7 @@ PUBLIC = [
     "drift",
     "feedforward_table",
     "identify",
+    "load_campaign",
     "load_controller",
     "load_log",
     "load_robot",
@@ -45,6 +47,7 @@ PUBLIC = [
     "save_robot",
     "simulate",
     "state_space",
+    "sweep",
     "track",
     "tune",
     "vary_robot",
