@@ -177,3 +177,12 @@ def test_draws_of_the_robot_file_are_those_of_plausible(tmp_path, write):
     made = problem(tmp_path, robot=str(path), robot_draws=True, vary={}, samples=40, seed=3)
     masses = [sample.robot.body.mass for sample in made.samples(10, 20)]
     assert masses == [robot.body.mass for robot in plausible(load_robot(path), 40, 3)][10:20]
+
+
+def test_a_command_file_is_applied(tmp_path, write):
+    path = write("t_s,u1_V,u2_V,u3_V\n0,0,3,-3\n0.01,0,3,-3\n", "volts.csv")
+    task = {"voltages": str(path), "duration_s": 0.5}
+    made = problem(tmp_path, track=None, simulate=task, vary={"simulate.scale": {"values": [0.5]}}, samples=1)
+    (sample,) = made.samples(0, 1)
+    run = simulate(load_robot("axebot"), [[0.0, 1.5, -1.5]] * 50, 0.01)
+    assert made.measure(sample)["drift_m"] == pytest.approx(np.hypot(*run.pose[-1, :2]), rel=1e-9)

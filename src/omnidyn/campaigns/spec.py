@@ -131,7 +131,7 @@ class Spec(Value):
     """A campaign. samples: how many; a grid counts its own. sampling: how they are drawn. seed: of the draws.
 
     robot_draws: whether each sample is a draw from the std and correlations of the robot file, before what [vary] says.
-    shard_rows: samples in a shard; by default as many as take a second.
+    shard_rows: samples in a shard; by default as many as take a second. metrics: those that are kept; all by default.
     """
 
     name: Text = ""
@@ -141,6 +141,7 @@ class Spec(Value):
     seed: Annotated[int, whole(0, MOST_SEED)] = 0
     robot_draws: Flag = False
     shard_rows: Annotated[int, whole(1, MOST_SAMPLES)] | None = None
+    metrics: Annotated[tuple[Text, ...], BeforeValidator(to_list)] = ()
     vary: dict[str, Variable] = Field(default_factory=dict)
     track: TrackTask | None = None
     simulate: SimulateTask | None = None

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from omnidyn.campaigns.batches import batch_columns, batched
 from omnidyn.campaigns.design import sample_count
 from omnidyn.campaigns.executors import Pool, opened
 from omnidyn.campaigns.folder import SAMPLE, Folder, Manifest, as_columns
@@ -29,7 +30,7 @@ from omnidyn.model.presets import robot_path
 from omnidyn.progress import Progress, Report, silent
 
 SHARD_S, MEASURE_S = 1.0, 0.3  # [s] of work in a shard; spent on finding out how many samples that is
-MOST_MEASURED, MOST_ROWS, ROWS_UNMEASURED = 50, 2**20, 100
+MOST_ROWS, ROWS_UNMEASURED = 2**20, 100
 FILES = (".toml", ".csv", ".parquet", ".pq")
 
 
@@ -175,16 +176,16 @@ def _rows(pool: Pool, problem: Problem) -> int:
 
 def _seconds(problem: Problem) -> float:
     """How long a sample takes [s], compiled; in the process that will work."""
-    with small_matrices():
-        for sample in problem.samples(0, 1):
-            problem.measure(sample)
-        begun, count = time.perf_counter(), 0
-        for sample in problem.samples(0, min(MOST_MEASURED, sample_count(problem.spec))):
-            problem.measure(sample)
-            count += 1
-            if time.perf_counter() - begun > MEASURE_S:
-                break
-    return max((time.perf_counter() - begun) / count, 1e-9)
+    _columns(problem, 0, 1)
+    seconds, count, most = 0.0, 1, sample_count(problem.spec)
+    while seconds < MEASURE_S:
+        begun = time.perf_counter()
+        _columns(problem, 0, count)
+        seconds = time.perf_counter() - begun
+        if count == most:
+            break
+        count = min(4 * count, most)
+    return max(seconds / count, 1e-9)
 
 
 def _run(home: Folder, shards: list[int], function: Function | None, pool: Pool, progress: Progress) -> None:
@@ -235,6 +236,9 @@ def _problem(folder: str, manifest: str, function: Function | None) -> Problem:
 
 def _columns(problem: Problem, start: int, stop: int) -> dict[str, Any]:
     """The columns of a shard."""
+    varied = {SAMPLE: np.arange(start, stop), **problem.columns(start, stop)}
+    if batched(problem):
+        return varied | batch_columns(problem, start, stop)
     rows = []
     with small_matrices():
         for sample in problem.samples(start, stop):
@@ -243,7 +247,7 @@ def _columns(problem: Problem, start: int, stop: int) -> dict[str, Any]:
             except Exception as error:
                 error.add_note(f"in sample {sample.index}: {_values(sample)}")
                 raise
-    return {SAMPLE: np.arange(start, stop), **problem.columns(start, stop), **as_columns(rows)}
+    return varied | as_columns(rows)
 
 
 def _values(sample: Sample) -> str:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from omnidyn.arguments import unknown_option
 from omnidyn.arrays import FloatArray
 from omnidyn.campaigns.design import numbers, points, sample_count, seed_of
 from omnidyn.campaigns.spec import SimulateTask, Spec, TrackTask
@@ -25,6 +26,7 @@ from omnidyn.control.paths.path import path as path_named
 from omnidyn.errors import InputError
 from omnidyn.logs.command_file import KINDS, HeldCommands, read_commands
 from omnidyn.model.keys import Key, expand
+from omnidyn.model.known.told import holding
 from omnidyn.model.known.uncertainty import Draws
 from omnidyn.model.motor import settled_current
 from omnidyn.model.robot import Robot
@@ -35,6 +37,27 @@ from omnidyn.simulation.simulate import simulate
 INPUTS = "inputs/"
 SETTLED = 0.02  # of the final speed: the twist of a simulation has settled within it
 ON_LIMIT = 1e-9  # of a limit: so near, it is met
+TRACK_METRICS = (
+    "rmse_position_m",
+    "worst_position_m",
+    "final_position_m",
+    "rmse_heading_rad",
+    "settling_s",
+    "saturated_share",
+    "effort_V",
+    "restlessness_V",
+    "energy_J",
+)
+SIMULATE_METRICS = (
+    "final_vx_m_s",
+    "final_vy_m_s",
+    "final_omega_rad_s",
+    "drift_m",
+    "turned_rad",
+    "settling_s",
+    "saturated_share",
+    "energy_J",
+)
 _FIELD = re.compile(r"(\w+)(?:\[(\d+)\])?", re.ASCII)
 
 
@@ -102,8 +125,15 @@ class Problem:
                 )
             for word in variable.values or ():
                 self._check_word(name, word)
+        self._check_metrics()
         for sample in self.samples(0, 1):
             self._check_sample(sample)
+
+    def _check_metrics(self) -> None:
+        known = TRACK_METRICS if self.spec.track is not None else SIMULATE_METRICS
+        for name in self.spec.metrics if self.function is None else ():
+            if name not in known:
+                raise unknown_option("the task", name, known, "metrics")
 
     def _check_word(self, name: str, word: Any) -> None:
         if name == "path":
@@ -115,7 +145,7 @@ class Problem:
         if self.function is None and self.spec.track is not None:
             _Loop.of(self, sample, self.spec.track)
         elif self.function is None and self.spec.simulate is not None:
-            _commands(self, sample, self.spec.simulate)
+            commands_of(self, sample, self.spec.simulate)
 
     def columns(self, start: int, stop: int) -> dict[str, Any]:
         """What varies, of the samples start to stop: a column for each variable."""
@@ -140,7 +170,7 @@ class Problem:
         for name, value in values.items():
             relative = self.spec.vary[name].factor is not None
             for key in self.keys[name]:
-                robot = key.set(robot, value * key.get(robot) if relative else value)
+                robot = with_number(robot, key, value * key.get(robot) if relative else value)
             if name.startswith("sensors."):
                 table = robot.sensor_model.model_dump(by_alias=True) | {name.removeprefix("sensors."): value}
                 robot = robot.replace(sensors=table)
@@ -149,11 +179,22 @@ class Problem:
     def measure(self, sample: Sample) -> dict[str, float]:
         """What is measured of a sample, by name."""
         if self.function is not None:
-            return _checked(self.function(sample))
-        if self.spec.track is not None:
-            return _Loop.of(self, sample, self.spec.track).measure()
-        assert self.spec.simulate is not None
-        return _simulated(self, sample, self.spec.simulate)
+            measured = _checked(self.function(sample))
+        elif self.spec.track is not None:
+            measured = _Loop.of(self, sample, self.spec.track).measure()
+        else:
+            assert self.spec.simulate is not None
+            measured = _simulated(self, sample, self.spec.simulate)
+        return {name: measured[name] for name in self.spec.metrics or measured}
+
+
+def with_number(robot: Robot, key: Key, value: float) -> Robot:
+    """The robot with one number changed; breakaway stays at least the Coulomb level. Raises InputError out of range."""
+    if not key.level:
+        return key.set(robot, value)
+    robot = holding(key.set(robot, value, checked=False))
+    getattr(robot.friction, key.table.rpartition(".")[2]).replace()
+    return robot
 
 
 def _checked(measured: Any) -> dict[str, float]:
@@ -219,20 +260,21 @@ class _Loop:
         controller = self.spec.make(self.believed, **told_of_loop(self.believed, self.around))
         tracking = tracked(self.plant, self.route, controller, self.around)
         off = np.hypot(*tracking.error[:, :2].T)
-        return {
-            "rmse_position_m": tracking.rmse_position,
-            "worst_position_m": tracking.worst_position,
-            "final_position_m": float(off[-1]),
-            "rmse_heading_rad": tracking.rmse_heading,
-            "settling_s": settled_from(tracking.run.t, off, self.settling),
-            "saturated_share": tracking.saturated_share,
-            "effort_V": tracking.effort,
-            "restlessness_V": tracking.restlessness,
-            "energy_J": energy(self.plant, tracking.run),
-        }
+        measured = (
+            tracking.rmse_position,
+            tracking.worst_position,
+            float(off[-1]),
+            tracking.rmse_heading,
+            settled_from(tracking.run.t, off, self.settling),
+            tracking.saturated_share,
+            tracking.effort,
+            tracking.restlessness,
+            energy(self.plant, tracking.run),
+        )
+        return dict(zip(TRACK_METRICS, measured, strict=True))
 
 
-def _commands(problem: Problem, sample: Sample, base: SimulateTask) -> HeldCommands:
+def commands_of(problem: Problem, sample: Sample, base: SimulateTask) -> HeldCommands:
     """What a simulation of a sample is given."""
     task: SimulateTask = _changed(base, "simulate", sample.values)
     if task.voltage is None:
@@ -246,7 +288,7 @@ def _commands(problem: Problem, sample: Sample, base: SimulateTask) -> HeldComma
 
 def _simulated(problem: Problem, sample: Sample, base: SimulateTask) -> dict[str, float]:
     """Where a robot comes to under given commands."""
-    held = _commands(problem, sample, base)
+    held = commands_of(problem, sample, base)
     applied: dict[str, Any] = {held.kind: held.rows, "dt": held.dt, "supply": held.supply}
     run = simulate(sample.robot, **applied)
     assert run.twist is not None
@@ -256,16 +298,15 @@ def _simulated(problem: Problem, sample: Sample, base: SimulateTask) -> dict[str
     rim = np.array([1.0, 1.0, float(np.mean(sample.robot.wheels.robot_radius))])
     off = np.linalg.norm((run.twist - last) * rim, axis=1)
     limit = np.asarray(sample.robot.motor.voltage_limit)
-    return {
-        "final_vx_m_s": float(last[0]),
-        "final_vy_m_s": float(last[1]),
-        "final_omega_rad_s": float(last[2]),
-        "drift_m": float(np.hypot(*moved[:2])),
-        "turned_rad": float(moved[2]),
-        "settling_s": settled_from(run.t, off, SETTLED * float(np.linalg.norm(last * rim))),
-        "saturated_share": float(np.mean((abs(run.voltage[:-1]) >= limit * (1.0 - ON_LIMIT)).any(axis=1))),
-        "energy_J": energy(sample.robot, run),
-    }
+    measured = (
+        *last.tolist(),
+        float(np.hypot(*moved[:2])),
+        float(moved[2]),
+        settled_from(run.t, off, SETTLED * float(np.linalg.norm(last * rim))),
+        float(np.mean((abs(run.voltage[:-1]) >= limit * (1.0 - ON_LIMIT)).any(axis=1))),
+        energy(sample.robot, run),
+    )
+    return dict(zip(SIMULATE_METRICS, measured, strict=True))
 
 
 def settled_from(t: FloatArray, off: FloatArray, bound: float) -> float:
