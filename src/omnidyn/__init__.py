@@ -21,6 +21,7 @@ __version__ = "0.1.0"
 _HOME = {
     "Batch": "omnidyn.simulation.batch.batch",
     "BatchRun": "omnidyn.simulation.batch.result",
+    "Campaign": "omnidyn.campaigns.results",
     "Comparison": "omnidyn.comparison.result",
     "Estimate": "omnidyn.identification.estimate",
     "Identification": "omnidyn.identification.identification",
@@ -45,6 +46,7 @@ _HOME = {
     "drift": "omnidyn.comparison.drift",
     "feedforward_table": "omnidyn.control.table",
     "identify": "omnidyn.identification.identify",
+    "load_campaign": "omnidyn.campaigns.results",
     "load_controller": "omnidyn.control.controllers",
     "load_log": "omnidyn.logs.read_log",
     "load_robot": "omnidyn.model.robot_file",
@@ -62,6 +64,7 @@ _HOME = {
     "simulate": "omnidyn.simulation.simulate",
     "simulate_batch": "omnidyn.simulation.batch.batch",
     "state_space": "omnidyn.model.dynamics",
+    "sweep": "omnidyn.campaigns.sweep",
     "track": "omnidyn.control.closed_loop",
     "tune": "omnidyn.control.tune",
     "vary_robot": "omnidyn.model.vary",
@@ -72,6 +75,8 @@ _HOME = {
 __all__ = ["__version__", *_HOME]  # pyright: ignore[reportUnsupportedDunderAll]
 
 if TYPE_CHECKING:
+    from omnidyn.campaigns.results import Campaign, load_campaign
+    from omnidyn.campaigns.sweep import sweep
     from omnidyn.comparison.compare import compare
     from omnidyn.comparison.drift import drift
     from omnidyn.comparison.result import Comparison

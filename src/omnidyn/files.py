@@ -305,16 +305,27 @@ def write_atomic(path: str | os.PathLike, content: str | bytes, force: bool = Fa
     A link stays and what it leads to is written; a file that is replaced hands on who may read it. Raises InputError
     when it exists (unless `force`), is no regular file, its folder is missing or not writable, or the disk is full.
     """
+    # A name of a file may hold bytes that are no text: they are shown as escapes.
+    data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
+    with open_atomic(path, force) as stream:
+        stream.write(data)
+    return Path(path)
+
+
+@contextlib.contextmanager
+def open_atomic(path: str | os.PathLike, force: bool = False) -> Iterator[BinaryIO]:
+    """A stream whose content becomes the file at its end, as `write_atomic` does it; nothing where an error leaves it.
+
+    Raises InputError as `write_atomic`, also for an OSError within.
+    """
     path = check_output(path, force)
     place = _behind_links(path)
     _remove_stale(place.parent)
-    # A name of a file may hold bytes that are no text: they are shown as escapes.
-    data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     temporary = None
     try:
         handle, temporary = tempfile.mkstemp(prefix=TEMPORARY_PREFIX, dir=place.parent)
         with open(handle, "wb") as stream:
-            stream.write(data)
+            yield stream
             stream.flush()
             os.fsync(stream.fileno())
         _hand_on(place, temporary)
@@ -335,7 +346,6 @@ def write_atomic(path: str | os.PathLike, content: str | bytes, force: bool = Fa
         if temporary is not None:
             with contextlib.suppress(OSError):
                 os.unlink(temporary)
-    return path
 
 
 def _hand_on(place: Path, temporary: str) -> None:

@@ -33,7 +33,7 @@ def alone(folder, monkeypatch):
     (folder / "alone.py").write_text(ALONE)
     monkeypatch.syspath_prepend(folder)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), *sys.path]))
-    monkeypatch.setattr(parallel, "_processors", lambda: 2)
+    monkeypatch.setattr(parallel, "processors", lambda: 2)
     children, popen = [], subprocess.Popen
     monkeypatch.setattr(subprocess, "Popen", lambda *a, **k: children.append(popen(*a, **k)) or children[-1])
     sys.modules.pop("alone", None)
@@ -92,7 +92,7 @@ def test_it_is_not_waited_for(alone):
 
 def test_one_processor_shares_nothing(alone, monkeypatch):
     module, children = alone
-    monkeypatch.setattr(parallel, "_processors", lambda: 1)
+    monkeypatch.setattr(parallel, "processors", lambda: 1)
     with compiled_elsewhere(module.twice, module.needs_it):
         assert children == []
 

@@ -7,6 +7,7 @@ import omnidyn
 PUBLIC = [
     "Batch",
     "BatchRun",
+    "Campaign",
     "Comparison",
     "Estimate",
     "Identification",
@@ -32,6 +33,7 @@ PUBLIC = [
     "drift",
     "feedforward_table",
     "identify",
+    "load_campaign",
     "load_controller",
     "load_log",
     "load_robot",
@@ -49,6 +51,7 @@ PUBLIC = [
     "simulate",
     "simulate_batch",
     "state_space",
+    "sweep",
     "track",
     "tune",
     "vary_robot",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 import omnidyn
-from omnidyn.cli import at_rest, check, compare, demo, exchange, identify, init, logs, loops, simulate, warm
+from omnidyn.cli import at_rest, check, compare, demo, exchange, identify, init, logs, loops, simulate, sweep, warm
 from omnidyn.cli.terminal.help import Grouped
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import show
@@ -63,6 +63,7 @@ for _command in (
     at_rest.friction,
     loops.track,
     loops.tune,
+    sweep.sweep,
     logs.info,
     logs.convert,
     robots,

@@ -96,10 +96,10 @@ def compiled_elsewhere(kernel: Any, caller: Callable[[], object]) -> Iterator[No
 
 def _wanted(kernel: Any) -> bool:
     is_there = getattr(getattr(kernel, "_cache", None), "is_there", None)  # numba's own cache has none
-    return is_there is not None and not is_there() and _processors() > 1
+    return is_there is not None and not is_there() and processors() > 1
 
 
-def _processors() -> int:
+def processors() -> int:
     """Those that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from omnidyn.campaigns.results import Campaign
 from omnidyn.comparison.result import Comparison
 from omnidyn.comparison.traces import unit as component_unit
 from omnidyn.errors import InputError, MissingExtraError
@@ -27,11 +28,12 @@ INSTALL = 'pip install "omnidyn[arrays]"'
 METRICS = ("samples", "rmse", "max", "bias", "fit_percent", "vaf", "whiteness", "lag")
 
 
-def to_dataframe(value: Run | Estimate | Identification | Comparison, library: str = PANDAS) -> Any:
+def to_dataframe(value: Run | Estimate | Identification | Comparison | Campaign, library: str = PANDAS) -> Any:
     """A data frame. Of a Run: columns u1_V, w1_rad_s, vx_m_s, ... over t_s; NaN where a value is missing.
 
     Of an Estimate: a row for each number, with value, std, its 95 % interval and unit. Of a Comparison: a row for each
-    robot and component. library: "pandas" or "polars". In pandas source, warnings and units stand in `attrs`.
+    robot and component. Of a Campaign: a row for each sample. library: "pandas" or "polars". In pandas source,
+    warnings and units stand in `attrs`.
     Raises MissingExtraError where the library is not installed, InputError for another one.
     """
     if library not in LIBRARIES:
@@ -41,6 +43,9 @@ def to_dataframe(value: Run | Estimate | Identification | Comparison, library: s
     module = _library(library)
     if isinstance(value, Run):
         return _of_run(value, module, library)
+    if isinstance(value, Campaign):
+        table = value.dataset().to_table()
+        return table.to_pandas() if library == PANDAS else module.from_arrow(table)
     if isinstance(value, Identification):
         columns, attributes = _of_groups(value)
     elif isinstance(value, Estimate):

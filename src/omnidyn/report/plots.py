@@ -7,6 +7,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from omnidyn.campaigns.results import Campaign
 from omnidyn.comparison.drift import Drift
 from omnidyn.comparison.result import Comparison
 from omnidyn.control.tracking import Tracking, Trackings
@@ -22,6 +23,7 @@ from omnidyn.model.frames import AXES
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import top_speeds
 from omnidyn.report.drift_picture import draw_drift
+from omnidyn.report.figures.campaign import draw_campaign
 from omnidyn.report.figures.channels import draw_run
 from omnidyn.report.figures.dead_zone_map import draw_dead_zone_map
 from omnidyn.report.figures.friction_speed import ONLY_GROUP, draw_estimates, draw_friction_speed, speeds_up_to
@@ -104,4 +106,5 @@ PICTURES: dict[type, Callable[..., Picture]] = {
     SteadyStudy: draw_polar,
     Tracking: draw_tracking,
     Trackings: draw_tracking,
+    Campaign: draw_campaign,
 }

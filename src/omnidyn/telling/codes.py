@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 ROOMS = (
     "model",
     "control",
+    "campaigns",
     "comparison",
     "fit",
     "lack_of_fit",

@@ -25,6 +25,7 @@ PLAIN_OPTIONS = (
     "map",
     "max_bytes",
     "max_steps",
+    "metric",
     "no_header",
     "no_observer",
     "noise",
@@ -32,7 +33,9 @@ PLAIN_OPTIONS = (
     "plant",
     "pose",
     "rate",
+    "scheduler",
     "sensors",
+    "shard",
     "skip",
     "skip_bad_rows",
     "sort",
@@ -42,6 +45,7 @@ PLAIN_OPTIONS = (
     "twist",
     "wheel_radius",
     "with",
+    "workers",
 )
 _OPTION_IN_TEXT = re.compile(r"`([a-z_]+)`")
 

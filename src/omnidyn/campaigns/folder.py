@@ -1,0 +1,301 @@
+"""Folder: what a campaign keeps on disk, so that nothing is lost, whatever ends.
+
+manifest.json            spec, hashes of inputs and task, version, samples, rows of a shard: written once
+inputs/                  the files that the spec names, copied
+shards/00000.parquet     one shard: sample, what varied, what was measured. Written whole or not at all, never changed
+shards/00000.failed      the traceback of a shard that failed; gone once the shard is there
+lock                     held by whoever works, on the bytes of its shards; the system lets go however a process ends
+merged.parquet           all shards as one file, by `merge`: the same bytes however it was cut into shards
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from omnidyn.campaigns.spec import Spec, parse_spec
+from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.files import open_atomic, read_text, write_atomic
+from omnidyn.logs.readers.parquet import import_pyarrow
+
+MANIFEST, SHARDS, LOCK, MERGED = "manifest.json", "shards", "lock", "merged.parquet"
+DONE, FAILED = ".parquet", ".failed"
+SAMPLE = "sample"
+GROUP_ROWS = 2**16  # rows of a group of the merged file
+WORD = "omnidyn campaign"
+
+
+class Manifest(NamedTuple):
+    """What makes a campaign this one: two of the same manifest have the same results.
+
+    spec: its tables, files by their copies. inputs: copy -> sha256. task: "track", "simulate" or "module:function".
+    task_sha256: of the source of a function. samples; shard_rows: samples of a shard.
+    """
+
+    omnidyn: str
+    spec: dict[str, Any]
+    inputs: dict[str, str]
+    task: str
+    task_sha256: str
+    samples: int
+    shard_rows: int
+
+    @property
+    def shards(self) -> int:
+        """How many shards there are."""
+        return -(-self.samples // self.shard_rows)
+
+    def rows(self, shard: int) -> tuple[int, int]:
+        """The samples of a shard: from, to."""
+        start = shard * self.shard_rows
+        return start, min(start + self.shard_rows, self.samples)
+
+    def to_json(self) -> str:
+        """The text of its file."""
+        return json.dumps({"kind": WORD, **self._asdict()}, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+    def differences(self, other: Manifest) -> list[str]:
+        """What differs in another campaign, in words; the rows of a shard are no difference."""
+        pairs = {name: (getattr(self, name), getattr(other, name)) for name in self._fields if name != "shard_rows"}
+        spec = pairs.pop("spec")
+        pairs |= dict(_leaves("", *({key: v for key, v in tables.items() if key != "shard_rows"} for tables in spec)))
+        inputs = pairs.pop("inputs")
+        changed = [
+            f"{name} has changed" for name in inputs[0] if inputs[1].get(name, inputs[0][name]) != inputs[0][name]
+        ]
+        return [f"{name}: {_text(old)} -> {_text(new)}" for name, (old, new) in pairs.items() if old != new] + changed
+
+
+def _leaves(path: str, old: Any, new: Any) -> Iterator[tuple[str, tuple[Any, Any]]]:
+    """Path of a key -> what it was and is, of two trees of tables."""
+    if not isinstance(old, Mapping) or not isinstance(new, Mapping):
+        yield path, (old, new)
+        return
+    for key in dict.fromkeys([*old, *new]):
+        yield from _leaves(f"{path}.{key}" if path else key, old.get(key), new.get(key))
+
+
+def _text(value: Any) -> str:
+    return "none" if value is None else json.dumps(value, ensure_ascii=False)[:60]
+
+
+@dataclass(frozen=True)
+class Status:
+    """Shards that are there, that failed (shard -> traceback), and how many there are in all; samples likewise."""
+
+    done: tuple[int, ...]
+    failed: dict[int, str]
+    shards: int
+    samples_done: int
+    samples: int
+
+    @property
+    def complete(self) -> bool:
+        """Whether all shards are there."""
+        return len(self.done) == self.shards
+
+
+@dataclass(frozen=True)
+class Folder:
+    """A folder that holds a campaign."""
+
+    path: Path
+
+    @property
+    def exists(self) -> bool:
+        """Whether a campaign has begun in it."""
+        return (self.path / MANIFEST).exists()
+
+    @property
+    def manifest(self) -> Manifest:
+        """Read from disk. Raises InputError where there is none, or what is there is none."""
+        place = self.path / MANIFEST
+        if not self.exists:
+            raise InputError("no campaign", expected=f"a folder with a {MANIFEST}", where=str(self.path))
+        try:
+            content = json.loads(read_text(place))
+            if content.pop("kind", None) != WORD:
+                raise TypeError
+            manifest = Manifest(**content)
+        except (ValueError, TypeError, AttributeError):
+            raise InputError(
+                "not the manifest of a campaign", expected="as a sweep wrote it", where=str(place)
+            ) from None
+        parse_spec(manifest.spec, str(place))
+        return manifest
+
+    @property
+    def spec(self) -> Spec:
+        """The spec of the campaign, files by their copies."""
+        return parse_spec(self.manifest.spec, str(self.path / MANIFEST))
+
+    def begin(self, manifest: Manifest, inputs: Mapping[str, bytes]) -> Manifest:
+        """Make the folder for a campaign, or find the same campaign in it: its manifest, whose shards count.
+
+        Raises InputError where the folder holds another campaign (what differs), or anything else.
+        """
+        self.path.mkdir(parents=True, exist_ok=True)
+        if not self.exists:
+            self._refuse_strangers(inputs)
+            for name, content in inputs.items():
+                (self.path / name).parent.mkdir(exist_ok=True)
+                write_atomic(self.path / name, content, force=True)
+            (self.path / SHARDS).mkdir(exist_ok=True)
+            try:
+                write_atomic(self.path / MANIFEST, manifest.to_json())
+            except InputError:
+                if not self.exists:  # else another part of the same campaign was quicker
+                    raise
+        before = self.manifest
+        if differences := before.differences(manifest):
+            raise InputError(
+                f"the folder holds another campaign ({'; '.join(differences)})",
+                expected="the same spec, inputs, task and version",
+                remedy="take a new folder",
+                where=str(self.path),
+            )
+        return before
+
+    def _refuse_strangers(self, inputs: Mapping[str, bytes]) -> None:
+        names = {name.partition("/")[0] for name in inputs} | {SHARDS, LOCK}
+        strangers = [entry.name for entry in self.path.iterdir() if entry.name not in names and entry.name[0] != "."]
+        if strangers:
+            raise InputError(
+                "the folder holds other files", got=strangers[0], expected="a new or empty folder", where=str(self.path)
+            )
+
+    def shard_path(self, shard: int, ending: str = DONE) -> Path:
+        """Where a shard, or the traceback of one that failed, stands."""
+        return self.path / SHARDS / f"{shard:05d}{ending}"
+
+    def is_done(self, shard: int) -> bool:
+        """Whether a shard is there."""
+        return self.shard_path(shard).exists()
+
+    def write_shard(self, shard: int, columns: Mapping[str, Any]) -> None:
+        """Write a shard. Raises InputError where it cannot be written: a full disk."""
+        pyarrow, parquet = import_pyarrow()
+        sink = pyarrow.BufferOutputStream()
+        parquet.write_table(pyarrow.table(dict(columns)), sink, write_page_checksum=True)
+        try:
+            write_atomic(self.shard_path(shard), sink.getvalue().to_pybytes(), force=True)
+        except InputError as error:
+            remedy = f"make room there, then go on: omnidyn sweep resume {self.path}"
+            raise InputError(error.what, got=error.got, remedy=remedy, where=error.where) from None
+        self.shard_path(shard, FAILED).unlink(missing_ok=True)
+
+    def mark_failed(self, shard: int, words: str) -> None:
+        """Keep why a shard failed."""
+        write_atomic(self.shard_path(shard, FAILED), words, force=True)
+
+    def status(self) -> Status:
+        """What is there. One listing of the folder."""
+        manifest, names = self.manifest, sorted(os.listdir(self.path / SHARDS))
+        done = tuple(int(name[: -len(DONE)]) for name in names if name.endswith(DONE) and name[0] != ".")
+        failed = {int(name[: -len(FAILED)]): "" for name in names if name.endswith(FAILED) and name[0] != "."}
+        words = {shard: read_text(self.shard_path(shard, FAILED)) for shard in failed if shard not in set(done)}
+        rows = sum(stop - start for start, stop in map(manifest.rows, done))
+        return Status(done, words, manifest.shards, rows, manifest.samples)
+
+    @contextlib.contextmanager
+    def locked(self, start: int, stop: int) -> Iterator[None]:
+        """Within it nobody else works on the shards start to stop. Raises InputError where somebody does.
+
+        Locks of bytes of a file: processes that work on other shards, `--shard i/n`, do not meet; the system lets go of
+        them when the process ends, however it ends; and a file system in a network (NFS) knows them.
+        """
+        if _working(self.path, start, stop):
+            raise self._taken(start, stop)
+        with open(self.path / LOCK, "a+b") as stream:
+            if not _seize(stream, start, stop - start):
+                raise self._taken(start, stop)
+            mark = (self.path.resolve(), start, stop)
+            _MARKS.append(mark)
+            try:
+                yield
+            finally:
+                _MARKS.remove(mark)
+
+    def _taken(self, start: int, stop: int) -> InputError:
+        return InputError(
+            "another run works in this folder",
+            got=f"shards {start} to {stop - 1}",
+            expected="one run at a time",
+            remedy="wait for it, or stop it; what it has done stays",
+            where=str(self.path),
+        )
+
+    def merge(self) -> Path:
+        """All shards as one file, in the order of the samples. Raises InsufficientDataError while some are missing."""
+        status = self.status()
+        if not status.complete:
+            raise InsufficientDataError(
+                "shards are missing",
+                got=f"{len(status.done)} of {status.shards}, {len(status.failed)} failed",
+                expected="all of them",
+                remedy=f"omnidyn sweep resume {self.path}",
+                where=str(self.path),
+            )
+        _, parquet = import_pyarrow()
+        with open_atomic(self.path / MERGED, force=True) as stream:
+            writer = None
+            for table in _regrouped(parquet.read_table(self.shard_path(shard)) for shard in range(status.shards)):
+                writer = writer or parquet.ParquetWriter(stream, table.schema, write_page_checksum=True)
+                writer.write_table(table, row_group_size=GROUP_ROWS)
+            assert writer is not None
+            writer.close()
+        return self.path / MERGED
+
+
+def _regrouped(tables: Iterable[Any]) -> Iterator[Any]:
+    """The rows of tables in groups of GROUP_ROWS, whatever they were cut into."""
+    pyarrow, _ = import_pyarrow()
+    rest = None
+    for table in tables:
+        rest = table if rest is None else pyarrow.concat_tables([rest, table])
+        while len(rest) >= GROUP_ROWS:
+            yield rest.slice(0, GROUP_ROWS).combine_chunks()
+            rest = rest.slice(GROUP_ROWS)
+    if rest is not None and len(rest):
+        yield rest.combine_chunks()
+
+
+# POSIX locks are of a process: two runs in one are told apart here, before the file is opened: to close it lets go.
+_MARKS: list[tuple[Path, int, int]] = []
+
+
+def _working(path: Path, start: int, stop: int) -> bool:
+    return any(path.resolve() == other and start < end and first < stop for other, first, end in _MARKS)
+
+
+def _seize(stream: Any, start: int, count: int) -> bool:
+    """Lock bytes of an open file, if they are free. Kept until the file is closed, or the process ends."""
+    try:
+        if os.name == "nt":
+            import msvcrt
+
+            stream.seek(start)
+            msvcrt.locking(stream.fileno(), msvcrt.LK_NBLCK, count)
+        else:
+            import fcntl
+
+            fcntl.lockf(stream, fcntl.LOCK_EX | fcntl.LOCK_NB, count, start)
+    except OSError:
+        return False
+    return True
+
+
+def as_columns(rows: list[Mapping[str, float]]) -> dict[str, Any]:
+    """Rows of numbers as columns. Raises InputError where rows have other names."""
+    names = [*rows[0]]
+    for row in rows:
+        if [*row] != names:
+            raise InputError("a task returned other names", got=", ".join(row), expected=", ".join(names))
+    return {name: np.array([row[name] for row in rows], dtype=float) for name in names}

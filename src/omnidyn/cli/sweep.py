@@ -1,0 +1,98 @@
+"""omnidyn sweep SPEC.toml -o FOLDER: many simulations, in shards that survive; and what to do with such a folder."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import typer
+
+import omnidyn
+from omnidyn.cli.terminal.pictures import refuse_picture, write_picture
+from omnidyn.cli.terminal.progress import shown_progress
+from omnidyn.cli.terminal.session import input_file, provenance
+from omnidyn.cli.terminal.streams import say
+from omnidyn.cli.terminal.telling import end_failed, tell
+from omnidyn.errors import InputError
+from omnidyn.progress import Report
+
+if TYPE_CHECKING:
+    from omnidyn.campaigns.results import Campaign
+
+STATUS, RESUME, MERGE, PLOT = "status", "resume", "merge", "plot"
+
+
+def sweep(
+    what: str = typer.Argument(
+        metavar="SPEC|status|resume|merge|plot", help="A spec, .toml; or what to do with FOLDER."
+    ),
+    folder: str = typer.Argument("", metavar="[FOLDER]", help="Of a campaign, behind status, resume, merge or plot."),
+    out: str = typer.Option("", "-o", "--out", metavar="FOLDER|FILE", help="Where shards go; of plot: a .png or .svg."),
+    workers: int | None = typer.Option(None, min=1, help="Processes; default: as many as processors."),
+    scheduler: str = typer.Option("", metavar="tcp://HOST:PORT", help="A Dask cluster that runs already."),
+    shard: str = typer.Option("", metavar="I/N", help="Only the I-th of N parts, as in an array of Slurm."),
+    metric: str = typer.Option("", metavar="NAME", help="What shares, limit and picture are about."),
+    limit: float | None = typer.Option(None, help="Of the metric: which share of the samples keeps it."),
+    force: bool = typer.Option(False, "--force", help="Replace a picture that exists."),
+    json: bool = typer.Option(False, "--json", help="For machines."),
+) -> None:
+    """Run many simulations that vary a robot, a path or a controller, in shards: a file each, done once.
+
+    Whatever ends it, even the power, `omnidyn sweep resume FOLDER` goes on with what is missing.
+    """
+    if what not in (STATUS, RESUME, MERGE, PLOT):
+        if folder or not out:
+            raise typer.BadParameter("a spec needs -o FOLDER; without a spec: status, resume, merge or plot FOLDER.")
+        return _run(what, out, workers, scheduler, shard, metric, limit, json)
+    if not folder:
+        raise typer.BadParameter(f"{what} needs a FOLDER.")
+    if what == RESUME:
+        return _run("", folder, workers, scheduler, shard, metric, limit, json)
+    campaign = omnidyn.load_campaign(folder)
+    if what == MERGE:
+        with shown_progress("merging shards", hint=""):
+            say(f"omnidyn: wrote {campaign.folder.merge()}")
+    if what == PLOT:
+        if not out:
+            raise typer.BadParameter("plot needs -o FILE, .png or .svg.")
+        refuse_picture(out, force)
+        from omnidyn.report.figures.campaign import draw_campaign
+
+        with shown_progress("drawing", hint=""):
+            picture = draw_campaign(campaign, metric=metric, limit=limit)
+        write_picture(picture, out, force)
+    _tell(campaign, metric, limit, json)
+
+
+def _run(
+    spec: str,
+    folder: str,
+    workers: int | None,
+    scheduler: str,
+    shard: str,
+    metric: str,
+    limit: float | None,
+    json: bool,
+) -> None:
+    part = _part(shard)
+    with shown_progress("reading the spec") as progress:
+        progress(Report("starting"))
+        campaign = omnidyn.sweep(
+            spec or None, folder, workers=workers, scheduler=scheduler, shard=part, progress=progress
+        )
+    say(f"omnidyn: shards are in {folder}; one file of them: omnidyn sweep merge {folder}")
+    _tell(campaign, metric, limit, json)
+
+
+def _part(text: str) -> tuple[int, int]:
+    """ "2/4" as (2, 4)."""
+    first, slash, second = (text or "1/1").partition("/")
+    if not slash or not first.isdecimal() or not second.isdecimal():
+        raise InputError("no part of the shards", got=text, expected="I/N, such as 1/4", where="shard")
+    return int(first), int(second)
+
+
+def _tell(campaign: Campaign, metric: str, limit: float | None, json: bool) -> None:
+    manifest = str(campaign.folder.path / "manifest.json")
+    tell(campaign.document(metric, limit), json, provenance([input_file("campaign", manifest)]))
+    if campaign.status.failed:
+        end_failed(campaign.verdict)

@@ -1,0 +1,39 @@
+"""What a campaign of many simulations says."""
+
+from __future__ import annotations
+
+from omnidyn.statement import Statement
+from omnidyn.telling.sentence import Sentence
+
+
+def _of(statement: Statement) -> str:
+    return f"the campaign{f' {statement.subject}' if statement.subject else ''}"
+
+
+def _done(statement: Statement) -> str:
+    """All shards of a campaign are there."""
+    numbers = statement.numbers
+    return f"{_of(statement)} is complete: {numbers['samples']} samples in {numbers['shards']} shards"
+
+
+def _open(statement: Statement) -> str:
+    """Some shards of a campaign are not there yet."""
+    numbers = statement.numbers
+    return f"{_of(statement)} is not complete: {numbers['done']} of {numbers['shards']} shards are there"
+
+
+def _failed(statement: Statement) -> str:
+    """Some shards of a campaign failed."""
+    numbers = statement.numbers
+    return f"{_of(statement)} has {numbers['failed']} failed shards; {numbers['done']} of {numbers['shards']} are there"
+
+
+SENTENCES = {
+    "campaign_done": Sentence(_done),
+    "campaign_open": Sentence(_open, "go on with omnidyn sweep resume"),
+    "campaign_failed": Sentence(_failed, "read their tracebacks, then omnidyn sweep resume runs them again"),
+    "shard_failed": Sentence("{subject}: {error}"),
+    "within_limit": Sentence(
+        "{share:%.3g} % of the samples have {subject} of at most {limit:.4g} (95 %: {low:%.3g} to {high:%.3g} %)"
+    ),
+}

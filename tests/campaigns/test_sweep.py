@@ -1,0 +1,208 @@
+"""Campaigns: the same bytes however they are cut, killed and resumed; nothing lost, nothing computed twice."""
+
+import errno
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from omnidyn import files
+from omnidyn.campaigns.sweep import sweep
+from omnidyn.errors import InputError, InsufficientDataError
+from omnidyn.files import sha256
+from tests.support import campaign_tasks
+from tests.support.campaign_tasks import MARKS, mass, product, raising
+
+ROOT = Path(__file__).parents[2]
+AB = {"task.a": {"range": [0.0, 1.0]}, "task.b": {"range": [1.0, 2.0]}}
+SPEC = {"schema": 1, "robot": "axebot", "samples": 200, "sampling": "random", "shard_rows": 5, "vary": AB}
+
+
+def merged(campaign):
+    return sha256(campaign.folder.merge().read_bytes())
+
+
+@pytest.fixture
+def threads():
+    """Two threads in place of processes, which take seconds to start."""
+    with ThreadPoolExecutor(2) as pool:
+        yield pool
+
+
+@pytest.fixture
+def undisturbed(tmp_path, threads):
+    """The hash of an undisturbed campaign."""
+    return merged(sweep(SPEC, tmp_path / "undisturbed", task=product, executor=threads))
+
+
+def test_any_cut_gives_the_same_bytes(tmp_path, threads, undisturbed):
+    whole = SPEC | {"shard_rows": 64}
+    assert merged(sweep(whole, tmp_path / "a", task=product, executor=threads)) == undisturbed
+    for k in (4, 2, 1, 3):
+        campaign = sweep(SPEC, tmp_path / "b", task=product, executor=threads, shard=(k, 4))
+        if k != 3:
+            with pytest.raises(InsufficientDataError, match="shards are missing"):
+                campaign.folder.merge()
+    assert merged(campaign) == undisturbed
+
+
+SCRIPT = """
+from omnidyn.campaigns.sweep import sweep
+from tests.campaigns.test_sweep import SPEC
+from tests.support.campaign_tasks import product
+if __name__ == "__main__":
+    sweep(SPEC, {folder!r}, task=product, workers={workers})
+"""
+
+
+def killed_and_resumed(folder, kills, workers, seed):
+    """Run a campaign in a process, kill it so many times as it works: samples begun in all."""
+    marks, draws = folder.parent / "marks", random.Random(seed)
+    marks.mkdir()
+    script = folder.parent / "script.py"
+    script.write_text(SCRIPT.format(folder=str(folder), workers=workers))
+    environment = os.environ | {MARKS: str(marks), "PYTHONPATH": str(ROOT)}
+    for kill in range(kills + 1):
+        before = len(list(marks.iterdir()))
+        process = subprocess.Popen([sys.executable, str(script)], env=environment, cwd=ROOT)
+        if kill == kills:
+            assert process.wait() == 0
+            break
+        goal = before + draws.randrange(1, 900 // (kills + 1))  # it is killed anywhere in a shard
+        while len(list(marks.iterdir())) < goal and process.poll() is None:
+            time.sleep(0.0005)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    return [int(mark.name.partition("-")[0]) for mark in marks.iterdir()]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="no SIGKILL")
+@pytest.mark.parametrize("kills, workers", [(2, 1), pytest.param(20, 2, marks=pytest.mark.long)])
+def test_kills_lose_nothing_and_repeat_only_what_was_in_flight(tmp_path, undisturbed, kills, workers):
+    folder = tmp_path / "killed"
+    begun = killed_and_resumed(folder, kills, workers, seed=1)
+    assert merged(sweep(SPEC, folder, task=product)) == undisturbed
+    assert set(begun) == set(range(200))
+    assert len(begun) - 200 <= kills * workers * SPEC["shard_rows"]
+
+
+def test_what_is_there_is_not_run_again(tmp_path, threads, monkeypatch):
+    sweep(SPEC, tmp_path / "c", task=product, executor=threads)
+    (tmp_path / "marks").mkdir()
+    monkeypatch.setenv(MARKS, str(tmp_path / "marks"))
+    (tmp_path / "c" / "shards" / "00007.parquet").unlink()
+    campaign = sweep(None, tmp_path / "c", task=product, executor=threads)
+    assert campaign.status.complete
+    assert sorted(int(mark.name.partition("-")[0]) for mark in (tmp_path / "marks").iterdir()) == [35, 36, 37, 38, 39]
+
+
+def test_a_task_that_raises_or_ends_its_process_is_marked_and_the_others_go_on(tmp_path):
+    spec = SPEC | {"samples": 20, "vary": {"task.a": {"range": [0.0, 1.0]}}}
+    campaign = sweep(spec, tmp_path / "d", task=raising, workers=1)
+    assert campaign.status.done == (0, 3)
+    assert "ValueError: no such wheel" in campaign.status.failed[1]
+    assert "in sample 5: task.a = " in campaign.status.failed[1]
+    assert "the process that worked on this shard ended" in campaign.status.failed[2]
+    assert campaign.verdict.code == "campaign_failed"
+
+
+def test_a_full_disk_is_said_and_resumed_from(tmp_path, threads, monkeypatch, undisturbed):
+    fsync, calls = os.fsync, []
+
+    def full(handle):
+        calls.append(handle)
+        if len(calls) > 20:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        fsync(handle)
+
+    monkeypatch.setattr(files.os, "fsync", full)
+    with pytest.raises(InputError, match="No space left on device"):
+        sweep(SPEC, tmp_path / "e", task=product, executor=threads)
+    monkeypatch.undo()
+    assert not list((tmp_path / "e").rglob("*tmp*"))
+    campaign = sweep(None, tmp_path / "e", task=product, executor=threads)
+    assert merged(campaign) == undisturbed
+
+
+def test_a_second_run_is_refused_and_another_share_is_not(tmp_path, threads):
+    campaign = sweep(SPEC, tmp_path / "f", task=product, executor=threads, shard=(1, 2))
+    words = "import sys; from pathlib import Path; from omnidyn.campaigns.folder import Folder\n"
+    words += "with Folder(Path(sys.argv[1])).locked(0, 20): print('locked', flush=True); sys.stdin.read()"
+    command = [sys.executable, "-c", words, str(tmp_path / "f")]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=ROOT) as other:
+        assert other.stdout.readline() == b"locked\n"
+        with pytest.raises(InputError, match="another run works in this folder"):
+            sweep(SPEC, tmp_path / "f", task=product, executor=threads)
+        sweep(SPEC, tmp_path / "f", task=product, executor=threads, shard=(2, 2))
+        other.kill()
+        other.wait()
+    with campaign.folder.locked(0, 5):  # and within one process
+        with pytest.raises(InputError, match="another run works in this folder"), campaign.folder.locked(4, 6):
+            pass
+        with campaign.folder.locked(5, 6):
+            pass
+
+
+def test_another_campaign_in_the_folder_is_refused_with_what_differs(tmp_path, threads, write):
+    sweep(SPEC, tmp_path / "g", task=product, executor=threads)
+    other = SPEC | {"samples": 300, "vary": AB | {"task.a": {"range": [0.0, 1.5]}}}
+    with pytest.raises(
+        InputError, match=r"samples: 200 -> 300.*vary\.task\.a\.range: \[0\.0, 1\.0\] -> \[0\.0, 1\.5\]"
+    ):
+        sweep(other, tmp_path / "g", task=product, executor=threads)
+    with pytest.raises(InputError, match=r"task: .*product.* -> .*mass"):
+        sweep(SPEC, tmp_path / "g", task=mass, executor=threads)
+    (tmp_path / "h").mkdir()
+    (tmp_path / "h" / "thesis.tex").touch()
+    with pytest.raises(InputError, match="the folder holds other files"):
+        sweep(SPEC, tmp_path / "h", task=product, executor=threads)
+
+
+def test_a_function_that_other_processes_cannot_find_is_refused(tmp_path):
+    with pytest.raises(InputError, match="other processes cannot find this task"):
+        sweep(SPEC, tmp_path / "i", task=lambda sample: {"a": 1.0})
+    assert campaign_tasks.product is product
+
+
+TRACK = {
+    "schema": 1,
+    "robot": "axebot",
+    "samples": 24,
+    "shard_rows": 4,
+    "vary": {"wheels.wheel_radius_m": {"factor": [0.98, 1.02]}, "friction": {"factor": [0.5, 1.5]}},
+    "track": {"path": "circle", "controller": "pid", "duration_s": 0.5, "noise_m_s": 0.005},
+}
+
+
+@pytest.mark.long
+@pytest.mark.filterwarnings("ignore")  # of dask, which are its own
+def test_processes_threads_and_dask_give_the_same_bytes_and_a_lost_worker_nothing(tmp_path, threads, undisturbed):
+    distributed = pytest.importorskip("distributed", reason="needs the extra `cluster`")
+    loops = [merged(sweep(TRACK, tmp_path / f"p{k}", workers=k)) for k in (1, 2)]
+    cluster = {"n_workers": 2, "threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": None}
+    (tmp_path / "marks").mkdir()
+    environment = {MARKS: str(tmp_path / "marks")}
+    with distributed.LocalCluster(**cluster, env=environment) as local, distributed.Client(local) as client:
+        loops.append(merged(sweep(TRACK, tmp_path / "p3", scheduler=local.scheduler_address)))
+        pids = list(client.run(os.getpid).values())
+        run = threads.submit(
+            sweep, SPEC | {"samples": 2000}, tmp_path / "q", task=product, scheduler=local.scheduler_address
+        )
+        while len(list((tmp_path / "marks").iterdir())) < 300:
+            time.sleep(0.001)
+        os.kill(pids[0], signal.SIGKILL)  # its nanny starts another one
+        campaign = run.result()
+        assert set(client.run(os.getpid).values()) != set(pids)
+    assert len(set(loops)) == 1
+    assert campaign.status.complete
+    begun = [int(mark.name.partition("-")[0]) for mark in (tmp_path / "marks").iterdir()]
+    assert set(begun) == set(range(2000))
+    assert len(begun) - 2000 <= SPEC["shard_rows"]  # the shard in flight, and none that was there
+    whole = sweep(SPEC | {"samples": 2000}, tmp_path / "r", task=product, executor=threads)
+    assert merged(whole) == merged(campaign)
