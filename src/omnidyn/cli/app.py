@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 import omnidyn
-from omnidyn.cli import at_rest, check, compare, demo, exchange, identify, init, logs, loops, simulate, warm
+from omnidyn.cli import at_rest, check, compare, demo, exchange, identify, init, logs, loops, simulate, studio, warm
 from omnidyn.cli.terminal.help import Grouped
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import show
@@ -68,6 +68,7 @@ for _command in (
     robots,
     exchange.export,
     warm.warm,
+    studio.studio,
 ):
     app.command(cls=Grouped)(_command)
 app.command("import", cls=Grouped)(exchange.bring)
