@@ -33,6 +33,7 @@ class Page:
     def __init__(self, session: Session) -> None:
         self.session, self.shown = session, ""
         self.parts: dict[str, list[Any]] = {}
+        self.folded: dict[str, bool] = {}  # title -> whether it is open
 
     def build(self) -> None:
         """Lay out the page."""
@@ -47,7 +48,9 @@ class Page:
             with ui.tabs().props("dense no-caps inline-label") as tabs:
                 log_tab, fit_tab, drive_tab = (ui.tab(name) for name in ("Log", "Fit", "Drive"))
             ui.space()
-            ui.button("Light or dark", on_click=lambda: dark.set_value(not dark.value)).props("flat dense no-caps")
+            ui.button("◐", on_click=lambda: dark.set_value(not dark.value)).props(
+                "flat dense aria-label='light or dark'"
+            )
         with ui.tab_panels(tabs, value=log_tab, animated=False).classes("panels"):
             with ui.tab_panel(log_tab):
                 self._log_tab()
@@ -67,6 +70,13 @@ class Page:
         shown()
         for part in parts:
             self.parts.setdefault(part, []).append(shown.refresh)
+
+    def _box(self, title: str, is_open: bool = False) -> ui.expansion:
+        """A part that can be folded; it stays as it was when it is made again."""
+        name = title.partition(" (")[0]
+        is_open = self.folded.get(name, is_open)
+        box = ui.expansion(title, value=is_open, on_value_change=lambda event: self.folded.update({name: event.value}))
+        return box.classes("box")
 
     # Log
 
@@ -94,7 +104,7 @@ class Page:
             ).classes("quiet")
             return
         with ui.row().classes("line"):
-            names = {key: other.name for key, other in self.session.logs.items()}
+            names = {key: other.label for key, other in self.session.logs.items()}
             ui.select(names, value=log.key, label="Log", on_change=lambda e: self._show(e.value)).classes("wide")
             ui.button("Remove", on_click=lambda: self.session.remove(log)).props("flat no-caps")
 
@@ -125,31 +135,38 @@ class Page:
             self._findings(log)
             self._uses(log)
             self._columns(log)
-        _calls(*self.session.check_call(log))
+        self._calls(*self.session.check_call(log))
 
     def _findings(self, log: LogFile) -> None:
+        """Errors and warnings, then notes, which are folded."""
         assert log.result is not None
-        if not log.result["findings"]:
-            return
-        with ui.expansion(f"Findings ({len(log.result['findings'])})", value=True).classes("box"):
-            for k, finding in enumerate(log.result["findings"]):
-                with ui.element("div").classes(f"finding {finding['severity']}").props(f"id=finding-{k}"):
-                    with ui.row().classes("line"):
-                        ui.label(MARK[finding["severity"]]).classes("mark")
-                        ui.label(f"{finding['severity']}: {finding['code']} {finding['subject']}").classes("code")
-                        if finding["spans"]:
-                            begin, end = finding["spans"][0][0], finding["spans"][-1][1]
-                            look = f"document.querySelector('omni-plot').look({begin}, {end})"
-                            ui.button("Show", on_click=lambda look=look: ui.run_javascript(look)).props(
-                                "flat dense no-caps"
-                            )
-                    ui.label(finding["text"]).classes("text")
-                    if finding["remedy"]:
-                        ui.label(f"→ {finding['remedy']}").classes("text remedy")
-                    if finding["code"] == "unsigned" and not log.unsigned:
-                        ui.button("Apply this remedy", on_click=lambda: self._signed(log)).props(
-                            "outline dense no-caps"
-                        )
+        numbered = list(enumerate(log.result["findings"]))
+        grave = [(k, finding) for k, finding in numbered if finding["severity"] != "note"]
+        notes = numbered[len(grave) :]  # they come last
+        for title, shown, is_open in (("Findings", grave, True), ("Notes", notes, False)):
+            if shown:
+                with self._box(f"{title} ({len(shown)})", is_open):
+                    for k, finding in shown:
+                        self._finding(log, k, finding)
+
+    def _finding(self, log: LogFile, k: int, finding: dict[str, Any]) -> None:
+        """What is the case, where, and what to do."""
+        with ui.element("div").classes(f"finding {finding['severity']}").props(f"id=finding-{k}"):
+            with ui.row().classes("line"):
+                ui.label(MARK[finding["severity"]]).classes("mark")
+                ui.label(f"{finding['severity']}: {finding['code']} {finding['subject']}").classes("code")
+                if finding["spans"]:
+                    look = (
+                        f"document.querySelector('omni-plot').show({finding['spans'][0][0]}, {finding['spans'][-1][1]})"
+                    )
+                    ui.button("Show", on_click=lambda: ui.run_javascript(look)).props("flat dense no-caps")
+            ui.label(finding["text"]).classes("text")
+            if finding["remedy"]:
+                ui.label(f"→ {finding['remedy']}").classes("text remedy")
+            if finding["code"] == "unsigned" and not log.unsigned:
+                ui.button("Apply this remedy", on_click=lambda: self._signed(log)).props(
+                    "outline dense no-caps id=apply-remedy"
+                )
 
     def _signed(self, log: LogFile) -> None:
         log.unsigned = True
@@ -157,7 +174,7 @@ class Page:
 
     def _uses(self, log: LogFile) -> None:
         assert log.result is not None
-        with ui.expansion("What it can be used for", value=True).classes("box"):
+        with self._box("What it can be used for", True):
             for use in log.result["uses"]:
                 with ui.row().classes("line"):
                     ui.label(f"{use['name']}: {'yes' if use['good'] else 'no'}").classes("use")
@@ -166,7 +183,7 @@ class Page:
     def _columns(self, log: LogFile) -> None:
         """The map of columns, to be corrected by hand."""
         assert log.result is not None
-        with ui.expansion(f"Columns and units ({len(log.result['columns'])})").classes("box"):
+        with self._box(f"Columns and units ({len(log.result['columns'])})"):
             for doubt in log.result["doubts"]:
                 ui.label(doubt).classes("text quiet")
             rows = [dict(row) for row in log.result["columns"]]
@@ -191,7 +208,7 @@ class Page:
 
     def _fit_tab(self, to_log: Callable[[], None]) -> None:
         self._part(self._robot_choice, ROBOT)
-        with ui.expansion("Describe another robot").classes("box"):
+        with self._box("Describe another robot"):
             self._robot_form()
         self._part(self._fit_start, FIT, LOGS)
         self._part(self._fit_progress, FIT, PROGRESS)
@@ -209,12 +226,11 @@ class Page:
 
     def _robot_form(self) -> None:
         fields = {
-            "--wheels": ("wheels", "3"),
+            "--azimuth": ("wheels stand at [degree]", "60,180,300"),
             "--wheel-radius": ("radius of a wheel [m]", "0.05"),
             "--robot-radius": ("centre to wheel [m]", "0.15"),
             "--mass": ("mass [kg]", "3"),
-            "--voltage-limit": ("most of a motor [V], empty: a guess", ""),
-            "--azimuth": ("wheels stand at [degree], empty: evenly", ""),
+            "--voltage-limit": ("voltage limit [V]", ""),
         }
         with ui.row().classes("line"):
             name = ui.input("name", value="my-robot")
@@ -223,16 +239,15 @@ class Page:
 
         async def make() -> None:
             options = [f"{flag}={field.value}" for flag, field in inputs.items() if str(field.value).strip()]
-            if inputs["--azimuth"].value:
-                options = [option for option in options if not option.startswith("--wheels=")]
             trouble.text = await self.session.make_robot(name.value, options)
 
-        ui.button("Make this robot", on_click=make).props("outline no-caps")
+        ui.button("Make this robot", on_click=make).props("outline no-caps id=make-robot")
+        ui.label("What is left empty is guessed, with a wide spread, and marked as a guess.").classes("text quiet")
 
     def _fit_start(self) -> None:
         session = self.session
         if len(session.logs) > 1:
-            names = {key: log.name for key, log in session.logs.items()}
+            names = {key: log.label for key, log in session.logs.items()}
             ui.select(
                 names,
                 value=session.held_out,
@@ -247,7 +262,7 @@ class Page:
             if code:
                 ui.label(words if code in ("unfit", "unread") else WHY[code]).classes("text quiet").props("id=why")
             elif not session.fit.running:
-                names = ", ".join(log.name for log in session.logs.values())
+                names = ", ".join(log.label for log in session.logs.values())
                 ui.label(f"{names}, from {session.robot}").classes("text quiet")
 
     def _hold_out(self, keys: list[str]) -> None:
@@ -293,10 +308,16 @@ class Page:
         if fit.series:
             ui.label("Free run: the model gets the inputs only").classes("title")
             _plot(fit.series, [])
-        with ui.expansion(f"Warnings and notes ({len(result['warnings'])})").classes("box"):
+        with self._box(f"Warnings and notes ({len(result['warnings'])})"):
             for warning in result["warnings"]:
                 ui.label(f"{warning['severity']}: {warning['text']}").classes("text")
-        _calls(fit.command, fit.python)
+        self._calls(fit.command, fit.python)
+
+    def _calls(self, command: str, python: str) -> None:
+        """The command line and the Python call that do the same."""
+        with self._box("The same by hand"):
+            ui.label(command).classes("call").props("id=call")
+            ui.label(python).classes("call")
 
     # Drive
 
@@ -342,13 +363,6 @@ def _verdict(severity: str, words: str, name: str = "verdict") -> None:
     with ui.row().classes(f"verdict {severity}").props(f"id={name} role=status"):
         ui.label(MARK[severity]).classes("mark")
         ui.label(words).classes("text")
-
-
-def _calls(command: str, python: str) -> None:
-    """The command line and the Python call that do the same."""
-    with ui.expansion("The same by hand").classes("box"):
-        ui.label(command).classes("call").props("id=call")
-        ui.label(python).classes("call")
 
 
 def _plot(series: str, spans: list[list[Any]]) -> None:

@@ -118,7 +118,7 @@ def _add_files(app: FastAPI, session: Session) -> None:
     @app.get("/series/{key}")
     async def series(key: str) -> Response:
         shown = session.series.get(key)
-        return Response(status_code=404) if shown is None else JSONResponse(shown.meta)
+        return Response(status_code=204) if shown is None else JSONResponse(shown.meta)  # a page that is late
 
     @app.get("/fit/{name}")
     async def fit_file(name: str) -> Response:

@@ -52,6 +52,11 @@ class LogFile:
     version: int = 0
 
     @property
+    def label(self) -> str:
+        """The name without its folder."""
+        return Path(self.name).name
+
+    @property
     def request(self) -> dict[str, Any]:
         """How a job reads it."""
         return {"path": self.path, "map": self.map, "unsigned": self.unsigned}
@@ -264,11 +269,6 @@ class Session:
 
     # Fit
 
-    @property
-    def fitted(self) -> list[LogFile]:
-        """The logs of a fit, those that are held out too."""
-        return [*self.logs.values()]
-
     def why_no_fit(self) -> tuple[str, str]:
         """What keeps from a fit: a code that the page has words for, and the library's words; ("", "") for nothing."""
         if not self.logs:
@@ -277,12 +277,12 @@ class Session:
             return "no_robot", ""
         for log in self.logs.values():
             if log.error:
-                return "unread", f"{log.name}: {log.error}"
+                return "unread", f"{log.label}: {log.error}"
             if log.result is None:
-                return "checking", log.name
+                return "checking", log.label
             fit_uses = [use for use in log.result["uses"] if use["name"] in ("whole logs", "steady state")]
             if log.result["has_errors"] or not any(use["good"] for use in fit_uses):
-                return "unfit", f"{log.name}: {log.result['verdict']}"
+                return "unfit", f"{log.label}: {log.result['verdict']}"
         return ("all_held_out", "") if len(self.held_out) == len(self.logs) else ("", "")
 
     async def run_fit(self, free: tuple[str, ...] = ()) -> None:

@@ -67,6 +67,27 @@ class Drop extends HTMLElement {
   }
 }
 
+// One socket for all pictures of a page; answers come in the order of the requests
+const wire = {
+  askers: [],
+  ask(plot, request) {
+    const text = JSON.stringify(request);
+    if (!this.socket) {
+      this.socket = new WebSocket(socketUrl('/plot'));
+      this.socket.binaryType = 'arraybuffer';
+      this.socket.onmessage = (e) => this.askers.shift()?.take(e.data);
+      this.socket.onclose = () => {
+        const left = this.askers.splice(0);
+        this.socket = null;
+        setTimeout(() => left.forEach((p) => { p.waiting = false; p.ask(); }), 1000);
+      };
+    }
+    this.askers.push(plot);
+    if (this.socket.readyState === 1) this.socket.send(text);
+    else this.socket.addEventListener('open', () => this.socket.send(text));
+  },
+};
+
 const LEFT = 62, RIGHT = 10, TOP = 20, PANEL = 110, GAP = 24, BOTTOM = 38;
 
 // Signals over time, one panel below the other, with findings shaded
@@ -76,9 +97,10 @@ class Plot extends HTMLElement {
     if (!this.canvas) this.build();
     this.resize = new ResizeObserver(() => this.ask());
     this.resize.observe(this);
-    this.open();
+    this.waiting = false;
+    this.load();
   }
-  disconnectedCallback() { this.resize?.disconnect(); const s = this.socket; this.socket = null; s?.close(); }
+  disconnectedCallback() { this.resize?.disconnect(); }
   attributeChangedCallback(name) {
     if (!this.isConnected || !this.canvas) return;
     if (name === 'data-series') this.load(); else this.draw();
@@ -88,6 +110,8 @@ class Plot extends HTMLElement {
     make('button', tools, { type: 'button', textContent: 'All', onclick: () => this.look(this.meta.begin, this.meta.end) });
     make('button', tools, { type: 'button', textContent: 'Save picture', onclick: () => save(this.canvas, 'log.png') });
     this.readout = make('span', tools, { textContent: 'Drag to pan, wheel or + and - to zoom' });
+    this.story = make('div', this, { className: 'story', hidden: true });
+    this.story.setAttribute('role', 'status');
     this.canvas = make('canvas', this, { tabIndex: 0 });
     this.canvas.setAttribute('role', 'img');
     this.canvas.setAttribute('aria-label', 'Signals over time');
@@ -113,18 +137,10 @@ class Plot extends HTMLElement {
     this.dark = new MutationObserver(() => this.draw());
     this.dark.observe(document.body, { attributes: true, attributeFilter: ['class'] });
   }
-  open() {
-    this.socket = new WebSocket(socketUrl('/plot'));
-    this.socket.binaryType = 'arraybuffer';
-    this.socket.onopen = () => this.load();
-    this.socket.onmessage = (e) => { this.waiting = false; this.take(e.data); if (this.again) this.ask(); };
-    this.socket.onclose = () => { if (this.socket) setTimeout(() => this.isConnected && this.open(), 1000); };
-    this.waiting = false;
-  }
   async load() {
     const series = this.dataset.series;
     const answer = await fetch(`/series/${series}`);
-    if (!answer.ok) return;
+    if (answer.status !== 200) return;
     const before = this.meta;
     this.meta = await answer.json();
     if (!before || before.begin !== this.meta.begin || before.end !== this.meta.end) this.view = [this.meta.begin, this.meta.end];
@@ -141,15 +157,22 @@ class Plot extends HTMLElement {
     this.view = [low, low + span];
     this.draw(); this.ask();
   }
+  show(begin, end) {
+    const edge = Math.max((end - begin) * 0.2, (this.meta.end - this.meta.begin) * 0.01);
+    this.look(begin - edge, end + edge);
+    this.scrollIntoView({ block: 'start' });
+  }
   zoom(factor, at) { this.look(at + (this.view[0] - at) * factor, at + (this.view[1] - at) * factor); }
   ask() {
-    if (!this.meta || this.socket?.readyState !== 1) return;
+    if (!this.meta || !this.isConnected) return;
     if (this.waiting) { this.again = true; return; }
     this.waiting = true; this.again = false;
-    this.socket.send(JSON.stringify({ series: this.dataset.series, begin: this.view[0], end: this.view[1],
-      width: Math.round(this.inner() * (window.devicePixelRatio || 1)) }));
+    wire.ask(this, { series: this.dataset.series, begin: this.view[0], end: this.view[1],
+      width: Math.round(this.inner() * (window.devicePixelRatio || 1)) });
   }
   take(data) {
+    this.waiting = false;
+    if (this.again) this.ask();
     if (data.byteLength < 8) return;
     const length = new DataView(data).getUint32(0, true);
     const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
@@ -181,6 +204,7 @@ class Plot extends HTMLElement {
     for (let s = first; n && s < first + panel.signals.length; s++)
       for (let i = 0; i < 2 * n; i++) { const v = shown.numbers[n + 2 * n * s + i]; if (v < low) low = v; if (v > high) high = v; }
     if (!(low <= high)) { low = -1; high = 1; }
+    if (high - low < 1e-9) { low -= 0.5; high += 0.5; }
     const edge = Math.max((high - low) * 0.06, Math.abs(high) * 1e-3, 1e-9);
     low -= edge; high += edge;
     const y = (v) => top + PANEL - (v - low) / (high - low) * PANEL;
@@ -196,7 +220,8 @@ class Plot extends HTMLElement {
     for (const v of ticks(low, high, 4)) { g.beginPath(); g.moveTo(LEFT, y(v)); g.lineTo(LEFT + inner, y(v)); g.stroke(); }
     panel.signals.forEach((name, k) => {
       const at = n + 2 * n * (first + k);
-      g.strokeStyle = css(`--c${k % 6}`); g.lineWidth = 1.3; g.setLineDash(name === 'model' ? [6, 3] : []);
+      const wide = name === 'measured'; // the model is drawn over it
+      g.strokeStyle = css(`--c${k % 6}`); g.lineWidth = wide ? 4 : 1.3; g.globalAlpha = wide ? 0.45 : 1;
       g.beginPath();
       let pen = false;
       for (let i = 0; i < n; i++) {
@@ -210,7 +235,6 @@ class Plot extends HTMLElement {
       g.stroke();
     });
     g.restore();
-    g.setLineDash([]);
     g.strokeStyle = css('--quiet'); g.strokeRect(LEFT + 0.5, top + 0.5, inner, PANEL);
     g.fillStyle = css('--quiet'); g.textAlign = 'right'; g.textBaseline = 'middle';
     for (const v of ticks(low, high, 4)) g.fillText(short(v), LEFT - 5, y(v));
@@ -226,9 +250,12 @@ class Plot extends HTMLElement {
   pick(px) {
     const t = this.time(px), reach = 4 * (this.view[1] - this.view[0]) / this.inner();
     const hits = this.areas().filter(([, , begin, end]) => t >= begin - reach && t <= end + reach);
-    document.querySelectorAll('.finding.chosen').forEach((e) => e.classList.remove('chosen'));
-    const row = hits.length && document.getElementById(`finding-${hits[0][0]}`);
-    if (row) { row.classList.add('chosen'); row.scrollIntoView({ block: 'nearest' }); this.readout.textContent = row.innerText.split('\n').slice(1).join(' '); }
+    this.story.replaceChildren();
+    this.story.hidden = !hits.length;
+    for (const [k, severity] of hits) {
+      const row = document.getElementById(`finding-${k}`), part = make('div', this.story, { className: `finding ${severity}` });
+      for (const words of row?.querySelectorAll('.code, .text') || []) make('div', part, { className: words.className, textContent: words.textContent });
+    }
   }
 }
 
@@ -382,10 +409,10 @@ class Drive extends HTMLElement {
     this.dataset.still = still; this.dataset.vx = f[4]; this.dataset.x = f[1];
   }
   lines() {
-    const n = this.robot.azimuth.length, width = this.clientWidth, names = this.robot.azimuth.map((_, k) => `wheel ${k + 1}`);
+    const n = this.robot.azimuth.length, width = this.clientWidth, names = this.robot.azimuth.map((_, k) => String(k + 1));
     const wheels = (what) => names.map((_, k) => (f) => this.wheel(f, k, what));
-    const panels = [['voltage [V]', names, wheels(1)], ['current [A]', names, wheels(2)], ['wheel speed [rad/s]', names, wheels(3)],
-      ['speed of the body [m/s, rad/s]', ['forward', 'left', 'turn'], [4, 5, 6].map((k) => (f) => f[k])]];
+    const panels = [['voltage of wheel [V]', names, wheels(1)], ['current of wheel [A]', names, wheels(2)], ['speed of wheel [rad/s]', names, wheels(3)],
+      ['body [m/s, rad/s]', ['forward', 'left', 'turn'], [4, 5, 6].map((k) => (f) => f[k])]];
     const high = 84, gap = 22, g = sharp(this.strips, width, panels.length * (high + gap) + 40), inner = width - LEFT - RIGHT;
     const end = this.newest[0], begin = end - STRIP / 60, x = (t) => LEFT + (t - begin) / (end - begin) * inner;
     panels.forEach(([title, labels, gets], p) => {
@@ -396,7 +423,7 @@ class Drive extends HTMLElement {
       const y = (v) => top + high / 2 - v / most * high / 2;
       g.strokeStyle = css('--line'); g.lineWidth = 1;
       g.fillStyle = css('--quiet'); g.textAlign = 'right'; g.textBaseline = 'middle';
-      for (const v of ticks(-most, most, 3)) { g.beginPath(); g.moveTo(LEFT, y(v)); g.lineTo(LEFT + inner, y(v)); g.stroke(); g.fillText(short(v), LEFT - 5, y(v)); }
+      for (const v of ticks(-most, most, 5)) { g.beginPath(); g.moveTo(LEFT, y(v)); g.lineTo(LEFT + inner, y(v)); g.stroke(); g.fillText(short(v), LEFT - 5, y(v)); }
       gets.forEach((get, k) => {
         g.strokeStyle = css(`--c${k % 6}`); g.lineWidth = 1.4; g.beginPath();
         for (const f of this.strip) if (f[0] >= begin) g.lineTo(x(f[0]), y(get(f)));
