@@ -5,7 +5,21 @@ from __future__ import annotations
 import typer
 
 import omnidyn
-from omnidyn.cli import at_rest, check, compare, demo, exchange, identify, init, logs, loops, simulate, sweep, warm
+from omnidyn.cli import (
+    at_rest,
+    check,
+    compare,
+    demo,
+    exchange,
+    identify,
+    init,
+    logs,
+    loops,
+    simulate,
+    studio,
+    sweep,
+    warm,
+)
 from omnidyn.cli.terminal.help import Grouped
 from omnidyn.cli.terminal.session import provenance, robot_input
 from omnidyn.cli.terminal.streams import show
@@ -69,6 +83,7 @@ for _command in (
     robots,
     exchange.export,
     warm.warm,
+    studio.studio,
 ):
     app.command(cls=Grouped)(_command)
 app.command("import", cls=Grouped)(exchange.bring)

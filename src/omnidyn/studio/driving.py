@@ -1,0 +1,185 @@
+"""Drive: a simulated robot under the keys and sliders of a page, 60 times a second.
+
+The page sends axes (-1..1 for x, y, yaw), a level (volts, a duty or m/s), an offset for each wheel, numbers of the
+robot file that change while it moves, and begin and end of a recording. A robot whose numbers change goes on from where
+it is.
+"""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import omnidyn
+from omnidyn.arrays import FloatArray
+from omnidyn.errors import OmnidynError
+from omnidyn.model.dynamics import settled_currents
+from omnidyn.model.keys import Key, friction_keys
+from omnidyn.model.motor import DUTY, SPEED, traction
+from omnidyn.model.robot import Robot
+from omnidyn.model.wheels import wheel_speed
+from omnidyn.simulation.live import LiveRobot, check_supply
+
+DT = 1.0 / 60.0  # [s]
+LATE = 0.25  # [s] behind the clock: the time that was lost is not made up
+MAX_ROWS = 60 * 60 * 30  # of a recording: half an hour
+CHANGED = ("body.mass_kg", "body.inertia_kg_m2")  # beside friction
+TOP_SPEED = 1.5  # [m/s] that a page may ask of a robot with a speed loop
+UNITS = {DUTY: "", SPEED: "m/s"}  # of the level; else volts
+
+
+class Drive:
+    """One robot on its way."""
+
+    def __init__(
+        self, robot: Robot, folder: Path, tell: Callable[[str, Any], None], commands: queue.Queue[Any]
+    ) -> None:
+        check_supply(robot, None)
+        self.robot, self.folder, self.tell, self.commands = robot, folder, tell, commands
+        self.patterns = omnidyn.axis_patterns(robot)
+        self.axes, self.level, self.offset = np.zeros(3), 0.0, np.zeros(robot.wheels.count)
+        self.live = LiveRobot(robot, DT)
+        self.rows: list[tuple[FloatArray, ...]] | None = None
+        self.count, self.recordings, self.stopped = 0, 0, False
+
+    def run(self) -> dict[str, Any]:
+        """Go on until the page says stop."""
+        self.live.step(np.zeros(self.robot.wheels.count))  # what is compiled or loaded is not part of the drive
+        self.live = LiveRobot(self.robot, DT)
+        self._introduce()
+        due = time.perf_counter()
+        while not self.stopped:
+            while not self.commands.empty():
+                self._take(self.commands.get())
+            self._step()
+            due += DT
+            now = time.perf_counter()
+            due = max(due, now - LATE)
+            if due > now:
+                time.sleep(due - now)
+        return {}
+
+    def _introduce(self) -> None:
+        """What the page has to know of the robot before the first frame."""
+        robot, keys = self.robot, [*friction_keys(self.robot), *CHANGED]
+        kind = robot.drive.kind
+        self.tell(
+            "robot",
+            {
+                "name": robot.name,
+                "kind": kind,
+                "unit": UNITS.get(kind, "V"),
+                "limit": _limit(robot),
+                "breakaway": self._breakaway(),
+                "azimuth": [float(angle) for angle in robot.wheels.azimuth_deg],
+                "roller": [
+                    float(angle) for angle in np.broadcast_to(robot.wheels.roller_angle_deg, robot.wheels.count)
+                ],
+                "distance": [float(r) for r in np.broadcast_to(robot.wheels.robot_radius, robot.wheels.count)],
+                "radius": [float(r) for r in robot.wheels.radii],
+                "numbers": [
+                    {
+                        "key": key,
+                        "words": Key.parse(key).words,
+                        "unit": Key.parse(key).unit,
+                        "value": Key.parse(key).get(robot),
+                    }
+                    for key in keys
+                ],
+            },
+        )
+
+    def _take(self, command: Mapping[str, Any]) -> None:
+        """One command of a page; what cannot be used is said, and the drive goes on."""
+        try:
+            if "axes" in command:
+                self.axes = np.clip(np.asarray(command["axes"], dtype=float).reshape(3), -1.0, 1.0)
+                self.level = float(np.clip(float(command["level"]), 0.0, _limit(self.robot)))
+            if "offset" in command:
+                self.offset = np.asarray(command["offset"], dtype=float).reshape(self.robot.wheels.count)
+            for key, value in command.get("set", {}).items():
+                self._change(Key.parse(key).set(self.robot, float(value)))
+            if command.get("home"):
+                self.live = LiveRobot(self.robot, DT)
+            if "record" in command:
+                self._record(bool(command["record"]))
+            self.stopped = self.stopped or bool(command.get("stop"))
+        except (OmnidynError, ValueError, TypeError, KeyError) as error:
+            self.tell("trouble", str(error))
+
+    def _change(self, robot: Robot) -> None:
+        """Another robot goes on where this one is."""
+        self.robot = robot
+        self.live = LiveRobot(robot, DT, pose=self.live.pose, twist=self.live.twist)
+        self.tell("breakaway", self._breakaway())
+
+    def _breakaway(self) -> list[float | None]:
+        """Volts of the pattern of each axis at which the robot begins to move; None where no voltage tells."""
+        if self.robot.drive.kind == SPEED:
+            return [None] * 3
+        volts = omnidyn.breakaway_voltage(self.robot, self.patterns)
+        return [float(value) if np.isfinite(value) else None for value in volts]
+
+    def _command(self) -> FloatArray:
+        """What the drives of the wheels get now: volts, a duty, or wheel speeds. Shape (wheels,)."""
+        if self.robot.drive.kind == SPEED:
+            reach = np.array([1.0, 1.0, 1.0 / float(np.mean(self.robot.wheels.robot_radius))])
+            return wheel_speed(self.robot.wheels, self.level * self.axes * reach) + self.offset
+        limit = _limit(self.robot)
+        return np.clip(self.level * (self.axes @ self.patterns) + self.offset, -limit, limit)
+
+    def _step(self) -> None:
+        """One step, its frame, and its row of the recording."""
+        live, command = self.live, self._command()
+        before = (live.wheel_speed.copy(), live.twist.copy(), live.pose.copy())
+        live.step(command)
+        if self.rows is not None:
+            self.rows.append((command if self.robot.drive.kind != SPEED else live.voltage, *before))
+            if len(self.rows) >= MAX_ROWS:
+                self._record(False)
+        current = settled_currents(self.robot, live.twist, live.voltage)
+        self.count += 1
+        wheels = [
+            command,
+            live.voltage,
+            current,
+            live.wheel_speed,
+            traction(self.robot.motor, self.robot.wheels, current),
+        ]
+        head = [self.count * DT, *live.pose, *live.twist, float(self.rows is not None)]
+        self.tell("frame", [float(value) for value in np.concatenate([head, *wheels])])
+
+    def _record(self, begin: bool) -> None:
+        """Begin a recording, or write it as a log."""
+        if begin:
+            self.rows = []
+            return
+        rows, self.rows = self.rows, None
+        if not rows or len(rows) < 2:
+            return
+        command, wheel_speed, twist, pose = (np.array(part) for part in zip(*rows, strict=True))
+        self.recordings += 1
+        path = self.folder / f"drive-{self.recordings}.csv"
+        channel = "duty" if self.robot.drive.kind == DUTY else "voltage"
+        run = omnidyn.Run(
+            t=DT * np.arange(len(rows)),
+            wheel_speed=wheel_speed,
+            twist=twist,
+            pose=pose,
+            source=path.stem,
+            **{channel: command},
+        )
+        omnidyn.write_run(run, path, force=True)
+        self.tell("recorded", {"path": str(path), "seconds": DT * len(rows)})
+
+
+def _limit(robot: Robot) -> float:
+    """The largest level: volts, a duty, or m/s."""
+    if robot.drive.kind == DUTY:
+        return 1.0
+    return TOP_SPEED if robot.drive.kind == SPEED else float(np.max(robot.motor.voltage_limit))

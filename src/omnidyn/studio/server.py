@@ -1,0 +1,193 @@
+"""Server: routes of the studio behind the guard: pages, pictures, uploads, what was written."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import secrets
+import socket
+import struct
+import sys
+import threading
+import webbrowser
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import uvicorn
+from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
+from fastapi.responses import FileResponse, JSONResponse
+from fastapi.staticfiles import StaticFiles
+from nicegui import ui
+
+from omnidyn.errors import InputError
+from omnidyn.studio.guard import Guard
+from omnidyn.studio.page import Page
+from omnidyn.studio.session import RefusedError, Session
+
+LOCAL = "127.0.0.1"
+STATIC = Path(__file__).with_name("static")
+TRIES = 20  # ports from the one asked for
+FIT_FILES = {"robot.toml": "text/plain", "numbers.csv": "text/csv", "report.html": "text/html"}
+NO_SCRIPT = "default-src 'none'; style-src 'unsafe-inline'; img-src data: 'self'; frame-ancestors 'none'"
+MESSAGE_BYTES = 65_536  # of what a page sends over a socket
+CLOSED = (WebSocketDisconnect, RuntimeError)  # how a socket says that its page is gone
+
+
+def serve(files: list[str], host: str, port: int, browse: bool) -> int:
+    """Serve until interrupted. host: "" for this machine alone; another one needs the token that is printed."""
+    for file in files:
+        if not Path(file).exists():
+            raise InputError("no such file", expected="a log or a robot file", where=file)
+    token = secrets.token_urlsafe(24) if host else ""
+    listener = _listener(host or LOCAL, port)
+    shown_host = LOCAL if host in ("", "0.0.0.0", "::") else host
+    address = f"http://{shown_host}:{listener.getsockname()[1]}/{f'?token={token}' if token else ''}"
+    session = Session()
+    app = application(session, files)
+    config = uvicorn.Config(
+        Guard(app, token),
+        log_level="warning",
+        ws_max_size=MESSAGE_BYTES,
+        timeout_graceful_shutdown=1,
+        server_header=False,
+    )
+    print(f"omnidyn studio: {address}", flush=True)
+    if browse:
+        threading.Timer(1.0, webbrowser.open, (address,)).start()
+    with contextlib.suppress(KeyboardInterrupt):
+        uvicorn.Server(config).run(sockets=[listener])
+    return 0
+
+
+def _listener(host: str, port: int) -> socket.socket:
+    """A socket on the first free port from the one asked for; on any with port 0. Raises InputError."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    for candidate in range(port, port + TRIES) if port else (0,):
+        listener = socket.socket(family, socket.SOCK_STREAM)
+        if sys.platform != "win32":
+            listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            listener.bind((host, candidate))
+            listener.listen()
+        except OSError as error:
+            listener.close()
+            reason = error
+            continue
+        listener.set_inheritable(False)
+        return listener
+    raise InputError("no port is free", got=str(reason), expected="an address of this machine", where=f"{host}:{port}")
+
+
+def application(session: Session, files: list[str]) -> FastAPI:
+    """The application without its guard."""
+
+    @contextlib.asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        session.open(files)
+        session.start(session.warm())
+        try:
+            yield
+        finally:
+            await session.close()
+
+    app = FastAPI(lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
+    app.mount("/static", StaticFiles(directory=STATIC))
+    _add_files(app, session)
+    _add_sockets(app, session)
+
+    @ui.page("/", title="omnidyn studio")
+    def show() -> None:
+        Page(session).build()
+
+    ui.run_with(app, title="omnidyn studio", dark=None, show_welcome_message=False)
+    return app
+
+
+def _add_files(app: FastAPI, session: Session) -> None:
+    """Uploads, and what can be downloaded."""
+
+    @app.post("/upload")
+    async def upload(request: Request, name: str) -> Response:
+        try:
+            return JSONResponse({"name": await session.upload(name, request.stream())})
+        except RefusedError:
+            return Response(status_code=413)
+
+    @app.get("/series/{key}")
+    async def series(key: str) -> Response:
+        shown = session.series.get(key)
+        return Response(status_code=204) if shown is None else JSONResponse(shown.meta)  # a page that is late
+
+    @app.get("/fit/{name}")
+    async def fit_file(name: str) -> Response:
+        folder = session.fit.folder
+        if name not in FIT_FILES or folder is None or not (folder / name).exists():
+            return Response(status_code=404)
+        headers = {"content-security-policy": NO_SCRIPT}
+        shown_here = name.endswith(".html")
+        return FileResponse(
+            folder / name,
+            media_type=FIT_FILES[name],
+            headers=headers,
+            filename=name,
+            content_disposition_type="inline" if shown_here else "attachment",
+        )
+
+    @app.get("/log/{key}/{what}")
+    async def log_file(key: str, what: str) -> Response:
+        log = session.logs.get(key)
+        path = {"map": log.map, "log": log.path}.get(what) if log else ""
+        if not log or not path or not Path(path).is_file():
+            return Response(status_code=404)
+        return FileResponse(path, media_type="text/plain", filename=Path(path).name)
+
+
+def _add_sockets(app: FastAPI, session: Session) -> None:
+    """Fast channels: pictures of signals, and the drive."""
+
+    @app.websocket("/plot")
+    async def plot(socket: WebSocket) -> None:
+        await socket.accept()
+        with contextlib.suppress(*CLOSED):
+            while True:
+                request = await socket.receive_json()
+                shown = session.series.get(str(request.get("series")))
+                if shown is None:
+                    await socket.send_bytes(b"")
+                    continue
+                view = (float(request["begin"]), float(request["end"]), int(request["width"]))
+                await socket.send_bytes(await asyncio.to_thread(shown.frame, *view))
+
+    @app.websocket("/drive")
+    async def drive(socket: WebSocket) -> None:
+        """Frames out, commands in. A slow page loses frames: only the newest ever waits."""
+        await socket.accept()
+        fresh = asyncio.Event()
+        session.drive.fresh.add(fresh)
+
+        async def send() -> None:
+            with contextlib.suppress(*CLOSED):
+                while True:
+                    await fresh.wait()
+                    fresh.clear()
+                    frame = np.asarray(session.drive.frame, dtype="<f4")
+                    await socket.send_bytes(struct.pack("<I", len(frame)) + frame.tobytes())
+
+        sender = asyncio.create_task(send())
+        try:
+            with contextlib.suppress(*CLOSED):
+                while True:
+                    _take(session, await socket.receive_json())
+        finally:
+            sender.cancel()
+            session.drive.fresh.discard(fresh)
+            if not session.drive.fresh:
+                session.command({"axes": [0.0, 0.0, 0.0], "level": 0.0})  # nobody holds a key any more
+
+
+def _take(session: Session, command: Any) -> None:
+    """A command of a page, as far as it is one."""
+    if isinstance(command, dict):
+        session.command({name: command[name] for name in ("axes", "level", "offset", "set") if name in command})

@@ -1,0 +1,413 @@
+"""Session: what all pages of one server share: files, the robot, the last fit, the drive. A reload shows the same.
+
+Files come from the command line, from uploads, from recordings. An upload lies in a folder of its own under a name made
+of plain letters, and goes away with the session.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import re
+import shlex
+import sys
+import tempfile
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import omnidyn
+from omnidyn.studio.series import META, Series
+from omnidyn.studio.worker import CancelledError, JobError, Worker
+
+MAX_FILES, MAX_FILE_BYTES, MAX_BYTES = 50, 2**30, 4 * 2**30  # of uploads
+ROBOT_SUFFIX = ".toml"
+MAX_NAME = 80
+# Parts of a page that change
+LOGS, ROBOT, FIT, PROGRESS, DRIVE, VIEW = "logs", "robot", "fit", "progress", "drive", "view"
+
+
+class RefusedError(Exception):
+    """An upload that is not taken, and why."""
+
+
+@dataclass
+class LogFile:
+    """A log, how it is read, and what check says of it.
+
+    name: that a page shows. path: of the file. map: of its columns, "" for a guess. result: of the job; error: why
+    there is none. series: id of its signals. progress: in words, while it is read.
+    """
+
+    key: str
+    name: str
+    path: str
+    map: str = ""
+    unsigned: bool = False
+    result: dict[str, Any] | None = None
+    error: str = ""
+    series: str = ""
+    progress: str = ""
+    version: int = 0
+
+    @property
+    def label(self) -> str:
+        """The name without its folder."""
+        return Path(self.name).name
+
+    @property
+    def request(self) -> dict[str, Any]:
+        """How a job reads it."""
+        return {"path": self.path, "map": self.map, "unsigned": self.unsigned}
+
+
+@dataclass
+class FitState:
+    """The last fit. result: of the job. running, progress, share: while it goes on. folder: of its files."""
+
+    result: dict[str, Any] | None = None
+    error: str = ""
+    running: bool = False
+    progress: str = ""
+    share: float | None = None
+    folder: Path | None = None
+    series: str = ""
+    command: str = ""
+    python: str = ""
+
+
+@dataclass
+class DriveState:
+    """The drive. robot: what a page must know of it. frame: the newest. recorded: keys of logs."""
+
+    running: bool = False
+    robot: dict[str, Any] | None = None
+    trouble: str = ""
+    recording: bool = False
+    frame: list[float] = field(default_factory=list)
+    fresh: set[asyncio.Event] = field(default_factory=set)
+
+
+class Session:
+    """The state of the server, and what can be done with it."""
+
+    def __init__(self) -> None:
+        self._folder = tempfile.TemporaryDirectory(prefix="omnidyn-studio-")
+        self.folder = Path(self._folder.name)
+        self.logs: dict[str, LogFile] = {}
+        self.robots = {name: name for name in omnidyn.preset_names()}  # shown name -> preset or path
+        self.robot = ""
+        self.fit, self.drive = FitState(), DriveState()
+        self.held_out: list[str] = []
+        self.series: dict[str, Series] = {}
+        self.listeners: set[Callable[[str], None]] = set()
+        self.workers = {name: Worker() for name in ("log", "fit", "drive")}
+        self._count, self._bytes, self._tasks = 0, 0, set[asyncio.Task[Any]]()
+
+    def changed(self, *parts: str) -> None:
+        """Tell all pages which parts of them are old."""
+        for listener in [*self.listeners]:
+            for part in parts:
+                listener(part)
+
+    def start(self, work: Any) -> None:
+        """Let something go on beside the pages."""
+        task = asyncio.get_running_loop().create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+
+    async def close(self) -> None:
+        """End all processes and remove all files."""
+        for worker in self.workers.values():
+            await worker.stop()
+        self._folder.cleanup()
+
+    # Files
+
+    def _new_folder(self) -> Path:
+        self._count += 1
+        folder = self.folder / str(self._count)
+        folder.mkdir()
+        return folder
+
+    def open(self, paths: list[str]) -> None:
+        """Take files that the command line names: logs, and robot files by their suffix."""
+        for path in paths:
+            if path.lower().endswith(ROBOT_SUFFIX):
+                self.robots[path] = self.robot = path
+            else:
+                self.add_log(path, path)
+
+    def add_log(self, path: str, name: str) -> LogFile:
+        """Take a log and check it."""
+        self._count += 1
+        log = LogFile(f"log{self._count}", name, path)
+        self.logs[log.key] = log
+        self.start(self.check(log))
+        self.changed(LOGS, FIT)
+        return log
+
+    async def upload(self, name: str, body: AsyncIterator[bytes]) -> str:
+        """Take an upload, and return the name it got. Raises RefusedError for one too many or too large."""
+        if len(self.logs) + len(self.robots) >= MAX_FILES:
+            raise RefusedError(f"{MAX_FILES}")
+        safe = safe_name(name)
+        path, size = self._new_folder() / safe, 0
+        try:
+            with path.open("xb") as file:
+                async for block in body:
+                    size += len(block)
+                    if size > MAX_FILE_BYTES or self._bytes + size > MAX_BYTES:
+                        raise RefusedError(f"{MAX_FILE_BYTES}")
+                    file.write(block)
+        except BaseException:
+            path.unlink(missing_ok=True)
+            raise
+        self._bytes += size
+        if safe.lower().endswith(ROBOT_SUFFIX):
+            self.add_robot(str(path), safe)
+        else:
+            self.add_log(str(path), safe)
+        return safe
+
+    def remove(self, log: LogFile) -> None:
+        """Forget a log; one that was uploaded is deleted."""
+        self.logs.pop(log.key, None)
+        self.held_out = [key for key in self.held_out if key in self.logs]
+        path = Path(log.path)
+        if self.folder in path.parents:
+            self._bytes -= path.stat().st_size if path.exists() else 0
+            path.unlink(missing_ok=True)
+        self.changed(LOGS, FIT)
+
+    async def example(self) -> None:
+        """A simulated log to begin with."""
+        path = self._new_folder() / "example.csv"
+        await self.workers["log"].run("example", {"path": str(path)}, lambda kind, value: None)
+        self.robot = self.robot or "axebot"
+        self.add_log(str(path), path.name)
+        self.changed(ROBOT)
+
+    async def check(self, log: LogFile) -> None:
+        """Read and check a log again."""
+        log.version += 1
+        version = log.version
+        folder = self._new_folder() / "series"
+        log.error, log.result, log.progress = "", None, "..."
+        self.changed(LOGS, FIT)
+
+        def listen(kind: str, value: Any) -> None:
+            log.progress = value["text"]
+            if value.get("drawn"):
+                self._take_series(log, folder)
+            self.changed(PROGRESS)
+
+        request = {**log.request, "robot": self.robot_path, "folder": str(folder)}
+        try:
+            result = await self.workers["log"].run("check", request, listen)
+        except JobError as error:
+            result, log.error = None, str(error).replace(f"{Path(log.path).parent}/", "")
+        except CancelledError:
+            return
+        if version == log.version:
+            log.result, log.progress = result, ""
+            self.changed(LOGS, FIT)
+
+    def _take_series(self, log: LogFile, folder: Path) -> None:
+        self.series.pop(log.series, None)
+        if (folder / META).exists():
+            log.series = f"{log.key}-{log.version}"
+            self.series[log.series] = Series(folder)
+            self.changed(LOGS)
+
+    async def map_columns(self, log: LogFile, rows: list[dict[str, Any]]) -> str:
+        """Read a log by a table of columns; an error in words, or ""."""
+        path = self._new_folder() / "columns.toml"
+        try:
+            await self.workers["log"].run("save_columns", {"rows": rows, "path": str(path)}, lambda kind, value: None)
+        except JobError as error:
+            return str(error)
+        log.map = str(path)
+        await self.check(log)
+        return ""
+
+    # Robot
+
+    @property
+    def robot_path(self) -> str:
+        """The preset or the path of the robot; "" for none."""
+        return self.robots.get(self.robot, "")
+
+    def add_robot(self, path: str, name: str) -> None:
+        """Take a robot file, and choose it."""
+        self.robots[name] = path
+        self.choose(name)
+
+    def choose(self, name: str) -> None:
+        """Choose a robot; logs are checked with it."""
+        if name in self.robots and name != self.robot:
+            self.robot = name
+            for log in self.logs.values():
+                self.start(self.check(log))
+            self.changed(ROBOT, FIT)
+
+    async def make_robot(self, name: str, options: list[str]) -> str:
+        """The robot that `omnidyn init` writes for these options; an error in words, or ""."""
+        path = self._new_folder() / f"{safe_name(name)}{ROBOT_SUFFIX}"
+        process = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-m", "omnidyn", "init", path.stem, *options, "-o", str(path)),
+            stdin=asyncio.subprocess.DEVNULL,
+            stdout=asyncio.subprocess.DEVNULL,
+            stderr=asyncio.subprocess.PIPE,
+        )
+        _, words = await process.communicate()
+        if process.returncode:
+            return words.decode("utf-8", "replace").strip().removeprefix("omnidyn: error: ")
+        self.add_robot(str(path), path.name)
+        return ""
+
+    # Fit
+
+    def why_no_fit(self) -> tuple[str, str]:
+        """What keeps from a fit: a code that the page has words for, and the library's words; ("", "") for nothing."""
+        if not self.logs:
+            return "no_log", ""
+        if not self.robot_path:
+            return "no_robot", ""
+        for log in self.logs.values():
+            if log.error:
+                return "unread", f"{log.label}: {log.error}"
+            if log.result is None:
+                return "checking", log.label
+            fit_uses = [use for use in log.result["uses"] if use["name"] in ("whole logs", "steady state")]
+            if log.result["has_errors"] or not any(use["good"] for use in fit_uses):
+                return "unfit", f"{log.label}: {log.result['verdict']}"
+        return ("all_held_out", "") if len(self.held_out) == len(self.logs) else ("", "")
+
+    async def run_fit(self, free: tuple[str, ...] = ()) -> None:
+        """Fit the robot to the logs."""
+        if self.fit.running or self.why_no_fit()[0]:
+            return
+        folder = self._new_folder() / "fit"
+        self.series.pop(self.fit.series, None)
+        command, python = self.fit_call(free)
+        self.fit = fit = FitState(running=True, folder=folder, progress="...", command=command, python=python)
+        self.changed(FIT)
+
+        def listen(kind: str, value: Any) -> None:
+            fit.progress, fit.share = value["text"], value["share"]
+            self.changed(PROGRESS)
+
+        request = {
+            "robot": self.robot_path,
+            "logs": [log.request for log in self.logs.values()],
+            "hold_out": [self.logs[key].path for key in self.held_out],
+            "free": free,
+            "folder": str(folder),
+            "command": command,
+        }
+        try:
+            fit.result = await self.workers["fit"].run("fit", request, listen)
+            if fit.result["series"]:
+                fit.series = f"fit{self._count}"
+                self.series[fit.series] = Series(folder / "series")
+        except JobError as error:
+            fit.error = str(error)
+        except CancelledError:
+            fit.error = ""
+        fit.running = False
+        self.changed(FIT)
+
+    async def warm(self) -> None:
+        """Load what the first fit needs, while nobody waits for it."""
+        with contextlib.suppress(CancelledError, JobError):
+            await self.workers["fit"].run("warm", {}, lambda kind, value: None)
+
+    # Drive
+
+    async def run_drive(self) -> None:
+        """Drive the robot until it is stopped."""
+        if self.drive.running or not self.robot_path:
+            return
+        folder = self._new_folder()
+        self.drive.running, self.drive.robot, self.drive.trouble = True, None, ""
+        self.changed(DRIVE, VIEW)
+
+        def listen(kind: str, value: Any) -> None:
+            if kind == "frame":
+                self.drive.frame = value
+                for fresh in self.drive.fresh:
+                    fresh.set()
+                return
+            if kind == "robot":
+                self.drive.robot = value
+                self.changed(VIEW)
+            elif kind == "breakaway" and self.drive.robot is not None:
+                self.drive.robot["breakaway"] = value
+            elif kind == "trouble":
+                self.drive.trouble = value
+            elif kind == "recorded":
+                self.add_log(value["path"], Path(value["path"]).name)
+            self.changed(VIEW if kind == "breakaway" else DRIVE)
+
+        try:
+            await self.workers["drive"].run("drive", {"robot": self.robot_path, "folder": str(folder)}, listen)
+        except JobError as error:
+            self.drive.trouble = str(error)
+        except CancelledError:
+            pass
+        self.drive.running = self.drive.recording = False
+        self.changed(DRIVE, VIEW)
+
+    def command(self, command: dict[str, Any]) -> None:
+        """Give a command of a page to the drive."""
+        if self.drive.running:
+            if "record" in command:
+                self.drive.recording = bool(command["record"])
+            for key, value in command.get("set", {}).items():
+                for number in (self.drive.robot or {}).get("numbers", []):
+                    if number["key"] == key:
+                        number["value"] = value
+            self.workers["drive"].send({"command": command})
+            if "record" in command:
+                self.changed(DRIVE)
+
+    # The same by hand
+
+    def check_call(self, log: LogFile) -> tuple[str, str]:
+        """The command line and the Python call that check a log so."""
+        robot = self.robot_path and Path(self.robot_path).name
+        words = ["omnidyn", "check", log.name]
+        words += ["--robot", robot] if robot else []
+        words += ["--map", "columns.toml"] if log.map else []
+        words += ["--current-unsigned"] if log.unsigned else []
+        options = "".join(
+            ([", columns='columns.toml'"] if log.map else []) + ([", current_unsigned=True"] if log.unsigned else [])
+        )
+        load = f"omnidyn.{'read_log' if options else 'load_log'}({log.name!r}{options})"
+        return shlex.join(words), f"omnidyn.check({load}{f', omnidyn.load_robot({robot!r})' if robot else ''})"
+
+    def fit_call(self, free: tuple[str, ...] = ()) -> tuple[str, str]:
+        """The command line and the Python call that fit so."""
+        robot = Path(self.robot_path).name
+        words = ["omnidyn", "identify", *(log.name for log in self.logs.values()), "--robot", robot]
+        for key in self.held_out:
+            words += ["--hold-out", self.logs[key].name]
+        for key in free:
+            words += ["--free", key]
+        if any(log.map for log in self.logs.values()):
+            words += ["--map", "columns.toml"]
+        unsigned = any(log.unsigned for log in self.logs.values())
+        words += ["--current-unsigned"] if unsigned else []
+        words += ["-o", "fitted.toml", "--report", "report.html"]
+        logs = ", ".join(f"omnidyn.load_log({log.name!r})" for log in self.logs.values())
+        held = f", hold_out={[self.logs[key].name for key in self.held_out]!r}" if self.held_out else ""
+        method = f", omnidyn.OutputError(free={free!r})" if free else ""
+        return shlex.join(words), f"omnidyn.identify([{logs}], omnidyn.load_robot({robot!r}){method}{held})"
+
+
+def safe_name(name: str) -> str:
+    """A name of plain letters, without a folder, for a file that somebody else named."""
+    plain = re.sub(r"[^A-Za-z0-9._-]+", "_", name.replace("\\", "/").rpartition("/")[2]).lstrip("._-")
+    return plain[-MAX_NAME:].lstrip("._-") or "file"

@@ -1,0 +1,112 @@
+"""A studio that runs as a process of its own, and a browser that looks at it.
+
+Needs Chromium (CHROMIUM names it where it is not on the path) and playwright, which no lock has: OMNIDYN_PLAYWRIGHT may
+name a folder that holds it. `.ci/run` sees to both; without them tests that need a browser are skipped.
+"""
+
+import contextlib
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+
+if folder := os.environ.get("OMNIDYN_PLAYWRIGHT"):
+    sys.path.append(folder)
+
+
+@dataclass(frozen=True)
+class Studio:
+    """A server: its process, its address, its port."""
+
+    process: subprocess.Popen
+    address: str
+    port: int
+
+
+@contextlib.contextmanager
+def running(*arguments: str) -> Iterator[Studio]:
+    """A studio on a free port."""
+    words = [sys.executable, "-m", "omnidyn", "studio", "--no-browser", "--port", "0", *arguments]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            address = process.stdout.readline().split()[-1]
+            yield Studio(process, address, int(address.split("://")[1].split("/")[0].rpartition(":")[2]))
+        finally:
+            process.terminate()
+            process.wait(20)
+
+
+@pytest.fixture(scope="module")
+def studio() -> Iterator[Studio]:
+    """A studio without files."""
+    pytest.importorskip("nicegui", reason="the extra studio is not installed")
+    with running() as server:
+        yield server
+
+
+@pytest.fixture
+def start():
+    """Starts a studio with arguments."""
+    pytest.importorskip("nicegui", reason="the extra studio is not installed")
+    return running
+
+
+@dataclass
+class Browser:
+    """A browser, the studios it looks at, and what its pages complained about or asked others for."""
+
+    chromium: Any
+    studios: contextlib.ExitStack
+    complaints: list[str] = field(default_factory=list)
+
+    def start(self, *files, width=1400, **options):
+        """A studio with these files, and a page of it."""
+        studio = self.studios.enter_context(running(*map(str, files)))
+        return studio, self.open(studio, width, **options)
+
+    def open(self, studio, width=1400, **options):
+        """A page of a studio."""
+        page = self.chromium.new_page(viewport={"width": width, "height": 900}, **options)
+        page.on("console", lambda m: self.complaints.append(m.text) if m.type in ("error", "warning") else None)
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("request", lambda request: self._note(request.url, studio.port))
+        page.set_default_timeout(60_000)
+        page.goto(studio.address)
+        page.wait_for_selector("#example")
+        return page
+
+    def _note(self, url, port):
+        if not url.startswith((f"http://127.0.0.1:{port}/", f"ws://127.0.0.1:{port}/", "data:", "blob:")):
+            self.complaints.append(f"asks {url}")
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    """Chromium, without a window."""
+    pytest.importorskip("nicegui", reason="the extra studio is not installed")
+    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    names = ("chromium", "chromium-browser", "google-chrome")
+    path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, names)), None)
+    if path is None:
+        pytest.skip("Chromium is not installed")
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def browser(chromium) -> Iterator[Browser]:
+    """A browser none of whose pages may complain, or ask anybody else."""
+    with contextlib.ExitStack() as studios:
+        browser = Browser(chromium, studios)
+        yield browser
+        for context in chromium.contexts:
+            context.close()
+        assert not browser.complaints

@@ -1,0 +1,273 @@
+"""The studio in a real browser: each test ends in what a page shows and the command prints for the same file."""
+
+import json
+import re
+import time
+import tomllib
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import omnidyn
+from omnidyn.cli import main
+from tests.support.axebot_logs import excitation
+
+# How long the server takes to answer a click [ms]: it turns the page dark, or light again
+ANSWER = """() => new Promise(done => { const begun = performance.now();
+    new MutationObserver((_, o) => { o.disconnect(); done(performance.now() - begun); })
+        .observe(document.body, { attributes: true, attributeFilter: ['class'] });
+    document.querySelector("[aria-label='light or dark']").click(); })"""
+ROBOTINO = Path(__file__).parents[2] / "examples" / "robotino" / "exp00.csv"
+
+
+def command(*words):
+    """What a command prints for machines, and its exit code."""
+    out, err = StringIO(), StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        code = main([str(word) for word in words])
+    return (json.loads(out.getvalue()) if out.getvalue().startswith("{") else {}), code, err.getvalue()
+
+
+def write_log(path, seconds=20.0, seed=1, change=None):
+    """A log of the axebot: voltages and a noisy twist."""
+    robot, draws = omnidyn.load_robot("axebot"), np.random.default_rng(seed)
+    run = omnidyn.simulate(robot, excitation(seconds, seed=seed), 0.01)
+    twist = run.twist + draws.standard_normal(run.twist.shape) * (0.01, 0.01, 0.05)
+    if change is not None:
+        change(twist)
+    omnidyn.write_run(omnidyn.Run(t=run.t, voltage=run.voltage, twist=twist), path)
+    return path
+
+
+def drop(page, path):
+    """Give a file to the page, as a user who clicks the place for files."""
+    page.set_input_files("input[type=file] >> nth=0", str(path))
+
+
+def tab(page, name):
+    """Go to a tab."""
+    page.get_by_role("tab", name=name).click()
+
+
+def verdict(page, name="#verdict"):
+    """The sentence on top, without the mark before it."""
+    page.wait_for_selector(name)
+    return page.inner_text(f"{name} .text")
+
+
+def as_flags(text):
+    """Options as the command line writes them."""
+    return re.sub(r"`([a-z_]+)`", lambda match: f"--{match[1].replace('_', '-')}", text)
+
+
+def numbers(page):
+    """Key -> value of the table of a fit."""
+    rows = page.locator("#numbers tbody tr").all()
+    cells = [[cell.inner_text().strip() for cell in row.locator("td").all()] for row in rows]
+    return {row[1]: row[2] for row in cells}
+
+
+def assert_same_numbers(page, path, *options):
+    """The table of the page has the numbers that `omnidyn identify` prints."""
+    said, code, words = command("identify", path, "--robot", "axebot", "--json", *options)
+    assert code == 0, words
+    shown = numbers(page)
+    assert len(said["parameters"]) >= 6
+    for key, number in said["parameters"].items():
+        assert shown[key] == f"{number['value']:.5g}", key
+
+
+def test_from_nothing_to_a_robot(browser, tmp_path):
+    begun = time.monotonic()
+    studio, page = browser.start()
+    page.click("#example")
+    assert verdict(page).startswith("Usable for whole logs")
+    tab(page, "Fit")
+    page.click("#fit:not([disabled])")
+    words = verdict(page, "#fit-verdict")
+    print(f"3 clicks, {time.monotonic() - begun:.1f} s from the start of the server")
+    log = tmp_path / "example.csv"
+    log.write_bytes(page.request.get(f"{studio.address}log/log2/log").body())
+    robot = tomllib.loads(page.request.get(f"{studio.address}fit/robot.toml").text())
+    assert robot["friction"]["axes"]["coulomb"][0]["value"] == pytest.approx(2.2, abs=0.03)  # Table 3
+    assert words in page.request.get(f"{studio.address}fit/report.html").text()
+    assert_same_numbers(page, log)
+
+
+def test_currents_without_a_sign_are_told_and_mended(browser):
+    _, page = browser.start(ROBOTINO)
+    assert verdict(page) == command("check", ROBOTINO, "--json")[0]["verdict"]
+    page.click("#apply-remedy")
+    mended = command("check", ROBOTINO, "--current-unsigned", "--json")[0]["verdict"]
+    page.get_by_text(mended).first.wait_for()
+    page.get_by_text("The same by hand").first.click()
+    assert "--current-unsigned" in page.inner_text("#call")
+
+
+def test_a_click_on_a_shaded_stretch_explains_it(browser, tmp_path):
+    def spike(twist):
+        twist[1000:1004, 0] += 25.0
+
+    path = write_log(tmp_path / "spikes.csv", change=spike)
+    said = command("check", path, "--json")[0]["logs"][0]
+    with_rows = next(finding for finding in said["findings"] if finding["rows"])
+    _, page = browser.start(path)
+    assert verdict(page) == said["verdict"]
+    page.wait_for_function("document.querySelector('omni-plot').frames > 0")
+    row = np.mean(with_rows["rows"][0]) - 2  # the first row of the file is its head
+    x = page.evaluate(
+        """t => { const p = document.querySelector('omni-plot'), box = p.canvas.getBoundingClientRect();
+        return box.left + 62 + (t - p.view[0]) / (p.view[1] - p.view[0]) * p.inner(); }""",
+        0.01 * float(row),
+    )
+    y = page.locator("omni-plot canvas").bounding_box()["y"] + 60
+    page.mouse.click(x, y)
+    page.wait_for_selector(".story .finding")
+    story = as_flags(page.inner_text(".story"))
+    assert with_rows["text"] in story
+    assert with_rows["remedy"] in story
+
+
+def test_what_cannot_be_read_or_fitted_is_said_and_fit_waits(browser, tmp_path):
+    broken, rest = tmp_path / "broken.csv", tmp_path / "rest.csv"
+    broken.write_text("t_s,vx_m_s\n0,1\n1,abc\n2,3\n", "utf-8")
+    robot = omnidyn.load_robot("axebot")
+    omnidyn.write_run(omnidyn.simulate(robot, np.zeros((600, 3)), 0.01), rest)
+    _, page = browser.start(broken)
+    words = command("check", broken, "--json")[2].strip().partition("omnidyn: error: ")[2].splitlines()[0]
+    assert as_flags(verdict(page)) == words.replace(f"{tmp_path}/", "")
+    page.click("text=Remove")
+    tab(page, "Fit")
+    assert page.is_disabled("#fit")
+    assert page.inner_text("#why") == "Add a log first: tab Log."
+    tab(page, "Log")
+    drop(page, rest)
+    said = command("check", rest, "--json")[0]["verdict"]
+    assert verdict(page) == said
+    tab(page, "Fit")
+    page.click(".robot")
+    page.click("text=axebot >> nth=0")
+    page.get_by_text("rest.csv: ").wait_for()
+    assert page.is_disabled("#fit")
+    with_robot = command("check", rest, "--robot", "axebot", "--json")[0]["verdict"]
+    assert page.inner_text("#why") == f"rest.csv: {with_robot}"
+
+
+def test_columns_corrected_by_hand(browser, tmp_path):
+    path = write_log(tmp_path / "log.csv")
+    wrong = tmp_path / "wrong.csv"
+    wrong.write_text(path.read_text("utf-8").replace("vx_m_s", "foo").replace("vy_m_s", "bar"), "utf-8")
+    studio, page = browser.start(wrong)
+    verdict(page)
+    page.get_by_text("Columns and units").click()
+    for column, component in (("foo", "vx"), ("bar", "vy")):
+        page.get_by_label(f"{column} is").click()
+        page.get_by_role("option", name=component, exact=True).click()
+        page.get_by_label(f"unit of {column}").fill("m/s")
+    page.click("#apply-columns")
+    page.get_by_text("Save this map").wait_for()
+    saved = tmp_path / "columns.toml"
+    saved.write_bytes(page.request.get(f"{studio.address}log/log1/map").body())
+    assert verdict(page) == command("check", wrong, "--map", saved, "--json")[0]["verdict"]
+    assert verdict(page) == command("check", path, "--json")[0]["verdict"]
+
+
+def test_a_fit_goes_on_while_pages_answer_and_can_be_cancelled(browser, tmp_path):
+    path = write_log(tmp_path / "long.csv", seconds=150.0)
+    studio, page = browser.start(path)
+    verdict(page)
+    other = browser.open(studio)
+    tab(page, "Fit")
+    page.click(".robot")
+    page.click("text=axebot >> nth=0")
+    page.click("#fit:not([disabled])")
+    page.wait_for_selector("#cancel")
+    spent = [page.evaluate(ANSWER) for _ in range(9)]
+    print(f"answers while a fit runs: {sorted(map(round, spent))} ms")
+    assert sorted(spent)[4] < 200.0
+    assert page.is_visible("#cancel"), "the fit was over too soon"
+    page.reload()
+    tab(page, "Fit")
+    page.wait_for_selector("#cancel")
+    tab(other, "Fit")
+    other.click("#cancel")
+    page.wait_for_selector("#cancel", state="detached")
+    page.wait_for_selector("#fit:not([disabled])")
+    page.click("#fit")
+    words = verdict(page, "#fit-verdict")
+    assert verdict(other, "#fit-verdict") == words
+    assert_same_numbers(page, path)
+
+
+def test_a_robot_of_its_own_sizes_is_that_of_init(browser, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    _, page = browser.start()
+    tab(page, "Fit")
+    page.get_by_text("Describe another robot").click()
+    page.get_by_label("mass").fill("3000")
+    page.click("#make-robot")
+    page.wait_for_function("document.querySelector('.error-text')?.innerText.includes('kg')")
+    sizes = ("--azimuth=60,180,300", "--wheel-radius=0.05", "--robot-radius=0.15")
+    _, code, words = command("init", "my-robot", *sizes, "--mass=3000")
+    assert code == 3
+    assert page.inner_text(".error-text >> nth=0") == words.strip().removeprefix("omnidyn: error: ")
+    page.get_by_label("mass").fill("3")
+    page.click("#make-robot")
+    page.get_by_text("my-robot.toml").first.wait_for()
+    assert command("init", "my-robot", *sizes, "--mass=3")[1] == 0
+    tab(page, "Drive")
+    page.click("#drive")
+    page.wait_for_selector("omni-drive canvas")
+    limit = page.get_attribute("input[name=level]", "max")
+    assert float(limit) == omnidyn.load_robot("my-robot.toml").motor.voltage_limit
+
+
+def slide(page, name, value):
+    """Set a slider."""
+    page.eval_on_selector(
+        f"input[name='{name}']", "(e, v) => { e.value = v; e.dispatchEvent(new Event('input')); }", str(value)
+    )
+    page.wait_for_timeout(150)
+
+
+def test_the_dead_zone_is_felt_and_the_drive_is_fitted(browser, tmp_path):
+    studio, page = browser.start()
+    tab(page, "Drive")
+    page.click("#drive")
+    page.wait_for_selector("omni-drive canvas")
+    page.wait_for_function("document.querySelector('omni-drive').painted > 10")
+    axes = command("deadzone", "axebot", "--json")[0]["dead_zone"]
+    assert f"forward {axes[0]['breakaway_scale_V']:.4g} V" in page.inner_text("#breakaway")
+    still = "document.querySelector('omni-drive').dataset.still"
+    slide(page, "level", 0.6)
+    page.keyboard.down("w")
+    page.wait_for_timeout(700)
+    assert page.evaluate(still) == "true"
+    slide(page, "level", 0.8)
+    page.wait_for_timeout(400)
+    assert page.evaluate(still) == "false"
+    page.keyboard.up("w")
+    page.wait_for_function(f"{still} === 'true'")
+    slide(page, "friction.axes.coulomb[0]", 3.3)
+    set_level = float(page.input_value("input[name='friction.axes.coulomb[0]']"))
+    slide(page, "level", 5.0)
+    page.click("#record")
+    for key in "wsadqewsadqe":
+        page.keyboard.down(key)
+        page.wait_for_timeout(350)
+        page.keyboard.up(key)
+    before = page.evaluate("[document.querySelector('omni-drive').received, performance.now()]")
+    page.wait_for_timeout(1500)
+    after = page.evaluate("[document.querySelector('omni-drive').received, performance.now()]")
+    print(f"{1000 * (after[0] - before[0]) / (after[1] - before[1]):.1f} frames a second")
+    page.click("#record")
+    page.click("#to-fit")
+    page.click("#fit:not([disabled])")
+    verdict(page, "#fit-verdict")
+    log = tmp_path / "drive-1.csv"
+    log.write_bytes(page.request.get(f"{studio.address}log/log2/log").body())
+    assert float(numbers(page)["friction.axes.coulomb[0]"]) == pytest.approx(set_level, rel=0.02)
+    assert_same_numbers(page, log)

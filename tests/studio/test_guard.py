@@ -1,0 +1,175 @@
+"""Who may talk to the studio: asked by a raw client, which can say what no browser would."""
+
+import base64
+import contextlib
+import json
+import os
+import socket
+import tempfile
+import threading
+from pathlib import Path
+
+import pytest
+
+from omnidyn.studio.guard import is_loopback
+
+SOCKETS = ("/plot", "/drive", "/_nicegui_ws/socket.io/?EIO=4&transport=websocket")
+POLLING = "/_nicegui_ws/socket.io/?EIO=4&transport=polling"
+
+
+def ask(port, path="/", method="GET", body=b"", **headers):
+    """Status and text of an answer to a request with these headers alone."""
+    given = {"Host": f"127.0.0.1:{port}", "Connection": "close", "Content-Length": str(len(body))}
+    given |= {name.replace("_", "-"): value for name, value in headers.items()}
+    lines = [f"{method} {path} HTTP/1.1", *(f"{name}: {value}" for name, value in given.items() if value is not None)]
+    with socket.create_connection(("127.0.0.1", port), 10) as client:
+        client.sendall("\r\n".join(lines).encode() + b"\r\n\r\n" + body)
+        answer = b""
+        try:
+            while block := client.recv(65536):
+                answer += block
+                if b"101 Switching" in answer:
+                    break
+        except (TimeoutError, ConnectionResetError):
+            pass
+    return int(answer.split()[1]), answer.decode("utf-8", "replace")
+
+
+def open_socket(port, path, **headers):
+    """Status of a WebSocket handshake: 101 where it opens."""
+    key = base64.b64encode(os.urandom(16)).decode()
+    upgrade = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec_WebSocket_Key": key, "Sec_WebSocket_Version": "13"}
+    return ask(port, path, **{**upgrade, **headers, "Content_Length": None})[0]
+
+
+def test_every_name_of_this_machine_is_fine_and_no_other(studio):
+    for host in ("127.0.0.1", "LOCALHOST", "[::1]", "127.0.0.1:9", "localhost:65000", "127.8.8.8"):
+        assert ask(studio.port, Host=host)[0] == 200, host
+    for host in (
+        "evil.example",
+        f"evil.example:{studio.port}",
+        "127.0.0.1.evil.example",
+        "localhost.evil",
+        "192.168.1.9",
+        "",
+    ):
+        assert ask(studio.port, Host=host)[0] == 403, host
+    assert is_loopback("127.0.0.1:8642")
+    assert not is_loopback("127.0.0.1@evil.example")
+
+
+def test_pages_of_other_sites_get_nothing(studio):
+    mine = f"http://127.0.0.1:{studio.port}"
+    assert ask(studio.port, POLLING, Origin=mine)[0] == 200
+    for origin in ("http://evil.example", "null", f"http://127.0.0.1:{studio.port + 1}", f"{mine}.evil.example"):
+        assert ask(studio.port, Origin=origin)[0] == 403, origin
+        assert ask(studio.port, POLLING, Origin=origin)[0] == 403, origin
+        assert ask(studio.port, "/upload?name=a.csv", "POST", b"x", Origin=origin)[0] == 403, origin
+    assert ask(studio.port, "/upload?name=a.csv", "POST", b"x")[0] == 403  # a browser says its origin here
+
+
+@pytest.mark.parametrize("path", SOCKETS)
+def test_sockets_open_for_pages_of_this_server_only(studio, path):
+    assert open_socket(studio.port, path, Origin=f"http://127.0.0.1:{studio.port}") == 101
+    for origin in ("http://evil.example", "null", None):
+        assert open_socket(studio.port, path, Origin=origin) == 403, origin
+    host = f"evil.example:{studio.port}"
+    assert open_socket(studio.port, path, Origin=f"http://{host}", Host=host) == 403
+
+
+def test_a_forwarded_port_works(studio):
+    """As `ssh -L` does: bytes go from another port of this machine, whose number the browser names."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    port = listener.getsockname()[1]
+
+    def forward():
+        client, _ = listener.accept()
+        with client, socket.create_connection(("127.0.0.1", studio.port)) as server:
+            back = threading.Thread(target=pump, args=(server, client))
+            back.start()
+            pump(client, server)
+            back.join()
+
+    def pump(source, target):
+        try:
+            while block := source.recv(65536):
+                target.sendall(block)
+            target.shutdown(socket.SHUT_WR)
+        except OSError:  # the client has closed
+            for end in (source, target):
+                with contextlib.suppress(OSError):
+                    end.shutdown(socket.SHUT_RDWR)
+
+    for path, status in (("/", 200), ("/plot", 101)):
+        way = threading.Thread(target=forward)
+        way.start()
+        origin = {"Origin": f"http://127.0.0.1:{port}"}
+        assert (ask(port, path, **origin)[0] if status == 200 else open_socket(port, path, **origin)) == status
+        way.join(10)
+    listener.close()
+
+
+def test_only_what_belongs_to_the_page_is_served(studio):
+    for path in (
+        "/docs",
+        "/openapi.json",
+        "/static/../server.py",
+        "/fit/..%2f..%2fetc%2fpasswd",
+        "/log/x/log",
+        "/series/x",
+    ):
+        status, text = ask(studio.port, path)
+        assert status in (404, 307), path
+        assert "root:" not in text
+    status, text = ask(studio.port)
+    assert "content-security-policy: default-src 'self'" in text.lower()
+    assert "https://" not in text.partition("<body")[0]
+
+
+def test_a_large_request_is_refused(studio):
+    mine = f"http://127.0.0.1:{studio.port}"
+    status, _ = ask(studio.port, f"{POLLING}&sid=x", "POST", b"x" * 1_100_000, Origin=mine)
+    assert status in (400, 413)
+
+
+def test_names_of_uploads_are_not_trusted_and_files_go_away(start, tmp_path, monkeypatch):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    with start() as server:
+        mine = f"http://127.0.0.1:{server.port}"
+        for name in ("../../evil.csv", "%2e%2e%2f%2e%2e%2fevil.csv", "..%5Cevil.csv", "evil.csv%00", ".evil.csv"):
+            status, text = ask(server.port, f"/upload?name={name}", "POST", b"t,vx\n0,1\n1,2\n", Origin=mine)
+            assert status == 200, text
+            assert json.loads(text.rpartition("\r\n\r\n")[2])["name"].strip("_") == "evil.csv"
+        folders = list(tmp_path.glob("omnidyn-studio-*"))
+        assert len(folders) == 1
+        written = list(tmp_path.rglob("evil.csv*"))
+        assert len(written) == 5
+        assert all(folders[0] in path.parents for path in written)
+    assert not folders[0].exists()
+    assert not list(Path(tempfile.gettempdir()).glob("evil*"))
+
+
+def test_uploads_are_bounded_in_number(start):
+    from omnidyn.studio.session import MAX_FILES
+
+    with start() as server:
+        mine, statuses = f"http://127.0.0.1:{server.port}", []
+        for _ in range(MAX_FILES):
+            statuses.append(ask(server.port, "/upload?name=a.toml2", "POST", b"", Origin=mine)[0])
+        assert statuses[0] == 200
+        assert statuses[-1] == 413
+
+
+def test_another_host_needs_the_token(start):
+    with start("--host", "0.0.0.0") as server:
+        token = server.address.partition("?token=")[2]
+        assert len(token) >= 30
+        assert ask(server.port)[0] == 403
+        assert ask(server.port, "/?token=wrong")[0] == 403
+        status, text = ask(server.port, f"/?token={token}", Host="robot.local:8642")
+        assert status == 200
+        assert f"set-cookie: omnidyn_studio={token}; HttpOnly; SameSite=Strict" in text
+        cookie = {"Cookie": f"omnidyn_studio={token}", "Origin": f"http://127.0.0.1:{server.port}"}
+        assert open_socket(server.port, "/drive", **cookie) == 101
+        assert open_socket(server.port, "/drive", Origin=cookie["Origin"]) == 403
+        assert ask(server.port, Cookie=cookie["Cookie"], Origin="http://evil.example")[0] == 403
