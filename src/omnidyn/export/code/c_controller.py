@@ -54,7 +54,7 @@ def c_controller(robot: Robot, controller: str | os.PathLike = "pid", dt: float 
     refuse_controller(KIND, spec.controller)
     refuse(KIND, robot)
     law, omissions = spec.make(robot, dt=dt), left_out(KIND, robot)
-    if law.sensors.twist_filter > 0.0:
+    if robot.sensor_model.in_steps(dt).twist_filter > 0.0:
         omissions = (*omissions, FILTERED)
     predicts = isinstance(law, Mpc)
     code = mpc_code(law) if predicts else control_code(law)  # pyright: ignore[reportArgumentType]  none is refused

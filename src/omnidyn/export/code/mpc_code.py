@@ -212,7 +212,7 @@ def _matrices(controller: Mpc, linear: np.ndarray) -> dict[str, Any]:
 def _noise(settings: Settings) -> dict[str, Any]:
     return {
         "NOISE": np.square(settings.noise),
-        "POSE_NOISE": np.square(settings.pose_noise),
+        "POSE_NOISE": np.square(np.array(settings.pose_noise, dtype=float)),
         "WALK": np.square(
             np.array((settings.walk, settings.push_walk, (settings.scale_walk,) * 3, settings.pose_walk), dtype=float)
         ),
