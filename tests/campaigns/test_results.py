@@ -99,6 +99,19 @@ def test_the_document_says_shares_and_limit(campaign):
     assert f"{100 * share:.3g} % of the samples have product of at most 1" in text
 
 
+def test_the_tolerance_is_the_largest_box_that_keeps_the_limit(campaign):
+    """a b <= 1 around the middles a = 0.5, b = 1.5: (0.5 + 0.5 s)(1.5 + 0.5 s) = 1 at s = sqrt(5) - 2."""
+    tolerance = campaign.tolerance(1.0, "product")
+    assert math.sqrt(5.0) - 2.0 <= tolerance.share < math.sqrt(5.0) - 2.0 + 0.08
+    assert tolerance.ends["task.a"] == pytest.approx((0.5 - 0.5 * tolerance.share, 0.5 + 0.5 * tolerance.share))
+    a, b, reach = campaign.column("task.a"), campaign.column("task.b"), 0.5 * tolerance.share
+    inside = (abs(a - 0.5) < reach) & (abs(b - 1.5) < reach)
+    assert tolerance.inside == inside.sum()
+    assert campaign.tolerance(5.0, "product")[::2] == (1.0, 450)
+    assert "with task.a from" in campaign.document("product", 1.0).to_text()
+    assert campaign.tolerance(-1.0, "product").inside == 0
+
+
 def test_frames_and_datasets_hold_the_same_numbers(campaign, tmp_path):
     products = campaign.column("product")
     assert np.array_equal(campaign.to_dataframe()["product"].to_numpy(), products)

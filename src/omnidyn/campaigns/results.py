@@ -19,6 +19,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.campaigns.folder import SAMPLE, Folder, Status
 from omnidyn.campaigns.spec import GRID, SOBOL
+from omnidyn.campaigns.tasks import Problem
 from omnidyn.document import Document, Part, Points, Table, plain
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.logs.readers.parquet import import_pyarrow
@@ -43,6 +44,14 @@ class Share(NamedTuple):
     share: float
     low: float
     high: float
+
+
+class Tolerance(NamedTuple):
+    """How far variables may be off together: share of their ranges, variable -> (low, high), samples in there."""
+
+    share: float
+    ends: dict[str, tuple[float, float]]
+    inside: int
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -112,6 +121,23 @@ class Campaign(Displayable):
         values = self.column(self.metric(metric))
         return wilson(int(np.sum(values <= limit)), len(values))
 
+    def tolerance(self, limit: float, metric: str = "") -> Tolerance:
+        """The largest box in the ranges within which every sample keeps a limit; words and values do not bound it.
+
+        It grows from what the file says, or from the middle of a range that does not hold that, to all sides alike.
+        """
+        beyond = ~(self.column(self.metric(metric)) <= limit)
+        sides = {name: ends for name, ends in Problem(self.folder.spec, self.folder.path).ends.items() if ends}
+        reach = np.zeros(len(beyond))
+        for name, (low, centre, high) in sides.items():
+            x = self.column(name)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                off = np.where(x > centre, (x - centre) / (high - centre), (centre - x) / (centre - low))
+            reach = np.maximum(reach, np.nan_to_num(off))
+        share = min(1.0, float(reach[beyond].min(initial=np.inf)))
+        ends = {name: (c - share * (c - low), c + share * (high - c)) for name, (low, c, high) in sides.items()}
+        return Tolerance(share, ends, int(np.sum((reach < share) | ~beyond & (reach <= share))))
+
     def shares(self, metric: str = "") -> list[Share]:
         """Which variables matter: share of the variance of a metric that each makes by itself, the largest first."""
         values = self.column(self.metric(metric)).astype(float)
@@ -160,7 +186,12 @@ class Campaign(Displayable):
             statement = Statement(
                 "within_limit", NOTE, name, {"limit": limit, "share": share, "low": low, "high": high}
             )
-            parts += ["", Points([statement], "-", "within")]
+            tolerance = self.tolerance(limit, name)
+            data["tolerance"] = tolerance._asdict()
+            box = {"keys": [*tolerance.ends], "low": [e[0] for e in tolerance.ends.values()]}
+            box |= {"high": [e[1] for e in tolerance.ends.values()], "limit": limit, "inside": tolerance.inside}
+            kept = Statement("tolerance" if tolerance.inside else "no_tolerance", NOTE, name, box)
+            parts += ["", Points([statement, kept], "-", "within")]
         if rows and (shares := self.shares(name)):
             cells = [(s.variable, f"{100 * s.share:.0f}", f"[{100 * s.low:.0f}, {100 * s.high:.0f}]") for s in shares]
             parts += ["", Table((f"what makes {name} vary", "% of variance", "95 %"), cells, "<>", name="shares")]

@@ -36,6 +36,7 @@ from omnidyn.simulation.simulate import simulate
 
 INPUTS = "inputs/"
 SETTLED = 0.02  # of the final speed: the twist of a simulation has settled within it
+FAR = 3.0  # std that a normal is taken to reach
 ON_LIMIT = 1e-9  # of a limit: so near, it is met
 TRACK_METRICS = (
     "rmse_position_m",
@@ -104,6 +105,22 @@ class Problem:
             other = head in ("path", "controller", "track", "simulate", "sensors", "task")
             keys[name] = () if other else tuple(map(Key.parse, expand(name, self.robot)))
         return keys
+
+    @cached_property
+    def ends(self) -> dict[str, tuple[float, float, float] | None]:
+        """Variable -> its low end, what the file says (of a factor 1, else the middle), its high end; None: values."""
+        ends = dict[str, tuple[float, float, float] | None]()
+        for name, variable in self.spec.vary.items():
+            nominal = self.keys[name][0].get(self.robot) if len(self.keys[name]) == 1 else None
+            if variable.std is not None and nominal is not None:
+                ends[name] = (nominal - FAR * variable.std, nominal, nominal + FAR * variable.std)
+            elif variable.ends is None:
+                ends[name] = None
+            else:
+                (low, high), centre = variable.ends, 1.0 if variable.factor else nominal
+                inside = centre is not None and low <= centre <= high
+                ends[name] = (low, centre if centre is not None and inside else 0.5 * (low + high), high)
+        return ends
 
     def check(self) -> None:
         """Raises InputError for a key that nothing has, a word that names nothing, or a first sample that cannot be."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from omnidyn.document import all_of
 from omnidyn.statement import Statement
 from omnidyn.telling.sentence import Sentence
 
@@ -28,7 +29,17 @@ def _failed(statement: Statement) -> str:
     return f"{_of(statement)} has {numbers['failed']} failed shards; {numbers['done']} of {numbers['shards']} are there"
 
 
+def _tolerance(statement: Statement) -> str:
+    """The largest box of the variables within which every sample keeps the limit."""
+    n = statement.numbers
+    ranges = zip(n["keys"], n["low"], n["high"], strict=True)
+    box = all_of([f"{key} from {low:.4g} to {high:.4g}" for key, low, high in ranges])
+    return f"with {box}, all {n['inside']} samples have {statement.subject} of at most {n['limit']:.4g}"
+
+
 SENTENCES = {
+    "tolerance": Sentence(_tolerance),
+    "no_tolerance": Sentence("no part of the ranges keeps {subject} of at most {limit:.4g}"),
     "campaign_done": Sentence(_done),
     "campaign_open": Sentence(_open, "go on with omnidyn sweep resume"),
     "campaign_failed": Sentence(_failed, "read their tracebacks, then omnidyn sweep resume runs them again"),
