@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from omnidyn.campaigns import batches
 from omnidyn.campaigns.batches import batch_columns, batched
 from omnidyn.campaigns.spec import parse_spec
-from omnidyn.campaigns.tasks import SIMULATE_METRICS, Problem
+from omnidyn.campaigns.tasks import SIMULATE_METRICS, TRACK_METRICS, Problem
 from omnidyn.errors import InputError
 
 VARY = {
@@ -44,6 +45,28 @@ def test_a_shard_may_be_cut_anywhere(tmp_path):
         assert np.array_equal(column, np.concatenate([part[name] for part in parts]), equal_nan=True)
 
 
+@pytest.mark.parametrize("controller, noise", [("pid", 0.0), ("pid", 0.01), ("pid_no_friction", 0.0)])
+def test_loops_together_are_those_of_track(tmp_path, controller, noise):
+    """An eight so fast that voltages meet their limit."""
+    task = {"path": "eight:period_s=3.5", "controller": controller, "duration_s": 1.2, "noise_m_s": noise}
+    made = problem(tmp_path, simulate=None, track=task, samples=12)
+    assert batched(made)
+    columns = batch_columns(made, 2, 9)
+    assert tuple(columns) == TRACK_METRICS
+    assert columns["saturated_share"].max() > 0.0
+    rows = [made.measure(sample) for sample in made.samples(2, 9)]
+    for name, column in columns.items():
+        assert column == pytest.approx([row[name] for row in rows], rel=1e-7, abs=1e-9, nan_ok=True), name
+
+
+def test_loops_may_be_cut_anywhere(tmp_path, monkeypatch):
+    monkeypatch.setattr(batches, "LOOPS", 16)
+    made = problem(tmp_path, simulate=None, track={"path": "circle", "duration_s": 0.3, "noise_m_s": 0.01})
+    whole, parts = batch_columns(made, 0, 64), [batch_columns(made, 0, 21), batch_columns(made, 21, 64)]
+    for name, column in whole.items():
+        assert np.array_equal(column, np.concatenate([part[name] for part in parts]), equal_nan=True)
+
+
 def test_metrics_that_are_chosen_are_the_same(tmp_path):
     whole, few = batch_columns(problem(tmp_path), 0, 64), ["drift_m", "turned_rad"]
     chosen = batch_columns(problem(tmp_path, metrics=few), 0, 64)
@@ -57,6 +80,9 @@ def test_metrics_that_are_chosen_are_the_same(tmp_path):
     "changes",
     [
         {"vary": VARY | {"simulate.scale": {"range": [0.0, 1.0]}}},
+        {"simulate": None, "track": {"path": "circle", "delay": 1}},
+        {"simulate": None, "track": {"path": "circle", "controller": "mpc"}},
+        {"simulate": None, "track": {"path": "circle", "sensors": "encoder"}},
         {"vary": VARY | {"motor.resistance_ohm": {"factor": [0.9, 1.1]}}},
         {
             "robot": "mecanum",

@@ -1,7 +1,8 @@
 """Batches: the samples of a shard moved together, where that gives what one after the other would give.
 
 That is: the exact engine serves the robot, it takes volts at even steps, and what varies are numbers of its body, its
-wheels' radius and its friction. Anything else is simulated sample by sample.
+wheels' radius and its friction; a closed loop is one of `pid` without delay, its sensors are at once. Anything else is
+simulated sample by sample.
 """
 
 from __future__ import annotations
@@ -11,45 +12,69 @@ from typing import Any
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.campaigns.design import sample_count, seed_of
 from omnidyn.campaigns.tasks import (
     ON_LIMIT,
     SETTLED,
     SIMULATE_METRICS,
+    TRACK_METRICS,
+    Loop,
     Problem,
     commands_of,
     settled_from,
     with_number,
 )
+from omnidyn.control.closed_loop import NOISE
+from omnidyn.control.instruments import Instruments
+from omnidyn.control.pid import Pid
+from omnidyn.control.pid_batch import PidBatch
 from omnidyn.logs.command_file import KINDS
 from omnidyn.model.keys import FRICTION, Key
 from omnidyn.model.motor import settled_current
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
-from omnidyn.simulation.batch.batch import simulate_batch
+from omnidyn.simulation.batch.batch import Batch, simulate_batch
 from omnidyn.simulation.batch.choice import EXACT, VOLTAGE, engine_kind
 from omnidyn.simulation.batch.sample import MASS, RADIUS, Sample
 
 BODY = (MASS, "body.inertia_kg_m2", RADIUS)
 AT_END = ("final_vx_m_s", "final_vy_m_s", "final_omega_rad_s", "drift_m", "turned_rad", "saturated_share")
 CELLS = 2**19  # robots times rows of a history that is held at once
+LOOPS = 2048  # loops of a block. Blocks begin at whole multiples: rounding of a sum may depend on the place in a block
 
 
 def batched(problem: Problem) -> bool:
     """Whether the samples can be moved together."""
     spec, keys = problem.spec, [key for keys in problem.keys.values() for key in keys]
-    if problem.function is not None or spec.simulate is None or spec.robot_draws or not all(problem.keys.values()):
+    if problem.function is not None or spec.robot_draws or not keys or not all(problem.keys.values()):
         return False
     if not all(str(key) in BODY or key.part == FRICTION for key in keys):
         return False
+    if engine_kind(problem.robot, VOLTAGE, None) != EXACT or problem.robot.drive.kind != VOLTAGE:
+        return False
     first = next(problem.samples(0, 1))
-    held = commands_of(problem, first, spec.simulate)
-    even = held.kind == KINDS[0] and bool(np.all(held.dt == held.dt[0]))
-    return even and engine_kind(problem.robot, VOLTAGE, None) == EXACT and _sample(problem, 0, 1).parameters is not None
+    if spec.simulate is not None:
+        held = commands_of(problem, first, spec.simulate)
+        can = held.kind == KINDS[0] and bool(np.all(held.dt == held.dt[0]))
+    else:
+        assert spec.track is not None
+        loop = Loop.of(problem, first, spec.track)
+        plain = loop.around.sensors == Instruments() and not loop.around.delay
+        can = plain and isinstance(loop.controller(), Pid)
+    return can and _sample(problem, 0, 1).parameters is not None
+
+
+def block_rows(problem: Problem) -> int:
+    """Samples that are moved together whether they are asked for or not: a shard holds whole blocks of them."""
+    return LOOPS if problem.spec.simulate is None and batched(problem) else 1
 
 
 def batch_columns(problem: Problem, start: int, stop: int) -> dict[str, FloatArray]:
-    """What is measured of the samples start to stop: the columns of a [simulate] task."""
-    assert problem.spec.simulate is not None
+    """What is measured of the samples start to stop: columns of metrics."""
+    if problem.spec.simulate is None:
+        names = problem.spec.metrics or TRACK_METRICS
+        parts = [_block(problem, k, start, stop) for k in range(start // LOOPS, -(-stop // LOOPS))]
+        return {name: np.concatenate([part[name] for part in parts]) for name in names}
     held = commands_of(problem, next(problem.samples(start, start + 1)), problem.spec.simulate)
     names = problem.spec.metrics or SIMULATE_METRICS
     whole = not set(names) <= set(AT_END)
@@ -59,6 +84,75 @@ def batch_columns(problem: Problem, start: int, stop: int) -> dict[str, FloatArr
         for first in range(start, stop, size)
     ]
     return {name: np.concatenate([part[name] for part in parts]) for name in names}
+
+
+def _block(problem: Problem, block: int, start: int, stop: int) -> dict[str, FloatArray]:
+    """The metrics of those loops of a block that lie within start to stop; all of the block are driven."""
+    first, last = block * LOOPS, min((block + 1) * LOOPS, sample_count(problem.spec))
+    measured = _tracked(problem, first, last)
+    rows = slice(max(start, first) - first, min(stop, last) - first)
+    return {name: column[rows] for name, column in measured.items()}
+
+
+def _tracked(problem: Problem, start: int, stop: int) -> dict[str, FloatArray]:
+    """`Loop.measure` of the samples start to stop."""
+    assert problem.spec.track is not None
+    loop = Loop.of(problem, next(problem.samples(start, start + 1)), problem.spec.track)
+    around, route, sample = loop.around, loop.route, _sample(problem, start, stop)
+    count, n, controller = around.steps(route), len(sample), loop.controller()
+    assert isinstance(controller, Pid)
+    t = np.arange(count + 1) * around.dt
+    noise = np.zeros((count, n, 6))
+    if around.noise:
+        fixed = problem.spec.track.seed
+        seeds = [seed_of(problem.spec, k) if fixed is None else fixed for k in range(start, stop)]
+        for k, seed in enumerate(seeds):
+            noise[:, k] = np.random.default_rng(seed).standard_normal((count, 6)) * (around.noise * NOISE)
+    pids, batch = PidBatch(controller, n), Batch(sample, around.dt, start_pose=route.at(0.0).pose, threads=1)
+    states, volts = np.empty((count + 1, n, 6)), np.empty((count, n, batch.wheels))
+    state = batch.state
+    states[0] = np.hstack([state.pose, state.twist])
+    for k in range(count):
+        seen = states[k] + noise[k]
+        volts[k] = pids.step_batch(float(t[k]), seen[:, :3], seen[:, 3:], route)
+        state = batch.step(volts[k])
+        states[k + 1] = np.hstack([state.pose, state.twist])
+    return _tracking(problem, loop, sample, t, states, volts)
+
+
+def _tracking(
+    problem: Problem, loop: Loop, sample: Sample, t: FloatArray, states: FloatArray, volts: FloatArray
+) -> dict[str, FloatArray]:
+    """The metrics of loops. t (samples,); states (samples, n, 6): poses, twists; volts (steps, n, wheels)."""
+    error = states[:, :, :3] - loop.route.at(t).pose[:, None]
+    off = np.hypot(error[..., 0], error[..., 1])
+    late = t >= loop.around.skip - 1e-9
+    late[0] = False
+    counted = slice(-1, None) if not late.any() else late
+    limit = np.asarray(problem.robot.motor.voltage_limit)
+    turning = _wheel_speeds(problem, sample, 0.5 * (states[1:, :, 3:] + states[:-1, :, 3:]))
+    power = np.sum(volts * settled_current(problem.robot.motor, volts, turning), axis=2)
+    changes = np.abs(np.diff(volts, axis=0)).mean(axis=(0, 2)) if len(volts) > 1 else np.zeros(len(sample))
+    measured = (
+        np.sqrt(np.mean(off[counted] ** 2, axis=0)),
+        off[counted].max(axis=0),
+        off[-1],
+        np.sqrt(np.mean(error[counted][..., 2] ** 2, axis=0)),
+        np.array([settled_from(t, way, loop.settling) for way in off.T]),
+        np.mean((np.abs(volts) >= limit * (1.0 - ON_LIMIT)).any(axis=2), axis=0),
+        np.sqrt(np.mean(volts**2, axis=(0, 2))),
+        changes,
+        np.diff(t) @ power,
+    )
+    return dict(zip(TRACK_METRICS, measured, strict=True))
+
+
+def _wheel_speeds(problem: Problem, sample: Sample, twist: FloatArray) -> FloatArray:
+    """Wheel speeds at twists (rows, n, 3) of robots whose wheels differ. Shape (rows, n, wheels)."""
+    scale = np.ones(len(sample))
+    if RADIUS in sample.keys:
+        scale = Key.parse(RADIUS).get(problem.robot) / sample.values[:, sample.keys.index(RADIUS)]
+    return wheel_speed(problem.robot.wheels, twist) * scale[:, None]
 
 
 def _sample(problem: Problem, start: int, stop: int) -> Sample:
@@ -104,9 +198,6 @@ def _measured(problem: Problem, sample: Sample, rows: FloatArray, dt: float, who
     bound = SETTLED * np.linalg.norm(run.twists[:, -1] * rim, axis=1)
     measured["settling_s"] = np.array([settled_from(run.t, way, end) for way, end in zip(off, bound, strict=True)])
     mean = 0.5 * (run.twists[:, 1:] + run.twists[:, :-1])
-    scale = np.ones(count)
-    if RADIUS in sample.keys:
-        scale = Key.parse(RADIUS).get(robot) / sample.values[:, sample.keys.index(RADIUS)]
-    turning = wheel_speed(robot.wheels, mean) * scale[:, None, None]
+    turning = _wheel_speeds(problem, sample, mean.swapaxes(0, 1)).swapaxes(0, 1)
     measured["energy_J"] = np.sum(volts * settled_current(robot.motor, volts, turning), axis=(1, 2)) * dt
     return measured

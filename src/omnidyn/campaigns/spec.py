@@ -91,8 +91,8 @@ class Variable(Value):
 class TrackTask(Value):
     """[track]: a controller made for the robot of the file drives each sample along a path; see `omnidyn.track`.
 
-    seed: of the noise; without it each sample has noise of its own. settling [m]: distance from the path that counts as
-    settled.
+    seed: of the noise; without it each sample has noise of its own. sensors: as for track, "" those of the robot file.
+    settling [m]: distance from the path that counts as settled.
     """
 
     path: Annotated[Text, Field(description="as for track: a name with options, or a file")]
@@ -103,6 +103,7 @@ class TrackTask(Value):
     noise: Annotated[Annotated[float, number(0.0, 100.0)], Field(alias="noise_m_s")] = 0.0
     delay: Annotated[int, whole(0, MOST_DELAY)] = 0
     seed: Annotated[int, whole(0, MOST_SEED)] | None = None
+    sensors: Text = ""
     settling: Annotated[Positive, Field(alias="settling_m")] = 0.005
 
 

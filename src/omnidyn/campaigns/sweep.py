@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from omnidyn.campaigns.batches import batch_columns, batched
+from omnidyn.campaigns.batches import batch_columns, batched, block_rows
 from omnidyn.campaigns.design import sample_count
 from omnidyn.campaigns.executors import Pool, opened
 from omnidyn.campaigns.folder import SAMPLE, Folder, Manifest, as_columns
@@ -169,20 +169,22 @@ def _version() -> str:
 
 
 def _rows(pool: Pool, problem: Problem) -> int:
-    """Samples of a shard: as many as take SHARD_S, as the first ones show."""
-    seconds = pool.call(_seconds, problem)
-    return ROWS_UNMEASURED if seconds is None else min(max(1, math.ceil(SHARD_S / seconds)), MOST_ROWS)
+    """Samples of a shard: as many as take SHARD_S, as the first ones show; whole blocks."""
+    seconds, block = pool.call(_seconds, problem), block_rows(problem)
+    rows = ROWS_UNMEASURED if seconds is None else min(math.ceil(SHARD_S / seconds), MOST_ROWS)
+    return -(-rows // block) * block
 
 
 def _seconds(problem: Problem) -> float:
     """How long a sample takes [s], compiled; in the process that will work."""
-    _columns(problem, 0, 1)
-    seconds, count, most = 0.0, 1, sample_count(problem.spec)
+    most = sample_count(problem.spec)
+    count, seconds = min(block_rows(problem), most), 0.0
+    _columns(problem, 0, count)
     while seconds < MEASURE_S:
         begun = time.perf_counter()
         _columns(problem, 0, count)
         seconds = time.perf_counter() - begun
-        if count == most:
+        if seconds >= MEASURE_S or count == most:
             break
         count = min(4 * count, most)
     return max(seconds / count, 1e-9)

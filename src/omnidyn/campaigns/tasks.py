@@ -20,7 +20,9 @@ from omnidyn.arrays import FloatArray
 from omnidyn.campaigns.design import numbers, points, sample_count, seed_of
 from omnidyn.campaigns.spec import SimulateTask, Spec, TrackTask
 from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
+from omnidyn.control.controller import Controller
 from omnidyn.control.controllers import ControllerFile, check_options, controller_spec
+from omnidyn.control.instruments import instruments
 from omnidyn.control.paths.motion import Path as Route
 from omnidyn.control.paths.path import path as path_named
 from omnidyn.errors import InputError
@@ -160,7 +162,7 @@ class Problem:
 
     def _check_sample(self, sample: Sample) -> None:
         if self.function is None and self.spec.track is not None:
-            _Loop.of(self, sample, self.spec.track)
+            Loop.of(self, sample, self.spec.track)
         elif self.function is None and self.spec.simulate is not None:
             commands_of(self, sample, self.spec.simulate)
 
@@ -198,7 +200,7 @@ class Problem:
         if self.function is not None:
             measured = _checked(self.function(sample))
         elif self.spec.track is not None:
-            measured = _Loop.of(self, sample, self.spec.track).measure()
+            measured = Loop.of(self, sample, self.spec.track).measure()
         else:
             assert self.spec.simulate is not None
             measured = _simulated(self, sample, self.spec.simulate)
@@ -247,7 +249,7 @@ def _changed(task: Any, head: str, values: Mapping[str, Any]) -> Any:
 
 
 @dataclass(frozen=True, eq=False)
-class _Loop:
+class Loop:
     """A closed loop: the controller believes in the robot of the file, and drives that of the sample."""
 
     plant: Robot
@@ -258,7 +260,7 @@ class _Loop:
     settling: float
 
     @classmethod
-    def of(cls, problem: Problem, sample: Sample, base: TrackTask) -> _Loop:
+    def of(cls, problem: Problem, sample: Sample, base: TrackTask) -> Loop:
         """Of a sample."""
         task: TrackTask = _changed(base, "track", sample.values)
         route = path_named(
@@ -270,12 +272,16 @@ class _Loop:
         spec = replace(spec, options={**spec.options, **options})
         seed = sample.seed if task.seed is None else task.seed
         around = Circumstances(task.dt, task.duration, task.skip, task.noise, task.delay, seed)
+        around = replace(around, sensors=instruments(task.sensors or None, sample.robot))
         return cls(sample.robot, route, spec, problem.robot, around, task.settling)
+
+    def controller(self) -> Controller:
+        """A new one, which has seen nothing."""
+        return self.spec.make(self.believed, **told_of_loop(self.believed, self.around))
 
     def measure(self) -> dict[str, float]:
         """How near it came, and at what expense."""
-        controller = self.spec.make(self.believed, **told_of_loop(self.believed, self.around))
-        tracking = tracked(self.plant, self.route, controller, self.around)
+        tracking = tracked(self.plant, self.route, self.controller(), self.around)
         off = np.hypot(*tracking.error[:, :2].T)
         measured = (
             tracking.rmse_position,

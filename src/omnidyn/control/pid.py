@@ -75,7 +75,7 @@ class Pid(Guarded):
         super()._take(robot)
         self.volts, self.late = Volts(robot, self.dt, self.friction), lateness(robot, self.delay, self.dt)
         self.gains = pose_gains(self.volts.held.rates, self.faster, self.integral, self.dt, self.late)
-        self._home = 0.5 * pole_rate(self.volts.held.rates, self.faster, self.dt, self.late)
+        self.home = 0.5 * pole_rate(self.volts.held.rates, self.faster, self.dt, self.late)
 
     def reset(self) -> None:
         """Forget all steps."""
@@ -110,7 +110,7 @@ class Pid(Guarded):
         if self.sensors.averaged:  # a mean is half a step old
             speed = speed - 0.5 * (then - now)
         back = self.gains.speed * (speed - twist) + self.gains.place * error
-        change, way = self.volts.change(now, then), 0.5 * (now + then) + self._home * error
+        change, way = self.volts.change(now, then), 0.5 * (now + then) + self.home * error
         if not self.feedforward:
             now, change = 0.0 * now, 0.0 * change
         return Aim(turned[0], now, change + back, way)
