@@ -51,6 +51,7 @@ NAMES = {
     "exported_robots": "20 robots of init and three presets in C and FMU: differences, sizes, stack (four minutes)",
     "stagger": "topics with clocks of their own: check, geometry and fits beside equal stamps (two minutes)",
     "studies": "intervals and false alarms over many draws: breakaway, laws, rounding, noise, motors (15 minutes)",
+    "campaigns": "shards beside the batch kernel, a million closed loops, overhead of a shard on Dask (five minutes)",
     "wrong_worlds": "forty kinds of wrong world, and right ones: what identify says of each (an hour)",
 }
 ANSWERS = "answers"

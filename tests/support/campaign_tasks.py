@@ -5,7 +5,6 @@ import time
 from pathlib import Path
 
 MARKS = "OMNIDYN_TEST_MARKS"  # environment: a folder where each sample leaves a mark when it begins
-DIES = "OMNIDYN_TEST_DIES"  # environment: the sample at which the process ends, as long as it is there
 
 
 def product(sample):
@@ -28,3 +27,8 @@ def raising(sample):
 def mass(sample):
     """The mass of the robot."""
     return {"mass": sample.robot.body.mass}
+
+
+def index(sample):
+    """Next to nothing."""
+    return {"index": sample.index}

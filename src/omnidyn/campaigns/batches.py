@@ -101,7 +101,7 @@ def _tracked(problem: Problem, start: int, stop: int) -> dict[str, FloatArray]:
     around, route, sample = loop.around, loop.route, _sample(problem, start, stop)
     count, n, controller = around.steps(route), len(sample), loop.controller()
     assert isinstance(controller, Pid)
-    t = np.arange(count + 1) * around.dt
+    t: FloatArray = np.arange(count + 1, dtype=np.float64) * around.dt
     noise = np.zeros((count, n, 6))
     if around.noise:
         fixed = problem.spec.track.seed
@@ -110,14 +110,20 @@ def _tracked(problem: Problem, start: int, stop: int) -> dict[str, FloatArray]:
             noise[:, k] = np.random.default_rng(seed).standard_normal((count, 6)) * (around.noise * NOISE)
     pids, batch = PidBatch(controller, n), Batch(sample, around.dt, start_pose=route.at(0.0).pose, threads=1)
     states, volts = np.empty((count + 1, n, 6)), np.empty((count, n, batch.wheels))
-    state = batch.state
-    states[0] = np.hstack([state.pose, state.twist])
+    states[0] = _state(batch)
     for k in range(count):
         seen = states[k] + noise[k]
         volts[k] = pids.step_batch(float(t[k]), seen[:, :3], seen[:, 3:], route)
-        state = batch.step(volts[k])
-        states[k + 1] = np.hstack([state.pose, state.twist])
+        batch.step(volts[k])
+        states[k + 1] = _state(batch)
     return _tracking(problem, loop, sample, t, states, volts)
+
+
+def _state(batch: Batch) -> FloatArray:
+    """Pose and twist of all robots. Shape (n, 6)."""
+    state = batch.state
+    assert state.pose is not None
+    return np.hstack([state.pose, state.twist])
 
 
 def _tracking(
@@ -185,7 +191,7 @@ def _measured(problem: Problem, sample: Sample, rows: FloatArray, dt: float, who
     limit = np.asarray(robot.motor.voltage_limit)
     volts = np.clip(rows, -limit, limit)
     saturated = float(np.mean((np.abs(volts) >= limit * (1.0 - ON_LIMIT)).any(axis=1)))
-    measured = dict(zip(AT_END[:3], run.end.twist.T, strict=True))
+    measured: dict[str, FloatArray] = {name: column for name, column in zip(AT_END, run.end.twist.T, strict=False)}
     measured["drift_m"] = np.hypot(run.end.pose[:, 0], run.end.pose[:, 1])
     measured["turned_rad"] = run.end.pose[:, 2]
     measured["saturated_share"] = np.full(count, saturated)

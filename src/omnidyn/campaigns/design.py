@@ -45,7 +45,7 @@ def points(spec: Spec, start: int, stop: int) -> FloatArray:
         return _latin(size, sample_count(spec), spec.seed)[start:stop]
     from scipy.stats import qmc  # imported lazily: slow to load
 
-    sequence = qmc.Sobol(size, seed=np.random.default_rng(spec.seed))
+    sequence = qmc.Sobol(size, seed=np.random.default_rng(spec.seed))  # pyright: ignore[reportCallIssue]  rng from scipy 1.15 on
     with warnings.catch_warnings():  # of a count that is no power of two
         warnings.simplefilter("ignore", UserWarning)
         if start:
@@ -57,7 +57,7 @@ def points(spec: Spec, start: int, stop: int) -> FloatArray:
 def _latin(size: int, count: int, seed: int) -> FloatArray:
     from scipy.stats import qmc
 
-    return qmc.LatinHypercube(size, seed=np.random.default_rng(seed)).random(count)
+    return qmc.LatinHypercube(size, seed=np.random.default_rng(seed)).random(count)  # pyright: ignore[reportCallIssue]
 
 
 def numbers(variable: Variable, u: FloatArray, nominal: float = 0.0) -> Column:

@@ -234,9 +234,9 @@ def variance_share(x: Sequence[Any] | FloatArray, y: FloatArray, balanced: bool 
     x: numbers, or words. balanced: whether samples of any group of x have all the other variables even, as those of a
     Sobol sequence. The interval: a jackknife over BLOCKS blocks of neighbours, Student's quantile.
     """
-    _, x = np.unique(np.asarray(x), return_inverse=True)  # ranks: words have none of their own
-    whole, block = _share(x, y, balanced), np.arange(len(y)) * BLOCKS // len(y)
-    parts = np.array([_share(x[block != k], y[block != k], balanced) for k in range(BLOCKS)])
+    _, rank = np.unique(np.asarray(x), return_inverse=True)  # words have none of their own
+    whole, block = _share(rank, y, balanced), np.arange(len(y)) * BLOCKS // len(y)
+    parts = np.array([_share(rank[block != k], y[block != k], balanced) for k in range(BLOCKS)])
     error = math.sqrt((BLOCKS - 1) * float(np.mean((parts - parts.mean()) ** 2)))
     reach = t_quantile(BLOCKS - 1) * error
     low, high = np.clip([whole - reach, whole + reach], 0.0, 1.0).tolist()

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -64,7 +64,8 @@ SIMULATE_METRICS = (
 _FIELD = re.compile(r"(\w+)(?:\[(\d+)\])?", re.ASCII)
 
 
-class Sample(NamedTuple):
+@dataclass(frozen=True)
+class Sample:
     """A sample: its index, the robot as it is varied, all its values by key, and a seed of its own."""
 
     index: int

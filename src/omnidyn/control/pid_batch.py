@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import BoolArray, FloatArray
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.pid import Pid
 from omnidyn.control.speed_loop import MOST_STEPS
@@ -45,7 +45,7 @@ class PidBatch:
 
     def _volts(
         self, now: FloatArray, change: FloatArray, way: FloatArray, turned: FloatArray, total: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+    ) -> tuple[FloatArray, BoolArray]:
         """Volts within the limits, with a sum of errors; and whether a limit was met, shape (n, 1)."""
         volts, levels = self._pid.volts, self._pid.volts.model.levels
         change = change + self._pid.gains.sum * (turned @ total[..., None])[..., 0]
@@ -53,4 +53,4 @@ class PidBatch:
         friction = volts.model.soft_friction(way, volts.fade) - viscous
         effort = volts.model.effort(now, volts.model.wrench(now, change, friction))
         met = (np.abs(effort.voltage) >= volts.limit) | (np.abs(effort.current) > volts.current_limit)
-        return np.clip(effort.voltage, -volts.limit, volts.limit), met.any(axis=1, keepdims=True)
+        return np.clip(effort.voltage, -volts.limit, volts.limit), np.any(met, axis=1)[:, None]
