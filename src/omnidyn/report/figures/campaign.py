@@ -32,7 +32,8 @@ def draw_campaign(campaign: Campaign, metric: str = "", limit: float | None = No
         figure = new_figure(WIDTH, 4.2)
         surface = figure.add_axes((0.09, 0.14, 0.4, 0.76))
         if len(numeric) > 1:
-            colours = _surface(surface, *(columns[key][there] for key in numeric[:2]), values[there], limit)
+            x, y = (columns[key][there] for key in numeric[:2])
+            colours = _surface(surface, x, y, values[there], limit)
             figure.colorbar(colours, cax=figure.add_axes((0.5, 0.14, 0.015, 0.76)))
             surface.set_ylabel(numeric[1])
         elif numeric:
