@@ -44,7 +44,7 @@ class RobotVectorEnv(VectorEnv):
         seed: Of robots that are drawn beforehand.
         setting: Fields of `Setting`: dt, substeps, duration, spread, push, interval, latency, uncertainty, randomise.
 
-    Raises InputError for what is out of range, UnsupportedError for a robot beyond the paper's law.
+    Raises InputError for what is out of range, UnsupportedError for a robot that blocks cannot move.
     """
 
     def __init__(

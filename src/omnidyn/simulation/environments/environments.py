@@ -1,7 +1,8 @@
 """Environments: many robots with one task each; `reset` and `step` in NumPy, without any other package.
 
-The physics are those of `simulate`, by the same `exact_step`: a robot of the paper's law, its latency, dead band and
-sensors as its file says. The bits of a robot do not depend on how many there are, nor on threads, nor on resets of
+The physics are those of `simulate`: robots of the paper's law by the same `exact_step`, those in a turning frame or
+under friction along the direction of travel by the same implicit steps; latency, dead band and sensors as the robot
+file says. The bits of a robot do not depend on how many there are, nor on threads, nor on resets of
 others.
 """
 
@@ -19,9 +20,12 @@ from numpy.typing import ArrayLike
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.robot import Robot
+from omnidyn.simulation.batch.implicit import stages
 from omnidyn.simulation.batch.parameters import BatchParameters
 from omnidyn.simulation.environments.layout import (
+    BOX_LAW,
     DISABLED,
+    EXACT_LAW,
     NEXT_STEP,
     PATH,
     PER_MASS,
@@ -42,6 +46,7 @@ from omnidyn.simulation.environments.pool import (
     check_robots,
     drawn_pool,
     largest_voltage,
+    law_of,
     rows_of,
 )
 from omnidyn.simulation.environments.step import follow_up, reset_blocks, step_blocks
@@ -194,7 +199,10 @@ class Environments:
         substep = np.array(shares) * setting.dt / setting.substeps
         travels = task != VELOCITY or sensors.averaged
         voltage = largest_voltage(robot)
-        rows = rows_of(self.pool.parameters, voltage, 0.5 * substep if travels else substep, kind)
+        lengths, law = 0.5 * substep if travels else substep, law_of(robot) or EXACT_LAW
+        turning = [member.body.rotating_frame for member in self.pool.robots] or robot.body.rotating_frame
+        rows = rows_of(self.pool.parameters, law, turning, voltage, lengths, kind)
+        rule = np.array([stages(law == BOX_LAW, length, kind).numbers for length in lengths])
         interval = 0 if setting.interval is None else max(1, round(setting.interval / setting.dt))
         if interval == 0 and self.pool.sizes[2] > 1:
             raise InputError("no interval for a range", got="interval=None", expected="seconds", where="interval")
@@ -218,6 +226,8 @@ class Environments:
             np.array(spread, dtype=kind),
             np.array(self.pool.sizes, dtype=np.int64),
             rows,
+            law,
+            rule,
             self._path(task, path),
             setting.dt,
         )
@@ -329,7 +339,8 @@ class Environments:
     def privileged(self) -> FloatArray:
         """What no sensor shows: twist, pose, push [N, N, N m], and numbers of the robot. Shape (count, columns).
 
-        The numbers are those of `pool.rows_of` without phi: C/M, S/M, a, 1/M per axis, and gains.
+        The numbers are those of `pool.rows_of` without phi: C/M, S/M, a, 1/M per axis, and gains; of robots that take
+        implicit steps C, damping, M, ones, and forces.
         """
         state, phi = self.state, 3 * len(self.numbers.lags)
         robots = np.delete(state.robots, slice(PER_MASS + 3, PER_MASS + 3 + phi), axis=1)

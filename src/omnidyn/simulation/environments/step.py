@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.compiled.kernel import inlined, kernel, part
+from omnidyn.simulation.batch.implicit import LAW, TURNING
 from omnidyn.simulation.environments.draws import draw, robot_key, uniform
 from omnidyn.simulation.environments.layout import (
     AGAIN,
     DISABLED,
+    EXACT_LAW,
     GOAL,
     LATER,
     MEMBER,
@@ -98,8 +100,8 @@ def take_action(out, action, first):
 
 @inlined
 def move(numbers, state, b, now, action, rooms):
-    """A block over a step: all pieces of it. action, acting: (wheels, W); room (6, W); the other rooms (3, W)."""
-    twist, pose, mean, drive, acting, room = rooms
+    """A block over a step: all pieces of it. action, acting: (wheels, W); room (6, W); work; the other rooms (3, W)."""
+    twist, pose, mean, drive, acting, room, work = rooms
     robots, past = state.robots[b], state.past[b]
     gain, late = first_gain(robots, len(action)), numbers.lags[0] > 0
     copy_rows(twist, state.twist[b])
@@ -115,21 +117,8 @@ def move(numbers, state, b, now, action, rooms):
         put_drive(drive, acting, robots, gain, numbers.dead)
         if numbers.pushed:
             add_push(drive, state.push[b], robots)
-        if numbers.travels:
-            share = numbers.shares[piece] / numbers.substeps
-            length = share * numbers.dt
-            travel(
-                twist,
-                pose,
-                mean,
-                room,
-                drive,
-                robots,
-                phi_of(piece),
-                numbers.substeps,
-                length,
-                share * (1.0 - numbers.kept),
-            )
+        if numbers.travels or numbers.law != EXACT_LAW:
+            travel(numbers, work, twist, pose, mean, room, drive, robots, piece)
         else:
             slide(twist, drive, robots, phi_of(piece), numbers.substeps)
     if late:
@@ -227,7 +216,7 @@ def step_blocks(first, last, now, numbers, state, action, buffers):
     taken, acting = np.zeros((len(action), W), dtype), np.zeros((len(action), W), dtype)
     twist, pose = np.zeros(shape, dtype), np.zeros(shape, dtype)
     mean, drive = np.zeros(shape, dtype), np.zeros(shape, dtype)
-    rooms = (twist, pose, mean, drive, acting, np.zeros((6, W), dtype))
+    rooms = (twist, pose, mean, drive, acting, np.zeros((6, W), dtype), np.zeros((LAW + TURNING + 1, W), dtype))
     row, reached = np.zeros(W, dtype), np.zeros(W, np.uint8)
     for b in range(first, last):
         take_action(taken, action, b * W)
