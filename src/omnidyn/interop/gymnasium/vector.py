@@ -134,7 +134,7 @@ def _mode(mode: AutoresetMode | str) -> AutoresetMode:
 
 def seed_of(env: Any, seed: int | None) -> int | None:
     """The seed of the robots: as given, else from the generator of Gymnasium where nothing has begun yet."""
-    if seed is None and not env.environments.begun:
+    if seed is None and not env.environments.was_reset:
         return int(env.np_random.integers(2**32))
     return seed
 

@@ -141,7 +141,7 @@ class Environments:
         threads: That share a step.
         seed: Of the pool that ranges draw from.
 
-    begun: whether they have been reset.
+    was_reset: whether any reset has been.
     """
 
     def __init__(
@@ -185,7 +185,7 @@ class Environments:
         share = -(-blocks // threads)
         self._parts = [(first, min(blocks, first + share)) for first in range(0, blocks, share)]
         self._threads = ThreadPoolExecutor(len(self._parts) - 1) if len(self._parts) > 1 else None
-        self._now, self.begun = 0, False
+        self._now, self.was_reset = 0, False
 
     def _numbers(self, robot: Robot, path: FloatArray | None) -> Numbers:
         """What a step needs to know."""
@@ -258,16 +258,16 @@ class Environments:
 
         seed: of their random numbers from here on; without one, each goes on with its own.
         """
-        if seed is None and not self.begun:
+        if seed is None and not self.was_reset:
             seed = int(np.random.SeedSequence().entropy)  # pyright: ignore[reportArgumentType]
         base = -1 if seed is None else int(np.random.SeedSequence(seed).generate_state(1)[0])
         chosen = np.ones(self.count, np.bool_) if mask is None else np.asarray(mask)
         if chosen.shape != (self.count,) or chosen.dtype != np.bool_:
             got = f"{chosen.dtype} of shape {chosen.shape}"
             raise InputError("not a mask", got=got, expected=f"bool of shape ({self.count},)", where="mask")
-        if not self.begun and not chosen.all():
+        if not self.was_reset and not chosen.all():
             raise InputError("not begun yet", got="a mask", expected="a reset of all first", where="mask")
-        self.begun = True
+        self.was_reset = True
         reset_blocks(self.numbers, self.state, chosen, base, self.buffers.observation)
         return self.buffers.observation[:, : self.count].T
 
@@ -280,7 +280,7 @@ class Environments:
         if columns.shape != (self.wheels, self.count):
             got, expected = np.shape(action), f"({self.count}, {self.wheels})"
             raise InputError("wrong shape", got=got, expected=expected, where="action")
-        if not self.begun:
+        if not self.was_reset:
             raise InputError("not begun yet", got="a step", expected="a reset first", where="step")
         if self.autoreset == "disabled" and self.over.any():
             got = f"{int(self.over.sum())} episodes that are over"

@@ -165,12 +165,12 @@ def move_poses(pose, room, twist, length):
         c0, s0 = kind(math.cos(np.float64(angle))), kind(math.sin(np.float64(angle)))
         c1, s1 = kind(math.cos(np.float64(halfway))), kind(math.sin(np.float64(halfway)))
         c2, s2 = kind(math.cos(np.float64(after))), kind(math.sin(np.float64(after)))
-        along = c0 * room[0, n] + four * (c1 * room[3, n]) + c2 * twist[0, n]
-        across = s0 * room[1, n] + four * (s1 * room[4, n]) + s2 * twist[1, n]
-        x[n] += sixth * (along - across)
-        along = s0 * room[0, n] + four * (s1 * room[3, n]) + s2 * twist[0, n]
-        across = c0 * room[1, n] + four * (c1 * room[4, n]) + c2 * twist[1, n]
-        y[n] += sixth * (along + across)
+        ahead = c0 * room[0, n] + four * (c1 * room[3, n]) + c2 * twist[0, n]
+        sideways = s0 * room[1, n] + four * (s1 * room[4, n]) + s2 * twist[1, n]
+        x[n] += sixth * (ahead - sideways)
+        ahead = s0 * room[0, n] + four * (s1 * room[3, n]) + s2 * twist[0, n]
+        sideways = c0 * room[1, n] + four * (c1 * room[4, n]) + c2 * twist[1, n]
+        y[n] += sixth * (ahead + sideways)
         heading[n] = after
 
 

@@ -111,8 +111,8 @@ def drawn_pool(robots: Sequence[Robot], ranges: Mapping[str, Range], uncertainty
 
 def _sizes(robots: int, when: set[str]) -> tuple[int, int, int]:
     """How many draws there are of each kind."""
-    each = max(2, int(MOST_MEMBERS ** (1.0 / max(1, len(when)))))
-    startup, reset, interval = (each if kind in when else 1 for kind in WHEN)
+    draws = max(2, int(MOST_MEMBERS ** (1.0 / max(1, len(when)))))
+    startup, reset, interval = (draws if kind in when else 1 for kind in WHEN)
     return max(startup, robots), reset, interval
 
 

@@ -86,12 +86,12 @@ def take_action(out, action, first):
     zero, one = kind(0), kind(1)
     whole = min(W, action.shape[1] - first)
     for wheel in range(len(action)):
-        row, asked = out[wheel], action[wheel, first : first + whole]
+        row, source = out[wheel], action[wheel, first : first + whole]
         if whole == W:
-            copy_row(row, asked)
+            copy_row(row, source)
         else:
             for n in range(whole):
-                row[n] = asked[n]
+                row[n] = source[n]
         for n in range(W):
             value = row[n] if row[n] == row[n] else zero
             value = value if value < one else one
