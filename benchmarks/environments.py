@@ -49,8 +49,10 @@ def measure() -> Table:
     _row(table, count, "path", "float32", 1, 2, None, "path, pushes, latency 30 ms", push=(1, 1, 0.1), latency=0.03)
     _checkers(table)
     _plain(table)
-    table.notes.append("steps/s of cpu: threads x steps of one second of the processor: other programs hardly touch it")
-    table.notes.append("goals are held to it; gymnax CartPole on an A100: 2e7 (EVIDENCE 10)")
+    table.notes.append("steps/s of cpu: threads x steps of one second of the processor; goals are held to it")
+    table.notes.append(
+        "memory is the limit of one substep: others who use it slow that down; gymnax CartPole on an A100: 2e7"
+    )
     return table
 
 

@@ -72,7 +72,7 @@ class State(NamedTuple):
 
     past: actions of steps before, (blocks, lags, wheels, W); places: poses of these, (blocks, steps, 3, W). count,
     episode, member, start (of the path): (blocks, W). key: of the random numbers; ended: whether the episode is over,
-    (blocks, W).
+    (blocks, W); rare: whether a block has an episode that ends or begins, (blocks,).
     """
 
     robots: Any
@@ -89,6 +89,7 @@ class State(NamedTuple):
     start: Any
     key: Any
     ended: Any
+    rare: Any
 
 
 class Buffers(NamedTuple):
@@ -113,5 +114,5 @@ def new_state(numbers: Numbers, robots: int, wheels: int) -> State:
     past = np.zeros((blocks, max(1, int(numbers.lags.max())), wheels, W), dtype)
     places = np.zeros((blocks, max(1, numbers.late + numbers.hold), 3, W), dtype)
     counts = [np.zeros((blocks, W), np.int32) for _ in range(4)]
-    marks = np.zeros((blocks, W), np.uint32), np.zeros((blocks, W), np.uint8)
+    marks = np.zeros((blocks, W), np.uint32), np.zeros((blocks, W), np.uint8), np.zeros(blocks, np.uint8)
     return State._make([np.zeros((blocks, numbers.pool.shape[1], W), dtype), *three, past, places, *counts, *marks])

@@ -222,7 +222,8 @@ def step_blocks(first, last, now, numbers, state, action, buffers):
         take_action(taken, action, b * W)
         move(numbers, state, b, now, taken, rooms)
         count_step(numbers, state, b)
-        over |= judge(numbers, state, b, buffers, row, reached)
+        state.rare[b] = judge(numbers, state, b, buffers, row, reached)
+        over |= state.rare[b]
         observe(numbers, state, b, taken, buffers.observation)
     return over
 
@@ -234,6 +235,8 @@ def follow_up(first, last, numbers, state, buffers):
     for b in range(first, last):
         if numbers.interval > 0:
             change(numbers, state, b)
+        if not state.rare[b]:
+            continue
         begins = False
         for n in range(W):
             robot = b * W + n
