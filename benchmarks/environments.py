@@ -24,7 +24,7 @@ from tests.support.plain_environment import PlainVelocity
 
 ROBOTS, REPEATS, CALLS = 65_536, 40, 8
 OFF = Range(0.8, 1.2, when="startup")
-EACH_ITS_OWN = {"body.mass_kg": OFF, "friction.axes.coulomb": OFF}
+VARIED = {"body.mass_kg": OFF, "friction.axes.coulomb": OFF}
 GOALS = {1: 1e8, 20: 4e7}  # by substeps, velocity, two threads, float32
 COLUMNS = ["what", "dtype", "substeps", "threads", "steps/s", "steps/s of cpu", "ns cpu", "ms a call"]
 PLAIN_ROBOTS, PLAIN_STEPS = 1000, 1000
@@ -49,8 +49,10 @@ def measure() -> Table:
     _row(table, count, "path", "float32", 1, 2, None, "path, pushes, latency 30 ms", push=(1, 1, 0.1), latency=0.03)
     _checkers(table)
     _plain(table)
-    table.notes.append("steps/s of cpu: threads x steps of one second of the processor: other programs hardly touch it")
-    table.notes.append("goals are held to it; gymnax CartPole on an A100: 2e7 (EVIDENCE 10)")
+    table.notes.append("steps/s of cpu: threads x steps of one second of the processor; goals are held to it")
+    table.notes.append(
+        "memory is the limit of one substep: others who use it slow that down; gymnax CartPole on an A100: 2e7"
+    )
     return table
 
 
@@ -66,7 +68,7 @@ def _row(
     **options: Any,
 ) -> None:
     """A line of speeds."""
-    settings = {"randomise": EACH_ITS_OWN, "copy": False} | options
+    settings = {"randomise": VARIED, "copy": False} | options
     envs = RobotVectorEnv(count, task=task, dtype=dtype, substeps=substeps, threads=threads, **settings)
     random = np.random.default_rng(5)
     actions = [random.uniform(-1.0, 1.0, (3, count)).astype(dtype).T for _ in range(CALLS)]
@@ -100,7 +102,7 @@ def _checkers(table: Table) -> None:
 def _plain(table: Table) -> None:
     """Random steps and partial resets, with new seeds at times, beside a plain Python loop."""
     robots, steps = max(70, int(PLAIN_ROBOTS * SHARE)), max(30, int(PLAIN_STEPS * SHARE))
-    setting = Setting(duration=0.6, substeps=1, randomise=EACH_ITS_OWN)
+    setting = Setting(duration=0.6, substeps=1, randomise=VARIED)
     envs = Environments(omnidyn.load_robot("axebot"), robots, setting, threads=2)
     rows, spread = envs.numbers.pool, envs.numbers.spread
     plain = [PlainVelocity(rows[k % len(rows)], 3, k, setting.steps, spread) for k in range(robots)]

@@ -27,6 +27,13 @@ def test_gymnasiums_own_pass(mode):
     check_vector_env(SyncVectorEnv(make, autoreset_mode=mode), steps=120)
 
 
+def test_observations_that_are_no_arrays_are_refused():
+    envs = Walk()
+    envs.single_observation_space = gymnasium.spaces.Dict(x=envs.single_observation_space)
+    with pytest.raises(InputError, match="no arrays"):
+        check_vector_env(envs)
+
+
 @pytest.mark.parametrize("task", ["Velocity", "Pose", "Path"])
 @pytest.mark.parametrize("mode", list(AutoresetMode))
 def test_ours_pass(task, mode):

@@ -99,6 +99,20 @@ def test_what_cannot_be_is_refused(wrong, message):
         wrong()
 
 
+@pytest.mark.parametrize("key", ["body.mass_kg", "wheels.robot_radius_m"])
+def test_robots_of_a_sample_live_one_after_the_other(key):
+    """Drawn as parameters, and as robots, where a number does not scale."""
+    sample = omnidyn.sample(omnidyn.load_robot("axebot"), 5, factors={key: (0.7, 1.3)})
+    envs = RobotVectorEnv(7, sample, dtype=np.float64)
+    envs.reset(seed=1)
+    actions = np.repeat([[0.2, -0.9, 0.8]], 7, axis=0)
+    for _ in range(10):
+        envs.step(actions)
+    for k, twist in enumerate(envs.environments.twist):
+        run = omnidyn.simulate(sample.robot(k % 5), np.repeat(6.0 * actions[:1], 10, axis=0), 0.02)
+        assert twist == pytest.approx(run.twist[-1], abs=1e-12)
+
+
 @pytest.mark.parametrize("task", TASKS)
 def test_a_rollout_is_a_run_that_simulate_repeats(task):
     envs = RobotVectorEnv(3, task=task, dtype=np.float64, substeps=20, duration=1.0)

@@ -5,6 +5,7 @@ import pytest
 
 import omnidyn
 from omnidyn.errors import InputError, UnsupportedError
+from omnidyn.model.friction import DirectionFriction, Friction
 from omnidyn.model.log_effects import Sensors
 from omnidyn.simulation.environments.environments import Environments, Setting
 from omnidyn.simulation.environments.pool import Range, largest_voltage
@@ -194,6 +195,43 @@ def test_what_cannot_be_is_refused(wrong, message):
         wrong()
 
 
+# Robots of the implicit engine: a turning frame, friction along the direction of travel
+
+
+def turning(friction=None):
+    robot = AXEBOT.replace(body=AXEBOT.body.replace(rotating_frame=True))
+    return robot if friction is None else robot.replace(friction=Friction(direction=friction))
+
+
+ELLIPSE = DirectionFriction(coulomb=(2.6, 1.9), viscous=0.9, yaw_coulomb=0.11, yaw_viscous=0.01)
+IMPLICIT = {"box": turning(), "ellipse": turning(ELLIPSE), "mecanum": omnidyn.load_robot("mecanum")}
+
+
+@pytest.mark.parametrize("name", IMPLICIT)
+def test_implicit_steps_are_those_of_simulate(name):
+    robot = IMPLICIT[name]
+    _, actions, twists, _, _ = driven(robot, Setting(substeps=4))
+    for k in range(3):
+        volts = np.repeat(actions[:, k] * largest_voltage(robot), 4, axis=0)
+        run = omnidyn.simulate(robot, volts, 0.005, tol=None)
+        assert np.abs(twists[:, k] - run.twist[::4]).max() < 1e-11
+        assert np.array_equal(twists[:, k] == 0.0, run.twist[::4] == 0.0)
+
+
+@pytest.mark.parametrize("name", IMPLICIT)
+def test_implicit_poses_are_near_those_of_a_fine_tolerance(name):
+    robot = IMPLICIT[name]
+    late = robot.replace(drive=robot.drive.replace(latency=0.026))
+    _, actions, twists, poses, _ = driven(late, Setting("pose", substeps=20), steps=40)
+    run = omnidyn.simulate(late, actions[:, 0] * largest_voltage(robot), 0.02, tol=1e-5)
+    assert np.abs(twists[:, 0] - run.twist).max() < 3e-3 * max(1.0, np.abs(run.twist).max())
+    assert np.abs(poses[:, 0] - run.pose).max() < 1e-3
+
+
 def test_other_laws_are_refused_by_name():
-    with pytest.raises(UnsupportedError, match="rotating frame"):
-        Environments(omnidyn.load_robot("mecanum"))
+    with pytest.raises(UnsupportedError, match="current limit"):
+        Environments(AXEBOT.replace(motor=AXEBOT.motor.replace(current_limit=2.0)))
+    with pytest.raises(UnsupportedError, match="speed loop"):
+        Environments(omnidyn.load_robot("robotino"))
+    with pytest.raises(InputError, match="one kind of drive"):
+        Environments([AXEBOT, turning()])

@@ -69,6 +69,8 @@ def _check_spaces(envs: Any) -> None:
     mode = envs.metadata.get("autoreset_mode")
     if not isinstance(mode, AutoresetMode):
         raise _broken("no autoreset mode in its metadata", mode, "an AutoresetMode", "set it in metadata")
+    if envs.single_observation_space.shape is None:
+        raise _broken("observations are no arrays", envs.single_observation_space, "arrays: others are not compared")
     for name in ("observation", "action"):
         single, batched = getattr(envs, f"single_{name}_space"), getattr(envs, f"{name}_space")
         if batched != batch_space(single, envs.num_envs):

@@ -16,12 +16,12 @@ from omnidyn.control.paths.path import path as path_named
 from omnidyn.errors import InputError
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
-from omnidyn.simulation.batch.parameters import BatchParameters
+from omnidyn.simulation.batch.sample import Sample
 from omnidyn.simulation.environments.environments import Environments, Setting
 from omnidyn.simulation.environments.layout import PREVIEW
 
 LARGEST = 1e3  # of what is observed: no robot of this size gets there within an episode
-Robots = str | os.PathLike | Robot | Sequence[Robot]
+Robots = str | os.PathLike | Robot | Sequence[Robot] | Sample
 
 
 class RobotVectorEnv(VectorEnv):
@@ -32,10 +32,10 @@ class RobotVectorEnv(VectorEnv):
 
     Args:
         num_envs: Number of environments.
-        robot: A robot, by name, path or value, or several for life, one after the other.
+        robot: A robot, by name, path or value; or several for life, one after the other: a list, or what
+            `omnidyn.sample` gives.
         task: "velocity", "pose" or "path".
         path: Of the task "path": what `omnidyn.path` takes. An episode begins anywhere on it.
-        parameters: Numbers of robots for life, as `omnidyn.sample` draws them, in place of those of `robot`.
         autoreset_mode: Of Gymnasium.
         copy: Whether observations are copied; without, the next step writes into the same array.
         privileged: Whether infos hold what no sensor shows, as "privileged", see `Environments.privileged`.
@@ -44,7 +44,7 @@ class RobotVectorEnv(VectorEnv):
         seed: Of robots that are drawn beforehand.
         setting: Fields of `Setting`: dt, substeps, duration, spread, push, interval, latency, uncertainty, randomise.
 
-    Raises InputError for what is out of range, UnsupportedError for a robot beyond the paper's law.
+    Raises InputError for what is out of range, UnsupportedError for a robot that blocks cannot move.
     """
 
     def __init__(
@@ -54,7 +54,6 @@ class RobotVectorEnv(VectorEnv):
         task: Any = "velocity",
         *,
         path: Any = "eight",
-        parameters: BatchParameters | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         copy: bool = True,
         privileged: bool = False,
@@ -71,7 +70,6 @@ class RobotVectorEnv(VectorEnv):
             num_envs,
             Setting(task=task, **setting),
             path,
-            parameters=parameters,
             autoreset=mode.name.lower(),
             dtype=dtype,
             threads=threads,
@@ -136,7 +134,7 @@ def _mode(mode: AutoresetMode | str) -> AutoresetMode:
 
 def seed_of(env: Any, seed: int | None) -> int | None:
     """The seed of the robots: as given, else from the generator of Gymnasium where nothing has begun yet."""
-    if seed is None and not env.environments.begun:
+    if seed is None and not env.environments.was_reset:
         return int(env.np_random.integers(2**32))
     return seed
 
@@ -148,8 +146,11 @@ def spaces(envs: Environments) -> tuple[Box, Box]:
 
 
 def environments(robot: Robots, count: int, setting: Setting, path: Any, **options: Any) -> Environments:
-    """The environments of robots by name, path or value, and of a path by name, file or value."""
+    """The environments of robots by name, path, value or sample, and of a path by name, file or value."""
     robots: Any = load_robot(robot) if isinstance(robot, str | os.PathLike) else robot
+    if isinstance(robot, Sample):
+        robots = list(robot) if robot.parameters is None else robot.center
+        options["parameters"] = robot.parameters
     rows = path_rows(path, setting) if setting.task == "path" else None
     return Environments(robots, count, setting, path=rows, **options)
 

@@ -146,7 +146,7 @@ def _ellipse_alone(bx, by, cx, cy, dx, dy, turn, tau):
 
 
 @inlined
-def _stage(work, to, back, box, k, zero):
+def put_stage(work, to, back, box, k, zero):
     """Fill rows `to`... with the speeds at the end of a stage whose x* is start + back (stage 1 - start)."""
     tau, ends = k[TAU], work[ALONE]
     vx, vy, vw, px, py, pw = (
@@ -242,8 +242,8 @@ def march_implicit(first, last, laws, rows, record, rule):
             _put_push(work, wheels, volts[b - first, step] if width > 1 else volts[0, step], width == 1)
             for n in range(WIDTH):
                 work[NODE, n], work[NODE + 1, n], work[NODE + 2, n] = zero, zero, zero
-            _stage(work, NODE, zero, rule.box, k, zero)
-            _stage(work, END, k[BACKWARD], rule.box, k, zero)
+            put_stage(work, NODE, zero, rule.box, k, zero)
+            put_stage(work, END, k[BACKWARD], rule.box, k, zero)
             if count > 3:
                 _advance_pose(work, k)
             else:

@@ -1,7 +1,8 @@
 """Environments: many robots with one task each; `reset` and `step` in NumPy, without any other package.
 
-The physics are those of `simulate`, by the same `exact_step`: a robot of the paper's law, its latency, dead band and
-sensors as its file says. The bits of a robot do not depend on how many there are, nor on threads, nor on resets of
+The physics are those of `simulate`: robots of the paper's law by the same `exact_step`, those in a turning frame or
+under friction along the direction of travel by the same implicit steps; latency, dead band and sensors as the robot
+file says. The bits of a robot do not depend on how many there are, nor on threads, nor on resets of
 others.
 """
 
@@ -19,9 +20,12 @@ from numpy.typing import ArrayLike
 from omnidyn.arrays import FloatArray
 from omnidyn.errors import InputError
 from omnidyn.model.robot import Robot
+from omnidyn.simulation.batch.implicit import stages
 from omnidyn.simulation.batch.parameters import BatchParameters
 from omnidyn.simulation.environments.layout import (
+    BOX_LAW,
     DISABLED,
+    EXACT_LAW,
     NEXT_STEP,
     PATH,
     PER_MASS,
@@ -42,6 +46,7 @@ from omnidyn.simulation.environments.pool import (
     check_robots,
     drawn_pool,
     largest_voltage,
+    law_of,
     rows_of,
 )
 from omnidyn.simulation.environments.step import follow_up, reset_blocks, step_blocks
@@ -136,7 +141,7 @@ class Environments:
         threads: That share a step.
         seed: Of the pool that ranges draw from.
 
-    begun: whether they have been reset.
+    was_reset: whether any reset has been.
     """
 
     def __init__(
@@ -180,7 +185,7 @@ class Environments:
         share = -(-blocks // threads)
         self._parts = [(first, min(blocks, first + share)) for first in range(0, blocks, share)]
         self._threads = ThreadPoolExecutor(len(self._parts) - 1) if len(self._parts) > 1 else None
-        self._now, self.begun = 0, False
+        self._now, self.was_reset = 0, False
 
     def _numbers(self, robot: Robot, path: FloatArray | None) -> Numbers:
         """What a step needs to know."""
@@ -194,7 +199,10 @@ class Environments:
         substep = np.array(shares) * setting.dt / setting.substeps
         travels = task != VELOCITY or sensors.averaged
         voltage = largest_voltage(robot)
-        rows = rows_of(self.pool.parameters, voltage, 0.5 * substep if travels else substep, kind)
+        lengths, law = 0.5 * substep if travels else substep, law_of(robot) or EXACT_LAW
+        turning = [member.body.rotating_frame for member in self.pool.robots] or robot.body.rotating_frame
+        rows = rows_of(self.pool.parameters, law, turning, voltage, lengths, kind)
+        rule = np.array([stages(law == BOX_LAW, length, kind).numbers for length in lengths])
         interval = 0 if setting.interval is None else max(1, round(setting.interval / setting.dt))
         if interval == 0 and self.pool.sizes[2] > 1:
             raise InputError("no interval for a range", got="interval=None", expected="seconds", where="interval")
@@ -218,6 +226,8 @@ class Environments:
             np.array(spread, dtype=kind),
             np.array(self.pool.sizes, dtype=np.int64),
             rows,
+            law,
+            rule,
             self._path(task, path),
             setting.dt,
         )
@@ -248,16 +258,16 @@ class Environments:
 
         seed: of their random numbers from here on; without one, each goes on with its own.
         """
-        if seed is None and not self.begun:
+        if seed is None and not self.was_reset:
             seed = int(np.random.SeedSequence().entropy)  # pyright: ignore[reportArgumentType]
         base = -1 if seed is None else int(np.random.SeedSequence(seed).generate_state(1)[0])
         chosen = np.ones(self.count, np.bool_) if mask is None else np.asarray(mask)
         if chosen.shape != (self.count,) or chosen.dtype != np.bool_:
             got = f"{chosen.dtype} of shape {chosen.shape}"
             raise InputError("not a mask", got=got, expected=f"bool of shape ({self.count},)", where="mask")
-        if not self.begun and not chosen.all():
+        if not self.was_reset and not chosen.all():
             raise InputError("not begun yet", got="a mask", expected="a reset of all first", where="mask")
-        self.begun = True
+        self.was_reset = True
         reset_blocks(self.numbers, self.state, chosen, base, self.buffers.observation)
         return self.buffers.observation[:, : self.count].T
 
@@ -270,7 +280,7 @@ class Environments:
         if columns.shape != (self.wheels, self.count):
             got, expected = np.shape(action), f"({self.count}, {self.wheels})"
             raise InputError("wrong shape", got=got, expected=expected, where="action")
-        if not self.begun:
+        if not self.was_reset:
             raise InputError("not begun yet", got="a step", expected="a reset first", where="step")
         if self.autoreset == "disabled" and self.over.any():
             got = f"{int(self.over.sum())} episodes that are over"
@@ -329,7 +339,8 @@ class Environments:
     def privileged(self) -> FloatArray:
         """What no sensor shows: twist, pose, push [N, N, N m], and numbers of the robot. Shape (count, columns).
 
-        The numbers are those of `pool.rows_of` without phi: C/M, S/M, a, 1/M per axis, and gains.
+        The numbers are those of `pool.rows_of` without phi: C/M, S/M, a, 1/M per axis, and gains; of robots that take
+        implicit steps C, damping, M, ones, and forces.
         """
         state, phi = self.state, 3 * len(self.numbers.lags)
         robots = np.delete(state.robots, slice(PER_MASS + 3, PER_MASS + 3 + phi), axis=1)

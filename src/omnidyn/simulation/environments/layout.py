@@ -17,6 +17,10 @@ NEXT_STEP, SAME_STEP, DISABLED = 0, 1, 2  # when an episode that ended begins an
 
 # Rows of the numbers of a robot, three each: one per axis; then phi of each piece of a step, then gain, 3 per wheel
 COULOMB, BREAKAWAY, RATE, PER_MASS, PHI = 0, 3, 6, 9, 12
+# Those of a robot of the implicit engine: forces, and ones in place of 1/M; where phi would begin, the mass that turns
+DAMPING, MASS, FRAME_MASS = 3, 6, 12
+
+EXACT_LAW, BOX_LAW, DIRECTION_LAW = 0, 1, 2  # how a robot is moved
 
 PREVIEW = (1, 5)  # steps ahead of which the path shows its twist
 
@@ -35,7 +39,8 @@ class Numbers(NamedTuple):
     late, hold [steps]: age of a new pose, and from one to the next. dead: band of the driver, as a share of the largest
     voltage, (wheels,). push: largest wrench [N, N, N m], (3,); interval [steps]: from one to the next, 0: for an
     episode. spread: largest goal or start, (3,). sizes: of the pool (startup, reset, interval). pool: numbers of
-    robots, (members, rows). path: poses and velocities step by step, (steps, 6). dt [s].
+    robots, (members, rows). law: as above; rule: of its implicit steps, a row per piece. path: poses and velocities
+    step by step, (steps, 6). dt [s].
     """
 
     task: int
@@ -56,6 +61,8 @@ class Numbers(NamedTuple):
     spread: Any
     sizes: Any
     pool: Any
+    law: int
+    rule: Any
     path: Any
     dt: float
 
@@ -65,7 +72,7 @@ class State(NamedTuple):
 
     past: actions of steps before, (blocks, lags, wheels, W); places: poses of these, (blocks, steps, 3, W). count,
     episode, member, start (of the path): (blocks, W). key: of the random numbers; ended: whether the episode is over,
-    (blocks, W).
+    (blocks, W); rare: whether a block has an episode that ends or begins, (blocks,).
     """
 
     robots: Any
@@ -82,6 +89,7 @@ class State(NamedTuple):
     start: Any
     key: Any
     ended: Any
+    rare: Any
 
 
 class Buffers(NamedTuple):
@@ -106,5 +114,5 @@ def new_state(numbers: Numbers, robots: int, wheels: int) -> State:
     past = np.zeros((blocks, max(1, int(numbers.lags.max())), wheels, W), dtype)
     places = np.zeros((blocks, max(1, numbers.late + numbers.hold), 3, W), dtype)
     counts = [np.zeros((blocks, W), np.int32) for _ in range(4)]
-    marks = np.zeros((blocks, W), np.uint32), np.zeros((blocks, W), np.uint8)
+    marks = np.zeros((blocks, W), np.uint32), np.zeros((blocks, W), np.uint8), np.zeros(blocks, np.uint8)
     return State._make([np.zeros((blocks, numbers.pool.shape[1], W), dtype), *three, past, places, *counts, *marks])

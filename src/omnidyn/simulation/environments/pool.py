@@ -21,7 +21,9 @@ from omnidyn.model.known.uncertainty import plausible
 from omnidyn.model.motor import DUTY, DYNAMIC, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
+from omnidyn.simulation.batch.choice import BOX, DIRECTION, EXACT, VOLTAGE, engine_kind
 from omnidyn.simulation.batch.parameters import BatchParameters, batch_parameters
+from omnidyn.simulation.environments.layout import BOX_LAW, DIRECTION_LAW, EXACT_LAW
 from omnidyn.simulation.exact.march import why_not_exact
 
 STARTUP, RESET, INTERVAL = WHEN = "startup", "reset", "interval"
@@ -109,8 +111,8 @@ def drawn_pool(robots: Sequence[Robot], ranges: Mapping[str, Range], uncertainty
 
 def _sizes(robots: int, when: set[str]) -> tuple[int, int, int]:
     """How many draws there are of each kind."""
-    each = max(2, int(MOST_MEMBERS ** (1.0 / max(1, len(when)))))
-    startup, reset, interval = (each if kind in when else 1 for kind in WHEN)
+    draws = max(2, int(MOST_MEMBERS ** (1.0 / max(1, len(when)))))
+    startup, reset, interval = (draws if kind in when else 1 for kind in WHEN)
     return max(startup, robots), reset, interval
 
 
@@ -125,9 +127,18 @@ def _changed(robot: Robot, name: str, entry: Range, share: float) -> Robot:
     return robot
 
 
+LAWS = {EXACT: EXACT_LAW, BOX: BOX_LAW, DIRECTION: DIRECTION_LAW}
+
+
+def law_of(robot: Robot) -> int | None:
+    """How a robot is moved in blocks; None where it cannot be."""
+    at_once = robot.model_copy(update={"drive": robot.drive.model_copy(update={"latency": 0.0})})
+    return LAWS.get(engine_kind(at_once, VOLTAGE, None))
+
+
 def why_no_environment(robot: Robot) -> list[str]:
     """What environments cannot do about this robot, each in words; empty when they can."""
-    reasons = why_not_exact(robot)
+    reasons = why_not_exact(robot) if law_of(robot) is None else []
     if robot.motor.electrical == DYNAMIC:
         reasons.append('winding inductance ([motor] electrical = "dynamic")')
     if robot.drive.kind == SPEED:
@@ -140,25 +151,21 @@ def why_no_environment(robot: Robot) -> list[str]:
 
 
 def check_robots(robots: Sequence[Robot]) -> None:
-    """Raises UnsupportedError for a robot that has no environment, InputError for those of different drives."""
+    """Raises UnsupportedError for a robot that has no environment, InputError for those of different kinds."""
+    kinds = {}
     for robot in robots:
         if reasons := why_no_environment(robot):
             raise UnsupportedError(
-                "environments know the paper's law only",
+                "environments cannot move this robot",
                 got=f"{robot.name}: {', '.join(reasons)}",
-                expected="friction on the body axes, axes that do not couple, volts or duties",
+                expected="friction on the body axes or along the direction of travel, volts or duties",
                 remedy="switch it off in a copy of the robot, by robot.replace(..)",
                 where="robot",
             )
-    first = robots[0]
-    for robot in robots:
-        if (robot.wheels.count, robot.drive.kind) != (first.wheels.count, first.drive.kind):
-            raise InputError(
-                "robots of different drives",
-                got=f"{robot.wheels.count} wheels, {robot.drive.kind}",
-                expected=f"{first.wheels.count} wheels, {first.drive.kind}",
-                where="robot",
-            )
+        kinds[(robot.wheels.count, robot.drive.kind, law_of(robot))] = robot.name
+    if len(kinds) > 1:
+        got = ", ".join(f"{name}: {wheels} wheels, {drive}, law {law}" for (wheels, drive, law), name in kinds.items())
+        raise InputError("robots of different kinds", got=got, expected="one kind of drive and friction", where="robot")
 
 
 def largest_voltage(robot: Robot) -> FloatArray:
@@ -169,13 +176,26 @@ def largest_voltage(robot: Robot) -> FloatArray:
     return np.minimum(volts, robot.drive.supply)
 
 
-def rows_of(parameters: BatchParameters, voltage: FloatArray, pieces: FloatArray, dtype: Any) -> FloatArray:
+def rows_of(
+    parameters: BatchParameters, law: int, turning: Any, voltage: FloatArray, pieces: FloatArray, dtype: Any
+) -> FloatArray:
     """The numbers of robots. Shape (robots, rows).
 
-    voltage: what an action of 1 is [V], (wheels,). pieces [s]: lengths whose phi is needed, shape (pieces,).
+    Args:
+        parameters: Of the robots.
+        law: How they are moved.
+        turning: Whether their frame turns, shape (robots,) or one for all.
+        voltage: What an action of 1 is [V], (wheels,).
+        pieces: Lengths whose phi is needed [s], shape (pieces,).
+        dtype: Of the rows.
     """
-    mass, rate = parameters.mass, parameters.damping / parameters.mass
-    held = [-np.expm1(-rate * length) / rate for length in pieces]
-    gain = parameters.push * voltage[:, None] / mass[:, None]  # (3, wheels, n)
-    columns = [parameters.coulomb / mass, parameters.breakaway / mass, rate, 1.0 / mass, *held, *gain.swapaxes(0, 1)]
+    mass, push = parameters.mass, (parameters.push * voltage[:, None]).swapaxes(0, 1)  # (wheels, 3, n)
+    if law == EXACT_LAW:
+        rate = parameters.damping / mass
+        held = [-np.expm1(-rate * length) / rate for length in pieces]
+        columns = [parameters.coulomb / mass, parameters.breakaway / mass, rate, 1.0 / mass, *held, *(push / mass)]
+    else:
+        frame = np.zeros((3 * len(pieces), parameters.count))
+        frame[0] = np.where(turning, parameters.body_mass, 0.0)
+        columns = [parameters.coulomb, parameters.damping, mass, np.ones_like(mass), frame, *push]
     return np.ascontiguousarray(np.concatenate(columns).T, dtype=dtype)

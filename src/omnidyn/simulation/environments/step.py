@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from omnidyn.compiled.kernel import inlined, kernel, part
+from omnidyn.simulation.batch.implicit import LAW, TURNING
 from omnidyn.simulation.environments.draws import draw, robot_key, uniform
 from omnidyn.simulation.environments.layout import (
     AGAIN,
     DISABLED,
+    EXACT_LAW,
     GOAL,
     LATER,
     MEMBER,
@@ -84,12 +86,12 @@ def take_action(out, action, first):
     zero, one = kind(0), kind(1)
     whole = min(W, action.shape[1] - first)
     for wheel in range(len(action)):
-        row, asked = out[wheel], action[wheel, first : first + whole]
+        row, source = out[wheel], action[wheel, first : first + whole]
         if whole == W:
-            copy_row(row, asked)
+            copy_row(row, source)
         else:
             for n in range(whole):
-                row[n] = asked[n]
+                row[n] = source[n]
         for n in range(W):
             value = row[n] if row[n] == row[n] else zero
             value = value if value < one else one
@@ -98,8 +100,8 @@ def take_action(out, action, first):
 
 @inlined
 def move(numbers, state, b, now, action, rooms):
-    """A block over a step: all pieces of it. action, acting: (wheels, W); room (6, W); the other rooms (3, W)."""
-    twist, pose, mean, drive, acting, room = rooms
+    """A block over a step: all pieces of it. action, acting: (wheels, W); room (6, W); work; the other rooms (3, W)."""
+    twist, pose, mean, drive, acting, room, work = rooms
     robots, past = state.robots[b], state.past[b]
     gain, late = first_gain(robots, len(action)), numbers.lags[0] > 0
     copy_rows(twist, state.twist[b])
@@ -115,21 +117,8 @@ def move(numbers, state, b, now, action, rooms):
         put_drive(drive, acting, robots, gain, numbers.dead)
         if numbers.pushed:
             add_push(drive, state.push[b], robots)
-        if numbers.travels:
-            share = numbers.shares[piece] / numbers.substeps
-            length = share * numbers.dt
-            travel(
-                twist,
-                pose,
-                mean,
-                room,
-                drive,
-                robots,
-                phi_of(piece),
-                numbers.substeps,
-                length,
-                share * (1.0 - numbers.kept),
-            )
+        if numbers.travels or numbers.law != EXACT_LAW:
+            travel(numbers, work, twist, pose, mean, room, drive, robots, piece)
         else:
             slide(twist, drive, robots, phi_of(piece), numbers.substeps)
     if late:
@@ -227,13 +216,14 @@ def step_blocks(first, last, now, numbers, state, action, buffers):
     taken, acting = np.zeros((len(action), W), dtype), np.zeros((len(action), W), dtype)
     twist, pose = np.zeros(shape, dtype), np.zeros(shape, dtype)
     mean, drive = np.zeros(shape, dtype), np.zeros(shape, dtype)
-    rooms = (twist, pose, mean, drive, acting, np.zeros((6, W), dtype))
+    rooms = (twist, pose, mean, drive, acting, np.zeros((6, W), dtype), np.zeros((LAW + TURNING + 1, W), dtype))
     row, reached = np.zeros(W, dtype), np.zeros(W, np.uint8)
     for b in range(first, last):
         take_action(taken, action, b * W)
         move(numbers, state, b, now, taken, rooms)
         count_step(numbers, state, b)
-        over |= judge(numbers, state, b, buffers, row, reached)
+        state.rare[b] = judge(numbers, state, b, buffers, row, reached)
+        over |= state.rare[b]
         observe(numbers, state, b, taken, buffers.observation)
     return over
 
@@ -245,6 +235,8 @@ def follow_up(first, last, numbers, state, buffers):
     for b in range(first, last):
         if numbers.interval > 0:
             change(numbers, state, b)
+        if not state.rare[b]:
+            continue
         begins = False
         for n in range(W):
             robot = b * W + n
