@@ -1,0 +1,112 @@
+"""The chain log -> identify -> track on the plants of `control_real`: is a fitted robot better than a guessed one?
+
+Each plant is driven for half a minute in open loop, and its encoders and volts are logged. `identify` begins with a
+guess: friction 1.5 times what it is, motors a tenth off, no latency. `pid` and `mpc` with their defaults then drive the
+plant by encoders, with the guess and with what was fitted. A cell is lost where the fitted robot is more than 1.1 times
+as far off as the guessed one, and by more than a difference that counts. The latency is to be in its interval, or
+nearer to it than the time step of the plant.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+import omnidyn
+from benchmarks.control_real import ALLOWED, COUNTS, DT, errors
+from benchmarks.control_real.paths import paths
+from benchmarks.control_real.plant import SUBSTEP, Plant
+from benchmarks.control_real.robots import NUMBERS, Numbers, robot_of
+from benchmarks.table import Table, machine
+from omnidyn.control.mpc.controller import Mpc
+from omnidyn.control.pid import Pid
+from omnidyn.identification.identification import Identification
+from omnidyn.model.friction import Friction
+from omnidyn.model.log_effects import Sensors
+from omnidyn.model.robot import Robot
+from omnidyn.run import Run
+
+SECONDS, HOLD, SEED = 30.0, 1.0, 1  # [s], [s] between two levels
+FRICTION, RESISTANCE = 1.5, 1.1  # times the truth
+FREE = ("friction", "motor.resistance_ohm")
+CONTROLLERS = {"pid": Pid, "mpc": Mpc}
+
+
+def driven(numbers: Numbers, seed: int) -> Run:
+    """Half a minute of levels on the axes of the body, as encoders and the program of the robot know it."""
+    plant, random = Plant(numbers), np.random.default_rng(seed)
+    rows, each = round(SECONDS / DT), round(HOLD / DT)
+    shares = random.uniform(-1.0, 1.0, (rows // each, 3)) * random.choice([0.0, 0.3, 0.9], (rows // each, 1))
+    unit = np.linalg.pinv(plant.directions)
+    unit = unit / np.abs(unit).max(axis=0)
+    levels = np.repeat(shares @ unit.T, each, axis=0)
+    levels /= np.maximum(np.abs(levels).max(axis=1, keepdims=True), 1.0)
+    sent = levels * (1.0 if plant.duty else plant.volts)
+    angles = [plant.encoders()]
+    for row in sent:
+        plant.step(row, DT)
+        angles.append(plant.encoders())
+    speed = np.diff(angles, axis=0, prepend=[angles[0]])[:-1] / DT
+    inputs: dict[str, Any] = {"duty": sent} if plant.duty else {"voltage": sent}
+    return Run(t=DT * np.arange(rows), wheel_speed=speed, source="half a minute", **inputs)
+
+
+def guess_of(robot: str, numbers: Numbers) -> Robot:
+    """What is known before the log."""
+    true = robot_of(robot, numbers)
+    more = {}
+    for place in ("axes", "direction"):
+        law = getattr(true.friction, place)
+        if law is not None:
+            names = [name for name in ("coulomb", "viscous", "yaw_coulomb", "yaw_viscous") if hasattr(law, name)]
+            scaled = {name: (FRICTION * np.asarray(getattr(law, name))).tolist() for name in names}
+            more[place] = type(law)(**scaled)
+    return true.replace(
+        friction=Friction(**more),
+        motor=true.motor.replace(resistance=RESISTANCE * np.asarray(true.motor.resistance)),
+        drive=true.drive.replace(latency=0.0),
+        sensors=Sensors(twist="mean"),
+        priors={},
+    )
+
+
+def _add_latency(table: Table, robot: str, plant: Plant, fit: Identification) -> None:
+    """A row: the latency that was fitted, beside the truth [ms]."""
+    late = fit.nuisances.get("latency.wheel_angle")
+    low, high = (fit.robot.drive.latency,) * 2 if late is None else late.ci95
+    off = max(low - plant.latency, plant.latency - high, 0.0)
+    interval = f"{1e3 * low:.3f} to {1e3 * high:.3f} ms" if late else f"{1e3 * low:.3f} ms, not fitted"
+    words = {"fitted": interval, "true file": f"{1e3 * plant.latency:.3f} ms"}
+    table.add("nearer than 0.4 ms", off < SUBSTEP, robot=robot, path="latency", guessed="0", **words)
+
+
+def measure() -> Table:
+    """The three robots on all paths."""
+    columns = ["robot", "path", "controller", "guessed", "fitted", "true file", "lost"]
+    table = Table("control_chain: rms of position mm / heading mrad, guessed and fitted robot", columns)
+    count, total = 0, 0
+    for robot, numbers in NUMBERS.items():
+        guess = guess_of(robot, numbers)
+        fit = omnidyn.identify([driven(numbers, SEED)], guess, omnidyn.OutputError(free=list(FREE)), quick=True)
+        fitted = fit.robot.replace(sensors=guess.sensors)
+        true = robot_of(robot, numbers).replace(sensors=guess.sensors)
+        plant = Plant(numbers)
+        _add_latency(table, robot, plant, fit)
+        for name in paths():
+            for controller, kind in CONTROLLERS.items():
+                off = {
+                    label: errors(plant, kind(known), paths()[name], "encoder")
+                    for label, known in (("guessed", guess), ("fitted", fitted), ("true file", true))
+                }
+                beaten = [
+                    unit
+                    for k, unit in enumerate(("mm", "mrad"))
+                    if off["fitted"][k] > max(ALLOWED * off["guessed"][k], off["guessed"][k] + COUNTS[k])
+                ]
+                count, total = count + len(beaten), total + 2
+                words = {label: f"{cell[0]:.2f}/{cell[1]:.2f}" for label, cell in off.items()}
+                table.add(robot=robot, path=name, controller=controller, lost=", ".join(beaten), **words)
+    table.add("0 cells", count == 0, robot="all", lost=f"{count} of {total}")
+    table.notes.append(machine())
+    return table
