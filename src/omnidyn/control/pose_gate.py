@@ -4,8 +4,9 @@
     twist = measured + b,    b: leaky mean of (pose - pose before)/dt - twist, where it is more than noise makes it
 
 A localisation that jumps is followed at RATE: one wrong pose moves the robot little, one that stays is reached. Wheels
-that slip count what the body did not drive: poses put that right. A sample that comes again although it says that the
-robot moves is moved on by its twist. Where none of this is the case, nothing is changed, to the last bit.
+that slip count what the body did not drive: poses put that right, unless they are late themselves. A sample that comes
+again although it says that the robot moves is moved on by its twist. Where none of this is the case, nothing is
+changed, to the last bit.
 """
 
 from __future__ import annotations
@@ -83,11 +84,11 @@ def slip(memory, i, speed):
 
 
 @kernel
-def judge(memory, top, averaged, dt, t, state):
+def judge(memory, top, averaged, late, dt, t, state):
     """Change a measured state (6,) into what is believed of it; returns a verdict.
 
-    memory (7, 3). top: speeds [m/s, m/s, rad/s], (3,). averaged: whether twists are means since the step before. dt:
-    of a step [s].
+    memory (7, 3). top: speeds [m/s, m/s, rad/s], (3,). averaged: whether twists are means since the step before. late:
+    whether poses are: their age trembles, and says nothing of slip. dt: of a step [s].
     """
     for i in range(6):
         if not math.isfinite(state[i]):
@@ -115,7 +116,7 @@ def judge(memory, top, averaged, dt, t, state):
     put3(memory, CLOCK, 0, (t, 1.0, repeats))
     for i in range(3):
         add = slip(memory, i, off[i] / (elapsed * top[i]))
-        if add != 0.0:
+        if add != 0.0 and not late:
             verdict = SLIPPED
             state[3 + i] += add * top[i]
     mean = minus(mean, minus(vector(memory, TWIST, 0), (state[3], state[4], state[5])))
@@ -133,6 +134,7 @@ class PoseGate:
 
     def __init__(self, robot: Robot, dt: float) -> None:
         self._top, self._averaged, self._dt = top_speeds(robot), robot.sensor_model.averaged, dt
+        self._late = robot.sensor_model.pose_age(dt) > 0.0
         self._memory, self._judge = np.zeros((7, 3)), judge
 
     def reset(self) -> None:
@@ -147,7 +149,7 @@ class PoseGate:
 
     def judge(self, t: float, state: FloatArray) -> int:
         """Change a state measured at t [s], shape (6,), into what is believed of it. Returns a verdict."""
-        arguments = self._memory, self._top, self._averaged, self._dt, t, state
+        arguments = self._memory, self._top, self._averaged, self._late, self._dt, t, state
         if self._judge is judge:
             self._judge = machine_code(judge, *arguments)
         return self._judge(*arguments)
