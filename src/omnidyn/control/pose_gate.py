@@ -17,7 +17,6 @@ import numpy as np
 
 from omnidyn.arrays import FloatArray
 from omnidyn.compiled.kernel import kernel, machine_code, part
-from omnidyn.control.mpc.small import minus, put3, vector
 from omnidyn.model.robot import Robot
 from omnidyn.model.sliding import top_speeds
 
@@ -36,15 +35,18 @@ USED, POSE, TWIST, MEAN, VARIANCE, SAMPLE, CLOCK = 0, 1, 2, 3, 4, 5, 6  # rows; 
 
 
 @part
+def row(memory, k):
+    """Three numbers."""
+    return memory[k, 0], memory[k, 1], memory[k, 2]
+
+
+@part
 def begin(memory, t, state):
     """Believe a first sample."""
-    put3(memory, USED, 0, (state[0], state[1], state[2]))
-    put3(memory, POSE, 0, (state[0], state[1], state[2]))
-    put3(memory, SAMPLE, 0, (state[0], state[1], state[2]))
-    put3(memory, TWIST, 0, (state[3], state[4], state[5]))
-    put3(memory, MEAN, 0, (0.0, 0.0, 0.0))
-    put3(memory, VARIANCE, 0, (START_NOISE**2, START_NOISE**2, START_NOISE**2))
-    put3(memory, CLOCK, 0, (t, 1.0, 0.0))
+    for i in range(3):
+        memory[USED, i] = memory[POSE, i] = memory[SAMPLE, i] = state[i]
+        memory[TWIST, i], memory[MEAN, i], memory[VARIANCE, i] = state[3 + i], 0.0, START_NOISE**2
+    memory[CLOCK, 0], memory[CLOCK, 1], memory[CLOCK, 2] = t, 1.0, 0.0
 
 
 @part
@@ -100,32 +102,42 @@ def judge(memory, top, averaged, late, dt, t, state):
     verdict, repeats = TRUSTED, 0.0
     if is_repeated(memory, state) and memory[CLOCK, 2] < MOST_REPEATED:
         verdict, repeats = REPEATED, memory[CLOCK, 2] + 1.0
-        _, behind = gap(vector(memory, POSE, 0), vector(memory, TWIST, 0), elapsed, vector(memory, POSE, 0))
-        state[0], state[1], state[2] = minus(vector(memory, POSE, 0), behind)
+        _, behind = gap(row(memory, POSE), row(memory, TWIST), elapsed, row(memory, POSE))
+        for i in range(3):
+            state[i] = memory[POSE, i] - behind[i]
     else:
-        put3(memory, SAMPLE, 0, (state[0], state[1], state[2]))
+        for i in range(3):
+            memory[SAMPLE, i] = state[i]
     share = 1.0 if averaged else 0.5
     mean = (
         state[3] + (1.0 - share) * (memory[TWIST, 0] - state[3]),
         state[4] + (1.0 - share) * (memory[TWIST, 1] - state[4]),
         state[5] + (1.0 - share) * (memory[TWIST, 2] - state[5]),
     )
-    off, _ = gap(vector(memory, POSE, 0), mean, elapsed, state)
-    put3(memory, POSE, 0, (state[0], state[1], state[2]))
-    put3(memory, TWIST, 0, (state[3], state[4], state[5]))
-    put3(memory, CLOCK, 0, (t, 1.0, repeats))
+    off, _ = gap(row(memory, POSE), mean, elapsed, state)
+    memory[CLOCK, 0], memory[CLOCK, 2] = t, repeats
+    added = (
+        (0.0, 0.0, 0.0)
+        if late
+        else (
+            slip(memory, 0, off[0] / (elapsed * top[0])) * top[0],
+            slip(memory, 1, off[1] / (elapsed * top[1])) * top[1],
+            slip(memory, 2, off[2] / (elapsed * top[2])) * top[2],
+        )
+    )
     for i in range(3):
-        add = slip(memory, i, off[i] / (elapsed * top[i]))
-        if add != 0.0 and not late:
+        memory[POSE, i], memory[TWIST, i] = state[i], state[3 + i]
+        if added[i] != 0.0:
             verdict = SLIPPED
-            state[3 + i] += add * top[i]
-    mean = minus(mean, minus(vector(memory, TWIST, 0), (state[3], state[4], state[5])))
-    _, (dx, dy, turn) = gap(vector(memory, USED, 0), mean, elapsed, state)
+            state[3 + i] += added[i]
+    mean = mean[0] + added[0], mean[1] + added[1], mean[2] + added[2]
+    _, (dx, dy, turn) = gap(row(memory, USED), mean, elapsed, state)
     far = max(math.hypot(dx, dy) / max(top[0], top[1]), abs(turn) / top[2]) / (RATE * elapsed)
     if far > 1.0:
         verdict, back = JUMPED, 1.0 - 1.0 / far
         state[0], state[1], state[2] = state[0] - back * dx, state[1] - back * dy, state[2] - back * turn
-    put3(memory, USED, 0, (state[0], state[1], state[2]))
+    for i in range(3):
+        memory[USED, i] = state[i]
     return verdict
 
 
