@@ -77,7 +77,7 @@ def _add_latency(table: Table, robot: str, plant: Plant, fit: Identification) ->
     low, high = (fit.robot.drive.latency,) * 2 if late is None else late.ci95
     off = max(low - plant.latency, plant.latency - high, 0.0)
     interval = f"{1e3 * low:.3f} to {1e3 * high:.3f} ms" if late else f"{1e3 * low:.3f} ms, not fitted"
-    words = {"fitted": interval, "true file": f"{1e3 * plant.latency:.3f} ms"}
+    words: dict[str, Any] = {"fitted": interval, "true file": f"{1e3 * plant.latency:.3f} ms"}
     table.add("nearer than 0.4 ms", off < SUBSTEP, robot=robot, path="latency", guessed="0", **words)
 
 
@@ -88,7 +88,8 @@ def measure() -> Table:
     count, total = 0, 0
     for robot, numbers in NUMBERS.items():
         guess = guess_of(robot, numbers)
-        fit = omnidyn.identify([driven(numbers, SEED)], guess, omnidyn.OutputError(free=list(FREE)), quick=True)
+        method = omnidyn.OutputError(free=FREE)
+        fit = omnidyn.identify([driven(numbers, SEED)], guess, method, quick=True)
         fitted = fit.robot.replace(sensors=guess.sensors)
         true = robot_of(robot, numbers).replace(sensors=guess.sensors)
         plant = Plant(numbers)
@@ -105,7 +106,7 @@ def measure() -> Table:
                     if off["fitted"][k] > max(ALLOWED * off["guessed"][k], off["guessed"][k] + COUNTS[k])
                 ]
                 count, total = count + len(beaten), total + 2
-                words = {label: f"{cell[0]:.2f}/{cell[1]:.2f}" for label, cell in off.items()}
+                words: dict[str, Any] = {label: f"{cell[0]:.2f}/{cell[1]:.2f}" for label, cell in off.items()}
                 table.add(robot=robot, path=name, controller=controller, lost=", ".join(beaten), **words)
     table.add("0 cells", count == 0, robot="all", lost=f"{count} of {total}")
     table.notes.append(machine())

@@ -76,9 +76,12 @@ class Faulty(Instruments):
 def cells_of(robot: str, numbers: Numbers, condition: str, kind: str, seed: int) -> dict[str, tuple[float, ...]]:
     """Controller -> (mm, mrad, us) on the clover."""
     plant, known, path = Plant(changed(numbers, condition)), Plant(numbers), paths()["clover"]
+
+    def equip(sensors: str, driven: Plant, number: int) -> Faulty:
+        return Faulty(sensors, driven, number, condition)
+
     return {
-        name: errors(plant, make(known), path, kind, seed, lambda *given: Faulty(*given, condition))
-        for name, make in makers(robot, numbers, kind).items()
+        name: errors(plant, make(known), path, kind, seed, equip) for name, make in makers(robot, numbers, kind).items()
     }
 
 

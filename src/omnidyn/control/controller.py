@@ -253,20 +253,19 @@ class Guarded(Safe, ABC):
     """A controller whose steps are checked before and after it sees them; subclasses write `_output`."""
 
     _late_pose: LatePose | None = None
-    _gate: PoseGate | None = None
+    _gate: PoseGate
 
     def _take(self, robot: Robot) -> None:
         super()._take(robot)
         self._late_pose = late_pose(robot, self.dt, self._late_pose)
-        self._gate = PoseGate(robot, self.dt) if self._gate is None else self._gate.replaced(robot)
+        self._gate = PoseGate(robot, self.dt, vars(self).get("_gate"))
 
     def reset(self) -> None:
         """Forget all steps."""
         super().reset()
         if self._late_pose is not None:
             self._late_pose.reset()
-        if self._gate is not None:
-            self._gate.reset()
+        self._gate.reset()
 
     def step(self, t: float, pose: Any, twist: Any, path: Any, supply: float | None = None) -> FloatArray:
         """What to send to the drive from t [s] on. Shape (wheels,). Never raises."""

@@ -142,22 +142,16 @@ def judge(memory, top, averaged, late, dt, t, state):
 
 
 class PoseGate:
-    """That of one controller of a robot, with steps of dt [s]."""
+    """That of one controller of a robot, with steps of dt [s]. before: one whose memory it takes over."""
 
-    def __init__(self, robot: Robot, dt: float) -> None:
+    def __init__(self, robot: Robot, dt: float, before: PoseGate | None = None) -> None:
         self._top, self._averaged, self._dt = top_speeds(robot), robot.sensor_model.averaged, dt
         self._late = robot.sensor_model.pose_age(dt) > 0.0
-        self._memory, self._judge = np.zeros((7, 3)), judge
+        self._memory, self._judge = np.zeros((7, 3)) if before is None else before._memory.copy(), judge
 
     def reset(self) -> None:
         """Forget all samples."""
         self._memory[:] = 0.0
-
-    def replaced(self, robot: Robot) -> PoseGate:
-        """One for another robot, that remembers the same."""
-        gate = PoseGate(robot, self._dt)
-        gate._memory[:] = self._memory
-        return gate
 
     def judge(self, t: float, state: FloatArray) -> int:
         """Change a state measured at t [s], shape (6,), into what is believed of it. Returns a verdict."""

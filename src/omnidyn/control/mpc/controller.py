@@ -74,7 +74,7 @@ class Mpc:
     name = "mpc"
     _late_pose: LatePose | None = None
     _filtered_twist: FilteredTwist | None = None
-    _gate: PoseGate | None = None
+    _gate: PoseGate
 
     def __init__(
         self,
@@ -124,7 +124,7 @@ class Mpc:
         self._tables = self.settings.tables(robot, self.dt, self.observer)
         self._late_pose = late_pose(robot, self.dt, self._late_pose)
         self._filtered_twist = filtered_twist(robot, self._filtered_twist)
-        self._gate = PoseGate(robot, self.dt) if self._gate is None else self._gate.replaced(robot)
+        self._gate = PoseGate(robot, self.dt, vars(self).get("_gate"))
         self._control = None  # compiled by the first step
 
     def reset(self) -> None:
