@@ -49,7 +49,7 @@ def driven(numbers: Numbers, seed: int) -> Run:
         angles.append(plant.encoders())
     speed = np.diff(angles, axis=0, prepend=[angles[0]])[:-1] / DT
     inputs: dict[str, Any] = {"duty": sent} if plant.duty else {"voltage": sent}
-    return Run(t=DT * np.arange(rows), wheel_speed=speed, source="half a minute", **inputs)
+    return Run(t=np.arange(rows, dtype=float) * DT, wheel_speed=speed, source="half a minute", **inputs)
 
 
 def guess_of(robot: str, numbers: Numbers) -> Robot:
