@@ -36,6 +36,7 @@ NAMES = {
     "control_plants": "tracking of richer robots: identified numbers beside those of a data sheet (two minutes)",
     "control_real": "closed loops on an independent plant with real sensors, beside hand PID and LQR (a minute)",
     "control_mismatch": "the same with wrong friction, payload, slip, jumps, missing samples, latency (a minute)",
+    "tune": "what tune finds, on an independent plant: errors before and after, three robots and sensors (15 minutes)",
     "coloured": "output error where errors have a memory: coverage, std beside the Cramer-Rao bound (an hour)",
     "forces": "a right robot under random forces of the floor: what is found, what intervals hold (ten minutes)",
     "ten_robots": "ten robots of a simulator of its own: init, then identify: coverage, what is reported (10 minutes)",

@@ -40,7 +40,7 @@ def test_a_search_keeps_to_bounds_and_stays_near():
     def cost(gains: Any) -> float:
         return 1.0 / gains["n"] + 1.0 / gains["w"]
 
-    assert tuning._search({"n": 20, "w": 1.0}, {"n": (5, 60), "w": (0.0, 1e9)}, cost, 50) == {"n": 60, "w": 16.0}
+    assert tuning._search({"n": 20, "w": 1.0}, {"n": (10, 60), "w": (0.0, 1e9)}, cost, 50) == {"n": 60, "w": 16.0}
 
 
 def test_over_the_robots_that_may_be_meant(tmp_path):
@@ -67,7 +67,7 @@ def test_a_bad_start_is_left_and_by_how_much_is_said(tmp_path):
     assert found.after.cost < 0.7 * found.before.cost
     assert not set(found.paths) & set(found.judged_on)
     assert found.verdict.code == "gains_tuned"
-    assert f"{1e3 * found.before.cost:.3g} mm before" in str(found.verdict)
+    assert f"{1e3 * found.before.mean:.3g} mm and {1e3 * found.before.heading:.3g} mrad before" in str(found.verdict)
     assert found.uncertain is False
     slow, tuned = (
         omnidyn.track(AXEBOT, "circle:turn_rad_s=1", ControllerFile("pid", options), noise=0.005, duration=4.0)
@@ -85,8 +85,8 @@ def test_settings_that_win_are_kept_and_that_is_said(monkeypatch):
     assert found.verdict.code == "gains_kept"
     assert found.tried.cost > found.before.cost == found.after.cost
     words = str(found.verdict)
-    assert f"{1e3 * found.before.cost:.3g} mm off" in words
-    assert f"tried is {1e3 * found.tried.cost:.3g} mm off" in words
+    assert f"began with: {1e3 * found.before.mean:.3g} mm and" in words
+    assert f"tried is {1e3 * found.tried.mean:.3g} mm and" in words
 
 
 def test_an_mpc_begins_with_what_follows_from_its_robot_and_its_sensors():

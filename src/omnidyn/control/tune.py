@@ -1,12 +1,12 @@
 """tune: settings by simulation, over the robots that may be meant and not only the one the numbers say.
 
     J(g) = geometric mean over the paths, free and, with half the weight, pushed, of
-           sqrt(mean over the robots of (position rmse^2 + (b heading rmse)^2))
+           sqrt(position error x heading error),   each the rms over robots and time, and what does not count
 
-b is the radius of the robot [m]: an error of the heading counts as far as its rim moves. The robots are draws from the
-std and the correlations of the robot file; each is measured with its own sensors, with the same noise and the same
-pushes for every g, so that J has no noise of its own. One setting after the other is made larger or smaller by a factor
-as long as J falls, then by a smaller one; what is found is judged on other draws, noise, pushes and paths.
+So a setting is judged by how many times less both are off. The robots are draws from the std and the correlations of
+the robot file; each is measured with its own sensors, with the same noise and the same pushes for every g, so that J
+has no noise of its own. One setting after the other is made larger or smaller by a factor as long as J falls, then by a
+smaller one; what is found is judged on other draws, noise, pushes and paths.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ DRAWS, EVALUATIONS, NOISE = 3, 30, 0.005
 MOST_DRAWS, MOST_EVALUATIONS = 1000, 10_000
 FACTORS, FARTHEST = (4.0, 2.0), 16.0  # by which a setting is changed, round by round; and from the start at the most
 MOST_RESTLESS = 2.0  # times the start: beyond, what voltages change by from step to step counts as an error
-LEAST_GAIN = 0.01  # of J: what gains less is not taken
+NEGLIGIBLE = (5e-5, 2e-4)  # [m], [rad] of an error that no robot can be told apart by
+LEAST_GAIN = 0.03  # of J: what gains less is not taken
 SECONDS, SKIP = 6.0, 1.0  # [s] that the paths below are followed for, and from the start that count for nothing
 # Turning, through rest on all axes, and at rest: those of the search, and those that it has not seen.
 TRAINING = ("eight:period_s={0},heading=turning,turn_rad_s={1}", "zigzag", "goal:x_m=0,travel_s=1,hold_s=5")
@@ -64,7 +65,7 @@ TUNED: dict[str, dict[str, tuple[float, float]]] = {
         "push_walk": (0.0, 1e9),
         "pose": (0.0, 1e9),
         "volts": (1e-9, 1e9),
-        "horizon": (5, 60),
+        "horizon": (10, 60),
     },
 }
 Setting = float | tuple[float, ...]
@@ -72,10 +73,14 @@ Gains = Mapping[str, Setting]
 
 
 class TuningScore(NamedTuple):
-    """What gains come to over the robots: J [m], the mean and the worst position rmse [m], restlessness [V]."""
+    """What gains come to over the robots.
+
+    J; the mean rmse of position [m] and heading [rad], the worst position rmse [m]; restlessness [V].
+    """
 
     cost: float
     mean: float
+    heading: float
     worst: float
     restless: float
 
@@ -125,7 +130,10 @@ class Tuned(Displayable):
     @property
     def verdict(self) -> Statement:
         """What tuning brought."""
-        numbers = {"before": self.before.cost, "after": self.tried.cost, "evaluations": self.evaluations}
+        scores = {"before": self.before, "after": self.tried}
+        numbers: dict[str, Any] = {name: score.mean for name, score in scores.items()}
+        numbers |= {f"heading_{name}": score.heading for name, score in scores.items()}
+        numbers |= {"less": 1.0 - self.tried.cost / self.before.cost, "evaluations": self.evaluations}
         if not self.better:
             return Statement("gains_kept", NOTE, self.controller.controller, numbers)
         changed = {name: value for name, value in self.gains.items() if value != self.start[name]}
@@ -164,13 +172,13 @@ class Tuned(Displayable):
                 name,
                 f"{1e3 * own_score.mean:.3f}",
                 f"{1e3 * score.mean:.3f}",
+                f"{1e3 * score.heading:.2f}",
                 f"{1e3 * score.worst:.3f}",
-                f"{1e3 * score.cost:.3f}",
                 f"{score.restless:.3f}",
             )
             for name, own_score, score in scores
         ]
-        head = ("", "this robot mm", "robots mm", "worst mm", "with heading mm", "change V")
+        head = ("", "this robot mm", "robots mm", "mrad", "worst mm", "change V")
         table, words = Table(head, rows, "<>", name="scores"), Points(self.statements(), "-", "statements")
         parts: list[Part] = [table, "", words, "", self.controller.to_toml()]
         return Document(parts, self.to_dict(), verdict=self.verdict)
@@ -242,7 +250,7 @@ def tune(
     _check_counts(draws, evaluations, path is None or paths)
     kit, robot = instruments(sensors, robot), told(robot, sensors)
     seconds = SECONDS if path is None and duration is None else duration
-    around = Circumstances(dt, seconds, SKIP, noise, delay, seed, sensors=kit)
+    around = Circumstances(dt, seconds, min(SKIP, 0.5 * (seconds or SECONDS)), noise, delay, seed, sensors=kit)
     spec = controller_spec(controller)
     start = _start(spec, robot)
     follow, judged = [[path_named(item) for item in paths]] * 2 if paths else _paths(robot)
@@ -405,7 +413,6 @@ def _score(
 ) -> TuningScore:
     """What a controller for one robot comes to when it drives the others, free and pushed."""
     control = spec.make(robot, **told_of_loop(robot, around))
-    rim = float(np.mean(robot.wheels.robot_radius))
     force = _force(robot)
     rows: list[list[Tracking]] = []
     weights: list[float] = []
@@ -421,19 +428,21 @@ def _score(
                 row.append(tracked(plant, path, control, under))
             rows.append(row)
     runs = [run for row in rows for run in row]
-    logs = [math.log(max(math.sqrt(float(np.mean([_square(run, rim) for run in row]))), 1e-9)) for row in rows]
+    squares = np.array([[_squares(run) for run in row] for row in rows]).mean(axis=1)
+    logs = 0.5 * np.log(squares + np.square(NEGLIGIBLE)).mean(axis=1)
     errors = [run.rmse_position for run in runs]
     return TuningScore(
         math.exp(float(np.average(logs, weights=weights))),
         float(np.mean(errors)),
+        float(np.mean([run.rmse_heading for run in runs])),
         max(errors),
         float(np.mean([run.restlessness for run in runs])),
     )
 
 
-def _square(tracking: Tracking, rim: float) -> float:
-    """Squared error of a run, heading at the rim included [m^2]."""
-    return tracking.rmse_position**2 + (rim * tracking.rmse_heading) ** 2
+def _squares(tracking: Tracking) -> tuple[float, float]:
+    """Squared errors of a run: of the position [m^2], of the heading [rad^2]."""
+    return tracking.rmse_position**2, tracking.rmse_heading**2
 
 
 # Pushes that nobody announces: a knock, then a long one, each from another side

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from omnidyn.document import all_of
 from omnidyn.statement import Statement
 from omnidyn.telling.sentence import Sentence
@@ -60,11 +63,14 @@ def _gains_tuned(statement: Statement) -> str:
     numbers = statement.numbers
     pairs = zip(numbers["names"], numbers["gains"], strict=True)
     gains = all_of([f"{name} {_setting(value)}" for name, value in pairs])
-    after, before = 1e3 * numbers["after"], 1e3 * numbers["before"]
     return (
-        f"with {gains}, {statement.subject} is {after:.3g} mm off, {before:.3g} mm before "
-        f"({100.0 * (1.0 - after / before):.0f} % less)"
+        f"with {gains}, {statement.subject} is {_error(numbers, 'after')} off, {_error(numbers, 'before')} before: "
+        f"{100.0 * numbers['less']:.0f} % less in the mean of both"
     )
+
+
+def _error(numbers: Mapping[str, Any], which: str) -> str:
+    return f"{1e3 * numbers[which]:.3g} mm and {1e3 * numbers[f'heading_{which}']:.3g} mrad"
 
 
 def _setting(value: float | tuple[float, ...]) -> str:
@@ -74,10 +80,10 @@ def _setting(value: float | tuple[float, ...]) -> str:
 def _gains_kept(statement: Statement) -> str:
     """The settings at the start stay: nothing that was tried is better where the search has not been."""
     numbers, name = statement.numbers, statement.subject
-    after, before = 1e3 * numbers["after"], 1e3 * numbers["before"]
     return (
-        f"{name} keeps the settings it began with: {before:.3g} mm off; the best of {numbers['evaluations']} "
-        f"tried is {after:.3g} mm off"
+        f"{name} keeps the settings it began with: {_error(numbers, 'before')} off; the best of "
+        f"{numbers['evaluations']} tried is {_error(numbers, 'after')} off, "
+        f"{-100.0 * numbers['less']:.0f} % more in the mean of both"
     )
 
 
@@ -92,7 +98,7 @@ def _optimised(statement: Statement) -> str:
         f"{100.0 * numbers['radius']:g} %)"
     )
     return (
-        f"optimised: rms distance from the path and rim error of the heading along {all_of(numbers['paths'])}, free "
+        f"optimised: the geometric mean of rms position and heading error along {all_of(numbers['paths'])}, free "
         f"and pushed, over {robots}; sensors {numbers['sensors']}, noise {numbers['noise']:g} m/s, delay "
         f"{numbers['delay']} steps, {numbers['dt']:g} s a step; {numbers['evaluations']} settings tried"
     )
