@@ -333,7 +333,7 @@ def _paths(robot: Robot) -> tuple[list[Path], list[Path]]:
     return training, held_out
 
 
-RESISTANCE, MASS, RADIUS = 0.15, 0.1, 0.01  # by which a robot may be off whose file says nothing of that
+RESISTANCE, MASS, RADIUS = 0.15, 0.1, 0.003  # by which a robot may be off whose file says nothing of that
 
 
 def _near(robot: Robot, count: int, seed: int, radius: float) -> list[Robot]:
