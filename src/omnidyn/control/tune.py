@@ -60,9 +60,8 @@ TUNED: dict[str, dict[str, tuple[float, float]]] = {
     "pid": {"faster": (0.05, 1000.0), "integral": (0.01, 1.0)},
     "speed": {"faster": (0.05, 1000.0)},
     "mpc": {
-        "noise": (0.0, 1e9),
+        "push_walk": (0.0, 1e9),  # beside noise, which is best on a plant that is ours and not on another
         "pose_noise": (0.0, 1e9),
-        "push_walk": (0.0, 1e9),
         "pose": (0.0, 1e9),
         "volts": (1e-9, 1e9),
         "horizon": (10, 60),
