@@ -38,6 +38,7 @@ NAMES = {
     "control_mismatch": "the same with wrong friction, payload, slip, jumps, missing samples, latency (a minute)",
     "control_chain": "log, identify, track on these plants: a guessed robot beside the fitted one (two minutes)",
     "control_casadi": "the predictive controller beside CasADi with IPOPT on these plants (a minute)",
+    "tune": "what tune finds, on an independent plant: errors before and after, three robots and sensors (15 minutes)",
     "coloured": "output error where errors have a memory: coverage, std beside the Cramer-Rao bound (an hour)",
     "forces": "a right robot under random forces of the floor: what is found, what intervals hold (ten minutes)",
     "ten_robots": "ten robots of a simulator of its own: init, then identify: coverage, what is reported (10 minutes)",

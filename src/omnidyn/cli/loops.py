@@ -142,20 +142,23 @@ def _record(robot: str, plant: str, files: list[str]) -> dict[str, Any]:
 
 def tune(
     robot: str = typer.Argument(metavar="ROBOT", help="A preset or a robot file; its std say what else may be meant."),
-    path: list[str] = typer.Option(..., "--path", metavar="NAME|FILE", help="As for track. Repeatable."),
+    path: list[str] = typer.Option(
+        [], "--path", metavar="NAME|FILE", help="As for track. Repeatable. Default: three that turn, reverse and hold."
+    ),
     controller: str = typer.Option("pid", "--controller", metavar="NAME|FILE", help="pid, speed, mpc, or a .toml."),
-    draws: int = typer.Option(8, help="Robots that are driven, drawn from the std of the file."),
+    draws: int = typer.Option(3, help="Robots that are driven, drawn from the std of the file."),
     evaluations: int = typer.Option(30, help="Settings that are tried, at the most."),
     noise: float = typer.Option(0.005, help="Std of the measured speeds [m/s]; other measurements in proportion."),
     delay: int = typer.Option(0, help="Steps until an output acts."),
     dt: float = typer.Option(0.02, help="Time between two steps [s]."),
     duration: float | None = typer.Option(None, help="How long to track [s]; default: as long as the path."),
-    seed: int = typer.Option(0, min=0, help="Of the draws and of the noise."),
+    sensors: str = SENSORS,
+    seed: int = typer.Option(0, min=0, help="Of draws, noise and pushes."),
     out: str = typer.Option("", "-o", "--out", metavar="FILE", help="The controller file, .toml."),
     force: bool = typer.Option(False, "--force", help="Replace the file if it exists."),
     json: bool = typer.Option(False, "--json", help="For machines."),
 ) -> None:
-    """Find the gains of a controller on simulated robots: all that the robot file says may be meant."""
+    """Find the settings of a controller on simulated robots, free and pushed: all that the file says may be meant."""
     if out:
         if not out.endswith(".toml"):
             raise InputError("another kind of file", got=out, expected="a name that ends in .toml", where="out")
@@ -171,7 +174,7 @@ def tune(
     with shown_progress("tuning") as progress:
         tuned = tune_controller(
             loaded,
-            path,
+            path or None,
             controller,
             draws=draws,
             evaluations=evaluations,
@@ -180,6 +183,7 @@ def tune(
             dt=dt,
             duration=duration,
             seed=seed,
+            sensors=sensors or None,
             progress=progress,
         )
     if out:

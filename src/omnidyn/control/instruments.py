@@ -24,7 +24,7 @@ from omnidyn.errors import InputError
 from omnidyn.model.frames import body_to_world, world_to_body
 from omnidyn.model.log_effects import FASTEST, INSTANTANEOUS, LATEST_POSE, MEAN, SLOWEST_FILTER, Sensors
 from omnidyn.model.robot import Robot
-from omnidyn.model.wheels import twist_from_wheel_speed, wheel_speed
+from omnidyn.model.wheels import Wheels, twist_from_wheel_speed, wheel_speed
 from omnidyn.simulation.live import LiveRobot
 
 MOST_COUNTS, MOST_JITTER, MOST_LOST = 1e7, 0.5, 0.9  # in a turn, of a step, of samples and of steps
@@ -178,14 +178,21 @@ class _Moment(NamedTuple):
 
 
 class Readings:
-    """What instruments show of a live robot, step by step. noise (6,): std of what no encoder counts, before a filter.
+    """What instruments show of a live robot, step by step. Call `seen` once, then `passed`, in turns.
 
-    Call `seen` once, then `passed`, in turns.
+    Args:
+        kit: the instruments.
+        live: the robot.
+        start: the time now [s].
+        noise: std of what no encoder counts, before a filter, shape (6,).
+        believed: wheels by whose size and place counts become a twist; those of the robot by default.
     """
 
-    def __init__(self, kit: Instruments, live: LiveRobot, start: float, noise: FloatArray) -> None:
+    def __init__(
+        self, kit: Instruments, live: LiveRobot, start: float, noise: FloatArray, believed: Wheels | None = None
+    ) -> None:
         self._kit, self._live, self._noise = kit, live, noise
-        self._wheels = live.robot.wheels
+        self._wheels, self._believed = live.robot.wheels, believed or live.robot.wheels
         self._turn = None if kit.counts is None else 2.0 * math.pi / kit.counts  # [rad] of a count
         self._angles = self._counted = np.zeros(self._wheels.count)
         self._slipping = live.wheel_speed - wheel_speed(self._wheels, live.twist)
@@ -208,7 +215,7 @@ class Readings:
         self._angles = self._angles + wheel_speed(self._wheels, moved) + 0.5 * seconds * (slipping + self._slipping)
         self._slipping, self._seconds = slipping, seconds
         counted = self._angles if self._turn is None else np.floor(self._angles / self._turn) * self._turn
-        way = twist_from_wheel_speed(self._wheels, counted - self._counted)
+        way = twist_from_wheel_speed(self._believed, counted - self._counted)
         self._counted_pose = self._counted_pose + body_to_world(self._counted_pose[2] + 0.5 * way[2]) @ way
         self._counted = counted
         self._twist = way / seconds if self._kit.sensors.twist == MEAN else np.array(self._live.twist)

@@ -1,27 +1,30 @@
-"""tune: gains by simulation, over the robots that may be meant and not only the one the numbers say.
+"""tune: settings by simulation, over the robots that may be meant and not only the one the numbers say.
 
-    J(g) = geometric mean over the paths of  sqrt(mean over the robots of (position rmse^2 + (b heading rmse)^2))
+    J(g) = geometric mean over the paths, free and, with half the weight, pushed, of
+           sqrt(position error x heading error),   each the rms over robots and time, and what does not count
 
-b is the radius of the robot [m]: an error of the heading counts as far as its rim moves. The robots are draws from the
-std and the correlations of the robot file; each is driven with the same noise for every g, so that J has no noise of
-its own. A search by Nelder and Mead (1965) finds the least J; what it says of that is checked on other draws.
+So a setting is judged by how many times less both are off. The robots are draws from the std and the correlations of
+the robot file; each is measured with its own sensors, with the same noise and the same pushes for every g, so that J
+has no noise of its own. One setting after the other is made larger or smaller by a factor as long as J falls, then by a
+smaller one; what is found is judged on other draws, noise, pushes and paths.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize
 
 from omnidyn.arguments import check_order
 from omnidyn.arrays import FloatArray
-from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
+from omnidyn.control.closed_loop import Circumstances, Push, told_of_loop, tracked
 from omnidyn.control.controllers import ControllerFile, controller_spec, options_of
+from omnidyn.control.demand import path_demand
 from omnidyn.control.feedforward import DT
+from omnidyn.control.instruments import Instruments, instruments, told
 from omnidyn.control.mpc.settings import Settings
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.paths.path import is_several
@@ -29,55 +32,54 @@ from omnidyn.control.paths.path import path as path_named
 from omnidyn.control.tracking import Tracking
 from omnidyn.document import Document, Part, Points, Table, all_of, plain
 from omnidyn.errors import InputError
-from omnidyn.model.known.told import told
+from omnidyn.model.inverse import inverse
+from omnidyn.model.known.told import told as known_errors
 from omnidyn.model.known.uncertainty import plausible
+from omnidyn.model.log_effects import Sensors
+from omnidyn.model.motor import SPEED
 from omnidyn.model.robot import Robot
+from omnidyn.model.value import PerWheel
 from omnidyn.progress import Progress, Report, silent
 from omnidyn.shown import Displayable
 from omnidyn.statement import NOTE, Statement, as_verdict
 
-DRAWS, EVALUATIONS, NOISE = 8, 30, 0.005
+DRAWS, EVALUATIONS, NOISE = 3, 30, 0.005
 MOST_DRAWS, MOST_EVALUATIONS = 1000, 10_000
-SPREAD = 0.15  # of the range of each gain: the first step of the search
-GAIN_TOLERANCE = 1e-3  # of J: a search that gains less has ended
-
-
-class Range(NamedTuple):
-    """Between which values a gain is looked for, and whether on a logarithmic scale."""
-
-    low: float
-    high: float
-    log: bool = True
-
-    def at(self, place: float) -> float:
-        """The value at a place from 0 to 1, four digits of it."""
-        share = min(1.0, max(0.0, place))
-        value = self.low * (self.high / self.low) ** share if self.log else self.low + share * (self.high - self.low)
-        return float(f"{value:.4g}")
-
-    def of(self, value: float) -> float:
-        """The place of a value."""
-        inside = min(self.high, max(self.low, value))
-        return (
-            math.log(inside / self.low) / math.log(self.high / self.low)
-            if self.log
-            else ((inside - self.low) / (self.high - self.low))
-        )
-
-
-# Controller -> option -> where its best value is looked for.
-TUNED: dict[str, dict[str, Range]] = {
-    "pid": {"faster": Range(0.3, 20.0), "integral": Range(0.0, 1.0, log=False)},
-    "speed": {"faster": Range(0.3, 20.0)},
-    "mpc": {"volts": Range(1e-6, 1.0), "scale_walk": Range(5e-4, 0.1)},
+FACTORS, FARTHEST = (4.0, 2.0), 16.0  # by which a setting is changed, round by round; and from the start at the most
+MOST_RESTLESS = 2.0  # times the start: beyond, what voltages change by from step to step counts as an error
+NEGLIGIBLE = (5e-5, 2e-4)  # [m], [rad] of an error that no robot can be told apart by
+LEAST_GAIN = 0.03  # of J: what gains less is not taken
+SECONDS, SKIP = 6.0, 1.0  # [s] that the paths below are followed for, and from the start that count for nothing
+# Turning, through rest on all axes, and at rest: those of the search, and those that it has not seen.
+TRAINING = ("eight:period_s={0},heading=turning,turn_rad_s={1}", "zigzag", "goal:x_m=0,travel_s=1,hold_s=5")
+HELD_OUT = ("circle:period_s={0},turn_rad_s={1}", "goal:x_m=0.5,y_m=0.3,heading_rad=1.5,travel_s=3,hold_s=3")
+PERIODS = (6.0, 12.0, 24.0, 48.0, 96.0)  # [s] of their first, the shortest that the robot can follow
+TURNED = 3.6  # [rad] in a period
+# Controller -> option -> the values that it may have.
+TUNED: dict[str, dict[str, tuple[float, float]]] = {
+    "pid": {"faster": (0.05, 1000.0), "integral": (0.01, 1.0)},
+    "speed": {"faster": (0.05, 1000.0)},
+    "mpc": {
+        "push_walk": (0.0, 1e9),  # beside noise, which is best on a plant that is ours and not on another
+        "pose_noise": (0.0, 1e9),
+        "pose": (0.0, 1e9),
+        "volts": (1e-9, 1e9),
+        "horizon": (10, 60),
+    },
 }
+Setting = float | tuple[float, ...]
+Gains = Mapping[str, Setting]
 
 
 class TuningScore(NamedTuple):
-    """What gains come to over the robots: J [m], the mean and the worst position rmse [m], restlessness [V]."""
+    """What gains come to over the robots.
+
+    J; the mean rmse of position [m] and heading [rad], the worst position rmse [m]; restlessness [V].
+    """
 
     cost: float
     mean: float
+    heading: float
     worst: float
     restless: float
 
@@ -86,54 +88,69 @@ class TuningScore(NamedTuple):
 class Tuned(Displayable):
     """What `tune` found.
 
-    robot, paths: names. controller: with the gains found, as a file has it. start: the gains it began with. before,
-    after: of these and of those found, over robots and noise that the search has not seen. own_before, own_after: on
-    the robot of the file itself.
-    draws: robots the search drove, 0 where the file says nothing of how far its numbers may be off: then it was the
-    robot of the file alone. evaluations: gains that were tried. noise [m/s], delay [steps], dt [s]: of the loops.
+    robot, paths, judged_on: names. controller: with the gains chosen, as a file has it. start: the gains it began with.
+    before, after: of these and of those chosen, over robots, noise, pushes and paths that the search has not seen;
+    tried: of the best of the search there. own_before, own_after: on the robot of the file itself.
+    draws: robots the search drove; uncertain: whether the file says how far its numbers may be off: else they are near
+    it. evaluations: gains that were tried. noise [m/s], delay [steps], dt [s], sensors: of the loops.
     """
 
     robot: str
     paths: tuple[str, ...]
+    judged_on: tuple[str, ...]
     controller: ControllerFile
-    start: Mapping[str, float]
+    start: Gains
     before: TuningScore
     after: TuningScore
+    tried: TuningScore
     own_before: TuningScore
     own_after: TuningScore
     draws: int
+    uncertain: bool
     evaluations: int
     noise: float
     delay: int
     dt: float
+    sensors: str
 
     def __repr__(self) -> str:
         return f"<Tuned {self.controller.controller} for {self.robot}: {dict(self.gains)}>"
 
     @property
-    def gains(self) -> dict[str, float]:
-        """The gains found."""
+    def gains(self) -> dict[str, Setting]:
+        """The gains chosen."""
         return {name: self.controller.options[name] for name in self.start}
 
     @property
     def better(self) -> bool:
-        """Whether they are better than those it began with, on robots that the search has not seen."""
+        """Whether they are better than those it began with, where the search has not been."""
         return self.after.cost < self.before.cost
 
     @property
     def verdict(self) -> Statement:
         """What tuning brought."""
-        errors = {"before": self.before.mean, "after": self.after.mean}
+        scores = {"before": self.before, "after": self.tried}
+        numbers: dict[str, Any] = {name: score.mean for name, score in scores.items()}
+        numbers |= {f"heading_{name}": score.heading for name, score in scores.items()}
+        numbers |= {"less": 1.0 - self.tried.cost / self.before.cost, "evaluations": self.evaluations}
         if not self.better:
-            return Statement("gains_kept", NOTE, self.controller.controller, errors)
-        gains = {"names": [*self.gains], "gains": [*self.gains.values()]}
-        return Statement("gains_tuned", NOTE, self.controller.controller, errors | gains)
+            return Statement("gains_kept", NOTE, self.controller.controller, numbers)
+        changed = {name: value for name, value in self.gains.items() if value != self.start[name]}
+        numbers |= {"names": [*changed], "gains": [*changed.values()]}
+        return Statement("gains_tuned", NOTE, self.controller.controller, numbers)
 
     def statements(self) -> list[Statement]:
         """What was optimised, and what that gave up."""
-        names = ("paths", "draws", "noise", "delay", "dt", "evaluations")
-        statements = [Statement("optimised", NOTE, numbers={name: getattr(self, name) for name in names})]
-        statements += [Statement("judged_on_other_draws", NOTE)] if self.draws else []
+        names = ("paths", "draws", "uncertain", "noise", "delay", "dt", "evaluations", "sensors")
+        numbers = {name: getattr(self, name) for name in names} | {
+            "resistance": RESISTANCE,
+            "mass": MASS,
+            "radius": RADIUS,
+        }
+        statements = [
+            Statement("optimised", NOTE, numbers=numbers),
+            Statement("judged_elsewhere", NOTE, numbers={"paths": self.judged_on}),
+        ]
         errors = {
             "given_up_rest": (self.before.restless, self.after.restless),
             "given_up_on_file": (self.own_before.mean, self.own_after.mean),
@@ -148,36 +165,39 @@ class Tuned(Displayable):
 
     def document(self) -> Document:
         """What it says."""
+        scores = (("before", self.own_before, self.before), ("tuned", self.own_after, self.after))
         rows = [
             (
                 name,
                 f"{1e3 * own_score.mean:.3f}",
                 f"{1e3 * score.mean:.3f}",
+                f"{1e3 * score.heading:.2f}",
                 f"{1e3 * score.worst:.3f}",
                 f"{score.restless:.3f}",
             )
-            for name, own_score, score in (
-                ("before", self.own_before, self.before),
-                ("tuned", self.own_after, self.after),
-            )
+            for name, own_score, score in scores
         ]
-        head = ("", "this robot mm", "robots mm", "worst mm", "change V")
-        scores, words = Table(head, rows, "<>", name="scores"), Points(self.statements(), "-", "statements")
-        parts: list[Part] = [scores, "", words, "", self.controller.to_toml()]
+        head = ("", "this robot mm", "robots mm", "mrad", "worst mm", "change V")
+        table, words = Table(head, rows, "<>", name="scores"), Points(self.statements(), "-", "statements")
+        parts: list[Part] = [table, "", words, "", self.controller.to_toml()]
         return Document(parts, self.to_dict(), verdict=self.verdict)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
-        scores = {name: getattr(self, name)._asdict() for name in ("before", "after", "own_before", "own_after")}
+        names = ("before", "after", "tried", "own_before", "own_after")
+        scores = {name: getattr(self, name)._asdict() for name in names}
         return plain(
             {
                 "robot": self.robot,
                 "paths": self.paths,
+                "judged_on": self.judged_on,
                 "controller": self.controller.controller,
                 "options": dict(self.controller.options),
                 "start": dict(self.start),
                 **scores,
                 "draws": self.draws,
+                "uncertain": self.uncertain,
+                "sensors": self.sensors,
                 "evaluations": self.evaluations,
                 "better": self.better,
                 "statements": self.statements(),
@@ -188,7 +208,7 @@ class Tuned(Displayable):
 
 def tune(
     robot: Robot,
-    path: Any,
+    path: Any = None,
     controller: str = "pid",
     *,
     draws: int = DRAWS,
@@ -198,15 +218,18 @@ def tune(
     dt: float = DT,
     duration: float | None = None,
     seed: int = 0,
+    sensors: str | Instruments | Sensors | None = None,
     progress: Progress = silent,
 ) -> Tuned:
-    """Find the gains of a controller by simulation, over the robots that the file says may be meant.
+    """Find the settings of a controller by simulation, over the robots that the file says may be meant.
 
-    Returns a Tuned, whose `controller` is what `track` reads from a file (`save_controller`).
+    Every path is driven free, and with pushes that come and go. Returns a Tuned, whose `controller` is what `track`
+    reads from a file (`save_controller`); the settings it began with where none that was found is better.
 
     Args:
-        robot: The robot, its std with it.
-        path: A Path or what `omnidyn.path` takes; or a list of several.
+        robot: The robot, its std and its sensors with it.
+        path: A Path or what `omnidyn.path` takes; or a list of several. By default paths that turn, go through rest and
+            stay there; what is found is then judged on others.
         controller: A name or a controller file: its options are where the search begins.
         draws: Robots that are driven.
         evaluations: Settings that are tried, at the most.
@@ -214,69 +237,68 @@ def tune(
         delay: As for `track`.
         dt: As for `track` [s].
         duration: As for `track` [s].
-        seed: As for `track`.
+        seed: As for `track`; of the draws and pushes too.
+        sensors: As for `track`.
         progress: Hears what is being driven.
 
     Raises InputError for a controller without gains, or a number out of range.
     """
-    paths: list[Any] = list(path) if is_several(path) else [path]
+    paths: list[Any] = [] if path is None else list(path) if is_several(path) else [path]
     kinds = (Path, str) if isinstance(path, Robot) else object
     check_order("tune(robot, path, controller)", (robot, Robot), (paths, kinds), (controller, str))
-    _check_counts(draws, evaluations, paths)
-    around = Circumstances(dt, duration, noise=noise, delay=delay, seed=seed)
-    follow = [path_named(item) for item in paths]
+    _check_counts(draws, evaluations, path is None or paths)
+    kit, robot = instruments(sensors, robot), told(robot, sensors)
+    seconds = SECONDS if path is None and duration is None else duration
+    around = Circumstances(dt, seconds, min(SKIP, 0.5 * (seconds or SECONDS)), noise, delay, seed, sensors=kit)
     spec = controller_spec(controller)
-    ranges = _ranges(spec)
-    uncertain = bool(told(robot).keys)
-    training = plausible(robot, draws, seed) if uncertain else [robot]
-    held_out = plausible(robot, draws, seed + 1) if uncertain else [robot]
-    trials: list[tuple[float, dict[str, float]]] = []
+    start = _start(spec, robot)
+    follow, judged = [[path_named(item) for item in paths]] * 2 if paths else _paths(robot)
+    uncertain = bool(known_errors(robot).keys)
+    training, held_out = (
+        plausible(robot, draws, k) if uncertain else _near(robot, draws, k, 0.0 if kit.odometry else RADIUS)
+        for k in (seed, seed + 1)
+    )
+    count, rest = 0, math.inf
 
-    def cost(places: FloatArray) -> float:
-        gains = {
-            name: interval.at(float(place)) for (name, interval), place in zip(ranges.items(), places, strict=True)
-        }
-        outside = float(np.sum(np.maximum(np.abs(places - 0.5) - 0.5, 0.0)))
-        progress(Report(f"trying {', '.join(f'{name} {value:g}' for name, value in gains.items())}"))
-        value = _score(robot, training, follow, _with(spec, gains), around).cost
-        trials.append((value, gains))
-        return math.log(value) + outside
+    def cost(gains: Gains) -> float:
+        nonlocal count, rest
+        count += 1
+        progress(Report(f"trying {', '.join(f'{name} {_text(value)}' for name, value in gains.items())}"))
+        score = _score(robot, training, follow, _with(spec, gains), around)
+        rest = min(rest, MOST_RESTLESS * score.restless) if count == 1 else rest
+        return score.cost * max(1.0, score.restless / rest)
 
-    defaults = options_of(spec.controller)
-    if "volts" in ranges:  # by default it follows from the robot
-        defaults["volts"] = Settings().of(robot).volts
-    start = {name: float(spec.options.get(name, defaults[name])) for name in ranges}
-    first = np.array([interval.of(start[name]) for name, interval in ranges.items()])
-    corners = np.vstack([first, *(first + _aside(first, k) for k in range(len(first)))])
-    options = {"maxfev": evaluations, "initial_simplex": corners, "xatol": 1e-2, "fatol": GAIN_TOLERANCE}
-    minimize(cost, first, method="Nelder-Mead", options=options)
-    best = min(trials, key=lambda trial: trial[0])[1]
-    old, new = _with(spec, start), _with(spec, best)
-    fresh = replace(around, seed=seed + 1)
-    before, after = (_score(robot, held_out, follow, gains, fresh) for gains in (old, new))
-    own_before, own_after = (_score(robot, [robot], follow, gains, fresh) for gains in (old, new))
-    if after.cost >= before.cost:
-        new, after, own_after = old, before, own_before
-    names = tuple(route.name for route in follow)
-    source = f"tuned for {robot.name} on {all_of(names)}, {draws if uncertain else 0} draws, seed {seed}"
+    best = _search(start, TUNED[spec.controller], cost, evaluations)
+    old, new, fresh = _with(spec, start), _with(spec, best), replace(around, seed=seed + 1)
+    before, tried = (_score(robot, held_out, judged, gains, fresh) for gains in (old, new))
+    if tried.cost > (1.0 - LEAST_GAIN) * before.cost:
+        new = old
+    after = before if new is old else tried
+    own_before, own_after = (_score(robot, [robot], judged, gains, fresh) for gains in (old, new))
+    names, judged_names = (tuple(route.name for route in routes) for routes in (follow, judged))
+    source = f"tuned for {robot.name} on {all_of(names)}, {draws} draws, seed {seed}"
     return Tuned(
         robot.name,
         names,
+        judged_names,
         replace(new, source=source),
         start,
         before,
         after,
+        tried,
         own_before,
         own_after,
-        draws if uncertain else 0,
-        len(trials),
+        draws,
+        uncertain,
+        count,
         noise,
         delay,
         dt,
+        str(kit),
     )
 
 
-def _check_counts(draws: int, evaluations: int, paths: Sequence[Any]) -> None:
+def _check_counts(draws: int, evaluations: int, paths: Any) -> None:
     for name, value, largest in (("draws", draws, MOST_DRAWS), ("evaluations", evaluations, MOST_EVALUATIONS)):
         if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= largest:
             raise InputError("out of range", got=value, expected=f"1 to {largest}", where=name)
@@ -284,8 +306,8 @@ def _check_counts(draws: int, evaluations: int, paths: Sequence[Any]) -> None:
         raise InputError("nothing to follow", got="no path", expected="a path, or several", where="path")
 
 
-def _ranges(spec: ControllerFile) -> dict[str, Range]:
-    """The gains of a controller that are looked for. Raises InputError where it has none."""
+def _start(spec: ControllerFile, robot: Robot) -> dict[str, Setting]:
+    """The settings that are looked for, as they are at first. Raises InputError where a controller has none."""
     if spec.controller not in TUNED:
         raise InputError(
             "this controller has no gains",
@@ -294,38 +316,163 @@ def _ranges(spec: ControllerFile) -> dict[str, Range]:
             remedy="it follows from the robot alone",
             where="controller",
         )
-    return TUNED[spec.controller]
+    defaults = options_of(spec.controller)
+    if "volts" in defaults:  # some follow from the robot
+        defaults |= vars(Settings().of(robot))
+    values = {name: spec.options.get(name, defaults[name]) for name in TUNED[spec.controller]}
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in values.items()}
 
 
-def _with(spec: ControllerFile, gains: Mapping[str, float]) -> ControllerFile:
+def _paths(robot: Robot) -> tuple[list[Path], list[Path]]:
+    """Those of the search, and those that judge it: as fast as the robot can."""
+    words = [(f"{period:g}", f"{TURNED / period:.3g}") for period in PERIODS]
+    able = (pair for pair in words if path_demand(robot, TRAINING[0].format(*pair)).follows)
+    period, turn = next(able, words[-1])
+    training, held_out = ([path_named(name.format(period, turn)) for name in names] for names in (TRAINING, HELD_OUT))
+    return training, held_out
+
+
+RESISTANCE, MASS, RADIUS = 0.15, 0.1, 0.003  # by which a robot may be off whose file says nothing of that
+
+
+def _near(robot: Robot, count: int, seed: int, radius: float) -> list[Robot]:
+    """Robots near one: heavier or lighter, with stronger or weaker motors, and wheels whose radius is off.
+
+    radius: share of it; 0 where the pose comes from these wheels alone: no setting makes good what that costs.
+    """
+    random, near = np.random.default_rng([seed, 2]), []
+    even = (2.0 * np.arange(count) + 1.0) / count - 1.0  # few draws, but of all sizes
+    off = np.stack([random.permutation(even) for _ in range(3)], axis=1)
+    for motor, mass, size in (1.0 + off * (RESISTANCE, MASS, radius)).tolist():
+        heavier = {name: _times(getattr(robot.body, name), mass) for name in ("mass", "inertia")}
+        near.append(
+            robot.replace(
+                motor=robot.motor.replace(resistance=_times(robot.motor.resistance, motor)),
+                body=robot.body.replace(**heavier),
+                wheels=robot.wheels.replace(wheel_radius=_times(robot.wheels.wheel_radius, size)),
+            )
+        )
+    return near
+
+
+def _times(value: PerWheel, factor: float) -> PerWheel:
+    """A number, or one for each wheel, times a factor."""
+    return tuple(factor * number for number in value) if isinstance(value, tuple) else factor * value
+
+
+def _search(
+    start: Gains, bounds: Mapping[str, tuple[float, float]], cost: Callable[[Gains], float], evaluations: int
+) -> Gains:
+    """The best settings found: one after the other is changed by a factor, either way, as long as the cost falls."""
+    best, least, left = start, cost(start), evaluations - 1
+    for factor in FACTORS:
+        for name, bound in bounds.items():
+            for change in (factor, 1.0 / factor):
+                value = _changed(best[name], change, bound)
+                went = False
+                while left > 0 and value != best[name] and _is_near(value, start[name]):
+                    left -= 1
+                    candidate = {**best, name: value}
+                    found = cost(candidate)
+                    if not found < (1.0 - LEAST_GAIN) * least:
+                        break
+                    best, least, went = candidate, found, True
+                    value = _changed(value, change, bound)
+                if went:
+                    break
+    return best
+
+
+def _changed(value: Setting, factor: float, bound: tuple[float, float]) -> Setting:
+    """A setting times a factor, within its bounds, to four digits; an integer stays one."""
+    if isinstance(value, tuple):
+        return tuple(float(f"{factor * number:.4g}") for number in value)
+    changed = min(max(factor * value, bound[0]), bound[1])
+    return round(changed) if isinstance(value, int) else float(f"{changed:.4g}")
+
+
+def _is_near(value: Setting, start: Setting) -> bool:
+    """Whether a setting is within FARTHEST times of that at the start, either way."""
+    now, before = (entry[0] if isinstance(entry, tuple) else entry for entry in (value, start))
+    return before <= FARTHEST * now * 1.01 and now <= FARTHEST * before * 1.01
+
+
+def _text(value: Setting) -> str:
+    """A setting in words."""
+    numbers = value if isinstance(value, tuple) else (value,)
+    return " ".join(f"{number:.4g}" for number in numbers)
+
+
+def _with(spec: ControllerFile, gains: Gains) -> ControllerFile:
     return replace(spec, options={**spec.options, **gains})
-
-
-def _aside(first: FloatArray, k: int) -> FloatArray:
-    """A step along one gain, inwards."""
-    step = np.zeros(len(first))
-    step[k] = SPREAD if first[k] < 0.5 else -SPREAD
-    return step
 
 
 def _score(
     robot: Robot, plants: Sequence[Robot], paths: Sequence[Path], spec: ControllerFile, around: Circumstances
 ) -> TuningScore:
-    """What a controller for one robot comes to when it drives the others."""
+    """What a controller for one robot comes to when it drives the others, free and pushed."""
     control = spec.make(robot, **told_of_loop(robot, around))
-    rim = float(np.mean(robot.wheels.robot_radius))
-    runs = [[tracked(plant, path, control, around) for plant in plants] for path in paths]
-    all_runs = [run for row in runs for run in row]
-    logs = [math.log(max(math.sqrt(float(np.mean([_square(run, rim) for run in row]))), 1e-9)) for row in runs]
-    errors = [run.rmse_position for run in all_runs]
+    force = _force(robot)
+    rows: list[list[Tracking]] = []
+    weights: list[float] = []
+    for path in paths:
+        for pushed in (False, True) if force.any() else (False,):
+            row = []
+            weights.append(PUSHED if pushed else 1.0)
+            for k, plant in enumerate(plants):
+                seed = [around.seed, k, len(rows)]
+                push = _pushes(force, around.duration or path.duration, np.random.default_rng(seed)) if pushed else None
+                number = int(np.random.default_rng(seed).integers(2**31))
+                under = replace(around, seed=number, **({} if push is None else {"push": push}))
+                row.append(tracked(plant, path, control, under))
+            rows.append(row)
+    runs = [run for row in rows for run in row]
+    squares = np.array([[_squares(run) for run in row] for row in rows]).mean(axis=1)
+    logs = 0.5 * np.log(squares + np.square(NEGLIGIBLE)).mean(axis=1)
+    errors = [run.rmse_position for run in runs]
     return TuningScore(
-        math.exp(float(np.mean(logs))),
+        math.exp(float(np.average(logs, weights=weights))),
         float(np.mean(errors)),
+        float(np.mean([run.rmse_heading for run in runs])),
         max(errors),
-        float(np.mean([run.restlessness for run in all_runs])),
+        float(np.mean([run.restlessness for run in runs])),
     )
 
 
-def _square(tracking: Tracking, rim: float) -> float:
-    """Squared error of a run, heading at the rim included [m^2]."""
-    return tracking.rmse_position**2 + (rim * tracking.rmse_heading) ** 2
+def _squares(tracking: Tracking) -> tuple[float, float]:
+    """Squared errors of a run: of the position [m^2], of the heading [rad^2]."""
+    return tracking.rmse_position**2, tracking.rmse_heading**2
+
+
+# Pushes that nobody announces: a knock, then a long one, each from another side
+
+PUSH_EVERY, KNOCK, KNOCK_FORCE, LONG, LONG_FORCE = 2.0, 0.15, 3.0, 1.2, 0.8  # [s], [s], of dry friction, [s], of it
+PUSHED = 0.5  # weight of a run that is pushed, beside one that is not
+LEAST_PUSH = 0.5  # [m/s^2], [rad/s^2]: where little rubs
+
+
+def _force(robot: Robot) -> FloatArray:
+    """What pushes are measured by: the dry friction of each axis [N, N, N m]; zeros where none can be simulated."""
+    if robot.wheels.traction_mu is not None and robot.drive.kind == SPEED:
+        return np.zeros(3)
+    model = inverse(robot)
+    sliding = -model.friction(np.eye(3), np.zeros((3, 3)))[range(3), range(3)]
+    viscous = (model.levels.directions**2).T @ model.levels.viscous
+    return np.maximum(sliding - viscous, LEAST_PUSH * np.diag(model.mass))
+
+
+def _pushes(force: FloatArray, duration: float, random: np.random.Generator) -> Callable[[float], Push]:
+    """The wrench at a time [s] of a run."""
+    count = math.ceil(duration / PUSH_EVERY) + 1
+    sides = random.uniform(-1.0, 1.0, (count, 3)) * force
+    starts = PUSH_EVERY * np.arange(count) + random.uniform(0.2, PUSH_EVERY - LONG, count)
+
+    def push(t: float) -> Push:
+        k = min(max(int(t / PUSH_EVERY), 0), count - 1)
+        length, share = (KNOCK, KNOCK_FORCE) if k % 2 == 0 else (LONG, LONG_FORCE)
+        if not starts[k] <= t < starts[k] + length:
+            return (0.0, 0.0, 0.0)
+        x, y, turn = (share * sides[k]).tolist()
+        return (x, y, turn)
+
+    return push

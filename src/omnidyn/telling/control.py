@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from omnidyn.document import all_of
 from omnidyn.statement import Statement
 from omnidyn.telling.sentence import Sentence
@@ -56,23 +59,56 @@ def _volts(statement: Statement) -> str:
 
 
 def _gains_tuned(statement: Statement) -> str:
-    """Tuned gains, and the error with them and before."""
+    """Tuned settings, and the error with them and before."""
     numbers = statement.numbers
-    gains = all_of([f"{name} {value:g}" for name, value in zip(numbers["names"], numbers["gains"], strict=True)])
-    after, before = 1e3 * numbers["after"], 1e3 * numbers["before"]
-    return f"with {gains}, {statement.subject} is {after:.3g} mm off in the mean, {before:.3g} mm before"
+    pairs = zip(numbers["names"], numbers["gains"], strict=True)
+    gains = all_of([f"{name} {_setting(value)}" for name, value in pairs])
+    return (
+        f"with {gains}, {statement.subject} is {_error(numbers, 'after')} off, {_error(numbers, 'before')} before: "
+        f"{100.0 * numbers['less']:.0f} % less in the mean of both"
+    )
+
+
+def _error(numbers: Mapping[str, Any], which: str) -> str:
+    return f"{1e3 * numbers[which]:.3g} mm and {1e3 * numbers[f'heading_{which}']:.3g} mrad"
+
+
+def _setting(value: float | tuple[float, ...]) -> str:
+    return " ".join(f"{number:g}" for number in (value if isinstance(value, tuple) else (value,)))
+
+
+def _gains_kept(statement: Statement) -> str:
+    """The settings at the start stay: nothing that was tried is better where the search has not been."""
+    numbers, name = statement.numbers, statement.subject
+    return (
+        f"{name} keeps the settings it began with: {_error(numbers, 'before')} off; the best of "
+        f"{numbers['evaluations']} tried is {_error(numbers, 'after')} off, "
+        f"{-100.0 * numbers['less']:.0f} % more in the mean of both"
+    )
 
 
 def _optimised(statement: Statement) -> str:
     """What was optimised, over which robots."""
     numbers = statement.numbers
-    robots = "the robot of the file alone: no number of it has a std, so nothing says how far it may be off"
-    if draws := numbers["draws"]:
-        robots = f"{draws} robots drawn from the std and correlations of the file"
+    robots = (
+        f"{numbers['draws']} robots drawn from the std and correlations of the file"
+        if numbers["uncertain"]
+        else f"{numbers['draws']} robots near that of the file, no number of which has a std (windings within "
+        f"{100.0 * numbers['resistance']:g} %, mass {100.0 * numbers['mass']:g} %, radius of the wheels "
+        f"{100.0 * numbers['radius']:g} %)"
+    )
     return (
-        f"optimised: rms distance from the path and rim error of the heading along {all_of(numbers['paths'])}, over "
-        f"{robots}; noise {numbers['noise']:g} m/s, delay {numbers['delay']} steps, {numbers['dt']:g} s a step; "
-        f"{numbers['evaluations']} settings tried"
+        f"optimised: the geometric mean of rms position and heading error along {all_of(numbers['paths'])}, free "
+        f"and pushed, over {robots}; sensors {numbers['sensors']}, noise {numbers['noise']:g} m/s, delay "
+        f"{numbers['delay']} steps, {numbers['dt']:g} s a step; {numbers['evaluations']} settings tried"
+    )
+
+
+def _judged_elsewhere(statement: Statement) -> str:
+    """On what tuned settings are judged."""
+    return (
+        "the numbers are those of other robots, noise and pushes, which the search has not seen, along "
+        f"{all_of(statement.numbers['paths'])}"
     )
 
 
@@ -88,11 +124,9 @@ SENTENCES = {
     ),
     "speed_jumps": Sentence("its speed jumps at {corners} corners, by up to {jump:.3g} m/s and {turn_jump:.3g} rad/s"),
     "gains_tuned": Sentence(_gains_tuned),
-    "gains_kept": Sentence("the gains it began with are as good as any that were tried: {after:m.3g} mm"),
+    "gains_kept": Sentence(_gains_kept),
     "optimised": Sentence(_optimised),
-    "judged_on_other_draws": Sentence(
-        "the numbers are those of as many other draws and of other noise, which the search has not seen"
-    ),
+    "judged_elsewhere": Sentence(_judged_elsewhere),
     "given_up_rest": Sentence("given up: rest: a voltage changes by {after:.3g} V a step, {before:.3g} V before"),
     "given_up_on_file": Sentence(
         "given up: the robot as the file says it: {after:m.3g} mm, {before:m.3g} mm before: the price of being "
