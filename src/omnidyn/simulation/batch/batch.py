@@ -88,7 +88,7 @@ def simulate_batch(
         threads=threads,
         tol=tol,
     )
-    return batch.run(given[names[0]], every=every, statistics=statistics)
+    return batch.run(as_floats(names[0], given[names[0]]), every=every, statistics=statistics)
 
 
 class Batch:
