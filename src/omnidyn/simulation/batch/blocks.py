@@ -194,9 +194,11 @@ def _count(beyond: BoolArray) -> tuple[int, int]:
 
 def drivers_of(robots: Sequence[Robot]) -> list[tuple[Robot, Any]]:
     """(a robot, indices of all that have its driver and its limits)."""
+    drivers = {id(robot): (robot.drive, robot.motor.voltage_limit) for robot in robots}
     places: dict[Any, list[int]] = {}
-    for k, robot in enumerate(robots):
-        places.setdefault((robot.drive, robot.motor.voltage_limit), []).append(k)
-    if len(places) == 1:
+    if len(set(drivers.values())) > 1:
+        for k, robot in enumerate(robots):
+            places.setdefault(drivers[id(robot)], []).append(k)
+    if not places:
         return [(robots[0], slice(None))]
     return [(robots[index[0]], np.array(index)) for index in places.values()]
