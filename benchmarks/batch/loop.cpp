@@ -6,16 +6,14 @@
 const int W = 64;
 
 template <class R> static inline R step(R v, R g, R c, R s, R a, R phi) {
+  R x = std::fabs(v);
   bool mirrored = (v < 0) | ((v == 0) & (g < 0));
-  R x = std::fabs(v), q = mirrored ? -g : g;
+  R q = mirrored ? -g : g;
   R slid = x + phi * (q - c - a * x);
-  bool crosses = (slid < 0) & (q < c);
-  R divisor = crosses ? c - q : c + s + phi;
-  R back = (q + c) * (phi - (x - phi * a * x) / divisor);
-  back = q < -s ? back : R(0);
-  R result = crosses ? back : std::max(slid, R(0));
-  result = (x == 0) & (q <= s) ? R(0) : result;
-  return mirrored & (result != 0) ? -result : result;
+  R back = q < -s ? (q + c) * (phi - (x - phi * a * x) / (c - q)) : R(0);
+  R moved = slid >= 0 ? slid : back, released = q <= s ? R(0) : moved;
+  moved = x > 0 ? moved : released;
+  return mirrored ? -moved : moved;
 }
 
 // laws (18 + 3, n): Coulomb, breakaway, rate, phi, acceleration per volt of 3 axes and 3 wheels; volts (steps, 3); v (3, n)
