@@ -120,10 +120,11 @@ def _ours(table: Table, robots: Sample, volts: np.ndarray) -> dict[str, float]:
     wide = batch_of(robots, threads=2)
     long = np.tile(volts, (5, 1))
     one, two = (least(lambda run=run: run(long), 15, time.perf_counter) for run in (full, wide))
+    quiet = one / two <= 2.1  # more than two cores can give: other programs took the time of one thread
     table.add(
         ">= 1.7 x one thread",
-        one / two >= 1.7,
-        what="omnidyn, f64, two threads, time on the wall",
+        one / two >= 1.7 if quiet else None,
+        what=f"omnidyn, f64, two threads, time on the wall{'' if quiet else ' (machine too busy to tell)'}",
         value=two * 1e9 / (ROBOTS * len(long)),
         unit="ns",
         ratio=one / two,
