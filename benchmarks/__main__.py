@@ -15,6 +15,7 @@ NAMES = {
     "accuracy": "exact engine against 50 digits: Table 3 and 50 random robots, 10,000 steps each (about a minute)",
     "simulate": "one robot, 10 s at 1 kHz: time and error beside scipy's LSODA with tanh friction",
     "inductance": "what winding inductance costs: exact engine with L > 0 beside L = 0, 10 s at 1 kHz",
+    "batch": "many robots at once beside a C++ loop, NumPy, JAX, MuJoCo; poses, implicit blocks, a million (5 minutes)",
     "rest": "60 s inside the dead zone: the robot must not move at all",
     "compare": "compare on simulated logs: rmse, false alarms of the test of white errors, which robot is better",
     "check": "12 faults in 200 simulated logs each, 1000 clean logs: what `omnidyn check` finds and says (10 minutes)",

@@ -22,6 +22,8 @@ from omnidyn.model.motor import DYNAMIC, SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
 from omnidyn.run import Run
+from omnidyn.simulation.batch.batch import simulate_batch
+from omnidyn.simulation.batch.result import BatchRun
 from omnidyn.simulation.exact.march import why_not_exact
 from omnidyn.simulation.simulate import simulate
 
@@ -58,7 +60,15 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("simulation, inductance", partial(_run, winding)),
         ("simulation, friction that falls with speed", partial(_run, falling_robot)),
         ("simulation, wheels that slip", partial(_run, slips)),
+        ("batch, twist alone", partial(_batch, paper, None)),
+        ("batch, fast poses", partial(_batch, paper, "fast")),
+        ("batch, exact poses", partial(_batch, paper, "exact")),
+        ("batch, friction of the direction of travel", partial(_batch, load_robot("lekiwi"), "exact")),
     ]
+
+
+def _batch(robot: Robot, pose: str | None) -> BatchRun:
+    return simulate_batch([robot], np.zeros((1, robot.wheels.count)), DT, pose=pose)
 
 
 def shared_out(robot: Robot) -> AbstractContextManager[None]:

@@ -131,6 +131,15 @@ def test_starts_of_their_own_and_a_start_that_is_no_number():
     assert np.abs(run.end.pose[0] - single.pose[-1]).max() < 1e-12
 
 
+def test_a_robot_that_turns_too_far_in_a_step_fails_where_simulate_refuses():
+    twist = [[0.0, 0.0, 900.0], [0.0, 0.0, 1.0]]
+    with pytest.raises(InputError, match="too far"):
+        omnidyn.simulate(ROBOT, np.zeros((2, 3)), 1000.0, twist=twist[0])
+    run = omnidyn.simulate_batch([ROBOT] * 2, np.zeros((2, 3)), 1000.0, start_twist=twist)
+    np.testing.assert_array_equal(run.end.failed, [True, False])
+    assert np.isnan(run.end.pose[0]).all()
+
+
 def test_duties_and_wheel_speeds():
     duty = VOLTAGE[:50] / 6.0
     driven = ROBOT.replace(drive=ROBOT.drive.replace(kind="duty", supply=7.0))

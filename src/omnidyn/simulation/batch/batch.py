@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,15 +13,17 @@ from omnidyn.errors import InputError
 from omnidyn.model.motor import SPEED
 from omnidyn.model.robot import Robot
 from omnidyn.simulation.batch.blocks import EXACT_POSE, FAST_POSE, BatchCommands, BlockGroup, GroupRun, drivers_of
-from omnidyn.simulation.batch.choice import DUTY, GENERAL, VOLTAGE, WHEEL_SPEED, engine_kind
+from omnidyn.simulation.batch.choice import DUTY, EXACT, GENERAL, VOLTAGE, WHEEL_SPEED, engine_kind
 from omnidyn.simulation.batch.parameters import batch_parameters, wheels_of
 from omnidyn.simulation.batch.result import BatchRun, BatchState, Statistics
-from omnidyn.simulation.batch.sample import Sample
 from omnidyn.simulation.batch.singles import SingleGroup
 from omnidyn.simulation.batch.threads import Threads
 from omnidyn.simulation.commands import MAX_DT, MIN_DT, as_floats
 from omnidyn.simulation.engine import as_tolerance
 from omnidyn.statement import WARNING, Statement
+
+if TYPE_CHECKING:
+    from omnidyn.simulation.batch.sample import Sample  # slow to load, for it needs SciPy
 
 POSES = (None, FAST_POSE, EXACT_POSE)
 
@@ -86,7 +88,7 @@ def simulate_batch(
         threads=threads,
         tol=tol,
     )
-    return batch.run(given[names[0]], every=every, statistics=statistics)
+    return batch.run(as_floats(names[0], given[names[0]]), every=every, statistics=statistics)
 
 
 class Batch:
@@ -122,15 +124,16 @@ class Batch:
 
     def _group(self, robots: Sequence[Robot] | Sample, dtype: Any, tol: float | None) -> list[tuple[IntArray, Any]]:
         """(indices, the group that moves those robots), one for each engine."""
-        if isinstance(robots, Sample) and robots.parameters is not None:
-            kind = engine_kind(robots.center, self.command, tol)
-            if kind != GENERAL:
-                _check_drive(robots.center, self.command, self._supply)
-                self.wheels = robots.center.wheels.count
-                turning = np.full(len(robots), robots.center.body.rotating_frame)
-                drivers = [(robots.center, slice(None))]
-                group = BlockGroup(kind, robots.parameters, drivers, turning, self.dt, self.pose, dtype)
-                return [(np.arange(len(robots)), group)]
+        parameters = getattr(robots, "parameters", None)
+        if parameters is not None:
+            center: Robot = robots.center  # pyright: ignore[reportAttributeAccessIssue]
+            kind = engine_kind(center, self.command, tol)
+            if kind == EXACT or (kind != GENERAL and np.array_equal(parameters.coulomb, parameters.breakaway)):
+                _check_drive(center, self.command, self._supply)
+                self.wheels = center.wheels.count
+                turning, drivers = np.full(parameters.count, center.body.rotating_frame), [(center, slice(None))]
+                group = BlockGroup(kind, parameters, drivers, turning, self.dt, self.pose, dtype)
+                return [(np.arange(parameters.count), group)]
         fleet = list(robots)
         self.wheels = wheels_of(fleet)
         kinds: dict[int, str] = {}

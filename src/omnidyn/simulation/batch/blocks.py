@@ -22,7 +22,7 @@ from omnidyn.simulation.batch.threads import Threads
 from omnidyn.statement import Statement
 
 FAST_POSE, EXACT_POSE = "fast", "exact"
-BLOCKS_AT_ONCE = 16  # whose volts are brought into order at a time, where each robot has its own
+VOLTS_AT_ONCE = 4_000_000  # brought into order at a time, where each robot has its own: what stays in the cache
 EXACT_NAME = "exact engine, in blocks"
 IMPLICIT_NAME = "implicit engine, fixed step, in blocks"
 
@@ -56,17 +56,14 @@ class GroupRun(NamedTuple):
 
 def reaching_volts(robot: Robot, commands: BatchCommands) -> tuple[FloatArray, BoolArray]:
     """Volts at the motors, shape as the rows; and which commands were beyond a limit."""
-    asked = commands.rows
+    asked, beyond = commands.rows, False
     if commands.kind == DUTY:
         duty = np.clip(commands.rows, -1.0, 1.0)
         battery = robot.drive.supply if commands.supply is None else commands.supply
         assert battery is not None
-        asked = voltage_of_duty(duty, battery)
+        asked, beyond = voltage_of_duty(duty, battery), duty != commands.rows
     limited = clip_voltage(robot.motor, asked)
-    beyond = limited != asked
-    if commands.kind == DUTY:
-        beyond |= duty != commands.rows
-    return reaching(robot, limited), beyond
+    return reaching(robot, limited), (limited != asked) | beyond
 
 
 class BlockGroup:
@@ -138,7 +135,8 @@ class BlockGroup:
             volts = self._own_volts(commands, span, fails, clipped) if shared is None else shared
             self._march(*span, self._laws, Rows(volts, self._states, fails), record, *self._rule)
 
-        threads.map(march, threads.spans(blocks, BLOCKS_AT_ONCE if shared is None else blocks))
+        size = WIDTH * commands.rows[0].size
+        threads.map(march, threads.spans(blocks, blocks if shared is not None else max(1, VOLTS_AT_ONCE // size)))
         self._failed = (fails < steps) | ~np.isfinite(self._states).all(axis=1)
         lost = self._failed.reshape(-1)[: self.count]
         sums = None
@@ -169,8 +167,9 @@ class BlockGroup:
         """
         first, last = span[0] * WIDTH, min(span[1] * WIDTH, self.count)
         rows = np.broadcast_to(commands.rows, (self.count, *commands.rows.shape[1:]))[first:last]
-        bad = ~np.isfinite(rows).all(axis=2)
-        if bad.any():
+        finite = np.isfinite(rows)
+        if not finite.all():
+            bad: BoolArray = ~np.asarray(finite.all(axis=2), dtype=bool)
             lost = np.where(bad.any(axis=1), bad.argmax(axis=1), np.iinfo(np.int64).max)
             flat = fails.reshape(-1)[first:last]
             np.minimum(flat, lost, out=flat)
@@ -187,15 +186,19 @@ class BlockGroup:
 
 def _count(beyond: BoolArray) -> tuple[int, int]:
     """(rows with a command beyond a limit, the first of them)."""
+    if not beyond.any():
+        return 0, 0
     rows = beyond.any(axis=2)
     return int(rows.sum()), int(rows.any(axis=0).argmax())
 
 
 def drivers_of(robots: Sequence[Robot]) -> list[tuple[Robot, Any]]:
     """(a robot, indices of all that have its driver and its limits)."""
+    drivers = {id(robot): (robot.drive, robot.motor.voltage_limit) for robot in robots}
     places: dict[Any, list[int]] = {}
-    for k, robot in enumerate(robots):
-        places.setdefault((robot.drive, robot.motor.voltage_limit), []).append(k)
-    if len(places) == 1:
+    if len(set(drivers.values())) > 1:
+        for k, robot in enumerate(robots):
+            places.setdefault(drivers[id(robot)], []).append(k)
+    if not places:
         return [(robots[0], slice(None))]
     return [(robots[index[0]], np.array(index)) for index in places.values()]

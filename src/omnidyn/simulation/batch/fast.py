@@ -1,11 +1,13 @@
-"""The fast pose of blocks of robots: 2 Gauss nodes a step, whatever happens within it.
+"""The fast pose of blocks of robots: 2 Gauss nodes a step.
 
     heading  += h/2 (omega_1 + omega_2)
     position += R(heading) h/2 sum_q R(turned_q) (v_x, v_y)_q,   turned_q = omega t_q + (omega' - omega) t_q^2/(2 h)
 
-Speeds at the nodes are exact, by `exact_step` with the phi of their time; omega' is that at the end of the step. A
-heading is kept with its cosine and sine, which are turned step by step and kept at length 1. What the quadrature makes
-of a stop or a reversal inside a step is of the order of h^2 times the jump of the acceleration.
+Speeds at the nodes are exact, by `exact_step` with the phi of their time; omega' is that at the end of the step. Where
+yaw stops or reverses inside a step, its turn is that of `turned_within`, the time of the event x/(c - q) (1 - y/2 +
+y^2/3 - y^3/4), y = a x/(c - q). A heading is kept with its cosine and sine, which are turned step by step and kept at
+length 1. What is left is what the nodes make of a stop along x or y: of the order of h^2 times the jump of the
+acceleration.
 """
 
 from __future__ import annotations
@@ -19,9 +21,16 @@ from omnidyn.compiled.kernel import inlined, kernel
 from omnidyn.simulation.batch.exact import BREAKAWAY, COULOMB, PER_VOLT, PHI, RATE, put_drive, put_shared_drive
 from omnidyn.simulation.batch.march import DRIVE, POSE, SPEED, TOTALS, first_failure, keep, load, spoil, store
 from omnidyn.simulation.batch.parameters import WIDTH, BatchParameters, in_blocks
-from omnidyn.simulation.exact.step import exact_step
+from omnidyn.simulation.exact.step import course, exact_step
 
-FIRST, SECOND, END, NODE_PHI, LAW = 12, 15, 18, 21, 27  # rows of `work`: speeds at the nodes and the end; see march.py
+FIRST, SECOND, END, TURN, NODE_PHI, LAW = (
+    12,
+    15,
+    18,
+    21,
+    22,
+    28,
+)  # rows of `work`: speeds at the nodes and the end, turn
 # sin x = x (1 - x^2/6 (1 - x^2/20 (1 - x^2/42))), cos x = 1 - x^2/2 (1 - x^2/12 (1 - x^2/30)): 1e-10 up to 0.3 rad
 SERIES = (1 / 6, 1 / 20, 1 / 42, 1 / 2, 1 / 12, 1 / 30)
 
@@ -29,7 +38,8 @@ SERIES = (1 / 6, 1 / 20, 1 / 42, 1 / 2, 1 / 12, 1 / 30)
 class GaussTwo(NamedTuple):
     """The rule of a fast pose. phi (blocks, 6, WIDTH) [s]: of the time of each node, 3 axes each.
 
-    numbers: SERIES, then 1, 3/2, h/2, and of each node its time and its square over 2 h [s]; in the type of the batch.
+    numbers: SERIES, then 1, 3/2, h/2, of each node its time and its square over 2 h [s], 1/3, 1/4 and h; in the type of
+    the batch.
     """
 
     phi: NDArray[Any]
@@ -40,7 +50,7 @@ def gauss_two(parameters: BatchParameters, dt: float, dtype: Any) -> GaussTwo:
     """The rule of steps of dt [s]."""
     times, rate = dt * (0.5 + np.array([-1.0, 1.0]) / np.sqrt(12.0)), parameters.damping / parameters.mass
     phi = np.concatenate([-np.expm1(-rate * time) / rate for time in times])
-    numbers = [*SERIES, 1.0, 1.5, dt / 2.0, *times, *(times**2 / (2.0 * dt))]
+    numbers = [*SERIES, 1.0, 1.5, dt / 2.0, *times, *(times**2 / (2.0 * dt)), 1.0 / 3.0, 0.25, dt]
     return GaussTwo(in_blocks(phi, dtype), np.array(numbers, dtype))
 
 
@@ -88,12 +98,37 @@ def _speeds_of_three(work, u0, u1, u2, zero):
             LAW + PER_VOLT + 3 * axis,
         )
         g0, g1, g2 = work[place], work[place + 1], work[place + 2]
-        first, second, end = work[FIRST + axis], work[SECOND + axis], work[END + axis]
+        first, second, end, drive = work[FIRST + axis], work[SECOND + axis], work[END + axis], work[DRIVE + axis]
         for n in range(WIDTH):
             g = u0 * g0[n] + u1 * g1[n] + u2 * g2[n]
+            drive[n] = g
             first[n] = exact_step(v[n], g, c[n], s[n], a[n], phi1[n], zero)
             second[n] = exact_step(v[n], g, c[n], s[n], a[n], phi2[n], zero)
             end[n] = exact_step(v[n], g, c[n], s[n], a[n], phi[n], zero)
+
+
+@inlined
+def _turn(work, k, zero):
+    """Fill TURN from the nodes; in closed form where yaw stops or reverses."""
+    v, g, c, s = work[SPEED + 2], work[DRIVE + 2], work[LAW + COULOMB + 2], work[LAW + BREAKAWAY + 2]
+    a, phi, first, second, end = (
+        work[LAW + RATE + 2],
+        work[LAW + PHI + 2],
+        work[FIRST + 2],
+        work[SECOND + 2],
+        work[END + 2],
+    )
+    turn, half, one, half_dt, third, quarter, dt = work[TURN], k[3], k[6], k[8], k[13], k[14], k[15]
+    for n in range(WIDTH):
+        mirrored, x, q, _, rests, crosses, reverses = course(v[n], g[n], c[n], s[n], a[n], phi[n], zero)
+        stops = crosses & (not rests)
+        rough = x / (c[n] - q if stops else one)
+        y = a[n] * rough
+        event = rough * (one - y * (half - y * (third - y * quarter)))
+        after = (q + c[n]) * (dt - event) if reverses else zero
+        closed = (x + (q - c[n]) * event + after - (-end[n] if mirrored else end[n])) / a[n]
+        closed = -closed if mirrored else closed
+        turn[n] = closed if stops else half_dt * (first[n] + second[n])
 
 
 @inlined
@@ -101,14 +136,7 @@ def _move_on(work, k):
     """Add a step to the poses, and make its end the start of the next one."""
     x, y, heading, cosine, sine = work[POSE], work[POSE + 1], work[POSE + 2], work[POSE + 3], work[POSE + 4]
     vx, vy, w = work[SPEED], work[SPEED + 1], work[SPEED + 2]
-    x1, y1, w1, x2, y2, w2 = (
-        work[FIRST],
-        work[FIRST + 1],
-        work[FIRST + 2],
-        work[SECOND],
-        work[SECOND + 1],
-        work[SECOND + 2],
-    )
+    x1, y1, x2, y2, turn = work[FIRST], work[FIRST + 1], work[SECOND], work[SECOND + 1], work[TURN]
     ex, ey, ew, more, half_dt = work[END], work[END + 1], work[END + 2], k[7], k[8]
     half = k[3]
     for n in range(WIDTH):
@@ -117,12 +145,11 @@ def _move_on(work, k):
         cos2, sin2 = _rotation(k[10] * w[n] + k[12] * change, k)
         dx = half_dt * (cos1 * x1[n] - sin1 * y1[n] + cos2 * x2[n] - sin2 * y2[n])
         dy = half_dt * (sin1 * x1[n] + cos1 * y1[n] + sin2 * x2[n] + cos2 * y2[n])
-        turn = half_dt * (w1[n] + w2[n])
         cos, sin = cosine[n], sine[n]
         x[n] += cos * dx - sin * dy
         y[n] += sin * dx + cos * dy
-        heading[n] += turn
-        a, b = _rotation(turn, k)
+        heading[n] += turn[n]
+        a, b = _rotation(turn[n], k)
         cos, sin = cos * a - sin * b, sin * a + cos * b
         scale = more - half * (cos * cos + sin * sin)
         cosine[n], sine[n] = scale * cos, scale * sin
@@ -152,6 +179,7 @@ def march_fast(first, last, laws, rows, record, rule):
                 else:
                     put_shared_drive(drive, law, volts[0, k, :, 0])
                 _speeds(work, zero)
+            _turn(work, rule.numbers, zero)
             _move_on(work, rule.numbers)
             if k >= failure:
                 spoil(work, 6, fails[b], k)

@@ -38,7 +38,7 @@ class BatchParameters(NamedTuple):
     body_mass: FloatArray
 
     @property
-    def count(self) -> int:
+    def count(self) -> int:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Number of robots."""
         return self.mass.shape[-1]
 

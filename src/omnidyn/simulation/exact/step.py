@@ -29,12 +29,13 @@ def course(speed, drive, coulomb, breakaway, rate, phi, zero):
 
     What crosses 0 and does not go on has stopped. What rests may seem to cross, too.
     """
-    mirrored = (speed < zero) | ((speed == zero) & (drive < zero))
+    at_rest = speed == zero
+    mirrored = (speed < zero) | (at_rest & (drive < zero))
     x = abs(speed)
     q = -drive if mirrored else drive
     slid = x + phi * (q - coulomb - rate * x)
     crosses = (slid < zero) & (q < coulomb)
-    return mirrored, x, q, slid, (x == zero) & (q <= breakaway), crosses, crosses & (q < -breakaway)
+    return mirrored, x, q, slid, at_rest & (q <= breakaway), crosses, (slid < zero) & (q < -breakaway)
 
 
 @part
@@ -44,13 +45,12 @@ def exact_step(speed, drive, coulomb, breakaway, rate, phi, zero):
     speed v [m/s]; drive g [m/s^2]; coulomb c and breakaway S >= c >= 0 [m/s^2]; rate a > 0 [1/s]; phi [s].
     For yaw read rad for m. Source: closed form of eqs (4)-(6), written out above.
     """
-    mirrored, x, q, slid, rests, crosses, reverses = course(speed, drive, coulomb, breakaway, rate, phi, zero)
-    divisor = coulomb - q if crosses else coulomb + breakaway + phi  # never 0, in either lane
+    mirrored, x, q, slid, rests, _, reverses = course(speed, drive, coulomb, breakaway, rate, phi, zero)
+    divisor = coulomb - q if reverses else coulomb + breakaway + phi  # never 0, in either lane
     reversed_ = (q + coulomb) * (phi - (x - phi * rate * x) / divisor)
-    reversed_ = reversed_ if reverses else zero
-    result = reversed_ if crosses else (slid if slid > zero else zero)
+    result = reversed_ if reverses else (slid if slid > zero else zero)  # what crosses 0 and stays has slid < 0
     result = zero if rests else result
-    return -result if mirrored & (result != zero) else result  # rest is 0, never -0
+    return zero - result if mirrored else result  # rest is 0, never -0
 
 
 @part
