@@ -165,15 +165,9 @@ class Drive:
         command, wheel_speed, twist, pose = (np.array(part) for part in zip(*rows, strict=True))
         self.recordings += 1
         path = self.folder / f"drive-{self.recordings}.csv"
-        channel = "duty" if self.robot.drive.kind == DUTY else "voltage"
-        run = omnidyn.Run(
-            t=DT * np.arange(len(rows)),
-            wheel_speed=wheel_speed,
-            twist=twist,
-            pose=pose,
-            source=path.stem,
-            **{channel: command},
-        )
+        inputs: dict[str, Any] = {"duty" if self.robot.drive.kind == DUTY else "voltage": command}
+        t = DT * np.arange(len(rows), dtype=np.float64)
+        run = omnidyn.Run(t, wheel_speed=wheel_speed, twist=twist, pose=pose, source=path.stem, **inputs)
         omnidyn.write_run(run, path, force=True)
         self.tell("recorded", {"path": str(path), "seconds": DT * len(rows)})
 

@@ -31,7 +31,7 @@ from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE
 from omnidyn.logs.columns.mapping import ColumnMap, load_map, map_to_toml, parse_column
 from omnidyn.logs.log import Log
 from omnidyn.logs.read_log import LogOptions, iter_logs
-from omnidyn.model.keys import in_words, unit
+from omnidyn.model.keys import find_key, in_words, unit
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Report
 from omnidyn.run import CHANNELS
@@ -256,7 +256,7 @@ def _remedies(result: Identification) -> list[dict[str, str]]:
     return [
         {"key": remedy.key, "text": str(remedy.cause)}
         for remedy in fits[0].lack_of_fit.causes
-        if remedy.offered and "." in remedy.key
+        if remedy.offered and find_key(remedy.key) is not None
     ]
 
 
