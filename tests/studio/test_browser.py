@@ -1,5 +1,6 @@
 """The studio in a real browser: each test ends in what a page shows and the command prints for the same file."""
 
+import contextlib
 import json
 import os
 import re
@@ -90,13 +91,22 @@ def assert_same_numbers(page, path, *options):
 
 
 def shown(page, name):
-    """Look at a tab as it is, narrow and wide; keep the wide picture for the documentation where a folder is named."""
+    """Look at a tab as it is, narrow and wide: nothing is wider than the page, and axe finds nothing serious.
+
+    Pictures, as the documentation has them, go to the folder OMNIDYN_PICTURES.
+    """
     for width in (420, 1400):
         page.set_viewport_size({"width": width, "height": 900})
         page.wait_for_timeout(500)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         if folder := os.environ.get("OMNIDYN_PICTURES"):
+            page.mouse.move(0, 0)
             page.screenshot(path=Path(folder) / f"studio-{name}{'-narrow' * (width < 1000)}.png", full_page=True)
+    with contextlib.suppress(ImportError):
+        from axe_playwright_python.sync_playwright import Axe
+
+        faults = [v["id"] for v in Axe().run(page).response["violations"] if v["impact"] in ("serious", "critical")]
+        assert not faults
 
 
 def test_from_nothing_to_a_robot(browser, tmp_path):
@@ -300,6 +310,8 @@ def test_the_dead_zone_is_felt_and_the_drive_is_fitted(browser, tmp_path):
     shown(page, "drive")
     page.keyboard.up("w")
     page.click("#record")
+    page.wait_for_selector("#to-fit")
+    page.click("#stop")
     page.click("#to-fit")
     page.click("#fit:not([disabled])")
     verdict(page, "#fit-verdict")

@@ -31,7 +31,7 @@ def table(table: dict[str, Any], name: str) -> None:
     with ui.element("div").classes("scroll"), ui.element("table").props(f"id={name}"):
         with ui.element("thead"), ui.element("tr"):
             for words in table["head"]:
-                with ui.element("th"):
+                with ui.element("th" if words else "td"):
                     ui.label(words)
         with ui.element("tbody"):
             for row in table["rows"]:

@@ -44,7 +44,8 @@ class Page:
         client.on_delete(lambda: session.listeners.discard(self.changed))
         dark = ui.dark_mode(None)
         with ui.header().classes("bar"):
-            ui.label("omnidyn studio").classes("brand")
+            with ui.element("h1").classes("brand"):
+                ui.label("omnidyn studio")
             with ui.tabs().props("dense no-caps inline-label") as tabs:
                 log_tab, fit_tab, drive_tab = (ui.tab(name) for name in ("Log", "Fit", "Drive"))
             ui.space()
@@ -336,19 +337,20 @@ class Page:
         if drive.trouble:
             verdict("error", drive.trouble)
         with ui.row().classes("line"):
-            if not drive.running:
+            if drive.running:
+                ui.button("Stop", on_click=lambda: session.command({"stop": True})).props("outline no-caps id=stop")
+                ui.button("Back to the start", on_click=lambda: session.command({"home": True})).props("flat no-caps")
+                ui.button(
+                    "End the recording" if drive.recording else "Record",
+                    on_click=lambda: session.command({"record": not drive.recording}),
+                ).props("outline no-caps id=record")
+            else:
                 ui.button("Drive", on_click=self._drive).props("outline no-caps id=drive")
-                words = "Choose a robot, then drive it by keys or sliders." if not session.robot else session.robot
-                ui.label(words).classes("text quiet")
-                return
-            ui.button("Stop", on_click=lambda: session.command({"stop": True})).props("outline no-caps id=stop")
-            ui.button("Back to the start", on_click=lambda: session.command({"home": True})).props("flat no-caps")
-            ui.button(
-                "End the recording" if drive.recording else "Record",
-                on_click=lambda: session.command({"record": not drive.recording}),
-            ).props("outline no-caps id=record")
             if any(Path(log.path).name.startswith("drive-") for log in session.logs.values()):
                 ui.button("Fit the recording", on_click=to_fit).props("outline no-caps id=to-fit")
+            if not drive.running:
+                words = session.robot or "Choose a robot, then drive it by keys or sliders."
+                ui.label(words).classes("text quiet")
 
     def _drive_view(self) -> None:
         drive = self.session.drive

@@ -465,6 +465,7 @@ class Drive extends HTMLElement {
   }
 }
 
+document.documentElement.lang = 'en';
 customElements.define('omni-drop', Drop);
 customElements.define('omni-plot', Plot);
 customElements.define('omni-drive', Drive);
