@@ -66,8 +66,8 @@ def test_strange_commands_are_told_and_nothing_else_happens(tmp_path):
 def test_a_worker_tells_errors_in_words_and_can_be_cancelled(tmp_path):
     async def work():
         worker, heard = Worker(), []
-        with pytest.raises(JobError, match="none.csv"):
-            absent = {"path": str(tmp_path / "none.csv"), "folder": str(tmp_path / "series")}
+        absent = {"path": str(tmp_path / "none.csv"), "folder": str(tmp_path / "series")}
+        with pytest.raises(JobError, match=r"none\.csv"):
             await worker.run("check", absent, lambda *_: None)
         request = {"robot": "axebot", "folder": str(tmp_path)}
         job = asyncio.ensure_future(worker.run("drive", request, lambda kind, value: heard.append(kind)))

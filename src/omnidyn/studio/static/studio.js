@@ -232,7 +232,7 @@ class Plot extends HTMLElement {
       const wide = name === 'measured'; // the model is drawn over it
       g.strokeStyle = css(`--c${k % 6}`); g.lineWidth = wide ? 4 : 1.3; g.globalAlpha = wide ? 0.45 : 1;
       g.beginPath();
-      if (n > inner / 2 && shown.reduced) { // columns of pixels: strokes as dense as this take ten times as long
+      if (n > inner / 2 && shown.rows > 20 * n) { // columns of pixels: strokes as dense as this take ten times as long
         let before = [NaN, NaN];
         for (let i = 0; i < n; i++) {
           let least = shown.numbers[at + i], largest = shown.numbers[at + n + i];
@@ -241,7 +241,8 @@ class Plot extends HTMLElement {
           if (before[1] < least) least = before[1];
           if (before[0] > largest) largest = before[0];
           before = ends;
-          const px = Math.floor(x(shown.begin + shown.numbers[i])), bottom = Math.ceil(y(least) + 0.5), head = Math.floor(y(largest) - 0.5);
+          const px = Math.floor(x(shown.begin + shown.numbers[i])), thick = wide ? 2 : 0.5;
+          const bottom = Math.ceil(y(least) + thick), head = Math.floor(y(largest) - thick);
           g.rect(px, head, Math.max(1, Math.ceil(inner / n)), bottom - head);
         }
         g.fillStyle = css(`--c${k % 6}`); g.fill(); g.globalAlpha = 1;
