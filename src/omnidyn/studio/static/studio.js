@@ -230,7 +230,7 @@ class Plot extends HTMLElement {
     panel.signals.forEach((name, k) => {
       const at = n + 2 * n * (first + k);
       const wide = name === 'measured'; // the model is drawn over it
-      g.strokeStyle = css(`--c${k % 6}`); g.lineWidth = wide ? 4 : 1.3; g.globalAlpha = wide ? 0.45 : 1;
+      g.strokeStyle = css(`--c${k % 6}`); g.lineWidth = wide ? 4 : 1.3; g.lineJoin = 'round'; g.globalAlpha = wide ? 0.45 : 1;
       g.beginPath();
       if (n > inner / 2 && shown.rows > 20 * n) { // columns of pixels: strokes as dense as this take ten times as long
         let before = [NaN, NaN];
