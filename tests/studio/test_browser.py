@@ -1,6 +1,8 @@
 """The studio in a real browser: each test ends in what a page shows and the command prints for the same file."""
 
+import contextlib
 import json
+import os
 import re
 import time
 import tomllib
@@ -13,6 +15,7 @@ import pytest
 
 import omnidyn
 from omnidyn.cli import main
+from omnidyn.model.keys import Key
 from tests.support.axebot_logs import excitation
 
 # How long the server takes to answer a click [ms]: it turns the page dark, or light again
@@ -31,9 +34,9 @@ def command(*words):
     return (json.loads(out.getvalue()) if out.getvalue().startswith("{") else {}), code, err.getvalue()
 
 
-def write_log(path, seconds=20.0, seed=1, change=None):
-    """A log of the axebot: voltages and a noisy twist."""
-    robot, draws = omnidyn.load_robot("axebot"), np.random.default_rng(seed)
+def write_log(path, seconds=20.0, seed=1, change=None, robot=None):
+    """A log of the axebot, or another robot: voltages and a noisy twist."""
+    robot, draws = robot or omnidyn.load_robot("axebot"), np.random.default_rng(seed)
     run = omnidyn.simulate(robot, excitation(seconds, seed=seed), 0.01)
     twist = run.twist + draws.standard_normal(run.twist.shape) * (0.01, 0.01, 0.05)
     if change is not None:
@@ -50,6 +53,13 @@ def drop(page, path):
 def tab(page, name):
     """Go to a tab."""
     page.get_by_role("tab", name=name).click()
+
+
+def choose_axebot(page):
+    """Choose the robot to start from."""
+    tab(page, "Fit")
+    page.click(".robot")
+    page.get_by_role("option", name="axebot", exact=True).click()
 
 
 def verdict(page, name="#verdict"):
@@ -80,6 +90,25 @@ def assert_same_numbers(page, path, *options):
         assert shown[key] == f"{number['value']:.5g}", key
 
 
+def shown(page, name):
+    """Look at a tab as it is, narrow and wide: nothing is wider than the page, and axe finds nothing serious.
+
+    Pictures, as the documentation has them, go to the folder OMNIDYN_PICTURES.
+    """
+    for width in (420, 1400):
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_timeout(500)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        if folder := os.environ.get("OMNIDYN_PICTURES"):
+            page.mouse.move(0, 0)
+            page.screenshot(path=Path(folder) / f"studio-{name}{'-narrow' * (width < 1000)}.png", full_page=True)
+    with contextlib.suppress(ImportError):
+        from axe_playwright_python.sync_playwright import Axe
+
+        faults = [v["id"] for v in Axe().run(page).response["violations"] if v["impact"] in ("serious", "critical")]
+        assert not faults
+
+
 def test_from_nothing_to_a_robot(browser, tmp_path):
     begun = time.monotonic()
     studio, page = browser.start()
@@ -89,6 +118,7 @@ def test_from_nothing_to_a_robot(browser, tmp_path):
     page.click("#fit:not([disabled])")
     words = verdict(page, "#fit-verdict")
     print(f"3 clicks, {time.monotonic() - begun:.1f} s from the start of the server")
+    shown(page, "fit")
     log = tmp_path / "example.csv"
     log.write_bytes(page.request.get(f"{studio.address}log/log2/log").body())
     robot = tomllib.loads(page.request.get(f"{studio.address}fit/robot.toml").text())
@@ -108,15 +138,16 @@ def test_currents_without_a_sign_are_told_and_mended(browser):
 
 
 def test_a_click_on_a_shaded_stretch_explains_it(browser, tmp_path):
-    def spike(twist):
-        twist[1000:1004, 0] += 25.0
+    def stick(twist):
+        twist[900:1100] = twist[900]
 
-    path = write_log(tmp_path / "spikes.csv", change=spike)
+    path = write_log(tmp_path / "stuck.csv", change=stick)
     said = command("check", path, "--json")[0]["logs"][0]
     with_rows = next(finding for finding in said["findings"] if finding["rows"])
     _, page = browser.start(path)
     assert verdict(page) == said["verdict"]
     page.wait_for_function("document.querySelector('omni-plot').frames > 0")
+    shown(page, "log")
     row = np.mean(with_rows["rows"][0]) - 2  # the first row of the file is its head
     x = page.evaluate(
         """t => { const p = document.querySelector('omni-plot'), box = p.canvas.getBoundingClientRect();
@@ -147,9 +178,7 @@ def test_what_cannot_be_read_or_fitted_is_said_and_fit_waits(browser, tmp_path):
     drop(page, rest)
     said = command("check", rest, "--json")[0]["verdict"]
     assert verdict(page) == said
-    tab(page, "Fit")
-    page.click(".robot")
-    page.click("text=axebot >> nth=0")
+    choose_axebot(page)
     page.get_by_text("rest.csv: ").wait_for()
     assert page.is_disabled("#fit")
     with_robot = command("check", rest, "--robot", "axebot", "--json")[0]["verdict"]
@@ -180,9 +209,7 @@ def test_a_fit_goes_on_while_pages_answer_and_can_be_cancelled(browser, tmp_path
     studio, page = browser.start(path)
     verdict(page)
     other = browser.open(studio)
-    tab(page, "Fit")
-    page.click(".robot")
-    page.click("text=axebot >> nth=0")
+    choose_axebot(page)
     page.click("#fit:not([disabled])")
     page.wait_for_selector("#cancel")
     spent = [page.evaluate(ANSWER) for _ in range(9)]
@@ -200,6 +227,22 @@ def test_a_fit_goes_on_while_pages_answer_and_can_be_cancelled(browser, tmp_path
     words = verdict(page, "#fit-verdict")
     assert verdict(other, "#fit-verdict") == words
     assert_same_numbers(page, path)
+
+
+def test_what_is_missing_is_added_by_a_button(browser, tmp_path):
+    resistance = Key.parse("motor.resistance_ohm")
+    robot = omnidyn.load_robot("axebot")
+    path = write_log(tmp_path / "warm.csv", robot=resistance.set(robot, 1.25 * resistance.get(robot)))
+    _, page = browser.start(path)
+    choose_axebot(page)
+    page.click("#fit:not([disabled])")
+    verdict(page, "#fit-verdict")
+    assert "motor.resistance_ohm" not in numbers(page)
+    page.click("text=Add motor.resistance_ohm and refit")
+    page.get_by_role("cell", name="motor.resistance_ohm").first.wait_for()
+    shown = float(numbers(page)["motor.resistance_ohm"])
+    assert shown == pytest.approx(1.25 * resistance.get(robot), rel=0.02)
+    assert_same_numbers(page, path, "--free", "friction", "--free", "motor.resistance_ohm")
 
 
 def test_a_robot_of_its_own_sizes_is_that_of_init(browser, tmp_path, monkeypatch):
@@ -263,7 +306,12 @@ def test_the_dead_zone_is_felt_and_the_drive_is_fitted(browser, tmp_path):
     page.wait_for_timeout(1500)
     after = page.evaluate("[document.querySelector('omni-drive').received, performance.now()]")
     print(f"{1000 * (after[0] - before[0]) / (after[1] - before[1]):.1f} frames a second")
+    page.keyboard.down("w")
+    shown(page, "drive")
+    page.keyboard.up("w")
     page.click("#record")
+    page.wait_for_selector("#to-fit")
+    page.click("#stop")
     page.click("#to-fit")
     page.click("#fit:not([disabled])")
     verdict(page, "#fit-verdict")

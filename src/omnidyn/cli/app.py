@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import runpy
+import sys
+from typing import Annotated
+
 import typer
 
 import omnidyn
@@ -16,7 +21,6 @@ from omnidyn.cli import (
     logs,
     loops,
     simulate,
-    studio,
     sweep,
     warm,
 )
@@ -47,6 +51,31 @@ def robots(json: bool = typer.Option(False, "--json", help="For machines.")) -> 
     data = [{"name": name, "wheels": robot.wheels.count, "source": robot.source} for name, robot in known.items()]
     rows = [(name, f"{robot.wheels.count} wheels", robot.source) for name, robot in known.items()]
     tell(Document([Table((), rows, "<")], {"robots": data}), json, provenance([robot_input(name) for name in known]))
+
+
+STUDIO_PORT = 8642
+STUDIO = "omnidyn.studio"  # a skin of its own, which this one does not import
+
+
+def studio(
+    files: Annotated[
+        list[str] | None, typer.Argument(metavar="FILE", help="Logs and robot files to begin with.")
+    ] = None,
+    host: str = typer.Option(
+        "", metavar="ADDRESS", help="Serve other machines too, from this address; a page then needs the token printed."
+    ),
+    port: int = typer.Option(
+        STUDIO_PORT, min=0, max=65535, help="Where the page is; the next free one where it is taken."
+    ),
+    no_browser: bool = typer.Option(False, "--no-browser", help="Print the address, and open no browser."),
+) -> None:
+    """Open a page on this machine: look at logs, fit a robot, drive it.
+
+    Only this machine can open it. Files stay here; what was dropped is removed at the end. Ctrl-C ends it.
+    """
+    sys.argv = [STUDIO, *(os.fspath(file) for file in files or ()), f"--host={host}", f"--port={port}"]
+    sys.argv += ["--no-browser"] if no_browser else []
+    runpy.run_module(STUDIO, run_name="__main__", alter_sys=False)
 
 
 @app.callback(invoke_without_command=True)
@@ -83,7 +112,7 @@ for _command in (
     robots,
     exchange.export,
     warm.warm,
-    studio.studio,
+    studio,
 ):
     app.command(cls=Grouped)(_command)
 app.command("import", cls=Grouped)(exchange.bring)

@@ -26,11 +26,17 @@ from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.live import LiveRobot, check_supply
 
 DT = 1.0 / 60.0  # [s]
+NOISE = (0.01, 0.01, 0.05)  # [m/s, m/s, rad/s] of the speed that a recording has
 LATE = 0.25  # [s] behind the clock: the time that was lost is not made up
 MAX_ROWS = 60 * 60 * 30  # of a recording: half an hour
 CHANGED = ("body.mass_kg", "body.inertia_kg_m2")  # beside friction
 TOP_SPEED = 1.5  # [m/s] that a page may ask of a robot with a speed loop
 UNITS = {DUTY: "", SPEED: "m/s"}  # of the level; else volts
+
+
+def as_measured(twist: FloatArray, seed: int) -> FloatArray:
+    """A twist with the noise of a good sensor: without any, a fit would take every rounding for a law. Shape (n, 3)."""
+    return twist + np.random.default_rng(seed).standard_normal(twist.shape) * NOISE
 
 
 class Drive:
@@ -136,10 +142,10 @@ class Drive:
     def _step(self) -> None:
         """One step, its frame, and its row of the recording."""
         live, command = self.live, self._command()
-        before = (live.wheel_speed.copy(), live.twist.copy(), live.pose.copy())
+        before = live.twist.copy()
         live.step(command)
         if self.rows is not None:
-            self.rows.append((command if self.robot.drive.kind != SPEED else live.voltage, *before))
+            self.rows.append((command if self.robot.drive.kind != SPEED else live.voltage, before))
             if len(self.rows) >= MAX_ROWS:
                 self._record(False)
         current = settled_currents(self.robot, live.twist, live.voltage)
@@ -162,18 +168,12 @@ class Drive:
         rows, self.rows = self.rows, None
         if not rows or len(rows) < 2:
             return
-        command, wheel_speed, twist, pose = (np.array(part) for part in zip(*rows, strict=True))
+        command, twist = (np.array(part) for part in zip(*rows, strict=True))
         self.recordings += 1
         path = self.folder / f"drive-{self.recordings}.csv"
-        channel = "duty" if self.robot.drive.kind == DUTY else "voltage"
-        run = omnidyn.Run(
-            t=DT * np.arange(len(rows)),
-            wheel_speed=wheel_speed,
-            twist=twist,
-            pose=pose,
-            source=path.stem,
-            **{channel: command},
-        )
+        inputs: dict[str, Any] = {"duty" if self.robot.drive.kind == DUTY else "voltage": command}
+        t = DT * np.arange(len(rows), dtype=np.float64)
+        run = omnidyn.Run(t, twist=as_measured(twist, self.recordings), source=path.stem, **inputs)
         omnidyn.write_run(run, path, force=True)
         self.tell("recorded", {"path": str(path), "seconds": DT * len(rows)})
 

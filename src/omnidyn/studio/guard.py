@@ -82,11 +82,12 @@ class Guard:
 
     async def _passed_on(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Give a request to the application; count what it brings, add headers to what it gets."""
-        size, begun = 0, False
+        size, begun, gone = 0, False, False
 
         async def counted() -> MutableMapping[str, Any]:
-            nonlocal size
+            nonlocal size, gone
             message = await receive()
+            gone = gone or message["type"] == "http.disconnect"
             size += len(message.get("body", b""))
             if size > MAX_BODY and scope["path"] != UPLOAD:
                 raise TooLargeError
@@ -112,6 +113,9 @@ class Guard:
         except TooLargeError:
             if not begun:
                 await _refuse(scope, receive, send, TOO_LARGE)
+        except RuntimeError:  # of the toolkit, where nobody waits for the answer any more
+            if not gone:
+                raise
 
 
 def is_loopback(host: str) -> bool:

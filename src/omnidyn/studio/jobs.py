@@ -31,10 +31,11 @@ from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE
 from omnidyn.logs.columns.mapping import ColumnMap, load_map, map_to_toml, parse_column
 from omnidyn.logs.log import Log
 from omnidyn.logs.read_log import LogOptions, iter_logs
-from omnidyn.model.keys import in_words, unit
+from omnidyn.model.keys import find_key, in_words, unit
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Report
 from omnidyn.run import CHANNELS
+from omnidyn.studio.driving import Drive, as_measured
 from omnidyn.studio.series import shown_times, write_series
 
 BLOCK = 500_000  # rows that are checked at once, as `omnidyn check` does
@@ -256,7 +257,7 @@ def _remedies(result: Identification) -> list[dict[str, str]]:
     return [
         {"key": remedy.key, "text": str(remedy.cause)}
         for remedy in fits[0].lack_of_fit.causes
-        if remedy.offered and "." in remedy.key
+        if remedy.offered and find_key(remedy.key) is not None
     ]
 
 
@@ -321,7 +322,6 @@ def warm(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any
 
 EXAMPLE = "axebot"
 SECONDS, DT, HOLDS, SEED = 40.0, 0.01, (20, 100), 7  # [s], [s], rows that a command is held
-NOISE = (0.01, 0.01, 0.05)  # [m/s, m/s, rad/s]
 
 
 def example(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
@@ -332,8 +332,7 @@ def example(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, 
     held = list(_held(draws, rows, robot.wheels.count, limit))
     run = omnidyn.simulate(robot, np.concatenate(held)[:rows], DT)
     assert run.twist is not None
-    twist = run.twist + draws.standard_normal(run.twist.shape) * NOISE
-    kept = omnidyn.Run(t=run.t, voltage=run.voltage, twist=twist, source="example")
+    kept = omnidyn.Run(t=run.t, voltage=run.voltage, twist=as_measured(run.twist, SEED), source="example")
     omnidyn.write_run(kept, request["path"])
     return {}
 
@@ -349,8 +348,6 @@ def _held(draws: np.random.Generator, rows: int, wheels: int, limit: float) -> I
 
 def drive(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
     """Drive a robot until the page stops it. request: "robot", "folder" of recorded logs."""
-    from omnidyn.studio.driving import Drive
-
     robot = _robot(request)
     assert robot is not None
     return Drive(robot, Path(request["folder"]), tell, commands).run()

@@ -9,16 +9,15 @@ from typing import Any
 
 from nicegui import ui
 
-from omnidyn.logs.channels import components
-from omnidyn.run import CHANNELS
-from omnidyn.studio.session import DRIVE, FIT, LOGS, PROGRESS, ROBOT, VIEW, LogFile, Session
+from omnidyn.studio import calls
+from omnidyn.studio.calls import LogFile
+from omnidyn.studio.elements import MARK, UNUSED, column_row, plot, table, verdict
+from omnidyn.studio.session import DRIVE, FIT, LOGS, NUMBERS, PROGRESS, ROBOT, VIEW, Session
 
 HEAD = """
 <link rel="stylesheet" href="/static/studio.css">
 <script type="module" src="/static/studio.js"></script>
 """
-UNUSED = "-"
-MARK = {"error": "✕", "warning": "!", "note": "i"}
 WHY = {
     "no_log": "Add a log first: tab Log.",
     "no_robot": "Choose a robot first.",
@@ -33,6 +32,7 @@ class Page:
     def __init__(self, session: Session) -> None:
         self.session, self.shown = session, ""
         self.parts: dict[str, list[Any]] = {}
+        self.view: ui.element | None = None  # of the drive
         self.folded: dict[str, bool] = {}  # title -> whether it is open
 
     def build(self) -> None:
@@ -44,7 +44,8 @@ class Page:
         client.on_delete(lambda: session.listeners.discard(self.changed))
         dark = ui.dark_mode(None)
         with ui.header().classes("bar"):
-            ui.label("omnidyn studio").classes("brand")
+            with ui.element("h1").classes("brand"):
+                ui.label("omnidyn studio")
             with ui.tabs().props("dense no-caps inline-label") as tabs:
                 log_tab, fit_tab, drive_tab = (ui.tab(name) for name in ("Log", "Fit", "Drive"))
             ui.space()
@@ -55,7 +56,7 @@ class Page:
             with ui.tab_panel(log_tab):
                 self._log_tab()
             with ui.tab_panel(fit_tab):
-                self._fit_tab(lambda: tabs.set_value("Log"))
+                self._fit_tab()
             with ui.tab_panel(drive_tab):
                 self._drive_tab(lambda: tabs.set_value("Fit"))
 
@@ -124,18 +125,18 @@ class Page:
         if log is None:
             return
         if log.error:
-            _verdict("error", log.error)
+            verdict("error", log.error)
         if log.result is not None:
-            _verdict(log.result["severity"], log.result["verdict"])
+            verdict(log.result["severity"], log.result["verdict"])
         if log.series:
             findings = log.result["findings"] if log.result else []
-            spans = [[k, f["severity"], a, b] for k, f in enumerate(findings) for a, b in f["spans"]]
-            _plot(log.series, spans)
+            spans = [[k, f["severity"], a, b, f["subject"]] for k, f in enumerate(findings) for a, b in f["spans"]]
+            plot(log.series, spans)
         if log.result is not None:
             self._findings(log)
             self._uses(log)
             self._columns(log)
-        self._calls(*self.session.check_call(log))
+        self._calls(*calls.check(log, self.session.robot_path))
 
     def _findings(self, log: LogFile) -> None:
         """Errors and warnings, then notes, which are folded."""
@@ -193,7 +194,7 @@ class Page:
                 for head in ("column of the file", "is", "in unit", "at the motor", "other sign"):
                     ui.label(head).classes("head")
                 for row in rows:
-                    _column_row(row)
+                    column_row(row)
             trouble = ui.label().classes("text error-text")
 
             async def apply() -> None:
@@ -206,7 +207,7 @@ class Page:
 
     # Fit
 
-    def _fit_tab(self, to_log: Callable[[], None]) -> None:
+    def _fit_tab(self) -> None:
         self._part(self._robot_choice, ROBOT)
         with self._box("Describe another robot"):
             self._robot_form()
@@ -219,7 +220,7 @@ class Page:
             ui.select(
                 list(self.session.robots),
                 value=self.session.robot or None,
-                label="Robot to start from",
+                label="Robot",
                 on_change=lambda e: self.session.choose(e.value),
             ).classes("wide robot")
             ui.element("omni-drop").props("words='Drop a robot file (.toml), or click'")
@@ -239,7 +240,7 @@ class Page:
 
         async def make() -> None:
             options = [f"{flag}={field.value}" for flag, field in inputs.items() if str(field.value).strip()]
-            trouble.text = await self.session.make_robot(name.value, options)
+            trouble.text = await self.session.make_robot(name.value or "", options)
 
         ui.button("Make this robot", on_click=make).props("outline no-caps id=make-robot")
         ui.label("What is left empty is guessed, with a wide spread, and marked as a guess.").classes("text quiet")
@@ -257,7 +258,7 @@ class Page:
             ).classes("wide").props("use-chips")
         code, words = session.why_no_fit()
         with ui.row().classes("line"):
-            button = ui.button("Fit", on_click=lambda: session.start(session.run_fit())).props("no-caps id=fit")
+            button = ui.button("Fit", on_click=lambda: session.start(session.run_fit())).props("outline no-caps id=fit")
             button.set_enabled(not code and not session.fit.running)
             if code:
                 ui.label(words if code in ("unfit", "unread") else WHY[code]).classes("text quiet").props("id=why")
@@ -285,33 +286,37 @@ class Page:
     def _fit_result(self) -> None:
         fit = self.session.fit
         if fit.error:
-            _verdict("error", fit.error)
+            verdict("error", fit.error)
         if fit.result is None:
             return
         result = fit.result
-        _verdict("error" if result["failed"] else "note", result["verdict"], "fit-verdict")
+        verdict("error" if result["failed"] else "note", result["verdict"], "fit-verdict")
         with ui.row().classes("line"):
             ui.link("Robot file", "/fit/robot.toml").props("download")
             ui.link("Numbers (CSV)", "/fit/numbers.csv").props("download")
             if result["report"]:
                 ui.link("Report", "/fit/report.html", new_tab=True)
-        _table(result["numbers"], "numbers")
+        table(result["numbers"], "numbers")
         for remedy in result["remedies"]:
             with ui.row().classes("line"):
                 ui.label(remedy["text"]).classes("text")
                 ui.button(
                     f"Add {remedy['key']} and refit",
-                    on_click=lambda key=remedy["key"]: self.session.start(self.session.run_fit(("friction", key))),
+                    on_click=self._refit(remedy["key"]),
                 ).props("outline dense no-caps")
         for words in result["advice"]:
             ui.label(f"→ {words}").classes("text")
         if fit.series:
             ui.label("Free run: the model gets the inputs only").classes("title")
-            _plot(fit.series, [])
+            plot(fit.series, [])
         with self._box(f"Warnings and notes ({len(result['warnings'])})"):
             for warning in result["warnings"]:
                 ui.label(f"{warning['severity']}: {warning['text']}").classes("text")
         self._calls(fit.command, fit.python)
+
+    def _refit(self, key: str) -> Callable[[], None]:
+        """What fits again, with a number that the model has not yet."""
+        return lambda: self.session.start(self.session.run_fit(("friction", key)))
 
     def _calls(self, command: str, python: str) -> None:
         """The command line and the Python call that do the same."""
@@ -321,92 +326,47 @@ class Page:
 
     # Drive
 
-    def _drive_tab(self, to_fit: Callable[[], None]) -> None:
+    def _drive_tab(self, to_fit: Callable[[], object]) -> None:
         self._part(self._robot_choice, ROBOT)
         self._part(lambda: self._drive_content(to_fit), DRIVE, ROBOT)
         self._part(self._drive_view, VIEW)
+        self.parts[NUMBERS] = [self._drive_numbers]
 
-    def _drive_content(self, to_fit: Callable[[], None]) -> None:
+    def _drive_content(self, to_fit: Callable[[], object]) -> None:
         session, drive = self.session, self.session.drive
         if drive.trouble:
-            _verdict("error", drive.trouble)
+            verdict("error", drive.trouble)
         with ui.row().classes("line"):
-            if not drive.running:
-                ui.button("Drive", on_click=self._drive).props("no-caps id=drive")
-                words = "Choose a robot, then drive it by keys or sliders." if not session.robot else session.robot
-                ui.label(words).classes("text quiet")
-                return
-            ui.button("Stop", on_click=lambda: session.command({"stop": True})).props("outline no-caps id=stop")
-            ui.button("Back to the start", on_click=lambda: session.command({"home": True})).props("flat no-caps")
-            ui.button(
-                "End the recording" if drive.recording else "Record",
-                on_click=lambda: session.command({"record": not drive.recording}),
-            ).props("outline no-caps id=record")
+            if drive.running:
+                ui.button("Stop", on_click=lambda: session.command({"stop": True})).props("outline no-caps id=stop")
+                ui.button("Back to the start", on_click=lambda: session.command({"home": True})).props("flat no-caps")
+                ui.button(
+                    "End the recording" if drive.recording else "Record",
+                    on_click=lambda: session.command({"record": not drive.recording}),
+                ).props("outline no-caps id=record")
+            else:
+                ui.button("Drive", on_click=self._drive).props("outline no-caps id=drive")
             if any(Path(log.path).name.startswith("drive-") for log in session.logs.values()):
                 ui.button("Fit the recording", on_click=to_fit).props("outline no-caps id=to-fit")
+            if not drive.running:
+                words = session.robot or "Choose a robot, then drive it by keys or sliders."
+                ui.label(words).classes("text quiet")
 
     def _drive_view(self) -> None:
         drive = self.session.drive
         if drive.running and drive.robot is None:
             ui.spinner(size="1.2em")
         elif drive.running:
-            view = ui.element("omni-drive")
+            view = self.view = ui.element("omni-drive")
             view._props["data-robot"] = json.dumps(drive.robot)
+
+    def _drive_numbers(self) -> None:
+        """The same element goes on with other numbers of the robot."""
+        if self.view is not None and not self.view.is_deleted and self.session.drive.running:
+            self.view._props["data-robot"] = json.dumps(self.session.drive.robot)
+            self.view.update()
 
     def _drive(self) -> None:
         self.session.robot = self.session.robot or "axebot"
         self.session.changed(ROBOT)
         self.session.start(self.session.run_drive())
-
-
-def _verdict(severity: str, words: str, name: str = "verdict") -> None:
-    with ui.row().classes(f"verdict {severity}").props(f"id={name} role=status"):
-        ui.label(MARK[severity]).classes("mark")
-        ui.label(words).classes("text")
-
-
-def _plot(series: str, spans: list[list[Any]]) -> None:
-    plot = ui.element("omni-plot")
-    plot._props["data-series"], plot._props["data-spans"] = series, json.dumps(spans)
-
-
-def _table(table: dict[str, Any], name: str) -> None:
-    """A table as it is, cell by cell."""
-    with ui.element("div").classes("scroll"), ui.element("table").props(f"id={name}"):
-        with ui.element("thead"), ui.element("tr"):
-            for words in table["head"]:
-                with ui.element("th"):
-                    ui.label(words)
-        with ui.element("tbody"):
-            for row in table["rows"]:
-                with ui.element("tr"):
-                    for cell in row:
-                        with ui.element("td"):
-                            ui.label(cell)
-
-
-def _component_names() -> list[str]:
-    """All that a column can be."""
-    return [UNUSED, "t", *(name for channel in CHANNELS for name in components(channel, 4))]
-
-
-def _column_row(row: dict[str, Any]) -> None:
-    """A column of the file: what it is, in which unit."""
-    names = _component_names()
-    names += [row["component"]] if row["component"] not in names else []
-
-    def take(name: str) -> Callable[[Any], None]:
-        return lambda event: row.__setitem__(name, event.value)
-
-    ui.label(row["column"]).classes("code")
-    ui.select(names, value=row["component"], on_change=take("component")).props(
-        f"dense aria-label='{_plain(row['column'])} is'"
-    )
-    ui.input(value=row["unit"], on_change=take("unit")).props(f"dense aria-label='unit of {_plain(row['column'])}'")
-    ui.checkbox(value=row["motor"], on_change=take("motor")).props(f"aria-label='{_plain(row['column'])} at the motor'")
-    ui.checkbox(value=row["invert"], on_change=take("invert")).props(f"aria-label='{_plain(row['column'])} other sign'")
-
-
-def _plain(text: str) -> str:
-    """A name of a file in an attribute."""
-    return "".join(c for c in text if c.isalnum() or c in " _-./")

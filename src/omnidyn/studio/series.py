@@ -63,15 +63,15 @@ class Series:
     def frame(self, begin: float, end: float, width: int) -> bytes:
         """What a picture of a stretch of time shows, as bytes: a head in JSON, then float32.
 
-        The head: begin [s], to which times are relative, signals and points. Then times (points,), then for each signal
-        least and largest values (2, points). width: pixels.
+        The head: begin [s], to which times are relative, signals, points, and the rows behind them. Then times
+        (points,), then for each signal least and largest values (2, points). width: pixels.
         """
         width = max(2, min(int(width), MAX_WIDTH))
         rows = len(self._t)
         first = max(0, int(np.searchsorted(self._t, begin)) - 1)
         last = min(rows, int(np.searchsorted(self._t, end, side="right")) + 1)
         t, least, largest = self._reduced(first, max(last, first + 1), width)
-        head = json.dumps({"begin": begin, "signals": len(least), "points": len(t)}).encode()
+        head = json.dumps({"begin": begin, "signals": len(least), "points": len(t), "rows": last - first}).encode()
         head += b" " * (-(len(head) + 4) % 4)
         both = np.stack([least, largest], axis=1)
         return struct.pack("<I", len(head)) + head + (t - begin).astype("<f4").tobytes() + both.astype("<f4").tobytes()

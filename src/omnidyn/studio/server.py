@@ -64,6 +64,7 @@ def serve(files: list[str], host: str, port: int, browse: bool) -> int:
 def _listener(host: str, port: int) -> socket.socket:
     """A socket on the first free port from the one asked for; on any with port 0. Raises InputError."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    reason = ""
     for candidate in range(port, port + TRIES) if port else (0,):
         listener = socket.socket(family, socket.SOCK_STREAM)
         if sys.platform != "win32":
@@ -73,11 +74,11 @@ def _listener(host: str, port: int) -> socket.socket:
             listener.listen()
         except OSError as error:
             listener.close()
-            reason = error
+            reason = str(error)
             continue
         listener.set_inheritable(False)
         return listener
-    raise InputError("no port is free", got=str(reason), expected="an address of this machine", where=f"{host}:{port}")
+    raise InputError("no port is free", got=reason, expected="an address of this machine", where=f"{host}:{port}")
 
 
 def application(session: Session, files: list[str]) -> FastAPI:

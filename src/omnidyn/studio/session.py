@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import re
-import shlex
 import sys
 import tempfile
 from collections.abc import AsyncIterator, Callable
@@ -18,6 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import omnidyn
+from omnidyn.studio import calls
+from omnidyn.studio.calls import LogFile
 from omnidyn.studio.series import META, Series
 from omnidyn.studio.worker import CancelledError, JobError, Worker
 
@@ -25,41 +26,12 @@ MAX_FILES, MAX_FILE_BYTES, MAX_BYTES = 50, 2**30, 4 * 2**30  # of uploads
 ROBOT_SUFFIX = ".toml"
 MAX_NAME = 80
 # Parts of a page that change
-LOGS, ROBOT, FIT, PROGRESS, DRIVE, VIEW = "logs", "robot", "fit", "progress", "drive", "view"
+LOGS, ROBOT, FIT, PROGRESS = "logs", "robot", "fit", "progress"
+DRIVE, VIEW, NUMBERS = "drive", "view", "numbers"  # the drive: its buttons, the robot, the numbers of the robot
 
 
 class RefusedError(Exception):
     """An upload that is not taken, and why."""
-
-
-@dataclass
-class LogFile:
-    """A log, how it is read, and what check says of it.
-
-    name: that a page shows. path: of the file. map: of its columns, "" for a guess. result: of the job; error: why
-    there is none. series: id of its signals. progress: in words, while it is read.
-    """
-
-    key: str
-    name: str
-    path: str
-    map: str = ""
-    unsigned: bool = False
-    result: dict[str, Any] | None = None
-    error: str = ""
-    series: str = ""
-    progress: str = ""
-    version: int = 0
-
-    @property
-    def label(self) -> str:
-        """The name without its folder."""
-        return Path(self.name).name
-
-    @property
-    def request(self) -> dict[str, Any]:
-        """How a job reads it."""
-        return {"path": self.path, "map": self.map, "unsigned": self.unsigned}
 
 
 @dataclass
@@ -291,7 +263,8 @@ class Session:
             return
         folder = self._new_folder() / "fit"
         self.series.pop(self.fit.series, None)
-        command, python = self.fit_call(free)
+        logs, held_out = [*self.logs.values()], [self.logs[key] for key in self.held_out]
+        command, python = calls.fit(logs, held_out, self.robot_path, free)
         self.fit = fit = FitState(running=True, folder=folder, progress="...", command=command, python=python)
         self.changed(FIT)
 
@@ -309,7 +282,7 @@ class Session:
         }
         try:
             fit.result = await self.workers["fit"].run("fit", request, listen)
-            if fit.result["series"]:
+            if fit.result is not None and fit.result["series"]:
                 fit.series = f"fit{self._count}"
                 self.series[fit.series] = Series(folder / "series")
         except JobError as error:
@@ -349,7 +322,7 @@ class Session:
                 self.drive.trouble = value
             elif kind == "recorded":
                 self.add_log(value["path"], Path(value["path"]).name)
-            self.changed(VIEW if kind == "breakaway" else DRIVE)
+            self.changed(NUMBERS if kind == "breakaway" else DRIVE)
 
         try:
             await self.workers["drive"].run("drive", {"robot": self.robot_path, "folder": str(folder)}, listen)
@@ -372,39 +345,6 @@ class Session:
             self.workers["drive"].send({"command": command})
             if "record" in command:
                 self.changed(DRIVE)
-
-    # The same by hand
-
-    def check_call(self, log: LogFile) -> tuple[str, str]:
-        """The command line and the Python call that check a log so."""
-        robot = self.robot_path and Path(self.robot_path).name
-        words = ["omnidyn", "check", log.name]
-        words += ["--robot", robot] if robot else []
-        words += ["--map", "columns.toml"] if log.map else []
-        words += ["--current-unsigned"] if log.unsigned else []
-        options = "".join(
-            ([", columns='columns.toml'"] if log.map else []) + ([", current_unsigned=True"] if log.unsigned else [])
-        )
-        load = f"omnidyn.{'read_log' if options else 'load_log'}({log.name!r}{options})"
-        return shlex.join(words), f"omnidyn.check({load}{f', omnidyn.load_robot({robot!r})' if robot else ''})"
-
-    def fit_call(self, free: tuple[str, ...] = ()) -> tuple[str, str]:
-        """The command line and the Python call that fit so."""
-        robot = Path(self.robot_path).name
-        words = ["omnidyn", "identify", *(log.name for log in self.logs.values()), "--robot", robot]
-        for key in self.held_out:
-            words += ["--hold-out", self.logs[key].name]
-        for key in free:
-            words += ["--free", key]
-        if any(log.map for log in self.logs.values()):
-            words += ["--map", "columns.toml"]
-        unsigned = any(log.unsigned for log in self.logs.values())
-        words += ["--current-unsigned"] if unsigned else []
-        words += ["-o", "fitted.toml", "--report", "report.html"]
-        logs = ", ".join(f"omnidyn.load_log({log.name!r})" for log in self.logs.values())
-        held = f", hold_out={[self.logs[key].name for key in self.held_out]!r}" if self.held_out else ""
-        method = f", omnidyn.OutputError(free={free!r})" if free else ""
-        return shlex.join(words), f"omnidyn.identify([{logs}], omnidyn.load_robot({robot!r}){method}{held})"
 
 
 def safe_name(name: str) -> str:

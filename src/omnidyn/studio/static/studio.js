@@ -181,8 +181,17 @@ class Plot extends HTMLElement {
     this.frames++;
     this.draw();
   }
-  areas() { return JSON.parse(this.dataset.spans || '[]'); }
-  draw() {
+  // Findings: all, or those about a signal of a panel; one about no signal is about every panel
+  areas(panel) {
+    const all = JSON.parse(this.dataset.spans || '[]'), known = this.meta.panels.flatMap((p) => p.signals);
+    if (!panel) return all;
+    return all.filter(([, , , , subject]) => {
+      const about = subject.split(' ').filter((name) => known.includes(name));
+      return !about.length || about.some((name) => panel.signals.includes(name));
+    });
+  }
+  draw() { this.due ||= requestAnimationFrame(() => { this.due = 0; this.render(); }); }
+  render() {
     if (!this.meta || !this.canvas) return;
     const panels = this.meta.panels, width = this.clientWidth;
     const height = TOP + panels.length * (PANEL + GAP) - GAP + BOTTOM;
@@ -210,19 +219,35 @@ class Plot extends HTMLElement {
     const y = (v) => top + PANEL - (v - low) / (high - low) * PANEL;
     g.save();
     g.beginPath(); g.rect(LEFT, top, inner, PANEL); g.clip();
-    for (const [, severity, begin, end] of this.areas()) {
+    for (const [, severity, begin, end] of this.areas(panel)) {
       g.fillStyle = css(`--${severity}-area`);
       const a = x(begin), b = Math.max(x(end), a + 2);
       g.fillRect(a, top, b - a, PANEL);
       if (severity !== 'note') { g.fillStyle = css(`--${severity}`); g.fillRect(a, top, b - a, 3); }
     }
     g.strokeStyle = css('--line'); g.lineWidth = 1;
-    for (const v of ticks(low, high, 4)) { g.beginPath(); g.moveTo(LEFT, y(v)); g.lineTo(LEFT + inner, y(v)); g.stroke(); }
+    for (const v of ticks(low, high, 5)) { g.beginPath(); g.moveTo(LEFT, y(v)); g.lineTo(LEFT + inner, y(v)); g.stroke(); }
     panel.signals.forEach((name, k) => {
       const at = n + 2 * n * (first + k);
       const wide = name === 'measured'; // the model is drawn over it
-      g.strokeStyle = css(`--c${k % 6}`); g.lineWidth = wide ? 4 : 1.3; g.globalAlpha = wide ? 0.45 : 1;
+      g.strokeStyle = css(`--c${k % 6}`); g.lineWidth = wide ? 4 : 1.3; g.lineJoin = 'round'; g.globalAlpha = wide ? 0.45 : 1;
       g.beginPath();
+      if (n > inner / 2 && shown.rows > 20 * n) { // columns of pixels: strokes as dense as this take ten times as long
+        let before = [NaN, NaN];
+        for (let i = 0; i < n; i++) {
+          let least = shown.numbers[at + i], largest = shown.numbers[at + n + i];
+          if (Number.isNaN(least)) continue;
+          const ends = [least, largest];
+          if (before[1] < least) least = before[1];
+          if (before[0] > largest) largest = before[0];
+          before = ends;
+          const px = Math.floor(x(shown.begin + shown.numbers[i])), thick = wide ? 2 : 0.5;
+          const bottom = Math.ceil(y(least) + thick), head = Math.floor(y(largest) - thick);
+          g.rect(px, head, Math.max(1, Math.ceil(inner / n)), bottom - head);
+        }
+        g.fillStyle = css(`--c${k % 6}`); g.fill(); g.globalAlpha = 1;
+        return;
+      }
       let pen = false;
       for (let i = 0; i < n; i++) {
         const least = shown.numbers[at + i], largest = shown.numbers[at + n + i];
@@ -237,7 +262,7 @@ class Plot extends HTMLElement {
     g.restore();
     g.strokeStyle = css('--quiet'); g.strokeRect(LEFT + 0.5, top + 0.5, inner, PANEL);
     g.fillStyle = css('--quiet'); g.textAlign = 'right'; g.textBaseline = 'middle';
-    for (const v of ticks(low, high, 4)) g.fillText(short(v), LEFT - 5, y(v));
+    for (const v of ticks(low, high, 5)) g.fillText(short(v), LEFT - 5, y(v));
     g.textAlign = 'left'; g.textBaseline = 'bottom'; g.fillStyle = css('--ink');
     const title = `${panel.title} [${panel.unit || '1'}]`;
     g.fillText(title, LEFT, top - 3);
@@ -441,6 +466,7 @@ class Drive extends HTMLElement {
   }
 }
 
+document.documentElement.lang = 'en';
 customElements.define('omni-drop', Drop);
 customElements.define('omni-plot', Plot);
 customElements.define('omni-drive', Drive);

@@ -1,0 +1,68 @@
+"""Elements of a page that are made in several places: a verdict, a plot, a table, a row of the map of columns."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+from nicegui import ui
+
+from omnidyn.logs.channels import components
+from omnidyn.run import CHANNELS
+
+UNUSED = "-"  # what a column is that nobody takes
+MARK = {"error": "✕", "warning": "!", "note": "i"}
+
+
+def verdict(severity: str, words: str, name: str = "verdict") -> None:
+    with ui.row().classes(f"verdict {severity}").props(f"id={name} role=status"):
+        ui.label(MARK[severity]).classes("mark")
+        ui.label(words).classes("text")
+
+
+def plot(series: str, spans: list[list[Any]]) -> None:
+    plot = ui.element("omni-plot")
+    plot._props["data-series"], plot._props["data-spans"] = series, json.dumps(spans)
+
+
+def table(table: dict[str, Any], name: str) -> None:
+    """A table as it is, cell by cell."""
+    with ui.element("div").classes("scroll"), ui.element("table").props(f"id={name}"):
+        with ui.element("thead"), ui.element("tr"):
+            for words in table["head"]:
+                with ui.element("th" if words else "td"):
+                    ui.label(words)
+        with ui.element("tbody"):
+            for row in table["rows"]:
+                with ui.element("tr"):
+                    for cell in row:
+                        with ui.element("td"):
+                            ui.label(cell)
+
+
+def _component_names() -> list[str]:
+    """All that a column can be."""
+    return [UNUSED, "t", *(name for channel in CHANNELS for name in components(channel, 4))]
+
+
+def column_row(row: dict[str, Any]) -> None:
+    """A column of the file: what it is, in which unit."""
+    names = _component_names()
+    names += [row["component"]] if row["component"] not in names else []
+
+    def take(name: str) -> Callable[[Any], None]:
+        return lambda event: row.__setitem__(name, event.value)
+
+    ui.label(row["column"]).classes("code")
+    ui.select(names, value=row["component"], on_change=take("component")).props(
+        f"dense aria-label='{_plain(row['column'])} is'"
+    )
+    ui.input(value=row["unit"], on_change=take("unit")).props(f"dense aria-label='unit of {_plain(row['column'])}'")
+    ui.checkbox(value=row["motor"], on_change=take("motor")).props(f"aria-label='{_plain(row['column'])} at the motor'")
+    ui.checkbox(value=row["invert"], on_change=take("invert")).props(f"aria-label='{_plain(row['column'])} other sign'")
+
+
+def _plain(text: str) -> str:
+    """A name of a file in an attribute."""
+    return "".join(c for c in text if c.isalnum() or c in " _-./")
