@@ -11,11 +11,8 @@ import os
 import sys
 from collections.abc import Sequence
 
-RARELY = (
-    200_000,
-    20,
-    50,
-)  # new objects before garbage is looked for, ..: loading makes many, and none of them is garbage
+# New objects before garbage is looked for, ..: loading makes many, and none of them is garbage.
+RARELY = (200_000, 20, 50)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -25,4 +22,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         gc.set_threshold(*RARELY)
     from omnidyn.cli.terminal.outcome import run_guarded
 
-    return run_guarded(list(sys.argv[1:] if arguments is None else arguments))
+    return run_guarded(_run, list(sys.argv[1:] if arguments is None else arguments))
+
+
+def _run(arguments: list[str]) -> int | None:
+    """The exit code of the command that these arguments call. Imported here: slow to load, and guarded."""
+    from omnidyn.cli.app import app
+
+    return app(arguments, prog_name="omnidyn", standalone_mode=False)

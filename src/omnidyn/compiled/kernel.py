@@ -140,7 +140,7 @@ def maker(function: Callable[..., Any]) -> Callable[..., Any]:
     return _linked(function, counted=True)
 
 
-def _linked(function: Callable[..., Any], counted: bool, **options: bool) -> Any:
+def _linked(function: Callable[..., Any], counted: bool, **options: Any) -> Any:
     """A function inside kernels; where numba is switched off, for debuggers, the function itself.
 
     numba counts who holds an array: it adds and removes one, atomically, around nearly every call that has a branch. In

@@ -9,7 +9,7 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import FrameType
 
 import typer
@@ -22,14 +22,16 @@ from omnidyn.errors import INTERRUPTS, OmnidynError, Terminated, printable, told
 BUG, USAGE, BAD_INPUT, INTERRUPTED, TERMINATED = 1, 2, 3, 130, 143
 
 
-def run_guarded(arguments: list[str]) -> int:
-    """Run the command line and turn whatever happens into an exit code."""
+def run_guarded(run: Callable[[list[str]], int | None], arguments: list[str]) -> int:
+    """Run the command line, `run`, and turn whatever happens into an exit code."""
     prepare()
     debug, arguments = _take_debug(arguments)
     session.begin(arguments)
     try:
         with _sigterm_unwinds(), _interrupts_come_again():
-            code = _run(arguments)
+            code = run(arguments) or 0
+            if code == INTERRUPTED:  # typer's word for Ctrl-C
+                raise KeyboardInterrupt
             if sys.stdout is not None:
                 sys.stdout.flush()
             return code
@@ -37,15 +39,6 @@ def run_guarded(arguments: list[str]) -> int:
         if debug and not isinstance(error, SystemExit):
             say_trace(traceback.format_exc())
         return _code_of(told_by(error), debug)
-
-
-def _run(arguments: list[str]) -> int:
-    from omnidyn.cli.app import app
-
-    code = app(arguments, prog_name="omnidyn", standalone_mode=False)
-    if code == INTERRUPTED:  # typer's word for Ctrl-C
-        raise KeyboardInterrupt
-    return code or 0
 
 
 def _code_of(error: BaseException, debug: bool) -> int:
