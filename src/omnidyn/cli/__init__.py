@@ -20,7 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if "numpy" not in sys.modules:  # our matrices are small: threads cost more than they give, most where others work
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
         gc.set_threshold(*RARELY)
-    from omnidyn.cli.terminal.outcome import run_guarded
+    from omnidyn.cli.outcome import run_guarded
 
     return run_guarded(_run, list(sys.argv[1:] if arguments is None else arguments))
 
