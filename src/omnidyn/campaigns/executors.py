@@ -76,7 +76,7 @@ def _dask(scheduler: str) -> Iterator[Any]:
             "no Dask scheduler there",
             got=str(error) or scheduler,
             expected="tcp://HOST:PORT of one that runs",
-            remedy="start one: dask scheduler --host 127.0.0.1",
+            remedy="start one with `dask scheduler`, and workers with `dask worker`",
             where="scheduler",
         ) from None
     try:

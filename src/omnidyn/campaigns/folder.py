@@ -208,7 +208,7 @@ class Folder:
     def locked(self, start: int, stop: int) -> Iterator[None]:
         """Within it nobody else works on the shards start to stop. Raises InputError where somebody does.
 
-        Locks of bytes of a file: processes that work on other shards, `--shard i/n`, do not meet; the system lets go of
+        Locks of bytes of a file: processes that work on other shards do not meet; the system lets go of
         them when the process ends, however it ends; and a file system in a network (NFS) knows them.
         """
         if _working(self.path, start, stop):
