@@ -1,12 +1,12 @@
 """PoseGate: what a controller believes of a measured pose and twist that disagree.
 
-    pose = pose before + R (twist dt) + q,    |q| <= RATE (top speed) dt
+    pose = pose before + R (twist dt) + q,    |q| <= RATE (top speed) dt + speed * wait
     twist = measured + b,    b: leaky mean of (pose - pose before)/dt - twist, where it is more than noise makes it
 
-A localisation that jumps is followed at RATE: one wrong pose moves the robot little, one that stays is reached. Wheels
-that slip count what the body did not drive: poses put that right, unless they are late themselves. A sample that comes
-again although it says that the robot moves is moved on by its twist. Where none of this is the case, nothing is
-changed, to the last bit.
+A localisation that jumps is followed at RATE: one wrong pose moves the robot little, one that stays is reached; `wait`
+is by how much the age of a pose may differ from that of the one before. Wheels that slip count what the body did not
+drive: poses put that right, unless they are late themselves. A sample that comes again although it says that the robot
+moves is moved on by its twist. Where none of this is the case, nothing is changed, to the last bit.
 """
 
 from __future__ import annotations
@@ -86,11 +86,11 @@ def slip(memory, i, speed):
 
 
 @kernel
-def judge(memory, top, averaged, late, dt, t, state):
+def judge(memory, top, averaged, late, wait, dt, t, state):
     """Change a measured state (6,) into what is believed of it; returns a verdict.
 
     memory (7, 3). top: speeds [m/s, m/s, rad/s], (3,). averaged: whether twists are means since the step before. late:
-    whether poses are: their age trembles, and says nothing of slip. dt: of a step [s].
+    whether poses are: their age trembles, and says nothing of slip. wait [s]: see above. dt: of a step [s].
     """
     for i in range(6):
         if not math.isfinite(state[i]):
@@ -132,7 +132,10 @@ def judge(memory, top, averaged, late, dt, t, state):
             state[3 + i] += added[i]
     mean = mean[0] + added[0], mean[1] + added[1], mean[2] + added[2]
     _, (dx, dy, turn) = gap(row(memory, USED), mean, elapsed, state)
-    far = max(math.hypot(dx, dy) / max(top[0], top[1]), abs(turn) / top[2]) / (RATE * elapsed)
+    far = max(
+        math.hypot(dx, dy) / (RATE * elapsed * max(top[0], top[1]) + wait * math.hypot(mean[0], mean[1])),
+        abs(turn) / (RATE * elapsed * top[2] + wait * abs(mean[2])),
+    )
     if far > 1.0:
         verdict, back = JUMPED, 1.0 - 1.0 / far
         state[0], state[1], state[2] = state[0] - back * dx, state[1] - back * dy, state[2] - back * turn
@@ -146,7 +149,8 @@ class PoseGate:
 
     def __init__(self, robot: Robot, dt: float, before: PoseGate | None = None) -> None:
         self._top, self._averaged, self._dt = top_speeds(robot), robot.sensor_model.averaged, dt
-        self._late = robot.sensor_model.pose_age(dt) > 0.0
+        sensors = robot.sensor_model
+        self._late, self._wait = sensors.pose_age(dt) > 0.0, 2.0 * (sensors.pose_age(dt) - sensors.pose_delay)
         self._memory, self._judge = np.zeros((7, 3)) if before is None else before._memory.copy(), judge
 
     def reset(self) -> None:
@@ -155,7 +159,7 @@ class PoseGate:
 
     def judge(self, t: float, state: FloatArray) -> int:
         """Change a state measured at t [s], shape (6,), into what is believed of it. Returns a verdict."""
-        arguments = self._memory, self._top, self._averaged, self._late, self._dt, t, state
+        arguments = self._memory, self._top, self._averaged, self._late, self._wait, self._dt, t, state
         if self._judge is judge:
             self._judge = machine_code(judge, *arguments)
         return self._judge(*arguments)
