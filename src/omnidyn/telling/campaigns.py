@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from omnidyn.document import all_of
 from omnidyn.statement import Statement
-from omnidyn.telling.sentence import Sentence
+from omnidyn.telling.sentence import Sentence, counted
 
 
 def _of(statement: Statement) -> str:
@@ -14,19 +14,20 @@ def _of(statement: Statement) -> str:
 def _done(statement: Statement) -> str:
     """All shards of a campaign are there."""
     numbers = statement.numbers
-    return f"{_of(statement)} is complete: {numbers['samples']} samples in {numbers['shards']} shards"
+    return f"{_of(statement)} is complete: {numbers['samples']} samples in {counted(numbers['shards'], 'shard')}"
 
 
 def _open(statement: Statement) -> str:
     """Some shards of a campaign are not there yet."""
     numbers = statement.numbers
-    return f"{_of(statement)} is not complete: {numbers['done']} of {numbers['shards']} shards are there"
+    return f"{_of(statement)} is not complete: {numbers['done']} of {counted(numbers['shards'], 'shard')} are there"
 
 
 def _failed(statement: Statement) -> str:
     """Some shards of a campaign failed."""
     numbers = statement.numbers
-    return f"{_of(statement)} has {numbers['failed']} failed shards; {numbers['done']} of {numbers['shards']} are there"
+    failed, done = counted(numbers["failed"], "failed shard"), numbers["done"]
+    return f"{_of(statement)} has {failed}; {done} of {numbers['shards']} are there"
 
 
 def _tolerance(statement: Statement) -> str:
