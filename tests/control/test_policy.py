@@ -137,3 +137,11 @@ def test_other_steps_and_other_drives_are_refused(tmp_path):
         Policy(AXEBOT, policy=network("path"), dt=0.01)
     with pytest.raises(InputError, match="another drive"):
         Policy(omnidyn.load_robot("four-wheel"), policy=network("path"))
+
+
+def test_a_file_that_is_no_policy_is_refused_when_it_is_loaded(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        omnidyn.load_controller(tmp_path / "nowhere.npz")
+    (tmp_path / "bad.npz").write_bytes(b"PK\x03\x04junk")
+    with pytest.raises(InputError, match="not a policy"):
+        omnidyn.load_controller(tmp_path / "bad.npz")

@@ -206,6 +206,9 @@ def load_controller(path: str | os.PathLike) -> ControllerFile:
     """Read a controller file, or a trained policy (.npz). Raises InputError, with the nearest key for one unknown."""
     file_name = os.fspath(path)
     if file_name.endswith(POLICY_SUFFIX):
+        from omnidyn.control.policy import load_policy  # as every controller: imported where it is needed
+
+        load_policy(file_name)  # says now what is wrong with it
         return ControllerFile(POLICY, {POLICY: file_name}, "trained")
     table = parse_toml(read_text(path), file_name)
     keys = ("schema", "controller", "source", "options")

@@ -183,3 +183,9 @@ def test_volts_beyond_the_limit_are_clipped_and_told():
 def test_bad_calls_are_refused(call, words):
     with pytest.raises(InputError, match=words):
         call()
+
+
+@pytest.mark.parametrize("robots", [omnidyn.load_robot("axebot"), "axebot", ["axebot"]])
+def test_what_is_no_list_of_robots_is_refused(robots):
+    with pytest.raises(InputError, match=r"not robots.*\[robot\] \* n is n robots alike"):
+        omnidyn.simulate_batch(robots, np.zeros((5, 3)), 0.01)

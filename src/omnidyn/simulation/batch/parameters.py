@@ -54,6 +54,14 @@ class BatchParameters(NamedTuple):
 
 def wheels_of(robots: Sequence[Robot]) -> int:
     """The number of wheels of each of some robots. Raises InputError where they differ in it, or there is no robot."""
+    if isinstance(robots, str | Robot) or not all(isinstance(robot, Robot) for robot in robots):
+        raise InputError(
+            "not robots",
+            got=robots.name if isinstance(robots, Robot) else type(robots).__name__,
+            expected="a list of robots, or what omnidyn.sample gives",
+            remedy="[robot] * n is n robots alike, omnidyn.load_robot reads one",
+            where="robots",
+        )
     counts = sorted({robot.wheels.count for robot in robots})
     if len(counts) != 1:
         raise InputError(

@@ -63,6 +63,7 @@ class SingleGroup:
         totals = np.full((self.count if statistics else 0, 4 * self.rows), np.nan)
 
         def move(k: int) -> tuple[Statement, ...]:
+            """What is to be said of robot k, which has moved: its rows are written."""
             live, rows = self._live[k], commands.rows[k if len(commands.rows) > 1 else 0]
             if live is None:
                 return ()
