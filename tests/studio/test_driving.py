@@ -6,7 +6,7 @@ import queue
 import pytest
 
 import omnidyn
-from omnidyn.studio.driving import Drive
+from omnidyn.studio.drive.job import Drive
 from omnidyn.studio.worker import CancelledError, JobError, Worker
 
 

@@ -22,9 +22,10 @@ from fastapi.staticfiles import StaticFiles
 from nicegui import ui
 
 from omnidyn.errors import InputError
+from omnidyn.studio.drive.state import Driving
 from omnidyn.studio.guard import Guard
-from omnidyn.studio.page import Page
-from omnidyn.studio.session import RefusedError, Session
+from omnidyn.studio.layout import Studio, show
+from omnidyn.studio.session import RefusedError
 
 LOCAL = "127.0.0.1"
 STATIC = Path(__file__).with_name("static")
@@ -44,8 +45,7 @@ def serve(files: list[str], host: str, port: int, browse: bool) -> int:
     listener = _listener(host or LOCAL, port)
     shown_host = LOCAL if host in ("", "0.0.0.0", "::") else host
     address = f"http://{shown_host}:{listener.getsockname()[1]}/{f'?token={token}' if token else ''}"
-    session = Session()
-    app = application(session, files)
+    app = application(Studio(), files)
     config = uvicorn.Config(
         Guard(app, token),
         log_level="warning",
@@ -81,8 +81,9 @@ def _listener(host: str, port: int) -> socket.socket:
     raise InputError("no port is free", got=reason, expected="an address of this machine", where=f"{host}:{port}")
 
 
-def application(session: Session, files: list[str]) -> FastAPI:
+def application(studio: Studio, files: list[str]) -> FastAPI:
     """The application without its guard."""
+    session = studio.session
 
     @contextlib.asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -95,19 +96,17 @@ def application(session: Session, files: list[str]) -> FastAPI:
 
     app = FastAPI(lifespan=lifespan, docs_url=None, redoc_url=None, openapi_url=None)
     app.mount("/static", StaticFiles(directory=STATIC))
-    _add_files(app, session)
-    _add_sockets(app, session)
+    _add_files(app, studio)
+    _add_sockets(app, studio)
 
-    @ui.page("/", title="omnidyn studio")
-    def show() -> None:
-        Page(session).build()
-
+    ui.page("/", title="omnidyn studio")(lambda: show(studio))
     ui.run_with(app, title="omnidyn studio", dark=None, show_welcome_message=False)
     return app
 
 
-def _add_files(app: FastAPI, session: Session) -> None:
+def _add_files(app: FastAPI, studio: Studio) -> None:
     """Uploads, and what can be downloaded."""
+    session = studio.session
 
     @app.post("/upload")
     async def upload(request: Request, name: str) -> Response:
@@ -123,7 +122,7 @@ def _add_files(app: FastAPI, session: Session) -> None:
 
     @app.get("/fit/{name}")
     async def fit_file(name: str) -> Response:
-        folder = session.fit.folder
+        folder = studio.fitting.last.folder
         if name not in FIT_FILES or folder is None or not (folder / name).exists():
             return Response(status_code=404)
         headers = {"content-security-policy": NO_SCRIPT}
@@ -145,8 +144,9 @@ def _add_files(app: FastAPI, session: Session) -> None:
         return FileResponse(path, media_type="text/plain", filename=Path(path).name)
 
 
-def _add_sockets(app: FastAPI, session: Session) -> None:
+def _add_sockets(app: FastAPI, studio: Studio) -> None:
     """Fast channels: pictures of signals, and the drive."""
+    session, driving = studio.session, studio.driving
 
     @app.websocket("/plot")
     async def plot(socket: WebSocket) -> None:
@@ -166,29 +166,29 @@ def _add_sockets(app: FastAPI, session: Session) -> None:
         """Frames out, commands in. A slow page loses frames: only the newest ever waits."""
         await socket.accept()
         fresh = asyncio.Event()
-        session.drive.fresh.add(fresh)
+        driving.fresh.add(fresh)
 
         async def send() -> None:
             with contextlib.suppress(*CLOSED):
                 while True:
                     await fresh.wait()
                     fresh.clear()
-                    frame = np.asarray(session.drive.frame, dtype="<f4")
+                    frame = np.asarray(driving.frame, dtype="<f4")
                     await socket.send_bytes(struct.pack("<I", len(frame)) + frame.tobytes())
 
         sender = asyncio.create_task(send())
         try:
             with contextlib.suppress(*CLOSED):
                 while True:
-                    _take(session, await socket.receive_json())
+                    _take(driving, await socket.receive_json())
         finally:
             sender.cancel()
-            session.drive.fresh.discard(fresh)
-            if not session.drive.fresh:
-                session.command({"axes": [0.0, 0.0, 0.0], "level": 0.0})  # nobody holds a key any more
+            driving.fresh.discard(fresh)
+            if not driving.fresh:
+                driving.send({"axes": [0.0, 0.0, 0.0], "level": 0.0})  # nobody holds a key any more
 
 
-def _take(session: Session, command: Any) -> None:
+def _take(driving: Driving, command: Any) -> None:
     """A command of a page, as far as it is one."""
     if isinstance(command, dict):
-        session.command({name: command[name] for name in ("axes", "level", "offset", "set") if name in command})
+        driving.send({name: command[name] for name in ("axes", "level", "offset", "set") if name in command})

@@ -12,53 +12,22 @@ import re
 import sys
 import tempfile
 from collections.abc import AsyncIterator, Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import omnidyn
-from omnidyn.studio import calls
 from omnidyn.studio.calls import LogFile
+from omnidyn.studio.parts import FIT, LOGS, PROGRESS, ROBOT
 from omnidyn.studio.series import META, Series
 from omnidyn.studio.worker import CancelledError, JobError, Worker
 
 MAX_FILES, MAX_FILE_BYTES, MAX_BYTES = 50, 2**30, 4 * 2**30  # of uploads
 ROBOT_SUFFIX = ".toml"
 MAX_NAME = 80
-# Parts of a page that change
-LOGS, ROBOT, FIT, PROGRESS = "logs", "robot", "fit", "progress"
-DRIVE, VIEW, NUMBERS = "drive", "view", "numbers"  # the drive: its buttons, the robot, the numbers of the robot
 
 
 class RefusedError(Exception):
     """An upload that is not taken, and why."""
-
-
-@dataclass
-class FitState:
-    """The last fit. result: of the job. running, progress, share: while it goes on. folder: of its files."""
-
-    result: dict[str, Any] | None = None
-    error: str = ""
-    running: bool = False
-    progress: str = ""
-    share: float | None = None
-    folder: Path | None = None
-    series: str = ""
-    command: str = ""
-    python: str = ""
-
-
-@dataclass
-class DriveState:
-    """The drive. robot: what a page must know of it. frame: the newest. recorded: keys of logs."""
-
-    running: bool = False
-    robot: dict[str, Any] | None = None
-    trouble: str = ""
-    recording: bool = False
-    frame: list[float] = field(default_factory=list)
-    fresh: set[asyncio.Event] = field(default_factory=set)
 
 
 class Session:
@@ -70,12 +39,10 @@ class Session:
         self.logs: dict[str, LogFile] = {}
         self.robots = {name: name for name in omnidyn.preset_names()}  # shown name -> preset or path
         self.robot = ""
-        self.fit, self.drive = FitState(), DriveState()
-        self.held_out: list[str] = []
         self.series: dict[str, Series] = {}
         self.listeners: set[Callable[[str], None]] = set()
         self.workers = {name: Worker() for name in ("log", "fit", "drive")}
-        self._count, self._bytes, self._tasks = 0, 0, set[asyncio.Task[Any]]()
+        self.count, self._bytes, self._tasks = 0, 0, set[asyncio.Task[Any]]()
 
     def changed(self, *parts: str) -> None:
         """Tell all pages which parts of them are old."""
@@ -97,9 +64,10 @@ class Session:
 
     # Files
 
-    def _new_folder(self) -> Path:
-        self._count += 1
-        folder = self.folder / str(self._count)
+    def new_folder(self) -> Path:
+        """A folder for one upload or one result."""
+        self.count += 1
+        folder = self.folder / str(self.count)
         folder.mkdir()
         return folder
 
@@ -113,8 +81,8 @@ class Session:
 
     def add_log(self, path: str, name: str) -> LogFile:
         """Take a log and check it."""
-        self._count += 1
-        log = LogFile(f"log{self._count}", name, path)
+        self.count += 1
+        log = LogFile(f"log{self.count}", name, path)
         self.logs[log.key] = log
         self.start(self.check(log))
         self.changed(LOGS, FIT)
@@ -125,7 +93,7 @@ class Session:
         if len(self.logs) + len(self.robots) >= MAX_FILES:
             raise RefusedError(f"{MAX_FILES}")
         safe = safe_name(name)
-        path, size = self._new_folder() / safe, 0
+        path, size = self.new_folder() / safe, 0
         try:
             with path.open("xb") as file:
                 async for block in body:
@@ -146,7 +114,6 @@ class Session:
     def remove(self, log: LogFile) -> None:
         """Forget a log; one that was uploaded is deleted."""
         self.logs.pop(log.key, None)
-        self.held_out = [key for key in self.held_out if key in self.logs]
         path = Path(log.path)
         if self.folder in path.parents:
             self._bytes -= path.stat().st_size if path.exists() else 0
@@ -155,7 +122,7 @@ class Session:
 
     async def example(self) -> None:
         """A simulated log to begin with."""
-        path = self._new_folder() / "example.csv"
+        path = self.new_folder() / "example.csv"
         await self.workers["log"].run("example", {"path": str(path)}, lambda kind, value: None)
         self.robot = self.robot or "axebot"
         self.add_log(str(path), path.name)
@@ -165,7 +132,7 @@ class Session:
         """Read and check a log again."""
         log.version += 1
         version = log.version
-        folder = self._new_folder() / "series"
+        folder = self.new_folder() / "series"
         log.error, log.result, log.progress = "", None, "..."
         self.changed(LOGS, FIT)
 
@@ -195,7 +162,7 @@ class Session:
 
     async def map_columns(self, log: LogFile, rows: list[dict[str, Any]]) -> str:
         """Read a log by a table of columns; an error in words, or ""."""
-        path = self._new_folder() / "columns.toml"
+        path = self.new_folder() / "columns.toml"
         try:
             await self.workers["log"].run("save_columns", {"rows": rows, "path": str(path)}, lambda kind, value: None)
         except JobError as error:
@@ -203,6 +170,11 @@ class Session:
         log.map = str(path)
         await self.check(log)
         return ""
+
+    async def warm(self) -> None:
+        """Load what the first fit needs, while nobody waits for it."""
+        with contextlib.suppress(CancelledError, JobError):
+            await self.workers["fit"].run("warm", {}, lambda kind, value: None)
 
     # Robot
 
@@ -226,7 +198,7 @@ class Session:
 
     async def make_robot(self, name: str, options: list[str]) -> str:
         """The robot that `omnidyn init` writes for these options; an error in words, or ""."""
-        path = self._new_folder() / f"{safe_name(name)}{ROBOT_SUFFIX}"
+        path = self.new_folder() / f"{safe_name(name)}{ROBOT_SUFFIX}"
         process = await asyncio.create_subprocess_exec(
             *(sys.executable, "-m", "omnidyn", "init", path.stem, *options, "-o", str(path)),
             stdin=asyncio.subprocess.DEVNULL,
@@ -238,113 +210,6 @@ class Session:
             return words.decode("utf-8", "replace").strip().removeprefix("omnidyn: error: ")
         self.add_robot(str(path), path.name)
         return ""
-
-    # Fit
-
-    def why_no_fit(self) -> tuple[str, str]:
-        """What keeps from a fit: a code that the page has words for, and the library's words; ("", "") for nothing."""
-        if not self.logs:
-            return "no_log", ""
-        if not self.robot_path:
-            return "no_robot", ""
-        for log in self.logs.values():
-            if log.error:
-                return "unread", f"{log.label}: {log.error}"
-            if log.result is None:
-                return "checking", log.label
-            fit_uses = [use for use in log.result["uses"] if use["name"] in ("whole logs", "steady state")]
-            if log.result["has_errors"] or not any(use["good"] for use in fit_uses):
-                return "unfit", f"{log.label}: {log.result['verdict']}"
-        return ("all_held_out", "") if len(self.held_out) == len(self.logs) else ("", "")
-
-    async def run_fit(self, free: tuple[str, ...] = ()) -> None:
-        """Fit the robot to the logs."""
-        if self.fit.running or self.why_no_fit()[0]:
-            return
-        folder = self._new_folder() / "fit"
-        self.series.pop(self.fit.series, None)
-        logs, held_out = [*self.logs.values()], [self.logs[key] for key in self.held_out]
-        command, python = calls.fit(logs, held_out, self.robot_path, free)
-        self.fit = fit = FitState(running=True, folder=folder, progress="...", command=command, python=python)
-        self.changed(FIT)
-
-        def listen(kind: str, value: Any) -> None:
-            fit.progress, fit.share = value["text"], value["share"]
-            self.changed(PROGRESS)
-
-        request = {
-            "robot": self.robot_path,
-            "logs": [log.request for log in self.logs.values()],
-            "hold_out": [self.logs[key].path for key in self.held_out],
-            "free": free,
-            "folder": str(folder),
-            "command": command,
-        }
-        try:
-            fit.result = await self.workers["fit"].run("fit", request, listen)
-            if fit.result is not None and fit.result["series"]:
-                fit.series = f"fit{self._count}"
-                self.series[fit.series] = Series(folder / "series")
-        except JobError as error:
-            fit.error = str(error)
-        except CancelledError:
-            fit.error = ""
-        fit.running = False
-        self.changed(FIT)
-
-    async def warm(self) -> None:
-        """Load what the first fit needs, while nobody waits for it."""
-        with contextlib.suppress(CancelledError, JobError):
-            await self.workers["fit"].run("warm", {}, lambda kind, value: None)
-
-    # Drive
-
-    async def run_drive(self) -> None:
-        """Drive the robot until it is stopped."""
-        if self.drive.running or not self.robot_path:
-            return
-        folder = self._new_folder()
-        self.drive.running, self.drive.robot, self.drive.trouble = True, None, ""
-        self.changed(DRIVE, VIEW)
-
-        def listen(kind: str, value: Any) -> None:
-            if kind == "frame":
-                self.drive.frame = value
-                for fresh in self.drive.fresh:
-                    fresh.set()
-                return
-            if kind == "robot":
-                self.drive.robot = value
-                self.changed(VIEW)
-            elif kind == "breakaway" and self.drive.robot is not None:
-                self.drive.robot["breakaway"] = value
-            elif kind == "trouble":
-                self.drive.trouble = value
-            elif kind == "recorded":
-                self.add_log(value["path"], Path(value["path"]).name)
-            self.changed(NUMBERS if kind == "breakaway" else DRIVE)
-
-        try:
-            await self.workers["drive"].run("drive", {"robot": self.robot_path, "folder": str(folder)}, listen)
-        except JobError as error:
-            self.drive.trouble = str(error)
-        except CancelledError:
-            pass
-        self.drive.running = self.drive.recording = False
-        self.changed(DRIVE, VIEW)
-
-    def command(self, command: dict[str, Any]) -> None:
-        """Give a command of a page to the drive."""
-        if self.drive.running:
-            if "record" in command:
-                self.drive.recording = bool(command["record"])
-            for key, value in command.get("set", {}).items():
-                for number in (self.drive.robot or {}).get("numbers", []):
-                    if number["key"] == key:
-                        number["value"] = value
-            self.workers["drive"].send({"command": command})
-            if "record" in command:
-                self.changed(DRIVE)
 
 
 def safe_name(name: str) -> str:

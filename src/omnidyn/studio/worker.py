@@ -6,14 +6,10 @@ job that listens. From it: {"progress": ...}, {"frame": ...}, and at the end {"r
 
 from __future__ import annotations
 
-import _thread
 import asyncio
 import contextlib
 import json
-import os
-import queue
 import sys
-import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -55,7 +51,7 @@ class Worker:
             self._process = await asyncio.create_subprocess_exec(
                 sys.executable,
                 "-m",
-                "omnidyn.studio.worker",
+                "omnidyn.studio.jobs",
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
                 limit=LINE_BYTES,
@@ -100,71 +96,3 @@ class Worker:
             with contextlib.suppress(ProcessLookupError):
                 self._process.kill()
             await self._process.wait()
-
-
-# The side of the process
-
-
-def main() -> None:
-    """Do jobs until the server closes the pipe."""
-    out = os.fdopen(os.dup(1), "wb", buffering=0)
-    os.dup2(2, 1)  # what a library prints must not stand between messages
-    messages: queue.Queue[dict[str, Any] | None] = queue.Queue()
-    commands: queue.Queue[Any] = queue.Queue()
-    working = threading.Event()
-
-    def tell(kind: str, value: Any) -> None:
-        out.write(json.dumps({kind: value}).encode() + b"\n")
-
-    def read() -> None:
-        for line in sys.stdin.buffer:
-            message = json.loads(line)
-            if "cancel" in message:
-                if working.is_set():
-                    _thread.interrupt_main()
-            elif "command" in message:
-                commands.put(message["command"])
-            else:
-                messages.put(message)
-        os._exit(0)  # the server is gone: nobody waits for the job
-
-    threading.Thread(target=read, daemon=True).start()
-    while (message := _next(messages)) is not None:
-        while not commands.empty():
-            commands.get()
-        working.set()
-        try:
-            kind, value = _answer(message, tell, commands)
-            working.clear()
-        except KeyboardInterrupt:  # cancelled while the answer was under way
-            working.clear()
-            kind, value = "error", None
-        tell(kind, value)
-
-
-def _next(messages: queue.Queue[dict[str, Any] | None]) -> dict[str, Any] | None:
-    """The next job; an interrupt that comes too late is dropped."""
-    while True:
-        with contextlib.suppress(KeyboardInterrupt):
-            return messages.get()
-
-
-def _answer(message: dict[str, Any], tell: Listener, commands: queue.Queue[Any]) -> tuple[str, Any]:
-    """What a job ends with."""
-    from omnidyn.errors import OmnidynError, told_by
-
-    try:
-        from omnidyn.studio import jobs
-
-        return "result", jobs.JOBS[message["job"]](message["request"], tell, commands)
-    except KeyboardInterrupt:
-        return "error", None
-    except Exception as raised:
-        error = told_by(raised)
-        if isinstance(error, OmnidynError):
-            return "error", str(error)
-        return "error", f"bug: {type(error).__name__}: {' '.join(str(error).split())}"
-
-
-if __name__ == "__main__":
-    main()

@@ -24,6 +24,7 @@ from omnidyn.model.motor import DUTY, SPEED, traction
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.live import LiveRobot, check_supply
+from omnidyn.studio.job import Tell, robot_of
 
 DT = 1.0 / 60.0  # [s]
 NOISE = (0.01, 0.01, 0.05)  # [m/s, m/s, rad/s] of the speed that a recording has
@@ -183,3 +184,10 @@ def _limit(robot: Robot) -> float:
     if robot.drive.kind == DUTY:
         return 1.0
     return TOP_SPEED if robot.drive.kind == SPEED else float(np.max(robot.motor.voltage_limit))
+
+
+def drive(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
+    """Drive a robot until the page stops it. request: "robot", "folder" of recorded logs."""
+    robot = robot_of(request)
+    assert robot is not None
+    return Drive(robot, Path(request["folder"]), tell, commands).run()

@@ -1,0 +1,1 @@
+"""Tab Fit: from logs to a robot. Read job, state, then tab."""

@@ -1,0 +1,170 @@
+"""Jobs of the tab Fit: a fit with all that is shown of it, and loading what the first one needs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import omnidyn
+from omnidyn.arrays import FloatArray
+from omnidyn.comparison.result import Comparison
+from omnidyn.comparison.traces import unit as unit_of
+from omnidyn.document import Table, interval_cell
+from omnidyn.identification.estimate import NOT_DETERMINED, Estimate
+from omnidyn.identification.fit_document import number_table
+from omnidyn.identification.identification import Identification
+from omnidyn.identification.methods import OutputError, SteadyState
+from omnidyn.identification.output_error.answer import OutputErrorEstimate
+from omnidyn.model.keys import find_key, in_words, unit
+from omnidyn.progress import Report
+from omnidyn.studio.job import Tell, listener, options_of, robot_of
+from omnidyn.studio.series import write_series
+
+
+def fit(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
+    """What `omnidyn identify` says of logs: verdict, numbers, advice; writes robot, report, table and series.
+
+    request: "robot", "logs" (path, map, unsigned each), "hold_out" (paths), "free" (keys, or none for the default),
+    "folder" of the results.
+    """
+    listen, folder, robot = listener(tell), Path(request["folder"]), robot_of(request)
+    folder.mkdir(parents=True)
+    listen(Report("reading", urgent=True))
+    logs = [omnidyn.load_log(log["path"], robot, options_of(log)) for log in request["logs"]]
+    free = tuple(request.get("free") or ())
+    result = omnidyn.identify(
+        [log.to_run() for log in logs],
+        robot,
+        OutputError(free=free) if free else None,
+        hold_out=[_literal(path) for path in request["hold_out"]],
+        progress=listen,
+        check=logs,
+        keep_best=True,
+    )
+    estimate = result.estimate
+    omnidyn.save_robot(estimate.robot, folder / "robot.toml")
+    _ = result.after  # what follows a fit is made here, where its progress is heard
+    listen(Report("drawing", urgent=True))
+    table = _numbers(estimate)
+    (folder / "numbers.csv").write_text(_csv(table), "utf-8")
+    shown = {
+        "verdict": result.headline,
+        "failed": bool(result.failures),
+        "interrupted": result.interrupted,
+        "numbers": {"head": list(table.head), "rows": [list(row) for row in table.rows]},
+        "values": {name: float(value) for name, value in estimate.value.items()},
+        "warnings": [{"severity": w.severity, "text": str(w)} for w in dict.fromkeys(estimate.warnings)],
+        "advice": [str(step) for step in result.advice],
+        "remedies": _remedies(result),
+        "series": _write_free_run(result, folder / "series"),
+    }
+    shown["report"] = _write_report(result, request, folder / "report.html")
+    return shown
+
+
+def _literal(path: str) -> str:
+    """A glob that only this path fits."""
+    return "".join(f"[{c}]" if c in "*?[" else c for c in path)
+
+
+def _numbers(estimate: Estimate) -> Table:
+    """Every number with its interval."""
+    if isinstance(estimate, OutputErrorEstimate):
+        table = number_table(estimate)
+        return replace(table, rows=[(row[0], *row[1:]) for row in table.rows])
+    rows = [
+        (
+            in_words(name),
+            name,
+            f"{value:.5g}",
+            f"{estimate.std[name]:.2g}",
+            NOT_DETERMINED if name in estimate.unidentifiable else interval_cell(estimate.ci95[name]),
+            unit(name),
+            "",
+        )
+        for name, value in estimate.value.items()
+    ]
+    return Table(("number", "key", "value", "std error", "95 % interval", "unit", ""), rows)
+
+
+def _csv(table: Table) -> str:
+    """A table as CSV."""
+    import csv
+    import io
+
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([table.head, *table.rows])
+    return text.getvalue()
+
+
+def _remedies(result: Identification) -> list[dict[str, str]]:
+    """What may be missing in the model and can be fitted: key, and words."""
+    fits = list(result.fits.values())
+    if not fits or fits[0].lack_of_fit is None:
+        return []
+    return [
+        {"key": remedy.key, "text": str(remedy.cause)}
+        for remedy in fits[0].lack_of_fit.causes
+        if remedy.offered and find_key(remedy.key) is not None
+    ]
+
+
+def _write_free_run(result: Identification, folder: Path) -> bool:
+    """The free run over the first log that was held out, or fitted; whether there is one."""
+    validation = result.validation if isinstance(result.method, OutputError) else None
+    if validation is None:
+        return False
+    comparison = validation.held_out or validation.fitted
+    panels, t, values = _measured_and_model(comparison)
+    if not panels:
+        return False
+    title = "held-out log" if validation.held_out else "fitted log"
+    write_series(folder, t, panels, values, title=f"{title}: {comparison.measured[0].source}")
+    return True
+
+
+def _measured_and_model(comparison: Comparison) -> tuple[list[dict[str, Any]], FloatArray, FloatArray]:
+    """A panel for each component of the first log: measured and model."""
+    segments = [segment for segment in comparison.segments if segment.log == 0]
+    panels, columns, t = [], [], np.zeros(0)
+    for name in comparison.channels:
+        traces = [comparison.trace(comparison.robots[0], name, segment) for segment in segments]
+        if not traces:
+            continue
+        t = np.concatenate([trace.t for trace in traces])
+        measured, model = (np.concatenate([getattr(trace, part) for trace in traces]) for part in ("measured", "model"))
+        panels.append({"title": name, "unit": unit_of(name), "signals": ["measured", "model"]})
+        columns += [measured, model]
+    return panels, t, np.array(columns)
+
+
+def _write_report(result: Identification, request: Mapping[str, Any], path: Path) -> bool:
+    """The page that `--report` writes; whether there is one."""
+    record = {"omnidyn": omnidyn.__version__, "command": request["command"], "inputs": []}
+    if isinstance(result.method, SteadyState) and result.study is not None:
+        from omnidyn.report.steady_page import render_study
+
+        study: Any = result.study
+        page = render_study(study, record, verdict=result.verdict, verdicts=result.verdicts)
+    elif isinstance(result.method, OutputError):
+        from omnidyn.report.fit_page import render_fit
+
+        page = render_fit(result, record)
+    else:
+        return False
+    path.write_text(page, "utf-8")
+    return True
+
+
+def warm(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
+    """Load what fits need, so that the first one starts at once."""
+    from omnidyn.identification.first_runs import first_runs
+
+    for name, make in first_runs()[:2]:
+        tell("progress", {"text": name, "share": None})
+        make()
+    return {}

@@ -1,0 +1,97 @@
+"""The state of the tab Fit, which all pages share, and what its buttons do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from omnidyn.studio import calls
+from omnidyn.studio.parts import FIT, PROGRESS
+from omnidyn.studio.series import Series
+from omnidyn.studio.session import Session
+from omnidyn.studio.worker import CancelledError, JobError
+
+
+@dataclass
+class Fit:
+    """A fit. result: of the job. running, progress, share: while it goes on. folder: of its files."""
+
+    result: dict[str, Any] | None = None
+    error: str = ""
+    running: bool = False
+    progress: str = ""
+    share: float | None = None
+    folder: Path | None = None
+    series: str = ""
+    command: str = ""
+    python: str = ""
+
+
+class Fitting:
+    """The last fit, and the keys of the logs that are held out."""
+
+    def __init__(self, session: Session) -> None:
+        self.session, self.last = session, Fit()
+        self._held_out: list[str] = []
+
+    @property
+    def held_out(self) -> list[str]:
+        """Keys of logs that are predicted, not fitted."""
+        return [key for key in self._held_out if key in self.session.logs]
+
+    def hold_out(self, keys: list[str]) -> None:
+        """Predict these logs, do not fit them."""
+        self._held_out = keys
+        self.session.changed(FIT)
+
+    def why_not(self) -> tuple[str, str]:
+        """What keeps from a fit: a code that the page has words for, and the library's words; ("", "") for nothing."""
+        if not self.session.logs:
+            return "no_log", ""
+        if not self.session.robot_path:
+            return "no_robot", ""
+        for log in self.session.logs.values():
+            if log.error:
+                return "unread", f"{log.label}: {log.error}"
+            if log.result is None:
+                return "checking", log.label
+            fit_uses = [use for use in log.result["uses"] if use["name"] in ("whole logs", "steady state")]
+            if log.result["has_errors"] or not any(use["good"] for use in fit_uses):
+                return "unfit", f"{log.label}: {log.result['verdict']}"
+        return ("all_held_out", "") if len(self.held_out) == len(self.session.logs) else ("", "")
+
+    async def run(self, free: tuple[str, ...] = ()) -> None:
+        """Fit the robot to the logs."""
+        if self.last.running or self.why_not()[0]:
+            return
+        folder = self.session.new_folder() / "fit"
+        self.session.series.pop(self.last.series, None)
+        logs, held_out = [*self.session.logs.values()], [self.session.logs[key] for key in self.held_out]
+        command, python = calls.fit(logs, held_out, self.session.robot_path, free)
+        self.last = fit = Fit(running=True, folder=folder, progress="...", command=command, python=python)
+        self.session.changed(FIT)
+
+        def listen(kind: str, value: Any) -> None:
+            fit.progress, fit.share = value["text"], value["share"]
+            self.session.changed(PROGRESS)
+
+        request = {
+            "robot": self.session.robot_path,
+            "logs": [log.request for log in self.session.logs.values()],
+            "hold_out": [self.session.logs[key].path for key in self.held_out],
+            "free": free,
+            "folder": str(folder),
+            "command": command,
+        }
+        try:
+            fit.result = await self.session.workers["fit"].run("fit", request, listen)
+            if fit.result is not None and fit.result["series"]:
+                fit.series = f"fit{self.session.count}"
+                self.session.series[fit.series] = Series(folder / "series")
+        except JobError as error:
+            fit.error = str(error)
+        except CancelledError:
+            fit.error = ""
+        fit.running = False
+        self.session.changed(FIT)

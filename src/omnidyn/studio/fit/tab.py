@@ -1,0 +1,126 @@
+"""Tab Fit: the robot to start from, the fit, what it found, what may be missing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from nicegui import ui
+
+from omnidyn.studio.elements import plot, table, verdict
+from omnidyn.studio.fit.state import Fitting
+from omnidyn.studio.page import Page
+from omnidyn.studio.parts import FIT, LOGS, PROGRESS, ROBOT
+
+WHY = {
+    "no_log": "Add a log first: tab Log.",
+    "no_robot": "Choose a robot first.",
+    "checking": "The log is being checked.",
+    "all_held_out": "Every log is held out: leave one to fit.",
+}
+
+
+class FitTab:
+    """The tab of one page."""
+
+    def __init__(self, page: Page, fitting: Fitting) -> None:
+        self.page, self.session, self.fitting = page, page.session, fitting
+
+    def build(self) -> None:
+        """Lay it out."""
+        self.page.part(self.page.robot_choice, ROBOT)
+        with self.page.box("Describe another robot"):
+            self._robot_form()
+        self.page.part(self._start, FIT, LOGS)
+        self.page.part(self._progress, FIT, PROGRESS)
+        self.page.part(self._result, FIT)
+
+    def _robot_form(self) -> None:
+        fields = {
+            "--azimuth": ("wheels stand at [degree]", "60,180,300"),
+            "--wheel-radius": ("radius of a wheel [m]", "0.05"),
+            "--robot-radius": ("centre to wheel [m]", "0.15"),
+            "--mass": ("mass [kg]", "3"),
+            "--voltage-limit": ("voltage limit [V]", ""),
+        }
+        with ui.row().classes("line"):
+            name = ui.input("name", value="my-robot")
+            inputs = {flag: ui.input(words, value=value) for flag, (words, value) in fields.items()}
+        trouble = ui.label().classes("text error-text")
+
+        async def make() -> None:
+            options = [f"{flag}={field.value}" for flag, field in inputs.items() if str(field.value).strip()]
+            trouble.text = await self.session.make_robot(name.value or "", options)
+
+        ui.button("Make this robot", on_click=make).props("outline no-caps id=make-robot")
+        ui.label("What is left empty is guessed, with a wide spread, and marked as a guess.").classes("text quiet")
+
+    def _start(self) -> None:
+        session = self.session
+        if len(session.logs) > 1:
+            names = {key: log.label for key, log in session.logs.items()}
+            ui.select(
+                names,
+                value=self.fitting.held_out,
+                multiple=True,
+                label="Hold out: predict these logs, do not fit them",
+                on_change=lambda e: self.fitting.hold_out(e.value),
+            ).classes("wide").props("use-chips")
+        code, words = self.fitting.why_not()
+        with ui.row().classes("line"):
+            button = ui.button("Fit", on_click=lambda: session.start(self.fitting.run())).props(
+                "outline no-caps id=fit"
+            )
+            button.set_enabled(not code and not self.fitting.last.running)
+            if code:
+                ui.label(words if code in ("unfit", "unread") else WHY[code]).classes("text quiet").props("id=why")
+            elif not self.fitting.last.running:
+                names = ", ".join(log.label for log in session.logs.values())
+                ui.label(f"{names}, from {session.robot}").classes("text quiet")
+
+    def _progress(self) -> None:
+        fit = self.fitting.last
+        if not fit.running:
+            return
+        with ui.row().classes("line"):
+            ui.spinner(size="1.2em")
+            ui.label(fit.progress).props("id=fit-progress")
+            ui.button("Cancel", on_click=lambda: self.session.start(self.session.workers["fit"].cancel())).props(
+                "outline dense no-caps id=cancel"
+            )
+        if fit.share is not None:
+            ui.linear_progress(fit.share, show_value=False)
+
+    def _result(self) -> None:
+        fit = self.fitting.last
+        if fit.error:
+            verdict("error", fit.error)
+        if fit.result is None:
+            return
+        result = fit.result
+        verdict("error" if result["failed"] else "note", result["verdict"], "fit-verdict")
+        with ui.row().classes("line"):
+            ui.link("Robot file", "/fit/robot.toml").props("download")
+            ui.link("Numbers (CSV)", "/fit/numbers.csv").props("download")
+            if result["report"]:
+                ui.link("Report", "/fit/report.html", new_tab=True)
+        table(result["numbers"], "numbers")
+        for remedy in result["remedies"]:
+            with ui.row().classes("line"):
+                ui.label(remedy["text"]).classes("text")
+                ui.button(
+                    f"Add {remedy['key']} and refit",
+                    on_click=self._refit(remedy["key"]),
+                ).props("outline dense no-caps")
+        for words in result["advice"]:
+            ui.label(f"→ {words}").classes("text")
+        if fit.series:
+            ui.label("Free run: the model gets the inputs only").classes("title")
+            plot(fit.series, [])
+        with self.page.box(f"Warnings and notes ({len(result['warnings'])})"):
+            for warning in result["warnings"]:
+                ui.label(f"{warning['severity']}: {warning['text']}").classes("text")
+        self.page.calls(fit.command, fit.python)
+
+    def _refit(self, key: str) -> Callable[[], None]:
+        """What fits again, with a number that the model has not yet."""
+        return lambda: self.session.start(self.fitting.run(("friction", key)))

@@ -1,0 +1,41 @@
+"""What jobs share: how they tell the page of their progress, and what a request names."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import omnidyn
+from omnidyn.logs.columns.mapping import load_map
+from omnidyn.logs.read_log import LogOptions
+from omnidyn.model.robot import Robot
+from omnidyn.progress import Report
+
+Tell = Callable[[str, Any], None]
+INTERVAL = 0.1  # [s] between two reports of progress
+
+
+def listener(tell: Tell) -> Callable[[Report], None]:
+    """A listener of the library that tells the page."""
+    last = [0.0]
+
+    def listen(report: Report) -> None:
+        now = time.monotonic()
+        if report.urgent or now - last[0] > INTERVAL:
+            last[0] = now
+            share = report.done / report.total if report.total else None
+            tell("progress", {"text": str(report), "share": share})
+
+    return listen
+
+
+def robot_of(request: Mapping[str, Any]) -> Robot | None:
+    """The robot that a request names."""
+    return omnidyn.load_robot(request["robot"]) if request.get("robot") else None
+
+
+def options_of(log: Mapping[str, Any]) -> LogOptions:
+    """How a log is read."""
+    columns = load_map(log["map"]) if log.get("map") else None
+    return LogOptions(columns=columns, current_unsigned=bool(log.get("unsigned")))

@@ -1,0 +1,54 @@
+"""Layout: the tabs of a page. Pictures are drawn by static/*.js."""
+
+from __future__ import annotations
+
+from nicegui import ui
+
+from omnidyn.studio.drive.state import Driving
+from omnidyn.studio.drive.tab import DriveTab
+from omnidyn.studio.fit.state import Fitting
+from omnidyn.studio.fit.tab import FitTab
+from omnidyn.studio.log.tab import LogTab
+from omnidyn.studio.page import Page
+from omnidyn.studio.session import Session
+
+HEAD = """
+<link rel="stylesheet" href="/static/studio.css">
+<script type="module" src="/static/studio.js"></script>
+"""
+
+
+class Studio:
+    """What all pages share: the session, and the state of each tab that has one."""
+
+    def __init__(self) -> None:
+        self.session = Session()
+        self.fitting, self.driving = Fitting(self.session), Driving(self.session)
+
+    def tabs(self, page: Page) -> dict[str, LogTab | FitTab | DriveTab]:
+        """The tabs of a page, by name."""
+        return {"Log": LogTab(page), "Fit": FitTab(page, self.fitting), "Drive": DriveTab(page, self.driving)}
+
+
+def show(studio: Studio) -> None:
+    """Lay out a page."""
+    ui.add_head_html(HEAD)
+    ui.colors(primary="#0b57a4")
+    session, client = studio.session, ui.context.client
+    page = Page(session)
+    tabs = studio.tabs(page)
+    session.listeners.add(page.changed)
+    client.on_delete(lambda: session.listeners.discard(page.changed))
+    dark = ui.dark_mode(None)
+    with ui.header().classes("bar"):
+        with ui.element("h1").classes("brand"):
+            ui.label("omnidyn studio")
+        with ui.tabs().props("dense no-caps inline-label") as page.tabs:
+            for name in tabs:
+                ui.tab(name)
+        ui.space()
+        ui.button("◐", on_click=lambda: dark.set_value(not dark.value)).props("flat dense aria-label='light or dark'")
+    with ui.tab_panels(page.tabs, value=next(iter(tabs)), animated=False).classes("panels"):
+        for name, tab in tabs.items():
+            with ui.tab_panel(name):
+                tab.build()

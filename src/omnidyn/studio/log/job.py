@@ -1,0 +1,153 @@
+"""Jobs of the tab Log: check a log, save a map of columns, make the example."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import omnidyn
+from omnidyn.arrays import FloatArray
+from omnidyn.comparison.traces import unit as unit_of
+from omnidyn.document import plain
+from omnidyn.findings.check import check_blocks, check_log
+from omnidyn.findings.finding import Finding, Verdict
+from omnidyn.logs.channels import components, si_suffix
+from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE
+from omnidyn.logs.columns.mapping import ColumnMap, map_to_toml, parse_column
+from omnidyn.logs.log import Log
+from omnidyn.logs.read_log import iter_logs
+from omnidyn.progress import Report
+from omnidyn.run import CHANNELS
+from omnidyn.studio.drive.job import as_measured
+from omnidyn.studio.job import Tell, listener, options_of, robot_of
+from omnidyn.studio.series import shown_times, write_series
+
+BLOCK = 500_000  # rows that are checked at once, as `omnidyn check` does
+EXAMPLE = "axebot"
+SECONDS, DT, HOLDS, SEED = 40.0, 0.01, (20, 100), 7  # [s], [s], rows that a command is held
+
+
+def check(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
+    """What `omnidyn check` says of a log, its columns, and its signals as a series in a folder.
+
+    request: "path", "robot", "map", "unsigned" of the log, and the "folder" of the series, which is made.
+    """
+    robot, options, listen = robot_of(request), options_of(request), listener(tell)
+    listen(Report(f"reading {Path(request['path']).name}", urgent=True))
+    log = omnidyn.load_log(request["path"], robot, options)
+    _write_log(log, Path(request["folder"]))
+    tell("progress", {"text": "checking", "share": None, "drawn": True})
+    if len(log) <= BLOCK:
+        verdict = check_log(log, robot)
+    else:
+        verdict = check_blocks(iter_logs(request["path"], robot, options, rows=BLOCK, progress=listen), robot)
+    return _told(log, verdict)
+
+
+def _told(log: Log, verdict: Verdict) -> dict[str, Any]:
+    """The verdict and the columns, as the page shows them."""
+    lines = {"error": 0, "warning": 1, "note": 2}
+    findings = [
+        {
+            "severity": finding.severity,
+            "code": finding.code,
+            "subject": finding.subject,
+            "text": str(finding),
+            "remedy": finding.remedy_text,
+            "count": finding.count,
+            "spans": _spans(log, finding),
+        }
+        for finding in sorted(verdict.findings, key=lambda finding: lines[finding.severity])
+    ]
+    columns = [
+        {
+            "component": component,
+            "column": column.name,
+            "unit": column.unit,
+            "motor": column.side == MOTOR_SIDE,
+            "invert": column.invert,
+        }
+        for component, column in log.columns.columns.items()
+    ]
+    return {
+        "verdict": verdict.verdict,
+        "severity": verdict.conclusion.severity,
+        "headline": verdict.headline(),
+        "has_errors": verdict.has_errors,
+        "rows": verdict.rows,
+        "uses": plain([{"name": use.name, "good": use.good, "reason": str(use.reason)} for use in verdict.uses]),
+        "findings": findings,
+        "columns": columns,
+        "unused": list(log.columns.unused),
+        "doubts": [doubt.with_remedy for doubt in log.columns.doubts],
+        "notes": [str(note) for note in log.notes],
+    }
+
+
+def _spans(log: Log, finding: Finding) -> list[tuple[float, float]]:
+    """The stretches of time in which a finding has its rows [s]."""
+    t = shown_times(log.t)
+    spans = []
+    for first, last in finding.rows:
+        a, b = np.searchsorted(log.lines, [first, last])
+        if a < len(t):
+            spans.append((float(t[a]), float(t[min(b, len(t) - 1)])))
+    return spans
+
+
+def _write_log(log: Log, folder: Path) -> None:
+    """The channels of a log that hold a number, as a series."""
+    panels, values = [], []
+    for channel in CHANNELS:
+        if channel not in log.channels:
+            continue
+        columns = log.channels[channel].reshape(len(log), -1)
+        names = components(channel, columns.shape[1])
+        by_unit: dict[str, list[str]] = {}
+        for name, column in zip(names, columns.T, strict=True):
+            if np.isfinite(column).any():
+                by_unit.setdefault(unit_of(name), []).append(name)
+                values.append(column)
+        panels += [
+            {"title": channel.replace("_", " "), "unit": unit, "signals": signals} for unit, signals in by_unit.items()
+        ]
+    if values and len(log):
+        write_series(folder, log.t, panels, np.array(values))
+
+
+def save_columns(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
+    """Write the map of columns that a table says, which `--map` takes. request: "rows", "path"."""
+    columns = {}
+    for row in request["rows"]:
+        sign, side = "-" if row["invert"] else "", MOTOR_SIDE if row["motor"] else WHEEL_SIDE
+        text = f"{row['component']}={sign}{row['column']}:{row['unit']}@{side}"
+        component, column = parse_column(text)
+        columns[component] = replace(column, name=row["column"], unit=row["unit"] or si_suffix(component))
+    Path(request["path"]).write_text(map_to_toml(ColumnMap(columns)), "utf-8")
+    return {}
+
+
+def example(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
+    """Write a simulated log of the axebot under random voltages. request: "path"."""
+    robot, draws = omnidyn.load_robot(EXAMPLE), np.random.default_rng(SEED)
+    rows = round(SECONDS / DT)
+    limit = float(np.max(robot.motor.voltage_limit))
+    held = list(_held(draws, rows, robot.wheels.count, limit))
+    run = omnidyn.simulate(robot, np.concatenate(held)[:rows], DT)
+    assert run.twist is not None
+    kept = omnidyn.Run(t=run.t, voltage=run.voltage, twist=as_measured(run.twist, SEED), source="example")
+    omnidyn.write_run(kept, request["path"])
+    return {}
+
+
+def _held(draws: np.random.Generator, rows: int, wheels: int, limit: float) -> Iterator[FloatArray]:
+    """Voltages that are held for a while, then others [V]. Shape (held, wheels) each."""
+    made = 0
+    while made < rows:
+        count = int(draws.integers(*HOLDS))
+        made += count
+        yield np.tile(draws.uniform(-limit, limit, wheels), (count, 1))

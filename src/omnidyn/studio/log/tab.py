@@ -1,0 +1,145 @@
+"""Tab Log: files, their signals with what was found in them, the map of their columns."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from nicegui import ui
+
+from omnidyn.studio import calls
+from omnidyn.studio.calls import LogFile
+from omnidyn.studio.elements import MARK, UNUSED, column_row, plot, verdict
+from omnidyn.studio.page import Page
+from omnidyn.studio.parts import LOGS, PROGRESS
+
+
+class LogTab:
+    """The tab of one page."""
+
+    def __init__(self, page: Page) -> None:
+        self.page, self.session, self.shown = page, page.session, ""
+
+    def build(self) -> None:
+        """Lay it out."""
+        with ui.row().classes("line"):
+            ui.element("omni-drop")
+            ui.button("Use the example log", on_click=self._example).props("outline no-caps id=example")
+        self.page.part(self._choice, LOGS)
+        self.page.part(self._progress, LOGS, PROGRESS)
+        self.page.part(self._content, LOGS)
+
+    async def _example(self) -> None:
+        await self.session.example()
+
+    def _log(self) -> LogFile | None:
+        """The log that this page shows."""
+        logs = self.session.logs
+        return logs.get(self.shown) or next(reversed(logs.values()), None)
+
+    def _choice(self) -> None:
+        log = self._log()
+        if log is None:
+            ui.label(
+                "No log yet. Drop a file here: CSV, Parquet, a ROS bag, MATLAB, WPILOG. It stays on this machine."
+            ).classes("quiet")
+            return
+        with ui.row().classes("line"):
+            names = {key: other.label for key, other in self.session.logs.items()}
+            ui.select(names, value=log.key, label="Log", on_change=lambda e: self._show(e.value)).classes("wide")
+            ui.button("Remove", on_click=lambda: self.session.remove(log)).props("flat no-caps")
+
+    def _show(self, key: str) -> None:
+        self.shown = key
+        self.page.changed(LOGS)
+
+    def _progress(self) -> None:
+        log = self._log()
+        if log is not None and log.progress:
+            with ui.row().classes("line"):
+                ui.spinner(size="1.2em")
+                ui.label(log.progress)
+
+    def _content(self) -> None:
+        log = self._log()
+        if log is None:
+            return
+        if log.error:
+            verdict("error", log.error)
+        if log.result is not None:
+            verdict(log.result["severity"], log.result["verdict"])
+        if log.series:
+            findings = log.result["findings"] if log.result else []
+            spans = [[k, f["severity"], a, b, f["subject"]] for k, f in enumerate(findings) for a, b in f["spans"]]
+            plot(log.series, spans)
+        if log.result is not None:
+            self._findings(log)
+            self._uses(log)
+            self._columns(log)
+        self.page.calls(*calls.check(log, self.session.robot_path))
+
+    def _findings(self, log: LogFile) -> None:
+        """Errors and warnings, then notes, which are folded."""
+        assert log.result is not None
+        numbered = list(enumerate(log.result["findings"]))
+        grave = [(k, finding) for k, finding in numbered if finding["severity"] != "note"]
+        notes = numbered[len(grave) :]  # they come last
+        for title, shown, is_open in (("Findings", grave, True), ("Notes", notes, False)):
+            if shown:
+                with self.page.box(f"{title} ({len(shown)})", is_open):
+                    for k, finding in shown:
+                        self._finding(log, k, finding)
+
+    def _finding(self, log: LogFile, k: int, finding: dict[str, Any]) -> None:
+        """What is the case, where, and what to do."""
+        with ui.element("div").classes(f"finding {finding['severity']}").props(f"id=finding-{k}"):
+            with ui.row().classes("line"):
+                ui.label(MARK[finding["severity"]]).classes("mark")
+                ui.label(f"{finding['severity']}: {finding['code']} {finding['subject']}").classes("code")
+                if finding["spans"]:
+                    look = (
+                        f"document.querySelector('omni-plot').show({finding['spans'][0][0]}, {finding['spans'][-1][1]})"
+                    )
+                    ui.button("Show", on_click=lambda: ui.run_javascript(look)).props("flat dense no-caps")
+            ui.label(finding["text"]).classes("text")
+            if finding["remedy"]:
+                ui.label(f"→ {finding['remedy']}").classes("text remedy")
+            if finding["code"] == "unsigned" and not log.unsigned:
+                ui.button("Apply this remedy", on_click=lambda: self._signed(log)).props(
+                    "outline dense no-caps id=apply-remedy"
+                )
+
+    def _signed(self, log: LogFile) -> None:
+        log.unsigned = True
+        self.session.start(self.session.check(log))
+
+    def _uses(self, log: LogFile) -> None:
+        assert log.result is not None
+        with self.page.box("What it can be used for", True):
+            for use in log.result["uses"]:
+                with ui.row().classes("line"):
+                    ui.label(f"{use['name']}: {'yes' if use['good'] else 'no'}").classes("use")
+                    ui.label(use["reason"]).classes("text")
+
+    def _columns(self, log: LogFile) -> None:
+        """The map of columns, to be corrected by hand."""
+        assert log.result is not None
+        with self.page.box(f"Columns and units ({len(log.result['columns'])})"):
+            for doubt in log.result["doubts"]:
+                ui.label(doubt).classes("text quiet")
+            rows = [dict(row) for row in log.result["columns"]]
+            blank = {"component": UNUSED, "unit": "", "motor": False, "invert": False}
+            rows += [{**blank, "column": name} for name in log.result["unused"]]
+            with ui.element("div").classes("table columns"):
+                for head in ("column of the file", "is", "in unit", "at the motor", "other sign"):
+                    ui.label(head).classes("head")
+                for row in rows:
+                    column_row(row)
+            trouble = ui.label().classes("text error-text")
+
+            async def apply() -> None:
+                trouble.text = await self.session.map_columns(log, [r for r in rows if r["component"] != UNUSED])
+
+            with ui.row().classes("line"):
+                ui.button("Read the log this way", on_click=apply).props("outline no-caps id=apply-columns")
+                if log.map:
+                    ui.link("Save this map", f"/log/{log.key}/map").props("download")

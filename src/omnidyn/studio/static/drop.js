@@ -1,0 +1,30 @@
+// A place to drop files on, or to click
+class Drop extends HTMLElement {
+  connectedCallback() {
+    if (this.input) return;
+    this.tabIndex = 0;
+    this.setAttribute('role', 'button');
+    this.say(this.getAttribute('words') || 'Drop a log here, or click');
+    this.input = document.createElement('input');
+    this.input.type = 'file'; this.input.multiple = true; this.input.hidden = true;
+    this.after(this.input);
+    this.input.onchange = (e) => { this.take(e.target.files); }; // the element may be gone by now: another tab
+    this.onclick = () => this.input.click();
+    this.onkeydown = (e) => { if (e.key === 'Enter' || e.key === ' ') { e.preventDefault(); this.input.click(); } };
+    this.ondragover = (e) => { e.preventDefault(); this.classList.add('over'); };
+    this.ondragleave = () => this.classList.remove('over');
+    this.ondrop = (e) => { e.preventDefault(); this.classList.remove('over'); this.take(e.dataTransfer.files); };
+  }
+  disconnectedCallback() { if (this.input) this.input.remove(); this.input = null; }
+  say(words) { this.textContent = words; }
+  async take(files) {
+    for (const file of files) {
+      this.say(`Reading ${file.name} ...`);
+      const answer = await fetch(`/upload?name=${encodeURIComponent(file.name)}`, { method: 'POST', body: file }).catch(() => null);
+      this.say(answer && answer.ok ? this.getAttribute('words') || 'Drop a log here, or click'
+        : `${file.name} was not taken: too large, or too many files`);
+    }
+  }
+}
+
+customElements.define('omni-drop', Drop);
