@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import omnidyn
+from omnidyn.progress import Report
 from omnidyn.studio.calls import LogFile
 from omnidyn.studio.parts import FIT, LOGS, PROGRESS, ROBOT
 from omnidyn.studio.series import META, Series
@@ -133,7 +134,7 @@ class Session:
         log.version += 1
         version = log.version
         folder = self.new_folder() / "series"
-        log.error, log.result, log.progress = "", None, "..."
+        log.error, log.result, log.progress = "", None, str(Report(f"reading {log.label}"))
         self.changed(LOGS, FIT)
 
         def listen(kind: str, value: Any) -> None:
@@ -172,7 +173,8 @@ class Session:
         return ""
 
     async def warm(self) -> None:
-        """Load what the first fit needs, while nobody waits for it."""
+        """Load what the first log and the first fit need, while nobody waits for it."""
+        await self.workers["log"].start()
         with contextlib.suppress(CancelledError, JobError):
             await self.workers["fit"].run("warm", {}, lambda kind, value: None)
 

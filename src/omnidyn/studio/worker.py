@@ -46,6 +46,11 @@ class Worker:
             finally:
                 self.busy = False
 
+    async def start(self) -> None:
+        """Start the process: what it needs is loaded while nobody waits for it."""
+        async with self._lock:
+            await self._started()
+
     async def _started(self) -> asyncio.subprocess.Process:
         if self._process is None or self._process.returncode is not None:
             self._process = await asyncio.create_subprocess_exec(

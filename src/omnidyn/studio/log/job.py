@@ -10,21 +10,23 @@ from typing import Any
 import numpy as np
 
 import omnidyn
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import FloatArray, IntArray
 from omnidyn.comparison.traces import unit as unit_of
 from omnidyn.document import plain
+from omnidyn.files import default_max_bytes, too_large
 from omnidyn.findings.check import check_blocks, check_log
 from omnidyn.findings.finding import Finding, Verdict
 from omnidyn.logs.channels import components, si_suffix
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE
 from omnidyn.logs.columns.mapping import ColumnMap, map_to_toml, parse_column
 from omnidyn.logs.log import Log
-from omnidyn.logs.read_log import iter_logs
-from omnidyn.progress import Report
+from omnidyn.logs.read_log import LogOptions, iter_logs
+from omnidyn.model.robot import Robot
+from omnidyn.progress import Progress, Report
 from omnidyn.run import CHANNELS
 from omnidyn.studio.drive.job import as_measured
 from omnidyn.studio.job import Tell, listener, options_of, robot_of
-from omnidyn.studio.series import shown_times, write_series
+from omnidyn.studio.series import SHOWN, shown_times, write_series
 
 BLOCK = 500_000  # rows that are checked at once, as `omnidyn check` does
 EXAMPLE = "axebot"
@@ -38,18 +40,36 @@ def check(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, An
     """
     robot, options, listen = robot_of(request), options_of(request), listener(tell)
     listen(Report(f"reading {Path(request['path']).name}", urgent=True))
-    log = omnidyn.load_log(request["path"], robot, options)
-    _write_log(log, Path(request["folder"]))
+    blocks = _blocks(request["path"], robot, options, listen)
+    _write_blocks(blocks, Path(request["folder"]))
     tell("progress", {"text": "checking", "share": None, "drawn": True})
-    if len(log) <= BLOCK:
-        verdict = check_log(log, robot)
-    else:
-        verdict = check_blocks(iter_logs(request["path"], robot, options, rows=BLOCK, progress=listen), robot)
-    return _told(log, verdict)
+    verdict = check_log(blocks[0], robot) if len(blocks) == 1 else check_blocks(_counted(blocks, listen), robot)
+    return _told(blocks, verdict)
 
 
-def _told(log: Log, verdict: Verdict) -> dict[str, Any]:
+def _blocks(path: str, robot: Robot | None, options: LogOptions, listen: Progress) -> list[Log]:
+    """A log in blocks of BLOCK rows, as `omnidyn check` reads it. Raises InputError for more than memory may hold."""
+    blocks, held, limit = [], 0, default_max_bytes()
+    for block in iter_logs(path, robot, options, rows=BLOCK, progress=listen):
+        blocks.append(block)
+        held += block.t.nbytes + sum(values.nbytes for values in block.channels.values())
+        if held > limit:
+            raise too_large(path, limit, "cut it into pieces")
+    return blocks
+
+
+def _counted(blocks: list[Log], listen: Progress) -> Iterator[Log]:
+    """The blocks, and how many of them are checked."""
+    for k, block in enumerate(blocks):
+        listen(Report("checking", k, len(blocks), urgent=True))
+        yield block
+
+
+def _told(blocks: list[Log], verdict: Verdict) -> dict[str, Any]:
     """The verdict and the columns, as the page shows them."""
+    log = blocks[0]
+    t = shown_times(np.concatenate([block.t for block in blocks]))
+    rows = np.concatenate([block.lines for block in blocks])
     lines = {"error": 0, "warning": 1, "note": 2}
     findings = [
         {
@@ -59,7 +79,7 @@ def _told(log: Log, verdict: Verdict) -> dict[str, Any]:
             "text": str(finding),
             "remedy": finding.remedy_text,
             "count": finding.count,
-            "spans": _spans(log, finding),
+            "spans": _spans(t, rows, finding),
         }
         for finding in sorted(verdict.findings, key=lambda finding: lines[finding.severity])
     ]
@@ -84,39 +104,41 @@ def _told(log: Log, verdict: Verdict) -> dict[str, Any]:
         "columns": columns,
         "unused": list(log.columns.unused),
         "doubts": [doubt.with_remedy for doubt in log.columns.doubts],
-        "notes": [str(note) for note in log.notes],
+        "notes": [str(note) for note in dict.fromkeys(note for block in blocks for note in block.notes)],
     }
 
 
-def _spans(log: Log, finding: Finding) -> list[tuple[float, float]]:
-    """The stretches of time in which a finding has its rows [s]."""
-    t = shown_times(log.t)
+def _spans(t: FloatArray, lines: IntArray, finding: Finding) -> list[tuple[float, float]]:
+    """The stretches of time in which a finding has its rows [s]. t, lines: of all rows, shape (rows,)."""
     spans = []
     for first, last in finding.rows:
-        a, b = np.searchsorted(log.lines, [first, last])
+        a, b = np.searchsorted(lines, [first, last])
         if a < len(t):
             spans.append((float(t[a]), float(t[min(b, len(t) - 1)])))
     return spans
 
 
-def _write_log(log: Log, folder: Path) -> None:
+def _write_blocks(blocks: list[Log], folder: Path) -> None:
     """The channels of a log that hold a number, as a series."""
-    panels, values = [], []
+    panels, columns = [], []
     for channel in CHANNELS:
-        if channel not in log.channels:
+        parts = [block.channels[channel].reshape(len(block), -1) for block in blocks if channel in block.channels]
+        if len(parts) < len(blocks):
             continue
-        columns = log.channels[channel].reshape(len(log), -1)
-        names = components(channel, columns.shape[1])
         by_unit: dict[str, list[str]] = {}
-        for name, column in zip(names, columns.T, strict=True):
-            if np.isfinite(column).any():
+        for k, name in enumerate(components(channel, parts[0].shape[1])):
+            if any(np.isfinite(part[:, k]).any() for part in parts):
                 by_unit.setdefault(unit_of(name), []).append(name)
-                values.append(column)
+                columns.append([part[:, k] for part in parts])
         panels += [
             {"title": channel.replace("_", " "), "unit": unit, "signals": signals} for unit, signals in by_unit.items()
         ]
-    if values and len(log):
-        write_series(folder, log.t, panels, np.array(values))
+    t = np.concatenate([block.t for block in blocks])
+    if columns and len(t):
+        values = np.empty((len(columns), len(t)), SHOWN)
+        for row, parts in zip(values, columns, strict=True):
+            np.concatenate(parts, out=row, casting="same_kind")
+        write_series(folder, t, panels, values)
 
 
 def save_columns(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:

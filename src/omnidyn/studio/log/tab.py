@@ -57,7 +57,7 @@ class LogTab:
         if log is not None and log.progress:
             with ui.row().classes("line"):
                 ui.spinner(size="1.2em")
-                ui.label(log.progress)
+                ui.label(log.progress).props("id=reading")
 
     def _content(self) -> None:
         log = self._log()

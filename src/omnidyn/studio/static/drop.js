@@ -20,10 +20,20 @@ class Drop extends HTMLElement {
   async take(files) {
     for (const file of files) {
       this.say(`Reading ${file.name} ...`);
-      const answer = await fetch(`/upload?name=${encodeURIComponent(file.name)}`, { method: 'POST', body: file }).catch(() => null);
-      this.say(answer && answer.ok ? this.getAttribute('words') || 'Drop a log here, or click'
+      const taken = await this.send(file);
+      this.say(taken ? this.getAttribute('words') || 'Drop a log here, or click'
         : `${file.name} was not taken: too large, or too many files`);
     }
+  }
+  send(file) { // fetch tells nothing of its progress
+    return new Promise((done) => {
+      const request = new XMLHttpRequest();
+      request.open('POST', `/upload?name=${encodeURIComponent(file.name)}`);
+      request.upload.onprogress = (e) => this.say(`Reading ${file.name}, ${Math.floor(100 * e.loaded / e.total)} %`);
+      request.onload = () => done(request.status === 200);
+      request.onerror = () => done(false);
+      request.send(file);
+    });
   }
 }
 

@@ -21,6 +21,7 @@ const wire = {
   },
 };
 
+const views = new Map(); // series -> what is looked at of it: the page is laid out anew where something changes
 const TOP = 20, PANEL = 110, GAP = 24, BOTTOM = 38;
 
 // Signals over time, one panel below the other, with findings shaded
@@ -74,9 +75,9 @@ class Plot extends HTMLElement {
     const series = this.dataset.series;
     const answer = await fetch(`/series/${series}`);
     if (answer.status !== 200) return;
-    const before = this.meta;
     this.meta = await answer.json();
-    if (!before || before.begin !== this.meta.begin || before.end !== this.meta.end) this.view = [this.meta.begin, this.meta.end];
+    const [begin, end] = views.get(series) || [this.meta.begin, this.meta.end];
+    this.view = [begin, end];
     this.shown = null;
     this.ask();
   }
@@ -88,6 +89,7 @@ class Plot extends HTMLElement {
     const middle = (begin + end) / 2;
     const low = Math.min(Math.max(middle - span / 2, this.meta.begin), this.meta.end - span);
     this.view = [low, low + span];
+    views.set(this.dataset.series, this.view);
     this.draw(); this.ask();
   }
   show(begin, end) {
