@@ -1,11 +1,10 @@
 """A long log in the studio, in a real browser: seconds to the first word of progress and to the first picture, pans.
 
-Needs Chromium and playwright as the tests of the studio do (tests/studio/conftest.py); without them nothing is measured.
+Needs Chromium and playwright, as the tests of the studio do: see tests/studio/conftest.py.
 """
 
 from __future__ import annotations
 
-import contextlib
 import tempfile
 import time
 from pathlib import Path

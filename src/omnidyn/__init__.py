@@ -36,6 +36,7 @@ _HOME = {
     "Trackings": "omnidyn.control.tracking",
     "Tuned": "omnidyn.control.tune",
     "acceleration": "omnidyn.model.dynamics",
+    "align": "omnidyn.comparison.align",
     "axis_patterns": "omnidyn.model.deadzone",
     "breakaway_voltage": "omnidyn.model.deadzone",
     "check": "omnidyn.findings.check",
@@ -77,6 +78,7 @@ __all__ = ["__version__", *_HOME]  # pyright: ignore[reportUnsupportedDunderAll]
 if TYPE_CHECKING:
     from omnidyn.campaigns.results import Campaign, load_campaign
     from omnidyn.campaigns.sweep import sweep
+    from omnidyn.comparison.align import align
     from omnidyn.comparison.compare import compare
     from omnidyn.comparison.drift import drift
     from omnidyn.comparison.result import Comparison

@@ -23,6 +23,7 @@ PUBLIC = [
     "Tuned",
     "__version__",
     "acceleration",
+    "align",
     "axis_patterns",
     "breakaway_voltage",
     "check",

@@ -98,6 +98,7 @@ for _command in (
     demo.demo,
     init.init,
     check.check,
+    logs.align,
     simulate.simulate,
     identify.identify,
     compare.compare,

@@ -107,3 +107,25 @@ def info(
         log_info = read_info(file, loaded, flags.options(), progress=listen)
     inputs = [*([robot_input(robot)] if robot else []), {"role": "log", "name": file, "sha256": log_info.sha256}]
     tell(log_info.document(), json, provenance(inputs), width=width())
+
+
+@reads_logs("save_map")
+def align(
+    first: str = typer.Argument(metavar="FIRST", help="A log, whose clock counts."),
+    second: str = typer.Argument(metavar="SECOND", help="Another log of the same motion."),
+    robot: str = typer.Option("", "--robot", metavar="ROBOT", help="The robot of the logs: a preset or a robot file."),
+    flags: LogFlags = NO_FLAGS,
+    json: bool = typer.Option(False, "--json", help="The offset for machines."),
+) -> None:
+    """Find what to add to the times of one log so that it shows the same motion as another at the same time.
+
+    By cross-correlation of the speeds that both recorded, to a part of a row.
+    """
+    log_options.keep_inputs([first, second], [robot], [flags.map_file])
+    log_options.refuse_missing([first, second])
+    loaded, options = omnidyn.load_robot(robot) if robot else None, flags.options()
+    with shown_progress("reading") as progress:
+        logs = [log for _, log in log_options.load_logs([first, second], loaded, options, progress)]
+        alignment = omnidyn.align(*(log.to_run(sort=flags.sort) for log in logs))
+    inputs = [{"role": "log", "name": log.source, "sha256": log.sha256} for log in logs]
+    tell(alignment.document(), json, provenance([*([robot_input(robot)] if robot else []), *inputs]))

@@ -99,6 +99,15 @@ def _taken_differently(statement: Statement) -> str:
 
 
 SENTENCES = {
+    "logs_aligned": Sentence(
+        "{subject} shows the motion of {first} when {offset:+.4f} s are added to its times: correlation "
+        "{correlation:.2f} of {components} over {overlap:.4g} s"
+    ),
+    "logs_unlike": Sentence(
+        "{subject} and {first} hardly show one motion: correlation {correlation:.2f} of {components} at best, with "
+        "{offset:+.4f} s added to the times of {subject}",
+        "give two recordings of one drive",
+    ),
     "applied": Sentence(_applied),
     "effects_of_other_log": Sentence(
         "{subject} was fitted together with effects of its own logs ({effects}); they are not applied to this other log"
