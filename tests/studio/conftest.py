@@ -76,7 +76,7 @@ class Browser:
         page.on("console", lambda m: self.complaints.append(m.text) if m.type in ("error", "warning") else None)
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
         page.on("request", lambda request: self._note(request.url, studio.port))
-        page.set_default_timeout(120_000)
+        page.set_default_timeout(float(os.environ.get("OMNIDYN_PATIENCE_MS", 120_000)))
         page.goto(studio.address)
         page.wait_for_selector("#example")
         return page

@@ -3,9 +3,9 @@
     offset = argmax over s of sum_c integral x_c(t) y_c(t - s) dt
 
 x_c, y_c: component c of both logs, without its mean, over its spread: the cross-correlation (matched filter) of
-G. L. Turin, IRE Trans. Inf. Theory 6, 311 (1960). A parabola through the largest value and its neighbours gives the
-part of a step. Both are smoothed in the same way first: a step in a log is then as wide as some rows, and no row's
-own place pulls the peak.
+G. L. Turin, IRE Trans. Inf. Theory 6, 311 (1960). The part of a step comes from a parabola through the correlation
+coefficients of the overlap there and one step beside: the ends of a log, which have no counterpart, do not pull them.
+Both logs are smoothed in the same way first: a step in a log is then as wide as some rows.
 """
 
 from __future__ import annotations
@@ -85,10 +85,12 @@ def align(first: Run, second: Run) -> Alignment:
         np.array([_on_grid(*of_run[name], grid, width) for name in names])
         for of_run, grid in zip(signals, grids, strict=True)
     )
-    shift = _best_shift(x, y)
+    k = _best_shift(x, y)
+    (before, _), (peak, overlap), (after, _) = (_alike(x, y, shift) for shift in (k - 1, k, k + 1))
+    bend = before - 2.0 * peak + after
+    shift = k + (0.5 * (before - after) / bend if bend < 0.0 else 0.0)
     offset = float(grids[0][0] - grids[1][0] + shift * step)
-    correlation, overlap = _alike(x, y, round(shift))
-    return Alignment(offset, correlation, overlap * step, names, runs[0].source, runs[1].source)
+    return Alignment(offset, peak, overlap * step, names, runs[0].source, runs[1].source)
 
 
 Signals = dict[str, tuple[FloatArray, FloatArray]]
@@ -125,24 +127,21 @@ def _common(first: Signals, second: Signals) -> tuple[str, ...]:
 
 
 def _on_grid(t: FloatArray, values: FloatArray, grid: FloatArray, width: int) -> FloatArray:
-    """A signal on a grid, smooth, without its mean and over its spread. Shape of the grid."""
+    """A signal on a grid, smooth, without its mean, over its spread. Shape of the grid, less `width` at both ends."""
     smooth = np.interp(grid, t, values)
     smooth = (smooth - smooth.mean()) / max(float(smooth.std()), np.finfo(float).tiny)
     for _ in range(2):
-        smooth = uniform_filter1d(smooth, width, mode="constant")
-    return smooth
+        smooth = uniform_filter1d(smooth, width, mode="nearest")
+    return smooth[width:-width] if len(smooth) > 4 * width else smooth
 
 
-def _best_shift(x: FloatArray, y: FloatArray) -> float:
+def _best_shift(x: FloatArray, y: FloatArray) -> int:
     """Steps by which y has to be moved to be most like x. Shapes (components, n) and (components, m)."""
     size = next_fast_len(x.shape[1] + y.shape[1] - 1, real=True)
     spectrum = sum(rfft(one, size) * np.conj(rfft(other, size)) for one, other in zip(x, y, strict=True))
     products = irfft(spectrum, size)
     k = int(np.argmax(products))
-    before, peak, after = products[k - 1], products[k], products[(k + 1) % size]
-    bend = before - 2.0 * peak + after
-    part = 0.5 * float((before - after) / bend) if bend < 0.0 else 0.0
-    return (k if k < x.shape[1] else k - size) + part
+    return k if k < x.shape[1] else k - size
 
 
 def _alike(x: FloatArray, y: FloatArray, shift: int) -> tuple[float, int]:

@@ -16,7 +16,8 @@ class LogFile:
     """A log, how it is read, and what check says of it.
 
     name: that a page shows. path: of the file. map: of its columns, "" for a guess. result: of the job; error: why
-    there is none. series: id of its signals. progress: in words, while it is read.
+    there is none. series: id of its signals. progress: in words, while it is read. other: key of a log that is drawn
+    over it, with offset added to its times [s]; aligned: what the library says of that.
     """
 
     key: str
@@ -29,6 +30,9 @@ class LogFile:
     series: str = ""
     progress: str = ""
     version: int = 0
+    other: str = ""
+    offset: float = 0.0
+    aligned: dict[str, Any] | None = None
 
     @property
     def label(self) -> str:
@@ -57,6 +61,15 @@ def check(log: LogFile, robot: str) -> tuple[str, str]:
     name = Path(robot).name if robot else ""
     words = ["omnidyn", "check", log.name, *(["--robot", name] if name else []), *log.flags]
     return shlex.join(words), f"omnidyn.check({log.python}{f', {_robot(name)}' if name else ''})"
+
+
+def align(log: LogFile, other: LogFile, robot: str) -> tuple[str, str]:
+    """Command line and Python call that put another log on the clock of a log."""
+    name = Path(robot).name if robot else ""
+    flags = max((log.flags, other.flags), key=len)
+    words = ["omnidyn", "align", log.name, other.name, *(["--robot", name] if name else []), *flags]
+    first, second = (one.python.replace("load_log(", "read_log(") for one in (log, other))
+    return shlex.join(words), f"omnidyn.align({first}, {second}).offset"
 
 
 def fit(logs: Sequence[LogFile], held_out: Sequence[LogFile], robot: str, free: Sequence[str]) -> tuple[str, str]:

@@ -21,9 +21,22 @@ def verdict(severity: str, words: str, name: str = "verdict") -> None:
         ui.label(words).classes("text")
 
 
-def plot(series: str, spans: list[list[Any]]) -> None:
+def plot(
+    series: str, spans: list[list[Any]], name: str = "signals.png", other: str = "", offset: float = 0.0
+) -> ui.element:
+    """A picture of signals over time.
+
+    Args:
+        series: id of the signals.
+        spans: what is shaded: number of a finding, its severity, from, to [s], its subject.
+        name: of the file that the picture is saved as.
+        other: id of a second series, drawn over the first.
+        offset: that is added to the times of the second [s].
+    """
     plot = ui.element("omni-plot")
-    plot._props["data-series"], plot._props["data-spans"] = series, json.dumps(spans)
+    plot._props |= {"data-series": series, "data-spans": json.dumps(spans), "data-name": name}
+    plot._props |= {"data-other": other, "data-offset": str(offset)} if other else {}
+    return plot
 
 
 def table(table: dict[str, Any], name: str) -> None:

@@ -19,11 +19,12 @@ from typing import Any
 from omnidyn.studio.drive.job import drive
 from omnidyn.studio.fit.job import fit, warm
 from omnidyn.studio.job import Tell
-from omnidyn.studio.log.job import check, example, save_columns
+from omnidyn.studio.log.job import align, check, example, save_columns
 from omnidyn.studio.worker import Listener
 
 JOBS: dict[str, Callable[[Mapping[str, Any], Tell, Any], dict[str, Any]]] = {
     "check": check,
+    "align": align,
     "save_columns": save_columns,
     "fit": fit,
     "warm": warm,

@@ -54,8 +54,8 @@ class Page:
             ).classes("wide robot")
             ui.element("omni-drop").props("words='Drop a robot file (.toml), or click'")
 
-    def calls(self, command: str, python: str) -> None:
-        """The command line and the Python call that do the same."""
+    def calls(self, command: str, python: str, name: str = "call") -> None:
+        """The command line and the Python call that do the same. name: id of the former."""
         with self.box("The same by hand"):
-            ui.label(command).classes("call").props("id=call")
+            ui.label(command).classes("call").props(f"id={name}")
             ui.label(python).classes("call")

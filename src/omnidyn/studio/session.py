@@ -172,6 +172,18 @@ class Session:
         await self.check(log)
         return ""
 
+    async def align(self, log: LogFile) -> None:
+        """Put the other log on the clock of a log, by what both recorded."""
+        request = {"robot": self.robot_path, "logs": [one.request for one in (log, self.logs[log.other])]}
+        try:
+            log.aligned = await self.workers["log"].run("align", request, lambda kind, value: None)
+        except (JobError, CancelledError) as error:
+            log.aligned = {"severity": "error", "verdict": str(error)}
+        for one in (log, self.logs[log.other]):
+            log.aligned["verdict"] = log.aligned["verdict"].replace(one.path, one.label)
+        log.offset = log.aligned.get("offset", log.offset)
+        self.changed(LOGS)
+
     async def warm(self) -> None:
         """Load what the first log and the first fit need, while nobody waits for it."""
         await self.workers["log"].start()

@@ -115,7 +115,7 @@ class FitTab:
             ui.label(f"→ {words}").classes("text")
         if fit.series:
             ui.label("Free run: the model gets the inputs only").classes("title")
-            plot(fit.series, [])
+            plot(fit.series, [], "free-run.png")
         with self.page.box(f"Warnings and notes ({len(result['warnings'])})"):
             for warning in result["warnings"]:
                 ui.label(f"{warning['severity']}: {warning['text']}").classes("text")

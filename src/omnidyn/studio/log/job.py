@@ -141,6 +141,16 @@ def _write_blocks(blocks: list[Log], folder: Path) -> None:
         write_series(folder, t, panels, values)
 
 
+def align(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
+    """What `omnidyn align` says of two logs. request: "logs" (path, map, unsigned each), "robot"."""
+    robot = robot_of(request)
+    first, second = (omnidyn.load_log(log["path"], robot, options_of(log)).to_run() for log in request["logs"])
+    alignment = omnidyn.align(first, second)
+    verdict = alignment.verdict
+    said = " ".join(filter(None, (alignment.document().verdict_text, verdict.remedy_text)))
+    return {"offset": alignment.offset, "severity": verdict.severity, "verdict": said}
+
+
 def save_columns(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
     """Write the map of columns that a table says, which `--map` takes. request: "rows", "path"."""
     columns = {}

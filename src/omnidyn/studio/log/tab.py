@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 from nicegui import ui
@@ -70,12 +71,53 @@ class LogTab:
         if log.series:
             findings = log.result["findings"] if log.result else []
             spans = [[k, f["severity"], a, b, f["subject"]] for k, f in enumerate(findings) for a, b in f["spans"]]
-            plot(log.series, spans)
+            self._plot(log, spans)
         if log.result is not None:
             self._findings(log)
             self._uses(log)
             self._columns(log)
         self.page.calls(*calls.check(log, self.session.robot_path))
+
+    def _plot(self, log: LogFile, spans: list[list[Any]]) -> None:
+        """The signals, and those of another log over them."""
+        others = {key: one.label for key, one in self.session.logs.items() if one is not log and one.series}
+        if log.other not in others:
+            log.other, log.offset, log.aligned = "", 0.0, None
+        if others:
+            self._second(log, others)
+        other = self.session.logs[log.other].series if log.other else ""
+        picture = plot(log.series, spans, f"{Path(log.label).stem}.png", other, log.offset)
+        picture.on("moved", lambda event: self._move(log, event.args["detail"]), args=["detail"])
+
+    def _second(self, log: LogFile, others: dict[str, str]) -> None:
+        """The choice of another log, and what is added to its times."""
+        with ui.row().classes("line"):
+            ui.select(
+                {"": "none", **others},
+                value=log.other,
+                label="Another log over it",
+                on_change=lambda e: self._take(log, e.value),
+            ).classes("wide").props("id=other-log")
+            if log.other:
+                field = ui.number("added to its times [s]", value=round(log.offset, 6), step=0.01, format="%.6f")
+                field.props("dense for=offset").on("change", lambda: self._move(log, field.value))
+                ui.button("Align", on_click=lambda: self.session.start(self.session.align(log))).props(
+                    "outline no-caps id=align"
+                )
+        if log.other and log.aligned is not None:
+            verdict(log.aligned["severity"], log.aligned["verdict"], "aligned")
+        if log.other:
+            self.page.calls(*calls.align(log, self.session.logs[log.other], self.session.robot_path), name="align-call")
+
+    def _take(self, log: LogFile, key: str) -> None:
+        log.other, log.offset, log.aligned = key, 0.0, None
+        self.page.changed(LOGS)
+
+    def _move(self, log: LogFile, offset: Any) -> None:
+        """Take an offset from the plot or the field; it is that of all pages."""
+        if isinstance(offset, int | float) and round(offset, 6) != round(log.offset, 6):
+            log.offset, log.aligned = float(offset), None
+            self.session.changed(LOGS)
 
     def _findings(self, log: LogFile) -> None:
         """Errors and warnings, then notes, which are folded."""

@@ -22,28 +22,57 @@ const wire = {
 };
 
 const views = new Map(); // series -> what is looked at of it: the page is laid out anew where something changes
+const HINT = 'Drag to pan, wheel or + and - to zoom; with Shift a drag moves the other log';
 const TOP = 20, PANEL = 110, GAP = 24, BOTTOM = 38;
 
-// Signals over time, one panel below the other, with findings shaded
+// A frame of the server: its head, and its numbers
+function frame(data) {
+  if (data.byteLength < 8) return null;
+  const length = new DataView(data).getUint32(0, true);
+  return { ...JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length))), numbers: new Float32Array(data, 4 + length) };
+}
+
+// What a picture shows of one series: it asks for the stretch that is looked at, once at a time
+class Layer {
+  constructor(plot, series, meta) { Object.assign(this, { plot, series, meta, offset: 0, shown: null, waiting: false }); }
+  ask() {
+    const plot = this.plot;
+    if (!plot.isConnected) return;
+    if (this.waiting) { this.again = true; return; }
+    this.waiting = true; this.again = false;
+    wire.ask(this, { series: this.series, begin: plot.view[0] - this.offset, end: plot.view[1] - this.offset,
+      width: Math.round(plot.inner() * (window.devicePixelRatio || 1)) });
+  }
+  take(data) {
+    this.waiting = false;
+    if (this.again) this.ask();
+    this.shown = frame(data) || this.shown;
+    this.plot.frames++;
+    this.plot.draw();
+  }
+  index(name) { return this.meta.panels.flatMap((p) => p.signals).indexOf(name); }
+}
+
+// Signals over time, one panel below the other, with findings shaded; another log may be drawn over them
 class Plot extends HTMLElement {
-  static observedAttributes = ['data-series', 'data-spans'];
+  static observedAttributes = ['data-series', 'data-spans', 'data-other', 'data-offset'];
   connectedCallback() {
     if (!this.canvas) this.build();
     this.resize = new ResizeObserver(() => this.ask());
     this.resize.observe(this);
-    this.waiting = false;
     this.load();
   }
   disconnectedCallback() { this.resize?.disconnect(); }
   attributeChangedCallback(name) {
     if (!this.isConnected || !this.canvas) return;
-    if (name === 'data-series') this.load(); else this.draw();
+    if (name === 'data-offset') this.move(+this.dataset.offset);
+    else if (name === 'data-spans') this.draw(); else this.load();
   }
   build() {
     const tools = make('div', this, { className: 'tools' });
-    make('button', tools, { type: 'button', textContent: 'All', onclick: () => this.look(this.meta.begin, this.meta.end) });
-    make('button', tools, { type: 'button', textContent: 'Save picture', onclick: () => save(this.canvas, 'log.png') });
-    this.readout = make('span', tools, { textContent: 'Drag to pan, wheel or + and - to zoom' });
+    make('button', tools, { type: 'button', textContent: 'All', onclick: () => this.look(...this.ends()) });
+    make('button', tools, { type: 'button', textContent: 'Save picture', onclick: () => save(this.canvas, this.dataset.name) });
+    this.readout = make('span', tools, { textContent: HINT });
     this.story = make('div', this, { className: 'story', hidden: true });
     this.story.setAttribute('role', 'status');
     this.canvas = make('canvas', this, { tabIndex: 0 });
@@ -52,15 +81,26 @@ class Plot extends HTMLElement {
     this.frames = 0;
     const c = this.canvas;
     c.addEventListener('wheel', (e) => { if (!this.meta) return; e.preventDefault(); this.zoom(Math.exp(e.deltaY * 0.002), this.time(e.offsetX)); }, { passive: false });
-    c.onpointerdown = (e) => { this.drag = { x: e.offsetX, view: [...this.view], moved: false }; c.setPointerCapture(e.pointerId); };
+    c.onpointerdown = (e) => {
+      this.drag = { x: e.offsetX, view: [...this.view], moved: false, second: e.shiftKey && this.second, offset: this.second?.offset };
+      c.setPointerCapture(e.pointerId);
+    };
     c.onpointermove = (e) => {
       if (!this.meta) return;
       if (!this.drag) { this.readout.textContent = `t = ${short(this.time(e.offsetX))} s`; return; }
       const shift = (this.drag.x - e.offsetX) * (this.drag.view[1] - this.drag.view[0]) / this.inner();
       this.drag.moved ||= Math.abs(e.offsetX - this.drag.x) > 3;
-      if (this.drag.moved) this.look(this.drag.view[0] + shift, this.drag.view[1] + shift);
+      if (this.drag.moved && this.drag.second) {
+        this.move(this.drag.offset - shift);
+        this.readout.textContent = `${short(this.second.offset)} s added`;
+      } else if (this.drag.moved) this.look(this.drag.view[0] + shift, this.drag.view[1] + shift);
     };
-    c.onpointerup = (e) => { const still = this.drag && !this.drag.moved; this.drag = null; if (still) this.pick(e.offsetX); };
+    c.onpointerup = (e) => {
+      const drag = this.drag;
+      this.drag = null;
+      if (drag && !drag.moved) this.pick(e.offsetX);
+      else if (drag?.second) this.dispatchEvent(new CustomEvent('moved', { detail: this.second.offset }));
+    };
     c.onkeydown = (e) => {
       const span = this.view[1] - this.view[0], middle = (this.view[0] + this.view[1]) / 2;
       const acts = { '+': () => this.zoom(0.7, middle), '-': () => this.zoom(1.4, middle),
@@ -72,22 +112,35 @@ class Plot extends HTMLElement {
     this.dark.observe(document.body, { attributes: true, attributeFilter: ['class'] });
   }
   async load() {
-    const series = this.dataset.series;
-    const answer = await fetch(`/series/${series}`);
-    if (answer.status !== 200) return;
-    this.meta = await answer.json();
-    const [begin, end] = views.get(series) || [this.meta.begin, this.meta.end];
-    this.view = [begin, end];
-    this.shown = null;
+    const { series, other } = this.dataset;
+    const answers = await Promise.all([series, other].map((key) => key && fetch(`/series/${key}`)));
+    const [meta, second] = await Promise.all(answers.map((answer) => (answer?.status === 200 ? answer.json() : null)));
+    if (!meta || series !== this.dataset.series || other !== this.dataset.other) return;
+    this.meta = meta;
+    this.first = new Layer(this, series, meta);
+    this.second = second && new Layer(this, other, second);
+    if (this.second) this.second.offset = +this.dataset.offset;
+    this.view = views.get(series) || this.ends();
     this.ask();
+  }
+  // From where to where there is anything, of both logs
+  ends() {
+    const of = [this.first, this.second].filter(Boolean);
+    return [Math.min(...of.map((l) => l.meta.begin + l.offset)), Math.max(...of.map((l) => l.meta.end + l.offset))];
+  }
+  move(offset) {
+    if (!this.second || this.second.offset === offset) return;
+    this.second.offset = offset;
+    this.second.ask();
+    this.draw();
   }
   inner() { return Math.max(50, this.clientWidth - LEFT - RIGHT); }
   time(x) { return this.view[0] + (x - LEFT) / this.inner() * (this.view[1] - this.view[0]); }
   look(begin, end) {
-    const whole = this.meta.end - this.meta.begin;
+    const [least, largest] = this.ends(), whole = largest - least;
     const span = Math.min(Math.max(end - begin, whole * 1e-6, 1e-6), whole || 1);
     const middle = (begin + end) / 2;
-    const low = Math.min(Math.max(middle - span / 2, this.meta.begin), this.meta.end - span);
+    const low = Math.min(Math.max(middle - span / 2, least), largest - span);
     this.view = [low, low + span];
     views.set(this.dataset.series, this.view);
     this.draw(); this.ask();
@@ -99,22 +152,8 @@ class Plot extends HTMLElement {
   }
   zoom(factor, at) { this.look(at + (this.view[0] - at) * factor, at + (this.view[1] - at) * factor); }
   ask() {
-    if (!this.meta || !this.isConnected) return;
-    if (this.waiting) { this.again = true; return; }
-    this.waiting = true; this.again = false;
-    wire.ask(this, { series: this.dataset.series, begin: this.view[0], end: this.view[1],
-      width: Math.round(this.inner() * (window.devicePixelRatio || 1)) });
-  }
-  take(data) {
-    this.waiting = false;
-    if (this.again) this.ask();
-    if (data.byteLength < 8) return;
-    const length = new DataView(data).getUint32(0, true);
-    const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-    const numbers = new Float32Array(data, 4 + length);
-    this.shown = { ...head, numbers };
-    this.frames++;
-    this.draw();
+    this.first?.ask();
+    this.second?.ask();
   }
   // Findings: all, or those about a signal of a panel; one about no signal is about every panel
   areas(panel) {
@@ -143,10 +182,18 @@ class Plot extends HTMLElement {
     g.fillText('time [s]', LEFT + this.inner() / 2, bottom + 20);
   }
   panel(g, panel, first, top, x, width) {
-    const shown = this.shown, n = shown ? shown.points : 0, inner = this.inner();
+    const inner = this.inner(), lines = [];
+    panel.signals.forEach((name, k) => {
+      for (const layer of [this.first, this.second]) {
+        const index = layer === this.first ? first + k : layer?.index(name) ?? -1;
+        if (index < 0 || !layer.shown) continue;
+        const { points: n, numbers } = layer.shown;
+        lines.push({ name, colour: css(`--c${k % 6}`), layer, n, numbers, at: n + 2 * n * index, x: (i) => x(layer.shown.begin + layer.offset + numbers[i]) });
+      }
+    });
     let low = Infinity, high = -Infinity;
-    for (let s = first; n && s < first + panel.signals.length; s++)
-      for (let i = 0; i < 2 * n; i++) { const v = shown.numbers[n + 2 * n * s + i]; if (v < low) low = v; if (v > high) high = v; }
+    for (const { n, numbers, at } of lines)
+      for (let i = at; i < at + 2 * n; i++) { const v = numbers[i]; if (v < low) low = v; if (v > high) high = v; }
     if (!(low <= high)) { low = -1; high = 1; }
     if (high - low < 1e-9) { low -= 0.5; high += 0.5; }
     const edge = Math.max((high - low) * 0.06, Math.abs(high) * 1e-3, 1e-9);
@@ -162,38 +209,7 @@ class Plot extends HTMLElement {
     }
     g.strokeStyle = css('--line'); g.lineWidth = 1;
     for (const v of ticks(low, high, 5)) { g.beginPath(); g.moveTo(LEFT, y(v)); g.lineTo(LEFT + inner, y(v)); g.stroke(); }
-    panel.signals.forEach((name, k) => {
-      const at = n + 2 * n * (first + k);
-      const wide = name === 'measured'; // the model is drawn over it
-      g.strokeStyle = css(`--c${k % 6}`); g.lineWidth = wide ? 4 : 1.3; g.lineJoin = 'round'; g.globalAlpha = wide ? 0.45 : 1;
-      g.beginPath();
-      if (n > inner / 2 && shown.rows > 20 * n) { // columns of pixels: strokes as dense as this take ten times as long
-        let before = [NaN, NaN];
-        for (let i = 0; i < n; i++) {
-          let least = shown.numbers[at + i], largest = shown.numbers[at + n + i];
-          if (Number.isNaN(least)) continue;
-          const ends = [least, largest];
-          if (before[1] < least) least = before[1];
-          if (before[0] > largest) largest = before[0];
-          before = ends;
-          const px = Math.floor(x(shown.begin + shown.numbers[i])), thick = wide ? 2 : 0.5;
-          const bottom = Math.ceil(y(least) + thick), head = Math.floor(y(largest) - thick);
-          g.rect(px, head, Math.max(1, Math.ceil(inner / n)), bottom - head);
-        }
-        g.fillStyle = css(`--c${k % 6}`); g.fill(); g.globalAlpha = 1;
-        return;
-      }
-      let pen = false;
-      for (let i = 0; i < n; i++) {
-        const least = shown.numbers[at + i], largest = shown.numbers[at + n + i];
-        if (Number.isNaN(least)) { if (!this.meta.sparse) pen = pen && n > inner / 2; continue; }
-        const px = x(shown.begin + shown.numbers[i]);
-        if (pen) g.lineTo(px, y(least)); else g.moveTo(px, y(least));
-        if (largest !== least) g.lineTo(px, y(largest));
-        pen = true;
-      }
-      g.stroke();
-    });
+    for (const line of lines) this.line(g, line, y, inner);
     g.restore();
     g.strokeStyle = css('--quiet'); g.strokeRect(LEFT + 0.5, top + 0.5, inner, PANEL);
     g.fillStyle = css('--quiet'); g.textAlign = 'right'; g.textBaseline = 'middle';
@@ -206,6 +222,40 @@ class Plot extends HTMLElement {
       g.fillStyle = css(`--c${k % 6}`); g.fillRect(at, top - 11, 14, 3); g.fillStyle = css('--ink');
       g.fillText(name, at + 18, top - 3); at += 30 + g.measureText(name).width;
     });
+  }
+  line(g, { name, colour, layer, n, numbers, at, x }, y, inner) {
+    const second = layer === this.second, wide = name === 'measured'; // the model is drawn over it
+    g.strokeStyle = g.fillStyle = colour;
+    g.lineWidth = wide ? 4 : 1.3; g.lineJoin = 'round'; g.globalAlpha = wide || second ? 0.45 : 1;
+    if (second) g.setLineDash([6, 3]);
+    g.beginPath();
+    if (n > inner / 2 && layer.shown.rows > 20 * n) { // columns of pixels: strokes as dense as this take ten times as long
+      let before = [NaN, NaN];
+      for (let i = 0; i < n; i++) {
+        let least = numbers[at + i], largest = numbers[at + n + i];
+        if (Number.isNaN(least)) continue;
+        const ends = [least, largest];
+        if (before[1] < least) least = before[1];
+        if (before[0] > largest) largest = before[0];
+        before = ends;
+        const px = Math.floor(x(i)), thick = wide ? 2 : 0.5;
+        const bottom = Math.ceil(y(least) + thick), head = Math.floor(y(largest) - thick);
+        g.rect(px, head, Math.max(1, Math.ceil(inner / n)), bottom - head);
+      }
+      g.fill();
+    } else {
+      let pen = false;
+      for (let i = 0; i < n; i++) {
+        const least = numbers[at + i], largest = numbers[at + n + i];
+        if (Number.isNaN(least)) { if (!layer.meta.sparse) pen = pen && n > inner / 2; continue; }
+        const px = x(i);
+        if (pen) g.lineTo(px, y(least)); else g.moveTo(px, y(least));
+        if (largest !== least) g.lineTo(px, y(largest));
+        pen = true;
+      }
+      g.stroke();
+    }
+    g.globalAlpha = 1; g.setLineDash([]);
   }
   pick(px) {
     const t = this.time(px), reach = 4 * (this.view[1] - this.view[0]) / this.inner();
