@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from omnidyn.studio import calls
-from omnidyn.studio.parts import FIT, PROGRESS
+from omnidyn.studio.parts import FIT, PROGRESS, ROBOT
 from omnidyn.studio.series import Series
 from omnidyn.studio.session import Session
 from omnidyn.studio.worker import CancelledError, JobError
@@ -29,10 +30,11 @@ class Fit:
 
 
 class Fitting:
-    """The last fit, and the keys of the logs that are held out."""
+    """The last fit, all that gave a robot by the name of its file, and the keys of the logs that are held out."""
 
     def __init__(self, session: Session) -> None:
         self.session, self.last = session, Fit()
+        self.fits: dict[str, Fit] = {}
         self._held_out: list[str] = []
 
     @property
@@ -86,6 +88,7 @@ class Fitting:
         }
         try:
             fit.result = await self.session.workers["fit"].run("fit", request, listen)
+            self.keep(fit)
             if fit.result is not None and fit.result["series"]:
                 fit.series = f"fit{self.session.count}"
                 self.session.series[fit.series] = Series(folder / "series")
@@ -95,3 +98,15 @@ class Fitting:
             fit.error = ""
         fit.running = False
         self.session.changed(FIT)
+
+    def keep(self, fit: Fit, name: str = "") -> None:
+        """Let all tabs take the robot of a fit, under this name or the next free one."""
+        assert fit.folder is not None
+        count = len(self.fits) + 1
+        while not name or name in self.session.robots:
+            name, count = f"fit-{count}.toml", count + 1
+        path = fit.folder / name
+        shutil.copyfile(fit.folder / "robot.toml", path)
+        self.fits[name] = fit
+        self.session.robots[name] = str(path)
+        self.session.changed(ROBOT)
