@@ -1,22 +1,15 @@
 """The studio in a real browser: each test ends in what a page shows and the command prints for the same file."""
 
-import contextlib
-import json
-import os
-import re
 import time
 import tomllib
-from contextlib import redirect_stderr, redirect_stdout
-from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.cli import main
 from omnidyn.model.keys import Key
-from tests.support.axebot_logs import excitation
+from tests.support.pages import as_flags, command, drop, shown, tab, verdict, write_log
 
 # How long the server takes to answer a click [ms]: it turns the page dark, or light again
 ANSWER = """() => new Promise(done => { const begun = performance.now();
@@ -26,51 +19,11 @@ ANSWER = """() => new Promise(done => { const begun = performance.now();
 ROBOTINO = Path(__file__).parents[2] / "examples" / "robotino" / "exp00.csv"
 
 
-def command(*words):
-    """What a command prints for machines, and its exit code."""
-    out, err = StringIO(), StringIO()
-    with redirect_stdout(out), redirect_stderr(err):
-        code = main([str(word) for word in words])
-    return (json.loads(out.getvalue()) if out.getvalue().startswith("{") else {}), code, err.getvalue()
-
-
-def write_log(path, seconds=20.0, seed=1, change=None, robot=None):
-    """A log of the axebot, or another robot: voltages and a noisy twist."""
-    robot, draws = robot or omnidyn.load_robot("axebot"), np.random.default_rng(seed)
-    run = omnidyn.simulate(robot, excitation(seconds, seed=seed), 0.01)
-    twist = run.twist + draws.standard_normal(run.twist.shape) * (0.01, 0.01, 0.05)
-    if change is not None:
-        change(twist)
-    omnidyn.write_run(omnidyn.Run(t=run.t, voltage=run.voltage, twist=twist), path)
-    return path
-
-
-def drop(page, path):
-    """Give a file to the page, as a user who clicks the place for files."""
-    page.set_input_files("input[type=file] >> nth=0", str(path))
-
-
-def tab(page, name):
-    """Go to a tab."""
-    page.get_by_role("tab", name=name).click()
-
-
 def choose_axebot(page):
     """Choose the robot to start from."""
     tab(page, "Fit")
     page.click(".robot")
     page.get_by_role("option", name="axebot", exact=True).click()
-
-
-def verdict(page, name="#verdict"):
-    """The sentence on top, without the mark before it."""
-    page.wait_for_selector(name)
-    return page.inner_text(f"{name} .text")
-
-
-def as_flags(text):
-    """Options as the command line writes them."""
-    return re.sub(r"`([a-z_]+)`", lambda match: f"--{match[1].replace('_', '-')}", text)
 
 
 def numbers(page):
@@ -88,25 +41,6 @@ def assert_same_numbers(page, path, *options):
     assert len(said["parameters"]) >= 6
     for key, number in said["parameters"].items():
         assert shown[key] == f"{number['value']:.5g}", key
-
-
-def shown(page, name):
-    """Look at a tab as it is, narrow and wide: nothing is wider than the page, and axe finds nothing serious.
-
-    Pictures, as the documentation has them, go to the folder OMNIDYN_PICTURES.
-    """
-    for width in (420, 1400):
-        page.set_viewport_size({"width": width, "height": 900})
-        page.wait_for_timeout(500)
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
-        if folder := os.environ.get("OMNIDYN_PICTURES"):
-            page.mouse.move(0, 0)
-            page.screenshot(path=Path(folder) / f"studio-{name}{'-narrow' * (width < 1000)}.png", full_page=True)
-    with contextlib.suppress(ImportError):
-        from axe_playwright_python.sync_playwright import Axe
-
-        faults = [v["id"] for v in Axe().run(page).response["violations"] if v["impact"] in ("serious", "critical")]
-        assert not faults
 
 
 def test_from_nothing_to_a_robot(browser, tmp_path):

@@ -13,7 +13,6 @@ from omnidyn.cli.terminal.session import input_file, provenance, robot_input
 from omnidyn.cli.terminal.telling import tell
 from omnidyn.errors import InputError
 from omnidyn.files import check_output, write_atomic
-from omnidyn.progress import Report
 
 if TYPE_CHECKING:
     from omnidyn.control.tracking import Tracking
@@ -83,8 +82,7 @@ def track(
     trackings: list[Tracking] = []
     with shown_progress("tracking") as progress:
         for follower in several(controller, believed, no_friction, no_observer, **options):
-            progress(Report(f"tracking with {follower.name}, {len(trackings) + 1} of {len(controller)}"))
-            trackings.append(tracked(driven, follow, follower, around))
+            trackings.append(tracked(driven, follow, follower, around, progress))
     document = trackings_document(trackings, notes := [demand.verdict, *demand.statements()])
     record = _record(robot, plant, files)
     _write(trackings, out, force)

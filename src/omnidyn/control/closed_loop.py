@@ -23,12 +23,14 @@ from omnidyn.errors import InputError
 from omnidyn.model.log_effects import Sensors
 from omnidyn.model.motor import DUTY, SPEED
 from omnidyn.model.robot import Robot
+from omnidyn.progress import Progress, Report, silent
 from omnidyn.run import Run
 from omnidyn.simulation.live import LiveRobot, check_supply
 
 SKIP = 0.5  # [s] from the start that count as no error: the robot starts at rest
 MOST_STEPS = 1_000_000
 MOST_DELAY = 100
+STEPS_OF_REPORT = 64  # from one report of progress to the next
 # What a noise of 1 m/s on the speeds is on the others: x, y [m], heading [rad], v_x, v_y [m/s], omega [rad/s].
 NOISE = np.array([0.2, 0.2, 0.4, 1.0, 1.0, 4.0])
 Push = tuple[float, float, float]
@@ -107,6 +109,7 @@ def track(  # pyright: ignore[reportInconsistentOverload]  it has the options by
     push: Push | Callable[[float], Push] = (0.0, 0.0, 0.0),
     supply: float | None = None,
     sensors: str | Instruments | Sensors | None = None,
+    progress: Progress = silent,
 ) -> Tracking | Trackings:
     """Drive a simulated robot along a path with a controller, and see how near it comes; or with several, one by one.
 
@@ -131,6 +134,7 @@ def track(  # pyright: ignore[reportInconsistentOverload]  it has the options by
         supply: Behind a duty [V].
         sensors: With which the robot is measured, such as "encoder:2048,pose:60Hz,40ms" (control/instruments.py); a
             controller that is made here knows of them. By default those of the [sensors] of the plant's file.
+        progress: Hears how far each controller is.
 
     Raises InputError for what cannot be driven, or a number out of range.
     """
@@ -147,7 +151,7 @@ def track(  # pyright: ignore[reportInconsistentOverload]  it has the options by
         raise InputError("no controller", got="an empty list", expected="one controller or more", where="controller")
     options = {"supply": supply, **told_of_loop(believed, around)}
     controllers = told_apart([_controller(entry, believed, options) for entry in wanted])
-    trackings = [tracked(plant or robot, follow, follower, around) for follower in controllers]
+    trackings = [tracked(plant or robot, follow, follower, around, progress) for follower in controllers]
     return Trackings(tuple(trackings)) if isinstance(controller, list | tuple) else trackings[0]
 
 
@@ -174,7 +178,9 @@ def told_of_loop(robot: Robot, around: Circumstances) -> dict[str, Any]:
     return {"dt": around.dt, **({"delay": late} if around.delay else {})}
 
 
-def tracked(plant: Robot, path: Path, controller: Controller, around: Circumstances) -> Tracking:
+def tracked(
+    plant: Robot, path: Path, controller: Controller, around: Circumstances, progress: Progress = silent
+) -> Tracking:
     """`track`, with all there is to it. Raises InputError where the robots take different outputs."""
     _check_match(plant, controller, around.supply)
     around.steps(path)
@@ -199,6 +205,8 @@ def tracked(plant: Robot, path: Path, controller: Controller, around: Circumstan
     state[0] = *live.pose, *live.twist, *live.wheel_speed
     took, words = np.empty(count), dict[str, int]()
     for k in range(count):
+        if k % STEPS_OF_REPORT == 0:
+            progress(Report(f"tracking with {controller.name}", k, count))
         pose, twist = readings.seen(draws[k], bool(lost[k]))
         start = time.perf_counter()
         sent[k] = controller.step(float(t[k]), pose, twist, path)

@@ -54,6 +54,11 @@ class Tracking(Displayable):
         return self.run.pose - self.wanted
 
     @property
+    def distance(self) -> FloatArray:
+        """Distance from the path [m]. Shape (samples,)."""
+        return np.hypot(*self.error[:, :2].T)
+
+    @property
     def counted(self) -> FloatArray:
         """The errors that count: from `skip` on, the start apart; the last one where nothing is left. (rows, 3)."""
         late = self.run.t >= self.skip - 1e-9

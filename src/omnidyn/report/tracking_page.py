@@ -14,7 +14,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.control.tracking import Tracking, trackings_document
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import per_wheel
-from omnidyn.report.figures.robot import wheel_places
+from omnidyn.report.figures.robot import wheel_lines, wheel_places
 from omnidyn.report.figures.tracking import COLOURS, draw_tracking, draw_voltages
 from omnidyn.report.html import Section, escaped, page, section
 from omnidyn.statement import Statement
@@ -120,9 +120,7 @@ def _robot(draw: Any, robot: Robot, pose: FloatArray, scale: float, to_pixels: A
     draw.ellipse(_around(centre, 0.85 * reach * scale * size), outline=colour, width=2 * OVERSAMPLING)
     ahead = pose[:2] + turn @ np.array([0.85 * reach * size, 0.0])
     draw.line([centre, to_pixels(ahead[None])[0]], fill=colour, width=2 * OVERSAMPLING)
-    for wheel, place in enumerate(places):
-        rolling = robot.wheels.wrench_matrix[:2, wheel] / np.hypot(*robot.wheels.wrench_matrix[:2, wheel])
-        ends = np.stack([place - rolling * robot.wheels.radii[wheel], place + rolling * robot.wheels.radii[wheel]])
+    for ends in wheel_lines(robot.wheels):
         draw.line(to_pixels(pose[:2] + size * ends @ turn.T), fill=INK, width=4 * OVERSAMPLING)
 
 

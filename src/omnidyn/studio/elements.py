@@ -10,6 +10,7 @@ from nicegui import ui
 
 from omnidyn.logs.channels import components
 from omnidyn.run import CHANNELS
+from omnidyn.studio.task import Task
 
 UNUSED = "-"  # what a column is that nobody takes
 MARK = {"error": "✕", "warning": "!", "note": "i"}
@@ -52,6 +53,30 @@ def table(table: dict[str, Any], name: str) -> None:
                     for cell in row:
                         with ui.element("td"):
                             ui.label(cell)
+
+
+def document(parts: list[dict[str, Any]], name: str) -> None:
+    """Text, points and tables of a result, in their order; the id of its first table."""
+    names = iter((name,))
+    for part in parts:
+        if "rows" in part:
+            table(part, next(names, part["name"]))
+        for severity, words in part.get("points", ()):
+            ui.label(f"{severity}: {words}" if severity else words).classes("text")
+        if "text" in part:
+            ui.label(part["text"]).classes("text quiet")
+
+
+def progress(task: Task, cancel: Callable[[], Any], name: str) -> None:
+    """How far a task is, and what cancels it."""
+    if not task.running:
+        return
+    with ui.row().classes("line"):
+        ui.spinner(size="1.2em")
+        ui.label(task.progress)
+        ui.button("Cancel", on_click=cancel).props(f"outline dense no-caps id=cancel-{name}")
+    if task.share is not None:
+        ui.linear_progress(task.share, show_value=False)
 
 
 def _component_names() -> list[str]:

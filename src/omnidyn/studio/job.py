@@ -7,10 +7,12 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import omnidyn
+from omnidyn.document import Document, Points, Table
 from omnidyn.logs.columns.mapping import load_map
 from omnidyn.logs.read_log import LogOptions
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Report
+from omnidyn.statement import NOTE
 
 Tell = Callable[[str, Any], None]
 INTERVAL = 0.1  # [s] between two reports of progress
@@ -39,3 +41,19 @@ def options_of(log: Mapping[str, Any]) -> LogOptions:
     """How a log is read."""
     columns = load_map(log["map"]) if log.get("map") else None
     return LogOptions(columns=columns, current_unsigned=bool(log.get("unsigned")))
+
+
+def shown(document: Document) -> dict[str, Any]:
+    """A result as the command prints it: its verdict, then text, points and tables in their order."""
+    parts: list[dict[str, Any]] = []
+    for part in document.parts:
+        if isinstance(part, Table):
+            parts.append({"head": list(part.head), "rows": [list(row) for row in part.rows], "name": part.name})
+        elif isinstance(part, Points):
+            points = ((getattr(words, "severity", ""), str(words)) for words in part.words)
+            parts.append({"points": [[severity * (not part.mark), text] for severity, text in points]})
+        elif text := part if isinstance(part, str) else part.text:
+            parts.append({"text": text})
+    parts += [{"text": line} for line in document.legend()]
+    severity = getattr(document.verdict, "severity", NOTE)
+    return {"verdict": document.verdict_text, "severity": severity, "parts": parts}

@@ -16,10 +16,12 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from omnidyn.studio.compare.job import compare, drift
 from omnidyn.studio.drive.job import drive
 from omnidyn.studio.fit.job import fit, warm
 from omnidyn.studio.job import Tell
 from omnidyn.studio.log.job import align, check, example, save_columns
+from omnidyn.studio.track.job import track
 from omnidyn.studio.worker import Listener
 
 JOBS: dict[str, Callable[[Mapping[str, Any], Tell, Any], dict[str, Any]]] = {
@@ -30,6 +32,9 @@ JOBS: dict[str, Callable[[Mapping[str, Any], Tell, Any], dict[str, Any]]] = {
     "warm": warm,
     "example": example,
     "drive": drive,
+    "track": track,
+    "compare": compare,
+    "drift": drift,
 }
 
 

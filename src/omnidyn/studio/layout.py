@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from nicegui import ui
 
+from omnidyn.studio.compare.state import Comparing
+from omnidyn.studio.compare.tab import CompareTab
 from omnidyn.studio.drive.state import Driving
 from omnidyn.studio.drive.tab import DriveTab
 from omnidyn.studio.fit.state import Fitting
@@ -11,6 +15,8 @@ from omnidyn.studio.fit.tab import FitTab
 from omnidyn.studio.log.tab import LogTab
 from omnidyn.studio.page import Page
 from omnidyn.studio.session import Session
+from omnidyn.studio.track.state import Tracks
+from omnidyn.studio.track.tab import TrackTab
 
 HEAD = """
 <link rel="stylesheet" href="/static/studio.css">
@@ -24,10 +30,17 @@ class Studio:
     def __init__(self) -> None:
         self.session = Session()
         self.fitting, self.driving = Fitting(self.session), Driving(self.session)
+        self.tracks, self.comparing = Tracks(self.session), Comparing(self.session)
 
-    def tabs(self, page: Page) -> dict[str, LogTab | FitTab | DriveTab]:
+    def tabs(self, page: Page) -> dict[str, Any]:
         """The tabs of a page, by name."""
-        return {"Log": LogTab(page), "Fit": FitTab(page, self.fitting), "Drive": DriveTab(page, self.driving)}
+        return {
+            "Log": LogTab(page),
+            "Fit": FitTab(page, self.fitting),
+            "Drive": DriveTab(page, self.driving),
+            "Track": TrackTab(page, self.tracks),
+            "Compare": CompareTab(page, self.comparing),
+        }
 
 
 def show(studio: Studio) -> None:

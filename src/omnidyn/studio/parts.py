@@ -2,3 +2,5 @@
 
 LOGS, ROBOT, FIT, PROGRESS = "logs", "robot", "fit", "progress"
 DRIVE, VIEW, NUMBERS = "drive", "view", "numbers"  # the drive: its buttons, the robot, the numbers of the robot
+TRACK, PATH, TRACK_START = "track", "path", "track start"  # what controllers did; their path; the button
+COMPARE, DRIFT, COMPARE_START = "compare", "drift", "compare start"  # robots over logs; fits; their buttons

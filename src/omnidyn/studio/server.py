@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import re
 import secrets
 import socket
 import struct
@@ -29,6 +30,8 @@ from omnidyn.studio.session import RefusedError
 
 LOCAL = "127.0.0.1"
 STATIC = Path(__file__).with_name("static")
+TRACK_FILE, DRIFT_FILE = re.compile(r"run-\d{1,3}\.csv|drawn\.csv|motion\.json"), re.compile(r"drift\.svg")
+ROBOT_FILE = re.compile(r"[^/\\]+\.toml", re.IGNORECASE)
 TRIES = 20  # ports from the one asked for
 FIT_FILES = {"robot.toml": "text/plain", "numbers.csv": "text/csv", "report.html": "text/html"}
 NO_SCRIPT = "default-src 'none'; style-src 'unsafe-inline'; img-src data: 'self'; frame-ancestors 'none'"
@@ -109,9 +112,9 @@ def _add_files(app: FastAPI, studio: Studio) -> None:
     session = studio.session
 
     @app.post("/upload")
-    async def upload(request: Request, name: str) -> Response:
+    async def upload(request: Request, name: str, kind: str = "") -> Response:
         try:
-            return JSONResponse({"name": await session.upload(name, request.stream())})
+            return JSONResponse({"name": await session.upload(name, request.stream(), kind)})
         except RefusedError:
             return Response(status_code=413)
 
@@ -135,6 +138,19 @@ def _add_files(app: FastAPI, studio: Studio) -> None:
             content_disposition_type="inline" if shown_here else "attachment",
         )
 
+    @app.get("/track/{name}")
+    async def track_file(name: str) -> Response:
+        return _file_of(studio.tracks.last.folder, name, TRACK_FILE)
+
+    @app.get("/drift/{name}")
+    async def drift_file(name: str) -> Response:
+        return _file_of(studio.comparing.last_drift.folder, name, DRIFT_FILE, "image/svg+xml")
+
+    @app.get("/robot/{name:path}")
+    async def robot_file(name: str) -> Response:
+        path = Path(session.robots.get(name, ""))
+        return _file_of(path.parent, path.name, ROBOT_FILE)
+
     @app.get("/log/{key}/{what}")
     async def log_file(key: str, what: str) -> Response:
         log = session.logs.get(key)
@@ -142,6 +158,13 @@ def _add_files(app: FastAPI, studio: Studio) -> None:
         if not log or not path or not Path(path).is_file():
             return Response(status_code=404)
         return FileResponse(path, media_type="text/plain", filename=Path(path).name)
+
+
+def _file_of(folder: Path | None, name: str, form: re.Pattern[str], kind: str = "text/plain") -> Response:
+    """A file that was written for a page, to be saved; nothing where its name has another form."""
+    if folder is None or not form.fullmatch(name) or not (folder / name).is_file():
+        return Response(status_code=404)
+    return FileResponse(folder / name, media_type=kind, filename=name, headers={"content-security-policy": NO_SCRIPT})
 
 
 def _add_sockets(app: FastAPI, studio: Studio) -> None:

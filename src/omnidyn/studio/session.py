@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import itertools
 import re
 import sys
 import tempfile
@@ -18,7 +19,7 @@ from typing import Any
 import omnidyn
 from omnidyn.progress import Report
 from omnidyn.studio.calls import LogFile
-from omnidyn.studio.parts import FIT, LOGS, PROGRESS, ROBOT
+from omnidyn.studio.parts import COMPARE, FIT, LOGS, PROGRESS, ROBOT, TRACK
 from omnidyn.studio.series import META, Series
 from omnidyn.studio.worker import CancelledError, JobError, Worker
 
@@ -42,7 +43,8 @@ class Session:
         self.robot = ""
         self.series: dict[str, Series] = {}
         self.listeners: set[Callable[[str], None]] = set()
-        self.workers = {name: Worker() for name in ("log", "fit", "drive")}
+        self.workers = {name: Worker() for name in ("log", "fit", "drive", TRACK, COMPARE)}
+        self.takers: dict[str, Callable[[str, str], object]] = {"": self.add_log, ROBOT_SUFFIX: self.add_robot}
         self.count, self._bytes, self._tasks = 0, 0, set[asyncio.Task[Any]]()
 
     def changed(self, *parts: str) -> None:
@@ -78,7 +80,7 @@ class Session:
             if path.lower().endswith(ROBOT_SUFFIX):
                 self.robots[path] = self.robot = path
             else:
-                self.add_log(path, path)
+                self.taker(Path(path).suffix.lower())(path, path)
 
     def add_log(self, path: str, name: str) -> LogFile:
         """Take a log and check it."""
@@ -89,8 +91,11 @@ class Session:
         self.changed(LOGS, FIT)
         return log
 
-    async def upload(self, name: str, body: AsyncIterator[bytes]) -> str:
-        """Take an upload, and return the name it got. Raises RefusedError for one too many or too large."""
+    async def upload(self, name: str, body: AsyncIterator[bytes], kind: str = "") -> str:
+        """Take an upload, and return the name it got. Raises RefusedError for one too many or too large.
+
+        kind: what it is, one of `takers`; "" where its suffix says it.
+        """
         if len(self.logs) + len(self.robots) >= MAX_FILES:
             raise RefusedError(f"{MAX_FILES}")
         safe = safe_name(name)
@@ -106,11 +111,16 @@ class Session:
             path.unlink(missing_ok=True)
             raise
         self._bytes += size
-        if safe.lower().endswith(ROBOT_SUFFIX):
-            self.add_robot(str(path), safe)
-        else:
-            self.add_log(str(path), safe)
+        self.taker(kind or path.suffix.lower())(str(path), safe)
         return safe
+
+    def taker(self, kind: str) -> Callable[[str, str], object]:
+        """What takes a file of a kind, by its path and the name that pages show; what is no other kind is a log."""
+        return self.takers.get(kind, self.add_log)
+
+    def shown(self, words: str) -> str:
+        """Words without the folders of uploads and results."""
+        return re.sub(rf"{re.escape(str(self.folder))}/\d+/", "", words)
 
     def remove(self, log: LogFile) -> None:
         """Forget a log; one that was uploaded is deleted."""
@@ -201,6 +211,12 @@ class Session:
         """Take a robot file, and choose it."""
         self.robots[name] = path
         self.choose(name)
+
+    def free_name(self, name: str) -> str:
+        """The name, or the next one that no robot has yet."""
+        stem, _, suffix = name.rpartition(".")
+        names = (f"{stem}-{k}.{suffix}" for k in itertools.count(2))
+        return next(free for free in itertools.chain((name,), names) if free not in self.robots)
 
     def choose(self, name: str) -> None:
         """Choose a robot; logs are checked with it."""

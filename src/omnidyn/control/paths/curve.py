@@ -161,6 +161,8 @@ def swinging(turn: float, half: float, lag: float) -> Callable[[FloatArray], Flo
 # Rows joined by straight lines: a path from a CSV file `t_s,x_m,y_m,heading_rad`, from a Run, or from an array
 
 COLUMNS = ("t_s", "x_m", "y_m", "heading_rad")
+SLOWEST, FASTEST = 1e-3, 100.0  # [m/s] on a path drawn by hand
+LARGEST_PLACE, NEAREST = 1e4, 1e-9  # [m] of its points; apart, where two are not one
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -228,6 +230,32 @@ def lines(t: ArrayLike, pose: ArrayLike, name: str) -> Polyline:
     if np.abs(place[:, 2]).max() <= np.pi + 1e-6:
         place[:, 2] = unwrapped(place[:, 2])
     return Polyline(name, time - time[0], place)
+
+
+def through(points: ArrayLike, speed: float, closed: bool, name: str) -> Polyline:
+    """A path drawn by hand: lines through points in the plane [m], shape (points, 2), at one speed [m/s].
+
+    Its heading is held at 0. closed: back to where it began.
+    Raises InputError for fewer than two different points, or a number out of range.
+    """
+    try:
+        place = np.array(points, dtype=float)
+    except (TypeError, ValueError):
+        place: FloatArray = np.empty(0)
+    if place.ndim != 2 or place.shape[1:] != (2,) or not (np.abs(place) <= LARGEST_PLACE).all():
+        got = f"{len(place)} points"
+        raise InputError("no drawn path", got=got, expected=f"points (x, y) up to {LARGEST_PLACE:g} m", where=name)
+    if not SLOWEST <= speed <= FASTEST:
+        raise InputError("out of range", got=speed, expected=f"{SLOWEST:g} to {FASTEST:g} m/s", where="speed")
+    place = np.concatenate([place, place[:1]]) if closed else place
+    lengths = np.hypot(*np.diff(place, axis=0).T)
+    if not (lengths > NEAREST).any():
+        raise InputError(
+            "no drawn path", got="no two different points", expected="a line", remedy="draw one", where=name
+        )
+    place = np.concatenate([place[:1], place[1:][lengths > NEAREST]])
+    t = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(place, axis=0).T))]) / speed
+    return lines(t, np.column_stack([place, np.zeros(len(place))]), name)
 
 
 def path_of_run(run: Run) -> Polyline:

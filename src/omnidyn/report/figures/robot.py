@@ -73,6 +73,13 @@ def wheel_places(wheels: Wheels) -> FloatArray:
     return places
 
 
+def wheel_lines(wheels: Wheels) -> FloatArray:
+    """The two ends of each wheel seen from above, in body coordinates [m]. Shape (wheels, 2 ends, 2)."""
+    direction = wheels.wrench_matrix[:2] / np.hypot(*wheels.wrench_matrix[:2])
+    half = (direction * wheels.radii).T
+    return wheel_places(wheels)[:, None] + np.stack([-half, half], axis=1)
+
+
 def _seen(point: np.ndarray) -> tuple[float, float]:
     """Body coordinates (x forward, y left) on the page: x up, y to the left."""
     return -float(point[1]), float(point[0])

@@ -42,9 +42,7 @@ def draw_tracking(trackings: Tracking | Iterable[Tracking]) -> Picture:
         distance_axes = figure.add_axes((0.59, 0.57, 0.4, 0.27))
         turned = figure.add_axes((0.59, 0.12, 0.4, 0.27))
         _plane(plane, tracking_list)
-        _errors(
-            distance_axes, tracking_list, lambda tracking: 1e3 * np.hypot(*tracking.error[:, :2].T), "off the path, mm"
-        )
+        _errors(distance_axes, tracking_list, lambda tracking: 1e3 * tracking.distance, "off the path, mm")
         _errors(turned, tracking_list, lambda tracking: 1e3 * tracking.error[:, 2], "heading off, mrad")
         turned.set_xlabel("time, s")
         handles, labels = plane.get_legend_handles_labels()

@@ -102,9 +102,7 @@ class Fitting:
     def keep(self, fit: Fit, name: str = "") -> None:
         """Let all tabs take the robot of a fit, under this name or the next free one."""
         assert fit.folder is not None
-        count = len(self.fits) + 1
-        while not name or name in self.session.robots:
-            name, count = f"fit-{count}.toml", count + 1
+        name = self.session.free_name(name or f"fit-{len(self.fits) + 1}.toml")
         path = fit.folder / name
         shutil.copyfile(fit.folder / "robot.toml", path)
         self.fits[name] = fit

@@ -28,7 +28,7 @@ class Drop extends HTMLElement {
   send(file) { // fetch tells nothing of its progress
     return new Promise((done) => {
       const request = new XMLHttpRequest();
-      request.open('POST', `/upload?name=${encodeURIComponent(file.name)}`);
+      request.open('POST', `/upload?name=${encodeURIComponent(file.name)}&kind=${this.getAttribute('kind') || ''}`);
       request.upload.onprogress = (e) => this.say(`Reading ${file.name}, ${Math.floor(100 * e.loaded / e.total)} %`);
       request.onload = () => done(request.status === 200);
       request.onerror = () => done(false);

@@ -3,5 +3,6 @@
 import './drop.js';
 import './plot.js';
 import './drive.js';
+import './track.js';
 
 document.documentElement.lang = 'en';

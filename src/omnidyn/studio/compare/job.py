@@ -1,0 +1,68 @@
+"""Jobs of the tab Compare: robots against logs, and fits of one robot beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import omnidyn
+from omnidyn.comparison.result import Comparison
+from omnidyn.comparison.traces import unit as unit_of
+from omnidyn.document import Document
+from omnidyn.progress import Report
+from omnidyn.report.drift_picture import draw_drift
+from omnidyn.studio.job import Tell, listener, options_of, shown
+from omnidyn.studio.series import write_series
+
+PICTURE = "drift.svg"
+
+
+def compare(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
+    """What `omnidyn compare` says of one robot or two and logs; writes the free runs over each log.
+
+    request: "robots" (paths), "logs" (path, map, unsigned each), "folder" of the results.
+    """
+    listen, folder = listener(tell), Path(request["folder"])
+    folder.mkdir(parents=True)
+    listen(Report("reading", urgent=True))
+    robots = [omnidyn.load_robot(path) for path in request["robots"]]
+    runs, unsigned = [], False
+    for log in request["logs"]:
+        loaded = omnidyn.load_log(log["path"], robots[0], options_of({**log, "unsigned": False}))
+        run = loaded.to_run()
+        runs.append(run.replace(warnings=(*run.warnings, *loaded.columns.doubts)))
+        unsigned = unsigned or log["unsigned"]
+    comparison = omnidyn.compare(robots[0], runs, *robots[1:], current_unsigned=unsigned, progress=listen)
+    listen(Report("drawing", urgent=True))
+    brief = Document([*comparison.brief_head(), comparison.brief_table()], verdict=comparison.verdict)
+    names = [name for k in range(len(runs)) if _write_free_runs(comparison, k, folder / (name := f"log-{k + 1}"))]
+    return {**shown(brief), "failed": comparison.failed, "all": shown(comparison.document())["parts"], "series": names}
+
+
+def _write_free_runs(comparison: Comparison, log: int, folder: Path) -> bool:
+    """A panel for each component of a log: measured, and the free run of each robot; whether there is one."""
+    segments = [segment for segment in comparison.segments if segment.log == log]
+    panels, columns = [], []
+    for name in comparison.channels if segments else ():
+        traces = {
+            robot: [comparison.trace(robot, name, segment) for segment in segments] for robot in comparison.robots
+        }
+        columns.append(np.concatenate([trace.measured for trace in traces[comparison.robots[0]]]))
+        columns += [np.concatenate([trace.model for trace in parts]) for parts in traces.values()]
+        panels.append({"title": name, "unit": unit_of(name), "signals": ["measured", *traces]})
+    if panels:
+        t = np.concatenate([comparison.measured[log].t[segment.rows] for segment in segments])
+        write_series(folder, t, panels, np.array(columns))
+    return bool(panels)
+
+
+def drift(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
+    """What `omnidyn drift` says of fits, the oldest first; draws them. request: "fits" (paths), "names", "folder"."""
+    folder = Path(request["folder"])
+    folder.mkdir(parents=True)
+    result = omnidyn.drift(request["fits"], request["names"])
+    (folder / PICTURE).write_bytes(draw_drift(result).svg)
+    return shown(result.document())

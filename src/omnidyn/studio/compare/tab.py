@@ -1,0 +1,146 @@
+"""Tab Compare: robots and fits over the same logs; fits of one robot, and what changed between them."""
+
+from __future__ import annotations
+
+from urllib.parse import quote
+
+from nicegui import ui
+
+from omnidyn.studio.compare.job import PICTURE
+from omnidyn.studio.compare.state import FIT, Comparing
+from omnidyn.studio.elements import document, plot, progress, verdict
+from omnidyn.studio.page import Page
+from omnidyn.studio.parts import COMPARE, COMPARE_START, DRIFT, LOGS, ROBOT
+from omnidyn.studio.task import progress_of
+
+WHY = {"no_robot": "Choose a robot first.", "no_log": "Add a log first: tab Log."}
+
+
+class CompareTab:
+    """The tab of one page."""
+
+    def __init__(self, page: Page, comparing: Comparing) -> None:
+        self.page, self.session, self.comparing = page, page.session, comparing
+
+    def build(self) -> None:
+        """Lay it out."""
+        page = self.page
+        page.part(self._choice, LOGS, ROBOT)
+        page.part(self._start, COMPARE, COMPARE_START, LOGS, ROBOT)
+        page.part(lambda: self._progress(COMPARE), COMPARE, progress_of(COMPARE))
+        page.part(self._result, COMPARE)
+        ui.label("Drift: what changed between fits of one robot").classes("title").props("role=heading aria-level=2")
+        page.part(self._fits, ROBOT)
+        page.part(self._start_drift, DRIFT, COMPARE_START, ROBOT)
+        page.part(lambda: self._progress(DRIFT), DRIFT, progress_of(DRIFT))
+        page.part(self._drift, DRIFT)
+
+    def _choice(self) -> None:
+        """Robots and logs."""
+        comparing, session = self.comparing, self.session
+        first, second = comparing.robots
+        with ui.row().classes("line"):
+            ui.select(
+                list(session.robots),
+                value=first or None,
+                label="Robot A",
+                on_change=lambda e: comparing.choose(0, e.value),
+            ).classes("wide robot-a")
+            ui.select(
+                ["", *session.robots],
+                value=second,
+                label="Robot B, if any",
+                on_change=lambda e: comparing.choose(1, e.value),
+            ).classes("wide robot-b")
+            ui.element("omni-drop").props(f"kind={FIT} words='Drop robot files or fits (.toml), or click'")
+        if len(session.logs) > 1:
+            ui.select(
+                {key: log.label for key, log in session.logs.items()},
+                value=[log.key for log in comparing.logs],
+                multiple=True,
+                label="Logs",
+                on_change=lambda e: comparing.choose_logs(e.value),
+            ).classes("wide logs").props("use-chips")
+
+    def _start(self) -> None:
+        comparing = self.comparing
+        code = comparing.why_not()
+        with ui.row().classes("line"):
+            button = ui.button("Compare", on_click=lambda: self.session.start(comparing.run()))
+            button.props("outline no-caps id=compare").set_enabled(not code and not comparing.last.running)
+            if code:
+                ui.label(WHY[code]).classes("text quiet").props("id=why-compare")
+
+    def _progress(self, part: str) -> None:
+        task = self.comparing.last if part == COMPARE else self.comparing.last_drift
+        progress(task, lambda: self.session.start(self.session.workers[COMPARE].cancel()), part)
+
+    def _result(self) -> None:
+        task = self.comparing.last
+        if task.error:
+            verdict("error", task.error, "compare-verdict")
+        if task.result is None:
+            return
+        result = task.result
+        verdict("error" if result["failed"] else result["severity"], result["verdict"], "compare-verdict")
+        document(result["parts"], "compared")
+        names = list(task.series)
+        if len(names) > 1:
+            ui.toggle(names, value=names[0], on_change=lambda e: show(e.value)).props("no-caps")
+        if names:
+            ui.label("Free run: the model gets the inputs only").classes("title")
+            signals = plot(task.series[names[0]], [])
+
+            def show(name: str) -> None:
+                signals.props["data-series"] = task.series[name]
+
+        with self.page.box("All that the comparison says"):
+            document(result["all"], "compared-all")
+        self.page.calls(task.command, task.python)
+
+    def _fits(self) -> None:
+        """Fits in their order, and their files."""
+        comparing = self.comparing
+        if not comparing.files:
+            ui.label("No fit yet. Fit a robot, or drop fits here: robot files that identify wrote.").classes(
+                "text quiet"
+            )
+            return
+        with ui.row().classes("line"):
+            ui.select(
+                comparing.files,
+                value=comparing.fits,
+                multiple=True,
+                label="Fits, the oldest first",
+                on_change=lambda e: comparing.choose_fits(e.value),
+            ).classes("wide fits").props("use-chips")
+        with ui.row().classes("line"):
+            for name in comparing.files:
+                ui.link(name, f"/robot/{quote(name)}").props("download")
+
+    def _start_drift(self) -> None:
+        comparing = self.comparing
+        if not comparing.files:
+            return
+        with ui.row().classes("line"):
+            button = ui.button("Compare fits", on_click=lambda: self.session.start(comparing.run_drift()))
+            button.props("outline no-caps id=drift").set_enabled(
+                len(comparing.fits) > 1 and not comparing.last_drift.running
+            )
+            if len(comparing.fits) < 2:
+                ui.label("Choose two fits or more.").classes("text quiet")
+
+    def _drift(self) -> None:
+        task = self.comparing.last_drift
+        if task.error:
+            verdict("error", task.error, "drift-verdict")
+        if task.result is None:
+            return
+        verdict(task.result["severity"], task.result["verdict"], "drift-verdict")
+        with ui.element("div").classes("scroll"):
+            picture = ui.element("img").classes("picture")
+            picture._props["src"] = f"/drift/{PICTURE}?of={task.folder.parent.name if task.folder else ''}"
+            picture._props["alt"] = task.result["verdict"]
+        ui.link("Save this picture", f"/drift/{PICTURE}").props("download")
+        document(task.result["parts"], "drifted")
+        self.page.calls(task.command, task.python)

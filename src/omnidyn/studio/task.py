@@ -1,0 +1,61 @@
+"""Task: a job that a tab asked for, its progress and what came of it; all pages share it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from omnidyn.studio.series import Series
+from omnidyn.studio.session import Session
+from omnidyn.studio.worker import CancelledError, JobError
+
+
+def progress_of(part: str) -> str:
+    """The part of a page that shows how far the task of a part is."""
+    return f"{part} progress"
+
+
+@dataclass
+class Task:
+    """A job. result: of it; error: in words. running, progress, share: while it goes on. folder: of its files.
+
+    series: of its signals, by the names of their folders. command, python: that do the same.
+    """
+
+    result: dict[str, Any] | None = None
+    error: str = ""
+    running: bool = False
+    progress: str = ""
+    share: float | None = None
+    folder: Path | None = None
+    series: dict[str, str] = field(default_factory=dict)
+    command: str = ""
+    python: str = ""
+
+    def end(self, session: Session) -> None:
+        """Forget its signals."""
+        for key in self.series.values():
+            session.series.pop(key, None)
+
+    async def run(self, session: Session, part: str, worker: str, job: str, request: dict[str, Any]) -> None:
+        """Do a job in a worker. part: of the page that shows it. request: without the "folder" of the results."""
+        self.running, self.progress, self.folder = True, "...", session.new_folder() / job
+        session.changed(part)
+
+        def listen(kind: str, value: Any) -> None:
+            self.progress, self.share = value["text"], value["share"]
+            session.changed(progress_of(part))
+
+        try:
+            result = await session.workers[worker].run(job, {**request, "folder": str(self.folder)}, listen)
+            for name in result.get("series", ()):
+                self.series[name] = f"{job}{session.count}-{name}"
+                session.series[self.series[name]] = Series(self.folder / name)
+            self.result = result
+        except JobError as error:
+            self.error = session.shown(str(error))
+        except CancelledError:
+            pass
+        self.running = False
+        session.changed(part)
