@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from PIL import Image
 
 import omnidyn
 from omnidyn.errors import InputError
@@ -105,6 +106,68 @@ def test_pictures_of_a_robot_have_names():
         assert ROBOT.plot(what).get_label()
     with pytest.raises(InputError, match="no such picture; got speed; expected layout, dead zone, friction"):
         ROBOT.plot("speed")
+
+
+def test_a_fit_to_steady_points_marks_them_and_rests_are_hollow():
+    table = omnidyn.read_steady_table(Path(__file__).parents[1] / "examples" / "table1.csv")
+    figure = omnidyn.identify(table, ROBOT).plot()
+    for axis, axes in enumerate(figure.axes):
+        rows = table.axis_index == axis
+        moving, rest = (line for line in axes.lines if line.get_marker() == "o")
+        np.testing.assert_array_equal(moving.get_xydata().T, [table.speed[rows][1:], table.force[rows][1:]])
+        np.testing.assert_array_equal(rest.get_xydata().T, [table.speed[rows][:1], table.force[rows][:1]])
+        assert rest.get_markerfacecolor() == "white"
+
+
+def test_points_across_several_axes_are_marked_where_friction_is_that_of_an_axis_alone(results):
+    steady = results["steady"].estimates["all"]
+    assert len(steady.points) == 12  # four along an axis, four diagonal ones that drive two each
+    (speed, force), *_ = (part for part in _marked(results["steady"].estimates["all"].plot()) if len(part[0]))
+    np.testing.assert_allclose(sorted(speed), [-0.4, 0.4], atol=0.01)
+    np.testing.assert_allclose(np.abs(force), 2.0, rtol=0.02)  # the disc of tests/support/steady_logs.py
+    box = omnidyn.identify(clean_runs(robot_with("box"), AROUND), ROBOT, omnidyn.SteadyState(shape="box")).study
+    assert len(next(_marked(box.estimates["all"].plot()))[0]) == 6
+
+
+def _marked(figure):
+    """(speeds, forces) of the marks of each panel."""
+    for axes in figure.axes:
+        marks = [line.get_xydata() for line in axes.lines if line.get_marker() == "o"]
+        yield np.concatenate([np.empty((0, 2)), *marks]).T
+
+
+def test_a_fit_draws_its_free_run_when_asked(results):
+    figure = results["identification"].plot("runs")
+    assert figure.get_label().startswith("Measured and axebot")
+    assert [axes.get_ylabel() for axes in figure.axes[::2]] == ["vx, m/s", "vy, m/s", "omega, rad/s"]
+    with pytest.raises(InputError, match="no such picture; got paths; expected friction, runs"):
+        results["identification"].plot("paths")
+
+
+def test_a_robot_moves_to_scale_along_its_run(tmp_path):
+    run = omnidyn.simulate(ROBOT, np.tile([0.0, 5.0, -5.0], (200, 1)), 0.01)
+    moving = run.animate(ROBOT)
+    moving.save(tmp_path / "run.gif")
+    assert moving._repr_html_().startswith('<img alt="animation" src="data:image/gif;base64,R0lGOD')
+    with Image.open(tmp_path / "run.gif") as picture:
+        assert picture.n_frames == 41  # 2 s, 0.05 s each, both ends
+        blue = [_blue(picture, frame) for frame in (0, 40)]
+    reach, radius, way = 0.1, 0.035, run.pose[-1, 0] - run.pose[0, 0]
+    scale = (480 - 2 * 16) / (way + 2 * (reach + radius))  # pixels of a metre
+    assert blue[1][1] - blue[0][1] == pytest.approx(way * scale, abs=2)  # the foremost blue is that of the body
+    assert blue[0][1] - blue[0][0] == pytest.approx(2 * 0.85 * reach * scale, abs=3)
+    with pytest.raises(InputError, match="where it went is not in the run; got voltage"):
+        omnidyn.Run(t=run.t, voltage=run.voltage).animate(ROBOT)
+    with pytest.raises(InputError, match=r"ends in \.gif"):
+        moving.save(tmp_path / "run.mp4")
+
+
+def _blue(picture, frame):
+    """The first and the last column of a frame that hold the colour of the robot, below the line of words."""
+    picture.seek(frame)
+    red, _, blue = np.moveaxis(np.asarray(picture.convert("RGB"), int)[20:], 2, 0)
+    columns = np.flatnonzero((blue - red > 60).any(axis=0))
+    return int(columns[0]), int(columns[-1])
 
 
 def test_a_run_draws_the_channels_asked_for(run):

@@ -119,6 +119,7 @@ if TYPE_CHECKING:
 _MAKERS = {
     shown.HTML: ("omnidyn.report.notebook", "document_html"),
     shown.FIGURE: ("omnidyn.report.plots", "plot"),
+    shown.ANIMATION: ("omnidyn.report.figures.moving", "animate"),
     shown.FRAME: ("omnidyn.interop.dataframe", "to_dataframe"),
     shown.DATASET: ("omnidyn.interop.runs", "to_xarray"),
     shown.RUN: ("omnidyn.interop.runs", "run_of"),

@@ -15,7 +15,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.clocks import fastest_step, has_own_clock, is_staggered, samples, usual_step
 from omnidyn.document import Document, Points, Table
 from omnidyn.errors import InputError
-from omnidyn.shown import DATASET, FIGURE, FRAME, RUN, Displayable, make
+from omnidyn.shown import ANIMATION, DATASET, FIGURE, FRAME, RUN, Animation, Displayable, make
 from omnidyn.statement import Statement, statements
 
 if TYPE_CHECKING:
@@ -176,6 +176,13 @@ class Run(Displayable):
         Raises InputError for a run that holds none of these.
         """
         return make(FIGURE, self, path=True, robot=robot)
+
+    def animate(self, robot: Any) -> Animation:
+        """The robot on its way, from above and to scale, as an Animation: `.save("run.gif")`; a notebook shows it.
+
+        robot: that is drawn. Raises InputError for a run that holds no pose, twist or wheel speeds of this robot.
+        """
+        return make(ANIMATION, self, robot=robot)
 
     def to_dataframe(self, library: str = "pandas") -> Any:
         """A DataFrame with the columns of a run file (u1_V, w1_rad_s, vx_m_s), over time t_s.

@@ -8,13 +8,19 @@ called.
 
 from __future__ import annotations
 
+import base64
+import os
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
+
+from omnidyn.errors import InputError
+from omnidyn.files import write_atomic
 
 if TYPE_CHECKING:
     from omnidyn.document import Document
 
-HTML, FIGURE, FRAME, DATASET, RUN = "html", "figure", "frame", "dataset", "run"
+HTML, FIGURE, ANIMATION, FRAME, DATASET, RUN = "html", "figure", "animation", "frame", "dataset", "run"
 SYSTEM = "system"
 SENTENCE, REMEDY, DOCUMENT = "sentence", "remedy", "document"
 
@@ -22,8 +28,8 @@ _MAKERS: dict[str, Callable[..., Any]] = {}
 
 
 def made_by(**makers: Callable[..., Any]) -> None:
-    """Who makes what: html(document), figure(result, **options), frame(result), dataset(run), run(table),
-    sentence(statement), remedy(statement), document(verdict), system(state space)."""
+    """Who makes what: html(document), figure(result, **options), animation(run, robot=), frame(result), dataset(run),
+    run(table), sentence(statement), remedy(statement), document(verdict), system(state space)."""
     _MAKERS.update(makers)
 
 
@@ -47,3 +53,20 @@ class Displayable:
     def _repr_html_(self) -> str:
         """What a notebook shows."""
         return make(HTML, self.document())
+
+
+@dataclass(frozen=True)
+class Animation:
+    """A moving picture. gif: the bytes of a GIF that repeats. A notebook shows it."""
+
+    gif: bytes = field(repr=False)
+
+    def save(self, path: str | os.PathLike, force: bool = False) -> None:
+        """Write it as a file `.gif`. Raises InputError for another ending, or where it exists, unless `force`."""
+        if not os.fspath(path).lower().endswith(".gif"):
+            raise InputError("another kind of file", got=os.fspath(path), expected="a name that ends in .gif")
+        write_atomic(path, self.gif, force)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        return f'<img alt="animation" src="data:image/gif;base64,{base64.b64encode(self.gif).decode()}">'

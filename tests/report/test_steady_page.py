@@ -1,14 +1,18 @@
 """The page of a study: whole, closed to the outside, with the numbers of the study on it."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from omnidyn.cli import main
 from omnidyn.identification.identify import identify
 from omnidyn.identification.methods import MotorLine, SteadyState
 from omnidyn.model.known.dead_zone import dead_zone
 from omnidyn.model.robot_file import load_robot
 from omnidyn.report.figures.motor_lines import draw_motor_lines
 from omnidyn.report.figures.shapes import shape_pictures
+from omnidyn.report.line_page import render_lines
 from omnidyn.report.motors_page import render_motors
 from omnidyn.report.steady_page import render_study
 from omnidyn.run import Run
@@ -100,6 +104,20 @@ def test_the_numbers_of_the_study_are_on_it(study, page):
         assert f"{travel.mean:.2f}" in text, group
     assert f"{study.choice.score.loo:.2f}" in text
     assert "24 inputs with their hashes" in text
+
+
+def test_a_table_of_points_and_the_line_of_logs_have_a_page(tmp_path, capsys):
+    page, table = tmp_path / "page.html", Path(__file__).parents[2] / "examples" / "table1.csv"
+    assert main(["identify", str(table), "--robot", "axebot", "--rest", "line", "--report", str(page)]) == 0
+    assert f"wrote {page}" in capsys.readouterr().err
+    text = Reader(page.read_text("utf-8")).text
+    for value in ("0.9382", "2.186", "0.9659", "1.522"):  # B and C of x and y: numpy.polyfit of the rows of the table
+        assert value in text
+    assert {"friction", "numbers", "warnings", "dead-zone"} <= set(Reader(page.read_text("utf-8")).all("id"))
+    lines = identify(
+        clean_runs(robot_with("box"), range(0, 360, 90), (0.2, 0.4)), load_robot("axebot"), SteadyState(shape="line")
+    )
+    assert "2.4" in Reader(render_lines(lines, RECORD)).text
 
 
 def test_the_same_study_gives_the_same_page(study, page):

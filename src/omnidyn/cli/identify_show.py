@@ -9,8 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 import omnidyn
 from omnidyn.attempts import Attempts
 from omnidyn.cli.terminal.flags import with_flags
@@ -22,7 +20,7 @@ from omnidyn.cli.terminal.telling import brief_document
 from omnidyn.cli.terminal.telling import tell as tell_document
 from omnidyn.document import Document, Table, Words, interval_cell, sentence
 from omnidyn.files import check_output, keep_apart, write_atomic
-from omnidyn.identification.methods import OutputError, SteadyState
+from omnidyn.identification.methods import SteadyState
 from omnidyn.progress import Progress, Report
 
 if TYPE_CHECKING:
@@ -93,7 +91,7 @@ def load_meanwhile(to: Out, quick: bool) -> None:
 def tell(result: Identification, attempts: Attempts, record: dict[str, Any], to: Out, progress: Progress) -> None:
     """Draw the page of an identification, and show the result."""
     report = ""
-    if to.report and _has_page(result):
+    if to.report:
         progress(Report("drawing"))
         report = to.write_report(attempts, lambda: _page(result, record))
     progress(Report("writing"))
@@ -104,13 +102,6 @@ def tell(result: Identification, attempts: Attempts, record: dict[str, Any], to:
     to.finish(attempts)
 
 
-def _has_page(result: Identification) -> bool:
-    """Whether there is a report to write."""
-    if result.study is None and not isinstance(result.method, OutputError):
-        say("omnidyn: --shape line has no page; --report is not used")
-    return result.study is not None or isinstance(result.method, OutputError)
-
-
 def _page(result: Identification, record: dict[str, Any]) -> str:
     """The report."""
     if isinstance(result.method, SteadyState) and result.study is not None:
@@ -118,6 +109,10 @@ def _page(result: Identification, record: dict[str, Any]) -> str:
 
         study: Any = result.study  # a SteadyStudy: this method makes no other
         return render_study(study, record, verdict=result.verdict, verdicts=result.verdicts)
+    if isinstance(result.method, SteadyState):
+        from omnidyn.report.line_page import render_lines
+
+        return render_lines(result, record)
     from omnidyn.report.fit_page import render_fit
 
     return render_fit(result, record)
@@ -125,16 +120,18 @@ def _page(result: Identification, record: dict[str, Any]) -> str:
 
 def tell_table(table: str, robot: str, request: IdentifyRequest, to: Out) -> None:
     """The paper's way, from a table of steady points; what the reader had to decide joins the warnings."""
-    if to.report:
-        raise typer.BadParameter("--report needs logs; a table of points has none.")
+    attempts, report = Attempts(), ""
     with shown_progress("identifying"):
         start, data = omnidyn.load_robot(robot), omnidyn.read_steady_table(table)
-        estimate = omnidyn.identify(data, start, request.method).estimate
+        result = omnidyn.identify(data, start, request.method)
         record = provenance([robot_input(robot), {"role": "data", "name": table, "sha256": data.sha256}])
-    to.save({"": estimate.robot}, record["inputs"])
-    tell_document(estimate.document(), to.json, record, output=to.files.get(""))
-    say_written(to.files.values())
-    to.finish(Attempts())
+        to.save({"": result.estimate.robot}, record["inputs"])
+        if to.report:
+            report = to.write_report(attempts, lambda: _page(result, record))
+    document = result.estimate.document()
+    tell_document(document, to.json, record, output=to.files.get(""), report=report or None)
+    say_written([*to.files.values(), report])
+    to.finish(attempts)
 
 
 def outputs(to: Out, names: Sequence[str], inputs: Sequence[Mapping[str, str]] = ()) -> dict[str, str]:

@@ -12,6 +12,7 @@ from omnidyn.arrays import FloatArray
 from omnidyn.document import Document, Part, Table, interval_cell, plain, sentence
 from omnidyn.errors import shortened
 from omnidyn.identification.lack_of_fit import Diagnosis, LackOfFit
+from omnidyn.logs.steady_table import SteadyTable
 from omnidyn.model.first_guess import rests_on as guesses_under
 from omnidyn.model.first_guess import rests_on_guesses
 from omnidyn.model.keys import in_words, unit
@@ -55,6 +56,7 @@ class Estimate(Displayable):
     scale: what all forces scale with, in words: numbers that were taken as they stand.
     log_alone: name -> 95 % interval from the log alone, were what the robot file knows with a std exact; empty where it
     knows nothing so.
+    points: at constant speed, that the friction was fitted to; None for a fit to whole logs.
     study: makes the diagnosis, on first access.
     """
 
@@ -72,6 +74,7 @@ class Estimate(Displayable):
     data: str = ""
     scale: str = ""
     log_alone: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    points: SteadyTable | None = field(default=None, repr=False)
     study: Callable[[], Diagnosis] | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
@@ -97,7 +100,10 @@ class Estimate(Displayable):
         return f"<{type(self).__name__} {self.robot.name}: {numbers}>"
 
     def plot(self) -> Figure:
-        """Friction against speed along x, along y and about yaw, with its 95 % band, as a matplotlib Figure."""
+        """Friction against speed along x, along y and about yaw, with its 95 % band, as a matplotlib Figure.
+
+        Points at constant speed are marked where the friction was fitted to such: Fig. 3 of the paper, with own data.
+        """
         return make(FIGURE, self)
 
     def to_dataframe(self, library: str = "pandas") -> Any:
@@ -164,7 +170,7 @@ class Estimate(Displayable):
             interval = interval_cell(self.ci95[name])
             rows.append((name, f"{value:.4g}", f"{self.std[name]:.3g}", interval, unit(name) + mark, in_words(name)))
         head = ("parameter", "value", "std error", "95 % interval", "unit", "in words")
-        return Table(head, rows, "<>>><")
+        return Table(head, rows, "<>>><", name="numbers")
 
     def alone_table(self) -> Table | None:
         """What the intervals owe to what the robot file gives with a std; None where that is not worth a word."""

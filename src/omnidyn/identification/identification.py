@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from omnidyn.attempts import Attempts, Missing, not_made
 from omnidyn.document import Document, Points, apart, sentence
@@ -143,9 +143,14 @@ class Identification(Displayable):
         """The estimates by output error with their diagnosis: group -> Estimate."""
         return self.after.fits
 
-    def plot(self) -> Figure:
-        """Friction against speed with its 95 % band, of each group; of motors, input against speed."""
-        return make(FIGURE, self)
+    def plot(self, what: Literal["friction", "runs"] = "friction") -> Figure:
+        """A picture of it, as a matplotlib Figure.
+
+        friction: force against speed with its 95 % band, of each group, and the points at constant speed that it was
+        fitted to; of motors, input against speed. runs: what was measured and the free run of the model with the band
+        that its intervals leave, of the first log held out, else of the first; by output error only.
+        """
+        return make(FIGURE, self, what=what)
 
     def to_dataframe(self, library: str = "pandas") -> Any:
         """A DataFrame with a row for each number of each group: value, std, 95 % interval, unit.

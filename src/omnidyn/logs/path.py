@@ -21,11 +21,13 @@ POSE, TWIST, WHEELS = "measured positions", "integrated body speeds", "integrate
 class BodyPath:
     """position: (x, y) in the world [m], shape (samples, 2), NaN where it is not known. step: (x, y) moved from each
     sample to the next, in the body frame [m], shape (samples - 1, 2). origin: from what, POSE, TWIST or WHEELS.
+    heading [rad]: shape (samples,), NaN where it is not known.
     """
 
     position: FloatArray
     step: FloatArray
     origin: str
+    heading: FloatArray
 
     @property
     def length(self) -> FloatArray:
@@ -46,7 +48,7 @@ def path_of(run: Run, robot: Robot | None = None) -> BodyPath | None:
     if run.pose is not None and np.isfinite(run.pose).all(axis=1).sum() > 1:
         pose = _filled(run.t if run.staggered else np.arange(len(run), dtype=float), run.pose)
         body = _turned(np.diff(pose[:, :2], axis=0), -0.5 * (pose[1:, 2] + pose[:-1, 2]))
-        return BodyPath(pose[:, :2], _without_gaps(run, body), POSE)
+        return BodyPath(pose[:, :2], _without_gaps(run, body), POSE, pose[:, 2])
     twist, origin = _twist(run, robot)
     if twist is None:
         return None
@@ -57,7 +59,7 @@ def path_of(run: Run, robot: Robot | None = None) -> BodyPath | None:
     heading = np.append(0.0, np.cumsum(middle[:, 2]))
     world = _turned(middle[:, :2], 0.5 * (heading[1:] + heading[:-1]))
     position = np.vstack([np.zeros(2), np.cumsum(world, axis=0)])
-    return BodyPath(position, middle[:, :2], origin)
+    return BodyPath(position, middle[:, :2], origin, heading)
 
 
 def body_twist(run: Run, robot: Robot | None = None) -> FloatArray | None:

@@ -8,6 +8,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from omnidyn.campaigns.results import Campaign
+from omnidyn.comparison.compare import with_fitted_band
 from omnidyn.comparison.drift import Drift
 from omnidyn.comparison.result import Comparison
 from omnidyn.control.tracking import Tracking, Trackings
@@ -78,11 +79,22 @@ def _verdict(verdict: Verdict) -> Picture:
     return draw_raw_log(verdict.log, verdict)
 
 
-def _motors(study: MotorStudy) -> Picture:
+def _motors(study: Any) -> Picture:
     windows = study.windows or study.drawn
     if windows is None:
         raise InputError("the logs have no windows to draw", expected="motors that turn, at more than 10 rows a second")
     return draw_motor_lines(study.motors, windows, study.starts, study.curves)
+
+
+def _identification(result: Identification, what: str) -> Picture:
+    """Friction or motors; or the free run of the first group."""
+    if what == "friction":
+        return draw_estimates(result.groups) if result.groups else _motors(result.study)
+    if what != "runs" or not result.validations:
+        expected = "friction, runs" if result.validations else "friction"
+        raise InputError("no such picture", got=what, expected=expected, where="what")
+    group, validation = next(iter(result.validations.items()))
+    return draw_overlay(with_fitted_band(validation.held_out or validation.fitted, result.groups[group].robot))
 
 
 def _of_file(robot: Robot) -> list[FrictionCurve]:
@@ -101,7 +113,7 @@ PICTURES: dict[type, Callable[..., Picture]] = {
     Comparison: draw_overlay,
     Drift: draw_drift,
     Estimate: lambda estimate: draw_estimates({ONLY_GROUP: estimate}),
-    Identification: lambda result: draw_estimates(result.groups) if result.groups else _motors(result.study),
+    Identification: _identification,
     MotorStudy: _motors,
     SteadyStudy: draw_polar,
     Tracking: draw_tracking,

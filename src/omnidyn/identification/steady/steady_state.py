@@ -125,6 +125,7 @@ def fit_steady_state(
         warnings=tuple(findings.warnings),
         method=str(Statement("line_method", NOTE, numbers=method)),
         scale="" if data.force_from == "table" else scale_of_traction(robot, data.force_from == "current"),
+        points=data,
     )
 
 

@@ -27,6 +27,7 @@ from omnidyn.identification.steady.levels import estimate_of
 from omnidyn.identification.steady.moment import Moment, levelled, moments, moments_by_shape
 from omnidyn.identification.steady.operating_points import CURRENT, VOLTAGE, ForcePoints, SteadyWindows, steady_windows
 from omnidyn.identification.steady.shapes import SHAPES, VISCOUS, ShapeFit, fit_shape, friction_of, is_turning
+from omnidyn.identification.steady.steady_state import steady_table
 from omnidyn.identification.steady.study_table import (
     Difference,
     SteadyStudy,
@@ -350,6 +351,7 @@ def _estimate(
         method=str(Statement("steady_method", NOTE, numbers=method)),
         scale=scale_of_traction(robot, points.force_from == CURRENT),
         log_alone=group_fit.intervals() if shifts.size else {},
+        points=steady_table(robot, points, group),
     )
 
 
