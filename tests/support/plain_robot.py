@@ -41,17 +41,17 @@ def robot(folder, *, radius=RADIUS, inertia=INERTIA):
     return omnidyn.load_robot(path)
 
 
-def log(seed, *, late_rows=0, push=(0.0, 0.0, 0.0), levels=20, held=40, still=25):
+def log(seed, *, late_rows=0, push=(0.0, 0.0, 0.0), levels=20, held=40, still=25, coulomb=COULOMB):
     """A Run of wheel speeds under random levels of voltage, from rest. push [N, N, N m]: a constant force."""
     rng = np.random.default_rng(seed)
     volts = np.concatenate([np.zeros((still, 3)), np.repeat(rng.uniform(-6.0, 6.0, (levels, 3)), held, axis=0)])
     acting = np.concatenate([np.zeros((late_rows, 3)), volts])[: len(volts)]
-    twist = moved(acting, np.asarray(push))
+    twist = moved(acting, np.asarray(push), coulomb)
     speeds = twist @ WRENCH / RADIUS + NOISE * rng.standard_normal(twist.shape)
     return omnidyn.Run(t=np.arange(len(volts)) * ROW, voltage=volts, wheel_speed=speeds)
 
 
-def moved(volts, push):
+def moved(volts, push, coulomb=COULOMB):
     """The twist at each row, (rows, 3): dry friction takes what would stop the mass within a step, up to its level."""
     step, mass = ROW / SUBSTEPS, np.array([MASS, MASS, INERTIA])
     gain, emf = CONSTANT * GEAR / (OHM * RADIUS), CONSTANT * GEAR / RADIUS
@@ -60,5 +60,5 @@ def moved(volts, push):
         found[k] = v
         for _ in range(SUBSTEPS):
             stop = v * mass / step + drive - drag @ v
-            v = (stop - np.clip(stop, -COULOMB, COULOMB)) * step / mass
+            v = (stop - np.clip(stop, -coulomb, coulomb)) * step / mass
     return found

@@ -244,14 +244,39 @@ class Folder:
                 where=str(self.path),
             )
         _, parquet = import_pyarrow()
-        with open_atomic(self.path / MERGED, force=True) as stream:
-            writer = None
-            for table in _regrouped(parquet.read_table(self.shard_path(shard)) for shard in range(status.shards)):
-                writer = writer or parquet.ParquetWriter(stream, table.schema, write_page_checksum=True)
+        schema = self.schema(status.done)
+        tables = (completed(parquet.read_table(self.shard_path(shard)), schema) for shard in status.done)
+        with (
+            open_atomic(self.path / MERGED, force=True) as stream,
+            parquet.ParquetWriter(stream, schema, write_page_checksum=True) as writer,
+        ):
+            for table in _regrouped(tables):
                 writer.write_table(table, row_group_size=GROUP_ROWS)
-            assert writer is not None
-            writer.close()
         return self.path / MERGED
+
+    def write_csv(self, path: Path, force: bool) -> None:
+        """Write what was merged as CSV, for spreadsheets: cells of what is not there are empty."""
+        pyarrow, parquet = import_pyarrow()
+        from pyarrow.csv import write_csv
+
+        sink = pyarrow.BufferOutputStream()
+        write_csv(parquet.read_table(self.path / MERGED), sink)
+        write_atomic(path, sink.getvalue().to_pybytes(), force=force)
+
+    def schema(self, shards: Iterable[int]) -> Any:
+        """Columns of some shards together, in the order in which they are first met: fits have not all the same."""
+        pyarrow, parquet = import_pyarrow()
+        return pyarrow.unify_schemas([parquet.read_schema(self.shard_path(shard)) for shard in shards])
+
+
+def completed(table: Any, schema: Any) -> Any:
+    """The table with all columns of a schema; null where it has none."""
+    pyarrow, _ = import_pyarrow()
+    if table.schema == schema:
+        return table
+    has = {*table.column_names}
+    columns = [table[field.name] if field.name in has else pyarrow.nulls(len(table), field.type) for field in schema]
+    return pyarrow.table(columns, schema=schema)
 
 
 def _regrouped(tables: Iterable[Any]) -> Iterator[Any]:
@@ -299,3 +324,14 @@ def as_columns(rows: list[Mapping[str, float]]) -> dict[str, Any]:
         if [*row] != names:
             raise InputError("a task returned other names", got=", ".join(row), expected=", ".join(names))
     return {name: np.array([row[name] for row in rows], dtype=float) for name in names}
+
+
+def as_table(rows: list[Mapping[str, bool | float | str | None]]) -> dict[str, Any]:
+    """Rows of numbers and words that need not have the same names as columns, null where a row has nothing."""
+    pyarrow, _ = import_pyarrow()
+    kinds, columns = {str: pyarrow.string(), bool: pyarrow.bool_()}, {}
+    for name in dict.fromkeys(name for row in rows for name in row):
+        values = [row.get(name) for row in rows]
+        kind = next((type(value) for value in values if value is not None), float)
+        columns[name] = pyarrow.array(values, kinds.get(kind, pyarrow.float64()))
+    return columns

@@ -9,6 +9,7 @@ variables. Intervals by a jackknife over blocks of neighbours, which of a Sobol 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from omnidyn.arrays import FloatArray
+from omnidyn.campaigns.fits import ENDS, VERDICT
 from omnidyn.campaigns.folder import SAMPLE, Folder, Status
 from omnidyn.campaigns.spec import GRID, SOBOL
 from omnidyn.campaigns.tasks import Problem
@@ -76,16 +78,25 @@ class Campaign(Displayable):
 
     @cached_property
     def metrics(self) -> tuple[str, ...]:
-        """What was measured. None where no shard is there."""
-        names = self.dataset().schema.names if self.status.done else []
-        return tuple(name for name in names if name not in (SAMPLE, *self.variables))
+        """Numbers that were measured. None where no shard is there."""
+        return tuple(name for name, is_number in self._measured.items() if is_number)
+
+    @cached_property
+    def _measured(self) -> dict[str, bool]:
+        """Column that was measured -> whether it holds numbers."""
+        schema = self.dataset().schema if self.status.done else ()
+        pyarrow, _ = import_pyarrow(str(self.folder.path))
+        ours = (SAMPLE, *self.variables)
+        return {field.name: pyarrow.types.is_floating(field.type) for field in schema if field.name not in ours}
 
     def dataset(self) -> Any:
         """All shards as a pyarrow Dataset, which reads nothing yet."""
         import_pyarrow(str(self.folder.path))
         from pyarrow.dataset import dataset
 
-        return dataset([str(self.folder.shard_path(shard)) for shard in self.status.done], format="parquet")
+        done = self.status.done
+        schema = self.folder.schema(done) if done and self.folder.spec.identify is not None else None
+        return dataset([str(self.folder.shard_path(shard)) for shard in done], schema, format="parquet")
 
     def column(self, name: str) -> Any:
         """One column of all samples that are there, in their order. Raises InputError for a name that none has."""
@@ -149,6 +160,11 @@ class Campaign(Displayable):
         shares = [Share(name, *variance_share(x, values[there], balanced)) for name, x in columns.items()]
         return sorted(shares, key=lambda share: -share.share)
 
+    def _is_end(self, name: str) -> bool:
+        """Whether a column is the end of the interval of another one."""
+        number, _, end = name.rpartition(".")
+        return end in ENDS and number in self.metrics
+
     @property
     def verdict(self) -> Statement:
         """How far it is."""
@@ -173,11 +189,16 @@ class Campaign(Displayable):
 
     def document(self, metric: str = "", limit: float | None = None) -> Document:
         """What it says: numbers of each metric, the share within a limit, and which variables matter."""
-        summaries = {name: summary(self.column(name)) for name in self.metrics}
+        summaries = {name: summary(self.column(name)) for name in self.metrics if not self._is_end(name)}
         rows = [(name, *(f"{value:.4g}" for value in values)) for name, values in summaries.items()]
         head = ("metric", "mean", "2.5 %", "median", "97.5 %", "largest", "none")
         parts: list[Part] = [Table(head, rows, "<>", name="metrics")] if rows else []
         data: dict[str, Any] = {**as_verdict(self.verdict), "folder": str(self.folder.path), "metrics": {}}
+        if VERDICT in self._measured:
+            counts = Counter(self.column(VERDICT).tolist())
+            data["verdicts"] = dict(counts.most_common())
+            cells = [(code, str(count)) for code, count in counts.most_common()]
+            parts = [Table(("verdict", "fits"), cells, "<>", name="verdicts"), "", *parts]
         data["metrics"] = {key: dict(zip(SUMMARY, values, strict=True)) for key, values in summaries.items()}
         name = self.metric(metric) if rows else ""
         if rows and limit is not None:
@@ -190,8 +211,8 @@ class Campaign(Displayable):
             data["tolerance"] = tolerance._asdict()
             box = {"keys": [*tolerance.ends], "low": [e[0] for e in tolerance.ends.values()]}
             box |= {"high": [e[1] for e in tolerance.ends.values()], "limit": limit, "inside": tolerance.inside}
-            kept = Statement("tolerance" if tolerance.inside else "no_tolerance", NOTE, name, box)
-            parts += ["", Points([statement, kept], "-", "within")]
+            kept = [Statement("tolerance" if tolerance.inside else "no_tolerance", NOTE, name, box)]
+            parts += ["", Points([statement, *(kept if tolerance.ends else [])], "-", "within")]
         if rows and (shares := self.shares(name)):
             cells = [(s.variable, f"{100 * s.share:.0f}", f"[{100 * s.low:.0f}, {100 * s.high:.0f}]") for s in shares]
             parts += ["", Table((f"what makes {name} vary", "% of variance", "95 %"), cells, "<>", name="shares")]

@@ -14,22 +14,26 @@
     controller = "pid"
 
 A key of [vary] is a key of the robot file, a key of [sensors] there, an option of the path ("path.period_s") or of the
-controller ("controller.faster"), a key of the table of the task ("track.noise_m_s"), or "path" and "controller".
+controller ("controller.faster"), a key of the table of the task ("track.noise_m_s"), or "path" and "controller". With
+[identify] it is a key of the robot file that fits start from, "robot" itself, or an option ("identify.loss").
 """
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, Strict, ValidationError, model_validator
 
+from omnidyn.arguments import unknown_option
 from omnidyn.control.closed_loop import MOST_DELAY, SKIP
 from omnidyn.control.feedforward import DT
 from omnidyn.errors import InputError
 from omnidyn.files import MAX_TOML_BYTES, parse_toml, read_text
+from omnidyn.identification.methods import AUTO, FRICTION_METHODS, OUTPUT_ERROR, STEADY_STATE, Method, takes_names
 from omnidyn.model.value import FieldType, Flag, Text, Value, from_validation, number, to_list, word_of
 
 SCHEMA = 1
@@ -128,6 +132,74 @@ class SimulateTask(Value):
         return self
 
 
+def _texts(value: Any) -> tuple[str, ...]:
+    """A text or several. Raises ValueError for what is neither."""
+    texts = (value,) if isinstance(value, str) else value
+    if not isinstance(texts, list | tuple) or not all(isinstance(text, str) and text for text in texts):
+        raise ValueError("not a file or several; expected text, or a list of texts")
+    return tuple(texts)
+
+
+def _sets(value: Any) -> Any:
+    """Files, or files by the name of their set."""
+    if not value:
+        raise ValueError("no logs; expected a file, a list of files, or such by name")
+    return {str(name): _texts(files) for name, files in value.items()} if isinstance(value, Mapping) else _texts(value)
+
+
+class IdentifyTask(Value):
+    """[identify]: a fit to each log, or to each set of logs together; see `omnidyn.identify`.
+
+    logs: files, folders and globs, a fit to each log; or the same by name, {gray = "gray/*.csv"}, a fit to each set.
+    hold_out: logs that are predicted and not fitted: by the fit of their set, or where there are none by every fit.
+    map: which column is what (TOML). method, quick: as of the command. options: of the method; in a file they stand in
+    [identify] itself, and several names may be one text, "body.mass_kg, friction".
+    """
+
+    logs: Annotated[Any, BeforeValidator(_sets)]
+    hold_out: Annotated[tuple[str, ...], BeforeValidator(_texts)] = ()
+    map: Text = ""
+    method: Annotated[str, word_of(AUTO, OUTPUT_ERROR, STEADY_STATE)] = AUTO
+    quick: Flag = False
+    options: dict[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_method(cls, tables: Any) -> Any:
+        """Moves what is no key of this table to the options of the method. Raises InputError for one that none has."""
+        if not isinstance(tables, Mapping):
+            return tables
+        options = {**tables.get("options", {}), **{key: v for key, v in tables.items() if key not in cls.model_fields}}
+        known = {option.name for kind in FRICTION_METHODS for option in fields(kind)} - {"per_free"}
+        for name in options:
+            if name not in known:
+                raise unknown_option("a fit", name, sorted({*known, *cls.model_fields} - {"options"}), "[identify]")
+        return {key: v for key, v in tables.items() if key in cls.model_fields} | {"options": options}
+
+    def method_asked(self) -> Method | None:
+        """The method with its options; None where robot and logs choose it. Raises InputError for what none takes."""
+        if not self.options and self.method == AUTO:
+            return None
+        named = [kind for kind in FRICTION_METHODS if self.method in (AUTO, kind.name)]
+        for kind in named:
+            known = {option.name: option for option in fields(kind)}
+            if known.keys() >= self.options.keys():
+                return kind(**{name: _names(value, known[name]) for name, value in self.options.items()})
+        raise InputError(
+            f"{named[0].name if len(named) == 1 else 'no method'} has all these options",
+            got=", ".join(self.options),
+            expected=f"those of {' or '.join(kind.name for kind in named)}",
+            where="[identify]",
+        )
+
+
+def _names(value: Any, option: Any) -> Any:
+    """The value of an option; names in one text as several."""
+    if isinstance(value, str) and takes_names(option):
+        return tuple(name.strip() for name in value.split(","))
+    return value
+
+
 class Spec(Value):
     """A campaign. samples: how many; a grid counts its own. sampling: how they are drawn. seed: of the draws.
 
@@ -146,13 +218,24 @@ class Spec(Value):
     vary: dict[str, Variable] = Field(default_factory=dict)
     track: TrackTask | None = None
     simulate: SimulateTask | None = None
+    identify: IdentifyTask | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_logs(cls, tables: Any) -> Any:
+        """Fits are made of every log with everything that varies: a grid."""
+        if isinstance(tables, Mapping) and tables.get("identify") is not None:
+            return {"sampling": GRID, **tables}
+        return tables
 
     @model_validator(mode="after")
     def _hangs_together(self) -> Spec:
-        if not self.vary and not self.robot_draws:
+        if not self.vary and not self.robot_draws and self.identify is None:
             raise ValueError("nothing varies; expected a table [vary], or robot_draws = true")
-        if self.track is not None and self.simulate is not None:
-            raise ValueError("two tasks; expected either [track] or [simulate]")
+        if sum(task is not None for task in (self.track, self.simulate, self.identify)) > 1:
+            raise ValueError("two tasks; expected one of [track], [simulate] and [identify]")
+        if self.identify is not None and self.sampling != GRID:
+            raise ValueError("[identify] fits every log with all that varies; leave out sampling")
         if self.sampling == GRID:
             self._check_grid()
         elif self.samples is None:

@@ -18,7 +18,8 @@ import numpy as np
 from omnidyn.campaigns.batches import batch_columns, batched, block_rows
 from omnidyn.campaigns.design import sample_count
 from omnidyn.campaigns.executors import Pool, opened
-from omnidyn.campaigns.folder import SAMPLE, Folder, Manifest, as_columns
+from omnidyn.campaigns.fits import hashes_of, with_logs
+from omnidyn.campaigns.folder import SAMPLE, Folder, Manifest, as_columns, as_table
 from omnidyn.campaigns.results import Campaign
 from omnidyn.campaigns.spec import Spec, load_spec, parse_spec, spec_tables
 from omnidyn.campaigns.tasks import INPUTS, Function, Problem, Sample
@@ -50,7 +51,7 @@ def sweep(
     Args:
         spec: A file, its tables, or a Spec; None goes on with what the folder holds.
         folder: Where shards and manifest stand; made where it is not there.
-        task: A function of a module, Sample -> {name: number}, in place of [track] and [simulate].
+        task: A function of a module, Sample -> {name: number}, in place of [track], [simulate] and [identify].
         executor: Any of `concurrent.futures`; by default a pool of processes of this machine.
         workers: Processes of that pool; by default as many as there are processors.
         scheduler: Address of a Dask cluster that runs already, in place of an executor.
@@ -77,22 +78,23 @@ def _begun(home: Folder, spec: Any, function: Function | None, pool: Pool, progr
     """The manifest of the campaign, its folder made where it is not there."""
     if spec is None:
         old = home.manifest
-        return home.begin(old._replace(**_made_by(function, old.task)), {})
+        inputs = old.inputs | hashes_of(home.spec)
+        return home.begin(old._replace(**_made_by(function, old.task), inputs=inputs), {})
     loaded, base = _read(spec)
     absolute = _renamed(loaded, lambda text: str((base / text).resolve()))
-    problem = Problem(absolute, home.path, function)
+    problem = Problem(with_logs(absolute, base), home.path, function)
     problem.check()
     copies = _copies(absolute)
     local = _renamed(absolute, lambda text: copies[text][0])
-    local = local.replace(robot=copies[absolute.robot][0])
+    local = with_logs(local.replace(robot=copies[absolute.robot][0]), base)
     manifest = Manifest(
-        **_made_by(function, "track" if local.track else "simulate"),
+        **_made_by(function, "track" if local.track else "simulate" if local.simulate else "identify"),
         spec=spec_tables(local),
-        inputs={copy: sha256(content) for copy, content in copies.values()},
+        inputs={copy: sha256(content) for copy, content in copies.values()} | hashes_of(local),
         samples=sample_count(local),
         shard_rows=local.shard_rows or 1,
     )
-    if local.shard_rows is None and not home.exists:
+    if local.shard_rows is None and local.identify is None and not home.exists:  # a fit is a shard
         progress(Report("timing the first samples"))
         manifest = manifest._replace(shard_rows=_rows(pool, problem))
     return home.begin(manifest, dict(copies.values()))
@@ -116,6 +118,8 @@ def _renamed(spec: Spec, rename: Callable[[str], str]) -> Spec:
         changes["track"] = spec.track.replace(path=new(spec.track.path), controller=new(spec.track.controller))
     if spec.simulate is not None:
         changes["simulate"] = spec.simulate.replace(voltages=new(spec.simulate.voltages))
+    if spec.identify is not None:
+        changes["identify"] = spec.identify.replace(map=new(spec.identify.map))
     changes["vary"] = {
         name: variable.replace(values=tuple(map(new, variable.values))) if variable.values else variable
         for name, variable in spec.vary.items()
@@ -233,7 +237,7 @@ def _problem(folder: str, manifest: str, function: Function | None) -> Problem:
     mine = home.manifest._replace(**_made_by(function, home.manifest.task))
     if differences := home.manifest.differences(mine):
         raise InputError("this worker computes otherwise", got="; ".join(differences), expected="the same version")
-    return Problem(home.spec, home.path, function)
+    return Problem(home.spec, home.path, function, home.manifest.inputs)
 
 
 def _columns(problem: Problem, start: int, stop: int) -> dict[str, Any]:
@@ -241,15 +245,15 @@ def _columns(problem: Problem, start: int, stop: int) -> dict[str, Any]:
     varied = {SAMPLE: np.arange(start, stop), **problem.columns(start, stop)}
     if batched(problem):
         return varied | batch_columns(problem, start, stop)
-    rows = []
+    rows, fits = [], problem.spec.identify is not None and problem.function is None
     with small_matrices():
         for sample in problem.samples(start, stop):
             try:
-                rows.append(problem.measure(sample))
+                rows.append(problem.fit(sample) if fits else problem.measure(sample))
             except Exception as error:
                 error.add_note(f"in sample {sample.index}: {_values(sample)}")
                 raise
-    return varied | as_columns(rows)
+    return varied | (as_table(rows) if fits else as_columns(rows))
 
 
 def _values(sample: Sample) -> str:

@@ -1,4 +1,4 @@
-"""Tasks: what is done with a sample, and what is measured of it: a closed loop, a simulation, or a function of a user.
+"""Tasks: what is done with a sample, and what is measured of it: a closed loop, a simulation, a fit, or a function.
 
 A function takes a Sample and returns its numbers by name. Whatever it is, it must depend on the sample alone: then any
 machine gives the same bytes.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,7 +18,8 @@ import numpy as np
 from omnidyn.arguments import unknown_option
 from omnidyn.arrays import FloatArray
 from omnidyn.campaigns.design import numbers, points, sample_count, seed_of
-from omnidyn.campaigns.spec import SimulateTask, Spec, TrackTask
+from omnidyn.campaigns.fits import LOG, Row, check_fit, fitted
+from omnidyn.campaigns.spec import IdentifyTask, SimulateTask, Spec, TrackTask
 from omnidyn.control.closed_loop import Circumstances, told_of_loop, tracked
 from omnidyn.control.controller import Controller
 from omnidyn.control.controllers import ControllerFile, check_options, controller_spec
@@ -61,6 +62,7 @@ SIMULATE_METRICS = (
     "saturated_share",
     "energy_J",
 )
+OWNERS = {"path": "track", "controller": "track", "robot": "identify", LOG: "identify"}  # what varies of which task
 _FIELD = re.compile(r"(\w+)(?:\[(\d+)\])?", re.ASCII)
 
 
@@ -79,11 +81,15 @@ Function = Callable[[Sample], Mapping[str, float]]
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A spec with the files that it names, read from a folder. function: the task of a user, in place of its tables."""
+    """A spec with the files that it names, read from a folder. function: the task of a user, in place of its tables.
+
+    hashes: file of a log -> sha256 that it had when the campaign began; empty before it has.
+    """
 
     spec: Spec
     folder: Path
     function: Function | None = None
+    hashes: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def robot(self) -> Robot:
@@ -105,7 +111,7 @@ class Problem:
         keys = {}
         for name in self.spec.vary:
             head = name.partition(".")[0]
-            other = head in ("path", "controller", "track", "simulate", "sensors", "task")
+            other = head in (*OWNERS, "track", "simulate", "identify", "sensors", "task")
             keys[name] = () if other else tuple(map(Key.parse, expand(name, self.robot)))
         return keys
 
@@ -127,12 +133,14 @@ class Problem:
 
     def check(self) -> None:
         """Raises InputError for a key that nothing has, a word that names nothing, or a first sample that cannot be."""
-        tasks = {"track": self.spec.track, "simulate": self.spec.simulate, "task": self.function}
-        if self.function is None and self.spec.track is None and self.spec.simulate is None:
-            raise InputError("no task", expected="a table [track] or [simulate], or task=function in Python")
+        tables = {"track": self.spec.track, "simulate": self.spec.simulate, "identify": self.spec.identify}
+        tasks = {**tables, "task": self.function}
+        if not any(tasks.values()):
+            expected = "a table [track], [simulate] or [identify], or task=function in Python"
+            raise InputError("no task", expected=expected)
         for name, variable in self.spec.vary.items():
             head = name.partition(".")[0]
-            owner = "track" if head in ("path", "controller") else head
+            owner = OWNERS.get(head, head)
             if owner in tasks and tasks[owner] is None:
                 raise InputError(f"no [{owner}] that could be varied", got=name, where="[vary]")
             if variable.factor is not None and not self.keys[name]:
@@ -145,9 +153,24 @@ class Problem:
                 )
             for word in variable.values or ():
                 self._check_word(name, word)
+        if self.spec.identify is not None and self.function is None:
+            self._check_fits(self.spec.identify)
+            return
         self._check_metrics()
         for sample in self.samples(0, 1):
             self._check_sample(sample)
+
+    def _check_fits(self, task: IdentifyTask) -> None:
+        """Everything that varies, with the first log."""
+        if self.spec.metrics:
+            raise InputError("a fit keeps all its numbers", got="metrics", expected="none", remedy="leave it out")
+        for sample in self.samples(0, sample_count(self.spec) // len(task.logs)):
+            check_fit(self._fit_task(sample, task), sample.robot)
+
+    def _fit_task(self, sample: Sample, base: IdentifyTask) -> IdentifyTask:
+        """[identify] of a sample, the map by where it stands."""
+        task: IdentifyTask = _changed(base, "identify", sample.values)
+        return task.replace(map=self.name_of(task.map))
 
     def _check_metrics(self) -> None:
         known = TRACK_METRICS if self.spec.track is not None else SIMULATE_METRICS
@@ -183,6 +206,8 @@ class Problem:
         for k in range(stop - start):
             values = {name: column[k] for name, column in plain.items()}
             robot = self.robot if self.draws is None else self.draws.robot(start + k)
+            if "robot" in values:
+                robot = load_robot(self.name_of(str(values["robot"])))
             yield Sample(start + k, self._varied(robot, values), values, seed_of(self.spec, start + k))
 
     def _varied(self, robot: Robot, values: Mapping[str, Any]) -> Robot:
@@ -195,6 +220,12 @@ class Problem:
                 table = robot.sensor_model.model_dump(by_alias=True) | {name.removeprefix("sensors."): value}
                 robot = robot.replace(sensors=table)
         return robot
+
+    def fit(self, sample: Sample) -> Row:
+        """What a fit says."""
+        assert self.spec.identify is not None
+        task = self._fit_task(sample, self.spec.identify)
+        return fitted(str(sample.values[LOG]), sample.robot, task, self.hashes)
 
     def measure(self, sample: Sample) -> dict[str, float]:
         """What is measured of a sample, by name."""

@@ -7,7 +7,6 @@ import inspect
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -17,7 +16,7 @@ from omnidyn.cli.terminal.help import MORE_PANEL
 from omnidyn.cli.terminal.streams import say
 from omnidyn.errors import InputError
 from omnidyn.files import check_output, keep_apart, open_regular
-from omnidyn.logs.readers.folders import files_of, is_log_folder, log_folders, natural
+from omnidyn.logs.readers.folders import files_of, is_log_folder
 from omnidyn.model.presets import robot_path
 from omnidyn.progress import Progress, Report, silent
 
@@ -172,19 +171,9 @@ def log_files(arguments: Sequence[str]) -> list[str]:
         if not os.path.isdir(argument) or is_log_folder(argument):
             files.append(argument)
             continue
-        from omnidyn.logs.readers.read_table import LOG_SUFFIXES
+        from omnidyn.logs.readers.read_table import logs_in
 
-        folders = log_folders(argument)
-        matches = [
-            str(path)
-            for path in Path(argument).rglob("*")
-            if path.suffix.lower() in LOG_SUFFIXES and path.is_file() and not {*path.parents} & {*folders}
-        ]
-        matches += map(str, folders)
-        if not matches:
-            expected = f"files that end in {' '.join(LOG_SUFFIXES)}"
-            raise InputError("no log in the folder", expected=expected, where=argument)
-        files += sorted(matches, key=natural)
+        files += logs_in(argument)
     if len(files) > MAX_FILES:
         raise InputError("too many files", got=len(files), expected=f"at most {MAX_FILES}")
     once = list(dict.fromkeys(files))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
@@ -13,6 +14,7 @@ from omnidyn.cli.terminal.session import input_file, provenance
 from omnidyn.cli.terminal.streams import say
 from omnidyn.cli.terminal.telling import end_failed, tell
 from omnidyn.errors import InputError
+from omnidyn.files import check_output
 from omnidyn.progress import Report
 
 if TYPE_CHECKING:
@@ -26,16 +28,18 @@ def sweep(
         metavar="SPEC|status|resume|merge|plot", help="A spec, .toml; or what to do with FOLDER."
     ),
     folder: str = typer.Argument("", metavar="[FOLDER]", help="Of a campaign, behind status, resume, merge or plot."),
-    out: str = typer.Option("", "-o", "--out", metavar="FOLDER|FILE", help="Where shards go; of plot: a .png or .svg."),
+    out: str = typer.Option(
+        "", "-o", "--out", metavar="FOLDER|FILE", help="Where shards go; of plot: .png, .svg; of merge: .csv."
+    ),
     workers: int | None = typer.Option(None, min=1, help="Processes; default: as many as processors."),
     scheduler: str = typer.Option("", metavar="tcp://HOST:PORT", help="A Dask cluster that runs already."),
     shard: str = typer.Option("", metavar="I/N", help="Only the I-th of N parts, as in an array of Slurm."),
     metric: str = typer.Option("", metavar="NAME", help="What shares, limit and picture are about."),
     limit: float | None = typer.Option(None, help="Of the metric: which share of the samples keeps it."),
-    force: bool = typer.Option(False, "--force", help="Replace a picture that exists."),
+    force: bool = typer.Option(False, "--force", help="Replace a picture or table that exists."),
     json: bool = typer.Option(False, "--json", help="For machines."),
 ) -> None:
-    """Run many simulations that vary a robot, a path or a controller, in shards: a file each, done once.
+    """Run many simulations that vary a robot, a path or a controller, or many fits, in shards: a file each, done once.
 
     Whatever ends it, even the power, `omnidyn sweep resume FOLDER` goes on with what is missing.
     """
@@ -49,8 +53,7 @@ def sweep(
         return _run("", folder, workers, scheduler, shard, metric, limit, json)
     campaign = omnidyn.load_campaign(folder)
     if what == MERGE:
-        with shown_progress("merging shards", hint=""):
-            say(f"omnidyn: wrote {campaign.folder.merge()}")
+        _merge(campaign, out, force)
     if what == PLOT:
         if not out:
             raise typer.BadParameter("plot needs -o FILE, .png or .svg.")
@@ -81,6 +84,19 @@ def _run(
         )
     say(f"omnidyn: shards are in {folder}; one file of them: omnidyn sweep merge {folder}")
     _tell(campaign, metric, limit, json)
+
+
+def _merge(campaign: Campaign, out: str, force: bool) -> None:
+    """All shards as one file, and as a table for spreadsheets where that is asked for."""
+    if out and not out.lower().endswith(".csv"):
+        raise typer.BadParameter("merge takes -o FILE.csv; without it merged.parquet is written into FOLDER.")
+    if out:
+        check_output(out, force)
+    with shown_progress("merging shards", hint=""):
+        say(f"omnidyn: wrote {campaign.folder.merge()}")
+        if out:
+            campaign.folder.write_csv(Path(out), force)
+            say(f"omnidyn: wrote {out}")
 
 
 def _part(text: str) -> tuple[int, int]:

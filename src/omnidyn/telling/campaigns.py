@@ -45,6 +45,8 @@ SENTENCES = {
     "campaign_open": Sentence(_open, "go on with omnidyn sweep resume"),
     "campaign_failed": Sentence(_failed, "read their tracebacks, then omnidyn sweep resume runs them again"),
     "shard_failed": Sentence("{subject}: {error}"),
+    "log_not_read": Sentence("{subject} cannot be read: {error}"),
+    "log_not_fitted": Sentence("{subject} cannot be fitted: {error}"),
     "within_limit": Sentence(
         "{share:%.3g} % of the samples have {subject} of at most {limit:.4g} (95 %: {low:%.3g} to {high:%.3g} %)"
     ),

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from omnidyn.errors import InputError
 from omnidyn.files import default_max_bytes, format_of
-from omnidyn.logs.readers.folders import files_of, is_bag_folder, is_log_folder
+from omnidyn.logs.readers.folders import files_of, is_bag_folder, is_log_folder, log_folders, natural
 from omnidyn.logs.readers.lerobot import PARQUET
 from omnidyn.logs.readers.matlab.mat import HDF5, MAT
 from omnidyn.logs.readers.reader import Reader, ReadOptions, completed
@@ -107,3 +107,18 @@ def _tables(path: str | os.PathLike, rows: int, options: ReadOptions) -> Iterato
         return tables
     note = f"the file holds {reader.word}, though its name ends in {suffix}"
     return (replace(table, notes=(note, *table.notes)) for table in tables)
+
+
+def logs_in(folder: str | os.PathLike) -> list[str]:
+    """The logs in a folder and below, numbers in names as numbers. Raises InputError where there is none."""
+    folders = log_folders(folder)
+    matches = [
+        str(path)
+        for path in Path(folder).rglob("*")
+        if path.suffix.lower() in LOG_SUFFIXES and path.is_file() and not {*path.parents} & {*folders}
+    ]
+    matches += map(str, folders)
+    if not matches:
+        expected = f"files that end in {' '.join(LOG_SUFFIXES)}"
+        raise InputError("no log in the folder", expected=expected, where=str(folder))
+    return sorted(matches, key=natural)
