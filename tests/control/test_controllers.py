@@ -342,3 +342,22 @@ def test_a_supply_measured_now_is_behind_the_duty(name):
     np.testing.assert_allclose(sagged.step(0.0, moved, REST, EIGHT, supply=10.0), first * 1.2, rtol=1e-12)
     for k, supply in enumerate((None, math.nan, -1.0, 0.0, "12")):
         assert np.isfinite(odd.step(0.02 * k, moved, REST, EIGHT, supply=supply)).all()
+
+
+@pytest.mark.parametrize("name", ["axebot", "mecanum", "four-wheel", "mean"])
+def test_the_law_of_pid_over_arrays_is_that_of_each_robot(name):
+    """And so are the limits it meets."""
+    robot = load_robot("axebot" if name == "mean" else name)
+    pid = Pid(robot.replace(sensors={"twist": "mean"}) if name == "mean" else robot)
+    rng = np.random.default_rng(3)
+    off, twist, total = (rng.normal(size=(4, 5, 3)) * 0.1 for _ in range(3))
+    heading, velocity = rng.uniform(-3.0, 3.0, (4, 5)), rng.normal(size=(3, 3))
+    aim = pid.aim(off, heading, twist, velocity)
+    effort = pid.effort(aim, total)
+    volts, current = pid.volts.beyond(effort)
+    for index in np.ndindex(4, 5):
+        alone = pid.effort(pid.aim(off[index], heading[index], twist[index], velocity), total[index])
+        assert effort.voltage[index] == pytest.approx(alone.voltage, rel=1e-12, abs=1e-12)
+        assert effort.current[index] == pytest.approx(alone.current, rel=1e-12, abs=1e-12)
+        _, met = pid.volts.within(alone)
+        assert met == ("voltage",) * bool(volts[index]) + ("current",) * bool(current[index])

@@ -9,14 +9,14 @@ to nu_1 exactly where nothing else bends its way. Dry friction counts with the d
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
 from omnidyn.arguments import check_order
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import FloatArray, product
 from omnidyn.control.controller import WHEEL_SPEED, Guarded
 from omnidyn.control.paths.motion import Path
 from omnidyn.errors import InputError
@@ -102,9 +102,9 @@ class Volts:
         self.current_limit = per_wheel(np.inf if limit is None else limit, count)
 
     def change(self, now: FloatArray, then: FloatArray) -> FloatArray:
-        """The acceleration at the start of a step that takes the twist from now to then. Shape (3,)."""
+        """The acceleration at the start of a step that takes the twist from now to then. Shapes (*batch, 3)."""
         step = self.held
-        return step.back @ (then - step.decay @ now) + step.A @ now
+        return product(step.back, then - product(step.decay, now)) + product(step.A, now)
 
     def exactly(self, now: FloatArray, then: FloatArray) -> Effort:
         """What takes the twist from now to then, friction as the model has it; from rest, what breaks it loose."""
@@ -123,14 +123,22 @@ class Volts:
         return self.model.effort(now, self.model.wrench(0.5 * then, change, friction), change)
 
     def softly(self, now: FloatArray, acceleration: FloatArray, way: FloatArray) -> Effort:
-        """What a motion takes, dry friction against `way` [m/s, m/s, rad/s], in proportion to it where that is slow."""
+        """What a motion takes, dry friction against `way` [m/s, m/s, rad/s], in proportion to it where that is slow.
+
+        Shapes (*batch, 3).
+        """
         friction = self.model.soft_friction(way, self.fade) - self._viscous(way - now)
         return self.model.effort(now, self.model.wrench(now, acceleration, friction))
 
     def _viscous(self, off: FloatArray) -> FloatArray:
         """Viscous friction of the difference of two twists."""
         levels = self.model.levels
-        return -(levels.viscous * (levels.directions @ off)) @ levels.directions
+        return -(levels.viscous * product(levels.directions, off)) @ levels.directions
+
+    def beyond(self, effort: Effort) -> tuple[Any, Any]:
+        """Whether an effort meets the limit of the voltage of a motor, and of its current. Truths (*batch,)."""
+        volts = (np.abs(effort.voltage) >= self.limit).any(axis=-1)
+        return volts, (np.abs(effort.current) > self.current_limit).any(axis=-1)
 
     def within(self, effort: Effort, together: bool = False) -> tuple[FloatArray, tuple[str, ...]]:
         """The volts within the limit of each motor, and the limits met.
@@ -139,12 +147,9 @@ class Volts:
         it never makes good what it lost beside its way. One on the pose does, and each motor for itself can do more:
         on fast paths its errors are a half to a fifth.
         """
-        share = float(np.max(np.abs(effort.voltage) / self.limit))
-        met = ("voltage",) if share >= 1.0 else ()
-        if bool((np.abs(effort.current) > self.current_limit).any()):
-            met = (*met, "current")
+        met = tuple(name for name, is_met in zip(Effort._fields, self.beyond(effort), strict=True) if is_met)
         if together:
-            return effort.voltage / max(share, 1.0), met
+            return effort.voltage / max(float(np.max(np.abs(effort.voltage) / self.limit)), 1.0), met
         return np.clip(effort.voltage, -self.limit, self.limit), met
 
 

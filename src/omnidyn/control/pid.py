@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from omnidyn.arrays import FloatArray
+from omnidyn.arrays import FloatArray, product
 from omnidyn.control.controller import WHEEL_SPEED, Guarded
 from omnidyn.control.feedforward import DT, Volts, check_delay, check_dt, lateness
 from omnidyn.control.paths.motion import Path
@@ -32,8 +32,8 @@ FASTER, INTEGRAL = 3.0, 0.25
 class Aim(NamedTuple):
     """What a step of the loop shall do, but for the sum of errors.
 
-    turned: world to body, shape (3, 3). now: twist of the path, change: acceleration wanted, way: twist which friction
-    opposes; shape (3,).
+    turned: world to body, shape (*batch, 3, 3). now: twist of the path, change: acceleration wanted, way: twist which
+    friction opposes; shape (*batch, 3).
     """
 
     turned: FloatArray
@@ -100,21 +100,23 @@ class Pid(Guarded):
         return self._sent(sent), met
 
     def aim(self, off: FloatArray, heading: FloatArray, twist: FloatArray, velocity: FloatArray) -> Aim:
-        """What a step shall do: off, the error of the pose in the world, shape (3,), its angle within half a turn.
+        """What a step shall do: off, the error of the pose in the world, its angle within half a turn, and the twist.
 
-        velocity: of the path in the world now, when the output acts, and a step later. Shape (3, 3).
+        Shapes (*batch, 3), that of heading (*batch,). velocity: of the path in the world now, when the output acts,
+        and a step later. Shape (3, 3).
         """
-        turned = world_to_body(heading + np.array([0.0, 1.0]) * self.dt * velocity[1, 2])
-        error, now, then = turned[0] @ off, turned[0] @ velocity[1], turned[1] @ velocity[2]
-        speed = turned[0] @ velocity[0]
+        turned = world_to_body(heading[..., None] + np.array([0.0, 1.0]) * self.dt * velocity[1, 2])
+        first, second = turned[..., 0, :, :], turned[..., 1, :, :]
+        error, now, then = product(first, off), product(first, velocity[1]), product(second, velocity[2])
+        speed = product(first, velocity[0])
         if self.sensors.averaged:  # a mean is half a step old
             speed = speed - 0.5 * (then - now)
         back = self.gains.speed * (speed - twist) + self.gains.place * error
         change, way = self.volts.change(now, then), 0.5 * (now + then) + self.home * error
         if not self.feedforward:
             now, change = 0.0 * now, 0.0 * change
-        return Aim(turned[0], now, change + back, way)
+        return Aim(first, now, change + back, way)
 
     def effort(self, aim: Aim, total: FloatArray) -> Effort:
-        """What that takes, with a sum of errors in the world [m s, m s, rad s]. Shape (3,) -> (wheels,)."""
-        return self.volts.softly(aim.now, aim.change + self.gains.sum * (aim.turned @ total), aim.way)
+        """What that takes, with a sum of errors in the world [m s, m s, rad s]. (*batch, 3) -> (*batch, wheels)."""
+        return self.volts.softly(aim.now, aim.change + self.gains.sum * product(aim.turned, total), aim.way)
