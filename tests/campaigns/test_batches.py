@@ -8,6 +8,7 @@ from omnidyn.campaigns.batches import batch_columns, batched
 from omnidyn.campaigns.spec import parse_spec
 from omnidyn.campaigns.tasks import SIMULATE_METRICS, TRACK_METRICS, Problem
 from omnidyn.errors import InputError
+from omnidyn.model.robot_file import load_robot, robot_to_toml, save_robot
 
 VARY = {
     "body.mass_kg": {"range": [1.0, 2.0]},
@@ -59,6 +60,53 @@ def test_loops_together_are_those_of_track(tmp_path, controller, noise):
         assert column == pytest.approx([row[name] for row in rows], rel=1e-7, abs=1e-9, nan_ok=True), name
 
 
+MECANUM = load_robot("mecanum")
+NONE = {"viscous": (0.0, 0.0, 0.0), "coulomb": (0.0, 0.0, 0.0)}
+HOLDS = {"viscous": (0.5, 0.5, 0.01), "coulomb": (1.0, 1.0, 0.05), "breakaway": (2.0, 2.0, 0.1)}
+DISC = {"coulomb": (1.8, 1.8), "viscous": 0.9, "yaw_coulomb": 0.1}
+BODY = {"body.mass_kg": {"factor": [0.8, 1.2]}, "friction": {"factor": [0.5, 1.5]}}
+MOTOR = BODY | {"motor.resistance_ohm": {"factor": [0.8, 1.2]}, "motor.voltage_limit_V": {"factor": [0.4, 1.0]}}
+
+
+@pytest.mark.parametrize(
+    "friction, vary, engine, near",
+    [
+        ({}, BODY, "fixed step", 1e-5),
+        ({}, MOTOR, "fixed step", 1e-5),
+        ({"direction": DISC, "axes": NONE}, BODY, "fixed step", 1e-5),
+        ({"wheels": {"coulomb": 0.6, "viscous": 0.2}, "axes": NONE}, BODY, "tol", 1e-8),
+        ({"axes": HOLDS}, MOTOR, "tol", 1e-8),
+    ],
+)
+def test_loops_of_other_robots_are_those_of_track(tmp_path, friction, vary, engine, near):
+    """Distances to 1e-5 m where steps are fixed; `track` takes the steps that its tolerance needs."""
+    save_robot(MECANUM.replace(friction=friction or MECANUM.friction), tmp_path / "mine.toml")
+    task = {"path": "eight:period_s=4", "duration_s": 1.0, "noise_m_s": 0.002}
+    made = problem(tmp_path, robot=str(tmp_path / "mine.toml"), simulate=None, track=task, samples=6, vary=vary)
+    assert batched(made)
+    moving, _ = batches._moving(batches._fleet(made, 0, 6), 0.02, np.zeros(3))
+    assert all(engine in name for name in moving.engines)
+    columns = batch_columns(made, 0, 6)
+    rows = [made.measure(sample) for sample in made.samples(0, 6)]
+    scale = {"effort_V": 1e2, "restlessness_V": 1e3, "energy_J": 1e3, "rmse_heading_rad": 10.0}
+    for name, column in columns.items():
+        bound = 0.021 if name == "settling_s" else near * scale.get(name, 1.0)
+        assert column == pytest.approx([row[name] for row in rows], rel=1e-9, abs=bound, nan_ok=True), name
+
+
+def test_loops_of_robots_that_are_drawn_are_those_of_track(tmp_path):
+    text = robot_to_toml(load_robot("axebot")).replace("mass_kg = 1.5", "mass_kg = { value = 1.5, std = 0.1 }")
+    (tmp_path / "mine.toml").write_text(text)
+    task = {"path": "circle", "duration_s": 0.4}
+    drawn = {"robot": str(tmp_path / "mine.toml"), "robot_draws": True, "vary": {}, "samples": 30}
+    made = problem(tmp_path, simulate=None, track=task, **drawn)
+    assert batched(made)
+    column = batch_columns(made, 3, 9)["worst_position_m"]
+    assert column == pytest.approx(
+        [made.measure(sample)["worst_position_m"] for sample in made.samples(3, 9)], rel=1e-9
+    )
+
+
 def test_loops_may_be_cut_anywhere(tmp_path, monkeypatch):
     monkeypatch.setattr(batches, "LOOPS", 16)
     made = problem(tmp_path, simulate=None, track={"path": "circle", "duration_s": 0.3, "noise_m_s": 0.01})
@@ -84,6 +132,8 @@ def test_metrics_that_are_chosen_are_the_same(tmp_path):
         {"simulate": None, "track": {"path": "circle", "controller": "mpc"}},
         {"simulate": None, "track": {"path": "circle", "sensors": "encoder"}},
         {"vary": VARY | {"motor.resistance_ohm": {"factor": [0.9, 1.1]}}},
+        {"simulate": None, "track": {"path": "circle"}, "vary": VARY | {"path.radius_m": {"range": [0.5, 1.0]}}},
+        {"simulate": None, "track": {"path": "circle"}, "vary": {"drive.latency_s": {"range": [0.0, 0.1]}}},
         {
             "robot": "mecanum",
             "simulate": VOLTS | {"voltage_V": [0.5, 2.0, -2.0, 1.0]},

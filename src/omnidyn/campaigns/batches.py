@@ -1,12 +1,15 @@
 """Batches: the samples of a shard moved together, where that gives what one after the other would give.
 
-That is: the exact engine serves the robot, it takes volts at even steps, and what varies are numbers of its body, its
-wheels' radius and its friction; a closed loop is one of `pid` without delay, its sensors are at once. Anything else is
-simulated sample by sample.
+A simulation: the exact engine serves the robot, it takes volts at even steps, and what varies are numbers of its body,
+its wheels' radius and its friction. A closed loop: one of `pid` without delay, its sensors are at once, and what varies
+are numbers of a robot that takes volts and does not slip. Where the exact engine does not serve it, robots whose
+friction acts along the axes or the direction of travel go in blocks by fixed steps of at most STEP: distances are those
+of `track` within 1e-5 m; others go one by one by the engine of `track`. Anything else is simulated sample by sample.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -29,52 +32,72 @@ from omnidyn.control.instruments import Instruments
 from omnidyn.control.pid import Pid
 from omnidyn.control.pid_batch import PidBatch
 from omnidyn.logs.command_file import KINDS
+from omnidyn.model.actuation import clip_voltage
 from omnidyn.model.keys import FRICTION, Key
 from omnidyn.model.motor import settled_current
 from omnidyn.model.robot import Robot
 from omnidyn.model.wheels import wheel_speed
 from omnidyn.simulation.batch.batch import Batch, simulate_batch
-from omnidyn.simulation.batch.choice import EXACT, VOLTAGE, engine_kind
+from omnidyn.simulation.batch.choice import EXACT, GENERAL, VOLTAGE, engine_kind
 from omnidyn.simulation.batch.sample import MASS, RADIUS, Sample
+from omnidyn.simulation.engine import TOLERANCE
 
 BODY = (MASS, "body.inertia_kg_m2", RADIUS)
 AT_END = ("final_vx_m_s", "final_vy_m_s", "final_omega_rad_s", "drift_m", "turned_rad", "saturated_share")
 CELLS = 2**19  # robots times rows of a history that is held at once
 LOOPS = 2048  # loops of a block. Blocks begin at whole multiples: rounding of a sum may depend on the place in a block
+FEW = 256  # the same of robots that go one by one
+STEP = 1e-3  # [s] the longest fixed step
+Fleet = Sample | list[Robot]
 
 
 def batched(problem: Problem) -> bool:
     """Whether the samples can be moved together."""
     spec, keys = problem.spec, [key for keys in problem.keys.values() for key in keys]
-    if problem.function is not None or spec.robot_draws or not keys or not all(problem.keys.values()):
-        return False
-    if not all(str(key) in BODY or key.part == FRICTION for key in keys):
-        return False
-    if engine_kind(problem.robot, VOLTAGE, None) != EXACT or problem.robot.drive.kind != VOLTAGE:
+    robot = problem.robot
+    if problem.function is not None or not all(problem.keys.values()) or robot.drive.kind != VOLTAGE:
         return False
     first = next(problem.samples(0, 1))
     if spec.simulate is not None:
+        if not keys or not _scales(problem) or engine_kind(robot, VOLTAGE, None) != EXACT:
+            return False
         held = commands_of(problem, first, spec.simulate)
         can = held.kind == KINDS[0] and bool(np.all(held.dt == held.dt[0]))
-    else:
-        assert spec.track is not None
-        loop = Loop.of(problem, first, spec.track)
-        plain = loop.around.sensors == Instruments() and not loop.around.delay
-        can = plain and isinstance(loop.controller(), Pid)
-    return can and _sample(problem, 0, 1).parameters is not None
+        return can and _sample(problem, 0, 1).parameters is not None
+    if spec.track is None:
+        return False
+    varied = keys if problem.draws is None else [*keys, *problem.draws.keys]
+    if robot.drive.latency or robot.wheels.traction_mu is not None or any(key.table == "drive" for key in varied):
+        return False
+    loop = Loop.of(problem, first, spec.track)
+    plain = loop.around.sensors == Instruments() and not loop.around.delay
+    return plain and isinstance(loop.controller(), Pid)
+
+
+def _scales(problem: Problem) -> bool:
+    """Whether what varies are numbers that many robots at once may differ in."""
+    keys = [key for keys in problem.keys.values() for key in keys]
+    return not problem.spec.robot_draws and all(str(key) in BODY or key.part == FRICTION for key in keys)
+
+
+def _loops(problem: Problem) -> int:
+    """Loops of a block."""
+    return FEW if engine_kind(problem.robot, VOLTAGE, None) == GENERAL else LOOPS
 
 
 def block_rows(problem: Problem) -> int:
     """Samples that are moved together whether they are asked for or not: a shard holds whole blocks of them."""
-    return LOOPS if problem.spec.simulate is None and batched(problem) else 1
+    return _loops(problem) if problem.spec.track is not None and batched(problem) else 1
 
 
 def batch_columns(problem: Problem, start: int, stop: int) -> dict[str, FloatArray]:
     """What is measured of the samples start to stop: columns of metrics."""
-    if problem.spec.simulate is None:
+    if problem.spec.track is not None:
         names = problem.spec.metrics or TRACK_METRICS
-        parts = [_block(problem, k, start, stop) for k in range(start // LOOPS, -(-stop // LOOPS))]
+        size = _loops(problem)
+        parts = [_block(problem, k * size, size, start, stop) for k in range(start // size, -(-stop // size))]
         return {name: np.concatenate([part[name] for part in parts]) for name in names}
+    assert problem.spec.simulate is not None
     held = commands_of(problem, next(problem.samples(start, start + 1)), problem.spec.simulate)
     names = problem.spec.metrics or SIMULATE_METRICS
     whole = not set(names) <= set(AT_END)
@@ -86,20 +109,39 @@ def batch_columns(problem: Problem, start: int, stop: int) -> dict[str, FloatArr
     return {name: np.concatenate([part[name] for part in parts]) for name in names}
 
 
-def _block(problem: Problem, block: int, start: int, stop: int) -> dict[str, FloatArray]:
+def _block(problem: Problem, first: int, size: int, start: int, stop: int) -> dict[str, FloatArray]:
     """The metrics of those loops of a block that lie within start to stop; all of the block are driven."""
-    first, last = block * LOOPS, min((block + 1) * LOOPS, sample_count(problem.spec))
+    last = min(first + size, sample_count(problem.spec))
     measured = _tracked(problem, first, last)
     rows = slice(max(start, first) - first, min(stop, last) - first)
     return {name: column[rows] for name, column in measured.items()}
+
+
+def _fleet(problem: Problem, start: int, stop: int) -> Fleet:
+    """The robots start to stop: numbers in arrays, where that is enough for blocks."""
+    kind = engine_kind(problem.robot, VOLTAGE, None)
+    if kind != GENERAL and problem.keys and _scales(problem):
+        numbers = (sample := _sample(problem, start, stop)).parameters
+        if numbers is not None and (kind == EXACT or np.array_equal(numbers.coulomb, numbers.breakaway)):
+            return sample
+    return [sample.robot for sample in problem.samples(start, stop)]
+
+
+def _moving(fleet: Fleet, dt: float, pose: FloatArray) -> tuple[Batch, int]:
+    """(the robots, where the path begins; steps for which a command is held)."""
+    robots = [fleet.center] if isinstance(fleet, Sample) else fleet
+    kinds = {engine_kind(robot, VOLTAGE, None) for robot in robots}
+    holds = 1 if GENERAL in kinds or kinds == {EXACT} else math.ceil(dt / STEP - 1e-9)
+    tol = TOLERANCE if GENERAL in kinds else None
+    return Batch(fleet, dt / holds, start_pose=pose, threads=1, tol=tol), holds
 
 
 def _tracked(problem: Problem, start: int, stop: int) -> dict[str, FloatArray]:
     """`Loop.measure` of the samples start to stop."""
     assert problem.spec.track is not None
     loop = Loop.of(problem, next(problem.samples(start, start + 1)), problem.spec.track)
-    around, route, sample = loop.around, loop.route, _sample(problem, start, stop)
-    count, n, controller = around.steps(route), len(sample), loop.controller()
+    around, route, fleet, n = loop.around, loop.route, _fleet(problem, start, stop), stop - start
+    count, controller = around.steps(route), loop.controller()
     assert isinstance(controller, Pid)
     t: FloatArray = np.arange(count + 1, dtype=np.float64) * around.dt
     noise = np.zeros((count, n, 6))
@@ -108,15 +150,15 @@ def _tracked(problem: Problem, start: int, stop: int) -> dict[str, FloatArray]:
         seeds = [seed_of(problem.spec, k) if fixed is None else fixed for k in range(start, stop)]
         for k, seed in enumerate(seeds):
             noise[:, k] = np.random.default_rng(seed).standard_normal((count, 6)) * (around.noise * NOISE)
-    pids, batch = PidBatch(controller, n), Batch(sample, around.dt, start_pose=route.at(0.0).pose, threads=1)
+    pids, (batch, holds) = PidBatch(controller, n), _moving(fleet, around.dt, route.at(0.0).pose)
     states, volts = np.empty((count + 1, n, 6)), np.empty((count, n, batch.wheels))
     states[0] = _state(batch)
     for k in range(count):
         seen = states[k] + noise[k]
         volts[k] = pids.step_batch(float(t[k]), seen[:, :3], seen[:, 3:], route)
-        batch.step(volts[k])
+        batch.run(np.repeat(volts[k, :, None], holds, axis=1))
         states[k + 1] = _state(batch)
-    return _tracking(problem, loop, sample, t, states, volts)
+    return _tracking(problem, loop, fleet, t, states, volts)
 
 
 def _state(batch: Batch) -> FloatArray:
@@ -127,30 +169,42 @@ def _state(batch: Batch) -> FloatArray:
 
 
 def _tracking(
-    problem: Problem, loop: Loop, sample: Sample, t: FloatArray, states: FloatArray, volts: FloatArray
+    problem: Problem, loop: Loop, fleet: Fleet, t: FloatArray, states: FloatArray, sent: FloatArray
 ) -> dict[str, FloatArray]:
-    """The metrics of loops. t (samples,); states (samples, n, 6): poses, twists; volts (steps, n, wheels)."""
+    """The metrics of loops. t (samples,); states (samples, n, 6): poses, twists; sent (steps, n, wheels) [V]."""
     error = states[:, :, :3] - loop.route.at(t).pose[:, None]
     off = np.hypot(error[..., 0], error[..., 1])
     late = t >= loop.around.skip - 1e-9
     late[0] = False
     counted = slice(-1, None) if not late.any() else late
     limit = np.asarray(problem.robot.motor.voltage_limit)
-    turning = _wheel_speeds(problem, sample, 0.5 * (states[1:, :, 3:] + states[:-1, :, 3:]))
-    power = np.sum(volts * settled_current(problem.robot.motor, volts, turning), axis=2)
-    changes = np.abs(np.diff(volts, axis=0)).mean(axis=(0, 2)) if len(volts) > 1 else np.zeros(len(sample))
+    volts, power = _power(problem, fleet, sent, 0.5 * (states[1:, :, 3:] + states[:-1, :, 3:]))
+    changes = np.abs(np.diff(volts, axis=0)).mean(axis=(0, 2)) if len(volts) > 1 else np.zeros(volts.shape[1])
     measured = (
         np.sqrt(np.mean(off[counted] ** 2, axis=0)),
         off[counted].max(axis=0),
         off[-1],
         np.sqrt(np.mean(error[counted][..., 2] ** 2, axis=0)),
         np.array([settled_from(t, way, loop.settling) for way in off.T]),
-        np.mean((np.abs(volts) >= limit * (1.0 - ON_LIMIT)).any(axis=2), axis=0),
+        np.mean((np.abs(sent) >= limit * (1.0 - ON_LIMIT)).any(axis=2), axis=0),
         np.sqrt(np.mean(volts**2, axis=(0, 2))),
         changes,
         np.diff(t) @ power,
     )
     return dict(zip(TRACK_METRICS, measured, strict=True))
+
+
+def _power(problem: Problem, fleet: Fleet, sent: FloatArray, twist: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(volts within the limits of each robot, (steps, n, wheels); electrical power [W], (steps, n))."""
+    if isinstance(fleet, Sample):
+        current = settled_current(problem.robot.motor, sent, _wheel_speeds(problem, fleet, twist))
+        return sent, np.sum(sent * current, axis=2)
+    volts, power = np.empty(sent.shape), np.empty(sent.shape[:2])
+    for k, robot in enumerate(fleet):
+        volts[:, k] = clip_voltage(robot.motor, sent[:, k])
+        current = settled_current(robot.motor, volts[:, k], wheel_speed(robot.wheels, twist[:, k]))
+        power[:, k] = np.sum(volts[:, k] * current, axis=1)
+    return volts, power
 
 
 def _wheel_speeds(problem: Problem, sample: Sample, twist: FloatArray) -> FloatArray:
