@@ -182,14 +182,22 @@ TRACK = {
 
 @pytest.mark.long
 @pytest.mark.filterwarnings("ignore")  # of dask, which are its own
-def test_processes_threads_and_dask_give_the_same_bytes_and_a_lost_worker_nothing(tmp_path, threads, undisturbed):
+def test_processes_parts_and_dask_give_the_same_bytes_and_a_lost_worker_nothing(tmp_path, threads, undisturbed):
+    """Loops that move together, and loops one by one: on one process, two, in four parts, on a cluster."""
     distributed = pytest.importorskip("distributed", reason="needs the extra `cluster`")
-    loops = [merged(sweep(TRACK, tmp_path / f"p{k}", workers=k)) for k in (1, 2)]
+    specs = {"together": TRACK, "alone": TRACK | {"track": TRACK["track"] | {"delay": 1}}}
+    loops = {
+        name: [merged(sweep(spec, tmp_path / f"{name}{k}", workers=k)) for k in (1, 2)] for name, spec in specs.items()
+    }
+    for name, spec in specs.items():
+        parts = [sweep(spec, tmp_path / f"{name}3", executor=threads, shard=(k, 4)) for k in (3, 1, 4, 2)]
+        loops[name].append(merged(parts[-1]))
     cluster = {"n_workers": 2, "threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": None}
     (tmp_path / "marks").mkdir()
     environment = {MARKS: str(tmp_path / "marks")}
     with distributed.LocalCluster(**cluster, env=environment) as local, distributed.Client(local) as client:
-        loops.append(merged(sweep(TRACK, tmp_path / "p3", scheduler=local.scheduler_address)))
+        for name, spec in specs.items():
+            loops[name].append(merged(sweep(spec, tmp_path / f"{name}4", scheduler=local.scheduler_address)))
         pids = list(client.run(os.getpid).values())
         run = threads.submit(
             sweep, SPEC | {"samples": 2000}, tmp_path / "q", task=product, scheduler=local.scheduler_address
@@ -199,7 +207,8 @@ def test_processes_threads_and_dask_give_the_same_bytes_and_a_lost_worker_nothin
         os.kill(pids[0], signal.SIGKILL)  # its nanny starts another one
         campaign = run.result()
         assert set(client.run(os.getpid).values()) != set(pids)
-    assert len(set(loops)) == 1
+    assert all(len(hashes) == 4 and len(set(hashes)) == 1 for hashes in loops.values())
+    assert loops["together"] != loops["alone"]
     assert campaign.status.complete
     begun = [int(mark.name.partition("-")[0]) for mark in (tmp_path / "marks").iterdir()]
     assert set(begun) == set(range(2000))
