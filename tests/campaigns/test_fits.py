@@ -12,8 +12,10 @@ from omnidyn.cli import main
 from omnidyn.errors import InputError
 from omnidyn.files import sha256
 from omnidyn.logs.run_file import write_run
+from omnidyn.report.figures.campaign import draw_campaign
 from tests.support import plain_robot
 from tests.support.codes import codes
+from tests.support.figures import shown_texts
 
 FLOORS = {"gray": 1.0, "blue": 1.4}  # name -> dry friction, times that of the file
 AXES = ("friction.axes.viscous", "friction.axes.coulomb")
@@ -87,6 +89,8 @@ def test_a_row_for_each_log_is_what_identify_says(folder, identified):
     assert "voltage" in bad.words.iloc[2]
     assert "log_not_read" in campaign.document().to_text()
     assert campaign.document().data["verdicts"]["log_not_read"] == 2
+    picture = draw_campaign(campaign, "fit.friction.axes.coulomb[0]")
+    assert {*names} <= {words for words, _ in shown_texts(picture.figure)}
     assert main(["sweep", "merge", "out", "-o", "fits.csv"]) == 0
     rows = [line.split('","') for line in (folder / "fits.csv").read_text().splitlines()]
     assert len(rows) == 1 + len(frame)

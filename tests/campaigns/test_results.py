@@ -54,6 +54,8 @@ def test_shares_of_a_sum_are_the_squares_of_its_slopes():
         share, low, high = variance_share(column, y)
         assert abs(share - truth) < 0.03
         assert low <= truth <= high
+    names, numbers = np.repeat([f"log{k}" for k in range(60)], 2), np.repeat(x[:60, 0], 2)  # words have no neighbours
+    assert variance_share(names, numbers, balanced=True)[0] == pytest.approx(1.0)
     words = np.where(x[:, 0] > 0.5, "pid", "mpc")  # a word is a variable like others
     assert variance_share(words, (x[:, 0] > 0.5) + 0.0)[0] == pytest.approx(1.0)
 

@@ -252,26 +252,27 @@ def wilson(hits: int, count: int) -> tuple[float, float, float]:
 def variance_share(x: Sequence[Any] | FloatArray, y: FloatArray, balanced: bool = False) -> tuple[float, float, float]:
     """Share of the variance of y that x makes by itself, and the ends of its 95 % interval. Shapes (n,), (n,).
 
-    x: numbers, or words. balanced: whether samples of any group of x have all the other variables even, as those of a
-    Sobol sequence. The interval: a jackknife over BLOCKS blocks of neighbours, Student's quantile.
+    x: numbers, or words, each of which is a group. balanced: whether samples of any group of x have all the other
+    variables even, as those of a Sobol sequence. The interval: a jackknife over BLOCKS blocks of neighbours, Student's
+    quantile.
     """
-    _, rank = np.unique(np.asarray(x), return_inverse=True)  # words have none of their own
-    whole, block = _share(rank, y, balanced), np.arange(len(y)) * BLOCKS // len(y)
-    parts = np.array([_share(rank[block != k], y[block != k], balanced) for k in range(BLOCKS)])
+    levels, rank = np.unique(np.asarray(x), return_inverse=True)
+    most = len(y) if levels.dtype.kind in "OU" else max(2, round(math.sqrt(len(y))))
+    whole, block = _share(rank, y, balanced, most), np.arange(len(y)) * BLOCKS // len(y)
+    parts = np.array([_share(rank[block != k], y[block != k], balanced, most) for k in range(BLOCKS)])
     error = math.sqrt((BLOCKS - 1) * float(np.mean((parts - parts.mean()) ** 2)))
     reach = t_quantile(BLOCKS - 1) * error
     low, high = np.clip([whole - reach, whole + reach], 0.0, 1.0).tolist()
     return max(0.0, whole), low, high
 
 
-def _share(rank: Any, y: FloatArray, balanced: bool) -> float:
-    """First-order index by the variance between groups of x."""
+def _share(rank: Any, y: FloatArray, balanced: bool, most: int) -> float:
+    """First-order index by the variance between groups of x, of which there are at most so many."""
     count = len(y)
     levels, group = np.unique(rank, return_inverse=True)
-    bins = max(2, round(math.sqrt(count)))
-    if len(levels) > bins:  # many numbers: groups of neighbours, as many in each
+    if len(levels) > most:  # many numbers: groups of neighbours, as many in each
         group = np.empty(count, int)
-        group[np.argsort(rank, kind="stable")] = np.arange(count) * bins // count
+        group[np.argsort(rank, kind="stable")] = np.arange(count) * most // count
     sizes = np.bincount(group)
     used = int((sizes > 0).sum())
     if used < 2 or used >= count:

@@ -1,4 +1,4 @@
-"""The picture of a campaign: a metric over two variables, its histogram, shares of its variance."""
+"""The picture of a campaign: a metric over two variables, or log by log; its histogram, shares of its variance."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from omnidyn.arrays import FloatArray
+from omnidyn.campaigns.fits import ENDS
 from omnidyn.campaigns.results import Campaign, Share
 from omnidyn.errors import InsufficientDataError
 from omnidyn.report.style import BLUE, GREY, VERMILLION, WIDTH, Picture, look, new_figure, picture, thin_out
 
 IN_CELL, MOST_CELLS = 9, 40  # samples in a cell of the surface, on the average; cells along a side
-MOST_POINTS, MOST_SHARES = 5000, 8
+MOST_POINTS, MOST_SHARES, MOST_LINES = 5000, 8, 30
 LONGEST = 26  # letters of a name beside its bar
 
 
@@ -28,10 +29,13 @@ def draw_campaign(campaign: Campaign, metric: str = "", limit: float | None = No
     order = [share.variable for share in shares] or list(campaign.variables)
     columns = {key: campaign.column(key) for key in order}
     numeric = [key for key, column in columns.items() if column.dtype != object and np.ptp(column) > 0.0]
+    words = campaign.variables[0] if campaign.folder.spec.identify is not None else ""
     with look():
         figure = new_figure(WIDTH, 4.2)
-        surface = figure.add_axes((0.09, 0.14, 0.4, 0.76))
-        if len(numeric) > 1:
+        surface = figure.add_axes((0.22 if words else 0.09, 0.14, 0.27 if words else 0.4, 0.76))
+        if words:
+            _by_word(surface, campaign, words, name)
+        elif len(numeric) > 1:
             x, y = (columns[key][there] for key in numeric[:2])
             colours = _surface(surface, x, y, values[there], limit)
             figure.colorbar(colours, cax=figure.add_axes((0.5, 0.14, 0.015, 0.76)))
@@ -39,17 +43,37 @@ def draw_campaign(campaign: Campaign, metric: str = "", limit: float | None = No
         elif numeric:
             step = slice(None, None, max(1, int(there.sum()) // MOST_POINTS))
             surface.plot(columns[numeric[0]][there][step], values[there][step], ".", color=BLUE, markersize=3)
-        surface.set_xlabel(numeric[0] if numeric else "")
+        surface.set_xlabel("" if words or not numeric else numeric[0])
         surface.set_title(name)
-        thin_out(surface, 4, 5)
+        if not words:
+            thin_out(surface, 4, 5)
         _histogram(figure.add_axes((0.66, 0.64, 0.32, 0.26)), values[there], name, limit)
         _shares(figure.add_axes((0.8, 0.14, 0.18, 0.26)), shares[:MOST_SHARES])
         line = f"; the line is where it is {limit:g}" if limit is not None and len(numeric) > 1 else ""
+        left = f"mean of {name} over the two variables that matter most{line}"
+        if words:
+            left = f"{name} of each fit, with its 95 % interval where it has one"
         caption = (
-            f"Left: mean of {name} over the two variables that matter most{line}. Right: how its {there.sum()} values "
+            f"Left: {left}. Right: how its {there.sum()} values "
             "are distributed, and which share of their variance each variable makes by itself, with 95 % intervals."
         )
         return picture("campaign", campaign.folder.spec.name or "Campaign", caption, figure)
+
+
+def _by_word(axes: Axes, campaign: Campaign, key: str, name: str) -> None:
+    """A metric of each sample, in the line of its word, with the interval that it has."""
+    words, values = campaign.column(key), campaign.column(name)
+    names = [*dict.fromkeys(words)]
+    line = np.array([names.index(word) for word in words], dtype=float)
+    for k in range(len(names)):  # samples of one line beside each other
+        line[words == names[k]] += np.linspace(-0.2, 0.2, 2 * int(np.sum(words == names[k])) + 1)[1::2]
+    ends = [campaign.column(f"{name}.{end}") for end in ENDS if f"{name}.{end}" in campaign.metrics]
+    reach = np.abs(np.array(ends) - values) if len(ends) == len(ENDS) else None
+    axes.errorbar(values, line, xerr=reach, fmt=".", color=BLUE, ecolor=GREY, markersize=5, elinewidth=1.0)
+    shown = range(0, len(names), -(-len(names) // MOST_LINES))
+    axes.set_yticks(shown, [_short(names[k]) for k in shown], fontsize=7.0)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.grid(False, axis="y")
 
 
 def _surface(axes: Axes, x: FloatArray, y: FloatArray, z: FloatArray, limit: float | None) -> Any:
