@@ -21,9 +21,9 @@ from omnidyn.identification.identification import Identification
 from omnidyn.identification.identify import identify
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.identification.output_error.prepare import expand_keys
+from omnidyn.identification.steady.study_table import SteadyStudy
 from omnidyn.identification.validation import FITTED, HELD_OUT
 from omnidyn.logs.columns.mapping import load_map
-from omnidyn.logs.log import Log
 from omnidyn.logs.read_log import LogOptions, load_log
 from omnidyn.logs.readers.folders import files_of, is_log_folder, natural
 from omnidyn.logs.readers.read_table import logs_in
@@ -107,12 +107,27 @@ def check_fit(task: IdentifyTask, robot: Robot) -> None:
     for name in (*(getattr(method, "free", None) or ()), *getattr(method, "fixed", ())):
         for key in expand_keys(name, robot):
             Key.parse(key).get(robot)
-    if task.map:
-        load_map(task.map)
+    _options(task)
+
+
+def _options(task: IdentifyTask) -> LogOptions:
+    """How logs are read. Raises InputError for a map that cannot be."""
+    read = task.read
+    return LogOptions(
+        columns=load_map(task.map) if task.map else None,
+        overrides=tuple(f"{component}={text}" for component, text in read.columns.items()),
+        assume=read.assume,
+        latency=read.latency,
+        header=read.header,
+        skip_bad_rows=read.skip_bad_rows,
+        current_unsigned=read.current_unsigned,
+        variables=read.variables,
+        rate=read.rate,
+    )
 
 
 def fitted(name: str, robot: Robot, task: IdentifyTask, hashes: Mapping[str, str]) -> Row:
-    """What a fit says: verdict, words, method, then each number, what free runs are off by, and logs held out.
+    """What a fit says: verdict, words, method, each number, and what free runs, or shapes of friction, are off by.
 
     name: of the fit in `logs`. robot: where it starts. hashes: file -> sha256 as it was when the campaign began.
     Raises InputError where a log has changed since.
@@ -122,21 +137,18 @@ def fitted(name: str, robot: Robot, task: IdentifyTask, hashes: Mapping[str, str
         if hashes and hashes.get(str(file)) != _sha256(file):
             raise InputError("the log has changed since the campaign began", where=str(file))
     try:
-        options = LogOptions(columns=load_map(task.map) if task.map else None)
-        logs = [load_log(path, robot, options) for path in paths]
+        logs = [load_log(path, robot, _options(task)) for path in paths]
+        runs = [log.to_run(sort=task.read.sort) for log in logs]
     except MissingExtraError:
         raise
     except (InputError, InsufficientDataError) as error:
         return _refused(Statement("log_not_read", ERROR, name, {"error": str(error)}))
     try:
-        return _row(_fit(logs, robot, task, [path for path in paths if path in held]))
+        hold_out = [glob.escape(path) for path in paths if path in held]
+        method = task.method_asked()
+        return _row(identify(runs, robot, method, hold_out=hold_out, quick=task.quick, check=logs))
     except (InputError, InsufficientDataError) as error:
         return _refused(Statement("log_not_fitted", ERROR, name, {"error": str(error)}))
-
-
-def _fit(logs: list[Log], robot: Robot, task: IdentifyTask, held: list[str]) -> Identification:
-    hold_out = [glob.escape(path) for path in held]
-    return identify(logs, robot, task.method_asked(), hold_out=hold_out, quick=task.quick)
 
 
 def _refused(statement: Statement) -> Row:
@@ -154,6 +166,8 @@ def _row(result: Identification) -> Row:
         "words": result.headline,
         "method": result.method.name,
     }
+    if isinstance(result.study, SteadyStudy):
+        row |= {"shape": result.study.choice.chosen, "left_out_rmse_N": result.study.choice.error}
     numbers = {key: (value, estimate.ci95[key]) for key, value in estimate.value.items()}
     if isinstance(estimate, OutputErrorEstimate):
         numbers |= {key: (nuisance.value, nuisance.ci95) for key, nuisance in estimate.nuisances.items()}

@@ -147,18 +147,33 @@ def _sets(value: Any) -> Any:
     return {str(name): _texts(files) for name, files in value.items()} if isinstance(value, Mapping) else _texts(value)
 
 
+class Reading(Value):
+    """[identify.read]: how logs are read; each as of `omnidyn.read_log`. columns: component -> "COLUMN:UNIT"."""
+
+    columns: dict[str, Text] = Field(default_factory=dict)
+    assume: dict[str, Text] = Field(default_factory=dict)
+    latency: dict[str, Real] = Field(default_factory=dict)
+    sort: Flag = False
+    header: Flag = True
+    skip_bad_rows: Flag = False
+    current_unsigned: Flag = False
+    variables: Annotated[tuple[str, ...], BeforeValidator(_texts)] = ()
+    rate: Positive | None = None
+
+
 class IdentifyTask(Value):
     """[identify]: a fit to each log, or to each set of logs together; see `omnidyn.identify`.
 
     logs: files, folders and globs, a fit to each log; or the same by name, {gray = "gray/*.csv"}, a fit to each set.
     hold_out: logs that are predicted and not fitted: by the fit of their set, or where there are none by every fit.
-    map: which column is what (TOML). method, quick: as of the command. options: of the method; in a file they stand in
-    [identify] itself, and several names may be one text, "body.mass_kg, friction".
+    map: which column is what (TOML). read: how logs are read. method, quick: as of the command. options: of the method;
+    in a file they stand in [identify] itself, and several names may be one text, "body.mass_kg, friction".
     """
 
     logs: Annotated[Any, BeforeValidator(_sets)]
     hold_out: Annotated[tuple[str, ...], BeforeValidator(_texts)] = ()
     map: Text = ""
+    read: Reading = Field(default_factory=Reading)
     method: Annotated[str, word_of(AUTO, OUTPUT_ERROR, STEADY_STATE)] = AUTO
     quick: Flag = False
     options: dict[str, Any] = Field(default_factory=dict)
