@@ -2,6 +2,7 @@
 
 import json
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 
 import numpy as np
 import pytest
@@ -21,6 +22,12 @@ FLOORS = {"gray": 1.0, "blue": 1.4}  # name -> dry friction, times that of the f
 AXES = ("friction.axes.viscous", "friction.axes.coulomb")
 
 
+@cache
+def log_on(factor, seed):
+    """A log of a floor."""
+    return plain_robot.log(seed, coulomb=factor * plain_robot.COULOMB)
+
+
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """A robot file, two logs of each of two floors, a file that is none, and one without volts; the test runs there."""
@@ -29,8 +36,7 @@ def folder(tmp_path, monkeypatch):
     for floor, factor in FLOORS.items():
         (tmp_path / floor).mkdir()
         for k in range(2):
-            run = plain_robot.log(k, coulomb=factor * plain_robot.COULOMB)
-            write_run(run, tmp_path / floor / f"day{k}.csv")
+            write_run(run := log_on(factor, k), tmp_path / floor / f"day{k}.csv")
     (tmp_path / "blue" / "day0a.csv").write_text("to do: charge the battery\n")
     write_run(run.replace(voltage=None), tmp_path / "blue" / "day0b.csv")
     return tmp_path
