@@ -93,7 +93,11 @@ def test_a_row_for_each_log_is_what_identify_says(folder, identified):
     assert bad["fit.friction.axes.coulomb[0]"].isna().all()
     assert "no rows" in bad.words.iloc[0]
     assert "voltage" in bad.words.iloc[2]
-    assert "log_not_read" in campaign.document().to_text()
+    text = campaign.document().to_text()
+    assert "log_not_read" in text
+    assert all(f"- blue/day0{k} cannot be" in text for k in ("a.csv", "b.csv"))  # why, of the first of each
+    grid = campaign.to_xarray()["fit.friction.axes.coulomb[0]"]
+    assert grid.sel({"log": "gray/day1.csv", "identify.loss": "gaussian"}) == frame["fit.friction.axes.coulomb[0]"][2]
     assert campaign.document().data["verdicts"]["log_not_read"] == 2
     picture = draw_campaign(campaign, "fit.friction.axes.coulomb[0]")
     assert {*names} <= {words for words, _ in shown_texts(picture.figure)}

@@ -46,7 +46,7 @@ BODY = (MASS, "body.inertia_kg_m2", RADIUS)
 AT_END = ("final_vx_m_s", "final_vy_m_s", "final_omega_rad_s", "drift_m", "turned_rad", "saturated_share")
 CELLS = 2**19  # robots times rows of a history that is held at once
 LOOPS = 2048  # loops of a block. Blocks begin at whole multiples: rounding of a sum may depend on the place in a block
-FEW = 256  # the same of robots that go one by one
+FEW = 64  # the same of robots that go one by one, a hundred times as slowly
 STEP = 1e-3  # [s] the longest fixed step
 Fleet = Sample | list[Robot]
 

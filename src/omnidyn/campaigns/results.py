@@ -26,7 +26,7 @@ from omnidyn.document import Document, Part, Points, Table, plain
 from omnidyn.errors import InputError, InsufficientDataError
 from omnidyn.logs.readers.parquet import import_pyarrow
 from omnidyn.shown import DATASET, FIGURE, FRAME, Displayable, make
-from omnidyn.statement import NOTE, WARNING, Statement, as_verdict
+from omnidyn.statement import NOTE, WARNING, Statement, as_verdict, quoted
 from omnidyn.statistics import t_quantile
 
 if TYPE_CHECKING:
@@ -179,13 +179,22 @@ class Campaign(Displayable):
         return Statement(code, WARNING if status.failed else NOTE, self.folder.spec.name, numbers)
 
     def statements(self) -> list[Statement]:
-        """Shards that failed, the last line of each traceback."""
-        return [
+        """Shards that failed, the last line of each traceback; the first fit of each verdict that does not stand."""
+        failed = [
             Statement(
                 "shard_failed", WARNING, str(self.folder.shard_path(shard, ".failed")), {"error": _last_line(words)}
             )
             for shard, words in self.status.failed.items()
         ]
+        return [*failed, *self._refused()]
+
+    def _refused(self) -> list[Statement]:
+        """What the first fit says of each verdict that does not stand."""
+        if VERDICT not in self._measured:
+            return []
+        rows = zip(self.column(VERDICT), self.column("words"), self.column("ok"), strict=True)
+        words = {verdict: text for verdict, text, is_ok in reversed([*rows]) if not is_ok}
+        return [quoted(text) for text in words.values()]
 
     def document(self, metric: str = "", limit: float | None = None) -> Document:
         """What it says: numbers of each metric, the share within a limit, and which variables matter."""
@@ -218,7 +227,7 @@ class Campaign(Displayable):
             parts += ["", Table((f"what makes {name} vary", "% of variance", "95 %"), cells, "<>", name="shares")]
             data["shares"] = {s.variable: s._asdict() for s in shares}
         statements = self.statements()
-        parts += [Points(statements[:3], "-", "failed")] if statements else []
+        parts += ["", Points(statements[:3], "-", "failed")] if statements else []
         data["warnings"] = plain(statements)
         return Document(parts, plain(data), statements, verdict=self.verdict)
 
