@@ -46,9 +46,9 @@ def test_a_shard_may_be_cut_anywhere(tmp_path):
         assert np.array_equal(column, np.concatenate([part[name] for part in parts]), equal_nan=True)
 
 
-@pytest.mark.parametrize("controller, noise", [("pid", 0.0), ("pid", 0.01), ("pid_no_friction", 0.0)])
+@pytest.mark.parametrize("controller, noise", [("pid", 0.0), ("pid", 0.01), ("pid", 0.1), ("pid_no_friction", 0.0)])
 def test_loops_together_are_those_of_track(tmp_path, controller, noise):
-    """An eight so fast that voltages meet their limit."""
+    """An eight so fast that voltages meet their limit; noise so large that poses are doubted."""
     task = {"path": "eight:period_s=3.5", "controller": controller, "duration_s": 1.2, "noise_m_s": noise}
     made = problem(tmp_path, simulate=None, track=task, samples=12)
     assert batched(made)

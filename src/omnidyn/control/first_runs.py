@@ -11,6 +11,8 @@ from omnidyn.arrays import FloatArray
 from omnidyn.control.closed_loop import track
 from omnidyn.control.mpc.controller import Mpc
 from omnidyn.control.paths.path import path
+from omnidyn.control.pid import Pid
+from omnidyn.control.pid_batch import PidBatch
 from omnidyn.control.tracking import Tracking
 from omnidyn.model.robot import Robot
 from omnidyn.model.robot_file import load_robot
@@ -26,6 +28,7 @@ def first_runs() -> list[tuple[str, Callable[[], object]]]:
         ("predictive controller, any friction", partial(_tracked, mecanum)),
         ("predictive controllers of many robots", partial(_many, paper)),
         ("a measurement that is missing", partial(_bridged, paper)),
+        ("pid of many robots", partial(_many_by_pid, paper)),
     ]
 
 
@@ -45,3 +48,9 @@ def _many(robot: Robot) -> FloatArray:
     """One step of two robots."""
     at = np.zeros((2, 3))
     return Mpc(robot).batch(2).step_batch(0.0, at, at, path(PATH))
+
+
+def _many_by_pid(robot: Robot) -> FloatArray:
+    """One step of two robots."""
+    at = np.zeros((2, 3))
+    return PidBatch(Pid(robot), 2).step_batch(0.0, at, at, path(PATH))

@@ -9,6 +9,7 @@ import numpy as np
 from omnidyn.arrays import FloatArray
 from omnidyn.control.paths.motion import Path
 from omnidyn.control.pid import Pid
+from omnidyn.control.pose_gate import PoseGate
 from omnidyn.control.speed_loop import MOST_STEPS
 
 
@@ -17,12 +18,16 @@ class PidBatch:
 
     def __init__(self, pid: Pid, count: int) -> None:
         self._pid, self._sum, self._t = pid, np.zeros((count, 3)), math.nan
+        self._gate, self._memories = PoseGate(pid.robot, pid.dt), np.zeros((count, 7, 3))
 
     def step_batch(self, t: float, pose: FloatArray, twist: FloatArray, path: Path) -> FloatArray:
         """Volts from t [s] on. pose, twist: shape (n, 3). Returns shape (n, wheels)."""
         pid, volts = self._pid, self._pid.volts
         dt = 0.0 if math.isnan(self._t) else min(t - self._t, MOST_STEPS * pid.dt)
         self._t = t
+        states = np.hstack([pose, twist])
+        self._gate.judge_each(self._memories, t, states)
+        pose, twist = states[:, :3], states[:, 3:]
         motion = path.at(np.array([t, t + pid.late, t + pid.late + pid.dt]))
         off = motion.pose[0] - pose
         off[:, 2] -= 2.0 * math.pi * np.round(off[:, 2] / (2.0 * math.pi))

@@ -85,8 +85,8 @@ def slip(memory, i, speed):
     return memory[MEAN, i] if abs(memory[MEAN, i]) > least else 0.0
 
 
-@kernel
-def judge(memory, top, averaged, late, wait, dt, t, state):
+@part
+def believe(memory, top, averaged, late, wait, dt, t, state):
     """Change a measured state (6,) into what is believed of it; returns a verdict.
 
     memory (7, 3). top: speeds [m/s, m/s, rad/s], (3,). averaged: whether twists are means since the step before. late:
@@ -144,6 +144,19 @@ def judge(memory, top, averaged, late, wait, dt, t, state):
     return verdict
 
 
+@kernel
+def judge(memory, top, averaged, late, wait, dt, t, state):
+    """`believe`, of one robot."""
+    return believe(memory, top, averaged, late, wait, dt, t, state)
+
+
+@kernel
+def judge_each(memories, top, averaged, late, wait, dt, t, states):
+    """The same of many. memories (n, 7, 3); states (n, 6)."""
+    for k in range(len(states)):
+        believe(memories[k], top, averaged, late, wait, dt, t, states[k])
+
+
 class PoseGate:
     """That of one controller of a robot, with steps of dt [s]. before: one whose memory it takes over."""
 
@@ -163,3 +176,7 @@ class PoseGate:
         if self._judge is judge:
             self._judge = machine_code(judge, *arguments)
         return self._judge(*arguments)
+
+    def judge_each(self, memories: FloatArray, t: float, states: FloatArray) -> None:
+        """The same of many robots, each with a memory, which begins as zeros. Shapes (n, 7, 3), (n, 6)."""
+        judge_each(memories, self._top, self._averaged, self._late, self._wait, self._dt, t, states)
