@@ -9,7 +9,7 @@ import pytest
 
 import omnidyn
 from omnidyn.model.keys import Key
-from tests.support.pages import as_flags, command, drop, shown, tab, verdict, write_log
+from tests.support.pages import as_flags, choose_axebot, command, drop, numbers, shown, tab, verdict, write_log
 
 # How long the server takes to answer a click [ms]: it turns the page dark, or light again
 ANSWER = """() => new Promise(done => { const begun = performance.now();
@@ -17,20 +17,6 @@ ANSWER = """() => new Promise(done => { const begun = performance.now();
         .observe(document.body, { attributes: true, attributeFilter: ['class'] });
     document.querySelector("[aria-label='light or dark']").click(); })"""
 ROBOTINO = Path(__file__).parents[2] / "examples" / "robotino" / "exp00.csv"
-
-
-def choose_axebot(page):
-    """Choose the robot to start from."""
-    tab(page, "Fit")
-    page.click(".robot")
-    page.get_by_role("option", name="axebot", exact=True).click()
-
-
-def numbers(page):
-    """Key -> value of the table of a fit."""
-    rows = page.locator("#numbers tbody tr").all()
-    cells = [[cell.inner_text().strip() for cell in row.locator("td").all()] for row in rows]
-    return {row[1]: row[2] for row in cells}
 
 
 def assert_same_numbers(page, path, *options):

@@ -4,13 +4,17 @@ import numpy as np
 import pytest
 
 import omnidyn
-from tests.support.pages import command, shown, tab, verdict, write_log
+from omnidyn.model.keys import Key
+from tests.support.pages import choose_axebot, command, numbers, shown, tab, verdict, write_log
 
 
-def choose(page, name, option):
+def choose(page, name, *options):
     """Choose of a list."""
     page.click(f".{name}:visible")
-    page.get_by_role("option", name=option, exact=True).click()
+    for option in options:
+        page.get_by_role("option", name=option, exact=True).click()
+    if len(options) > 1:
+        page.keyboard.press("Escape")
     page.wait_for_function("!document.querySelector('[role=option]')")
 
 
@@ -106,7 +110,7 @@ def test_a_drawn_path_is_the_file_that_track_takes_and_a_bad_one_is_told(browser
     page.wait_for_selector("omni-path[data-count='3']")
     page.get_by_label("speed [m/s]").fill("fast")
     page.click("#track:not([disabled])")
-    assert "expected 0.001 to 100 m/s" in verdict(page, "#track-verdict")
+    page.get_by_text("expected 0.001 to 100 m/s").wait_for()
     page.get_by_label("speed [m/s]").fill("0.2")
     page.click("#track:not([disabled])")
     page.get_by_text("axebot along drawn.csv: 346 steps").wait_for()
@@ -138,6 +142,61 @@ def test_robots_and_fits_over_the_same_logs(browser, tmp_path):
         rmse = [f"{said['robots'][robot]['overall'][name]['rmse']:.4g}" for robot in ("axebot", "robotino")]
         assert table[name] == [said["units"][name], *rmse, gap["better"] or "cannot tell"]
     page.wait_for_function("document.querySelector('omni-plot').frames")
-    page.get_by_role("button", name="log-2").click()
+    page.get_by_role("button", name="tuesday.csv").click()
     page.wait_for_function("document.querySelector('omni-plot').frames > 1")
     shown(page, "compare")
+
+
+def test_fits_are_compared_and_come_back_in_a_workspace(browser, tmp_path):
+    heavier = Key.parse("friction.axes.coulomb[0]").set(omnidyn.load_robot("axebot"), 3.0)
+    first, second = write_log(tmp_path / "monday.csv"), write_log(tmp_path / "tuesday.csv", seed=2, robot=heavier)
+    later = tmp_path / "later.toml"
+    assert command("identify", second, "--robot", "axebot", "-o", later, "--json")[1] == 0
+    studio, page = browser.start(first)
+    choose_axebot(page)
+    page.click("#fit:not([disabled])")
+    fit_words, fit_numbers = verdict(page, "#fit-verdict"), numbers(page)
+    tab(page, "Compare")
+    choose(page, "robot-b", "fit-1.toml")
+    page.click("#compare:not([disabled])")
+    page.wait_for_selector("#compared")
+    fit = tmp_path / "fit-1.toml"
+    fit.write_bytes(page.request.get(f"{studio.address}robot/fit-1.toml").body())
+    said = command("compare", first, "--robot", "axebot", "--robot", fit, "--json")[0]
+    assert verdict(page, "#compare-verdict") == said["verdict"]
+    for name, scores in said["robots"]["axebot (B)"]["overall"].items():
+        assert rows(page, "compared")[name][2] == f"{scores['rmse']:.4g}"
+    page.set_input_files("omni-drop[kind=fit] + input", str(later))
+    page.get_by_role("link", name="later.toml").wait_for()
+    choose(page, "fits", "fit-1.toml", "later.toml")
+    page.click("#drift:not([disabled])")
+    page.wait_for_selector("#drifted")
+    drift = command("drift", fit, later, "--json")[0]
+    assert verdict(page, "#drift-verdict") == drift["verdict"].replace(f"{tmp_path}/", "")
+    number = drift["numbers"]["friction.axes.coulomb[0]"]
+    assert number["changed"]
+    cells = [row.inner_text() for row in page.locator("#drifted tbody tr").all()]
+    row = next(k for k, text in enumerate(cells) if "friction.axes.coulomb[0]" in text)
+    for text, name in zip(cells[row : row + 2], (fit, later), strict=True):
+        assert f"{number['fits'][str(name)]['value']:.4g}" in text
+    assert page.evaluate("document.querySelector('img.picture').naturalWidth") > 400
+    shown(page, "drift")
+    kept = tmp_path / "workspace.zip"
+    kept.write_bytes(page.request.get(f"{studio.address}workspace").body())
+    _, again = browser.start(kept)
+    assert verdict(again).startswith("Usable for whole logs")
+    tab(again, "Fit")
+    assert verdict(again, "#fit-verdict") == fit_words
+    assert numbers(again) == fit_numbers
+    again.click("#fit:not([disabled])")
+    again.wait_for_selector("#cancel")
+    again.wait_for_selector("#fit:not([disabled])")
+    assert numbers(again) == fit_numbers
+    tab(again, "Compare")
+    again.get_by_role("link", name="later.toml").wait_for()
+    tab(again, "Log")
+    again.wait_for_selector("#example")
+    again.set_input_files("omni-drop:not([kind]) + input", str(kept))
+    again.get_by_text("Drop a log here").wait_for()
+    tab(again, "Fit")
+    again.get_by_text("monday.csv, monday.csv, from axebot").wait_for()

@@ -55,6 +55,20 @@ def as_flags(text):
     return re.sub(r"`([a-z_]+)`", lambda match: f"--{match[1].replace('_', '-')}", text)
 
 
+def choose_axebot(page):
+    """Choose the robot to start from."""
+    tab(page, "Fit")
+    page.click(".robot")
+    page.get_by_role("option", name="axebot", exact=True).click()
+
+
+def numbers(page):
+    """Key -> value of the table of a fit."""
+    rows = page.locator("#numbers tbody tr").all()
+    cells = [[cell.inner_text().strip() for cell in row.locator("td").all()] for row in rows]
+    return {row[1]: row[2] for row in cells}
+
+
 def shown(page, name):
     """Look at a tab as it is, narrow and wide: nothing is wider than the page, and axe finds nothing serious.
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
+import shutil
+from pathlib import Path
 from typing import Any
 
 from nicegui import ui
 
+from omnidyn.studio import workspace
 from omnidyn.studio.compare.state import Comparing
 from omnidyn.studio.compare.tab import CompareTab
 from omnidyn.studio.drive.state import Driving
@@ -31,6 +35,25 @@ class Studio:
         self.session = Session()
         self.fitting, self.driving = Fitting(self.session), Driving(self.session)
         self.tracks, self.comparing = Tracks(self.session), Comparing(self.session)
+
+        self.session.takers[workspace.SUFFIX] = self.open
+
+    async def open(self, path: str, name: str) -> None:
+        """Add what a workspace holds. Raises InputError for what is none, RefusedError for what is too large."""
+        folder = self.session.new_folder()
+        try:
+            space = await asyncio.to_thread(workspace.read, path, folder)
+            workspace.adopt(space, self.session, self.fitting)
+        except Exception:
+            shutil.rmtree(folder)
+            raise
+
+    async def save(self) -> Path:
+        """The path of a new file with all of it. Raises InputError where that cannot be."""
+        space = workspace.workspace_of(self.session, self.fitting)
+        path = self.session.new_folder() / workspace.FILE_NAME
+        await asyncio.to_thread(workspace.write, space, path)
+        return path
 
     def tabs(self, page: Page) -> dict[str, Any]:
         """The tabs of a page, by name."""
@@ -65,3 +88,8 @@ def show(studio: Studio) -> None:
         for name, tab in tabs.items():
             with ui.tab_panel(name):
                 tab.build()
+    with ui.row().classes("line foot"):
+        ui.link("Save the workspace", "/workspace").props("download")
+        words = "All logs, maps, robots and fits as one file. To open it: drop it on the tab Log, or"
+        ui.label(words).classes("text quiet")
+        ui.label(f"omnidyn studio {workspace.FILE_NAME}").classes("code")

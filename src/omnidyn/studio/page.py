@@ -56,6 +56,8 @@ class Page:
 
     def calls(self, command: str, python: str, name: str = "call") -> None:
         """The command line and the Python call that do the same. name: id of the former."""
+        if not command:
+            return
         with self.box("The same by hand"):
             ui.label(command).classes("call").props(f"id={name}")
             ui.label(python).classes("call")

@@ -18,11 +18,13 @@ from typing import Any
 import numpy as np
 import uvicorn
 from fastapi import FastAPI, Request, Response, WebSocket, WebSocketDisconnect
-from fastapi.responses import FileResponse, JSONResponse
+from fastapi.responses import FileResponse, JSONResponse, PlainTextResponse
 from fastapi.staticfiles import StaticFiles
 from nicegui import ui
+from starlette.background import BackgroundTask
 
 from omnidyn.errors import InputError
+from omnidyn.studio import workspace
 from omnidyn.studio.drive.state import Driving
 from omnidyn.studio.guard import Guard
 from omnidyn.studio.layout import Studio, show
@@ -44,6 +46,8 @@ def serve(files: list[str], host: str, port: int, browse: bool) -> int:
     for file in files:
         if not Path(file).exists():
             raise InputError("no such file", expected="a log or a robot file", where=file)
+        if file.lower().endswith(workspace.SUFFIX):
+            workspace.read(file)  # refused here, where somebody reads it
     token = secrets.token_urlsafe(24) if host else ""
     listener = _listener(host or LOCAL, port)
     shown_host = LOCAL if host in ("", "0.0.0.0", "::") else host
@@ -117,6 +121,16 @@ def _add_files(app: FastAPI, studio: Studio) -> None:
             return JSONResponse({"name": await session.upload(name, request.stream(), kind)})
         except RefusedError:
             return Response(status_code=413)
+        except InputError as error:
+            return JSONResponse({"error": session.shown(str(error))}, 400)
+
+    @app.get("/workspace")
+    async def save_workspace() -> Response:
+        try:
+            path = await studio.save()
+        except InputError as error:
+            return PlainTextResponse(session.shown(str(error)), 400)
+        return FileResponse(path, filename=path.name, background=BackgroundTask(path.unlink))
 
     @app.get("/series/{key}")
     async def series(key: str) -> Response:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import inspect
 import itertools
 import re
 import sys
@@ -53,6 +54,10 @@ class Session:
             for part in parts:
                 listener(part)
 
+    def changed_all(self) -> None:
+        """Tell all pages that files, robots and fits are others."""
+        self.changed(LOGS, ROBOT, FIT)
+
     def start(self, work: Any) -> None:
         """Let something go on beside the pages."""
         task = asyncio.get_running_loop().create_task(work)
@@ -80,7 +85,9 @@ class Session:
             if path.lower().endswith(ROBOT_SUFFIX):
                 self.robots[path] = self.robot = path
             else:
-                self.taker(Path(path).suffix.lower())(path, path)
+                taken = self.taker(Path(path).suffix.lower())(path, path)
+                if inspect.isawaitable(taken):
+                    self.start(taken)
 
     def add_log(self, path: str, name: str) -> LogFile:
         """Take a log and check it."""
@@ -111,8 +118,20 @@ class Session:
             path.unlink(missing_ok=True)
             raise
         self._bytes += size
-        self.taker(kind or path.suffix.lower())(str(path), safe)
+        taken = self.taker(kind or path.suffix.lower())(str(path), safe)
+        if inspect.isawaitable(taken):
+            try:
+                await taken
+            finally:  # what it held lies elsewhere now, or was refused
+                self._bytes -= size
+                path.unlink(missing_ok=True)
         return safe
+
+    def make_room(self, count: int, size: int) -> None:
+        """Count files that lie in the folder of the session [bytes]. Raises RefusedError for too many."""
+        if len(self.logs) + len(self.robots) + count > MAX_FILES or self._bytes + size > MAX_BYTES:
+            raise RefusedError
+        self._bytes += size
 
     def taker(self, kind: str) -> Callable[[str, str], object]:
         """What takes a file of a kind, by its path and the name that pages show; what is no other kind is a log."""

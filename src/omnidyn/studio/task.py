@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -52,7 +53,7 @@ class Task:
             for name in result.get("series", ()):
                 self.series[name] = f"{job}{session.count}-{name}"
                 session.series[self.series[name]] = Series(self.folder / name)
-            self.result = result
+            self.result = json.loads(session.shown(json.dumps(result)))
         except JobError as error:
             self.error = session.shown(str(error))
         except CancelledError:

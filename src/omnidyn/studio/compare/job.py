@@ -38,8 +38,14 @@ def compare(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, 
     comparison = omnidyn.compare(robots[0], runs, *robots[1:], current_unsigned=unsigned, progress=listen)
     listen(Report("drawing", urgent=True))
     brief = Document([*comparison.brief_head(), comparison.brief_table()], verdict=comparison.verdict)
-    names = [name for k in range(len(runs)) if _write_free_runs(comparison, k, folder / (name := f"log-{k + 1}"))]
-    return {**shown(brief), "failed": comparison.failed, "all": shown(comparison.document())["parts"], "series": names}
+    paths = {f"log-{k + 1}": Path(log["path"]) for k, log in enumerate(request["logs"])}
+    names = {
+        name: path.name
+        for k, (name, path) in enumerate(paths.items())
+        if _write_free_runs(comparison, k, folder / name)
+    }
+    parts = shown(comparison.document())["parts"]
+    return {**shown(brief), "failed": comparison.failed, "all": parts, "series": names}
 
 
 def _write_free_runs(comparison: Comparison, log: int, folder: Path) -> bool:

@@ -86,7 +86,7 @@ class CompareTab:
         document(result["parts"], "compared")
         names = list(task.series)
         if len(names) > 1:
-            ui.toggle(names, value=names[0], on_change=lambda e: show(e.value)).props("no-caps")
+            ui.toggle(result["series"], value=names[0], on_change=lambda e: show(e.value)).props("no-caps")
         if names:
             ui.label("Free run: the model gets the inputs only").classes("title")
             signals = plot(task.series[names[0]], [])

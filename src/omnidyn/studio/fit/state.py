@@ -99,8 +99,8 @@ class Fitting:
         fit.running = False
         self.session.changed(FIT)
 
-    def keep(self, fit: Fit, name: str = "") -> None:
-        """Let all tabs take the robot of a fit, under this name or the next free one."""
+    def keep(self, fit: Fit, name: str = "") -> str:
+        """Let all tabs take the robot of a fit, under this name or the next free one, which is returned."""
         assert fit.folder is not None
         name = self.session.free_name(name or f"fit-{len(self.fits) + 1}.toml")
         path = fit.folder / name
@@ -108,3 +108,4 @@ class Fitting:
         self.fits[name] = fit
         self.session.robots[name] = str(path)
         self.session.changed(ROBOT)
+        return name

@@ -20,18 +20,18 @@ class Drop extends HTMLElement {
   async take(files) {
     for (const file of files) {
       this.say(`Reading ${file.name} ...`);
-      const taken = await this.send(file);
-      this.say(taken ? this.getAttribute('words') || 'Drop a log here, or click'
-        : `${file.name} was not taken: too large, or too many files`);
+      const fault = await this.send(file);
+      this.say(fault ? `${file.name} was not taken: ${fault}` : this.getAttribute('words') || 'Drop a log here, or click');
     }
   }
-  send(file) { // fetch tells nothing of its progress
+  send(file) { // what is wrong, or nothing; fetch tells nothing of its progress
+    const refused = 'too large, or too many files';
     return new Promise((done) => {
       const request = new XMLHttpRequest();
       request.open('POST', `/upload?name=${encodeURIComponent(file.name)}&kind=${this.getAttribute('kind') || ''}`);
       request.upload.onprogress = (e) => this.say(`Reading ${file.name}, ${Math.floor(100 * e.loaded / e.total)} %`);
-      request.onload = () => done(request.status === 200);
-      request.onerror = () => done(false);
+      request.onload = () => done(request.status === 200 ? '' : request.status === 400 ? JSON.parse(request.responseText).error : refused);
+      request.onerror = () => done(refused);
       request.send(file);
     });
   }
