@@ -20,6 +20,7 @@ def test_its_numbers_by_hand():
     off = run.pose - path.at(run.t).pose
     late = off[run.t >= 1.0 - 1e-9]
     np.testing.assert_array_equal(found.error, off)
+    np.testing.assert_allclose(found.distance, np.sqrt(off[:, 0] ** 2 + off[:, 1] ** 2), rtol=1e-12)
     assert found.rmse_position == pytest.approx(np.sqrt(np.mean(late[:, 0] ** 2 + late[:, 1] ** 2)), rel=1e-12)
     assert found.worst_position == pytest.approx(np.max(np.hypot(late[:, 0], late[:, 1])), rel=1e-12)
     assert found.rmse_heading == pytest.approx(np.sqrt(np.mean(late[:, 2] ** 2)), abs=1e-15)
@@ -183,3 +184,14 @@ def test_a_controller_as_read_from_a_file_is_taken_and_what_is_none_is_said():
     assert read.rmse_position == named.rmse_position
     with pytest.raises(InputError, match=r"no controller; got int; expected a Controller"):
         omnidyn.track(load_robot("axebot"), "eight", 3)
+
+
+def test_how_far_it_is_is_told_of_each_controller():
+    reports = []
+    omnidyn.track(AXEBOT, "circle", ["pid", "feedforward"], duration=4.0, progress=reports.append)
+    assert [report.phase for report in reports if report.done == 0] == [
+        "tracking with pid",
+        "tracking with feedforward",
+    ]
+    assert [report.done for report in reports[: len(reports) // 2]] == [0, 64, 128, 192]
+    assert {report.total for report in reports} == {200}

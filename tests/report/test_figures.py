@@ -17,7 +17,7 @@ from omnidyn.identification.steady.steady_state import fit_steady_state
 from omnidyn.model.robot_file import load_robot, preset_names
 from omnidyn.paper.friction import table_1_points
 from omnidyn.report.figures.paper_pictures import paper_pictures
-from omnidyn.report.figures.robot import draw_robot, wheel_places
+from omnidyn.report.figures.robot import draw_robot, wheel_lines, wheel_places
 from omnidyn.report.style import AXIS_COLOUR, LEVEL_COLOURS, LOOK, look, new_figure, picture
 from tests.support.figures import shown_texts
 
@@ -148,6 +148,16 @@ def test_the_mecanum_preset_stands_on_its_own_corners():
     """Front left, front right, rear left, rear right: half track and half wheelbase 0.1 m, as its file says."""
     places = wheel_places(load_robot("mecanum").wheels)
     np.testing.assert_allclose(places, [[0.1, 0.1], [0.1, -0.1], [-0.1, 0.1], [-0.1, -0.1]], atol=1e-15)
+
+
+def test_a_wheel_is_a_line_of_its_diameter_across_its_axle():
+    wheels = load_robot("axebot").wheels  # at 30, 150 and 270 degrees, rolling at right angles to that
+    ends = wheel_lines(wheels)
+    along = ends[:, 1] - ends[:, 0]
+    angle = np.deg2rad(wheels.azimuth_deg)
+    np.testing.assert_allclose(ends.mean(axis=1), wheel_places(wheels), atol=1e-15)
+    np.testing.assert_allclose(np.hypot(*along.T), 2.0 * wheels.radii, rtol=1e-12)
+    np.testing.assert_allclose(along[:, 0] * np.cos(angle) + along[:, 1] * np.sin(angle), 0.0, atol=1e-15)
 
 
 def test_wheels_that_nothing_tells_apart_stand_side_by_side(robot):

@@ -117,6 +117,12 @@ def test_only_what_belongs_to_the_page_is_served(studio):
         "/fit/..%2f..%2fetc%2fpasswd",
         "/log/x/log",
         "/series/x",
+        "/track/run-1.csv",
+        "/track/..%2frobot.toml",
+        "/drift/drift.svg",
+        "/robot/axebot",
+        "/robot/..%2f..%2fetc%2fpasswd",
+        "/robot//etc/passwd",
     ):
         status, text = ask(studio.port, path)
         assert status in (404, 307, 204), path  # 204: a picture that is no more
@@ -147,6 +153,21 @@ def test_names_of_uploads_are_not_trusted_and_files_go_away(start, tmp_path, mon
         assert all(folders[0] in path.parents for path in written)
     assert not folders[0].exists()
     assert not list(Path(tempfile.gettempdir()).glob("evil*"))
+
+
+def test_a_bad_workspace_is_told_and_refused(start, tmp_path):
+    from omnidyn.cli import main
+
+    bad = tmp_path / "bad.zip"
+    bad.write_bytes(b"PK")
+    assert main(["studio", str(bad), "--no-browser", "--port", "0"]) == 3
+    with start() as server:
+        mine = f"http://127.0.0.1:{server.port}"
+        status, text = ask(server.port, "/upload?name=bad.zip", "POST", bad.read_bytes(), Origin=mine)
+        assert status == 400
+        assert "bad.zip: not a workspace" in text
+        assert ask(server.port, "/upload?name=bad.zip", "POST", b"PK", Origin="http://evil.example")[0] == 403
+        assert ask(server.port, "/workspace", Origin="http://evil.example")[0] == 403
 
 
 def test_uploads_are_bounded_in_number(start):

@@ -59,7 +59,7 @@ STUDIO = "omnidyn.studio"  # a skin of its own, which this one does not import
 
 def studio(
     files: Annotated[
-        list[str] | None, typer.Argument(metavar="FILE", help="Logs and robot files to begin with.")
+        list[str] | None, typer.Argument(metavar="FILE", help="Logs, robot files or a workspace to begin with.")
     ] = None,
     host: str = typer.Option(
         "", metavar="ADDRESS", help="Serve other machines too, from this address; a page then needs the token printed."
@@ -69,7 +69,7 @@ def studio(
     ),
     no_browser: bool = typer.Option(False, "--no-browser", help="Print the address, and open no browser."),
 ) -> None:
-    """Open a page on this machine: look at logs, fit a robot, drive it.
+    """Open a page on this machine: look at logs, fit a robot, drive it, let it follow a path, compare.
 
     Only this machine can open it. Files stay here; what was dropped is removed at the end. Ctrl-C ends it.
     """

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import omnidyn
-from omnidyn.control.paths.curve import lines
+from omnidyn.control.paths.curve import lines, through
 from omnidyn.errors import InputError
 from omnidyn.run import Run
 
@@ -134,3 +134,37 @@ def test_a_file_without_poses_is_refused(tmp_path):
     (tmp_path / "speeds.csv").write_text("t_s,x_m,y_m\n0,0,0\n1,1,0\n")
     with pytest.raises(InputError, match=r"no path in this file; got t_s, x_m, y_m; .*add heading_rad"):
         omnidyn.path(tmp_path / "speeds.csv")
+
+
+def test_a_drawn_path_goes_through_its_points_at_its_speed():
+    corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.5], [1.0, 0.5], [0.0, 0.5]]  # one of them twice
+    path = through(corners, 0.25, True, "drawn")
+    assert path.duration == pytest.approx(3.0 / 0.25, rel=1e-12)
+    motion = path.at(np.linspace(0.0, 11.9, 120))
+    np.testing.assert_allclose(np.hypot(*motion.velocity[:, :2].T), 0.25, rtol=1e-12)
+    np.testing.assert_allclose(
+        path.at(np.array([2.0, 4.0, 8.0, 12.0])).pose[:, :2], [[0.5, 0], [1, 0], [0.5, 0.5], [0, 0]]
+    )
+    assert not motion.pose[:, 2].any()
+    assert through(corners, 0.25, False, "drawn").duration == pytest.approx(2.5 / 0.25, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("points", "speed", "words"),
+    [
+        ([], 1.0, r"no drawn path.*got 0 points.*expected points"),
+        ([[0, 0], [1]], 1.0, "no drawn path"),
+        ([["a", 0], [1, 1]], 1.0, "no drawn path"),
+        ([[0, 0, 0], [1, 1, 1]], 1.0, "no drawn path"),
+        ([[0, 0], [math.nan, 1]], 1.0, "no drawn path"),
+        ([[0, 0], [1e300, 1]], 1.0, r"expected points \(x, y\) up to 10000 m"),
+        ([[1, 1]], 1.0, r"no drawn path.*two different points"),
+        ([[1, 1], [1, 1]], 1.0, r"no drawn path.*remedy|no drawn path.*draw one"),
+        ([[0, 0], [1, 1]], 0.0, r"out of range.*expected 0\.001 to 100 m/s"),
+        ([[0, 0], [1, 1]], math.nan, "out of range"),
+        ([[0, 0], [1, 1]], math.inf, "out of range"),
+    ],
+)
+def test_what_is_no_drawn_path_is_refused(points, speed, words):
+    with pytest.raises(InputError, match=words):
+        through(points, speed, True, "drawn")
