@@ -73,6 +73,13 @@ def test_controllers_side_by_side(browser, tmp_path):
     page.reload()
     tab(page, "Track")
     assert verdict(page, "#track-verdict") == said["verdict"]
+    page.get_by_label("rounds").fill("900")
+    page.click("#track:not([disabled])")
+    page.get_by_text("tracking with pid, 1 %").wait_for()
+    page.click("#cancel-track")
+    page.wait_for_selector("#cancel-track", state="detached")
+    page.wait_for_selector("#track:not([disabled])")
+    assert not page.is_visible("#track-verdict")
 
 
 def test_a_drawn_path_is_the_file_that_track_takes_and_a_bad_one_is_told(browser, tmp_path):
@@ -125,7 +132,7 @@ def test_a_drawn_path_is_the_file_that_track_takes_and_a_bad_one_is_told(browser
 
 
 def test_robots_and_fits_over_the_same_logs(browser, tmp_path):
-    first, second = write_log(tmp_path / "monday.csv"), write_log(tmp_path / "tuesday.csv", seed=2)
+    first, second = write_log(tmp_path / "monday.csv", 8.0), write_log(tmp_path / "tuesday.csv", 8.0, 2)
     _, page = browser.start(first, second)
     tab(page, "Compare")
     assert page.inner_text("#why-compare") == "Choose a robot first."
@@ -149,7 +156,10 @@ def test_robots_and_fits_over_the_same_logs(browser, tmp_path):
 
 def test_fits_are_compared_and_come_back_in_a_workspace(browser, tmp_path):
     heavier = Key.parse("friction.axes.coulomb[0]").set(omnidyn.load_robot("axebot"), 3.0)
-    first, second = write_log(tmp_path / "monday.csv"), write_log(tmp_path / "tuesday.csv", seed=2, robot=heavier)
+    first, second = (
+        write_log(tmp_path / "monday.csv", 12.0),
+        write_log(tmp_path / "tuesday.csv", 12.0, 2, robot=heavier),
+    )
     later = tmp_path / "later.toml"
     assert command("identify", second, "--robot", "axebot", "-o", later, "--json")[1] == 0
     studio, page = browser.start(first)

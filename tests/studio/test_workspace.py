@@ -66,6 +66,7 @@ def test_all_comes_back(make, tmp_path):
         path.write_bytes(f"# {name}\n".encode() + ROWS)
     omnidyn.save_robot(robot, tmp_path / "mine.toml", force=True)
     (tmp_path / "numbers.csv").write_text('number,key\n"a, b",c\n', "utf-8")
+    (tmp_path / "warnings.csv").write_text('severity,text\nwarning,"a, b"\n', "utf-8")
     studio = make()
     session = studio.session
     session.logs["log1"] = LogFile("log1", "/somewhere/log.csv", str(files["log.csv"]))
@@ -96,6 +97,7 @@ def test_all_comes_back(make, tmp_path):
     restored = other.fitting.last
     assert (restored.command, restored.python) == ("", "")  # a stranger's command is not shown to be copied
     assert restored.result["verdict"] == "Good."
+    assert restored.result["warnings"] == [{"severity": "warning", "text": "a, b"}]
     assert restored.result["numbers"] == {"head": ["number", "key"], "rows": [["a, b", "c"]]}
 
 

@@ -139,7 +139,7 @@ class Session:
 
     def shown(self, words: str) -> str:
         """Words without the folders of uploads and results."""
-        return re.sub(rf"{re.escape(str(self.folder))}/\d+/", "", words)
+        return re.sub(rf"{re.escape(str(self.folder))}/(?:\d+/)+", "", words)
 
     def remove(self, log: LogFile) -> None:
         """Forget a log; one that was uploaded is deleted."""

@@ -34,9 +34,9 @@ END, END_BYTES, END_64, END_64_BYTES = b"PK\x05\x06", 22, b"PK\x06\x07", 20  # o
 FORM: dict[str, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...], tuple[str, ...]]] = {
     "logs": (("name",), ("unsigned", "held_out"), ("file",), ("map",)),
     "robots": (("name",), (), ("file",), ()),
-    "fits": (("name", "verdict"), ("failed",), ("robot", "numbers"), ("report",)),
+    "fits": (("name", "verdict"), ("failed",), ("robot", "numbers", "warnings"), ("report",)),
 }
-FIT_FILES = {"robot": "robot.toml", "numbers": "numbers.csv", "report": "report.html"}
+FIT_FILES = {"robot": "robot.toml", "numbers": "numbers.csv", "warnings": "warnings.csv", "report": "report.html"}
 
 
 @dataclass
@@ -233,12 +233,13 @@ def _fit(entry: Mapping[str, Any], files: Mapping[str, Path]) -> Fit:
     for key, name in FIT_FILES.items():
         if entry[key] and files[entry[key]] != folder / name:
             shutil.move(files[entry[key]], folder / name)
+    warnings = _table(folder / FIT_FILES["warnings"], ("severity", "text"))
     shown = {
         "verdict": entry["verdict"],
         "failed": entry["failed"],
         "interrupted": False,
         "numbers": _table(folder / FIT_FILES["numbers"]),
-        "warnings": [],
+        "warnings": [dict(zip(warnings["head"], row, strict=True)) for row in warnings["rows"]],
         "advice": [],
         "remedies": [],
         "report": bool(entry["report"]),
@@ -246,12 +247,14 @@ def _fit(entry: Mapping[str, Any], files: Mapping[str, Path]) -> Fit:
     return Fit(result=shown, folder=folder)  # no command: one of a stranger would be run by hand
 
 
-def _table(path: Path) -> dict[str, Sequence[Any]]:
-    """A table as it was written; empty for what is none."""
+def _table(path: Path, columns: Sequence[str] = ()) -> dict[str, Sequence[Any]]:
+    """A table as it was written; empty for what is none, or has other columns."""
     with path.open("rb") as file:
         text = file.read(MAX_TABLE).decode("utf-8", "replace")
     try:
         head, *rows = csv.reader(io.StringIO(text), strict=True)
     except (csv.Error, ValueError):
-        return {"head": [], "rows": []}
+        head, rows = [], []
+    if columns and head != [*columns]:
+        head, rows = [], []
     return {"head": head, "rows": [row for row in rows if len(row) == len(head)]}

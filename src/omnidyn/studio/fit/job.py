@@ -50,14 +50,18 @@ def fit(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]
     _ = result.after  # what follows a fit is made here, where its progress is heard
     listen(Report("drawing", urgent=True))
     table = _numbers(estimate)
+    warnings = [{"severity": w.severity, "text": str(w)} for w in dict.fromkeys(estimate.warnings)]
     (folder / "numbers.csv").write_text(_csv(table), "utf-8")
+    (folder / "warnings.csv").write_text(
+        _csv(Table(("severity", "text"), [(*warning.values(),) for warning in warnings])), "utf-8"
+    )
     shown = {
         "verdict": result.headline,
         "failed": bool(result.failures),
         "interrupted": result.interrupted,
         "numbers": {"head": list(table.head), "rows": [list(row) for row in table.rows]},
         "values": {name: float(value) for name, value in estimate.value.items()},
-        "warnings": [{"severity": w.severity, "text": str(w)} for w in dict.fromkeys(estimate.warnings)],
+        "warnings": warnings,
         "advice": [str(step) for step in result.advice],
         "remedies": _remedies(result),
         "series": _write_free_run(result, folder / "series"),

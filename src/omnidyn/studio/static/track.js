@@ -12,23 +12,30 @@ function grid(g, width, height, at, scale, low) {
 
 function line(g, points, at) { g.beginPath(); for (const [x, y] of points) g.lineTo(...at(x, y)); g.stroke(); }
 
-function canvasOf(element, words) {
-  const canvas = make('canvas', element, { tabIndex: 0 });
-  canvas.setAttribute('role', 'img'); canvas.setAttribute('aria-label', words);
-  new ResizeObserver(() => element.draw()).observe(element);
-  new MutationObserver(() => element.draw()).observe(document.body, { attributes: true, attributeFilter: ['class'] });
-  return canvas;
+// An element that draws itself again when its size changes, or the page turns dark
+class Picture extends HTMLElement {
+  connectedCallback() {
+    if (!this.canvas) this.build();
+    const size = new ResizeObserver(() => this.draw()), look = new MutationObserver(() => this.draw());
+    size.observe(this); look.observe(document.body, { attributes: true, attributeFilter: ['class'] });
+    this.leave = () => { size.disconnect(); look.disconnect(); };
+  }
+  disconnectedCallback() { this.leave(); }
+  picture(words) {
+    this.canvas = make('canvas', this);
+    this.canvas.setAttribute('role', 'img'); this.canvas.setAttribute('aria-label', words);
+  }
 }
 
 // Robots on their path: play, pause, scrub
-class Track extends HTMLElement {
+class Track extends Picture {
   static observedAttributes = ['data-motion'];
-  connectedCallback() { if (!this.canvas) this.build(); this.load(); }
-  disconnectedCallback() { this.playing = false; }
+  connectedCallback() { super.connectedCallback(); this.load(); }
+  disconnectedCallback() { super.disconnectedCallback(); this.playing = false; }
   attributeChangedCallback() { if (this.canvas) this.load(); }
   build() {
     this.frame = 0;
-    this.canvas = canvasOf(this, 'Robots on their path, from above');
+    this.picture('Robots on their path, from above');
     const tools = make('div', this, { className: 'tools' });
     this.button = make('button', tools, { type: 'button', textContent: 'Play', onclick: () => this.play(!this.playing) });
     this.scrub = make('input', tools, { type: 'range', min: 0, max: 0, value: 0, name: 'time' });
@@ -100,11 +107,12 @@ class Track extends HTMLElement {
 const WIDE = 3, HIGH = 2, NEAR = 0.02, STEP = 0.1, MOST = 2000; // metres that are shown, between two points, of an arrow key; points
 
 // A place to draw a path: by mouse or touch, or by arrow keys and Enter
-class Drawing extends HTMLElement {
-  connectedCallback() {
-    if (this.canvas) return;
+class Drawing extends Picture {
+  build() {
     this.points = JSON.parse(this.dataset.points || '[]'); this.pen = [0, 0];
-    const c = this.canvas = canvasOf(this, 'A path to draw. Arrow keys move the pen, Enter sets a point, Backspace takes it away');
+    this.picture('A path to draw. Arrow keys move the pen, Enter sets a point, Backspace takes it away');
+    const c = this.canvas;
+    c.tabIndex = 0;
     const tools = make('div', this, { className: 'tools' });
     make('button', tools, { type: 'button', textContent: 'Clear', onclick: () => { this.points = []; this.tell(); } });
     make('span', tools, { textContent: 'Draw by mouse or touch, or by arrow keys and Enter' });
@@ -119,7 +127,6 @@ class Drawing extends HTMLElement {
       if (e.key === 'Enter') this.add(this.pen); else this.points.pop();
       this.tell();
     };
-    this.draw();
   }
   scale() { return this.canvas.clientWidth / WIDE; }
   place(e) { return [+(e.offsetX / this.scale() - WIDE / 2).toFixed(3), +(HIGH / 2 - e.offsetY / this.scale()).toFixed(3)]; }

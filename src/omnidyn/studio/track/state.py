@@ -62,9 +62,9 @@ class Tracks:
         self.controllers = names
         self.session.changed(TRACK_START)
 
-    def draw(self, points: list[Any]) -> None:
+    def draw(self, points: Any) -> None:
         """Take the points that were drawn."""
-        self.points = points
+        self.points = points if isinstance(points, list) else []
         self.session.changed(TRACK_START)
 
     @property
