@@ -89,14 +89,14 @@ class CompareTab:
             ui.toggle(result["series"], value=names[0], on_change=lambda e: show(e.value)).props("no-caps")
         if names:
             ui.label("Free run: the model gets the inputs only").classes("title")
-            signals = plot(task.series[names[0]], [])
+            signals = plot(task.series[names[0]], [], "compare.png")
 
             def show(name: str) -> None:
                 signals.props["data-series"] = task.series[name]
 
         with self.page.box("All that the comparison says"):
             document(result["all"], "compared-all")
-        self.page.calls(task.command, task.python)
+        self.page.calls(task.command, task.python, "call-compare")
 
     def _fits(self) -> None:
         """Fits in their order, and their files."""
@@ -143,4 +143,4 @@ class CompareTab:
             picture._props["alt"] = task.result["verdict"]
         ui.link("Save this picture", f"/drift/{PICTURE}").props("download")
         document(task.result["parts"], "drifted")
-        self.page.calls(task.command, task.python)
+        self.page.calls(task.command, task.python, "call-drift")

@@ -127,8 +127,8 @@ class TrackTab:
                 ui.link(f"Run of {name} (CSV)", f"/track/run-{k + 1}.csv").props("download")
             if result["drawn"]:
                 ui.link("Drawn path (CSV)", f"/track/{DRAWN}").props("download")
-        plot(task.series[SERIES], [])
-        self.page.calls(task.command, task.python)
+        plot(task.series[SERIES], [], "track-signals.png")
+        self.page.calls(task.command, task.python, "call-track")
 
 
 def _into(given: dict[str, str], name: str) -> Callable[[Any], None]:
