@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import omnidyn
+from omnidyn.comparison.result import Comparison
+from omnidyn.comparison.traces import unit as unit_of
 from omnidyn.document import Document, Points, Table
 from omnidyn.logs.columns.mapping import load_map
 from omnidyn.logs.read_log import LogOptions
 from omnidyn.model.robot import Robot
 from omnidyn.progress import Report
 from omnidyn.statement import NOTE
+from omnidyn.studio.series import write_series
 
 Tell = Callable[[str, Any], None]
 INTERVAL = 0.1  # [s] between two reports of progress
@@ -41,6 +47,26 @@ def options_of(log: Mapping[str, Any]) -> LogOptions:
     """How a log is read."""
     columns = load_map(log["map"]) if log.get("map") else None
     return LogOptions(columns=columns, current_unsigned=bool(log.get("unsigned")))
+
+
+def write_free_runs(comparison: Comparison, log: int, folder: Path, **more: Any) -> bool:
+    """A panel for each component of a log: measured, and the free run of each robot; whether there is one.
+
+    more: what a page needs beside them.
+    """
+    segments = [segment for segment in comparison.segments if segment.log == log]
+    panels, columns = [], []
+    for name in comparison.channels if segments else ():
+        traces = {
+            robot: [comparison.trace(robot, name, segment) for segment in segments] for robot in comparison.robots
+        }
+        columns.append(np.concatenate([trace.measured for trace in traces[comparison.robots[0]]]))
+        columns += [np.concatenate([trace.model for trace in parts]) for parts in traces.values()]
+        panels.append({"title": name, "unit": unit_of(name), "signals": ["measured", *traces]})
+    if panels:
+        t = np.concatenate([comparison.measured[log].t[segment.rows] for segment in segments])
+        write_series(folder, t, panels, np.array(columns), **more)
+    return bool(panels)
 
 
 def shown(document: Document) -> dict[str, Any]:

@@ -6,16 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import omnidyn
-from omnidyn.comparison.result import Comparison
-from omnidyn.comparison.traces import unit as unit_of
 from omnidyn.document import Document
 from omnidyn.progress import Report
 from omnidyn.report.drift_picture import draw_drift
-from omnidyn.studio.job import Tell, listener, options_of, shown
-from omnidyn.studio.series import write_series
+from omnidyn.studio.job import Tell, listener, options_of, shown, write_free_runs
 
 PICTURE = "drift.svg"
 
@@ -40,29 +35,10 @@ def compare(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, 
     brief = Document([*comparison.brief_head(), comparison.brief_table()], verdict=comparison.verdict)
     paths = {f"log-{k + 1}": Path(log["path"]) for k, log in enumerate(request["logs"])}
     names = {
-        name: path.name
-        for k, (name, path) in enumerate(paths.items())
-        if _write_free_runs(comparison, k, folder / name)
+        name: path.name for k, (name, path) in enumerate(paths.items()) if write_free_runs(comparison, k, folder / name)
     }
     parts = shown(comparison.document())["parts"]
     return {**shown(brief), "failed": comparison.failed, "all": parts, "series": names}
-
-
-def _write_free_runs(comparison: Comparison, log: int, folder: Path) -> bool:
-    """A panel for each component of a log: measured, and the free run of each robot; whether there is one."""
-    segments = [segment for segment in comparison.segments if segment.log == log]
-    panels, columns = [], []
-    for name in comparison.channels if segments else ():
-        traces = {
-            robot: [comparison.trace(robot, name, segment) for segment in segments] for robot in comparison.robots
-        }
-        columns.append(np.concatenate([trace.measured for trace in traces[comparison.robots[0]]]))
-        columns += [np.concatenate([trace.model for trace in parts]) for parts in traces.values()]
-        panels.append({"title": name, "unit": unit_of(name), "signals": ["measured", *traces]})
-    if panels:
-        t = np.concatenate([comparison.measured[log].t[segment.rows] for segment in segments])
-        write_series(folder, t, panels, np.array(columns))
-    return bool(panels)
 
 
 def drift(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:

@@ -7,12 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import omnidyn
-from omnidyn.arrays import FloatArray
-from omnidyn.comparison.result import Comparison
-from omnidyn.comparison.traces import unit as unit_of
 from omnidyn.document import Table, interval_cell
 from omnidyn.identification.estimate import NOT_DETERMINED, Estimate
 from omnidyn.identification.fit_document import number_table
@@ -21,8 +16,7 @@ from omnidyn.identification.methods import OutputError, SteadyState
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
 from omnidyn.model.keys import find_key, in_words, unit
 from omnidyn.progress import Report
-from omnidyn.studio.job import Tell, listener, options_of, robot_of
-from omnidyn.studio.series import write_series
+from omnidyn.studio.job import Tell, listener, options_of, robot_of, write_free_runs
 
 
 def fit(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
@@ -123,27 +117,8 @@ def _write_free_run(result: Identification, folder: Path) -> bool:
     if validation is None:
         return False
     comparison = validation.held_out or validation.fitted
-    panels, t, values = _measured_and_model(comparison)
-    if not panels:
-        return False
     title = "held-out log" if validation.held_out else "fitted log"
-    write_series(folder, t, panels, values, title=f"{title}: {comparison.measured[0].source}")
-    return True
-
-
-def _measured_and_model(comparison: Comparison) -> tuple[list[dict[str, Any]], FloatArray, FloatArray]:
-    """A panel for each component of the first log: measured and model."""
-    segments = [segment for segment in comparison.segments if segment.log == 0]
-    panels, columns, t = [], [], np.zeros(0)
-    for name in comparison.channels:
-        traces = [comparison.trace(comparison.robots[0], name, segment) for segment in segments]
-        if not traces:
-            continue
-        t = np.concatenate([trace.t for trace in traces])
-        measured, model = (np.concatenate([getattr(trace, part) for trace in traces]) for part in ("measured", "model"))
-        panels.append({"title": name, "unit": unit_of(name), "signals": ["measured", "model"]})
-        columns += [measured, model]
-    return panels, t, np.array(columns)
+    return write_free_runs(comparison, 0, folder, title=f"{title}: {comparison.measured[0].source}")
 
 
 def _write_report(result: Identification, request: Mapping[str, Any], path: Path) -> bool:
