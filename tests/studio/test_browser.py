@@ -50,7 +50,7 @@ def test_from_nothing_to_a_robot(browser, tmp_path):
 def test_currents_without_a_sign_are_told_and_mended(browser):
     _, page = browser.start(ROBOTINO)
     assert verdict(page) == command("check", ROBOTINO, "--json")[0]["verdict"]
-    page.click("#apply-remedy")
+    page.click("text=Apply this remedy")
     mended = command("check", ROBOTINO, "--current-unsigned", "--json")[0]["verdict"]
     page.get_by_text(mended).first.wait_for()
     page.get_by_text("The same by hand").first.click()

@@ -141,7 +141,7 @@ def _best_shift(x: FloatArray, y: FloatArray) -> int:
     spectrum = sum(rfft(one, size) * np.conj(rfft(other, size)) for one, other in zip(x, y, strict=True))
     products = irfft(spectrum, size)
     k = int(np.argmax(products))
-    return k if k < x.shape[1] else k - size
+    return k if k < x.shape[1] else k - int(size)
 
 
 def _alike(x: FloatArray, y: FloatArray, shift: int) -> tuple[float, int]:

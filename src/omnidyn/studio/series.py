@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from omnidyn.arrays import FloatArray
 
@@ -23,7 +24,7 @@ SHOWN = np.float32  # numbers of a picture: fine for any number of pixels, at ha
 
 
 def write_series(
-    folder: Path, t: FloatArray, panels: Sequence[Mapping[str, Any]], values: FloatArray, **more: Any
+    folder: Path, t: FloatArray, panels: Sequence[Mapping[str, Any]], values: NDArray[np.floating], **more: Any
 ) -> None:
     """Write signals to a new folder.
 
@@ -37,11 +38,11 @@ def write_series(
     folder.mkdir(parents=True)
     time = shown_times(t)
     np.save(folder / "t.npy", time)
-    values = values.astype(SHOWN, copy=False)
-    np.save(folder / "values.npy", values)
+    shown = values.astype(SHOWN, copy=False)
+    np.save(folder / "values.npy", shown)
     edges = np.arange(0, len(time), BLOCK)
-    np.save(folder / "least.npy", np.fmin.reduceat(values, edges, axis=1))
-    np.save(folder / "largest.npy", np.fmax.reduceat(values, edges, axis=1))
+    np.save(folder / "least.npy", np.fmin.reduceat(shown, edges, axis=1))
+    np.save(folder / "largest.npy", np.fmax.reduceat(shown, edges, axis=1))
     meta = {"panels": panels, "begin": float(time[0]), "end": float(time[-1]), "rows": len(time), **more}
     (folder / META).write_text(json.dumps(meta), "utf-8")
 

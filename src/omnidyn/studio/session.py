@@ -201,16 +201,25 @@ class Session:
         await self.check(log)
         return ""
 
+    async def remedy(self, log: LogFile, remedy: dict[str, Any]) -> None:
+        """Read a log as the remedy of a finding says: with a map, or with currents that get a sign."""
+        if remedy["map"]:
+            path = self.new_folder() / "columns.toml"
+            path.write_text(remedy["map"], "utf-8")
+            log.map = str(path)
+        log.unsigned = log.unsigned or remedy["unsigned"]
+        await self.check(log)
+
     async def align(self, log: LogFile) -> None:
         """Put the other log on the clock of a log, by what both recorded."""
         request = {"robot": self.robot_path, "logs": [one.request for one in (log, self.logs[log.other])]}
         try:
-            log.aligned = await self.workers["log"].run("align", request, lambda kind, value: None)
+            aligned = await self.workers["log"].run("align", request, lambda kind, value: None)
         except (JobError, CancelledError) as error:
-            log.aligned = {"severity": "error", "verdict": str(error)}
+            aligned = {"severity": "error", "verdict": str(error)}
         for one in (log, self.logs[log.other]):
-            log.aligned["verdict"] = log.aligned["verdict"].replace(one.path, one.label)
-        log.offset = log.aligned.get("offset", log.offset)
+            aligned["verdict"] = aligned["verdict"].replace(one.path, one.label)
+        log.aligned, log.offset = aligned, aligned.get("offset", log.offset)
         self.changed(LOGS)
 
     async def warm(self) -> None:

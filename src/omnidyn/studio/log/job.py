@@ -16,6 +16,7 @@ from omnidyn.document import plain
 from omnidyn.files import default_max_bytes, too_large
 from omnidyn.findings.check import check_blocks, check_log
 from omnidyn.findings.finding import Finding, Verdict
+from omnidyn.findings.remedies import remedied
 from omnidyn.logs.channels import components, si_suffix
 from omnidyn.logs.column import MOTOR_SIDE, WHEEL_SIDE
 from omnidyn.logs.columns.mapping import ColumnMap, map_to_toml, parse_column
@@ -44,7 +45,7 @@ def check(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, An
     _write_blocks(blocks, Path(request["folder"]))
     tell("progress", {"text": "checking", "share": None, "drawn": True})
     verdict = check_log(blocks[0], robot) if len(blocks) == 1 else check_blocks(_counted(blocks, listen), robot)
-    return _told(blocks, verdict)
+    return _told(blocks, verdict, options)
 
 
 def _blocks(path: str, robot: Robot | None, options: LogOptions, listen: Progress) -> list[Log]:
@@ -65,7 +66,7 @@ def _counted(blocks: list[Log], listen: Progress) -> Iterator[Log]:
         yield block
 
 
-def _told(blocks: list[Log], verdict: Verdict) -> dict[str, Any]:
+def _told(blocks: list[Log], verdict: Verdict, options: LogOptions) -> dict[str, Any]:
     """The verdict and the columns, as the page shows them."""
     log = blocks[0]
     t = shown_times(np.concatenate([block.t for block in blocks]))
@@ -80,6 +81,7 @@ def _told(blocks: list[Log], verdict: Verdict) -> dict[str, Any]:
             "remedy": finding.remedy_text,
             "count": finding.count,
             "spans": _spans(t, rows, finding),
+            "reading": _reading(finding, options, log.columns),
         }
         for finding in sorted(verdict.findings, key=lambda finding: lines[finding.severity])
     ]
@@ -105,6 +107,18 @@ def _told(blocks: list[Log], verdict: Verdict) -> dict[str, Any]:
         "unused": list(log.columns.unused),
         "doubts": [doubt.with_remedy for doubt in log.columns.doubts],
         "notes": [str(note) for note in dict.fromkeys(note for block in blocks for note in block.notes)],
+    }
+
+
+def _reading(finding: Finding, options: LogOptions, columns: ColumnMap) -> dict[str, Any] | None:
+    """What a button does about a finding: another map, as text, or a sign for the currents; None for neither."""
+    mended = remedied(finding, options, columns)
+    if mended is None:
+        return None
+    changed = mended.columns is not None and mended.columns != options.columns
+    return {
+        "map": map_to_toml(mended.columns) if changed and mended.columns else "",
+        "unsigned": mended.current_unsigned,
     }
 
 

@@ -76,6 +76,8 @@ class LogTab:
             self._findings(log)
             self._uses(log)
             self._columns(log)
+        if log.other:
+            self.page.calls(*calls.align(log, self.session.logs[log.other], self.session.robot_path), name="align-call")
         self.page.calls(*calls.check(log, self.session.robot_path))
 
     def _plot(self, log: LogFile, spans: list[list[Any]]) -> None:
@@ -86,7 +88,9 @@ class LogTab:
         if others:
             self._second(log, others)
         other = self.session.logs[log.other].series if log.other else ""
-        picture = plot(log.series, spans, f"{Path(log.label).stem}.png", other, log.offset)
+        name = f"{Path(log.label).stem}.png"
+        picture = plot(log.series, spans, name, other, log.offset)
+        picture._props["data-words"] = self.session.logs[log.other].label if log.other else ""
         picture.on("moved", lambda event: self._move(log, event.args["detail"]), args=["detail"])
 
     def _second(self, log: LogFile, others: dict[str, str]) -> None:
@@ -106,8 +110,6 @@ class LogTab:
                 )
         if log.other and log.aligned is not None:
             verdict(log.aligned["severity"], log.aligned["verdict"], "aligned")
-        if log.other:
-            self.page.calls(*calls.align(log, self.session.logs[log.other], self.session.robot_path), name="align-call")
 
     def _take(self, log: LogFile, key: str) -> None:
         log.other, log.offset, log.aligned = key, 0.0, None
@@ -145,14 +147,11 @@ class LogTab:
             ui.label(finding["text"]).classes("text")
             if finding["remedy"]:
                 ui.label(f"→ {finding['remedy']}").classes("text remedy")
-            if finding["code"] == "unsigned" and not log.unsigned:
-                ui.button("Apply this remedy", on_click=lambda: self._signed(log)).props(
-                    "outline dense no-caps id=apply-remedy"
-                )
-
-    def _signed(self, log: LogFile) -> None:
-        log.unsigned = True
-        self.session.start(self.session.check(log))
+            if finding["reading"]:
+                remedy = self.session.remedy
+                ui.button(
+                    "Apply this remedy", on_click=lambda: self.session.start(remedy(log, finding["reading"]))
+                ).props(f"outline dense no-caps id=apply-{k}")
 
     def _uses(self, log: LogFile) -> None:
         assert log.result is not None

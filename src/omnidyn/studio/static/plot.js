@@ -22,7 +22,7 @@ const wire = {
 };
 
 const views = new Map(); // series -> what is looked at of it: the page is laid out anew where something changes
-const HINT = 'Drag to pan, wheel or + and - to zoom; with Shift a drag moves the other log';
+const HINT = 'Drag to pan, wheel or + and - to zoom';
 const TOP = 20, PANEL = 110, GAP = 24, BOTTOM = 38;
 
 // A frame of the server: its head, and its numbers
@@ -121,6 +121,7 @@ class Plot extends HTMLElement {
     this.second = second && new Layer(this, other, second);
     if (this.second) this.second.offset = +this.dataset.offset;
     this.view = views.get(series) || this.ends();
+    this.readout.textContent = this.second ? `${HINT}; with Shift a drag moves ${this.dataset.words}` : HINT;
     this.ask();
   }
   // From where to where there is anything, of both logs
@@ -180,11 +181,12 @@ class Plot extends HTMLElement {
     g.fillStyle = css('--quiet'); g.textAlign = 'center'; g.textBaseline = 'top';
     for (const t of ticks(this.view[0], this.view[1], this.inner() / 90)) g.fillText(short(t), x(t), bottom + 5);
     g.fillText('time [s]', LEFT + this.inner() / 2, bottom + 20);
+    if (this.second) { g.textAlign = 'right'; g.fillText(`pale: ${this.dataset.words}`, width - RIGHT, bottom + 20); }
   }
   panel(g, panel, first, top, x, width) {
     const inner = this.inner(), lines = [];
     panel.signals.forEach((name, k) => {
-      for (const layer of [this.first, this.second]) {
+      for (const layer of [this.second, this.first]) { // the first is drawn over the other
         const index = layer === this.first ? first + k : layer?.index(name) ?? -1;
         if (index < 0 || !layer.shown) continue;
         const { points: n, numbers } = layer.shown;
@@ -224,10 +226,9 @@ class Plot extends HTMLElement {
     });
   }
   line(g, { name, colour, layer, n, numbers, at, x }, y, inner) {
-    const second = layer === this.second, wide = name === 'measured'; // the model is drawn over it
+    const wide = name === 'measured' || layer === this.second; // the model, or the first log, is drawn over it
     g.strokeStyle = g.fillStyle = colour;
-    g.lineWidth = wide ? 4 : 1.3; g.lineJoin = 'round'; g.globalAlpha = wide || second ? 0.45 : 1;
-    if (second) g.setLineDash([6, 3]);
+    g.lineWidth = wide ? 4 : 1.3; g.lineJoin = 'round'; g.globalAlpha = wide ? 0.45 : 1;
     g.beginPath();
     if (n > inner / 2 && layer.shown.rows > 20 * n) { // columns of pixels: strokes as dense as this take ten times as long
       let before = [NaN, NaN];
@@ -255,7 +256,7 @@ class Plot extends HTMLElement {
       }
       g.stroke();
     }
-    g.globalAlpha = 1; g.setLineDash([]);
+    g.globalAlpha = 1;
   }
   pick(px) {
     const t = this.time(px), reach = 4 * (this.view[1] - this.view[0]) / this.inner();
