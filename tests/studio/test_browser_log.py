@@ -5,7 +5,8 @@ import pytest
 
 import omnidyn
 from tests.support.axebot_logs import excitation
-from tests.support.pages import command, shown, verdict
+from tests.support.pages import command, drop, shown, tab, verdict
+from tests.support.pushed_logs import clean_log
 
 
 def cut(path, begin, every, seed):
@@ -21,6 +22,13 @@ def choose(page, name, option):
     """Choose of a list."""
     page.click(f"#{name}")
     page.get_by_role("option", name=option, exact=True).click()
+
+
+def choose_axebot(page):
+    """Choose the robot to start from."""
+    tab(page, "Fit")
+    page.click(".robot")
+    page.get_by_role("option", name="axebot", exact=True).click()
 
 
 def test_two_logs_are_put_on_one_time_axis(browser, tmp_path):
@@ -49,3 +57,35 @@ def test_two_logs_are_put_on_one_time_axis(browser, tmp_path):
     shown(page, "two-logs")
     page.get_by_text("The same by hand").first.click()
     assert page.inner_text("#align-call") == f"omnidyn align {first} {second}"
+
+
+def test_a_good_log_and_three_bad_ones_that_a_button_mends(browser, tmp_path):
+    log = clean_log(omnidyn.load_robot("axebot"))
+    good = omnidyn.Run(t=log.t, **log.channels)
+    speed, plane = good.wheel_speed, (good.twist @ [1.0, 1.0j, 0.0]) * np.exp(1j * good.pose[:, 2])
+    bad = {
+        "exchanged": good.replace(wheel_speed=speed[:, [1, 0, 2]] * [1.0, -1.0, 1.0]),
+        "rpm": good.replace(wheel_speed=speed * 60.0 / (2.0 * np.pi)),
+        "room": good.replace(twist=np.column_stack([plane.real, plane.imag, good.twist[:, 2]])),
+    }
+    paths = {name: tmp_path / f"{name}.csv" for name in ("good", *bad)}
+    for name, run in (("good", good), *bad.items()):
+        omnidyn.write_run(run, paths[name])
+    right = command("check", paths["good"], "--robot", "axebot", "--json")[0]["verdict"]
+    studio, page = browser.start(paths["good"])
+    verdict(page)
+    choose_axebot(page)
+    tab(page, "Log")
+    page.get_by_text(right).first.wait_for()
+    for name in bad:
+        drop(page, paths[name])
+        said = command("check", paths[name], "--robot", "axebot", "--json")[0]
+        assert said["has_errors"]
+        page.get_by_text(said["verdict"]).first.wait_for()
+        page.get_by_text("Apply this remedy").first.click()
+        page.get_by_text(right).first.wait_for()
+        saved = tmp_path / f"{name}.toml"
+        link = page.locator("a[href$='/map']").first.get_attribute("href")
+        saved.write_bytes(page.request.get(f"{studio.address}{link[1:]}").body())
+        again = command("check", paths[name], "--robot", "axebot", "--map", saved, "--json")[0]
+        assert verdict(page) == again["verdict"] == right

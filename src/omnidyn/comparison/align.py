@@ -13,7 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
+from numpy.fft import irfft, rfft
+from scipy.fft import next_fast_len
 from scipy.ndimage import uniform_filter1d
 
 from omnidyn.arrays import FloatArray
@@ -137,11 +138,12 @@ def _on_grid(t: FloatArray, values: FloatArray, grid: FloatArray, width: int) ->
 
 def _best_shift(x: FloatArray, y: FloatArray) -> int:
     """Steps by which y has to be moved to be most like x. Shapes (components, n) and (components, m)."""
-    size = next_fast_len(x.shape[1] + y.shape[1] - 1, real=True)
-    spectrum = sum(rfft(one, size) * np.conj(rfft(other, size)) for one, other in zip(x, y, strict=True))
+    size = int(next_fast_len(x.shape[1] + y.shape[1] - 1, real=True) or 0)
+    spectra = (rfft(one, size) * np.conj(rfft(other, size)) for one, other in zip(x, y, strict=True))
+    spectrum = np.sum(list(spectra), axis=0)
     products = irfft(spectrum, size)
     k = int(np.argmax(products))
-    return k if k < x.shape[1] else k - int(size)
+    return k if k < x.shape[1] else k - size
 
 
 def _alike(x: FloatArray, y: FloatArray, shift: int) -> tuple[float, int]:

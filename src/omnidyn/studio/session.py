@@ -219,7 +219,7 @@ class Session:
             aligned = {"severity": "error", "verdict": str(error)}
         for one in (log, self.logs[log.other]):
             aligned["verdict"] = aligned["verdict"].replace(one.path, one.label)
-        log.aligned, log.offset = aligned, aligned.get("offset", log.offset)
+        log.aligned, log.offset = aligned, float(aligned.get("offset", log.offset))
         self.changed(LOGS)
 
     async def warm(self) -> None:

@@ -92,6 +92,8 @@ def _told(blocks: list[Log], verdict: Verdict, options: LogOptions) -> dict[str,
             "unit": column.unit,
             "motor": column.side == MOTOR_SIDE,
             "invert": column.invert,
+            "latency": column.latency,
+            "frame": column.frame,
         }
         for component, column in log.columns.columns.items()
     ]
@@ -115,11 +117,8 @@ def _reading(finding: Finding, options: LogOptions, columns: ColumnMap) -> dict[
     mended = remedied(finding, options, columns)
     if mended is None:
         return None
-    changed = mended.columns is not None and mended.columns != options.columns
-    return {
-        "map": map_to_toml(mended.columns) if changed and mended.columns else "",
-        "unsigned": mended.current_unsigned,
-    }
+    changed = None if mended.columns is options.columns else mended.columns
+    return {"map": map_to_toml(changed) if changed else "", "unsigned": mended.current_unsigned}
 
 
 def _spans(t: FloatArray, lines: IntArray, finding: Finding) -> list[tuple[float, float]]:
@@ -172,7 +171,8 @@ def save_columns(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[
         sign, side = "-" if row["invert"] else "", MOTOR_SIDE if row["motor"] else WHEEL_SIDE
         text = f"{row['component']}={sign}{row['column']}:{row['unit']}@{side}"
         component, column = parse_column(text)
-        columns[component] = replace(column, name=row["column"], unit=row["unit"] or si_suffix(component))
+        more = {"latency": row.get("latency", 0.0), "frame": row.get("frame", "")}
+        columns[component] = replace(column, name=row["column"], unit=row["unit"] or si_suffix(component), **more)
     Path(request["path"]).write_text(map_to_toml(ColumnMap(columns)), "utf-8")
     return {}
 
