@@ -1,9 +1,12 @@
 """Tabs Log and Fit in a real browser: each test ends in a number that a command prints for the same file."""
 
+import re
+
 import numpy as np
 import pytest
 
 import omnidyn
+from omnidyn.model.keys import Key, find_key
 from tests.support.axebot_logs import excitation
 from tests.support.pages import command, drop, shown, tab, verdict
 from tests.support.pushed_logs import clean_log
@@ -24,11 +27,18 @@ def choose(page, name, option):
     page.get_by_role("option", name=option, exact=True).click()
 
 
-def choose_axebot(page):
+def choose_robot(page, name):
     """Choose the robot to start from."""
     tab(page, "Fit")
     page.click(".robot")
-    page.get_by_role("option", name="axebot", exact=True).click()
+    page.get_by_role("option", name=name, exact=True).click()
+
+
+def numbers(page):
+    """Key -> value of the table of a fit."""
+    rows = page.locator("#numbers tbody tr").all()
+    cells = [[cell.inner_text().strip() for cell in row.locator("td").all()] for row in rows]
+    return {row[1]: row[2] for row in cells}
 
 
 def test_two_logs_are_put_on_one_time_axis(browser, tmp_path):
@@ -74,7 +84,7 @@ def test_a_good_log_and_three_bad_ones_that_a_button_mends(browser, tmp_path):
     right = command("check", paths["good"], "--robot", "axebot", "--json")[0]["verdict"]
     studio, page = browser.start(paths["good"])
     verdict(page)
-    choose_axebot(page)
+    choose_robot(page, "axebot")
     tab(page, "Log")
     page.get_by_text(right).first.wait_for()
     for name in bad:
@@ -89,3 +99,50 @@ def test_a_good_log_and_three_bad_ones_that_a_button_mends(browser, tmp_path):
         saved.write_bytes(page.request.get(f"{studio.address}{link[1:]}").body())
         again = command("check", paths[name], "--robot", "axebot", "--map", saved, "--json")[0]
         assert verdict(page) == again["verdict"] == right
+
+
+def test_what_is_free_is_chosen_and_a_cancelled_fit_keeps_the_best_so_far(browser, tmp_path):
+    robot, draws, path = omnidyn.load_robot("mecanum"), np.random.default_rng(1), tmp_path / "mecanum.csv"
+    run = omnidyn.simulate(robot, np.repeat(draws.uniform(-10.0, 10.0, (250, 4)), 40, axis=0), 0.01)
+    twist = run.twist + draws.standard_normal(run.twist.shape) * (0.01, 0.01, 0.05)
+    omnidyn.write_run(omnidyn.Run(t=run.t, voltage=run.voltage, twist=twist), path)
+    studio, page = browser.start(path)
+    verdict(page)
+    choose_robot(page, "mecanum")
+    page.click(".free")
+    page.get_by_role("option", name=re.compile("body.mass_kg")).click()
+    page.keyboard.press("Escape")
+    page.click("#fit:not([disabled])")
+    page.wait_for_function("document.querySelector('#fit-progress')?.innerText.includes(', step')")
+    assert re.fullmatch(r"\d+ s", page.inner_text("#fit-time"))
+    page.click("#cancel")
+    assert "interrupted" in verdict(page, "#fit-verdict")
+    assert "--free body.mass_kg" in page.text_content("#call")
+    saved = tmp_path / "robot.toml"
+    saved.write_bytes(page.request.get(f"{studio.address}fit/robot.toml").body())
+    kept, cells = omnidyn.load_robot(saved), numbers(page)
+    assert "body.mass_kg" in cells
+    for key, cell in ((key, cell) for key, cell in cells.items() if find_key(key)):
+        assert cell == f"{Key.parse(key).get(kept):.5g}", key
+
+
+def test_the_robot_is_drawn_while_its_sizes_are_typed(browser, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    _, page = browser.start()
+    tab(page, "Fit")
+    assert page.inner_text("#why") == "Add a log first: tab Log."
+    page.get_by_text("Describe another robot").click()
+    page.get_by_label("wheels stand at").fill("45,135,225,315")
+    page.get_by_label("radius of a wheel").fill("0.06")
+    page.get_by_label("centre to wheel").fill("0.2,0.2,0.2,0.25")
+    drawn = "document.querySelector('omni-robot').wheels"
+    page.wait_for_function(f"{drawn}.length === 4 && {drawn}[3][2] === 0.25 && {drawn}[0][1] === 0.06")
+    shown(page, "robot")
+    page.click("#make-robot")
+    page.get_by_text("my-robot.toml").first.wait_for()
+    sizes = ("--azimuth=45,135,225,315", "--wheel-radius=0.06", "--robot-radius=0.2,0.2,0.2,0.25", "--mass=3")
+    assert command("init", "my-robot", *sizes)[1] == 0
+    wheels = omnidyn.load_robot("my-robot.toml").wheels
+    made = page.evaluate(drawn)
+    assert [angle for angle, _, _ in made] == pytest.approx(wheels.azimuth_deg)
+    assert [radius for _, _, radius in made] == pytest.approx(np.asarray(wheels.robot_radius))

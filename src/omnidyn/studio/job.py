@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import contextlib
+import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import omnidyn
+from omnidyn.cli.terminal.progress import COMPILING
 from omnidyn.comparison.result import Comparison
 from omnidyn.comparison.traces import unit as unit_of
+from omnidyn.compiled.listeners import heard
 from omnidyn.document import Document, Points, Table
 from omnidyn.logs.columns.mapping import load_map
 from omnidyn.logs.read_log import LogOptions
@@ -22,6 +26,7 @@ from omnidyn.studio.series import write_series
 
 Tell = Callable[[str, Any], None]
 INTERVAL = 0.1  # [s] between two reports of progress
+BEAT = 0.2  # [s] between two of a job that is silent, such as one that waits for the compiler
 
 
 def listener(tell: Tell) -> Callable[[Report], None]:
@@ -36,6 +41,38 @@ def listener(tell: Tell) -> Callable[[Report], None]:
             tell("progress", {"text": str(report), "share": share})
 
     return listen
+
+
+@contextlib.contextmanager
+def timed(tell: Tell) -> Iterator[Callable[[Report], None]]:
+    """A listener of the library that tells the page, beside what is done, the time spent and left, also in silence.
+
+    Time left: of a phase that counts, as it went so far. The page hears of a kernel that is being compiled.
+    """
+    begun, phase, latest, finished = time.monotonic(), [time.monotonic()], [Report("")], threading.Event()
+
+    def listen(report: Report) -> None:
+        if report.phase != latest[0].phase:
+            phase[0] = time.monotonic()
+        latest[0] = report
+
+    with heard() as compiling:
+
+        def beat() -> None:
+            while not finished.wait(BEAT):
+                report, now = latest[0], time.monotonic()
+                share = report.done / report.total if report.total else None
+                left = (now - phase[0]) * (1.0 - share) / share if share else None
+                words = str(report) + COMPILING * bool(compiling.under_way)
+                tell("progress", {"text": words, "share": share, "spent": now - begun, "left": left})
+
+        teller = threading.Thread(target=beat, daemon=True)
+        teller.start()
+        try:
+            yield listen
+        finally:
+            finished.set()
+            teller.join()
 
 
 def robot_of(request: Mapping[str, Any]) -> Robot | None:

@@ -18,7 +18,7 @@ from typing import Any
 
 from omnidyn.studio.compare.job import compare, drift
 from omnidyn.studio.drive.job import drive
-from omnidyn.studio.fit.job import fit, warm
+from omnidyn.studio.fit.job import fit, free_keys, warm
 from omnidyn.studio.job import Tell
 from omnidyn.studio.log.job import align, check, example, save_columns
 from omnidyn.studio.track.job import track
@@ -30,6 +30,7 @@ JOBS: dict[str, Callable[[Mapping[str, Any], Tell, Any], dict[str, Any]]] = {
     "save_columns": save_columns,
     "fit": fit,
     "warm": warm,
+    "free_keys": free_keys,
     "example": example,
     "drive": drive,
     "track": track,

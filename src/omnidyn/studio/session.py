@@ -44,7 +44,7 @@ class Session:
         self.robot = ""
         self.series: dict[str, Series] = {}
         self.listeners: set[Callable[[str], None]] = set()
-        self.workers = {name: Worker() for name in ("log", "fit", "drive", TRACK, COMPARE)}
+        self.workers = {name: Worker() for name in ("log", "fit", "drive", TRACK, COMPARE, "warm")}
         self.takers: dict[str, Callable[[str, str], object]] = {"": self.add_log, ROBOT_SUFFIX: self.add_robot}
         self.count, self._bytes, self._tasks = 0, 0, set[asyncio.Task[Any]]()
 
@@ -226,7 +226,10 @@ class Session:
         """Load what the first log and the first fit need, while nobody waits for it."""
         await self.workers["log"].start()
         with contextlib.suppress(CancelledError, JobError):
-            await self.workers["fit"].run("warm", {}, lambda kind, value: None)
+            done = await self.workers["fit"].run("warm", {"all": False}, lambda kind, value: None)
+            if not done["is_warm"]:
+                await self.workers["warm"].run("warm", {"all": True}, lambda kind, value: None)
+                await self.workers["warm"].stop()
 
     # Robot
 

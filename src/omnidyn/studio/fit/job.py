@@ -9,14 +9,30 @@ from typing import Any
 
 import omnidyn
 from omnidyn.document import Table, interval_cell
+from omnidyn.errors import OmnidynError
 from omnidyn.identification.estimate import NOT_DETERMINED, Estimate
 from omnidyn.identification.fit_document import number_table
 from omnidyn.identification.identification import Identification
 from omnidyn.identification.methods import OutputError, SteadyState
 from omnidyn.identification.output_error.answer import OutputErrorEstimate
-from omnidyn.model.keys import find_key, in_words, unit
-from omnidyn.progress import Report
-from omnidyn.studio.job import Tell, listener, options_of, robot_of, write_free_runs
+from omnidyn.identification.output_error.prepare import free_by_default, guesses
+from omnidyn.model.keys import EMF, ROTOR, TORQUE, Key, find_key, in_words, unit
+from omnidyn.model.robot import Robot
+from omnidyn.progress import Progress, Report
+from omnidyn.studio.job import Tell, options_of, robot_of, timed, write_free_runs
+
+LOADED, COMPILED = 2, 8  # of the first runs: a simulation and a fit; those of the exact engine, seconds each
+CHOICES = (  # what a page offers beside what is free by default; any key can be named on the command line
+    "body.mass_kg",
+    "body.inertia_kg_m2",
+    "wheels.wheel_radius_m",
+    "wheels.robot_radius_m",
+    "motor.resistance_ohm",
+    TORQUE,
+    EMF,
+    "motor.gear_ratio",
+    ROTOR,
+)
 
 
 def fit(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
@@ -25,9 +41,14 @@ def fit(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]
     request: "robot", "logs" (path, map, unsigned each), "hold_out" (paths), "free" (keys, or none for the default),
     "folder" of the results.
     """
-    listen, folder, robot = listener(tell), Path(request["folder"]), robot_of(request)
+    with timed(tell) as listen:
+        return _fitted(request, listen)
+
+
+def _fitted(request: Mapping[str, Any], listen: Progress) -> dict[str, Any]:
+    folder, robot = Path(request["folder"]), robot_of(request)
     folder.mkdir(parents=True)
-    listen(Report("reading", urgent=True))
+    listen(Report("reading"))
     logs = [omnidyn.load_log(log["path"], robot, options_of(log)) for log in request["logs"]]
     free = tuple(request.get("free") or ())
     result = omnidyn.identify(
@@ -42,7 +63,7 @@ def fit(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]
     estimate = result.estimate
     omnidyn.save_robot(estimate.robot, folder / "robot.toml")
     _ = result.after  # what follows a fit is made here, where its progress is heard
-    listen(Report("drawing", urgent=True))
+    listen(Report("drawing"))
     table = _numbers(estimate)
     warnings = [{"severity": w.severity, "text": str(w)} for w in dict.fromkeys(estimate.warnings)]
     (folder / "numbers.csv").write_text(_csv(table), "utf-8")
@@ -139,11 +160,42 @@ def _write_report(result: Identification, request: Mapping[str, Any], path: Path
     return True
 
 
-def warm(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
-    """Load what fits need, so that the first one starts at once."""
-    from omnidyn.identification.first_runs import first_runs
+def free_keys(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
+    """What can be free of a robot: key and words; those that are so by default first. request: "robot"."""
+    robot = robot_of(request)
+    assert robot is not None
+    default = dict.fromkeys((*free_by_default(robot), *guesses(robot)))
+    others = (key for key in map(Key.parse, CHOICES) if key.name not in default and _is_there(key, robot))
+    return {"default": [[key, in_words(key)] for key in default], "others": [[str(key), key.words] for key in others]}
 
-    for name, make in first_runs()[:2]:
+
+def _is_there(key: Key, robot: Robot) -> bool:
+    """Whether the robot has one such number, and not 0."""
+    try:
+        return key.get(robot) > 0.0
+    except (OmnidynError, TypeError, ValueError):
+        return False
+
+
+def warm(request: Mapping[str, Any], tell: Tell, commands: Any) -> dict[str, Any]:
+    """Load what fits need, and compile what is not on disk; "is_warm": whether all was there.
+
+    request: "all": whether to compile all that `omnidyn warm` does; else only what comes first, until a command comes:
+    a fit waits for one run at most.
+    """
+    from omnidyn.compiled.kernel import kept
+    from omnidyn.compiled.warmed import circumstances, recalled, remember
+    from omnidyn.control import first_runs as of_control
+    from omnidyn.identification import first_runs as of_identification
+
+    made_with = circumstances()
+    is_warm, runs = bool(recalled(made_with)), of_identification.first_runs()
+    runs = [*runs, *of_control.first_runs()] if request["all"] else runs[: LOADED if is_warm else COMPILED]
+    for name, make in runs:
+        if not commands.empty():
+            break
         tell("progress", {"text": name, "share": None})
         make()
-    return {}
+    if request["all"]:
+        remember(kept(), made_with)
+    return {"is_warm": is_warm}

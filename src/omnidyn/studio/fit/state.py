@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,13 +17,15 @@ from omnidyn.studio.worker import CancelledError, JobError
 
 @dataclass
 class Fit:
-    """A fit. result: of the job. running, progress, share: while it goes on. folder: of its files."""
+    """A fit. result: of the job. running, progress, share, spent, left [s]: while it goes on. folder: of its files."""
 
     result: dict[str, Any] | None = None
     error: str = ""
     running: bool = False
     progress: str = ""
     share: float | None = None
+    spent: float = 0.0
+    left: float | None = None
     folder: Path | None = None
     series: str = ""
     command: str = ""
@@ -36,6 +39,9 @@ class Fitting:
         self.session, self.last = session, Fit()
         self.fits: dict[str, Fit] = {}
         self._held_out: list[str] = []
+        self.choices: dict[str, Any] = {"default": [], "others": []}  # what can be free of the robot `_choices_of`
+        self.free: list[str] = []
+        self._choices_of = ""
 
     @property
     def held_out(self) -> list[str]:
@@ -46,6 +52,30 @@ class Fitting:
         """Predict these logs, do not fit them."""
         self._held_out = keys
         self.session.changed(FIT)
+
+    def want_choices(self) -> None:
+        """See to it that the choices are those of the robot that is chosen."""
+        if self.session.robot_path and self.session.robot_path != self._choices_of:
+            self._choices_of = self.session.robot_path
+            self.session.start(self._choose(self._choices_of))
+
+    async def _choose(self, robot: str) -> None:
+        with contextlib.suppress(JobError, CancelledError):
+            choices = await self.session.workers["log"].run("free_keys", {"robot": robot}, lambda kind, value: None)
+            if robot == self._choices_of:
+                self.choices, self.free = choices, [key for key, _ in choices["default"]]
+                self.session.changed(FIT)
+
+    def set_free(self, keys: list[str]) -> None:
+        """Fit these numbers, in the order in which they are offered."""
+        offered = [key for group in ("default", "others") for key, _ in self.choices[group]]
+        self.free = sorted(keys, key=offered.index)
+        self.session.changed(FIT)
+
+    @property
+    def free_keys(self) -> tuple[str, ...]:
+        """The keys that are free; () for what `identify` frees of itself."""
+        return () if self.free == [key for key, _ in self.choices["default"]] else tuple(self.free)
 
     def why_not(self) -> tuple[str, str]:
         """What keeps from a fit: a code that the page has words for, and the library's words; ("", "") for nothing."""
@@ -61,12 +91,19 @@ class Fitting:
             fit_uses = [use for use in log.result["uses"] if use["name"] in ("whole logs", "steady state")]
             if log.result["has_errors"] or not any(use["good"] for use in fit_uses):
                 return "unfit", f"{log.label}: {log.result['verdict']}"
+        if not self.free and self.choices["default"]:
+            return "nothing_free", ""
         return ("all_held_out", "") if len(self.held_out) == len(self.session.logs) else ("", "")
 
-    async def run(self, free: tuple[str, ...] = ()) -> None:
-        """Fit the robot to the logs."""
+    async def run(self, added: str = "") -> None:
+        """Fit the robot to the logs. added: a number that is free beside the others."""
         if self.last.running or self.why_not()[0]:
             return
+        if added and added not in self.free:
+            self.free.append(added)
+            if all(key != added for key, _ in self.choices["others"]):
+                self.choices["others"].append([added, added])
+        free = self.free_keys
         folder = self.session.new_folder() / "fit"
         self.session.series.pop(self.last.series, None)
         logs, held_out = [*self.session.logs.values()], [self.session.logs[key] for key in self.held_out]
@@ -75,7 +112,7 @@ class Fitting:
         self.session.changed(FIT)
 
         def listen(kind: str, value: Any) -> None:
-            fit.progress, fit.share = value["text"], value["share"]
+            fit.progress, fit.share, fit.spent, fit.left = (value[k] for k in ("text", "share", "spent", "left"))
             self.session.changed(PROGRESS)
 
         request = {
@@ -86,6 +123,7 @@ class Fitting:
             "folder": str(folder),
             "command": command,
         }
+        self.session.workers["fit"].send({"command": "fit"})  # what warms up makes way
         try:
             fit.result = await self.session.workers["fit"].run("fit", request, listen)
             self.keep(fit)

@@ -15,6 +15,7 @@ WHY = {
     "no_log": "Add a log first: tab Log.",
     "no_robot": "Choose a robot first.",
     "checking": "The log is being checked.",
+    "nothing_free": "Nothing is free: choose what to fit.",
     "all_held_out": "Every log is held out: leave one to fit.",
 }
 
@@ -65,6 +66,7 @@ class FitTab:
                 label="Hold out: predict these logs, do not fit them",
                 on_change=lambda e: self.fitting.hold_out(e.value),
             ).classes("wide").props("use-chips")
+        self._free()
         code, words = self.fitting.why_not()
         with ui.row().classes("line"):
             button = ui.button("Fit", on_click=lambda: session.start(self.fitting.run())).props(
@@ -77,6 +79,20 @@ class FitTab:
                 names = ", ".join(log.label for log in session.logs.values())
                 ui.label(f"{names}, from {session.robot}").classes("text quiet")
 
+    def _free(self) -> None:
+        """What is fitted; at first what `identify` fits of itself."""
+        self.fitting.want_choices()
+        choices = self.fitting.choices
+        names = {key: f"{words} ({key})" for group in ("default", "others") for key, words in choices[group]}
+        if names:
+            ui.select(
+                names,
+                value=[key for key in self.fitting.free if key in names],
+                multiple=True,
+                label="Free: what is fitted",
+                on_change=lambda e: self.fitting.set_free(e.value),
+            ).classes("wide free").props("use-chips")
+
     def _progress(self) -> None:
         fit = self.fitting.last
         if not fit.running:
@@ -84,6 +100,8 @@ class FitTab:
         with ui.row().classes("line"):
             ui.spinner(size="1.2em")
             ui.label(fit.progress).props("id=fit-progress")
+            left = "" if fit.left is None else f", about {fit.left:.0f} s left"
+            ui.label(f"{fit.spent:.0f} s{left}").classes("quiet").props("id=fit-time")
             ui.button("Cancel", on_click=lambda: self.session.start(self.session.workers["fit"].cancel())).props(
                 "outline dense no-caps id=cancel"
             )
@@ -123,4 +141,4 @@ class FitTab:
 
     def _refit(self, key: str) -> Callable[[], None]:
         """What fits again, with a number that the model has not yet."""
-        return lambda: self.session.start(self.fitting.run(("friction", key)))
+        return lambda: self.session.start(self.fitting.run(key))

@@ -3,6 +3,7 @@
 import './drop.js';
 import './plot.js';
 import './drive.js';
+import './robot.js';
 import './track.js';
 
 document.documentElement.lang = 'en';
